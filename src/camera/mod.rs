@@ -1,0 +1,11 @@
+//! How does a point in front of the camera become a pixel? Pinhole, Brown-Conrady distortion, their derivatives and inverse.
+
+mod brown_conrady;
+mod intrinsics;
+mod parameter;
+mod projection;
+
+pub use brown_conrady::{BrownConrady, UndistortError};
+pub use intrinsics::Camera;
+pub use parameter::{FreeParameters, Parameter, UnknownParameter};
+pub use projection::{BehindCamera, ProjectionJacobian, project_with_jacobian};

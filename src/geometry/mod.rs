@@ -1,0 +1,15 @@
+//! Plane and space geometry that knows nothing of cameras: rotations, poses, homographies, fits.
+
+pub mod homography;
+pub mod pose;
+pub mod rotation;
+
+pub use homography::{Homography, HomographyError, HomographyFit};
+pub use pose::Pose;
+
+/// A point or vector of the plane.
+pub type Vec2 = nalgebra::Vector2<f64>;
+/// A point or vector of space.
+pub type Vec3 = nalgebra::Vector3<f64>;
+/// A 3 x 3 matrix.
+pub type Mat3 = nalgebra::Matrix3<f64>;

@@ -1,0 +1,7 @@
+//! What would a camera of known truth see? The virtual camera, its scenes, and the one place where noise enters.
+
+pub mod scene;
+pub mod stream;
+
+pub use scene::{Scene, SceneError, Truth};
+pub use stream::{Stream, StreamKey};

@@ -1,0 +1,90 @@
+//! What does one photograph of a target give? Pairs of target point and pixel.
+
+use crate::geometry::Vec2;
+
+/// The correspondences of one photograph: `points[i]` of the target's plane Z = 0 was seen at `pixels[i]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct View {
+    points: Vec<Vec2>,
+    pixels: Vec<Vec2>,
+}
+
+/// Why correspondences cannot be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ViewError {
+    /// Points and pixels do not pair up.
+    #[error("{points} target points but {pixels} pixels: every point needs its pixel")]
+    Lengths {
+        /// Number of target points.
+        points: usize,
+        /// Number of pixels.
+        pixels: usize,
+    },
+    /// A number is NaN or infinite.
+    #[error("point {index} is not finite: target ({x}, {y}), pixel ({u}, {v})")]
+    NotFinite {
+        /// Position in the list.
+        index: usize,
+        /// Target X.
+        x: f64,
+        /// Target Y.
+        y: f64,
+        /// Pixel u.
+        u: f64,
+        /// Pixel v.
+        v: f64,
+    },
+}
+
+impl View {
+    /// Pairs target points with pixels.
+    pub fn new(points: Vec<Vec2>, pixels: Vec<Vec2>) -> Result<View, ViewError> {
+        if points.len() != pixels.len() {
+            return Err(ViewError::Lengths { points: points.len(), pixels: pixels.len() });
+        }
+        for (index, (point, pixel)) in points.iter().zip(&pixels).enumerate() {
+            if ![point.x, point.y, pixel.x, pixel.y].iter().all(|c| c.is_finite()) {
+                return Err(ViewError::NotFinite { index, x: point.x, y: point.y, u: pixel.x, v: pixel.y });
+            }
+        }
+        Ok(View { points, pixels })
+    }
+
+    /// Target points, in the target's unit.
+    pub fn points(&self) -> &[Vec2] {
+        &self.points
+    }
+
+    /// Their pixels.
+    pub fn pixels(&self) -> &[Vec2] {
+        &self.pixels
+    }
+
+    /// Number of pairs.
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Whether there is no pair.
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// `(target point, pixel)` pairs.
+    pub fn pairs(&self) -> impl ExactSizeIterator<Item = (&Vec2, &Vec2)> {
+        self.points.iter().zip(&self.pixels)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bad_pairs_are_refused_with_their_numbers() {
+        let point = Vec2::new(1.0, 2.0);
+        assert_eq!(View::new(vec![point], vec![]), Err(ViewError::Lengths { points: 1, pixels: 0 }));
+        let error = View::new(vec![point], vec![Vec2::new(f64::NAN, 0.0)]).unwrap_err();
+        assert!(matches!(error, ViewError::NotFinite { index: 0, .. }));
+    }
+}
