@@ -255,15 +255,11 @@ impl Pairs<'_> {
             system.add(&a, 1.0, to.x, to.y, &-to);
         }
         let pivot = system.smallest_pivot();
-        let degenerate = |side| HomographyError::Degenerate { side, points: self.from.len(), pivot };
+        let degenerate = HomographyError::Degenerate { points: self.from.len(), pivot };
         if pivot < SMALLEST_PIVOT {
-            return Err(degenerate(if spans_plane(self.from, &self.from_frame) {
-                "image"
-            } else {
-                "target"
-            }));
+            return Err(degenerate);
         }
-        system.solve().ok_or_else(|| degenerate("target"))
+        system.solve().ok_or(degenerate)
     }
 
     /// Normal equations of the geometric error; infinite cost where a point falls behind the line at infinity.
