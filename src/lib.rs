@@ -15,5 +15,6 @@
 
 pub mod camera;
 pub mod geometry;
+pub mod raster;
 pub mod synth;
 pub mod target;
