@@ -15,6 +15,7 @@
 
 pub mod calibrate;
 pub mod camera;
+pub mod evaluate;
 pub mod geometry;
 pub mod raster;
 pub mod synth;
