@@ -1,6 +1,8 @@
 //! Plane and space geometry that knows nothing of cameras: rotations, poses, homographies, fits.
 
 pub mod homography;
+mod homography_system;
+pub(crate) mod lanes;
 pub mod pose;
 pub mod rotation;
 

@@ -1,0 +1,658 @@
+//! What are the sums over the points of a view? The inner loop of the calibration, four points at a time.
+//!
+//! Of a point's Jacobian the row of u depends on (fx, cx, skew) and the row of v on (fy, cy), while pose and lens move both.
+//! With `q = (pose, k1, k2, p1, p2, k3)` only the products that are not 0 are summed: `q_u q_u^T + q_v q_v^T`, `q_u` and `q_v`
+//! times their own linear parameters, and a handful of scalars. Which of them a problem needs is looked up afterwards.
+
+use super::Loss;
+use crate::camera::{Camera, Parameter};
+use crate::geometry::Pose;
+use crate::geometry::lanes::{Arithmetic, Kernel, LANES, Lanes, PairBlocks, dispatch};
+
+/// Six pose columns, then k1, k2, p1, p2, k3, then one of zeros that makes whole blocks of lanes.
+const SHARED: usize = 12;
+/// Shared columns of the lens with k1, k2 alone.
+const SHARED_RADIAL: usize = 8;
+
+/// Sums over the points of a view, found by [`intrinsics_slot`] and its kin.
+///
+/// Rows 0 to 11: upper triangle of the shared columns' squares. Rows 12 to 16: shared columns times fx, cx, skew (row u) and fy,
+/// cy (row v). Row 17: shared columns times the residual. Row 18: the scalars of [`scalars`].
+pub(super) type Sums = [[f64; SHARED]; 19];
+
+const FX: usize = 12;
+const CX: usize = 13;
+const SKEW: usize = 14;
+const FY: usize = 15;
+const CY: usize = 16;
+const RESIDUAL: usize = 17;
+const SCALARS: usize = 18;
+
+/// Where the scalar sums stand in row 18.
+mod scalars {
+    pub const XX: usize = 0;
+    pub const XY: usize = 1;
+    pub const YY: usize = 2;
+    pub const X: usize = 3;
+    pub const Y: usize = 4;
+    pub const ONE: usize = 5;
+    pub const X_RU: usize = 6;
+    pub const RU: usize = 7;
+    pub const Y_RU: usize = 8;
+    pub const Y_RV: usize = 9;
+    pub const RV: usize = 10;
+    pub const COST: usize = 11;
+}
+
+/// The place of the product of two intrinsics' columns.
+pub(super) const INTRINSICS_SLOTS: [[(u8, u8); Parameter::COUNT]; Parameter::COUNT] = {
+    let mut slots = [[(0, 0); Parameter::COUNT]; Parameter::COUNT];
+    let mut a = 0;
+    while a < Parameter::COUNT {
+        let mut b = 0;
+        while b < Parameter::COUNT {
+            slots[a][b] = if a <= b { product_slot(a, b) } else { product_slot(b, a) };
+            b += 1;
+        }
+        a += 1;
+    }
+    slots
+};
+
+const fn product_slot(a: usize, b: usize) -> (u8, u8) {
+    const LENS: usize = Parameter::K1 as usize;
+    // In the order of `Parameter`: fx, fy, cx, cy, skew.
+    const ROWS: [usize; LENS] = [FX, FY, CX, CY, SKEW];
+    // The last diagonal entry of the squares is that of the column of zeros.
+    const NOTHING: (usize, usize) = (SHARED - 1, SHARED - 1);
+    const LINEAR: [[usize; LENS]; LENS] = {
+        use scalars::{ONE, X, XX, XY, Y, YY};
+        const NO: usize = SHARED;
+        [
+            [XX, NO, X, NO, XY],
+            [NO, YY, NO, Y, NO],
+            [X, NO, ONE, NO, Y],
+            [NO, Y, NO, ONE, NO],
+            [XY, NO, Y, NO, YY],
+        ]
+    };
+    let (row, column) = if a >= LENS {
+        (a - LENS + 6, b - LENS + 6)
+    } else if b >= LENS {
+        (ROWS[a], b - LENS + 6)
+    } else if LINEAR[a][b] == SHARED {
+        NOTHING
+    } else {
+        (SCALARS, LINEAR[a][b])
+    };
+    (row as u8, column as u8)
+}
+
+/// The product of an intrinsic parameter's column with pose column `i`.
+#[inline(always)]
+pub(super) fn coupling(sums: &Sums, parameter: Parameter, i: usize) -> f64 {
+    match parameter {
+        Parameter::Fx => sums[FX][i],
+        Parameter::Fy => sums[FY][i],
+        Parameter::Cx => sums[CX][i],
+        Parameter::Cy => sums[CY][i],
+        Parameter::Skew => sums[SKEW][i],
+        lens => sums[i][lens as usize - Parameter::K1 as usize + 6],
+    }
+}
+
+/// The product of an intrinsic parameter's column with the residual.
+pub(super) fn gradient(sums: &Sums, parameter: Parameter) -> f64 {
+    match parameter {
+        Parameter::Fx => sums[SCALARS][scalars::X_RU],
+        Parameter::Fy => sums[SCALARS][scalars::Y_RV],
+        Parameter::Cx => sums[SCALARS][scalars::RU],
+        Parameter::Cy => sums[SCALARS][scalars::RV],
+        Parameter::Skew => sums[SCALARS][scalars::Y_RU],
+        lens => sums[RESIDUAL][lens as usize - Parameter::K1 as usize + 6],
+    }
+}
+
+/// The product of pose column `i` with the residual.
+#[inline(always)]
+pub(super) fn pose_gradient(sums: &Sums, i: usize) -> f64 {
+    sums[RESIDUAL][i]
+}
+
+/// The sum of the loss.
+pub(super) fn cost(sums: &Sums) -> f64 {
+    sums[SCALARS][scalars::COST]
+}
+
+/// Whether the lens and what is free of it are within k1 and k2, with no skew: then fewer columns are needed.
+pub(super) fn is_radial(camera: &Camera, free: crate::camera::FreeParameters) -> bool {
+    use Parameter::{K3, P1, P2, Skew};
+    [Skew, P1, P2, K3].into_iter().all(|p| !free.contains(p) && camera.get(p) == 0.0)
+}
+
+/// Camera and pose in every lane.
+pub(super) struct Model<L> {
+    fx: L,
+    fy: L,
+    cx: L,
+    cy: L,
+    skew: L,
+    k1: L,
+    k2: L,
+    p1: L,
+    p2: L,
+    k3: L,
+    /// First two columns of `R`.
+    r: [[L; 2]; 3],
+    t: [L; 3],
+}
+
+impl<L: Arithmetic> Model<L> {
+    #[inline(always)]
+    pub fn new(camera: &Camera, cam_from_target: &Pose) -> Model<L> {
+        let (r, t, lens) = (&cam_from_target.rotation, &cam_from_target.translation, &camera.distortion);
+        let row = |i: usize| [L::splat(r[(i, 0)]), L::splat(r[(i, 1)])];
+        Model {
+            fx: L::splat(camera.fx),
+            fy: L::splat(camera.fy),
+            cx: L::splat(camera.cx),
+            cy: L::splat(camera.cy),
+            skew: L::splat(camera.skew),
+            k1: L::splat(lens.k1),
+            k2: L::splat(lens.k2),
+            p1: L::splat(lens.p1),
+            p2: L::splat(lens.p2),
+            k3: L::splat(lens.k3),
+            r: [row(0), row(1), row(2)],
+            t: [L::splat(t.x), L::splat(t.y), L::splat(t.z)],
+        }
+    }
+}
+
+/// A predicted pixel and the rows of its Jacobian.
+pub(super) struct Rows<L> {
+    pub depth: L,
+    pub pixel: [L; 2],
+    /// Distorted normalised coordinates: the columns of fx, skew and fy.
+    pub distorted: [L; 2],
+    pub u: [L; SHARED],
+    pub v: [L; SHARED],
+}
+
+/// [`crate::camera::project_with_jacobian`], written out for points with Z = 0. With `RADIAL` skew, p1, p2 and k3 are taken to be 0
+/// and have no columns.
+#[inline(always)]
+pub(super) fn rows<L: Arithmetic, const RADIAL: bool>(m: &Model<L>, px: L, py: L) -> Rows<L> {
+    let (one, two, three) = (L::splat(1.0), L::splat(2.0), L::splat(3.0));
+    let rotated = |i: usize| m.r[i][0] * px + m.r[i][1] * py;
+    let (qx, qy, qz) = (rotated(0), rotated(1), rotated(2));
+    let depth = qz + m.t[2];
+    let inverse_depth = one / depth;
+    let (x, y) = ((qx + m.t[0]) * inverse_depth, (qy + m.t[1]) * inverse_depth);
+    let (xx, yy, xy) = (x * x, y * y, x * y);
+    let s = xx + yy;
+    let k2_s = m.k2 * s;
+    let (g, slope) = if RADIAL {
+        (one + s * (m.k1 + k2_s), m.k1 + (k2_s + k2_s))
+    } else {
+        let k3_ss = m.k3 * s * s;
+        (one + s * (m.k1 + k2_s + k3_ss), m.k1 + (k2_s + k2_s) + three * k3_ss)
+    };
+    let twice_slope = slope + slope;
+    let (mut xd, mut yd) = (x * g, y * g);
+    let mut cross = twice_slope * xy;
+    let (mut xd_by_x, mut yd_by_y) = (g + twice_slope * xx, g + twice_slope * yy);
+    let (tx, ty, twice_xy) = (s + two * xx, s + two * yy, two * xy);
+    if !RADIAL {
+        let six = L::splat(6.0);
+        xd = xd + m.p1 * twice_xy + m.p2 * tx;
+        yd = yd + m.p1 * ty + m.p2 * twice_xy;
+        cross = cross + two * (m.p1 * x + m.p2 * y);
+        xd_by_x = xd_by_x + two * (m.p1 * y) + six * (m.p2 * x);
+        yd_by_y = yd_by_y + six * (m.p1 * y) + two * (m.p2 * x);
+    }
+
+    // Derivatives of the pixel by the ideal point, then by the point in camera coordinates.
+    let along_u = |lx: L, ly: L| if RADIAL { m.fx * lx } else { m.fx * lx + m.skew * ly };
+    let by_point = |dx: L, dy: L| {
+        let (a, b) = (dx * inverse_depth, dy * inverse_depth);
+        [a, b, -(a * x + b * y)]
+    };
+    let pu = by_point(along_u(xd_by_x, cross), along_u(cross, yd_by_y));
+    let pv = by_point(m.fy * cross, m.fy * yd_by_y);
+    // d X_c / d delta = -[q]x, so a row p becomes -(p^T [q]x) = (q x p)^T.
+    let by_rotation = |p: &[L; 3]| [qy * p[2] - qz * p[1], qz * p[0] - qx * p[2], qx * p[1] - qy * p[0]];
+    let (du, dv) = (by_rotation(&pu), by_rotation(&pv));
+
+    let (k1u, k1v) = (along_u(x * s, y * s), m.fy * (y * s));
+    let (k2u, k2v) = (k1u * s, k1v * s);
+    let none = L::splat(0.0);
+    let (p1, p2, k3) = if RADIAL {
+        ([none; 2], [none; 2], [none; 2])
+    } else {
+        ([along_u(twice_xy, ty), m.fy * ty], [along_u(tx, twice_xy), m.fy * twice_xy], [k2u * s, k2v * s])
+    };
+    Rows {
+        depth,
+        pixel: [along_u(xd, yd) + m.cx, m.fy * yd + m.cy],
+        distorted: [xd, yd],
+        u: [du[0], du[1], du[2], pu[0], pu[1], pu[2], k1u, k2u, p1[0], p2[0], k3[0], none],
+        v: [dv[0], dv[1], dv[2], pv[0], pv[1], pv[2], k1v, k2v, p1[1], p2[1], k3[1], none],
+    }
+}
+
+/// The sums of one view, or `None` where a point is not in front of the camera.
+pub(super) fn view_sums(
+    camera: &Camera,
+    cam_from_target: &Pose,
+    pairs: &PairBlocks,
+    loss: Loss,
+    radial: bool,
+) -> Option<Sums> {
+    let view = View { camera, cam_from_target, pairs, loss };
+    match (loss, radial) {
+        (Loss::Squares, true) => dispatch(ViewSums::<SHARED_RADIAL, true, false>(view)),
+        (Loss::Squares, false) => dispatch(ViewSums::<SHARED, false, false>(view)),
+        _ => dispatch(ViewSums::<SHARED, false, true>(view)),
+    }
+}
+
+/// What the kernels read.
+#[derive(Clone, Copy)]
+struct View<'a> {
+    camera: &'a Camera,
+    cam_from_target: &'a Pose,
+    pairs: &'a PairBlocks,
+    loss: Loss,
+}
+
+/// The kernel for `Q` shared columns; with `ROBUST` every point has the weight of the loss.
+struct ViewSums<'a, const Q: usize, const RADIAL: bool, const ROBUST: bool>(View<'a>);
+
+impl<const Q: usize, const RADIAL: bool, const ROBUST: bool> Kernel for ViewSums<'_, Q, RADIAL, ROBUST> {
+    type Output = Option<Sums>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Option<Sums> {
+        let View { camera, cam_from_target, pairs, loss } = self.0;
+        let model = Model::<L>::new(camera, cam_from_target);
+        let mut sums = Accumulators::<L, Q>::zero();
+        for (index, block) in pairs.blocks.iter().enumerate() {
+            let mut at = rows::<L, RADIAL>(&model, L::load(&block.x), L::load(&block.y));
+            if !at.depth.all_positive() {
+                return None;
+            }
+            let mut residual = [at.pixel[0] - L::load(&block.u), at.pixel[1] - L::load(&block.v)];
+            // The root of the weight: it scales the rows and the residual.
+            let mut root = L::splat(1.0);
+            let mask = pairs.mask(index);
+            let mut cost = residual[0] * residual[0] + residual[1] * residual[1];
+            if ROBUST || mask.is_some() {
+                let mask = mask.unwrap_or([1.0; LANES]);
+                root = L::load(&mask);
+                if ROBUST {
+                    let (losses, weights) = lane_losses(loss, cost.store());
+                    cost = L::load(&losses);
+                    root = root * L::load(&weights).sqrt();
+                }
+                cost = cost * L::load(&mask);
+                for i in 0..Q {
+                    at.u[i] = at.u[i] * root;
+                    at.v[i] = at.v[i] * root;
+                }
+                residual = residual.map(|r| r * root);
+                at.distorted = at.distorted.map(|d| d * root);
+            }
+            sums.add::<RADIAL, ROBUST>(&at, residual, root, cost);
+        }
+        Some(sums.reduce::<RADIAL>())
+    }
+}
+
+fn lane_losses(loss: Loss, squares: [f64; LANES]) -> ([f64; LANES], [f64; LANES]) {
+    let at = squares.map(|s| loss.at(s));
+    (at.map(|(rho, _)| rho), at.map(|(_, weight)| weight))
+}
+
+/// [`Sums`] lane by lane.
+struct Accumulators<L, const Q: usize> {
+    squares: [[L; Q]; Q],
+    linear: [[L; Q]; 5],
+    residual: [L; Q],
+    scalars: [L; SHARED],
+}
+
+impl<L: Lanes, const Q: usize> Accumulators<L, Q> {
+    #[inline(always)]
+    fn zero() -> Accumulators<L, Q> {
+        let zero = L::zero();
+        Accumulators {
+            squares: [[zero; Q]; Q],
+            linear: [[zero; Q]; 5],
+            residual: [zero; Q],
+            scalars: [zero; SHARED],
+        }
+    }
+
+    /// Adds a block. `one` is the column of cx and cy: the root of the weight.
+    #[inline(always)]
+    fn add<const RADIAL: bool, const ROBUST: bool>(
+        &mut self,
+        rows: &Rows<L>,
+        [ru, rv]: [L; 2],
+        one: L,
+        cost: L,
+    ) {
+        // A mask of 0 and 1 is its own square: only other weights need the product with the column of the principal point.
+        let times_one = |value: L| if ROBUST { value * one } else { value };
+        let (u, v, [x, y]) = (&rows.u, &rows.v, rows.distorted);
+        let columns = if RADIAL { SHARED_RADIAL } else { SHARED - 1 };
+        for i in 0..columns {
+            for j in i..columns {
+                self.squares[i][j] = self.squares[i][j] + (u[i] * u[j] + v[i] * v[j]);
+            }
+        }
+        for i in 0..columns {
+            self.linear[0][i] = self.linear[0][i] + x * u[i];
+            self.linear[1][i] = self.linear[1][i] + times_one(u[i]);
+            if !RADIAL {
+                self.linear[2][i] = self.linear[2][i] + y * u[i];
+            }
+            self.linear[3][i] = self.linear[3][i] + y * v[i];
+            self.linear[4][i] = self.linear[4][i] + times_one(v[i]);
+            self.residual[i] = self.residual[i] + (ru * u[i] + rv * v[i]);
+        }
+        let s = &mut self.scalars;
+        let mut add = |slot: usize, value: L| s[slot] = s[slot] + value;
+        add(scalars::XX, x * x);
+        add(scalars::YY, y * y);
+        add(scalars::X, times_one(x));
+        add(scalars::Y, times_one(y));
+        add(scalars::ONE, times_one(one));
+        add(scalars::X_RU, x * ru);
+        add(scalars::RU, times_one(ru));
+        add(scalars::Y_RV, y * rv);
+        add(scalars::RV, times_one(rv));
+        add(scalars::COST, cost);
+        if !RADIAL {
+            add(scalars::XY, x * y);
+            add(scalars::Y_RU, y * ru);
+        }
+    }
+
+    #[inline(always)]
+    fn reduce<const RADIAL: bool>(&self) -> Sums {
+        let mut sums = [[0.0; SHARED]; 19];
+        let columns = if RADIAL { SHARED_RADIAL } else { SHARED - 1 };
+        for i in 0..columns {
+            reduce_row(&self.squares[i], i / LANES * LANES, &mut sums[i]);
+        }
+        for (row, target) in self.linear.iter().zip(&mut sums[FX..=CY]) {
+            reduce_row(row, 0, target);
+        }
+        reduce_row(&self.residual, 0, &mut sums[RESIDUAL]);
+        reduce_row(&self.scalars, 0, &mut sums[SCALARS]);
+        sums
+    }
+}
+
+/// Sums lanes of entries `from` and on.
+#[inline(always)]
+fn reduce_row<L: Lanes, const Q: usize>(row: &[L; Q], from: usize, target: &mut [f64; SHARED]) {
+    let mut i = from;
+    while i < Q {
+        let [a, b, c, d] = L::sums([row[i], row[i + 1], row[i + 2], row[i + 3]]);
+        (target[i], target[i + 1], target[i + 2], target[i + 3]) = (a, b, c, d);
+        i += LANES;
+    }
+}
+
+/// Residuals of a view and what the report needs of them.
+pub(super) struct ViewResiduals {
+    /// Predicted - observed, px; infinite behind the camera.
+    pub residuals: Vec<crate::geometry::Vec2>,
+    /// Sum of squares.
+    pub square: f64,
+    /// Largest squared distance of an ideal point from the axis, in normalised coordinates.
+    pub largest_radius_sq: f64,
+}
+
+/// Predicts every pixel of a view.
+pub(super) fn view_residuals(camera: &Camera, cam_from_target: &Pose, pairs: &PairBlocks) -> ViewResiduals {
+    let view = View { camera, cam_from_target, pairs, loss: Loss::Squares };
+    dispatch(Residuals(view))
+}
+
+struct Residuals<'a>(View<'a>);
+
+impl Kernel for Residuals<'_> {
+    type Output = ViewResiduals;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> ViewResiduals {
+        use crate::geometry::Vec2;
+        let View { camera, cam_from_target, pairs, .. } = self.0;
+        let m = Model::<L>::new(camera, cam_from_target);
+        let mut residuals = Vec::with_capacity(pairs.blocks.len() * LANES);
+        let (mut square, mut largest) = (L::zero(), L::zero());
+        for (index, block) in pairs.blocks.iter().enumerate() {
+            let [x, y, depth] = ideal_point(&m, L::load(&block.x), L::load(&block.y));
+            let s = x * x + y * y;
+            largest = s.max(largest);
+            let [xd, yd] = distorted_point(&m, x, y, s);
+            let mut ru = m.fx * xd + m.skew * yd + m.cx - L::load(&block.u);
+            let mut rv = m.fy * yd + m.cy - L::load(&block.v);
+            if !depth.all_positive() {
+                // Not in front of the camera: no prediction. The search never ends there unless it started there.
+                let unseen = hidden(depth.store(), pairs.len() - index * LANES);
+                (ru, rv) = (behind(ru, unseen), behind(rv, unseen));
+            }
+            let mut sum = ru * ru + rv * rv;
+            if let Some(mask) = pairs.mask(index) {
+                sum = sum * L::load(&mask);
+            }
+            square = square + sum;
+            let (ru, rv) = (ru.store(), rv.store());
+            for i in 0..LANES {
+                residuals.push(Vec2::new(ru[i], rv[i]));
+            }
+        }
+        residuals.truncate(pairs.len());
+        let largest_radius_sq = largest.store().into_iter().fold(0.0, f64::max);
+        let [square, ..] = L::sums([square; 4]);
+        ViewResiduals { residuals, square, largest_radius_sq }
+    }
+}
+
+/// Which lanes hold a point that is not in front of the camera.
+fn hidden(depth: [f64; LANES], used: usize) -> [bool; LANES] {
+    std::array::from_fn(|i| i < used && (depth[i].is_nan() || depth[i] <= 0.0))
+}
+
+/// Infinity in the lanes `unseen`.
+#[inline(always)]
+fn behind<L: Lanes>(residual: L, unseen: [bool; LANES]) -> L {
+    let values = residual.store();
+    L::load(&std::array::from_fn(|i| if unseen[i] { f64::INFINITY } else { values[i] }))
+}
+
+/// Normalised coordinates and depth.
+#[inline(always)]
+fn ideal_point<L: Arithmetic>(m: &Model<L>, px: L, py: L) -> [L; 3] {
+    let at = |i: usize| m.r[i][0] * px + m.r[i][1] * py + m.t[i];
+    let depth = at(2);
+    let inverse_depth = L::splat(1.0) / depth;
+    [at(0) * inverse_depth, at(1) * inverse_depth, depth]
+}
+
+/// [`crate::camera::BrownConrady::distort`].
+#[inline(always)]
+fn distorted_point<L: Arithmetic>(m: &Model<L>, x: L, y: L, s: L) -> [L; 2] {
+    let two = L::splat(2.0);
+    let g = L::splat(1.0) + s * (m.k1 + s * (m.k2 + s * m.k3));
+    let twice_xy = two * (x * y);
+    [
+        x * g + m.p1 * twice_xy + m.p2 * (s + two * (x * x)),
+        y * g + m.p1 * (s + two * (y * y)) + m.p2 * twice_xy,
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{FreeParameters, project_with_jacobian};
+    use crate::geometry::lanes::run_portable;
+    use crate::geometry::{Vec2, Vec3, rotation};
+
+    fn pose() -> Pose {
+        Pose { rotation: rotation::from_xyz_rad(0.3, -0.4, 0.2), translation: Vec3::new(5.0, -7.0, 150.0) }
+    }
+
+    fn full_camera() -> Camera {
+        Camera::from_parameters([600.0, 580.0, 326.0, 243.0, 1.5, -0.2, 0.05, 1e-3, -2e-3, 0.01])
+    }
+
+    fn radial_camera() -> Camera {
+        Camera::from_parameters([600.0, 580.0, 326.0, 243.0, 0.0, -0.2, 0.05, 0.0, 0.0, 0.0])
+    }
+
+    #[test]
+    fn the_kernel_agrees_with_the_readable_jacobian() {
+        fn check<const RADIAL: bool>(camera: &Camera) {
+            for point in [Vec2::new(-40.0, 30.0), Vec2::new(13.0, 0.0), Vec2::new(0.0, -21.0)] {
+                let kernel = rows::<f64, RADIAL>(&Model::new(camera, &pose()), point.x, point.y);
+                let plain =
+                    project_with_jacobian(camera, &pose(), &Vec3::new(point.x, point.y, 0.0)).unwrap();
+                // Same formulas in another order: a few ulp of the largest entry, a focal length.
+                assert!((Vec2::from(kernel.pixel) - plain.pixel).norm() < 1e-12);
+                let mut columns: Vec<(Vec2, Vec2)> = Vec::new();
+                for i in 0..6 {
+                    columns.push((Vec2::new(kernel.u[i], kernel.v[i]), plain.pose.column(i).into()));
+                }
+                let [x, y] = kernel.distorted;
+                let linear = [[x, 0.0], [0.0, y], [1.0, 0.0], [0.0, 1.0], [y, 0.0]].map(Vec2::from);
+                for i in 0..if RADIAL { 7 } else { 10 } {
+                    let own = if i < 5 { linear[i] } else { Vec2::new(kernel.u[i + 1], kernel.v[i + 1]) };
+                    columns.push((own, plain.intrinsics.column(i).into()));
+                }
+                for (own, expected) in columns {
+                    assert!((own - expected).amax() < 1e-11, "{own} for {expected}");
+                }
+            }
+        }
+        check::<true>(&radial_camera());
+        check::<false>(&full_camera());
+    }
+
+    /// Pairs a fraction of a pixel from their prediction.
+    fn pairs(camera: &Camera, count: usize) -> PairBlocks {
+        PairBlocks::new((0..count).map(|i| {
+            let point = Vec2::new((i % 9) as f64 * 10.0 - 40.0, (i / 9) as f64 * 10.0 - 30.0);
+            let seen = camera.project(&pose().apply(&Vec3::new(point.x, point.y, 0.0))).unwrap();
+            let offset = Vec2::new(libm::sin(7.0 * i as f64), libm::cos(11.0 * i as f64)) * 0.3;
+            (point, seen + offset)
+        }))
+    }
+
+    /// The sums as they are defined: `sum w J^T J`, `sum w J^T r` and the cost over ten intrinsics and six pose parameters.
+    fn plain_sums(camera: &Camera, pairs: &PairBlocks, loss: Loss) -> ([[f64; 16]; 16], [f64; 16], f64) {
+        let (mut square, mut gradient, mut cost) = ([[0.0; 16]; 16], [0.0; 16], 0.0);
+        for (point, pixel) in pairs.iter() {
+            let at = project_with_jacobian(camera, &pose(), &Vec3::new(point.x, point.y, 0.0)).unwrap();
+            let r = at.pixel - pixel;
+            let (rho, weight) = loss.at(r.norm_squared());
+            cost += rho;
+            let column = |i: usize| -> Vec2 {
+                if i < 10 { at.intrinsics.column(i).into() } else { at.pose.column(i - 10).into() }
+            };
+            for i in 0..16 {
+                gradient[i] += weight * column(i).dot(&r);
+                for j in 0..16 {
+                    square[i][j] += weight * column(i).dot(&column(j));
+                }
+            }
+        }
+        (square, gradient, cost)
+    }
+
+    #[test]
+    fn the_sums_are_those_of_the_definition_for_every_model_and_loss() {
+        let chapter = FreeParameters::CHAPTER;
+        let all = FreeParameters::of(&Parameter::ALL);
+        let losses = [Loss::Squares, Loss::Huber { delta_px: 0.2 }, Loss::Cauchy { scale_px: 0.2 }];
+        for (camera, free) in [(radial_camera(), chapter), (full_camera(), all)] {
+            for loss in losses {
+                let pairs = pairs(&camera, 63);
+                let sums = view_sums(&camera, &pose(), &pairs, loss, is_radial(&camera, free)).unwrap();
+                let (square, slope, expected_cost) = plain_sums(&camera, &pairs, loss);
+                // A sum of 126 products errs by at most 126 roundings of the sum of sizes, here by Cauchy-Schwarz.
+                let close = |own: f64, i: usize, j: usize| {
+                    let scale = (square[i][i] * square[j][j]).sqrt();
+                    assert!(
+                        (own - square[i][j]).abs() <= 126.0 * f64::EPSILON * scale,
+                        "{loss:?} ({i}, {j})"
+                    );
+                };
+                let slope_close = |own: f64, i: usize| {
+                    let scale = (square[i][i] * expected_cost).sqrt();
+                    assert!(
+                        (own - slope[i]).abs()
+                            <= 126.0 * f64::EPSILON * (scale + slope[i].abs()) + 1e-9 * scale
+                    );
+                };
+                for a in free.iter() {
+                    for b in free.iter() {
+                        let (row, column) = INTRINSICS_SLOTS[a as usize][b as usize];
+                        close(sums[usize::from(row)][usize::from(column)], a as usize, b as usize);
+                    }
+                    slope_close(gradient(&sums, a), a as usize);
+                    for i in 0..6 {
+                        close(coupling(&sums, a, i), a as usize, 10 + i);
+                    }
+                }
+                for i in 0..6 {
+                    slope_close(pose_gradient(&sums, i), 10 + i);
+                    for j in i..6 {
+                        close(sums[i][j], 10 + i, 10 + j);
+                    }
+                }
+                assert!((cost(&sums) - expected_cost).abs() <= 1e-9 * expected_cost);
+            }
+        }
+    }
+
+    #[test]
+    fn wide_registers_give_the_bits_of_plain_code() {
+        let bits = |sums: Option<Sums>| sums.unwrap().map(|row| row.map(f64::to_bits));
+        for count in [60, 61, 62, 63] {
+            let (radial, full) = (radial_camera(), full_camera());
+            let pose = pose();
+            let view = |camera, pairs, loss| View { camera, cam_from_target: &pose, pairs, loss };
+            let (near, far) = (pairs(&radial, count), pairs(&full, count));
+            let of_radial = || ViewSums::<SHARED_RADIAL, true, false>(view(&radial, &near, Loss::Squares));
+            assert_eq!(bits(dispatch(of_radial())), bits(run_portable(of_radial())));
+            let of_full = || ViewSums::<SHARED, false, false>(view(&full, &far, Loss::Squares));
+            assert_eq!(bits(dispatch(of_full())), bits(run_portable(of_full())));
+            let robust =
+                || ViewSums::<SHARED, false, true>(view(&full, &far, Loss::Cauchy { scale_px: 0.1 }));
+            assert_eq!(bits(dispatch(robust())), bits(run_portable(robust())));
+            let (wide, plain) = (
+                dispatch(Residuals(view(&full, &far, Loss::Squares))),
+                run_portable(Residuals(view(&full, &far, Loss::Squares))),
+            );
+            assert_eq!(wide.residuals, plain.residuals);
+            assert_eq!(wide.square.to_bits(), plain.square.to_bits());
+        }
+    }
+
+    #[test]
+    fn a_point_behind_the_camera_has_no_sums_and_an_infinite_residual() {
+        let camera = radial_camera();
+        let pairs = pairs(&camera, 6);
+        let behind = Pose { translation: Vec3::new(0.0, 0.0, -1.0), ..pose() };
+        assert!(view_sums(&camera, &behind, &pairs, Loss::Squares, true).is_none());
+        let found = view_residuals(&camera, &behind, &pairs);
+        assert_eq!(found.residuals.len(), 6);
+        assert!(found.residuals.iter().any(|r| r.x == f64::INFINITY) && found.square == f64::INFINITY);
+    }
+}
