@@ -184,8 +184,7 @@ pub(super) struct Rows<L> {
 #[inline(always)]
 pub(super) fn rows<L: Arithmetic, const RADIAL: bool>(m: &Model<L>, px: L, py: L) -> Rows<L> {
     let (one, two, three) = (L::splat(1.0), L::splat(2.0), L::splat(3.0));
-    let rotated = |i: usize| m.r[i][0] * px + m.r[i][1] * py;
-    let (qx, qy, qz) = (rotated(0), rotated(1), rotated(2));
+    let [qx, qy, qz] = rotated(m, px, py);
     let depth = qz + m.t[2];
     let inverse_depth = one / depth;
     let (x, y) = ((qx + m.t[0]) * inverse_depth, (qy + m.t[1]) * inverse_depth);
@@ -213,32 +212,60 @@ pub(super) fn rows<L: Arithmetic, const RADIAL: bool>(m: &Model<L>, px: L, py: L
     }
 
     // Derivatives of the pixel by the ideal point, then by the point in camera coordinates.
-    let along_u = |lx: L, ly: L| if RADIAL { m.fx * lx } else { m.fx * lx + m.skew * ly };
-    let by_point = |dx: L, dy: L| {
-        let (a, b) = (dx * inverse_depth, dy * inverse_depth);
-        [a, b, -(a * x + b * y)]
-    };
-    let pu = by_point(along_u(xd_by_x, cross), along_u(cross, yd_by_y));
-    let pv = by_point(m.fy * cross, m.fy * yd_by_y);
-    // d X_c / d delta = -[q]x, so a row p becomes -(p^T [q]x) = (q x p)^T.
-    let by_rotation = |p: &[L; 3]| [qy * p[2] - qz * p[1], qz * p[0] - qx * p[2], qx * p[1] - qy * p[0]];
-    let (du, dv) = (by_rotation(&pu), by_rotation(&pv));
+    let pu = by_point(
+        [along_u::<L, RADIAL>(m, xd_by_x, cross), along_u::<L, RADIAL>(m, cross, yd_by_y)],
+        [x, y],
+        inverse_depth,
+    );
+    let pv = by_point([m.fy * cross, m.fy * yd_by_y], [x, y], inverse_depth);
+    let (du, dv) = (by_rotation([qx, qy, qz], pu), by_rotation([qx, qy, qz], pv));
 
-    let (k1u, k1v) = (along_u(x * s, y * s), m.fy * (y * s));
+    let (k1u, k1v) = (along_u::<L, RADIAL>(m, x * s, y * s), m.fy * (y * s));
     let (k2u, k2v) = (k1u * s, k1v * s);
     let none = L::splat(0.0);
     let (p1, p2, k3) = if RADIAL {
         ([none; 2], [none; 2], [none; 2])
     } else {
-        ([along_u(twice_xy, ty), m.fy * ty], [along_u(tx, twice_xy), m.fy * twice_xy], [k2u * s, k2v * s])
+        (
+            [along_u::<L, RADIAL>(m, twice_xy, ty), m.fy * ty],
+            [along_u::<L, RADIAL>(m, tx, twice_xy), m.fy * twice_xy],
+            [k2u * s, k2v * s],
+        )
     };
     Rows {
         depth,
-        pixel: [along_u(xd, yd) + m.cx, m.fy * yd + m.cy],
+        pixel: [along_u::<L, RADIAL>(m, xd, yd) + m.cx, m.fy * yd + m.cy],
         distorted: [xd, yd],
         u: [du[0], du[1], du[2], pu[0], pu[1], pu[2], k1u, k2u, p1[0], p2[0], k3[0], none],
         v: [dv[0], dv[1], dv[2], pv[0], pv[1], pv[2], k1v, k2v, p1[1], p2[1], k3[1], none],
     }
+}
+
+// Functions, not closures: only functions can be told to be inlined into code for wide registers.
+
+/// `R [x y 0]^T`.
+#[inline(always)]
+fn rotated<L: Arithmetic>(m: &Model<L>, px: L, py: L) -> [L; 3] {
+    [m.r[0][0] * px + m.r[0][1] * py, m.r[1][0] * px + m.r[1][1] * py, m.r[2][0] * px + m.r[2][1] * py]
+}
+
+/// What `(lx, ly)` on the plane Z = 1 moves u by.
+#[inline(always)]
+fn along_u<L: Arithmetic, const RADIAL: bool>(m: &Model<L>, lx: L, ly: L) -> L {
+    if RADIAL { m.fx * lx } else { m.fx * lx + m.skew * ly }
+}
+
+/// The row of the point in camera coordinates from that of the ideal point.
+#[inline(always)]
+fn by_point<L: Arithmetic>([dx, dy]: [L; 2], [x, y]: [L; 2], inverse_depth: L) -> [L; 3] {
+    let (a, b) = (dx * inverse_depth, dy * inverse_depth);
+    [a, b, -(a * x + b * y)]
+}
+
+/// The row of the rotation from that of the point: `d X_c / d delta = -[q]x`, so a row p becomes `-(p^T [q]x) = (q x p)^T`.
+#[inline(always)]
+fn by_rotation<L: Arithmetic>([qx, qy, qz]: [L; 3], p: [L; 3]) -> [L; 3] {
+    [qy * p[2] - qz * p[1], qz * p[0] - qx * p[2], qx * p[1] - qy * p[0]]
 }
 
 /// The sums of one view, or `None` where a point is not in front of the camera.
@@ -343,8 +370,6 @@ impl<L: Lanes, const Q: usize> Accumulators<L, Q> {
         one: L,
         cost: L,
     ) {
-        // A mask of 0 and 1 is its own square: only other weights need the product with the column of the principal point.
-        let times_one = |value: L| if ROBUST { value * one } else { value };
         let (u, v, [x, y]) = (&rows.u, &rows.v, rows.distorted);
         let columns = if RADIAL { SHARED_RADIAL } else { SHARED - 1 };
         for i in 0..columns {
@@ -354,29 +379,31 @@ impl<L: Lanes, const Q: usize> Accumulators<L, Q> {
         }
         for i in 0..columns {
             self.linear[0][i] = self.linear[0][i] + x * u[i];
-            self.linear[1][i] = self.linear[1][i] + times_one(u[i]);
+            self.linear[1][i] = self.linear[1][i] + times_one::<L, ROBUST>(u[i], one);
             if !RADIAL {
                 self.linear[2][i] = self.linear[2][i] + y * u[i];
             }
             self.linear[3][i] = self.linear[3][i] + y * v[i];
-            self.linear[4][i] = self.linear[4][i] + times_one(v[i]);
+            self.linear[4][i] = self.linear[4][i] + times_one::<L, ROBUST>(v[i], one);
             self.residual[i] = self.residual[i] + (ru * u[i] + rv * v[i]);
         }
-        let s = &mut self.scalars;
-        let mut add = |slot: usize, value: L| s[slot] = s[slot] + value;
-        add(scalars::XX, x * x);
-        add(scalars::YY, y * y);
-        add(scalars::X, times_one(x));
-        add(scalars::Y, times_one(y));
-        add(scalars::ONE, times_one(one));
-        add(scalars::X_RU, x * ru);
-        add(scalars::RU, times_one(ru));
-        add(scalars::Y_RV, y * rv);
-        add(scalars::RV, times_one(rv));
-        add(scalars::COST, cost);
-        if !RADIAL {
-            add(scalars::XY, x * y);
-            add(scalars::Y_RU, y * ru);
+        let zero = L::zero();
+        let terms = [
+            x * x,
+            if RADIAL { zero } else { x * y },
+            y * y,
+            times_one::<L, ROBUST>(x, one),
+            times_one::<L, ROBUST>(y, one),
+            times_one::<L, ROBUST>(one, one),
+            x * ru,
+            times_one::<L, ROBUST>(ru, one),
+            if RADIAL { zero } else { y * ru },
+            y * rv,
+            times_one::<L, ROBUST>(rv, one),
+            cost,
+        ];
+        for (sum, term) in self.scalars.iter_mut().zip(terms) {
+            *sum = *sum + term;
         }
     }
 
@@ -394,6 +421,12 @@ impl<L: Lanes, const Q: usize> Accumulators<L, Q> {
         reduce_row(&self.scalars, 0, &mut sums[SCALARS]);
         sums
     }
+}
+
+/// The product with the column of the principal point. A mask of 0 and 1 is its own square: only other weights need it.
+#[inline(always)]
+fn times_one<L: Arithmetic, const ROBUST: bool>(value: L, one: L) -> L {
+    if ROBUST { value * one } else { value }
 }
 
 /// Sums lanes of entries `from` and on.
@@ -479,10 +512,10 @@ fn behind<L: Lanes>(residual: L, unseen: [bool; LANES]) -> L {
 /// Normalised coordinates and depth.
 #[inline(always)]
 fn ideal_point<L: Arithmetic>(m: &Model<L>, px: L, py: L) -> [L; 3] {
-    let at = |i: usize| m.r[i][0] * px + m.r[i][1] * py + m.t[i];
-    let depth = at(2);
+    let [qx, qy, qz] = rotated(m, px, py);
+    let depth = qz + m.t[2];
     let inverse_depth = L::splat(1.0) / depth;
-    [at(0) * inverse_depth, at(1) * inverse_depth, depth]
+    [(qx + m.t[0]) * inverse_depth, (qy + m.t[1]) * inverse_depth, depth]
 }
 
 /// [`crate::camera::BrownConrady::distort`].

@@ -192,16 +192,15 @@ impl Kernel for Moments<'_> {
         let full = self.pairs.len() / LANES;
         let (blocks, rest) = self.pairs.blocks.split_at(full);
         let mask = L::load(&self.pairs.mask(full.min(self.pairs.blocks.len() - 1)).unwrap_or([1.0; LANES]));
-        let coordinates = |b: &PairBlock| [L::load(&b.x), L::load(&b.y), L::load(&b.u), L::load(&b.v)];
         let mut totals = [L::zero(); 4];
         for block in blocks {
-            let at = coordinates(block);
+            let at = coordinates::<L>(block);
             for i in 0..4 {
                 totals[i] = totals[i] + at[i];
             }
         }
         for block in rest {
-            let at = coordinates(block);
+            let at = coordinates::<L>(block);
             for i in 0..4 {
                 totals[i] = totals[i] + at[i] * mask;
             }
@@ -210,7 +209,7 @@ impl Kernel for Moments<'_> {
         let means = L::sums(totals).map(|sum| sum / count);
         let mut scatter = [[L::zero(); 4]; 2];
         for (index, block) in self.pairs.blocks.iter().enumerate() {
-            let mut offsets = coordinates(block);
+            let mut offsets = coordinates::<L>(block);
             for i in 0..4 {
                 offsets[i] = offsets[i] - L::splat(means[i]);
                 if index >= full {
@@ -229,6 +228,11 @@ impl Kernel for Moments<'_> {
             Spread { centroid: Vec2::new(means[2 * side], means[2 * side + 1]), xx, yy, xy }
         })
     }
+}
+
+#[inline(always)]
+fn coordinates<L: Lanes>(block: &PairBlock) -> [L; 4] {
+    [L::load(&block.x), L::load(&block.y), L::load(&block.u), L::load(&block.v)]
 }
 
 /// The pairs in their frames.
