@@ -12,9 +12,13 @@ use crate::camera::{Camera, FreeParameters, Parameter};
 use crate::geometry::{Homography, Mat3, Pose, Vec2, Vec3, rotation};
 use crate::target::View;
 
+/// Homographies of the start are refined until a step promises less than this part of their cost: distortion, which they leave out, is
+/// far larger than what is left to gain.
+const START_GAIN: f64 = 1e-3;
+
 /// Estimates the free parameters of `settings` and the pose of every view.
 ///
-/// 1. A maximum-likelihood homography for each view.
+/// 1. A homography for each view, of least squared pixel distance.
 /// 2. Intrinsics in closed form, poses from them (Zhang 2000, section 3.1).
 /// 3. All unknowns refined together: the sum of squared pixel distances is least (Zhang 2000, section 3.2, with the full
 ///    Brown-Conrady model), which is the maximum-likelihood estimate under Gaussian noise.
@@ -27,7 +31,7 @@ pub fn calibrate(views: &[View], settings: &Settings) -> Result<Calibration, Cal
     check_counts(views, settings)?;
     let frame = TargetFrame::of(views);
     let (observations, homographies) = homographies(views, &frame)?;
-    let starts = start::starts(&homographies, settings, pixel_frame(views))?;
+    let starts = start::starts(&homographies, settings, pixel_frame(&observations))?;
     let problem = Problem {
         free: settings.free(),
         observations: &observations,
@@ -79,7 +83,7 @@ fn homographies(
 ) -> Result<(Vec<Observations>, Vec<Homography>), CalibrationError> {
     let fits = chunks::map(views, |index, view| {
         let observations = frame.observations(view);
-        Homography::fit_pairs(&observations)
+        Homography::fit_pairs(&observations, START_GAIN)
             .map(|fit| (observations, fit.homography))
             .map_err(|source| CalibrationError::View { view: index, source })
     });
@@ -93,10 +97,12 @@ fn homographies(
 }
 
 /// Centre and half-width of the box around all pixels.
-fn pixel_frame(views: &[View]) -> (Vec2, f64) {
-    let pixels = || views.iter().flat_map(View::pixels);
-    let low = pixels().fold(Vec2::repeat(f64::INFINITY), |m, p| m.inf(p));
-    let high = pixels().fold(Vec2::repeat(f64::NEG_INFINITY), |m, p| m.sup(p));
+fn pixel_frame(observations: &[Observations]) -> (Vec2, f64) {
+    let outside = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
+    let (low, high) = observations
+        .iter()
+        .map(Observations::to_box)
+        .fold(outside, |(low, high), (l, h)| (low.inf(&l), high.sup(&h)));
     (0.5 * (low + high), 0.5 * (high - low).max())
 }
 
@@ -109,10 +115,23 @@ struct TargetFrame {
 
 impl TargetFrame {
     fn of(views: &[View]) -> TargetFrame {
-        let points = || views.iter().flat_map(View::points);
-        let count = points().count() as f64;
-        let centre = points().sum::<Vec2>() / count;
-        let mean_square = points().map(|p| (p - centre).norm_squared()).sum::<f64>() / count;
+        let points = || views.iter().flat_map(|view| view.points().iter());
+        // Moments about one of the points: its distance from the centroid is of the points' own size.
+        let Some(&origin) = points().next() else { return TargetFrame { centre: Vec2::zeros(), scale: 1.0 } };
+        let (mut count, mut sum, mut square) = (0.0, Vec2::zeros(), 0.0);
+        for view in views {
+            let (mut x, mut y, mut squares) = (0.0, 0.0, 0.0);
+            for point in view.points() {
+                let (dx, dy) = (point.x - origin.x, point.y - origin.y);
+                (x, y, squares) = (x + dx, y + dy, squares + (dx * dx + dy * dy));
+            }
+            count += view.len() as f64;
+            sum += Vec2::new(x, y);
+            square += squares;
+        }
+        let offset = sum / count;
+        let centre = origin + offset;
+        let mean_square = square / count - offset.norm_squared();
         // Coincident points have no size; their homography refuses them.
         let scale = if mean_square > 0.0 { mean_square.sqrt() } else { 1.0 };
         TargetFrame { centre, scale }

@@ -147,9 +147,7 @@ impl Slope {
     /// `None` for a plane seen edge-on.
     fn of(pose: &Pose, observations: &Observations) -> Option<Slope> {
         let normal = pose.rotation.column(2).into_owned();
-        let pixels = || observations.iter().map(|(_, pixel)| pixel);
-        let low = pixels().fold(Vec2::repeat(f64::INFINITY), |m, p| m.inf(&p));
-        let high = pixels().fold(Vec2::repeat(f64::NEG_INFINITY), |m, p| m.sup(&p));
+        let (low, high) = observations.to_box();
         (normal.z.abs() > 1e-6).then(|| Slope {
             value: Vec2::new(normal.x / normal.z, normal.y / normal.z),
             half_width_px: 0.25 * (high - low).sum(),

@@ -20,6 +20,9 @@ const SHARED_RADIAL: usize = 8;
 /// cy (row v). Row 17: shared columns times the residual. Row 18: the scalars of [`scalars`].
 pub(super) type Sums = [[f64; SHARED]; 19];
 
+/// Sums of nothing.
+pub(super) const NO_SUMS: Sums = [[0.0; SHARED]; 19];
+
 const FX: usize = 12;
 const CX: usize = 13;
 const SKEW: usize = 14;
@@ -275,12 +278,13 @@ pub(super) fn view_sums(
     pairs: &PairBlocks,
     loss: Loss,
     radial: bool,
-) -> Option<Sums> {
+    sums: &mut Sums,
+) -> Option<()> {
     let view = View { camera, cam_from_target, pairs, loss };
     match (loss, radial) {
-        (Loss::Squares, true) => dispatch(ViewSums::<SHARED_RADIAL, true, false>(view)),
-        (Loss::Squares, false) => dispatch(ViewSums::<SHARED, false, false>(view)),
-        _ => dispatch(ViewSums::<SHARED, false, true>(view)),
+        (Loss::Squares, true) => dispatch(ViewSums::<SHARED_RADIAL, true, false>(view, sums)),
+        (Loss::Squares, false) => dispatch(ViewSums::<SHARED, false, false>(view, sums)),
+        _ => dispatch(ViewSums::<SHARED, false, true>(view, sums)),
     }
 }
 
@@ -294,13 +298,13 @@ struct View<'a> {
 }
 
 /// The kernel for `Q` shared columns; with `ROBUST` every point has the weight of the loss.
-struct ViewSums<'a, const Q: usize, const RADIAL: bool, const ROBUST: bool>(View<'a>);
+struct ViewSums<'a, const Q: usize, const RADIAL: bool, const ROBUST: bool>(View<'a>, &'a mut Sums);
 
 impl<const Q: usize, const RADIAL: bool, const ROBUST: bool> Kernel for ViewSums<'_, Q, RADIAL, ROBUST> {
-    type Output = Option<Sums>;
+    type Output = Option<()>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Option<Sums> {
+    fn run<L: Lanes>(self) -> Option<()> {
         let View { camera, cam_from_target, pairs, loss } = self.0;
         let model = Model::<L>::new(camera, cam_from_target);
         let mut sums = Accumulators::<L, Q>::zero();
@@ -332,7 +336,8 @@ impl<const Q: usize, const RADIAL: bool, const ROBUST: bool> Kernel for ViewSums
             }
             sums.add::<RADIAL, ROBUST>(&at, residual, root, cost);
         }
-        Some(sums.reduce::<RADIAL>())
+        sums.reduce_into::<RADIAL>(self.1);
+        Some(())
     }
 }
 
@@ -408,8 +413,8 @@ impl<L: Lanes, const Q: usize> Accumulators<L, Q> {
     }
 
     #[inline(always)]
-    fn reduce<const RADIAL: bool>(&self) -> Sums {
-        let mut sums = [[0.0; SHARED]; 19];
+    // Entries that the model has no use for are left as they are: 0.
+    fn reduce_into<const RADIAL: bool>(&self, sums: &mut Sums) {
         let columns = if RADIAL { SHARED_RADIAL } else { SHARED - 1 };
         for i in 0..columns {
             reduce_row(&self.squares[i], i / LANES * LANES, &mut sums[i]);
@@ -419,7 +424,6 @@ impl<L: Lanes, const Q: usize> Accumulators<L, Q> {
         }
         reduce_row(&self.residual, 0, &mut sums[RESIDUAL]);
         reduce_row(&self.scalars, 0, &mut sums[SCALARS]);
-        sums
     }
 }
 
@@ -616,7 +620,8 @@ mod tests {
         for (camera, free) in [(radial_camera(), chapter), (full_camera(), all)] {
             for loss in losses {
                 let pairs = pairs(&camera, 63);
-                let sums = view_sums(&camera, &pose(), &pairs, loss, is_radial(&camera, free)).unwrap();
+                let mut sums = NO_SUMS;
+                view_sums(&camera, &pose(), &pairs, loss, is_radial(&camera, free), &mut sums).unwrap();
                 let (square, slope, expected_cost) = plain_sums(&camera, &pairs, loss);
                 // A sum of 126 products errs by at most 126 roundings of the sum of sizes, here by Cauchy-Schwarz.
                 let close = |own: f64, i: usize, j: usize| {
@@ -656,19 +661,25 @@ mod tests {
 
     #[test]
     fn wide_registers_give_the_bits_of_plain_code() {
-        let bits = |sums: Option<Sums>| sums.unwrap().map(|row| row.map(f64::to_bits));
+        let bits = |sums: Sums| sums.map(|row| row.map(f64::to_bits));
+        fn compare<const Q: usize, const RADIAL: bool, const ROBUST: bool>(view: View<'_>) -> [Sums; 2] {
+            let (mut wide, mut plain) = (NO_SUMS, NO_SUMS);
+            dispatch(ViewSums::<Q, RADIAL, ROBUST>(view, &mut wide)).unwrap();
+            run_portable(ViewSums::<Q, RADIAL, ROBUST>(view, &mut plain)).unwrap();
+            [wide, plain]
+        }
         for count in [60, 61, 62, 63] {
             let (radial, full) = (radial_camera(), full_camera());
             let pose = pose();
             let view = |camera, pairs, loss| View { camera, cam_from_target: &pose, pairs, loss };
             let (near, far) = (pairs(&radial, count), pairs(&full, count));
-            let of_radial = || ViewSums::<SHARED_RADIAL, true, false>(view(&radial, &near, Loss::Squares));
-            assert_eq!(bits(dispatch(of_radial())), bits(run_portable(of_radial())));
-            let of_full = || ViewSums::<SHARED, false, false>(view(&full, &far, Loss::Squares));
-            assert_eq!(bits(dispatch(of_full())), bits(run_portable(of_full())));
-            let robust =
-                || ViewSums::<SHARED, false, true>(view(&full, &far, Loss::Cauchy { scale_px: 0.1 }));
-            assert_eq!(bits(dispatch(robust())), bits(run_portable(robust())));
+            for [wide, plain] in [
+                compare::<SHARED_RADIAL, true, false>(view(&radial, &near, Loss::Squares)),
+                compare::<SHARED, false, false>(view(&full, &far, Loss::Squares)),
+                compare::<SHARED, false, true>(view(&full, &far, Loss::Cauchy { scale_px: 0.1 })),
+            ] {
+                assert_eq!(bits(wide), bits(plain));
+            }
             let (wide, plain) = (
                 dispatch(Residuals(view(&full, &far, Loss::Squares))),
                 run_portable(Residuals(view(&full, &far, Loss::Squares))),
@@ -683,7 +694,7 @@ mod tests {
         let camera = radial_camera();
         let pairs = pairs(&camera, 6);
         let behind = Pose { translation: Vec3::new(0.0, 0.0, -1.0), ..pose() };
-        assert!(view_sums(&camera, &behind, &pairs, Loss::Squares, true).is_none());
+        assert!(view_sums(&camera, &behind, &pairs, Loss::Squares, true, &mut NO_SUMS.clone()).is_none());
         let found = view_residuals(&camera, &behind, &pairs);
         assert_eq!(found.residuals.len(), 6);
         assert!(found.residuals.iter().any(|r| r.x == f64::INFINITY) && found.square == f64::INFINITY);

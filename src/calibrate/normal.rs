@@ -46,10 +46,11 @@ pub(super) fn fill(
     system.views.resize_with(observations.len(), ViewBlock::zero);
     let mut total = Some(Share::zero());
     let chunk = |index: usize, blocks: &mut [ViewBlock]| {
-        let mut share = Share::zero();
+        let (mut share, mut sums) = (Share::zero(), kernel::NO_SUMS);
         for (k, block) in blocks.iter_mut().enumerate() {
             let view = index * CHUNK + k;
-            let sums = kernel::view_sums(camera, &cam_from_target[view], &observations[view], loss, radial)?;
+            let (pose, pairs) = (&cam_from_target[view], &observations[view]);
+            kernel::view_sums(camera, pose, pairs, loss, radial, &mut sums)?;
             columns.spread(&sums, &mut share, block);
         }
         Some(share)

@@ -88,11 +88,15 @@ impl Homography {
         if from.len() != to.len() {
             return Err(HomographyError::Lengths { from: from.len(), to: to.len() });
         }
-        Homography::fit_pairs(&PairBlocks::new(from.iter().copied().zip(to.iter().copied())))
+        Homography::fit_pairs(&PairBlocks::new(from.iter().copied().zip(to.iter().copied())), RELATIVE_GAIN)
     }
 
-    /// [`Homography::fit`] for pairs that are already in blocks.
-    pub(crate) fn fit_pairs(pairs: &PairBlocks) -> Result<HomographyFit, HomographyError> {
+    /// [`Homography::fit`] for pairs that are already in blocks, ended when the next step promises to lower the cost by less than
+    /// `relative_gain` of it.
+    pub(crate) fn fit_pairs(
+        pairs: &PairBlocks,
+        relative_gain: f64,
+    ) -> Result<HomographyFit, HomographyError> {
         if pairs.len() < 4 {
             return Err(HomographyError::TooFewPoints { need: 4, got: pairs.len() });
         }
@@ -104,7 +108,7 @@ impl Homography {
         let rounding_cost = (ROUNDINGS * f64::EPSILON) * (ROUNDINGS * f64::EPSILON) * pairs.len() as f64;
         while iterations < MAX_ITERATIONS {
             let Some((step, predicted_gain)) = system.solve() else { break };
-            if predicted_gain <= RELATIVE_GAIN * system.cost || system.cost <= rounding_cost {
+            if predicted_gain <= relative_gain * system.cost || system.cost <= rounding_cost {
                 break;
             }
             let (next, next_system) = descend(&pairs, &estimate, &system, &step);
@@ -260,12 +264,9 @@ fn matrix(h: &[f64; 8]) -> Mat3 {
 /// The direct linear transform: `u (h6 x + h7 y + 1) = h0 x + h1 y + h2` and the same for v, least squares.
 fn linear_estimate(pairs: &PairBlocks) -> Result<[f64; 8], HomographyError> {
     let system = NormalEquations::linear(pairs);
-    let pivot = system.smallest_pivot();
-    let degenerate = HomographyError::Degenerate { points: pairs.len(), pivot };
-    if pivot < SMALLEST_PIVOT {
-        return Err(degenerate);
-    }
-    system.solve().map(|(h, _)| h).ok_or(degenerate)
+    system
+        .solve_if_regular(SMALLEST_PIVOT)
+        .map_err(|pivot| HomographyError::Degenerate { points: pairs.len(), pivot })
 }
 
 /// The step, halved until the cost falls (at most ten times).

@@ -39,8 +39,8 @@ struct Factor {
     p: [[f64; 2]; 3],
     q: [[f64; 2]; 3],
     rest: [[f64; 2]; 2],
-    /// Smallest squared pivot relative to its diagonal entry.
-    smallest_pivot: f64,
+    /// Squared pivots.
+    pivots: [f64; 5],
 }
 
 impl NormalEquations {
@@ -60,6 +60,19 @@ impl NormalEquations {
             return None;
         }
         let f = self.factor()?;
+        Some(self.solve_with(&f))
+    }
+
+    /// The solution of linear equations, or the smallest squared pivot of the factor relative to its diagonal entry where that is below
+    /// `smallest_pivot`; 0 if there is no factor.
+    pub fn solve_if_regular(&self, smallest_pivot: f64) -> Result<[f64; 8], f64> {
+        let factor = self.factor().ok_or(0.0)?;
+        let diagonal = [self.sums[M], self.sums[M + 3], self.sums[M + 5], self.sums[T], self.sums[T + 2]];
+        let smallest = factor.pivots.iter().zip(diagonal).map(|(p, d)| p / d).fold(1.0, f64::min);
+        if smallest < smallest_pivot { Err(smallest) } else { Ok(self.solve_with(&factor).0) }
+    }
+
+    fn solve_with(&self, f: &Factor) -> ([f64; 8], f64) {
         let g: [f64; 8] = std::array::from_fn(|i| self.sums[G + i]);
         let forward = |b: [f64; 3]| {
             let y0 = b[0] * f.l[0][0];
@@ -84,27 +97,19 @@ impl NormalEquations {
         let ([h0, h1, h2], [h3, h4, h5]) = (back(less(yu, &f.p)), back(less(yv, &f.q)));
         let step = [h0, h1, h2, h3, h4, h5, h6, h7];
         let gain = -(0..8).map(|i| g[i] * step[i]).sum::<f64>();
-        Some((step, gain))
-    }
-
-    /// Smallest squared pivot of the Cholesky factor relative to its diagonal entry; 0 if there is no factor.
-    pub fn smallest_pivot(&self) -> f64 {
-        self.factor().map_or(0.0, |f| f.smallest_pivot)
+        (step, gain)
     }
 
     fn factor(&self) -> Option<Factor> {
         let s = &self.sums;
         let m = [s[M], s[M + 1], s[M + 2], s[M + 3], s[M + 4], s[M + 5]];
-        let mut smallest_pivot = 1.0f64;
-        let mut inverse_root = |pivot: f64, diagonal: f64| {
-            smallest_pivot = smallest_pivot.min(pivot / diagonal);
-            (pivot > 0.0).then(|| 1.0 / pivot.sqrt())
-        };
-        let d0 = inverse_root(m[0], m[0])?;
+        let d0 = inverse_root(m[0])?;
         let (l10, l20) = (m[1] * d0, m[2] * d0);
-        let d1 = inverse_root(m[3] - l10 * l10, m[3])?;
+        let pivot1 = m[3] - l10 * l10;
+        let d1 = inverse_root(pivot1)?;
         let l21 = (m[4] - l20 * l10) * d1;
-        let d2 = inverse_root(m[5] - l20 * l20 - l21 * l21, m[5])?;
+        let pivot2 = m[5] - l20 * l20 - l21 * l21;
+        let d2 = inverse_root(pivot2)?;
         let whiten = |first: usize| {
             let column = |b: [f64; 3]| {
                 let y0 = -b[0] * d0;
@@ -122,17 +127,24 @@ impl NormalEquations {
         let rest = |i: usize, j: usize, own: f64| {
             (0..3).fold(own, |sum, k| sum - (p[k][i] * p[k][j] + q[k][i] * q[k][j]))
         };
-        let d6 = inverse_root(rest(0, 0, s[T]), s[T])?;
+        let pivot6 = rest(0, 0, s[T]);
+        let d6 = inverse_root(pivot6)?;
         let l76 = rest(0, 1, s[T + 1]) * d6;
-        let d7 = inverse_root(rest(1, 1, s[T + 2]) - l76 * l76, s[T + 2])?;
+        let pivot7 = rest(1, 1, s[T + 2]) - l76 * l76;
+        let d7 = inverse_root(pivot7)?;
         Some(Factor {
             l: [[d0, 0.0, 0.0], [l10, d1, 0.0], [l20, l21, d2]],
             p,
             q,
             rest: [[d6, 0.0], [l76, d7]],
-            smallest_pivot,
+            pivots: [m[0], pivot1, pivot2, pivot6, pivot7],
         })
     }
+}
+
+/// `1 / sqrt(pivot)`; `None` if it is not positive.
+fn inverse_root(pivot: f64) -> Option<f64> {
+    (pivot > 0.0).then(|| 1.0 / pivot.sqrt())
 }
 
 /// Sums over the pairs, at a homography or for the linear equations.
@@ -245,7 +257,8 @@ mod tests {
         let factor = square.cholesky().unwrap();
         let pivot =
             (0..8).map(|i| factor.l()[(i, i)] * factor.l()[(i, i)] / square[(i, i)]).fold(1.0, f64::min);
-        assert!((system.smallest_pivot() - pivot).abs() <= 1e-12);
+        assert_eq!(system.solve_if_regular(0.0), Ok(step));
+        assert!((system.solve_if_regular(1.0).unwrap_err() - pivot).abs() <= 1e-12);
     }
 
     #[test]

@@ -284,11 +284,35 @@ impl PairBlocks {
         (0..self.len).map(move |k| pair(&self.blocks[k / LANES], k % LANES))
     }
 
+    /// Least and greatest u and v: the corners of the box around the second points. Empty is infinite and inside out.
+    pub fn to_box(&self) -> (Vec2, Vec2) {
+        dispatch(Bounds { pairs: self })
+    }
+
     /// For a block that is not full: 1 in the lanes of pairs, 0 in the others.
     #[inline(always)]
     pub fn mask(&self, block: usize) -> Option<[f64; LANES]> {
         let used = self.len - block * LANES;
         (used < LANES).then(|| [1.0, f64::from(used > 1), f64::from(used > 2), 0.0])
+    }
+}
+
+struct Bounds<'a> {
+    pairs: &'a PairBlocks,
+}
+
+impl Kernel for Bounds<'_> {
+    type Output = (Vec2, Vec2);
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> (Vec2, Vec2) {
+        let mut most = [L::splat(f64::NEG_INFINITY); 4];
+        for block in &self.pairs.blocks {
+            let (u, v) = (L::load(&block.u), L::load(&block.v));
+            most = [u.max(most[0]), v.max(most[1]), (-u).max(most[2]), (-v).max(most[3])];
+        }
+        let most = most.map(|lanes| lanes.store().into_iter().fold(f64::NEG_INFINITY, f64::max));
+        (Vec2::new(-most[2], -most[3]), Vec2::new(most[0], most[1]))
     }
 }
 
@@ -335,6 +359,7 @@ mod tests {
             let pair = |i: usize| (Vec2::new(i as f64, 0.5), Vec2::new(-(i as f64), 2.0));
             let blocks = PairBlocks::new((0..len).map(pair));
             assert!(blocks.iter().eq((0..len).map(pair)));
+            assert_eq!(blocks.to_box(), (Vec2::new(1.0 - len as f64, 2.0), Vec2::new(0.0, 2.0)));
             let used: f64 = (0..blocks.blocks.len())
                 .map(|b| blocks.mask(b).map_or(LANES as f64, |m| m.iter().sum()))
                 .sum();
