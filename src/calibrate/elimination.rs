@@ -1,4 +1,5 @@
 //! What is left of a view once its pose is eliminated? Small dense algebra of fixed size, written out.
+#![allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
 
 use super::system::{Coupling, Intrinsics, N, PoseBlock, ViewBlock};
 use crate::geometry::lanes::{Kernel, LANES, Lanes, dispatch};

@@ -3,6 +3,7 @@
 //! Of a point's Jacobian the row of u depends on (fx, cx, skew) and the row of v on (fy, cy), while pose and lens move both.
 //! With `q = (pose, k1, k2, p1, p2, k3)` only the products that are not 0 are summed: `q_u q_u^T + q_v q_v^T`, `q_u` and `q_v`
 //! times their own linear parameters, and a handful of scalars. Which of them a problem needs is looked up afterwards.
+#![allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
 
 use super::Loss;
 use crate::camera::{Camera, Parameter};

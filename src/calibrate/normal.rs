@@ -102,9 +102,9 @@ impl Columns {
         }
         share.cost += kernel::cost(sums);
         for i in 0..6 {
-            for j in i..6 {
-                block.pose[(i, j)] = sums[i][j];
-                block.pose[(j, i)] = sums[i][j];
+            for (j, &sum) in sums[i].iter().enumerate().take(6).skip(i) {
+                block.pose[(i, j)] = sum;
+                block.pose[(j, i)] = sum;
             }
             block.gradient[i] = kernel::pose_gradient(sums, i);
         }
