@@ -420,7 +420,7 @@ mod tests {
         #[test]
         fn undistortion_is_exact_inside_the_monotone_disc(
             k1 in -0.5f64..0.5, k2 in -0.3f64..0.3, k3 in -0.2f64..0.2, p1 in -0.01f64..0.01, p2 in -0.01f64..0.01,
-            angle in 0.0f64..6.28, fraction in 0.0f64..0.9,
+            angle in 0.0f64..std::f64::consts::TAU, fraction in 0.0f64..0.9,
         ) {
             let lens = BrownConrady { k1, k2, p1, p2, k3 };
             let radius = fraction * lens.monotone_radius().min(1.0);
