@@ -15,6 +15,9 @@
 
 pub mod camera;
 pub mod geometry;
+#[cfg(feature = "io")]
+pub mod io;
+pub mod planar;
 pub mod raster;
 pub mod synth;
 pub mod target;

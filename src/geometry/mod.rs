@@ -3,6 +3,7 @@
 pub mod affine;
 pub mod homography;
 pub mod pose;
+pub mod projective_frame;
 pub mod rotation;
 pub mod scatter;
 pub mod similarity;
