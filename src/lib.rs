@@ -17,6 +17,9 @@ pub mod calibrate;
 pub mod camera;
 pub mod evaluate;
 pub mod geometry;
+#[cfg(feature = "io")]
+pub mod io;
+pub mod planar;
 pub mod raster;
 pub mod synth;
 pub mod target;
