@@ -13,6 +13,7 @@
 //! the left; residual = predicted - observed; RMSE is per point.
 #![warn(missing_docs)]
 
+pub mod calibrate;
 pub mod camera;
 pub mod geometry;
 #[cfg(feature = "io")]
