@@ -124,10 +124,6 @@ fn check(centre_free: bool, parameters: usize) {
     // The chapter's sheet gives 0.1355 +- 0.008 for both; that is the held centre's mean, two parameters fewer.
     let spread = if centre_free { 0.008 } else { interval + 0.00005 };
     assert!((sample.rms_mean - 0.1355).abs() < spread, "{}", sample.rms_mean);
-    println!(
-        "RMS {:.5} for {exact:.5} +- {interval:.5}; mean square {:.3}",
-        sample.rms_mean, sample.mean_square
-    );
     // e^T C^-1 e follows chi-square with d degrees: mean d, variance 2 d. The linearisation moves the mean by a few percent of
     // that at most: the curvature enters with sd(centre) / focal, about 1e-2, squared against terms of order one.
     let d = if centre_free { 4.0 } else { 2.0 };
@@ -161,7 +157,6 @@ fn a_centre_held_at_the_image_centre_adds_the_expected_model_error() {
     let (_, sd) = predicted_rms_px(SIGMA_PX, POINTS, 10);
     let interval = Z * sd / (TRIALS as f64).sqrt();
     assert!((mean - expected).abs() < interval, "{mean} for {expected} +- {interval}");
-    println!("RMS {mean:.5} for {expected:.5} +- {interval:.5}, model error {:.5}", fit.rms_px);
     // The chapter's sheet: 0.1422 +- 0.009.
     assert!((mean - 0.1422).abs() < interval + 0.00005, "{mean} for 0.1422 +- {interval}");
 }
