@@ -15,6 +15,8 @@
 
 pub mod camera;
 pub mod geometry;
+#[cfg(feature = "harness")]
+pub mod harness;
 pub mod raster;
 pub mod synth;
 pub mod target;

@@ -1,10 +1,12 @@
 //! Plane and space geometry that knows nothing of cameras: rotations, poses, homographies, fits.
 
 pub mod homography;
+pub mod line;
 pub mod pose;
 pub mod rotation;
 
 pub use homography::{Homography, HomographyError, HomographyFit};
+pub use line::{LineError, LineFit};
 pub use pose::Pose;
 
 /// A point or vector of the plane.
