@@ -17,6 +17,8 @@ pub mod calibrate;
 pub mod camera;
 pub mod evaluate;
 pub mod geometry;
+#[cfg(feature = "harness")]
+pub mod harness;
 #[cfg(feature = "io")]
 pub mod io;
 pub mod planar;
