@@ -20,5 +20,6 @@ pub mod geometry;
 pub mod io;
 pub mod planar;
 pub mod raster;
+pub mod rectify;
 pub mod synth;
 pub mod target;
