@@ -1,6 +1,7 @@
 //! Which four samples make an output pixel, and in what mixture? A look-up table, computed once for images of one size.
 
-use super::{Sample, source_pixel};
+use super::Sample;
+use super::points::source_within;
 use crate::camera::Camera;
 use crate::geometry::Vec2;
 use crate::raster::Raster;
@@ -92,7 +93,8 @@ impl RectifyMap {
         output: &Camera,
         output_size: (usize, usize),
     ) -> Result<RectifyMap, RectifyError> {
-        RectifyMap::new(input_size, output_size, |pixel| source_pixel(camera, output, pixel))
+        let radius = camera.distortion.monotone_radius();
+        RectifyMap::new(input_size, output_size, |pixel| source_within(camera, output, radius, pixel))
     }
 
     /// Width and height of the photographs, px.
@@ -188,6 +190,7 @@ fn split(position: f64, count: usize) -> Option<(usize, f32)> {
 mod tests {
     use super::*;
     use crate::camera::BrownConrady;
+    use crate::rectify::source_pixel;
     use proptest::prelude::*;
 
     const SIZE: (usize, usize) = (64, 48);

@@ -21,9 +21,14 @@ pub fn rectify_points(
 /// The pixel of the photograph that shows what `pixel` of an output image shows; `None` where the lens model, of either camera,
 /// has folded back: what it predicts there is seen elsewhere already.
 pub fn source_pixel(camera: &Camera, output: &Camera, pixel: &Vec2) -> Option<Vec2> {
-    let ray = output.normalised_ray(pixel).ok()?;
+    source_within(camera, output, camera.distortion.monotone_radius(), pixel)
+}
+
+/// [`source_pixel`] with the monotone radius of the photograph's lens given: finding it costs more than the rest.
+pub(super) fn source_within(camera: &Camera, output: &Camera, radius: f64, pixel: &Vec2) -> Option<Vec2> {
+    let seen = output.normalised_from_pixel(pixel);
+    let ray = if output.distortion.is_ideal() { seen } else { output.distortion.undistort(&seen).ok()? };
     let lens = &camera.distortion;
-    let radius = lens.monotone_radius();
     let unfolded = ray.norm_squared() <= radius * radius && lens.jacobian(&ray).determinant() > 0.0;
     unfolded.then(|| camera.pixel_from_normalised(&lens.distort(&ray)))
 }
