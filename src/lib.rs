@@ -23,5 +23,6 @@ pub mod harness;
 pub mod io;
 pub mod planar;
 pub mod raster;
+pub mod rectify;
 pub mod synth;
 pub mod target;
