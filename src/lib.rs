@@ -14,6 +14,7 @@
 #![warn(missing_docs)]
 
 pub mod camera;
+pub mod detect;
 pub mod geometry;
 pub mod raster;
 pub mod synth;
