@@ -7,20 +7,12 @@
 //! 3. One Gauss-Newton step on the centre against the model `c = S(d)`, `d` the distance to the ellipse. It weighs each pixel
 //!    by the slope of the edge, which the centroid does not, and so attains the Cramer-Rao bound of the centre: by symmetry
 //!    the centre's derivatives are orthogonal to those of axes, levels and edge width, whose errors then do not matter.
-//!
-//! `S` is the integral of Epanechnikov's parabola: `S(t) = 1/2 - 3/4 t + 1/4 t^3`, `t = d / h` in -1 ... 1. Its variance
-//! `h^2 / 5` is matched to the edge; a sharp lens leaves the pixel's own 1/12, `h = 0.645` px.
 
 use super::blob::{Blob, semi_axes};
+use super::edge::{Edge, SHARPEST_EDGE_PX, SPREAD_PER_WIDTH};
 use crate::geometry::Vec2;
 use crate::raster::{Raster, Sample};
 use nalgebra::{Matrix2, Matrix3, Vector3};
-
-/// Half-width of the edge of a perfectly sharp image, px: `sqrt(5 / 12)`.
-const SHARPEST_EDGE_PX: f64 = 0.645_497_224_367_902_8;
-
-/// `integral S (1 - S) dd / h` of the edge model: 9/35.
-const SPREAD_PER_WIDTH: f64 = 9.0 / 35.0;
 
 /// Fewest pixels that fix a plane; with fewer the level is taken as constant.
 const PLANE_PIXELS: f64 = 40.0;
@@ -150,7 +142,17 @@ impl Levels {
                 ground.add(&p, level);
             }
         });
-        Some(Levels { ground: ground.solve()?, mark: mark.solve()? })
+        let (own, middle) = (mark.solve()?, Vec2::new(mark.x, mark.y) / mark.n);
+        let ground = ground.solve()?;
+        // Light falls on mark and ground alike, and the ground, being wider, shows its slope with less noise. Not so for
+        // bright marks: their ground shows no light.
+        let (mark_level, ground_level) = (own.at(&middle), ground.at(&middle));
+        let mark = if 0.0 <= mark_level && mark_level < ground_level {
+            Plane(ground.0 * (mark_level / ground_level))
+        } else {
+            own
+        };
+        Some(Levels { ground, mark })
     }
 
     fn contrast(&self) -> f64 {
@@ -202,20 +204,20 @@ fn step<T: Sample>(
     image: &Raster<T>,
     ellipse: &Ellipse,
     levels: &Levels,
-    edge_px: f64,
+    edge: &Edge,
 ) -> Option<(Vec2, f64)> {
     let (mut normal, mut gradient) = (Matrix2::zeros(), Vec2::zeros());
     let (mut square, mut count) = (0.0, 0.0);
-    for_each_pixel(image, ellipse, edge_px, |p, level| {
+    let reach_px = edge.reach_px();
+    for_each_pixel(image, ellipse, reach_px, |p, level| {
         let (d, direction) = ellipse.distance(&p);
-        let t = d / edge_px;
-        if t.abs() >= 1.0 {
+        if d.abs() >= reach_px {
             return;
         }
-        let model = 0.5 - t * (0.75 - 0.25 * t * t);
+        let (model, slope) = edge.coverage(d, &direction);
         let residual = levels.coverage(&p, level) - model;
-        // dS/d(centre) = -S'(d) direction.
-        let by_centre = direction * (0.75 * (1.0 - t * t) / edge_px);
+        // The edge moves with the centre: dS/d(centre) = -dS/dd direction.
+        let by_centre = direction * slope;
         normal += by_centre * by_centre.transpose();
         gradient += by_centre * residual;
         square += residual * residual;
@@ -233,8 +235,10 @@ pub(super) fn refine<T: Sample>(image: &Raster<T>, centre: Vec2, covariance: Mat
     let (ellipse, edge_px) = moments(image, &rough, &levels, clear_px)?;
     // Second look, with the edge's own width.
     let edge_px = edge_px.clamp(SHARPEST_EDGE_PX, clear_px.max(SHARPEST_EDGE_PX));
-    let levels = Levels::fit(image, &ellipse, 0.1 + edge_px, outer_px(&ellipse, 0.1 + edge_px))?;
-    let (moved, misfit) = step(image, &ellipse, &levels, edge_px)?;
+    let edge = Edge::new(edge_px);
+    let clear_px = 0.1 + edge.reach_px();
+    let levels = Levels::fit(image, &ellipse, clear_px, outer_px(&ellipse, clear_px))?;
+    let (moved, misfit) = step(image, &ellipse, &levels, &edge)?;
     let blob = Blob {
         centre_px: ellipse.centre + moved,
         covariance_px2: ellipse.covariance,
@@ -249,5 +253,5 @@ pub(super) fn refine<T: Sample>(image: &Raster<T>, centre: Vec2, covariance: Mat
 /// How far around the mark its ground is looked at: a few pixels, more for larger marks, but less than half of the gap to
 /// a neighbour that is as far away as the mark is wide.
 fn outer_px(ellipse: &Ellipse, clear_px: f64) -> f64 {
-    clear_px + (0.4 * ellipse.short_px).clamp(1.0, 8.0)
+    clear_px + (0.5 * ellipse.short_px).clamp(1.0, 8.0)
 }

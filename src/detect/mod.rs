@@ -4,6 +4,7 @@ mod bias;
 mod blob;
 mod centre;
 mod components;
+mod edge;
 mod grid;
 mod lattice;
 mod neighbours;
