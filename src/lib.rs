@@ -15,6 +15,7 @@
 
 pub mod calibrate;
 pub mod camera;
+pub mod detect;
 pub mod evaluate;
 pub mod geometry;
 #[cfg(feature = "harness")]

@@ -3,11 +3,19 @@
 pub mod atomic;
 pub mod corners;
 pub mod data;
+#[cfg(feature = "photo")]
+pub mod image;
+#[cfg(feature = "photo")]
+pub mod overlay;
 pub mod pairs;
 mod table;
 
 pub use atomic::write_atomically;
 pub use corners::{CornerFile, parse_corners, read_corners};
 pub use data::{MissingDataFolder, data_folder};
+#[cfg(feature = "photo")]
+pub use image::{Grey, ImageError, read_image, write_png, write_png_16};
+#[cfg(feature = "photo")]
+pub use overlay::{Colour, Overlay};
 pub use pairs::{PointPairs, parse_point_pairs, read_point_pairs};
 pub use table::TableError;
