@@ -1,6 +1,7 @@
 //! What can a user ask for? The command line: one verb a file, and the exit codes that all share.
 
 mod bless;
+mod calibrate;
 mod check;
 mod exit;
 mod list;
@@ -41,6 +42,8 @@ enum Verb {
     Check(check::Arguments),
     /// Accepts the present result of an experiment as its golden snapshot, and its figures with it
     Bless(bless::Arguments),
+    /// Calibrates a camera from a corner file, or a plane from a file of point pairs
+    Calibrate(calibrate::Arguments),
 }
 
 /// The `calibench` command over a table of experiments.
@@ -58,6 +61,7 @@ pub fn main(experiments: &[Experiment]) -> ExitCode {
         Some(Verb::Run(arguments)) => run::run(experiments, &arguments),
         Some(Verb::Check(arguments)) => check::run(experiments, &arguments),
         Some(Verb::Bless(arguments)) => bless::run(experiments, &arguments),
+        Some(Verb::Calibrate(arguments)) => calibrate::run(&arguments),
     };
     exit.into()
 }

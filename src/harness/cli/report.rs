@@ -5,7 +5,7 @@ use crate::harness::{Reconciliation, Record, significant};
 use comfy_table::{CellAlignment, Table, presets};
 
 /// A table without lines beyond those that help the eye.
-fn table(header: &[&str]) -> Table {
+pub(super) fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::NOTHING);
     table.set_header(header.to_vec());
