@@ -2,12 +2,15 @@
 
 use crate::harness::verdict::{Golden, Run, Tally, Verdict};
 use crate::harness::{Reconciliation, Record, significant};
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 
-/// A table without lines beyond those that help the eye.
+/// One rule under the header, none elsewhere.
+const STYLE: TableStyle =
+    TableStyle::new().header_separator(LineStyle::new('\u{2500}', '\u{2500}', '\u{2500}', '\u{2500}'));
+
 fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
-    table.load_style(presets::NOTHING);
+    table.load_style(STYLE);
     table.set_header(header.to_vec());
     table
 }
