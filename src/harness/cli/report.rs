@@ -2,7 +2,10 @@
 
 use crate::harness::verdict::{Golden, Run, Tally, Verdict};
 use crate::harness::{Reconciliation, Record, significant};
-use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
+use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
+
+/// Characters in a line, whatever the terminal: a saved report looks like the one on the screen.
+const WIDTH: u16 = 120;
 
 /// One rule under the header, none elsewhere.
 const STYLE: TableStyle =
@@ -11,6 +14,8 @@ const STYLE: TableStyle =
 fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_style(STYLE);
+    table.set_content_arrangement(ContentArrangement::Dynamic);
+    table.set_width(WIDTH);
     table.set_header(header.to_vec());
     table
 }
