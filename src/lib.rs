@@ -13,10 +13,17 @@
 //! the left; residual = predicted - observed; RMSE is per point.
 #![warn(missing_docs)]
 
+pub mod calibrate;
 pub mod camera;
+pub mod detect;
+pub mod evaluate;
 pub mod geometry;
 #[cfg(feature = "harness")]
 pub mod harness;
+#[cfg(feature = "io")]
+pub mod io;
+pub mod planar;
 pub mod raster;
+pub mod rectify;
 pub mod synth;
 pub mod target;

@@ -1,0 +1,77 @@
+//! Why can no camera be estimated from these data?
+
+use super::ClosedFormError;
+use crate::camera::Parameter;
+use crate::geometry::HomographyError;
+
+/// A calibration that is refused. Every variant carries the numbers and says what to do.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CalibrationError {
+    /// Each view gives two constraints on the linear parameters.
+    #[error(
+        "{got} view(s) cannot determine {linear} free linear parameters (fx fy cx cy skew): each view gives two constraints, \
+         so at least {need} are needed; add views of other tilt or hold parameters"
+    )]
+    TooFewViews {
+        /// Views needed.
+        need: usize,
+        /// Views given.
+        got: usize,
+        /// Free parameters among fx, fy, cx, cy, skew.
+        linear: usize,
+    },
+    /// The points are fewer than the unknowns.
+    #[error(
+        "{coordinates} pixel coordinates cannot determine {unknowns} unknowns: give more points or hold parameters"
+    )]
+    TooFewPoints {
+        /// Twice the number of points.
+        coordinates: usize,
+        /// Free intrinsics and six per view.
+        unknowns: usize,
+    },
+    /// A view has no homography.
+    #[error("view {view}: {source}")]
+    View {
+        /// Index of the view.
+        view: usize,
+        /// What is wrong with it.
+        source: HomographyError,
+    },
+    /// A parameter that is not free has no value.
+    #[error(
+        "{parameter} is neither free nor given a value: hold it at one, or state the image size for cx and cy"
+    )]
+    HeldWithoutValue {
+        /// Which.
+        parameter: Parameter,
+    },
+    /// A value that no camera has.
+    #[error("{parameter} cannot be held at {value}")]
+    BadHeldValue {
+        /// Which.
+        parameter: Parameter,
+        /// The value.
+        value: f64,
+    },
+    /// The loss has no positive scale.
+    #[error("a robust loss needs a positive scale in px")]
+    BadLoss,
+    /// The data do not tell the free parameters apart.
+    #[error(
+        "the data cannot separate {}: {why}. Tilt the target by 20 degrees or more, about different axes, in some views, or \
+         hold one of them", inseparable.join(" and ")
+    )]
+    NotIdentifiable {
+        /// The parameters that trade off against each other, strongest first.
+        inseparable: Vec<String>,
+        /// What in the data makes it so.
+        why: String,
+    },
+    /// No start put every point in front of the camera.
+    #[error("no starting values: {source}, and no focal length put the target in front of the camera")]
+    NoStart {
+        /// Why the closed form failed.
+        source: ClosedFormError,
+    },
+}

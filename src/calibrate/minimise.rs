@@ -1,0 +1,140 @@
+//! Which parameters make the residuals least? Levenberg-Marquardt on the arrow-shaped normal equations.
+
+use super::Loss;
+use super::normal::{self, Observations};
+use super::system::{Step, System};
+use crate::camera::{Camera, FreeParameters};
+use crate::geometry::Pose;
+
+/// How the refinement ended. Every way is a result; only the first is a minimum.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Termination {
+    /// A further step would lower the cost by less than 1e-14 of it: the estimate is a minimum to about a millionth of its
+    /// standard deviation, or to rounding.
+    Converged,
+    /// The iterations ran out.
+    IterationLimit,
+    /// No step lowers the cost although the gradient is not zero: the surface is too flat or too rough for the arithmetic.
+    Stalled,
+}
+
+/// The unknowns.
+#[derive(Debug, Clone)]
+pub(super) struct State {
+    pub camera: Camera,
+    pub cam_from_target: Vec<Pose>,
+}
+
+/// What is minimised.
+pub(super) struct Problem<'a> {
+    pub free: FreeParameters,
+    pub observations: &'a [Observations],
+    pub loss: Loss,
+    pub max_iterations: usize,
+    /// Whether every target keeps the normal of its starting pose.
+    pub hold_tilt: bool,
+}
+
+/// A minimum, or where the search ended.
+pub(super) struct Minimum {
+    pub state: State,
+    /// Normal equations one last negligible step before `state`.
+    pub system: System,
+    pub termination: Termination,
+    pub iterations: usize,
+}
+
+/// A step that gains less than this part of the cost moves no parameter by more than `1e-7 sqrt(degrees of freedom)` of
+/// its standard deviation.
+const RELATIVE_GAIN: f64 = 1e-14;
+/// Residuals of pixels near `p` cannot be known better than this many roundings of `p`.
+const ROUNDINGS: f64 = 8.0;
+/// Small enough not to slow a good start, large enough to tame a singular first matrix.
+const FIRST_DAMPING: f64 = 1e-6;
+/// Damping grows by this on failure and falls by it on success.
+const DAMPING_FACTOR: f64 = 10.0;
+/// With this damping a step is a short way down the gradient; if that fails, nothing helps.
+const LARGEST_DAMPING: f64 = 1e10;
+
+impl Problem<'_> {
+    /// Normal equations at a state; an infinite cost where a point is not in front of the camera.
+    pub fn linearise_into(&self, state: &State, system: &mut System) {
+        system.clear();
+        for (pose, observations) in state.cam_from_target.iter().zip(self.observations) {
+            if normal::add_view(system, &state.camera, self.free, pose, observations, self.loss).is_none() {
+                system.cost = f64::INFINITY;
+                return;
+            }
+        }
+        if self.hold_tilt {
+            for (view, pose) in system.views.iter_mut().zip(&state.cam_from_target) {
+                view.hold_tilt(&pose.rotation.column(2).into_owned());
+            }
+        }
+        if !(state.camera.fx > 0.0 && state.camera.fy > 0.0) || system.cost.is_nan() {
+            system.cost = f64::INFINITY;
+        }
+    }
+
+    /// Below this a cost is rounding.
+    pub fn rounding_cost(&self) -> f64 {
+        let unit = |p: f64| (ROUNDINGS * f64::EPSILON * p) * (ROUNDINGS * f64::EPSILON * p);
+        self.observations.iter().flat_map(|o| &o.pairs).map(|(_, pixel)| unit(pixel.x) + unit(pixel.y)).sum()
+    }
+
+    /// Levenberg-Marquardt (Levenberg 1944; Marquardt 1963) with damping `lambda diag(J^T J)`.
+    pub fn minimise(&self, start: State) -> Minimum {
+        let rounding_cost = self.rounding_cost();
+        let views = self.observations.len();
+        let mut state = start;
+        let mut system = System::new(self.free, views);
+        let mut trial_system = System::new(self.free, views);
+        let mut step = Step { poses: Vec::with_capacity(views), ..Step::default() };
+        let mut trial = state.clone();
+        let mut damping = FIRST_DAMPING;
+        let mut iterations = 0;
+        self.linearise_into(&state, &mut system);
+        let termination = loop {
+            if iterations == self.max_iterations {
+                break Termination::IterationLimit;
+            }
+            if damping > LARGEST_DAMPING || !system.cost.is_finite() {
+                break Termination::Stalled;
+            }
+            if system.solve_into(damping, &mut step).is_none() {
+                damping *= DAMPING_FACTOR;
+                continue;
+            }
+            state.step_into(self.free, &step, &mut trial);
+            let undamped = damping <= FIRST_DAMPING;
+            if undamped && step.predicted_gain <= RELATIVE_GAIN * system.cost + rounding_cost {
+                std::mem::swap(&mut state, &mut trial);
+                break Termination::Converged;
+            }
+            iterations += 1;
+            self.linearise_into(&trial, &mut trial_system);
+            if trial_system.cost < system.cost {
+                std::mem::swap(&mut state, &mut trial);
+                std::mem::swap(&mut system, &mut trial_system);
+                damping = (damping / DAMPING_FACTOR).max(FIRST_DAMPING / 1e6);
+            } else if step.predicted_gain <= ROUNDINGS * f64::EPSILON * system.cost + rounding_cost {
+                // The promised gain is below what the sum of squares can show.
+                break Termination::Converged;
+            } else {
+                damping = damping.max(FIRST_DAMPING) * DAMPING_FACTOR;
+            }
+        };
+        Minimum { state, system, termination, iterations }
+    }
+}
+
+impl State {
+    fn step_into(&self, free: FreeParameters, step: &Step, moved: &mut State) {
+        moved.camera = self.camera.stepped(free, step.intrinsics.as_slice());
+        for ((to, from), delta) in
+            moved.cam_from_target.iter_mut().zip(&self.cam_from_target).zip(&step.poses)
+        {
+            *to = from.perturbed(delta);
+        }
+    }
+}

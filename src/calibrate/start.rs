@@ -1,0 +1,128 @@
+//! Where does the refinement start? Zhang's closed form, or a known principal point where it has no answer.
+
+use super::closed_form::{self, ClosedFormError};
+use super::minimise::State;
+use super::{CalibrationError, Settings};
+use crate::camera::{Camera, Parameter};
+use crate::geometry::{Homography, Mat3, Pose, Vec2};
+
+/// The intrinsics and poses to refine from, the most promising first: the caller's own, the closed form, one focal length
+/// from the principal point, guesses of a wide and of a long lens. `homographies` take the target frame of the refinement to
+/// pixels; `pixel_frame` is the centre and the half-width of the pixels seen.
+pub(super) fn starts(
+    homographies: &[Homography],
+    settings: &Settings,
+    pixel_frame: (Vec2, f64),
+) -> Result<Vec<State>, CalibrationError> {
+    let held = Held::of(settings, pixel_frame.0)?;
+    let half_width = pixel_frame.1;
+    let closed = normalised_closed_form(homographies, settings, pixel_frame);
+    let centred = |focal: f64| Camera::pinhole(focal, focal, held.centre.x, held.centre.y);
+    let cameras = [
+        settings.start,
+        closed.as_ref().ok().copied().filter(|camera| is_plausible(camera, pixel_frame)),
+        focal_from_centre(homographies, held.centre).map(centred),
+        Some(centred(2.0 * half_width)),
+        Some(centred(8.0 * half_width)),
+    ];
+    let states: Vec<State> =
+        cameras.into_iter().flatten().filter_map(|camera| held.state(camera, homographies)).collect();
+    if states.is_empty() {
+        return Err(CalibrationError::NoStart {
+            source: closed.err().unwrap_or(ClosedFormError::NoRealCamera),
+        });
+    }
+    Ok(states)
+}
+
+/// The closed form in pixels scaled to unit size, where its equations are well conditioned for any image size.
+fn normalised_closed_form(
+    homographies: &[Homography],
+    settings: &Settings,
+    (centre, half_width): (Vec2, f64),
+) -> Result<Camera, ClosedFormError> {
+    let s = 1.0 / half_width;
+    let normalise = Mat3::new(s, 0.0, -s * centre.x, 0.0, s, -s * centre.y, 0.0, 0.0, 1.0);
+    let scaled: Vec<Homography> = homographies
+        .iter()
+        .map(|h| {
+            let m = normalise * h.0;
+            Homography(m / m.norm())
+        })
+        .collect();
+    let unit = closed_form::closed_form(&scaled, settings.free().contains(Parameter::Skew))?;
+    Ok(Camera {
+        skew: unit.skew * half_width,
+        ..Camera::pinhole(
+            unit.fx * half_width,
+            unit.fy * half_width,
+            unit.cx * half_width + centre.x,
+            unit.cy * half_width + centre.y,
+        )
+    })
+}
+
+/// A closed form thrown off by noise lies far outside what optics make: it is then no better than a guess.
+fn is_plausible(camera: &Camera, (centre, half_width): (Vec2, f64)) -> bool {
+    let focal_ok = |f: f64| f > 0.1 * half_width && f < 200.0 * half_width;
+    focal_ok(camera.fx)
+        && focal_ok(camera.fy)
+        && camera.fx < 5.0 * camera.fy
+        && camera.fy < 5.0 * camera.fx
+        && (Vec2::new(camera.cx, camera.cy) - centre).norm() < 5.0 * half_width
+}
+
+/// One focal length from the two constraints of every view when the principal point is known (Zhang 2000, section 3.1 with
+/// `u0, v0` given): `h1^T B h2 = 0` and `h1^T B h1 = h2^T B h2` with `B = diag(w, w, 1)`, least squares in `w = 1/f^2`.
+fn focal_from_centre(homographies: &[Homography], centre: Vec2) -> Option<f64> {
+    let shift = Mat3::new(1.0, 0.0, -centre.x, 0.0, 1.0, -centre.y, 0.0, 0.0, 1.0);
+    let (mut square, mut product) = (0.0, 0.0);
+    for h in homographies {
+        let h = shift * h.0;
+        let h = h / h.norm();
+        let (a, b) = (h.column(0), h.column(1));
+        let across = (a[0] * b[0] + a[1] * b[1], a[2] * b[2]);
+        let difference = (a[0] * a[0] + a[1] * a[1] - b[0] * b[0] - b[1] * b[1], a[2] * a[2] - b[2] * b[2]);
+        for (factor, constant) in [across, difference] {
+            square += factor * factor;
+            product += factor * constant;
+        }
+    }
+    let w = -product / square;
+    (w > 0.0 && w.is_finite()).then(|| 1.0 / w.sqrt())
+}
+
+/// The values that are not estimated.
+struct Held {
+    values: [Option<f64>; Parameter::COUNT],
+    centre: Vec2,
+}
+
+impl Held {
+    fn of(settings: &Settings, pixel_centre: Vec2) -> Result<Held, CalibrationError> {
+        let mut values = [None; Parameter::COUNT];
+        for parameter in Parameter::ALL {
+            values[parameter as usize] = settings.held(parameter)?;
+        }
+        let image_centre = settings
+            .image_size
+            .map_or(pixel_centre, |(w, h)| Vec2::new(0.5 * (w as f64 - 1.0), 0.5 * (h as f64 - 1.0)));
+        let centre = Vec2::new(
+            values[Parameter::Cx as usize].unwrap_or(image_centre.x),
+            values[Parameter::Cy as usize].unwrap_or(image_centre.y),
+        );
+        Ok(Held { values, centre })
+    }
+
+    /// The camera with its held values, and the poses it implies.
+    fn state(&self, camera: Camera, homographies: &[Homography]) -> Option<State> {
+        let mut parameters = camera.parameters();
+        for (parameter, held) in parameters.iter_mut().zip(self.values) {
+            *parameter = held.unwrap_or(*parameter);
+        }
+        let camera = Camera::from_parameters(parameters);
+        let poses: Option<Vec<Pose>> =
+            homographies.iter().map(|h| closed_form::pose_from_homography(&camera, h)).collect();
+        poses.map(|cam_from_target| State { camera, cam_from_target })
+    }
+}

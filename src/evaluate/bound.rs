@@ -1,0 +1,56 @@
+//! How well could any unbiased calibrator do? The Cramer-Rao bound of a scene.
+
+use crate::calibrate::{Covariance, information};
+use crate::camera::FreeParameters;
+use crate::synth::Truth;
+
+/// A scene that bounds nothing.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum BoundError {
+    /// The free parameters are not identifiable even from perfect knowledge of the noise.
+    #[error("the scene does not determine {free} together with {views} poses: no unbiased estimate exists")]
+    Singular {
+        /// Free intrinsics.
+        free: String,
+        /// Number of views.
+        views: usize,
+    },
+    /// A point is behind the camera.
+    #[error("a target point of the scene is not in front of the camera")]
+    BehindCamera,
+}
+
+/// The Cramer-Rao bound `sigma^2 (J^T J)^-1` of intrinsics and poses for Gaussian noise of standard deviation `sigma_px` on each
+/// pixel coordinate, `J` taken at the truth (Rao 1945; Cramer 1946). The maximum-likelihood estimate attains it to first order.
+///
+/// # Errors
+/// A scene whose information matrix is singular, or with points behind the camera.
+pub fn cramer_rao(truth: &Truth, free: FreeParameters, sigma_px: f64) -> Result<Covariance, BoundError> {
+    information(&truth.camera, free, &truth.cam_from_target, &truth.points)
+        .ok_or(BoundError::BehindCamera)?
+        .covariance()
+        .map(|unit| unit.scaled(sigma_px * sigma_px))
+        .ok_or_else(|| BoundError::Singular { free: free.to_string(), views: truth.cam_from_target.len() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_chapters_bound_is_met_to_its_printed_digits() {
+        // CHAPTER 5.3: standard deviations with all poses at 120 mm.
+        let bound = cramer_rao(&Truth::chapter(), FreeParameters::CHAPTER, 0.1).unwrap();
+        for (parameter, (sd, digit)) in FreeParameters::CHAPTER.iter().zip([
+            (0.681, 1e-3),
+            (0.684, 1e-3),
+            (0.392, 1e-3),
+            (0.376, 1e-3),
+            (0.0035, 1e-4),
+            (0.0157, 1e-4),
+        ]) {
+            let ours = bound.standard_deviation(parameter).unwrap();
+            assert!((ours - sd).abs() <= 0.5 * digit, "{parameter}: {ours}");
+        }
+    }
+}

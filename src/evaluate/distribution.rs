@@ -1,0 +1,150 @@
+//! How likely is a value by chance? The normal and chi-squared distributions, the same digits on every machine.
+//!
+//! The distributions are those of `statrs`, whose logarithms and exponentials may be the platform's; their last digits
+//! differ between machines. Every result is therefore rounded to ten significant digits, far more than a probability needs.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+
+/// Digits of a result that do not depend on the platform's mathematics.
+const DIGITS: i32 = 10;
+
+/// Rounds to `digits` significant digits.
+pub fn round_significant(x: f64, digits: i32) -> f64 {
+    if x == 0.0 || !x.is_finite() {
+        return x;
+    }
+    let exponent = libm::floor(libm::log10(x.abs())) as i32;
+    let power = digits - 1 - exponent;
+    // Powers of ten are exact up to 1e22; dividing by one keeps small numbers exact to a rounding.
+    if power.abs() > 300 {
+        return x;
+    }
+    let scale = libm::exp10(f64::from(power.abs())).round();
+    if power >= 0 { (x * scale).round() / scale } else { (x / scale).round() * scale }
+}
+
+fn stable(x: f64) -> f64 {
+    round_significant(x, DIGITS)
+}
+
+fn standard_normal() -> Normal {
+    Normal::new(0.0, 1.0).expect("the standard normal distribution exists")
+}
+
+/// `P(Z <= z)` of a standard normal variable.
+pub fn normal_cdf(z: f64) -> f64 {
+    stable(standard_normal().cdf(z))
+}
+
+/// The `z` with `P(Z <= z) = p`, 0 < p < 1.
+pub fn normal_quantile(p: f64) -> f64 {
+    stable(standard_normal().inverse_cdf(p))
+}
+
+/// The half-width `z` of a two-sided interval that a standard normal variable leaves with probability `false_alarm`.
+pub fn normal_two_sided(false_alarm: f64) -> f64 {
+    // By symmetry; the lower tail keeps its digits where 1 - p would not.
+    -normal_quantile(0.5 * false_alarm)
+}
+
+/// A chi-squared distribution.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ChiSquare {
+    degrees_of_freedom: f64,
+}
+
+impl ChiSquare {
+    /// `degrees_of_freedom` > 0; 0 is treated as the least positive number, so that every sum exceeds it.
+    pub fn new(degrees_of_freedom: usize) -> ChiSquare {
+        ChiSquare { degrees_of_freedom: (degrees_of_freedom as f64).max(f64::MIN_POSITIVE) }
+    }
+
+    fn distribution(self) -> ChiSquared {
+        ChiSquared::new(self.degrees_of_freedom).expect("degrees of freedom are positive")
+    }
+
+    /// `P(X <= x)`.
+    pub fn cdf(self, x: f64) -> f64 {
+        stable(self.distribution().cdf(x.max(0.0)))
+    }
+
+    /// `P(X > x)`: the p-value of an observed sum.
+    pub fn survival(self, x: f64) -> f64 {
+        stable(self.distribution().sf(x.max(0.0)))
+    }
+
+    /// The `x` with `P(X <= x) = p`, 0 < p < 1, to ten digits.
+    ///
+    /// Bisection of the distribution function between bounds from the normal approximation (Wilson & Hilferty 1931).
+    pub fn quantile(self, p: f64) -> f64 {
+        let d = self.degrees_of_freedom;
+        let c = 2.0 / (9.0 * d);
+        let root = 1.0 - c + normal_quantile(p) * c.sqrt();
+        let guess = (d * root * root * root).max(1e-3);
+        let (mut low, mut high) = (0.0, 2.0 * guess + 10.0);
+        let distribution = self.distribution();
+        // The tail in which p is small keeps its digits.
+        let below = |x: f64| if p < 0.5 { distribution.cdf(x) < p } else { distribution.sf(x) > 1.0 - p };
+        while below(high) {
+            high *= 2.0;
+        }
+        for _ in 0..200 {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                break;
+            }
+            if below(middle) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        stable(0.5 * (low + high))
+    }
+
+    /// Mean of the square root of the variable: `sqrt(2) Gamma((d + 1) / 2) / Gamma(d / 2)`.
+    pub fn mean_of_root(self) -> f64 {
+        let d = self.degrees_of_freedom;
+        std::f64::consts::SQRT_2 * libm::exp(libm::lgamma(0.5 * (d + 1.0)) - libm::lgamma(0.5 * d))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tabulated_values_are_met() {
+        // Abramowitz & Stegun 1964, tables 26.1 and 26.8.
+        assert!((normal_two_sided(0.05) - 1.959_963_985).abs() < 1e-8);
+        assert!((ChiSquare::new(6).quantile(0.95) - 12.591_587).abs() < 1e-5);
+        assert!((ChiSquare::new(6).survival(9.0) - 0.173_578_1).abs() < 1e-6);
+        assert!((ChiSquare::new(1).quantile(0.99) - 6.634_897).abs() < 1e-5);
+        assert!((ChiSquare::new(474).quantile(0.5) - 473.333).abs() < 1e-2);
+    }
+
+    #[test]
+    fn quantile_and_distribution_function_are_inverse() {
+        for d in [1, 2, 6, 63, 474, 5000] {
+            for p in [1e-6, 0.01, 0.5, 0.99, 0.999_999] {
+                let x = ChiSquare::new(d).quantile(p);
+                assert!((ChiSquare::new(d).cdf(x) - p).abs() < 1e-8, "d {d} p {p}");
+            }
+        }
+    }
+
+    #[test]
+    fn rounding_keeps_the_leading_digits() {
+        assert_eq!(round_significant(123.456_789, 4), 123.5);
+        assert_eq!(round_significant(-0.001_234_56, 3), -0.001_23);
+        assert_eq!(round_significant(9.999_6e20, 4), 1e21);
+        assert_eq!(round_significant(0.0, 4), 0.0);
+    }
+
+    #[test]
+    fn the_mean_of_a_chi_variable_is_the_known_one() {
+        // One degree of freedom: half-normal, sqrt(2 / pi). Large d: sqrt(d - 1/2) to 1 / (16 d^1.5).
+        assert!((ChiSquare::new(1).mean_of_root() - (2.0 / std::f64::consts::PI).sqrt()).abs() < 1e-14);
+        assert!((ChiSquare::new(474).mean_of_root() - 473.5f64.sqrt()).abs() < 1e-4);
+    }
+}

@@ -1,0 +1,14 @@
+//! How far is the estimate from the truth, and how far should it be? The only place where both are known.
+
+pub mod bound;
+pub mod distribution;
+pub mod errors;
+pub mod interval;
+pub mod rmse;
+pub mod sample;
+
+pub use bound::{BoundError, cramer_rao};
+pub use errors::{Errors, reconcile};
+pub use interval::Interval;
+pub use rmse::RmseDistribution;
+pub use sample::Sample;
