@@ -52,6 +52,7 @@ pub fn main(experiments: &[Experiment]) -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => return terminal::usage(&error).into(),
     };
+    end_well_on_interrupt();
     if let Err(exit) = set_threads(arguments.threads) {
         return exit.into();
     }
@@ -68,7 +69,18 @@ pub fn main(experiments: &[Experiment]) -> ExitCode {
 
 /// The command of an experiment's own binary: one run, as `calibench run ID` does it.
 pub fn main_for(experiment: &Experiment) -> ExitCode {
+    end_well_on_interrupt();
     run::main_for(experiment).into()
+}
+
+/// Ctrl-C ends the program with a code of its own. Files are renamed into place whole, so what is finished stays.
+fn end_well_on_interrupt() {
+    let handler = || {
+        warn("interrupted: results of finished experiments are kept, the rest is missing");
+        std::process::exit(Exit::Incomplete as i32);
+    };
+    // A handler that was set before stays in charge.
+    let _ = ctrlc::set_handler(handler);
 }
 
 /// Sets the size of the thread pool.
