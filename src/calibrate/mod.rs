@@ -16,6 +16,7 @@ mod minimise;
 mod normal;
 mod report;
 mod settings;
+pub mod single_plane;
 mod start;
 mod system;
 

@@ -1,13 +1,22 @@
 //! Plane and space geometry that knows nothing of cameras: rotations, poses, homographies, fits.
 
+pub mod affine;
 pub mod homography;
 mod homography_system;
 pub(crate) mod lanes;
+pub mod line;
 pub mod pose;
+pub mod projective_frame;
 pub mod rotation;
+pub mod scatter;
+pub mod similarity;
 
+pub use affine::{Affine, LinearFitError};
 pub use homography::{Homography, HomographyError, HomographyFit};
+pub use line::{LineError, LineFit};
 pub use pose::Pose;
+pub use scatter::Scatter;
+pub use similarity::{Handedness, Similarity};
 
 /// A point or vector of the plane.
 pub type Vec2 = nalgebra::Vector2<f64>;

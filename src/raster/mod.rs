@@ -1,5 +1,9 @@
 //! What is an image to this library? A rectangle of grey samples; files are the business of `io`.
 
+mod sample;
+
+pub use sample::Sample;
+
 /// A grey image, row by row. Sample `(x, y)` is centred on pixel coordinate `(x, y)`.
 ///
 /// `Raster<f32>` holds linear intensity with black 0 and white 1; `Raster<u8>` and `Raster<u16>` hold grey levels.

@@ -1,5 +1,6 @@
 //! What would a camera of known truth see? The virtual camera, its scenes, and the one place where noise enters.
 
+pub mod render;
 pub mod scene;
 pub mod stream;
 

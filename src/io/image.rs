@@ -1,0 +1,331 @@
+//! How does a photograph become a raster? PNG, JPEG, BMP, PGM/PPM and TIFF; grey or colour, 8 or 16 bit.
+//!
+//! The format is told by the content, not by the name. Colour becomes grey by Rec. 601 luma,
+//! `(299 R + 587 G + 114 B) / 1000` rounded, the weights of the field's other tools; an alpha channel is ignored.
+
+use crate::raster::Raster;
+use image::{DynamicImage, ImageDecoder, ImageReader};
+use std::io::{BufReader, Cursor, Seek};
+use std::path::Path;
+
+/// A grey image with the depth of its file.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Grey {
+    /// 8 bits a sample.
+    U8(Raster<u8>),
+    /// 16 bits a sample.
+    U16(Raster<u16>),
+    /// Floating-point intensity.
+    F32(Raster<f32>),
+}
+
+/// Why a file is not an image that can be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// The file cannot be opened or read.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file.
+        path: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file cannot be written.
+    #[error("cannot write {0}")]
+    Write(std::io::Error),
+    /// The file has no bytes.
+    #[error("{path}: the file is empty (0 bytes)")]
+    Empty {
+        /// The file.
+        path: String,
+    },
+    /// The content is of no known format.
+    #[error("{path}: not an image in PNG, JPEG, BMP, PGM/PPM or TIFF format ({reason})")]
+    UnknownFormat {
+        /// The file.
+        path: String,
+        /// What the reader said.
+        reason: String,
+    },
+    /// The image is larger than this program handles.
+    #[error("{path}: {width} x {height} px exceed the limit of {limit_px} px an image")]
+    TooLarge {
+        /// The file.
+        path: String,
+        /// Width, px.
+        width: u32,
+        /// Height, px.
+        height: u32,
+        /// Largest number of pixels.
+        limit_px: u64,
+    },
+    /// The content is damaged or cut off.
+    #[error("{path}: broken image: {reason}")]
+    Broken {
+        /// The file.
+        path: String,
+        /// What the reader said.
+        reason: String,
+    },
+}
+
+/// Largest number of pixels: 200 megapixels, above the largest sensors and below what exhausts a small machine.
+pub const LIMIT_PX: u64 = 200_000_000;
+
+impl Grey {
+    /// Width, px.
+    pub fn width(&self) -> usize {
+        self.size().0
+    }
+
+    /// Height, px.
+    pub fn height(&self) -> usize {
+        self.size().1
+    }
+
+    /// Width and height, px.
+    pub fn size(&self) -> (usize, usize) {
+        match self {
+            Grey::U8(image) => (image.width(), image.height()),
+            Grey::U16(image) => (image.width(), image.height()),
+            Grey::F32(image) => (image.width(), image.height()),
+        }
+    }
+
+    /// The image as intensity, black 0 and white 1.
+    pub fn to_f32(&self) -> Raster<f32> {
+        match self {
+            Grey::U8(image) => image.to_f32(),
+            Grey::U16(image) => image.to_f32(),
+            Grey::F32(image) => image.clone(),
+        }
+    }
+
+    /// The image in 8 bits, for display and for detectors that want no more.
+    pub fn to_u8(&self) -> Raster<u8> {
+        match self {
+            Grey::U8(image) => image.clone(),
+            // 65535 = 255 x 257.
+            Grey::U16(image) => image.map(|&level| ((u32::from(level) + 128) / 257) as u8),
+            Grey::F32(image) => image.to_u8(),
+        }
+    }
+}
+
+/// Reads a photograph.
+///
+/// # Errors
+/// See [`ImageError`]; a damaged file is an error, never a panic, and a forged size allocates nothing.
+pub fn read_image(path: &Path) -> Result<Grey, ImageError> {
+    let name = path.display().to_string();
+    let io = |source| ImageError::Io { path: name.clone(), source };
+    let file = std::fs::File::open(path).map_err(io)?;
+    if file.metadata().map_err(io)?.len() == 0 {
+        return Err(ImageError::Empty { path: name });
+    }
+    decode(BufReader::new(file), &name)
+}
+
+/// Reads a photograph from the bytes of a file; `name` stands in errors.
+///
+/// # Errors
+/// See [`ImageError`].
+pub fn parse_image(bytes: &[u8], name: &str) -> Result<Grey, ImageError> {
+    if bytes.is_empty() {
+        return Err(ImageError::Empty { path: name.to_string() });
+    }
+    decode(Cursor::new(bytes), name)
+}
+
+fn decode(source: impl std::io::BufRead + Seek, name: &str) -> Result<Grey, ImageError> {
+    let path = || name.to_string();
+    let reader = ImageReader::new(source)
+        .with_guessed_format()
+        .map_err(|source| ImageError::Io { path: path(), source })?;
+    if reader.format().is_none() {
+        return Err(ImageError::UnknownFormat { path: path(), reason: "unknown first bytes".into() });
+    }
+    let failed = |error: image::ImageError| match error {
+        image::ImageError::Unsupported(error) => {
+            ImageError::UnknownFormat { path: path(), reason: error.to_string() }
+        }
+        error => ImageError::Broken { path: path(), reason: error.to_string() },
+    };
+    let decoder = reader.into_decoder().map_err(failed)?;
+    let (width, height) = decoder.dimensions();
+    if u64::from(width) * u64::from(height) > LIMIT_PX {
+        return Err(ImageError::TooLarge { path: path(), width, height, limit_px: LIMIT_PX });
+    }
+    if width == 0 || height == 0 {
+        return Err(ImageError::Broken {
+            path: path(),
+            reason: format!("{width} x {height} px hold no image"),
+        });
+    }
+    Ok(grey(DynamicImage::from_decoder(decoder).map_err(failed)?))
+}
+
+/// Grey levels of a decoded image.
+fn grey(image: DynamicImage) -> Grey {
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    let of_u8 = |samples| Grey::U8(raster(width, height, samples));
+    let of_u16 = |samples| Grey::U16(raster(width, height, samples));
+    match image {
+        DynamicImage::ImageLuma8(image) => of_u8(image.into_raw()),
+        DynamicImage::ImageLumaA8(image) => of_u8(image.pixels().map(|p| p.0[0]).collect()),
+        DynamicImage::ImageRgb8(image) => {
+            of_u8(image.pixels().map(|p| luma([p.0[0], p.0[1], p.0[2]])).collect())
+        }
+        DynamicImage::ImageRgba8(image) => {
+            of_u8(image.pixels().map(|p| luma([p.0[0], p.0[1], p.0[2]])).collect())
+        }
+        DynamicImage::ImageLuma16(image) => of_u16(image.into_raw()),
+        DynamicImage::ImageLumaA16(image) => of_u16(image.pixels().map(|p| p.0[0]).collect()),
+        DynamicImage::ImageRgb16(image) => {
+            of_u16(image.pixels().map(|p| luma_16([p.0[0], p.0[1], p.0[2]])).collect())
+        }
+        DynamicImage::ImageRgba16(image) => {
+            of_u16(image.pixels().map(|p| luma_16([p.0[0], p.0[1], p.0[2]])).collect())
+        }
+        // Floating-point images (TIFF) and any depth added later.
+        other => {
+            let weights = [0.299f32, 0.587, 0.114];
+            let luma = |p: &image::Rgb<f32>| weights[0] * p.0[0] + weights[1] * p.0[1] + weights[2] * p.0[2];
+            Grey::F32(raster(width, height, other.to_rgb32f().pixels().map(luma).collect()))
+        }
+    }
+}
+
+fn raster<T: Copy>(width: usize, height: usize, samples: Vec<T>) -> Raster<T> {
+    Raster::from_samples(width, height, samples).expect("a decoded image has a sample for every pixel")
+}
+
+fn luma(rgb: [u8; 3]) -> u8 {
+    luma_16(rgb.map(u16::from)) as u8
+}
+
+fn luma_16(rgb: [u16; 3]) -> u16 {
+    let [r, g, b] = rgb.map(u32::from);
+    ((299 * r + 587 * g + 114 * b + 500) / 1000) as u16
+}
+
+/// The PNG of an 8-bit image.
+///
+/// # Errors
+/// Only an image without pixels, or of 2^32 or more on a side, cannot be written.
+pub fn png(image: &Raster<u8>) -> Result<Vec<u8>, ImageError> {
+    encoded(image.samples(), image.width(), image.height(), image::ExtendedColorType::L8)
+}
+
+/// Writes an 8-bit image as PNG.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_png(path: &Path, image: &Raster<u8>) -> Result<(), ImageError> {
+    write(path, &png(image)?)
+}
+
+/// Writes a 16-bit image as PNG.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_png_16(path: &Path, image: &Raster<u16>) -> Result<(), ImageError> {
+    let bytes: Vec<u8> = image.samples().iter().flat_map(|level| level.to_ne_bytes()).collect();
+    write(path, &encoded(&bytes, image.width(), image.height(), image::ExtendedColorType::L16)?)
+}
+
+/// Encodes samples as PNG.
+pub(super) fn encoded(
+    bytes: &[u8],
+    width: usize,
+    height: usize,
+    colour: image::ExtendedColorType,
+) -> Result<Vec<u8>, ImageError> {
+    let broken = |reason: String| ImageError::Broken { path: "PNG".into(), reason };
+    let side = |length: usize| u32::try_from(length).map_err(|error| broken(error.to_string()));
+    let mut file = Vec::new();
+    let encoder = image::codecs::png::PngEncoder::new(&mut file);
+    image::ImageEncoder::write_image(encoder, bytes, side(width)?, side(height)?, colour)
+        .map_err(|error| broken(error.to_string()))?;
+    Ok(file)
+}
+
+pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
+    super::write_atomically(path, bytes).map_err(ImageError::Write)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file_of(image: DynamicImage, format: image::ImageFormat) -> Vec<u8> {
+        let mut bytes = Cursor::new(Vec::new());
+        image.write_to(&mut bytes, format).unwrap();
+        bytes.into_inner()
+    }
+
+    #[test]
+    fn every_lossless_format_and_depth_gives_its_levels() {
+        use image::ImageFormat::{Bmp, Png, Pnm, Tiff};
+        let grey = image::GrayImage::from_fn(5, 3, |x, y| image::Luma([(50 * y + 7 * x) as u8]));
+        let expected = Raster::from_fn(5, 3, |x, y| (50 * y + 7 * x) as u8);
+        for format in [Png, Bmp, Pnm, Tiff] {
+            let read = parse_image(&file_of(grey.clone().into(), format), "grey").unwrap();
+            assert_eq!(read, Grey::U8(expected.clone()), "{format:?}");
+            let colour = DynamicImage::from(grey.clone()).to_rgb8();
+            let read = parse_image(&file_of(colour.into(), format), "colour").unwrap();
+            assert_eq!(read, Grey::U8(expected.clone()), "{format:?}");
+        }
+        let deep = image::ImageBuffer::from_fn(5, 3, |x, y| image::Luma([(9000 * y + 700 * x) as u16]));
+        for format in [Png, Pnm, Tiff] {
+            let read = parse_image(&file_of(deep.clone().into(), format), "deep").unwrap();
+            assert_eq!(
+                read,
+                Grey::U16(Raster::from_fn(5, 3, |x, y| (9000 * y + 700 * x) as u16)),
+                "{format:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_jpeg_keeps_smooth_levels() {
+        let smooth = image::GrayImage::from_fn(64, 48, |x, y| image::Luma([(60 + x + 2 * y) as u8]));
+        let read = parse_image(&file_of(smooth.into(), image::ImageFormat::Jpeg), "smooth").unwrap();
+        let Grey::U8(read) = read else { panic!("a JPEG has 8 bits") };
+        // Quality 75 quantises the lowest frequencies in steps of at most 16 / 8 levels.
+        assert!((0..48).all(|y| (0..64).all(|x| read.get(x, y).abs_diff((60 + x + 2 * y) as u8) <= 4)));
+    }
+
+    #[test]
+    fn bad_files_are_refused_with_a_reason() {
+        assert!(matches!(parse_image(&[], "x"), Err(ImageError::Empty { .. })));
+        assert!(matches!(parse_image(b"u,v\n1,2\n", "x"), Err(ImageError::UnknownFormat { .. })));
+        assert!(matches!(read_image(Path::new("no/such/file.png")), Err(ImageError::Io { .. })));
+        let whole = file_of(image::GrayImage::new(300, 200).into(), image::ImageFormat::Png);
+        for length in [9, 20, 40, whole.len() / 2] {
+            let error = parse_image(&whole[..length], "cut.png").unwrap_err();
+            assert!(matches!(error, ImageError::Broken { .. }), "{length}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_forged_size_is_refused_before_memory_is_taken() {
+        let error = parse_image(b"P5\n4000000000 4000000000\n255\n", "forged.pgm").unwrap_err();
+        assert!(matches!(error, ImageError::TooLarge { .. } | ImageError::Broken { .. }), "{error}");
+        let error = parse_image(b"P5\n40000 40000\n255\nabc", "forged.pgm").unwrap_err();
+        assert!(matches!(error, ImageError::TooLarge { width: 40_000, .. }), "{error}");
+    }
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        let folder = std::env::temp_dir().join(format!("calibench-image-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let deep = Raster::from_fn(7, 4, |x, y| (5000 * x + 300 * y) as u16);
+        write_png_16(&folder.join("deep.png"), &deep).unwrap();
+        assert_eq!(read_image(&folder.join("deep.png")).unwrap(), Grey::U16(deep.clone()));
+        let eight = Grey::U16(deep).to_u8();
+        write_png(&folder.join("eight.png"), &eight).unwrap();
+        assert_eq!(read_image(&folder.join("eight.png")).unwrap(), Grey::U8(eight));
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+}

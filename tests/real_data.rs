@@ -1,0 +1,129 @@
+//! Does the solver find what others published for their own measurements?
+//!
+//! Expected values: `published.toml` of the data folder. Skipped, with a message, where the folder is absent.
+#![cfg(feature = "io")]
+
+use calibench::calibrate::{Calibration, Settings, Termination, calibrate, closed_form};
+use calibench::camera::FreeParameters;
+use calibench::geometry::Homography;
+use calibench::io::{CornerFile, data_folder, read_corners};
+use std::path::PathBuf;
+
+struct Published {
+    folder: PathBuf,
+    table: toml::Table,
+}
+
+impl Published {
+    /// `None`, said on standard error, if there are no data.
+    fn load() -> Option<Published> {
+        let Some(folder) = data_folder().expect("CALIBENCH_DATA names a folder") else {
+            eprintln!("SKIPPED: no folder of real data (set CALIBENCH_DATA)");
+            return None;
+        };
+        let text = std::fs::read_to_string(folder.join("published.toml")).unwrap();
+        Some(Published { folder, table: text.parse().unwrap() })
+    }
+
+    fn set(&self, name: &str) -> &toml::Table {
+        self.table[name].as_table().unwrap()
+    }
+
+    fn numbers(&self, set: &str, key: &str) -> Vec<f64> {
+        self.set(set)[key].as_array().unwrap().iter().map(|x| x.as_float().unwrap()).collect()
+    }
+
+    fn number(&self, set: &str, key: &str) -> f64 {
+        self.set(set)[key].as_float().unwrap()
+    }
+
+    fn entry(&self, set: &str, table: &str, key: &str) -> f64 {
+        self.set(set)[table].as_table().unwrap()[key].as_float().unwrap()
+    }
+
+    fn corners(&self, file: &str) -> CornerFile {
+        read_corners(&self.folder.join(file)).unwrap()
+    }
+}
+
+fn solve(corners: &CornerFile, free: &str) -> Calibration {
+    let free: FreeParameters = free.parse().unwrap();
+    let result = calibrate(&corners.views, &Settings::new(free).with_image_size((640, 480))).unwrap();
+    assert_eq!(result.termination, Termination::Converged);
+    result
+}
+
+fn assert_relative(ours: f64, theirs: f64, tolerance: f64, what: &str) {
+    let error = (ours / theirs - 1.0).abs();
+    assert!(error <= tolerance, "{what}: {ours} against {theirs}, relative {error:.2e} > {tolerance:.0e}");
+}
+
+/// Zhang's names in the order of our parameters: alpha, beta, u0, v0, gamma, k1, k2.
+const ZHANG_ORDER: [usize; 7] = [0, 2, 3, 4, 1, 5, 6];
+
+#[test]
+fn zhangs_optimum_and_standard_deviations_are_found() {
+    let Some(published) = Published::load() else { return };
+    let result = solve(&published.corners("zhang/points.csv"), "fx,fy,cx,cy,skew,k1,k2");
+    let optimum = published.numbers("zhang", "optimum");
+    let sigma = published.numbers("zhang", "sigma");
+    for (parameter, place) in result.free.iter().zip(ZHANG_ORDER) {
+        assert_relative(result.camera.get(parameter), optimum[place], 1e-6, parameter.name());
+        // Printed with four digits; gamma and k1 with three.
+        let sd = result.standard_deviation(parameter).unwrap();
+        assert_relative(sd, sigma[place], 1e-3, &format!("sd {parameter}"));
+    }
+    assert_relative(result.rmse_px, published.number("zhang", "rms_point_px"), 1e-6, "rms");
+}
+
+#[test]
+fn zhangs_closed_form_is_met_to_the_printed_digits() {
+    let Some(published) = Published::load() else { return };
+    let corners = published.corners("zhang/points.csv");
+    let homographies: Vec<Homography> =
+        corners.views.iter().map(|v| Homography::fit(v.points(), v.pixels()).unwrap().homography).collect();
+    let camera = closed_form(&homographies, true).unwrap();
+    for (name, value) in [
+        ("alpha", camera.fx),
+        ("gamma", camera.skew),
+        ("beta", camera.fy),
+        ("u0", camera.cx),
+        ("v0", camera.cy),
+    ] {
+        let precise = published.entry("zhang", "closed_form", name);
+        assert!((value - precise).abs() <= 5.1e-5, "{name}: {value} against {precise}");
+        let printed = published.entry("zhang", "closed_form_published", name);
+        let half_digit = if name == "gamma" { 5e-5 } else { 5e-3 };
+        assert!((value - printed).abs() <= half_digit, "{name}: {value} against the printed {printed}");
+    }
+}
+
+#[test]
+fn opencvs_published_camera_is_found() {
+    let Some(published) = Published::load() else { return };
+    let result = solve(&published.corners("opencv_left/corners.csv"), "fx,fy,cx,cy,k1,k2,p1,p2,k3");
+    for (parameter, theirs) in result.free.iter().zip(published.numbers("opencv_left", "published")) {
+        assert_relative(result.camera.get(parameter), theirs, 1e-6, parameter.name());
+    }
+    assert_relative(result.rmse_px, published.number("opencv_left", "rms_point_px"), 1e-6, "rms");
+}
+
+#[test]
+fn the_matlab_toolboxs_camera_is_found() {
+    let Some(published) = Published::load() else { return };
+    let result = solve(&published.corners("calib1/points.csv"), "fx,fy,cx,cy,k1,k2,p1,p2");
+    let theirs = published.numbers("calib1", "published");
+    // MATLAB stopped 2e-6 short of the optimum in f.
+    assert_relative(result.camera.fx, theirs[0], 3e-6, "fx");
+    assert_relative(result.camera.fy, theirs[1], 3e-6, "fy");
+    for (parameter, optimum) in result.free.iter().zip(published.numbers("calib1", "optimum")) {
+        // The valley is flat (fx is known to 0.8 %), and two searches for its bottom end a small way apart.
+        let z = (result.camera.get(parameter) - optimum) / result.standard_deviation(parameter).unwrap();
+        assert!(z.abs() < 1e-4, "{parameter}: {z:.1e} standard deviations from the optimum");
+    }
+    // The toolbox divides by N - 1.
+    let unbiased = result.rms_per_axis_px() * (245.0f64 / 244.0).sqrt();
+    let rms = published.numbers("calib1", "rms_axis_px");
+    assert_relative(unbiased.x, rms[0], 1e-6, "rms u");
+    assert_relative(unbiased.y, rms[1], 1e-6, "rms v");
+}

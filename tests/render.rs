@@ -1,0 +1,151 @@
+//! The virtual camera's images against independent integration of the same scene.
+
+use calibench::camera::{BrownConrady, Camera};
+use calibench::geometry::{Pose, Vec2, Vec3};
+use calibench::synth::render::{
+    Appearance, Imaging, RenderError, SensorNoise, Shading, Surround, nine_dot_stand_in, photograph,
+};
+use calibench::synth::scene::looking_at_centre;
+use calibench::synth::{Stream, StreamKey, Truth};
+use calibench::target::Board;
+
+/// The board point that a pixel sees: the camera model inverted, then the ray met with the plane Z = 0.
+fn board_point(camera: &Camera, cam_from_target: &Pose, pixel: &Vec2) -> Vec2 {
+    let ray = camera.normalised_ray(pixel).unwrap();
+    let target_from_cam = cam_from_target.inverse();
+    let direction = target_from_cam.rotation * Vec3::new(ray.x, ray.y, 1.0);
+    let origin = target_from_cam.translation;
+    (origin - direction * (origin.z / direction.z)).xy()
+}
+
+/// Mean of the board's level over the square of a pixel from `n x n` point samples.
+fn supersampled(level: &dyn Fn(&Vec2) -> f64, pixel: (usize, usize), n: usize) -> f64 {
+    let offset = |i: usize| (i as f64 + 0.5) / n as f64 - 0.5;
+    let sum: f64 = (0..n)
+        .flat_map(|i| (0..n).map(move |j| (i, j)))
+        .map(|(i, j)| level(&Vec2::new(pixel.0 as f64 + offset(i), pixel.1 as f64 + offset(j))))
+        .sum();
+    sum / (n * n) as f64
+}
+
+/// Largest difference between a rendered image and supersampling, over a scatter of pixels with partial coverage.
+fn largest_difference(board: &Board, ink: &dyn Fn(&Vec2) -> bool) -> (f64, usize) {
+    let camera = Truth::chapter_camera().with_distortion(BrownConrady {
+        k1: -0.18,
+        k2: 0.05,
+        p1: 2e-3,
+        p2: -1e-3,
+        k3: 0.01,
+    });
+    let pose = looking_at_centre([-25.0, 30.0, 10.0], 150.0);
+    let photo = photograph(&camera, (640, 480), board, &pose, &Imaging::default()).unwrap();
+    let level = |pixel: &Vec2| if ink(&board_point(&camera, &pose, pixel)) { 0.1 } else { 0.85 };
+    let (mut largest, mut tested) = (0.0f64, 0);
+    for y in 0..480 {
+        for x in 0..640 {
+            let seen = f64::from(photo.image.get(x, y));
+            if (0.11..0.84).contains(&seen) && (7 * x + 13 * y) % 29 == 0 {
+                largest = largest.max((seen - supersampled(&level, (x, y), 48)).abs());
+                tested += 1;
+            }
+        }
+    }
+    (largest, tested)
+}
+
+// An edge pixel of n x n samples is wrong by about sqrt(n) / n^2 samples (3e-3 at n = 48), five times that in the worst of
+// hundreds, times the contrast 0.75.
+const SUPERSAMPLING_PX: f64 = 5.0 * 3e-3 * 0.75;
+
+#[test]
+fn discs_cover_what_supersampling_finds() {
+    let board = Truth::chapter_board();
+    let centres = board.points();
+    let ink = |p: &Vec2| centres.iter().any(|c| (p - c).norm() < 1.5);
+    let (largest, tested) = largest_difference(&board, &ink);
+    assert!(tested > 50 && largest < SUPERSAMPLING_PX, "{largest} over {tested}");
+}
+
+#[test]
+fn squares_cover_what_supersampling_finds() {
+    let board = Board::chessboard(9, 7, 10.0).unwrap();
+    let ink = |p: &Vec2| {
+        let (i, j) = ((p.x + 50.0) / 10.0, (p.y + 40.0) / 10.0);
+        (0.0..10.0).contains(&i) && (0.0..8.0).contains(&j) && (i.floor() + j.floor()) as i64 % 2 == 0
+    };
+    let (largest, tested) = largest_difference(&board, &ink);
+    assert!(tested > 200 && largest < SUPERSAMPLING_PX, "{largest} over {tested}");
+}
+
+#[test]
+fn a_board_seen_from_behind_keeps_its_levels() {
+    let pose = looking_at_centre([180.0, 0.0, 0.0], 120.0);
+    let photo =
+        photograph(&Truth::chapter_camera(), (640, 480), &Truth::chapter_board(), &pose, &Imaging::default());
+    let image = photo.unwrap().image;
+    let darkest = image.samples().iter().copied().fold(1.0, f32::min);
+    let brightest = image.samples().iter().copied().fold(0.0, f32::max);
+    assert!((darkest - 0.1).abs() < 1e-6 && (brightest - 0.85).abs() < 1e-6);
+}
+
+#[test]
+fn blur_moves_light_but_makes_none() {
+    let total = |blur_px: f64| -> f64 {
+        let imaging = Imaging { blur_px, ..Imaging::default() };
+        let board = Truth::chapter_board();
+        let pose = Truth::chapter_poses()[3];
+        let photo = photograph(&Truth::chapter_camera(), (640, 480), &board, &pose, &imaging).unwrap();
+        photo.image.samples().iter().map(|&x| 0.85 - f64::from(x)).sum()
+    };
+    // 307 200 samples rounded to f32 near 0.85: each 3e-8 at most, the same for all paper pixels.
+    let sharp = total(0.0);
+    assert!((total(0.8) / sharp - 1.0).abs() < 1e-5);
+    assert!((total(3.0) / sharp - 1.0).abs() < 1e-5);
+}
+
+#[test]
+fn the_surround_shading_and_noise_enter_where_they_should() {
+    let appearance =
+        Appearance { surround: Some(Surround { level: 0.3, margin: 8.0 }), ..Appearance::default() };
+    let shading = Shading { slope_x: 0.2, ..Shading::default() };
+    let imaging = Imaging { appearance, shading, ..Imaging::default() };
+    let pose = looking_at_centre([0.0; 3], 150.0);
+    let photo =
+        photograph(&Truth::chapter_camera(), (640, 480), &Truth::chapter_board(), &pose, &imaging).unwrap();
+    let left = f64::from(photo.image.get(0, 240));
+    assert!((left / 0.3 - 0.8).abs() < 1e-3, "{left}");
+    let key = StreamKey { seed: 3, scenario: "render", trial: 0, purpose: "noise" };
+    let noise = SensorNoise::constant(0.01);
+    let noisy = photo.clone().with_noise(&noise, &mut Stream::open(key));
+    let again = photo.clone().with_noise(&noise, &mut Stream::open(key));
+    assert_eq!(noisy, again);
+    assert_ne!(noisy.image, photo.image);
+    assert_eq!(noisy.centres_true, photo.centres_true);
+}
+
+#[test]
+fn the_nine_dot_stand_in_has_the_published_geometry() {
+    let photo = nine_dot_stand_in();
+    assert_eq!((photo.image.width(), photo.image.height()), (1571, 1053));
+    let c = &photo.centres_true;
+    assert!((c[4] - Vec2::new(714.708, 565.993)).norm() < 1e-12);
+    assert!((c[5].x - c[4].x - 236.23).abs() < 1e-12 && (c[7].y - c[4].y - 236.19).abs() < 1e-12);
+    assert!(photo.image.get(715, 566) < 0.11 && photo.image.get(600, 450) > 0.84);
+}
+
+#[test]
+fn what_cannot_be_seen_is_refused_with_its_place() {
+    let see = |camera: &Camera, pose: &Pose, imaging: &Imaging| {
+        photograph(camera, (640, 480), &Truth::chapter_board(), pose, imaging).unwrap_err()
+    };
+    let camera = Truth::chapter_camera();
+    let close = looking_at_centre([80.0, 0.0, 0.0], 20.0);
+    assert!(matches!(see(&camera, &close, &Imaging::default()), RenderError::BehindCamera { .. }));
+    let folding = camera.with_distortion(BrownConrady::radial(-2.0, 0.0));
+    let front = looking_at_centre([0.0; 3], 120.0);
+    assert!(matches!(see(&folding, &front, &Imaging::default()), RenderError::BeyondMonotoneRadius { .. }));
+    for blur_px in [-1.0, f64::NAN, 1e9] {
+        let imaging = Imaging { blur_px, ..Imaging::default() };
+        assert!(matches!(see(&camera, &front, &imaging), RenderError::Setting { name: "blur_px", .. }));
+    }
+}
