@@ -2,8 +2,11 @@
 //!
 //! At a pixel `p` on an edge through the corner `q` the gradient `g` is perpendicular to `p - q`; inside a square it is
 //! zero. So `q` minimises `sum w (g . (p - q))^2`, a linear problem, solved again around each new `q` until it rests
-//! (Foerstner & Gulch 1987; the window and weights are those of OpenCV's `cornerSubPix`).
+//! (Foerstner & Gulch 1987; the window and weights are those of OpenCV's `cornerSubPix`). Differences between pixels put an
+//! error of some hundredths of a pixel into it that depends on the corner's place on the pixel grid, so it is only the start
+//! of a fit to the pixels themselves (`saddle`), and what remains where that does not converge.
 
+use super::saddle;
 use crate::geometry::Vec2;
 use crate::raster::{Raster, Sample};
 use nalgebra::Matrix2;
@@ -71,7 +74,7 @@ pub fn refine_corner<T: Sample>(image: &Raster<T>, start: Vec2, half_px: usize) 
             break;
         }
     }
-    Ok(corner)
+    Ok(saddle::refine(image, corner, half_px).unwrap_or(corner))
 }
 
 /// One solution of the linear problem around a place.

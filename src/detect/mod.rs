@@ -12,6 +12,7 @@ mod grid;
 mod lattice;
 mod neighbours;
 mod order;
+mod saddle;
 mod threshold;
 
 pub use bias::{disc_bias, disc_biases};
