@@ -25,7 +25,7 @@ fn refined_corners_are_near_the_truth() {
             .sum();
         let rms = (square / 54.0).sqrt();
         eprintln!("tilt {tilt:?}: {rms:.5} px");
-        // Bilinear sampling and bent edges leave some thousandths: measured 0.002 to 0.01 px.
-        assert!(rms < 0.02, "tilt {tilt:?}: {rms}");
+        // Measured 0.001 to 0.004 px; most where edges run along pixel rows and the lens is only nearly Gaussian.
+        assert!(rms < 0.01, "tilt {tilt:?}: {rms}");
     }
 }

@@ -15,8 +15,9 @@ use calib_targets_chessboard::{
     ChessboardDetector, ChessboardParams, GrayImageView, default_chess_config, detect_corners,
 };
 
-/// Largest half-window of the refinement, px: beyond, lens distortion bends the edges more than noise moves them.
-const LARGEST_HALF_WINDOW_PX: f64 = 5.0;
+/// Largest half-window of the refinement, px: beyond, bent edges and bent boards cost more than further pixels bring. Measured
+/// on OpenCV's 13 sample photographs: calibration leaves 0.164, 0.160, 0.175 and 0.220 px RMS with 5, 7, 9 and 12 px.
+const LARGEST_HALF_WINDOW_PX: f64 = 7.0;
 
 /// Part of the distance to the nearest corner that the half-window may take: its corners then stay clear of the next edges.
 const WINDOW_FRACTION: f64 = 0.4;
@@ -24,6 +25,9 @@ const WINDOW_FRACTION: f64 = 0.4;
 /// How far a corner may lie from where its cell's other corners put it, as a fraction of the cell's side: perspective and
 /// distortion change a cell by less from one to the next.
 const HOLE_FRACTION: f64 = 0.2;
+
+/// Rounds of filling: a hole, and the corner behind it that it had cut off.
+const HOLE_ROUNDS: usize = 2;
 
 /// The inner corners of a chessboard, `columns x rows`, row by row, px.
 ///
@@ -43,7 +47,10 @@ pub fn chessboard_corners(image: &Raster<u8>, columns: usize, rows: usize) -> Re
     let centres: Vec<Vec2> =
         corners.iter().map(|c| Vec2::new(c.position.x.into(), c.position.y.into())).collect();
     let labelled: Lattice = detection.corners.iter().map(|c| ((c.grid.u, c.grid.v), c.input_index)).collect();
-    let lattice = with_holes_filled(without_strays(labelled), &centres);
+    let mut lattice = without_strays(labelled);
+    for _ in 0..HOLE_ROUNDS {
+        lattice = with_holes_filled(lattice, &centres);
+    }
     let marks = ordered_rectangle(&lattice, &centres, columns, rows)?;
     let ordered: Vec<Vec2> = marks.into_iter().map(|mark| centres[mark]).collect();
     Ok((0..ordered.len()).map(|i| refined(image, &ordered, i, columns)).collect())
