@@ -142,10 +142,9 @@ fn rectangle(lattice: &Lattice, seen: usize, columns: usize, rows: usize) -> Res
         }
     }
     let expected = columns * rows;
-    if found > expected && found - expected <= columns.min(rows) / 3 {
-        if let Some(only) = only_rectangle(lattice, columns, rows) {
-            return Ok(only);
-        }
+    let few_strays = found > expected && found - expected <= columns.min(rows) / 3;
+    if few_strays && let Some(only) = only_rectangle(lattice, columns, rows) {
+        return Ok(only);
     }
     Err(if found < expected {
         GridError::Partial { columns, rows, found, expected, seen }
