@@ -18,9 +18,12 @@ pub mod camera;
 pub mod detect;
 pub mod evaluate;
 pub mod geometry;
+#[cfg(feature = "harness")]
+pub mod harness;
 #[cfg(feature = "io")]
 pub mod io;
 pub mod planar;
 pub mod raster;
+pub mod rectify;
 pub mod synth;
 pub mod target;

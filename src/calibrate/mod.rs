@@ -13,6 +13,7 @@ mod minimise;
 mod normal;
 mod report;
 mod settings;
+pub mod single_plane;
 mod start;
 mod system;
 

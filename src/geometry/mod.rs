@@ -2,6 +2,7 @@
 
 pub mod affine;
 pub mod homography;
+pub mod line;
 pub mod pose;
 pub mod projective_frame;
 pub mod rotation;
@@ -10,6 +11,7 @@ pub mod similarity;
 
 pub use affine::{Affine, LinearFitError};
 pub use homography::{Homography, HomographyError, HomographyFit};
+pub use line::{LineError, LineFit};
 pub use pose::Pose;
 pub use scatter::Scatter;
 pub use similarity::{Handedness, Similarity};

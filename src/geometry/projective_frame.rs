@@ -15,21 +15,21 @@ pub fn entry(index: usize) -> Mat3 {
 
 /// The covariance of the entries of `M = left L right`, scaled to `m33 = 1`, from that of `L`, scaled to `l33 = 1`.
 ///
-/// First order: `dM = (left dL right - M (left dL right)_33) / (left L right)_33`. `None` if `m33` is zero: then the origin
-/// maps to infinity and no such scale exists.
-pub fn change_frames(
+/// First order: `dM = (left dL right - M (left dL right)_33) / (left L right)_33`. Parameters beyond the eighth stay as they are.
+/// `None` if `m33` is zero: then the origin maps to infinity and no such scale exists.
+pub fn change_frames<const N: usize>(
     left: &Mat3,
     local: &Mat3,
     right: &Mat3,
-    covariance: &EntryCovariance,
-) -> Option<EntryCovariance> {
+    covariance: &SMatrix<f64, N, N>,
+) -> Option<SMatrix<f64, N, N>> {
     let product = left * local * right;
     let scale = product[(2, 2)];
     if scale == 0.0 {
         return None;
     }
     let matrix = product / scale;
-    let mut jacobian = EntryCovariance::zeros();
+    let mut jacobian = SMatrix::<f64, N, N>::identity();
     for column in 0..8 {
         let moved = left * entry(column) * right;
         let change = (moved - matrix * moved[(2, 2)]) / scale;

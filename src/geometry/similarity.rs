@@ -54,8 +54,7 @@ impl Similarity {
     /// plane and without the restriction to rotations).
     ///
     /// # Errors
-    /// Fewer than two pairs on each side of a line: points that are collinear leave the handedness open and are refused, as are
-    /// pairs with `det S = 0`.
+    /// Fewer than three pairs, or `from` on one line: that leaves the handedness open. So does `det S = 0`, which is refused too.
     pub fn fit(from: &[Vec2], to: &[Vec2]) -> Result<Similarity, LinearFitError> {
         let (from_centroid, to_centroid) = checked_centroids(from, to, 3)?;
         let mut cross = Matrix2::zeros();

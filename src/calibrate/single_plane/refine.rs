@@ -1,0 +1,152 @@
+//! Which parameters put the predicted pixels nearest to the observed ones? Levenberg-Marquardt on twelve parameters.
+
+use super::SinglePlaneError;
+use super::model::{Frames, PARAMETERS, ParameterVector, predict, predict_with_jacobian};
+use crate::target::View;
+use nalgebra::SMatrix;
+
+/// How a refinement ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Termination {
+    /// The next step would gain less than the rounding of the cost: the optimum.
+    Converged,
+    /// No step reduces the cost although one should: rounding limits the solution, or the start was hopeless.
+    NoFurtherDescent,
+    /// The limit on steps was reached before the optimum.
+    TooManySteps,
+}
+
+pub(super) struct Outcome {
+    pub parameters: ParameterVector,
+    /// `(J^T J)^-1` of the active parameters for residuals in px, zero for the held ones.
+    pub unit_covariance: SMatrix<f64, PARAMETERS, PARAMETERS>,
+    pub termination: Termination,
+    pub iterations: usize,
+}
+
+/// From the homography alone it takes 5 to 10 steps; 200 leave room for damping through any valley.
+const MAX_STEPS: usize = 200;
+/// Smallest relative pivot of a well-posed system: the 9 x 7 grid has 1e-3, rounding gives 1e-16.
+const SMALLEST_PIVOT: f64 = 1e-12;
+/// Damping beyond which a step is shorter than rounding.
+const LARGEST_DAMPING: f64 = 1e16;
+
+struct Normal {
+    matrix: SMatrix<f64, PARAMETERS, PARAMETERS>,
+    gradient: ParameterVector,
+    cost: f64,
+}
+
+/// Minimises over the first `active` parameters, by Levenberg-Marquardt with Marquardt's scaling (Marquardt 1963) and
+/// Nielsen's damping rule (Nielsen 1999).
+pub(super) fn refine(
+    frames: &Frames,
+    view: &View,
+    start: ParameterVector,
+    active: usize,
+) -> Result<Outcome, SinglePlaneError> {
+    let mut at = start;
+    let mut normal = normal_equations(frames, view, &at, active);
+    let (mut damping, mut growth) = (1e-4, 2.0);
+    let mut iterations = 0;
+    let termination = loop {
+        if let Some(newton) = solve(&normal, 0.0) {
+            let promised = -normal.gradient.dot(&newton);
+            if promised <= rounding(view, normal.cost) {
+                // Too short for the cost to judge, but the gradient, small itself, is known better: the last digits.
+                at += newton;
+                normal = normal_equations(frames, view, &at, active);
+                break Termination::Converged;
+            }
+        }
+        if iterations == MAX_STEPS {
+            break Termination::TooManySteps;
+        }
+        iterations += 1;
+        let step = solve(&normal, damping).map(|step| (step, at + step));
+        let better = step.filter(|(_, next)| cost(frames, view, next) < normal.cost);
+        if let Some((step, next)) = better {
+            let next_normal = normal_equations(frames, view, &next, active);
+            let promised = promised_gain(&normal, &step, damping);
+            let ratio = (normal.cost - next_normal.cost) / promised;
+            let odd = 2.0 * ratio - 1.0;
+            damping *= (1.0 - odd * odd * odd).max(1.0 / 3.0);
+            growth = 2.0;
+            (at, normal) = (next, next_normal);
+        } else {
+            damping *= growth;
+            growth *= 2.0;
+            if damping > LARGEST_DAMPING {
+                break Termination::NoFurtherDescent;
+            }
+        }
+    };
+    let pivot = smallest_pivot(&normal);
+    let inverse = (pivot >= SMALLEST_PIVOT).then(|| normal.matrix.cholesky()).flatten();
+    let Some(inverse) = inverse.map(|c| c.inverse()) else {
+        return Err(SinglePlaneError::NotIdentifiable { points: view.len(), pivot });
+    };
+    let is_active = |i: usize, j: usize| i < active && j < active;
+    // Residuals are in units of the gauge length; so is the standard deviation that the caller gives in px.
+    let unit = frames.focal_px * frames.focal_px;
+    let unit_covariance = SMatrix::from_fn(|i, j| if is_active(i, j) { inverse[(i, j)] / unit } else { 0.0 });
+    Ok(Outcome { parameters: at, unit_covariance, termination, iterations })
+}
+
+/// The sum of squares `|r|^2` is not known better than `2 |r| |d| + |d|^2`, where `d` is the rounding of the residuals: a few
+/// roundings of numbers of order one in each coordinate.
+fn rounding(view: &View, cost: f64) -> f64 {
+    let coordinate = 4.0 * f64::EPSILON;
+    let all = (2.0 * view.len() as f64).sqrt() * coordinate;
+    all * (2.0 * cost.sqrt() + all)
+}
+
+/// Sum of squares; infinite where a point falls behind the horizon.
+fn cost(frames: &Frames, view: &View, at: &ParameterVector) -> f64 {
+    let sum: f64 =
+        view.pairs().map(|(p, m)| (predict(frames, at, p) - frames.pixel_offset(m)).norm_squared()).sum();
+    if sum.is_nan() { f64::INFINITY } else { sum }
+}
+
+fn normal_equations(frames: &Frames, view: &View, at: &ParameterVector, active: usize) -> Normal {
+    let mut normal = Normal { matrix: SMatrix::zeros(), gradient: ParameterVector::zeros(), cost: 0.0 };
+    for (point, pixel) in view.pairs() {
+        let Some((predicted, jacobian)) = predict_with_jacobian(frames, at, point) else {
+            normal.cost = f64::INFINITY;
+            break;
+        };
+        let residual = predicted - frames.pixel_offset(pixel);
+        normal.matrix += jacobian.transpose() * jacobian;
+        normal.gradient += jacobian.transpose() * residual;
+        normal.cost += residual.norm_squared();
+    }
+    for held in active..PARAMETERS {
+        normal.matrix.row_mut(held).fill(0.0);
+        normal.matrix.column_mut(held).fill(0.0);
+        normal.matrix[(held, held)] = 1.0;
+        normal.gradient[held] = 0.0;
+    }
+    normal
+}
+
+/// The step of `(J^T J + damping diag(J^T J)) step = -J^T r`.
+fn solve(normal: &Normal, damping: f64) -> Option<ParameterVector> {
+    let mut damped = normal.matrix;
+    for i in 0..PARAMETERS {
+        damped[(i, i)] *= 1.0 + damping;
+    }
+    damped.cholesky().map(|c| -c.solve(&normal.gradient))
+}
+
+/// What the linearised residuals gain by a damped step: `step^T (damping D step - J^T r)`.
+fn promised_gain(normal: &Normal, step: &ParameterVector, damping: f64) -> f64 {
+    (0..PARAMETERS).map(|i| step[i] * (damping * normal.matrix[(i, i)] * step[i] - normal.gradient[i])).sum()
+}
+
+/// Smallest squared pivot of the Cholesky factor relative to its diagonal entry.
+fn smallest_pivot(normal: &Normal) -> f64 {
+    normal.matrix.cholesky().map_or(0.0, |c| {
+        let ratio = |i: usize| c.l_dirty()[(i, i)] * c.l_dirty()[(i, i)] / normal.matrix[(i, i)];
+        (0..PARAMETERS).map(ratio).fold(1.0, f64::min)
+    })
+}

@@ -1,0 +1,150 @@
+//! Is the number correct? A statement about one value, with the interval that theory or an oracle gives and its reason.
+
+use super::predicted::Predicted;
+
+/// A statement that holds or does not. Blessing never changes it: a claim that fails is a finding about the code.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Claim {
+    /// Name within the experiment, in kebab-case.
+    pub id: String,
+    /// What is claimed, as a sentence.
+    pub statement: String,
+    /// The value judged.
+    pub value: f64,
+    /// Unit of the value, empty for a pure number.
+    pub unit: String,
+    /// Where the value must lie, both ends included; an end may be infinite.
+    pub interval: (f64, f64),
+    /// Where the interval comes from.
+    pub reason: String,
+    /// Chance that a correct program fails this claim; `None` where nothing is drawn.
+    pub false_alarm_rate: Option<f64>,
+    /// Whether the value lies in the interval.
+    pub held: bool,
+    /// The cases that failed, for a claim about many.
+    pub failures: Vec<String>,
+}
+
+impl Claim {
+    /// `low <= value <= high`. NaN is never within.
+    pub fn within(
+        id: impl Into<String>,
+        statement: impl Into<String>,
+        value: f64,
+        (low, high): (f64, f64),
+        reason: impl Into<String>,
+    ) -> Claim {
+        Claim {
+            id: id.into(),
+            statement: statement.into(),
+            value,
+            unit: String::new(),
+            interval: (low, high),
+            reason: reason.into(),
+            false_alarm_rate: None,
+            held: (low..=high).contains(&value),
+            failures: Vec::new(),
+        }
+    }
+
+    /// `value <= bound`.
+    pub fn at_most(
+        id: impl Into<String>,
+        statement: impl Into<String>,
+        value: f64,
+        bound: f64,
+        reason: impl Into<String>,
+    ) -> Claim {
+        Claim::within(id, statement, value, (f64::NEG_INFINITY, bound), reason)
+    }
+
+    /// `value >= bound`.
+    pub fn at_least(
+        id: impl Into<String>,
+        statement: impl Into<String>,
+        value: f64,
+        bound: f64,
+        reason: impl Into<String>,
+    ) -> Claim {
+        Claim::within(id, statement, value, (bound, f64::INFINITY), reason)
+    }
+
+    /// Every named case holds. The value is the number of cases that fail; no case at all is a failure too.
+    pub fn all_of(
+        id: impl Into<String>,
+        statement: impl Into<String>,
+        cases: impl IntoIterator<Item = (String, bool)>,
+        reason: impl Into<String>,
+    ) -> Claim {
+        let mut count = 0;
+        let mut failures = Vec::new();
+        for (name, held) in cases {
+            count += 1;
+            if !held {
+                failures.push(name);
+            }
+        }
+        if count == 0 {
+            failures.push("no case was examined".to_string());
+        }
+        let claim = Claim::within(id, statement, failures.len() as f64, (0.0, 0.0), reason);
+        Claim { failures, ..claim }
+    }
+
+    /// The value lies in the central interval of its predicted distribution that a correct program misses at
+    /// `false_alarm_rate`.
+    pub fn drawn_from(
+        id: impl Into<String>,
+        statement: impl Into<String>,
+        value: f64,
+        predicted: &Predicted,
+        false_alarm_rate: f64,
+        reason: impl Into<String>,
+    ) -> Claim {
+        let interval = predicted.interval(false_alarm_rate);
+        let reason = format!("{}; {}", predicted, reason.into());
+        Claim::within(id, statement, value, interval, reason)
+            .with_false_alarm_rate(predicted.effective_rate(false_alarm_rate))
+    }
+
+    /// States how often a correct program fails the claim.
+    pub fn with_false_alarm_rate(self, rate: f64) -> Claim {
+        Claim { false_alarm_rate: Some(rate), ..self }
+    }
+
+    /// States the unit of the value and the interval.
+    pub fn in_unit(self, unit: impl Into<String>) -> Claim {
+        Claim { unit: unit.into(), ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_claim_holds_on_its_edge_and_never_for_nan() {
+        let held = |value| Claim::within("c", "in one", value, (0.0, 1.0), "definition").held;
+        assert!(held(0.0) && held(1.0));
+        assert!(!held(1.0 + f64::EPSILON) && !held(f64::NAN));
+        assert!(!Claim::at_most("c", "", f64::NAN, 1.0, "").held);
+        assert!(Claim::at_least("c", "", 2.0, 1.0, "").held);
+    }
+
+    #[test]
+    fn a_claim_about_many_names_the_cases_that_fail() {
+        let cases = [("one", true), ("two", false), ("three", false)];
+        let claim = Claim::all_of("c", "", cases.map(|(n, h)| (n.to_string(), h)), "");
+        assert!(!claim.held);
+        assert_eq!((claim.value, claim.failures), (2.0, vec!["two".to_string(), "three".to_string()]));
+        assert!(!Claim::all_of("c", "", [], "").held);
+    }
+
+    #[test]
+    fn a_drawn_value_is_judged_at_the_stated_rate() {
+        let predicted = Predicted::Normal { mean: 0.0, sd: 1.0 };
+        // Two-sided 5 % of the normal distribution: 1.959964.
+        let held = |value| Claim::drawn_from("c", "", value, &predicted, 0.05, "").held;
+        assert!(held(1.9599) && !held(1.9600));
+    }
+}

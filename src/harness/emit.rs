@@ -1,0 +1,124 @@
+//! How does a record reach the disk? CSV, JSON and figures, each written beside its place and renamed into it.
+
+use super::provenance::{Commit, crate_versions};
+use super::reconcile::{Expectation, Reconciliation};
+use super::record::Record;
+use serde_json::{Value, json};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A file could not be written.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write {path}: {source}", path = path.display())]
+pub struct EmitError {
+    /// The file or folder.
+    pub path: PathBuf,
+    /// What the system said.
+    pub source: io::Error,
+}
+
+/// Writes `<out>/<experiment>/*.csv` and `record.json`, and the figures to the folder `figures`. An interrupted run leaves
+/// whole files only.
+pub fn emit(record: &Record, out: &Path, figures: &Path, commit: Option<&Commit>) -> Result<(), EmitError> {
+    let folder = out.join(record.experiment());
+    for table in record.tables() {
+        write_atomically(&folder.join(format!("{}.csv", table.name)), table.to_csv().as_bytes())?;
+    }
+    for figure in record.figures() {
+        write_atomically(&figures.join(figure.file_name()), &figure.bytes)?;
+    }
+    let text = format!("{:#}\n", to_json(record, commit));
+    write_atomically(&folder.join("record.json"), text.as_bytes())
+}
+
+/// Writes a file beside its place and renames it into it, making its folder if need be.
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), EmitError> {
+    let failed = |source| EmitError { path: path.to_path_buf(), source };
+    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    // The process id keeps two runs at the same time apart.
+    let beside = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).map_err(failed)?;
+    }
+    let written = fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, path));
+    written.map_err(|source| {
+        // Nothing more can be done about a file that could not be written.
+        let _ = fs::remove_file(&beside);
+        failed(source)
+    })
+}
+
+/// The record as JSON. A number that is not finite stands as a word, since JSON has none for it.
+fn to_json(record: &Record, commit: Option<&Commit>) -> Value {
+    let versions: serde_json::Map<String, Value> =
+        crate_versions().into_iter().map(|(name, version)| (name, version.into())).collect();
+    json!({
+        "experiment": record.experiment(),
+        "provenance": {
+            "commit": commit.map(|c| c.hash.clone()),
+            "dirty": commit.map(|c| c.dirty),
+            "seed": record.seed(),
+            "crates": versions,
+            "inputs": record.inputs().iter().map(|i| json!({"name": i.name, "sha256": i.sha256})).collect::<Vec<_>>(),
+        },
+        "numbers": record.numbers().iter().map(|n| json!({
+            "id": n.id, "value": number(n.value), "unit": n.unit, "band": n.band.width(),
+            "band_reason": n.band.reason(), "description": n.description,
+        })).collect::<Vec<_>>(),
+        "claims": record.claims().iter().map(|c| json!({
+            "id": c.id, "statement": c.statement, "value": number(c.value), "unit": c.unit,
+            "interval": [number(c.interval.0), number(c.interval.1)], "reason": c.reason,
+            "false_alarm_rate": c.false_alarm_rate, "held": c.held, "failures": c.failures,
+        })).collect::<Vec<_>>(),
+        "published": record.reconciliations().iter().map(published).collect::<Vec<_>>(),
+        "tables": record.tables().iter().map(|t| json!({
+            "file": format!("{}.csv", t.name), "caption": t.caption, "rows": t.rows().len(),
+        })).collect::<Vec<_>>(),
+        "figures": record.figures().iter().map(|f| json!({
+            "file": f.file_name(), "caption": f.caption,
+        })).collect::<Vec<_>>(),
+        "notes": record.notes(),
+    })
+}
+
+fn published(r: &Reconciliation) -> Value {
+    let mut value = json!({
+        "id": r.entry.id, "section": r.entry.section, "what": r.entry.what, "unit": r.entry.unit,
+        "printed": r.entry.printed, "kind": r.entry.kind.name(), "ours": number(r.ours),
+        "expectation": r.expectation_text(), "book_held": r.book_held, "ours_held": r.ours_held,
+    });
+    if let Expectation::Distribution { predicted, interval, .. } = &r.expectation {
+        value["interval"] = json!([number(interval.0), number(interval.1)]);
+        value["z_book"] = predicted.z(r.entry.value()).map_or(Value::Null, number);
+        value["z_ours"] = predicted.z(r.ours).map_or(Value::Null, number);
+    }
+    value
+}
+
+fn number(value: f64) -> Value {
+    serde_json::Number::from_f64(value).map_or_else(|| Value::String(value.to_string()), Value::Number)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::harness::{Band, Claim};
+
+    #[test]
+    fn a_number_that_is_not_finite_is_written_as_a_word() {
+        let mut record = Record::new("e", 1);
+        record.number("n", f64::INFINITY, "px", Band::Exact, "");
+        record.claim(Claim::at_most("c", "", 0.0, 1.0, ""));
+        let json = to_json(&record, None);
+        assert_eq!(json["numbers"][0]["value"], "inf");
+        assert_eq!(json["claims"][0]["interval"], json!(["-inf", 1.0]));
+        assert_eq!(json["provenance"]["commit"], Value::Null);
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_written_is_named() {
+        let error = write_atomically(Path::new("/dev/null/x.csv"), b"").unwrap_err();
+        assert!(error.to_string().contains("/dev/null/x.csv"));
+    }
+}

@@ -1,0 +1,332 @@
+//! What did an experiment find? Named numbers, tables, figures, claims, and the published values beside ours.
+
+use super::band::Band;
+use super::claim::Claim;
+use super::figure::Figure;
+use super::hash::sha256_hex;
+use super::predicted::Predicted;
+use super::published::{self, Entry, Kind, PublishedError};
+use super::reconcile::Reconciliation;
+use super::table::Table;
+
+/// A named number, locked in golden/.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Number {
+    /// Name within the experiment, in kebab-case; the book and `published.toml` know it as `<experiment>.<id>`.
+    pub id: String,
+    /// The value.
+    pub value: f64,
+    /// Unit, empty for a pure number.
+    pub unit: String,
+    /// How far it may move before it counts as changed.
+    pub band: Band,
+    /// What it is.
+    pub description: String,
+}
+
+/// A file or data set that went into an experiment.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Input {
+    /// What it is called in the record; no path.
+    pub name: String,
+    /// SHA-256 of its bytes, hexadecimal.
+    pub sha256: String,
+}
+
+/// The result of one run of one experiment, in the order in which it was told.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Record {
+    experiment: String,
+    seed: u64,
+    numbers: Vec<Number>,
+    tables: Vec<Table>,
+    figures: Vec<Figure>,
+    claims: Vec<Claim>,
+    reconciliations: Vec<Reconciliation>,
+    inputs: Vec<Input>,
+    notes: Vec<String>,
+}
+
+/// A record that contradicts itself or `published.toml`: a mistake in the experiment's file.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RecordError {
+    /// The same name twice.
+    #[error("experiment `{experiment}` has two {what} named `{id}`")]
+    Duplicate {
+        /// Experiment.
+        experiment: String,
+        /// `numbers`, `claims`, ...
+        what: &'static str,
+        /// The name.
+        id: String,
+    },
+    /// A name that is not lower-case letters, digits, `-` and `.`.
+    #[error(
+        "`{0}` is no name for a number, claim, table or figure: use lower-case letters, digits, `-` and `.`"
+    )]
+    Name(String),
+    /// An experiment without a claim shows nothing.
+    #[error("experiment `{0}` has no claim: say what theory or an oracle expects of at least one number")]
+    NoClaim(String),
+    /// The number to reconcile is not in the record.
+    #[error("number `{0}` is not in the record yet: add it before it is reconciled")]
+    NoSuchNumber(String),
+    /// The book does not print it.
+    #[error("golden/published.toml has no value `{0}`")]
+    NotPublished(String),
+    /// A number is reconciled by another rule than its kind asks for.
+    #[error("published value `{id}` is {}, but was reconciled as {}", expected.name(), got.name())]
+    Kind {
+        /// `<experiment>.<number>`.
+        id: String,
+        /// Kind in `published.toml`.
+        expected: Kind,
+        /// Kind of the call.
+        got: Kind,
+    },
+    /// A row with another number of cells than columns.
+    #[error("table `{table}`, row {row}: {need} columns, but {got} cells")]
+    RaggedTable {
+        /// Name of the table.
+        table: String,
+        /// Index of the row.
+        row: usize,
+        /// Number of columns.
+        need: usize,
+        /// Number of cells.
+        got: usize,
+    },
+    /// `published.toml` itself is broken.
+    #[error(transparent)]
+    Published(#[from] PublishedError),
+}
+
+impl Record {
+    /// An empty record. Experiments get theirs from the context.
+    pub fn new(experiment: impl Into<String>, seed: u64) -> Record {
+        Record {
+            experiment: experiment.into(),
+            seed,
+            numbers: Vec::new(),
+            tables: Vec::new(),
+            figures: Vec::new(),
+            claims: Vec::new(),
+            reconciliations: Vec::new(),
+            inputs: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
+    /// Adds a number and gives its value back.
+    pub fn number(
+        &mut self,
+        id: impl Into<String>,
+        value: f64,
+        unit: impl Into<String>,
+        band: Band,
+        description: impl Into<String>,
+    ) -> f64 {
+        let (id, unit, description) = (id.into(), unit.into(), description.into());
+        self.numbers.push(Number { id, value, unit, band, description });
+        value
+    }
+
+    /// Adds a table.
+    pub fn table(&mut self, table: Table) {
+        self.tables.push(table);
+    }
+
+    /// Adds a figure.
+    pub fn figure(&mut self, figure: Figure) {
+        self.figures.push(figure);
+    }
+
+    /// Adds a claim.
+    pub fn claim(&mut self, claim: Claim) {
+        self.claims.push(claim);
+    }
+
+    /// Names a file or data set that went into the experiment, by the hash of its bytes.
+    pub fn input(&mut self, name: impl Into<String>, bytes: &[u8]) {
+        self.inputs.push(Input { name: name.into(), sha256: sha256_hex(bytes) });
+    }
+
+    /// Adds a remark for the reader, such as that a stand-in was used.
+    pub fn note(&mut self, note: impl Into<String>) {
+        self.notes.push(note.into());
+    }
+
+    /// Holds number `id` against the published value of the same name: ours must round to the printed digits.
+    pub fn reconcile_exact(&mut self, id: &str) -> Result<(), RecordError> {
+        let (entry, ours) = self.published(id, Kind::Exact)?;
+        self.reconciliations.push(Reconciliation::exact(entry, ours));
+        Ok(())
+    }
+
+    /// Holds number `id` and the published value of the same name against a predicted distribution, each at
+    /// `false_alarm_rate`.
+    pub fn reconcile_sampled(
+        &mut self,
+        id: &str,
+        predicted: Predicted,
+        false_alarm_rate: f64,
+    ) -> Result<(), RecordError> {
+        let (entry, ours) = self.published(id, Kind::Sampled)?;
+        self.reconciliations.push(Reconciliation::sampled(entry, ours, predicted, false_alarm_rate));
+        Ok(())
+    }
+
+    /// Holds number `id` against the published value of the same name, which rests on data that is not available:
+    /// `stand_in` says what takes its place and where the tolerance comes from.
+    pub fn reconcile_reference(
+        &mut self,
+        id: &str,
+        tolerance: f64,
+        stand_in: impl Into<String>,
+    ) -> Result<(), RecordError> {
+        let (entry, ours) = self.published(id, Kind::Reference)?;
+        self.reconciliations.push(Reconciliation::reference(entry, ours, tolerance, stand_in.into()));
+        Ok(())
+    }
+
+    /// The value that the book prints for number `id`, to be drawn beside ours.
+    pub fn printed(&self, id: &str) -> Result<f64, RecordError> {
+        Ok(self.entry(id)?.value())
+    }
+
+    fn entry(&self, id: &str) -> Result<&'static Entry, RecordError> {
+        let full = format!("{}.{id}", self.experiment);
+        let entry = published::chapter()?.iter().find(|e| e.id == full);
+        entry.ok_or(RecordError::NotPublished(full))
+    }
+
+    /// The published value that number `id` reconciles, with the number's value.
+    fn published(&self, id: &str, got: Kind) -> Result<(&'static Entry, f64), RecordError> {
+        let ours = self.value(id).ok_or_else(|| RecordError::NoSuchNumber(id.to_string()))?;
+        let entry = self.entry(id)?;
+        if entry.kind != got {
+            return Err(RecordError::Kind { id: entry.id.clone(), expected: entry.kind, got });
+        }
+        Ok((entry, ours))
+    }
+
+    /// The value of a number.
+    pub fn value(&self, id: &str) -> Option<f64> {
+        self.numbers.iter().find(|n| n.id == id).map(|n| n.value)
+    }
+
+    /// Name of the experiment.
+    pub fn experiment(&self) -> &str {
+        &self.experiment
+    }
+
+    /// Seed of the run.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// The numbers.
+    pub fn numbers(&self) -> &[Number] {
+        &self.numbers
+    }
+
+    /// The tables.
+    pub fn tables(&self) -> &[Table] {
+        &self.tables
+    }
+
+    /// The figures.
+    pub fn figures(&self) -> &[Figure] {
+        &self.figures
+    }
+
+    /// The claims.
+    pub fn claims(&self) -> &[Claim] {
+        &self.claims
+    }
+
+    /// The published values beside ours.
+    pub fn reconciliations(&self) -> &[Reconciliation] {
+        &self.reconciliations
+    }
+
+    /// What went in.
+    pub fn inputs(&self) -> &[Input] {
+        &self.inputs
+    }
+
+    /// Remarks for the reader.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// Whether the record is complete and free of contradictions.
+    pub fn validate(&self) -> Result<(), RecordError> {
+        if self.claims.is_empty() {
+            return Err(RecordError::NoClaim(self.experiment.clone()));
+        }
+        self.unique("numbers", self.numbers.iter().map(|n| n.id.as_str()))?;
+        self.unique("claims", self.claims.iter().map(|c| c.id.as_str()))?;
+        self.unique("tables", self.tables.iter().map(|t| t.name.as_str()))?;
+        self.unique("figures", self.figures.iter().map(|f| f.name.as_str()))?;
+        self.unique("reconciliations", self.reconciliations.iter().map(|r| r.entry.number()))?;
+        self.tables.iter().try_for_each(Table::validate)
+    }
+
+    fn unique<'a>(
+        &self,
+        what: &'static str,
+        names: impl Iterator<Item = &'a str>,
+    ) -> Result<(), RecordError> {
+        let mut seen = std::collections::BTreeSet::new();
+        for name in names {
+            let plain = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-' || b == b'.';
+            if name.is_empty() || !name.bytes().all(plain) {
+                return Err(RecordError::Name(name.to_string()));
+            }
+            if !seen.insert(name) {
+                let experiment = self.experiment.clone();
+                return Err(RecordError::Duplicate { experiment, what, id: name.to_string() });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with_claim() -> Record {
+        let mut record = Record::new("line-bending", 0);
+        record.claim(Claim::at_most("c", "zero is small", 0.0, 1.0, "definition"));
+        record
+    }
+
+    #[test]
+    fn a_record_needs_a_claim_and_names_of_its_own() {
+        assert_eq!(Record::new("e", 0).validate(), Err(RecordError::NoClaim("e".into())));
+        let mut record = with_claim();
+        assert_eq!(record.validate(), Ok(()));
+        record.number("n", 1.0, "px", Band::Exact, "");
+        record.number("n", 2.0, "px", Band::Exact, "");
+        assert!(matches!(record.validate(), Err(RecordError::Duplicate { what: "numbers", .. })));
+        let mut record = with_claim();
+        record.number("Not | a name", 1.0, "", Band::Exact, "");
+        assert!(matches!(record.validate(), Err(RecordError::Name(_))));
+    }
+
+    #[test]
+    fn only_a_published_number_is_reconciled_and_only_by_its_kind() {
+        let mut record = with_claim();
+        let missing = record.reconcile_exact("max-deviation");
+        assert_eq!(missing, Err(RecordError::NoSuchNumber("max-deviation".into())));
+        record.number("max-deviation", 4.677_75, "px", Band::Exact, "");
+        record.number("other", 1.0, "px", Band::Exact, "");
+        assert!(matches!(record.reconcile_exact("other"), Err(RecordError::NotPublished(_))));
+        let wrong = record.reconcile_reference("max-deviation", 1.0, "nothing");
+        assert!(matches!(wrong, Err(RecordError::Kind { expected: Kind::Exact, .. })));
+        record.reconcile_exact("max-deviation").unwrap();
+        assert!(record.reconciliations()[0].held());
+    }
+}
