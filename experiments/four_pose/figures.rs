@@ -96,10 +96,10 @@ pub fn residual_distribution(draw: &Draw) -> Figure {
     let n = draw.standardised.len() as f64;
     let expected: Vec<_> = bars
         .iter()
-        .flat_map(|&(left, right, _)| {
+        .map(|&(left, right, _)| {
             let share = normal_cdf(right) - normal_cdf(left);
             let (mean, sd) = (share / (right - left), (share * (1.0 - share) / n).sqrt() / (right - left));
-            [left, right].map(|x| (x, (mean - 2.0 * sd).max(0.0), mean + 2.0 * sd))
+            (0.5 * (left + right), (mean - 2.0 * sd).max(0.0), mean + 2.0 * sd)
         })
         .collect();
     let plot = Plot::new(
@@ -109,7 +109,7 @@ pub fn residual_distribution(draw: &Draw) -> Figure {
     )
     .x_range(range.0, range.1)
     .histogram("504 residual coordinates", &bars)
-    .band_as("two standard deviations of a bin", &expected, Look::ink())
+    .error_bars_as("expected, two standard deviations of a bin", &expected, Look::ink())
     .line_as("standard normal", &curve, Look::series(1).dash(Dash::Solid).width(2.0));
     let caption = format!(
         "Every residual coordinate of the calibrated camera over its own predicted standard deviation, 0.1 px times \
@@ -134,14 +134,15 @@ pub fn ellipse(draw: &Draw, book: &Book, trials: &Outcome) -> Figure {
         &cloud,
         faint,
     );
-    let regions = [("68 %", 0.68, 1.2), ("95 %", 0.95, 1.6), ("99.7 %", 0.997, 2.2)];
-    let plot = regions.iter().fold(plot, |plot, &(name, p, width)| {
+    let regions =
+        [("68 %", 0.68, Dash::Solid), ("95 %", 0.95, Dash::Dashed), ("99.7 %", 0.997, Dash::Dotted)];
+    let plot = regions.iter().fold(plot, |plot, &(name, p, dash)| {
         plot.ellipse_as(
             format!("predicted, {name}"),
             truth,
             &covariance,
             (-2.0 * libm::log(1.0 - p)).sqrt(),
-            Look::ink().width(width),
+            Look::ink().dash(dash).width(1.6),
         )
     });
     let plot = plot
@@ -250,7 +251,8 @@ pub fn overfitting(grids: &[Grid]) -> Figure {
         .points_as("300 trials, 95 %", &over(&|g| g.trials.errors().standard_deviation(k2)), sampled)
         .error_bars_as("", &spreads, sampled)
         .log_x()
-        .log_y();
+        .log_y()
+        .y_range(0.01, 0.1);
     let caption = "The four views with fewer points on the same 80 x 60 mm (3 x 3 to 9 x 7), 300 trials each: RMSE in pixels and \
                    spread of k2, with 95 % intervals and predictions. Notice that the RMSE falls far under the floor just \
                    where the parameters are worst: it is low because they fit the noise.";
