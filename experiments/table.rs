@@ -2,8 +2,13 @@
 
 use calibench::harness::Experiment;
 
+#[path = "four_pose.rs"]
+mod four_pose;
+#[path = "k2_observability.rs"]
+mod k2_observability;
 #[path = "line_bending.rs"]
 mod line_bending;
 
 /// All experiments, in the order of the book.
-pub const EXPERIMENTS: &[Experiment] = &[line_bending::EXPERIMENT];
+pub const EXPERIMENTS: &[Experiment] =
+    &[line_bending::EXPERIMENT, four_pose::EXPERIMENT, k2_observability::EXPERIMENT];

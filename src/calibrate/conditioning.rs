@@ -26,10 +26,25 @@ pub struct WeakComponent {
     pub weight: f64,
 }
 
+/// Smallest eigenvalue of the scaled information below which it is rounding: the elimination subtracts numbers of size 1, so its
+/// error is some hundred roundings.
+const SINGULAR: f64 = 1e-12;
 /// Members of the weakest combination below this share of the largest one are not worth a name.
 const NAMED_SHARE: f64 = 0.2;
 
+impl System {
+    /// How well these equations separate the intrinsics; `None` if nothing is free or a pose is undetermined.
+    pub fn conditioning(&self) -> Option<Conditioning> {
+        Conditioning::of(self)
+    }
+}
+
 impl Conditioning {
+    /// Whether the weakest combination is known by nothing but rounding.
+    pub fn is_singular(&self) -> bool {
+        self.smallest_eigenvalue.is_nan() || self.smallest_eigenvalue <= SINGULAR
+    }
+
     /// Analyses normal equations; `None` if nothing is free or a pose is undetermined.
     pub(super) fn of(system: &System) -> Option<Conditioning> {
         let n = system.free.len();

@@ -13,9 +13,6 @@ use super::normal::Observations;
 use super::system::System;
 use crate::geometry::{Pose, Vec2, Vec3, rotation};
 
-/// Smallest eigenvalue of the scaled information below which it is rounding: the elimination subtracts numbers of size 1, so its
-/// error is some hundred roundings.
-const SINGULAR: f64 = 1e-12;
 /// With this probability planes that are parallel pass for tilted: -ln(1e-9).
 const LOG_FALSE_ACCEPTANCE: f64 = 20.7;
 /// Planes whose difference of tilt moves the edge of the target's image by more than this many standard deviations of a pixel are not
@@ -100,7 +97,7 @@ fn refuse_if_singular(
     why: impl FnOnce() -> String,
 ) -> Result<(), CalibrationError> {
     match conditioning {
-        Some(c) if c.smallest_eigenvalue > SINGULAR => Ok(()),
+        Some(c) if !c.is_singular() => Ok(()),
         Some(c) => Err(CalibrationError::NotIdentifiable { inseparable: spoken(&c.weakest), why: why() }),
         None => Err(CalibrationError::NotIdentifiable {
             inseparable: vec!["camera".into(), "poses".into()],
