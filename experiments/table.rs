@@ -5,5 +5,12 @@ use calibench::harness::Experiment;
 #[path = "line_bending.rs"]
 mod line_bending;
 
+#[path = "collinearity.rs"]
+mod collinearity;
+
+#[path = "nine_point.rs"]
+mod nine_point;
+
 /// All experiments, in the order of the book.
-pub const EXPERIMENTS: &[Experiment] = &[line_bending::EXPERIMENT];
+pub const EXPERIMENTS: &[Experiment] =
+    &[line_bending::EXPERIMENT, collinearity::EXPERIMENT, nine_point::EXPERIMENT];

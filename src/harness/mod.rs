@@ -23,6 +23,7 @@ pub mod provenance;
 pub mod published;
 mod reconcile;
 mod record;
+mod simulated;
 mod table;
 pub mod verdict;
 
