@@ -32,6 +32,7 @@ pub mod provenance;
 pub mod published;
 mod reconcile;
 mod record;
+mod simulated;
 mod table;
 pub mod verdict;
 
