@@ -308,10 +308,9 @@ fn tell_rmse(record: &mut Record, draw: &Draw) -> Result<(), ExperimentError> {
 /// What the residuals of the one draw must satisfy, whatever their correlations.
 fn claim_residuals(record: &mut Record, draw: &Draw) {
     let parameters = draw.rmse.parameters as f64;
-    // The trace of a projection is its rank. Its entries come from an inverse whose relative error is below the number of
-    // unknowns times the condition number in roundings, and there are as many entries as coordinates.
-    let condition = draw.calibration.conditioning.as_ref().map_or(f64::NAN, |c| c.condition_number);
-    let rounding = 2.0 * draw.rmse.points as f64 * parameters * condition * f64::EPSILON;
+    // The trace of a projection is its rank. Covariance and Jacobian are taken one last step of the refinement apart, 1e-6 of
+    // a standard deviation at most; a whole standard deviation would not change the derivatives by as much as themselves.
+    let convergence = 1e-6 * parameters;
     record.number(
         "leverage-sum",
         draw.leverage_sum,
@@ -323,8 +322,8 @@ fn claim_residuals(record: &mut Record, draw: &Draw) {
         "leverages-count-the-parameters",
         "the leverages of the 504 coordinates sum to the 30 parameters that absorb noise",
         draw.leverage_sum,
-        (parameters - rounding, parameters + rounding),
-        "trace of the hat matrix; rounding of the inverse times its condition number",
+        (parameters - convergence, parameters + convergence),
+        "trace of the hat matrix; each leverage to the 1e-6 of a standard deviation to which the refinement converges",
     ));
     let largest = draw.standardised.iter().fold(0.0f64, |m, z| m.max(z.abs()));
     let bound = normal_two_sided(each_of(draw.standardised.len(), RATE));
