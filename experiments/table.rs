@@ -8,7 +8,9 @@ mod four_pose;
 mod k2_observability;
 #[path = "line_bending.rs"]
 mod line_bending;
+#[path = "photographs.rs"]
+mod photographs;
 
 /// All experiments, in the order of the book.
 pub const EXPERIMENTS: &[Experiment] =
-    &[line_bending::EXPERIMENT, four_pose::EXPERIMENT, k2_observability::EXPERIMENT];
+    &[line_bending::EXPERIMENT, four_pose::EXPERIMENT, k2_observability::EXPERIMENT, photographs::EXPERIMENT];
