@@ -12,6 +12,8 @@ mod k2_observability;
 mod line_bending;
 #[path = "nine_point.rs"]
 mod nine_point;
+#[path = "photographs.rs"]
+mod photographs;
 
 /// All experiments, in the order of the book.
 #[rustfmt::skip]
@@ -21,4 +23,5 @@ pub const EXPERIMENTS: &[Experiment] = &[
     k2_observability::EXPERIMENT,
     collinearity::EXPERIMENT,
     nine_point::EXPERIMENT,
+    photographs::EXPERIMENT,
 ];

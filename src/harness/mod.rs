@@ -25,6 +25,7 @@ pub mod figure;
 pub mod golden;
 pub mod hash;
 pub mod monte_carlo;
+pub mod photos;
 mod predicted;
 mod progress;
 pub mod project;

@@ -61,6 +61,15 @@ pub struct ViewFields {
     pub residuals_px: Vec<[f64; 2]>,
 }
 
+/// A view that was given but not used.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LeftOut {
+    /// Its name.
+    pub name: String,
+    /// Why it was left out.
+    pub reason: String,
+}
+
 /// The whole of a calibration.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CalibrationFields {
@@ -92,6 +101,8 @@ pub struct CalibrationFields {
     pub weakest_information: Option<f64>,
     /// What to be careful about.
     pub warnings: Vec<String>,
+    /// Views that were given but not used; the caller adds them.
+    pub left_out: Vec<LeftOut>,
     /// View by view.
     pub views: Vec<ViewFields>,
 }
@@ -125,6 +136,7 @@ impl CalibrationFields {
                 .collect(),
             weakest_information: calibration.conditioning.as_ref().map(|c| c.smallest_eigenvalue),
             warnings: calibration.warnings.iter().map(ToString::to_string).collect(),
+            left_out: Vec::new(),
             views: (0..calibration.cam_from_target.len())
                 .map(|i| view_fields(calibration, names, i))
                 .collect(),

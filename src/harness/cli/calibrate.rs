@@ -1,24 +1,34 @@
-//! `calibench calibrate FILE.csv`: a camera from a corner file, or a plane map from a file of point pairs.
+//! `calibench calibrate`: a camera from a corner file or from photographs, or a plane map from a file of point pairs.
 
 use super::report::table;
 use super::{Exit, print, warn};
-use crate::calibrate::{self as solver, Calibration, Loss, Settings, Termination};
+use crate::calibrate::Loss;
 use crate::camera::{FreeParameters, Parameter};
-use crate::harness::significant;
-use crate::io::{
-    CalibrationFields, CornerFile, PointPairs, read_corners, read_point_pairs, write_atomically,
-};
-use crate::planar::{PlaneCalibration, PlaneModel, calibrate_plane};
+use crate::harness::photos::BoardSpec;
+use crate::io::read_corners;
+use crate::planar::PlaneModel;
+use camera::Observed;
 use clap::{Args, ValueEnum};
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+mod advice;
+mod camera;
+mod maps;
+mod page;
+mod photographs;
+mod plane;
 mod plots;
+
+pub(super) use plane::plane_text;
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Corner file with the columns view,point,X,Y,u,v, or point pairs with point,px,py,X,Y
-    file: PathBuf,
+    /// Corner file with the columns view,point,X,Y,u,v, or point pairs with point,px,py,X,Y; with --board, photographs
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// The board in the photographs: chess:9x6:25mm (inner corners), circles:9x7:10mm:3mm (spacing, diameter) or dots:3x3:1
+    #[arg(long, value_name = "BOARD")]
+    board: Option<BoardSpec>,
     /// Parameters to estimate, of fx fy cx cy skew k1 k2 p1 p2 k3; the others are held, distortion and skew at 0
     #[arg(long, value_name = "LIST", default_value = "fx,fy,cx,cy,k1,k2")]
     free: FreeParameters,
@@ -31,10 +41,13 @@ pub(super) struct Arguments {
     /// Loss of a residual: squares, huber:PX or cauchy:PX
     #[arg(long, value_name = "LOSS", default_value = "squares", value_parser = parse_loss)]
     loss: Loss,
+    /// Leaves out views whose RMSE exceeds FACTOR times the median, worst first, such as 3
+    #[arg(long, value_name = "FACTOR", value_parser = parse_factor)]
+    reject_views: Option<f64>,
     /// Map of a plane from point pairs
     #[arg(long, value_enum, default_value_t = Mode::Planar)]
     mode: Mode,
-    /// Folder for result.json and plots
+    /// Folder for result.json, the page report.html, plots, and the photographs with their marks drawn in
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Text for people or JSON for programs
@@ -108,11 +121,25 @@ fn parse_loss(text: &str) -> Result<Loss, String> {
     if loss.is_valid() { Ok(loss) } else { Err(wanted()) }
 }
 
+fn parse_factor(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(factor) if factor > 1.0 && f64::is_finite(factor) => Ok(factor),
+        _ => Err("expected a factor above 1, such as 3".to_string()),
+    }
+}
+
 pub(super) fn run(arguments: &Arguments) -> Exit {
-    let outcome = match has_views(&arguments.file) {
-        Ok(true) => camera(arguments),
-        Ok(false) => plane(arguments),
-        Err(message) => Err(message),
+    let outcome = match (&arguments.board, &arguments.files[..]) {
+        (Some(board), photos) => photographs::run(arguments, board, photos),
+        (None, [file]) => match has_views(file) {
+            Ok(true) => corners(arguments, file),
+            Ok(false) => plane::run(arguments, file),
+            Err(message) => Err(message),
+        },
+        (None, files) => Err(format!(
+            "{} files but no --board: give one CSV file, or the board that the photographs show",
+            files.len()
+        )),
     };
     outcome.unwrap_or_else(|message| {
         warn(&message);
@@ -128,125 +155,14 @@ fn has_views(path: &Path) -> Result<bool, String> {
     Ok(!header.split(',').any(|column| column.trim() == "px"))
 }
 
-fn camera(arguments: &Arguments) -> Result<Exit, String> {
-    let corners = read_corners(&arguments.file).map_err(|error| error.to_string())?;
-    let mut settings = Settings::new(arguments.free).with_loss(arguments.loss);
-    settings.image_size = arguments.image_size;
-    for &(parameter, value) in &arguments.fix {
-        settings = settings.hold(parameter, value);
-    }
-    let calibration = solver::calibrate(&corners.views, &settings)
-        .map_err(|error| format!("{}: {error}", arguments.file.display()))?;
-    let fields = CalibrationFields::of(&calibration, &corners.view_names, arguments.image_size);
-    if let Some(folder) = &arguments.out {
-        write_result(folder, &fields, &calibration, &corners).map_err(|error| error.to_string())?;
-    }
-    match arguments.format {
-        Format::Json => print(&fields.to_json()),
-        Format::Text => print(&camera_text(&calibration, &corners)),
-    }
-    Ok(if calibration.termination == Termination::Converged { Exit::Held } else { Exit::Incomplete })
-}
-
-fn write_result(
-    folder: &Path,
-    fields: &CalibrationFields,
-    calibration: &Calibration,
-    corners: &CornerFile,
-) -> std::io::Result<()> {
-    write_atomically(&folder.join("result.json"), fields.to_json().as_bytes())?;
-    for figure in plots::figures(calibration, corners, fields.image_size) {
-        write_atomically(&folder.join(figure.file_name()), &figure.bytes)?;
-    }
-    Ok(())
-}
-
-fn camera_text(calibration: &Calibration, corners: &CornerFile) -> String {
-    let mut parameters = table(&["parameter", "value", "standard deviation", "unit"]);
-    for parameter in Parameter::ALL {
-        let deviation = match calibration.standard_deviation(parameter) {
-            Some(sd) => significant(sd, 3),
-            None if calibration.camera.get(parameter) == 0.0 => continue,
-            None => "held".to_string(),
-        };
-        let value = significant(calibration.camera.get(parameter), 10);
-        parameters.add_row([parameter.name().to_string(), value, deviation, parameter.unit().to_string()]);
-    }
-    let mut views = table(&["view", "points", "RMSE (px)", "distance"]);
-    for (i, name) in corners.view_names.iter().enumerate() {
-        let rmse = calibration.view_rmse_px(i).unwrap_or(f64::NAN);
-        let distance = calibration.cam_from_target[i].translation.z;
-        let points = calibration.residuals[i].len().to_string();
-        views.add_row([name.clone(), points, significant(rmse, 4), significant(distance, 5)]);
-    }
-    let mut text = format!("{parameters}\n\n{views}\n\n");
-    let axes = calibration.rms_per_axis_px();
-    // Writing to a string cannot fail.
-    let _ = write!(
-        text,
-        "RMSE {} px over {} points (u {}, v {}); noise of a coordinate {} px on {} degrees of freedom\n{} after {} steps\n",
-        significant(calibration.rmse_px, 7),
-        calibration.points(),
-        significant(axes.x, 4),
-        significant(axes.y, 4),
-        significant(calibration.sigma_px, 4),
-        calibration.degrees_of_freedom,
-        calibration.termination.name(),
-        calibration.iterations,
-    );
-    if let Some(conditioning) = &calibration.conditioning {
-        let members: Vec<String> =
-            conditioning.weakest.iter().map(|m| format!("{} {:+.2}", m.name, m.weight)).collect();
-        let _ = writeln!(text, "weakest direction: {}", members.join(", "));
-    }
-    for warning in &calibration.warnings {
-        let _ = writeln!(text, "warning: {warning}");
-    }
-    text
-}
-
-fn plane(arguments: &Arguments) -> Result<Exit, String> {
-    let PointPairs { pixels, world, .. } =
-        read_point_pairs(&arguments.file).map_err(|error| error.to_string())?;
-    let result = calibrate_plane(arguments.mode.into(), &pixels, &world)
-        .map_err(|error| format!("{}: {error}", arguments.file.display()))?;
-    let json = plane_json(&result);
-    if let Some(folder) = &arguments.out {
-        write_atomically(&folder.join("result.json"), json.as_bytes()).map_err(|error| error.to_string())?;
-    }
-    match arguments.format {
-        Format::Json => print(&json),
-        Format::Text => print(&plane_text(&result)),
-    }
-    Ok(Exit::Held)
-}
-
-fn plane_json(result: &PlaneCalibration) -> String {
-    let m = result.map.matrix();
-    let value = serde_json::json!({
-        "matrix": (0..3).map(|i| (0..3).map(|j| m[(i, j)]).collect::<Vec<f64>>()).collect::<Vec<_>>(),
-        "scale_x": result.scale_x,
-        "scale_y": result.scale_y,
-        "rms_point": result.rms_point,
-        "max_point": result.max_point,
-        "degrees_of_freedom": result.degrees_of_freedom,
-        "residuals": result.residuals.iter().map(|r| [r.x, r.y]).collect::<Vec<_>>(),
-    });
-    format!("{value:#}\n")
-}
-
-pub(super) fn plane_text(result: &PlaneCalibration) -> String {
-    let m = result.map.matrix();
-    let mut rows = table(&["world from pixel", "", ""]);
-    for i in 0..3 {
-        rows.add_row([0, 1, 2].map(|j| significant(m[(i, j)], 15)));
-    }
-    format!(
-        "{rows}\n\nscales {} and {} world units per px; residual RMS {} per point, largest {}, {} degrees of freedom\n",
-        significant(result.scale_x, 8),
-        significant(result.scale_y, 8),
-        significant(result.rms_point, 9),
-        significant(result.max_point, 9),
-        result.degrees_of_freedom,
-    )
+fn corners(arguments: &Arguments, file: &Path) -> Result<Exit, String> {
+    let corners = read_corners(file).map_err(|error| error.to_string())?;
+    let observed = Observed {
+        source: file.display().to_string(),
+        names: corners.view_names,
+        views: corners.views,
+        image_size: arguments.image_size,
+        ..Observed::default()
+    };
+    camera::run(arguments, observed)
 }

@@ -44,7 +44,7 @@ enum Verb {
     Check(check::Arguments),
     /// Accepts the present result of an experiment as its golden snapshot, and its figures with it
     Bless(bless::Arguments),
-    /// Calibrates a camera from a corner file, or a plane from a file of point pairs
+    /// Calibrates a camera from a corner file or from photographs, or a plane from a file of point pairs
     Calibrate(calibrate::Arguments),
     /// Finds the dots of a nine-point board in a photograph, and maps its pixels to the unit grid
     Ninepoint(ninepoint::Arguments),

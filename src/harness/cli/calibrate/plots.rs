@@ -4,20 +4,20 @@ use crate::calibrate::Calibration;
 use crate::camera::Parameter;
 use crate::geometry::Vec2;
 use crate::harness::{Figure, Look, Plot};
-use crate::io::CornerFile;
+use crate::target::View;
 
 /// The figures of a calibration.
 pub(super) fn figures(
     calibration: &Calibration,
-    corners: &CornerFile,
+    views: &[View],
     image_size: Option<(usize, usize)>,
 ) -> Vec<Figure> {
-    vec![residuals(calibration, corners, image_size), views(calibration), lens(calibration, corners)]
+    vec![residuals(calibration, views, image_size), view_errors(calibration), lens(calibration, views)]
 }
 
 /// Residuals as arrows where they were seen.
-fn residuals(calibration: &Calibration, corners: &CornerFile, image_size: Option<(usize, usize)>) -> Figure {
-    let pixels = || corners.views.iter().flat_map(|v| v.pixels());
+fn residuals(calibration: &Calibration, views: &[View], image_size: Option<(usize, usize)>) -> Figure {
+    let pixels = || views.iter().flat_map(|v| v.pixels());
     let residuals = || calibration.residuals.iter().flatten();
     let extent = pixels().fold(0.0f64, |m, p| m.max(p.x).max(p.y));
     // The longest arrow takes a twentieth of the frame; a round factor is easier to undo by eye.
@@ -44,7 +44,7 @@ fn round_down(x: f64) -> f64 {
 }
 
 /// RMSE of each view against that of all.
-fn views(calibration: &Calibration) -> Figure {
+fn view_errors(calibration: &Calibration) -> Figure {
     let points: Vec<(f64, f64)> = (0..calibration.residuals.len())
         .filter_map(|i| Some((i as f64 + 1.0, calibration.view_rmse_px(i)?)))
         .collect();
@@ -62,10 +62,9 @@ fn views(calibration: &Calibration) -> Figure {
 }
 
 /// Radial displacement by the lens with its standard deviation, out to the farthest point seen.
-fn lens(calibration: &Calibration, corners: &CornerFile) -> Figure {
+fn lens(calibration: &Calibration, views: &[View]) -> Figure {
     let camera = &calibration.camera;
-    let farthest = corners
-        .views
+    let farthest = views
         .iter()
         .flat_map(|v| v.pixels())
         .filter_map(|p| camera.normalised_ray(p).ok())

@@ -1,0 +1,11 @@
+//! From photographs of a board to a camera: what the board is, where its marks are, which views count, and the fit.
+//!
+//! ```text
+//! BoardSpec --detect(photograph)--> marks --fit--> calibrate, subtract the discs' bias, leave out stray views
+//! ```
+
+mod board;
+mod fit;
+
+pub use board::{BoardSpec, BoardSpecError, DetectError, MarkKind};
+pub use fit::{BiasCorrection, Fit, Fitter, Rejected};

@@ -1,0 +1,210 @@
+//! Does `calibench calibrate --board` get from image files to a camera, and say what it left out?
+#![cfg(feature = "harness")]
+
+use calibench::geometry::Pose;
+use calibench::harness::photos::BoardSpec;
+use calibench::io::{write_png, write_png_16};
+use calibench::raster::Raster;
+use calibench::synth::Truth;
+use calibench::synth::render::{Imaging, photograph};
+use calibench::synth::scene::looking_at_centre;
+use calibench::target::Board;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const CALIBENCH: &str = env!("CARGO_BIN_EXE_calibench");
+
+fn calibrate(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(CALIBENCH)
+        .arg("calibrate")
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("the program starts")
+}
+
+/// An empty folder of this test's own.
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    if folder.exists() {
+        fs::remove_dir_all(&folder).expect("an old folder is removed");
+    }
+    fs::create_dir_all(&folder).expect("a folder is made");
+    folder
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn rendered(board: &Board, pose: &Pose) -> Raster<f32> {
+    let imaging = Imaging { blur_px: 0.5, ..Imaging::default() };
+    photograph(&Truth::chapter_camera(), Truth::CHAPTER_IMAGE, board, pose, &imaging)
+        .expect("it is seen")
+        .image
+}
+
+/// The chapter's four photographs, 16 bits each: `pose0.png` to `pose3.png`.
+fn chapter_photos(folder: &Path) {
+    for (i, pose) in Truth::chapter_poses().iter().enumerate() {
+        let photo = rendered(&Truth::chapter_board(), pose).to_u16();
+        write_png_16(&folder.join(format!("pose{i}.png")), &photo).expect("it is written");
+    }
+}
+
+fn result(folder: &Path) -> serde_json::Value {
+    let text = fs::read_to_string(folder.join("out/result.json")).expect("a result is written");
+    serde_json::from_str(&text).expect("the result is JSON")
+}
+
+const CHAPTER_PHOTOS: [&str; 4] = ["pose0.png", "pose1.png", "pose2.png", "pose3.png"];
+
+#[test]
+fn photographs_give_the_camera_and_bad_files_are_named_and_left_out() {
+    let folder = folder("photo-command");
+    chapter_photos(&folder);
+    let whole = fs::read(folder.join("pose0.png")).unwrap();
+    fs::write(folder.join("broken.png"), &whole[..whole.len() / 2]).unwrap();
+    fs::write(folder.join("empty.png"), b"").unwrap();
+    write_png(&folder.join("small.png"), &Raster::filled(320, 240, 200u8)).unwrap();
+    write_png(&folder.join("blank.png"), &Raster::filled(640, 480, 200u8)).unwrap();
+    let bad = ["broken.png", "empty.png", "small.png", "blank.png", "missing.png"];
+    let mut arguments = vec!["--board", "circles:9x7:10mm:3mm", "--out", "out"];
+    // The broken file comes first: the size is that of the first photograph that can be read.
+    arguments.push(bad[0]);
+    arguments.extend(CHAPTER_PHOTOS);
+    arguments.extend(&bad[1..]);
+    let output = calibrate(&folder, &arguments);
+    let (out, err) = (text(&output.stdout), text(&output.stderr));
+    assert_eq!(output.status.code(), Some(0), "{out}\n{err}");
+    for name in bad {
+        assert!(err.contains(&format!("left out: {name}: ")), "{name}: {err}");
+        assert!(out.contains(&format!("left out: {name}: ")), "{name}: {out}");
+    }
+    assert!(err.contains("320 x 240 px") && err.contains("0 bytes") && err.contains("broken image"), "{err}");
+    let result = result(&folder);
+    assert_eq!(result["left_out"].as_array().map(Vec::len), Some(bad.len()));
+    assert_eq!(result["views"].as_array().map(Vec::len), Some(4));
+    // The detector leaves 0.0014 px RMS at most on sharp renders (its tests), over 252 points an error vector of 0.022 px;
+    // by Cauchy-Schwarz it moves fx by 6.81 px a pixel of unit noise at most: 0.15 px, and k1 by 0.035 x 0.022 = 8e-4.
+    let camera = |name: &str| result["camera"][name].as_f64().unwrap();
+    assert!((camera("fx") - 600.0).abs() < 0.15 && (camera("cx") - 326.0).abs() < 0.15, "{result:#}");
+    assert!((camera("k1") + 0.18).abs() < 8e-4, "{result:#}");
+    assert!(out.contains("bias of the discs' centres corrected"), "{out}");
+    for i in 0..4 {
+        let overlay = fs::read(folder.join(format!("out/overlay/{:03}-pose{i}.png", i + 2))).unwrap();
+        assert_eq!(&overlay[1..4], b"PNG");
+    }
+    let page = fs::read_to_string(folder.join("out/report.html")).unwrap();
+    for name in bad.iter().chain(&CHAPTER_PHOTOS) {
+        assert!(page.contains(name), "{name} is not in the report");
+    }
+    // Residuals, views, lens, coverage, deviation of a pixel.
+    assert_eq!(page.matches("<svg").count(), 5);
+    for external in ["src=", "<script", "<link", "@import", "url("] {
+        assert!(!page.contains(external), "the page must need nothing else, but holds {external}");
+    }
+}
+
+#[test]
+fn without_the_diameter_the_bias_stays_and_is_said() {
+    let folder = folder("photo-command-bias");
+    chapter_photos(&folder);
+    let mut arguments = vec!["--board", "circles:9x7:10mm", "--format", "json"];
+    arguments.extend(CHAPTER_PHOTOS);
+    let output = calibrate(&folder, &arguments);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let result: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let warnings = result["warnings"].to_string();
+    assert!(warnings.contains("not corrected for their bias"), "{warnings}");
+    // r_max is 0.44 of a corner radius of about 0.67 in the chapter's camera.
+    assert!(warnings.contains("of the corner radius"), "{warnings}");
+}
+
+#[test]
+fn a_mis_detected_view_is_rejected_on_request() {
+    let folder = folder("photo-command-reject");
+    chapter_photos(&folder);
+    for i in 0..3 {
+        let pose = looking_at_centre([12.0 * f64::from(i) - 20.0, 18.0, 5.0], 125.0);
+        write_png(&folder.join(format!("more{i}.png")), &rendered(&Truth::chapter_board(), &pose).to_u8())
+            .unwrap();
+    }
+    // A board of another spacing across: the detector finds a 9 x 7 grid in it, but it is not the board.
+    let bent = Board::circles(9, 7, 8.0, 2.4).unwrap();
+    let mut photo = rendered(&bent, &looking_at_centre([25.0, 0.0, 0.0], 120.0));
+    let sharp = photo.clone();
+    for y in 0..480 {
+        for x in 0..640 {
+            // A third of the frame is displaced, as by a torn sheet.
+            photo.set(x, y, sharp.get(x, if x > 400 { (y + 6).min(479) } else { y }));
+        }
+    }
+    write_png(&folder.join("torn.png"), &photo.to_u8()).unwrap();
+    let mut arguments =
+        vec!["--board", "circles:9x7:10mm:3mm", "--out", "out", "--reject-views", "3", "torn.png"];
+    arguments.extend(CHAPTER_PHOTOS);
+    arguments.extend(["more0.png", "more1.png", "more2.png"]);
+    let output = calibrate(&folder, &arguments);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let result = result(&folder);
+    let left_out = result["left_out"].as_array().unwrap();
+    assert_eq!(left_out.len(), 1, "{left_out:?}");
+    assert_eq!(left_out[0]["name"], "torn.png");
+    assert!(left_out[0]["reason"].as_str().unwrap().contains("times the median"));
+    assert!((result["camera"]["fx"].as_f64().unwrap() - 600.0).abs() < 0.15);
+}
+
+#[test]
+fn nothing_usable_ends_with_two() {
+    let folder = folder("photo-command-none");
+    write_png(&folder.join("blank.png"), &Raster::filled(640, 480, 200u8)).unwrap();
+    let none = calibrate(&folder, &["--board", "circles:9x7:10mm", "blank.png", "missing.png"]);
+    assert_eq!(none.status.code(), Some(2));
+    assert!(text(&none.stderr).contains("none of 2 photographs"), "{}", text(&none.stderr));
+    for board in ["squares:9x7:10mm", "circles:9x7", "chess:9x6:25mm:3mm"] {
+        assert_eq!(calibrate(&folder, &["--board", board, "blank.png"]).status.code(), Some(2), "{board}");
+    }
+    assert_eq!(calibrate(&folder, &["--reject-views", "0.5", "blank.png"]).status.code(), Some(2));
+    let several = calibrate(&folder, &["a.csv", "b.csv"]);
+    assert_eq!(several.status.code(), Some(2));
+    assert!(text(&several.stderr).contains("--board"));
+}
+
+#[test]
+fn a_chessboard_needs_its_detector() {
+    let board: BoardSpec = "chess:9x6:25mm".parse().unwrap();
+    assert_eq!(board.check_detector().is_ok(), cfg!(feature = "chessboard"));
+    if cfg!(not(feature = "chessboard")) {
+        let folder = folder("photo-command-chess");
+        let output = calibrate(&folder, &["--board", "chess:9x6:25mm", "photo.png"]);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(text(&output.stderr).contains("--features chessboard"), "{}", text(&output.stderr));
+    }
+}
+
+#[cfg(feature = "chessboard")]
+#[test]
+fn the_bumblebee_camera_comes_out_of_the_command() {
+    let Some(data) = calibench::io::data_folder().expect("CALIBENCH_DATA names a folder") else {
+        eprintln!("SKIPPED: no folder of real data (set CALIBENCH_DATA)");
+        return;
+    };
+    let folder = folder("photo-command-bumblebee");
+    let photos: Vec<String> = (1..=11)
+        .map(|i| data.join(format!("bumblebee_left/left{i:02}.jpg")).to_string_lossy().into_owned())
+        .collect();
+    let mut arguments = vec!["--board", "chess:4x6:30mm", "--out", "out"];
+    arguments.extend(photos.iter().map(String::as_str));
+    let output = calibrate(&folder, &arguments);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let published: toml::Table = fs::read_to_string(data.join("published.toml")).unwrap().parse().unwrap();
+    let numbers = |key: &str| published["bumblebee_left"][key].as_array().unwrap().clone();
+    let result = result(&folder);
+    let names = ["fx", "fy", "cx", "cy", "k1", "k2"];
+    for ((name, theirs), tolerance) in names.iter().zip(numbers("published")).zip(numbers("tolerance")) {
+        let difference = result["camera"][name].as_f64().unwrap() - theirs.as_float().unwrap();
+        assert!(difference.abs() <= tolerance.as_float().unwrap(), "{name} differs by {difference}");
+    }
+}
