@@ -23,6 +23,7 @@ pub mod provenance;
 pub mod published;
 mod reconcile;
 mod record;
+pub mod study;
 mod table;
 pub mod verdict;
 

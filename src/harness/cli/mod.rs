@@ -7,6 +7,7 @@ mod list;
 mod report;
 mod reproduce;
 mod run;
+mod study;
 mod terminal;
 
 pub use exit::Exit;
@@ -41,6 +42,8 @@ enum Verb {
     Check(check::Arguments),
     /// Accepts the present result of an experiment as its golden snapshot, and its figures with it
     Bless(bless::Arguments),
+    /// Monte Carlo studies from a file: resumable, sharded, with intervals
+    Study(study::Arguments),
 }
 
 /// The `calibench` command over a table of experiments.
@@ -58,6 +61,7 @@ pub fn main(experiments: &[Experiment]) -> ExitCode {
         Some(Verb::Run(arguments)) => run::run(experiments, &arguments),
         Some(Verb::Check(arguments)) => check::run(experiments, &arguments),
         Some(Verb::Bless(arguments)) => bless::run(experiments, &arguments),
+        Some(Verb::Study(arguments)) => study::run(&arguments),
     };
     exit.into()
 }
