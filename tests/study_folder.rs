@@ -244,7 +244,7 @@ fn a_damaged_or_occupied_folder_is_refused() {
 
 /// Long enough to be killed on the way, on a fast machine too.
 fn long_spec() -> String {
-    SPEC.replace("per_cell = 45", "per_cell = 3000").replace("batch = 10", "batch = 25")
+    SPEC.replace("per_cell = 45", "per_cell = 600").replace("batch = 10", "batch = 25")
 }
 
 fn command(arguments: &[&str]) -> Command {

@@ -16,8 +16,10 @@ pub struct Tally {
     pub outcomes: BTreeMap<String, u64>,
     /// One a quantity of the study, over converged trials.
     pub moments: Vec<Moments>,
-    /// As `moments`.
+    /// Counts of values less their `origins`.
     pub sketches: Vec<Sketch>,
+    /// What the values are expected to lie about: a sketch is exact to a part of the distance from there.
+    pub origins: Vec<f64>,
     /// Joint sums of all quantities that the cell measures, over converged trials that have them all.
     pub joint: Sample,
     /// Which quantities the joint sums hold.
@@ -27,14 +29,15 @@ pub struct Tally {
 impl Tally {
     pub(super) fn new(cell: &Cell) -> Tally {
         let quantities = cell.prediction.0.len();
+        let origins: Vec<f64> = cell.prediction.0.iter().map(|p| p.map_or(0.0, |p| p.mean)).collect();
         let joint_of: Vec<usize> = (0..quantities).filter(|&q| cell.prediction.0[q].is_some()).collect();
-        let origin: Vec<f64> =
-            joint_of.iter().map(|&q| cell.prediction.0[q].map_or(0.0, |p| p.mean)).collect();
+        let origin: Vec<f64> = joint_of.iter().map(|&q| origins[q]).collect();
         Tally {
             trials: 0,
             outcomes: BTreeMap::new(),
             moments: vec![Moments::default(); quantities],
             sketches: vec![Sketch::default(); quantities],
+            origins,
             joint: Sample::about(&origin),
             joint_of,
         }
@@ -52,10 +55,10 @@ impl Tally {
         if !trial.converged() {
             return;
         }
-        for ((value, moments), sketch) in trial.values.iter().zip(&mut self.moments).zip(&mut self.sketches) {
+        for (q, value) in trial.values.iter().enumerate() {
             if let Some(x) = value {
-                moments.add(*x);
-                sketch.add(*x);
+                self.moments[q].add(*x);
+                self.sketches[q].add(x - self.origins[q]);
             }
         }
         let joint: Option<Vec<f64>> = self.joint_of.iter().map(|&q| trial.values[q]).collect();

@@ -146,6 +146,11 @@ impl Cell {
         }
     }
 
+    /// Standard deviation of a pixel coordinate.
+    pub fn noise_px(&self) -> f64 {
+        self.design.scene.noise_px
+    }
+
     /// Views and points of each.
     pub fn size(&self) -> (usize, usize) {
         let views = match &self.scene {

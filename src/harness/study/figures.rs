@@ -10,7 +10,7 @@ use crate::harness::{Dash, Figure, HeatMap, Look, Plot};
 /// Series beyond this number cannot be told apart in one plot.
 const MOST_SERIES: usize = 6;
 /// Axes that span more than this are logarithmic.
-const WIDE: f64 = 9.0;
+const WIDE: f64 = 4.0;
 
 /// All figures of a study.
 pub(super) fn draw(engine: &Engine, summary: &Summary) -> Vec<Figure> {

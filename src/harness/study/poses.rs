@@ -10,8 +10,8 @@ use std::f64::consts::TAU;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Poses {
-    /// The chapter's four poses.
-    Chapter,
+    /// The chapter's four poses. (Braces, so that a field too many is an error.)
+    Chapter {},
     /// Views tilted alike about directions that follow the golden angle. The first views of a longer series are those of a shorter one.
     Spread {
         /// Number of views.
@@ -118,7 +118,7 @@ impl Poses {
     /// Number of views.
     pub fn views(&self) -> usize {
         match self {
-            Poses::Chapter => 4,
+            Poses::Chapter {} => 4,
             Poses::List { poses } => poses.len(),
             Poses::Spread { views, .. } | Poses::Random(RandomPoses { views, .. }) => *views,
         }
@@ -128,7 +128,7 @@ impl Poses {
     pub(super) fn generate(&self, sight: &Sight<'_>, stream: &mut Stream) -> Result<Vec<Pose>, PosesError> {
         self.check()?;
         let poses: Vec<Pose> = match self {
-            Poses::Chapter => crate::synth::Truth::chapter_poses(),
+            Poses::Chapter {} => crate::synth::Truth::chapter_poses(),
             Poses::List { poses } => poses.iter().map(PoseSpec::pose).collect(),
             Poses::Spread { views, tilt_deg, coverage, distance_mm } => {
                 (0..*views).map(|k| spread(k, *tilt_deg, *coverage, *distance_mm, sight)).collect()
@@ -143,7 +143,7 @@ impl Poses {
 
     fn check(&self) -> Result<(), PosesError> {
         let (views, tilt, share, distance, spread) = match self {
-            Poses::Chapter => return Ok(()),
+            Poses::Chapter {} => return Ok(()),
             Poses::List { poses } => (poses.len(), 0.0, 0.0, 1.0, 0.0),
             Poses::Spread { views, tilt_deg, coverage, distance_mm } => {
                 (*views, *tilt_deg, *coverage, *distance_mm, 0.0)

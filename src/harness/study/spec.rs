@@ -130,18 +130,13 @@ pub struct Estimator {
 }
 
 /// See [`Loss`].
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 #[allow(missing_docs, reason = "the fields are those of `calibrate::Loss`")]
 pub enum LossChoice {
-    #[default]
-    Squares,
-    Huber {
-        delta_px: f64,
-    },
-    Cauchy {
-        scale_px: f64,
-    },
+    Squares {},
+    Huber { delta_px: f64 },
+    Cauchy { scale_px: f64 },
 }
 
 /// How many trials a cell has, and in what batches.
@@ -194,7 +189,7 @@ fn chapter_model() -> FreeParameters {
 
 impl Default for Estimator {
     fn default() -> Estimator {
-        Estimator { free: chapter_model(), hold: BTreeMap::new(), loss: LossChoice::Squares }
+        Estimator { free: chapter_model(), hold: BTreeMap::new(), loss: LossChoice::default() }
     }
 }
 
@@ -302,11 +297,17 @@ impl Estimator {
     }
 }
 
+impl Default for LossChoice {
+    fn default() -> LossChoice {
+        LossChoice::Squares {}
+    }
+}
+
 impl LossChoice {
     /// The solver's loss.
     pub fn loss(self) -> Loss {
         match self {
-            LossChoice::Squares => Loss::Squares,
+            LossChoice::Squares {} => Loss::Squares,
             LossChoice::Huber { delta_px } => Loss::Huber { delta_px },
             LossChoice::Cauchy { scale_px } => Loss::Cauchy { scale_px },
         }

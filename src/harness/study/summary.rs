@@ -113,7 +113,9 @@ fn statistic(
         mean: moments.mean_interval(false_alarm),
         sd,
         rms: moments.rms_interval(false_alarm),
-        quantiles: SHARES.map(|share| (share, quantile(&tally.sketches[q], share, false_alarm))).to_vec(),
+        quantiles: SHARES
+            .map(|share| (share, quantile(&tally.sketches[q], tally.origins[q], share, false_alarm)))
+            .to_vec(),
         predicted,
         ratio,
     }
@@ -121,11 +123,11 @@ fn statistic(
 
 /// A quantile, and the values at the ranks between which the true one lies: their number below it is binomial (normal approximation).
 /// `None` where a rank would lie outside the sample.
-fn quantile(sketch: &Sketch, share: f64, false_alarm: f64) -> Option<Estimated> {
+fn quantile(sketch: &Sketch, origin: f64, share: f64, false_alarm: f64) -> Option<Estimated> {
     let n = sketch.total() as f64;
     let middle = n * share;
     let half = normal_two_sided(false_alarm) * (n * share * (1.0 - share)).sqrt();
-    let rank = |x: f64| if x >= 1.0 { sketch.of_rank(x as u64) } else { None };
+    let rank = |x: f64| if x >= 1.0 { sketch.of_rank(x as u64).map(|v| origin + v) } else { None };
     Some(Estimated {
         value: rank(libm::ceil(middle))?,
         low: rank(libm::floor(middle - half))?,
