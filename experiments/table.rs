@@ -1,9 +1,17 @@
-//! The table of experiments. Each is a file of its own, a module here and a binary of its own (see Cargo.toml).
+//! Which experiments are there? Adding one is adding its module and its line here.
 
 use calibench::harness::Experiment;
 
+#[path = "collinearity.rs"]
+mod collinearity;
+#[path = "four_pose.rs"]
+mod four_pose;
+#[path = "k2_observability.rs"]
+mod k2_observability;
 #[path = "line_bending.rs"]
 mod line_bending;
+#[path = "nine_point.rs"]
+mod nine_point;
 
 #[path = "focal_depth.rs"]
 mod focal_depth;
@@ -13,5 +21,14 @@ mod noise_floor;
 mod pose_count;
 
 /// All experiments, in the order of the book.
-pub const EXPERIMENTS: &[Experiment] =
-    &[line_bending::EXPERIMENT, pose_count::EXPERIMENT, noise_floor::EXPERIMENT, focal_depth::EXPERIMENT];
+#[rustfmt::skip]
+pub const EXPERIMENTS: &[Experiment] = &[
+    line_bending::EXPERIMENT,
+    four_pose::EXPERIMENT,
+    k2_observability::EXPERIMENT,
+    collinearity::EXPERIMENT,
+    nine_point::EXPERIMENT,
+    pose_count::EXPERIMENT,
+    noise_floor::EXPERIMENT,
+    focal_depth::EXPERIMENT,
+];

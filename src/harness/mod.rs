@@ -7,6 +7,14 @@
 //!   -> claim     correct, by theory or an oracle?
 //!   -> published reproduces the book?
 //! ```
+//!
+//! # Adding an experiment
+//! 1. `experiments/<name>.rs`: `pub const EXPERIMENT: Experiment`, `calibench::experiment_main!(EXPERIMENT);`, and a
+//!    `run(&Context) -> Result<Record, ExperimentError>` that tells numbers, claims, tables and figures.
+//! 2. Three registrations: a `[[bin]]` in Cargo.toml, `mod` and table entry in `experiments/table.rs`.
+//! 3. `calibench run <id>`, read and look; then `calibench bless <id>` and commit golden/ and figures/.
+//!
+//! The layout test names whatever was forgotten.
 
 mod band;
 mod claim;
@@ -16,6 +24,7 @@ mod experiment;
 pub mod figure;
 pub mod golden;
 pub mod hash;
+pub mod monte_carlo;
 mod predicted;
 mod progress;
 pub mod project;
@@ -23,6 +32,7 @@ pub mod provenance;
 pub mod published;
 mod reconcile;
 mod record;
+mod simulated;
 pub mod study;
 mod table;
 pub mod verdict;
@@ -32,6 +42,7 @@ pub use claim::Claim;
 pub use emit::{EmitError, emit, write_atomically};
 pub use experiment::{Context, Experiment, ExperimentError};
 pub use figure::{Dash, Figure, HeatMap, Look, Marker, Plot};
+pub use monte_carlo::{MonteCarlo, Outcome};
 pub use predicted::{Predicted, significant};
 pub use progress::{Progress, ProgressDisplay};
 pub use reconcile::{Expectation, Reconciliation};

@@ -1,14 +1,17 @@
 //! What can a user ask for? The command line: one verb a file, and the exit codes that all share.
 
 mod bless;
+mod calibrate;
 mod check;
 mod exit;
 mod list;
+mod ninepoint;
 mod report;
 mod reproduce;
 mod run;
 mod study;
 mod terminal;
+mod undistort;
 
 pub use exit::Exit;
 pub use terminal::{print, warn};
@@ -42,6 +45,12 @@ enum Verb {
     Check(check::Arguments),
     /// Accepts the present result of an experiment as its golden snapshot, and its figures with it
     Bless(bless::Arguments),
+    /// Calibrates a camera from a corner file, or a plane from a file of point pairs
+    Calibrate(calibrate::Arguments),
+    /// Finds the dots of a nine-point board in a photograph, and maps its pixels to the unit grid
+    Ninepoint(ninepoint::Arguments),
+    /// Removes a calibrated lens's distortion from photographs
+    Undistort(undistort::Arguments),
     /// Monte Carlo studies from a file: resumable, sharded, with intervals
     Study(study::Arguments),
 }
@@ -52,6 +61,10 @@ pub fn main(experiments: &[Experiment]) -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => return terminal::usage(&error).into(),
     };
+    // A study finishes its batch first, and has a handler of its own.
+    if !matches!(arguments.verb, Some(Verb::Study(_))) {
+        end_well_on_interrupt();
+    }
     if let Err(exit) = set_threads(arguments.threads) {
         return exit.into();
     }
@@ -61,6 +74,9 @@ pub fn main(experiments: &[Experiment]) -> ExitCode {
         Some(Verb::Run(arguments)) => run::run(experiments, &arguments),
         Some(Verb::Check(arguments)) => check::run(experiments, &arguments),
         Some(Verb::Bless(arguments)) => bless::run(experiments, &arguments),
+        Some(Verb::Calibrate(arguments)) => calibrate::run(&arguments),
+        Some(Verb::Ninepoint(arguments)) => ninepoint::run(&arguments),
+        Some(Verb::Undistort(arguments)) => undistort::run(&arguments),
         Some(Verb::Study(arguments)) => study::run(&arguments),
     };
     exit.into()
@@ -68,7 +84,18 @@ pub fn main(experiments: &[Experiment]) -> ExitCode {
 
 /// The command of an experiment's own binary: one run, as `calibench run ID` does it.
 pub fn main_for(experiment: &Experiment) -> ExitCode {
+    end_well_on_interrupt();
     run::main_for(experiment).into()
+}
+
+/// Ctrl-C ends the program with a code of its own. Files are renamed into place whole, so what is finished stays.
+fn end_well_on_interrupt() {
+    let handler = || {
+        warn("interrupted: results of finished experiments are kept, the rest is missing");
+        std::process::exit(Exit::Incomplete as i32);
+    };
+    // A handler that was set before stays in charge.
+    let _ = ctrlc::set_handler(handler);
 }
 
 /// Sets the size of the thread pool.

@@ -1,7 +1,7 @@
 //! How is a quantity over two others shown? Cells of a colour scale, with their values written in.
 
 use super::axis::{Axis, Scale, Span};
-use super::canvas::{Anchor, Canvas, Point};
+use super::canvas::{Anchor, Canvas, Point, text_width};
 use super::clip::Frame;
 use super::colour::{INK, heat, text_on};
 use crate::harness::predicted::significant;
@@ -111,11 +111,14 @@ impl HeatMap {
         let (left, right) = (frame.right + 14.0, frame.right + 28.0);
         const STEPS: usize = 64;
         let level = |k: usize| frame.bottom - frame.height() * k as f64 / STEPS as f64;
-        for k in 0..STEPS {
+        for k in (0..STEPS).rev() {
             let colour = heat((k as f64 + 0.5) / STEPS as f64);
-            canvas.rectangle((left, level(k + 1)), (right, level(k)), colour);
+            // Drawn down to the foot, each over the last: no seam shows between the steps.
+            canvas.rectangle((left, level(k + 1)), (right, level(0)), colour);
         }
-        for tick in span.ticks(5) {
+        let ticks = span.ticks(5);
+        let widest = ticks.iter().map(|t| text_width(&t.text, text_px)).fold(0.0, f64::max);
+        for tick in ticks {
             let y = frame.bottom - frame.height() * span.fraction(tick.value);
             let mark: [Point; 2] = [(right, y), (right + 4.0, y)];
             canvas.line(&mark, INK, 1.0);
@@ -123,7 +126,7 @@ impl HeatMap {
         }
         canvas.text(
             &self.label,
-            (frame.right + 78.0, 0.5 * (frame.top + frame.bottom)),
+            (right + widest + 17.0, 0.5 * (frame.top + frame.bottom)),
             text_px + 1.0,
             INK,
             Anchor::Upwards,

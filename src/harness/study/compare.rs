@@ -110,6 +110,9 @@ impl Pairs {
     }
 }
 
+/// A batch with its place, `(batch, cell)`.
+type Batch = ((u64, usize), Vec<Trial>);
+
 /// One of the two runs, read batch by batch.
 struct Side {
     engine: Engine,
@@ -133,8 +136,7 @@ impl Side {
         Ok(Side { engine, replay, _folder: folder })
     }
 
-    /// The next batch with its place, `(batch, cell)`.
-    fn next(&mut self) -> Result<Option<((u64, usize), Vec<Trial>)>, CompareError> {
+    fn next(&mut self) -> Result<Option<Batch>, CompareError> {
         let Some((cell, batch)) = self.engine.next() else { return Ok(None) };
         let Some(trials) = self.replay.trials(&self.engine)? else { return Ok(None) };
         self.engine.absorb((cell, batch), &trials);

@@ -75,8 +75,10 @@ impl SpecError {
 
 /// Line and column, both from 1, of a byte; the column counts characters.
 pub(super) fn place(text: &str, byte: usize) -> (usize, usize) {
-    let before = &text[..text.floor_char_boundary(byte)];
-    let line = before.matches('\n').count() + 1;
-    let column = before.rsplit('\n').next().map_or(0, |rest| rest.chars().count()) + 1;
+    let before = &text.as_bytes()[..byte.min(text.len())];
+    let line = before.iter().filter(|&&b| b == b'\n').count() + 1;
+    let start = before.iter().rposition(|&b| b == b'\n').map_or(0, |at| at + 1);
+    // Every character has one byte that does not continue another.
+    let column = before[start..].iter().filter(|&&b| b & 0xc0 != 0x80).count() + 1;
     (line, column)
 }
