@@ -4,6 +4,8 @@ use calibench::harness::Experiment;
 
 #[path = "collinearity.rs"]
 mod collinearity;
+#[path = "focal_depth.rs"]
+mod focal_depth;
 #[path = "four_pose.rs"]
 mod four_pose;
 #[path = "k2_observability.rs"]
@@ -12,8 +14,12 @@ mod k2_observability;
 mod line_bending;
 #[path = "nine_point.rs"]
 mod nine_point;
+#[path = "noise_floor.rs"]
+mod noise_floor;
 #[path = "photographs.rs"]
 mod photographs;
+#[path = "pose_count.rs"]
+mod pose_count;
 
 /// All experiments, in the order of the book.
 #[rustfmt::skip]
@@ -21,6 +27,9 @@ pub const EXPERIMENTS: &[Experiment] = &[
     line_bending::EXPERIMENT,
     four_pose::EXPERIMENT,
     k2_observability::EXPERIMENT,
+    pose_count::EXPERIMENT,
+    noise_floor::EXPERIMENT,
+    focal_depth::EXPERIMENT,
     collinearity::EXPERIMENT,
     nine_point::EXPERIMENT,
     photographs::EXPERIMENT,

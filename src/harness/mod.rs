@@ -34,6 +34,7 @@ pub mod published;
 mod reconcile;
 mod record;
 mod simulated;
+pub mod study;
 mod table;
 pub mod verdict;
 

@@ -60,6 +60,11 @@ impl Progress {
         self.bar.inc(steps as u64);
     }
 
+    /// Says something beside the bar, such as what is worst so far.
+    pub fn note(&self, text: &str) {
+        self.bar.set_message(format!("{} {text}", self.label));
+    }
+
     /// Puts the bar on the display.
     fn show(&self) {
         if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {per_sec} eta {eta}") {

@@ -9,6 +9,7 @@ mod ninepoint;
 mod report;
 mod reproduce;
 mod run;
+mod study;
 mod terminal;
 mod undistort;
 
@@ -50,6 +51,8 @@ enum Verb {
     Ninepoint(ninepoint::Arguments),
     /// Removes a calibrated lens's distortion from photographs
     Undistort(undistort::Arguments),
+    /// Monte Carlo studies from a file: resumable, sharded, with intervals
+    Study(study::Arguments),
 }
 
 /// The `calibench` command over a table of experiments.
@@ -58,7 +61,10 @@ pub fn main(experiments: &[Experiment]) -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => return terminal::usage(&error).into(),
     };
-    end_well_on_interrupt();
+    // A study finishes its batch first, and has a handler of its own.
+    if !matches!(arguments.verb, Some(Verb::Study(_))) {
+        end_well_on_interrupt();
+    }
     if let Err(exit) = set_threads(arguments.threads) {
         return exit.into();
     }
@@ -71,6 +77,7 @@ pub fn main(experiments: &[Experiment]) -> ExitCode {
         Some(Verb::Calibrate(arguments)) => calibrate::run(&arguments),
         Some(Verb::Ninepoint(arguments)) => ninepoint::run(&arguments),
         Some(Verb::Undistort(arguments)) => undistort::run(&arguments),
+        Some(Verb::Study(arguments)) => study::run(&arguments),
     };
     exit.into()
 }

@@ -1,0 +1,260 @@
+//! Which of two runs is closer to the truth? Trials that met the same noise are compared one by one.
+
+use super::engine::{Engine, RunError};
+use super::folder::{Folder, FolderError, Located, Replay};
+use super::moments::Estimated;
+use super::quantity::Quantity;
+use super::tables;
+use super::trial::Trial;
+use crate::evaluate::distribution::normal_two_sided;
+use crate::evaluate::interval::each_of;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+/// Runs that cannot be compared.
+#[derive(Debug, thiserror::Error)]
+pub enum CompareError {
+    /// The file system, or a damaged run.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// The specification.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// The trials do not meet the same noise.
+    #[error("{what}: {a} and {b}; trials are paired by seed, cell and index, so both runs need the same")]
+    NotPaired {
+        /// What differs.
+        what: &'static str,
+        /// In the first run.
+        a: String,
+        /// In the second.
+        b: String,
+    },
+}
+
+/// What can be said of a pair of runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// The second run's errors are smaller.
+    SecondBetter,
+    /// The first run's errors are smaller.
+    FirstBetter,
+    /// The interval holds "no difference".
+    NotTold,
+}
+
+/// One cell and quantity.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Effect {
+    /// Cell, as either run names it.
+    pub cell: String,
+    /// Of what.
+    pub quantity: Quantity,
+    /// Trials in which both converged.
+    pub pairs: u64,
+    /// Root mean square error of both runs over those.
+    pub rms: [f64; 2],
+    /// The second over the first, with its interval.
+    pub ratio: Estimated,
+    /// What follows.
+    pub verdict: Verdict,
+}
+
+/// A comparison of two runs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Comparison {
+    /// One a cell and error that both runs measure.
+    pub effects: Vec<Effect>,
+    /// Trials of each cell that converged in the first run only, and in the second only.
+    pub only: Vec<(String, u64, u64)>,
+    /// False-alarm rate of each interval; that of all together is the runs' own.
+    pub each: f64,
+}
+
+/// Sums over the pairs of one cell and quantity: `a^2`, `b^2` and their products.
+#[derive(Debug, Clone, Copy, Default)]
+struct Pairs {
+    count: u64,
+    a: f64,
+    b: f64,
+    aa: f64,
+    bb: f64,
+    ab: f64,
+}
+
+impl Pairs {
+    fn add(&mut self, a: f64, b: f64) {
+        let (a, b) = (a * a, b * b);
+        self.count += 1;
+        for (sum, term) in [&mut self.a, &mut self.b, &mut self.aa, &mut self.bb, &mut self.ab]
+            .into_iter()
+            .zip([a, b, a * a, b * b, a * b])
+        {
+            *sum += term;
+        }
+    }
+
+    /// `rms_b / rms_a`: its logarithm is nearly normal with variance `var(b^2 / mean b^2 - a^2 / mean a^2) / (4 n)`, pair by pair.
+    fn ratio(&self, false_alarm: f64) -> Option<Estimated> {
+        let n = self.count as f64;
+        let (a, b) = (self.a / n, self.b / n);
+        if self.count < 4 || a <= 0.0 || b <= 0.0 {
+            return None;
+        }
+        let variance = (self.aa / (a * a) + self.bb / (b * b) - 2.0 * self.ab / (a * b)) / n;
+        let half = 0.5 * normal_two_sided(false_alarm) * (variance.max(0.0) / n).sqrt();
+        let value = (b / a).sqrt();
+        let factor = libm::exp(half);
+        Some(Estimated { value, low: value / factor, high: value * factor })
+    }
+}
+
+/// A batch with its place, `(batch, cell)`.
+type Batch = ((u64, usize), Vec<Trial>);
+
+/// One of the two runs, read batch by batch.
+struct Side {
+    engine: Engine,
+    replay: Replay<BufReader<File>>,
+    _folder: Folder,
+}
+
+impl Side {
+    fn open(path: &Path) -> Result<Side, CompareError> {
+        let folder = Folder::open(path)?;
+        let manifest = folder.manifest()?;
+        let shard = manifest.shard.parse().map_err(|e: super::ShardError| FolderError::Damaged {
+            path: folder.file("manifest.json"),
+            what: e.to_string(),
+        })?;
+        let engine = Engine::new(&folder.read("spec.toml")?, shard).map_err(RunError::from)?;
+        let name = folder.file("trials.csv");
+        let file = File::open(&name).map_err(|source| Located { path: name.clone(), source });
+        let mut replay = Replay::new(BufReader::new(file.map_err(FolderError::from)?), name);
+        replay.expect_header(&tables::header(&engine.quantities))?;
+        Ok(Side { engine, replay, _folder: folder })
+    }
+
+    fn next(&mut self) -> Result<Option<Batch>, CompareError> {
+        let Some((cell, batch)) = self.engine.next() else { return Ok(None) };
+        let Some(trials) = self.replay.trials(&self.engine)? else { return Ok(None) };
+        self.engine.absorb((cell, batch), &trials);
+        Ok(Some(((batch, cell), trials)))
+    }
+}
+
+/// Compares the runs in two folders. The intervals are widened so that all together raise a false alarm as rarely as one of the first
+/// run's own intervals (Bonferroni).
+pub fn compare(first: &Path, second: &Path) -> Result<Comparison, CompareError> {
+    let (mut a, mut b) = (Side::open(first)?, Side::open(second)?);
+    check_pairing(&a.engine, &b.engine)?;
+    let shared: Vec<(Quantity, usize, usize)> = a
+        .engine
+        .quantities
+        .iter()
+        .enumerate()
+        .filter(|(_, q)| q.is_error())
+        .filter_map(|(i, q)| Some((*q, i, b.engine.quantities.iter().position(|r| r == q)?)))
+        .collect();
+    let cells = a.engine.cells.len();
+    let mut pairs = vec![Pairs::default(); cells * shared.len()];
+    let mut only = vec![(0, 0); cells];
+    let (mut left, mut right) = (a.next()?, b.next()?);
+    while let (Some((at, ours)), Some((bt, theirs))) = (&left, &right) {
+        if at == bt {
+            let sums = &mut pairs[at.1 * shared.len()..][..shared.len()];
+            ours.iter().zip(theirs).for_each(|(x, y)| add(x, y, &shared, sums, &mut only[at.1]));
+        }
+        // A cell that ended early in one run has batches without partner in the other.
+        match at.cmp(bt) {
+            std::cmp::Ordering::Less => left = a.next()?,
+            std::cmp::Ordering::Greater => right = b.next()?,
+            std::cmp::Ordering::Equal => (left, right) = (a.next()?, b.next()?),
+        }
+    }
+    Ok(conclude(&a.engine, &b.engine, &shared, &pairs, &only))
+}
+
+fn check_pairing(a: &Engine, b: &Engine) -> Result<(), CompareError> {
+    let differ = |what, a: String, b: String| {
+        if a == b { Ok(()) } else { Err(CompareError::NotPaired { what, a, b }) }
+    };
+    differ("seed", a.spec.seed.to_string(), b.spec.seed.to_string())?;
+    differ("number of cells", a.cells.len().to_string(), b.cells.len().to_string())?;
+    differ("trials.batch", a.spec.trials.batch.to_string(), b.spec.trials.batch.to_string())
+}
+
+fn add(a: &Trial, b: &Trial, shared: &[(Quantity, usize, usize)], sums: &mut [Pairs], only: &mut (u64, u64)) {
+    match (a.converged(), b.converged()) {
+        (true, false) => only.0 += 1,
+        (false, true) => only.1 += 1,
+        (true, true) => {
+            for ((_, i, j), sum) in shared.iter().zip(sums) {
+                if let (Some(x), Some(y)) = (a.values[*i], b.values[*j]) {
+                    sum.add(x, y);
+                }
+            }
+        }
+        (false, false) => {}
+    }
+}
+
+fn conclude(
+    a: &Engine,
+    b: &Engine,
+    shared: &[(Quantity, usize, usize)],
+    pairs: &[Pairs],
+    only: &[(u64, u64)],
+) -> Comparison {
+    let told = pairs.iter().filter(|p| p.count >= 4).count();
+    let each = each_of(told, 1.0 - a.spec.confidence);
+    let name = |cell: usize| match (&a.cells[cell].name, &b.cells[cell].name) {
+        (x, y) if x == y => x.clone(),
+        (x, y) => format!("{x} | {y}"),
+    };
+    let mut effects = Vec::new();
+    for (cell, sums) in pairs.chunks(shared.len().max(1)).enumerate() {
+        for ((quantity, _, _), sum) in shared.iter().zip(sums) {
+            let Some(ratio) = sum.ratio(each) else { continue };
+            let verdict = match ratio {
+                r if r.high < 1.0 => Verdict::SecondBetter,
+                r if r.low > 1.0 => Verdict::FirstBetter,
+                _ => Verdict::NotTold,
+            };
+            let rms = [sum.a, sum.b].map(|s| (s / sum.count as f64).sqrt());
+            effects.push(Effect {
+                cell: name(cell),
+                quantity: *quantity,
+                pairs: sum.count,
+                rms,
+                ratio,
+                verdict,
+            });
+        }
+    }
+    let only = only.iter().enumerate().map(|(cell, o)| (name(cell), o.0, o.1)).collect();
+    Comparison { effects, only, each }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_errors_have_ratio_one_without_doubt() {
+        let mut pairs = Pairs::default();
+        [0.3, -1.2, 0.8, 2.0, -0.1].iter().for_each(|x| pairs.add(*x, -x));
+        let ratio = pairs.ratio(0.05).unwrap();
+        assert!((ratio.value - 1.0).abs() < 1e-15 && ratio.high - ratio.low < 1e-7);
+    }
+
+    #[test]
+    fn a_common_factor_is_found_exactly() {
+        let mut pairs = Pairs::default();
+        [0.3, -1.2, 0.8, 2.0, -0.1].iter().for_each(|x| pairs.add(*x, 3.0 * x));
+        let ratio = pairs.ratio(0.05).unwrap();
+        // The variance of the paired difference is rounding; its root, 1e-8, is what is left.
+        assert!((ratio.value - 3.0).abs() < 1e-14 && ratio.low > 2.999_999 && ratio.high < 3.000_001);
+    }
+}

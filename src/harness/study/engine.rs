@@ -1,0 +1,210 @@
+//! In which order are trials done, and when is a cell finished? Batches of fixed size, one cell after the other, round by round.
+
+use super::accumulate::Tally;
+use super::cells::Cell;
+use super::quantity::Quantity;
+use super::shard::Shard;
+use super::spec::Spec;
+use super::spec_error::SpecError;
+use super::trial::{Trial, run_trial};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A study in progress: what is done, and what comes next.
+#[derive(Debug)]
+pub struct Engine {
+    /// The study.
+    pub spec: Spec,
+    /// Its cells.
+    pub cells: Vec<Cell>,
+    /// What every trial measures.
+    pub quantities: Vec<Quantity>,
+    /// The part that is done here.
+    pub shard: Shard,
+    /// What the trials say, one a cell.
+    pub tallies: Vec<Tally>,
+    /// Batches absorbed.
+    pub batches: u64,
+    finished: Vec<bool>,
+    round: u64,
+    place: usize,
+}
+
+/// How far a run is, told after each batch.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pace {
+    /// Trials done since the run began or was resumed.
+    pub trials: u64,
+    /// Trials done before it was resumed.
+    pub before: u64,
+    /// The cell that is known worst: its name and the relative half-width of its interval.
+    pub worst: Option<(String, f64)>,
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// All is done.
+    Complete,
+    /// Asked to stop, and stopped after a batch.
+    Interrupted,
+}
+
+/// A request to stop after the present batch.
+pub type Interruption = AtomicBool;
+
+/// A run that cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The study's file.
+    #[error(transparent)]
+    Spec(#[from] SpecError),
+    /// The folder of results.
+    #[error(transparent)]
+    Folder(#[from] super::folder::FolderError),
+}
+
+/// The stop rule needs this many batches.
+const LEAST_BATCHES: u64 = 2;
+
+impl Engine {
+    /// The beginning of a study's part; `text` is its file.
+    pub fn new(text: &str, shard: Shard) -> Result<Engine, SpecError> {
+        Engine::of(Spec::parse(text)?, text, shard)
+    }
+
+    /// The same for a study that was read already.
+    pub fn of(spec: Spec, text: &str, shard: Shard) -> Result<Engine, SpecError> {
+        let cells = spec.cells(text)?;
+        let quantities = spec.quantities(&cells);
+        let tallies = cells.iter().map(Tally::new).collect();
+        let finished = vec![false; cells.len()];
+        Ok(Engine { spec, quantities, tallies, finished, cells, shard, batches: 0, round: 0, place: 0 })
+    }
+
+    /// Cell and batch that come next; `None` at the end.
+    pub(super) fn next(&self) -> Option<(usize, u64)> {
+        let rounds = self.spec.trials.per_cell.div_ceil(self.spec.trials.batch);
+        let whole_cells = self.spec.trials.precision.is_some();
+        let (mut round, mut place) = (self.round, self.place);
+        while round < rounds {
+            if place == self.cells.len() {
+                (round, place) = (round + 1, 0);
+                continue;
+            }
+            if !self.finished[place] && self.shard.holds(place, round, self.cells.len(), whole_cells) {
+                return Some((place, round));
+            }
+            place += 1;
+        }
+        None
+    }
+
+    /// The trials of a batch.
+    pub(super) fn trials_of(&self, batch: u64) -> std::ops::Range<u64> {
+        let size = self.spec.trials.batch;
+        batch * size..((batch + 1) * size).min(self.spec.trials.per_cell)
+    }
+
+    /// Runs the batch that comes next, in parallel; the trials are in order.
+    fn run(&self, (cell, batch): (usize, u64)) -> Vec<Trial> {
+        let cell = &self.cells[cell];
+        self.trials_of(batch).into_par_iter().map(|trial| run_trial(cell, &self.quantities, trial)).collect()
+    }
+
+    /// Takes in the trials of the batch that comes next.
+    pub(super) fn absorb(&mut self, (cell, batch): (usize, u64), trials: &[Trial]) {
+        trials.iter().for_each(|trial| self.tallies[cell].add(trial));
+        self.batches += 1;
+        (self.round, self.place) = (batch, cell + 1);
+        if batch + 1 >= LEAST_BATCHES && self.is_precise(cell) {
+            self.finished[cell] = true;
+        }
+    }
+
+    fn is_precise(&self, cell: usize) -> bool {
+        let Some(precision) = &self.spec.trials.precision else { return false };
+        self.relative_half_width(cell, &precision.quantity)
+            .is_some_and(|width| width <= precision.relative_half_width)
+    }
+
+    /// Half-width of the interval of a quantity's standard deviation over that.
+    fn relative_half_width(&self, cell: usize, quantity: &str) -> Option<f64> {
+        let at = self.quantities.iter().position(|q| q.name() == quantity)?;
+        let sd = self.tallies[cell].moments[at].sd_interval(1.0 - self.spec.confidence)?;
+        Some(0.5 * (sd.high - sd.low) / sd.value)
+    }
+
+    /// The cell whose trials say least, by the wanted quantity or else the first estimated parameter.
+    fn worst(&self) -> Option<(String, f64)> {
+        let first = self.quantities.iter().find(|q| q.is_error()).map(|q| q.name());
+        let quantity = self.spec.trials.precision.as_ref().map_or(first, |p| Some(p.quantity.as_str()))?;
+        let width = |cell: usize| Some((self.relative_half_width(cell, quantity)?, cell));
+        let (width, cell) = (0..self.cells.len()).filter_map(width).max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some((self.cells[cell].name.clone(), width))
+    }
+
+    /// The most trials this part may take.
+    pub fn most_trials(&self) -> u64 {
+        let rounds = self.spec.trials.per_cell.div_ceil(self.spec.trials.batch);
+        let whole_cells = self.spec.trials.precision.is_some();
+        let size = |batch: u64| {
+            let range = self.trials_of(batch);
+            range.end - range.start
+        };
+        (0..rounds)
+            .map(|batch| {
+                let held = (0..self.cells.len())
+                    .filter(|&cell| self.shard.holds(cell, batch, self.cells.len(), whole_cells));
+                size(batch) * held.count() as u64
+            })
+            .sum()
+    }
+
+    /// Trials done.
+    pub fn trials(&self) -> u64 {
+        self.tallies.iter().map(|t| t.trials).sum()
+    }
+
+    /// Runs to the end or until asked to stop. `keep` stores each batch before it counts.
+    pub(super) fn drive(
+        &mut self,
+        stop: &Interruption,
+        mut keep: impl FnMut(&[Trial]) -> Result<(), RunError>,
+        mut tell: impl FnMut(&Pace),
+    ) -> Result<Outcome, RunError> {
+        let before = self.trials();
+        while let Some(unit) = self.next() {
+            if stop.load(Ordering::Relaxed) {
+                return Ok(Outcome::Interrupted);
+            }
+            let trials = self.run(unit);
+            keep(&trials)?;
+            self.absorb(unit, &trials);
+            tell(&Pace { trials: self.trials() - before, before, worst: self.worst() });
+        }
+        Ok(Outcome::Complete)
+    }
+}
+
+/// Runs a whole study without files: for experiments, plans and measurements.
+pub fn in_memory(spec: Spec, text: &str, tell: impl FnMut(&Pace)) -> Result<Engine, SpecError> {
+    in_memory_seeing(spec, text, |_| {}, tell)
+}
+
+/// As [`in_memory`], showing every trial, in order.
+pub fn in_memory_seeing(
+    spec: Spec,
+    text: &str,
+    mut see: impl FnMut(&Trial),
+    tell: impl FnMut(&Pace),
+) -> Result<Engine, SpecError> {
+    let mut engine = Engine::of(spec, text, Shard::WHOLE)?;
+    let keep = |trials: &[Trial]| {
+        trials.iter().for_each(&mut see);
+        Ok(())
+    };
+    let ended = engine.drive(&AtomicBool::new(false), keep, tell);
+    ended.expect("nothing was stored, so nothing can fail");
+    Ok(engine)
+}

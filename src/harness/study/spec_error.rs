@@ -1,0 +1,84 @@
+//! What is wrong with a study's file, where, and what helps?
+
+use super::poses::PosesError;
+
+/// A study that cannot be run as written.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SpecError {
+    /// Not TOML, an unknown or missing field, or a value of the wrong type.
+    #[error("line {line}, column {column}: {message}; the fields are explained in studies/README.md")]
+    Toml {
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// What the reader says.
+        message: String,
+    },
+    /// The name is used for files.
+    #[error("name `{0}`: use lower-case letters, digits and `-`")]
+    Name(String),
+    /// A number outside its domain.
+    #[error("{field} is {value}: it must be {need}")]
+    Value {
+        /// Path of the field.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// Its domain.
+        need: &'static str,
+    },
+    /// No such board.
+    #[error("scene.target: {0}")]
+    Target(String),
+    /// A factor that cannot be applied.
+    #[error("line {line}, column {column}: factor `{factor}`: {message}")]
+    Factor {
+        /// Line of the level, from 1; 0 where the text is not at hand.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// Name of the factor.
+        factor: String,
+        /// What is wrong, and what to do.
+        message: String,
+    },
+    /// The same name for two factors.
+    #[error("two factors are named `{0}`: give each a name of its own")]
+    DuplicateFactor(String),
+    /// A cell whose poses do not exist.
+    #[error("cell {cell}: {source}")]
+    Poses {
+        /// The cell's levels.
+        cell: String,
+        /// What is wrong.
+        source: PosesError,
+    },
+    /// The precision is wanted of a quantity that is not estimated in every cell.
+    #[error("trials.precision.quantity `{quantity}` is not measured in cell {cell}; there are: {known}")]
+    Precision {
+        /// As given.
+        quantity: String,
+        /// The cell's levels.
+        cell: String,
+        /// Quantities of that cell.
+        known: String,
+    },
+}
+
+impl SpecError {
+    pub(super) fn toml(text: &str, error: &toml::de::Error) -> SpecError {
+        let (line, column) = place(text, error.span().map_or(0, |span| span.start));
+        SpecError::Toml { line, column, message: error.message().trim().to_string() }
+    }
+}
+
+/// Line and column, both from 1, of a byte; the column counts characters.
+pub(super) fn place(text: &str, byte: usize) -> (usize, usize) {
+    let before = &text.as_bytes()[..byte.min(text.len())];
+    let line = before.iter().filter(|&&b| b == b'\n').count() + 1;
+    let start = before.iter().rposition(|&b| b == b'\n').map_or(0, |at| at + 1);
+    // Every character has one byte that does not continue another.
+    let column = before[start..].iter().filter(|&&b| b & 0xc0 != 0x80).count() + 1;
+    (line, column)
+}

@@ -1,0 +1,314 @@
+//! Do threads, parts and interruptions leave every byte of a study where it was, and is a changed study refused?
+
+use calibench::harness::study::{
+    Engine, Folder, FolderError, Interruption, Manifest, MergeError, Outcome, Shard, finish, merge,
+};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Two cells of different noise, 5 batches each; the last is short.
+const SPEC: &str = r#"
+name = "small"
+question = "Does nothing but the seed decide?"
+seed = 11
+
+[scene]
+image = [640, 480]
+camera = { fx = 600.0, fy = 600.0, cx = 326.0, cy = 243.0, k1 = -0.18, k2 = 0.05 }
+target = { columns = 9, rows = 7, spacing_mm = 10.0 }
+poses = { kind = "random", views = 3, tilt_deg = 35.0, tilt_min_deg = 10.0, coverage = 0.5, distance_mm = 150.0, redraw = true }
+noise_px = 0.1
+
+[trials]
+per_cell = 45
+batch = 10
+
+[[factor]]
+name = "noise"
+unit = "px"
+set = ["scene.noise_px"]
+levels = [0.1, 0.3]
+"#;
+
+fn scratch(name: &str) -> PathBuf {
+    let path = std::env::temp_dir().join(format!("calibench-study-{}-{name}", std::process::id()));
+    let _ = fs::remove_dir_all(&path);
+    path
+}
+
+fn begin(path: &Path, text: &str, shard: Shard) -> (Folder, Engine) {
+    let engine = Engine::new(text, shard).unwrap();
+    let folder = Folder::create(path, text, &Manifest::new(&engine.spec, shard, None)).unwrap();
+    (folder, engine)
+}
+
+/// Runs to the end.
+fn run(path: &Path, text: &str, shard: Shard) {
+    let (folder, mut engine) = begin(path, text, shard);
+    let outcome = folder.run(&mut engine, &AtomicBool::new(false), |_| {}).unwrap();
+    assert_eq!(outcome, Outcome::Complete);
+    finish(&folder, &engine).unwrap();
+}
+
+fn resume(path: &Path) {
+    let folder = Folder::open(path).unwrap();
+    let shard = folder.manifest().unwrap().shard.parse().unwrap();
+    let mut engine = Engine::new(&folder.read("spec.toml").unwrap(), shard).unwrap();
+    folder.check(&Manifest::new(&engine.spec, shard, None)).unwrap();
+    folder.run(&mut engine, &AtomicBool::new(false), |_| {}).unwrap();
+    finish(&folder, &engine).unwrap();
+}
+
+/// Every file with its bytes.
+fn contents(path: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut folders = vec![path.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).unwrap() {
+            let entry = entry.unwrap().path();
+            if entry.is_dir() {
+                folders.push(entry);
+            } else {
+                let name = entry.strip_prefix(path).unwrap().display().to_string();
+                found.insert(name, fs::read(&entry).unwrap());
+            }
+        }
+    }
+    found
+}
+
+fn assert_same(a: &Path, b: &Path) {
+    let (a, b) = (contents(a), contents(b));
+    assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
+    for (name, bytes) in &a {
+        assert!(bytes == &b[name], "{name} differs");
+    }
+    for name in
+        ["trials.csv", "summary.csv", "outcomes.csv", "correlations.csv", "report.html", "manifest.json"]
+    {
+        assert!(a[name].len() > 100, "{name} is empty");
+    }
+}
+
+#[test]
+fn the_number_of_threads_moves_no_byte() {
+    let reference = scratch("threads-1");
+    let pool = |n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
+    pool(1).install(|| run(&reference, SPEC, Shard::WHOLE));
+    for threads in [2, 5] {
+        let other = scratch("threads-n");
+        pool(threads).install(|| run(&other, SPEC, Shard::WHOLE));
+        assert_same(&reference, &other);
+        fs::remove_dir_all(other).unwrap();
+    }
+    fs::remove_dir_all(reference).unwrap();
+}
+
+/// With a precision, cells end at different trials, and shards hold whole cells.
+fn with_precision() -> String {
+    let precision = "batch = 10\nprecision = { quantity = \"fx\", relative_half_width = 0.33 }";
+    SPEC.replace("batch = 10", precision).replace("per_cell = 45", "per_cell = 200")
+}
+
+#[test]
+fn parts_join_to_the_bytes_of_the_whole() {
+    for (kind, text) in [("count", SPEC.to_string()), ("precision", with_precision())] {
+        let whole = scratch(&format!("whole-{kind}"));
+        run(&whole, &text, Shard::WHOLE);
+        for count in [2, 3] {
+            let parts: Vec<PathBuf> =
+                (0..count).map(|i| scratch(&format!("{kind}-part-{i}-of-{count}"))).collect();
+            for (index, part) in parts.iter().enumerate() {
+                run(part, &text, Shard { index: index as u64, count });
+            }
+            let joined = scratch(&format!("{kind}-joined-{count}"));
+            // The order in which parts are named does not matter.
+            let named: Vec<PathBuf> = parts.iter().rev().cloned().collect();
+            let (folder, engine) = merge(&named, &joined).unwrap();
+            finish(&folder, &engine).unwrap();
+            assert_same(&whole, &joined);
+            parts.iter().chain([&joined]).for_each(|p| fs::remove_dir_all(p).unwrap());
+        }
+        fs::remove_dir_all(whole).unwrap();
+    }
+}
+
+#[test]
+fn a_precision_ends_cells_at_a_batch_and_before_the_most() {
+    let path = scratch("precise");
+    run(&path, &with_precision(), Shard::WHOLE);
+    let trials = fs::read_to_string(path.join("trials.csv")).unwrap();
+    for cell in ["0,", "1,"] {
+        let count = trials.lines().filter(|l| l.starts_with(cell)).count();
+        // Half-width 0.33 of sd needs about 1.96 / sqrt(2 n) = 0.33, n = 18, for normal errors.
+        assert!(count % 10 == 0 && (20..200).contains(&count), "{count}");
+    }
+    fs::remove_dir_all(path).unwrap();
+}
+
+#[test]
+fn parts_that_make_no_whole_are_refused() {
+    let paths = [scratch("a"), scratch("b"), scratch("c"), scratch("other")];
+    for (index, path) in paths[..2].iter().enumerate() {
+        run(path, SPEC, Shard { index: index as u64, count: 3 });
+    }
+    let refuse = |parts: &[&PathBuf]| {
+        let out = scratch("refused");
+        let error =
+            merge(&parts.iter().map(|p| p.to_path_buf()).collect::<Vec<_>>(), &out).map(|_| ()).unwrap_err();
+        assert!(!out.exists(), "nothing is written for parts that are refused");
+        error
+    };
+    let error = refuse(&[&paths[0], &paths[1]]);
+    assert!(matches!(&error, MergeError::Parts { missing, .. } if missing == "2/3"), "{error}");
+    let (folder, _) = begin(&paths[2], SPEC, Shard { index: 2, count: 3 });
+    drop(folder);
+    let error = refuse(&[&paths[0], &paths[1], &paths[2]]);
+    assert!(matches!(&error, MergeError::Incomplete { shard, .. } if shard == "2/3"), "{error}");
+    run(&paths[3], &SPEC.replace("seed = 11", "seed = 12"), Shard { index: 2, count: 3 });
+    let error = refuse(&[&paths[0], &paths[1], &paths[3]]);
+    assert!(error.to_string().contains("spec.seed: was 11, is 12"), "{error}");
+    // A folder is locked while it is open, so the same part twice is refused as in use.
+    assert!(merge(&[paths[0].clone(), paths[0].clone()], &scratch("twice")).is_err());
+    paths.iter().for_each(|p| fs::remove_dir_all(p).unwrap());
+}
+
+#[test]
+fn a_stop_after_any_batch_is_continued_to_the_same_bytes() {
+    let whole = scratch("unstopped");
+    run(&whole, SPEC, Shard::WHOLE);
+    for batches in [1, 4, 9] {
+        let path = scratch("stopped");
+        let (folder, mut engine) = begin(&path, SPEC, Shard::WHOLE);
+        let stop: Interruption = AtomicBool::new(false);
+        let mut done = 0;
+        let outcome = folder.run(&mut engine, &stop, |_| {
+            done += 1;
+            stop.store(done == batches, Ordering::Relaxed);
+        });
+        assert_eq!(outcome.unwrap(), Outcome::Interrupted);
+        drop(folder);
+        resume(&path);
+        assert_same(&whole, &path);
+        fs::remove_dir_all(path).unwrap();
+    }
+    fs::remove_dir_all(whole).unwrap();
+}
+
+#[test]
+fn a_changed_study_or_code_is_refused_by_name() {
+    let path = scratch("changed");
+    let (folder, engine) = begin(&path, SPEC, Shard::WHOLE);
+    let louder = Engine::new(&SPEC.replace("noise_px = 0.1", "noise_px = 0.2"), Shard::WHOLE).unwrap();
+    let error = folder.check(&Manifest::new(&louder.spec, Shard::WHOLE, None)).unwrap_err().to_string();
+    assert!(error.contains("spec.scene.noise_px: was 0.1, is 0.2"), "{error}");
+    let mut other_code = Manifest::new(&engine.spec, Shard::WHOLE, None);
+    other_code.code.behaviour = "another".to_string();
+    let error = folder.check(&other_code).unwrap_err().to_string();
+    assert!(error.contains("code.behaviour"), "{error}");
+    // Layout and comments are not the study.
+    let same = Engine::new(&format!("# a remark\n{SPEC}"), Shard::WHOLE).unwrap();
+    assert!(folder.check(&Manifest::new(&same.spec, Shard::WHOLE, None)).is_ok());
+    drop(folder);
+    fs::remove_dir_all(path).unwrap();
+}
+
+#[test]
+fn a_damaged_or_occupied_folder_is_refused() {
+    let path = scratch("damaged");
+    run(&path, SPEC, Shard::WHOLE);
+    let trials = path.join("trials.csv");
+    let good = fs::read_to_string(&trials).unwrap();
+    let refuse = |text: &str| {
+        fs::write(&trials, text).unwrap();
+        let folder = Folder::open(&path).unwrap();
+        let mut engine = Engine::new(SPEC, Shard::WHOLE).unwrap();
+        folder.run(&mut engine, &AtomicBool::new(false), |_| {}).unwrap_err().to_string()
+    };
+    assert!(refuse(&good[..good.len() / 2]).contains("the checkpoint counts"));
+    let digit = good.rfind(|c: char| c.is_ascii_digit()).unwrap();
+    let mut flipped = good.clone().into_bytes();
+    flipped[digit] = if flipped[digit] == b'1' { b'2' } else { b'1' };
+    assert!(refuse(std::str::from_utf8(&flipped).unwrap()).contains("SHA-256"));
+    let held = Folder::open(&path).unwrap();
+    assert!(matches!(Folder::open(&path), Err(FolderError::InUse(_))));
+    drop(held);
+    let engine = Engine::new(SPEC, Shard::WHOLE).unwrap();
+    let again = Folder::create(&path, SPEC, &Manifest::new(&engine.spec, Shard::WHOLE, None));
+    assert!(matches!(again, Err(FolderError::Taken(_))));
+    fs::remove_dir_all(path).unwrap();
+}
+
+/// Long enough to be killed on the way, on a fast machine too.
+fn long_spec() -> String {
+    SPEC.replace("per_cell = 45", "per_cell = 600").replace("batch = 10", "batch = 25")
+}
+
+fn command(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_calibench"));
+    command.args(arguments).stdout(Stdio::null()).stderr(Stdio::null());
+    command
+}
+
+#[test]
+fn a_killed_run_is_resumed_to_the_bytes_of_an_undisturbed_one() {
+    let folder = scratch("kill");
+    fs::create_dir_all(&folder).unwrap();
+    let spec = folder.join("spec.toml");
+    fs::write(&spec, long_spec()).unwrap();
+    let path = |name: &str| folder.join(name).display().to_string();
+    let (whole, killed) = (path("whole"), path("killed"));
+    assert!(command(&["study", "run", &path("spec.toml"), "--out", &whole]).status().unwrap().success());
+
+    let mut child = command(&["study", "run", &path("spec.toml"), "--out", &killed]).spawn().unwrap();
+    let checkpoint = Path::new(&killed).join("checkpoint.json");
+    let batches = || -> u64 {
+        let text = fs::read_to_string(&checkpoint).unwrap_or_default();
+        text.split("\"batches\":").nth(1).and_then(|t| t.split(',').next()?.parse().ok()).unwrap_or(0)
+    };
+    while batches() < 3 && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    // SIGKILL: no handler runs.
+    child.kill().unwrap();
+    let status = child.wait().unwrap();
+    assert!(!status.success(), "the run ended before it could be killed");
+    let kept = batches();
+    assert!(kept >= 3);
+    // A torn line at the end, as a crash in the middle of a write leaves it.
+    let mut file = fs::OpenOptions::new().append(true).open(Path::new(&killed).join("trials.csv")).unwrap();
+    std::io::Write::write_all(&mut file, b"0,12345,conv").unwrap();
+    assert!(command(&["study", "resume", &killed]).status().unwrap().success());
+    assert_same(Path::new(&whole), Path::new(&killed));
+    fs::remove_dir_all(folder).unwrap();
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_finishes_the_batch_and_says_how_to_go_on() {
+    let folder = scratch("interrupt");
+    fs::create_dir_all(&folder).unwrap();
+    let spec = folder.join("spec.toml");
+    fs::write(&spec, long_spec()).unwrap();
+    let out = folder.join("run");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_calibench"))
+        .args(["study", "run", &spec.display().to_string(), "--out", &out.display().to_string()])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    while !out.join("checkpoint.json").exists() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    let interrupted = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(interrupted.success());
+    let output = child.wait_with_output().unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(3), "{message}");
+    assert!(message.contains("calibench study resume"), "{message}");
+    assert!(command(&["study", "resume", &out.display().to_string()]).status().unwrap().success());
+    fs::remove_dir_all(folder).unwrap();
+}
