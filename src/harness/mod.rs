@@ -9,6 +9,7 @@
 //! ```
 
 mod band;
+pub mod book;
 mod claim;
 pub mod cli;
 mod emit;
