@@ -18,6 +18,17 @@ pub enum Termination {
     Stalled,
 }
 
+impl Termination {
+    /// `converged`, `iteration-limit` or `stalled`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Termination::Converged => "converged",
+            Termination::IterationLimit => "iteration-limit",
+            Termination::Stalled => "stalled",
+        }
+    }
+}
+
 /// The unknowns.
 #[derive(Debug, Clone)]
 pub(super) struct State {

@@ -2,6 +2,8 @@
 
 use super::progress::{Progress, ProgressDisplay};
 use super::record::{Record, RecordError};
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 
 /// An experiment: one file in experiments/.
@@ -51,6 +53,9 @@ pub enum ExperimentError {
     /// The user's input cannot be used.
     #[error("{0}")]
     Input(String),
+    /// A defect: the code met a state that it holds for impossible.
+    #[error("the experiment panicked, which is a defect: {0}")]
+    Panicked(String),
     /// A step failed that should not.
     #[error("{step}: {source}")]
     Step {
@@ -112,9 +117,11 @@ impl Context {
 }
 
 impl Experiment {
-    /// Runs the experiment and checks its record.
+    /// Runs the experiment and checks its record. A panic becomes an error, so that the other experiments finish.
     pub fn execute(&self, context: &Context) -> Result<Record, ExperimentError> {
-        let record = (self.run)(context)?;
+        // A panic leaves nothing behind that is used again: the context is read only, the record is lost.
+        let outcome = catch_unwind(AssertUnwindSafe(|| (self.run)(context)));
+        let record = outcome.unwrap_or_else(|payload| Err(ExperimentError::Panicked(message(&*payload))))?;
         record.validate()?;
         Ok(record)
     }
@@ -122,5 +129,43 @@ impl Experiment {
     /// Whether the run in this context is the one that golden/ locks.
     pub fn is_locked_run(&self, context: &Context) -> bool {
         context.seed == self.seed && context.image.is_none()
+    }
+}
+
+/// What a panic said.
+fn message(payload: &(dyn Any + Send)) -> String {
+    let text = payload.downcast_ref::<&str>().map(|text| text.to_string());
+    text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no message".to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::harness::Claim;
+
+    fn experiment(run: fn(&Context) -> Result<Record, ExperimentError>) -> Experiment {
+        Experiment { id: "e", title: "", question: "", seed: 5, takes_image: false, run }
+    }
+
+    #[test]
+    fn a_record_is_checked_before_it_is_given_out() {
+        let without_claim = experiment(|context| Ok(context.record()));
+        let result = without_claim.execute(&Context::of(&without_claim));
+        assert!(matches!(result, Err(ExperimentError::Record(RecordError::NoClaim(_)))));
+        let complete = experiment(|context| {
+            let mut record = context.record();
+            record.claim(Claim::at_most("c", "", 0.0, 1.0, ""));
+            Ok(record)
+        });
+        let record = complete.execute(&Context::of(&complete).with_seed(9)).unwrap();
+        assert_eq!((record.experiment(), record.seed()), ("e", 9));
+        assert!(!complete.is_locked_run(&Context::of(&complete).with_seed(9)));
+    }
+
+    #[test]
+    fn a_panic_is_an_error_with_its_message() {
+        let broken = experiment(|_| panic!("row 3"));
+        let error = broken.execute(&Context::of(&broken)).unwrap_err();
+        assert!(error.to_string().contains("row 3"), "{error}");
     }
 }

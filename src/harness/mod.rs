@@ -7,6 +7,14 @@
 //!   -> claim     correct, by theory or an oracle?
 //!   -> published reproduces the book?
 //! ```
+//!
+//! # Adding an experiment
+//! 1. `experiments/<name>.rs`: `pub const EXPERIMENT: Experiment`, `calibench::experiment_main!(EXPERIMENT);`, and a
+//!    `run(&Context) -> Result<Record, ExperimentError>` that tells numbers, claims, tables and figures.
+//! 2. Three registrations: a `[[bin]]` in Cargo.toml, `mod` and table entry in `experiments/table.rs`.
+//! 3. `calibench run <id>`, read and look; then `calibench bless <id>` and commit golden/ and figures/.
+//!
+//! The layout test names whatever was forgotten.
 
 mod band;
 pub mod book;

@@ -189,12 +189,21 @@ impl Record {
         Ok(())
     }
 
+    /// The value that the book prints for number `id`, to be drawn beside ours.
+    pub fn printed(&self, id: &str) -> Result<f64, RecordError> {
+        Ok(self.entry(id)?.value())
+    }
+
+    fn entry(&self, id: &str) -> Result<&'static Entry, RecordError> {
+        let full = format!("{}.{id}", self.experiment);
+        let entry = published::chapter()?.iter().find(|e| e.id == full);
+        entry.ok_or(RecordError::NotPublished(full))
+    }
+
     /// The published value that number `id` reconciles, with the number's value.
     fn published(&self, id: &str, got: Kind) -> Result<(&'static Entry, f64), RecordError> {
         let ours = self.value(id).ok_or_else(|| RecordError::NoSuchNumber(id.to_string()))?;
-        let full = format!("{}.{id}", self.experiment);
-        let entry = published::chapter()?.iter().find(|e| e.id == full);
-        let entry = entry.ok_or(RecordError::NotPublished(full))?;
+        let entry = self.entry(id)?;
         if entry.kind != got {
             return Err(RecordError::Kind { id: entry.id.clone(), expected: entry.kind, got });
         }

@@ -8,6 +8,7 @@ pub mod image;
 #[cfg(feature = "photo")]
 pub mod overlay;
 pub mod pairs;
+pub mod result;
 mod table;
 
 pub use atomic::write_atomically;
@@ -18,4 +19,5 @@ pub use image::{Grey, ImageError, read_image, write_png, write_png_16};
 #[cfg(feature = "photo")]
 pub use overlay::{Colour, Overlay};
 pub use pairs::{PointPairs, parse_point_pairs, read_point_pairs};
+pub use result::{CalibrationFields, ResultError, read_camera};
 pub use table::TableError;

@@ -25,7 +25,7 @@ impl Exit {
     pub fn of_failure(error: &ExperimentError) -> Exit {
         match error {
             ExperimentError::Input(_) | ExperimentError::File { .. } => Exit::Usage,
-            ExperimentError::Record(_) | ExperimentError::Step { .. } => Exit::Incomplete,
+            _ => Exit::Incomplete,
         }
     }
 

@@ -2,6 +2,7 @@
 
 mod bless;
 mod book;
+mod calibrate;
 mod check;
 mod exit;
 mod list;
@@ -44,6 +45,8 @@ enum Verb {
     Bless(bless::Arguments),
     /// Builds the book into out/book
     Book(book::Arguments),
+    /// Calibrates a camera from a corner file, or a plane from a file of point pairs
+    Calibrate(calibrate::Arguments),
 }
 
 /// The `calibench` command over a table of experiments.
@@ -52,6 +55,7 @@ pub fn main(experiments: &[Experiment]) -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => return terminal::usage(&error).into(),
     };
+    end_well_on_interrupt();
     if let Err(exit) = set_threads(arguments.threads) {
         return exit.into();
     }
@@ -62,13 +66,25 @@ pub fn main(experiments: &[Experiment]) -> ExitCode {
         Some(Verb::Check(arguments)) => check::run(experiments, &arguments),
         Some(Verb::Bless(arguments)) => bless::run(experiments, &arguments),
         Some(Verb::Book(arguments)) => book::run(experiments, &arguments),
+        Some(Verb::Calibrate(arguments)) => calibrate::run(&arguments),
     };
     exit.into()
 }
 
 /// The command of an experiment's own binary: one run, as `calibench run ID` does it.
 pub fn main_for(experiment: &Experiment) -> ExitCode {
+    end_well_on_interrupt();
     run::main_for(experiment).into()
+}
+
+/// Ctrl-C ends the program with a code of its own. Files are renamed into place whole, so what is finished stays.
+fn end_well_on_interrupt() {
+    let handler = || {
+        warn("interrupted: results of finished experiments are kept, the rest is missing");
+        std::process::exit(Exit::Incomplete as i32);
+    };
+    // A handler that was set before stays in charge.
+    let _ = ctrlc::set_handler(handler);
 }
 
 /// Sets the size of the thread pool.

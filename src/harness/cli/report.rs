@@ -2,12 +2,21 @@
 
 use crate::harness::verdict::{Golden, Run, Tally, Verdict};
 use crate::harness::{Reconciliation, Record, significant};
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 
-/// A table without lines beyond those that help the eye.
-fn table(header: &[&str]) -> Table {
+/// Characters in a line, whatever the terminal: a saved report looks like the one on the screen.
+const WIDTH: u16 = 120;
+
+/// One rule under the header, none elsewhere.
+const STYLE: TableStyle =
+    TableStyle::new().header_separator(LineStyle::new('\u{2500}', '\u{2500}', '\u{2500}', '\u{2500}'));
+
+/// A table in the one style of all reports.
+pub(super) fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
-    table.load_style(presets::NOTHING);
+    table.load_style(STYLE);
+    table.set_content_arrangement(ContentArrangement::Dynamic);
+    table.set_width(WIDTH);
     table.set_header(header.to_vec());
     table
 }

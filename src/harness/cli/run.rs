@@ -84,7 +84,7 @@ fn run_one(experiment: &Experiment, options: &Options) -> Exit {
     print(&summary(record));
     let written = out.join(experiment.id);
     print(&format!("\nwritten: {} and {}\n", written.display(), figures.display()));
-    print(&details(&[verdict.clone()]));
+    print(&details(std::slice::from_ref(&verdict)));
     if verdict.held() { Exit::Held } else { Exit::Deviates }
 }
 

@@ -82,7 +82,7 @@ impl Span {
     }
 }
 
-/// Multiples of 1, 2 or 5 times a power of ten.
+/// Multiples of 1, 2 or 5 times a power of ten, up to half as many again as wanted.
 fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<Tick> {
     let raw = (high - low) / wanted.max(1) as f64;
     if !(raw > 0.0 && raw.is_finite()) {
@@ -93,7 +93,7 @@ fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<Tick> {
         .into_iter()
         .map(|m| (m, decade))
         .chain([(1.0, decade + 1)])
-        .find(|&(m, d)| m * power_of_ten(d) >= raw * (1.0 - 1e-9))
+        .find(|&(m, d)| m * power_of_ten(d) >= 0.7 * raw)
         .unwrap_or((1.0, decade + 1));
     let step = mantissa * power_of_ten(decade);
     let decimals = (-decade).max(0) as usize;
@@ -116,7 +116,7 @@ fn log_ticks(low: f64, high: f64, wanted: usize) -> Vec<Tick> {
     let (first, last) = (libm::floor(libm::log10(low)) as i32, libm::ceil(libm::log10(high)) as i32);
     let decades = (last - first).max(1) as usize;
     let stride = decades.div_ceil(wanted.max(1)).max(1);
-    let multiples: &[f64] = if decades <= 2 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+    let multiples: &[f64] = if high / low <= 100.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
     let inside = |v: f64| v >= low * (1.0 - 1e-9) && v <= high * (1.0 + 1e-9);
     (first..=last)
         .step_by(stride)

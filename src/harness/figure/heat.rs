@@ -111,9 +111,10 @@ impl HeatMap {
         let (left, right) = (frame.right + 14.0, frame.right + 28.0);
         const STEPS: usize = 64;
         let level = |k: usize| frame.bottom - frame.height() * k as f64 / STEPS as f64;
-        for k in 0..STEPS {
+        for k in (0..STEPS).rev() {
             let colour = heat((k as f64 + 0.5) / STEPS as f64);
-            canvas.rectangle((left, level(k + 1)), (right, level(k)), colour);
+            // Drawn down to the foot, each over the last: no seam shows between the steps.
+            canvas.rectangle((left, level(k + 1)), (right, level(0)), colour);
         }
         for tick in span.ticks(5) {
             let y = frame.bottom - frame.height() * span.fraction(tick.value);
@@ -123,7 +124,7 @@ impl HeatMap {
         }
         canvas.text(
             &self.label,
-            (frame.right + 78.0, 0.5 * (frame.top + frame.bottom)),
+            (frame.right + 72.0, 0.5 * (frame.top + frame.bottom)),
             text_px + 1.0,
             INK,
             Anchor::Upwards,

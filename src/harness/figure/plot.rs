@@ -196,7 +196,7 @@ impl Plot {
         scale: f64,
     ) -> Plot {
         let look = self.next_look();
-        self.line_as(label, &ellipse_points(centre, covariance, scale), look.dash(Dash::Solid))
+        self.line_as(label, &ellipse_points(centre, covariance, scale), look)
     }
 
     /// A vertical line across the plot.

@@ -1,6 +1,6 @@
 //! How does a plot become a picture? Panels on a sheet; in each a title, axes, layers, and a legend below.
 
-use super::axis::Span;
+use super::axis::{Scale, Span};
 use super::canvas::{self, Anchor, Canvas, Point, text_width};
 use super::clip::{Frame, dashes};
 use super::colour::{Dash, GRID, INK, Look, Marker, PAPER};
@@ -62,6 +62,12 @@ impl Panel {
         let extent: Vec<(f64, f64)> = plot.layers.iter().flat_map(Layer::extent).collect();
         let mut x = plot.x.span(extent.iter().map(|p| p.0));
         let mut y = plot.y.span(extent.iter().map(|p| p.1));
+        // Bars stand on the axis.
+        let bars = plot.layers.iter().any(|layer| matches!(layer, Layer::Histogram { .. }));
+        let below = extent.iter().any(|p| p.1 < 0.0);
+        if bars && !below && y.scale == Scale::Linear && plot.y.fixed.is_none() {
+            y.low = 0.0;
+        }
         let widest =
             |texts: &mut dyn Iterator<Item = &str>| texts.map(|t| text_width(t, TICK_PX)).fold(0.0, f64::max);
         let y_ticks = y.ticks(6);

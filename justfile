@@ -1,0 +1,33 @@
+# What CI runs, one recipe a step; `just` alone lists them.
+default:
+    @just --list
+
+# Everything CI runs
+ci:
+    bash .ci/run
+
+# Formatter and lints, warnings as errors
+lint:
+    cargo fmt --check
+    cargo clippy --all-targets --locked -- -D warnings
+    cargo clippy --no-default-features --locked -- -D warnings
+
+# The test suite
+test:
+    cargo test --locked
+
+# The documentation, warnings as errors
+doc:
+    RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --locked
+
+# Golden values, claims, published values and figures; writes nothing
+check:
+    cargo run --release --locked -- check
+
+# The same bits for any thread count, in debug and release, without AVX2 and FMA, and on aarch64
+reproducible:
+    bash .ci/reproducible
+
+# Every experiment, figure and table, and the reconciliation
+all:
+    cargo run --release --locked

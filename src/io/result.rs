@@ -1,0 +1,230 @@
+//! How is a calibration kept and handed on? `result.json`: the camera by its parameters' names, with all that is known of it.
+
+use crate::calibrate::Calibration;
+use crate::camera::{Camera, Parameter};
+use crate::geometry::{Vec2, rotation};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// The ten intrinsic parameters by name; those left out of a file are 0.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "the names are those of `Parameter`")]
+pub struct CameraFields {
+    pub fx: f64,
+    pub fy: f64,
+    pub cx: f64,
+    pub cy: f64,
+    #[serde(default)]
+    pub skew: f64,
+    #[serde(default)]
+    pub k1: f64,
+    #[serde(default)]
+    pub k2: f64,
+    #[serde(default)]
+    pub p1: f64,
+    #[serde(default)]
+    pub p2: f64,
+    #[serde(default)]
+    pub k3: f64,
+}
+
+impl From<Camera> for CameraFields {
+    fn from(camera: Camera) -> CameraFields {
+        let [fx, fy, cx, cy, skew, k1, k2, p1, p2, k3] = camera.parameters();
+        CameraFields { fx, fy, cx, cy, skew, k1, k2, p1, p2, k3 }
+    }
+}
+
+impl From<CameraFields> for Camera {
+    fn from(f: CameraFields) -> Camera {
+        Camera::from_parameters([f.fx, f.fy, f.cx, f.cy, f.skew, f.k1, f.k2, f.p1, f.p2, f.k3])
+    }
+}
+
+/// One view of a result.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ViewFields {
+    /// Its name.
+    pub name: String,
+    /// Number of points.
+    pub points: usize,
+    /// RMSE per point, px.
+    pub rmse_px: f64,
+    /// Rotation vector of `cam_from_target`, rad.
+    pub rotation_vector_rad: [f64; 3],
+    /// Translation of `cam_from_target`, in the target's unit.
+    pub translation: [f64; 3],
+    /// Standard deviations of the rotation (left perturbation, rad) and of the translation.
+    pub standard_deviations: [f64; 6],
+    /// Predicted - observed `[du, dv]`, px, in the order of the points.
+    pub residuals_px: Vec<[f64; 2]>,
+}
+
+/// The whole of a calibration.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CalibrationFields {
+    /// The program that wrote it.
+    pub written_by: String,
+    /// The estimate.
+    pub camera: CameraFields,
+    /// Width and height, px, if known.
+    pub image_size: Option<(usize, usize)>,
+    /// Names of the estimated parameters, in the order of the covariance.
+    pub free: Vec<&'static str>,
+    /// Standard deviation of each estimated parameter.
+    pub standard_deviations: BTreeMap<&'static str, f64>,
+    /// Covariance of the estimated parameters.
+    pub covariance: Vec<Vec<f64>>,
+    /// `sqrt(sum |r|^2 / N)`, px.
+    pub rmse_px: f64,
+    /// Estimated noise of one pixel coordinate, px.
+    pub sigma_px: f64,
+    /// `2 N - p`.
+    pub degrees_of_freedom: usize,
+    /// `converged`, `iteration-limit` or `stalled`.
+    pub termination: &'static str,
+    /// Refinement steps.
+    pub iterations: usize,
+    /// The combination of parameters the data say least about: names and weights, strongest first.
+    pub weakest_direction: Vec<(String, f64)>,
+    /// Part of that combination's information that remains when all else is unknown.
+    pub weakest_information: Option<f64>,
+    /// What to be careful about.
+    pub warnings: Vec<String>,
+    /// View by view.
+    pub views: Vec<ViewFields>,
+}
+
+impl CalibrationFields {
+    /// The result of a calibration of views with these names.
+    pub fn of(
+        calibration: &Calibration,
+        names: &[String],
+        image_size: Option<(usize, usize)>,
+    ) -> CalibrationFields {
+        let n = calibration.free.len();
+        let covariance = &calibration.covariance.intrinsics;
+        let deviation = |p: Parameter| Some((p.name(), calibration.standard_deviation(p)?));
+        CalibrationFields {
+            written_by: format!("calibench {}", env!("CARGO_PKG_VERSION")),
+            camera: calibration.camera.into(),
+            image_size,
+            free: calibration.free.iter().map(Parameter::name).collect(),
+            standard_deviations: calibration.free.iter().filter_map(deviation).collect(),
+            covariance: (0..n).map(|i| (0..n).map(|j| covariance[(i, j)]).collect()).collect(),
+            rmse_px: calibration.rmse_px,
+            sigma_px: calibration.sigma_px,
+            degrees_of_freedom: calibration.degrees_of_freedom,
+            termination: calibration.termination.name(),
+            iterations: calibration.iterations,
+            weakest_direction: calibration
+                .conditioning
+                .iter()
+                .flat_map(|c| c.weakest.iter().map(|m| (m.name.clone(), m.weight)))
+                .collect(),
+            weakest_information: calibration.conditioning.as_ref().map(|c| c.smallest_eigenvalue),
+            warnings: calibration.warnings.iter().map(ToString::to_string).collect(),
+            views: (0..calibration.cam_from_target.len())
+                .map(|i| view_fields(calibration, names, i))
+                .collect(),
+        }
+    }
+
+    /// The file's text.
+    pub fn to_json(&self) -> String {
+        // Plain fields and string keys: nothing in them can fail to serialise.
+        serde_json::to_string_pretty(self).expect("a calibration serialises") + "\n"
+    }
+}
+
+fn view_fields(calibration: &Calibration, names: &[String], i: usize) -> ViewFields {
+    let pose = &calibration.cam_from_target[i];
+    let residuals: &[Vec2] = &calibration.residuals[i];
+    ViewFields {
+        name: names.get(i).cloned().unwrap_or_else(|| i.to_string()),
+        points: residuals.len(),
+        rmse_px: calibration.view_rmse_px(i).unwrap_or(f64::NAN),
+        rotation_vector_rad: rotation::log(&pose.rotation).into(),
+        translation: pose.translation.into(),
+        standard_deviations: std::array::from_fn(|k| calibration.covariance.poses[i][(k, k)].sqrt()),
+        residuals_px: residuals.iter().map(|r| [r.x, r.y]).collect(),
+    }
+}
+
+/// What another command needs of a result; further fields are ignored.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+struct CameraOnly {
+    camera: CameraFields,
+    #[serde(default)]
+    image_size: Option<(usize, usize)>,
+}
+
+/// Why a result cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ResultError {
+    /// The file cannot be read.
+    #[error("{file}: {source}")]
+    Open {
+        /// The file.
+        file: String,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// It is not such a result.
+    #[error("{file}:{}:{}: {source}; expected {{\"camera\": {{\"fx\": ..., \"fy\": ..., \"cx\": ..., \"cy\": ...}}}}", source.line(), source.column())]
+    Format {
+        /// The file.
+        file: String,
+        /// What is wrong, with line and column.
+        source: serde_json::Error,
+    },
+    /// No camera has these numbers.
+    #[error("{file}: fx and fy must be positive, and every parameter finite")]
+    NoCamera {
+        /// The file.
+        file: String,
+    },
+}
+
+/// Reads the camera, and the image size if it is there, of a `result.json`.
+pub fn read_camera(path: &Path) -> Result<(Camera, Option<(usize, usize)>), ResultError> {
+    let file = path.display().to_string();
+    let text =
+        std::fs::read_to_string(path).map_err(|source| ResultError::Open { file: file.clone(), source })?;
+    parse_camera(&file, &text)
+}
+
+/// As [`read_camera`], from text; `file` names it in errors.
+pub fn parse_camera(file: &str, text: &str) -> Result<(Camera, Option<(usize, usize)>), ResultError> {
+    let fields: CameraOnly =
+        serde_json::from_str(text).map_err(|source| ResultError::Format { file: file.into(), source })?;
+    let camera = Camera::from(fields.camera);
+    if camera.is_valid() {
+        Ok((camera, fields.image_size))
+    } else {
+        Err(ResultError::NoCamera { file: file.into() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_camera_survives_the_way_through_a_file() {
+        let camera =
+            Camera::from_parameters([600.1, 599.7, 326.0, 243.0, 0.1, -0.18, 0.05, 1e-3, -1e-3, 0.0]);
+        let text =
+            serde_json::json!({"camera": CameraFields::from(camera), "image_size": [640, 480], "extra": 1});
+        assert_eq!(parse_camera("f", &text.to_string()).unwrap(), (camera, Some((640, 480))));
+    }
+
+    #[test]
+    fn broken_files_are_refused_with_their_place() {
+        let error = parse_camera("r.json", "{\"camera\": {\"fx\": 1,\n \"fy\": x}}").unwrap_err().to_string();
+        assert!(error.starts_with("r.json:2:"), "{error}");
+        let no_camera = r#"{"camera": {"fx": -1, "fy": 1, "cx": 0, "cy": 0}}"#;
+        assert!(matches!(parse_camera("r.json", no_camera), Err(ResultError::NoCamera { .. })));
+    }
+}

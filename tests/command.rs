@@ -1,0 +1,119 @@
+//! Does the command end as it says it does? Exit codes, files and streams of `calibench` and of an experiment's own binary.
+#![cfg(feature = "harness")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+const CALIBENCH: &str = env!("CARGO_BIN_EXE_calibench");
+const LINE_BENDING: &str = env!("CARGO_BIN_EXE_line-bending");
+
+fn run(program: &str, folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(program).args(arguments).current_dir(folder).output().expect("the program starts")
+}
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// An empty folder of this test's own.
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    if folder.exists() {
+        fs::remove_dir_all(&folder).expect("an old folder is removed");
+    }
+    fs::create_dir_all(&folder).expect("a folder is made");
+    folder
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+#[test]
+fn check_holds_and_says_so_in_json() {
+    let output = run(CALIBENCH, root(), &["check", "--format", "json"]);
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("standard output is JSON");
+    assert_eq!(output.status.code(), Some(0), "{report:#}");
+    assert_eq!(report["outcome"], "held");
+    assert!(report["experiments"].as_array().is_some_and(|list| !list.is_empty()));
+}
+
+#[test]
+fn wrong_usage_ends_with_two_and_names_what_there_is() {
+    let unknown = run(CALIBENCH, root(), &["run", "no-such-experiment"]);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(text(&unknown.stderr).contains("line-bending"));
+    assert_eq!(run(CALIBENCH, root(), &["--no-such-option"]).status.code(), Some(2));
+    assert_eq!(run(CALIBENCH, root(), &["check", "--threads", "0"]).status.code(), Some(2));
+    let image = run(LINE_BENDING, root(), &["--image", "photo.png"]);
+    assert_eq!(image.status.code(), Some(2));
+    assert!(text(&image.stderr).contains("takes no image"));
+}
+
+#[test]
+fn check_outside_the_source_tree_says_where_to_go() {
+    let output = run(CALIBENCH, Path::new("/"), &["check"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("source tree"));
+}
+
+#[test]
+fn help_and_list_read_well() {
+    let help = run(CALIBENCH, root(), &["--help"]);
+    assert_eq!(help.status.code(), Some(0));
+    assert!(text(&help.stdout).contains("Exit codes: 0 all held"));
+    assert!(text(&run(CALIBENCH, root(), &["list", "--names"]).stdout).lines().any(|l| l == "line-bending"));
+}
+
+#[test]
+fn an_own_binary_writes_where_it_is_told_and_skips_golden_for_another_seed() {
+    let out = folder("own-binary");
+    let output = run(LINE_BENDING, root(), &["--seed", "7", "--out", &out.to_string_lossy()]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("golden values not compared"));
+    let record = fs::read_to_string(out.join("line-bending/record.json")).expect("a record is written");
+    let record: serde_json::Value = serde_json::from_str(&record).expect("the record is JSON");
+    assert_eq!(record["provenance"]["seed"], 7);
+    assert!(out.join("line-bending/deviation.csv").is_file());
+    assert!(out.join("line-bending/figures/grids.svg").is_file());
+}
+
+#[test]
+fn a_place_that_cannot_be_written_ends_with_three() {
+    let file = folder("no-place").join("file");
+    fs::write(&file, "").expect("a file is written");
+    let output = run(LINE_BENDING, root(), &["--out", &file.to_string_lossy()]);
+    assert_eq!(output.status.code(), Some(3));
+    assert!(text(&output.stderr).contains("cannot write"));
+}
+
+#[test]
+fn a_reader_that_goes_away_is_no_error() {
+    let mut child = Command::new(CALIBENCH)
+        .arg("list")
+        .current_dir(root())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    drop(child.stdout.take());
+    let output = child.wait_with_output().expect("the program ends");
+    assert_eq!((output.status.code(), text(&output.stderr).as_str()), (Some(0), ""));
+}
+
+/// A copy of the golden files in which one number has moved: the tree that `check` must refuse.
+#[test]
+fn a_number_that_moved_ends_with_one_and_is_named() {
+    let tree = folder("moved");
+    fs::create_dir_all(tree.join("golden")).expect("a folder is made");
+    fs::copy(root().join("golden/published.toml"), tree.join("golden/published.toml")).expect("copied");
+    let golden = fs::read_to_string(root().join("golden/line-bending.snap")).expect("a snapshot");
+    let moved = golden.replace("number | max-deviation | 4.6", "number | max-deviation | 4.5");
+    assert_ne!(golden, moved);
+    fs::write(tree.join("golden/line-bending.snap"), moved).expect("written");
+    let output = run(LINE_BENDING, &tree, &[]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stdout).contains("number max-deviation"), "{}", text(&output.stdout));
+    assert!(tree.join("figures/line-bending/grids.svg").is_file(), "the locked run draws the tree's figures");
+}

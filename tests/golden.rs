@@ -1,0 +1,85 @@
+//! Is every experiment unchanged, correct, and true to the book? The same comparison as `calibench check`.
+#![cfg(feature = "harness")]
+
+#[path = "../experiments/table.rs"]
+mod table;
+
+use calibench::harness::{Context, Record, golden, verdict::Verdict};
+use insta::comparator::Comparator;
+use insta::internals::SnapshotContents;
+use insta::{Settings, Snapshot};
+
+/// Compares snapshots number by number, each within the band that stands in the golden one.
+#[derive(Clone)]
+struct WithinBands;
+
+impl Comparator for WithinBands {
+    fn matches(&self, reference: &Snapshot, test: &Snapshot) -> bool {
+        let (SnapshotContents::Text(reference), SnapshotContents::Text(test)) =
+            (reference.contents(), test.contents())
+        else {
+            return false;
+        };
+        golden::compare(&reference.to_string(), &test.to_string()).held()
+    }
+
+    fn dyn_clone(&self) -> Box<dyn Comparator> {
+        Box::new(self.clone())
+    }
+}
+
+fn records() -> Vec<Record> {
+    let run = |e: &calibench::harness::Experiment| {
+        e.execute(&Context::of(e)).unwrap_or_else(|error| panic!("{}: {error}", e.id))
+    };
+    table::EXPERIMENTS.iter().map(run).collect()
+}
+
+#[test]
+fn every_number_lies_in_the_band_of_its_golden_snapshot() {
+    let mut settings = Settings::clone_current();
+    settings.set_snapshot_path("../golden");
+    settings.set_prepend_module_to_snapshot(false);
+    settings.set_omit_expression(true);
+    settings.set_comparator(Box::new(WithinBands));
+    settings.bind(|| {
+        for record in records() {
+            insta::assert_snapshot!(record.experiment(), golden::snapshot(&record));
+        }
+    });
+}
+
+#[test]
+fn every_claim_and_every_published_value_holds() {
+    let deviations: Vec<String> = records()
+        .iter()
+        .map(|record| Verdict::of(record, None, false))
+        .flat_map(|verdict| verdict.deviations)
+        .collect();
+    assert!(deviations.is_empty(), "{}", deviations.join("\n"));
+}
+
+#[test]
+fn claims_and_published_values_hold_for_another_seed_too() {
+    for experiment in table::EXPERIMENTS {
+        let context = Context::of(experiment).with_seed(experiment.seed + 1);
+        let record =
+            experiment.execute(&context).unwrap_or_else(|error| panic!("{}: {error}", experiment.id));
+        let verdict = Verdict::of(&record, None, false);
+        assert!(verdict.held(), "{}: {}", experiment.id, verdict.deviations.join("\n"));
+    }
+}
+
+#[test]
+fn the_number_of_threads_changes_no_bit() {
+    let with_threads = |threads: usize| {
+        let pool =
+            rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a thread pool starts");
+        let snapshots: Vec<String> = pool.install(records).iter().map(golden::snapshot).collect();
+        snapshots
+    };
+    let one = with_threads(1);
+    for threads in [2, 5] {
+        assert_eq!(one, with_threads(threads), "{threads} threads");
+    }
+}

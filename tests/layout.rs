@@ -1,0 +1,204 @@
+//! Was anything forgotten? Every experiment has its file, its three registrations, its snapshot, its figures and its
+//! published values; every layer imports only from the layers below it.
+#![cfg(feature = "harness")]
+
+#[path = "../experiments/table.rs"]
+mod table;
+
+use calibench::harness::{Context, Experiment, published};
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn read(path: &str) -> String {
+    fs::read_to_string(root().join(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+/// Files below a folder with one of these extensions, in order.
+fn files(folder: &str, extensions: &[&str]) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut folders = vec![root().join(folder)];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).into_iter().flatten().flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| extensions.iter().any(|x| e == *x)) {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+fn source_file(experiment: &Experiment) -> String {
+    format!("experiments/{}.rs", experiment.id.replace('-', "_"))
+}
+
+#[test]
+fn every_experiment_is_registered_everywhere() {
+    let manifest = read("Cargo.toml");
+    let mut forgotten = Vec::new();
+    for experiment in table::EXPERIMENTS {
+        let (id, file) = (experiment.id, source_file(experiment));
+        let mut need = |there: bool, what: String| {
+            if !there {
+                forgotten.push(format!("{id}: {what}"));
+            }
+        };
+        need(root().join(&file).is_file(), format!("{file} is missing"));
+        let binary =
+            format!("[[bin]]\nname = \"{id}\"\npath = \"{file}\"\nrequired-features = [\"harness\"]\n");
+        need(manifest.contains(&binary), format!("Cargo.toml lacks\n{binary}"));
+        need(root().join(format!("golden/{id}.snap")).is_file(), format!("run `calibench bless {id}`"));
+    }
+    assert!(forgotten.is_empty(), "{}", forgotten.join("\n"));
+}
+
+#[test]
+fn every_file_of_an_experiment_is_in_the_table() {
+    let known: BTreeSet<String> = table::EXPERIMENTS.iter().map(source_file).collect();
+    for file in fs::read_dir(root().join("experiments")).expect("experiments/ is there").flatten() {
+        let name = format!("experiments/{}", file.file_name().to_string_lossy());
+        let shared = ["experiments/main.rs", "experiments/table.rs"].contains(&name.as_str());
+        let experiment = file.path().extension().is_some_and(|e| e == "rs") && !shared;
+        assert!(!experiment || known.contains(&name), "{name} is not in experiments/table.rs");
+    }
+}
+
+#[test]
+fn ids_are_unique_and_every_snapshot_has_its_experiment() {
+    let ids: BTreeSet<&str> = table::EXPERIMENTS.iter().map(|e| e.id).collect();
+    assert_eq!(ids.len(), table::EXPERIMENTS.len());
+    for snapshot in files("golden", &["snap"]) {
+        let id = snapshot.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+        assert!(ids.contains(id.as_str()), "golden/{id}.snap belongs to no experiment: delete it");
+    }
+}
+
+/// Experiments whose published values are listed but whose file is still to come.
+const TO_COME: [&str; 4] = ["four-pose", "collinearity", "nine-point", "expiry"];
+
+#[test]
+fn every_published_value_is_reconciled_exactly_once() {
+    let mut reconciled: Vec<String> = Vec::new();
+    let registered: BTreeSet<&str> = table::EXPERIMENTS.iter().map(|e| e.id).collect();
+    for experiment in table::EXPERIMENTS {
+        let record = experiment.execute(&Context::of(experiment)).expect("every experiment runs");
+        reconciled.extend(record.reconciliations().iter().map(|r| r.entry.id.clone()));
+    }
+    let mut problems = Vec::new();
+    for entry in published::chapter().expect("golden/published.toml is well formed") {
+        let id = entry.experiment();
+        let times = reconciled.iter().filter(|r| **r == entry.id).count();
+        match (registered.contains(id), TO_COME.contains(&id)) {
+            (true, true) => problems.push(format!("{id} has come: strike it from TO_COME")),
+            (true, false) if times != 1 => problems.push(format!("{} is reconciled {times} times", entry.id)),
+            (false, false) => problems.push(format!("{}: there is no experiment {id}", entry.id)),
+            _ => {}
+        }
+    }
+    problems.dedup();
+    assert!(problems.is_empty(), "{}", problems.join("\n"));
+}
+
+/// A layer and the layers it may import, from the ground up.
+const LAYERS: [(&str, &[&str]); 13] = [
+    ("geometry", &[]),
+    ("camera", &["geometry"]),
+    ("target", &["geometry"]),
+    ("raster", &["geometry"]),
+    ("synth", &["geometry", "camera", "target", "raster"]),
+    ("detect", &["geometry", "camera", "target", "raster"]),
+    ("calibrate", &["geometry", "camera", "target", "raster"]),
+    ("planar", &["geometry", "camera", "target", "raster"]),
+    ("rectify", &["geometry", "camera", "target", "raster"]),
+    ("evaluate", &SOLVER),
+    ("io", &BELOW_IO),
+    ("harness", &BELOW_HARNESS),
+    ("lib", &[]),
+];
+const SOLVER: [&str; 9] =
+    ["geometry", "camera", "target", "raster", "synth", "detect", "calibrate", "planar", "rectify"];
+const BELOW_IO: [&str; 10] = [
+    "geometry",
+    "camera",
+    "target",
+    "raster",
+    "synth",
+    "detect",
+    "calibrate",
+    "planar",
+    "rectify",
+    "evaluate",
+];
+const BELOW_HARNESS: [&str; 11] = [
+    "geometry",
+    "camera",
+    "target",
+    "raster",
+    "synth",
+    "detect",
+    "calibrate",
+    "planar",
+    "rectify",
+    "evaluate",
+    "io",
+];
+
+/// Names that follow `crate::` in a source text, comments left out.
+fn imports(source: &str) -> BTreeSet<String> {
+    let code: String =
+        source.lines().filter(|l| !l.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n");
+    let name =
+        |rest: &str| rest.chars().take_while(|c| c.is_ascii_lowercase() || *c == '_').collect::<String>();
+    code.split("crate::").skip(1).map(name).filter(|n| !n.is_empty()).collect()
+}
+
+#[test]
+fn layers_import_only_from_the_layers_below() {
+    let mut wrong = Vec::new();
+    for path in files("src", &["rs"]) {
+        let inside = path.strip_prefix(root().join("src")).expect("it was found there");
+        let first = inside.components().next().expect("a file has a name").as_os_str().to_string_lossy();
+        let layer = first.trim_end_matches(".rs").to_string();
+        let Some((_, allowed)) = LAYERS.iter().find(|(name, _)| *name == layer) else {
+            wrong.push(format!("{} belongs to no layer of tests/layout.rs", inside.display()));
+            continue;
+        };
+        let source = fs::read_to_string(&path).expect("the file is read");
+        for import in imports(&source) {
+            let known = LAYERS.iter().any(|(name, _)| *name == import);
+            if known && import != layer && !allowed.contains(&import.as_str()) {
+                wrong.push(format!("{}: `{layer}` may not import `{import}`", inside.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_import_scanner_sees_imports_and_no_comments() {
+    let source = "// crate::synth\nuse crate::geometry::Vec2;\nlet x = crate::camera::f();\n";
+    assert_eq!(imports(source).into_iter().collect::<Vec<_>>(), ["camera", "geometry"]);
+}
+
+/// The committed figures together stay small enough to clone.
+const FIGURES_LIMIT_BYTES: u64 = 10_000_000;
+
+#[test]
+fn figures_stay_small_and_golden_files_carry_no_trace_of_the_machine() {
+    let figures = files("figures", &["svg", "png"]);
+    let total: u64 = figures.iter().map(|f| fs::metadata(f).map_or(0, |m| m.len())).sum();
+    assert!(total < FIGURES_LIMIT_BYTES, "figures/ holds {total} bytes");
+    let here = root().to_string_lossy().into_owned();
+    for file in files("golden", &["snap", "toml"]).into_iter().chain(files("figures", &["svg"])) {
+        let text = fs::read_to_string(&file).expect("a text file");
+        assert!(!text.contains(&here), "{} names this machine's folder", file.display());
+    }
+}
