@@ -153,8 +153,20 @@ impl Step {
 
 fn tell_layouts(record: &mut Record, cases: &[Case]) {
     let count = || Band::Exact;
-    record.number("layouts", cases[0].linear.layouts() as f64, "", count(), "orders of the four numbers of a row");
-    record.number("limit", limit(), "", Band::relative(1e-9, "inverse of the normal distribution"), "largest deviation of the right layout, in standard deviations");
+    record.number(
+        "layouts",
+        cases[0].linear.layouts() as f64,
+        "",
+        count(),
+        "orders of the four numbers of a row",
+    );
+    record.number(
+        "limit",
+        limit(),
+        "",
+        Band::relative(1e-9, "inverse of the normal distribution"),
+        "largest deviation of the right layout, in standard deviations",
+    );
     let [chapter, different, square, .., worst] = cases else { return };
     for (id, case) in [("chapter", chapter), ("different", different), ("square", square), ("worst", worst)] {
         let what = format!("wrong layouts of the focal lengths' row that this truth hides: {}", case.name);
@@ -177,7 +189,11 @@ fn tell_layouts(record: &mut Record, cases: &[Case]) {
         ("hidden_distortion", ""),
         ("predicted_distortion", ""),
     ];
-    let mut table = Table::new("layouts", "what every truth says of the layouts of both rows; wrong layouts that stay hidden, found and predicted", &columns);
+    let mut table = Table::new(
+        "layouts",
+        "what every truth says of the layouts of both rows; wrong layouts that stay hidden, found and predicted",
+        &columns,
+    );
     for case in cases {
         let c = &case.camera;
         let numbers = [c.fx, c.fy, c.cx, c.cy, c.distortion.p1, c.distortion.p2];
@@ -212,19 +228,34 @@ fn tell_layouts(record: &mut Record, cases: &[Case]) {
 
 fn tell_sweep(record: &mut Record, sweep: &[Step]) {
     let columns = [("fy_minus_cx", "px"), ("z", ""), ("sd_fy", "px")];
-    let mut table = Table::new("sweep", "deviation of the number read as fy from the true fy when fy and cx are exchanged, in standard deviations", &columns);
+    let mut table = Table::new(
+        "sweep",
+        "deviation of the number read as fy from the true fy when fy and cx are exchanged, in standard deviations",
+        &columns,
+    );
     sweep.iter().for_each(|s| table.push([s.difference_px, s.z, s.sd_px]));
     record.table(table);
     let limit = limit();
     let middle = &sweep[sweep.len() / 2];
-    record.number("blind-px", limit * middle.sd_px, "px", Band::relative(1e-6, "inverse of the information matrix"), "difference of fy and cx below which an exchange stays hidden");
+    record.number(
+        "blind-px",
+        limit * middle.sd_px,
+        "px",
+        Band::relative(1e-6, "inverse of the information matrix"),
+        "difference of fy and cx below which an exchange stays hidden",
+    );
     let drawn: Vec<(f64, f64)> = sweep.iter().map(|s| (s.difference_px, s.z)).collect();
-    let expected: Vec<(f64, f64)> = sweep.iter().map(|s| (s.difference_px, -s.difference_px / s.sd_px)).collect();
-    let plot = Plot::new("How far must fy lie from cx?", "fy \u{2212} cx of the truth (px)", "deviation read as fy (standard deviations)")
-        .line("expected", &expected)
-        .points_as("one calibration each", &drawn, Look::series(1))
-        .hline("limit", limit)
-        .hline("", -limit);
+    let expected: Vec<(f64, f64)> =
+        sweep.iter().map(|s| (s.difference_px, -s.difference_px / s.sd_px)).collect();
+    let plot = Plot::new(
+        "How far must fy lie from cx?",
+        "fy \u{2212} cx of the truth (px)",
+        "deviation read as fy (standard deviations)",
+    )
+    .line("expected", &expected)
+    .points_as("one calibration each", &drawn, Look::series(1))
+    .hline("limit", limit)
+    .hline("", -limit);
     let caption = "What a reader who exchanges fy and cx sees in fy's place, in standard deviations of fy, for truths whose focal \
                    length approaches cx; noise 0.1 px, one calibration a point, seed 1. Notice the blind zone between the limits.";
     record.figure(Figure::plot("blind-zone", &plot, caption));
@@ -235,5 +266,7 @@ fn tell_sweep(record: &mut Record, sweep: &[Step]) {
     let worst = sweep.iter().map(|s| (s.z + s.difference_px / s.sd_px).abs()).fold(0.0, f64::max);
     let reason = "noise of cx in units of fy's deviation, below 2, at a rate of 1e-6 over all steps";
     let statement = "what the reader sees is the difference of the two truths and noise";
-    record.claim(Claim::at_most("sweep-follows-theory", statement, worst, bound, reason).with_false_alarm_rate(1e-6));
+    record.claim(
+        Claim::at_most("sweep-follows-theory", statement, worst, bound, reason).with_false_alarm_rate(1e-6),
+    );
 }

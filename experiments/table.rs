@@ -2,8 +2,15 @@
 
 use calibench::harness::Experiment;
 
+#[path = "distortion_model.rs"]
+mod distortion_model;
+#[path = "expiry.rs"]
+mod expiry;
+#[path = "interface.rs"]
+mod interface;
 #[path = "line_bending.rs"]
 mod line_bending;
 
 /// All experiments, in the order of the book.
-pub const EXPERIMENTS: &[Experiment] = &[line_bending::EXPERIMENT];
+pub const EXPERIMENTS: &[Experiment] =
+    &[line_bending::EXPERIMENT, distortion_model::EXPERIMENT, interface::EXPERIMENT, expiry::EXPERIMENT];

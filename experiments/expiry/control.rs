@@ -53,7 +53,11 @@ impl Ewma {
         // 40 halvings of a range of 2 leave 2e-12.
         for _ in 0..40 {
             let limit = 0.5 * (low + high);
-            if (Ewma { weight, limit }).false_alarm(checks) > false_alarm { low = limit } else { high = limit }
+            if (Ewma { weight, limit }).false_alarm(checks) > false_alarm {
+                low = limit
+            } else {
+                high = limit
+            }
         }
         Ewma { weight, limit: 0.5 * (low + high) }
     }
@@ -80,7 +84,10 @@ impl Ewma {
             .collect();
         let mut pass = vec![1.0; NODES];
         for _ in 0..checks {
-            pass = kernel.chunks_exact(NODES).map(|row| row.iter().zip(&pass).map(|(k, s)| k * s).sum()).collect();
+            pass = kernel
+                .chunks_exact(NODES)
+                .map(|row| row.iter().zip(&pass).map(|(k, s)| k * s).sum())
+                .collect();
         }
         // The middle node is z = 0, where the rule starts.
         1.0 - pass[NODES / 2]

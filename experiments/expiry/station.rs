@@ -36,7 +36,8 @@ pub(crate) struct Station {
 
 impl Station {
     /// The chapter's camera at the chapter's distance, with causes in round numbers: an aluminium mount (30 ppm/K), a summer
-    /// 8 K warmer than the spring, and 5 urad of creep a shift.
+    /// 8 K warmer than the spring, and 5 urad of creep a shift. The bracket turns away from the reference's far end, the worse
+    /// case: its share then adds to that of the warmth.
     pub(crate) fn case_study() -> Station {
         Station {
             camera: Camera::pinhole(600.0, 600.0, 326.0, 243.0),
@@ -53,11 +54,7 @@ impl Station {
 
     /// The same station with other causes.
     pub(crate) fn scaled(&self, season: f64, creep: f64) -> Station {
-        Station {
-            season_kelvin: season * self.season_kelvin,
-            creep_rad: creep * self.creep_rad,
-            ..*self
-        }
+        Station { season_kelvin: season * self.season_kelvin, creep_rad: creep * self.creep_rad, ..*self }
     }
 
     /// Standard deviation of one check: two ends, each the mean of some frames, mm.
@@ -70,8 +67,9 @@ impl Station {
     pub(crate) fn error_mm(&self, kelvin: f64, turn_rad: f64) -> f64 {
         let stretch = 1.0 + self.focal_per_kelvin * kelvin;
         let now = Camera { fx: self.camera.fx * stretch, fy: self.camera.fy * stretch, ..self.camera };
-        // The camera turns towards the reference's far end: the plane turns the other way in its eyes.
-        let turn = Pose { rotation: rotation::exp(&Vec3::new(0.0, -turn_rad, 0.0)), translation: Vec3::zeros() };
+        // The camera turns away from the reference's far end, which then lies farther out in its eyes.
+        let turn =
+            Pose { rotation: rotation::exp(&Vec3::new(0.0, turn_rad, 0.0)), translation: Vec3::zeros() };
         let see = |x_mm: f64| {
             let point = turn.apply(&Vec3::new(x_mm, 0.0, self.distance_mm));
             now.project(&point).expect("a plane 120 mm ahead stays ahead under turns of milliradians")
@@ -89,7 +87,7 @@ impl Station {
     pub(crate) fn first_order_mm(&self, kelvin: f64, turn_rad: f64) -> (f64, f64) {
         let (z, t) = (self.distance_mm, self.reference_mm / self.distance_mm);
         let a = self.focal_per_kelvin * kelvin;
-        // The plane turns by minus the camera's turn.
+        // The far end moves outwards: the plane turns by minus w.
         let w = -turn_rad;
         let bound = 2.0 * z * (t * (1.0 + t * t) * w * w + (a * w).abs() * t * t);
         (z * (a * t - t * t * w), bound)

@@ -81,12 +81,33 @@ impl Results {
 
 pub(crate) fn numbers(record: &mut Record, r: &Results) -> Result<(), ExperimentError> {
     let sum = || Band::relative(1e-9, "rounding in sums of 4000 values of one size");
-    let count = || Band::relative(1e-9, "a count: moves only if an alarm falls on the other side of its limit");
+    let count =
+        || Band::relative(1e-9, "a count: moves only if an alarm falls on the other side of its limit");
     let root = || Band::relative(1e-6, "bisection and quadrature");
     let end = mean(&r.ends(0));
-    record.number("drift-mm", end, "mm", sum(), "systematic error of the reference after a quarter, mean of all stations");
-    record.number("drift-thermal-mm", mean(&r.ends(1)), "mm", sum(), "share of the focal length's drift alone");
+    record.number(
+        "drift-mm",
+        end,
+        "mm",
+        sum(),
+        "systematic error of the reference after a quarter, mean of all stations",
+    );
+    record.number(
+        "drift-thermal-mm",
+        mean(&r.ends(1)),
+        "mm",
+        sum(),
+        "share of the focal length's drift alone",
+    );
     record.number("drift-bracket-mm", mean(&r.ends(2)), "mm", sum(), "share of the bracket's turn alone");
+    let opposed = mean(&r.ends(1)) - mean(&r.ends(2));
+    record.number(
+        "drift-opposed-mm",
+        opposed,
+        "mm",
+        sum(),
+        "what would be left had the bracket turned the other way, first order",
+    );
     let (low, high) = (quantile(&r.ends(0), 0.025), quantile(&r.ends(0), 0.975));
     record.number("drift-low-mm", low, "mm", sum(), "2.5 % quantile over stations");
     record.number("drift-high-mm", high, "mm", sum(), "97.5 % quantile over stations");
@@ -95,34 +116,118 @@ pub(crate) fn numbers(record: &mut Record, r: &Results) -> Result<(), Experiment
     record.number("tolerance-mm", TOLERANCE_MM, "mm", Band::Exact, "error that may not go unnoticed");
     record.number("reference-mm", r.station.reference_mm, "mm", Band::Exact, "length of the reference");
     record.number("frames", r.station.frames as f64, "", Band::Exact, "frames averaged by one check");
-    record.number("focal-ppm-per-kelvin", 1e6 * r.station.focal_per_kelvin, "ppm/K", Band::relative(1e-15, "one product"), "relative drift of the focal length");
+    record.number(
+        "focal-ppm-per-kelvin",
+        1e6 * r.station.focal_per_kelvin,
+        "ppm/K",
+        Band::relative(1e-15, "one product"),
+        "relative drift of the focal length",
+    );
     record.number("season-kelvin", r.station.season_kelvin, "K", Band::Exact, "warming within the quarter");
-    record.number("creep-urad", 1e6 * r.station.creep_rad, "\u{b5}rad", Band::relative(1e-15, "one product"), "mean turn of the bracket in a shift");
-    record.number("check-sd-mm", r.sd_mm, "mm", Band::relative(1e-15, "three operations"), "standard deviation of one check");
-    record.number("threshold-limit", r.threshold.limit, "", root(), "limit of the threshold, standard deviations of one check");
+    record.number(
+        "creep-urad",
+        1e6 * r.station.creep_rad,
+        "\u{b5}rad",
+        Band::relative(1e-15, "one product"),
+        "mean turn of the bracket in a shift",
+    );
+    record.number(
+        "check-sd-mm",
+        r.sd_mm,
+        "mm",
+        Band::relative(1e-15, "three operations"),
+        "standard deviation of one check",
+    );
+    record.number(
+        "threshold-limit",
+        r.threshold.limit,
+        "",
+        root(),
+        "limit of the threshold, standard deviations of one check",
+    );
     record.number("threshold-limit-mm", r.threshold.limit * r.sd_mm, "mm", root(), "the same in mm");
     record.number("ewma-limit-mm", r.ewma.limit * r.sd_mm, "mm", root(), "limit of the run rule, in mm");
-    record.number("false-alarm", FALSE_ALARM, "", Band::Exact, "chance of a false alarm in a quarter, both rules");
+    record.number(
+        "false-alarm",
+        FALSE_ALARM,
+        "",
+        Band::Exact,
+        "chance of a false alarm in a quarter, both rules",
+    );
     let share = |pick: fn(&(bool, bool)) -> bool| {
         r.alarms.iter().filter(|a| pick(a)).count() as f64 / IN_CONTROL as f64
     };
-    record.number("threshold-false-alarms", share(|a| a.0), "", count(), "share of driftless quarters with an alarm, threshold");
+    record.number(
+        "threshold-false-alarms",
+        share(|a| a.0),
+        "",
+        count(),
+        "share of driftless quarters with an alarm, threshold",
+    );
     record.number("ewma-false-alarms", share(|a| a.1), "", count(), "the same, run rule");
     for (rule, name) in ["threshold", "ewma"].into_iter().enumerate() {
         let (shifts, errors) = (r.alarm_shifts(rule), r.errors_at_alarm(rule));
         let missed = (QUARTERS - errors.len()) as f64 / QUARTERS as f64;
-        record.number(format!("{name}-median-days"), days(quantile(&shifts, 0.5)), "days", count(), "median day of the alarm");
-        record.number(format!("{name}-late-days"), days(quantile(&shifts, 0.95)), "days", count(), "day by which 95 % of the stations had their alarm");
-        record.number(format!("{name}-error-mm"), quantile(&errors, 0.5), "mm", sum(), "median systematic error at the alarm");
+        record.number(
+            format!("{name}-median-days"),
+            days(quantile(&shifts, 0.5)),
+            "days",
+            count(),
+            "median day of the alarm",
+        );
+        record.number(
+            format!("{name}-late-days"),
+            days(quantile(&shifts, 0.95)),
+            "days",
+            count(),
+            "day by which 95 % of the stations had their alarm",
+        );
+        record.number(
+            format!("{name}-error-mm"),
+            quantile(&errors, 0.5),
+            "mm",
+            sum(),
+            "median systematic error at the alarm",
+        );
         record.number(format!("{name}-missed"), missed, "", count(), "share of quarters without an alarm");
     }
-    record.number("calendar-days", days(r.calendar_shifts()), "days", count(), "calendar interval at which 1 % of a fleet exceed the tolerance");
+    record.number(
+        "calendar-days",
+        days(r.calendar_shifts()),
+        "days",
+        count(),
+        "calendar interval at which 1 % of a fleet exceed the tolerance",
+    );
     let asked = r.asked_shifts();
-    record.number("check-median-days", days(quantile(&asked, 0.5)), "days", count(), "median interval when the check asks, at the same risk");
-    record.number("check-action-mm", r.action_limit() * r.sd_mm, "mm", sum(), "smoothed check at which it asks");
+    record.number(
+        "check-median-days",
+        days(quantile(&asked, 0.5)),
+        "days",
+        count(),
+        "median interval when the check asks, at the same risk",
+    );
+    record.number(
+        "check-action-mm",
+        r.action_limit() * r.sd_mm,
+        "mm",
+        sum(),
+        "smoothed check at which it asks",
+    );
     let never = asked.iter().filter(|&&s| s >= YEAR as f64).count() as f64 / FLEET as f64;
-    record.number("check-never", never, "", count(), "share of the fleet that needs no calibration within a year");
-    record.number("check-gain", quantile(&asked, 0.5) / r.calendar_shifts(), "", count(), "median interval over the calendar's");
+    record.number(
+        "check-never",
+        never,
+        "",
+        count(),
+        "share of the fleet that needs no calibration within a year",
+    );
+    record.number(
+        "check-gain",
+        quantile(&asked, 0.5) / r.calendar_shifts(),
+        "",
+        count(),
+        "median interval over the calendar's",
+    );
     let half = 0.5 * (high - low);
     let stand_in = "a simulated station with round causes (30 ppm/K, 8 K, 5 urad a shift); tolerance: half the central 95 % of \
                     its stations";
@@ -181,26 +286,41 @@ pub(crate) fn claims(record: &mut Record, r: &Results, seed: u64) {
     let interval = Interval::of_proportion(earlier, QUARTERS, RATE);
     let statement = "against slow drift the run rule is the earlier of the two more often than not";
     let reason = format!("{earlier} of {QUARTERS} quarters; lower end of the Wilson interval above one half");
-    record.claim(Claim::at_least("run-rule-is-earlier", statement, interval.low, 0.5, reason).with_false_alarm_rate(RATE));
+    record.claim(
+        Claim::at_least("run-rule-is-earlier", statement, interval.low, 0.5, reason)
+            .with_false_alarm_rate(RATE),
+    );
 }
 
 pub(crate) fn tables_and_figures(record: &mut Record, r: &Results, seed: u64) {
     let bands = error_bands(r, seed);
     let columns = [("day", "days"), ("low", "mm"), ("median", "mm"), ("high", "mm")];
-    let mut table = Table::new("error", "systematic error of the reference against time: 2.5 %, 50 % and 97.5 % of the stations", &columns);
+    let mut table = Table::new(
+        "error",
+        "systematic error of the reference against time: 2.5 %, 50 % and 97.5 % of the stations",
+        &columns,
+    );
     bands.iter().for_each(|row| table.push(row.to_vec()));
     record.table(table);
 
     let trade = trade_off(r, seed);
     let columns = [("false_alarm", ""), ("threshold_days", "days"), ("ewma_days", "days")];
-    let mut table = Table::new("trade-off", "median day of the alarm against the chance of a false alarm in a quarter", &columns);
+    let mut table = Table::new(
+        "trade-off",
+        "median day of the alarm against the chance of a false alarm in a quarter",
+        &columns,
+    );
     trade.iter().for_each(|row| table.push(row.to_vec()));
     record.table(table);
 
     let asked = r.asked_shifts();
     let exceeds: Vec<f64> = r.fleet.iter().map(|f| f.exceeds.unwrap_or(YEAR) as f64).collect();
     let columns = [("share", ""), ("exceeds", "days"), ("check_asks", "days")];
-    let mut table = Table::new("fleet", "day by which a share of the fleet exceeds the tolerance, and by which the check has asked; 365 means never in the year", &columns);
+    let mut table = Table::new(
+        "fleet",
+        "day by which a share of the fleet exceeds the tolerance, and by which the check has asked; 365 means never in the year",
+        &columns,
+    );
     let shares: Vec<f64> = (0..=100).map(|k| f64::from(k) / 100.0).collect();
     for &share in &shares {
         table.push([share, days(quantile(&exceeds, share)), days(quantile(&asked, share))]);
@@ -252,8 +372,12 @@ fn trade_off(r: &Results, seed: u64) -> Vec<[f64; 3]> {
 fn error_figure(r: &Results, seed: u64, bands: &[[f64; 4]]) -> Figure {
     let edges: Vec<(f64, f64, f64)> = bands.iter().map(|b| (b[0], b[1], b[3])).collect();
     let median: Vec<(f64, f64)> = bands.iter().map(|b| (b[0], b[2])).collect();
-    let mut plot = Plot::new("Systematic error of the 40 mm reference", "days since calibration", "error (mm)")
-        .band_as("central 95 % of stations", &edges, Look::series(4));
+    let mut plot = Plot::new(
+        "Systematic error of the 40 mm reference",
+        "days since calibration",
+        "error (mm)",
+    )
+    .band_as("central 95 % of stations", &edges, Look::series(4));
     for trial in 0..SHOWN {
         let history = History::of(&r.station, seed, "quarter", trial, QUARTER);
         let path: Vec<(f64, f64)> =
@@ -283,12 +407,13 @@ fn alarm_figure(r: &Results) -> Figure {
             })
             .collect()
     };
-    let plot = Plot::new("Which rule notices when?", "days since calibration", "share of stations with an alarm")
-        .line("threshold on one check", &curve(0))
-        .line("run rule (EWMA)", &curve(1))
-        .hline("", 0.5)
-        .x_range(0.0, 91.0)
-        .y_range(0.0, 1.0);
+    let plot =
+        Plot::new("Which rule notices when?", "days since calibration", "share of stations with an alarm")
+            .line("threshold on one check", &curve(0))
+            .line("run rule (EWMA)", &curve(1))
+            .hline("", 0.5)
+            .x_range(0.0, 91.0)
+            .y_range(0.0, 1.0);
     let caption = format!(
         "Share of {QUARTERS} drifting stations whose check has given an alarm, both rules set to a false-alarm chance of 1 % a \
          quarter. Notice the lead of the run rule at one half."

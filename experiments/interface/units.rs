@@ -87,11 +87,35 @@ pub(crate) fn tell(record: &mut Record, examined: &Examined) {
     // standard deviation.
     let stop = || Band::absolute(1e-6, "where the solver stops");
     let Examined { chapter, black_box, sweep } = examined;
-    record.number("units-direct", chapter.direct, "", rounding(), "RMS of corrected pixels minus millimetres, true camera");
+    record.number(
+        "units-direct",
+        chapter.direct,
+        "",
+        rounding(),
+        "RMS of corrected pixels minus millimetres, true camera",
+    );
     record.number("units-direct-box", black_box.direct, "", stop(), "the same from the black box");
-    record.number("units-spacing-ratio", chapter.spacing_ratio, "", rounding(), "spacing of the answer over the target's");
-    record.number("units-affine-mm", black_box.affine_mm, "mm", stop(), "RMS residual of an affine fit of the black box's answer");
-    record.number("units-collinearity", black_box.collinearity, "", stop(), "largest distance from the top row's line, black box");
+    record.number(
+        "units-spacing-ratio",
+        chapter.spacing_ratio,
+        "",
+        rounding(),
+        "spacing of the answer over the target's",
+    );
+    record.number(
+        "units-affine-mm",
+        black_box.affine_mm,
+        "mm",
+        stop(),
+        "RMS residual of an affine fit of the black box's answer",
+    );
+    record.number(
+        "units-collinearity",
+        black_box.collinearity,
+        "",
+        stop(),
+        "largest distance from the top row's line, black box",
+    );
 
     let columns = [
         ("distance", "mm"),
@@ -125,7 +149,10 @@ pub(crate) fn tell(record: &mut Record, examined: &Examined) {
         "a facing plane is seen at f / Z px a mm",
     ));
     let blind = sweep.iter().map(|c| {
-        (format!("{} mm: {} mm, {}", c.distance_mm, c.affine_mm, c.collinearity), c.affine_mm.max(c.collinearity) <= ROUNDING)
+        (
+            format!("{} mm: {} mm, {}", c.distance_mm, c.affine_mm, c.collinearity),
+            c.affine_mm.max(c.collinearity) <= ROUNDING,
+        )
     });
     record.claim(Claim::all_of(
         "fits-are-blind",
@@ -135,11 +162,13 @@ pub(crate) fn tell(record: &mut Record, examined: &Examined) {
     ));
 
     let direct: Vec<(f64, f64)> = sweep.iter().map(|c| (c.distance_mm, c.direct)).collect();
-    let ratio: Vec<(f64, f64)> = sweep.iter().map(|c| (c.distance_mm, 100.0 * (c.spacing_ratio - 1.0).abs())).collect();
-    let plot = Plot::new("Pixels taken for millimetres", "distance of the target (mm)", "what the check shows")
-        .line("difference to the target (\u{201c}mm\u{201d})", &direct)
-        .line("error of the spacing (%)", &ratio)
-        .vline("one pixel a millimetre", Truth::chapter_camera().fx);
+    let ratio: Vec<(f64, f64)> =
+        sweep.iter().map(|c| (c.distance_mm, 100.0 * (c.spacing_ratio - 1.0).abs())).collect();
+    let plot =
+        Plot::new("Pixels taken for millimetres", "distance of the target (mm)", "what the check shows")
+            .line("difference to the target (\u{201c}mm\u{201d})", &direct)
+            .line("error of the spacing (%)", &ratio)
+            .vline("one pixel a millimetre", Truth::chapter_camera().fx);
     let caption = "RMS difference of corrected pixels and target millimetres, and error of the spacing of neighbours, against the \
                    distance of a facing target; nothing is drawn at random. Notice that the spacing alone is blind at 600 mm, \
                    where the offset still shows.";
