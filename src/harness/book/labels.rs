@@ -48,7 +48,8 @@ impl Labels {
         for piece in pieces {
             let name = match &piece.kind {
                 Kind::Equation { label: Some(label), .. } => label.to_string(),
-                Kind::Place(name) => name.to_string(),
+                // Places may bear the same name on different pages.
+                Kind::Place(name) => format!("{page}#{name}"),
                 Kind::Placeholder(text) => match label_of(text) {
                     Some(name) => name,
                     None => continue,
@@ -69,7 +70,7 @@ impl Labels {
             };
             let (page, file, line) = (page.to_string(), file.to_string(), piece.line);
             let label = Label { page, words, number, file: file.clone(), line };
-            if self.known.insert(name.clone(), label).is_some() && !class.is_empty() {
+            if self.known.insert(name.clone(), label).is_some() {
                 findings.push(Finding::new(file, line, format!("the name `{name}` is given twice")));
             }
         }
@@ -79,6 +80,12 @@ impl Labels {
     pub(super) fn refer(&mut self, name: &str) -> Option<&Label> {
         self.used.insert(name.to_string());
         self.known.get(name)
+    }
+
+    /// Whether a page has a place or a named thing that a link can lead to.
+    pub(super) fn on_page(&self, page: &str, name: &str) -> bool {
+        self.known.contains_key(&format!("{page}#{name}"))
+            || self.known.get(name).is_some_and(|l| l.page == page)
     }
 
     /// What a name stands for.

@@ -18,6 +18,6 @@ pub(super) fn dead(page: &str, target: &str, pages: &BTreeSet<String>, labels: &
         return Some(format!("dead link: there is no page `{path}`"));
     }
     let name = name?;
-    let known = labels.get(name).is_some_and(|l| l.page == path);
-    (!known).then(|| format!("dead link: page `{path}` has no place `{name}`; give its heading {{#{name}}}"))
+    (!labels.on_page(path, name))
+        .then(|| format!("dead link: page `{path}` has no place `{name}`; give its heading {{#{name}}}"))
 }

@@ -199,9 +199,6 @@ impl<'a> Resolver<'a> {
 
     fn refer(&mut self, name: &str) -> Resolved {
         let label = self.labels.refer(name).ok_or_else(|| format!("nothing is named `{name}`"))?;
-        if label.words.is_empty() {
-            return Err(format!("`{name}` is a place without a number: link to it by its words"));
-        }
         Ok(format!(r##"<a class="ref" href="{}#{name}">{}</a>"##, label.page, label.words))
     }
 
