@@ -1,16 +1,33 @@
-//! The table of experiments. Each is a file of its own, a module here and a binary of its own (see Cargo.toml).
+//! Which experiments are there? Adding one is adding its module and its line here.
 
 use calibench::harness::Experiment;
 
+#[path = "collinearity.rs"]
+mod collinearity;
 #[path = "distortion_model.rs"]
 mod distortion_model;
 #[path = "expiry.rs"]
 mod expiry;
+#[path = "four_pose.rs"]
+mod four_pose;
 #[path = "interface.rs"]
 mod interface;
+#[path = "k2_observability.rs"]
+mod k2_observability;
 #[path = "line_bending.rs"]
 mod line_bending;
+#[path = "nine_point.rs"]
+mod nine_point;
 
 /// All experiments, in the order of the book.
-pub const EXPERIMENTS: &[Experiment] =
-    &[line_bending::EXPERIMENT, distortion_model::EXPERIMENT, interface::EXPERIMENT, expiry::EXPERIMENT];
+#[rustfmt::skip]
+pub const EXPERIMENTS: &[Experiment] = &[
+    line_bending::EXPERIMENT,
+    four_pose::EXPERIMENT,
+    k2_observability::EXPERIMENT,
+    distortion_model::EXPERIMENT,
+    collinearity::EXPERIMENT,
+    nine_point::EXPERIMENT,
+    interface::EXPERIMENT,
+    expiry::EXPERIMENT,
+];

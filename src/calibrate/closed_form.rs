@@ -1,7 +1,7 @@
 //! Which camera do the homographies alone imply? Zhang's closed form (Zhang 2000, sections 2.3, 3.1, appendix B).
 
 use crate::camera::Camera;
-use crate::geometry::{Homography, Mat3, Pose, rotation};
+use crate::geometry::{Homography, Mat3, Pose, Vec3};
 use nalgebra::{DMatrix, SVector};
 
 /// Why the closed form has no answer.
@@ -102,16 +102,30 @@ pub fn pose_from_homography(camera: &Camera, homography: &Homography) -> Option<
     if c[2] < 0.0 {
         scale = -scale;
     }
-    let (r1, r2): (nalgebra::Vector3<f64>, nalgebra::Vector3<f64>) = (a * scale, b * scale);
-    let rotation = rotation::nearest(&Mat3::from_columns(&[r1, r2, r1.cross(&r2)]))?;
+    let rotation = nearest_rotation(&(a * scale), &(b * scale));
     let pose = Pose { rotation, translation: c * scale };
     (pose.is_finite() && pose.translation.z > 0.0).then_some(pose)
+}
+
+/// The rotation nearest to `[r1, r2, r1 x r2]`, not finite if `r1` and `r2` are parallel.
+///
+/// The third column stands on the first two, so the polar factor falls apart: with `G = [r1 r2]^T [r1 r2]` the first two columns are
+/// `[r1 r2] G^(-1/2)`, and a 2 x 2 root is `G^(1/2) = (G + d I) / sqrt(trace G + 2 d)`, `d = sqrt(det G)` (Higham 2008, section 6.1).
+fn nearest_rotation(r1: &Vec3, r2: &Vec3) -> Mat3 {
+    let (g11, g12, g22) = (r1.norm_squared(), r1.dot(r2), r2.norm_squared());
+    // |r1 x r2| is the root of the determinant without cancellation.
+    let root = r1.cross(r2).norm();
+    // G^(-1/2) = adj(G + d I) / (sqrt(trace G + 2 d) d).
+    let factor = 1.0 / ((g11 + g22 + 2.0 * root).sqrt() * root);
+    let first = (r1 * (g22 + root) - r2 * g12) * factor;
+    let second = (r2 * (g11 + root) - r1 * g12) * factor;
+    Mat3::from_columns(&[first, second, first.cross(&second)])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vec3;
+    use crate::geometry::rotation;
 
     fn views(camera: &Camera, degrees: &[[f64; 3]]) -> Vec<Homography> {
         degrees
@@ -142,6 +156,17 @@ mod tests {
         assert!((found.fx - 600.0).abs() < 1e-7 && found.skew == 0.0);
         let pose = pose_from_homography(&square, &views(&square, &degrees)[2]).unwrap();
         assert!((pose.translation - Vec3::new(3.0, -2.0, 120.0)).norm() < 1e-9);
+    }
+
+    #[test]
+    fn the_rotation_is_the_nearest() {
+        for (r1, r2) in [
+            (Vec3::new(1.0, 0.1, -0.2), Vec3::new(0.05, 0.8, 0.3)),
+            (Vec3::new(0.2, 0.0, 0.9), Vec3::new(-0.1, 1.2, 0.3)),
+        ] {
+            let expected = rotation::nearest(&Mat3::from_columns(&[r1, r2, r1.cross(&r2)])).unwrap();
+            assert!((nearest_rotation(&r1, &r2) - expected).norm() < 1e-14);
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Which combination of parameters do the data say least about?
 
-use super::system::{Coupling, System};
-use crate::camera::Parameter;
+use super::elimination::Eliminated;
+use super::system::{N, System};
 use nalgebra::{DMatrix, DVector, SVector};
 
 /// How well the data separate the intrinsics, and the direction in which they do worst.
@@ -26,17 +26,33 @@ pub struct WeakComponent {
     pub weight: f64,
 }
 
+/// Smallest eigenvalue of the scaled information below which it is rounding: the elimination subtracts numbers of size 1, so its
+/// error is some hundred roundings.
+const SINGULAR: f64 = 1e-12;
 /// Members of the weakest combination below this share of the largest one are not worth a name.
 const NAMED_SHARE: f64 = 0.2;
 
+impl System {
+    /// How well these equations separate the intrinsics; `None` if nothing is free or a pose is undetermined.
+    pub fn conditioning(&self) -> Option<Conditioning> {
+        Conditioning::of(self)
+    }
+}
+
 impl Conditioning {
+    /// Whether the weakest combination is known by nothing but rounding.
+    pub fn is_singular(&self) -> bool {
+        self.smallest_eigenvalue.is_nan() || self.smallest_eigenvalue <= SINGULAR
+    }
+
     /// Analyses normal equations; `None` if nothing is free or a pose is undetermined.
     pub(super) fn of(system: &System) -> Option<Conditioning> {
         let n = system.free.len();
         if n == 0 {
             return None;
         }
-        let schur = system.schur()?;
+        let mut eliminated = Vec::new();
+        let schur = system.eliminate(0.0, &mut eliminated)?.matrix(n);
         let scale = DVector::from_fn(n, |i, _| 1.0 / system.intrinsics[(i, i)].sqrt());
         let scaled = DMatrix::from_fn(n, n, |i, j| schur[(i, j)] * scale[i] * scale[j]);
         if !scaled.iter().all(|x| x.is_finite()) {
@@ -49,13 +65,18 @@ impl Conditioning {
         Some(Conditioning {
             smallest_eigenvalue: smallest,
             condition_number: largest / smallest,
-            weakest: named(system, &direction, &scale),
+            weakest: named(system, &eliminated, &direction, &scale),
         })
     }
 }
 
-fn named(system: &System, direction: &DVector<f64>, scale: &DVector<f64>) -> Vec<WeakComponent> {
-    let mut step = SVector::<f64, { Parameter::COUNT }>::zeros();
+fn named(
+    system: &System,
+    eliminated: &[Eliminated],
+    direction: &DVector<f64>,
+    scale: &DVector<f64>,
+) -> Vec<WeakComponent> {
+    let mut step = SVector::<f64, N>::zeros();
     for (i, d) in direction.iter().enumerate() {
         step[i] = d * scale[i];
     }
@@ -65,7 +86,7 @@ fn named(system: &System, direction: &DVector<f64>, scale: &DVector<f64>) -> Vec
         .zip(direction.iter())
         .map(|(parameter, &weight)| WeakComponent { name: parameter.name().to_string(), weight })
         .collect();
-    let response = pose_response(system, &step);
+    let response = pose_response(system, eliminated, &step);
     for (name, weight) in ["tilt", "roll", "lateral position", "distance"].into_iter().zip(response) {
         members.push(WeakComponent { name: name.to_string(), weight });
     }
@@ -77,13 +98,11 @@ fn named(system: &System, direction: &DVector<f64>, scale: &DVector<f64>) -> Vec
 
 /// How far the poses follow an intrinsics step, `-C^-1 B^T d`, in units in which each component alone has unit information:
 /// root mean square over the views of tilt (x, y), roll (z), lateral position (x, y), distance (z).
-fn pose_response(system: &System, step: &SVector<f64, { Parameter::COUNT }>) -> [f64; 4] {
+fn pose_response(system: &System, eliminated: &[Eliminated], step: &SVector<f64, N>) -> [f64; 4] {
     let mut squares = [0.0; 4];
     let total: f64 = system.views.len() as f64;
-    for view in &system.views {
-        let Some(factor) = view.pose.cholesky() else { continue };
-        let coupling: &Coupling = &view.coupling;
-        let moved = factor.solve(&coupling.tr_mul(step));
+    for (view, factors) in system.views.iter().zip(eliminated) {
+        let moved = factors.response(step, system.free.len());
         for i in 0..6 {
             let group = [0, 0, 1, 2, 2, 3][i];
             squares[group] += moved[i] * moved[i] * view.pose[(i, i)] / total;

@@ -2,17 +2,23 @@
 
 use super::conditioning::Conditioning;
 use super::minimise::{Minimum, Problem, State, Termination};
-use super::normal::{self, Observations};
+use super::normal::Observations;
 use super::report::{STRONG_CORRELATION, UNCERTAIN_FOCAL};
-use super::{Calibration, CalibrationError, Covariance, Loss, Settings, Warning, identifiability, start};
+use super::{
+    Calibration, CalibrationError, Covariance, Loss, Settings, Warning, chunks, identifiability, kernel,
+    start,
+};
 use crate::camera::{Camera, FreeParameters, Parameter};
 use crate::geometry::{Homography, Mat3, Pose, Vec2, Vec3, rotation};
 use crate::target::View;
-use nalgebra::SMatrix;
+
+/// Homographies of the start are refined until a step promises less than this part of their cost: distortion, which they leave out, is
+/// far larger than what is left to gain.
+const START_GAIN: f64 = 1e-3;
 
 /// Estimates the free parameters of `settings` and the pose of every view.
 ///
-/// 1. A maximum-likelihood homography for each view.
+/// 1. A homography for each view, of least squared pixel distance.
 /// 2. Intrinsics in closed form, poses from them (Zhang 2000, section 3.1).
 /// 3. All unknowns refined together: the sum of squared pixel distances is least (Zhang 2000, section 3.2, with the full
 ///    Brown-Conrady model), which is the maximum-likelihood estimate under Gaussian noise.
@@ -24,9 +30,8 @@ use nalgebra::SMatrix;
 pub fn calibrate(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
     check_counts(views, settings)?;
     let frame = TargetFrame::of(views);
-    let observations: Vec<Observations> = views.iter().map(|view| frame.observations(view)).collect();
-    let homographies = homographies(&observations)?;
-    let starts = start::starts(&homographies, settings, pixel_frame(views))?;
+    let (observations, homographies) = homographies(views, &frame)?;
+    let starts = start::starts(&homographies, settings, pixel_frame(&observations))?;
     let problem = Problem {
         free: settings.free(),
         observations: &observations,
@@ -71,24 +76,33 @@ fn check_counts(views: &[View], settings: &Settings) -> Result<(), CalibrationEr
     Ok(())
 }
 
-fn homographies(observations: &[Observations]) -> Result<Vec<Homography>, CalibrationError> {
-    observations
-        .iter()
-        .enumerate()
-        .map(|(view, o)| {
-            let (points, pixels): (Vec<Vec2>, Vec<Vec2>) = o.pairs.iter().copied().unzip();
-            Homography::fit(&points, &pixels)
-                .map(|fit| fit.homography)
-                .map_err(|source| CalibrationError::View { view, source })
-        })
-        .collect()
+/// The views in the target's frame, and the homography of each.
+fn homographies(
+    views: &[View],
+    frame: &TargetFrame,
+) -> Result<(Vec<Observations>, Vec<Homography>), CalibrationError> {
+    let fits = chunks::map(views, |index, view| {
+        let observations = frame.observations(view);
+        Homography::fit_pairs(&observations, START_GAIN)
+            .map(|fit| (observations, fit.homography))
+            .map_err(|source| CalibrationError::View { view: index, source })
+    });
+    let mut both = (Vec::with_capacity(views.len()), Vec::with_capacity(views.len()));
+    for fit in fits {
+        let (observations, homography) = fit?;
+        both.0.push(observations);
+        both.1.push(homography);
+    }
+    Ok(both)
 }
 
 /// Centre and half-width of the box around all pixels.
-fn pixel_frame(views: &[View]) -> (Vec2, f64) {
-    let pixels = || views.iter().flat_map(View::pixels);
-    let low = pixels().fold(Vec2::repeat(f64::INFINITY), |m, p| m.inf(p));
-    let high = pixels().fold(Vec2::repeat(f64::NEG_INFINITY), |m, p| m.sup(p));
+fn pixel_frame(observations: &[Observations]) -> (Vec2, f64) {
+    let outside = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
+    let (low, high) = observations
+        .iter()
+        .map(Observations::to_box)
+        .fold(outside, |(low, high), (l, h)| (low.inf(&l), high.sup(&h)));
     (0.5 * (low + high), 0.5 * (high - low).max())
 }
 
@@ -101,19 +115,30 @@ struct TargetFrame {
 
 impl TargetFrame {
     fn of(views: &[View]) -> TargetFrame {
-        let points = || views.iter().flat_map(View::points);
-        let count = points().count() as f64;
-        let centre = points().sum::<Vec2>() / count;
-        let mean_square = points().map(|p| (p - centre).norm_squared()).sum::<f64>() / count;
+        let points = || views.iter().flat_map(|view| view.points().iter());
+        // Moments about one of the points: its distance from the centroid is of the points' own size.
+        let Some(&origin) = points().next() else { return TargetFrame { centre: Vec2::zeros(), scale: 1.0 } };
+        let (mut count, mut sum, mut square) = (0.0, Vec2::zeros(), 0.0);
+        for view in views {
+            let (mut x, mut y, mut squares) = (0.0, 0.0, 0.0);
+            for point in view.points() {
+                let (dx, dy) = (point.x - origin.x, point.y - origin.y);
+                (x, y, squares) = (x + dx, y + dy, squares + (dx * dx + dy * dy));
+            }
+            count += view.len() as f64;
+            sum += Vec2::new(x, y);
+            square += squares;
+        }
+        let offset = sum / count;
+        let centre = origin + offset;
+        let mean_square = square / count - offset.norm_squared();
         // Coincident points have no size; their homography refuses them.
         let scale = if mean_square > 0.0 { mean_square.sqrt() } else { 1.0 };
         TargetFrame { centre, scale }
     }
 
     fn observations(&self, view: &View) -> Observations {
-        Observations {
-            pairs: view.pairs().map(|(p, pixel)| ((p - self.centre) / self.scale, *pixel)).collect(),
-        }
+        Observations::new(view.pairs().map(|(p, pixel)| ((p - self.centre) / self.scale, *pixel)))
     }
 
     /// `t = s t' - R c` for a pose of the centred, scaled target.
@@ -128,15 +153,33 @@ impl TargetFrame {
         pose.rotation * Vec3::new(self.centre.x, self.centre.y, 0.0)
     }
 
-    /// Carries pose blocks over: `d t = s d t' + [R c]x delta`.
-    fn covariance(&self, mut covariance: Covariance, poses: &[Pose]) -> Covariance {
-        for (i, pose) in poses.iter().enumerate() {
-            let mut change = SMatrix::<f64, 6, 6>::identity();
-            change.fixed_view_mut::<3, 3>(3, 0).copy_from(&rotation::skew(&self.rotated_centre(pose)));
-            change.fixed_view_mut::<3, 3>(3, 3).copy_from(&(Mat3::identity() * self.scale));
-            covariance.poses[i] = change * covariance.poses[i] * change.transpose();
-            covariance.cross[i] = &covariance.cross[i] * change.transpose();
+    /// Carries pose blocks over, `d t = s d t' + [R c]x delta`, for noise of variance `variance`.
+    fn covariance(&self, mut covariance: Covariance, poses: &[Pose], variance: f64) -> Covariance {
+        let blocks = covariance.poses.iter_mut().zip(&mut covariance.cross);
+        for (pose, (block, cross)) in poses.iter().zip(blocks) {
+            let lever = rotation::skew(&self.rotated_centre(pose));
+            let turned = |rr: &Mat3, rt: &Mat3| lever * rr + self.scale * rt.transpose();
+            let (rr, rt): (Mat3, Mat3) =
+                (block.fixed_view::<3, 3>(0, 0).into(), block.fixed_view::<3, 3>(0, 3).into());
+            let tt: Mat3 = block.fixed_view::<3, 3>(3, 3).into();
+            // With the change [[I, 0], [K, s I]]: the lower rows K P_rr + s P_tr and K P_rt + s P_tt, then the columns alike.
+            let lower = turned(&rr, &rt);
+            let corner = lower * lever.transpose() + self.scale * (lever * rt + self.scale * tt);
+            let symmetric = 0.5 * (corner + corner.transpose());
+            block.fixed_view_mut::<3, 3>(0, 0).copy_from(&(variance * rr));
+            block.fixed_view_mut::<3, 3>(3, 0).copy_from(&(variance * lower));
+            block.fixed_view_mut::<3, 3>(0, 3).copy_from(&(variance * lower.transpose()));
+            block.fixed_view_mut::<3, 3>(3, 3).copy_from(&(variance * symmetric));
+            for mut row in cross.row_iter_mut() {
+                let (r, t) = (Vec3::new(row[0], row[1], row[2]), Vec3::new(row[3], row[4], row[5]));
+                let moved = (lever * r + self.scale * t) * variance;
+                let scaled = r * variance;
+                for i in 0..3 {
+                    (row[i], row[3 + i]) = (scaled[i], moved[i]);
+                }
+            }
         }
+        covariance.intrinsics *= variance;
         covariance
     }
 }
@@ -149,19 +192,19 @@ fn report(
     let observations = problem.observations;
     let State { camera, cam_from_target } = &minimum.state;
     let system = &minimum.system;
-    let residuals = residuals(&minimum.state, observations);
+    let Fit { residuals, square, largest_radius } = Fit::of(&minimum.state, observations);
     let points = residuals.iter().map(Vec::len).sum::<usize>();
     let degrees_of_freedom = 2 * points - system.unknowns();
-    let square: f64 = residuals.iter().flatten().map(|r| r.norm_squared()).sum();
     let freedom = degrees_of_freedom.max(1) as f64;
     let sigma_px = (square / freedom).sqrt();
-    identifiability::check(problem, minimum, sigma_px)?;
+    let conditioning = Conditioning::of(system);
+    identifiability::check(problem, minimum, conditioning.as_ref(), sigma_px)?;
     let unit = system.covariance().ok_or_else(|| CalibrationError::NotIdentifiable {
         inseparable: vec!["camera".into(), "poses".into()],
         why: "the normal equations are singular".into(),
     })?;
-    let covariance =
-        frame.covariance(unit, cam_from_target).scaled(noise_variance(&residuals, problem.loss, freedom));
+    let variance = noise_variance(&residuals, square, problem.loss, freedom);
+    let covariance = frame.covariance(unit, cam_from_target, variance);
     let mut calibration = Calibration {
         camera: *camera,
         free: system.free,
@@ -170,35 +213,44 @@ fn report(
         sigma_px,
         degrees_of_freedom,
         covariance,
-        conditioning: Conditioning::of(system),
+        conditioning,
         termination: minimum.termination,
         iterations: minimum.iterations,
         warnings: Vec::new(),
         residuals,
     };
-    calibration.warnings = warnings(&calibration, observations, &minimum.state);
+    calibration.warnings = warnings(&calibration, largest_radius);
     Ok(calibration)
 }
 
-fn residuals(state: &State, observations: &[Observations]) -> Vec<Vec<Vec2>> {
-    let at = |pose: &Pose, (point, pixel): &(Vec2, Vec2)| {
-        // Not in front of the camera: no prediction. The search never ends there unless it started there.
-        normal::predict(&state.camera, pose, point)
-            .map_or(Vec2::repeat(f64::INFINITY), |predicted| predicted - pixel)
-    };
-    state
-        .cam_from_target
-        .iter()
-        .zip(observations)
-        .map(|(pose, o)| o.pairs.iter().map(|pair| at(pose, pair)).collect())
-        .collect()
+/// How the minimum fits the observations.
+struct Fit {
+    residuals: Vec<Vec<Vec2>>,
+    /// Sum of squared residuals.
+    square: f64,
+    /// Largest distance of an ideal point from the axis, in normalised coordinates.
+    largest_radius: f64,
+}
+
+impl Fit {
+    fn of(state: &State, observations: &[Observations]) -> Fit {
+        let views = chunks::map(observations, |index, pairs| {
+            kernel::view_residuals(&state.camera, &state.cam_from_target[index], pairs)
+        });
+        let square = views.iter().map(|view| view.square).sum();
+        let largest_radius = views.iter().map(|view| view.largest_radius_sq).fold(0.0, f64::max).sqrt();
+        Fit { residuals: views.into_iter().map(|view| view.residuals).collect(), square, largest_radius }
+    }
 }
 
 /// Factor of the unit covariance: the residual variance, or Huber's correction for a robust loss.
 ///
 /// The weighted normal matrix is `sum w J^T J`; with `m = mean w` it stands for `m J^T J`, so the sandwich
 /// `sum w^2 r^2 / m^2 (J^T J)^-1` is `sum w^2 r^2 / m` times its inverse.
-fn noise_variance(residuals: &[Vec<Vec2>], loss: Loss, freedom: f64) -> f64 {
+fn noise_variance(residuals: &[Vec<Vec2>], square: f64, loss: Loss, freedom: f64) -> f64 {
+    if loss == Loss::Squares {
+        return square / freedom;
+    }
     let (mut square, mut weights, mut count) = (0.0, 0.0, 0.0);
     for r in residuals.iter().flatten() {
         let s = r.norm_squared();
@@ -210,7 +262,7 @@ fn noise_variance(residuals: &[Vec<Vec2>], loss: Loss, freedom: f64) -> f64 {
     square / freedom * count / weights
 }
 
-fn warnings(calibration: &Calibration, observations: &[Observations], state: &State) -> Vec<Warning> {
+fn warnings(calibration: &Calibration, largest_radius: f64) -> Vec<Warning> {
     let mut warnings = Vec::new();
     if calibration.termination != Termination::Converged {
         warnings.push(Warning::NotConverged {
@@ -226,7 +278,7 @@ fn warnings(calibration: &Calibration, observations: &[Observations], state: &St
         let relative = calibration.standard_deviation(parameter)? / calibration.camera.get(parameter);
         (relative > UNCERTAIN_FOCAL).then_some(Warning::FocalLengthUncertain { parameter, relative })
     }));
-    warnings.extend(folding(&calibration.camera, observations, state));
+    warnings.extend(folding(&calibration.camera, largest_radius));
     warnings
 }
 
@@ -250,19 +302,8 @@ fn correlated(covariance: &Covariance, free: FreeParameters) -> Vec<Warning> {
 }
 
 /// Warns if the model folds within 1.2 times the largest radius seen.
-fn folding(camera: &Camera, observations: &[Observations], state: &State) -> Option<Warning> {
+fn folding(camera: &Camera, largest_observed: f64) -> Option<Warning> {
     let monotone_radius = camera.distortion.monotone_radius();
-    let largest_observed = state
-        .cam_from_target
-        .iter()
-        .zip(observations)
-        .flat_map(|(pose, o)| {
-            o.pairs.iter().map(|(p, _)| {
-                let c = pose.apply(&Vec3::new(p.x, p.y, 0.0));
-                c.xy().norm() / c.z
-            })
-        })
-        .fold(0.0, f64::max);
     (monotone_radius < 1.2 * largest_observed)
         .then_some(Warning::FoldsInsideImage { monotone_radius, largest_observed })
 }

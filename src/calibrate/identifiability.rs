@@ -13,9 +13,6 @@ use super::normal::Observations;
 use super::system::System;
 use crate::geometry::{Pose, Vec2, Vec3, rotation};
 
-/// Smallest eigenvalue of the scaled information below which it is rounding: the elimination subtracts numbers of size 1, so its
-/// error is some hundred roundings.
-const SINGULAR: f64 = 1e-12;
 /// With this probability planes that are parallel pass for tilted: -ln(1e-9).
 const LOG_FALSE_ACCEPTANCE: f64 = 20.7;
 /// Planes whose difference of tilt moves the edge of the target's image by more than this many standard deviations of a pixel are not
@@ -25,13 +22,18 @@ const EVIDENT_TILT: f64 = 50.0;
 const PARALLEL_ITERATIONS: usize = 50;
 
 /// Refuses if the free parameters are not determined by the data that `problem` holds and `minimum` explains with noise
-/// `sigma_px` on a pixel coordinate.
-pub(super) fn check(problem: &Problem<'_>, minimum: &Minimum, sigma_px: f64) -> Result<(), CalibrationError> {
-    let Minimum { state, system, .. } = minimum;
+/// `sigma_px` on a pixel coordinate; `conditioning` is that of the minimum.
+pub(super) fn check(
+    problem: &Problem<'_>,
+    minimum: &Minimum,
+    conditioning: Option<&Conditioning>,
+    sigma_px: f64,
+) -> Result<(), CalibrationError> {
+    let state = &minimum.state;
     if problem.free.is_empty() {
         return Ok(());
     }
-    refuse_if_singular(Conditioning::of(system), || "the normal equations are singular".to_string())?;
+    refuse_if_singular(conditioning, || "the normal equations are singular".to_string())?;
     let slopes: Vec<Slope> =
         state.cam_from_target.iter().zip(problem.observations).filter_map(|(p, o)| Slope::of(p, o)).collect();
     if slopes.len() < state.cam_from_target.len() {
@@ -82,7 +84,7 @@ fn refuse_if_fits(
     }
     let mut exact = System::new(problem.free, problem.observations.len());
     problem.linearise_into(&held.state, &mut exact);
-    refuse_if_singular(Conditioning::of(&exact), || {
+    refuse_if_singular(Conditioning::of(&exact).as_ref(), || {
         format!(
             "{what} within noise (holding it so raises the cost by {ratio:.1} variances, and up to {bound:.0} could be \
              chance on {degrees_of_freedom} degrees of freedom)"
@@ -91,11 +93,11 @@ fn refuse_if_fits(
 }
 
 fn refuse_if_singular(
-    conditioning: Option<Conditioning>,
+    conditioning: Option<&Conditioning>,
     why: impl FnOnce() -> String,
 ) -> Result<(), CalibrationError> {
     match conditioning {
-        Some(c) if c.smallest_eigenvalue > SINGULAR => Ok(()),
+        Some(c) if !c.is_singular() => Ok(()),
         Some(c) => Err(CalibrationError::NotIdentifiable { inseparable: spoken(&c.weakest), why: why() }),
         None => Err(CalibrationError::NotIdentifiable {
             inseparable: vec!["camera".into(), "poses".into()],
@@ -142,9 +144,7 @@ impl Slope {
     /// `None` for a plane seen edge-on.
     fn of(pose: &Pose, observations: &Observations) -> Option<Slope> {
         let normal = pose.rotation.column(2).into_owned();
-        let pixels = || observations.pairs.iter().map(|(_, pixel)| pixel);
-        let low = pixels().fold(Vec2::repeat(f64::INFINITY), |m, p| m.inf(p));
-        let high = pixels().fold(Vec2::repeat(f64::NEG_INFINITY), |m, p| m.sup(p));
+        let (low, high) = observations.to_box();
         (normal.z.abs() > 1e-6).then(|| Slope {
             value: Vec2::new(normal.x / normal.z, normal.y / normal.z),
             half_width_px: 0.25 * (high - low).sum(),

@@ -70,12 +70,10 @@ const LARGEST_DAMPING: f64 = 1e10;
 impl Problem<'_> {
     /// Normal equations at a state; an infinite cost where a point is not in front of the camera.
     pub fn linearise_into(&self, state: &State, system: &mut System) {
-        system.clear();
-        for (pose, observations) in state.cam_from_target.iter().zip(self.observations) {
-            if normal::add_view(system, &state.camera, self.free, pose, observations, self.loss).is_none() {
-                system.cost = f64::INFINITY;
-                return;
-            }
+        let State { camera, cam_from_target } = state;
+        if normal::fill(system, camera, cam_from_target, self.observations, self.loss).is_none() {
+            system.cost = f64::INFINITY;
+            return;
         }
         if self.hold_tilt {
             for (view, pose) in system.views.iter_mut().zip(&state.cam_from_target) {
@@ -90,7 +88,11 @@ impl Problem<'_> {
     /// Below this a cost is rounding.
     pub fn rounding_cost(&self) -> f64 {
         let unit = |p: f64| (ROUNDINGS * f64::EPSILON * p) * (ROUNDINGS * f64::EPSILON * p);
-        self.observations.iter().flat_map(|o| &o.pairs).map(|(_, pixel)| unit(pixel.x) + unit(pixel.y)).sum()
+        self.observations
+            .iter()
+            .flat_map(Observations::iter)
+            .map(|(_, pixel)| unit(pixel.x) + unit(pixel.y))
+            .sum()
     }
 
     /// Levenberg-Marquardt (Levenberg 1944; Marquardt 1963) with damping `lambda diag(J^T J)`.
@@ -100,7 +102,7 @@ impl Problem<'_> {
         let mut state = start;
         let mut system = System::new(self.free, views);
         let mut trial_system = System::new(self.free, views);
-        let mut step = Step { poses: Vec::with_capacity(views), ..Step::default() };
+        let mut step = Step::default();
         let mut trial = state.clone();
         let mut damping = FIRST_DAMPING;
         let mut iterations = 0;

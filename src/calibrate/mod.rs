@@ -2,12 +2,15 @@
 //!
 //! [`calibrate`] is the whole way; the steps stand in files of their own. Truth never enters here.
 
+mod chunks;
 mod closed_form;
 mod conditioning;
 mod covariance;
+mod elimination;
 mod error;
 mod estimate;
 mod identifiability;
+mod kernel;
 mod loss;
 mod minimise;
 mod normal;

@@ -1,19 +1,22 @@
 //! How are thousands of poses solved for without a matrix of thousands of rows? Schur elimination of the pose blocks.
 //!
 //! The normal equations of a calibration are an arrow: intrinsics `A` (n x n), one pose block `C_i` (6 x 6) a view, and
-//! couplings `B_i` (n x 6). Poses do not couple with each other, so with `Y_i = C_i^-1 B_i^T`
+//! couplings `B_i` (n x 6). Poses do not couple with each other, so with `C_i = L_i L_i^T`, `W_i = L_i^-1 B_i^T`,
+//! `z_i = L_i^-1 g_i`
 //!
 //! ```text
-//! S = A - sum B_i Y_i,   S d_a = -(g_a - sum Y_i^T g_i),   d_i = -C_i^-1 g_i - Y_i d_a
+//! S = A - sum W_i^T W_i,   S d_a = -(g_a - sum W_i^T z_i),   L_i^T d_i = -(z_i + W_i d_a)
 //! ```
 //! and time and memory grow linearly in the number of views.
 
 use super::Covariance;
+use super::chunks::{self, CHUNK};
+use super::elimination::{self, Eliminated, Reduced};
 use crate::camera::{FreeParameters, Parameter};
-use nalgebra::{Cholesky, Const, DMatrix, DVector, SMatrix, SVector};
+use nalgebra::{DMatrix, MatrixXx6, SMatrix, SVector};
 
-/// Room for every intrinsic parameter; rows beyond the free ones stay 0.
-const N: usize = Parameter::COUNT;
+/// Room for every intrinsic parameter and the gradient, in whole lanes; rows beyond the free ones stay 0.
+pub(super) const N: usize = (Parameter::COUNT + 1).next_multiple_of(crate::geometry::lanes::LANES);
 
 pub(super) type Intrinsics = SMatrix<f64, N, N>;
 pub(super) type PoseBlock = SMatrix<f64, 6, 6>;
@@ -49,6 +52,8 @@ pub(super) struct Step {
     pub poses: Vec<SVector<f64, 6>>,
     /// Predicted fall of the cost, `-(2 g^T d + d^T H d)`, without the damping.
     pub predicted_gain: f64,
+    /// The views' factors, kept between the two passes over them.
+    eliminated: Vec<Eliminated>,
 }
 
 impl System {
@@ -63,77 +68,59 @@ impl System {
         }
     }
 
-    /// Empties the system and keeps its memory.
-    pub(super) fn clear(&mut self) {
-        self.intrinsics.fill(0.0);
-        self.gradient.fill(0.0);
-        self.views.clear();
-        self.cost = 0.0;
+    /// Factors the damped pose blocks; returns `S` and the right-hand side. `None` where a block is not positive definite.
+    pub(super) fn eliminate(&self, damping: f64, eliminated: &mut Vec<Eliminated>) -> Option<Reduced> {
+        let n = self.free.len();
+        eliminated.resize_with(self.views.len(), Eliminated::default);
+        let mut reduced = Some(Reduced::of(&self.intrinsics, &self.gradient, damping));
+        let chunk = |index: usize, chunk: &mut [Eliminated]| {
+            let views = &self.views[index * CHUNK..][..chunk.len()];
+            elimination::eliminate(views, chunk, damping, n)
+        };
+        chunks::fold(eliminated, chunk, |part| {
+            reduced = match (reduced.take(), part) {
+                (Some(sum), Some(part)) => Some(sum.less(&part, n)),
+                _ => None,
+            };
+        });
+        reduced
     }
 
     /// Solves for the step of `H + damping diag(H)`. `None` where the damped matrix is not positive definite.
     pub(super) fn solve_into(&self, damping: f64, step: &mut Step) -> Option<()> {
         let n = self.free.len();
-        let mut schur = damped(&self.intrinsics, damping);
-        let mut right = self.gradient;
-        for view in &self.views {
-            let factor = damped(&view.pose, damping).cholesky()?;
-            // With C = L L^T and W = L^-1 B^T, S loses W^T W: symmetric by construction.
-            let w = whiten(&factor, &view.coupling);
-            let z = factor.l_dirty().solve_lower_triangular(&view.gradient)?;
-            subtract_square(&mut schur, &w, n);
-            right -= w.tr_mul(&z);
-        }
-        let factor = leading_cholesky(&schur, n)?;
-        step.intrinsics.fill(0.0);
-        let solved = factor.solve(&DVector::from_fn(n, |i, _| -right[i]));
-        step.intrinsics.rows_mut(0, n).copy_from(&solved);
-        step.poses.clear();
-        for view in &self.views {
-            let rest = -(view.gradient + view.coupling.tr_mul(&step.intrinsics));
-            step.poses.push(damped(&view.pose, damping).cholesky()?.solve(&rest));
-        }
-        step.predicted_gain = self.predicted_gain(step);
+        let reduced = self.eliminate(damping, &mut step.eliminated)?;
+        step.intrinsics = reduced.solve(n)?;
+        let a = step.intrinsics;
+        // (H + damping D) d = -g turns -(2 g^T d + d^T H d) into -g^T d + damping d^T D d.
+        let gain_of = |g: f64, d: f64, diagonal: f64| d * (damping * diagonal * d - g);
+        let mut gain: f64 = (0..n).map(|i| gain_of(self.gradient[i], a[i], self.intrinsics[(i, i)])).sum();
+        step.poses.resize(self.views.len(), SVector::zeros());
+        let eliminated = &step.eliminated;
+        let chunk = |index: usize, poses: &mut [SVector<f64, 6>]| {
+            let mut gain = 0.0;
+            for (k, pose) in poses.iter_mut().enumerate() {
+                let (view, factors) = (&self.views[index * CHUNK + k], &eliminated[index * CHUNK + k]);
+                *pose = factors.pose_step(&a, n);
+                gain += (0..6).map(|i| gain_of(view.gradient[i], pose[i], view.pose[(i, i)])).sum::<f64>();
+            }
+            gain
+        };
+        chunks::fold(&mut step.poses, chunk, |part| gain += part);
+        step.predicted_gain = gain;
         Some(())
-    }
-
-    /// `-(2 g^T d + d^T H d)`.
-    fn predicted_gain(&self, step: &Step) -> f64 {
-        let a = &step.intrinsics;
-        let mut gain = -(2.0 * self.gradient.dot(a) + a.dot(&(self.intrinsics * a)));
-        for (view, d) in self.views.iter().zip(&step.poses) {
-            let along = view.coupling.tr_mul(a) * 2.0 + view.pose * d;
-            gain -= 2.0 * view.gradient.dot(d) + d.dot(&along);
-        }
-        gain
-    }
-
-    /// `S`, the information on the intrinsics once the poses are unknown too; `None` where a pose is undetermined.
-    pub(super) fn schur(&self) -> Option<DMatrix<f64>> {
-        let n = self.free.len();
-        let mut schur = self.intrinsics;
-        for view in &self.views {
-            let w = whiten(&view.pose.cholesky()?, &view.coupling);
-            subtract_square(&mut schur, &w, n);
-        }
-        Some(DMatrix::from_fn(n, n, |i, j| schur[(i, j)]))
     }
 
     /// The inverse of the normal matrix, block by block, for unit noise; `None` if it is singular.
     pub fn covariance(&self) -> Option<Covariance> {
         let n = self.free.len();
-        let intrinsics = self.schur()?.cholesky()?.inverse();
-        let mut poses = Vec::with_capacity(self.views.len());
-        let mut cross = Vec::with_capacity(self.views.len());
-        for view in &self.views {
-            let factor = view.pose.cholesky()?;
-            let y = factor.solve(&view.coupling.transpose());
-            let y = y.columns(0, n);
-            let minus_cross = &intrinsics * y.transpose();
-            let pose = factor.inverse() + y * &minus_cross;
-            poses.push(0.5 * (pose + pose.transpose()));
-            cross.push(-minus_cross);
-        }
+        let mut eliminated = Vec::new();
+        let schur = self.eliminate(0.0, &mut eliminated)?.matrix(n);
+        let intrinsics = if n > 0 { schur.cholesky()?.inverse() } else { DMatrix::zeros(0, 0) };
+        let padded = SMatrix::from_fn(|i, j| if i < n && j < n { intrinsics[(i, j)] } else { 0.0 });
+        let blocks: Vec<(PoseBlock, MatrixXx6<f64>)> =
+            chunks::map(&eliminated, |_, factors| factors.covariance(&padded, n));
+        let (poses, cross) = blocks.into_iter().unzip();
         Some(Covariance { free: self.free, intrinsics, poses, cross })
     }
 
@@ -144,6 +131,11 @@ impl System {
 }
 
 impl ViewBlock {
+    /// A view that says nothing.
+    pub(super) fn zero() -> ViewBlock {
+        ViewBlock { coupling: SMatrix::zeros(), pose: SMatrix::zeros(), gradient: SVector::zeros() }
+    }
+
     /// Lets the target turn only about `normal` (unit vector, camera frame), so that its plane keeps its tilt: with
     /// `P = diag(n n^T, I)` the block becomes `P C P + (I - P) c` and `B P`, `P g`, whose step stays in the range of `P`.
     pub(super) fn hold_tilt(&mut self, normal: &nalgebra::Vector3<f64>) {
@@ -156,45 +148,13 @@ impl ViewBlock {
     }
 }
 
-fn damped<const K: usize>(matrix: &SMatrix<f64, K, K>, damping: f64) -> SMatrix<f64, K, K> {
-    let mut out = *matrix;
-    for i in 0..K {
-        out[(i, i)] *= 1.0 + damping;
-    }
-    out
-}
-
-/// `W = L^-1 B^T`.
-fn whiten(factor: &Cholesky<f64, Const<6>>, coupling: &Coupling) -> SMatrix<f64, 6, N> {
-    let mut w = coupling.transpose();
-    // The factor's diagonal is positive, so the solve cannot fail.
-    factor.l_dirty().solve_lower_triangular_mut(&mut w);
-    w
-}
-
-/// `S -= W^T W` on the leading `n x n` block.
-fn subtract_square(schur: &mut Intrinsics, w: &SMatrix<f64, 6, N>, n: usize) {
-    for i in 0..n {
-        for j in i..n {
-            let product = w.column(i).dot(&w.column(j));
-            schur[(i, j)] -= product;
-            if i != j {
-                schur[(j, i)] -= product;
-            }
-        }
-    }
-}
-
-fn leading_cholesky(matrix: &Intrinsics, n: usize) -> Option<Cholesky<f64, nalgebra::Dyn>> {
-    DMatrix::from_fn(n, n, |i, j| matrix[(i, j)]).cholesky()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::calibrate::information;
     use crate::camera::{BrownConrady, Camera};
     use crate::geometry::{Pose, Vec2, Vec3, rotation};
+    use nalgebra::DVector;
 
     fn system() -> System {
         let camera =

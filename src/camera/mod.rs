@@ -1,6 +1,7 @@
 //! How does a point in front of the camera become a pixel? Pinhole, Brown-Conrady distortion, their derivatives and inverse.
 
 mod brown_conrady;
+mod correction;
 mod intrinsics;
 mod parameter;
 mod projection;

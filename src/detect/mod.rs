@@ -3,14 +3,23 @@
 mod bias;
 mod blob;
 mod centre;
+#[cfg(feature = "chessboard")]
+mod chessboard;
 mod components;
+mod corner;
 mod edge;
 mod grid;
 mod lattice;
 mod neighbours;
+mod order;
+mod saddle;
 mod threshold;
 
 pub use bias::{disc_bias, disc_biases};
 pub use blob::{Blob, BlobOptions, blobs};
+#[cfg(feature = "chessboard")]
+pub use chessboard::chessboard_corners;
 pub use components::Polarity;
-pub use grid::{DotGrid, GridError, circle_grid, circle_grid_of, sparse_dots, sparse_dots_of};
+pub use corner::{RefineError, refine_corner};
+pub use grid::{DotGrid, circle_grid, circle_grid_of, sparse_dots, sparse_dots_of};
+pub use order::GridError;

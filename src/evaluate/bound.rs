@@ -26,16 +26,31 @@ pub enum BoundError {
 /// # Errors
 /// A scene whose information matrix is singular, or with points behind the camera.
 pub fn cramer_rao(truth: &Truth, free: FreeParameters, sigma_px: f64) -> Result<Covariance, BoundError> {
-    information(&truth.camera, free, &truth.cam_from_target, &truth.points)
-        .ok_or(BoundError::BehindCamera)?
-        .covariance()
-        .map(|unit| unit.scaled(sigma_px * sigma_px))
-        .ok_or_else(|| BoundError::Singular { free: free.to_string(), views: truth.cam_from_target.len() })
+    let information = information(&truth.camera, free, &truth.cam_from_target, &truth.points)
+        .ok_or(BoundError::BehindCamera)?;
+    let singular = || BoundError::Singular { free: free.to_string(), views: truth.cam_from_target.len() };
+    // Rounding can leave a singular matrix with a Cholesky factor: its inverse would be large and meaningless.
+    if information.conditioning().is_some_and(|c| c.is_singular()) {
+        return Err(singular());
+    }
+    information.covariance().map(|unit| unit.scaled(sigma_px * sigma_px)).ok_or_else(singular)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::synth::scene::looking_at_centre;
+
+    #[test]
+    fn views_that_face_the_camera_bound_nothing_at_any_distance() {
+        for z in 60..200 {
+            let distances = [0.9, 1.0, 1.1, 1.3].map(|factor| factor * f64::from(z));
+            let poses = distances.map(|z| looking_at_centre([0.0, 0.0, 10.0], z)).to_vec();
+            let truth = Truth { cam_from_target: poses, ..Truth::chapter() };
+            let bound = cramer_rao(&truth, FreeParameters::CHAPTER, 0.1);
+            assert!(matches!(bound, Err(BoundError::Singular { views: 4, .. })), "{z} mm: {bound:?}");
+        }
+    }
 
     #[test]
     fn the_chapters_bound_is_met_to_its_printed_digits() {

@@ -3,7 +3,7 @@
 //! The distributions are those of `statrs`, whose logarithms and exponentials may be the platform's; their last digits
 //! differ between machines. Every result is therefore rounded to ten significant digits, far more than a probability needs.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal};
 
 /// Digits of a result that do not depend on the platform's mathematics.
 const DIGITS: i32 = 10;
@@ -47,6 +47,14 @@ pub fn normal_two_sided(false_alarm: f64) -> f64 {
     -normal_quantile(0.5 * false_alarm)
 }
 
+/// `P(F <= f)` of the ratio of two independent chi-squared variables, each over its degrees of freedom: a squared
+/// Mahalanobis distance over its dimension follows it if the covariance was scaled by an estimated variance (Fisher 1924).
+/// NaN if a number of degrees of freedom is 0.
+pub fn fisher_cdf(f: f64, numerator_freedom: usize, denominator_freedom: usize) -> f64 {
+    FisherSnedecor::new(numerator_freedom as f64, denominator_freedom as f64)
+        .map_or(f64::NAN, |d| stable(d.cdf(f.max(0.0))))
+}
+
 /// A chi-squared distribution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChiSquare {
@@ -57,6 +65,12 @@ impl ChiSquare {
     /// `degrees_of_freedom` > 0; 0 is treated as the least positive number, so that every sum exceeds it.
     pub fn new(degrees_of_freedom: usize) -> ChiSquare {
         ChiSquare { degrees_of_freedom: (degrees_of_freedom as f64).max(f64::MIN_POSITIVE) }
+    }
+
+    /// Any number of degrees of freedom, whole or not; `None` unless it is positive and finite.
+    pub fn with_freedom(degrees_of_freedom: f64) -> Option<ChiSquare> {
+        (degrees_of_freedom > 0.0 && degrees_of_freedom.is_finite())
+            .then_some(ChiSquare { degrees_of_freedom })
     }
 
     fn distribution(self) -> ChiSquared {
@@ -121,6 +135,9 @@ mod tests {
         assert!((ChiSquare::new(6).survival(9.0) - 0.173_578_1).abs() < 1e-6);
         assert!((ChiSquare::new(1).quantile(0.99) - 6.634_897).abs() < 1e-5);
         assert!((ChiSquare::new(474).quantile(0.5) - 473.333).abs() < 1e-2);
+        // Table 26.9: F of 6 and 30 degrees of freedom exceeds 2.42 with probability 5 %, to its three digits.
+        assert!((fisher_cdf(2.4205, 6, 30) - 0.95).abs() < 1e-4);
+        assert!(fisher_cdf(1.0, 0, 5).is_nan());
     }
 
     #[test]

@@ -4,11 +4,13 @@ pub mod bound;
 pub mod distribution;
 pub mod errors;
 pub mod interval;
+pub mod leverage;
 pub mod rmse;
 pub mod sample;
 
 pub use bound::{BoundError, cramer_rao};
 pub use errors::{Errors, reconcile};
 pub use interval::Interval;
+pub use leverage::leverages;
 pub use rmse::RmseDistribution;
 pub use sample::Sample;

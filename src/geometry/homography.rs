@@ -1,7 +1,8 @@
 //! Which projective map takes one plane to another? Normalised DLT, then the maximum-likelihood estimate.
 
+use super::homography_system::NormalEquations;
+use super::lanes::{Kernel, LANES, Lanes, PairBlock, PairBlocks, dispatch};
 use super::{Mat3, Vec2, Vec3};
-use nalgebra::{SMatrix, SVector};
 
 /// A projective map of the plane: `s [u v 1]^T = H [X Y 1]^T`, defined up to scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -87,28 +88,36 @@ impl Homography {
         if from.len() != to.len() {
             return Err(HomographyError::Lengths { from: from.len(), to: to.len() });
         }
-        if from.len() < 4 {
-            return Err(HomographyError::TooFewPoints { need: 4, got: from.len() });
+        Homography::fit_pairs(&PairBlocks::new(from.iter().copied().zip(to.iter().copied())), RELATIVE_GAIN)
+    }
+
+    /// [`Homography::fit`] for pairs that are already in blocks, ended when the next step promises to lower the cost by less than
+    /// `relative_gain` of it.
+    pub(crate) fn fit_pairs(
+        pairs: &PairBlocks,
+        relative_gain: f64,
+    ) -> Result<HomographyFit, HomographyError> {
+        if pairs.len() < 4 {
+            return Err(HomographyError::TooFewPoints { need: 4, got: pairs.len() });
         }
-        let from_frame = Frame::of(from, "target")?;
-        let to_frame = Frame::of(to, "image")?;
-        let pairs = Pairs { from, to, from_frame, to_frame };
-        let mut estimate = pairs.linear_estimate()?;
-        let mut system = pairs.normal_equations(&estimate);
+        let [from_frame, to_frame] = Frame::both(pairs)?;
+        let pairs = normalised(pairs, &from_frame, &to_frame);
+        let mut estimate = linear_estimate(&pairs)?;
+        let mut system = NormalEquations::geometric(&pairs, &estimate);
         let mut iterations = 0;
+        let rounding_cost = (ROUNDINGS * f64::EPSILON) * (ROUNDINGS * f64::EPSILON) * pairs.len() as f64;
         while iterations < MAX_ITERATIONS {
-            let Some(step) = system.solve() else { break };
-            let (next, next_system) = pairs.descend(&estimate, &system, &step);
-            iterations += 1;
-            let gain = system.cost - next_system.cost;
-            let improved = gain > 0.0;
-            if improved {
-                estimate = next;
-                system = next_system;
-            }
-            if !improved || gain <= RELATIVE_GAIN * system.cost {
+            let Some((step, predicted_gain)) = system.solve() else { break };
+            if predicted_gain <= relative_gain * system.cost || system.cost <= rounding_cost {
                 break;
             }
+            let (next, next_system) = descend(&pairs, &estimate, &system, &step);
+            iterations += 1;
+            if next_system.cost >= system.cost {
+                break;
+            }
+            estimate = next;
+            system = next_system;
         }
         let h = to_frame.unnormalise() * matrix(&estimate) * from_frame.normalise();
         let homography = Homography(if h[(2, 2)] != 0.0 { h / h[(2, 2)] } else { h });
@@ -119,8 +128,11 @@ impl Homography {
 
 /// Gauss-Newton halves the error at the very least; 30 steps are far past convergence for any usable data.
 const MAX_ITERATIONS: usize = 30;
-/// Convergence is quadratic-like near the optimum: a step that gained less than this leaves the estimate exact to rounding.
+/// Convergence is quadratic-like near the optimum: when the next step would gain less than this part of the cost, the estimate is within
+/// `1e-6 sqrt(degrees of freedom)` of a standard deviation of the minimum, and the step before gained about as much more.
 const RELATIVE_GAIN: f64 = 1e-12;
+/// Residuals of normalised coordinates, of size 1, below this many roundings are rounding.
+const ROUNDINGS: f64 = 2.0;
 /// A line seen with rounding errors has 1e-16; points that leave their line by a millionth of its length still pass.
 const SMALLEST_FLATNESS: f64 = 1e-12;
 /// Smallest pivot, relative to its diagonal, of a well-posed normalised system: a 9 x 7 grid has 1e-2, rounding gives 1e-16.
@@ -134,25 +146,22 @@ struct Frame {
 }
 
 impl Frame {
-    fn of(points: &[Vec2], side: &'static str) -> Result<Frame, HomographyError> {
-        let count = points.len() as f64;
-        let centroid = points.iter().sum::<Vec2>() / count;
-        let mean_square = points.iter().map(|p| (p - centroid).norm_squared()).sum::<f64>() / count;
-        let scale = (2.0 / mean_square).sqrt();
-        let scatter = points.iter().fold(nalgebra::Matrix2::zeros(), |sum, p| {
-            let offset = p - centroid;
-            sum + offset * offset.transpose()
-        });
-        let flatness = 4.0 * scatter.determinant() / (scatter.trace() * scatter.trace());
+    /// The frames of target and image points.
+    fn both(pairs: &PairBlocks) -> Result<[Frame; 2], HomographyError> {
+        let [target, image] = dispatch(Moments { pairs });
+        Ok([Frame::of(target, pairs.len(), "target")?, Frame::of(image, pairs.len(), "image")?])
+    }
+
+    fn of(spread: Spread, points: usize, side: &'static str) -> Result<Frame, HomographyError> {
+        let Spread { centroid, xx, yy, xy } = spread;
+        let trace = xx + yy;
+        let scale = (2.0 * points as f64 / trace).sqrt();
+        let flatness = 4.0 * (xx * yy - xy * xy) / (trace * trace);
         if scale.is_finite() && flatness > SMALLEST_FLATNESS {
             Ok(Frame { centroid, scale })
         } else {
-            Err(HomographyError::Collinear { side, points: points.len(), flatness })
+            Err(HomographyError::Collinear { side, points, flatness })
         }
-    }
-
-    fn apply(&self, p: &Vec2) -> Vec2 {
-        (p - self.centroid) * self.scale
     }
 
     fn normalise(&self) -> Mat3 {
@@ -166,130 +175,115 @@ impl Frame {
     }
 }
 
-type Vec8 = SVector<f64, 8>;
+/// Centroid and scatter about it.
+struct Spread {
+    centroid: Vec2,
+    xx: f64,
+    yy: f64,
+    xy: f64,
+}
+
+/// The spread of both sides of the pairs.
+struct Moments<'a> {
+    pairs: &'a PairBlocks,
+}
+
+impl Kernel for Moments<'_> {
+    type Output = [Spread; 2];
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> [Spread; 2] {
+        let full = self.pairs.len() / LANES;
+        let (blocks, rest) = self.pairs.blocks.split_at(full);
+        let mask = L::load(&self.pairs.mask(full.min(self.pairs.blocks.len() - 1)).unwrap_or([1.0; LANES]));
+        let mut totals = [L::zero(); 4];
+        for block in blocks {
+            let at = coordinates::<L>(block);
+            for i in 0..4 {
+                totals[i] = totals[i] + at[i];
+            }
+        }
+        for block in rest {
+            let at = coordinates::<L>(block);
+            for i in 0..4 {
+                totals[i] = totals[i] + at[i] * mask;
+            }
+        }
+        let count = self.pairs.len() as f64;
+        let means = L::sums(totals).map(|sum| sum / count);
+        let mut scatter = [[L::zero(); 4]; 2];
+        for (index, block) in self.pairs.blocks.iter().enumerate() {
+            let mut offsets = coordinates::<L>(block);
+            for i in 0..4 {
+                offsets[i] = offsets[i] - L::splat(means[i]);
+                if index >= full {
+                    offsets[i] = offsets[i] * mask;
+                }
+            }
+            for (side, sums) in scatter.iter_mut().enumerate() {
+                let (x, y) = (offsets[2 * side], offsets[2 * side + 1]);
+                sums[0] = sums[0] + x * x;
+                sums[1] = sums[1] + y * y;
+                sums[2] = sums[2] + x * y;
+            }
+        }
+        std::array::from_fn(|side| {
+            let [xx, yy, xy, _] = L::sums(scatter[side]);
+            Spread { centroid: Vec2::new(means[2 * side], means[2 * side + 1]), xx, yy, xy }
+        })
+    }
+}
+
+#[inline(always)]
+fn coordinates<L: Lanes>(block: &PairBlock) -> [L; 4] {
+    [L::load(&block.x), L::load(&block.y), L::load(&block.u), L::load(&block.v)]
+}
+
+/// The pairs in their frames.
+fn normalised(pairs: &PairBlocks, from: &Frame, to: &Frame) -> PairBlocks {
+    let mut out = pairs.clone();
+    let move_to = |values: &mut [f64; LANES], origin: f64, scale: f64| {
+        for value in values {
+            *value = (*value - origin) * scale;
+        }
+    };
+    for block in &mut out.blocks {
+        move_to(&mut block.x, from.centroid.x, from.scale);
+        move_to(&mut block.y, from.centroid.y, from.scale);
+        move_to(&mut block.u, to.centroid.x, to.scale);
+        move_to(&mut block.v, to.centroid.y, to.scale);
+    }
+    out
+}
 
 /// `[[h0, h1, h2], [h3, h4, h5], [h6, h7, 1]]`.
-fn matrix(h: &Vec8) -> Mat3 {
+fn matrix(h: &[f64; 8]) -> Mat3 {
     Mat3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], 1.0)
 }
 
-/// Normal equations `J^T J step = -J^T r`.
-struct NormalEquations {
-    matrix: SMatrix<f64, 8, 8>,
-    gradient: Vec8,
-    cost: f64,
+/// The direct linear transform: `u (h6 x + h7 y + 1) = h0 x + h1 y + h2` and the same for v, least squares.
+fn linear_estimate(pairs: &PairBlocks) -> Result<[f64; 8], HomographyError> {
+    let system = NormalEquations::linear(pairs);
+    system
+        .solve_if_regular(SMALLEST_PIVOT)
+        .map_err(|pivot| HomographyError::Degenerate { points: pairs.len(), pivot })
 }
 
-impl NormalEquations {
-    fn zero() -> NormalEquations {
-        NormalEquations { matrix: SMatrix::zeros(), gradient: Vec8::zeros(), cost: 0.0 }
-    }
-
-    /// Adds the rows of one point. The rows for u and v share their pattern: `[a, 0, -u a], [0, a, -v a]` with three, three
-    /// and two entries, so the matrix is built from one outer product of `a = (x, y, 1)`.
-    fn add(&mut self, a: &Vec3, weight: f64, u: f64, v: f64, residual: &Vec2) {
-        let outer = a * a.transpose() * (weight * weight);
-        let square = u * u + v * v;
-        for i in 0..3 {
-            for j in 0..3 {
-                self.matrix[(i, j)] += outer[(i, j)];
-                self.matrix[(i + 3, j + 3)] += outer[(i, j)];
-            }
-            for j in 0..2 {
-                self.matrix[(i, j + 6)] -= u * outer[(i, j)];
-                self.matrix[(i + 3, j + 6)] -= v * outer[(i, j)];
-            }
+/// The step, halved until the cost falls (at most ten times).
+fn descend(
+    pairs: &PairBlocks,
+    at: &[f64; 8],
+    system: &NormalEquations,
+    step: &[f64; 8],
+) -> ([f64; 8], NormalEquations) {
+    let mut factor = 1.0;
+    loop {
+        let next = std::array::from_fn(|i| at[i] + step[i] * factor);
+        let next_system = NormalEquations::geometric(pairs, &next);
+        if next_system.cost < system.cost || factor < 1e-3 {
+            return (next, next_system);
         }
-        for i in 0..2 {
-            for j in 0..2 {
-                self.matrix[(i + 6, j + 6)] += square * outer[(i, j)];
-            }
-        }
-        let along = u * residual.x + v * residual.y;
-        for i in 0..3 {
-            self.gradient[i] += weight * a[i] * residual.x;
-            self.gradient[i + 3] += weight * a[i] * residual.y;
-        }
-        for i in 0..2 {
-            self.gradient[i + 6] -= weight * a[i] * along;
-        }
-        self.cost += residual.norm_squared();
-    }
-
-    fn solve(&self) -> Option<Vec8> {
-        let mut full = self.matrix;
-        full.fill_lower_triangle_with_upper_triangle();
-        full.cholesky().map(|c| -c.solve(&self.gradient))
-    }
-
-    /// Smallest squared pivot of the Cholesky factor relative to its diagonal entry.
-    fn smallest_pivot(&self) -> f64 {
-        let mut full = self.matrix;
-        full.fill_lower_triangle_with_upper_triangle();
-        full.cholesky().map_or(0.0, |c| {
-            (0..8).map(|i| c.l_dirty()[(i, i)] * c.l_dirty()[(i, i)] / full[(i, i)]).fold(1.0, f64::min)
-        })
-    }
-}
-
-/// Point pairs seen in their normalised frames.
-struct Pairs<'a> {
-    from: &'a [Vec2],
-    to: &'a [Vec2],
-    from_frame: Frame,
-    to_frame: Frame,
-}
-
-impl Pairs<'_> {
-    fn normalised(&self) -> impl Iterator<Item = (Vec3, Vec2)> {
-        self.from.iter().zip(self.to).map(|(f, t)| {
-            let f = self.from_frame.apply(f);
-            (Vec3::new(f.x, f.y, 1.0), self.to_frame.apply(t))
-        })
-    }
-
-    /// The direct linear transform: `u (h6 x + h7 y + 1) = h0 x + h1 y + h2` and the same for v, least squares.
-    fn linear_estimate(&self) -> Result<Vec8, HomographyError> {
-        let mut system = NormalEquations::zero();
-        for (a, to) in self.normalised() {
-            system.add(&a, 1.0, to.x, to.y, &-to);
-        }
-        let pivot = system.smallest_pivot();
-        let degenerate = HomographyError::Degenerate { points: self.from.len(), pivot };
-        if pivot < SMALLEST_PIVOT {
-            return Err(degenerate);
-        }
-        system.solve().ok_or(degenerate)
-    }
-
-    /// Normal equations of the geometric error; infinite cost where a point falls behind the line at infinity.
-    fn normal_equations(&self, h: &Vec8) -> NormalEquations {
-        let h = matrix(h);
-        let mut system = NormalEquations::zero();
-        for (a, to) in self.normalised() {
-            let image = h * a;
-            if image.z.is_nan() || image.z <= 0.0 {
-                system.cost = f64::INFINITY;
-                return system;
-            }
-            let weight = 1.0 / image.z;
-            let (u, v) = (image.x * weight, image.y * weight);
-            system.add(&a, weight, u, v, &Vec2::new(u - to.x, v - to.y));
-        }
-        system
-    }
-
-    /// The step, halved until the cost falls (at most ten times).
-    fn descend(&self, at: &Vec8, system: &NormalEquations, step: &Vec8) -> (Vec8, NormalEquations) {
-        let mut factor = 1.0;
-        loop {
-            let next = at + step * factor;
-            let next_system = self.normal_equations(&next);
-            if next_system.cost < system.cost || factor < 1e-3 {
-                return (next, next_system);
-            }
-            factor *= 0.5;
-        }
+        factor *= 0.5;
     }
 }
 

@@ -2,6 +2,8 @@
 
 pub mod affine;
 pub mod homography;
+mod homography_system;
+pub(crate) mod lanes;
 pub mod line;
 pub mod pose;
 pub mod projective_frame;

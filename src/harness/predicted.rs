@@ -1,6 +1,6 @@
 //! From which distribution should a sampled number come? What theory predicts before anything is drawn.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use crate::evaluate::distribution::{ChiSquare, normal_quantile};
 use std::fmt;
 
 /// A predicted distribution of one number.
@@ -61,9 +61,10 @@ impl Predicted {
 
     /// The value below which a draw lies with probability `p`.
     fn quantile(&self, p: f64) -> f64 {
-        let chi_squared = |dof: f64| ChiSquared::new(dof).map_or(f64::NAN, |d| d.inverse_cdf(p));
+        let chi_squared = |dof: f64| ChiSquare::with_freedom(dof).map_or(f64::NAN, |d| d.quantile(p));
         match self {
-            Predicted::Normal { mean, sd } => Normal::new(*mean, *sd).map_or(f64::NAN, |d| d.inverse_cdf(p)),
+            Predicted::Normal { mean, sd } if *sd > 0.0 => mean + sd * normal_quantile(p),
+            Predicted::Normal { .. } => f64::NAN,
             Predicted::ChiSquared { dof } => chi_squared(*dof),
             Predicted::Chi { scale, dof } => scale * chi_squared(*dof).sqrt(),
             Predicted::Simulated { .. } => f64::NAN,

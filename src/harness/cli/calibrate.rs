@@ -43,20 +43,31 @@ pub(super) struct Arguments {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
+pub(super) enum Format {
     Text,
     Json,
 }
 
 /// The three maps of a plane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Mode {
+pub(super) enum Mode {
     /// Affine, six parameters.
     Planar,
     /// Projective, eight parameters.
     Tilted,
     /// Rotation, scale and shift, four parameters.
     Similarity,
+}
+
+impl Mode {
+    /// Its word on the command line.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Mode::Planar => "planar",
+            Mode::Tilted => "tilted",
+            Mode::Similarity => "similarity",
+        }
+    }
 }
 
 impl From<Mode> for PlaneModel {
@@ -224,7 +235,7 @@ fn plane_json(result: &PlaneCalibration) -> String {
     format!("{value:#}\n")
 }
 
-fn plane_text(result: &PlaneCalibration) -> String {
+pub(super) fn plane_text(result: &PlaneCalibration) -> String {
     let m = result.map.matrix();
     let mut rows = table(&["world from pixel", "", ""]);
     for i in 0..3 {

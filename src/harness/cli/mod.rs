@@ -6,10 +6,12 @@ mod calibrate;
 mod check;
 mod exit;
 mod list;
+mod ninepoint;
 mod report;
 mod reproduce;
 mod run;
 mod terminal;
+mod undistort;
 
 pub use exit::Exit;
 pub use terminal::{print, warn};
@@ -47,6 +49,10 @@ enum Verb {
     Book(book::Arguments),
     /// Calibrates a camera from a corner file, or a plane from a file of point pairs
     Calibrate(calibrate::Arguments),
+    /// Finds the dots of a nine-point board in a photograph, and maps its pixels to the unit grid
+    Ninepoint(ninepoint::Arguments),
+    /// Removes a calibrated lens's distortion from photographs
+    Undistort(undistort::Arguments),
 }
 
 /// The `calibench` command over a table of experiments.
@@ -67,6 +73,8 @@ pub fn main(experiments: &[Experiment]) -> ExitCode {
         Some(Verb::Bless(arguments)) => bless::run(experiments, &arguments),
         Some(Verb::Book(arguments)) => book::run(experiments, &arguments),
         Some(Verb::Calibrate(arguments)) => calibrate::run(&arguments),
+        Some(Verb::Ninepoint(arguments)) => ninepoint::run(&arguments),
+        Some(Verb::Undistort(arguments)) => undistort::run(&arguments),
     };
     exit.into()
 }

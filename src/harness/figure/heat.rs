@@ -1,7 +1,7 @@
 //! How is a quantity over two others shown? Cells of a colour scale, with their values written in.
 
 use super::axis::{Axis, Scale, Span};
-use super::canvas::{Anchor, Canvas, Point};
+use super::canvas::{Anchor, Canvas, Point, text_width};
 use super::clip::Frame;
 use super::colour::{INK, heat, text_on};
 use crate::harness::predicted::significant;
@@ -116,7 +116,9 @@ impl HeatMap {
             // Drawn down to the foot, each over the last: no seam shows between the steps.
             canvas.rectangle((left, level(k + 1)), (right, level(0)), colour);
         }
-        for tick in span.ticks(5) {
+        let ticks = span.ticks(5);
+        let widest = ticks.iter().map(|t| text_width(&t.text, text_px)).fold(0.0, f64::max);
+        for tick in ticks {
             let y = frame.bottom - frame.height() * span.fraction(tick.value);
             let mark: [Point; 2] = [(right, y), (right + 4.0, y)];
             canvas.line(&mark, INK, 1.0);
@@ -124,7 +126,7 @@ impl HeatMap {
         }
         canvas.text(
             &self.label,
-            (frame.right + 72.0, 0.5 * (frame.top + frame.bottom)),
+            (right + widest + 17.0, 0.5 * (frame.top + frame.bottom)),
             text_px + 1.0,
             INK,
             Anchor::Upwards,

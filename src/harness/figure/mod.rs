@@ -1,6 +1,7 @@
 //! How does a reader see the result? Plots as SVG, photographs as PNG, the same bytes on every machine.
 
 mod axis;
+mod bins;
 mod canvas;
 mod clip;
 mod colour;
@@ -9,6 +10,7 @@ mod legend;
 mod plot;
 mod render;
 
+pub use bins::density;
 pub use colour::{Dash, Look, Marker};
 pub use heat::HeatMap;
 pub use plot::Plot;

@@ -196,6 +196,18 @@ impl Plot {
         scale: f64,
     ) -> Plot {
         let look = self.next_look();
+        self.ellipse_as(label, centre, covariance, scale, look)
+    }
+
+    /// The same curve in a given look.
+    pub fn ellipse_as(
+        self,
+        label: impl Into<String>,
+        centre: Vec2,
+        covariance: &Matrix2<f64>,
+        scale: f64,
+        look: Look,
+    ) -> Plot {
         self.line_as(label, &ellipse_points(centre, covariance, scale), look)
     }
 

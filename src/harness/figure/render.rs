@@ -11,7 +11,7 @@ const TITLE_PX: f64 = 14.0;
 const LABEL_PX: f64 = 12.5;
 const TICK_PX: f64 = 11.5;
 /// Room beside the frame for a colour scale with its ticks and label.
-const SCALE_PX: f64 = 88.0;
+const SCALE_PX: f64 = 96.0;
 
 /// The SVG of panels, row by row.
 pub(super) fn svg(plots: &[Plot], columns: usize, caption: &str) -> String {

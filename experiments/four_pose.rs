@@ -1,0 +1,350 @@
+//! How well do four views of the target determine the camera, and what does the reprojection error say about that?
+//!
+//! Expected: the chapter's Table 5.1 and ours are two plausible draws from the distribution that the Cramer-Rao bound
+//! predicts, and over many draws the solver attains that bound. The RMSE settles a little under the noise floor whatever
+//! the errors of k1 and k2, and lies far under it only if few points feed many parameters (section 5.3).
+//!
+//! What it cannot show: errors of a real target, lens or detector. Here the model is right and the noise is Gaussian.
+
+use calibench::calibrate::{Calibration, Settings, calibrate};
+use calibench::camera::{Camera, FreeParameters, Parameter};
+use calibench::evaluate::distribution::{fisher_cdf, normal_cdf, normal_two_sided, round_significant};
+use calibench::evaluate::interval::each_of;
+use calibench::evaluate::{
+    BoundError, Errors, Interval, RmseDistribution, Sample, cramer_rao, leverages, reconcile,
+};
+use calibench::geometry::Vec2;
+use calibench::harness::figure::density;
+use calibench::harness::monte_carlo::Estimate;
+use calibench::harness::{
+    Band, Cell, Claim, Context, Dash, Experiment, ExperimentError, Figure, Look, Marker, MonteCarlo, Outcome,
+    Plot, Predicted, Record, Table,
+};
+use calibench::synth::{Scene, Stream, StreamKey, Truth, scene::looking_at_centre};
+use calibench::target::View;
+
+#[path = "four_pose/figures.rs"]
+mod figures;
+#[path = "four_pose/trials.rs"]
+mod trials;
+#[path = "four_pose/weak.rs"]
+mod weak;
+
+/// The experiment.
+pub const EXPERIMENT: Experiment = Experiment {
+    id: "four-pose",
+    title: "The camera from four views",
+    question: "Four views of 63 points with 0.1 px of noise: how close do fx, fy, cx, cy, k1 and k2 come to the truth, is the \
+               book's table one plausible draw, does the solver attain the Cramer-Rao bound, and does the reprojection \
+               error tell? Expected: both tables inside the predicted distribution, RMSE 0.1371 +- 0.0045 px just under \
+               the floor of 0.1414 px, and no relation between RMSE and the errors of k1 and k2.",
+    seed: 1,
+    takes_image: false,
+    run,
+};
+
+calibench::experiment_main!(EXPERIMENT);
+
+/// Standard deviation of the noise on each of u and v.
+const SIGMA_PX: f64 = 0.1;
+/// Trials of the Monte Carlo of the four poses.
+const TRIALS: usize = 2000;
+/// Points of the target as columns x rows, always over the same 80 x 60 mm.
+const GRIDS: [(usize, usize); 5] = [(3, 3), (4, 3), (5, 4), (7, 5), (9, 7)];
+/// Trials of each.
+const GRID_TRIALS: usize = 300;
+/// Distances of the views that face the camera, mm, and trials with them.
+const FACING_MM: [f64; 4] = [100.0, 120.0, 140.0, 160.0];
+const FACING_TRIALS: usize = 200;
+/// Chance that a correct program fails one claim, or one family of claims.
+const RATE: f64 = 1e-4;
+/// Nominal coverage of the estimate's own confidence region.
+const COVERAGE: f64 = 0.95;
+/// Residuals are drawn this many times longer than they are.
+const ARROW_SCALE: f64 = 150.0;
+/// Dots of the clouds: enough to show a shape.
+const CLOUD: usize = 600;
+
+fn run(context: &Context) -> Result<Record, ExperimentError> {
+    let mut record = context.record();
+    let draw = Draw::new(context.seed)?;
+    let book = Book::new(&record, &draw)?;
+    tell_inputs(&mut record, &draw);
+    tell_table(&mut record, &draw, &book)?;
+    tell_rmse(&mut record, &draw)?;
+    claim_residuals(&mut record, &draw);
+
+    let outcome = draw.monte_carlo(context);
+    trials::claim_attained(&mut record, &draw, &outcome);
+    trials::claim_rmse_blind(&mut record, &draw, &outcome);
+    let grids = weak::few_points(context)?;
+    weak::claim_overfitting(&mut record, &grids);
+    weak::claim_facing_views(&mut record, context)?;
+
+    record.figure(figures::views(&draw));
+    record.figure(figures::residuals(&draw));
+    record.figure(figures::residual_distribution(&draw));
+    record.figure(figures::ellipse(&draw, &book, &outcome));
+    record.figure(figures::rmse(&draw, &book, &outcome));
+    record.figure(figures::blind(&draw, &outcome));
+    record.figure(figures::overfitting(&grids));
+    Ok(record)
+}
+
+/// The seeded draw, calibrated, with what theory predicts of it.
+struct Draw {
+    seed: u64,
+    scene: Scene,
+    views: Vec<View>,
+    calibration: Calibration,
+    bound: calibench::calibrate::Covariance,
+    errors: Errors,
+    rmse: RmseDistribution,
+    /// Residual over its predicted standard deviation `sigma sqrt(1 - h)`, u and v of every point.
+    standardised: Vec<f64>,
+    leverage_sum: f64,
+}
+
+impl Draw {
+    fn new(seed: u64) -> Result<Draw, ExperimentError> {
+        let scene = Scene::chapter();
+        let key = StreamKey { seed, scenario: "four-pose", trial: 0, purpose: "noise" };
+        let views = scene.observe(SIGMA_PX, &mut Stream::open(key));
+        let calibration =
+            calibrate(&views, &Settings::chapter()).map_err(ExperimentError::at("calibration"))?;
+        let bound = cramer_rao(&scene.truth, FreeParameters::CHAPTER, SIGMA_PX)
+            .map_err(ExperimentError::at("Cramer-Rao bound"))?;
+        let singular = || ExperimentError::Input("the Cramer-Rao bound is singular".to_string());
+        let errors = reconcile(&scene.truth.camera, &calibration.camera, &bound).ok_or_else(singular)?;
+        let leverages = leverages(&calibration, &views).ok_or_else(singular)?;
+        let leverage: Vec<f64> = leverages.iter().flatten().flat_map(|h| [h.x, h.y]).collect();
+        let residuals = calibration.residuals.iter().flatten().flat_map(|r| [r.x, r.y]);
+        let standardised = residuals.zip(&leverage).map(|(r, h)| r / (SIGMA_PX * (1.0 - h).sqrt())).collect();
+        let rmse = RmseDistribution {
+            sigma_px: SIGMA_PX,
+            points: scene.observations(),
+            parameters: unknowns(scene.pixels().len()),
+        };
+        let leverage_sum = leverage.iter().sum();
+        Ok(Draw { seed, scene, views, calibration, bound, errors, rmse, standardised, leverage_sum })
+    }
+
+    fn sd(&self, parameter: Parameter) -> f64 {
+        self.bound.standard_deviation(parameter).unwrap_or(f64::NAN)
+    }
+
+    /// The RMSE as a distribution that published values are held against.
+    fn predicted_rmse(&self) -> Predicted {
+        let scale = SIGMA_PX / (self.rmse.points as f64).sqrt();
+        Predicted::Chi { scale, dof: self.rmse.degrees_of_freedom() as f64 }
+    }
+
+    fn monte_carlo(&self, context: &Context) -> Outcome {
+        let settings = Settings::chapter();
+        MonteCarlo {
+            scene: &self.scene,
+            settings: &settings,
+            sigma_px: SIGMA_PX,
+            seed: context.seed,
+            scenario: "four-pose/monte-carlo",
+            trials: TRIALS,
+        }
+        .run(&context.progress("Monte Carlo", TRIALS))
+    }
+}
+
+/// Six intrinsics and six numbers for every pose.
+fn unknowns(views: usize) -> usize {
+    FreeParameters::CHAPTER.len() + 6 * views
+}
+
+/// The book's table against the same truth and bound.
+struct Book {
+    camera: Camera,
+    errors: Errors,
+    rmse_px: f64,
+}
+
+impl Book {
+    fn new(record: &Record, draw: &Draw) -> Result<Book, ExperimentError> {
+        let mut values = [0.0; Parameter::COUNT];
+        for parameter in FreeParameters::CHAPTER.iter() {
+            values[parameter as usize] = record.printed(parameter.name())?;
+        }
+        let camera = Camera::from_parameters(values);
+        let errors = reconcile(&draw.scene.truth.camera, &camera, &draw.bound)
+            .ok_or_else(|| ExperimentError::Input("the Cramer-Rao bound is singular".to_string()))?;
+        Ok(Book { camera, errors, rmse_px: record.printed("rmse")? })
+    }
+}
+
+/// Bands of estimates: the refinement ends within 1e-6 of a standard deviation of the minimum.
+fn of_deviation(sd: f64) -> Band {
+    Band::absolute(
+        round_significant(1e-5 * sd, 2),
+        "ten times the 1e-6 of a standard deviation to which the refinement converges",
+    )
+}
+
+/// Bands of sums over estimates, and of predictions: rounding and convergence.
+fn relative() -> Band {
+    Band::relative(1e-6, "convergence of the refinement and rounding of the prediction")
+}
+
+fn tell_inputs(record: &mut Record, draw: &Draw) {
+    let truth = &draw.scene.truth;
+    for parameter in FreeParameters::CHAPTER.iter() {
+        let (name, unit) = (parameter.name(), parameter.unit());
+        record.number(format!("{name}-true"), truth.camera.get(parameter), unit, Band::Exact, "truth");
+    }
+    let half_width = 0.5 * truth.image_size.0 as f64;
+    let field_of_view = 2.0 * libm::atan(half_width / truth.camera.fx).to_degrees();
+    let last_bits = Band::absolute(1e-12, "rounding of an angle below 180 degrees");
+    record.number("field-of-view-deg", field_of_view, "deg", last_bits, "horizontal field of view");
+    record.number("points-per-view", truth.points.len() as f64, "", Band::Exact, "points of the target");
+    record.number("pairs", draw.rmse.points as f64, "", Band::Exact, "point pairs of the four views");
+    record.number("sigma", SIGMA_PX, "px", Band::Exact, "standard deviation of the noise on each of u and v");
+    record.number("noise-floor", draw.rmse.noise_floor_px(), "px", Band::Exact, "sqrt(2) sigma");
+    record.number("trials", TRIALS as f64, "", Band::Exact, "trials of the Monte Carlo");
+}
+
+fn tell_table(record: &mut Record, draw: &Draw, book: &Book) -> Result<(), ExperimentError> {
+    for name in ["field-of-view-deg", "points-per-view", "pairs", "sigma", "noise-floor"] {
+        record.reconcile_exact(name)?;
+    }
+    let columns = [
+        ("parameter", ""),
+        ("unit", ""),
+        ("truth", ""),
+        ("ours", ""),
+        ("error", ""),
+        ("predicted_sd", ""),
+        ("z", ""),
+        ("book", ""),
+        ("book_error", ""),
+        ("book_z", ""),
+    ];
+    let mut table = Table::new("table-5-1", "truth, ours and the book's, in the parameter's unit", &columns);
+    for (ours, theirs) in draw.errors.items.iter().zip(&book.errors.items) {
+        let (parameter, sd) = (ours.parameter, ours.standard_deviation);
+        let (name, unit) = (parameter.name(), parameter.unit());
+        record.number(name, ours.estimate, unit, of_deviation(sd), format!("calibrated {name}"));
+        let error = format!("{name}-error");
+        record.number(&error, ours.error, unit, of_deviation(sd), format!("calibrated minus true {name}"));
+        let sd_text = format!("Cramer-Rao standard deviation of {name} at the truth");
+        record.number(format!("{name}-sd"), sd, unit, relative(), sd_text);
+        record.number(
+            format!("{name}-z"),
+            ours.z,
+            "",
+            of_deviation(1.0),
+            "our error over its standard deviation",
+        );
+        record.number(format!("{name}-book-z"), theirs.z, "", of_deviation(1.0), "the book's error over it");
+        record.reconcile_exact(&format!("{name}-true"))?;
+        record.reconcile_sampled(name, Predicted::Normal { mean: ours.truth, sd }, RATE)?;
+        record.reconcile_sampled(&error, Predicted::Normal { mean: 0.0, sd }, RATE)?;
+        let numbers =
+            [ours.truth, ours.estimate, ours.error, sd, ours.z, theirs.estimate, theirs.error, theirs.z];
+        table.push([Cell::from(name), Cell::from(unit)].into_iter().chain(numbers.map(Cell::from)));
+    }
+    record.table(table);
+    tell_percent(record, draw, Parameter::Fx, "focal-error-percent")?;
+    tell_percent(record, draw, Parameter::K2, "k2-error-percent")?;
+    claim_joint(record, "ours", &draw.errors);
+    claim_joint(record, "book", &book.errors);
+    Ok(())
+}
+
+/// `|error| / |truth|` in percent: half-normal, the root of a chi-squared variable with one degree of freedom.
+fn tell_percent(
+    record: &mut Record,
+    draw: &Draw,
+    parameter: Parameter,
+    id: &str,
+) -> Result<(), ExperimentError> {
+    let percent = 100.0 / draw.scene.truth.camera.get(parameter).abs();
+    let error = draw.errors.items.iter().find(|i| i.parameter == parameter).map_or(f64::NAN, |i| i.error);
+    let scale = percent * draw.sd(parameter);
+    let what = format!("|error of {parameter}| over {parameter}");
+    record.number(id, percent * error.abs(), "%", of_deviation(scale), what);
+    record.reconcile_sampled(id, Predicted::Chi { scale, dof: 1.0 }, RATE)?;
+    Ok(())
+}
+
+fn claim_joint(record: &mut Record, whose: &str, errors: &Errors) {
+    let dof = errors.items.len();
+    let value = errors.chi_squared;
+    record.number(
+        format!("chi-squared-{whose}"),
+        value,
+        "",
+        relative(),
+        "squared Mahalanobis distance from the truth",
+    );
+    record.number(format!("p-value-{whose}"), errors.p_value, "", relative(), "chance of a larger one");
+    record.claim(Claim::drawn_from(
+        format!("table-plausible-{whose}"),
+        format!("the six errors ({whose}) are jointly one plausible draw under the Cramer-Rao covariance"),
+        value,
+        &Predicted::ChiSquared { dof: dof as f64 },
+        RATE,
+        "the maximum-likelihood estimate is Gaussian about the truth to first order in the noise",
+    ));
+}
+
+fn tell_rmse(record: &mut Record, draw: &Draw) -> Result<(), ExperimentError> {
+    record.number("rmse", draw.calibration.rmse_px, "px", relative(), "reprojection RMSE per point");
+    record.number("rmse-expected", draw.rmse.mean_px(), "px", relative(), "its expectation");
+    record.number("rmse-sd", draw.rmse.standard_deviation_px(), "px", relative(), "its standard deviation");
+    let p = |rmse: f64| draw.rmse.p_value(rmse);
+    let (ours, book) = (p(draw.calibration.rmse_px), p(record.printed("rmse")?));
+    record.number("rmse-p-value-ours", ours, "", Band::absolute(1e-5, "convergence"), "two-sided, ours");
+    record.number("rmse-p-value-book", book, "", relative(), "two-sided, the book's");
+    record.reconcile_sampled("rmse", draw.predicted_rmse(), RATE)?;
+    Ok(())
+}
+
+/// What the residuals of the one draw must satisfy, whatever their correlations.
+fn claim_residuals(record: &mut Record, draw: &Draw) {
+    let parameters = draw.rmse.parameters as f64;
+    // The trace of a projection is its rank. Its entries come from an inverse whose relative error is below the number of
+    // unknowns times the condition number in roundings, and there are as many entries as coordinates.
+    let condition = draw.calibration.conditioning.as_ref().map_or(f64::NAN, |c| c.condition_number);
+    let rounding = 2.0 * draw.rmse.points as f64 * parameters * condition * f64::EPSILON;
+    record.number(
+        "leverage-sum",
+        draw.leverage_sum,
+        "",
+        relative(),
+        "sum of the leverages of all coordinates",
+    );
+    record.claim(Claim::within(
+        "leverages-count-the-parameters",
+        "the leverages of the 504 coordinates sum to the 30 parameters that absorb noise",
+        draw.leverage_sum,
+        (parameters - rounding, parameters + rounding),
+        "trace of the hat matrix; rounding of the inverse times its condition number",
+    ));
+    let largest = draw.standardised.iter().fold(0.0f64, |m, z| m.max(z.abs()));
+    let bound = normal_two_sided(each_of(draw.standardised.len(), RATE));
+    record.number(
+        "largest-residual",
+        largest,
+        "sd",
+        relative(),
+        "largest residual in its own standard deviations",
+    );
+    let claim = Claim::at_most(
+        "no-outlier",
+        "no residual is larger than the noise model allows for 504 of them",
+        largest,
+        bound,
+        "each is standard normal once divided by sigma sqrt(1 - leverage); Bonferroni over all, valid whatever their correlations",
+    );
+    record.claim(claim.in_unit("sd").with_false_alarm_rate(RATE));
+}
+
+fn position(parameter: Parameter) -> usize {
+    FreeParameters::CHAPTER.position(parameter).expect("k1 and k2 are free in the chapter's model")
+}

@@ -1,0 +1,181 @@
+//! The figures of the observability experiment: maps over coverage and tilt, and sections through them.
+
+use super::*;
+use calibench::harness::{Dash, Figure, HeatMap, Look, Plot};
+
+/// Confidence of the intervals drawn at the trials.
+const SHOWN: f64 = 0.05;
+/// Tilts and coverages of the sections.
+const SECTION_TILTS: [u32; 3] = [5, 20, 45];
+const SECTION_TENTHS: [u32; 4] = [3, 5, 7, 10];
+
+const MAP_NOTE: &str = "Coverage is the fraction of the way to the image's border that the points reach in every view, tilt the \
+                        chapter's 20 degrees replaced.";
+
+fn map_plot(
+    map: &Map,
+    title: &str,
+    label: &str,
+    style: impl Fn(HeatMap) -> HeatMap,
+    value: impl Fn(&Node) -> f64,
+) -> Result<Plot, ExperimentError> {
+    let columns = COVERAGE_TENTHS.map(|c| format!("{:.1}", f64::from(c) / 10.0)).to_vec();
+    let rows = TILT_DEG.map(|t| t.to_string()).to_vec();
+    let heat = HeatMap::new(label, columns, rows, map.nodes.iter().map(value).collect())
+        .map_err(ExperimentError::at("heat map"))?;
+    Ok(Plot::heat_map(title, "coverage (fraction of the way to the border)", "tilt (deg)", style(heat))
+        .size(560.0, 360.0))
+}
+
+fn three_digits(heat: HeatMap) -> HeatMap {
+    heat.digits(3)
+}
+
+/// Colours over the values that the RMSE of a single calibration takes, so that flat looks flat.
+fn as_wide_as_one_draw(heat: HeatMap) -> HeatMap {
+    heat.digits(4).range(0.12, 0.15)
+}
+
+/// Blank where first-order theory does not apply.
+fn where_identifiable(value: impl Fn(&Node) -> f64) -> impl Fn(&Node) -> f64 {
+    move |n| if n.is_identifiable() { value(n) } else { f64::NAN }
+}
+
+pub fn heat_maps(map: &Map, seed: u64) -> Result<Figure, ExperimentError> {
+    let panels = [
+        map_plot(map, "k2", "standard deviation of k2 (bound)", HeatMap::logarithmic, |n| {
+            n.bound_sd(Parameter::K2)
+        })?,
+        map_plot(map, "fx", "standard deviation of fx (bound, px)", HeatMap::logarithmic, |n| {
+            n.bound_sd(Parameter::Fx)
+        })?,
+        map_plot(
+            map,
+            "k1 and k2",
+            "correlation of k1 and k2 (bound)",
+            three_digits,
+            Node::bound_correlation,
+        )?,
+        map_plot(map, "RMSE", "mean RMSE of the trials (px)", as_wide_as_one_draw, Node::sampled_rmse_px)?,
+    ];
+    let caption = format!(
+        "Bound of k2 and fx, correlation of k1 and k2, and mean RMSE of {TRIALS} trials (noise 0.1 px, seed {seed}) over coverage \
+         and tilt; a dash where there is none. {MAP_NOTE} Notice that k2 asks for coverage, fx for tilt, and that the RMSE does \
+         not notice (its colours span what single calibrations scatter over)."
+    );
+    Ok(Figure::panels("maps", &panels, 2, caption))
+}
+
+pub fn ratios(map: &Map, seed: u64) -> Result<Figure, ExperimentError> {
+    let over = |p: Parameter| where_identifiable(move |n: &Node| n.sampled_sd(p) / n.bound_sd(p));
+    let panels = [
+        map_plot(
+            map,
+            "k2 against the bound",
+            "spread of the trials / bound",
+            three_digits,
+            over(Parameter::K2),
+        )?,
+        map_plot(
+            map,
+            "fx against the bound",
+            "spread of the trials / bound",
+            three_digits,
+            over(Parameter::Fx),
+        )?,
+    ];
+    let caption = format!(
+        "Spread of {TRIALS} trials over the Cramer-Rao bound (noise 0.1 px, seed {seed}; one standard deviation of the ratio is \
+         0.05). A dash where the bound of fx exceeds 3 %, and without tilt, where all trials are refused. {MAP_NOTE} Notice that \
+         the ratios scatter about 1 without pattern."
+    );
+    Ok(Figure::panels("against-the-bound", &panels, 2, caption))
+}
+
+/// Bounds as lines, trials as points with intervals, one series a level.
+fn sections<'a, L: Copy>(
+    plot: Plot,
+    levels: &[(L, String)],
+    parameter: Parameter,
+    nodes: impl Fn(L) -> Vec<(f64, &'a Node)>,
+) -> Plot {
+    levels.iter().enumerate().fold(plot, |plot, (i, (level, name))| {
+        let look = Look::series(i);
+        let nodes = nodes(*level);
+        let bound: Vec<_> = nodes.iter().map(|(x, n)| (*x, n.bound_sd(parameter))).collect();
+        let seen: Vec<_> = nodes.iter().filter(|(_, n)| n.outcome.converged() == TRIALS).collect();
+        let ratio = Interval::of_deviation_ratio(TRIALS, SHOWN);
+        let bars: Vec<_> = seen
+            .iter()
+            .map(|(x, n)| (*x, n.sampled_sd(parameter) / ratio.high, n.sampled_sd(parameter) / ratio.low))
+            .collect();
+        let points: Vec<_> = seen.iter().map(|(x, n)| (*x, n.sampled_sd(parameter))).collect();
+        plot.line_as(name, &bound, look).points_as("", &points, look).error_bars_as("", &bars, look)
+    })
+}
+
+pub fn k2_sections(map: &Map, seed: u64) -> Figure {
+    let levels = SECTION_TILTS.map(|t| (t, format!("tilt {t}\u{b0}")));
+    let plot = Plot::new(
+        "k2 against coverage",
+        "coverage (fraction of the way to the border)",
+        "standard deviation of k2",
+    )
+    .log_y();
+    let plot = sections(plot, &levels, Parameter::K2, |t| {
+        COVERAGE_TENTHS.iter().map(|&c| map.at(c, t)).map(|n| (n.coverage(), n)).collect()
+    });
+    let caption = format!(
+        "Standard deviation of k2 against coverage: Cramer-Rao bound (lines) and {TRIALS} trials (points with 95 % intervals; \
+         noise 0.1 px, seed {seed}). {MAP_NOTE} Notice two orders of magnitude between a target in the middle and one that \
+         fills the image."
+    );
+    Figure::plot("k2-sections", &plot, caption)
+}
+
+pub fn focal_sections(map: &Map, seed: u64) -> Figure {
+    let levels = SECTION_TENTHS.map(|c| (c, format!("coverage {:.1}", f64::from(c) / 10.0)));
+    let plot = Plot::new("Focal length against tilt", "tilt (deg)", "standard deviation of fx (px)").log_y();
+    let plot = sections(plot, &levels, Parameter::Fx, |c| {
+        TILT_DEG.iter().map(|&t| (f64::from(t), map.at(c, t))).collect()
+    });
+    let caption = format!(
+        "Standard deviation of fx against tilt: Cramer-Rao bound (lines) and {TRIALS} trials (points with 95 % intervals, where \
+         none was refused; noise 0.1 px, seed {seed}). {MAP_NOTE} Notice that it grows without limit towards no tilt, where \
+         every trial is refused."
+    );
+    Figure::plot("focal-sections", &plot, caption)
+}
+
+pub fn rmse_sections(map: &Map, seed: u64) -> Figure {
+    let any = map.at(COVERAGE_TENTHS[0], 20);
+    let (mean, sd) = (any.rmse.mean_px(), any.rmse.standard_deviation_px());
+    let around = Interval::of_mean(mean, sd, TRIALS, SHOWN);
+    let (first, last) = (0.28, 1.02);
+    let plot =
+        Plot::new("RMSE against coverage", "coverage (fraction of the way to the border)", "mean RMSE (px)")
+            .x_range(first, last)
+            .y_range(0.134, 0.143)
+            .band_as(
+                "predicted, 95 %",
+                &[(first, around.low, around.high), (last, around.low, around.high)],
+                Look::ink(),
+            );
+    let plot = SECTION_TILTS.iter().enumerate().fold(plot, |plot, (i, &t)| {
+        let nodes = COVERAGE_TENTHS.map(|c| map.at(c, t));
+        let points: Vec<_> = nodes.iter().map(|n| (n.coverage(), n.sampled_rmse_px())).collect();
+        plot.line_as(format!("tilt {t}\u{b0}"), &points, Look::series(i).width(0.9)).points_as(
+            "",
+            &points,
+            Look::series(i),
+        )
+    });
+    let plot =
+        plot.hline_as("noise floor", any.rmse.noise_floor_px(), Look::ink().dash(Dash::Dotted).width(2.0));
+    let caption = format!(
+        "Mean RMSE of {TRIALS} trials against coverage, with the interval that holds 95 % of such means if the model is right \
+         (noise 0.1 px, seed {seed}). {MAP_NOTE} Notice that it is flat while the standard deviation of k2 changes by two \
+         orders of magnitude."
+    );
+    Figure::plot("rmse-sections", &plot, caption)
+}
