@@ -4,10 +4,16 @@ use calibench::harness::Experiment;
 
 #[path = "collinearity.rs"]
 mod collinearity;
+#[path = "distortion_model.rs"]
+mod distortion_model;
+#[path = "expiry.rs"]
+mod expiry;
 #[path = "focal_depth.rs"]
 mod focal_depth;
 #[path = "four_pose.rs"]
 mod four_pose;
+#[path = "interface.rs"]
+mod interface;
 #[path = "k2_observability.rs"]
 mod k2_observability;
 #[path = "line_bending.rs"]
@@ -31,6 +37,9 @@ pub const EXPERIMENTS: &[Experiment] = &[
     noise_floor::EXPERIMENT,
     focal_depth::EXPERIMENT,
     collinearity::EXPERIMENT,
+    distortion_model::EXPERIMENT,
     nine_point::EXPERIMENT,
     photographs::EXPERIMENT,
+    interface::EXPERIMENT,
+    expiry::EXPERIMENT,
 ];

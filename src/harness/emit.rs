@@ -50,7 +50,7 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), EmitError> {
 }
 
 /// The record as JSON. A number that is not finite stands as a word, since JSON has none for it.
-fn to_json(record: &Record, commit: Option<&Commit>) -> Value {
+pub(super) fn to_json(record: &Record, commit: Option<&Commit>) -> Value {
     let versions: serde_json::Map<String, Value> =
         crate_versions().into_iter().map(|(name, version)| (name, version.into())).collect();
     json!({

@@ -17,6 +17,7 @@
 //! The layout test names whatever was forgotten.
 
 mod band;
+pub mod book;
 mod claim;
 pub mod cli;
 mod emit;

@@ -3,6 +3,7 @@
 use super::report::{details, reconciliation_table};
 use super::reproduce::{exit_of, judge_all};
 use super::{Exit, print, warn};
+use crate::harness::book::{self, Finding};
 use crate::harness::project::Project;
 use crate::harness::verdict::{self, Golden, Run, Verdict};
 use crate::harness::{Context, Experiment, ProgressDisplay, Record, published};
@@ -53,22 +54,29 @@ pub(super) fn run(experiments: &[Experiment], arguments: &Arguments) -> Exit {
             }
         }
     }
-    tell(&runs, &verdicts, arguments.format)
+    let records: Vec<&Record> = runs.iter().filter_map(|run| run.result.as_ref().ok()).collect();
+    let findings = book::check(&project, experiments, &records);
+    tell(&runs, &verdicts, &findings, arguments.format)
 }
 
-fn tell(runs: &[Run], verdicts: &[Option<Verdict>], format: Format) -> Exit {
+fn tell(runs: &[Run], verdicts: &[Option<Verdict>], findings: &[Finding], format: Format) -> Exit {
     let failed = |run: &Run| run.result.as_ref().err().map(|e| format!("FAILED {}: {e}", run.experiment.id));
     let failures: Vec<String> = runs.iter().filter_map(failed).collect();
     let judged: Vec<Verdict> = verdicts.iter().flatten().cloned().collect();
-    let exit = exit_of(&judged, !failures.is_empty());
+    let book = if findings.is_empty() { Exit::Held } else { Exit::Deviates };
+    let exit = exit_of(&judged, !failures.is_empty()).max(book);
     match format {
         Format::Text => {
             print(&reconciliation_table(runs, verdicts));
             print(&details(&judged));
+            print(&super::book::told(findings));
         }
         Format::Json => {
             let experiments: Vec<Value> = judged.iter().map(to_json).collect();
-            let report = json!({"outcome": exit.name(), "experiments": experiments, "failures": failures});
+            let book: Vec<String> = findings.iter().map(ToString::to_string).collect();
+            let report = json!({
+                "outcome": exit.name(), "experiments": experiments, "failures": failures, "book": book,
+            });
             print(&format!("{report:#}\n"));
         }
     }

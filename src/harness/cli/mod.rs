@@ -1,6 +1,7 @@
 //! What can a user ask for? The command line: one verb a file, and the exit codes that all share.
 
 mod bless;
+mod book;
 mod calibrate;
 mod check;
 mod exit;
@@ -23,8 +24,8 @@ use std::process::ExitCode;
 /// A test bench for camera calibration: every number is reconciled with truth, with theory, with the published values, and
 /// with the last run.
 ///
-/// Without a verb, every experiment runs: out/ receives its tables and record, figures/ its figures, and one table says
-/// what holds.
+/// Without a verb, every experiment runs: out/ receives its tables and record, figures/ its figures, out/book
+/// the book, and one table says what holds.
 #[derive(Debug, Parser)]
 #[command(name = "calibench", version, max_term_width = 100, after_help = Exit::HELP)]
 struct Arguments {
@@ -41,10 +42,12 @@ enum Verb {
     List(list::Arguments),
     /// Runs one experiment
     Run(run::Arguments),
-    /// Runs everything and compares, writing nothing: golden values, claims, published values, committed figures
+    /// Runs everything and compares, writing nothing: golden values, claims, published values, committed figures, the book
     Check(check::Arguments),
     /// Accepts the present result of an experiment as its golden snapshot, and its figures with it
     Bless(bless::Arguments),
+    /// Builds the book into out/book
+    Book(book::Arguments),
     /// Calibrates a camera from a corner file or from photographs, or a plane from a file of point pairs
     Calibrate(calibrate::Arguments),
     /// Finds the dots of a nine-point board in a photograph, and maps its pixels to the unit grid
@@ -74,6 +77,7 @@ pub fn main(experiments: &[Experiment]) -> ExitCode {
         Some(Verb::Run(arguments)) => run::run(experiments, &arguments),
         Some(Verb::Check(arguments)) => check::run(experiments, &arguments),
         Some(Verb::Bless(arguments)) => bless::run(experiments, &arguments),
+        Some(Verb::Book(arguments)) => book::run(experiments, &arguments),
         Some(Verb::Calibrate(arguments)) => calibrate::run(&arguments),
         Some(Verb::Ninepoint(arguments)) => ninepoint::run(&arguments),
         Some(Verb::Undistort(arguments)) => undistort::run(&arguments),

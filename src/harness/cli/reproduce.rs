@@ -5,7 +5,7 @@ use super::{Exit, print, warn};
 use crate::harness::project::Project;
 use crate::harness::provenance::{self, Commit};
 use crate::harness::verdict::{self, Run, Verdict};
-use crate::harness::{Context, EmitError, Experiment, ProgressDisplay, emit};
+use crate::harness::{Context, EmitError, Experiment, ProgressDisplay, Record, emit};
 use rayon::prelude::*;
 use std::fs;
 
@@ -34,7 +34,9 @@ pub(super) fn run(experiments: &[Experiment]) -> Exit {
     let judged: Vec<Verdict> = verdicts.into_iter().flatten().collect();
     print(&details(&judged));
     failures.iter().for_each(|failure| warn(failure));
-    exit_of(&judged, !failures.is_empty())
+    let records: Vec<&Record> = runs.iter().filter_map(|run| run.result.as_ref().ok()).collect();
+    let book = super::book::build_of(&project, experiments, &records);
+    exit_of(&judged, !failures.is_empty()).max(book)
 }
 
 /// Each experiment is written as soon as it is finished: an interruption keeps what is done.
