@@ -134,7 +134,7 @@ pub(super) fn claims_table(experiment: &str, claims: &[RecordClaim], places: boo
         let place = if places { format!(" id=\"claim-{}\"", claim.id) } else { String::new() };
         let _ = write!(
             rows,
-            "<tr{place} title=\"{title}\"><td>{}</td><td class=\"value\">{}{unit}</td><td>{interval}</td>\
+            "<tr{place} title=\"{title}\"><td class=\"text\">{}</td><td class=\"value\">{}{unit}</td><td>{interval}</td>\
              <td class=\"{class}\">{word}</td></tr>",
             inline(&claim.statement),
             significant(number(&claim.value), 4)
@@ -176,10 +176,10 @@ pub(super) fn published_table(sources: &Sources) -> String {
         });
         let _ = write!(
             rows,
-            "<tr id=\"published-{}\" title=\"{title}\"><td>\u{a7}{}</td><td>{}</td><td class=\"value\">{}{}</td>\
+            "<tr id=\"published-{}\" title=\"{title}\"><td>{}</td><td>{}</td><td class=\"value\">{}{}</td>\
              <td class=\"value\">{ours}</td><td>{}</td><td>{against}</td><td class=\"{class}\">{word}</td></tr>",
             entry.id,
-            inline(&entry.section),
+            section(&entry.section),
             inline(&entry.what),
             typeset(&entry.printed),
             format::unit(&entry.unit),
@@ -191,6 +191,12 @@ pub(super) fn published_table(sources: &Sources) -> String {
     format!(
         "<div class=\"table-wrapper\"><table class=\"published\">{head}<tbody>{rows}</tbody></table></div>\n"
     )
+}
+
+/// A section with its sign; `case study` has no number.
+fn section(name: &str) -> String {
+    let sign = if name.starts_with(|c: char| c.is_ascii_digit()) { "\u{a7}" } else { "" };
+    format!("{sign}{}", inline(name))
 }
 
 /// Links to the pages of all records.

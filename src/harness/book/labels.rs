@@ -22,6 +22,8 @@ pub(super) struct Label {
 pub(super) struct Labels {
     known: BTreeMap<String, Label>,
     used: BTreeSet<String>,
+    /// Counts of the pages without a chapter number, which share one row of numbers.
+    unnumbered: BTreeMap<&'static str, usize>,
 }
 
 /// The name under which a placeholder can be referred to.
@@ -36,7 +38,7 @@ pub(super) fn label_of(placeholder: &str) -> Option<String> {
 }
 
 impl Labels {
-    /// Takes the names of one page. Counts begin anew on every page.
+    /// Takes the names of one page. Counts begin anew in every chapter.
     pub(super) fn take(
         &mut self,
         (page, file): (&str, &str),
@@ -44,7 +46,7 @@ impl Labels {
         pieces: &[Piece<'_>],
         findings: &mut Vec<Finding>,
     ) {
-        let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+        let mut in_chapter = BTreeMap::new();
         for piece in pieces {
             let name = match &piece.kind {
                 Kind::Equation { label: Some(label), .. } => label.to_string(),
@@ -58,6 +60,7 @@ impl Labels {
             };
             let class = name.split_once(':').map_or("", |(class, _)| class);
             let class = ["eq", "fig", "tab"].into_iter().find(|c| *c == class).unwrap_or("");
+            let counts = if chapter.is_empty() { &mut self.unnumbered } else { &mut in_chapter };
             let count = counts.entry(class).or_insert(0);
             *count += 1;
             let prefix = chapter.first().map(|n| format!("{n}.")).unwrap_or_default();

@@ -148,8 +148,8 @@ impl<'a> Resolver<'a> {
         let command = command_line(experiment, golden);
         let body = appendix::csv_table(csv, columns, options, &path)?;
         Ok(format!(
-            "<div class=\"table-wrapper\" id=\"{label}\"><table><caption><b>{number}.</b> {caption} \
-             (<a href=\"{path}\">CSV</a>) {command}</caption>{body}</table></div>\n"
+            "<div class=\"caption\" id=\"{label}\"><b>{number}.</b> {caption} (<a href=\"{path}\">CSV</a>) {command}</div>\n\
+             <div class=\"table-wrapper\"><table>{body}</table></div>\n"
         ))
     }
 

@@ -1,0 +1,117 @@
+//! Does the book notice what is wrong with its sources? One broken page a fault, and the book as it stands.
+
+use calibench::harness::book::{Compiled, Evidence, Page, Sources, build, compile};
+use calibench::harness::project::Project;
+use calibench::harness::{Claim, Context, Experiment, ExperimentError, Record};
+use std::path::Path;
+
+const LINE_BENDING: Experiment =
+    Experiment { id: "line-bending", title: "title", question: "question", seed: 0, takes_image: false, run };
+
+fn run(context: &Context) -> Result<Record, ExperimentError> {
+    let mut record = context.record();
+    record.claim(Claim::at_most("c", "zero is small", 0.0, 1.0, "definition"));
+    Ok(record)
+}
+
+fn project() -> Project {
+    Project::above(Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap()
+}
+
+/// A book of one page, with the golden values of line bending and no record.
+fn book_of(text: &str) -> Compiled {
+    let project = project();
+    let page = Page { path: "page.md".into(), number: vec![1], text: text.into() };
+    let evidence = Evidence::of_records(&project, &[LINE_BENDING], &[]);
+    let root = project.root().to_path_buf();
+    compile(&Sources { pages: vec![page], evidence, root, ..Sources::default() })
+}
+
+/// Findings of the page, as `line: message`.
+fn findings(text: &str) -> Vec<String> {
+    let of_page = |f: &&calibench::harness::book::Finding| f.file == "book/text/page.md";
+    book_of(text).findings.iter().filter(of_page).map(|f| format!("{}: {}", f.line, f.message)).collect()
+}
+
+#[test]
+fn a_number_is_shown_with_its_provenance() {
+    let compiled = book_of("It bends by {{num line-bending.max-deviation .3 unit}}.");
+    let page = &compiled.pages[0].content;
+    assert!(page.contains("4.678\u{a0}px</a>"), "{page}");
+    for part in [
+        "seed 0",
+        "absolute 3e-12",
+        "published 4.678",
+        "row 4 of data/line-bending/numbers.csv",
+        "calibench run line-bending",
+    ] {
+        assert!(page.contains(part), "{part} is not in {page}");
+    }
+    let csv = String::from_utf8(compiled.assets["data/line-bending/numbers.csv"].clone()).unwrap();
+    assert!(csv.lines().nth(4).unwrap().starts_with("max-deviation,4.67774722"), "{csv}");
+}
+
+#[test]
+fn what_does_not_resolve_is_found_with_its_line() {
+    let cases = [
+        ("{{num line-bending.nonsense .3}}", "has no number `nonsense`"),
+        ("{{num nonsense.rmse .3}}", "there is no experiment `nonsense`"),
+        ("{{num line-bending.points x3}}", "is no format"),
+        ("{{figure line-bending.nonsense}}", "draws no figure"),
+        ("{{table line-bending.nonsense *}}", "has no table"),
+        ("{{cite nobody1900}}", "has no `nobody1900`"),
+        ("{{ref eq:nonsense}}", "nothing is named"),
+        ("{{const nonsense}}", "is no constant"),
+        ("{{code experiments/line_bending.rs nonsense}}", "has no item"),
+        ("{{nonsense}}", "is not understood"),
+        ("{{num line-bending.points", "is opened here and never closed"),
+        ("[gone](gone.md)", "there is no page `gone.md`"),
+        ("[gone](#gone)", "has no place `gone`"),
+        ("[plain](http://example.org)", "only https"),
+        ("$\\nonsense$", "formula"),
+        ("bends by 4.678", "`4.678` is typed in"),
+        ("off by 33 %", "`33` is typed in"),
+        ("$$\nx\n$$ {#eq:x}", "never referred to"),
+    ];
+    for (text, expected) in cases {
+        let found = findings(&format!("# Title\n\n{text}\n"));
+        assert!(found.iter().any(|f| f.starts_with("3: ") && f.contains(expected)), "{text}: {found:?}");
+    }
+}
+
+#[test]
+fn a_sound_page_has_no_finding() {
+    let text = "# Title {#top}\n\nSee [above](#top), {{ref eq:x}} and §5.1 of 1971; `4.5 px` is code, $4.5$ a formula.\n\n\
+                $$\nx^2\n$$ {#eq:x}\n";
+    assert_eq!(findings(text), Vec::<String>::new());
+}
+
+#[test]
+fn figures_that_no_page_shows_are_found() {
+    let compiled = book_of("# Title\n");
+    let unused: Vec<String> = compiled.findings.iter().map(ToString::to_string).collect();
+    assert!(
+        unused.iter().any(|f| f.contains("figure `line-bending.grids` is shown on no page")),
+        "{unused:?}"
+    );
+}
+
+#[test]
+fn the_book_is_built_whole_and_leads_nowhere_outside() {
+    let project = project();
+    let evidence = Evidence::of_records(&project, &[LINE_BENDING], &[]);
+    let sources = Sources::load(&project, evidence).unwrap();
+    let compiled = compile(&sources);
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("book");
+    build(&project, &compiled, &folder).unwrap();
+    for page in &sources.pages {
+        let html = folder.join(page.path.replace(".md", ".html"));
+        let text = std::fs::read_to_string(&html).unwrap_or_else(|e| panic!("{}: {e}", html.display()));
+        for outside in ["src=\"http", "src=\"//", "<link rel=\"stylesheet\" href=\"http", "url(http"] {
+            assert!(!text.contains(outside), "{} has {outside}", page.path);
+        }
+    }
+    for file in ["print.html", "style/book.css", "style/CalibenchMath.woff2", "record-line-bending.html"] {
+        assert!(folder.join(file).is_file(), "{file} is missing");
+    }
+}
