@@ -153,6 +153,10 @@ impl Poses {
         let check = |field, value, need, held| {
             if held { Ok(()) } else { Err(PosesError::Value { field, value, need }) }
         };
+        if let Poses::Random(random) = self {
+            let (least, most) = (random.tilt_min_deg, random.tilt_deg);
+            check("tilt_min_deg", least, "from 0 to tilt_deg", (0.0..=most).contains(&least))?;
+        }
         check("views", views as f64, "1 or more", views >= 1)?;
         check("tilt_deg", tilt, "from 0 to below 90", (0.0..90.0).contains(&tilt))?;
         check("coverage", share, "from 0 to 1", (0.0..=1.0).contains(&share))?;
