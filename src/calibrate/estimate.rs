@@ -198,7 +198,9 @@ fn report(
     let freedom = degrees_of_freedom.max(1) as f64;
     let sigma_px = (square / freedom).sqrt();
     let conditioning = Conditioning::of(system);
-    identifiability::check(problem, minimum, conditioning.as_ref(), sigma_px)?;
+    // The cost under the loss in use: gross errors, which a robust loss discounts, say nothing of the noise.
+    let noise_px = (system.cost / freedom).sqrt();
+    identifiability::check(problem, minimum, conditioning.as_ref(), noise_px)?;
     let unit = system.covariance().ok_or_else(|| CalibrationError::NotIdentifiable {
         inseparable: vec!["camera".into(), "poses".into()],
         why: "the normal equations are singular".into(),
