@@ -251,7 +251,7 @@ fn differences(a: &Camera, b: &Camera) -> Vec<f64> {
     FreeParameters::CHAPTER.iter().map(|p| a.get(p) - b.get(p)).collect()
 }
 
-fn base<'a>(outcomes: &'a [Outcome]) -> Result<&'a Outcome, ExperimentError> {
+fn base(outcomes: &[Outcome]) -> Result<&Outcome, ExperimentError> {
     outcomes.iter().find(|o| o.node == BASE).ok_or(ExperimentError::Input("the base node is missing".into()))
 }
 
