@@ -4,6 +4,7 @@ mod bless;
 mod calibrate;
 mod check;
 mod exit;
+mod gate;
 mod list;
 mod report;
 mod reproduce;
@@ -44,6 +45,8 @@ enum Verb {
     Bless(bless::Arguments),
     /// Calibrates a camera from a corner file, or a plane from a file of point pairs
     Calibrate(calibrate::Arguments),
+    /// Judges a solver, this library's or any program, on problems with known answers
+    Gate(Box<gate::Arguments>),
 }
 
 /// The `calibench` command over a table of experiments.
@@ -63,6 +66,7 @@ pub fn main(experiments: &[Experiment]) -> ExitCode {
         Some(Verb::Check(arguments)) => check::run(experiments, &arguments),
         Some(Verb::Bless(arguments)) => bless::run(experiments, &arguments),
         Some(Verb::Calibrate(arguments)) => calibrate::run(&arguments),
+        Some(Verb::Gate(arguments)) => gate::run(&arguments),
     };
     exit.into()
 }
