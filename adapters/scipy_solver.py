@@ -10,10 +10,11 @@ differences are SciPy's, as a user would call them. The covariance is `s^2 (J^T 
 import json
 import sys
 
+# First, because it sets the number of threads.
+from minimal_solver import NAMES, project, rotation_matrix, start
+
 import numpy as np
 from scipy.optimize import least_squares
-
-from minimal_solver import NAMES, project, rotation_matrix, start
 
 
 def solve(problem):
@@ -34,7 +35,6 @@ def solve(problem):
         return np.concatenate([(project(values, b, t) - p).ravel() for b, (t, p) in zip(blocks, views)])
 
     x = np.r_[camera[free], np.concatenate(poses)]
-    # Each view touches the intrinsics and its own pose only.
     fit = least_squares(
         residuals, x, jac="3-point", method="trf", x_scale="jac", ftol=1e-15, xtol=1e-15, gtol=1e-15, max_nfev=200
     )

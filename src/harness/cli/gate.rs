@@ -1,13 +1,13 @@
 //! `calibench gate`: is a solver to be trusted, ours or anyone's?
 
 use super::{Exit, print, warn};
+use crate::harness::gate;
 use crate::harness::gate::faults::{Faulty, planted};
 use crate::harness::gate::files::{self, FilesError};
 use crate::harness::gate::paired::{self, Paired};
 use crate::harness::gate::{
     Builtin, EXPECTED_FALSE_ALARMS, Plan, Process, Property, QUICK, Report, Solver, THOROUGH, power, protocol,
 };
-use crate::harness::gate;
 use crate::harness::project::Project;
 use crate::harness::{ProgressDisplay, provenance, write_atomically};
 use std::path::{Path, PathBuf};
@@ -164,7 +164,8 @@ fn solver(arguments: &Arguments) -> Result<Box<dyn Solver>, Stop> {
         (Some(command), _) => process(arguments, command),
         (None, Some(id)) => {
             let fault = planted().into_iter().find(|fault| fault.id == id);
-            let fault = fault.ok_or_else(|| usage(format!("no planted fault `{id}`; see `--planted list`")))?;
+            let fault =
+                fault.ok_or_else(|| usage(format!("no planted fault `{id}`; see `--planted list`")))?;
             Ok(Box::new(Faulty::new(fault)))
         }
         (None, None) => Ok(Box::new(Builtin)),
@@ -207,7 +208,12 @@ fn judge(arguments: &Arguments, plan: &Plan, solver: &dyn Solver) -> Result<Exit
     Ok(if report.held() { Exit::Held } else { Exit::Deviates })
 }
 
-fn compare(arguments: &Arguments, solver: &dyn Solver, reference: &str, samples: usize) -> Result<Exit, Stop> {
+fn compare(
+    arguments: &Arguments,
+    solver: &dyn Solver,
+    reference: &str,
+    samples: usize,
+) -> Result<Exit, Stop> {
     let (plan, other): (Plan, Box<dyn Solver>) = match reference {
         "builtin" => (Plan::new(arguments.seed, samples).map_err(incomplete)?, Box::new(Builtin)),
         folder if Path::new(folder).join("manifest.json").is_file() => {
@@ -245,7 +251,8 @@ const CLEAN_SAMPLES: usize = 32;
 fn measure_power(arguments: &Arguments, file: &Path, samples: usize) -> Result<Exit, Stop> {
     let started = Instant::now();
     let faults = planted();
-    let mut table = String::from("fault,class,caught,samples_a_scenario,problems,verdict,first_property,what\n");
+    let mut table =
+        String::from("fault,class,caught,samples_a_scenario,problems,verdict,first_property,what\n");
     let progress = ProgressDisplay::stderr().start("planted faults", faults.len() + 1);
     let mut missed = Vec::new();
     for fault in &faults {
@@ -271,10 +278,12 @@ fn measure_power(arguments: &Arguments, file: &Path, samples: usize) -> Result<E
     drop(progress);
     let progress = ProgressDisplay::stderr().start("clean seeds", CLEAN_SEEDS);
     let first = arguments.seed + 1000;
-    let alarms =
-        power::false_alarms(first, CLEAN_SEEDS, CLEAN_SAMPLES, &|n| progress.advance(n)).map_err(incomplete)?;
+    let alarms = power::false_alarms(first, CLEAN_SEEDS, CLEAN_SAMPLES, &|n| progress.advance(n))
+        .map_err(incomplete)?;
     let commit = Project::find().ok().and_then(|p| provenance::commit(p.root()));
-    let commit = commit.map_or("unknown".to_string(), |c| format!("{}{}", c.hash, if c.dirty { " with changes" } else { "" }));
+    let commit = commit.map_or("unknown".to_string(), |c| {
+        format!("{}{}", c.hash, if c.dirty { " with changes" } else { "" })
+    });
     let mut text = format!(
         "# calibench gate --power, --samples {samples}, --seed {}; commit {commit}\n# correct solver up to {samples} samples \
          a scenario: {}\n",

@@ -111,7 +111,9 @@ pub fn accept(problem: &Problem, answer: Answer) -> Outcome {
         return Outcome::Broken(Breakage::WrongId { got: answer.id });
     }
     match answer.status {
-        Status::Ok => estimate(problem, answer).map_or_else(Outcome::Broken, |e| Outcome::Estimate(Box::new(e))),
+        Status::Ok => {
+            estimate(problem, answer).map_or_else(Outcome::Broken, |e| Outcome::Estimate(Box::new(e)))
+        }
         Status::Refused => Outcome::Refused(answer.message.unwrap_or_else(|| "refused".into())),
         Status::NotConverged => {
             Outcome::Refused(format!("not converged: {}", answer.message.unwrap_or_default()))
@@ -143,7 +145,11 @@ fn estimate(problem: &Problem, answer: Answer) -> Result<Estimate, Breakage> {
 
 type HeldChange = Option<(Parameter, f64, f64)>;
 
-fn camera(problem: &Problem, answer: &Answer, free: FreeParameters) -> Result<(Camera, HeldChange), Breakage> {
+fn camera(
+    problem: &Problem,
+    answer: &Answer,
+    free: FreeParameters,
+) -> Result<(Camera, HeldChange), Breakage> {
     let mut values = [0.0; Parameter::COUNT];
     let mut changed = None;
     for parameter in Parameter::ALL {
@@ -263,7 +269,8 @@ mod tests {
 
     #[test]
     fn a_held_value_that_moved_is_seen() {
-        let Outcome::Estimate(estimate) = read(r#"{"id":"a","status":"ok","parameters":{"fx":2,"cx":321}}"#) else {
+        let Outcome::Estimate(estimate) = read(r#"{"id":"a","status":"ok","parameters":{"fx":2,"cx":321}}"#)
+        else {
             panic!("the answer keeps the protocol");
         };
         assert_eq!(estimate.held_changed, Some((Parameter::Cx, 320.0, 321.0)));

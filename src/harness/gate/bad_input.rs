@@ -2,10 +2,10 @@
 
 use super::protocol::{Problem, ProblemView};
 use crate::camera::{Camera, Parameter};
+use crate::geometry::Pose;
 use crate::geometry::Vec2;
 use crate::synth::scene::looking_at_centre;
 use crate::synth::{Scene, SceneError, Stream, StreamKey, Truth};
-use crate::geometry::Pose;
 use std::collections::BTreeMap;
 
 /// What is wrong with the data.
@@ -54,7 +54,11 @@ fn degenerate(seed: u64) -> Result<Vec<BadCase>, SceneError> {
     let four = Truth::chapter_poses();
     let sets: [(&'static str, Vec<Pose>, Vec<Vec2>); 10] = [
         ("three-parallel-views", facing(&[110.0, 120.0, 135.0]), grid.clone()),
-        ("eight-parallel-views", facing(&[110.0, 112.0, 115.0, 119.0, 124.0, 128.0, 133.0, 140.0]), grid.clone()),
+        (
+            "eight-parallel-views",
+            facing(&[110.0, 112.0, 115.0, 119.0, 124.0, 128.0, 133.0, 140.0]),
+            grid.clone(),
+        ),
         ("one-view", vec![tilted([20.0, 0.0, 0.0])], grid.clone()),
         ("one-facing-view", facing(&[120.0]), grid.clone()),
         ("same-view-four-times", vec![tilted([0.0, 20.0, 0.0]); 4], grid.clone()),

@@ -47,7 +47,9 @@ pub enum FilesError {
         reason: String,
     },
     /// This version of the gate makes other problems from the same seed.
-    #[error("the problems were made by another version of the gate: export them again (sha256 {found}, now {now})")]
+    #[error(
+        "the problems were made by another version of the gate: export them again (sha256 {found}, now {now})"
+    )]
     OtherVersion {
         /// Of the manifest.
         found: String,
@@ -108,7 +110,8 @@ fn truth_lines(plan: &Plan) -> String {
         let poses: Vec<serde_json::Value> = poses
             .iter()
             .map(|pose| {
-                let rows: Vec<Vec<f64>> = pose.rotation.row_iter().map(|r| r.iter().copied().collect()).collect();
+                let rows: Vec<Vec<f64>> =
+                    pose.rotation.row_iter().map(|r| r.iter().copied().collect()).collect();
                 serde_json::json!({"rotation": rows, "translation": pose.translation.as_slice()})
             })
             .collect();

@@ -67,9 +67,11 @@ pub fn compare(
         .iter()
         .enumerate()
         .map(|(index, scenario)| {
-            let pairs = plan.cases.iter().zip(new.iter().zip(old)).filter(|(case, _)| {
-                case.scenario == index && case.purpose == Purpose::Sample
-            });
+            let pairs = plan
+                .cases
+                .iter()
+                .zip(new.iter().zip(old))
+                .filter(|(case, _)| case.scenario == index && case.purpose == Purpose::Sample);
             of_scenario(scenario, pairs.filter_map(|(_, (n, o))| Some((n.as_ref()?, o.as_ref()?))).collect())
         })
         .collect();
@@ -94,11 +96,8 @@ fn of_scenario(scenario: &Scenario, replies: Vec<(&Seen, &Seen)>) -> Comparison 
             _ => None,
         })
         .collect();
-    let sd: Vec<f64> = scenario
-        .free
-        .iter()
-        .map(|p| scenario.bound.standard_deviation(p).unwrap_or(f64::NAN))
-        .collect();
+    let sd: Vec<f64> =
+        scenario.free.iter().map(|p| scenario.bound.standard_deviation(p).unwrap_or(f64::NAN)).collect();
     let standardised = |i: usize| -> Vec<(f64, f64)> {
         both.iter().map(|(n, o)| (n.errors[i] / sd[i], o.errors[i] / sd[i])).collect()
     };
@@ -117,10 +116,7 @@ fn of_scenario(scenario: &Scenario, replies: Vec<(&Seen, &Seen)>) -> Comparison 
         lost: replies.iter().filter(|(n, o)| !estimate(n) && estimate(o)).count(),
         gained: replies.iter().filter(|(n, o)| estimate(n) && !estimate(o)).count(),
         bits: both.iter().filter(|(n, o)| n.bits != o.bits).count(),
-        largest: (0..names.len())
-            .flat_map(standardised)
-            .map(|(n, o)| (n - o).abs())
-            .fold(0.0, f64::max),
+        largest: (0..names.len()).flat_map(standardised).map(|(n, o)| (n - o).abs()).fold(0.0, f64::max),
         shift: most_certain(shift).filter(|_| lawful),
         spread: most_certain(spread).filter(|_| lawful),
         time: median(both.iter().map(|(n, _)| n.seconds)) / median(both.iter().map(|(_, o)| o.seconds)),
@@ -182,13 +178,15 @@ impl Paired {
     /// Whether a scenario's estimates moved by an amount that matters and that chance does not explain.
     pub fn moved(&self, c: &Comparison) -> bool {
         let shifted = c.shift.as_ref().is_some_and(|(_, d, p)| d.abs() > RELEVANT && self.certain(*p));
-        let spread = c.spread.as_ref().is_some_and(|(_, r, p)| (r - 1.0).abs() > RELEVANT && self.certain(*p));
+        let spread =
+            c.spread.as_ref().is_some_and(|(_, r, p)| (r - 1.0).abs() > RELEVANT && self.certain(*p));
         shifted || spread || c.lost > 0
     }
 
     /// Whether nothing that matters changed.
     pub fn held(&self) -> bool {
-        !self.comparisons.iter().any(|c| self.moved(c)) && self.verdicts.iter().all(|(_, _, old, new)| new <= old)
+        !self.comparisons.iter().any(|c| self.moved(c))
+            && self.verdicts.iter().all(|(_, _, old, new)| new <= old)
     }
 
     /// One line a scenario, then what follows.

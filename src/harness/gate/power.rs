@@ -98,7 +98,8 @@ pub fn false_alarms(
             .collect();
         let smallest = p_values.iter().fold(1.0f64, |a, b| a.min(*b)) * p_values.len() as f64;
         let certain = checks.iter().filter(|c| c.basis == Basis::Certain(false));
-        let told = |c: &judge::Check| format!("seed {seed}: {} / {}: {}", c.property.name(), c.scenario, c.evidence);
+        let told =
+            |c: &judge::Check| format!("seed {seed}: {} / {}: {}", c.property.name(), c.scenario, c.evidence);
         let certain = certain.map(told).collect();
         progress(1);
         Ok((smallest, certain))

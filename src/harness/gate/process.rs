@@ -77,7 +77,9 @@ impl Process {
             let left = deadline.saturating_duration_since(Instant::now());
             let line = match running.from_child.recv_timeout(left) {
                 Ok(line) => line,
-                Err(RecvTimeoutError::Disconnected) => return Err(wrong.unwrap_or_else(|| running.obituary())),
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(wrong.unwrap_or_else(|| running.obituary()));
+                }
                 Err(RecvTimeoutError::Timeout) => {
                     return Err(wrong.unwrap_or(Breakage::Timeout { seconds: self.timeout.as_secs_f64() }));
                 }
@@ -113,7 +115,9 @@ impl Solver for Process {
             for worker in &self.workers {
                 scope.spawn(|| {
                     let mut worker = worker.lock().unwrap_or_else(PoisonError::into_inner);
-                    while let Some(i) = Some(next.fetch_add(1, Ordering::Relaxed)).filter(|i| *i < problems.len()) {
+                    while let Some(i) =
+                        Some(next.fetch_add(1, Ordering::Relaxed)).filter(|i| *i < problems.len())
+                    {
                         let given = reply(&problems[i], || self.ask_worker(&mut worker, &problems[i]));
                         *replies[i].lock().unwrap_or_else(PoisonError::into_inner) = Some(given);
                     }

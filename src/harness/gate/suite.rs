@@ -1,9 +1,9 @@
 //! On which scenes is a solver judged? Families of cameras and poses with known truth, as data.
 
+use crate::calibrate::Covariance;
 use crate::camera::{BrownConrady, Camera, FreeParameters, Parameter};
 use crate::evaluate::{BoundError, cramer_rao};
 use crate::geometry::{Pose, Vec2};
-use crate::calibrate::Covariance;
 use crate::synth::scene::looking_at_centre;
 use crate::synth::{Scene, SceneError, Truth};
 use crate::target::{Board, BoardError, Pattern};

@@ -148,9 +148,8 @@ fn square(camera: &Camera, poses: &[Pose], problem: &Problem) -> f64 {
 
 /// The least sum of squares that the answered camera allows: only poses are free.
 fn refitted_square(camera: &Camera, problem: &Problem) -> Option<f64> {
-    let settings = Parameter::ALL
-        .into_iter()
-        .fold(Settings::new(FreeParameters::NONE), |s, p| s.hold(p, camera.get(p)));
+    let settings =
+        Parameter::ALL.into_iter().fold(Settings::new(FreeParameters::NONE), |s, p| s.hold(p, camera.get(p)));
     let fit = calibrate(&solver::views(problem).ok()?, &settings).ok()?;
     Some(fit.rmse_px * fit.rmse_px * fit.points() as f64)
 }

@@ -33,13 +33,19 @@ pub(super) const FAULTS: &[Planted] = &[
     }),
     gross("no-refinement", "the closed form without refinement", |p, _| iterations(p, 0)),
     gross("one-iteration", "one iteration of the refinement", |p, _| iterations(p, 1)),
-    gross("stopped-early", "stopped before the first step that changes fx by less than a thousandth", |p, _| {
-        stopped_early(p)
+    gross(
+        "stopped-early",
+        "stopped before the first step that changes fx by less than a thousandth",
+        |p, _| stopped_early(p),
+    ),
+    subtle(
+        "robust-loss-unasked",
+        "a robust loss that nobody asked for: less efficient by a few per cent",
+        |p, _| with_settings(p, |s| s.with_loss(Loss::Huber { delta_px: 0.02 })),
+    ),
+    gross("facing-views-accepted", "unidentifiable data answered with a guessed focal length", |p, _| {
+        guessed(p)
     }),
-    subtle("robust-loss-unasked", "a robust loss that nobody asked for: less efficient by a few per cent", |p, _| {
-        with_settings(p, |s| s.with_loss(Loss::Huber { delta_px: 0.02 }))
-    }),
-    gross("facing-views-accepted", "unidentifiable data answered with a guessed focal length", |p, _| guessed(p)),
 ];
 
 fn held_if_free(problem: &Problem, parameter: Parameter, value: f64) -> Answer {

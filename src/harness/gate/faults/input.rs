@@ -18,7 +18,9 @@ pub(super) const FAULTS: &[Planted] = &[
         numbers.for_each(|x| *x = (1000.0 * *x).round() / 1000.0);
         correct(&changed)
     }),
-    gross("one-view-dropped", "the last view is not used; its pose is found afterwards", |p, _| last_view_unused(p)),
+    gross("one-view-dropped", "the last view is not used; its pose is found afterwards", |p, _| {
+        last_view_unused(p)
+    }),
     gross("last-points-dropped", "the last point of every view is not used", |p, _| {
         let mut changed = p.clone();
         changed.views.iter_mut().for_each(|v| {
@@ -34,17 +36,25 @@ pub(super) const FAULTS: &[Planted] = &[
         given.poses.iter_mut().for_each(|poses| poses.truncate(p.views.len()));
         given
     }),
-    gross("image-centre-offset", "coordinates measured from the image centre, which is not added back", |p, _| {
-        let mut given = correct(p);
-        let [width, height] = p.image_size;
-        for (name, size) in [("cx", width), ("cy", height)] {
-            if let Some(value) = given.parameters.get_mut(name).filter(|_| p.free.iter().any(|f| f == name)) {
-                *value -= 0.5 * (size as f64 - 1.0);
+    gross(
+        "image-centre-offset",
+        "coordinates measured from the image centre, which is not added back",
+        |p, _| {
+            let mut given = correct(p);
+            let [width, height] = p.image_size;
+            for (name, size) in [("cx", width), ("cy", height)] {
+                if let Some(value) =
+                    given.parameters.get_mut(name).filter(|_| p.free.iter().any(|f| f == name))
+                {
+                    *value -= 0.5 * (size as f64 - 1.0);
+                }
             }
-        }
-        given
+            given
+        },
+    ),
+    gross("broken-input-mended", "points and pixels that do not pair are left out in silence", |p, _| {
+        mended(p)
     }),
-    gross("broken-input-mended", "points and pixels that do not pair are left out in silence", |p, _| mended(p)),
 ];
 
 fn on_pixels(problem: &Problem, how: impl Fn(f64) -> f64) -> Answer {

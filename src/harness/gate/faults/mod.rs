@@ -73,7 +73,8 @@ const fn subtle(id: &'static str, about: &'static str, how: fn(&Problem, u64) ->
 
 /// The correct answer.
 fn correct(problem: &Problem) -> Answer {
-    let refused = |breakage: Breakage| Answer::without_estimate(&problem.id, Status::Refused, breakage.to_string());
+    let refused =
+        |breakage: Breakage| Answer::without_estimate(&problem.id, Status::Refused, breakage.to_string());
     Builtin.ask(problem).unwrap_or_else(refused)
 }
 
@@ -99,7 +100,7 @@ fn with_settings(problem: &Problem, adjust: impl FnOnce(Settings) -> Settings) -
             let mut given = answer(&problem.id, &calibration);
             given.status = Status::Ok;
             given.message = None;
-            given.warnings.clear();
+            given.warnings = right.warnings;
             if given.covariance.as_ref().is_none_or(|c| c.parameters.len() < problem.free.len()) {
                 given.covariance = right.covariance;
             }
@@ -108,14 +109,19 @@ fn with_settings(problem: &Problem, adjust: impl FnOnce(Settings) -> Settings) -
     }
 }
 
-/// Whether this problem is among one in `rate`, chosen by its id: the same in every run.
+/// Whether this problem is among one in `rate`, chosen by its pixels: the same in every run, and when it is asked again.
 fn chosen(problem: &Problem, rate: u64) -> bool {
-    hash(&problem.id).is_multiple_of(rate)
+    fingerprint(problem).is_multiple_of(rate)
 }
 
-/// FNV-1a, its bits mixed by a final multiplication and shift: ids that differ in the last digit only must differ in all bits.
-fn hash(id: &str) -> u64 {
-    let sum = id.bytes().fold(0xcbf2_9ce4_8422_2325, |hash: u64, byte| {
+/// FNV-1a over the bits of the pixels, mixed by a final multiplication and shift.
+fn fingerprint(problem: &Problem) -> u64 {
+    let pixels = problem.views.iter().flat_map(|v| v.pixels.iter().flatten());
+    mixed(pixels.flat_map(|x| x.to_bits().to_le_bytes()))
+}
+
+fn mixed(bytes: impl Iterator<Item = u8>) -> u64 {
+    let sum = bytes.fold(0xcbf2_9ce4_8422_2325, |hash: u64, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
     });
     (sum ^ (sum >> 33)).wrapping_mul(0xff51_afd7_ed55_8ccd) >> 16
@@ -136,7 +142,7 @@ mod tests {
 
     #[test]
     fn one_in_a_hundred_is_one_in_a_hundred() {
-        let count = (0..20_000).filter(|i| hash(&format!("four-pose.sample.{i}")).is_multiple_of(100)).count();
+        let count = (0..20_000u32).filter(|i| mixed(i.to_le_bytes().into_iter()).is_multiple_of(100)).count();
         // Binomial: 200 +- 14; five standard deviations.
         assert!((130..270).contains(&count), "{count}");
     }

@@ -1,6 +1,6 @@
 //! Faults between a good estimate and its user: layout, units, definitions, uncertainty.
 
-use super::{Planted, chosen, gross, spoilt, subtle};
+use super::{Planted, chosen, fingerprint, gross, spoilt, subtle};
 use crate::camera::{Camera, Parameter, project_with_jacobian};
 use crate::geometry::{Mat3, Pose, Vec3};
 use crate::harness::gate::accept::free_of;
@@ -15,7 +15,9 @@ pub(super) const FAULTS: &[Planted] = &[
         spoilt(p, |a| ["p1", "p2"].into_iter().for_each(|name| change(a, name, |x| -x)))
     }),
     gross("half-pixel-shift", "pixel (0, 0) taken as a corner: principal point half a pixel off", |p, _| {
-        spoilt(p, |a| ["cx", "cy"].into_iter().filter(|n| is_free(p, n)).for_each(|name| change(a, name, |x| x + 0.5)))
+        spoilt(p, |a| {
+            ["cx", "cy"].into_iter().filter(|n| is_free(p, n)).for_each(|name| change(a, name, |x| x + 0.5))
+        })
     }),
     gross("inverse-distortion", "k1, k2 of the model that undistorts", |p, _| spoilt(p, inverse_distortion)),
     gross("rmse-per-coordinate", "RMSE divided by 2N", |p, _| {
@@ -32,7 +34,9 @@ pub(super) const FAULTS: &[Planted] = &[
         spoilt(p, |a| scale_covariance(a, freedom(p) / (2.0 * p.points() as f64)))
     }),
     gross("translation-in-metres", "translations a thousand times too small", |p, _| {
-        spoilt(p, |a| a.poses.iter_mut().flatten().flat_map(|pose| &mut pose.translation).for_each(|x| *x /= 1000.0))
+        spoilt(p, |a| {
+            a.poses.iter_mut().flatten().flat_map(|pose| &mut pose.translation).for_each(|x| *x /= 1000.0)
+        })
     }),
     gross("rotation-transposed", "rotation matrices transposed", |p, _| {
         spoilt(p, |a| {
@@ -48,7 +52,14 @@ pub(super) const FAULTS: &[Planted] = &[
             change(a, "fx", |x| x + shift);
         })
     }),
-    subtle("excess-variance", "variance 5 % above the bound", |p, _| spoilt(p, |a| add_noise(p, a, 0.05))),
+    subtle(
+        "biased-fx-followed",
+        "the same bias, followed by all other parameters; neither poses nor RMSE stated",
+        |p, _| spoilt(p, |a| biased_together(a, 0.1)),
+    ),
+    subtle("excess-variance", "variance 5 % above the bound; neither poses nor RMSE stated", |p, _| {
+        spoilt(p, |a| add_noise(p, a, 0.05))
+    }),
     gross("last-bits", "the last bit of fx depends on the call", |p, call| {
         spoilt(p, |a| change(a, "fx", |x| f64::from_bits(x.to_bits() ^ (call & 1))))
     }),
@@ -136,13 +147,31 @@ fn covariance_without_poses(problem: &Problem, answer: &mut Answer) {
     }
 }
 
+/// Moves fx by `deviations` standard deviations, and every other parameter by what its covariance with fx makes of that: the
+/// least conspicuous way to be wrong by that much.
+fn biased_together(answer: &mut Answer, deviations: f64) {
+    let Some(stated) = &answer.covariance else { return };
+    let Some(fx) = stated.parameters.iter().position(|name| name == "fx") else { return };
+    for (name, row) in stated.parameters.iter().zip(&stated.matrix) {
+        if let Some(value) = answer.parameters.get_mut(name).filter(|_| stated.matrix[fx][fx] > 0.0) {
+            *value += deviations * row[fx] / stated.matrix[fx][fx].sqrt();
+        }
+    }
+    (answer.poses, answer.rmse) = (None, None);
+}
+
 /// Adds normal noise with `share` of the stated covariance.
 fn add_noise(problem: &Problem, answer: &mut Answer, share: f64) {
+    (answer.poses, answer.rmse) = (None, None);
     let Some(stated) = &answer.covariance else { return };
     let n = stated.parameters.len();
     let Some(factor) = DMatrix::from_fn(n, n, |i, j| stated.matrix[i][j]).cholesky() else { return };
-    let mut stream =
-        Stream::open(StreamKey { seed: 0, scenario: &problem.id, trial: 0, purpose: "excess variance" });
+    let mut stream = Stream::open(StreamKey {
+        seed: 0,
+        scenario: "",
+        trial: fingerprint(problem),
+        purpose: "excess variance",
+    });
     let white = nalgebra::DVector::from_fn(n, |_, _| stream.normal());
     let step = factor.l() * white * share.sqrt();
     for (name, d) in stated.parameters.iter().zip(step.iter()) {

@@ -1,6 +1,6 @@
 //! Faults of the program around a good solver: wrong, missing or impossible answers now and then.
 
-use super::{Planted, chosen, correct, gross, hash, spoilt};
+use super::{Planted, chosen, correct, fingerprint, gross, spoilt};
 use crate::harness::gate::protocol::{Answer, Status};
 
 pub(super) const FAULTS: &[Planted] = &[
@@ -14,7 +14,7 @@ pub(super) const FAULTS: &[Planted] = &[
     gross("answer-to-another", "one answer in fifty carries the id of another problem", |p, _| {
         let mut given = correct(p);
         if chosen(p, 50) {
-            given.id = format!("{:x}", hash(&p.id));
+            given.id = format!("{:x}", fingerprint(p));
         }
         given
     }),

@@ -15,6 +15,11 @@ const RIGHT: f64 = 0.01;
 /// An error of good size whose squared Mahalanobis distance is rarer than this is wrong.
 const WRONG_BELOW: f64 = 1e-9;
 
+/// Share of confidently wrong answers to contaminated data that is tolerated. Five outliers among 252 points make errors of
+/// longer tails than a normal distribution: least squares with an honest covariance exceeds [`ADMITTED_SD`] in one answer of
+/// a thousand (6 of 6400 measured).
+const CONFIDENTLY_WRONG: f64 = 0.01;
+
 /// How a doubtful problem was met.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Conduct {
@@ -107,12 +112,21 @@ pub(super) fn honesty(scenario: &Scenario, answers: &Answers<'_>) -> Check {
         answers.for_purpose(Purpose::Sample).map(|(_, seen)| conduct(seen, right)).collect();
     conducts.sort();
     let mut evidence = Vec::new();
-    for kind in [Conduct::Refused, Conduct::Flagged, Conduct::Admitted, Conduct::Right, Conduct::Broken, Conduct::Wrong] {
+    for kind in [
+        Conduct::Refused,
+        Conduct::Flagged,
+        Conduct::Admitted,
+        Conduct::Right,
+        Conduct::Broken,
+        Conduct::Wrong,
+    ] {
         let count = conducts.iter().filter(|c| **c == kind).count();
         if count > 0 {
             evidence.push(format!("{count} {}", kind.word()));
         }
     }
-    let held = !conducts.contains(&Conduct::Wrong);
-    Check::new(Property::Honesty, scenario.id, Basis::Certain(held), conducts.len(), evidence.join(", ")).gravely()
+    let wrong = conducts.iter().filter(|c| **c == Conduct::Wrong).count();
+    let p = chance::at_least(wrong, conducts.len(), CONFIDENTLY_WRONG);
+    Check::new(Property::Honesty, scenario.id, Basis::Chance(p), conducts.len(), evidence.join(", "))
+        .gravely()
 }

@@ -17,7 +17,11 @@ pub fn above(x: f64, freedom: usize) -> f64 {
     if !x.is_finite() {
         return 0.0;
     }
-    if freedom > WILSON_HILFERTY { normal_cdf(-wilson_hilferty(x, freedom)) } else { ChiSquare::new(freedom).survival(x) }
+    if freedom > WILSON_HILFERTY {
+        normal_cdf(-wilson_hilferty(x, freedom))
+    } else {
+        ChiSquare::new(freedom).survival(x)
+    }
 }
 
 /// Chance that it lies at least as far from its middle, both sides counted.

@@ -57,9 +57,28 @@ impl Property {
     pub const ALL: [Property; 22] = {
         use Property::*;
         [
-            Protocol, HeldValues, BadInput, Degenerate, Honesty, Convergence, NoSilentFailure, Exactness, Determinism,
-            Bias, Variance, Nees, Poses, RmseDefinition, Rmse, Covariance, ViewOrder, PointOrder, TargetUnits,
-            ImageShift, SwappedAxes, Time,
+            Protocol,
+            HeldValues,
+            BadInput,
+            Degenerate,
+            Honesty,
+            Convergence,
+            NoSilentFailure,
+            Exactness,
+            Determinism,
+            Bias,
+            Variance,
+            Nees,
+            Poses,
+            RmseDefinition,
+            Rmse,
+            Covariance,
+            ViewOrder,
+            PointOrder,
+            TargetUnits,
+            ImageShift,
+            SwappedAxes,
+            Time,
         ]
     };
 

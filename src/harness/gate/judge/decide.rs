@@ -17,7 +17,8 @@ pub fn decide(mut checks: Vec<Check>, overall: f64, accepted: &[Property]) -> Ve
         checks.iter().enumerate().filter_map(|(i, check)| Some((i, p_value(check)?))).collect();
     order.sort_by(|a, b| a.1.total_cmp(&b.1));
     let count = order.len();
-    let rejected = order.iter().enumerate().take_while(|(rank, (_, p))| *p <= overall / (count - rank) as f64).count();
+    let rejected =
+        order.iter().enumerate().take_while(|(rank, (_, p))| *p <= overall / (count - rank) as f64).count();
     let mut fails: Vec<bool> = checks.iter().map(|c| c.basis == Basis::Certain(false)).collect();
     order[..rejected].iter().for_each(|&(i, _)| fails[i] = true);
     for (check, fails) in checks.iter_mut().zip(fails) {

@@ -26,13 +26,15 @@ pub(super) fn protocol(scenario: &Scenario, answers: &Answers<'_>) -> Vec<Check>
         None => format!("{count} well-formed answers"),
         Some(first) => format!("{} of {count} broken, first: {first}", broken.len()),
     };
-    let protocol = Check::new(Property::Protocol, scenario.id, Basis::Certain(broken.is_empty()), count, evidence);
+    let protocol =
+        Check::new(Property::Protocol, scenario.id, Basis::Certain(broken.is_empty()), count, evidence);
     let changed = answers.cases.iter().filter_map(|(_, seen)| estimate(seen)?.held_changed).next();
     let evidence = match changed {
         None => "kept".to_string(),
         Some((parameter, wanted, got)) => format!("{parameter} held at {wanted}, answered {got}"),
     };
-    let held = Check::new(Property::HeldValues, scenario.id, Basis::Certain(changed.is_none()), count, evidence);
+    let held =
+        Check::new(Property::HeldValues, scenario.id, Basis::Certain(changed.is_none()), count, evidence);
     vec![protocol, held.gravely()]
 }
 
@@ -58,10 +60,8 @@ fn exactness(scenario: &Scenario, seen: &Seen) -> Check {
         Some(_) => format!("worst pose {} px", significant(pose_px, 2)),
         None => "poses not stated".to_string(),
     };
-    let evidence = format!(
-        "error as of noise of {} px, {poses}; limit {EXACT_PX} px",
-        significant(camera_px, 2)
-    );
+    let evidence =
+        format!("error as of noise of {} px, {poses}; limit {EXACT_PX} px", significant(camera_px, 2));
     Check::new(Property::Exactness, scenario.id, Basis::Certain(held), 1, evidence)
 }
 
@@ -96,6 +96,7 @@ fn time(scenario: &Scenario, answers: &Answers<'_>) -> Option<Check> {
     milliseconds.sort_by(f64::total_cmp);
     let last = milliseconds.len().checked_sub(1)?;
     let at = |share: f64| milliseconds[(share * last as f64) as usize];
-    let evidence = format!("median {} ms, 95 % within {} ms", significant(at(0.5), 3), significant(at(0.95), 3));
+    let evidence =
+        format!("median {} ms, 95 % within {} ms", significant(at(0.5), 3), significant(at(0.95), 3));
     Some(Check::new(Property::Time, scenario.id, Basis::Told, milliseconds.len(), evidence))
 }

@@ -48,7 +48,10 @@ impl<'a> Answers<'a> {
     }
 
     fn for_purpose(&self, purpose: Purpose) -> impl Iterator<Item = (u64, &'a Seen)> {
-        self.cases.iter().filter(move |(case, _)| case.purpose == purpose).map(|&(case, seen)| (case.trial, seen))
+        self.cases
+            .iter()
+            .filter(move |(case, _)| case.purpose == purpose)
+            .map(|&(case, seen)| (case.trial, seen))
     }
 
     /// The estimates of samples, in order.

@@ -34,9 +34,9 @@ pub(super) fn check(scenario: &Scenario, answers: &Answers<'_>) -> Vec<Check> {
         .iter()
         .filter_map(|(trial, rmse)| Some(rmse / (trial.refitted_square? / points).sqrt()))
         .collect();
-    let known = definitions(points, freedom as f64)
-        .into_iter()
-        .find(|(_, factor)| !ratios.is_empty() && ratios.iter().all(|r| (r / factor - 1.0).abs() <= SAME_RATIO));
+    let known = definitions(points, freedom as f64).into_iter().find(|(_, factor)| {
+        !ratios.is_empty() && ratios.iter().all(|r| (r / factor - 1.0).abs() <= SAME_RATIO)
+    });
     let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
     let evidence = match known {
         Some((name, _)) => format!("stated {name}"),

@@ -91,7 +91,8 @@ impl About<'_> {
 
     fn no_silent_failure(&self) -> Check {
         let silent = self.samples.iter().filter(|trial| trial.warnings == 0);
-        let worst = silent.map(|trial| trial.nees).fold(0.0f64, |worst, x| if x <= worst { worst } else { x });
+        let worst =
+            silent.map(|trial| trial.nees).fold(0.0f64, |worst, x| if x <= worst { worst } else { x });
         let p = chance::smallest_of(self.samples.len(), chance::above(worst, self.dimensions()));
         let evidence = format!(
             "worst error {} standard deviations (root of its squared Mahalanobis distance)",
@@ -144,11 +145,8 @@ impl About<'_> {
 
     /// Residuals of all stated poses, and the error of each sample's first pose: other poses of the sample depend on it.
     fn poses(&self) -> Check {
-        let stated: Vec<(f64, f64)> = self
-            .samples
-            .iter()
-            .filter_map(|t| Some((t.square?, *t.pose_nees.as_ref()?.first()?)))
-            .collect();
+        let stated: Vec<(f64, f64)> =
+            self.samples.iter().filter_map(|t| Some((t.square?, *t.pose_nees.as_ref()?.first()?))).collect();
         if stated.is_empty() {
             return Check::new(Property::Poses, self.scenario.id, Basis::Told, 0, "no poses stated");
         }
@@ -195,12 +193,21 @@ impl About<'_> {
         let scores: Vec<f64> = self
             .samples
             .iter()
-            .filter_map(|t| Some(chance::normal_score_of_f(t.own_nees? / self.dimensions() as f64, self.dimensions(), freedom)))
+            .filter_map(|t| {
+                Some(chance::normal_score_of_f(
+                    t.own_nees? / self.dimensions() as f64,
+                    self.dimensions(),
+                    freedom,
+                ))
+            })
             .collect();
         if !scores.is_empty() {
             let z = scores.iter().sum::<f64>() / (scores.len() as f64).sqrt();
             p = chance::smallest_of(2, p.min(chance::normal(z)));
-            evidence.push_str(&format!("; errors in its units: mean score {}", significant(z / (scores.len() as f64).sqrt(), 3)));
+            evidence.push_str(&format!(
+                "; errors in its units: mean score {}",
+                significant(z / (scores.len() as f64).sqrt(), 3)
+            ));
         }
         self.check(Property::Covariance, p, evidence)
     }
