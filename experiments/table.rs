@@ -12,6 +12,8 @@ mod expiry;
 mod focal_depth;
 #[path = "four_pose.rs"]
 mod four_pose;
+#[path = "gate_power.rs"]
+mod gate_power;
 #[path = "interface.rs"]
 mod interface;
 #[path = "k2_observability.rs"]
@@ -42,4 +44,5 @@ pub const EXPERIMENTS: &[Experiment] = &[
     photographs::EXPERIMENT,
     interface::EXPERIMENT,
     expiry::EXPERIMENT,
+    gate_power::EXPERIMENT,
 ];

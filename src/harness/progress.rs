@@ -34,7 +34,8 @@ impl ProgressDisplay {
         ProgressDisplay { bars: MultiProgress::new() }
     }
 
-    pub(super) fn start(&self, label: &str, total: usize) -> Progress {
+    /// Announces `total` steps of work.
+    pub fn start(&self, label: &str, total: usize) -> Progress {
         let bar = ProgressBar::with_draw_target(Some(total as u64), ProgressDrawTarget::hidden());
         Progress {
             display: self.clone(),

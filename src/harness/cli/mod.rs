@@ -5,6 +5,7 @@ mod book;
 mod calibrate;
 mod check;
 mod exit;
+mod gate;
 mod list;
 mod ninepoint;
 mod report;
@@ -56,6 +57,8 @@ enum Verb {
     Undistort(undistort::Arguments),
     /// Monte Carlo studies from a file: resumable, sharded, with intervals
     Study(study::Arguments),
+    /// Judges a solver, this library's or any program, on problems with known answers
+    Gate(Box<gate::Arguments>),
 }
 
 /// The `calibench` command over a table of experiments.
@@ -82,6 +85,7 @@ pub fn main(experiments: &[Experiment]) -> ExitCode {
         Some(Verb::Ninepoint(arguments)) => ninepoint::run(&arguments),
         Some(Verb::Undistort(arguments)) => undistort::run(&arguments),
         Some(Verb::Study(arguments)) => study::run(&arguments),
+        Some(Verb::Gate(arguments)) => gate::run(&arguments),
     };
     exit.into()
 }

@@ -1,0 +1,308 @@
+//! `calibench gate`: is a solver to be trusted, ours or anyone's?
+
+use super::{Exit, print, warn};
+use crate::harness::gate;
+use crate::harness::gate::faults::{Faulty, planted};
+use crate::harness::gate::files::{self, FilesError};
+use crate::harness::gate::paired::{self, Paired};
+use crate::harness::gate::{
+    Builtin, EXPECTED_FALSE_ALARMS, Plan, Process, Property, QUICK, Report, Solver, THOROUGH, power, protocol,
+};
+use crate::harness::project::Project;
+use crate::harness::{ProgressDisplay, provenance, write_atomically};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// How many problems.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Size {
+    /// 128 samples a scenario: every gross fault
+    Quick,
+    /// 8192 samples a scenario: a bias of a tenth of a standard deviation, a variance 5 % too large
+    Thorough,
+}
+
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    /// Program to judge: reads problems, writes answers, one JSON object a line (see adapters/PROTOCOL.md)
+    /// [default: this library's solver]
+    #[arg(long, value_name = "COMMAND")]
+    solver: Option<String>,
+    /// Copies of the program that run at the same time
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    jobs: usize,
+    /// Seconds that the program may take for a problem
+    #[arg(long, value_name = "SECONDS", default_value_t = 20.0)]
+    timeout: f64,
+    /// Number of problems
+    #[arg(long, value_enum, default_value_t = Size::Quick)]
+    size: Size,
+    /// Samples a scenario, in place of --size
+    #[arg(long, value_name = "N")]
+    samples: Option<usize>,
+    /// Seed of the noise
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Chance that a correct solver fails the run
+    #[arg(long, value_name = "RATE", default_value_t = EXPECTED_FALSE_ALARMS)]
+    false_alarms: f64,
+    /// Property whose failure is known and does not fail the run; may be repeated
+    #[arg(long, value_name = "PROPERTY", value_parser = property)]
+    accept: Vec<Property>,
+    /// Writes the report as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Writes the report as JUnit XML
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+    /// Writes the report as a page
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Compares with a reference on the same problems: `builtin`, a program, or a folder written by --record
+    #[arg(long, value_name = "REF", conflicts_with_all = ["export", "judge", "power"])]
+    against: Option<String>,
+    /// Writes the problems to a folder, truth kept apart, for programs that cannot be driven by a pipe
+    #[arg(long, value_name = "DIR")]
+    export: Option<PathBuf>,
+    /// Writes the problems and the solver's answers to a folder
+    #[arg(long, value_name = "DIR", conflicts_with = "export")]
+    record: Option<PathBuf>,
+    /// Judges the answers in a folder written by --export: DIR/answers.jsonl, or files in DIR/answers/
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["export", "record", "solver"])]
+    judge: Option<PathBuf>,
+    /// Judges this library's solver with a planted fault; `list` names them
+    #[arg(long, value_name = "FAULT", conflicts_with_all = ["solver", "judge"])]
+    planted: Option<String>,
+    /// Measures the gate itself: every planted fault, and false alarms over 200 clean seeds; writes the table to a file
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["solver", "judge", "export", "record", "planted"])]
+    power: Option<PathBuf>,
+    /// Writes the JSON schemas of the protocol to a folder
+    #[arg(long, value_name = "DIR")]
+    schema: Option<PathBuf>,
+}
+
+fn property(name: &str) -> Result<Property, String> {
+    let known = || Property::ALL.map(Property::name).join(", ");
+    Property::ALL
+        .into_iter()
+        .find(|p| p.name() == name)
+        .ok_or_else(|| format!("no property `{name}`; there are: {}", known()))
+}
+
+pub(super) fn run(arguments: &Arguments) -> Exit {
+    dispatch(arguments).unwrap_or_else(|(exit, message)| {
+        warn(&message);
+        exit
+    })
+}
+
+/// A way to end before there is a verdict.
+type Stop = (Exit, String);
+
+fn usage(message: impl ToString) -> Stop {
+    (Exit::Usage, message.to_string())
+}
+
+fn incomplete(message: impl ToString) -> Stop {
+    (Exit::Incomplete, message.to_string())
+}
+
+fn of_files(error: FilesError) -> Stop {
+    match error {
+        FilesError::Write(_) | FilesError::Plan(_) => incomplete(error),
+        _ => usage(error),
+    }
+}
+
+fn dispatch(arguments: &Arguments) -> Result<Exit, Stop> {
+    if let Some(folder) = &arguments.schema {
+        for (name, text) in protocol::schemas() {
+            write_atomically(&folder.join(name), text.as_bytes()).map_err(incomplete)?;
+        }
+        return Ok(Exit::Held);
+    }
+    let samples = arguments.samples.unwrap_or(match arguments.size {
+        Size::Quick => QUICK,
+        Size::Thorough => THOROUGH,
+    });
+    if samples == 0 || !(arguments.false_alarms > 0.0 && arguments.false_alarms < 1.0) {
+        return Err(usage("--samples must be at least 1 and --false-alarms between 0 and 1"));
+    }
+    if arguments.planted.as_deref() == Some("list") {
+        planted().iter().for_each(|fault| print(&format!("{:<26} {}\n", fault.id, fault.about)));
+        return Ok(Exit::Held);
+    }
+    if let Some(file) = &arguments.power {
+        return measure_power(arguments, file, samples);
+    }
+    if let Some(folder) = &arguments.export {
+        let plan = Plan::new(arguments.seed, samples).map_err(incomplete)?;
+        files::export(&plan, folder, None).map_err(of_files)?;
+        print(&format!("{} problems written to {}\n", plan.cases.len(), folder.display()));
+        return Ok(Exit::Held);
+    }
+    if let Some(folder) = &arguments.judge {
+        let (plan, answers) = files::recorded(folder).map_err(of_files)?;
+        return judge(arguments, &plan, &answers);
+    }
+    let solver = solver(arguments)?;
+    if let Some(folder) = &arguments.record {
+        let plan = Plan::new(arguments.seed, samples).map_err(incomplete)?;
+        files::export(&plan, folder, Some(solver.as_ref())).map_err(of_files)?;
+        print(&format!("{} problems and answers written to {}\n", plan.cases.len(), folder.display()));
+        return Ok(Exit::Held);
+    }
+    if let Some(reference) = &arguments.against {
+        return compare(arguments, solver.as_ref(), reference, samples);
+    }
+    let plan = Plan::new(arguments.seed, samples).map_err(incomplete)?;
+    judge(arguments, &plan, solver.as_ref())
+}
+
+fn solver(arguments: &Arguments) -> Result<Box<dyn Solver>, Stop> {
+    match (&arguments.solver, &arguments.planted) {
+        (Some(command), _) => process(arguments, command),
+        (None, Some(id)) => {
+            let fault = planted().into_iter().find(|fault| fault.id == id);
+            let fault =
+                fault.ok_or_else(|| usage(format!("no planted fault `{id}`; see `--planted list`")))?;
+            Ok(Box::new(Faulty::new(fault)))
+        }
+        (None, None) => Ok(Box::new(Builtin)),
+    }
+}
+
+fn process(arguments: &Arguments, command: &str) -> Result<Box<dyn Solver>, Stop> {
+    let timeout = Duration::try_from_secs_f64(arguments.timeout).ok().filter(|t| !t.is_zero());
+    let timeout = timeout.ok_or_else(|| usage("--timeout must be a positive number of seconds"))?;
+    Ok(Box::new(Process::new(command, timeout, arguments.jobs)))
+}
+
+/// Asks every problem of the plan, showing progress.
+fn asked(arguments: &Arguments, plan: &Plan, solver: &dyn Solver) -> Report {
+    let progress = ProgressDisplay::stderr().start("gate", plan.cases.len());
+    let started = Instant::now();
+    let seen = gate::run(plan, solver, &|done| progress.advance(done));
+    let seconds = started.elapsed().as_secs_f64();
+    let commit = Project::find().ok().and_then(|p| provenance::commit(p.root()));
+    Report::new(plan, &solver.name(), &seen, arguments.false_alarms, &arguments.accept, seconds)
+        .with_commit(commit.as_ref())
+}
+
+fn judge(arguments: &Arguments, plan: &Plan, solver: &dyn Solver) -> Result<Exit, Stop> {
+    let report = asked(arguments, plan, solver);
+    let outputs: [(&Option<PathBuf>, fn(&Report) -> String); 3] = [
+        (&arguments.json, Report::to_json),
+        (&arguments.junit, Report::to_junit),
+        (&arguments.html, Report::to_html),
+    ];
+    for (path, text) in outputs {
+        if let Some(path) = path {
+            write_atomically(path, text(&report).as_bytes()).map_err(incomplete)?;
+        }
+    }
+    print(&report.to_text());
+    if !report.held() {
+        warn(&report.details());
+    }
+    Ok(if report.held() { Exit::Held } else { Exit::Deviates })
+}
+
+fn compare(
+    arguments: &Arguments,
+    solver: &dyn Solver,
+    reference: &str,
+    samples: usize,
+) -> Result<Exit, Stop> {
+    let (plan, other): (Plan, Box<dyn Solver>) = match reference {
+        "builtin" => (Plan::new(arguments.seed, samples).map_err(incomplete)?, Box::new(Builtin)),
+        folder if Path::new(folder).join("manifest.json").is_file() => {
+            let (plan, answers) = files::recorded(Path::new(folder)).map_err(of_files)?;
+            (plan, Box::new(answers))
+        }
+        command => (Plan::new(arguments.seed, samples).map_err(incomplete)?, process(arguments, command)?),
+    };
+    let ask = |solver: &dyn Solver| {
+        let progress = ProgressDisplay::stderr().start("gate", plan.cases.len());
+        let seen = gate::run(&plan, solver, &|done| progress.advance(done));
+        let report = Report::new(&plan, "", &seen, arguments.false_alarms, &arguments.accept, 0.0);
+        (seen, report.checks)
+    };
+    let (old, old_checks) = ask(other.as_ref());
+    let (new, new_checks) = ask(solver);
+    let paired: Paired = paired::compare(
+        &plan,
+        (&solver.name(), &new, &new_checks),
+        (&other.name(), &old, &old_checks),
+        arguments.false_alarms,
+    );
+    if let Some(path) = &arguments.json {
+        let text = format!("{:#}\n", serde_json::to_value(&paired).unwrap_or_default());
+        write_atomically(path, text.as_bytes()).map_err(incomplete)?;
+    }
+    print(&paired.to_text());
+    Ok(if paired.held() { Exit::Held } else { Exit::Deviates })
+}
+
+/// Clean seeds over which false alarms are counted, and samples a scenario in each.
+const CLEAN_SEEDS: usize = 200;
+const CLEAN_SAMPLES: usize = 32;
+
+fn measure_power(arguments: &Arguments, file: &Path, samples: usize) -> Result<Exit, Stop> {
+    let started = Instant::now();
+    let faults = planted();
+    let mut table =
+        String::from("fault,class,caught,samples_a_scenario,problems,verdict,first_property,what\n");
+    let progress = ProgressDisplay::stderr().start("planted faults", faults.len() + 1);
+    let mut missed = Vec::new();
+    for fault in &faults {
+        let caught = power::catch(*fault, arguments.seed, samples).map_err(incomplete)?;
+        progress.step();
+        if caught.samples.is_none() {
+            missed.push(fault.id);
+        }
+        table.push_str(&format!(
+            "{},{:?},{},{},{},{},{},\"{}\"\n",
+            fault.id,
+            fault.class,
+            caught.samples.is_some(),
+            caught.samples.map_or("-".to_string(), |n| n.to_string()),
+            caught.problems,
+            caught.verdict.word(),
+            caught.by.first().map_or("-", |p| p.name()),
+            fault.about
+        ));
+    }
+    let control = power::catch_solver(&Builtin, arguments.seed, samples).map_err(incomplete)?;
+    progress.step();
+    drop(progress);
+    let progress = ProgressDisplay::stderr().start("clean seeds", CLEAN_SEEDS);
+    let first = arguments.seed + 1000;
+    let alarms = power::false_alarms(first, CLEAN_SEEDS, CLEAN_SAMPLES, &|n| progress.advance(n))
+        .map_err(incomplete)?;
+    let commit = Project::find().ok().and_then(|p| provenance::commit(p.root()));
+    let commit = commit.map_or("unknown".to_string(), |c| {
+        format!("{}{}", c.hash, if c.dirty { " with changes" } else { "" })
+    });
+    let mut text = format!(
+        "# calibench gate --power, --samples {samples}, --seed {}; commit {commit}\n# correct solver up to {samples} samples \
+         a scenario: {}\n",
+        arguments.seed,
+        if control.samples.is_none() { "not caught" } else { "CAUGHT" }
+    );
+    for rate in [0.2, 0.05, 0.01, EXPECTED_FALSE_ALARMS] {
+        text.push_str(&format!(
+            "# false alarms at a stated overall rate of {rate}: {} of {CLEAN_SEEDS} clean seeds (from {first}), {CLEAN_SAMPLES} \
+             samples a scenario\n",
+            alarms.at(rate)
+        ));
+    }
+    for line in &alarms.certain {
+        text.push_str(&format!("# certain failure of the correct solver: {line}\n"));
+    }
+    write_atomically(file, (text.clone() + &table).as_bytes()).map_err(incomplete)?;
+    print(&(text + &table));
+    warn(&format!("{:.0} s; missed: {}", started.elapsed().as_secs_f64(), missed.join(", ")));
+    let sound = missed.is_empty() && control.samples.is_none() && alarms.certain.is_empty();
+    Ok(if sound { Exit::Held } else { Exit::Deviates })
+}

@@ -1,0 +1,59 @@
+//! Which checks fail, at one stated rate of false alarms for all of them together?
+
+use super::checks::{Basis, Check, Property, Verdict};
+
+/// Chance that a correct solver fails any check of a run, unless the user asks for another.
+pub const EXPECTED_FALSE_ALARMS: f64 = 1e-3;
+
+/// Decides every check. Statistical ones by Holm's step-down procedure (1979): with `m` p-values in ascending order, the i-th
+/// is rejected while it is at most `overall / (m - i + 1)`; the chance of any false rejection is at most `overall`,
+/// however the checks depend on each other. Properties in `accepted` do not fail the run.
+pub fn decide(mut checks: Vec<Check>, overall: f64, accepted: &[Property]) -> Vec<Check> {
+    let p_value = |check: &Check| match check.basis {
+        Basis::Chance(p) => Some(p),
+        _ => None,
+    };
+    let mut order: Vec<(usize, f64)> =
+        checks.iter().enumerate().filter_map(|(i, check)| Some((i, p_value(check)?))).collect();
+    order.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let count = order.len();
+    let rejected =
+        order.iter().enumerate().take_while(|(rank, (_, p))| *p <= overall / (count - rank) as f64).count();
+    let mut fails: Vec<bool> = checks.iter().map(|c| c.basis == Basis::Certain(false)).collect();
+    order[..rejected].iter().for_each(|&(i, _)| fails[i] = true);
+    for (check, fails) in checks.iter_mut().zip(fails) {
+        check.verdict = match (check.basis, fails) {
+            (Basis::Told, _) => Verdict::NotJudged,
+            (_, false) => Verdict::Held,
+            (_, true) if accepted.contains(&check.property) => Verdict::Accepted,
+            (_, true) if check.grave => Verdict::Grave,
+            (_, true) => Verdict::Failed,
+        };
+    }
+    checks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn checks(p: &[f64]) -> Vec<Check> {
+        p.iter().map(|&p| Check::new(Property::Bias, "s", Basis::Chance(p), 1, "")).collect()
+    }
+
+    #[test]
+    fn holm_steps_down_and_stops_at_the_first_that_holds() {
+        // 0.05/3 = 0.0167, 0.05/2 = 0.025, 0.05: the second is above its limit, so the third holds too.
+        let verdicts: Vec<Verdict> =
+            decide(checks(&[0.04, 0.01, 0.03]), 0.05, &[]).iter().map(|c| c.verdict).collect();
+        assert_eq!(verdicts, [Verdict::Held, Verdict::Failed, Verdict::Held]);
+        let all = decide(checks(&[0.04, 0.01, 0.02]), 0.05, &[]);
+        assert!(all.iter().all(|c| c.verdict == Verdict::Failed));
+    }
+
+    #[test]
+    fn what_is_accepted_does_not_fail() {
+        let decided = decide(checks(&[1e-9]), 0.05, &[Property::Bias]);
+        assert_eq!(decided[0].verdict, Verdict::Accepted);
+    }
+}

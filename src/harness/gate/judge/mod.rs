@@ -1,0 +1,73 @@
+//! What follows from the answers? One check a property and scenario, then one decision over all of them.
+
+mod bad;
+mod chance;
+mod checks;
+mod decide;
+mod exact;
+mod invariance;
+mod rmse;
+mod statistics;
+
+pub use checks::{Basis, Check, Property, Verdict};
+pub use decide::{EXPECTED_FALSE_ALARMS, decide};
+
+use super::plan::{Case, Plan, Purpose};
+use super::suite::{Demand, Scenario};
+use super::trial::{Seen, Trial};
+
+/// Every check of a plan on the answers seen so far, undecided.
+pub fn check(plan: &Plan, seen: &[Option<Seen>]) -> Vec<Check> {
+    let mut checks = bad::check(plan, seen);
+    for (index, scenario) in plan.scenarios.iter().enumerate() {
+        let answers = Answers::of(plan, seen, index);
+        checks.extend(exact::protocol(scenario, &answers));
+        match scenario.demand {
+            Demand::Honesty => checks.push(bad::honesty(scenario, &answers)),
+            Demand::Law => {
+                checks.extend(exact::check(scenario, &answers));
+                checks.extend(statistics::check(scenario, &answers));
+                checks.extend(rmse::check(scenario, &answers));
+                checks.extend(invariance::check(scenario, &answers));
+            }
+        }
+    }
+    checks
+}
+
+/// The answers of one scenario.
+struct Answers<'a> {
+    cases: Vec<(&'a Case, &'a Seen)>,
+}
+
+impl<'a> Answers<'a> {
+    fn of(plan: &'a Plan, seen: &'a [Option<Seen>], index: usize) -> Answers<'a> {
+        let of_scenario = |case: &Case| case.scenario == index && !matches!(case.purpose, Purpose::Bad(_));
+        let cases = plan.cases.iter().zip(seen).filter(|(case, _)| of_scenario(case));
+        Answers { cases: cases.filter_map(|(case, seen)| Some((case, seen.as_ref()?))).collect() }
+    }
+
+    fn for_purpose(&self, purpose: Purpose) -> impl Iterator<Item = (u64, &'a Seen)> {
+        self.cases
+            .iter()
+            .filter(move |(case, _)| case.purpose == purpose)
+            .map(|&(case, seen)| (case.trial, seen))
+    }
+
+    /// The estimates of samples, in order.
+    fn samples(&self) -> Vec<&'a Trial> {
+        self.for_purpose(Purpose::Sample).filter_map(|(_, seen)| estimate(seen)).collect()
+    }
+}
+
+fn estimate(seen: &Seen) -> Option<&Trial> {
+    match seen {
+        Seen::Estimate(trial) => Some(trial),
+        _ => None,
+    }
+}
+
+/// An error of the camera as the noise that would cause it: `sigma sqrt(e^T P^-1 e / k)`, px.
+fn equivalent_noise_px(scenario: &Scenario, nees: f64, dimensions: usize) -> f64 {
+    scenario.sigma_px * (nees / dimensions as f64).sqrt()
+}

@@ -1,0 +1,189 @@
+//! Does the gate treat any program as a black box, and end as it says? Programs that work, hang, crash and babble.
+#![cfg(all(feature = "harness", unix))]
+
+use calibench::harness::gate::accept::{Breakage, Outcome};
+use calibench::harness::gate::faults::{Faulty, planted};
+use calibench::harness::gate::plan::Purpose;
+use calibench::harness::gate::protocol::{Problem, schemas};
+use calibench::harness::gate::{
+    Builtin, EXPECTED_FALSE_ALARMS, Plan, Process, Property, Report, Solver, run,
+};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
+
+const CALIBENCH: &str = env!("CARGO_BIN_EXE_calibench");
+
+fn gate(arguments: &[&str]) -> Output {
+    Command::new(CALIBENCH).arg("gate").args(arguments).output().expect("the program starts")
+}
+
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    if folder.exists() {
+        std::fs::remove_dir_all(&folder).expect("an old folder is removed");
+    }
+    folder
+}
+
+fn problems(count: usize) -> Vec<Problem> {
+    let plan = Plan::new(1, 1).expect("a plan");
+    let samples = plan.cases.iter().filter(|case| case.purpose == Purpose::Sample);
+    samples.take(count).map(|case| plan.problem(case)).collect()
+}
+
+fn breakages(command: &str, seconds: f64, count: usize) -> Vec<Breakage> {
+    let process = Process::new(command, Duration::from_secs_f64(seconds), 1);
+    let replies = process.ask_all(&problems(count));
+    let broken = |outcome| match outcome {
+        Outcome::Broken(breakage) => breakage,
+        other => panic!("{command}: {other:?}"),
+    };
+    replies.into_iter().map(|reply| broken(reply.outcome)).collect()
+}
+
+#[test]
+fn a_program_that_hangs_is_ended_and_at_last_not_asked_any_more() {
+    let started = Instant::now();
+    let seen = breakages("sleep 1000", 0.2, 5);
+    assert!(seen[..3].iter().all(|b| matches!(b, Breakage::Timeout { .. })), "{seen:?}");
+    assert!(seen[3..].iter().all(|b| matches!(b, Breakage::NotAsked(_))), "{seen:?}");
+    // Three times 0.2 s; the rest is for a busy machine.
+    assert!(started.elapsed() < Duration::from_secs(30));
+}
+
+#[test]
+fn a_program_that_crashes_is_quoted() {
+    let seen = breakages("echo out of memory >&2; exit 7", 20.0, 1);
+    assert!(
+        matches!(&seen[0], Breakage::Crashed { how, stderr } if how.contains('7') && stderr == "out of memory"),
+        "{seen:?}"
+    );
+    let missing = breakages("/no/such/program", 20.0, 1);
+    assert!(matches!(&missing[0], Breakage::Crashed { .. }), "{missing:?}");
+}
+
+#[test]
+fn garbage_foreign_ids_and_nan_are_named() {
+    let babble = breakages("while read line; do echo hello; done", 0.3, 1);
+    assert!(matches!(&babble[0], Breakage::Garbage { line, .. } if line == "hello"), "{babble:?}");
+    let foreign = breakages(r#"while read line; do echo '{"id":"x","status":"refused"}'; done"#, 0.3, 1);
+    assert_eq!(foreign[0], Breakage::WrongId { got: "x".into() });
+    let id = problems(1)[0].id.clone();
+    let nan =
+        breakages(&format!(r#"while read line; do echo '{{"id": "{id}", "rmse": NaN}}'; done"#), 20.0, 1);
+    assert!(matches!(nan[0], Breakage::BadNumber { .. }), "{nan:?}");
+}
+
+#[test]
+fn a_program_is_kept_alive_and_judged_without_a_crash_of_ours() {
+    let refuses = r#"sed -u 's/^{"id":"\([^"]*\)".*/{"id":"\1","status":"refused","message":"never"}/'"#;
+    let output = gate(&["--samples", "1", "--solver", refuses]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(text.contains("NOT TRUSTED"), "{text}");
+    assert!(text.lines().any(|l| l.starts_with("exactness") && l.contains("FAILED")), "{text}");
+    assert!(text.lines().any(|l| l.starts_with("protocol") && l.contains("held")), "{text}");
+}
+
+#[test]
+fn our_solver_is_trusted_and_every_report_is_written() {
+    let out = folder("gate-reports");
+    let path = |name: &str| out.join(name).to_string_lossy().into_owned();
+    let (json, junit, html) = (path("a.json"), path("a.xml"), path("a.html"));
+    let output = gate(&["--samples", "4", "--json", &json, "--junit", &junit, "--html", &html]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stdout));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(text.lines().count() <= 30, "one screen:\n{text}");
+    let report: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(&json).expect("written")).expect("JSON");
+    assert_eq!(report["verdict"], "held");
+    assert!(report["checks"].as_array().is_some_and(|checks| checks.len() > 100));
+    let xml = std::fs::read_to_string(&junit).expect("written");
+    assert!(xml.contains("<testsuite name=\"exactness\"") && !xml.contains("<failure"), "{xml}");
+    let page = std::fs::read_to_string(&html).expect("written");
+    assert!(page.contains("TRUSTED") && !page.contains("http"), "self-contained");
+}
+
+#[test]
+fn answers_from_files_get_the_verdict_of_the_same_answers_from_a_pipe() {
+    let out = folder("gate-files");
+    let place = out.to_string_lossy().into_owned();
+    assert_eq!(gate(&["--samples", "2", "--record", &place]).status.code(), Some(0));
+    let problems = std::fs::read_to_string(out.join("problems.jsonl")).expect("written");
+    assert!(!problems.contains("truth"), "truth stands apart");
+    let judged = gate(&["--judge", &place]);
+    assert_eq!(judged.status.code(), Some(0), "{}", String::from_utf8_lossy(&judged.stdout));
+    // The same solver against its own record: not a bit differs.
+    let same = gate(&["--against", &place]);
+    assert!(String::from_utf8_lossy(&same.stdout).contains("SAME: not a bit differs"));
+    std::fs::remove_file(out.join("answers.jsonl")).expect("removed");
+    assert_eq!(gate(&["--judge", &place]).status.code(), Some(2));
+}
+
+#[test]
+fn a_change_far_below_the_noise_shows_on_common_noise() {
+    let same_law = gate(&["--samples", "64", "--against", "builtin", "--planted", "last-bits"]);
+    let text = String::from_utf8_lossy(&same_law.stdout).into_owned();
+    assert!(text.contains("determinism") && text.contains("CHANGED"), "{text}");
+    let biased = gate(&["--samples", "64", "--against", "builtin", "--planted", "biased-fx"]);
+    let text = String::from_utf8_lossy(&biased.stdout).into_owned();
+    assert_eq!(biased.status.code(), Some(1));
+    assert!(
+        text.lines().any(|l| l.starts_with("four-pose") && l.contains("fx 0.1") && l.contains("MOVED")),
+        "{text}"
+    );
+}
+
+#[test]
+fn wrong_usage_ends_with_two() {
+    for arguments in [
+        &["--samples", "0"][..],
+        &["--accept", "beauty"],
+        &["--planted", "no-such-fault"],
+        &["--timeout", "-1", "--solver", "true"],
+        &["--judge", "/no/such/folder"],
+    ] {
+        assert_eq!(gate(arguments).status.code(), Some(2), "{arguments:?}");
+    }
+}
+
+#[test]
+fn what_is_known_can_be_accepted() {
+    let fault = planted().into_iter().find(|f| f.id == "rounded-to-f32").expect("the fault");
+    let plan = Plan::new(1, 1).expect("a plan");
+    let solver = Faulty::new(fault);
+    let seen = run(&plan, &solver, &|_| ());
+    let report = |accepted: &[Property]| Report::new(&plan, "", &seen, EXPECTED_FALSE_ALARMS, accepted, 0.0);
+    assert!(!report(&[]).held());
+    assert!(report(&[Property::Exactness]).held(), "{}", report(&[Property::Exactness]).details());
+}
+
+#[test]
+fn the_same_seed_gives_the_same_problems_and_another_does_not() {
+    let lines = |seed: u64| -> Vec<String> {
+        let plan = Plan::new(seed, 1).expect("a plan");
+        plan.cases.iter().map(|case| plan.problem(case).to_line()).collect()
+    };
+    assert_eq!(lines(5), lines(5));
+    assert_ne!(lines(5), lines(6));
+}
+
+#[test]
+fn the_committed_schemas_are_those_of_the_program_and_know_every_field() {
+    for (name, text) in schemas() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("adapters").join(name);
+        let committed = std::fs::read_to_string(&path).expect("a committed schema");
+        assert_eq!(committed, text, "run `calibench gate --schema adapters`");
+    }
+    let [(_, problem), (_, answer)] = schemas();
+    let fields = |schema: &str| -> Vec<String> {
+        let schema: serde_json::Value = serde_json::from_str(schema).expect("JSON");
+        schema["properties"].as_object().expect("an object").keys().cloned().collect()
+    };
+    let problem_line: serde_json::Value = serde_json::from_str(&problems(1)[0].to_line()).expect("JSON");
+    assert!(problem_line.as_object().expect("an object").keys().all(|key| fields(&problem).contains(key)));
+    let given = Builtin.ask(&problems(1)[0]).expect("an answer");
+    let given = serde_json::to_value(given).expect("JSON");
+    assert!(given.as_object().expect("an object").keys().all(|key| fields(&answer).contains(key)));
+}
