@@ -45,7 +45,7 @@ pub(super) fn quantities(prose: &str) -> Vec<(usize, &str)> {
         let place = prose[..start].trim_end_matches(['\u{a0}', ' ']).ends_with('\u{a7}');
         let in_name = prose[at..].starts_with(|c: char| c.is_alphabetic() && c != '\u{b5}');
         let quantity = number.contains('.') || has_unit(&prose[at..]);
-        if quantity && !in_word && !place && !(in_name && !number.contains('.')) {
+        if quantity && !in_word && !place && (!in_name || number.contains('.')) {
             found.push((start, number));
         }
     }
