@@ -189,9 +189,12 @@ fn asked(arguments: &Arguments, plan: &Plan, solver: &dyn Solver) -> Report {
         .with_commit(commit.as_ref())
 }
 
+/// A report in one form, and where it goes if it is wanted.
+type Output<'a> = (&'a Option<PathBuf>, fn(&Report) -> String);
+
 fn judge(arguments: &Arguments, plan: &Plan, solver: &dyn Solver) -> Result<Exit, Stop> {
     let report = asked(arguments, plan, solver);
-    let outputs: [(&Option<PathBuf>, fn(&Report) -> String); 3] = [
+    let outputs: [Output<'_>; 3] = [
         (&arguments.json, Report::to_json),
         (&arguments.junit, Report::to_junit),
         (&arguments.html, Report::to_html),

@@ -87,6 +87,9 @@ pub fn compare(
     }
 }
 
+/// A paired test: what is told, and its p-value.
+type Test = fn(&[(f64, f64)]) -> Option<(f64, f64)>;
+
 fn of_scenario(scenario: &Scenario, replies: Vec<(&Seen, &Seen)>) -> Comparison {
     let estimate = |seen: &Seen| matches!(seen, Seen::Estimate(_));
     let both: Vec<(&Trial, &Trial)> = replies
@@ -102,7 +105,7 @@ fn of_scenario(scenario: &Scenario, replies: Vec<(&Seen, &Seen)>) -> Comparison 
         both.iter().map(|(n, o)| (n.errors[i] / sd[i], o.errors[i] / sd[i])).collect()
     };
     let names: Vec<Parameter> = scenario.free.iter().collect();
-    let most_certain = |test: fn(&[(f64, f64)]) -> Option<(f64, f64)>| {
+    let most_certain = |test: Test| {
         let each = names.iter().enumerate().filter_map(|(i, name)| {
             let (value, p) = test(&standardised(i))?;
             Some((name.name().to_string(), value, p))

@@ -19,7 +19,7 @@ pub(super) const FAULTS: &[Planted] = &[
         given
     }),
     gross("a-pose-missing", "the last pose is not stated", |p, _| {
-        spoilt(p, |a| a.poses.iter_mut().for_each(|poses| drop(poses.pop())))
+        spoilt(p, |a| a.poses.iter_mut().for_each(|poses| poses.truncate(p.views.len() - 1)))
     }),
     gross("refuses-good-data", "one good problem in twenty is refused", |p, _| {
         if chosen(p, 20) { Answer::without_estimate(&p.id, Status::Refused, "bad luck") } else { correct(p) }
