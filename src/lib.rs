@@ -27,3 +27,8 @@ pub mod raster;
 pub mod rectify;
 pub mod synth;
 pub mod target;
+
+/// The README's example, compiled and run with the documentation's tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

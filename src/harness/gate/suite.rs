@@ -186,8 +186,8 @@ fn lawful() -> Vec<Draft> {
 pub fn suite() -> Result<Vec<Scenario>, SuiteError> {
     let mut scenarios: Vec<Scenario> =
         lawful().into_iter().map(|draft| build(draft, LAW_SIGMA_PX)).collect::<Result<_, _>>()?;
-    // Second-order bias at ordinary noise is below 0.02 standard deviations (measured on 1e5 trials): 500 samples see
-    // 0.02 sqrt(500) = 0.45 standard errors of it, a tenth of what would be called a deviation.
+    // Second-order bias grows with the square of the noise. 500 samples would show one of 0.02 standard deviations as
+    // 0.02 sqrt(500) = 0.45 standard errors, a tenth of what is called a deviation.
     let ordinary = chapter_draft("ordinary-noise", "the chapter's scene with its noise of 0.1 px");
     scenarios.push(Scenario { most: 500, ..build(ordinary, ORDINARY_SIGMA_PX)? });
     let near = Draft {
