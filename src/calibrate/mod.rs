@@ -30,3 +30,4 @@ pub use minimise::Termination;
 pub use normal::information;
 pub use report::{Calibration, Warning};
 pub use settings::Settings;
+pub use system::System;
