@@ -1,11 +1,11 @@
-//! Was anything forgotten? Every experiment has its file, its three registrations, its snapshot, its figures and its
-//! published values; every layer imports only from the layers below it.
+//! Was anything forgotten? Every experiment has its file, its three registrations, its snapshot and its figures;
+//! every layer imports only from the layers below it.
 #![cfg(feature = "harness")]
 
 #[path = "../experiments/table.rs"]
 mod table;
 
-use calibench::harness::{Context, Experiment, published};
+use calibench::harness::Experiment;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -79,32 +79,6 @@ fn ids_are_unique_and_every_snapshot_has_its_experiment() {
         let id = snapshot.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         assert!(ids.contains(id.as_str()), "golden/{id}.snap belongs to no experiment: delete it");
     }
-}
-
-/// Experiments whose published values are listed but whose file is still to come.
-const TO_COME: [&str; 0] = [];
-
-#[test]
-fn every_published_value_is_reconciled_exactly_once() {
-    let mut reconciled: Vec<String> = Vec::new();
-    let registered: BTreeSet<&str> = table::EXPERIMENTS.iter().map(|e| e.id).collect();
-    for experiment in table::EXPERIMENTS {
-        let record = experiment.execute(&Context::of(experiment)).expect("every experiment runs");
-        reconciled.extend(record.reconciliations().iter().map(|r| r.entry.id.clone()));
-    }
-    let mut problems = Vec::new();
-    for entry in published::chapter().expect("golden/published.toml is well formed") {
-        let id = entry.experiment();
-        let times = reconciled.iter().filter(|r| **r == entry.id).count();
-        match (registered.contains(id), TO_COME.contains(&id)) {
-            (true, true) => problems.push(format!("{id} has come: strike it from TO_COME")),
-            (true, false) if times != 1 => problems.push(format!("{} is reconciled {times} times", entry.id)),
-            (false, false) => problems.push(format!("{}: there is no experiment {id}", entry.id)),
-            _ => {}
-        }
-    }
-    problems.dedup();
-    assert!(problems.is_empty(), "{}", problems.join("\n"));
 }
 
 /// The layers from the ground up. Those of one inner list do not know each other.
