@@ -48,6 +48,22 @@ impl<T: Copy> Raster<T> {
         Raster { width, height, samples }
     }
 
+    /// An image made row by row: `fill(y, row)` changes rows that are at `level` before.
+    pub fn from_rows(
+        width: usize,
+        height: usize,
+        level: T,
+        mut fill: impl FnMut(usize, &mut [T]),
+    ) -> Raster<T> {
+        // Not the whole image at once: a row that was just set is near when it is filled.
+        let mut samples = Vec::with_capacity(width * height);
+        for y in 0..height {
+            samples.resize((y + 1) * width, level);
+            fill(y, &mut samples[y * width..]);
+        }
+        Raster { width, height, samples }
+    }
+
     /// Width, px.
     pub fn width(&self) -> usize {
         self.width
