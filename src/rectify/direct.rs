@@ -24,7 +24,7 @@ pub fn rectify_image<T: Sample>(
     let size = (photograph.width(), photograph.height());
     check_size(size)?;
     let samples = photograph.samples();
-    let bytes = T::as_bytes(samples).map(|samples| Photograph { samples, size });
+    let bytes = T::as_bytes(samples).map(|samples| Photograph::new(samples, size));
     let mut rows = SourceRows::new(camera, output, output_size.0);
     let mut sources = Sources::new();
     Ok(Raster::from_rows(output_size.0, output_size.1, border, |y, levels| {

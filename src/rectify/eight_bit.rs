@@ -2,13 +2,13 @@
 
 use super::fraction::{Place, coarse};
 use super::source_row::Sources;
-use super::window::{PIXELS, Window, mix};
+use super::window::{Limits, PIXELS, Window, mix};
 
 /// Registers that hold a window.
 trait Registers {
     type Window: Copy;
     /// [`Window::of`].
-    fn find(u: &[f64; PIXELS], v: &[f64; PIXELS], size: (usize, usize)) -> Option<Self::Window>;
+    fn find(u: &[f64; PIXELS], v: &[f64; PIXELS], width: usize, limits: &Limits) -> Option<Self::Window>;
     /// A window that is not [`Window::NONE`].
     fn load(window: &Window) -> Self::Window;
     /// [`Window::mix`].
@@ -18,15 +18,31 @@ trait Registers {
 /// A photograph of 8-bit levels.
 #[derive(Clone, Copy)]
 pub struct Photograph<'a> {
-    pub samples: &'a [u8],
-    pub size: (usize, usize),
+    samples: &'a [u8],
+    size: (usize, usize),
+    limits: Limits,
 }
 
-impl Photograph<'_> {
+impl<'a> Photograph<'a> {
+    /// Of an image's samples and size.
+    pub fn new(samples: &'a [u8], size: (usize, usize)) -> Photograph<'a> {
+        Photograph { samples, size, limits: Limits::of(size) }
+    }
+
     /// The level at a place.
     pub fn at(&self, place: &Place) -> u8 {
         let at = place.row as usize * self.size.0 + place.column as usize;
         mix(self.samples, self.size.0, at, coarse(place.right), coarse(place.down))
+    }
+
+    /// Levels of pixels one by one; pixels outside stay as they are.
+    #[cold]
+    fn mix_single(&self, sources: &Sources, first: usize, levels: &mut [u8]) {
+        for (i, level) in levels.iter_mut().enumerate() {
+            if let Some(place) = Place::of(&sources.get(first + i), self.size) {
+                *level = self.at(&place);
+            }
+        }
     }
 
     /// Levels of a part of an output row from their windows; `single` gives the levels of a block without window, by number.
@@ -57,31 +73,32 @@ fn mix_windows<R: Registers>(
     levels: &mut [u8],
     mut single: impl FnMut(usize, &mut [u8]),
 ) {
-    for (block, (window, levels)) in windows.iter().zip(levels.chunks_mut(PIXELS)).enumerate() {
-        if window.first != Window::NONE.first && levels.len() == PIXELS {
-            levels.copy_from_slice(&R::mix(R::load(window), photograph.samples, photograph.size.0));
+    let (samples, width) = (photograph.samples, photograph.size.0);
+    let (full, rest) = levels.as_chunks_mut::<PIXELS>();
+    for (block, (window, levels)) in windows.iter().zip(&mut *full).enumerate() {
+        if window.first != Window::NONE.first {
+            *levels = R::mix(R::load(window), samples, width);
         } else {
             single(block, levels);
         }
+    }
+    if !rest.is_empty() {
+        single(full.len(), rest);
     }
 }
 
 #[inline(always)]
 fn mix_sources<R: Registers>(photograph: &Photograph, sources: &Sources, levels: &mut [u8]) {
+    let Photograph { samples, size: (width, _), limits } = *photograph;
     let (us, vs) = (sources.u.as_chunks::<PIXELS>().0, sources.v.as_chunks::<PIXELS>().0);
-    for (block, ((u, v), levels)) in us.iter().zip(vs).zip(levels.chunks_mut(PIXELS)).enumerate() {
-        if levels.len() == PIXELS
-            && let Some(window) = R::find(u, v, photograph.size)
-        {
-            levels.copy_from_slice(&R::mix(window, photograph.samples, photograph.size.0));
-            continue;
-        }
-        for (i, level) in levels.iter_mut().enumerate() {
-            if let Some(place) = Place::of(&sources.get(block * PIXELS + i), photograph.size) {
-                *level = photograph.at(&place);
-            }
+    let (full, rest) = levels.as_chunks_mut::<PIXELS>();
+    for (block, ((u, v), levels)) in us.iter().zip(vs).zip(&mut *full).enumerate() {
+        match R::find(u, v, width, &limits) {
+            Some(window) => *levels = R::mix(window, samples, width),
+            None => photograph.mix_single(sources, block * PIXELS, levels),
         }
     }
+    photograph.mix_single(sources, full.len() * PIXELS, rest);
 }
 
 /// Plain code, for any machine.
@@ -91,8 +108,8 @@ impl Registers for Portable {
     type Window = Window;
 
     #[inline(always)]
-    fn find(u: &[f64; PIXELS], v: &[f64; PIXELS], size: (usize, usize)) -> Option<Window> {
-        Window::of(u, v, size)
+    fn find(u: &[f64; PIXELS], v: &[f64; PIXELS], width: usize, limits: &Limits) -> Option<Window> {
+        Window::of(u, v, width, limits)
     }
 
     #[inline(always)]
@@ -111,7 +128,7 @@ impl Registers for Portable {
 #[cfg(target_arch = "x86_64")]
 mod wide {
     use super::super::fraction::{COARSE, COARSE_BITS, ON_A_SAMPLE_PX};
-    use super::super::window::{COLUMNS, LOWER, MIDDLE_BITS, PIXELS, Window, corner};
+    use super::super::window::{COLUMNS, LOWER, Limits, MIDDLE_BITS, PIXELS, ROWS, Window};
     use super::{Photograph, Registers, Sources};
     use std::arch::x86_64::*;
 
@@ -122,9 +139,9 @@ mod wide {
         first: usize,
         /// Eight bytes.
         places: __m128i,
-        /// Eight of 16 bits.
-        right: __m128i,
-        down: __m128i,
+        /// Eight of 32 bits.
+        right: __m256i,
+        down: __m256i,
     }
 
     #[target_feature(enable = "avx2")]
@@ -165,26 +182,23 @@ mod wide {
 
     #[target_feature(enable = "avx2")]
     #[inline]
-    fn find(u: &[f64; PIXELS], v: &[f64; PIXELS], size: (usize, usize)) -> Option<WideWindow> {
+    fn find(u: &[f64; PIXELS], v: &[f64; PIXELS], width: usize, limits: &Limits) -> Option<WideWindow> {
         let (u, v) = (coarse_positions(u), coarse_positions(v));
         let ends = |of: __m256i| [_mm256_extract_epi32::<0>(of), _mm256_extract_epi32::<7>(of)];
-        let (column, row) = corner(ends(u), ends(v), size)?;
+        let (column, row) = limits.corner(ends(u), ends(v))?;
         let whole = |of: __m256i| _mm256_srai_epi32::<{ COARSE_BITS as i32 }>(of);
         let x = _mm256_sub_epi32(whole(u), _mm256_set1_epi32(column));
         let y = _mm256_sub_epi32(whole(v), _mm256_set1_epi32(row));
-        // As numbers without sign, negative ones are too large.
-        let is_at_most =
-            |of: __m256i, most: i32| _mm256_cmpeq_epi32(of, _mm256_min_epu32(of, _mm256_set1_epi32(most)));
-        let is_positive = |of: __m256i| _mm256_cmpgt_epi32(of, _mm256_setzero_si256());
-        let in_window = _mm256_and_si256(is_at_most(x, COLUMNS as i32 - 2), is_at_most(y, 1));
-        let in_image = _mm256_and_si256(is_positive(u), is_positive(v));
-        if _mm256_movemask_epi8(_mm256_and_si256(in_window, in_image)) != -1 {
+        // Bits that a place in the window does not have: none in columns 0 to 14, where column + 1 has none either, and rows 0 and 1.
+        let next = _mm256_add_epi32(x, _mm256_set1_epi32(1));
+        let bits = _mm256_or_si256(_mm256_or_si256(x, next), _mm256_slli_epi32::<3>(y));
+        if _mm256_testz_si256(bits, _mm256_set1_epi32(!(COLUMNS as i32 - 1))) == 0 {
             return None;
         }
-        let fraction = |of: __m256i| narrowed(_mm256_and_si256(of, _mm256_set1_epi32(i32::from(COARSE) - 1)));
+        let fraction = |of: __m256i| _mm256_and_si256(of, _mm256_set1_epi32(i32::from(COARSE) - 1));
         let places = narrowed(_mm256_or_si256(x, _mm256_slli_epi32::<{ LOWER.trailing_zeros() as i32 }>(y)));
         Some(WideWindow {
-            first: row as usize * size.0 + column as usize,
+            first: row as usize * width + column as usize,
             places: _mm_packus_epi16(places, places),
             right: fraction(u),
             down: fraction(v),
@@ -199,26 +213,16 @@ mod wide {
             WideWindow {
                 first: window.first as usize,
                 places: _mm_loadl_epi64(window.places.as_ptr().cast()),
-                right: _mm_loadu_si128(window.right.as_ptr().cast()),
-                down: _mm_loadu_si128(window.down.as_ptr().cast()),
+                right: _mm256_cvtepu16_epi32(_mm_loadu_si128(window.right.as_ptr().cast())),
+                down: _mm256_cvtepu16_epi32(_mm_loadu_si128(window.down.as_ptr().cast())),
             }
         }
-    }
-
-    /// Sixteen samples from an index on.
-    #[target_feature(enable = "avx2")]
-    #[inline]
-    fn samples_at(samples: &[u8], first: usize) -> __m128i {
-        let row = &samples[first..first + COLUMNS];
-        // SAFETY: the pointer is to sixteen bytes.
-        unsafe { _mm_loadu_si128(row.as_ptr().cast()) }
     }
 
     /// Pairs of weights `(1 - w, w)`.
     #[target_feature(enable = "avx2")]
     #[inline]
-    fn pairs(weights: __m128i) -> __m256i {
-        let weights = _mm256_cvtepu16_epi32(weights);
+    fn pairs(weights: __m256i) -> __m256i {
         let others = _mm256_sub_epi32(_mm256_set1_epi32(i32::from(COARSE)), weights);
         _mm256_or_si256(others, _mm256_slli_epi32::<16>(weights))
     }
@@ -236,14 +240,25 @@ mod wide {
     #[target_feature(enable = "avx2")]
     #[inline]
     fn mix(window: WideWindow, samples: &[u8], width: usize) -> [u8; PIXELS] {
-        let [top, middle, bottom] = [0, 1, 2].map(|row| samples_at(samples, window.first + row * width));
-        // Every place twice: for the left sample, and one more for the right one.
-        let places = _mm_unpacklo_epi8(window.places, window.places);
-        let columns =
-            _mm_add_epi8(_mm_andnot_si128(_mm_set1_epi8(LOWER as i8), places), _mm_set1_epi16(0x0100));
-        let [top, middle, bottom] = [top, middle, bottom].map(|row| _mm_shuffle_epi8(row, columns));
-        let upper = _mm256_cvtepu8_epi16(_mm_blendv_epi8(top, middle, places));
-        let lower = _mm256_cvtepu8_epi16(_mm_blendv_epi8(middle, bottom, places));
+        let part = samples[window.first..][..(ROWS - 1) * width + COLUMNS].as_ptr();
+        // SAFETY: the part holds three rows, of sixteen bytes at least.
+        let (top, middle, bottom) = unsafe {
+            (
+                _mm_loadu_si128(part.cast()),
+                _mm_loadu_si128(part.add(width).cast()),
+                _mm_loadu_si128(part.add(2 * width).cast()),
+            )
+        };
+        // Every place twice: for the left sample, and one more for the right one. A set highest bit makes zero of a shuffled byte, so that each
+        // comes from one of two rows.
+        let twice = _mm_unpacklo_epi8(window.places, window.places);
+        let first = _mm_add_epi8(twice, _mm_set1_epi16(0x0100));
+        let second = _mm_xor_si128(first, _mm_set1_epi8(LOWER as i8));
+        let of_two = |one: __m128i, other: __m128i| {
+            let both = _mm_or_si128(_mm_shuffle_epi8(one, first), _mm_shuffle_epi8(other, second));
+            _mm256_cvtepu8_epi16(both)
+        };
+        let (upper, lower) = (of_two(top, middle), of_two(middle, bottom));
         let right = pairs(window.right);
         let upper = rounded::<TO_MIDDLE>(_mm256_madd_epi16(upper, right));
         let lower = rounded::<TO_MIDDLE>(_mm256_madd_epi16(lower, right));
@@ -256,9 +271,9 @@ mod wide {
         type Window = WideWindow;
 
         #[inline(always)]
-        fn find(u: &[f64; PIXELS], v: &[f64; PIXELS], size: (usize, usize)) -> Option<WideWindow> {
+        fn find(u: &[f64; PIXELS], v: &[f64; PIXELS], width: usize, limits: &Limits) -> Option<WideWindow> {
             // SAFETY: see the module.
-            unsafe { find(u, v, size) }
+            unsafe { find(u, v, width, limits) }
         }
 
         #[inline(always)]

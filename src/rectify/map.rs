@@ -4,7 +4,7 @@ use super::Sample;
 use super::eight_bit::Photograph;
 use super::fraction::Place;
 use super::source_row::{PIECE, SourceRows, Sources};
-use super::window::{PIXELS, Window};
+use super::window::{Limits, PIXELS, Window};
 use crate::camera::Camera;
 use crate::geometry::Vec2;
 use crate::raster::Raster;
@@ -144,7 +144,7 @@ impl RectifyMap {
             return Err(RectifyError::OtherSize { expected_width, expected_height, width, height });
         }
         let samples = photograph.samples();
-        let bytes = T::as_bytes(samples).map(|samples| Photograph { samples, size: self.input_size });
+        let bytes = T::as_bytes(samples).map(|samples| Photograph::new(samples, self.input_size));
         Ok(Raster::from_rows(self.output_size.0, self.output_size.1, border, |y, levels| {
             if let (Some(photograph), Some(levels)) = (&bytes, T::as_bytes_mut(levels)) {
                 return self.mix_bytes(photograph, y, levels);
@@ -173,13 +173,14 @@ impl RectifyMap {
 
     /// Windows of blocks of eight pixels, row by row; the last of a row may be short and then has none.
     fn to_windows(&self) -> Vec<Window> {
+        let limits = Limits::of(self.input_size);
         let block = |entries: &[Entry]| {
             let (mut u, mut v) = ([f64::NAN; PIXELS], [f64::NAN; PIXELS]);
             for (i, entry) in entries.iter().enumerate() {
                 let source = entry.source(self.input_size.0).unwrap_or(Vec2::new(f64::NAN, f64::NAN));
                 (u[i], v[i]) = (source.x, source.y);
             }
-            Window::of(&u, &v, self.input_size).unwrap_or(Window::NONE)
+            Window::of(&u, &v, self.input_size.0, &limits).unwrap_or(Window::NONE)
         };
         (0..self.output_size.1).flat_map(|y| self.row(y).chunks(PIXELS).map(block)).collect()
     }

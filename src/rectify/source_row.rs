@@ -84,9 +84,30 @@ struct Distort<'a, 'b> {
 impl Kernel for Distort<'_, '_> {
     type Output = ();
 
-    /// The operations of `BrownConrady::distort`, `BrownConrady::jacobian` and `Camera::pixel_from_normalised`, in their order.
     #[inline(always)]
     fn run<L: Lanes>(self) {
+        if self.is_plain() { self.distort::<L, true>() } else { self.distort::<L, false>() }
+    }
+}
+
+impl Distort<'_, '_> {
+    /// Whether the lens has but k1 and k2, the axes are not skew, and the whole piece lies within the monotone radius.
+    fn is_plain(&self) -> bool {
+        let camera = self.rows.camera;
+        let lens = &camera.distortion;
+        // Farthest from the middle is an end: columns are in order, and so are the roundings of their squares.
+        let last = (self.first + self.count).next_multiple_of(LANES) - 1;
+        let farthest = self.rows.x[self.first].abs().max(self.rows.x[last].abs());
+        let y = self.rows.output.normalised_from_pixel(&Vec2::new(0.0, self.y as f64)).y;
+        let is_unfolded = farthest * farthest + y * y < self.rows.radius * self.rows.radius;
+        is_unfolded && [lens.p1, lens.p2, lens.k3, camera.skew].iter().all(|&x| x == 0.0)
+    }
+
+    /// The operations of `BrownConrady::distort`, `BrownConrady::jacobian` and `Camera::pixel_from_normalised`, in their order. Products with zero are
+    /// left out if `PLAIN`: they add nothing.
+    #[inline(always)]
+    #[allow(clippy::needless_range_loop, reason = "three slices of one length")]
+    fn distort<L: Lanes, const PLAIN: bool>(self) {
         let Distort { rows, y: row, first, count, sources } = self;
         let lens = &rows.camera.distortion;
         let [k1, k2, k3, p1, p2] = [lens.k1, lens.k2, lens.k3, lens.p1, lens.p2].map(L::splat);
@@ -97,12 +118,19 @@ impl Kernel for Distort<'_, '_> {
         let radius_sq = L::splat(rows.radius * rows.radius);
         let y = L::splat(rows.output.normalised_from_pixel(&Vec2::new(0.0, row as f64)).y);
         let yy = y * y;
-        let blocks = rows.x[first..].as_chunks::<LANES>().0.iter().take(count.div_ceil(LANES));
-        let us = sources.u.as_chunks_mut::<LANES>().0.iter_mut();
-        let vs = sources.v.as_chunks_mut::<LANES>().0.iter_mut();
-        for (block, ((x, u), v)) in blocks.zip(us).zip(vs).enumerate() {
-            let x = L::load(x);
+        let blocks = count.div_ceil(LANES);
+        let xs = &rows.x[first..].as_chunks::<LANES>().0[..blocks];
+        let us = &mut sources.u.as_chunks_mut::<LANES>().0[..blocks];
+        let vs = &mut sources.v.as_chunks_mut::<LANES>().0[..blocks];
+        for block in 0..blocks {
+            let x = L::load(&xs[block]);
             let s = x * x + yy;
+            if PLAIN {
+                let g = one + s * (k1 + s * k2);
+                us[block] = (fx * (x * g) + cx).store();
+                vs[block] = (fy * (y * g) + cy).store();
+                continue;
+            }
             let g = one + s * (k1 + s * (k2 + s * k3));
             let (mut x_d, mut y_d) = (x * g, y * g);
             let mut unfolded = (radius_sq - s).all_positive();
@@ -117,13 +145,13 @@ impl Kernel for Distort<'_, '_> {
                 unfolded = unfolded && (xx * yy - off_diagonal * off_diagonal).all_positive();
             }
             // Without tangential part the determinant is positive within the monotone radius.
-            *u = (fx * x_d + skew * y_d + cx).store();
-            *v = (fy * y_d + cy).store();
+            us[block] = (fx * x_d + skew * y_d + cx).store();
+            vs[block] = (fy * y_d + cy).store();
             if !unfolded {
                 for lane in 0..LANES {
                     let source = rows.source(first + block * LANES + lane, row);
                     let source = source.unwrap_or(Vec2::new(f64::NAN, f64::NAN));
-                    (u[lane], v[lane]) = (source.x, source.y);
+                    (us[block][lane], vs[block][lane]) = (source.x, source.y);
                 }
             }
         }

@@ -36,11 +36,12 @@ impl Window {
     pub const NONE: Window =
         Window { first: u32::MAX, places: [0; PIXELS], right: [0; PIXELS], down: [0; PIXELS] };
 
-    /// The window of eight sources; `None` where they do not lie in one, or not all inside the image.
-    pub fn of(u: &[f64; PIXELS], v: &[f64; PIXELS], size: (usize, usize)) -> Option<Window> {
+    /// The window of eight sources; `None` where they do not lie in one, or not all inside the image of this width and
+    /// these limits.
+    pub fn of(u: &[f64; PIXELS], v: &[f64; PIXELS], width: usize, limits: &Limits) -> Option<Window> {
         let (u, v) = (u.map(coarse_position), v.map(coarse_position));
-        let (column, row) = corner([u[0], u[PIXELS - 1]], [v[0], v[PIXELS - 1]], size)?;
-        let mut window = Window { first: (row as usize * size.0 + column as usize) as u32, ..Window::NONE };
+        let (column, row) = limits.corner([u[0], u[PIXELS - 1]], [v[0], v[PIXELS - 1]])?;
+        let mut window = Window { first: (row as usize * width + column as usize) as u32, ..Window::NONE };
         for i in 0..PIXELS {
             let (x, y) = ((u[i] >> COARSE_BITS) - column, (v[i] >> COARSE_BITS) - row);
             // A pixel on the very first column or row may be outside by less than a fraction: not to be decided here.
@@ -66,14 +67,29 @@ impl Window {
     }
 }
 
-/// Column and row of a window's upper left sample, from the sources of its first and last pixel in coarse fractions: so far left and up that it
-/// lies in the image.
-#[inline(always)]
-pub fn corner(u: [i32; 2], v: [i32; 2], (width, height): (usize, usize)) -> Option<(i32, i32)> {
-    let last = |size: usize, part: usize| i32::try_from(size).unwrap_or(i32::MAX) - part as i32;
-    let column = (u[0].min(u[1]) >> COARSE_BITS).min(last(width, COLUMNS));
-    let row = (v[0].min(v[1]) >> COARSE_BITS).min(last(height, ROWS));
-    (column >= 0 && row >= 0).then_some((column, row))
+/// How far right and down a window may begin in an image.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    column: i32,
+    row: i32,
+}
+
+impl Limits {
+    /// Negative, so that nothing is a window, for images smaller than one.
+    pub fn of((width, height): (usize, usize)) -> Limits {
+        let last = |size: usize, part: usize| i32::try_from(size).unwrap_or(i32::MAX) - part as i32;
+        Limits { column: last(width, COLUMNS), row: last(height, ROWS) }
+    }
+
+    /// Column and row of a window's upper left sample, from the sources of its first and last pixel in coarse fractions: so far left
+    /// and up that it lies in the image. `None` if that is not to be had, or in the first column or row: a pixel there may be
+    /// outside by less than a fraction, which is not to be decided here.
+    #[inline(always)]
+    pub fn corner(&self, u: [i32; 2], v: [i32; 2]) -> Option<(i32, i32)> {
+        let column = (u[0].min(u[1]) >> COARSE_BITS).min(self.column);
+        let row = (v[0].min(v[1]) >> COARSE_BITS).min(self.row);
+        (column > 0 && row > 0).then_some((column, row))
+    }
 }
 
 /// Bits of a level between its two mixings: it then fits 15 bits, and errs by 2^-8.
