@@ -3,7 +3,7 @@
 
 use calibench::camera::{BrownConrady, Camera};
 use calibench::raster::Raster;
-use calibench::rectify::RectifyMap;
+use calibench::rectify::{RectifyMap, rectify_image};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 
 /// The chapter's camera, its image scaled to another width.
@@ -24,6 +24,9 @@ fn bench(c: &mut Criterion) {
         group.throughput(Throughput::Elements((size.0 * size.1) as u64));
         group.sample_size(if size.0 > 1000 { 20 } else { 100 });
         group.bench_function(BenchmarkId::new("cached", &name), |b| b.iter(|| map.apply(&photo, 0)));
+        group.bench_function(BenchmarkId::new("direct", &name), |b| {
+            b.iter(|| rectify_image(&photo, &camera, &output, size, 0));
+        });
         group.bench_function(BenchmarkId::new("table", &name), |b| {
             b.iter(|| RectifyMap::between(&camera, size, &output, size));
         });

@@ -289,3 +289,91 @@ mod wide {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::source_row::PIECE;
+    use super::*;
+    use crate::geometry::Vec2;
+
+    const SIZE: (usize, usize) = (97, 61);
+
+    fn samples() -> Vec<u8> {
+        (0..SIZE.0 * SIZE.1).map(|i| ((i * 7919 + i * i % 251 * 31) % 256) as u8).collect()
+    }
+
+    /// Sources that a lens may give: along a row, drifting down and stretched, some outside, some at the very edge.
+    fn row(stretch: f64, slope: f64, start: Vec2) -> Sources {
+        let mut sources = Sources::new();
+        for i in 0..PIECE {
+            let t = i as f64;
+            (sources.u[i], sources.v[i]) = (start.x + stretch * t, start.y + slope * t + 1e-4 * t * t);
+        }
+        sources
+    }
+
+    #[test]
+    fn wide_registers_give_the_bits_of_single_pixels() {
+        let samples = samples();
+        let photograph = Photograph::new(&samples, SIZE);
+        let (mut in_windows, mut blocks) = (0, 0);
+        for stretch in [-1.1, 0.3, 0.97, 1.0, 1.06, 1.9, 2.5] {
+            for slope in [-0.3, -0.02, 0.0, 0.11] {
+                for start in [
+                    (-3.3, 0.0),
+                    (0.0, 0.0),
+                    (0.25, 1.0),
+                    (5.1, 57.9),
+                    (12.7, 30.5),
+                    (95.0, 58.999),
+                    (f64::NAN, 3.0),
+                ] {
+                    let sources = row(stretch, slope, Vec2::new(start.0, start.1));
+                    let count = 251;
+                    let (mut expected, mut portable, mut wide) =
+                        (vec![9; count], vec![9; count], vec![9; count]);
+                    for (i, level) in expected.iter_mut().enumerate() {
+                        if let Some(place) = Place::of(&sources.get(i), SIZE) {
+                            *level = photograph.at(&place);
+                        }
+                    }
+                    mix_sources::<Portable>(&photograph, &sources, &mut portable);
+                    photograph.mix_sources(&sources, &mut wide);
+                    assert_eq!(portable, expected, "{stretch} {slope} {start:?}");
+                    assert_eq!(wide, expected, "{stretch} {slope} {start:?}");
+
+                    let us = sources.u.as_chunks::<PIXELS>().0.iter();
+                    let windows: Vec<Window> = us
+                        .zip(sources.v.as_chunks::<PIXELS>().0)
+                        .map(|(u, v)| Window::of(u, v, SIZE.0, &Limits::of(SIZE)).unwrap_or(Window::NONE))
+                        .collect();
+                    in_windows += windows.iter().filter(|window| **window != Window::NONE).count();
+                    blocks += windows.len();
+                    let single = |block: usize, levels: &mut [u8]| {
+                        let first = block * PIXELS;
+                        levels.copy_from_slice(&expected[first..first + levels.len()]);
+                    };
+                    for levels in [&mut portable, &mut wide] {
+                        levels.fill(9);
+                    }
+                    mix_windows::<Portable>(&photograph, &windows, &mut portable, single);
+                    photograph.mix_windows(&windows, &mut wide, single);
+                    assert_eq!(portable, expected);
+                    assert_eq!(wide, expected);
+                }
+            }
+        }
+        // Both ways were taken.
+        assert!(in_windows > 500 && blocks - in_windows > 500, "{in_windows} of {blocks}");
+    }
+
+    #[test]
+    fn images_smaller_than_a_window_are_mixed_pixel_by_pixel() {
+        let samples = [10, 20, 30, 40];
+        let photograph = Photograph::new(&samples, (2, 2));
+        let mut levels = [0; 8];
+        photograph.mix_sources(&row(0.125, 0.0, Vec2::new(0.0, 0.5)), &mut levels);
+        // Half-way down: 20 to 30.
+        assert_eq!(levels, [20, 21, 23, 24, 25, 26, 28, 29]);
+    }
+}
