@@ -8,6 +8,9 @@ use super::{RectifyError, Sample};
 use crate::camera::Camera;
 use crate::raster::Raster;
 
+/// Rows of the output whose pieces are made one below the other: they look at nearly the same samples.
+const BAND: usize = 64;
+
 /// Turns a photograph of `camera` into an image of `output`, usually a camera without distortion; pixels without data get the level
 /// `border`. The same image as [`RectifyMap::between`](super::RectifyMap::between) and [`RectifyMap::apply`](super::RectifyMap::apply) make, at a
 /// fraction of their time together; a table is for several photographs.
@@ -27,17 +30,21 @@ pub fn rectify_image<T: Sample>(
     let bytes = T::as_bytes(samples).map(|samples| Photograph::new(samples, size));
     let mut rows = SourceRows::new(camera, output, output_size.0);
     let mut sources = Sources::new();
-    Ok(Raster::from_rows(output_size.0, output_size.1, border, |y, levels| {
-        for (piece, levels) in levels.chunks_mut(PIECE).enumerate() {
-            rows.fill(y, piece * PIECE, levels.len(), &mut sources);
-            if let (Some(photograph), Some(levels)) = (&bytes, T::as_bytes_mut(levels)) {
-                photograph.mix_sources(&sources, levels);
-                continue;
-            }
-            for (place, level) in levels.iter_mut().enumerate() {
-                if let Some(Place { column, row, right, down }) = Place::of(&sources.get(place), size) {
-                    let at = row as usize * size.0 + column as usize;
-                    *level = T::mix(samples, size.0, at, right, down);
+    let (width, height) = output_size;
+    Ok(Raster::from_bands(width, height, border, BAND, |top, band| {
+        for first in (0..width).step_by(PIECE) {
+            for (y, row) in (top..).zip(band.chunks_exact_mut(width)) {
+                let levels = &mut row[first..width.min(first + PIECE)];
+                rows.fill(y, first, levels.len(), &mut sources);
+                if let (Some(photograph), Some(levels)) = (&bytes, T::as_bytes_mut(levels)) {
+                    photograph.mix_sources(&sources, levels);
+                    continue;
+                }
+                for (place, level) in levels.iter_mut().enumerate() {
+                    if let Some(Place { column, row, right, down }) = Place::of(&sources.get(place), size) {
+                        let at = row as usize * size.0 + column as usize;
+                        *level = T::mix(samples, size.0, at, right, down);
+                    }
                 }
             }
         }

@@ -127,8 +127,8 @@ impl Registers for Portable {
 /// `unsafe` block below sound that is not about a pointer.
 #[cfg(target_arch = "x86_64")]
 mod wide {
-    use super::super::fraction::{COARSE, COARSE_BITS, ON_A_SAMPLE_PX};
-    use super::super::window::{COLUMNS, LOWER, Limits, MIDDLE_BITS, PIXELS, ROWS, Window};
+    use super::super::fraction::{COARSE, COARSE_BITS, ROUNDING};
+    use super::super::window::{COLUMNS, LOWER, Limits, MIDDLE_BITS, PIXELS, ROWS, TO_NEAREST, Window};
     use super::{Photograph, Registers, Sources};
     use std::arch::x86_64::*;
 
@@ -159,16 +159,14 @@ mod wide {
         super::mix_sources::<Wide>(photograph, sources, levels);
     }
 
-    /// `coarse_position` of eight positions.
+    /// `whole_position` of eight positions.
     #[target_feature(enable = "avx2")]
     #[inline]
-    fn coarse_positions(positions: &[f64; PIXELS]) -> __m256i {
+    fn whole_positions(positions: &[f64; PIXELS]) -> __m256i {
         let four = |values: &[f64]| {
             // SAFETY: the pointer is to four numbers.
             let position = unsafe { _mm256_loadu_pd(values[..4].as_ptr()) };
-            let nudged = _mm256_add_pd(position, _mm256_set1_pd(ON_A_SAMPLE_PX));
-            let fractions = _mm256_mul_pd(nudged, _mm256_set1_pd(f64::from(COARSE)));
-            _mm256_cvttpd_epi32(_mm256_add_pd(fractions, _mm256_set1_pd(0.5)))
+            _mm256_cvttpd_epi32(_mm256_add_pd(position, _mm256_set1_pd(ROUNDING)))
         };
         _mm256_set_m128i(four(&positions[4..]), four(&positions[..4]))
     }
@@ -183,9 +181,11 @@ mod wide {
     #[target_feature(enable = "avx2")]
     #[inline]
     fn find(u: &[f64; PIXELS], v: &[f64; PIXELS], width: usize, limits: &Limits) -> Option<WideWindow> {
-        let (u, v) = (coarse_positions(u), coarse_positions(v));
-        let ends = |of: __m256i| [_mm256_extract_epi32::<0>(of), _mm256_extract_epi32::<7>(of)];
-        let (column, row) = limits.corner(ends(u), ends(v))?;
+        let (u, v) = (whole_positions(u), whole_positions(v));
+        let (column, row) = limits.corner(
+            _mm256_extract_epi32::<0>(u),
+            [_mm256_extract_epi32::<0>(v), _mm256_extract_epi32::<7>(v)],
+        )?;
         let whole = |of: __m256i| _mm256_srai_epi32::<{ COARSE_BITS as i32 }>(of);
         let x = _mm256_sub_epi32(whole(u), _mm256_set1_epi32(column));
         let y = _mm256_sub_epi32(whole(v), _mm256_set1_epi32(row));
@@ -227,16 +227,6 @@ mod wide {
         _mm256_or_si256(others, _mm256_slli_epi32::<16>(weights))
     }
 
-    /// Numbers divided by a power of two and rounded, halves upwards.
-    #[target_feature(enable = "avx2")]
-    #[inline]
-    fn rounded<const BITS: i32>(numbers: __m256i) -> __m256i {
-        _mm256_srli_epi32::<BITS>(_mm256_add_epi32(numbers, _mm256_set1_epi32(1 << (BITS - 1))))
-    }
-
-    const TO_MIDDLE: i32 = (COARSE_BITS - MIDDLE_BITS) as i32;
-    const TO_LEVEL: i32 = (COARSE_BITS + MIDDLE_BITS) as i32;
-
     #[target_feature(enable = "avx2")]
     #[inline]
     fn mix(window: WideWindow, samples: &[u8], width: usize) -> [u8; PIXELS] {
@@ -260,10 +250,17 @@ mod wide {
         };
         let (upper, lower) = (of_two(top, middle), of_two(middle, bottom));
         let right = pairs(window.right);
-        let upper = rounded::<TO_MIDDLE>(_mm256_madd_epi16(upper, right));
-        let lower = rounded::<TO_MIDDLE>(_mm256_madd_epi16(lower, right));
-        let both = _mm256_or_si256(upper, _mm256_slli_epi32::<16>(lower));
-        let levels = narrowed(rounded::<TO_LEVEL>(_mm256_madd_epi16(both, pairs(window.down))));
+        // Each cut to its middle bits, the lower one in the upper halves.
+        let upper =
+            _mm256_srli_epi32::<{ (COARSE_BITS - MIDDLE_BITS) as i32 }>(_mm256_madd_epi16(upper, right));
+        let lower =
+            _mm256_slli_epi32::<{ (16 + MIDDLE_BITS - COARSE_BITS) as i32 }>(_mm256_madd_epi16(lower, right));
+        let both = _mm256_blend_epi16::<0b1010_1010>(upper, lower);
+        let mixed = _mm256_add_epi32(
+            _mm256_madd_epi16(both, pairs(window.down)),
+            _mm256_set1_epi32(TO_NEAREST as i32),
+        );
+        let levels = narrowed(_mm256_srli_epi32::<{ (COARSE_BITS + MIDDLE_BITS) as i32 }>(mixed));
         _mm_cvtsi128_si64(_mm_packus_epi16(levels, levels)).to_le_bytes()
     }
 
@@ -307,7 +304,7 @@ mod tests {
         let mut sources = Sources::new();
         for i in 0..PIECE {
             let t = i as f64;
-            (sources.u[i], sources.v[i]) = (start.x + stretch * t, start.y + slope * t + 1e-4 * t * t);
+            sources.set(i, Some(start + Vec2::new(stretch * t, slope * t + 1e-4 * t * t)));
         }
         sources
     }

@@ -39,7 +39,8 @@ impl Place {
 /// The lower of two neighbouring samples about a position, and the weight of the upper one; the last pair serves the last sample
 /// too.
 fn split(position: f64, count: usize) -> Option<(u32, f32)> {
-    let nudged = position + ON_A_SAMPLE_PX;
+    // Exact but for the rounding of `rounding`, which both kinds of fraction share.
+    let nudged = (rounding(position * f64::from(COARSE)) - 0.5) / f64::from(COARSE);
     let last = (count - 1) as f64;
     if !(nudged >= 0.0 && position - last <= ON_A_SAMPLE_PX) {
         return None;
@@ -54,13 +55,21 @@ pub fn coarse(fraction: f32) -> u16 {
     (fraction * f32::from(COARSE) + 0.5) as u16
 }
 
-/// A position in coarse fractions of a pixel, as [`Place::of`] and [`coarse`] would find it; negative for a negative one, NaN, or one beyond
-/// 2^17 px.
+/// What is added to a position in coarse fractions before it is cut to a whole number of them.
+pub const ROUNDING: f64 = ON_A_SAMPLE_PX * COARSE as f64 + 0.5;
+
 #[inline(always)]
-pub fn coarse_position(position: f64) -> i32 {
-    let fractions = (position + ON_A_SAMPLE_PX) * f64::from(COARSE) + 0.5;
+fn rounding(fractions: f64) -> f64 {
+    fractions + ROUNDING
+}
+
+/// A position in coarse fractions of a pixel as a whole number of them, as [`Place::of`] and [`coarse`] find it; negative for a
+/// negative one, NaN, or one beyond 2^17 px.
+#[inline(always)]
+pub fn whole_position(fractions: f64) -> i32 {
+    let rounded = rounding(fractions);
     // What the processor's conversion gives where the number does not fit.
-    if fractions.abs() < 2_147_483_648.0 { fractions as i32 } else { i32::MIN }
+    if rounded.abs() < 2_147_483_648.0 { rounded as i32 } else { i32::MIN }
 }
 
 #[cfg(test)]
@@ -77,7 +86,7 @@ mod tests {
                 ((position / tick) as u32 as f64 + 0.5) * tick + [0.0, 1e-12, -1e-9, 5e-9][near - 1]
             } else { position };
             let (lower, fraction) = split(position, 5000).unwrap();
-            prop_assert_eq!(coarse_position(position), lower as i32 * i32::from(COARSE) + i32::from(coarse(fraction)));
+            prop_assert_eq!(whole_position(position * f64::from(COARSE)), lower as i32 * i32::from(COARSE) + i32::from(coarse(fraction)));
             prop_assert!((f64::from(lower) + f64::from(fraction) - position).abs() <= 1.0 / FINE);
         }
     }
@@ -88,9 +97,13 @@ mod tests {
             assert_eq!(split(7.0 + off, 10), Some((7, 0.0)));
             assert_eq!(split(0.0 + off, 10), Some((0, 0.0)));
             assert_eq!(split(9.0 + off, 10), Some((8, 1.0)));
-            assert_eq!(coarse_position(7.0 + off), 7 << COARSE_BITS);
+            assert_eq!(whole_position((7.0 + off) * f64::from(COARSE)), 7 << COARSE_BITS);
         }
         assert_eq!((split(-1.01e-9, 10), split(9.0 + 1.01e-9, 10), split(f64::NAN, 10)), (None, None, None));
-        assert!([-0.6, f64::NAN, 3e5, -3e5, f64::INFINITY].into_iter().all(|x| coarse_position(x) < 0));
+        assert!(
+            [-0.6, f64::NAN, 3e5, -3e5, f64::INFINITY]
+                .into_iter()
+                .all(|x| whole_position(x * f64::from(COARSE)) < 0)
+        );
     }
 }

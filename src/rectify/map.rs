@@ -2,7 +2,7 @@
 
 use super::Sample;
 use super::eight_bit::Photograph;
-use super::fraction::Place;
+use super::fraction::{COARSE, Place};
 use super::source_row::{PIECE, SourceRows, Sources};
 use super::window::{Limits, PIXELS, Window};
 use crate::camera::Camera;
@@ -145,7 +145,7 @@ impl RectifyMap {
         }
         let samples = photograph.samples();
         let bytes = T::as_bytes(samples).map(|samples| Photograph::new(samples, self.input_size));
-        Ok(Raster::from_rows(self.output_size.0, self.output_size.1, border, |y, levels| {
+        Ok(Raster::from_bands(self.output_size.0, self.output_size.1, border, 1, |y, levels| {
             if let (Some(photograph), Some(levels)) = (&bytes, T::as_bytes_mut(levels)) {
                 return self.mix_bytes(photograph, y, levels);
             }
@@ -178,7 +178,7 @@ impl RectifyMap {
             let (mut u, mut v) = ([f64::NAN; PIXELS], [f64::NAN; PIXELS]);
             for (i, entry) in entries.iter().enumerate() {
                 let source = entry.source(self.input_size.0).unwrap_or(Vec2::new(f64::NAN, f64::NAN));
-                (u[i], v[i]) = (source.x, source.y);
+                (u[i], v[i]) = (source.x * f64::from(COARSE), source.y * f64::from(COARSE));
             }
             Window::of(&u, &v, self.input_size.0, &limits).unwrap_or(Window::NONE)
         };

@@ -1,5 +1,6 @@
 //! Where in the photograph was a whole row of the output seen? Four pixels at a time, with the bits of one at a time.
 
+use super::fraction::COARSE;
 use super::points::source_within;
 use crate::camera::Camera;
 use crate::geometry::Vec2;
@@ -8,7 +9,7 @@ use crate::geometry::lanes::{Kernel, LANES, Lanes, dispatch};
 /// Pixels of a row that are worked on while they are near.
 pub const PIECE: usize = 256;
 
-/// Sources of pixels of a row; NaN without data.
+/// Sources of pixels of a row, in coarse fractions of a pixel (a power of two, so no bit is lost); NaN without data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sources {
     pub u: [f64; PIECE],
@@ -21,9 +22,15 @@ impl Sources {
         Sources { u: [f64::NAN; PIECE], v: [f64::NAN; PIECE] }
     }
 
-    /// The source of a pixel of the piece.
+    /// The source of a pixel of the piece, px.
     pub fn get(&self, place: usize) -> Vec2 {
-        Vec2::new(self.u[place], self.v[place])
+        Vec2::new(self.u[place], self.v[place]) / f64::from(COARSE)
+    }
+
+    /// Changes the source of a pixel of the piece, px.
+    pub fn set(&mut self, place: usize, source: Option<Vec2>) {
+        let source = source.unwrap_or(Vec2::new(f64::NAN, f64::NAN)) * f64::from(COARSE);
+        (self.u[place], self.v[place]) = (source.x, source.y);
     }
 }
 
@@ -49,7 +56,7 @@ impl<'a> SourceRows<'a> {
     pub fn fill(&mut self, y: usize, first: usize, count: usize, sources: &mut Sources) {
         if !self.output.distortion.is_ideal() {
             for place in 0..count {
-                set(sources, place, self.source(first + place, y));
+                sources.set(place, self.source(first + place, y));
             }
             return;
         }
@@ -66,11 +73,6 @@ impl<'a> SourceRows<'a> {
     fn source(&self, x: usize, y: usize) -> Option<Vec2> {
         source_within(self.camera, self.output, self.radius, &Vec2::new(x as f64, y as f64))
     }
-}
-
-fn set(sources: &mut Sources, place: usize, source: Option<Vec2>) {
-    let source = source.unwrap_or(Vec2::new(f64::NAN, f64::NAN));
-    (sources.u[place], sources.v[place]) = (source.x, source.y);
 }
 
 struct Distort<'a, 'b> {
@@ -112,7 +114,8 @@ impl Distort<'_, '_> {
         let lens = &rows.camera.distortion;
         let [k1, k2, k3, p1, p2] = [lens.k1, lens.k2, lens.k3, lens.p1, lens.p2].map(L::splat);
         let c = rows.camera;
-        let [fx, fy, cx, cy, skew] = [c.fx, c.fy, c.cx, c.cy, c.skew].map(L::splat);
+        let [fx, fy, cx, cy, skew] =
+            [c.fx, c.fy, c.cx, c.cy, c.skew].map(|x| L::splat(x * f64::from(COARSE)));
         let [one, two, three, six] = [1.0, 2.0, 3.0, 6.0].map(L::splat);
         let is_tangential = lens.p1 != 0.0 || lens.p2 != 0.0;
         let radius_sq = L::splat(rows.radius * rows.radius);
@@ -150,7 +153,7 @@ impl Distort<'_, '_> {
             if !unfolded {
                 for lane in 0..LANES {
                     let source = rows.source(first + block * LANES + lane, row);
-                    let source = source.unwrap_or(Vec2::new(f64::NAN, f64::NAN));
+                    let source = source.unwrap_or(Vec2::new(f64::NAN, f64::NAN)) * f64::from(COARSE);
                     (us[block][lane], vs[block][lane]) = (source.x, source.y);
                 }
             }
@@ -193,7 +196,7 @@ mod tests {
                             rows.fill(y, first, count, &mut sources);
                             let mut one_by_one = Sources::new();
                             for place in 0..count {
-                                set(&mut one_by_one, place, rows.source(first + place, y));
+                                one_by_one.set(place, rows.source(first + place, y));
                             }
                             assert_eq!(bits(&sources, count), bits(&one_by_one, count), "{lens:?} {y}");
                             folded += (0..count).filter(|&i| sources.u[i].is_nan()).count();

@@ -4,7 +4,7 @@
 //! rows. Such a window is loaded as three registers and its samples are shuffled into place. Whatever the registers, the
 //! arithmetic is that of [`mix`], so the bits are the same; pixels that lie otherwise are mixed one by one.
 
-use super::fraction::{COARSE, COARSE_BITS, coarse_position};
+use super::fraction::{COARSE, COARSE_BITS, whole_position};
 
 /// Output pixels of a window.
 pub const PIXELS: usize = 8;
@@ -36,11 +36,11 @@ impl Window {
     pub const NONE: Window =
         Window { first: u32::MAX, places: [0; PIXELS], right: [0; PIXELS], down: [0; PIXELS] };
 
-    /// The window of eight sources; `None` where they do not lie in one, or not all inside the image of this width and
+    /// The window of eight sources, given in coarse fractions of a pixel; `None` where they do not lie in one, or not all inside the image of this width and
     /// these limits.
     pub fn of(u: &[f64; PIXELS], v: &[f64; PIXELS], width: usize, limits: &Limits) -> Option<Window> {
-        let (u, v) = (u.map(coarse_position), v.map(coarse_position));
-        let (column, row) = limits.corner([u[0], u[PIXELS - 1]], [v[0], v[PIXELS - 1]])?;
+        let (u, v) = (u.map(whole_position), v.map(whole_position));
+        let (column, row) = limits.corner(u[0], [v[0], v[PIXELS - 1]])?;
         let mut window = Window { first: (row as usize * width + column as usize) as u32, ..Window::NONE };
         for i in 0..PIXELS {
             let (x, y) = ((u[i] >> COARSE_BITS) - column, (v[i] >> COARSE_BITS) - row);
@@ -82,18 +82,23 @@ impl Limits {
     }
 
     /// Column and row of a window's upper left sample, from the sources of its first and last pixel in coarse fractions: so far left
-    /// and up that it lies in the image. `None` if that is not to be had, or in the first column or row: a pixel there may be
-    /// outside by less than a fraction, which is not to be decided here.
+    /// and up that it lies in the image. The first pixel is taken for the leftmost: a mirrored image has no windows. `None` if they are not
+    /// to be had, or in the first column or row: a pixel there may be outside by less than a fraction, which is not to be decided
+    /// here.
     #[inline(always)]
-    pub fn corner(&self, u: [i32; 2], v: [i32; 2]) -> Option<(i32, i32)> {
-        let column = (u[0].min(u[1]) >> COARSE_BITS).min(self.column);
+    pub fn corner(&self, u: i32, v: [i32; 2]) -> Option<(i32, i32)> {
+        let column = (u >> COARSE_BITS).min(self.column);
         let row = (v[0].min(v[1]) >> COARSE_BITS).min(self.row);
-        (column > 0 && row > 0).then_some((column, row))
+        // Either sign: a single test.
+        (((column - 1) | (row - 1)) >= 0).then_some((column, row))
     }
 }
 
-/// Bits of a level between its two mixings: it then fits 15 bits, and errs by 2^-8.
+/// Bits of a level between its two mixings: it then fits 15 bits. Cut to these it is too small by 2^-8 in the mean, and by no more off that.
 pub const MIDDLE_BITS: u32 = 7;
+
+/// What rounds a mixture to the nearest level: a half, and the mean of what was cut off.
+pub const TO_NEAREST: u32 = (1 << (COARSE_BITS + MIDDLE_BITS - 1)) + (1 << (COARSE_BITS - 1));
 
 /// The mixture of four samples, the upper left at index `at`, in whole numbers: within half a level, and 0.02 for weights of 14 bits, of the exact
 /// one. Weights are at most [`COARSE`].
@@ -101,10 +106,9 @@ pub const MIDDLE_BITS: u32 = 7;
 pub fn mix(samples: &[u8], width: usize, at: usize, right: u16, down: u16) -> u8 {
     let between = |index: usize| {
         let (left, other) = (u32::from(samples[index]), u32::from(samples[index + 1]));
-        let mixed = left * u32::from(COARSE - right) + other * u32::from(right);
-        (mixed + (1 << (COARSE_BITS - MIDDLE_BITS - 1))) >> (COARSE_BITS - MIDDLE_BITS)
+        (left * u32::from(COARSE - right) + other * u32::from(right)) >> (COARSE_BITS - MIDDLE_BITS)
     };
     let (upper, lower) = (between(at), between(at + width));
     let mixed = upper * u32::from(COARSE - down) + lower * u32::from(down);
-    ((mixed + (1 << (COARSE_BITS + MIDDLE_BITS - 1))) >> (COARSE_BITS + MIDDLE_BITS)) as u8
+    ((mixed + TO_NEAREST) >> (COARSE_BITS + MIDDLE_BITS)) as u8
 }
