@@ -23,7 +23,16 @@ pub fn poses(views: usize) -> Vec<Pose> {
 
 /// `views` noisy views of 63 points.
 pub fn views(views: usize) -> Vec<View> {
-    let truth = Truth { cam_from_target: poses(views), ..Truth::chapter() };
+    observed(poses(views))
+}
+
+/// Three views of a target that faces the camera: they determine no focal length.
+pub fn facing_views() -> Vec<View> {
+    observed([110.0, 130.0, 150.0].map(|distance| scene::looking_at_centre([0.0; 3], distance)).to_vec())
+}
+
+fn observed(cam_from_target: Vec<Pose>) -> Vec<View> {
+    let truth = Truth { cam_from_target, ..Truth::chapter() };
     let scene = Scene::new(truth).expect("every view lies in front of the camera");
     scene.observe(0.1, &mut Stream::open(KEY))
 }

@@ -67,6 +67,10 @@ pub fn named(row: &str) -> Option<Box<dyn Work>> {
                 .expect("every view lies in front of the camera");
             job(move || system.covariance(), |_| Vec::new())
         }
+        "refusal" => {
+            let views = common::facing_views();
+            job(move || calibrate(&views, &Settings::chapter()).expect_err("nothing tilts"), |_| Vec::new())
+        }
         "homography" => {
             let view = common::views(4).remove(3);
             let answer = |h: Homography| h.0.transpose().iter().copied().collect();
