@@ -105,12 +105,44 @@ pub fn named(row: &str) -> Option<Box<dyn Work>> {
             let run = move || circle_grid(&image, 9, 7).expect("the grid is there");
             job(run, |found| flat(&found.centres_px()))
         }
+        #[cfg(feature = "harness")]
+        "study" => Some(Box::new(Study)),
         "dots" => {
             let (image, _) = dots();
             let run = move || sparse_dots(&image, 3, 3).expect("the dots are there");
             job(run, |found| flat(&found.centres_px()))
         }
         _ => None,
+    }
+}
+
+/// Every row there is.
+pub fn rows() -> Vec<String> {
+    let calibrations = VIEWS.iter().map(|views| format!("calibrate-{views}"));
+    let frames = FRAMES.iter().map(|(width, height)| format!("{width}x{height}"));
+    let images = frames.flat_map(|size| [format!("remap-{size}"), format!("undistort-{size}")]);
+    let rest = ["covariance-100", "refusal", "homography", "affine", "points", "grid", "dots"];
+    let study = cfg!(feature = "harness").then_some("study");
+    calibrations.chain(images).chain(rest.into_iter().chain(study).map(str::to_string)).collect()
+}
+
+/// Trials of the study of four poses, in one batch as `study run` does them but for the files: a repetition is a trial.
+#[cfg(feature = "harness")]
+struct Study;
+
+#[cfg(feature = "harness")]
+impl Work for Study {
+    fn repeat(&mut self, times: usize) {
+        use calibench::harness::study::{Spec, in_memory};
+        let text = include_str!("../studies/four-pose.toml");
+        let mut spec = Spec::parse(text).expect("a study of the project");
+        spec.trials.per_cell = times as u64;
+        spec.trials.batch = times as u64;
+        black_box(in_memory(spec, text, |_| {}).expect("a study of the project"));
+    }
+
+    fn answer(&mut self) -> Vec<f64> {
+        Vec::new()
     }
 }
 

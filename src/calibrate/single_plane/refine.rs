@@ -163,9 +163,11 @@ impl Kernel for Sum<'_> {
         };
         Normal {
             matrix: SMatrix::from_fn(entry),
-            gradient: SMatrix::from_fn(|i, _| {
-                if is_active(i) { gradient[i / LANES][i % LANES] } else { 0.0 }
-            }),
+            gradient: SMatrix::from_fn(
+                |i, _| {
+                    if is_active(i) { gradient[i / LANES][i % LANES] } else { 0.0 }
+                },
+            ),
             cost,
         }
     }
