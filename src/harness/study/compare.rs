@@ -1,24 +1,19 @@
 //! Which of two runs is closer to the truth? Trials that met the same noise are compared one by one.
 
 use super::engine::{Engine, RunError};
-use super::folder::{Folder, FolderError, Located, Replay};
+use super::folder::FolderError;
 use super::moments::Estimated;
 use super::quantity::Quantity;
-use super::tables;
+use super::reading::Reading;
 use super::trial::Trial;
 use crate::evaluate::distribution::normal_two_sided;
 use crate::evaluate::interval::each_of;
-use std::fs::File;
-use std::io::BufReader;
 use std::path::Path;
 
 /// Runs that cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
-    /// The file system, or a damaged run.
-    #[error(transparent)]
-    Folder(#[from] FolderError),
-    /// The specification.
+    /// A run that cannot be read.
     #[error(transparent)]
     Run(#[from] RunError),
     /// The trials do not meet the same noise.
@@ -31,6 +26,12 @@ pub enum CompareError {
         /// In the second.
         b: String,
     },
+}
+
+impl From<FolderError> for CompareError {
+    fn from(error: FolderError) -> CompareError {
+        RunError::from(error).into()
+    }
 }
 
 /// What can be said of a pair of runs.
@@ -110,44 +111,10 @@ impl Pairs {
     }
 }
 
-/// A batch with its place, `(batch, cell)`.
-type Batch = ((u64, usize), Vec<Trial>);
-
-/// One of the two runs, read batch by batch.
-struct Side {
-    engine: Engine,
-    replay: Replay<BufReader<File>>,
-    _folder: Folder,
-}
-
-impl Side {
-    fn open(path: &Path) -> Result<Side, CompareError> {
-        let folder = Folder::open(path)?;
-        let manifest = folder.manifest()?;
-        let shard = manifest.shard.parse().map_err(|e: super::ShardError| FolderError::Damaged {
-            path: folder.file("manifest.json"),
-            what: e.to_string(),
-        })?;
-        let engine = Engine::new(&folder.read("spec.toml")?, shard).map_err(RunError::from)?;
-        let name = folder.file("trials.csv");
-        let file = File::open(&name).map_err(|source| Located { path: name.clone(), source });
-        let mut replay = Replay::new(BufReader::new(file.map_err(FolderError::from)?), name);
-        replay.expect_header(&tables::header(&engine.quantities))?;
-        Ok(Side { engine, replay, _folder: folder })
-    }
-
-    fn next(&mut self) -> Result<Option<Batch>, CompareError> {
-        let Some((cell, batch)) = self.engine.next() else { return Ok(None) };
-        let Some(trials) = self.replay.trials(&self.engine)? else { return Ok(None) };
-        self.engine.absorb((cell, batch), &trials);
-        Ok(Some(((batch, cell), trials)))
-    }
-}
-
 /// Compares the runs in two folders. The intervals are widened so that all together raise a false alarm as rarely as one of the first
 /// run's own intervals (Bonferroni).
 pub fn compare(first: &Path, second: &Path) -> Result<Comparison, CompareError> {
-    let (mut a, mut b) = (Side::open(first)?, Side::open(second)?);
+    let (mut a, mut b) = (Reading::open(first)?, Reading::open(second)?);
     check_pairing(&a.engine, &b.engine)?;
     let shared: Vec<(Quantity, usize, usize)> = a
         .engine
@@ -161,13 +128,14 @@ pub fn compare(first: &Path, second: &Path) -> Result<Comparison, CompareError> 
     let mut pairs = vec![Pairs::default(); cells * shared.len()];
     let mut only = vec![(0, 0); cells];
     let (mut left, mut right) = (a.next()?, b.next()?);
-    while let (Some((at, ours)), Some((bt, theirs))) = (&left, &right) {
-        if at == bt {
-            let sums = &mut pairs[at.1 * shared.len()..][..shared.len()];
-            ours.iter().zip(theirs).for_each(|(x, y)| add(x, y, &shared, sums, &mut only[at.1]));
+    while let (Some(((cell, batch), ours)), Some(((other, its_batch), theirs))) = (&left, &right) {
+        let order = (batch, cell).cmp(&(its_batch, other));
+        if order.is_eq() {
+            let sums = &mut pairs[cell * shared.len()..][..shared.len()];
+            ours.iter().zip(theirs).for_each(|(x, y)| add(x, y, &shared, sums, &mut only[*cell]));
         }
         // A cell that ended early in one run has batches without partner in the other.
-        match at.cmp(bt) {
+        match order {
             std::cmp::Ordering::Less => left = a.next()?,
             std::cmp::Ordering::Greater => right = b.next()?,
             std::cmp::Ordering::Equal => (left, right) = (a.next()?, b.next()?),

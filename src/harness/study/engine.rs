@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A study in progress: what is done, and what comes next.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Engine {
     /// The study.
     pub spec: Spec,
@@ -80,6 +80,13 @@ impl Engine {
         let tallies = cells.iter().map(Tally::new).collect();
         let finished = vec![false; cells.len()];
         Ok(Engine { spec, quantities, tallies, finished, cells, shard, batches: 0, round: 0, place: 0 })
+    }
+
+    /// The same study's beginning in another part.
+    pub(super) fn for_shard(&self, shard: Shard) -> Engine {
+        let tallies = self.cells.iter().map(Tally::new).collect();
+        let finished = vec![false; self.cells.len()];
+        Engine { shard, tallies, finished, batches: 0, round: 0, place: 0, ..self.clone() }
     }
 
     /// Cell and batch that come next; `None` at the end.

@@ -18,7 +18,6 @@ pub(in crate::harness::cli) struct Arguments {
 impl From<CompareError> for Failure {
     fn from(error: CompareError) -> Failure {
         match error {
-            CompareError::Folder(error) => error.into(),
             CompareError::Run(error) => error.into(),
             other => Failure::usage(other.to_string()),
         }

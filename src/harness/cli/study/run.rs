@@ -4,7 +4,7 @@ use super::{Failure, read};
 use crate::harness::cli::{Exit, print, warn};
 use crate::harness::project::Project;
 use crate::harness::study::{
-    Engine, Folder, Interruption, Manifest, Outcome, RunError, Shard, Summary, finish, merge,
+    Engine, Folder, Interruption, Manifest, Outcome, RunError, Shard, Summary, TrialFile, finish, merge,
 };
 use crate::harness::{ProgressDisplay, provenance, significant};
 use std::path::{Path, PathBuf};
@@ -22,6 +22,9 @@ pub(in crate::harness::cli) struct Arguments {
     /// Part i of n, from 0: batches are dealt out in turn, whole cells where the study stops at a precision
     #[arg(long, value_name = "i/n", default_value_t = Shard::WHOLE)]
     shard: Shard,
+    /// File of the trials: csv, or parquet where this program was built with that feature
+    #[arg(long, value_name = "csv|parquet", default_value_t = TrialFile::Csv)]
+    trials: TrialFile,
 }
 
 #[derive(Debug, clap::Args)]
@@ -38,29 +41,34 @@ pub(in crate::harness::cli) struct MergeArguments {
     /// Folder for the whole
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// File of the trials, csv or parquet [default: as in the first shard]
+    #[arg(long, value_name = "csv|parquet")]
+    trials: Option<TrialFile>,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
+    arguments.trials.check()?;
     let text = read(&arguments.spec)?;
     let engine = Engine::new(&text, arguments.shard)
         .map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.display())))?;
     let out = arguments.out.clone().unwrap_or_else(|| default_folder(&engine));
     let manifest = Manifest::new(&engine.spec, arguments.shard, commit().as_ref());
+    let manifest = manifest.with_trials(arguments.trials);
     let folder = Folder::create(&out, &text, &manifest)?;
     drive(&folder, engine)
 }
 
 pub(super) fn resume(arguments: &ResumeArguments) -> Result<Exit, Failure> {
     let folder = Folder::open(&arguments.run)?;
-    let shard =
-        folder.manifest()?.shard.parse().map_err(|e| Failure::usage(format!("manifest.json: {e}")))?;
+    folder.manifest()?.trials.check()?;
+    let shard = folder.shard()?;
     let engine = Engine::new(&folder.read("spec.toml")?, shard).map_err(RunError::from)?;
     folder.check(&Manifest::new(&engine.spec, shard, None))?;
     drive(&folder, engine)
 }
 
 pub(super) fn merge_parts(arguments: &MergeArguments) -> Result<Exit, Failure> {
-    let (folder, engine) = merge(&arguments.parts, &arguments.out)?;
+    let (folder, engine) = merge(&arguments.parts, &arguments.out, arguments.trials)?;
     let summary = finish(&folder, &engine)?;
     tell(&folder, &engine, &summary);
     Ok(Exit::Held)
