@@ -77,6 +77,35 @@ fn a_precision_ends_cells_at_a_batch_and_before_the_most() {
 }
 
 #[test]
+fn progress_counts_to_what_there_will_be_and_names_the_worst_cell() {
+    let path = scratch("pace");
+    // The first cell's views face the camera: nothing converges there.
+    let text = with_precision()
+        .replace("name = \"noise\"", "name = \"tilt\"")
+        .replace(
+            "set = [\"scene.noise_px\"]",
+            "set = [\"scene.poses.tilt_min_deg\", \"scene.poses.tilt_deg\"]",
+        )
+        .replace("levels = [0.1, 0.3]", "levels = [[0.0, 0.0], [10.0, 35.0]]");
+    let (folder, mut engine) = begin(&path, &text, Shard::WHOLE);
+    let mut paces = Vec::new();
+    folder.run(&mut engine, &AtomicBool::new(false), |pace| paces.push(pace.clone())).unwrap();
+    let last = paces.last().unwrap();
+    assert_eq!((last.trials, last.expected), (engine.trials(), engine.trials()));
+    assert!(
+        last.expected > 200 && last.expected < 400,
+        "one cell takes its 200, the other ends early: {last:?}"
+    );
+    for pace in &paces[1..] {
+        let worst = pace.worst.as_ref().unwrap();
+        assert_eq!((worst.quantity, worst.relative_half_width), ("fx", None), "{worst:?}");
+        assert!(worst.cell.starts_with("tilt = [0"), "{worst:?}");
+    }
+    drop(folder);
+    fs::remove_dir_all(path).unwrap();
+}
+
+#[test]
 fn parts_that_make_no_whole_are_refused() {
     let paths = [scratch("a"), scratch("b"), scratch("c"), scratch("other")];
     for (index, path) in paths[..2].iter().enumerate() {

@@ -91,6 +91,11 @@ impl Grid<'_> {
         self.summary.cells[cell].of(quantity.name())
     }
 
+    /// What the bars of a plot are.
+    fn bars(&self) -> String {
+        format!("Bars are {} % intervals.", libm::round(1e6 * self.engine.spec.confidence) / 1e4)
+    }
+
     fn caption(&self, what: &str) -> String {
         let spec = &self.engine.spec;
         let trials: Vec<u64> = self.summary.cells.iter().map(|c| c.trials).collect();
@@ -98,9 +103,8 @@ impl Grid<'_> {
             (trials.iter().min().copied().unwrap_or(0), trials.iter().max().copied().unwrap_or(0));
         let trials = if least == most { format!("{most}") } else { format!("{least} to {most}") };
         format!(
-            "{what} {trials} trials a cell, seed {}, bars are {:.0} % intervals. Statistics are of the trials that converged.",
-            spec.seed,
-            100.0 * spec.confidence
+            "{what} {trials} trials a cell, seed {}. Statistics are of the trials that converged.",
+            spec.seed
         )
     }
 
@@ -109,10 +113,11 @@ impl Grid<'_> {
         let series = self.series(x);
         let panels: Vec<Plot> =
             self.errors().map(|quantity| self.spread_panel(x, &series, quantity)).collect();
-        let caption = self.caption(
-            "Standard deviation of the error of each quantity (marks) and its Cramer-Rao bound (lines). Notice where the \
-             marks leave the line: there the first-order theory ends.",
-        );
+        let caption = self.caption(&format!(
+            "Standard deviation of the error of each quantity (marks) and its Cramer-Rao bound (lines), which holds for Gaussian noise \
+             without gross errors. Notice where the marks leave the line. {}",
+            self.bars()
+        ));
         Figure::panels("spread", &panels, panels.len().min(3), caption)
     }
 
@@ -171,7 +176,10 @@ impl Grid<'_> {
         Some(Figure::plot(
             "converged",
             &plot,
-            self.caption("Share of trials that found a minimum; the others are counted by reason."),
+            self.caption(&format!(
+                "Share of trials that found a minimum; the others are counted by reason. {}",
+                self.bars()
+            )),
         ))
     }
 
@@ -268,7 +276,8 @@ impl Grid<'_> {
         };
         let panels: Vec<Plot> = self.errors().map(panel).collect();
         let what = format!(
-            "Quantiles of the errors at the shares {SHARES:?}, and those of a normal distribution with the Cramer-Rao bound's spread."
+            "Quantiles of the errors at the shares {SHARES:?}, and those of a normal distribution with the Cramer-Rao bound's spread. {}",
+            self.bars()
         );
         Figure::panels("errors", &panels, panels.len().min(3), self.caption(&what))
     }

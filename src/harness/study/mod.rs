@@ -46,7 +46,7 @@ mod within;
 
 pub use accumulate::Tally;
 pub use cells::Cell;
-pub use engine::{Engine, Interruption, Outcome, Pace, RunError, in_memory, in_memory_seeing};
+pub use engine::{Engine, Interruption, Outcome, Pace, RunError, Worst, in_memory, in_memory_seeing};
 pub use fingerprint::Fingerprint;
 pub use finish::finish;
 pub use folder::{Folder, FolderError, Located};

@@ -4,7 +4,8 @@ use super::{Failure, read};
 use crate::harness::cli::{Exit, print, warn};
 use crate::harness::project::Project;
 use crate::harness::study::{
-    Engine, Folder, Interruption, Manifest, Outcome, RunError, Shard, Summary, TrialFile, finish, merge,
+    Engine, Folder, Interruption, Manifest, Outcome, RunError, Shard, Summary, TrialFile, Worst, finish,
+    merge,
 };
 use crate::harness::{ProgressDisplay, provenance, significant};
 use std::path::{Path, PathBuf};
@@ -110,12 +111,11 @@ fn drive(folder: &Folder, mut engine: Engine) -> Result<Exit, Failure> {
     let (started, mut told) = (Instant::now(), None);
     let outcome = folder.run(&mut engine, &stop, |pace| {
         if told.is_none() {
-            progress.advance(pace.before as usize);
+            progress.already(pace.before as usize);
         }
+        progress.expect(pace.expected as usize);
+        progress.note(&pace.worst.as_ref().map_or_else(String::new, worst));
         progress.advance((pace.trials - told.unwrap_or(0)) as usize);
-        if let Some((cell, width)) = &pace.worst {
-            progress.note(&format!("worst {cell}: \u{b1}{} %", significant(100.0 * width, 2)));
-        }
         told = Some(pace.trials);
     })?;
     drop(progress);
@@ -136,6 +136,17 @@ fn drive(folder: &Folder, mut engine: Engine) -> Result<Exit, Failure> {
         print(&format!("{trials} trials in {seconds:.1} s: {rate:.0} a second on {cores} thread(s)\n"));
     }
     Ok(Exit::Held)
+}
+
+/// `worst: sd(fx) +-8.2 % at tilt = 40`.
+fn worst(worst: &Worst) -> String {
+    match worst.relative_half_width {
+        Some(width) => {
+            let percent = significant(100.0 * width, 2);
+            format!("worst: sd({}) \u{b1}{percent} % at {}", worst.quantity, worst.cell)
+        }
+        None => format!("worst: too few trials converge at {}", worst.cell),
+    }
 }
 
 /// A few lines for the terminal; everything stands in the report.
