@@ -8,13 +8,13 @@ use super::summary::{CellSummary, Statistic, Summary};
 use crate::harness::{Figure, significant};
 use std::fmt::Write;
 
-/// Wide tables and figures scroll within the page, which never does: on a phone figures keep a size at which they can be read.
+/// Wide tables and figures scroll within the page, which never does: figures keep a size at which they can be read.
 const STYLE: &str = "body{font:15px/1.5 sans-serif;max-width:1280px;margin:2em auto;padding:0 1em;color:#1a1a1a}\
 h1{font-size:1.6em;margin-bottom:.2em}h2{font-size:1.2em;margin-top:2em}\
 table{border-collapse:collapse;margin:.5em 0;font-variant-numeric:tabular-nums;font-size:13px}\
 th,td{padding:.15em .7em;text-align:right;border-bottom:1px solid #ddd;white-space:nowrap}\
 th:first-child,td:first-child{text-align:left}thead th{border-bottom:2px solid #888}td small{color:#555}\
-.wide{overflow-x:auto}figure{margin:1em 0}figure svg{width:100%;min-width:900px;height:auto}\
+.wide{overflow-x:auto}figure{margin:1em 0}figure svg{max-width:none}\
 figcaption{color:#444;font-size:14px}\
 pre{background:#f5f5f5;padding:1em;overflow:auto;font-size:13px}.low{color:#666}.hash{word-break:break-all;white-space:normal}";
 
