@@ -1,7 +1,8 @@
 //! From correspondences to a camera with its uncertainty: the steps of Zhang's method in order.
 
+use super::Termination;
 use super::conditioning::Conditioning;
-use super::minimise::{Minimum, Problem, State, Termination};
+use super::minimise::{Minimum, Problem, State};
 use super::normal::Observations;
 use super::report::{STRONG_CORRELATION, UNCERTAIN_FOCAL};
 use super::{
