@@ -220,6 +220,31 @@ fn of_two_paired_runs_the_quieter_is_found_better_and_a_copy_is_not() {
     paths.iter().for_each(|p| fs::remove_dir_all(p).unwrap());
 }
 
+#[test]
+fn levels_of_a_factor_are_paired_within_a_run() {
+    use calibench::harness::study::compare::{CompareError, Verdict, compare_levels};
+    let (path, alone) = (scratch("levels"), scratch("levels-alone"));
+    let loss = "[[factor]]\nname = \"loss\"\nset = [\"estimator.loss\"]\nlevels = [{ kind = \"squares\" }, { kind = \"huber\", delta_px = 9.0 }]\n";
+    let text = format!("{SPEC}\n{loss}");
+    run(&path, &text, Shard::WHOLE);
+    let noise = compare_levels(&path, "noise").unwrap();
+    assert_eq!(noise.effects.len(), 14, "the louder of two noises, with two losses, seven errors each");
+    for e in &noise.effects {
+        // To first order three times the noise is three times the error; the second order is a few percent at 0.3 px.
+        assert!(e.verdict == Verdict::FirstBetter && (e.ratio.value - 3.0).abs() < 0.3, "{e:?}");
+    }
+    let losses = compare_levels(&path, "loss").unwrap();
+    // Huber's loss beyond all residuals is least squares.
+    assert!(
+        losses.effects.iter().all(|e| e.verdict == Verdict::NotTold && (e.ratio.value - 1.0).abs() < 1e-6)
+    );
+    let error = compare_levels(&path, "lens").unwrap_err();
+    assert!(matches!(&error, CompareError::Factor { known, .. } if known == "noise, loss"), "{error}");
+    run(&alone, &text.replace("seed = 11", "seed = 11\ncommon_random_numbers = false"), Shard::WHOLE);
+    assert!(matches!(compare_levels(&alone, "loss"), Err(CompareError::NotCommon { .. })));
+    [path, alone].iter().for_each(|p| fs::remove_dir_all(p).unwrap());
+}
+
 /// Long enough to be killed on the way, on a fast machine too.
 fn long_spec() -> String {
     SPEC.replace("per_cell = 45", "per_cell = 600").replace("batch = 10", "batch = 25")

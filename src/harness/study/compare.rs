@@ -8,7 +8,8 @@ use super::reading::Reading;
 use super::trial::Trial;
 use crate::evaluate::distribution::normal_two_sided;
 use crate::evaluate::interval::each_of;
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 /// Runs that cannot be compared.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +26,22 @@ pub enum CompareError {
         a: String,
         /// In the second.
         b: String,
+    },
+    /// Cells that draw numbers of their own.
+    #[error("the cells of {path} draw noise of their own (common_random_numbers = false): their trials are no pairs", path = path.display())]
+    NotCommon {
+        /// The run.
+        path: PathBuf,
+    },
+    /// No such factor.
+    #[error("`{factor}` is no factor of {path}; there are: {known}", path = path.display())]
+    Factor {
+        /// The run.
+        path: PathBuf,
+        /// As asked.
+        factor: String,
+        /// Those that are.
+        known: String,
     },
 }
 
@@ -141,7 +158,49 @@ pub fn compare(first: &Path, second: &Path) -> Result<Comparison, CompareError> 
             std::cmp::Ordering::Equal => (left, right) = (a.next()?, b.next()?),
         }
     }
-    Ok(conclude(&a.engine, &b.engine, &shared, &pairs, &only))
+    let name = |cell: usize| match (&a.engine.cells[cell].name, &b.engine.cells[cell].name) {
+        (x, y) if x == y => x.clone(),
+        (x, y) => format!("{x} | {y}"),
+    };
+    let names: Vec<String> = (0..cells).map(name).collect();
+    Ok(conclude(&names, &shared, &pairs, &only, 1.0 - a.engine.spec.confidence))
+}
+
+/// Compares the levels of a factor within the run in a folder: each cell with that of the factor's first level and the same levels
+/// of the others, trial by trial. The first of a pair is the cell of the first level.
+pub fn compare_levels(path: &Path, factor: &str) -> Result<Comparison, CompareError> {
+    let mut run = Reading::open(path)?;
+    let spec = &run.engine.spec;
+    if !spec.common_random_numbers {
+        return Err(CompareError::NotCommon { path: path.to_path_buf() });
+    }
+    let at = spec.factor.iter().position(|f| f.name == factor).ok_or_else(|| CompareError::Factor {
+        path: path.to_path_buf(),
+        factor: factor.to_string(),
+        known: spec.factor.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", "),
+    })?;
+    let after: usize = spec.factor[at + 1..].iter().map(|f| f.levels.len()).product();
+    // Cells are numbered in mixed radix, so the first level's comes first in every round.
+    let levels: Vec<usize> = run.engine.cells.iter().map(|cell| cell.levels[at]).collect();
+    let errors = run.engine.quantities.iter().enumerate().filter(|(_, q)| q.is_error());
+    let shared: Vec<(Quantity, usize, usize)> = errors.map(|(i, q)| (*q, i, i)).collect();
+    let names: Vec<String> = run.engine.cells.iter().map(|cell| cell.name.clone()).collect();
+    let false_alarm = 1.0 - spec.confidence;
+    let mut pairs = vec![Pairs::default(); names.len() * shared.len()];
+    let mut only = vec![(0, 0); names.len()];
+    let (mut round, mut firsts) = (0, BTreeMap::new());
+    while let Some(((cell, batch), trials)) = run.next()? {
+        if batch != round {
+            (round, firsts) = (batch, BTreeMap::new());
+        }
+        if levels[cell] == 0 {
+            firsts.insert(cell, trials);
+        } else if let Some(first) = firsts.get(&(cell - levels[cell] * after)) {
+            let sums = &mut pairs[cell * shared.len()..][..shared.len()];
+            first.iter().zip(&trials).for_each(|(x, y)| add(x, y, &shared, sums, &mut only[cell]));
+        }
+    }
+    Ok(conclude(&names, &shared, &pairs, &only, false_alarm))
 }
 
 fn check_pairing(a: &Engine, b: &Engine) -> Result<(), CompareError> {
@@ -169,18 +228,14 @@ fn add(a: &Trial, b: &Trial, shared: &[(Quantity, usize, usize)], sums: &mut [Pa
 }
 
 fn conclude(
-    a: &Engine,
-    b: &Engine,
+    names: &[String],
     shared: &[(Quantity, usize, usize)],
     pairs: &[Pairs],
     only: &[(u64, u64)],
+    false_alarm: f64,
 ) -> Comparison {
     let told = pairs.iter().filter(|p| p.count >= 4).count();
-    let each = each_of(told, 1.0 - a.spec.confidence);
-    let name = |cell: usize| match (&a.cells[cell].name, &b.cells[cell].name) {
-        (x, y) if x == y => x.clone(),
-        (x, y) => format!("{x} | {y}"),
-    };
+    let each = each_of(told, false_alarm);
     let mut effects = Vec::new();
     for (cell, sums) in pairs.chunks(shared.len().max(1)).enumerate() {
         for ((quantity, _, _), sum) in shared.iter().zip(sums) {
@@ -192,7 +247,7 @@ fn conclude(
             };
             let rms = [sum.a, sum.b].map(|s| (s / sum.count as f64).sqrt());
             effects.push(Effect {
-                cell: name(cell),
+                cell: names[cell].clone(),
                 quantity: *quantity,
                 pairs: sum.count,
                 rms,
@@ -201,7 +256,7 @@ fn conclude(
             });
         }
     }
-    let only = only.iter().enumerate().map(|(cell, o)| (name(cell), o.0, o.1)).collect();
+    let only = only.iter().zip(names).map(|(o, name)| (name.clone(), o.0, o.1)).collect();
     Comparison { effects, only, each }
 }
 

@@ -171,6 +171,13 @@ impl Engine {
         Some(Worst { cell, quantity: quantity.name(), relative_half_width })
     }
 
+    /// Cells of this part that took all their trials and are not as precise as was wanted.
+    pub fn imprecise(&self) -> Vec<&Cell> {
+        let held = |cell: &&Cell| self.shard.holds(cell.index, 0, self.cells.len(), true);
+        let wanted = self.spec.trials.precision.is_some();
+        self.cells.iter().filter(|cell| wanted && held(cell) && !self.is_precise(cell.index)).collect()
+    }
+
     /// Trials at the end, see [`Pace::expected`].
     fn expected_trials(&self) -> u64 {
         let Some(precision) = &self.spec.trials.precision else { return self.most_trials() };

@@ -39,6 +39,13 @@ pub(super) fn page(
         percent(summary.confidence),
         if engine.shard == Shard::WHOLE { String::new() } else { format!(" Part {} only.", engine.shard) },
     ));
+    let imprecise: Vec<String> = engine.imprecise().iter().map(|cell| escape(&cell.name)).collect();
+    if !imprecise.is_empty() {
+        page.push_str(&format!(
+            "<p>Not as precise as wanted after all trials: {}.</p>\n",
+            imprecise.join("; ")
+        ));
+    }
     page.push_str("<h2>Figures</h2>\n");
     for figure in figures {
         let drawing = String::from_utf8_lossy(&figure.bytes);

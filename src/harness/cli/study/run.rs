@@ -173,6 +173,17 @@ fn tell(folder: &Folder, engine: &Engine, summary: &Summary) {
         });
         print(&format!("{} ({} trials){spread}{failed}\n", cell.name, cell.trials));
     }
+    if let Some(precision) = &engine.spec.trials.precision {
+        for cell in engine.imprecise() {
+            print(&format!(
+                "{}: sd({}) is not known to {} % after {} trials\n",
+                cell.name,
+                precision.quantity,
+                significant(100.0 * precision.relative_half_width, 3),
+                engine.spec.trials.per_cell
+            ));
+        }
+    }
     let report: &Path = &folder.file("report.html");
     print(&format!("{} trials; written: {}\n", engine.trials(), report.display()));
 }
