@@ -128,6 +128,11 @@ fn parts_that_make_no_whole_are_refused() {
     run(&paths[3], &SPEC.replace("seed = 11", "seed = 12"), Shard { index: 2, count: 3 });
     let error = refuse(&[&paths[0], &paths[1], &paths[3]]);
     assert!(error.to_string().contains("spec.seed: was 11, is 12"), "{error}");
+    let manifest = paths[1].join("manifest.json");
+    let text = fs::read_to_string(&manifest).unwrap();
+    fs::write(&manifest, text.replace("\"behaviour\": \"", "\"behaviour\": \"0")).unwrap();
+    let error = refuse(&[&paths[0], &paths[1], &paths[3]]);
+    assert!(error.to_string().contains("code.behaviour"), "{error}");
     // A folder is locked while it is open, so the same part twice is refused as in use.
     assert!(merge(&[paths[0].clone(), paths[0].clone()], &scratch("twice"), None).is_err());
     paths.iter().for_each(|p| fs::remove_dir_all(p).unwrap());

@@ -9,6 +9,8 @@ use crate::harness::{Dash, Figure, HeatMap, Look, Plot};
 
 /// Series beyond this number cannot be told apart in one plot.
 const MOST_SERIES: usize = 6;
+/// Width of a page on a desktop, px: three panels of 400.
+const PAGE: f64 = 1200.0;
 /// Axes that span more than this are logarithmic.
 const WIDE: f64 = 4.0;
 
@@ -219,6 +221,7 @@ impl Grid<'_> {
     fn maps(&self) -> Option<Figure> {
         let [across, up] = [&self.engine.spec.factor[1], &self.engine.spec.factor[0]];
         let labels = |f: &super::factor::Factor| (0..f.levels.len()).map(|l| f.label(l)).collect::<Vec<_>>();
+        let width = (170.0 + 62.0 * across.levels.len() as f64).max(400.0);
         let panels: Vec<Plot> = self
             .errors()
             .filter_map(|q| {
@@ -231,14 +234,11 @@ impl Grid<'_> {
                 let named = |f: &super::factor::Factor| {
                     if f.unit.is_empty() { f.name.clone() } else { format!("{} ({})", f.name, f.unit) }
                 };
-                let width = 170.0 + 62.0 * across.levels.len() as f64;
-                Some(
-                    Plot::heat_map(format!("{} error", q.name()), named(across), named(up), heat)
-                        .size(width.max(420.0), 340.0),
-                )
+                let title = format!("{} error", q.name());
+                Some(Plot::heat_map(title, named(across), named(up), heat).size(width, 340.0))
             })
             .collect();
-        let columns = panels.len().min(3);
+        let columns = ((PAGE / width) as usize).clamp(1, panels.len().max(1));
         (!panels.is_empty()).then(|| {
             Figure::panels(
                 "map",

@@ -74,6 +74,8 @@ pub fn merge(
     let text = first.folder.read("spec.toml")?;
     let mut whole = Engine::new(&text, Shard::WHOLE).map_err(RunError::from)?;
     let manifest = Manifest::new(&whole.spec, Shard::WHOLE, commit(&parts).as_ref()).with_trials(trials);
+    // Bounds and statistics of the whole come from this code, its trials from that of the parts: the manifest names one.
+    first.folder.check(&manifest)?;
     let shards: Vec<Shard> = parts.iter().map(|part| part.shard).collect();
     let mut readings = parts
         .into_iter()
