@@ -98,8 +98,9 @@ mod tests {
                 let columns = if rows.contains(&row) { region.columns(row, 60) } else { 0..0 };
                 for column in 0..60 {
                     let p = Vec2::new(column as f64, row as f64) - centre;
-                    let (along, across) = (c * p.x + s * p.y, c * p.y - s * p.x);
-                    let rho_sq = (along / (a + c_px)).powi(2) + (across / (b + c_px)).powi(2);
+                    let along = (c * p.x + s * p.y) / (a + c_px);
+                    let across = (c * p.y - s * p.x) / (b + c_px);
+                    let rho_sq = along * along + across * across;
                     // Pixels on the outline belong to either side.
                     prop_assert!((rho_sq - 1.0).abs() < 1e-9 || columns.contains(&column) == (rho_sq < 1.0));
                 }
