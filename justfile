@@ -28,6 +28,11 @@ check:
 reproducible:
     bash .ci/reproducible
 
+# Studies on a Slurm and a Dask of this machine alone
+cluster:
+    bash .ci/slurm
+    bash .ci/dask
+
 # Every experiment, figure and table, and the reconciliation
 all:
     cargo run --release --locked

@@ -4,10 +4,11 @@
 #[path = "../experiments/table.rs"]
 mod table;
 
-use calibench::harness::{Context, Record, golden, verdict::Verdict};
+use calibench::harness::{Context, Record, golden, published, verdict::Verdict};
 use insta::comparator::Comparator;
 use insta::internals::SnapshotContents;
 use insta::{Settings, Snapshot};
+use std::sync::LazyLock;
 
 /// Compares snapshots number by number, each within the band that stands in the golden one.
 #[derive(Clone)]
@@ -35,6 +36,9 @@ fn records() -> Vec<Record> {
     table::EXPERIMENTS.iter().map(run).collect()
 }
 
+/// Run once for all tests that only look at them.
+static RECORDS: LazyLock<Vec<Record>> = LazyLock::new(records);
+
 #[test]
 fn every_number_lies_in_the_band_of_its_golden_snapshot() {
     let mut settings = Settings::clone_current();
@@ -43,20 +47,31 @@ fn every_number_lies_in_the_band_of_its_golden_snapshot() {
     settings.set_omit_expression(true);
     settings.set_comparator(Box::new(WithinBands));
     settings.bind(|| {
-        for record in records() {
-            insta::assert_snapshot!(record.experiment(), golden::snapshot(&record));
+        for record in RECORDS.iter() {
+            insta::assert_snapshot!(record.experiment(), golden::snapshot(record));
         }
     });
 }
 
 #[test]
 fn every_claim_and_every_published_value_holds() {
-    let deviations: Vec<String> = records()
+    let deviations: Vec<String> = RECORDS
         .iter()
         .map(|record| Verdict::of(record, None, false))
         .flat_map(|verdict| verdict.deviations)
         .collect();
     assert!(deviations.is_empty(), "{}", deviations.join("\n"));
+}
+
+#[test]
+fn every_published_value_is_reconciled_exactly_once() {
+    let reconciliations = RECORDS.iter().flat_map(|record| record.reconciliations());
+    let mut reconciled: Vec<&str> = reconciliations.map(|r| r.entry.id.as_str()).collect();
+    let published = published::chapter().expect("golden/published.toml is well formed");
+    let mut listed: Vec<&str> = published.iter().map(|entry| entry.id.as_str()).collect();
+    reconciled.sort_unstable();
+    listed.sort_unstable();
+    assert_eq!(reconciled, listed);
 }
 
 #[test]

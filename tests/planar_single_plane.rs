@@ -1,7 +1,8 @@
 //! Does the single-plane calibration recover a lens from one view, with the residuals and the spread that theory predicts?
 
+use calibench::calibrate::Termination;
 use calibench::calibrate::single_plane::{
-    SinglePlane, SinglePlaneError, SinglePlaneOptions, Termination, calibrate_single_plane, predicted_rms_px,
+    SinglePlane, SinglePlaneError, SinglePlaneOptions, calibrate_single_plane, predicted_rms_px,
 };
 use calibench::camera::{BrownConrady, Camera};
 use calibench::geometry::Vec2;

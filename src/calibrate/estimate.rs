@@ -1,7 +1,8 @@
 //! From correspondences to a camera with its uncertainty: the steps of Zhang's method in order.
 
+use super::Termination;
 use super::conditioning::Conditioning;
-use super::minimise::{Minimum, Problem, State, Termination};
+use super::minimise::{Minimum, Problem, State};
 use super::normal::Observations;
 use super::report::{STRONG_CORRELATION, UNCERTAIN_FOCAL};
 use super::{
@@ -254,21 +255,22 @@ impl Fit {
 
 /// Factor of the unit covariance: the residual variance, or Huber's correction for a robust loss.
 ///
-/// The weighted normal matrix is `sum w J^T J`; with `m = mean w` it stands for `m J^T J`, so the sandwich
-/// `sum w^2 r^2 / m^2 (J^T J)^-1` is `sum w^2 r^2 / m` times its inverse.
+/// The weighted normal matrix is `sum w J^T J`; with `mean w` it stands for `mean w J^T J`, so the sandwich
+/// `sum w^2 r^2 / (mean psi')^2 (J^T J)^-1` is `sum w^2 r^2 mean w / (mean psi')^2` times its inverse.
 fn noise_variance(residuals: &[Vec<Vec2>], square: f64, loss: Loss, freedom: f64) -> f64 {
     if loss == Loss::Squares {
         return square / freedom;
     }
-    let (mut square, mut weights, mut count) = (0.0, 0.0, 0.0);
+    let (mut square, mut weights, mut slopes, mut count) = (0.0, 0.0, 0.0, 0.0);
     for r in residuals.iter().flatten() {
         let s = r.norm_squared();
         let weight = loss.at(s).1;
         square += weight * weight * s;
         weights += weight;
+        slopes += loss.slope(s);
         count += 1.0;
     }
-    square / freedom * count / weights
+    square / freedom * weights * count / (slopes * slopes)
 }
 
 fn warnings(calibration: &Calibration, largest_radius: f64) -> Vec<Warning> {

@@ -7,8 +7,9 @@
 //! not, and if the parameters could not be identified were the planes parallel, the data are refused.
 
 use super::CalibrationError;
+use super::Termination;
 use super::conditioning::{Conditioning, WeakComponent};
-use super::minimise::{Minimum, Problem, State, Termination};
+use super::minimise::{Minimum, Problem, State};
 use super::normal::Observations;
 use super::system::System;
 use crate::geometry::{Pose, Vec2, Vec3, rotation};

@@ -19,6 +19,7 @@ mod settings;
 pub mod single_plane;
 mod start;
 mod system;
+mod termination;
 
 pub use closed_form::{ClosedFormError, closed_form, pose_from_homography};
 pub use conditioning::{Conditioning, WeakComponent};
@@ -26,8 +27,8 @@ pub use covariance::Covariance;
 pub use error::CalibrationError;
 pub use estimate::calibrate;
 pub use loss::Loss;
-pub use minimise::Termination;
 pub use normal::information;
 pub use report::{Calibration, Warning};
 pub use settings::Settings;
 pub use system::System;
+pub use termination::Termination;

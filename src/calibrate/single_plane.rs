@@ -12,6 +12,7 @@
 mod model;
 mod refine;
 
+use super::Termination;
 use crate::camera::{BrownConrady, Camera, UndistortError};
 use crate::geometry::projective_frame::change_frames;
 use crate::geometry::{Homography, HomographyError, Mat3, Vec2};
@@ -19,7 +20,6 @@ use crate::target::View;
 use model::{Frames, PARAMETERS, ParameterVector};
 use nalgebra::{DMatrix, Matrix4, SMatrix};
 use refine::Outcome;
-pub use refine::Termination;
 
 /// What is given, and what is sought.
 #[derive(Debug, Clone, Copy, PartialEq)]

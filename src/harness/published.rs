@@ -58,6 +58,9 @@ pub enum PublishedError {
         /// What stands there.
         printed: String,
     },
+    /// No entry of that id.
+    #[error("golden/published.toml has no value `{0}`")]
+    Unknown(String),
     /// An id that is not `<experiment>.<number>`, or stands twice.
     #[error("golden/published.toml: id `{id}` {problem}")]
     Id {
@@ -138,6 +141,12 @@ pub fn chapter() -> Result<&'static [Entry], PublishedError> {
     static ENTRIES: OnceLock<Result<Vec<Entry>, PublishedError>> = OnceLock::new();
     let entries = ENTRIES.get_or_init(|| parse(include_str!("../../golden/published.toml")));
     entries.as_deref().map_err(Clone::clone)
+}
+
+/// The chapter's value with the id `experiment.number`.
+pub fn entry(experiment: &str, number: &str) -> Result<&'static Entry, PublishedError> {
+    let id = format!("{experiment}.{number}");
+    chapter()?.iter().find(|entry| entry.id == id).ok_or(PublishedError::Unknown(id))
 }
 
 #[cfg(test)]

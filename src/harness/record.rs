@@ -71,9 +71,6 @@ pub enum RecordError {
     /// The number to reconcile is not in the record.
     #[error("number `{0}` is not in the record yet: add it before it is reconciled")]
     NoSuchNumber(String),
-    /// The book does not print it.
-    #[error("golden/published.toml has no value `{0}`")]
-    NotPublished(String),
     /// A number is reconciled by another rule than its kind asks for.
     #[error("published value `{id}` is {}, but was reconciled as {}", expected.name(), got.name())]
     Kind {
@@ -191,19 +188,13 @@ impl Record {
 
     /// The value that the book prints for number `id`, to be drawn beside ours.
     pub fn printed(&self, id: &str) -> Result<f64, RecordError> {
-        Ok(self.entry(id)?.value())
-    }
-
-    fn entry(&self, id: &str) -> Result<&'static Entry, RecordError> {
-        let full = format!("{}.{id}", self.experiment);
-        let entry = published::chapter()?.iter().find(|e| e.id == full);
-        entry.ok_or(RecordError::NotPublished(full))
+        Ok(published::entry(&self.experiment, id)?.value())
     }
 
     /// The published value that number `id` reconciles, with the number's value.
     fn published(&self, id: &str, got: Kind) -> Result<(&'static Entry, f64), RecordError> {
         let ours = self.value(id).ok_or_else(|| RecordError::NoSuchNumber(id.to_string()))?;
-        let entry = self.entry(id)?;
+        let entry = published::entry(&self.experiment, id)?;
         if entry.kind != got {
             return Err(RecordError::Kind { id: entry.id.clone(), expected: entry.kind, got });
         }
@@ -323,7 +314,10 @@ mod tests {
         assert_eq!(missing, Err(RecordError::NoSuchNumber("max-deviation".into())));
         record.number("max-deviation", 4.677_75, "px", Band::Exact, "");
         record.number("other", 1.0, "px", Band::Exact, "");
-        assert!(matches!(record.reconcile_exact("other"), Err(RecordError::NotPublished(_))));
+        assert!(matches!(
+            record.reconcile_exact("other"),
+            Err(RecordError::Published(PublishedError::Unknown(_)))
+        ));
         let wrong = record.reconcile_reference("max-deviation", 1.0, "nothing");
         assert!(matches!(wrong, Err(RecordError::Kind { expected: Kind::Exact, .. })));
         record.reconcile_exact("max-deviation").unwrap();

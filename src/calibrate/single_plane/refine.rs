@@ -1,21 +1,11 @@
 //! Which parameters put the predicted pixels nearest to the observed ones? Levenberg-Marquardt on twelve parameters.
 
+use super::super::Termination;
 use super::SinglePlaneError;
 use super::model::{Frames, PARAMETERS, ParameterVector, PointJacobian, predict, predict_with_jacobian};
 use crate::geometry::lanes::{Kernel, LANES, Lanes, dispatch};
 use crate::target::View;
 use nalgebra::SMatrix;
-
-/// How a refinement ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Termination {
-    /// The next step would gain less than the rounding of the cost: the optimum.
-    Converged,
-    /// No step reduces the cost although one should: rounding limits the solution, or the start was hopeless.
-    NoFurtherDescent,
-    /// The limit on steps was reached before the optimum.
-    TooManySteps,
-}
 
 pub(super) struct Outcome {
     pub parameters: ParameterVector,
@@ -61,7 +51,7 @@ pub(super) fn refine(
             }
         }
         if iterations == MAX_STEPS {
-            break Termination::TooManySteps;
+            break Termination::IterationLimit;
         }
         iterations += 1;
         let step = solve(&normal, damping).map(|step| (step, at + step));
@@ -78,7 +68,7 @@ pub(super) fn refine(
             damping *= growth;
             growth *= 2.0;
             if damping > LARGEST_DAMPING {
-                break Termination::NoFurtherDescent;
+                break Termination::Stalled;
             }
         }
     };

@@ -49,7 +49,7 @@ pub(super) fn reconciliation_table(runs: &[Run], verdicts: &[Option<Verdict>]) -
             }
         });
     }
-    format!("{table}\n")
+    table.trim_fmt() + "\n"
 }
 
 /// Every deviation, every drift, and why a comparison was left out.
@@ -87,9 +87,9 @@ pub(super) fn summary(record: &Record) -> String {
         let statement = format!("{mark}{}", c.statement);
         claims.add_row([c.id.clone(), significant(c.value, 4), interval, statement]);
     }
-    text.push_str(&format!("{numbers}\n{claims}\n"));
+    text.push_str(&format!("{}\n{}\n", numbers.trim_fmt(), claims.trim_fmt()));
     if !record.reconciliations().is_empty() {
-        text.push_str(&format!("{}\n", published_table(record.reconciliations())));
+        text.push_str(&format!("{}\n", published_table(record.reconciliations()).trim_fmt()));
     }
     text
 }

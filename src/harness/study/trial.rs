@@ -23,7 +23,7 @@ pub struct Trial {
 }
 
 /// The outcome whose values count in the statistics.
-pub(super) const CONVERGED: &str = "converged";
+pub(super) const CONVERGED: &str = Termination::Converged.name();
 
 impl Trial {
     /// Whether a minimum was found.
@@ -50,7 +50,7 @@ pub fn run_trial(cell: &Cell, quantities: &[Quantity], trial: u64) -> Trial {
         Ok(calibration) => Trial {
             cell: cell.index,
             trial,
-            outcome: ending(calibration.termination).to_string(),
+            outcome: calibration.termination.name().to_string(),
             iterations: calibration.iterations,
             values: quantities.iter().map(|q| measure(*q, cell, scene, &calibration)).collect(),
         },
@@ -103,14 +103,6 @@ fn measure(quantity: Quantity, cell: &Cell, scene: &Scene, calibration: &Calibra
         }
     };
     value.is_finite().then_some(value)
-}
-
-fn ending(termination: Termination) -> &'static str {
-    match termination {
-        Termination::Converged => CONVERGED,
-        Termination::IterationLimit => "iteration-limit",
-        Termination::Stalled => "stalled",
-    }
 }
 
 fn reason(error: &CalibrationError) -> &'static str {

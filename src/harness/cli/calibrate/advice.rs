@@ -111,7 +111,7 @@ fn standing_out(calibration: &Calibration, names: &[String]) -> Option<String> {
         .collect();
     (!out.is_empty()).then(|| {
         format!(
-            "the RMSE of {} is more than {STANDS_OUT} times the median: look at the marks found there, or leave out strays with \
+            "the RMSE of view {} is more than {STANDS_OUT} times the median: look at the marks found there, or leave out strays with \
              --reject-views 3",
             out.join(", ")
         )

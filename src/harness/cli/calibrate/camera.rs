@@ -173,7 +173,7 @@ fn text(told: &Told) -> String {
         let points = calibration.residuals[i].len().to_string();
         views.add_row([name.clone(), points, significant(rmse, 4), significant(distance, 5)]);
     }
-    let mut text = format!("{parameters}\n\n{views}\n\n{}", summary(told));
+    let mut text = format!("{}\n\n{}\n\n{}", parameters.trim_fmt(), views.trim_fmt(), summary(told));
     // Writing to a string cannot fail, here and below.
     if let Some(weakest) = weakest(told) {
         let _ = writeln!(text, "weakest direction: {weakest}");

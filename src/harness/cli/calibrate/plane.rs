@@ -43,7 +43,8 @@ pub(in crate::harness::cli) fn plane_text(result: &PlaneCalibration) -> String {
         rows.add_row([0, 1, 2].map(|j| significant(m[(i, j)], 15)));
     }
     format!(
-        "{rows}\n\nscales {} and {} world units per px; residual RMS {} per point, largest {}, {} degrees of freedom\n",
+        "{}\n\nscales {} and {} world units per px; residual RMS {} per point, largest {}, {} degrees of freedom\n",
+        rows.trim_fmt(),
         significant(result.scale_x, 8),
         significant(result.scale_y, 8),
         significant(result.rms_point, 9),

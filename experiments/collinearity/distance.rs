@@ -1,0 +1,98 @@
+//! The distance of the target, which two published numbers fix, one of them the mistake of reading pixels as millimetres.
+
+use super::*;
+
+/// Distances of the sweep, mm.
+pub const DISTANCES_MM: std::ops::RangeInclusive<u32> = 110..=130;
+
+/// RMS per point of corrected pixel minus target millimetre, both as plain numbers.
+pub fn pixels_minus_millimetres(corrected: &[Vec2], points: &[Vec2]) -> f64 {
+    rms(&corrected.iter().zip(points).map(|(pixel, point)| pixel - point).collect::<Vec<_>>())
+}
+
+/// The chapter's second finding about its interface: a call documented to return world coordinates returns corrected pixels.
+pub fn tell_units_mistake(
+    record: &mut Record,
+    exact: &View,
+    ours: &Found,
+    view: &View,
+) -> Result<(), ExperimentError> {
+    let truth = Truth::chapter_camera();
+    let mistake = pixels_minus_millimetres(&corrected(&truth, exact.pixels())?, exact.points());
+    let band = Band::absolute(ROUNDING_PX, "rounding of coordinates below 640 px over 40 operations");
+    let what = "RMS per point of corrected pixel minus target millimetre, true model, no noise";
+    record.number("units-mistake", mistake, "", band, what);
+    record.reconcile_exact("units-mistake")?;
+    let noisy = pixels_minus_millimetres(&ours.corrected, view.points());
+    record.number(
+        "units-mistake-calibrated",
+        noisy,
+        "",
+        converged(),
+        "the same of our noisy single-plane calibration",
+    );
+    // Corrected pixels are c + (f / Z) X, so the difference is c + (f / Z - 1) X, and X has mean zero.
+    let centre = truth.cx * truth.cx + truth.cy * truth.cy;
+    let stretch = truth.fx / DISTANCE_MM - 1.0;
+    let spread = exact.points().iter().map(Vec2::norm_squared).sum::<f64>() / exact.len() as f64;
+    let theory = (centre + stretch * stretch * spread).sqrt();
+    record.claim(Claim::at_most(
+        "units-mistake-explained",
+        "the 'residual' is sqrt(cx^2 + cy^2 + (f / Z - 1)^2 mean |X|^2): principal point and magnification, no accuracy",
+        (mistake - theory).abs(),
+        2.0 * ROUNDING_PX,
+        "closed form of corrected pixel minus target millimetre; rounding on both sides",
+    ));
+    Ok(())
+}
+
+/// Two published numbers fix the distance that the chapter does not give.
+pub fn tell_distances(record: &mut Record, draws: &[Draw], book: &Book) -> Result<(), ExperimentError> {
+    let truth = Truth::chapter_camera();
+    let columns = [("distance", "mm"), ("top_row_before", "px"), ("units_mistake", "")];
+    let mut table =
+        Table::new("distances", "both numbers without noise against the target's distance", &columns);
+    let (mut rows, mut mistakes) = (Vec::new(), Vec::new());
+    for distance in DISTANCES_MM.map(f64::from) {
+        let view = scene(distance)?.exact().remove(0);
+        let row = line(&view.pixels()[TOP_ROW])?.max_deviation();
+        let mistake = pixels_minus_millimetres(&corrected(&truth, view.pixels())?, view.points());
+        table.push([distance, row, mistake]);
+        rows.push((distance, row));
+        mistakes.push((distance, mistake));
+    }
+    record.table(table);
+    let sd = moments(&column(draws, MAIN, 1)).standard_deviation(0);
+    let whole: Vec<f64> = mistakes.iter().filter(|(_, m)| m.round() == 427.0).map(|(z, _)| *z).collect();
+    let sigmas = |z: f64| {
+        rows.iter().find(|(at, _)| *at == z).map_or(f64::NAN, |(_, d)| (d - book[1].value()).abs() / sd)
+    };
+    record.claim(Claim::all_of(
+        "distance-is-120-mm",
+        "the printed 427 leaves 119, 120 and 121 mm of all whole distances, and the published top row agrees with 120",
+        [
+            (format!("427 at {whole:?} mm"), whole == [DISTANCE_MM - 1.0, DISTANCE_MM, DISTANCE_MM + 1.0]),
+            ("top row within 3 standard deviations at 120 mm".to_string(), sigmas(DISTANCE_MM) < 3.0),
+        ],
+        "the 'residual' in pixels minus millimetres falls by 0.4 a millimetre, so its printed digits allow a range of 2.4 mm",
+    ));
+    let band: Vec<(f64, f64, f64)> = rows.iter().map(|&(z, d)| (z, d - 3.0 * sd, d + 3.0 * sd)).collect();
+    let size = |plot: Plot| plot.size(440.0, 340.0);
+    let panels = [
+        size(Plot::new("Top row against the distance", "distance (mm)", "largest deviation (px)"))
+            .band("noise, \u{b1}3 sd", &band)
+            .line("without noise", &rows)
+            .hline(format!("published: {} px", book[1].printed), book[1].value()),
+        size(Plot::new("Pixels read as millimetres", "distance (mm)", "RMS of pixel minus mm"))
+            .line("without noise", &mistakes)
+            .hline("published: 427", 427.0)
+            .vline("120 mm", DISTANCE_MM),
+    ];
+    let caption = format!(
+        "Largest deviation of the target's top row in pixels, and corrected pixels minus target millimetres, against the \
+         target's distance, without noise; the band is three standard deviations of {TRIALS} draws at 120 mm. Notice that \
+         both published numbers lead to the same distance."
+    );
+    record.figure(Figure::panels("distance", &panels, 2, caption));
+    Ok(())
+}

@@ -1,0 +1,115 @@
+//! The chapter's numbers: do they follow from each other, do their residuals look like noise, do ours agree?
+
+use super::*;
+
+pub const SPACING_ROUNDING_PX: f64 = 0.005;
+
+/// The published centre is printed to 0.001 px.
+pub const CENTRE_ROUNDING_PX: f64 = 0.0005;
+
+/// Draws behind the distribution of the residuals' shape; one more leaves it with probability 2 / (TRIALS + 1) = 1e-4.
+pub const TRIALS: usize = 19_999;
+
+pub const FALSE_ALARM_RATE: f64 = 1e-4;
+
+/// A published number of this experiment.
+pub fn entry(id: &str) -> Result<&'static Entry, ExperimentError> {
+    published::entry(EXPERIMENT.id, id).map_err(ExperimentError::at("published values"))
+}
+
+/// The interval of values that print as the published digits.
+pub fn before_rounding(id: &str) -> Result<(f64, f64), ExperimentError> {
+    let entry = entry(id)?;
+    Ok((entry.value() - entry.rounding(), entry.value() + entry.rounding()))
+}
+
+/// Do the chapter's own numbers follow from each other, within their printed digits?
+pub fn claim_published_consistent(record: &mut Record) -> Result<(), ExperimentError> {
+    let value = |id: &str| entry(id).map(Entry::value);
+    let overlap = |a: (f64, f64), b: (f64, f64)| a.0 <= b.1 && b.0 <= a.1;
+    let over = |a: (f64, f64), b: (f64, f64)| (a.0 / b.1, a.1 / b.0);
+    let (sx, sy) = (before_rounding("sx")?, before_rounding("sy")?);
+    let centre = |at: f64| (at - CENTRE_ROUNDING_PX, at + CENTRE_ROUNDING_PX);
+    let times = |a: (f64, f64), b: (f64, f64)| (a.0 * b.0, a.1 * b.1);
+    let minus_tx = (-before_rounding("tx")?.1, -before_rounding("tx")?.0);
+    let both = (sx.0, sy.1);
+    let middle = 0.5 * (value("spacing-rows")? + value("spacing-columns")?);
+    let cases = [
+        ("1 / sx is the column spacing", overlap(over((1.0, 1.0), sx), before_rounding("spacing-columns")?)),
+        ("1 / sy is the row spacing", overlap(over((1.0, 1.0), sy), before_rounding("spacing-rows")?)),
+        ("the mean spacing prints as 236.2", entry("spacing")?.rounds_from(middle)),
+        ("-tx is sx times the centre's u", overlap(times(sx, centre(714.708)), minus_tx)),
+        ("ty is sy times the centre's v", overlap(times(sy, centre(565.993)), before_rounding("ty")?)),
+        ("RMS in pixels", overlap(over(before_rounding("rms")?, both), before_rounding("rms-px")?)),
+        ("maximum in pixels", overlap(over(before_rounding("max")?, both), before_rounding("max-px")?)),
+    ];
+    record.claim(Claim::all_of(
+        "book-agrees-with-itself",
+        "the chapter's spacings, scales, translations and residuals follow from each other within their printed digits",
+        cases.map(|(name, held)| (name.to_string(), held)),
+        "interval arithmetic over half a unit of each last printed digit",
+    ));
+    Ok(())
+}
+
+/// The size of a residual is the real image's, but largest over RMS of nine points is the same for any size of the noise.
+pub fn claim_residual_shape(record: &mut Record, context: &Context) -> Result<(), ExperimentError> {
+    let key = StreamKey { seed: context.seed, scenario: "nine-point", trial: 0, purpose: "noise" };
+    let mut stream = Stream::open(key);
+    let world = unit_grid();
+    let mut ratios = Vec::with_capacity(TRIALS);
+    for _ in 0..TRIALS {
+        let seen: Vec<Vec2> =
+            world.iter().map(|w| w + Vec2::new(stream.normal(), stream.normal()) * 1e-4).collect();
+        let affine = Affine::fit(&seen, &world).map_err(ExperimentError::at("affine fit"))?;
+        let squares: Vec<f64> =
+            seen.iter().zip(&world).map(|(s, w)| (affine.apply(s) - w).norm_squared()).collect();
+        let largest = squares.iter().copied().fold(0.0, f64::max);
+        ratios.push((largest * 9.0 / squares.iter().sum::<f64>()).sqrt());
+    }
+    let ratio = entry("max")?.value() / entry("rms")?.value();
+    record.number("book-max-over-rms", ratio, "", Band::Exact, "largest over RMS residual, as published");
+    let predicted = Predicted::from_draws(&ratios, 1, "affine fits of nine points with Gaussian errors");
+    record.claim(Claim::drawn_from(
+        "book-residuals-look-like-noise",
+        "the published largest residual stands to the RMS as it does for nine centres with Gaussian errors",
+        ratio,
+        &predicted,
+        FALSE_ALARM_RATE,
+        "the ratio does not depend on the size of the errors",
+    ));
+    Ok(())
+}
+
+pub fn reconcile(record: &mut Record, stand_in: &str) -> Result<(), ExperimentError> {
+    let relative = (SPACING_ROUNDING_PX + DETECTION_PX) / SPACING_PX.1;
+    let pixels = "; tolerance from the printed digits and 0.005 px of detection";
+    for id in ["image-width", "image-height"] {
+        record.reconcile_reference(id, 0.0, stand_in)?;
+    }
+    for id in ["spacing", "spacing-rows", "spacing-columns", "m11", "m22", "sx", "sy"] {
+        let entry = entry(id)?;
+        let tolerance = entry.rounding() + relative * entry.value().abs();
+        record.reconcile_reference(id, tolerance, format!("{stand_in}{pixels}"))?;
+    }
+    for id in ["tx", "ty"] {
+        let entry = entry(id)?;
+        let shift = (CENTRE_ROUNDING_PX + DETECTION_PX) / SPACING_PX.1;
+        let tolerance = entry.rounding() + relative * entry.value().abs() + shift;
+        record.reconcile_reference(id, tolerance, format!("{stand_in}{pixels}"))?;
+    }
+    for id in ["rms", "max", "rms-px", "max-px"] {
+        let entry = entry(id)?;
+        let reason = format!(
+            "{stand_in}, without the noise of the real one: anything from none to the published residual"
+        );
+        record.reconcile_reference(id, entry.value() + entry.rounding(), reason)?;
+    }
+    for id in GUI {
+        let reason = "affine fit to centres on half pixels near ours; must print the published digits";
+        record.reconcile_reference(id, entry(id)?.rounding(), reason)?;
+    }
+    let reason = "GUI's translations reproduced, less ours; must print the published digit";
+    record.reconcile_reference("gui-gap", entry("gui-gap")?.rounding(), reason)?;
+    Ok(())
+}

@@ -1,0 +1,112 @@
+//! The numbers and tables of the three modes.
+
+use super::*;
+
+pub fn tell_geometry(record: &mut Record, image: &Raster<f32>, centres: &[Vec2], band: Band) {
+    record.number("image-width", image.width() as f64, "px", Band::Exact, "width of the image");
+    record.number("image-height", image.height() as f64, "px", Band::Exact, "height of the image");
+    let (along, between) = spacings(centres);
+    record.number("spacing", 0.5 * (along + between), "px", band.clone(), "mean spacing of the dots");
+    record.number("spacing-rows", between, "px", band.clone(), "mean spacing from row to row");
+    record.number("spacing-columns", along, "px", band.clone(), "mean spacing from column to column");
+    let mean = mean(centres);
+    record.number("centre-u", mean.x, "px", band.clone(), "mean of the nine centres, u");
+    record.number("centre-v", mean.y, "px", band, "mean of the nine centres, v");
+}
+
+/// Mean distance of neighbours along the rows, and from row to row.
+pub fn spacings(centres: &[Vec2]) -> (f64, f64) {
+    let mean = |pairs: [(usize, usize); 6]| {
+        pairs.iter().map(|&(i, j)| (centres[j] - centres[i]).norm()).sum::<f64>() / 6.0
+    };
+    let along_rows = mean([(0, 1), (1, 2), (3, 4), (4, 5), (6, 7), (7, 8)]);
+    let row_to_row = mean([(0, 3), (3, 6), (1, 4), (4, 7), (2, 5), (5, 8)]);
+    (along_rows, row_to_row)
+}
+
+pub fn tell_planar(record: &mut Record, fit: &PlaneCalibration, band: Band) {
+    let m = fit.map.matrix();
+    let mut tell = |id: &str, value: f64, unit: &str, what: &str| {
+        record.number(id, value, unit, band.clone(), what);
+    };
+    tell("m11", m[(0, 0)], "1/px", "matrix, row 1, column 1");
+    tell("m22", m[(1, 1)], "1/px", "matrix, row 2, column 2");
+    tell("tx", m[(0, 2)], "", "matrix, translation along x");
+    tell("ty", m[(1, 2)], "", "matrix, translation along y");
+    tell("sx", fit.scale_x, "1/px", "scale along u");
+    tell("sy", fit.scale_y, "1/px", "scale along v");
+    let fine = Band::absolute(1e-8, "centres repeat to 1e-6 px, 4e-9 units");
+    let per_px = 0.5 * (fit.scale_x + fit.scale_y);
+    for (id, value, unit, what) in [
+        ("rms", fit.rms_point, "", "residual RMS per point, target units"),
+        ("max", fit.max_point, "", "largest residual, target units"),
+        ("m12", m[(0, 1)], "1/px", "matrix, row 1, column 2"),
+        ("m21", m[(1, 0)], "1/px", "matrix, row 2, column 1"),
+    ] {
+        record.number(id, value, unit, fine.clone(), what);
+    }
+    let fine = Band::absolute(3e-6, "centres repeat to 1e-6 px");
+    record.number("rms-px", fit.rms_point / per_px, "px", fine.clone(), "residual RMS in pixels");
+    record.number("max-px", fit.max_point / per_px, "px", fine, "largest residual in pixels");
+}
+
+pub fn modes_table(fits: &[PlaneCalibration]) -> Result<Table, ExperimentError> {
+    let names = [
+        "source", "m11", "m12", "tx", "m21", "m22", "ty", "m31", "m32", "m33", "sx", "sy", "rms", "max",
+        "rms_px", "max_px",
+    ];
+    let columns: Vec<(&str, &str)> =
+        names.iter().map(|&name| (name, if name.ends_with("_px") { "px" } else { "" })).collect();
+    let mut table =
+        Table::new("modes", "the three modes, and what the chapter and the vendor's GUI print", &columns);
+    for ((name, _), fit) in MODES.iter().zip(fits) {
+        let m = fit.map.matrix();
+        let entries = (0..9).map(|i| Cell::from(m[(i / 3, i % 3)]));
+        let per_px = 0.5 * (fit.scale_x + fit.scale_y);
+        let rest = [
+            fit.scale_x,
+            fit.scale_y,
+            fit.rms_point,
+            fit.max_point,
+            fit.rms_point / per_px,
+            fit.max_point / per_px,
+        ];
+        table.push(std::iter::once(Cell::from(*name)).chain(entries).chain(rest.map(Cell::from)));
+    }
+    let printed = |id: &str| entry(id).map(|entry| Cell::from(entry.printed.as_str()));
+    let text = |text: &str| Cell::from(text);
+    // The chapter gives no digits for "~0" entries; the GUI does not show the cells left empty.
+    let mut book = vec![text("book, planar"), printed("m11")?, text("~0"), printed("tx")?, text("~0")];
+    book.extend([printed("m22")?, printed("ty")?, text("0"), text("0"), text("1")]);
+    for id in ["sx", "sy", "rms", "max", "rms-px", "max-px"] {
+        book.push(printed(id)?);
+    }
+    let mut gui = vec![text("vendor GUI"), printed("gui-a11")?, text(""), printed("gui-tx")?, text("")];
+    gui.extend([printed("gui-a22")?, printed("gui-ty")?, text(""), text(""), text("")]);
+    gui.extend([printed("gui-sx")?, printed("gui-sy")?, text(""), text(""), text(""), text("")]);
+    table.push(book);
+    table.push(gui);
+    Ok(table)
+}
+
+pub fn residual_table(centres: &[Vec2], fits: &[PlaneCalibration]) -> Table {
+    let columns = [
+        ("x", ""),
+        ("y", ""),
+        ("u", "px"),
+        ("v", "px"),
+        ("planar_x", ""),
+        ("planar_y", ""),
+        ("tilted_x", ""),
+        ("tilted_y", ""),
+        ("similarity_x", ""),
+        ("similarity_y", ""),
+    ];
+    let mut table =
+        Table::new("residuals", "predicted minus given target point, for the three modes", &columns);
+    for (i, (point, pixel)) in unit_grid().iter().zip(centres).enumerate() {
+        let residuals = fits.iter().flat_map(|f| [f.residuals[i].x, f.residuals[i].y]);
+        table.push([point.x, point.y, pixel.x, pixel.y].into_iter().chain(residuals));
+    }
+    table
+}

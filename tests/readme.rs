@@ -1,0 +1,81 @@
+//! Does README.md say what the program says? Its tables and numbers are compared with golden/ and with a run.
+#![cfg(feature = "harness")]
+
+use calibench::io::data_folder;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+
+fn read(path: &str) -> String {
+    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).expect("a file of the project")
+}
+
+/// The lines of a golden snapshot of the given kind, split into their fields.
+fn golden(experiment: &str, kind: &str) -> Vec<Vec<String>> {
+    let fields = |line: &str| line.split(" | ").map(str::to_string).collect::<Vec<_>>();
+    read(&format!("golden/{experiment}.snap")).lines().map(fields).filter(|f| f[0] == kind).collect()
+}
+
+#[test]
+fn the_table_of_experiments_counts_what_golden_holds() {
+    let counted: BTreeMap<String, Vec<String>> = read("README.md")
+        .lines()
+        .filter_map(|line| line.strip_prefix("| `"))
+        .filter_map(|line| line.split_once("` |"))
+        .map(|(id, counts)| {
+            (id.to_string(), counts.trim_matches(['|', ' ']).split(" | ").map(|c| c.trim().into()).collect())
+        })
+        .collect();
+    let of_all = |n: usize| if n == 0 { "–".to_string() } else { format!("{n} of {n}") };
+    let held: BTreeMap<String, Vec<String>> =
+        std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/golden"))
+            .expect("golden/ is there")
+            .map(|file| file.expect("a file of golden/").path())
+            .filter(|path| path.extension().is_some_and(|e| e == "snap"))
+            .map(|path| {
+                let id = path.file_stem().expect("a snapshot has a name").to_string_lossy().into_owned();
+                let counts = ["number", "claim", "published"].map(|kind| of_all(golden(&id, kind).len()));
+                (id, counts.to_vec())
+            })
+            .collect();
+    for (id, counts) in &held {
+        assert_eq!(counted.get(id), Some(counts), "`{id}` in README.md");
+    }
+}
+
+#[test]
+fn the_chi_squared_of_both_tables_are_the_golden_ones() {
+    let value = |id: &str| -> f64 {
+        let numbers = golden("four-pose", "number");
+        let number = numbers.iter().find(|f| f[1] == id).unwrap_or_else(|| panic!("no number `{id}`"));
+        number[2].parse().expect("a golden number")
+    };
+    let said = format!(
+        "(joint chi-squared {:.2} on 6 degrees of freedom; ours {:.2})",
+        value("chi-squared-book"),
+        value("chi-squared-ours")
+    );
+    let readme = read("README.md").split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(readme.contains(&said), "README.md should say: {said}");
+}
+
+#[test]
+fn the_output_shown_for_zhangs_data_is_what_the_command_prints() {
+    let Some(folder) = data_folder().expect("a readable folder or none") else {
+        eprintln!("skipped: no ../shared/data and CALIBENCH_DATA is not set");
+        return;
+    };
+    let readme = read("README.md");
+    let (_, shown) =
+        readme.split_once("$ calibench calibrate zhang/points.csv ").expect("the command is shown");
+    let (shown, _) = shown.split_once("\n```").expect("the block ends");
+    let (arguments, output) = shown.split_once('\n').expect("output follows the command");
+    let run = Command::new(env!("CARGO_BIN_EXE_calibench"))
+        .args(["calibrate", "zhang/points.csv"])
+        .args(arguments.split_whitespace())
+        .current_dir(folder)
+        .output()
+        .expect("the program starts");
+    let printed = String::from_utf8_lossy(&run.stdout);
+    assert_eq!(printed.trim_end(), output.trim_end(), "{}", String::from_utf8_lossy(&run.stderr));
+}
