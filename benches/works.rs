@@ -7,7 +7,7 @@ use calibench::camera::{BrownConrady, Camera, FreeParameters};
 use calibench::detect::{circle_grid, sparse_dots};
 use calibench::geometry::{Affine, Homography, Vec2};
 use calibench::raster::Raster;
-use calibench::rectify::RectifyMap;
+use calibench::rectify::{RectifyMap, rectify_image};
 use calibench::synth::render::{Imaging, SensorNoise, nine_dot_stand_in, photograph};
 use calibench::synth::{Stream, StreamKey, Truth, scene};
 use calibench::target::{Board, View};
@@ -94,10 +94,7 @@ pub fn named(row: &str) -> Option<Box<dyn Work>> {
         "undistort" => {
             let (size, image) = (parse_size(size)?, frame(parse_size(size)?));
             let (camera, output) = cameras(size);
-            let run = move || {
-                let map = RectifyMap::between(&camera, size, &output, size).expect("a map");
-                map.apply(&image, 0).expect("the map's size")
-            };
+            let run = move || rectify_image(&image, &camera, &output, size, 0).expect("a photograph");
             job(run, |i: Raster<u8>| levels(&i))
         }
         "grid" => {

@@ -1,7 +1,7 @@
 //! Which combination of parameters do the data say least about?
 
 use super::elimination::Eliminated;
-use super::system::{N, System};
+use super::system::{N, Reduction, System};
 use nalgebra::{DMatrix, DVector, SVector};
 
 /// How well the data separate the intrinsics, and the direction in which they do worst.
@@ -35,7 +35,7 @@ const NAMED_SHARE: f64 = 0.2;
 impl System {
     /// How well these equations separate the intrinsics; `None` if nothing is free or a pose is undetermined.
     pub fn conditioning(&self) -> Option<Conditioning> {
-        Conditioning::of(self)
+        Conditioning::of(self, &self.reduction()?)
     }
 }
 
@@ -45,14 +45,13 @@ impl Conditioning {
         self.smallest_eigenvalue.is_nan() || self.smallest_eigenvalue <= SINGULAR
     }
 
-    /// Analyses normal equations; `None` if nothing is free or a pose is undetermined.
-    pub(super) fn of(system: &System) -> Option<Conditioning> {
+    /// Analyses normal equations and their reduction; `None` if nothing is free.
+    pub(super) fn of(system: &System, reduction: &Reduction) -> Option<Conditioning> {
         let n = system.free.len();
         if n == 0 {
             return None;
         }
-        let mut eliminated = Vec::new();
-        let schur = system.eliminate(0.0, &mut eliminated)?.matrix(n);
+        let Reduction { eliminated, schur, .. } = reduction;
         let scale = DVector::from_fn(n, |i, _| 1.0 / system.intrinsics[(i, i)].sqrt());
         let scaled = DMatrix::from_fn(n, n, |i, j| schur[(i, j)] * scale[i] * scale[j]);
         if !scaled.iter().all(|x| x.is_finite()) {
@@ -65,7 +64,7 @@ impl Conditioning {
         Some(Conditioning {
             smallest_eigenvalue: smallest,
             condition_number: largest / smallest,
-            weakest: named(system, &eliminated, &direction, &scale),
+            weakest: named(system, eliminated, &direction, &scale),
         })
     }
 }

@@ -202,13 +202,16 @@ fn report(
     let degrees_of_freedom = 2 * points - system.unknowns();
     let freedom = degrees_of_freedom.max(1) as f64;
     let sigma_px = (square / freedom).sqrt();
-    let conditioning = Conditioning::of(system);
+    let reduction = system.reduction();
+    let conditioning = reduction.as_ref().and_then(|reduction| Conditioning::of(system, reduction));
     // The cost under the loss in use: gross errors, which a robust loss discounts, say nothing of the noise.
     let noise_px = (system.cost / freedom).sqrt();
     identifiability::check(problem, minimum, conditioning.as_ref(), noise_px)?;
-    let unit = system.covariance().ok_or_else(|| CalibrationError::NotIdentifiable {
-        inseparable: vec!["camera".into(), "poses".into()],
-        why: "the normal equations are singular".into(),
+    let unit = reduction.and_then(|reduction| reduction.covariance()).ok_or_else(|| {
+        CalibrationError::NotIdentifiable {
+            inseparable: vec!["camera".into(), "poses".into()],
+            why: "the normal equations are singular".into(),
+        }
     })?;
     let variance = noise_variance(&residuals, square, problem.loss, freedom);
     let covariance = frame.covariance(unit, cam_from_target, variance);

@@ -85,7 +85,7 @@ fn refuse_if_fits(
     }
     let mut exact = System::new(problem.free, problem.observations.len());
     problem.linearise_into(&held.state, &mut exact);
-    refuse_if_singular(Conditioning::of(&exact).as_ref(), || {
+    refuse_if_singular(exact.conditioning().as_ref(), || {
         format!(
             "{what} within noise (holding it so raises the cost by {ratio:.1} variances, and up to {bound:.0} could be \
              chance on {degrees_of_freedom} degrees of freedom)"

@@ -43,6 +43,15 @@ pub struct System {
     pub(super) cost: f64,
 }
 
+/// Normal equations without the poses: what uncertainty and conditioning are both read from.
+pub(super) struct Reduction {
+    free: FreeParameters,
+    /// The views' factors.
+    pub eliminated: Vec<Eliminated>,
+    /// `S`, the intrinsics' information when the poses are unknown too.
+    pub schur: DMatrix<f64>,
+}
+
 /// A step of all unknowns.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Step {
@@ -111,22 +120,34 @@ impl System {
         Some(())
     }
 
+    /// The undamped equations with the poses eliminated; `None` where a pose is undetermined.
+    pub(super) fn reduction(&self) -> Option<Reduction> {
+        let mut eliminated = Vec::new();
+        let schur = self.eliminate(0.0, &mut eliminated)?.matrix(self.free.len());
+        Some(Reduction { free: self.free, eliminated, schur })
+    }
+
     /// The inverse of the normal matrix, block by block, for unit noise; `None` if it is singular.
     pub fn covariance(&self) -> Option<Covariance> {
-        let n = self.free.len();
-        let mut eliminated = Vec::new();
-        let schur = self.eliminate(0.0, &mut eliminated)?.matrix(n);
-        let intrinsics = if n > 0 { schur.cholesky()?.inverse() } else { DMatrix::zeros(0, 0) };
-        let padded = SMatrix::from_fn(|i, j| if i < n && j < n { intrinsics[(i, j)] } else { 0.0 });
-        let blocks: Vec<(PoseBlock, MatrixXx6<f64>)> =
-            chunks::map(&eliminated, |_, factors| factors.covariance(&padded, n));
-        let (poses, cross) = blocks.into_iter().unzip();
-        Some(Covariance { free: self.free, intrinsics, poses, cross })
+        self.reduction()?.covariance()
     }
 
     /// Number of unknowns.
     pub fn unknowns(&self) -> usize {
         self.free.len() + 6 * self.views.len()
+    }
+}
+
+impl Reduction {
+    /// See [`System::covariance`].
+    pub fn covariance(&self) -> Option<Covariance> {
+        let n = self.free.len();
+        let intrinsics = if n > 0 { self.schur.clone().cholesky()?.inverse() } else { DMatrix::zeros(0, 0) };
+        let padded = SMatrix::from_fn(|i, j| if i < n && j < n { intrinsics[(i, j)] } else { 0.0 });
+        let blocks: Vec<(PoseBlock, MatrixXx6<f64>)> =
+            chunks::map(&self.eliminated, |_, factors| factors.covariance(&padded, n));
+        let (poses, cross) = blocks.into_iter().unzip();
+        Some(Covariance { free: self.free, intrinsics, poses, cross })
     }
 }
 

@@ -190,3 +190,43 @@ fn smallest_pivot(normal: &Normal) -> f64 {
         (0..PARAMETERS).map(ratio).fold(1.0, f64::min)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Vec2;
+    use crate::geometry::lanes::run_portable;
+
+    #[test]
+    fn the_sums_are_those_of_the_definition_to_the_bit_on_any_registers() {
+        let points: Vec<Vec2> =
+            (0..35).map(|i| Vec2::new(f64::from(i % 7) - 3.0, f64::from(i / 7) - 2.0) * 12.0).collect();
+        let pixels = points.iter().map(|p| Vec2::new(320.0, 240.0) + p * 5.0 + p.yx() * 0.3).collect();
+        let view = View::new(points, pixels).unwrap();
+        let frames = Frames::of(&view, 600.0, Vec2::new(310.0, 250.0));
+        let at = ParameterVector::from_column_slice(&[
+            0.3, 0.01, 0.02, -0.02, 0.28, -0.01, 0.05, -0.04, -0.2, 0.1, 0.01, -0.02,
+        ]);
+        for active in [PARAMETERS - 2, PARAMETERS] {
+            let mut matrix = SMatrix::<f64, PARAMETERS, PARAMETERS>::zeros();
+            let mut gradient = ParameterVector::zeros();
+            for (point, pixel) in view.pairs() {
+                let (predicted, jacobian) = predict_with_jacobian(&frames, &at, point).unwrap();
+                matrix += jacobian.transpose() * jacobian;
+                gradient += jacobian.transpose() * (predicted - frames.pixel_offset(pixel));
+            }
+            let sum = || Sum { frames: &frames, view: &view, at: &at, active };
+            for normal in [dispatch(sum()), run_portable(sum())] {
+                for i in 0..PARAMETERS {
+                    for j in 0..PARAMETERS {
+                        let held = if i == j { 1.0 } else { 0.0 };
+                        let expected = if i.max(j) < active { matrix[(i, j)] } else { held };
+                        assert_eq!(normal.matrix[(i, j)].to_bits(), expected.to_bits(), "({i}, {j})");
+                    }
+                    let expected = if i < active { gradient[i] } else { 0.0 };
+                    assert_eq!(normal.gradient[i].to_bits(), expected.to_bits());
+                }
+            }
+        }
+    }
+}
