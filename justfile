@@ -36,3 +36,15 @@ cluster:
 # Every experiment, figure and table, and the reconciliation
 all:
     cargo run --release --locked
+
+# This library beside OpenCV, mrcal and Ceres in one run; `just peers --write README.md` puts the tables there
+peers *ARGUMENTS:
+    benches/peers/run {{ARGUMENTS}}
+
+# Instructions of the kernels against golden/instructions.toml
+instructions:
+    .ci/instructions
+
+# Accepts the present counts
+bless-instructions:
+    .ci/instructions --bless

@@ -39,7 +39,9 @@ mod found;
 mod images;
 
 use distance::{tell_distances, tell_units_mistake};
-use draws::{Draw, claim_excluded, claim_theory, column, moments, reconcile, simulate};
+use draws::{
+    Draw, claim_excluded, claim_theory, column, moments, percent_below, readings_table, reconcile, simulate,
+};
 use figures::{predicted_figure, residual_figure, row_figure};
 use found::{Book, CENTRES, Centre, Found, MAIN, QUANTITIES, book, corrected, line, rms};
 use images::rectify;
@@ -102,6 +104,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     reconcile(&mut record, &draws)?;
     record.table(centres_table(&ours, &noise_free, &draws, &book));
     claim_excluded(&mut record, &draws, &book);
+    record.table(readings_table(&draws, &book));
     record.table(points_table(&view, &ours[MAIN]));
     claim_theory(&mut record, &ours, &noise_free, &draws);
     claim_top_line(&mut record)?;
@@ -116,7 +119,9 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
         "The chapter does not say what its single-plane calibration assumes of the distortion centre. Its RMS alone fits a \
          centre held at the middle of the image, (320, 240), a little better, but its affine residual of 0.0329 mm does not: \
          with that centre the affine residual is 0.0333 mm without any noise. The five numbers are reconciled with a free \
-         centre; table `centres` has all three. (RMS is per point, the chapter's definition.)",
+         centre; table `centres` has all three. (RMS is per point, the chapter's definition. Read as RMS per coordinate the affine \
+         residual alone would allow the image centre, but its ratio to the largest residual would then be one of the smallest \
+         of all draws: table `readings`.)",
     );
     record.note(
         "With the same K, a barrel lens leaves no pixel of the rectified image without data: every output pixel was seen \
@@ -186,8 +191,7 @@ fn centres_table(ours: &[Found], noise_free: &[Found], draws: &[Draw], book: &Bo
             let values = column(draws, i, q);
             let sample = moments(&values);
             let (low, high) = Predicted::from_draws(&values, 1, "").interval(FALSE_ALARM_RATE);
-            let below =
-                |x: f64| 100.0 * values.iter().filter(|&&v| v < x).count() as f64 / values.len() as f64;
+            let below = |x: f64| percent_below(&values, x);
             let mut row = vec![Cell::from(centre.name()), Cell::from(*id), Cell::from(*unit)];
             let (mean, sd) = (sample.mean(0), sample.standard_deviation(0));
             let numbers = [

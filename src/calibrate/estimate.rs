@@ -30,6 +30,10 @@ const START_GAIN: f64 = 1e-3;
 /// no error: the result says so in [`Calibration::termination`] and in a warning.
 pub fn calibrate(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
     check_counts(views, settings)?;
+    chunks::in_pool(views.len(), || estimate(views, settings))
+}
+
+fn estimate(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
     let frame = TargetFrame::of(views);
     let (observations, homographies) = homographies(views, &frame)?;
     let starts = start::starts(&homographies, settings, pixel_frame(&observations))?;

@@ -77,51 +77,86 @@ pub fn components<T: Sample>(
 ) -> Vec<Component> {
     let mut forest = Forest::default();
     let (mut above, mut runs): (Vec<Run>, Vec<Run>) = (Vec::new(), Vec::new());
+    let mut stretches = Vec::new();
     for y in 0..image.height() {
+        if y % TILE_PX == 0 {
+            stretches.clear();
+            find_stretches(thresholds.row(y / TILE_PX), image.width(), polarity, &mut stretches);
+        }
         std::mem::swap(&mut above, &mut runs);
         runs.clear();
-        find_runs(image.row(y), thresholds.row(y / TILE_PX), polarity, &mut runs);
+        find_runs(image.row(y), &stretches, polarity, &mut runs);
         forest.attach(&above, &mut runs, y as u32);
     }
     forest.roots()
 }
 
-/// Cuts a row into runs of marked pixels.
-fn find_runs<T: Sample>(
-    row: &[T],
+/// Neighbouring columns in a row of tiles that may be marked.
+struct Stretch<T> {
+    start: usize,
+    end: usize,
+    /// The threshold that decides, unless all are marked.
+    level: Option<T>,
+}
+
+/// The stretches of a row of tiles, left to right: one for every mixed tile, one for neighbouring tiles of the mark's side.
+fn find_stretches<T: Sample>(
     tiles: impl Iterator<Item = (T, Side)>,
+    width: usize,
     polarity: Polarity,
-    runs: &mut Vec<Run>,
+    stretches: &mut Vec<Stretch<T>>,
 ) {
     let mark_side = if polarity == Polarity::Dark { Side::Dark } else { Side::Bright };
-    let mut start = None;
-    let mut close = |start: &mut Option<usize>, end: usize| {
-        if let Some(start) = start.take() {
-            runs.push(Run { start: start as u32, end: end as u32, component: 0 });
-        }
-    };
-    for (tile, (samples, (level, side))) in row.chunks(TILE_PX).zip(tiles).enumerate() {
-        let first = tile * TILE_PX;
-        if side != Side::Mixed {
-            if side == mark_side {
-                start.get_or_insert(first);
-            } else {
-                close(&mut start, first);
-            }
-            continue;
-        }
-        for (offset, &sample) in samples.iter().enumerate() {
-            let marked = (sample < level) == (polarity == Polarity::Dark);
-            if marked != start.is_some() {
-                if marked {
-                    start = Some(first + offset);
-                } else {
-                    close(&mut start, first + offset);
-                }
+    for (tile, (level, side)) in tiles.enumerate() {
+        let (start, end) = (tile * TILE_PX, width.min((tile + 1) * TILE_PX));
+        if side == Side::Mixed {
+            stretches.push(Stretch { start, end, level: Some(level) });
+        } else if side == mark_side {
+            match stretches.last_mut() {
+                Some(last) if last.end == start && last.level.is_none() => last.end = end,
+                _ => stretches.push(Stretch { start, end, level: None }),
             }
         }
     }
-    close(&mut start, row.len());
+}
+
+/// Cuts a row into runs of marked pixels.
+fn find_runs<T: Sample>(row: &[T], stretches: &[Stretch<T>], polarity: Polarity, runs: &mut Vec<Run>) {
+    let mut close = |start: Option<usize>, end: usize| {
+        if let Some(start) = start {
+            runs.push(Run { start: start as u32, end: end as u32, component: 0 });
+        }
+    };
+    let (mut start, mut seen) = (None, 0);
+    for stretch in stretches {
+        if stretch.start > seen {
+            close(start.take(), seen);
+        }
+        seen = stretch.end;
+        let Some(level) = stretch.level else {
+            start.get_or_insert(stretch.start);
+            continue;
+        };
+        // One bit a pixel, set where the row passes from unmarked to marked or back.
+        let samples = &row[stretch.start..stretch.end];
+        let marked = marks(samples, level, polarity);
+        let mut passes = (marked ^ (marked << 1 | u32::from(start.is_some()))) & ((1 << samples.len()) - 1);
+        while passes != 0 {
+            let at = stretch.start + passes.trailing_zeros() as usize;
+            match start.take() {
+                None => start = Some(at),
+                open => close(open, at),
+            }
+            passes &= passes - 1;
+        }
+    }
+    close(start, seen);
+}
+
+/// Which of a tile's samples are marked: bit `i` for sample `i`.
+fn marks<T: Sample>(samples: &[T], level: T, polarity: Polarity) -> u32 {
+    let dark = samples.iter().rev().fold(0, |bits, &sample| bits << 1 | u32::from(sample < level));
+    if polarity == Polarity::Dark { dark } else { !dark }
 }
 
 /// A union-find forest of components; the root of a tree is its oldest member.

@@ -10,8 +10,10 @@ mod corner;
 mod edge;
 mod grid;
 mod lattice;
+mod levels;
 mod neighbours;
 mod order;
+mod region;
 mod saddle;
 mod threshold;
 

@@ -48,7 +48,7 @@ impl<T: Sample> Thresholds<T> {
             inherited(seen, tiles.columns, tiles.rows).into_iter().map(T::at_least).collect();
         let sides = levels
             .iter()
-            .zip(&tiles.extremes)
+            .zip(tiles.low.iter().zip(&tiles.high))
             .map(|(level, (low, high))| match (low < level, high < level) {
                 (true, true) => Side::Dark,
                 (true, false) => Side::Mixed,
@@ -69,7 +69,8 @@ impl<T: Sample> Thresholds<T> {
 struct Extremes<T> {
     columns: usize,
     rows: usize,
-    extremes: Vec<(T, T)>,
+    low: Vec<T>,
+    high: Vec<T>,
 }
 
 impl<T: Sample> Extremes<T> {
@@ -79,57 +80,85 @@ impl<T: Sample> Extremes<T> {
         if columns == 0 || rows == 0 {
             return None;
         }
-        let mut extremes = Vec::with_capacity(columns * rows);
-        let (mut low, mut high) = (Vec::new(), Vec::new());
-        for tile_row in 0..rows {
-            let first = tile_row * TILE_PX;
-            low.clear();
-            low.extend_from_slice(image.row(first));
-            high.clear();
-            high.extend_from_slice(image.row(first));
+        let (mut low, mut high) = (Vec::with_capacity(columns * rows), Vec::with_capacity(columns * rows));
+        let (mut lows, mut highs) = (Vec::new(), Vec::new());
+        for tiles in image.samples().chunks(TILE_PX * image.width()) {
+            let mut rows = tiles.chunks_exact(image.width());
+            let top = rows.next().unwrap_or_default();
+            lows.clear();
+            lows.extend_from_slice(top);
+            highs.clear();
+            highs.extend_from_slice(top);
             // Column by column first: this loop runs over whole rows and vectorises.
-            for y in first + 1..(first + TILE_PX).min(image.height()) {
-                for ((low, high), &sample) in low.iter_mut().zip(&mut high).zip(image.row(y)) {
-                    *low = if sample < *low { sample } else { *low };
-                    *high = if sample > *high { sample } else { *high };
+            for row in rows {
+                for ((low, high), &sample) in lows.iter_mut().zip(&mut highs).zip(row) {
+                    *low = lesser(sample, *low);
+                    *high = greater(sample, *high);
                 }
             }
-            let tiles = low.chunks(TILE_PX).zip(high.chunks(TILE_PX));
-            extremes.extend(tiles.map(|(low, high)| (least(low), greatest(high))));
+            low.extend(lows.chunks(TILE_PX).map(|tile| pick_one(tile, lesser)));
+            high.extend(highs.chunks(TILE_PX).map(|tile| pick_one(tile, greater)));
         }
-        Some(Extremes { columns, rows, extremes })
+        Some(Extremes { columns, rows, low, high })
     }
 
     fn range(&self) -> (T, T) {
-        self.extremes[1..].iter().fold(self.extremes[0], |all, tile| wider(all, *tile))
+        let of =
+            |values: &[T], pick: fn(T, T) -> T| values[1..].iter().fold(values[0], |best, &x| pick(x, best));
+        (of(&self.low, lesser), of(&self.high, greater))
     }
 
     /// Half-way between the extremes of the 3 x 3 tiles around each tile, where they differ enough.
     fn neighbourhood_levels(&self, least_contrast: f64) -> Vec<Option<f64>> {
-        let level = |column: usize, row: usize| {
-            let mut around = self.extremes[row * self.columns + column];
-            for y in row.saturating_sub(1)..(row + 2).min(self.rows) {
-                for x in column.saturating_sub(1)..(column + 2).min(self.columns) {
-                    around = wider(around, self.extremes[y * self.columns + x]);
-                }
-            }
-            let (low, high) = (around.0.to_f64(), around.1.to_f64());
+        let low = over_neighbours(&self.low, self.columns, lesser);
+        let high = over_neighbours(&self.high, self.columns, greater);
+        let level = |(low, high): (&T, &T)| {
+            let (low, high) = (low.to_f64(), high.to_f64());
             (high - low >= least_contrast).then_some(0.5 * (low + high))
         };
-        (0..self.rows).flat_map(|row| (0..self.columns).map(move |column| level(column, row))).collect()
+        low.iter().zip(&high).map(level).collect()
     }
 }
 
-fn least<T: Sample>(samples: &[T]) -> T {
-    samples[1..].iter().fold(samples[0], |best, &x| if x < best { x } else { best })
+/// The one of a tile's samples that wins against all others, in halves: each is one operation on short vectors.
+fn pick_one<T: Sample>(tile: &[T], pick: impl Fn(T, T) -> T) -> T {
+    let Some(samples) = tile.first_chunk::<TILE_PX>() else {
+        return tile[1..].iter().fold(tile[0], |best, &x| pick(x, best));
+    };
+    let eight: [T; 8] = std::array::from_fn(|i| pick(samples[i], samples[i + 8]));
+    let four: [T; 4] = std::array::from_fn(|i| pick(eight[i], eight[i + 4]));
+    pick(pick(four[0], four[2]), pick(four[1], four[3]))
 }
 
-fn greatest<T: Sample>(samples: &[T]) -> T {
-    samples[1..].iter().fold(samples[0], |best, &x| if x > best { x } else { best })
+/// Every value combined with its eight neighbours, those there are: first along columns, then along rows.
+fn over_neighbours<T: Sample>(values: &[T], columns: usize, pick: impl Fn(T, T) -> T) -> Vec<T> {
+    let mut upright = values.to_vec();
+    for (row, &value) in upright[columns..].iter_mut().zip(values) {
+        *row = pick(value, *row);
+    }
+    for (row, &value) in upright.iter_mut().zip(&values[columns..]) {
+        *row = pick(value, *row);
+    }
+    let mut all = upright.clone();
+    for (row, upright) in all.chunks_exact_mut(columns).zip(upright.chunks_exact(columns)) {
+        for (place, &value) in row[1..].iter_mut().zip(upright) {
+            *place = pick(value, *place);
+        }
+        for (place, &value) in row.iter_mut().zip(&upright[1..]) {
+            *place = pick(value, *place);
+        }
+    }
+    all
 }
 
-fn wider<T: Sample>(a: (T, T), b: (T, T)) -> (T, T) {
-    (if b.0 < a.0 { b.0 } else { a.0 }, if b.1 > a.1 { b.1 } else { a.1 })
+/// The first if it is less, else the second.
+fn lesser<T: Sample>(a: T, b: T) -> T {
+    if a < b { a } else { b }
+}
+
+/// The first if it is greater, else the second.
+fn greater<T: Sample>(a: T, b: T) -> T {
+    if a > b { a } else { b }
 }
 
 /// Every tile's level, missing ones taken from the coarsest-necessary average of their surroundings.

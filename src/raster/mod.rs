@@ -48,6 +48,23 @@ impl<T: Copy> Raster<T> {
         Raster { width, height, samples }
     }
 
+    /// An image made a few rows at a time: `fill(y, rows)` changes at most `at_once` rows, from row `y` on, that are at `level` before.
+    pub fn from_bands(
+        width: usize,
+        height: usize,
+        level: T,
+        at_once: usize,
+        mut fill: impl FnMut(usize, &mut [T]),
+    ) -> Raster<T> {
+        // Not the whole image at once: rows that were just set are near when they are filled.
+        let mut samples = Vec::with_capacity(width * height);
+        for y in (0..height).step_by(at_once.max(1)) {
+            samples.resize((y + at_once.max(1)).min(height) * width, level);
+            fill(y, &mut samples[y * width..]);
+        }
+        Raster { width, height, samples }
+    }
+
     /// Width, px.
     pub fn width(&self) -> usize {
         self.width

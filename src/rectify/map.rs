@@ -1,10 +1,14 @@
 //! Which four samples make an output pixel, and in what mixture? A look-up table, computed once for images of one size.
 
 use super::Sample;
-use super::points::source_within;
+use super::eight_bit::Photograph;
+use super::fraction::{COARSE, Place};
+use super::source_row::{PIECE, SourceRows, Sources};
+use super::window::{Limits, PIXELS, Window};
 use crate::camera::Camera;
 use crate::geometry::Vec2;
 use crate::raster::Raster;
+use std::sync::OnceLock;
 
 /// Why an image cannot be rectified.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -36,12 +40,15 @@ pub enum RectifyError {
 /// A look-up table from output pixels to samples of the photograph.
 ///
 /// An output pixel has data when its source lies within the centres of the photograph's outermost samples, so that no sample is
-/// invented. Pixel (0, 0) is the centre of the top-left sample on both sides.
-#[derive(Debug, Clone, PartialEq)]
+/// invented. Pixel (0, 0) is the centre of the top-left sample on both sides. Levels of 16 bits and intensities are mixed in `f32`, 8-bit
+/// levels in whole numbers, within 0.02 of a level before they are rounded.
+#[derive(Debug, Clone)]
 pub struct RectifyMap {
     input_size: (usize, usize),
     output_size: (usize, usize),
     entries: Vec<Entry>,
+    /// The same for 8-bit levels, made when the first photograph of them comes.
+    windows: OnceLock<Vec<Window>>,
 }
 
 /// Index of the upper left of four samples, and how far towards the right and lower ones.
@@ -53,9 +60,22 @@ struct Entry {
 }
 
 const NO_DATA: u32 = u32::MAX;
-/// A source this close to a sample's centre is on it: maps that agree but for rounding (1e-12 px) take samples unchanged, and
-/// a source on the image's edge is inside. It moves nothing visibly: `f32` weights are coarser.
-const ON_A_SAMPLE_PX: f64 = 1e-9;
+
+impl PartialEq for RectifyMap {
+    fn eq(&self, other: &RectifyMap) -> bool {
+        (self.input_size, self.output_size) == (other.input_size, other.output_size)
+            && self.entries == other.entries
+    }
+}
+
+/// That images of this size can be interpolated.
+pub(super) fn check_size((width, height): (usize, usize)) -> Result<(), RectifyError> {
+    let too_many = width.checked_mul(height).is_none_or(|samples| samples >= NO_DATA as usize);
+    if width < 2 || height < 2 || too_many {
+        return Err(RectifyError::Size { width, height });
+    }
+    Ok(())
+}
 
 impl RectifyMap {
     /// The table of any inverse map: `source` gives the photograph's pixel that an output pixel shows, or `None`. Sizes are
@@ -68,19 +88,15 @@ impl RectifyMap {
         output_size: (usize, usize),
         source: impl Fn(&Vec2) -> Option<Vec2>,
     ) -> Result<RectifyMap, RectifyError> {
-        let (width, height) = input_size;
-        let too_many = width.checked_mul(height).is_none_or(|samples| samples >= NO_DATA as usize);
-        if width < 2 || height < 2 || too_many {
-            return Err(RectifyError::Size { width, height });
-        }
+        check_size(input_size)?;
         let mut entries = Vec::with_capacity(output_size.0 * output_size.1);
         for y in 0..output_size.1 {
             for x in 0..output_size.0 {
                 let position = source(&Vec2::new(x as f64, y as f64));
-                entries.push(position.map_or(Entry::NONE, |p| Entry::at(&p, width, height)));
+                entries.push(position.map_or(Entry::NONE, |p| Entry::at(&p, input_size)));
             }
         }
-        Ok(RectifyMap { input_size, output_size, entries })
+        Ok(RectifyMap { input_size, output_size, entries, windows: OnceLock::new() })
     }
 
     /// The table that turns photographs of `camera` into images of `output`, usually one without distortion.
@@ -93,8 +109,18 @@ impl RectifyMap {
         output: &Camera,
         output_size: (usize, usize),
     ) -> Result<RectifyMap, RectifyError> {
-        let radius = camera.distortion.monotone_radius();
-        RectifyMap::new(input_size, output_size, |pixel| source_within(camera, output, radius, pixel))
+        check_size(input_size)?;
+        let mut entries = Vec::with_capacity(output_size.0 * output_size.1);
+        let mut rows = SourceRows::new(camera, output, output_size.0);
+        let mut sources = Sources::new();
+        for y in 0..output_size.1 {
+            for first in (0..output_size.0).step_by(PIECE) {
+                let count = PIECE.min(output_size.0 - first);
+                rows.fill(y, first, count, &mut sources);
+                entries.extend((0..count).map(|place| Entry::at(&sources.get(place), input_size)));
+            }
+        }
+        Ok(RectifyMap { input_size, output_size, entries, windows: OnceLock::new() })
     }
 
     /// Width and height of the photographs, px.
@@ -118,15 +144,45 @@ impl RectifyMap {
             return Err(RectifyError::OtherSize { expected_width, expected_height, width, height });
         }
         let samples = photograph.samples();
-        let mut output = Raster::filled(self.output_size.0, self.output_size.1, border);
-        for y in 0..self.output_size.1 {
-            for (level, entry) in output.row_mut(y).iter_mut().zip(self.row(y)) {
+        let bytes = T::as_bytes(samples).map(|samples| Photograph::new(samples, self.input_size));
+        Ok(Raster::from_bands(self.output_size.0, self.output_size.1, border, 1, |y, levels| {
+            if let (Some(photograph), Some(levels)) = (&bytes, T::as_bytes_mut(levels)) {
+                return self.mix_bytes(photograph, y, levels);
+            }
+            for (level, entry) in levels.iter_mut().zip(self.row(y)) {
                 if entry.upper_left != NO_DATA {
                     *level = entry.mix(samples, width);
                 }
             }
-        }
-        Ok(output)
+        }))
+    }
+
+    /// A row of 8-bit levels.
+    fn mix_bytes(&self, photograph: &Photograph, y: usize, levels: &mut [u8]) {
+        let blocks = self.output_size.0.div_ceil(PIXELS);
+        let windows = &self.windows.get_or_init(|| self.to_windows())[y * blocks..][..blocks];
+        let entries = self.row(y);
+        photograph.mix_windows(windows, levels, |block, levels| {
+            for (level, entry) in levels.iter_mut().zip(&entries[block * PIXELS..]) {
+                if let Some(place) = entry.place(self.input_size.0) {
+                    *level = photograph.at(&place);
+                }
+            }
+        });
+    }
+
+    /// Windows of blocks of eight pixels, row by row; the last of a row may be short and then has none.
+    fn to_windows(&self) -> Vec<Window> {
+        let limits = Limits::of(self.input_size);
+        let block = |entries: &[Entry]| {
+            let (mut u, mut v) = ([f64::NAN; PIXELS], [f64::NAN; PIXELS]);
+            for (i, entry) in entries.iter().enumerate() {
+                let source = entry.source(self.input_size.0).unwrap_or(Vec2::new(f64::NAN, f64::NAN));
+                (u[i], v[i]) = (source.x * f64::from(COARSE), source.y * f64::from(COARSE));
+            }
+            Window::of(&u, &v, self.input_size.0, &limits).unwrap_or(Window::NONE)
+        };
+        (0..self.output_size.1).flat_map(|y| self.row(y).chunks(PIXELS).map(block)).collect()
     }
 
     /// Which output pixels have data.
@@ -137,12 +193,7 @@ impl RectifyMap {
     /// The photograph's pixel that an output pixel is sampled at, to the precision of the weights; `None` without data. Panics
     /// outside the output.
     pub fn source(&self, x: usize, y: usize) -> Option<Vec2> {
-        let entry = self.row(y)[x];
-        (entry.upper_left != NO_DATA).then(|| {
-            let index = entry.upper_left as usize;
-            let (column, row) = (index % self.input_size.0, index / self.input_size.0);
-            Vec2::new(column as f64 + f64::from(entry.right), row as f64 + f64::from(entry.down))
-        })
+        self.row(y)[x].source(self.input_size.0)
     }
 
     fn row(&self, y: usize) -> &[Entry] {
@@ -153,37 +204,30 @@ impl RectifyMap {
 impl Entry {
     const NONE: Entry = Entry { upper_left: NO_DATA, right: 0.0, down: 0.0 };
 
-    fn at(source: &Vec2, width: usize, height: usize) -> Entry {
-        match (split(source.x, width), split(source.y, height)) {
-            (Some((column, right)), Some((row, down))) => {
-                Entry { upper_left: (row * width + column) as u32, right, down }
-            }
-            _ => Entry::NONE,
-        }
+    fn at(source: &Vec2, size: (usize, usize)) -> Entry {
+        Place::of(source, size).map_or(Entry::NONE, |place| Entry {
+            upper_left: place.row * size.0 as u32 + place.column,
+            right: place.right,
+            down: place.down,
+        })
     }
 
-    /// Exact where a weight is 0 or 1, unlike `left + w (right - left)`.
+    fn place(&self, width: usize) -> Option<Place> {
+        let Entry { upper_left, right, down } = *self;
+        let (row, column) = (upper_left / width as u32, upper_left % width as u32);
+        (upper_left != NO_DATA).then_some(Place { column, row, right, down })
+    }
+
+    fn source(&self, width: usize) -> Option<Vec2> {
+        self.place(width).map(|place| {
+            let (u, v) = (f64::from(place.column), f64::from(place.row));
+            Vec2::new(u + f64::from(place.right), v + f64::from(place.down))
+        })
+    }
+
     fn mix<T: Sample>(&self, samples: &[T], width: usize) -> T {
-        let at = self.upper_left as usize;
-        let between = |index: usize| {
-            let (left, right) = (samples[index].to_f32(), samples[index + 1].to_f32());
-            left * (1.0 - self.right) + right * self.right
-        };
-        let (upper, lower) = (between(at), between(at + width));
-        T::from_f32(upper * (1.0 - self.down) + lower * self.down)
+        T::mix(samples, width, self.upper_left as usize, self.right, self.down)
     }
-}
-
-/// The lower of two neighbouring samples about a position, and the weight of the upper one; the last pair serves the last sample
-/// too. `None` outside of the samples' centres, or for NaN.
-fn split(position: f64, count: usize) -> Option<(usize, f32)> {
-    let nearest = position.round();
-    let position = if (position - nearest).abs() <= ON_A_SAMPLE_PX { nearest } else { position };
-    if !(position >= 0.0 && position <= (count - 1) as f64) {
-        return None;
-    }
-    let lower = (position as usize).min(count - 2);
-    Some((lower, (position - lower as f64) as f32))
 }
 
 #[cfg(test)]
@@ -257,8 +301,8 @@ mod tests {
                     let upper = at(0, 0) * (1.0 - shift_x) + at(1, 0) * shift_x;
                     let lower = at(0, 1) * (1.0 - shift_x) + at(1, 1) * shift_x;
                     let exact = upper * (1.0 - shift_y) + lower * shift_y;
-                    // Half a level, and f32 rounding of levels below 256.
-                    prop_assert!((f64::from(rectified.get(x, y)) - exact).abs() <= 0.5 + 1e-4);
+                    // Half a level; weights of 14 bits, 2 * 255 / 2^15; the middle rounding, 2^-8.
+                    prop_assert!((f64::from(rectified.get(x, y)) - exact).abs() <= 0.5 + 0.0195);
                 }
             }
         }

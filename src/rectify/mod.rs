@@ -5,11 +5,17 @@
 //! ```
 //! The inverse mapping needs only the forward distortion, leaves no holes, and its look-up table serves every image of a size.
 
+mod direct;
+mod eight_bit;
+mod fraction;
 mod map;
 mod output;
 mod points;
 mod sample;
+mod source_row;
+mod window;
 
+pub use direct::rectify_image;
 pub use map::{RectifyError, RectifyMap};
 pub use output::{OutputCameraError, OutputView, output_camera};
 pub use points::{rectify_points, source_pixel};
