@@ -28,6 +28,23 @@ check:
 reproducible:
     bash .ci/reproducible
 
+# Studies on a Slurm and a Dask of this machine alone
+cluster:
+    bash .ci/slurm
+    bash .ci/dask
+
 # Every experiment, figure and table, and the reconciliation
 all:
     cargo run --release --locked
+
+# This library beside OpenCV, mrcal and Ceres in one run; `just peers --write README.md` puts the tables there
+peers *ARGUMENTS:
+    benches/peers/run {{ARGUMENTS}}
+
+# Instructions of the kernels against golden/instructions.toml
+instructions:
+    .ci/instructions
+
+# Accepts the present counts
+bless-instructions:
+    .ci/instructions --bless

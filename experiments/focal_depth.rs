@@ -11,7 +11,7 @@ use calibench::camera::{FreeParameters, Parameter};
 use calibench::evaluate::interval::each_of;
 use calibench::evaluate::{Interval, cramer_rao};
 use calibench::geometry::{Pose, Vec3, rotation};
-use calibench::harness::study::{CellSummary, Engine, Spec, Summary, in_memory, summarise};
+use calibench::harness::study::{CellSummary, Engine, Summary, within};
 use calibench::harness::{
     Band, Cell, Claim, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
 };
@@ -71,19 +71,9 @@ struct Bound {
 
 fn run(context: &Context) -> Result<Record, ExperimentError> {
     let mut record = context.record();
-    let mut spec = Spec::parse(STUDY).map_err(ExperimentError::at("study"))?;
-    spec.seed = context.seed;
-    record.input("study", STUDY.as_bytes());
-    let cells = spec.factor[0].levels.len();
-    let progress = context.progress("trials", cells * spec.trials.per_cell as usize);
-    let mut done = 0;
-    let engine = in_memory(spec, STUDY, |pace| {
-        progress.advance((pace.trials - done) as usize);
-        done = pace.trials;
-    })
-    .map_err(ExperimentError::at("study"))?;
-    let summary = summarise(&engine);
-    let bounds: Vec<Option<Bound>> = (0..cells).map(|cell| bound(tilt_deg(&engine, cell))).collect();
+    let (engine, summary) = within(context, &mut record, "study", STUDY, |_| {})?;
+    let bounds: Vec<Option<Bound>> =
+        (0..engine.cells.len()).map(|cell| bound(tilt_deg(&engine, cell))).collect();
 
     tell_numbers(&mut record, &engine, &summary, &bounds);
     claim_facing_refused(&mut record, &summary);

@@ -7,7 +7,7 @@
 
 use calibench::evaluate::interval::each_of;
 use calibench::evaluate::{Interval, RmseDistribution};
-use calibench::harness::study::{Engine, Spec, Summary, in_memory_seeing, summarise};
+use calibench::harness::study::{Cell as Design, Engine, Spec, Summary, Trial, within};
 use calibench::harness::{
     Band, Cell, Claim, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
 };
@@ -117,10 +117,8 @@ fn sweep(
     assumed_px: Option<f64>,
 ) -> Result<Swept, ExperimentError> {
     let text = format!("name = \"{name}\"\n{SCENE}{factors}");
-    let mut spec = Spec::parse(&text).map_err(ExperimentError::at("study"))?;
-    spec.seed = context.seed;
-    record.input(name, text.as_bytes());
-    let cells = spec.cells(&text).map_err(ExperimentError::at("study"))?;
+    let cells =
+        Spec::parse(&text).and_then(|spec| spec.cells(&text)).map_err(ExperimentError::at("study"))?;
     let thresholds: Vec<f64> = cells
         .iter()
         .map(|cell| {
@@ -129,21 +127,18 @@ fn sweep(
         })
         .collect();
     let mut alarms = vec![0; cells.len()];
-    let progress = context.progress(name, cells.len() * spec.trials.per_cell as usize);
-    let see = |trial: &calibench::harness::study::Trial| {
-        progress.step();
+    let see = |trial: &Trial| {
         // The first quantity is the RMSE; a trial without one raises no alarm.
         if trial.values[0].is_some_and(|rmse| rmse < thresholds[trial.cell]) {
             alarms[trial.cell] += 1;
         }
     };
-    let engine = in_memory_seeing(spec, &text, see, |_| {}).map_err(ExperimentError::at("study"))?;
-    let summary = summarise(&engine);
+    let (engine, summary) = within(context, record, name, &text, see)?;
     Ok(Swept { engine, summary, alarms })
 }
 
 /// The predicted distribution of a cell's RMSE: six intrinsics, and six pose parameters a view.
-fn predicted(cell: &calibench::harness::study::Cell) -> RmseDistribution {
+fn predicted(cell: &Design) -> RmseDistribution {
     let (views, points) = cell.size();
     RmseDistribution { sigma_px: cell.noise_px(), points: views * points, parameters: 6 + 6 * views }
 }

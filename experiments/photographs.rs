@@ -88,15 +88,11 @@ struct Exact {
 fn run(context: &Context) -> Result<Record, ExperimentError> {
     let mut record = context.record();
     let nodes = nodes();
-    let progress = context.progress("photographs", nodes.len() + DIAMETERS_MM.len());
-    let outcomes: Vec<Outcome> = nodes
-        .par_iter()
-        .map(|node| outcome(*node, context.seed).inspect(|_| progress.step()))
-        .collect::<Result<_, _>>()?;
-    let exact: Vec<Exact> = DIAMETERS_MM
-        .par_iter()
-        .map(|&diameter| noise_free(diameter).inspect(|_| progress.step()))
-        .collect::<Result<_, _>>()?;
+    let album = Album::of(&nodes, context)?;
+    let outcomes: Vec<Outcome> =
+        nodes.par_iter().map(|node| outcome(*node, &album, context.seed)).collect::<Result<_, _>>()?;
+    let exact: Vec<Exact> =
+        DIAMETERS_MM.par_iter().map(|&diameter| noise_free(diameter, &album)).collect::<Result<_, _>>()?;
     let unit = unit_deviations()?;
     tell_noise(&mut record, &outcomes)?;
     tell_bias(&mut record, &exact, &unit)?;
@@ -110,7 +106,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
         "0.1 px is not what a sensor makes of dots like these: noise of 1 % of full scale gives less than a twentieth of it. What \
          print, flatness and uneven sharpness add is not rendered here.",
     );
-    let photo = photo(&Truth::chapter_poses()[3], &BASE)?;
+    let photo = &album.photos(&BASE)[3];
     let caption = "The chapter's target in its compound pose, dots of 3 mm, blur 0.5 px, without noise: what the detector sees.";
     record.figure(Figure::photo("photograph", &photo.image.to_u8(), caption));
     Ok(record)
@@ -130,6 +126,44 @@ fn board(diameter_mm: f64) -> Result<Board, ExperimentError> {
     Board::circles(9, 7, 10.0, diameter_mm).map_err(ExperimentError::at("board"))
 }
 
+/// The noise-free photographs of the chapter's poses, each rendered once: nodes that differ in noise alone share theirs.
+struct Album(Vec<(Node, Vec<Photograph>)>);
+
+impl Album {
+    fn of(nodes: &[Node], context: &Context) -> Result<Album, ExperimentError> {
+        let mut scenes: Vec<Node> = Vec::new();
+        for scene in nodes.iter().map(Node::noiseless) {
+            if !scenes.contains(&scene) {
+                scenes.push(scene);
+            }
+        }
+        let poses = Truth::chapter_poses();
+        let progress = context.progress("photographs", scenes.len() * poses.len());
+        let sheets: Vec<(&Node, &Pose)> =
+            scenes.iter().flat_map(|node| poses.iter().map(move |pose| (node, pose))).collect();
+        let photos: Vec<Photograph> = sheets
+            .par_iter()
+            .map(|(node, pose)| photo(pose, node).inspect(|_| progress.step()))
+            .collect::<Result<_, _>>()?;
+        let mut photos = photos.into_iter();
+        let pages = scenes.into_iter().map(|node| (node, photos.by_ref().take(poses.len()).collect()));
+        Ok(Album(pages.collect()))
+    }
+
+    /// One photograph a pose.
+    fn photos(&self, node: &Node) -> &[Photograph] {
+        let page = self.0.iter().find(|(scene, _)| *scene == node.noiseless());
+        &page.expect("the album was made for all nodes").1
+    }
+}
+
+impl Node {
+    /// What the photographs show before noise is added.
+    fn noiseless(&self) -> Node {
+        Node { noise: 0.0, ..*self }
+    }
+}
+
 fn photo(pose: &Pose, node: &Node) -> Result<Photograph, ExperimentError> {
     let imaging = Imaging { blur_px: node.blur_px, ..Imaging::default() };
     photograph(&Truth::chapter_camera(), Truth::CHAPTER_IMAGE, &board(node.diameter_mm)?, pose, &imaging)
@@ -144,13 +178,12 @@ fn biases(pose: &Pose, board: &Board) -> Result<Vec<Vec2>, ExperimentError> {
     disc_biases(&Truth::chapter_camera(), pose, board).map_err(ExperimentError::at("bias of the discs"))
 }
 
-fn outcome(node: Node, seed: u64) -> Result<Outcome, ExperimentError> {
+fn outcome(node: Node, album: &Album, seed: u64) -> Result<Outcome, ExperimentError> {
     let scenario = format!("blur {} noise {} diameter {}", node.blur_px, node.noise, node.diameter_mm);
     let (mut errors, mut variances) = (Vec::new(), Vec::new());
-    for (pose, trial) in Truth::chapter_poses().iter().zip(0..) {
+    for ((pose, photo), trial) in Truth::chapter_poses().iter().zip(album.photos(&node)).zip(0..) {
         let key = StreamKey { seed, scenario: &scenario, trial, purpose: "image noise" };
-        let photo =
-            photo(pose, &node)?.with_noise(&SensorNoise::constant(node.noise), &mut Stream::open(key));
+        let photo = photo.clone().with_noise(&SensorNoise::constant(node.noise), &mut Stream::open(key));
         let seen = detected(&photo)?;
         let biases = biases(pose, &board(node.diameter_mm)?)?;
         errors.extend(seen.iter().zip(&photo.centres_true).zip(&biases).map(|((s, t), b)| s - t - b));
@@ -186,14 +219,13 @@ fn edge_variance(pose: &Pose, centre: &Vec2, node: &Node) -> f64 {
     information.try_inverse().map_or(f64::NAN, |variance| 0.5 * variance.trace())
 }
 
-fn noise_free(diameter_mm: f64) -> Result<Exact, ExperimentError> {
+fn noise_free(diameter_mm: f64, album: &Album) -> Result<Exact, ExperimentError> {
     let board = board(diameter_mm)?;
     let node = Node { diameter_mm, ..BASE };
     let (mut seen_views, mut predicted_views) = (Vec::new(), Vec::new());
     let (mut all_biases, mut displacements) = (Vec::new(), Vec::new());
-    for pose in &Truth::chapter_poses() {
-        let photo = photo(pose, &node)?;
-        let seen = detected(&photo)?;
+    for (pose, photo) in Truth::chapter_poses().iter().zip(album.photos(&node)) {
+        let seen = detected(photo)?;
         let biases = biases(pose, &board)?;
         displacements.extend(seen.iter().zip(&photo.centres_true).map(|(s, t)| s - t));
         let biased = photo.centres_true.iter().zip(&biases).map(|(t, b)| t + b).collect();

@@ -9,7 +9,7 @@
 use calibench::camera::{FreeParameters, Parameter};
 use calibench::evaluate::Interval;
 use calibench::evaluate::interval::each_of;
-use calibench::harness::study::{CellSummary, Engine, Spec, Summary, in_memory, summarise};
+use calibench::harness::study::{CellSummary, Engine, Summary, within};
 use calibench::harness::{
     Band, Claim, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
 };
@@ -62,18 +62,7 @@ const SOLVER: f64 = 1e-6;
 
 fn run(context: &Context) -> Result<Record, ExperimentError> {
     let mut record = context.record();
-    let mut spec = Spec::parse(STUDY).map_err(ExperimentError::at("study"))?;
-    spec.seed = context.seed;
-    record.input("study", STUDY.as_bytes());
-    let cells = spec.factor[0].levels.len() as u64;
-    let progress = context.progress("trials", (cells * spec.trials.per_cell) as usize);
-    let mut done = 0;
-    let engine = in_memory(spec, STUDY, |pace| {
-        progress.advance((pace.trials - done) as usize);
-        done = pace.trials;
-    })
-    .map_err(ExperimentError::at("study"))?;
-    let summary = summarise(&engine);
+    let (engine, summary) = within(context, &mut record, "study", STUDY, |_| {})?;
 
     tell_numbers(&mut record, &engine, &summary);
     claim_all_converged(&mut record, &summary);

@@ -1,96 +1,23 @@
 //! Do threads, parts and interruptions leave every byte of a study where it was, and is a changed study refused?
 
+mod study;
+
 use calibench::harness::study::{
-    Engine, Folder, FolderError, Interruption, Manifest, MergeError, Outcome, Shard, finish, merge,
+    Engine, Folder, FolderError, Interruption, Manifest, MergeError, Outcome, Shard, TrialFile, finish, merge,
 };
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
+use study::{SPEC, assert_same, resume, scratch};
 
-/// Two cells of different noise, 5 batches each; the last is short.
-const SPEC: &str = r#"
-name = "small"
-question = "Does nothing but the seed decide?"
-seed = 11
-
-[scene]
-image = [640, 480]
-camera = { fx = 600.0, fy = 600.0, cx = 326.0, cy = 243.0, k1 = -0.18, k2 = 0.05 }
-target = { columns = 9, rows = 7, spacing_mm = 10.0 }
-poses = { kind = "random", views = 3, tilt_deg = 35.0, tilt_min_deg = 10.0, coverage = 0.5, distance_mm = 150.0, redraw = true }
-noise_px = 0.1
-
-[trials]
-per_cell = 45
-batch = 10
-
-[[factor]]
-name = "noise"
-unit = "px"
-set = ["scene.noise_px"]
-levels = [0.1, 0.3]
-"#;
-
-fn scratch(name: &str) -> PathBuf {
-    let path = std::env::temp_dir().join(format!("calibench-study-{}-{name}", std::process::id()));
-    let _ = fs::remove_dir_all(&path);
-    path
+/// A run whose trials stand in CSV.
+fn run(path: &Path, text: &str, shard: Shard) {
+    study::run(path, text, shard, TrialFile::Csv);
 }
 
 fn begin(path: &Path, text: &str, shard: Shard) -> (Folder, Engine) {
-    let engine = Engine::new(text, shard).unwrap();
-    let folder = Folder::create(path, text, &Manifest::new(&engine.spec, shard, None)).unwrap();
-    (folder, engine)
-}
-
-/// Runs to the end.
-fn run(path: &Path, text: &str, shard: Shard) {
-    let (folder, mut engine) = begin(path, text, shard);
-    let outcome = folder.run(&mut engine, &AtomicBool::new(false), |_| {}).unwrap();
-    assert_eq!(outcome, Outcome::Complete);
-    finish(&folder, &engine).unwrap();
-}
-
-fn resume(path: &Path) {
-    let folder = Folder::open(path).unwrap();
-    let shard = folder.manifest().unwrap().shard.parse().unwrap();
-    let mut engine = Engine::new(&folder.read("spec.toml").unwrap(), shard).unwrap();
-    folder.check(&Manifest::new(&engine.spec, shard, None)).unwrap();
-    folder.run(&mut engine, &AtomicBool::new(false), |_| {}).unwrap();
-    finish(&folder, &engine).unwrap();
-}
-
-/// Every file with its bytes.
-fn contents(path: &Path) -> BTreeMap<String, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    let mut folders = vec![path.to_path_buf()];
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(&folder).unwrap() {
-            let entry = entry.unwrap().path();
-            if entry.is_dir() {
-                folders.push(entry);
-            } else {
-                let name = entry.strip_prefix(path).unwrap().display().to_string();
-                found.insert(name, fs::read(&entry).unwrap());
-            }
-        }
-    }
-    found
-}
-
-fn assert_same(a: &Path, b: &Path) {
-    let (a, b) = (contents(a), contents(b));
-    assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
-    for (name, bytes) in &a {
-        assert!(bytes == &b[name], "{name} differs");
-    }
-    for name in
-        ["trials.csv", "summary.csv", "outcomes.csv", "correlations.csv", "report.html", "manifest.json"]
-    {
-        assert!(a[name].len() > 100, "{name} is empty");
-    }
+    study::begin(path, text, shard, TrialFile::Csv)
 }
 
 #[test]
@@ -127,7 +54,7 @@ fn parts_join_to_the_bytes_of_the_whole() {
             let joined = scratch(&format!("{kind}-joined-{count}"));
             // The order in which parts are named does not matter.
             let named: Vec<PathBuf> = parts.iter().rev().cloned().collect();
-            let (folder, engine) = merge(&named, &joined).unwrap();
+            let (folder, engine) = merge(&named, &joined, None).unwrap();
             finish(&folder, &engine).unwrap();
             assert_same(&whole, &joined);
             parts.iter().chain([&joined]).for_each(|p| fs::remove_dir_all(p).unwrap());
@@ -150,6 +77,35 @@ fn a_precision_ends_cells_at_a_batch_and_before_the_most() {
 }
 
 #[test]
+fn progress_counts_to_what_there_will_be_and_names_the_worst_cell() {
+    let path = scratch("pace");
+    // The first cell's views face the camera: nothing converges there.
+    let text = with_precision()
+        .replace("name = \"noise\"", "name = \"tilt\"")
+        .replace(
+            "set = [\"scene.noise_px\"]",
+            "set = [\"scene.poses.tilt_min_deg\", \"scene.poses.tilt_deg\"]",
+        )
+        .replace("levels = [0.1, 0.3]", "levels = [[0.0, 0.0], [10.0, 35.0]]");
+    let (folder, mut engine) = begin(&path, &text, Shard::WHOLE);
+    let mut paces = Vec::new();
+    folder.run(&mut engine, &AtomicBool::new(false), |pace| paces.push(pace.clone())).unwrap();
+    let last = paces.last().unwrap();
+    assert_eq!((last.trials, last.expected), (engine.trials(), engine.trials()));
+    assert!(
+        last.expected > 200 && last.expected < 400,
+        "one cell takes its 200, the other ends early: {last:?}"
+    );
+    for pace in &paces[1..] {
+        let worst = pace.worst.as_ref().unwrap();
+        assert_eq!((worst.quantity, worst.relative_half_width), ("fx", None), "{worst:?}");
+        assert!(worst.cell.starts_with("tilt = [0"), "{worst:?}");
+    }
+    drop(folder);
+    fs::remove_dir_all(path).unwrap();
+}
+
+#[test]
 fn parts_that_make_no_whole_are_refused() {
     let paths = [scratch("a"), scratch("b"), scratch("c"), scratch("other")];
     for (index, path) in paths[..2].iter().enumerate() {
@@ -157,8 +113,9 @@ fn parts_that_make_no_whole_are_refused() {
     }
     let refuse = |parts: &[&PathBuf]| {
         let out = scratch("refused");
-        let error =
-            merge(&parts.iter().map(|p| p.to_path_buf()).collect::<Vec<_>>(), &out).map(|_| ()).unwrap_err();
+        let error = merge(&parts.iter().map(|p| p.to_path_buf()).collect::<Vec<_>>(), &out, None)
+            .map(|_| ())
+            .unwrap_err();
         assert!(!out.exists(), "nothing is written for parts that are refused");
         error
     };
@@ -171,8 +128,13 @@ fn parts_that_make_no_whole_are_refused() {
     run(&paths[3], &SPEC.replace("seed = 11", "seed = 12"), Shard { index: 2, count: 3 });
     let error = refuse(&[&paths[0], &paths[1], &paths[3]]);
     assert!(error.to_string().contains("spec.seed: was 11, is 12"), "{error}");
+    let manifest = paths[1].join("manifest.json");
+    let text = fs::read_to_string(&manifest).unwrap();
+    fs::write(&manifest, text.replace("\"behaviour\": \"", "\"behaviour\": \"0")).unwrap();
+    let error = refuse(&[&paths[0], &paths[1], &paths[3]]);
+    assert!(error.to_string().contains("code.behaviour"), "{error}");
     // A folder is locked while it is open, so the same part twice is refused as in use.
-    assert!(merge(&[paths[0].clone(), paths[0].clone()], &scratch("twice")).is_err());
+    assert!(merge(&[paths[0].clone(), paths[0].clone()], &scratch("twice"), None).is_err());
     paths.iter().for_each(|p| fs::remove_dir_all(p).unwrap());
 }
 
@@ -263,6 +225,31 @@ fn of_two_paired_runs_the_quieter_is_found_better_and_a_copy_is_not() {
     paths.iter().for_each(|p| fs::remove_dir_all(p).unwrap());
 }
 
+#[test]
+fn levels_of_a_factor_are_paired_within_a_run() {
+    use calibench::harness::study::compare::{CompareError, Verdict, compare_levels};
+    let (path, alone) = (scratch("levels"), scratch("levels-alone"));
+    let loss = "[[factor]]\nname = \"loss\"\nset = [\"estimator.loss\"]\nlevels = [{ kind = \"squares\" }, { kind = \"huber\", delta_px = 9.0 }]\n";
+    let text = format!("{SPEC}\n{loss}");
+    run(&path, &text, Shard::WHOLE);
+    let noise = compare_levels(&path, "noise").unwrap();
+    assert_eq!(noise.effects.len(), 14, "the louder of two noises, with two losses, seven errors each");
+    for e in &noise.effects {
+        // To first order three times the noise is three times the error; the second order is a few percent at 0.3 px.
+        assert!(e.verdict == Verdict::FirstBetter && (e.ratio.value - 3.0).abs() < 0.3, "{e:?}");
+    }
+    let losses = compare_levels(&path, "loss").unwrap();
+    // Huber's loss beyond all residuals is least squares.
+    assert!(
+        losses.effects.iter().all(|e| e.verdict == Verdict::NotTold && (e.ratio.value - 1.0).abs() < 1e-6)
+    );
+    let error = compare_levels(&path, "lens").unwrap_err();
+    assert!(matches!(&error, CompareError::Factor { known, .. } if known == "noise, loss"), "{error}");
+    run(&alone, &text.replace("seed = 11", "seed = 11\ncommon_random_numbers = false"), Shard::WHOLE);
+    assert!(matches!(compare_levels(&alone, "loss"), Err(CompareError::NotCommon { .. })));
+    [path, alone].iter().for_each(|p| fs::remove_dir_all(p).unwrap());
+}
+
 /// Long enough to be killed on the way, on a fast machine too.
 fn long_spec() -> String {
     SPEC.replace("per_cell = 45", "per_cell = 600").replace("batch = 10", "batch = 25")
@@ -331,5 +318,38 @@ fn an_interrupt_finishes_the_batch_and_says_how_to_go_on() {
     assert_eq!(output.status.code(), Some(3), "{message}");
     assert!(message.contains("calibench study resume"), "{message}");
     assert!(command(&["study", "resume", &out.display().to_string()]).status().unwrap().success());
+    fs::remove_dir_all(folder).unwrap();
+}
+
+#[cfg(not(feature = "parquet"))]
+#[test]
+fn without_the_feature_parquet_is_refused_by_name() {
+    let folder = scratch("no-parquet");
+    fs::create_dir_all(&folder).unwrap();
+    let spec = folder.join("spec.toml");
+    fs::write(&spec, SPEC).unwrap();
+    let out = folder.join("run");
+    let output = Command::new(env!("CARGO_BIN_EXE_calibench"))
+        .args(["study", "run", &spec.display().to_string(), "--trials", "parquet"])
+        .args(["--out", &out.display().to_string()])
+        .output()
+        .unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("--features parquet"), "{message}");
+    assert!(!out.exists(), "nothing is begun that cannot be ended");
+    // The run of another program, which has the feature.
+    run(&out, SPEC, Shard::WHOLE);
+    let manifest = fs::read_to_string(out.join("manifest.json")).unwrap();
+    fs::write(out.join("manifest.json"), manifest.replace("\"trials\": \"csv\"", "\"trials\": \"parquet\""))
+        .unwrap();
+    let error = merge(&[out], &folder.join("whole"), None).map(|_| ()).unwrap_err();
+    assert!(
+        matches!(
+            &error,
+            MergeError::Run(calibench::harness::study::RunError::Folder(FolderError::NoParquet))
+        ),
+        "{error}"
+    );
     fs::remove_dir_all(folder).unwrap();
 }

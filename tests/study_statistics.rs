@@ -111,6 +111,26 @@ fn a_robust_loss_withstands_gross_errors() {
 }
 
 #[test]
+fn a_robust_loss_knows_its_own_spread() {
+    let factor = "[[factor]]\nname = \"loss\"\nset = [\"estimator.loss\"]\n\
+                  levels = [{ kind = \"huber\", delta_px = 0.15 }, { kind = \"cauchy\", scale_px = 0.2 }]";
+    let text = spec("{ kind = \"chapter\" }", &format!("trials = {{ per_cell = 1000 }}\n{factor}"));
+    let mut spec = Spec::parse(&text).unwrap();
+    spec.confidence = 1.0 - each_of(2, FALSE_ALARM);
+    let summary = summarise(&in_memory(spec, &text, |_| {}).unwrap());
+    for cell in &summary.cells {
+        let nees = cell.of("nees").unwrap();
+        let (mean, expected) = (nees.mean.unwrap(), nees.predicted.unwrap().mean);
+        // The correction is asymptotic: its own terms of the next order are p / (2N - p), 30 of 474, or 6 %.
+        assert!(
+            mean.low < 1.06 * expected && mean.high > 0.94 * expected,
+            "{}: {mean:?} {expected}",
+            cell.name
+        );
+    }
+}
+
+#[test]
 fn a_plan_finds_the_fewest_views_and_trials_confirm_it() {
     let text = spec("{ kind = \"chapter\" }", "trials = { per_cell = 100 }");
     let mut spec = Spec::parse(&text).unwrap();

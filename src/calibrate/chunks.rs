@@ -6,6 +6,18 @@ pub(super) const CHUNK: usize = 16;
 #[cfg(feature = "parallel")]
 const WORTH_SHARING: usize = 4 * CHUNK;
 
+/// Does `work` over `items` items on a thread of the pool where it is worth sharing: there one [`fold`] after another finds the other
+/// threads awake, while each that is called from outside the pool puts its caller to sleep and wakes it up again.
+pub(super) fn in_pool<R: Send>(items: usize, work: impl FnOnce() -> R + Send) -> R {
+    #[cfg(feature = "parallel")]
+    if items >= WORTH_SHARING && rayon::current_num_threads() > 1 {
+        return rayon::scope(|_| work());
+    }
+    #[cfg(not(feature = "parallel"))]
+    let _ = items;
+    work()
+}
+
 /// Applies `work` to the chunks of `items`, with the chunk's number, and hands the results to `combine` in order.
 pub(super) fn fold<T: Send, R: Send>(
     items: &mut [T],

@@ -30,6 +30,10 @@ const START_GAIN: f64 = 1e-3;
 /// no error: the result says so in [`Calibration::termination`] and in a warning.
 pub fn calibrate(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
     check_counts(views, settings)?;
+    chunks::in_pool(views.len(), || estimate(views, settings))
+}
+
+fn estimate(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
     let frame = TargetFrame::of(views);
     let (observations, homographies) = homographies(views, &frame)?;
     let starts = start::starts(&homographies, settings, pixel_frame(&observations))?;
@@ -248,21 +252,22 @@ impl Fit {
 
 /// Factor of the unit covariance: the residual variance, or Huber's correction for a robust loss.
 ///
-/// The weighted normal matrix is `sum w J^T J`; with `m = mean w` it stands for `m J^T J`, so the sandwich
-/// `sum w^2 r^2 / m^2 (J^T J)^-1` is `sum w^2 r^2 / m` times its inverse.
+/// The weighted normal matrix is `sum w J^T J`; with `mean w` it stands for `mean w J^T J`, so the sandwich
+/// `sum w^2 r^2 / (mean psi')^2 (J^T J)^-1` is `sum w^2 r^2 mean w / (mean psi')^2` times its inverse.
 fn noise_variance(residuals: &[Vec<Vec2>], square: f64, loss: Loss, freedom: f64) -> f64 {
     if loss == Loss::Squares {
         return square / freedom;
     }
-    let (mut square, mut weights, mut count) = (0.0, 0.0, 0.0);
+    let (mut square, mut weights, mut slopes, mut count) = (0.0, 0.0, 0.0, 0.0);
     for r in residuals.iter().flatten() {
         let s = r.norm_squared();
         let weight = loss.at(s).1;
         square += weight * weight * s;
         weights += weight;
+        slopes += loss.slope(s);
         count += 1.0;
     }
-    square / freedom * count / weights
+    square / freedom * weights * count / (slopes * slopes)
 }
 
 fn warnings(calibration: &Calibration, largest_radius: f64) -> Vec<Warning> {

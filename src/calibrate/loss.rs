@@ -38,6 +38,18 @@ impl Loss {
         }
     }
 
+    /// `rho'(s) + s rho''(s)`: the slope of the influence `rho'(|r|^2) r`, the mean of its slopes along and across the residual.
+    pub fn slope(&self, s: f64) -> f64 {
+        let weight = self.at(s).1;
+        match *self {
+            Loss::Squares => 1.0,
+            // Beyond delta the influence keeps its size: it only turns.
+            Loss::Huber { .. } if weight < 1.0 => 0.5 * weight,
+            Loss::Huber { .. } => 1.0,
+            Loss::Cauchy { .. } => weight * weight,
+        }
+    }
+
     /// Whether the scale is a positive number.
     pub fn is_valid(&self) -> bool {
         match *self {
@@ -60,6 +72,9 @@ mod tests {
                 let h = 1e-6 * s;
                 let slope = (loss.at(s + h).0 - loss.at(s - h).0) / (2.0 * h);
                 assert!((slope - loss.at(s).1).abs() < 1e-8, "{loss:?} at {s}");
+                let curvature = (loss.at(s + h).1 - loss.at(s - h).1) / (2.0 * h);
+                // The weight's rounding, 1e-16, over the step, 1e-6 s, times s.
+                assert!((slope + s * curvature - loss.slope(s)).abs() < 1e-8, "{loss:?} at {s}");
             }
         }
     }

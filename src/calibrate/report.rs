@@ -24,7 +24,7 @@ pub struct Calibration {
     /// Degrees of freedom `2 N - p`.
     pub degrees_of_freedom: usize,
     /// First-order covariance of intrinsics and poses. Under a robust loss it is scaled by Huber's correction
-    /// `[sum psi^2 / (2N - p)] / [mean psi']^2` with the weights' own approximation `psi' = w` (Huber & Ronchetti 2009, section 7.6).
+    /// `[sum psi^2 / (2N - p)] / [mean psi']^2` (Huber & Ronchetti 2009, section 7.6), psi' being [`Loss::slope`](crate::calibrate::Loss::slope).
     pub covariance: Covariance,
     /// Weakest direction of the estimate; `None` if nothing but poses was free.
     pub conditioning: Option<Conditioning>,

@@ -42,10 +42,11 @@ pub(crate) trait Kernel {
     fn run<L: Lanes>(self) -> Self::Output;
 }
 
-/// Runs a kernel with the widest registers that the machine has.
+/// Runs a kernel with the widest registers that the machine has, or in plain code if built with `--cfg calibench_portable`: that is for
+/// measuring what other machines run.
 #[inline]
 pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", not(calibench_portable)))]
     if std::is_x86_feature_detected!("avx2") {
         // SAFETY: the processor has AVX2.
         return unsafe { wide::run(kernel) };
@@ -135,7 +136,7 @@ impl Lanes for Portable {
 
 /// AVX2. The type is named in this module only, and made only inside [`wide::run`], which runs only where AVX2 is: that is what makes
 /// every `unsafe` block below sound.
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(calibench_portable)))]
 mod wide {
     use super::{Add, Arithmetic, Div, Kernel, LANES, Lanes, Mul, Neg, Sub};
     use std::arch::x86_64::*;

@@ -35,6 +35,7 @@ pub mod provenance;
 pub mod published;
 mod reconcile;
 mod record;
+pub mod resources;
 mod simulated;
 pub mod study;
 mod table;

@@ -1,6 +1,8 @@
 //! How far is it? A bar on standard error for work that takes over a second, nothing otherwise.
 
-use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use super::significant;
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use std::fmt::Write;
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
@@ -61,17 +63,34 @@ impl Progress {
         self.bar.inc(steps as u64);
     }
 
-    /// Says something beside the bar, such as what is worst so far.
-    pub fn note(&self, text: &str) {
-        self.bar.set_message(format!("{} {text}", self.label));
+    /// So many steps were done before, in no time: they count, but say nothing of the rate.
+    pub fn already(&self, steps: usize) {
+        self.bar.set_position(steps as u64);
+        self.bar.tick();
+        self.bar.reset_eta();
     }
 
-    /// Puts the bar on the display.
+    /// The work is now known to be so many steps.
+    pub fn expect(&self, total: usize) {
+        self.bar.set_length(total as u64);
+    }
+
+    /// Says something after the bar, such as what is worst so far.
+    pub fn note(&self, text: &str) {
+        self.bar.set_message(text.to_string());
+    }
+
+    /// Puts the bar on the display. The note comes last: a narrow terminal cuts it and nothing else.
     fn show(&self) {
-        if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {per_sec} eta {eta}") {
-            self.bar.set_style(style);
+        let template = "{prefix} {bar:20} {pos}/{len} {rate} eta {eta} {wide_msg}";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            let rate = |state: &ProgressState, out: &mut dyn Write| {
+                // A failure would be that of the terminal, and there is nobody left to tell.
+                let _ = write!(out, "{}/s", significant(state.per_sec(), 3));
+            };
+            self.bar.set_style(style.with_key("rate", rate));
         }
-        self.bar.set_message(self.label.clone());
+        self.bar.set_prefix(self.label.clone());
         self.display.bars.add(self.bar.clone());
     }
 }

@@ -7,8 +7,10 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The ten intrinsic parameters by name; those left out of a file are 0.
+/// The ten intrinsic parameters by name; those left out of a file are 0, and any other name is refused: without it this would be another
+/// camera.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 #[allow(missing_docs, reason = "the names are those of `Parameter`")]
 pub struct CameraFields {
     pub fx: f64,

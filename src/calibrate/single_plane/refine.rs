@@ -2,7 +2,8 @@
 
 use super::super::Termination;
 use super::SinglePlaneError;
-use super::model::{Frames, PARAMETERS, ParameterVector, predict, predict_with_jacobian};
+use super::model::{Frames, PARAMETERS, ParameterVector, PointJacobian, predict, predict_with_jacobian};
+use crate::geometry::lanes::{Kernel, LANES, Lanes, dispatch};
 use crate::target::View;
 use nalgebra::SMatrix;
 
@@ -99,24 +100,73 @@ fn cost(frames: &Frames, view: &View, at: &ParameterVector) -> f64 {
 }
 
 fn normal_equations(frames: &Frames, view: &View, at: &ParameterVector, active: usize) -> Normal {
-    let mut normal = Normal { matrix: SMatrix::zeros(), gradient: ParameterVector::zeros(), cost: 0.0 };
-    for (point, pixel) in view.pairs() {
-        let Some((predicted, jacobian)) = predict_with_jacobian(frames, at, point) else {
-            normal.cost = f64::INFINITY;
-            break;
+    dispatch(Sum { frames, view, at, active })
+}
+
+/// Vectors of lanes in a row of the normal matrix.
+const VECTORS: usize = PARAMETERS / LANES;
+const _: () = assert!(PARAMETERS.is_multiple_of(LANES));
+
+/// `sum J^T J`, `sum J^T r` and `sum |r|^2`, point by point: an entry is the same sum in the same order on any registers.
+struct Sum<'a> {
+    frames: &'a Frames,
+    view: &'a View,
+    at: &'a ParameterVector,
+    active: usize,
+}
+
+impl Kernel for Sum<'_> {
+    type Output = Normal;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Normal {
+        let Sum { frames, view, at, active } = self;
+        // Blocks on and right of the diagonal.
+        let mut rows = [[L::zero(); VECTORS]; PARAMETERS];
+        let mut gradient = [L::zero(); VECTORS];
+        let mut cost = 0.0;
+        for (point, pixel) in view.pairs() {
+            let Some((predicted, jacobian)) = predict_with_jacobian(frames, at, point) else {
+                cost = f64::INFINITY;
+                break;
+            };
+            let residual = predicted - frames.pixel_offset(pixel);
+            let (u, v) = (vectors::<L>(&jacobian, 0), vectors::<L>(&jacobian, 1));
+            for i in 0..PARAMETERS {
+                let (ui, vi) = (L::splat(jacobian[(0, i)]), L::splat(jacobian[(1, i)]));
+                for k in i / LANES..VECTORS {
+                    rows[i][k] = rows[i][k] + (ui * u[k] + vi * v[k]);
+                }
+            }
+            let (ru, rv) = (L::splat(residual.x), L::splat(residual.y));
+            for k in 0..VECTORS {
+                gradient[k] = gradient[k] + (u[k] * ru + v[k] * rv);
+            }
+            cost += residual.norm_squared();
+        }
+        let is_active = |i: usize| i < active;
+        let rows = rows.map(|row| row.map(L::store));
+        let gradient = gradient.map(L::store);
+        let entry = |i: usize, j: usize| match (is_active(i) && is_active(j), i == j) {
+            (true, _) => rows[i.min(j)][i.max(j) / LANES][i.max(j) % LANES],
+            (false, on_diagonal) => f64::from(on_diagonal),
         };
-        let residual = predicted - frames.pixel_offset(pixel);
-        normal.matrix += jacobian.transpose() * jacobian;
-        normal.gradient += jacobian.transpose() * residual;
-        normal.cost += residual.norm_squared();
+        Normal {
+            matrix: SMatrix::from_fn(entry),
+            gradient: SMatrix::from_fn(
+                |i, _| {
+                    if is_active(i) { gradient[i / LANES][i % LANES] } else { 0.0 }
+                },
+            ),
+            cost,
+        }
     }
-    for held in active..PARAMETERS {
-        normal.matrix.row_mut(held).fill(0.0);
-        normal.matrix.column_mut(held).fill(0.0);
-        normal.matrix[(held, held)] = 1.0;
-        normal.gradient[held] = 0.0;
-    }
-    normal
+}
+
+/// A row of the Jacobian.
+#[inline(always)]
+fn vectors<L: Lanes>(jacobian: &PointJacobian, row: usize) -> [L; VECTORS] {
+    std::array::from_fn(|k| L::load(&std::array::from_fn(|lane| jacobian[(row, k * LANES + lane)])))
 }
 
 /// The step of `(J^T J + damping diag(J^T J)) step = -J^T r`.

@@ -2,8 +2,9 @@
 
 use super::calibrate::{Format, Mode, plane_text};
 use super::{Exit, print, warn};
-use crate::detect::{DotGrid, sparse_dots};
+use crate::detect::{DotGrid, sparse_dots_of};
 use crate::geometry::Vec2;
+use crate::harness::photos::ordered_discs;
 use crate::io::{Overlay, read_image, write_atomically};
 use crate::planar::{PlaneCalibration, calibrate_plane};
 use clap::Args;
@@ -48,8 +49,8 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
 fn ninepoint(arguments: &Arguments) -> Result<Exit, String> {
     let image = read_image(&arguments.image).map_err(|error| error.to_string())?;
     let at_file = |error: &dyn std::fmt::Display| format!("{}: {error}", arguments.image.display());
-    let grid =
-        sparse_dots(&image.to_f32(), arguments.columns, arguments.rows).map_err(|error| at_file(&error))?;
+    let grid = ordered_discs(&image, |discs| sparse_dots_of(discs, arguments.columns, arguments.rows))
+        .map_err(|error| at_file(&error))?;
     let (centres_px, world) = (grid.centres_px(), unit_grid(arguments.columns, arguments.rows));
     let plane =
         calibrate_plane(arguments.mode.into(), &centres_px, &world).map_err(|error| at_file(&error))?;

@@ -86,7 +86,6 @@ impl From<RunError> for Failure {
 impl From<MergeError> for Failure {
     fn from(error: MergeError) -> Failure {
         match error {
-            MergeError::Folder(error) => error.into(),
             MergeError::Run(error) => error.into(),
             MergeError::Incomplete { .. } => Failure { exit: Exit::Incomplete, message: error.to_string() },
             other => Failure::usage(other.to_string()),

@@ -1,9 +1,9 @@
 //! What does the user say of a board, and where are its marks in a photograph? `chess:9x6:25mm`, `circles:9x7:10mm:3mm`.
 
-use crate::detect::{DotGrid, GridError, circle_grid, sparse_dots};
+use super::discs::{NotFound, ordered_discs};
+use crate::detect::{GridError, circle_grid_of, sparse_dots_of};
 use crate::geometry::Vec2;
 use crate::io::Grey;
-use crate::raster::{Raster, Sample};
 use crate::target::{Board, BoardError, Pattern};
 use std::fmt;
 use std::str::FromStr;
@@ -13,9 +13,9 @@ use std::str::FromStr;
 pub enum MarkKind {
     /// Inner corners of a chessboard.
     Chess,
-    /// A dense grid of dark discs, at least 4 on a side.
+    /// A dense grid of discs, at least 4 on a side.
     Circles,
-    /// A few dark dots, such as 3 x 3.
+    /// A few dots, such as 3 x 3.
     Dots,
 }
 
@@ -178,24 +178,17 @@ impl BoardSpec {
     ///
     /// # Errors
     /// See [`DetectError`].
-    pub fn detect(&self, photo: &Grey) -> Result<Vec<Vec2>, DetectError> {
-        if self.kind == MarkKind::Chess {
-            return self.corners(photo);
-        }
-        let grid = match photo {
-            Grey::U8(image) => self.discs(image),
-            Grey::U16(image) => self.discs(image),
-            Grey::F32(image) => self.discs(image),
+    pub fn detect(&self, photo: &Grey) -> Result<Vec<Vec2>, NotFound> {
+        let (columns, rows) = (self.board.columns(), self.board.rows());
+        let grid = match self.kind {
+            MarkKind::Chess => {
+                let no_candidates = |reason| NotFound { reason, candidates_px: Vec::new() };
+                return self.corners(photo).map_err(no_candidates);
+            }
+            MarkKind::Dots => ordered_discs(photo, |discs| sparse_dots_of(discs, columns, rows)),
+            MarkKind::Circles => ordered_discs(photo, |discs| circle_grid_of(discs, columns, rows)),
         };
         Ok(grid?.centres_px())
-    }
-
-    fn discs<T: Sample>(&self, image: &Raster<T>) -> Result<DotGrid, GridError> {
-        let (columns, rows) = (self.board.columns(), self.board.rows());
-        match self.kind {
-            MarkKind::Dots => sparse_dots(image, columns, rows),
-            MarkKind::Circles | MarkKind::Chess => circle_grid(image, columns, rows),
-        }
     }
 
     #[cfg(feature = "chessboard")]

@@ -5,7 +5,9 @@
 //! ```
 
 mod board;
+mod discs;
 mod fit;
 
 pub use board::{BoardSpec, BoardSpecError, DetectError, MarkKind};
+pub use discs::{NotFound, ordered_discs};
 pub use fit::{BiasCorrection, Fit, Fitter, Rejected};

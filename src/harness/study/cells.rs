@@ -87,7 +87,7 @@ impl Cell {
         let named: Vec<String> =
             spec.factor.iter().zip(&labels).map(|(f, label)| format!("{} = {label}", f.name)).collect();
         let name = if named.is_empty() { "-".to_string() } else { named.join(", ") };
-        let camera = design.scene.camera.camera();
+        let camera = Camera::from(design.scene.camera);
         // Without the cell in the key, trial t draws the same numbers in every cell.
         let scenario =
             if spec.common_random_numbers { "study".to_string() } else { format!("study: {name}") };

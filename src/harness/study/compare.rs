@@ -1,24 +1,20 @@
 //! Which of two runs is closer to the truth? Trials that met the same noise are compared one by one.
 
 use super::engine::{Engine, RunError};
-use super::folder::{Folder, FolderError, Located, Replay};
+use super::folder::FolderError;
 use super::moments::Estimated;
 use super::quantity::Quantity;
-use super::tables;
+use super::reading::Reading;
 use super::trial::Trial;
 use crate::evaluate::distribution::normal_two_sided;
 use crate::evaluate::interval::each_of;
-use std::fs::File;
-use std::io::BufReader;
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 /// Runs that cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
-    /// The file system, or a damaged run.
-    #[error(transparent)]
-    Folder(#[from] FolderError),
-    /// The specification.
+    /// A run that cannot be read.
     #[error(transparent)]
     Run(#[from] RunError),
     /// The trials do not meet the same noise.
@@ -31,6 +27,28 @@ pub enum CompareError {
         /// In the second.
         b: String,
     },
+    /// Cells that draw numbers of their own.
+    #[error("the cells of {path} draw noise of their own (common_random_numbers = false): their trials are no pairs", path = path.display())]
+    NotCommon {
+        /// The run.
+        path: PathBuf,
+    },
+    /// No such factor.
+    #[error("`{factor}` is no factor of {path}; there are: {known}", path = path.display())]
+    Factor {
+        /// The run.
+        path: PathBuf,
+        /// As asked.
+        factor: String,
+        /// Those that are.
+        known: String,
+    },
+}
+
+impl From<FolderError> for CompareError {
+    fn from(error: FolderError) -> CompareError {
+        RunError::from(error).into()
+    }
 }
 
 /// What can be said of a pair of runs.
@@ -110,44 +128,10 @@ impl Pairs {
     }
 }
 
-/// A batch with its place, `(batch, cell)`.
-type Batch = ((u64, usize), Vec<Trial>);
-
-/// One of the two runs, read batch by batch.
-struct Side {
-    engine: Engine,
-    replay: Replay<BufReader<File>>,
-    _folder: Folder,
-}
-
-impl Side {
-    fn open(path: &Path) -> Result<Side, CompareError> {
-        let folder = Folder::open(path)?;
-        let manifest = folder.manifest()?;
-        let shard = manifest.shard.parse().map_err(|e: super::ShardError| FolderError::Damaged {
-            path: folder.file("manifest.json"),
-            what: e.to_string(),
-        })?;
-        let engine = Engine::new(&folder.read("spec.toml")?, shard).map_err(RunError::from)?;
-        let name = folder.file("trials.csv");
-        let file = File::open(&name).map_err(|source| Located { path: name.clone(), source });
-        let mut replay = Replay::new(BufReader::new(file.map_err(FolderError::from)?), name);
-        replay.expect_header(&tables::header(&engine.quantities))?;
-        Ok(Side { engine, replay, _folder: folder })
-    }
-
-    fn next(&mut self) -> Result<Option<Batch>, CompareError> {
-        let Some((cell, batch)) = self.engine.next() else { return Ok(None) };
-        let Some(trials) = self.replay.trials(&self.engine)? else { return Ok(None) };
-        self.engine.absorb((cell, batch), &trials);
-        Ok(Some(((batch, cell), trials)))
-    }
-}
-
 /// Compares the runs in two folders. The intervals are widened so that all together raise a false alarm as rarely as one of the first
 /// run's own intervals (Bonferroni).
 pub fn compare(first: &Path, second: &Path) -> Result<Comparison, CompareError> {
-    let (mut a, mut b) = (Side::open(first)?, Side::open(second)?);
+    let (mut a, mut b) = (Reading::open(first)?, Reading::open(second)?);
     check_pairing(&a.engine, &b.engine)?;
     let shared: Vec<(Quantity, usize, usize)> = a
         .engine
@@ -161,19 +145,62 @@ pub fn compare(first: &Path, second: &Path) -> Result<Comparison, CompareError> 
     let mut pairs = vec![Pairs::default(); cells * shared.len()];
     let mut only = vec![(0, 0); cells];
     let (mut left, mut right) = (a.next()?, b.next()?);
-    while let (Some((at, ours)), Some((bt, theirs))) = (&left, &right) {
-        if at == bt {
-            let sums = &mut pairs[at.1 * shared.len()..][..shared.len()];
-            ours.iter().zip(theirs).for_each(|(x, y)| add(x, y, &shared, sums, &mut only[at.1]));
+    while let (Some(((cell, batch), ours)), Some(((other, its_batch), theirs))) = (&left, &right) {
+        let order = (batch, cell).cmp(&(its_batch, other));
+        if order.is_eq() {
+            let sums = &mut pairs[cell * shared.len()..][..shared.len()];
+            ours.iter().zip(theirs).for_each(|(x, y)| add(x, y, &shared, sums, &mut only[*cell]));
         }
         // A cell that ended early in one run has batches without partner in the other.
-        match at.cmp(bt) {
+        match order {
             std::cmp::Ordering::Less => left = a.next()?,
             std::cmp::Ordering::Greater => right = b.next()?,
             std::cmp::Ordering::Equal => (left, right) = (a.next()?, b.next()?),
         }
     }
-    Ok(conclude(&a.engine, &b.engine, &shared, &pairs, &only))
+    let name = |cell: usize| match (&a.engine.cells[cell].name, &b.engine.cells[cell].name) {
+        (x, y) if x == y => x.clone(),
+        (x, y) => format!("{x} | {y}"),
+    };
+    let names: Vec<String> = (0..cells).map(name).collect();
+    Ok(conclude(&names, &shared, &pairs, &only, 1.0 - a.engine.spec.confidence))
+}
+
+/// Compares the levels of a factor within the run in a folder: each cell with that of the factor's first level and the same levels
+/// of the others, trial by trial. The first of a pair is the cell of the first level.
+pub fn compare_levels(path: &Path, factor: &str) -> Result<Comparison, CompareError> {
+    let mut run = Reading::open(path)?;
+    let spec = &run.engine.spec;
+    if !spec.common_random_numbers {
+        return Err(CompareError::NotCommon { path: path.to_path_buf() });
+    }
+    let at = spec.factor.iter().position(|f| f.name == factor).ok_or_else(|| CompareError::Factor {
+        path: path.to_path_buf(),
+        factor: factor.to_string(),
+        known: spec.factor.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", "),
+    })?;
+    let after: usize = spec.factor[at + 1..].iter().map(|f| f.levels.len()).product();
+    // Cells are numbered in mixed radix, so the first level's comes first in every round.
+    let levels: Vec<usize> = run.engine.cells.iter().map(|cell| cell.levels[at]).collect();
+    let errors = run.engine.quantities.iter().enumerate().filter(|(_, q)| q.is_error());
+    let shared: Vec<(Quantity, usize, usize)> = errors.map(|(i, q)| (*q, i, i)).collect();
+    let names: Vec<String> = run.engine.cells.iter().map(|cell| cell.name.clone()).collect();
+    let false_alarm = 1.0 - spec.confidence;
+    let mut pairs = vec![Pairs::default(); names.len() * shared.len()];
+    let mut only = vec![(0, 0); names.len()];
+    let (mut round, mut firsts) = (0, BTreeMap::new());
+    while let Some(((cell, batch), trials)) = run.next()? {
+        if batch != round {
+            (round, firsts) = (batch, BTreeMap::new());
+        }
+        if levels[cell] == 0 {
+            firsts.insert(cell, trials);
+        } else if let Some(first) = firsts.get(&(cell - levels[cell] * after)) {
+            let sums = &mut pairs[cell * shared.len()..][..shared.len()];
+            first.iter().zip(&trials).for_each(|(x, y)| add(x, y, &shared, sums, &mut only[cell]));
+        }
+    }
+    Ok(conclude(&names, &shared, &pairs, &only, false_alarm))
 }
 
 fn check_pairing(a: &Engine, b: &Engine) -> Result<(), CompareError> {
@@ -201,18 +228,14 @@ fn add(a: &Trial, b: &Trial, shared: &[(Quantity, usize, usize)], sums: &mut [Pa
 }
 
 fn conclude(
-    a: &Engine,
-    b: &Engine,
+    names: &[String],
     shared: &[(Quantity, usize, usize)],
     pairs: &[Pairs],
     only: &[(u64, u64)],
+    false_alarm: f64,
 ) -> Comparison {
     let told = pairs.iter().filter(|p| p.count >= 4).count();
-    let each = each_of(told, 1.0 - a.spec.confidence);
-    let name = |cell: usize| match (&a.cells[cell].name, &b.cells[cell].name) {
-        (x, y) if x == y => x.clone(),
-        (x, y) => format!("{x} | {y}"),
-    };
+    let each = each_of(told, false_alarm);
     let mut effects = Vec::new();
     for (cell, sums) in pairs.chunks(shared.len().max(1)).enumerate() {
         for ((quantity, _, _), sum) in shared.iter().zip(sums) {
@@ -224,7 +247,7 @@ fn conclude(
             };
             let rms = [sum.a, sum.b].map(|s| (s / sum.count as f64).sqrt());
             effects.push(Effect {
-                cell: name(cell),
+                cell: names[cell].clone(),
                 quantity: *quantity,
                 pairs: sum.count,
                 rms,
@@ -233,7 +256,7 @@ fn conclude(
             });
         }
     }
-    let only = only.iter().enumerate().map(|(cell, o)| (name(cell), o.0, o.1)).collect();
+    let only = only.iter().zip(names).map(|(o, name)| (name.clone(), o.0, o.1)).collect();
     Comparison { effects, only, each }
 }
 

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A study in progress: what is done, and what comes next.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Engine {
     /// The study.
     pub spec: Spec,
@@ -37,8 +37,22 @@ pub struct Pace {
     pub trials: u64,
     /// Trials done before it was resumed.
     pub before: u64,
-    /// The cell that is known worst: its name and the relative half-width of its interval.
-    pub worst: Option<(String, f64)>,
+    /// Trials that the part will have at its end, as far as can be told: a cell that stops at a precision is taken to approach it by
+    /// the root of its trials.
+    pub expected: u64,
+    /// The cell that is known worst.
+    pub worst: Option<Worst>,
+}
+
+/// The cell whose trials say least.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Worst {
+    /// Its name.
+    pub cell: String,
+    /// Of whose standard deviation.
+    pub quantity: &'static str,
+    /// Half-width of the interval over the value; `None` where too few trials converged to say anything.
+    pub relative_half_width: Option<f64>,
 }
 
 /// How a run ended.
@@ -80,6 +94,13 @@ impl Engine {
         let tallies = cells.iter().map(Tally::new).collect();
         let finished = vec![false; cells.len()];
         Ok(Engine { spec, quantities, tallies, finished, cells, shard, batches: 0, round: 0, place: 0 })
+    }
+
+    /// The same study's beginning in another part.
+    pub(super) fn for_shard(&self, shard: Shard) -> Engine {
+        let tallies = self.cells.iter().map(Tally::new).collect();
+        let finished = vec![false; self.cells.len()];
+        Engine { shard, tallies, finished, batches: 0, round: 0, place: 0, ..self.clone() }
     }
 
     /// Cell and batch that come next; `None` at the end.
@@ -135,13 +156,46 @@ impl Engine {
         Some(0.5 * (sd.high - sd.low) / sd.value)
     }
 
-    /// The cell whose trials say least, by the wanted quantity or else the first estimated parameter.
-    fn worst(&self) -> Option<(String, f64)> {
-        let first = self.quantities.iter().find(|q| q.is_error()).map(|q| q.name());
-        let quantity = self.spec.trials.precision.as_ref().map_or(first, |p| Some(p.quantity.as_str()))?;
-        let width = |cell: usize| Some((self.relative_half_width(cell, quantity)?, cell));
-        let (width, cell) = (0..self.cells.len()).filter_map(width).max_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some((self.cells[cell].name.clone(), width))
+    /// The cell whose trials say least, by the wanted quantity or else the first estimated parameter. Cells that are precise enough or
+    /// not begun are not asked.
+    fn worst(&self) -> Option<Worst> {
+        let wanted = self.spec.trials.precision.as_ref().map(|p| p.quantity.as_str());
+        let quantity =
+            self.quantities.iter().find(|q| q.is_error() && wanted.is_none_or(|w| w == q.name()))?;
+        let open = (0..self.cells.len()).filter(|&c| !self.finished[c] && self.tallies[c].trials > 0);
+        let width = |cell| self.relative_half_width(cell, quantity.name());
+        let size = |width: &Option<f64>| width.unwrap_or(f64::INFINITY);
+        let (cell, relative_half_width) =
+            open.map(|cell| (cell, width(cell))).max_by(|a, b| size(&a.1).total_cmp(&size(&b.1)))?;
+        let cell = self.cells[cell].name.clone();
+        Some(Worst { cell, quantity: quantity.name(), relative_half_width })
+    }
+
+    /// Cells of this part that took all their trials and are not as precise as was wanted.
+    pub fn imprecise(&self) -> Vec<&Cell> {
+        let held = |cell: &&Cell| self.shard.holds(cell.index, 0, self.cells.len(), true);
+        let wanted = self.spec.trials.precision.is_some();
+        self.cells.iter().filter(|cell| wanted && held(cell) && !self.is_precise(cell.index)).collect()
+    }
+
+    /// Trials at the end, see [`Pace::expected`].
+    fn expected_trials(&self) -> u64 {
+        let Some(precision) = &self.spec.trials.precision else { return self.most_trials() };
+        let trials = &self.spec.trials;
+        let of_cell = |cell: usize| {
+            let done = self.tallies[cell].trials;
+            if self.finished[cell] {
+                return done;
+            }
+            let Some(width) = self.relative_half_width(cell, &precision.quantity) else {
+                return trials.per_cell;
+            };
+            let factor = width / precision.relative_half_width;
+            let needed = libm::ceil(done as f64 * factor * factor) as u64;
+            needed.div_ceil(trials.batch).saturating_mul(trials.batch).clamp(done, trials.per_cell)
+        };
+        let held = (0..self.cells.len()).filter(|&cell| self.shard.holds(cell, 0, self.cells.len(), true));
+        held.map(of_cell).sum()
     }
 
     /// The most trials this part may take.
@@ -181,7 +235,8 @@ impl Engine {
             let trials = self.run(unit);
             keep(&trials)?;
             self.absorb(unit, &trials);
-            tell(&Pace { trials: self.trials() - before, before, worst: self.worst() });
+            let expected = self.expected_trials();
+            tell(&Pace { trials: self.trials() - before, before, expected, worst: self.worst() });
         }
         Ok(Outcome::Complete)
     }

@@ -9,6 +9,8 @@ use crate::harness::{Dash, Figure, HeatMap, Look, Plot};
 
 /// Series beyond this number cannot be told apart in one plot.
 const MOST_SERIES: usize = 6;
+/// Width of a page on a desktop, px: three panels of 400.
+const PAGE: f64 = 1200.0;
 /// Axes that span more than this are logarithmic.
 const WIDE: f64 = 4.0;
 
@@ -91,6 +93,11 @@ impl Grid<'_> {
         self.summary.cells[cell].of(quantity.name())
     }
 
+    /// What the bars of a plot are.
+    fn bars(&self) -> String {
+        format!("Bars are {} % intervals.", libm::round(1e6 * self.engine.spec.confidence) / 1e4)
+    }
+
     fn caption(&self, what: &str) -> String {
         let spec = &self.engine.spec;
         let trials: Vec<u64> = self.summary.cells.iter().map(|c| c.trials).collect();
@@ -98,9 +105,8 @@ impl Grid<'_> {
             (trials.iter().min().copied().unwrap_or(0), trials.iter().max().copied().unwrap_or(0));
         let trials = if least == most { format!("{most}") } else { format!("{least} to {most}") };
         format!(
-            "{what} {trials} trials a cell, seed {}, bars are {:.0} % intervals. Statistics are of the trials that converged.",
-            spec.seed,
-            100.0 * spec.confidence
+            "{what} {trials} trials a cell, seed {}. Statistics are of the trials that converged.",
+            spec.seed
         )
     }
 
@@ -109,10 +115,11 @@ impl Grid<'_> {
         let series = self.series(x);
         let panels: Vec<Plot> =
             self.errors().map(|quantity| self.spread_panel(x, &series, quantity)).collect();
-        let caption = self.caption(
-            "Standard deviation of the error of each quantity (marks) and its Cramer-Rao bound (lines). Notice where the \
-             marks leave the line: there the first-order theory ends.",
-        );
+        let caption = self.caption(&format!(
+            "Standard deviation of the error of each quantity (marks) and its Cramer-Rao bound (lines), which holds for Gaussian noise \
+             without gross errors. Notice where the marks leave the line. {}",
+            self.bars()
+        ));
         Figure::panels("spread", &panels, panels.len().min(3), caption)
     }
 
@@ -171,7 +178,10 @@ impl Grid<'_> {
         Some(Figure::plot(
             "converged",
             &plot,
-            self.caption("Share of trials that found a minimum; the others are counted by reason."),
+            self.caption(&format!(
+                "Share of trials that found a minimum; the others are counted by reason. {}",
+                self.bars()
+            )),
         ))
     }
 
@@ -211,6 +221,7 @@ impl Grid<'_> {
     fn maps(&self) -> Option<Figure> {
         let [across, up] = [&self.engine.spec.factor[1], &self.engine.spec.factor[0]];
         let labels = |f: &super::factor::Factor| (0..f.levels.len()).map(|l| f.label(l)).collect::<Vec<_>>();
+        let width = (170.0 + 62.0 * across.levels.len() as f64).max(400.0);
         let panels: Vec<Plot> = self
             .errors()
             .filter_map(|q| {
@@ -223,14 +234,11 @@ impl Grid<'_> {
                 let named = |f: &super::factor::Factor| {
                     if f.unit.is_empty() { f.name.clone() } else { format!("{} ({})", f.name, f.unit) }
                 };
-                let width = 170.0 + 62.0 * across.levels.len() as f64;
-                Some(
-                    Plot::heat_map(format!("{} error", q.name()), named(across), named(up), heat)
-                        .size(width.max(420.0), 340.0),
-                )
+                let title = format!("{} error", q.name());
+                Some(Plot::heat_map(title, named(across), named(up), heat).size(width, 340.0))
             })
             .collect();
-        let columns = panels.len().min(3);
+        let columns = ((PAGE / width) as usize).clamp(1, panels.len().max(1));
         (!panels.is_empty()).then(|| {
             Figure::panels(
                 "map",
@@ -268,7 +276,8 @@ impl Grid<'_> {
         };
         let panels: Vec<Plot> = self.errors().map(panel).collect();
         let what = format!(
-            "Quantiles of the errors at the shares {SHARES:?}, and those of a normal distribution with the Cramer-Rao bound's spread."
+            "Quantiles of the errors at the shares {SHARES:?}, and those of a normal distribution with the Cramer-Rao bound's spread. {}",
+            self.bars()
         );
         Figure::panels("errors", &panels, panels.len().min(3), self.caption(&what))
     }

@@ -1,10 +1,11 @@
-//! Is this the code that began the study? Version, numeric crates, and the bits of fixed calibrations.
+//! Is this the code that began the study? Version, numeric crates, and the bits of the trials of a fixed study.
 
-use crate::calibrate::{Loss, Settings, calibrate};
-use crate::camera::{FreeParameters, Parameter};
+use super::engine::Engine;
+use super::shard::Shard;
+use super::tables;
+use super::trial::{Trial, run_trial};
 use crate::harness::hash::sha256_hex;
 use crate::harness::provenance::crate_versions;
-use crate::synth::{Scene, Stream, StreamKey};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -13,7 +14,7 @@ use std::collections::BTreeMap;
 pub struct Fingerprint {
     /// Version of calibench.
     pub calibench: String,
-    /// SHA-256 of the results of fixed calibrations and of the first random numbers, bit for bit.
+    /// SHA-256 of the trials and predictions of a fixed study, bit for bit.
     pub behaviour: String,
     /// Versions of the crates whose arithmetic stands in the path of a number.
     pub crates: BTreeMap<String, String>,
@@ -30,34 +31,62 @@ impl Fingerprint {
     }
 }
 
-/// Seed of the fixed calibrations; any would do.
-const SEED: u64 = 0;
+/// Touches what a trial can meet: drawn poses, gross errors, a length, every parameter and every loss. The seed is arbitrary.
+const STUDY: &str = r#"
+name = "fingerprint"
+question = "Is this the code that began the study?"
+seed = 0
+scene.image = [640, 480]
+scene.camera = { fx = 600.0, fy = 590.0, cx = 326.0, cy = 243.0, k1 = -0.18, k2 = 0.05, p1 = 0.001, p2 = -0.0015 }
+scene.target = { columns = 9, rows = 7, spacing_mm = 10.0 }
+scene.noise_px = 0.1
+scene.length = { centre_mm = [20.0, -10.0, 160.0], length_mm = 25.0, direction_deg = 30.0 }
+trials = { per_cell = 2 }
 
+[scene.poses]
+kind = "random"
+views = 5
+tilt_min_deg = 10.0
+tilt_deg = 35.0
+roll_deg = 90.0
+coverage = 0.7
+distance_mm = 150.0
+distance_spread = 0.1
+
+[[factor]]
+name = "kind"
+set = ["estimator.free", "estimator.loss", "scene.outlier_share"]
+levels = [
+    [["fx", "fy", "cx", "cy", "k1", "k2"], { kind = "squares" }, 0.0],
+    [["fx", "fy", "cx", "cy", "skew", "k1", "k2", "p1", "p2", "k3"], { kind = "squares" }, 0.0],
+    [["fx", "fy", "cx", "cy", "k1", "k2"], { kind = "huber", delta_px = 0.15 }, 0.05],
+    [["fx", "fy", "cx", "cy", "k1", "k2"], { kind = "cauchy", scale_px = 0.2 }, 0.05],
+]
+"#;
+
+/// Trials and predictions of a fixed study, bit for bit.
 fn behaviour() -> String {
-    let full = FreeParameters::of(&Parameter::ALL);
-    let models = [
-        Settings::chapter(),
-        Settings::new(full).with_image_size((640, 480)),
-        Settings::chapter().with_loss(Loss::Huber { delta_px: 0.15 }),
-        Settings::chapter().with_loss(Loss::Cauchy { scale_px: 0.2 }),
-    ];
-    let mut bytes = Vec::new();
-    for (trial, settings) in models.iter().enumerate() {
-        let key = StreamKey { seed: SEED, scenario: "fingerprint", trial: trial as u64, purpose: "noise" };
-        let mut stream = Stream::open(key);
-        let views = Scene::chapter().observe(0.1, &mut stream);
-        bytes.extend(stream.uniform().to_le_bytes());
-        match calibrate(&views, settings) {
-            Err(error) => bytes.extend(error.to_string().bytes()),
-            Ok(result) => {
-                bytes.extend((result.iterations as u64).to_le_bytes());
-                let poses = result.cam_from_target.iter().flat_map(|p| p.translation.iter().copied());
-                let numbers = result.camera.parameters().into_iter().chain(poses).chain([result.rmse_px]);
-                numbers
-                    .chain(result.covariance.intrinsics.iter().copied())
-                    .for_each(|x| bytes.extend(x.to_le_bytes()));
-            }
+    let engine = Engine::new(STUDY, Shard::WHOLE).expect("a test runs this study");
+    let mut text = String::new();
+    for cell in &engine.cells {
+        let trials: Vec<Trial> = (0..2).map(|trial| run_trial(cell, &engine.quantities, trial)).collect();
+        text.push_str(&tables::rows(&trials));
+        text.push_str(&format!("{:?}\n", cell.prediction));
+    }
+    sha256_hex(text.as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_same_code_has_the_same_fingerprint_and_its_trials_give_cameras() {
+        assert_eq!(Fingerprint::current(), Fingerprint::current());
+        let engine = Engine::new(STUDY, Shard::WHOLE).unwrap();
+        for cell in &engine.cells {
+            let trial = run_trial(cell, &engine.quantities, 0);
+            assert!(trial.converged(), "{}: {}", cell.name, trial.outcome);
         }
     }
-    sha256_hex(&bytes)
 }

@@ -24,7 +24,8 @@ pub fn finish(folder: &Folder, engine: &Engine) -> Result<Summary, FolderError> 
     for figure in &figures {
         write(&format!("figures/{}", figure.file_name()), &figure.bytes)?;
     }
-    manifest.files.insert("trials.csv".to_string(), folder.trials_sha256()?);
+    let trials = folder.put_trials(engine, &manifest)?;
+    manifest.files.insert(manifest.trials.name().to_string(), trials);
     manifest.files.insert("spec.toml".to_string(), sha256_hex(folder.read("spec.toml")?.as_bytes()));
     let page = report::page(engine, &summary, &figures, &manifest, &folder.read("spec.toml")?);
     folder.write("report.html", page.as_bytes())?;
@@ -32,5 +33,6 @@ pub fn finish(folder: &Folder, engine: &Engine) -> Result<Summary, FolderError> 
     manifest.complete = true;
     // Last: a complete manifest vouches for all that it names.
     folder.write("manifest.json", manifest.to_text().as_bytes())?;
+    folder.drop_log(&manifest)?;
     Ok(summary)
 }

@@ -1,17 +1,13 @@
-//! How does a run survive an interruption? Trials are appended, made durable, and only then counted in a checkpoint.
+//! Whose folder is this? One run's: begun once, used by one process at a time, continued only by the same study and code.
 
-use super::engine::{Engine, Interruption, Outcome, Pace, RunError};
 use super::manifest::{Difference, Manifest};
-use super::tables;
-use super::trial::Trial;
+use super::shard::{Shard, ShardError};
 use crate::io::write_atomically;
-use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufRead, BufReader, Seek, SeekFrom, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
-/// The folder of one run: `spec.toml`, `manifest.json`, `trials.csv`, `checkpoint.json`, and the results once it is complete.
+/// The folder of one run: `spec.toml`, `manifest.json`, `trials.csv` and `checkpoint.json`, and the results once it is complete.
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
@@ -52,6 +48,9 @@ pub enum FolderError {
         /// What is wrong.
         what: String,
     },
+    /// Built without the feature.
+    #[error("this calibench cannot read or write Parquet: build it with `--features parquet`, or use csv")]
+    NoParquet,
     /// Trials of two kinds must not mix.
     #[error(
         "{path} was begun with another specification or other code and is not continued:\n{}\nRestore what differs, or begin again in another folder",
@@ -63,23 +62,6 @@ pub enum FolderError {
         /// In what.
         differences: Vec<Difference>,
     },
-}
-
-/// What is known to be on the disk.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Checkpoint {
-    batches: u64,
-    bytes: u64,
-    sha256: String,
-}
-
-/// The end of `trials.csv`, with the running hash of what is before.
-pub(super) struct Log {
-    file: File,
-    path: PathBuf,
-    bytes: u64,
-    hash: Sha256,
 }
 
 impl Folder {
@@ -144,6 +126,11 @@ impl Folder {
             .map_err(|e| self.damaged("manifest.json", e.to_string()))
     }
 
+    /// Which part of its study the run does.
+    pub fn shard(&self) -> Result<Shard, FolderError> {
+        self.manifest()?.shard.parse().map_err(|e: ShardError| self.damaged("manifest.json", e.to_string()))
+    }
+
     /// Refuses if what would be run now is not what was begun.
     pub fn check(&self, now: &Manifest) -> Result<Manifest, FolderError> {
         let then = self.manifest()?;
@@ -155,157 +142,7 @@ impl Folder {
         }
     }
 
-    /// SHA-256 of `trials.csv`, as the checkpoint vouches for it.
-    pub(super) fn trials_sha256(&self) -> Result<String, FolderError> {
-        let text = self.read("checkpoint.json")?;
-        let checkpoint: Checkpoint =
-            serde_json::from_str(&text).map_err(|e| self.damaged("checkpoint.json", e.to_string()))?;
-        Ok(checkpoint.sha256)
-    }
-
-    fn damaged(&self, name: &str, what: impl Into<String>) -> FolderError {
+    pub(super) fn damaged(&self, name: &str, what: impl Into<String>) -> FolderError {
         FolderError::Damaged { path: self.file(name), what: what.into() }
-    }
-
-    /// Continues the trials where the checkpoint says, to the end or until asked to stop.
-    pub fn run(
-        &self,
-        engine: &mut Engine,
-        stop: &Interruption,
-        tell: impl FnMut(&Pace),
-    ) -> Result<Outcome, RunError> {
-        let mut log = self.replay(engine)?;
-        let mut batches = engine.batches;
-        let keep = |trials: &[Trial]| {
-            batches += 1;
-            self.append(&mut log, tables::rows(trials).as_bytes(), batches)?;
-            Ok(())
-        };
-        engine.drive(stop, keep, tell)
-    }
-
-    /// Takes in the trials that the checkpoint vouches for, and cuts off what was written after it.
-    pub(super) fn replay(&self, engine: &mut Engine) -> Result<Log, FolderError> {
-        let header = tables::header(&engine.quantities);
-        let path = self.file("trials.csv");
-        let located = |source| Located { path: path.clone(), source };
-        let file = OpenOptions::new().read(true).append(true).create(true).open(&path).map_err(located)?;
-        let mut log = Log { file, path: path.clone(), bytes: 0, hash: Sha256::new() };
-        if !self.file("checkpoint.json").exists() {
-            log.file.set_len(0).map_err(located)?;
-            self.append(&mut log, header.as_bytes(), 0)?;
-            return Ok(log);
-        }
-        let checkpoint: Checkpoint = serde_json::from_str(&self.read("checkpoint.json")?)
-            .map_err(|e| self.damaged("checkpoint.json", e.to_string()))?;
-        let length = log.file.metadata().map_err(located)?.len();
-        if length < checkpoint.bytes {
-            let what = format!("{length} bytes, but the checkpoint counts {}", checkpoint.bytes);
-            return Err(self.damaged("trials.csv", what));
-        }
-        log.file.set_len(checkpoint.bytes).map_err(located)?;
-        log.file.seek(SeekFrom::Start(0)).map_err(located)?;
-        let mut reader = Replay::new(BufReader::new(&log.file), path.clone());
-        reader.expect_header(&header)?;
-        while reader.batch(engine)? {}
-        (log.bytes, log.hash) = (reader.bytes, reader.hash);
-        let found = hexadecimal(&log.hash);
-        if found != checkpoint.sha256 || engine.batches != checkpoint.batches {
-            return Err(self.damaged("trials.csv", "it is not what was written: its SHA-256 has changed"));
-        }
-        Ok(log)
-    }
-
-    /// Trials first, on the disk; then the checkpoint that counts them.
-    fn append(&self, log: &mut Log, bytes: &[u8], batches: u64) -> Result<(), FolderError> {
-        self.append_only(log, bytes)?;
-        self.checkpoint(log, batches)
-    }
-
-    /// Trials that no checkpoint counts yet.
-    pub(super) fn append_only(&self, log: &mut Log, bytes: &[u8]) -> Result<(), FolderError> {
-        log.file.write_all(bytes).map_err(|source| Located { path: log.path.clone(), source })?;
-        log.bytes += bytes.len() as u64;
-        log.hash.update(bytes);
-        Ok(())
-    }
-
-    pub(super) fn checkpoint(&self, log: &mut Log, batches: u64) -> Result<(), FolderError> {
-        log.file.sync_data().map_err(|source| Located { path: log.path.clone(), source })?;
-        let checkpoint = Checkpoint { batches, bytes: log.bytes, sha256: hexadecimal(&log.hash) };
-        let text = serde_json::to_string(&checkpoint).expect("a checkpoint holds nothing that JSON cannot");
-        self.write("checkpoint.json", text.as_bytes())
-    }
-}
-
-fn hexadecimal(hash: &Sha256) -> String {
-    hash.clone().finalize().iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// Reads `trials.csv` batch by batch.
-pub(super) struct Replay<R> {
-    reader: R,
-    path: PathBuf,
-    line: String,
-    number: usize,
-    bytes: u64,
-    hash: Sha256,
-}
-
-impl<R: BufRead> Replay<R> {
-    pub(super) fn new(reader: R, path: PathBuf) -> Replay<R> {
-        Replay { reader, path, line: String::new(), number: 0, bytes: 0, hash: Sha256::new() }
-    }
-
-    /// The next line, without its end; `None` after the last.
-    fn next_line(&mut self) -> Result<Option<&str>, FolderError> {
-        self.line.clear();
-        let read = self.reader.read_line(&mut self.line);
-        let count = read.map_err(|source| Located { path: self.path.clone(), source })?;
-        self.number += 1;
-        self.bytes += count as u64;
-        self.hash.update(self.line.as_bytes());
-        Ok((count > 0).then(|| self.line.trim_end()))
-    }
-
-    pub(super) fn expect_header(&mut self, header: &str) -> Result<(), FolderError> {
-        let held = self.next_line()? == Some(header.trim_end());
-        if held { Ok(()) } else { Err(self.damaged("its first line is not that of this study")) }
-    }
-
-    /// Reads the batch that the engine expects next; whether there was one.
-    pub(super) fn batch(&mut self, engine: &mut Engine) -> Result<bool, FolderError> {
-        let Some(trials) = self.trials(engine)? else { return Ok(false) };
-        let unit = engine.next().expect("trials were read for the batch that comes next");
-        engine.absorb(unit, &trials);
-        Ok(true)
-    }
-
-    /// The trials of the batch that the engine expects next; `None` at the end of the file.
-    pub(super) fn trials(&mut self, engine: &Engine) -> Result<Option<Vec<Trial>>, FolderError> {
-        let Some((cell, batch)) = engine.next() else {
-            return match self.next_line()? {
-                None => Ok(None),
-                Some(_) => Err(self.damaged("more trials than the study has")),
-            };
-        };
-        let mut trials = Vec::new();
-        for index in engine.trials_of(batch) {
-            let quantities = engine.quantities.len();
-            let trial = match self.next_line()? {
-                None if trials.is_empty() => return Ok(None),
-                None => return Err(self.damaged("it ends within a batch")),
-                Some(line) => tables::parse_row(line, quantities),
-            };
-            match trial {
-                Some(trial) if trial.cell == cell && trial.trial == index => trials.push(trial),
-                _ => return Err(self.damaged(&format!("not trial {index} of cell {cell}"))),
-            }
-        }
-        Ok(Some(trials))
-    }
-
-    fn damaged(&self, what: &str) -> FolderError {
-        FolderError::Damaged { path: self.path.clone(), what: format!("line {}: {what}", self.number) }
     }
 }

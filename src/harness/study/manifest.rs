@@ -3,6 +3,7 @@
 use super::fingerprint::Fingerprint;
 use super::shard::Shard;
 use super::spec::Spec;
+use super::trial_file::TrialFile;
 use crate::harness::hash::sha256_hex;
 use crate::harness::provenance::Commit;
 use serde::{Deserialize, Serialize};
@@ -20,6 +21,9 @@ pub struct Manifest {
     pub seed: u64,
     /// Part of the study, `i/n`.
     pub shard: String,
+    /// In which file its trials stand once it is complete.
+    #[serde(default)]
+    pub trials: TrialFile,
     /// Whether every trial of the part is done.
     pub complete: bool,
     /// Commit of the source tree, where known.
@@ -61,6 +65,7 @@ impl Manifest {
             study: spec.name.clone(),
             seed: spec.seed,
             shard: shard.to_string(),
+            trials: TrialFile::Csv,
             complete: false,
             commit: commit.map(|c| c.hash.clone()),
             dirty: commit.map(|c| c.dirty),
@@ -69,6 +74,12 @@ impl Manifest {
             spec: canonical,
             files: BTreeMap::new(),
         }
+    }
+
+    /// The same, with another kind of file for its trials.
+    #[must_use]
+    pub fn with_trials(self, trials: TrialFile) -> Manifest {
+        Manifest { trials, ..self }
     }
 
     /// Whatever would make trials of `now` unfit to stand beside those of `self`. Commits may differ as long as the code behaves alike.

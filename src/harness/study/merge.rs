@@ -1,22 +1,19 @@
 //! How do parts become the whole? Their batches are interleaved in the order in which an undivided run does them.
 
 use super::engine::{Engine, RunError};
-use super::folder::{Folder, FolderError, Located, Replay};
+use super::folder::{Folder, FolderError};
 use super::manifest::{Difference, Manifest};
+use super::reading::Reading;
 use super::shard::Shard;
 use super::tables;
+use super::trial_file::TrialFile;
 use crate::harness::provenance::Commit;
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 /// Parts that do not make a whole.
 #[derive(Debug, thiserror::Error)]
 pub enum MergeError {
-    /// The file system, or a damaged part.
-    #[error(transparent)]
-    Folder(#[from] FolderError),
-    /// The specification, or writing.
+    /// A part that cannot be read, or a whole that cannot be written.
     #[error(transparent)]
     Run(#[from] RunError),
     /// Nothing to merge.
@@ -50,47 +47,62 @@ pub enum MergeError {
     },
 }
 
+impl From<FolderError> for MergeError {
+    fn from(error: FolderError) -> MergeError {
+        RunError::from(error).into()
+    }
+}
+
 struct Part {
     folder: Folder,
     manifest: Manifest,
     shard: Shard,
 }
 
-/// Joins the runs in `parts` into a new folder `out`, which then holds what an undivided run would, byte for byte.
-pub fn merge(parts: &[PathBuf], out: &Path) -> Result<(Folder, Engine), MergeError> {
+/// Joins the runs in `parts` into a new folder `out`, which then holds what an undivided run would, byte for byte. Its trials stand in
+/// the kind of file of the first part, or in that asked for: the one part of an undivided run is put into another file so.
+pub fn merge(
+    parts: &[PathBuf],
+    out: &Path,
+    trials: Option<TrialFile>,
+) -> Result<(Folder, Engine), MergeError> {
     let parts = parts.iter().map(|path| open(path)).collect::<Result<Vec<Part>, _>>()?;
     let first = parts.first().ok_or(MergeError::Nothing)?;
-    let count = first.shard.count;
-    check(&parts, count)?;
+    check(&parts, first.shard.count)?;
+    let trials = trials.unwrap_or(first.manifest.trials);
+    trials.check()?;
     let text = first.folder.read("spec.toml")?;
     let mut whole = Engine::new(&text, Shard::WHOLE).map_err(RunError::from)?;
-    let folder =
-        Folder::create(out, &text, &Manifest::new(&whole.spec, Shard::WHOLE, commit(&parts).as_ref()))?;
-    let mut streams = parts.iter().map(|part| stream(part, &text, &whole)).collect::<Result<Vec<_>, _>>()?;
+    let manifest = Manifest::new(&whole.spec, Shard::WHOLE, commit(&parts).as_ref()).with_trials(trials);
+    // Bounds and statistics of the whole come from this code, its trials from that of the parts: the manifest names one.
+    first.folder.check(&manifest)?;
+    let shards: Vec<Shard> = parts.iter().map(|part| part.shard).collect();
+    let mut readings = parts
+        .into_iter()
+        .map(|part| Reading::begin(part.folder, whole.for_shard(part.shard)))
+        .collect::<Result<Vec<Reading>, _>>()?;
+    let folder = Folder::create(out, &text, &manifest)?;
     let mut log = folder.replay(&mut whole)?;
     while let Some((cell, batch)) = whole.next() {
         let whole_cells = whole.spec.trials.precision.is_some();
-        let at = parts.iter().position(|p| p.shard.holds(cell, batch, whole.cells.len(), whole_cells));
-        let (engine, replay) = &mut streams[at.expect("the parts were checked to hold every batch")];
-        let trials = replay.trials(engine)?.ok_or_else(|| MergeError::Incomplete {
-            path: out.to_path_buf(),
-            shard: engine.shard.to_string(),
-        })?;
-        engine.absorb((cell, batch), &trials);
+        let at = shards.iter().position(|s| s.holds(cell, batch, whole.cells.len(), whole_cells));
+        let reading = &mut readings[at.expect("the parts were checked to hold every batch")];
+        let Some((_, trials)) = reading.next()? else {
+            return Err(MergeError::Incomplete {
+                path: reading.folder.path().to_path_buf(),
+                shard: reading.engine.shard.to_string(),
+            });
+        };
         whole.absorb((cell, batch), &trials);
         folder.append_only(&mut log, tables::rows(&trials).as_bytes())?;
     }
-    folder.checkpoint(&mut log, whole.batches)?;
+    folder.count(&mut log, whole.batches)?;
     Ok((folder, whole))
 }
 
 fn open(path: &Path) -> Result<Part, MergeError> {
     let folder = Folder::open(path)?;
-    let manifest = folder.manifest()?;
-    let shard = manifest.shard.parse().map_err(|e: super::ShardError| FolderError::Damaged {
-        path: folder.file("manifest.json"),
-        what: e.to_string(),
-    })?;
+    let (manifest, shard) = (folder.manifest()?, folder.shard()?);
     if !manifest.complete {
         return Err(MergeError::Incomplete { path: path.to_path_buf(), shard: manifest.shard });
     }
@@ -125,14 +137,4 @@ fn commit(parts: &[Part]) -> Option<Commit> {
     let hash = parts[0].manifest.commit.clone()?;
     let same = parts.iter().all(|p| p.manifest.commit.as_ref() == Some(&hash));
     same.then(|| Commit { hash, dirty: parts.iter().any(|p| p.manifest.dirty == Some(true)) })
-}
-
-/// The trials of a part, from the beginning, and the engine that knows their order.
-fn stream(part: &Part, text: &str, whole: &Engine) -> Result<(Engine, Replay<BufReader<File>>), MergeError> {
-    let path = part.folder.file("trials.csv");
-    let file = File::open(&path).map_err(|source| Located { path: path.clone(), source });
-    let mut replay = Replay::new(BufReader::new(file.map_err(FolderError::from)?), path);
-    replay.expect_header(&tables::header(&whole.quantities))?;
-    let engine = Engine::new(text, part.shard).map_err(RunError::from)?;
-    Ok((engine, replay))
 }

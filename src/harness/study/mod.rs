@@ -17,14 +17,22 @@ mod figures;
 mod fingerprint;
 mod finish;
 mod folder;
+mod log;
 mod manifest;
 mod merge;
 mod moments;
 mod names;
+#[cfg(feature = "parquet")]
+mod parquet;
+#[cfg(not(feature = "parquet"))]
+#[path = "parquet_absent.rs"]
+mod parquet;
 pub mod plan;
 mod poses;
 mod prediction;
 mod quantity;
+mod reading;
+mod replay;
 mod report;
 mod shard;
 mod sketch;
@@ -33,10 +41,12 @@ mod spec_error;
 mod summary;
 mod tables;
 mod trial;
+mod trial_file;
+mod within;
 
 pub use accumulate::Tally;
 pub use cells::Cell;
-pub use engine::{Engine, Interruption, Outcome, Pace, RunError, in_memory, in_memory_seeing};
+pub use engine::{Engine, Interruption, Outcome, Pace, RunError, Worst, in_memory, in_memory_seeing};
 pub use fingerprint::Fingerprint;
 pub use finish::finish;
 pub use folder::{Folder, FolderError, Located};
@@ -48,7 +58,9 @@ pub use prediction::{Predicted, Prediction};
 pub use quantity::Quantity;
 pub use shard::{Shard, ShardError};
 pub use sketch::Sketch;
-pub use spec::{CameraSpec, Estimator, Length, LossChoice, Precision, SceneSpec, Spec, TargetSpec, Trials};
+pub use spec::{Estimator, Length, LossChoice, Precision, SceneSpec, Spec, TargetSpec, Trials};
 pub use spec_error::SpecError;
 pub use summary::{CellSummary, Statistic, Summary, summarise};
 pub use trial::{Trial, run_trial};
+pub use trial_file::{TrialFile, TrialFileError};
+pub use within::within;

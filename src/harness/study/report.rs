@@ -3,17 +3,20 @@
 use super::engine::Engine;
 use super::manifest::Manifest;
 use super::moments::Estimated;
+use super::shard::Shard;
 use super::summary::{CellSummary, Statistic, Summary};
 use crate::harness::{Figure, significant};
 use std::fmt::Write;
 
+/// Wide tables and figures scroll within the page, which never does: figures keep a size at which they can be read.
 const STYLE: &str = "body{font:15px/1.5 sans-serif;max-width:1280px;margin:2em auto;padding:0 1em;color:#1a1a1a}\
 h1{font-size:1.6em;margin-bottom:.2em}h2{font-size:1.2em;margin-top:2em}\
 table{border-collapse:collapse;margin:.5em 0;font-variant-numeric:tabular-nums;font-size:13px}\
 th,td{padding:.15em .7em;text-align:right;border-bottom:1px solid #ddd;white-space:nowrap}\
-th:first-child,td:first-child{text-align:left}thead th{border-bottom:2px solid #888}\
-figure{margin:1em 0}figure svg{max-width:100%;height:auto}figcaption{color:#444;font-size:14px}\
-pre{background:#f5f5f5;padding:1em;overflow:auto;font-size:13px}.low{color:#666}";
+th:first-child,td:first-child{text-align:left}thead th{border-bottom:2px solid #888}td small{color:#555}\
+.wide{overflow-x:auto}figure{margin:1em 0}figure svg{max-width:none}\
+figcaption{color:#444;font-size:14px}\
+pre{background:#f5f5f5;padding:1em;overflow:auto;font-size:13px}.low{color:#666}.hash{word-break:break-all;white-space:normal}";
 
 /// The page, self-contained.
 pub(super) fn page(
@@ -26,21 +29,28 @@ pub(super) fn page(
     let mut page = String::new();
     let name = escape(&engine.spec.name);
     page.push_str(&format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Study {name}</title>\n<style>{STYLE}</style></head><body>\n\
-         <h1>Study {name}</h1>\n<p>{}</p>\n<p class=\"low\">{} trials in {} cells, seed {}; intervals at {} % confidence. \
-         Part {}.</p>\n",
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><title>Study {name}</title>\n<style>{STYLE}</style></head><body>\n\
+         <h1>Study {name}</h1>\n<p>{}</p>\n<p class=\"low\">{} trials in {} cells, seed {}; intervals at {} % confidence.{}</p>\n",
         escape(&engine.spec.question),
         engine.trials(),
         engine.cells.len(),
         engine.spec.seed,
-        significant(100.0 * summary.confidence, 3),
-        manifest.shard,
+        percent(summary.confidence),
+        if engine.shard == Shard::WHOLE { String::new() } else { format!(" Part {} only.", engine.shard) },
     ));
+    let imprecise: Vec<String> = engine.imprecise().iter().map(|cell| escape(&cell.name)).collect();
+    if !imprecise.is_empty() {
+        page.push_str(&format!(
+            "<p>Not as precise as wanted after all trials: {}.</p>\n",
+            imprecise.join("; ")
+        ));
+    }
     page.push_str("<h2>Figures</h2>\n");
     for figure in figures {
         let drawing = String::from_utf8_lossy(&figure.bytes);
         page.push_str(&format!(
-            "<figure>{drawing}<figcaption>{}</figcaption></figure>\n",
+            "<figure><div class=\"wide\">{drawing}</div><figcaption>{}</figcaption></figure>\n",
             escape(&figure.caption)
         ));
     }
@@ -56,83 +66,80 @@ pub(super) fn page(
     page
 }
 
+/// A share without the rounding of its binary fraction: 95, 99.9.
+fn percent(share: f64) -> f64 {
+    libm::round(1e6 * share) / 1e4
+}
+
 fn endings(summary: &Summary) -> String {
-    let mut text = String::from(
-        "<table><thead><tr><th>cell</th><th>outcome</th><th>trials</th><th>share</th></tr></thead>\n",
-    );
+    let mut rows = String::new();
     for cell in &summary.cells {
         for (outcome, count, share) in &cell.outcomes {
-            row(&mut text, &[&cell.name, outcome, &count.to_string(), &told(Some(*share))]);
+            row(&mut rows, &[escape(&cell.name), escape(outcome), count.to_string(), told(Some(*share))]);
         }
     }
-    text + "</table>\n"
+    table(&["cell", "outcome", "trials", "share"], &rows)
 }
 
 fn quantity_table(summary: &Summary, name: &str) -> String {
     let statistics: Vec<(&CellSummary, &Statistic)> =
         summary.cells.iter().filter_map(|c| Some((c, c.of(name)?))).filter(|(_, s)| s.count > 0).collect();
     let Some(&(_, first)) = statistics.first() else { return String::new() };
-    let unit = if first.quantity.unit().is_empty() {
-        String::new()
-    } else {
-        format!(" ({})", first.quantity.unit())
+    let unit = match first.quantity.unit() {
+        "" => String::new(),
+        unit => format!(" ({unit})"),
     };
     let mean = if first.quantity.is_error() { "bias" } else { "mean" };
-    let mut text = format!(
-        "<h3>{name}{unit}</h3>\n<table><thead><tr><th>cell</th><th>trials</th><th>{mean}</th><th>sd</th><th>RMS</th>\
-         <th>2.5 %</th><th>median</th><th>97.5 %</th><th>predicted</th><th>sd / bound</th></tr></thead>\n"
-    );
+    let mut heads = vec!["cell".to_string(), "trials".into(), mean.into(), "sd".into(), "RMS".into()];
+    heads.extend(first.quantiles.iter().map(|(share, _)| match share {
+        0.5 => "median".to_string(),
+        share => format!("{} %", percent(*share)),
+    }));
+    heads.extend(["predicted", "sd / bound"].map(String::from));
+    let mut rows = String::new();
     for (cell, s) in statistics {
-        let quantile = |i: usize| s.quantiles[i].1.map_or_else(dash, |q| significant(q.value, 4));
-        let predicted = s.predicted.map_or_else(dash, |p| {
-            let mean = if first.quantity.is_error() {
-                String::new()
-            } else {
-                format!("{} \u{b1} ", significant(p.mean, 4))
-            };
-            format!("{mean}{}", significant(p.sd, 4))
+        let predicted = s.predicted.map_or_else(dash, |p| match first.quantity.is_error() {
+            true => significant(p.sd, 4),
+            false => format!("{}<br><small>\u{b1} {}</small>", significant(p.mean, 4), significant(p.sd, 4)),
         });
-        row(
-            &mut text,
-            &[
-                &cell.name,
-                &s.count.to_string(),
-                &told(s.mean),
-                &told(s.sd),
-                &told(s.rms),
-                &quantile(0),
-                &quantile(2),
-                &quantile(4),
-                &predicted,
-                &told(s.ratio),
-            ],
-        );
+        let mut entries =
+            vec![escape(&cell.name), s.count.to_string(), told(s.mean), told(s.sd), told(s.rms)];
+        entries.extend(s.quantiles.iter().map(|(_, q)| told(*q)));
+        entries.extend([predicted, told(s.ratio)]);
+        row(&mut rows, &entries);
     }
-    text + "</table>\n"
+    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
+    format!("<h3>{name}{unit}</h3>\n{}", table(&heads, &rows))
 }
 
 fn provenance(manifest: &Manifest, spec_text: &str) -> String {
-    let mut text = String::from("<h2>How this was made</h2>\n<table>\n");
+    let mut text = String::from("<h2>How this was made</h2>\n<div class=\"wide\"><table>\n");
     let commit = manifest.commit.clone().unwrap_or_else(|| "unknown".to_string());
     let dirty = if manifest.dirty == Some(true) { " (with changes)" } else { "" };
-    row(&mut text, &["commit", &format!("{commit}{dirty}")]);
-    row(&mut text, &["calibench", &manifest.code.calibench]);
-    row(&mut text, &["solver behaviour", &manifest.code.behaviour]);
-    for (name, version) in &manifest.code.crates {
-        row(&mut text, &[name, version]);
-    }
-    row(&mut text, &["specification", &manifest.spec_sha256]);
-    for (name, hash) in &manifest.files {
-        row(&mut text, &[name, hash]);
-    }
-    text.push_str("</table>\n<p>Command: <code>calibench study run spec.toml</code> with</p>\n");
+    let mut tell = |what: &str, is: &str| {
+        row(&mut text, &[escape(what), format!("<span class=\"hash\">{}</span>", escape(is))]);
+    };
+    tell("commit", &format!("{commit}{dirty}"));
+    tell("calibench", &manifest.code.calibench);
+    tell("solver behaviour", &manifest.code.behaviour);
+    manifest.code.crates.iter().for_each(|(name, version)| tell(name, version));
+    tell("specification", &manifest.spec_sha256);
+    manifest.files.iter().for_each(|(name, hash)| tell(name, hash));
+    text.push_str("</table></div>\n<p>Command: <code>calibench study run spec.toml</code> with</p>\n");
     text + &format!("<pre>{}</pre>\n", escape(spec_text))
 }
 
-fn row(text: &mut String, cells: &[&str]) {
+/// A table that scrolls where the page is narrower.
+fn table(heads: &[&str], rows: &str) -> String {
+    let heads: String = heads.iter().map(|head| format!("<th>{head}</th>")).collect();
+    format!("<div class=\"wide\"><table><thead><tr>{heads}</tr></thead>\n{rows}</table></div>\n")
+}
+
+/// A row of entries that are HTML already.
+fn row(text: &mut String, entries: &[String]) {
     text.push_str("<tr>");
-    for cell in cells {
-        write!(text, "<td>{}</td>", escape(cell)).expect("writing to memory cannot fail");
+    for entry in entries {
+        write!(text, "<td>{entry}</td>").expect("writing to memory cannot fail");
     }
     text.push_str("</tr>\n");
 }
@@ -141,10 +148,11 @@ fn dash() -> String {
     "\u{2013}".to_string()
 }
 
-/// `0.681 [0.670, 0.692]`.
+/// The value, and its interval in a line of its own.
 fn told(estimated: Option<Estimated>) -> String {
     estimated.map_or_else(dash, |e| {
-        format!("{} [{}, {}]", significant(e.value, 4), significant(e.low, 4), significant(e.high, 4))
+        let [value, low, high] = [e.value, e.low, e.high].map(|x| significant(x, 4));
+        format!("{value}<br><small>[{low}, {high}]</small>")
     })
 }
 

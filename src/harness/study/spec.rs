@@ -7,6 +7,7 @@ use super::spec_error::SpecError;
 use crate::calibrate::{Loss, Settings};
 use crate::camera::{Camera, FreeParameters, Parameter};
 use crate::geometry::Vec2;
+use crate::io::result::CameraFields;
 use crate::target::Board;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -45,7 +46,7 @@ pub struct Spec {
 #[serde(deny_unknown_fields)]
 pub struct SceneSpec {
     /// The virtual camera.
-    pub camera: CameraSpec,
+    pub camera: CameraFields,
     /// Image width and height, px.
     pub image: (usize, usize),
     /// The board.
@@ -63,29 +64,6 @@ pub struct SceneSpec {
     /// A length measured with the calibrated camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub length: Option<Length>,
-}
-
-/// Intrinsic parameters; skew and distortion are 0 unless given.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[allow(missing_docs, reason = "the parameters' names are those of `camera::Parameter`")]
-pub struct CameraSpec {
-    pub fx: f64,
-    pub fy: f64,
-    pub cx: f64,
-    pub cy: f64,
-    #[serde(default)]
-    pub skew: f64,
-    #[serde(default)]
-    pub k1: f64,
-    #[serde(default)]
-    pub k2: f64,
-    #[serde(default)]
-    pub p1: f64,
-    #[serde(default)]
-    pub p2: f64,
-    #[serde(default)]
-    pub k3: f64,
 }
 
 /// A grid of marks.
@@ -242,7 +220,7 @@ fn check(field: &'static str, value: f64, need: &'static str, held: bool) -> Res
 
 impl SceneSpec {
     pub(super) fn check(&self) -> Result<(), SpecError> {
-        let camera = self.camera.camera();
+        let camera = Camera::from(self.camera);
         check("scene.camera.fx", camera.fx, "positive, and every parameter finite", camera.is_valid())?;
         let noise = self.noise_px;
         check("scene.noise_px", noise, "a positive number", noise > 0.0 && noise.is_finite())?;
@@ -260,14 +238,6 @@ impl SceneSpec {
             )?;
         }
         self.target.board().map(|_| ())
-    }
-}
-
-impl CameraSpec {
-    /// The camera.
-    pub fn camera(&self) -> Camera {
-        let c = self;
-        Camera::from_parameters([c.fx, c.fy, c.cx, c.cy, c.skew, c.k1, c.k2, c.p1, c.p2, c.k3])
     }
 }
 

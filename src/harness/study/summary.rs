@@ -86,7 +86,9 @@ pub fn summarise(engine: &Engine) -> Summary {
 fn outcomes(tally: &Tally, false_alarm: f64) -> Vec<(String, u64, Estimated)> {
     let share = |count: u64| {
         let interval = Interval::of_proportion(count as usize, tally.trials as usize, false_alarm);
-        Estimated { value: count as f64 / tally.trials as f64, low: interval.low, high: interval.high }
+        let value = count as f64 / tally.trials as f64;
+        // The interval holds its estimate but for a rounding, which shows at 0 and 1.
+        Estimated { value, low: interval.low.min(value), high: interval.high.max(value) }
     };
     let mut counts = tally.outcomes.clone();
     // Said even where nothing converged.

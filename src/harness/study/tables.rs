@@ -4,16 +4,22 @@ use super::quantity::Quantity;
 use super::trial::Trial;
 use std::fmt::Write;
 
-/// The first line of `trials.csv`.
-pub(super) fn header(quantities: &[Quantity]) -> String {
+/// Names of the columns, units in brackets.
+pub(super) fn columns(quantities: &[Quantity]) -> Vec<String> {
     let column = |q: &Quantity| {
         let what = if q.is_error() { "_error" } else { "" };
         match q.unit() {
-            "" => format!(",{}{what}", q.name()),
-            unit => format!(",{}{what} [{unit}]", q.name()),
+            "" => format!("{}{what}", q.name()),
+            unit => format!("{}{what} [{unit}]", q.name()),
         }
     };
-    format!("cell,trial,outcome,iterations{}\n", quantities.iter().map(column).collect::<String>())
+    let leading = ["cell", "trial", "outcome", "iterations"].map(String::from);
+    leading.into_iter().chain(quantities.iter().map(column)).collect()
+}
+
+/// The first line of `trials.csv`.
+pub(super) fn header(quantities: &[Quantity]) -> String {
+    columns(quantities).join(",") + "\n"
 }
 
 /// One line a trial. A value that is not there is an empty field.

@@ -71,10 +71,7 @@ fn views(told: &Told) -> Vec<Vec<String>> {
         let normal = pose.rotation.column(2);
         let tilt = libm::atan2(libm::hypot(normal.x, normal.y), normal.z.abs()).to_degrees();
         vec![
-            match told.overlays.get(name) {
-                Some(overlay) => format!("<a href=\"{}\">{}</a>", escaped(overlay), escaped(name)),
-                None => escaped(name),
-            },
+            linked(told, name),
             residuals.len().to_string(),
             significant(calibration.view_rmse_px(i).unwrap_or(f64::NAN), 4),
             significant(largest, 3),
@@ -89,11 +86,25 @@ fn left_out(page: &mut String, told: &Told) {
     if told.left_out.is_empty() {
         return;
     }
-    page.push_str("<h2>Left out</h2>\n<ul>\n");
+    page.push_str("<h2>Left out</h2>\n");
+    paragraph(
+        page,
+        "",
+        "In the picture of a photograph without the board, a red cross stands on each disc that was seen.",
+    );
+    page.push_str("<ul>\n");
     for left in &told.left_out {
-        let _ = writeln!(page, "<li>{}: {}</li>", escaped(&left.name), escaped(&left.reason));
+        let _ = writeln!(page, "<li>{}: {}</li>", linked(told, &left.name), escaped(&left.reason));
     }
     page.push_str("</ul>\n");
+}
+
+/// A view's name, which leads to its picture if there is one.
+fn linked(told: &Told, name: &str) -> String {
+    match told.overlays.get(name) {
+        Some(overlay) => format!("<a href=\"{}\">{}</a>", escaped(overlay), escaped(name)),
+        None => escaped(name),
+    }
 }
 
 fn paragraph(page: &mut String, attributes: &str, text: &str) {

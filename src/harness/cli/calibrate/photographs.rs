@@ -3,7 +3,7 @@
 use super::camera::{self, Observed};
 use super::{Arguments, Exit, warn};
 use crate::geometry::Vec2;
-use crate::harness::photos::{BoardSpec, DetectError, MarkKind};
+use crate::harness::photos::{BoardSpec, MarkKind, NotFound};
 use crate::io::{Grey, ImageError, LeftOut, Overlay, read_image};
 use crate::target::{View, ViewError};
 use rayon::prelude::*;
@@ -11,6 +11,9 @@ use std::path::{Path, PathBuf};
 
 /// Photographs wider than this are not enlarged in their overlays: a mark then has pixels enough.
 const ENLARGED_BELOW_PX: usize = 1200;
+
+/// Colour of a mark that fits no board.
+const CANDIDATE: [u8; 3] = [230, 40, 40];
 
 /// Why a photograph is left out.
 #[derive(Debug, thiserror::Error)]
@@ -20,7 +23,7 @@ enum PhotoError {
     Image(#[from] ImageError),
     /// The board was not found.
     #[error(transparent)]
-    Detect(#[from] DetectError),
+    NotFound(#[from] NotFound),
     /// Another camera, or another setting of it.
     #[error("{} x {} px, but {} has {} x {} px: one camera's photographs have one size", got.0, got.1, of, size.0, size.1)]
     Size {
@@ -39,7 +42,7 @@ enum PhotoError {
 /// A photograph that was read.
 struct Seen {
     size: (usize, usize),
-    marks: Result<Vec<Vec2>, DetectError>,
+    marks: Result<Vec<Vec2>, NotFound>,
     /// The overlay's path in the output folder, or why it could not be written.
     overlay: Option<Result<String, String>>,
 }
@@ -65,16 +68,13 @@ pub(super) fn run(arguments: &Arguments, board: &BoardSpec, photos: &[PathBuf]) 
 fn see(path: &Path, index: usize, board: &BoardSpec, out: Option<&Path>) -> Result<Seen, ImageError> {
     let photo = read_image(path)?;
     let marks = board.detect(&photo);
-    let overlay = match (out, &marks) {
-        (Some(out), Ok(marks)) => {
-            let stem = plain(&path.file_stem().map(|stem| stem.to_string_lossy()).unwrap_or_default());
-            // Photographs of two folders may share a name; their place in the list they do not.
-            let name = format!("overlay/{:03}-{stem}.png", index + 1);
-            let written = draw(&photo, marks, board.board().columns()).write_png(&out.join(&name));
-            Some(written.map(|()| name).map_err(|error| error.to_string()))
-        }
-        _ => None,
-    };
+    let overlay = out.map(|out| {
+        let stem = plain(&path.file_stem().map(|stem| stem.to_string_lossy()).unwrap_or_default());
+        // Photographs of two folders may share a name; their place in the list they do not.
+        let name = format!("overlay/{:03}-{stem}.png", index + 1);
+        let written = draw(&photo, &marks, board.board().columns()).write_png(&out.join(&name));
+        written.map(|()| name).map_err(|error| error.to_string())
+    });
     Ok(Seen { size: photo.size(), marks, overlay })
 }
 
@@ -83,10 +83,14 @@ fn plain(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect()
 }
 
-fn draw(photo: &Grey, marks: &[Vec2], columns: usize) -> Overlay {
+/// The board's marks in their order; where it was not found, a red cross on each disc that might be one of them.
+fn draw(photo: &Grey, marks: &Result<Vec<Vec2>, NotFound>, columns: usize) -> Overlay {
     let scale = if photo.width() < ENLARGED_BELOW_PX { 2 } else { 1 };
     let mut overlay = Overlay::new(&photo.to_u8(), scale);
-    overlay.grid(marks, columns);
+    match marks {
+        Ok(marks) => overlay.grid(marks, columns),
+        Err(missing) => missing.candidates_px.iter().for_each(|&at| overlay.cross(at, 4.0, CANDIDATE)),
+    }
     overlay
 }
 
@@ -118,11 +122,11 @@ fn observed(
     }
     for (path, seen) in photos.iter().zip(seen) {
         let name = path.display().to_string();
+        if let Some(overlay) = seen.as_ref().ok().and_then(|seen| seen.overlay.clone()) {
+            observed.overlays.insert(name.clone(), overlay?);
+        }
         match view(seen, expected.as_ref(), &points) {
-            Ok((view, overlay)) => {
-                if let Some(overlay) = overlay {
-                    observed.overlays.insert(name.clone(), overlay?);
-                }
+            Ok(view) => {
                 observed.names.push(name);
                 observed.views.push(view);
             }
@@ -132,19 +136,17 @@ fn observed(
     Ok(observed)
 }
 
-type Overlaid = Option<Result<String, String>>;
-
 fn view(
     seen: Result<Seen, ImageError>,
     expected: Option<&((usize, usize), String)>,
     points: &[Vec2],
-) -> Result<(View, Overlaid), PhotoError> {
+) -> Result<View, PhotoError> {
     let seen = seen?;
     match expected {
         Some((size, of)) if *size != seen.size => {
             Err(PhotoError::Size { got: seen.size, size: *size, of: of.clone() })
         }
-        _ => Ok((View::new(points.to_vec(), seen.marks?)?, seen.overlay)),
+        _ => Ok(View::new(points.to_vec(), seen.marks?)?),
     }
 }
 

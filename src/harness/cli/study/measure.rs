@@ -2,6 +2,7 @@
 
 use super::{Failure, read};
 use crate::harness::cli::{Exit, print};
+use crate::harness::resources::{peak_memory_mib, processor_seconds};
 use crate::harness::study::{RunError, Spec, in_memory};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -40,21 +41,4 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
         ));
     }
     Ok(Exit::Held)
-}
-
-/// The largest resident set so far, as Linux tells it.
-fn peak_memory_mib() -> Option<f64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-    let kib: f64 = line.trim().trim_end_matches("kB").trim().parse().ok()?;
-    Some(kib / 1024.0)
-}
-
-/// Processor time of all threads so far, s, as Linux tells it: user and system time, in hundredths of a second whatever the kernel's clock.
-fn processor_seconds() -> Option<f64> {
-    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // The name, in parentheses, may hold spaces; after it, user time is field 12 and system time field 13.
-    let mut fields = stat.rsplit_once(')')?.1.split_whitespace().skip(11);
-    let (user, system): (f64, f64) = (fields.next()?.parse().ok()?, fields.next()?.parse().ok()?);
-    Some((user + system) / 100.0)
 }

@@ -4,7 +4,8 @@ use super::{Failure, read};
 use crate::harness::cli::{Exit, print, warn};
 use crate::harness::project::Project;
 use crate::harness::study::{
-    Engine, Folder, Interruption, Manifest, Outcome, RunError, Shard, Summary, finish, merge,
+    Engine, Folder, Interruption, Manifest, Outcome, RunError, Shard, Summary, TrialFile, Worst, finish,
+    merge,
 };
 use crate::harness::{ProgressDisplay, provenance, significant};
 use std::path::{Path, PathBuf};
@@ -22,6 +23,9 @@ pub(in crate::harness::cli) struct Arguments {
     /// Part i of n, from 0: batches are dealt out in turn, whole cells where the study stops at a precision
     #[arg(long, value_name = "i/n", default_value_t = Shard::WHOLE)]
     shard: Shard,
+    /// File of the trials: csv, or parquet where this program was built with that feature
+    #[arg(long, value_name = "csv|parquet", default_value_t = TrialFile::Csv)]
+    trials: TrialFile,
 }
 
 #[derive(Debug, clap::Args)]
@@ -38,29 +42,34 @@ pub(in crate::harness::cli) struct MergeArguments {
     /// Folder for the whole
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// File of the trials, csv or parquet [default: as in the first shard]
+    #[arg(long, value_name = "csv|parquet")]
+    trials: Option<TrialFile>,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
+    arguments.trials.check()?;
     let text = read(&arguments.spec)?;
     let engine = Engine::new(&text, arguments.shard)
         .map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.display())))?;
     let out = arguments.out.clone().unwrap_or_else(|| default_folder(&engine));
     let manifest = Manifest::new(&engine.spec, arguments.shard, commit().as_ref());
+    let manifest = manifest.with_trials(arguments.trials);
     let folder = Folder::create(&out, &text, &manifest)?;
     drive(&folder, engine)
 }
 
 pub(super) fn resume(arguments: &ResumeArguments) -> Result<Exit, Failure> {
     let folder = Folder::open(&arguments.run)?;
-    let shard =
-        folder.manifest()?.shard.parse().map_err(|e| Failure::usage(format!("manifest.json: {e}")))?;
+    folder.manifest()?.trials.check()?;
+    let shard = folder.shard()?;
     let engine = Engine::new(&folder.read("spec.toml")?, shard).map_err(RunError::from)?;
     folder.check(&Manifest::new(&engine.spec, shard, None))?;
     drive(&folder, engine)
 }
 
 pub(super) fn merge_parts(arguments: &MergeArguments) -> Result<Exit, Failure> {
-    let (folder, engine) = merge(&arguments.parts, &arguments.out)?;
+    let (folder, engine) = merge(&arguments.parts, &arguments.out, arguments.trials)?;
     let summary = finish(&folder, &engine)?;
     tell(&folder, &engine, &summary);
     Ok(Exit::Held)
@@ -102,12 +111,11 @@ fn drive(folder: &Folder, mut engine: Engine) -> Result<Exit, Failure> {
     let (started, mut told) = (Instant::now(), None);
     let outcome = folder.run(&mut engine, &stop, |pace| {
         if told.is_none() {
-            progress.advance(pace.before as usize);
+            progress.already(pace.before as usize);
         }
+        progress.expect(pace.expected as usize);
+        progress.note(&pace.worst.as_ref().map_or_else(String::new, worst));
         progress.advance((pace.trials - told.unwrap_or(0)) as usize);
-        if let Some((cell, width)) = &pace.worst {
-            progress.note(&format!("worst {cell}: \u{b1}{} %", significant(100.0 * width, 2)));
-        }
         told = Some(pace.trials);
     })?;
     drop(progress);
@@ -128,6 +136,17 @@ fn drive(folder: &Folder, mut engine: Engine) -> Result<Exit, Failure> {
         print(&format!("{trials} trials in {seconds:.1} s: {rate:.0} a second on {cores} thread(s)\n"));
     }
     Ok(Exit::Held)
+}
+
+/// `worst: sd(fx) +-8.2 % at tilt = 40`.
+fn worst(worst: &Worst) -> String {
+    match worst.relative_half_width {
+        Some(width) => {
+            let percent = significant(100.0 * width, 2);
+            format!("worst: sd({}) \u{b1}{percent} % at {}", worst.quantity, worst.cell)
+        }
+        None => format!("worst: too few trials converge at {}", worst.cell),
+    }
 }
 
 /// A few lines for the terminal; everything stands in the report.
@@ -153,6 +172,17 @@ fn tell(folder: &Folder, engine: &Engine, summary: &Summary) {
             )
         });
         print(&format!("{} ({} trials){spread}{failed}\n", cell.name, cell.trials));
+    }
+    if let Some(precision) = &engine.spec.trials.precision {
+        for cell in engine.imprecise() {
+            print(&format!(
+                "{}: sd({}) is not known to {} % after {} trials\n",
+                cell.name,
+                precision.quantity,
+                significant(100.0 * precision.relative_half_width, 3),
+                engine.spec.trials.per_cell
+            ));
+        }
     }
     let report: &Path = &folder.file("report.html");
     print(&format!("{} trials; written: {}\n", engine.trials(), report.display()));

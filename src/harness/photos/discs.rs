@@ -1,0 +1,50 @@
+//! Where are a board's discs in a photograph, be they dark on bright ground or bright on dark?
+
+use super::DetectError;
+use crate::detect::{Blob, BlobOptions, DotGrid, GridError, Polarity, blobs};
+use crate::geometry::Vec2;
+use crate::io::Grey;
+use crate::raster::{Raster, Sample};
+
+/// A board that was not found, and what might have been its marks.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{reason}")]
+pub struct NotFound {
+    /// Why.
+    pub reason: DetectError,
+    /// Centres of the discs that were seen but do not make the board, px; none for a chessboard.
+    pub candidates_px: Vec<Vec2>,
+}
+
+/// The discs of a photograph in the order that `order` gives them. Dark ones are tried first, then bright ones.
+///
+/// # Errors
+/// Neither makes the board: the reason of whichever kind has more discs.
+pub fn ordered_discs(
+    photo: &Grey,
+    order: impl Fn(&[Blob]) -> Result<DotGrid, GridError>,
+) -> Result<DotGrid, NotFound> {
+    match photo {
+        Grey::U8(image) => of_either_polarity(image, order),
+        Grey::U16(image) => of_either_polarity(image, order),
+        Grey::F32(image) => of_either_polarity(image, order),
+    }
+}
+
+fn of_either_polarity<T: Sample>(
+    image: &Raster<T>,
+    order: impl Fn(&[Blob]) -> Result<DotGrid, GridError>,
+) -> Result<DotGrid, NotFound> {
+    let of = |polarity| {
+        let discs = blobs(image, &BlobOptions { polarity, ..BlobOptions::default() });
+        order(&discs).map_err(|reason| NotFound {
+            reason: reason.into(),
+            candidates_px: discs.iter().map(|disc| disc.centre_px).collect(),
+        })
+    };
+    of(Polarity::Dark).or_else(|dark| {
+        of(Polarity::Bright).map_err(|bright| {
+            if bright.candidates_px.len() > dark.candidates_px.len() { bright } else { dark }
+        })
+    })
+}
