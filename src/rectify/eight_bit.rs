@@ -47,7 +47,7 @@ impl<'a> Photograph<'a> {
 
     /// Levels of a part of an output row from their windows; `single` gives the levels of a block without window, by number.
     pub fn mix_windows(&self, windows: &[Window], levels: &mut [u8], single: impl FnMut(usize, &mut [u8])) {
-        #[cfg(target_arch = "x86_64")]
+        #[cfg(all(target_arch = "x86_64", not(calibench_portable)))]
         if std::is_x86_feature_detected!("avx2") {
             // SAFETY: the processor has AVX2.
             return unsafe { wide::mix_windows(self, windows, levels, single) };
@@ -57,7 +57,7 @@ impl<'a> Photograph<'a> {
 
     /// Levels of a part of an output row from their sources; pixels outside stay as they are.
     pub fn mix_sources(&self, sources: &Sources, levels: &mut [u8]) {
-        #[cfg(target_arch = "x86_64")]
+        #[cfg(all(target_arch = "x86_64", not(calibench_portable)))]
         if std::is_x86_feature_detected!("avx2") {
             // SAFETY: the processor has AVX2.
             return unsafe { wide::mix_sources(self, sources, levels) };
@@ -125,7 +125,7 @@ impl Registers for Portable {
 
 /// AVX2. [`wide::Wide`] is named in this module only, in functions compiled for AVX2, which run only where AVX2 is: that is what makes every
 /// `unsafe` block below sound that is not about a pointer.
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(calibench_portable)))]
 mod wide {
     use super::super::fraction::{COARSE, COARSE_BITS, ROUNDING};
     use super::super::window::{COLUMNS, LOWER, Limits, MIDDLE_BITS, PIXELS, ROWS, TO_NEAREST, Window};
