@@ -1,6 +1,6 @@
 //! How is a program judged that is not ours? As a black box behind two pipes, kept alive over all problems.
 
-use super::accept::Breakage;
+use super::accept::{Breakage, id_in, read_line};
 use super::protocol::{Answer, Problem};
 use super::solver::{Reply, Solver, reply};
 use std::io::{BufRead, BufReader, Read, Write};
@@ -10,12 +10,12 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// After this many breakages in a row a worker stops asking: the program does not work at all.
+/// After this many breakages in a row a worker stops asking a program that never gave an answer: it does not work at all.
 const PATIENCE: usize = 3;
+/// The same for a program that has answered before: more than all bad input of a run, which may well break it every time.
+const LONG_PATIENCE: usize = 24;
 /// Bytes of standard error that are quoted.
 const STDERR_TAIL: usize = 400;
-/// Characters of a wrong line that are quoted.
-const LINE_HEAD: usize = 80;
 
 /// A program that reads problems and writes answers, one JSON object a line.
 #[derive(Debug)]
@@ -30,6 +30,7 @@ pub struct Process {
 struct Worker {
     running: Option<Running>,
     broken_in_a_row: usize,
+    has_answered: bool,
 }
 
 #[derive(Debug)]
@@ -48,10 +49,12 @@ impl Process {
     }
 
     fn ask_worker(&self, worker: &mut Worker, problem: &Problem) -> Result<Answer, Breakage> {
-        if worker.broken_in_a_row >= PATIENCE {
-            return Err(Breakage::NotAsked(format!("{PATIENCE} breakages in a row before")));
+        let patience = if worker.has_answered { LONG_PATIENCE } else { PATIENCE };
+        if worker.broken_in_a_row >= patience {
+            return Err(Breakage::NotAsked(format!("{patience} breakages in a row before")));
         }
         let result = self.converse(worker, problem);
+        worker.has_answered |= result.is_ok();
         worker.broken_in_a_row = if result.is_ok() { 0 } else { worker.broken_in_a_row + 1 };
         if result.is_err() {
             // A late or half-read answer must not meet the next problem.
@@ -89,7 +92,7 @@ impl Process {
                 Ok(answer) => wrong = wrong.or(Some(Breakage::WrongId { got: answer.id })),
                 Err(breakage) => {
                     wrong = wrong.or(Some(breakage));
-                    if line_names(&line, &problem.id) {
+                    if id_in(&line) == Some(&problem.id) {
                         return Err(wrong.unwrap_or(Breakage::Missing { what: "an answer".into() }));
                     }
                 }
@@ -127,24 +130,6 @@ impl Solver for Process {
         let told = |slot: Mutex<Option<Reply>>| slot.into_inner().unwrap_or_else(PoisonError::into_inner);
         replies.into_iter().map(|slot| told(slot).expect("every problem was taken by a worker")).collect()
     }
-}
-
-/// An answer, or why the line is none.
-fn read_line(line: &str) -> Result<Answer, Breakage> {
-    serde_json::from_str(line).map_err(|error| {
-        // JSON has no NaN; most languages write one all the same.
-        for word in ["NaN", "Infinity", "nan", "inf"] {
-            if line.trim_start().starts_with('{') && line.contains(&format!(": {word}")) {
-                return Breakage::BadNumber { what: "a number of the answer".into(), value: f64::NAN };
-            }
-        }
-        Breakage::Garbage { reason: error.to_string(), line: line.chars().take(LINE_HEAD).collect() }
-    })
-}
-
-/// Whether a line that is no answer is meant as the one to `id`.
-fn line_names(line: &str, id: &str) -> bool {
-    line.trim_start().starts_with('{') && line.contains(&format!("\"{id}\""))
 }
 
 impl Running {
