@@ -8,7 +8,7 @@ use calibench::harness::gate::power::Measured;
 use calibench::harness::gate::protocol::{Problem, schemas};
 use calibench::harness::gate::{Builtin, Plan, Process, Property, Report, Solver, Terms, run};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 const CALIBENCH: &str = env!("CARGO_BIN_EXE_calibench");
@@ -49,6 +49,36 @@ fn a_program_that_hangs_is_ended_and_at_last_not_asked_any_more() {
     assert!(seen[3..].iter().all(|b| matches!(b, Breakage::NotAsked(_))), "{seen:?}");
     // Three times 0.2 s; the rest is for a busy machine.
     assert!(started.elapsed() < Duration::from_secs(30));
+}
+
+#[test]
+fn an_interrupted_gate_leaves_no_program_behind() {
+    let out = folder("gate-interrupted");
+    std::fs::create_dir_all(&out).expect("a folder");
+    let id_file = out.join("id");
+    let solver = format!("echo $$ > {}; sleep 1000", id_file.display());
+    let gate = Command::new(CALIBENCH).args(["gate", "--solver", &solver]).stderr(Stdio::null()).spawn();
+    let mut gate = gate.expect("the program starts");
+    let patience = Instant::now() + Duration::from_secs(60);
+    let id = loop {
+        let id = std::fs::read_to_string(&id_file).unwrap_or_default().trim().to_string();
+        if !id.is_empty() {
+            break id;
+        }
+        assert!(Instant::now() < patience, "the solver was never started");
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    let signal = |name: &str, id: &str| Command::new("kill").args([name, id]).stderr(Stdio::null()).status();
+    assert!(signal("-INT", &gate.id().to_string()).expect("kill runs").success());
+    assert_eq!(gate.wait().expect("it ends").code(), Some(3));
+    // Ended, and perhaps not yet collected by the system.
+    let runs = |id: &str| {
+        std::fs::read_to_string(format!("/proc/{id}/stat")).is_ok_and(|text| !text.contains(") Z "))
+    };
+    while runs(&id) {
+        assert!(Instant::now() < patience, "process {id} still runs");
+        std::thread::sleep(Duration::from_millis(20));
+    }
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use super::accept::{Breakage, id_in, read_line};
 use super::protocol::{Answer, Problem};
 use super::solver::{Reply, Solver, reply};
+use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -16,6 +17,23 @@ const PATIENCE: usize = 3;
 const LONG_PATIENCE: usize = 24;
 /// Bytes of standard error that are quoted.
 const STDERR_TAIL: usize = 400;
+
+/// Process groups that run, to be ended when the gate is interrupted: a group of its own hears no Ctrl-C.
+static GROUPS: Mutex<BTreeSet<u32>> = Mutex::new(BTreeSet::new());
+
+/// Ends every program that any gate of this process started.
+pub fn end_all() {
+    let groups = std::mem::take(&mut *GROUPS.lock().unwrap_or_else(PoisonError::into_inner));
+    groups.into_iter().for_each(end_group);
+}
+
+/// Ends a program and what it started. This fails only where all have ended already.
+fn end_group(id: u32) {
+    #[cfg(unix)]
+    let _ = Command::new("kill").args(["-KILL", "--", &format!("-{id}")]).stderr(Stdio::null()).status();
+    #[cfg(not(unix))]
+    let _ = id;
+}
 
 /// A program that reads problems and writes answers, one JSON object a line.
 #[derive(Debug)]
@@ -141,6 +159,7 @@ impl Running {
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut starter, 0);
         let mut child = starter.spawn()?;
+        GROUPS.lock().unwrap_or_else(PoisonError::into_inner).insert(child.id());
         let broken = || std::io::Error::other("the program has no pipes");
         let mut stdin = child.stdin.take().ok_or_else(broken)?;
         let stdout = child.stdout.take().ok_or_else(broken)?;
@@ -204,12 +223,10 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // These fail only where the program has ended already.
-        #[cfg(unix)]
-        let _ = Command::new("kill")
-            .args(["-KILL", "--", &format!("-{}", self.child.id())])
-            .stderr(Stdio::null())
-            .status();
+        let id = self.child.id();
+        end_group(id);
+        GROUPS.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
+        // As there: it fails only where the program has ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -35,7 +35,7 @@ pub struct Scenario {
     /// Share of points that are displaced by [`OUTLIER_PX`].
     pub outliers: f64,
     /// Share of samples to which textbook least squares gives a confidently wrong answer: measured for the doubtful scenes,
-    /// none where the law holds.
+    /// none where the law holds ([`super::textbook`]).
     pub textbook_misled: f64,
     /// Most samples for which the second-order terms that the law neglects stay below its resolution.
     pub most: usize,
