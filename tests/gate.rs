@@ -4,12 +4,11 @@
 use calibench::harness::gate::accept::{Breakage, Outcome};
 use calibench::harness::gate::faults::{Faulty, planted};
 use calibench::harness::gate::plan::Purpose;
+use calibench::harness::gate::power::Measured;
 use calibench::harness::gate::protocol::{Problem, schemas};
-use calibench::harness::gate::{
-    Builtin, EXPECTED_FALSE_ALARMS, Plan, Process, Property, Report, Solver, run,
-};
+use calibench::harness::gate::{Builtin, Plan, Process, Property, Report, Solver, Terms, run};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 const CALIBENCH: &str = env!("CARGO_BIN_EXE_calibench");
@@ -53,6 +52,36 @@ fn a_program_that_hangs_is_ended_and_at_last_not_asked_any_more() {
 }
 
 #[test]
+fn an_interrupted_gate_leaves_no_program_behind() {
+    let out = folder("gate-interrupted");
+    std::fs::create_dir_all(&out).expect("a folder");
+    let id_file = out.join("id");
+    let solver = format!("echo $$ > {}; sleep 1000", id_file.display());
+    let gate = Command::new(CALIBENCH).args(["gate", "--solver", &solver]).stderr(Stdio::null()).spawn();
+    let mut gate = gate.expect("the program starts");
+    let patience = Instant::now() + Duration::from_secs(60);
+    let id = loop {
+        let id = std::fs::read_to_string(&id_file).unwrap_or_default().trim().to_string();
+        if !id.is_empty() {
+            break id;
+        }
+        assert!(Instant::now() < patience, "the solver was never started");
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    let signal = |name: &str, id: &str| Command::new("kill").args([name, id]).stderr(Stdio::null()).status();
+    assert!(signal("-INT", &gate.id().to_string()).expect("kill runs").success());
+    assert_eq!(gate.wait().expect("it ends").code(), Some(3));
+    // Ended, and perhaps not yet collected by the system.
+    let runs = |id: &str| {
+        std::fs::read_to_string(format!("/proc/{id}/stat")).is_ok_and(|text| !text.contains(") Z "))
+    };
+    while runs(&id) {
+        assert!(Instant::now() < patience, "process {id} still runs");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
 fn a_program_that_crashes_is_quoted() {
     let seen = breakages("echo out of memory >&2; exit 7", 20.0, 1);
     assert!(
@@ -61,6 +90,19 @@ fn a_program_that_crashes_is_quoted() {
     );
     let missing = breakages("/no/such/program", 20.0, 1);
     assert!(matches!(&missing[0], Breakage::Crashed { .. }), "{missing:?}");
+}
+
+#[test]
+fn a_program_that_breaks_on_bad_input_is_asked_again() {
+    // Answers the first problem of every start, then ends: no two answers in a row, and yet it is never given up.
+    let once =
+        r#"read line; printf '%s\n' "$line" | sed 's/^{"id":"\([^"]*\)".*/{"id":"\1","status":"refused"}/'"#;
+    let process = Process::new(once, Duration::from_secs(20), 1);
+    let replies = process.ask_all(&problems(9));
+    let crashed = |outcome: &Outcome| matches!(outcome, Outcome::Broken(Breakage::Crashed { .. }));
+    let refused = |outcome: &Outcome| matches!(outcome, Outcome::Refused(_));
+    assert!(refused(&replies[0].outcome), "{replies:?}");
+    assert!(replies.iter().all(|r| crashed(&r.outcome) || refused(&r.outcome)), "{replies:?}");
 }
 
 #[test]
@@ -117,7 +159,28 @@ fn answers_from_files_get_the_verdict_of_the_same_answers_from_a_pipe() {
     // The same solver against its own record: not a bit differs.
     let same = gate(&["--against", &place]);
     assert!(String::from_utf8_lossy(&same.stdout).contains("SAME: not a bit differs"));
-    std::fs::remove_file(out.join("answers.jsonl")).expect("removed");
+    // What is wrong with an answer in a file is a finding about its problem.
+    let path = out.join("answers.jsonl");
+    let answers = std::fs::read_to_string(&path).expect("written");
+    let spoilt: String = answers
+        .lines()
+        .enumerate()
+        .map(|(i, line)| match i {
+            3 => format!("{{{}\n", &line[1..].replacen("\"rmse\":", "\"rmse\":NaN,\"x\":", 1)),
+            5 => format!("{line}\n{line}\n"),
+            7 => "garbage\n".to_string(),
+            _ => format!("{line}\n"),
+        })
+        .collect();
+    std::fs::write(&path, spoilt).expect("written");
+    let judged = gate(&["--judge", &place]);
+    assert_eq!(judged.status.code(), Some(1));
+    let text = String::from_utf8_lossy(&judged.stderr).into_owned();
+    assert!(
+        text.contains("protocol / four-pose: 3 of 15 broken, first: a number of the answer is NaN"),
+        "{text}"
+    );
+    std::fs::remove_file(path).expect("removed");
     assert_eq!(gate(&["--judge", &place]).status.code(), Some(2));
 }
 
@@ -142,6 +205,8 @@ fn wrong_usage_ends_with_two() {
         &["--accept", "beauty"],
         &["--planted", "no-such-fault"],
         &["--timeout", "-1", "--solver", "true"],
+        &["--median-time", "0"],
+        &["--power-table", "/no/such/folder"],
         &["--judge", "/no/such/folder"],
     ] {
         assert_eq!(gate(arguments).status.code(), Some(2), "{arguments:?}");
@@ -154,9 +219,49 @@ fn what_is_known_can_be_accepted() {
     let plan = Plan::new(1, 1).expect("a plan");
     let solver = Faulty::new(fault);
     let seen = run(&plan, &solver, &|_| ());
-    let report = |accepted: &[Property]| Report::new(&plan, "", &seen, EXPECTED_FALSE_ALARMS, accepted, 0.0);
+    let report = |accepted: &[Property]| {
+        Report::new(&plan, "", &seen, &Terms { accepted: accepted.to_vec(), ..Terms::default() }, 0.0)
+    };
     assert!(!report(&[]).held());
     assert!(report(&[Property::Exactness]).held(), "{}", report(&[Property::Exactness]).details());
+}
+
+#[test]
+fn excess_variance_is_no_business_of_the_invariances() {
+    let fault = planted().into_iter().find(|f| f.id == "excess-variance").expect("the fault");
+    let plan = Plan::new(1, 2).expect("a plan");
+    let seen = run(&plan, &Faulty::new(fault), &|_| ());
+    let report = Report::new(&plan, "", &seen, &Terms::default(), 0.0);
+    assert!(report.held(), "{}", report.details());
+    let clean = Report::new(&plan, "", &run(&plan, &Builtin, &|_| ()), &Terms::default(), 0.0);
+    let bias = |report: &Report| -> Vec<String> {
+        let of = report.checks.iter().filter(|c| c.property == Property::Bias);
+        of.map(|c| c.evidence.clone()).collect()
+    };
+    assert_ne!(bias(&report), bias(&clean), "the noise is there all the same");
+}
+
+#[test]
+fn time_is_judged_where_a_limit_is_set() {
+    let code = |limit: &str| gate(&["--samples", "2", "--median-time", limit]).status.code();
+    // No problem takes a nanosecond, and none ten minutes.
+    assert_eq!((code("1e-9"), code("600")), (Some(1), Some(0)));
+}
+
+#[test]
+fn the_readme_quotes_the_committed_table() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let measured = Measured::read(&root.join("golden/gate-power")).expect("committed tables");
+    assert_eq!(measured.wrong(), Vec::<&str>::new());
+    let readme = std::fs::read_to_string(root.join("README.md")).expect("a readme");
+    let quoted = readme
+        .split_once("<!-- begin gate-power -->\n")
+        .and_then(|(_, rest)| rest.split_once("<!-- end gate-power -->"));
+    assert_eq!(
+        quoted.expect("the two marks").0,
+        measured.to_markdown(),
+        "put there what `calibench gate --power-table golden/gate-power` prints"
+    );
 }
 
 #[test]

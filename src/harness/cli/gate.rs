@@ -1,16 +1,18 @@
 //! `calibench gate`: is a solver to be trusted, ours or anyone's?
 
+mod compare;
+mod power;
+
 use super::{Exit, print, warn};
 use crate::harness::gate;
 use crate::harness::gate::faults::{Faulty, planted};
 use crate::harness::gate::files::{self, FilesError};
-use crate::harness::gate::paired::{self, Paired};
 use crate::harness::gate::{
-    Builtin, EXPECTED_FALSE_ALARMS, Plan, Process, Property, QUICK, Report, Solver, THOROUGH, power, protocol,
+    Builtin, EXPECTED_FALSE_ALARMS, Plan, Process, Property, QUICK, Report, Solver, THOROUGH, Terms, protocol,
 };
 use crate::harness::project::Project;
 use crate::harness::{ProgressDisplay, provenance, write_atomically};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// How many problems.
@@ -46,6 +48,9 @@ pub(super) struct Arguments {
     /// Chance that a correct solver fails the run
     #[arg(long, value_name = "RATE", default_value_t = EXPECTED_FALSE_ALARMS)]
     false_alarms: f64,
+    /// Longest median time for a problem in any scenario; without it, time is told and not judged
+    #[arg(long, value_name = "SECONDS")]
+    median_time: Option<f64>,
     /// Property whose failure is known and does not fail the run; may be repeated
     #[arg(long, value_name = "PROPERTY", value_parser = property)]
     accept: Vec<Property>,
@@ -73,18 +78,23 @@ pub(super) struct Arguments {
     /// Judges this library's solver with a planted fault; `list` names them
     #[arg(long, value_name = "FAULT", conflicts_with_all = ["solver", "judge"])]
     planted: Option<String>,
-    /// Measures the gate itself: every planted fault, and false alarms over 200 clean seeds; writes the table to a file
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["solver", "judge", "export", "record", "planted"])]
+    /// Measures the gate itself: every planted fault, false alarms over 200 clean seeds, how often textbook least squares is
+    /// misled; writes three tables to a folder
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["solver", "judge", "export", "record", "planted"])]
     power: Option<PathBuf>,
+    /// Prints the tables in a folder written by --power as Markdown
+    #[arg(long, value_name = "DIR")]
+    power_table: Option<PathBuf>,
     /// Writes the JSON schemas of the protocol to a folder
     #[arg(long, value_name = "DIR")]
     schema: Option<PathBuf>,
 }
 
 fn property(name: &str) -> Result<Property, String> {
-    let known = || Property::ALL.map(Property::name).join(", ");
+    let known = || Property::ALL.iter().map(|p| p.name()).collect::<Vec<_>>().join(", ");
     Property::ALL
-        .into_iter()
+        .iter()
+        .copied()
         .find(|p| p.name() == name)
         .ok_or_else(|| format!("no property `{name}`; there are: {}", known()))
 }
@@ -128,12 +138,18 @@ fn dispatch(arguments: &Arguments) -> Result<Exit, Stop> {
     if samples == 0 || !(arguments.false_alarms > 0.0 && arguments.false_alarms < 1.0) {
         return Err(usage("--samples must be at least 1 and --false-alarms between 0 and 1"));
     }
+    if arguments.median_time.is_some_and(|s| !(s > 0.0 && s.is_finite())) {
+        return Err(usage("--median-time must be a positive number of seconds"));
+    }
     if arguments.planted.as_deref() == Some("list") {
         planted().iter().for_each(|fault| print(&format!("{:<26} {}\n", fault.id, fault.about)));
         return Ok(Exit::Held);
     }
-    if let Some(file) = &arguments.power {
-        return measure_power(arguments, file, samples);
+    if let Some(folder) = &arguments.power_table {
+        return power::print_table(folder);
+    }
+    if let Some(folder) = &arguments.power {
+        return power::measure(arguments, folder, samples);
     }
     if let Some(folder) = &arguments.export {
         let plan = Plan::new(arguments.seed, samples).map_err(incomplete)?;
@@ -153,7 +169,7 @@ fn dispatch(arguments: &Arguments) -> Result<Exit, Stop> {
         return Ok(Exit::Held);
     }
     if let Some(reference) = &arguments.against {
-        return compare(arguments, solver.as_ref(), reference, samples);
+        return compare::run(arguments, solver.as_ref(), reference, samples);
     }
     let plan = Plan::new(arguments.seed, samples).map_err(incomplete)?;
     judge(arguments, &plan, solver.as_ref())
@@ -178,15 +194,26 @@ fn process(arguments: &Arguments, command: &str) -> Result<Box<dyn Solver>, Stop
     Ok(Box::new(Process::new(command, timeout, arguments.jobs)))
 }
 
+fn terms(arguments: &Arguments) -> Terms {
+    Terms {
+        false_alarm_rate: arguments.false_alarms,
+        accepted: arguments.accept.clone(),
+        median_seconds: arguments.median_time,
+    }
+}
+
+/// The commit of the gate, as it stands in reports.
+fn commit() -> Option<provenance::Commit> {
+    Project::find().ok().and_then(|p| provenance::commit(p.root()))
+}
+
 /// Asks every problem of the plan, showing progress.
 fn asked(arguments: &Arguments, plan: &Plan, solver: &dyn Solver) -> Report {
     let progress = ProgressDisplay::stderr().start("gate", plan.cases.len());
     let started = Instant::now();
     let seen = gate::run(plan, solver, &|done| progress.advance(done));
     let seconds = started.elapsed().as_secs_f64();
-    let commit = Project::find().ok().and_then(|p| provenance::commit(p.root()));
-    Report::new(plan, &solver.name(), &seen, arguments.false_alarms, &arguments.accept, seconds)
-        .with_commit(commit.as_ref())
+    Report::new(plan, &solver.name(), &seen, &terms(arguments), seconds).with_commit(commit().as_ref())
 }
 
 /// A report in one form, and where it goes if it is wanted.
@@ -204,108 +231,11 @@ fn judge(arguments: &Arguments, plan: &Plan, solver: &dyn Solver) -> Result<Exit
             write_atomically(path, text(&report).as_bytes()).map_err(incomplete)?;
         }
     }
-    print(&report.to_text());
+    // The width of the terminal, where there is one.
+    let columns = comfy_table::Table::new().width().map_or(gate::report::COLUMNS, usize::from);
+    print(&report.to_text(columns));
     if !report.held() {
         warn(&report.details());
     }
     Ok(if report.held() { Exit::Held } else { Exit::Deviates })
-}
-
-fn compare(
-    arguments: &Arguments,
-    solver: &dyn Solver,
-    reference: &str,
-    samples: usize,
-) -> Result<Exit, Stop> {
-    let (plan, other): (Plan, Box<dyn Solver>) = match reference {
-        "builtin" => (Plan::new(arguments.seed, samples).map_err(incomplete)?, Box::new(Builtin)),
-        folder if Path::new(folder).join("manifest.json").is_file() => {
-            let (plan, answers) = files::recorded(Path::new(folder)).map_err(of_files)?;
-            (plan, Box::new(answers))
-        }
-        command => (Plan::new(arguments.seed, samples).map_err(incomplete)?, process(arguments, command)?),
-    };
-    let ask = |solver: &dyn Solver| {
-        let progress = ProgressDisplay::stderr().start("gate", plan.cases.len());
-        let seen = gate::run(&plan, solver, &|done| progress.advance(done));
-        let report = Report::new(&plan, "", &seen, arguments.false_alarms, &arguments.accept, 0.0);
-        (seen, report.checks)
-    };
-    let (old, old_checks) = ask(other.as_ref());
-    let (new, new_checks) = ask(solver);
-    let paired: Paired = paired::compare(
-        &plan,
-        (&solver.name(), &new, &new_checks),
-        (&other.name(), &old, &old_checks),
-        arguments.false_alarms,
-    );
-    if let Some(path) = &arguments.json {
-        let text = format!("{:#}\n", serde_json::to_value(&paired).unwrap_or_default());
-        write_atomically(path, text.as_bytes()).map_err(incomplete)?;
-    }
-    print(&paired.to_text());
-    Ok(if paired.held() { Exit::Held } else { Exit::Deviates })
-}
-
-/// Clean seeds over which false alarms are counted, and samples a scenario in each.
-const CLEAN_SEEDS: usize = 200;
-const CLEAN_SAMPLES: usize = 32;
-
-fn measure_power(arguments: &Arguments, file: &Path, samples: usize) -> Result<Exit, Stop> {
-    let started = Instant::now();
-    let faults = planted();
-    let mut table =
-        String::from("fault,class,caught,samples_a_scenario,problems,verdict,first_property,what\n");
-    let progress = ProgressDisplay::stderr().start("planted faults", faults.len() + 1);
-    let mut missed = Vec::new();
-    for fault in &faults {
-        let caught = power::catch(*fault, arguments.seed, samples).map_err(incomplete)?;
-        progress.step();
-        if caught.samples.is_none() {
-            missed.push(fault.id);
-        }
-        table.push_str(&format!(
-            "{},{:?},{},{},{},{},{},\"{}\"\n",
-            fault.id,
-            fault.class,
-            caught.samples.is_some(),
-            caught.samples.map_or("-".to_string(), |n| n.to_string()),
-            caught.problems,
-            caught.verdict.word(),
-            caught.by.first().map_or("-", |p| p.name()),
-            fault.about
-        ));
-    }
-    let control = power::catch_solver(&Builtin, arguments.seed, samples).map_err(incomplete)?;
-    progress.step();
-    drop(progress);
-    let progress = ProgressDisplay::stderr().start("clean seeds", CLEAN_SEEDS);
-    let first = arguments.seed + 1000;
-    let alarms = power::false_alarms(first, CLEAN_SEEDS, CLEAN_SAMPLES, &|n| progress.advance(n))
-        .map_err(incomplete)?;
-    let commit = Project::find().ok().and_then(|p| provenance::commit(p.root()));
-    let commit = commit.map_or("unknown".to_string(), |c| {
-        format!("{}{}", c.hash, if c.dirty { " with changes" } else { "" })
-    });
-    let mut text = format!(
-        "# calibench gate --power, --samples {samples}, --seed {}; commit {commit}\n# correct solver up to {samples} samples \
-         a scenario: {}\n",
-        arguments.seed,
-        if control.samples.is_none() { "not caught" } else { "CAUGHT" }
-    );
-    for rate in [0.2, 0.05, 0.01, EXPECTED_FALSE_ALARMS] {
-        text.push_str(&format!(
-            "# false alarms at a stated overall rate of {rate}: {} of {CLEAN_SEEDS} clean seeds (from {first}), {CLEAN_SAMPLES} \
-             samples a scenario\n",
-            alarms.at(rate)
-        ));
-    }
-    for line in &alarms.certain {
-        text.push_str(&format!("# certain failure of the correct solver: {line}\n"));
-    }
-    write_atomically(file, (text.clone() + &table).as_bytes()).map_err(incomplete)?;
-    print(&(text + &table));
-    warn(&format!("{:.0} s; missed: {}", started.elapsed().as_secs_f64(), missed.join(", ")));
-    let sound = missed.is_empty() && control.samples.is_none() && alarms.certain.is_empty();
-    Ok(if sound { Exit::Held } else { Exit::Deviates })
 }

@@ -99,7 +99,8 @@ pub fn main_for(experiment: &Experiment) -> ExitCode {
 /// Ctrl-C ends the program with a code of its own. Files are renamed into place whole, so what is finished stays.
 fn end_well_on_interrupt() {
     let handler = || {
-        warn("interrupted: results of finished experiments are kept, the rest is missing");
+        warn("interrupted: what was finished and written is kept, the rest is missing");
+        crate::harness::gate::process::end_all();
         std::process::exit(Exit::Incomplete as i32);
     };
     // A handler that was set before stays in charge.

@@ -2,7 +2,7 @@
 
 use super::protocol::{Answer, AnswerPose, Problem, Status};
 use crate::camera::{Camera, FreeParameters, Parameter};
-use crate::geometry::{Mat3, Pose, Vec3};
+use crate::geometry::Pose;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 
@@ -91,6 +91,9 @@ pub enum Breakage {
         /// Which.
         what: String,
     },
+    /// Two answers to one problem, in files.
+    #[error("answered more than once")]
+    Twice,
     /// The solver broke too often and was not asked any more.
     #[error("not asked: {0}")]
     NotAsked(String),
@@ -103,6 +106,29 @@ pub fn free_of(problem: &Problem) -> FreeParameters {
         .iter()
         .filter_map(|name| name.parse::<Parameter>().ok())
         .fold(FreeParameters::NONE, |free, p| free.with(p))
+}
+
+/// Characters of a wrong line that are quoted.
+const LINE_HEAD: usize = 80;
+
+/// An answer, or why the line is none.
+pub fn read_line(line: &str) -> Result<Answer, Breakage> {
+    serde_json::from_str(line).map_err(|error| {
+        // JSON has no NaN; most languages write one all the same.
+        for word in ["NaN", "Infinity", "-Infinity", "nan", "inf"] {
+            let stands = |before: &str| line.contains(&format!("{before}{word}"));
+            if line.trim_start().starts_with('{') && [": ", ":", "[", ", "].into_iter().any(stands) {
+                return Breakage::BadNumber { what: "a number of the answer".into(), value: f64::NAN };
+            }
+        }
+        Breakage::Garbage { reason: error.to_string(), line: line.chars().take(LINE_HEAD).collect() }
+    })
+}
+
+/// For which problem a line is meant, even where it is no answer.
+pub fn id_in(line: &str) -> Option<&str> {
+    let after_key = line.trim_start().strip_prefix('{')?.split_once("\"id\"")?.1;
+    after_key.trim_start().strip_prefix(':')?.trim_start().strip_prefix('"')?.split('"').next()
 }
 
 /// Reads an answer as the outcome of a problem.
@@ -212,10 +238,7 @@ fn poses(given: &[AnswerPose], need: usize) -> Result<Vec<Pose>, Breakage> {
         .iter()
         .enumerate()
         .map(|(i, pose)| {
-            let pose = Pose {
-                rotation: Mat3::from_fn(|r, c| pose.rotation[r][c]),
-                translation: Vec3::from(pose.translation),
-            };
+            let pose = pose.pose();
             let bad = Breakage::BadNumber { what: format!("a number of pose {i}"), value: f64::NAN };
             pose.is_finite().then_some(pose).ok_or(bad)
         })
@@ -265,6 +288,20 @@ mod tests {
         assert_eq!(broken(r#"{"id":"a","status":"ok","parameters":{"fx":1},"rmse":-1}"#), "rmse is -1");
         let line = r#"{"id":"a","status":"ok","parameters":{"fx":1},"covariance":{"parameters":["fx"],"matrix":[]}}"#;
         assert_eq!(broken(line), "rows and columns of the covariance: 1 needed, got 0");
+    }
+
+    #[test]
+    fn a_line_that_is_no_json_tells_its_problem_and_its_fault() {
+        for line in [
+            r#"{"id": "a.1", "rmse": NaN}"#,
+            r#"{"rmse":NaN,"id":"a.1"}"#,
+            r#"{"x":[1,-Infinity],"id" : "a.1""#,
+        ] {
+            assert_eq!(id_in(line), Some("a.1"), "{line}");
+        }
+        assert!(matches!(read_line(r#"{"id":"a","x":[NaN]}"#), Err(Breakage::BadNumber { .. })));
+        assert!(matches!(read_line(r#"{"id":"a","x":}"#), Err(Breakage::Garbage { .. })));
+        assert_eq!((id_in("hello"), id_in(r#"{"id":7}"#)), (None, None));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! How is a program judged that cannot be driven by a pipe? Problems as files, truth kept apart, answers as files.
 
-use super::accept::Breakage;
+use super::accept::{Breakage, id_in, read_line};
 use super::plan::{Plan, PlanError, Purpose};
 use super::protocol::{Answer, Problem};
 use super::solver::Solver;
@@ -36,15 +36,13 @@ pub enum FilesError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// A line is no JSON object of the protocol.
-    #[error("{path}, line {line}: {reason}", path = path.display())]
-    Line {
+    /// The manifest is none.
+    #[error("{path} is no manifest of an export: {source}", path = path.display())]
+    Manifest {
         /// The file.
         path: PathBuf,
-        /// Counted from 1.
-        line: usize,
         /// What is wrong.
-        reason: String,
+        source: serde_json::Error,
     },
     /// This version of the gate makes other problems from the same seed.
     #[error(
@@ -124,35 +122,33 @@ fn truth_lines(plan: &Plan) -> String {
 #[derive(Debug)]
 pub struct Recorded {
     folder: PathBuf,
-    answers: BTreeMap<String, Answer>,
+    answers: BTreeMap<String, Result<Answer, Breakage>>,
+    /// The first line that is no answer to anything, and where.
+    stray: Option<String>,
 }
 
 /// The plan of a folder, and the answers in it: `answers.jsonl`, and every file in `answers/`.
 ///
+/// A line that is no answer is a finding about its problem.
+///
 /// # Errors
-/// A folder without a manifest or answers, a line that is no answer, or problems of another version.
+/// A folder without a manifest or answers, or problems of another version.
 pub fn recorded(folder: &Path) -> Result<(Plan, Recorded), FilesError> {
     let path = folder.join("manifest.json");
-    let line_error = |path: &Path, line: usize, e: serde_json::Error| FilesError::Line {
-        path: path.to_path_buf(),
-        line,
-        reason: e.to_string(),
-    };
     let manifest: Manifest =
-        serde_json::from_str(&read(&path)?).map_err(|e| line_error(&path, e.line(), e))?;
+        serde_json::from_str(&read(&path)?).map_err(|source| FilesError::Manifest { path, source })?;
     let plan = Plan::new(manifest.seed, manifest.samples)?;
     let now = sha256_hex(problem_lines(&plan).as_bytes());
     if now != manifest.sha256 {
         return Err(FilesError::OtherVersion { found: manifest.sha256, now });
     }
-    let mut answers = BTreeMap::new();
+    let mut recorded = Recorded { folder: folder.to_path_buf(), answers: BTreeMap::new(), stray: None };
     for path in answer_files(folder)? {
         for (i, line) in read(&path)?.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
-            let answer: Answer = serde_json::from_str(line).map_err(|e| line_error(&path, i + 1, e))?;
-            answers.insert(answer.id.clone(), answer);
+            recorded.take(line, || format!("{}, line {}", path.display(), i + 1));
         }
     }
-    Ok((plan, Recorded { folder: folder.to_path_buf(), answers }))
+    Ok((plan, recorded))
 }
 
 fn read(path: &Path) -> Result<String, FilesError> {
@@ -170,13 +166,30 @@ fn answer_files(folder: &Path) -> Result<Vec<PathBuf>, FilesError> {
     Ok(files)
 }
 
+impl Recorded {
+    /// Files a line under the problem that it answers.
+    fn take(&mut self, line: &str, place: impl Fn() -> String) {
+        let answer = read_line(line);
+        let id = answer.as_ref().map_or_else(|_| id_in(line).map(str::to_string), |a| Some(a.id.clone()));
+        match (id, answer) {
+            (Some(id), answer) => {
+                let filed = if self.answers.contains_key(&id) { Err(Breakage::Twice) } else { answer };
+                self.answers.insert(id, filed);
+            }
+            (None, Err(why)) => _ = self.stray.get_or_insert_with(|| format!("{}: {why}", place())),
+            (None, Ok(_)) => {}
+        }
+    }
+}
+
 impl Solver for Recorded {
     fn name(&self) -> String {
         format!("answers in {}", self.folder.display())
     }
 
     fn ask(&self, problem: &Problem) -> Result<Answer, Breakage> {
-        let missing = || Breakage::Missing { what: format!("the answer to {}", problem.id) };
-        self.answers.get(&problem.id).cloned().ok_or_else(missing)
+        let stray = self.stray.as_ref().map_or(String::new(), |stray| format!(" ({stray})"));
+        let missing = || Err(Breakage::Missing { what: format!("the answer to {}{stray}", problem.id) });
+        self.answers.get(&problem.id).cloned().unwrap_or_else(missing)
     }
 }

@@ -23,10 +23,11 @@ pub mod report;
 pub mod run;
 pub mod solver;
 pub mod suite;
+pub mod textbook;
 pub mod trial;
 pub mod variant;
 
-pub use judge::{Check, EXPECTED_FALSE_ALARMS, Property, Verdict};
+pub use judge::{Check, EXPECTED_FALSE_ALARMS, Property, Terms, Verdict};
 pub use plan::{Plan, PlanError};
 pub use process::Process;
 pub use report::Report;

@@ -11,6 +11,7 @@ use crate::evaluate::distribution::normal_cdf;
 use crate::evaluate::interval::each_of;
 use crate::harness::significant;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// A mean difference or an excess of spread below this part of a standard deviation is no change that matters, however certain.
 const RELEVANT: f64 = 1e-3;
@@ -173,6 +174,15 @@ fn spread(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
     Some((aa / bb, two_sided(z)))
 }
 
+/// Whether a verdict is worse than the one before; what is no longer stated is.
+fn worse(old: Verdict, new: Verdict) -> bool {
+    match (old, new) {
+        (_, Verdict::NotJudged) => true,
+        (Verdict::NotJudged, new) => new >= Verdict::Failed,
+        (old, new) => new > old,
+    }
+}
+
 impl Paired {
     fn certain(&self, p: f64) -> bool {
         p <= each_of(self.tests, self.false_alarm_rate)
@@ -186,10 +196,10 @@ impl Paired {
         shifted || spread || c.lost > 0
     }
 
-    /// Whether nothing that matters changed.
+    /// Whether nothing that matters changed: what is no longer stated counts as changed.
     pub fn held(&self) -> bool {
         !self.comparisons.iter().any(|c| self.moved(c))
-            && self.verdicts.iter().all(|(_, _, old, new)| new <= old)
+            && !self.verdicts.iter().any(|(_, _, old, new)| worse(*old, *new))
     }
 
     /// One line a scenario, then what follows.
@@ -226,8 +236,19 @@ impl Paired {
                 text.push_str(&format!("{:<18} {} answers lost, {} gained\n", "", c.lost, c.gained));
             }
         }
+        let mut changes: BTreeMap<(Property, Verdict, Verdict), Vec<&str>> = BTreeMap::new();
         for (property, scenario, old, new) in &self.verdicts {
-            text.push_str(&format!("{} / {scenario}: {} -> {}\n", property.name(), old.word(), new.word()));
+            changes.entry((*property, *old, *new)).or_default().push(scenario);
+        }
+        for ((property, old, new), scenarios) in changes {
+            let (first, count) = (scenarios[0], scenarios.len());
+            let others = if count > 1 { format!(" and {} more", count - 1) } else { String::new() };
+            text.push_str(&format!(
+                "{}: {} -> {} ({first}{others})\n",
+                property.name(),
+                old.word(),
+                new.word()
+            ));
         }
         let bits: usize = self.comparisons.iter().map(|c| c.bits).sum();
         let conclusion = match (self.held(), bits) {
@@ -236,8 +257,10 @@ impl Paired {
             (false, _) => "CHANGED",
         };
         text.push_str(&format!(
-            "\n{conclusion}; two solvers of one law are told apart in {} runs of 100000 ({} tests, Bonferroni)\n",
-            significant(1e5 * self.false_alarm_rate, 3),
+            "\n{conclusion}; median time {} of the reference's\nby chance two solvers of one law are told apart in one run of {} \
+             ({} tests, Bonferroni)\n",
+            significant(median(self.comparisons.iter().map(|c| c.time)), 3),
+            significant(1.0 / self.false_alarm_rate, 3),
             self.tests
         ));
         text

@@ -73,11 +73,12 @@ impl Plan {
     pub fn new(seed: u64, samples: usize) -> Result<Plan, PlanError> {
         let scenarios = suite()?;
         let bad = bad_cases(seed)?;
-        let mut cases: Vec<Case> =
-            (0..bad.len()).map(|i| Case { scenario: 0, purpose: Purpose::Bad(i), trial: 0 }).collect();
+        let mut cases: Vec<Case> = Vec::new();
         for (i, scenario) in scenarios.iter().enumerate() {
             cases.extend(cases_of(i, scenario, samples));
         }
+        // Last: a program that breaks on bad input has been heard on good data by then.
+        cases.extend((0..bad.len()).map(|i| Case { scenario: 0, purpose: Purpose::Bad(i), trial: 0 }));
         Ok(Plan { scenarios, bad, seed, samples, cases })
     }
 

@@ -1,8 +1,9 @@
 //! How is a program judged that is not ours? As a black box behind two pipes, kept alive over all problems.
 
-use super::accept::Breakage;
+use super::accept::{Breakage, id_in, read_line};
 use super::protocol::{Answer, Problem};
 use super::solver::{Reply, Solver, reply};
+use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -10,12 +11,29 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// After this many breakages in a row a worker stops asking: the program does not work at all.
+/// After this many breakages in a row a worker stops asking a program that never gave an answer: it does not work at all.
 const PATIENCE: usize = 3;
+/// The same for a program that has answered before: more than all bad input of a run, which may well break it every time.
+const LONG_PATIENCE: usize = 24;
 /// Bytes of standard error that are quoted.
 const STDERR_TAIL: usize = 400;
-/// Characters of a wrong line that are quoted.
-const LINE_HEAD: usize = 80;
+
+/// Process groups that run, to be ended when the gate is interrupted: a group of its own hears no Ctrl-C.
+static GROUPS: Mutex<BTreeSet<u32>> = Mutex::new(BTreeSet::new());
+
+/// Ends every program that any gate of this process started.
+pub fn end_all() {
+    let groups = std::mem::take(&mut *GROUPS.lock().unwrap_or_else(PoisonError::into_inner));
+    groups.into_iter().for_each(end_group);
+}
+
+/// Ends a program and what it started. This fails only where all have ended already.
+fn end_group(id: u32) {
+    #[cfg(unix)]
+    let _ = Command::new("kill").args(["-KILL", "--", &format!("-{id}")]).stderr(Stdio::null()).status();
+    #[cfg(not(unix))]
+    let _ = id;
+}
 
 /// A program that reads problems and writes answers, one JSON object a line.
 #[derive(Debug)]
@@ -30,6 +48,7 @@ pub struct Process {
 struct Worker {
     running: Option<Running>,
     broken_in_a_row: usize,
+    has_answered: bool,
 }
 
 #[derive(Debug)]
@@ -48,10 +67,12 @@ impl Process {
     }
 
     fn ask_worker(&self, worker: &mut Worker, problem: &Problem) -> Result<Answer, Breakage> {
-        if worker.broken_in_a_row >= PATIENCE {
-            return Err(Breakage::NotAsked(format!("{PATIENCE} breakages in a row before")));
+        let patience = if worker.has_answered { LONG_PATIENCE } else { PATIENCE };
+        if worker.broken_in_a_row >= patience {
+            return Err(Breakage::NotAsked(format!("{patience} breakages in a row before")));
         }
         let result = self.converse(worker, problem);
+        worker.has_answered |= result.is_ok();
         worker.broken_in_a_row = if result.is_ok() { 0 } else { worker.broken_in_a_row + 1 };
         if result.is_err() {
             // A late or half-read answer must not meet the next problem.
@@ -89,7 +110,7 @@ impl Process {
                 Ok(answer) => wrong = wrong.or(Some(Breakage::WrongId { got: answer.id })),
                 Err(breakage) => {
                     wrong = wrong.or(Some(breakage));
-                    if line_names(&line, &problem.id) {
+                    if id_in(&line) == Some(&problem.id) {
                         return Err(wrong.unwrap_or(Breakage::Missing { what: "an answer".into() }));
                     }
                 }
@@ -129,24 +150,6 @@ impl Solver for Process {
     }
 }
 
-/// An answer, or why the line is none.
-fn read_line(line: &str) -> Result<Answer, Breakage> {
-    serde_json::from_str(line).map_err(|error| {
-        // JSON has no NaN; most languages write one all the same.
-        for word in ["NaN", "Infinity", "nan", "inf"] {
-            if line.trim_start().starts_with('{') && line.contains(&format!(": {word}")) {
-                return Breakage::BadNumber { what: "a number of the answer".into(), value: f64::NAN };
-            }
-        }
-        Breakage::Garbage { reason: error.to_string(), line: line.chars().take(LINE_HEAD).collect() }
-    })
-}
-
-/// Whether a line that is no answer is meant as the one to `id`.
-fn line_names(line: &str, id: &str) -> bool {
-    line.trim_start().starts_with('{') && line.contains(&format!("\"{id}\""))
-}
-
 impl Running {
     fn start(command: &str) -> std::io::Result<Running> {
         let (shell, flag) = if cfg!(windows) { ("cmd", "/C") } else { ("sh", "-c") };
@@ -156,6 +159,7 @@ impl Running {
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut starter, 0);
         let mut child = starter.spawn()?;
+        GROUPS.lock().unwrap_or_else(PoisonError::into_inner).insert(child.id());
         let broken = || std::io::Error::other("the program has no pipes");
         let mut stdin = child.stdin.take().ok_or_else(broken)?;
         let stdout = child.stdout.take().ok_or_else(broken)?;
@@ -219,12 +223,10 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // These fail only where the program has ended already.
-        #[cfg(unix)]
-        let _ = Command::new("kill")
-            .args(["-KILL", "--", &format!("-{}", self.child.id())])
-            .stderr(Stdio::null())
-            .status();
+        let id = self.child.id();
+        end_group(id);
+        GROUPS.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
+        // As there: it fails only where the program has ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -2,6 +2,7 @@
 //!
 //! The page for authors of solvers is `adapters/PROTOCOL.md`; the schemas in `adapters/` are generated from these types.
 
+use crate::geometry::{Mat3, Pose, Vec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -105,6 +106,16 @@ impl Answer {
             rmse: None,
             warnings: Vec::new(),
             message: Some(message.into()),
+        }
+    }
+}
+
+impl AnswerPose {
+    /// The pose, camera from target.
+    pub fn pose(&self) -> Pose {
+        Pose {
+            rotation: Mat3::from_fn(|r, c| self.rotation[r][c]),
+            translation: Vec3::from(self.translation),
         }
     }
 }

@@ -4,15 +4,20 @@ mod estimation;
 mod input;
 mod output;
 mod protocol;
+mod uncertainty;
 
 use super::accept::Breakage;
 use super::protocol::{Answer, Problem, Status};
 use super::solver::{Builtin, Solver, answer, solve};
 use crate::calibrate::Settings;
+use crate::camera::{Camera, Parameter};
+use crate::geometry::{Vec2, Vec3};
+use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// How hard a fault is to see.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Class {
     /// A quick run must catch it.
     Gross,
@@ -35,7 +40,7 @@ pub struct Planted {
 
 /// All planted faults.
 pub fn planted() -> Vec<Planted> {
-    [output::FAULTS, input::FAULTS, estimation::FAULTS, protocol::FAULTS].concat()
+    [output::FAULTS, uncertainty::FAULTS, input::FAULTS, estimation::FAULTS, protocol::FAULTS].concat()
 }
 
 /// A solver with a planted fault.
@@ -107,6 +112,29 @@ fn with_settings(problem: &Problem, adjust: impl FnOnce(Settings) -> Settings) -
             given
         }
     }
+}
+
+/// Degrees of freedom of the residuals.
+fn freedom(problem: &Problem) -> f64 {
+    (2 * problem.points() - problem.free.len() - 6 * problem.views.len()) as f64
+}
+
+fn camera_of(answer: &Answer) -> Camera {
+    Camera::from_parameters(Parameter::ALL.map(|p| answer.parameters.get(p.name()).copied().unwrap_or(0.0)))
+}
+
+/// Target point and residual (predicted - observed, px) of every point that the answer puts before the camera.
+fn residuals(problem: &Problem, answer: &Answer) -> Vec<(Vec2, Vec2)> {
+    let camera = camera_of(answer);
+    let mut residuals = Vec::with_capacity(problem.points());
+    for (pose, view) in answer.poses.iter().flatten().zip(&problem.views) {
+        let pose = pose.pose();
+        for (&[x, y], &[u, v]) in view.target.iter().zip(&view.pixels) {
+            let predicted = camera.project(&pose.apply(&Vec3::new(x, y, 0.0)));
+            residuals.extend(predicted.map(|p| (Vec2::new(x, y), p - Vec2::new(u, v))));
+        }
+    }
+    residuals
 }
 
 /// Whether this problem is among one in `rate`, chosen by its pixels: the same in every run, and when it is asked again.

@@ -15,11 +15,6 @@ const RIGHT: f64 = 0.01;
 /// An error of good size whose squared Mahalanobis distance is rarer than this is wrong.
 const WRONG_BELOW: f64 = 1e-9;
 
-/// Share of confidently wrong answers to contaminated data that is tolerated. Five outliers among 252 points make errors of
-/// longer tails than a normal distribution: least squares with an honest covariance exceeds [`ADMITTED_SD`] in one answer of
-/// a thousand (6 of 6400 measured).
-const CONFIDENTLY_WRONG: f64 = 0.01;
-
 /// How a doubtful problem was met.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Conduct {
@@ -105,11 +100,20 @@ fn admits(trial: &Trial) -> bool {
     !stated.is_empty() && trial.errors.iter().zip(stated).all(|(e, sd)| e.abs() <= ADMITTED_SD * sd)
 }
 
-/// One check over all samples of a doubtful scenario.
+/// How a sample of a doubtful scenario was met.
+fn conduct_in_doubt(seen: &Seen) -> Conduct {
+    conduct(seen, |trial| chance::above(trial.nees, trial.errors.len()) > WRONG_BELOW)
+}
+
+/// Whether a sample of a doubtful scenario was answered wrongly with confidence.
+pub fn misled(seen: &Seen) -> bool {
+    conduct_in_doubt(seen) == Conduct::Wrong
+}
+
+/// One check over all samples of a doubtful scenario: no more confident wrong answers than textbook least squares gives.
 pub(super) fn honesty(scenario: &Scenario, answers: &Answers<'_>) -> Check {
-    let right = |trial: &Trial| chance::above(trial.nees, trial.errors.len()) > WRONG_BELOW;
     let mut conducts: Vec<Conduct> =
-        answers.for_purpose(Purpose::Sample).map(|(_, seen)| conduct(seen, right)).collect();
+        answers.for_purpose(Purpose::Sample).map(|(_, seen)| conduct_in_doubt(seen)).collect();
     conducts.sort();
     let mut evidence = Vec::new();
     for kind in [
@@ -126,7 +130,7 @@ pub(super) fn honesty(scenario: &Scenario, answers: &Answers<'_>) -> Check {
         }
     }
     let wrong = conducts.iter().filter(|c| **c == Conduct::Wrong).count();
-    let p = chance::at_least(wrong, conducts.len(), CONFIDENTLY_WRONG);
+    let p = chance::at_least(wrong, conducts.len(), scenario.textbook_misled);
     Check::new(Property::Honesty, scenario.id, Basis::Chance(p), conducts.len(), evidence.join(", "))
         .gravely()
 }

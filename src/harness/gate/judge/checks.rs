@@ -2,114 +2,83 @@
 
 use serde::Serialize;
 
-/// What a solver should be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Property {
-    /// Every problem gets one well-formed answer.
-    Protocol,
-    /// Held parameters keep their values.
-    HeldValues,
-    /// Broken input is refused.
-    BadInput,
-    /// Data that determine no camera are refused, flagged, or answered with the uncertainty they deserve.
-    Degenerate,
-    /// Poor or contaminated data likewise.
-    Honesty,
-    /// Good data are answered.
-    Convergence,
-    /// No answer is far from the truth without a warning.
-    NoSilentFailure,
-    /// Without noise the truth is found.
-    Exactness,
-    /// The same problem gets the same bits.
-    Determinism,
-    /// Errors have zero mean.
-    Bias,
-    /// Every parameter's variance is the Cramer-Rao bound's.
-    Variance,
-    /// Errors are jointly as large as the bound says (normalised estimation error squared).
-    Nees,
-    /// Poses explain the pixels and are as far from the truth as the bound says.
-    Poses,
-    /// The stated RMSE is the one per point.
-    RmseDefinition,
-    /// The RMSE follows its distribution.
-    Rmse,
-    /// The stated covariance is the true one.
-    Covariance,
-    /// The order of views does not matter.
-    ViewOrder,
-    /// The order of points does not matter.
-    PointOrder,
-    /// The target's unit does not matter.
-    TargetUnits,
-    /// A larger image around the same one moves the principal point only.
-    ImageShift,
-    /// Rows and columns can be exchanged.
-    SwappedAxes,
-    /// Time per problem.
-    Time,
+/// Declares the properties once: the enum, their order in reports, their names, and what each asks.
+macro_rules! properties {
+    ($(#[doc = $meaning:literal] $property:ident = $name:literal,)*) => {
+        /// What a solver should be.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+        #[serde(rename_all = "kebab-case")]
+        pub enum Property {
+            $(#[doc = $meaning] $property,)*
+        }
+
+        impl Property {
+            /// All, in the order of reports.
+            pub const ALL: &[Property] = &[$(Property::$property,)*];
+
+            /// Name in reports and on the command line.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Property::$property => $name,)*
+                }
+            }
+
+            /// What holds if the property does, in a sentence.
+            pub fn meaning(self) -> &'static str {
+                match self {
+                    $(Property::$property => $meaning,)*
+                }
+                .trim()
+            }
+        }
+    };
 }
 
-impl Property {
-    /// All, in the order of reports.
-    pub const ALL: [Property; 22] = {
-        use Property::*;
-        [
-            Protocol,
-            HeldValues,
-            BadInput,
-            Degenerate,
-            Honesty,
-            Convergence,
-            NoSilentFailure,
-            Exactness,
-            Determinism,
-            Bias,
-            Variance,
-            Nees,
-            Poses,
-            RmseDefinition,
-            Rmse,
-            Covariance,
-            ViewOrder,
-            PointOrder,
-            TargetUnits,
-            ImageShift,
-            SwappedAxes,
-            Time,
-        ]
-    };
-
-    /// Name in reports and on the command line.
-    pub fn name(self) -> &'static str {
-        use Property::*;
-        match self {
-            Protocol => "protocol",
-            HeldValues => "held-values",
-            BadInput => "bad-input",
-            Degenerate => "degenerate",
-            Honesty => "honesty",
-            Convergence => "convergence",
-            NoSilentFailure => "no-silent-failure",
-            Exactness => "exactness",
-            Determinism => "determinism",
-            Bias => "bias",
-            Variance => "variance",
-            Nees => "nees",
-            Poses => "poses",
-            RmseDefinition => "rmse-definition",
-            Rmse => "rmse",
-            Covariance => "covariance",
-            ViewOrder => "view-order",
-            PointOrder => "point-order",
-            TargetUnits => "target-units",
-            ImageShift => "image-shift",
-            SwappedAxes => "swapped-axes",
-            Time => "time",
-        }
-    }
+properties! {
+    /// Every problem gets one well-formed answer.
+    Protocol = "protocol",
+    /// Held parameters keep their values.
+    HeldValues = "held-values",
+    /// Broken input is refused.
+    BadInput = "bad-input",
+    /// Data that determine no camera are refused, flagged, or answered with the uncertainty they deserve.
+    Degenerate = "degenerate",
+    /// Poor or contaminated data mislead no more often than they mislead textbook least squares.
+    Honesty = "honesty",
+    /// Good data are answered.
+    Convergence = "convergence",
+    /// No answer is far from the truth without a warning.
+    NoSilentFailure = "no-silent-failure",
+    /// Without noise the truth is found.
+    Exactness = "exactness",
+    /// The same problem gets the same bits.
+    Determinism = "determinism",
+    /// Errors have zero mean.
+    Bias = "bias",
+    /// Every parameter's variance is the Cramer-Rao bound's.
+    Variance = "variance",
+    /// Errors are jointly as large as the bound says (normalised estimation error squared).
+    Nees = "nees",
+    /// Poses explain the pixels and are as far from the truth as the bound says.
+    Poses = "poses",
+    /// The stated RMSE is the one per point.
+    RmseDefinition = "rmse-definition",
+    /// The RMSE follows its distribution.
+    Rmse = "rmse",
+    /// The stated covariance is the true one.
+    Covariance = "covariance",
+    /// The order of views does not matter.
+    ViewOrder = "view-order",
+    /// The order of points does not matter.
+    PointOrder = "point-order",
+    /// The target's unit does not matter.
+    TargetUnits = "target-units",
+    /// A larger image around the same one moves the principal point only.
+    ImageShift = "image-shift",
+    /// Rows and columns can be exchanged.
+    SwappedAxes = "swapped-axes",
+    /// The median time for a problem is within the limit, if one was set.
+    Time = "time",
 }
 
 /// On what a verdict rests.

@@ -5,10 +5,28 @@ use super::checks::{Basis, Check, Property, Verdict};
 /// Chance that a correct solver fails any check of a run, unless the user asks for another.
 pub const EXPECTED_FALSE_ALARMS: f64 = 1e-3;
 
+/// By what a run is judged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Terms {
+    /// Chance that a correct solver fails any check.
+    pub false_alarm_rate: f64,
+    /// Properties whose failure is known and does not fail the run.
+    pub accepted: Vec<Property>,
+    /// Longest median time for a problem, s; without it, time is told and not judged.
+    pub median_seconds: Option<f64>,
+}
+
+impl Default for Terms {
+    fn default() -> Terms {
+        Terms { false_alarm_rate: EXPECTED_FALSE_ALARMS, accepted: Vec::new(), median_seconds: None }
+    }
+}
+
 /// Decides every check. Statistical ones by Holm's step-down procedure (1979): with `m` p-values in ascending order, the i-th
 /// is rejected while it is at most `overall / (m - i + 1)`; the chance of any false rejection is at most `overall`,
-/// however the checks depend on each other. Properties in `accepted` do not fail the run.
-pub fn decide(mut checks: Vec<Check>, overall: f64, accepted: &[Property]) -> Vec<Check> {
+/// however the checks depend on each other.
+pub fn decide(mut checks: Vec<Check>, terms: &Terms) -> Vec<Check> {
+    let overall = terms.false_alarm_rate;
     let p_value = |check: &Check| match check.basis {
         Basis::Chance(p) => Some(p),
         _ => None,
@@ -25,7 +43,7 @@ pub fn decide(mut checks: Vec<Check>, overall: f64, accepted: &[Property]) -> Ve
         check.verdict = match (check.basis, fails) {
             (Basis::Told, _) => Verdict::NotJudged,
             (_, false) => Verdict::Held,
-            (_, true) if accepted.contains(&check.property) => Verdict::Accepted,
+            (_, true) if terms.accepted.contains(&check.property) => Verdict::Accepted,
             (_, true) if check.grave => Verdict::Grave,
             (_, true) => Verdict::Failed,
         };
@@ -41,19 +59,23 @@ mod tests {
         p.iter().map(|&p| Check::new(Property::Bias, "s", Basis::Chance(p), 1, "")).collect()
     }
 
+    fn terms(accepted: &[Property]) -> Terms {
+        Terms { false_alarm_rate: 0.05, accepted: accepted.to_vec(), ..Terms::default() }
+    }
+
     #[test]
     fn holm_steps_down_and_stops_at_the_first_that_holds() {
         // 0.05/3 = 0.0167, 0.05/2 = 0.025, 0.05: the second is above its limit, so the third holds too.
         let verdicts: Vec<Verdict> =
-            decide(checks(&[0.04, 0.01, 0.03]), 0.05, &[]).iter().map(|c| c.verdict).collect();
+            decide(checks(&[0.04, 0.01, 0.03]), &terms(&[])).iter().map(|c| c.verdict).collect();
         assert_eq!(verdicts, [Verdict::Held, Verdict::Failed, Verdict::Held]);
-        let all = decide(checks(&[0.04, 0.01, 0.02]), 0.05, &[]);
+        let all = decide(checks(&[0.04, 0.01, 0.02]), &terms(&[]));
         assert!(all.iter().all(|c| c.verdict == Verdict::Failed));
     }
 
     #[test]
     fn what_is_accepted_does_not_fail() {
-        let decided = decide(checks(&[1e-9]), 0.05, &[Property::Bias]);
+        let decided = decide(checks(&[1e-9]), &terms(&[Property::Bias]));
         assert_eq!(decided[0].verdict, Verdict::Accepted);
     }
 }

@@ -1,7 +1,7 @@
 //! What needs no statistics? The protocol, held values, exact data, and the same bits twice.
 
 use super::checks::{Basis, Check, Property};
-use super::{Answers, equivalent_noise_px, estimate};
+use super::{Answers, Terms, equivalent_noise_px, estimate};
 use crate::harness::gate::plan::Purpose;
 use crate::harness::gate::suite::Scenario;
 use crate::harness::gate::trial::Seen;
@@ -38,11 +38,11 @@ pub(super) fn protocol(scenario: &Scenario, answers: &Answers<'_>) -> Vec<Check>
     vec![protocol, held.gravely()]
 }
 
-pub(super) fn check(scenario: &Scenario, answers: &Answers<'_>) -> Vec<Check> {
+pub(super) fn check(scenario: &Scenario, answers: &Answers<'_>, terms: &Terms) -> Vec<Check> {
     let mut checks = Vec::new();
     checks.extend(answers.for_purpose(Purpose::Exact).next().map(|(_, seen)| exactness(scenario, seen)));
     checks.extend(determinism(scenario, answers));
-    checks.extend(time(scenario, answers));
+    checks.extend(time(scenario, answers, terms.median_seconds));
     checks
 }
 
@@ -84,7 +84,7 @@ fn determinism(scenario: &Scenario, answers: &Answers<'_>) -> Option<Check> {
     (!pairs.is_empty()).then(|| Check::new(Property::Determinism, scenario.id, basis, pairs.len(), evidence))
 }
 
-fn time(scenario: &Scenario, answers: &Answers<'_>) -> Option<Check> {
+fn time(scenario: &Scenario, answers: &Answers<'_>, limit_s: Option<f64>) -> Option<Check> {
     let mut milliseconds: Vec<f64> = answers
         .for_purpose(Purpose::Sample)
         .filter_map(|(_, seen)| match seen {
@@ -96,7 +96,9 @@ fn time(scenario: &Scenario, answers: &Answers<'_>) -> Option<Check> {
     milliseconds.sort_by(f64::total_cmp);
     let last = milliseconds.len().checked_sub(1)?;
     let at = |share: f64| milliseconds[(share * last as f64) as usize];
+    let limit = limit_s.map_or(String::new(), |s| format!("; limit {} ms", significant(1e3 * s, 3)));
     let evidence =
-        format!("median {} ms, 95 % within {} ms", significant(at(0.5), 3), significant(at(0.95), 3));
-    Some(Check::new(Property::Time, scenario.id, Basis::Told, milliseconds.len(), evidence))
+        format!("median {} ms, 95 % within {} ms{limit}", significant(at(0.5), 3), significant(at(0.95), 3));
+    let basis = limit_s.map_or(Basis::Told, |s| Basis::Certain(at(0.5) <= 1e3 * s));
+    Some(Check::new(Property::Time, scenario.id, basis, milliseconds.len(), evidence))
 }

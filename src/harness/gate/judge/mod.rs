@@ -9,15 +9,22 @@ mod invariance;
 mod rmse;
 mod statistics;
 
+pub(super) use bad::misled;
+pub(super) use chance::at_least;
 pub use checks::{Basis, Check, Property, Verdict};
-pub use decide::{EXPECTED_FALSE_ALARMS, decide};
+pub use decide::{EXPECTED_FALSE_ALARMS, Terms, decide};
 
 use super::plan::{Case, Plan, Purpose};
 use super::suite::{Demand, Scenario};
 use super::trial::{Seen, Trial};
 
-/// Every check of a plan on the answers seen so far, undecided.
-pub fn check(plan: &Plan, seen: &[Option<Seen>]) -> Vec<Check> {
+/// Every check of a plan on the answers seen so far, decided.
+pub fn judged(plan: &Plan, seen: &[Option<Seen>], terms: &Terms) -> Vec<Check> {
+    decide(check(plan, seen, terms), terms)
+}
+
+/// Every check, undecided.
+pub fn check(plan: &Plan, seen: &[Option<Seen>], terms: &Terms) -> Vec<Check> {
     let mut checks = bad::check(plan, seen);
     for (index, scenario) in plan.scenarios.iter().enumerate() {
         let answers = Answers::of(plan, seen, index);
@@ -25,7 +32,7 @@ pub fn check(plan: &Plan, seen: &[Option<Seen>]) -> Vec<Check> {
         match scenario.demand {
             Demand::Honesty => checks.push(bad::honesty(scenario, &answers)),
             Demand::Law => {
-                checks.extend(exact::check(scenario, &answers));
+                checks.extend(exact::check(scenario, &answers, terms));
                 checks.extend(statistics::check(scenario, &answers));
                 checks.extend(rmse::check(scenario, &answers));
                 checks.extend(invariance::check(scenario, &answers));

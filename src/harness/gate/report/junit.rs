@@ -25,6 +25,7 @@ impl Report {
                     }
                 };
                 let mut case = TestCase::new(check.scenario, status);
+                case.set_classname(row.property.name());
                 case.set_system_out(evidence);
                 suite.add_test_case(case);
             }

@@ -4,7 +4,10 @@ mod html;
 mod junit;
 mod text;
 
-use super::judge::{self, Basis, Check, Property, Verdict};
+pub use text::COLUMNS;
+
+use super::bad_input::Fault;
+use super::judge::{self, Basis, Check, Property, Terms, Verdict};
 use super::plan::Plan;
 use super::trial::Seen;
 use crate::harness::provenance::Commit;
@@ -33,9 +36,21 @@ pub struct Report {
     pub commit: Option<String>,
     /// Every check.
     pub checks: Vec<Check>,
+    /// What was asked.
+    pub scenarios: Vec<Described>,
+}
+
+/// A scenario or a bad problem in words.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Described {
+    /// Its name in checks.
+    pub name: &'static str,
+    /// What is particular about it.
+    pub about: String,
 }
 
 /// One property over all scenarios.
+#[derive(Debug, Clone, Serialize)]
 pub struct Row<'a> {
     /// Which.
     pub property: Property,
@@ -44,32 +59,27 @@ pub struct Row<'a> {
     /// Checks that hold, of those that were judged.
     pub held: (usize, usize),
     /// The check to tell about: the worst, or else the most doubtful.
+    #[serde(skip)]
     pub telling: &'a Check,
 }
 
 impl Report {
     /// Judges what was seen.
-    pub fn new(
-        plan: &Plan,
-        solver: &str,
-        seen: &[Option<Seen>],
-        false_alarm_rate: f64,
-        accepted: &[Property],
-        seconds: f64,
-    ) -> Report {
-        let checks = judge::decide(judge::check(plan, seen), false_alarm_rate, accepted);
+    pub fn new(plan: &Plan, solver: &str, seen: &[Option<Seen>], terms: &Terms, seconds: f64) -> Report {
+        let checks = judge::judged(plan, seen, terms);
         let statistical = checks.iter().filter(|c| matches!(c.basis, Basis::Chance(_))).count();
         Report {
             solver: solver.to_string(),
             seed: plan.seed,
             samples: plan.samples,
             problems: seen.iter().flatten().count(),
-            false_alarm_rate,
+            false_alarm_rate: terms.false_alarm_rate,
             statistical_checks: statistical,
             verdict: checks.iter().map(|c| c.verdict).max().unwrap_or(Verdict::NotJudged),
             seconds,
             commit: None,
             checks,
+            scenarios: described(plan),
         }
     }
 
@@ -93,7 +103,7 @@ impl Report {
 
     /// One row a property that was looked at.
     pub fn rows(&self) -> Vec<Row<'_>> {
-        Property::ALL.into_iter().filter_map(|property| self.row(property)).collect()
+        Property::ALL.iter().filter_map(|&property| self.row(property)).collect()
     }
 
     fn row(&self, property: Property) -> Option<Row<'_>> {
@@ -110,9 +120,25 @@ impl Report {
         Some(Row { property, verdict: telling.verdict, held: (held, judged), telling })
     }
 
-    /// The report as JSON.
+    /// The report as JSON: its fields, and under `properties` a verdict each.
     pub fn to_json(&self) -> String {
         // Evidence is text and rates are finite, so nothing can fail.
-        format!("{:#}\n", serde_json::to_value(self).unwrap_or_default())
+        let mut value = serde_json::to_value(self).unwrap_or_default();
+        value["properties"] = serde_json::to_value(self.rows()).unwrap_or_default();
+        format!("{value:#}\n")
     }
+}
+
+fn described(plan: &Plan) -> Vec<Described> {
+    let scenarios = plan.scenarios.iter().map(|s| Described { name: s.id, about: s.about.to_string() });
+    let bad = plan.bad.iter().map(|case| {
+        let views = case.problem.views.len();
+        let points = case.problem.points();
+        let kind = match case.fault {
+            Fault::Degenerate => "well formed, but determines no camera",
+            Fault::Malformed => "broken",
+        };
+        Described { name: case.id, about: format!("{kind}: {views} views, {points} pixels") }
+    });
+    scenarios.chain(bad).collect()
 }
