@@ -288,7 +288,10 @@ fn base(outcomes: &[Outcome]) -> Result<&Outcome, ExperimentError> {
 }
 
 fn band() -> Band {
-    Band::relative(1e-5, "the bits repeat on every machine, so that a larger difference is a change of method")
+    Band::relative(
+        1e-5,
+        "the bits repeat on every machine, so that a larger difference is a change of method",
+    )
 }
 
 fn tell_noise(record: &mut Record, outcomes: &[Outcome]) -> Result<(), ExperimentError> {

@@ -13,7 +13,8 @@ use crate::calibrate::Settings;
 use crate::camera::{Camera, Parameter};
 use crate::geometry::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
 
 /// How hard a fault is to see.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -25,6 +26,9 @@ pub enum Class {
     Subtle,
 }
 
+/// A faulty solver; its second argument tells how often the problem was asked before.
+type How = fn(&Problem, &dyn Fn() -> u64) -> Answer;
+
 /// A fault.
 #[derive(Debug, Clone, Copy)]
 pub struct Planted {
@@ -34,8 +38,7 @@ pub struct Planted {
     pub about: &'static str,
     /// How hard it is to see.
     pub class: Class,
-    /// The faulty solver; the second argument counts its calls.
-    how: fn(&Problem, u64) -> Answer,
+    how: How,
 }
 
 /// All planted faults.
@@ -47,13 +50,23 @@ pub fn planted() -> Vec<Planted> {
 #[derive(Debug)]
 pub struct Faulty {
     fault: Planted,
-    calls: AtomicU64,
+    /// How often each problem was asked, by its fingerprint: a count of all calls would depend on the order of threads.
+    asked: Mutex<BTreeMap<u64, u64>>,
 }
 
 impl Faulty {
     /// The solver with this fault.
     pub fn new(fault: Planted) -> Faulty {
-        Faulty { fault, calls: AtomicU64::new(0) }
+        Faulty { fault, asked: Mutex::default() }
+    }
+
+    fn asked_before(&self, problem: &Problem) -> u64 {
+        let points = problem.views.iter().flat_map(|v| v.target.iter().chain(&v.pixels).flatten());
+        let fingerprint = mixed(points.flat_map(|x| x.to_bits().to_le_bytes()));
+        let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
+        let count = asked.entry(fingerprint).or_default();
+        *count += 1;
+        *count - 1
     }
 }
 
@@ -63,16 +76,15 @@ impl Solver for Faulty {
     }
 
     fn ask(&self, problem: &Problem) -> Result<Answer, Breakage> {
-        let call = self.calls.fetch_add(1, Ordering::Relaxed);
-        Ok((self.fault.how)(problem, call))
+        Ok((self.fault.how)(problem, &|| self.asked_before(problem)))
     }
 }
 
-const fn gross(id: &'static str, about: &'static str, how: fn(&Problem, u64) -> Answer) -> Planted {
+const fn gross(id: &'static str, about: &'static str, how: How) -> Planted {
     Planted { id, about, class: Class::Gross, how }
 }
 
-const fn subtle(id: &'static str, about: &'static str, how: fn(&Problem, u64) -> Answer) -> Planted {
+const fn subtle(id: &'static str, about: &'static str, how: How) -> Planted {
     Planted { id, about, class: Class::Subtle, how }
 }
 

@@ -42,8 +42,8 @@ pub(super) const FAULTS: &[Planted] = &[
             change(a, "fx", |x| x + shift);
         })
     }),
-    gross("last-bits", "the last bit of fx depends on the call", |p, call| {
-        spoilt(p, |a| change(a, "fx", |x| f64::from_bits(x.to_bits() ^ (call & 1))))
+    gross("last-bits", "the last bit of fx changes when a problem is asked again", |p, asked_before| {
+        spoilt(p, |a| change(a, "fx", |x| f64::from_bits(x.to_bits() ^ (asked_before() & 1))))
     }),
     subtle("silent-failure", "one answer in a hundred has fx 10 % too large", |p, _| {
         spoilt(p, |a| change(a, "fx", |x| if chosen(p, 100) { 1.1 * x } else { x }))
