@@ -112,9 +112,9 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     tell_distances(&mut record, &draws, &book)?;
     rectify(&mut record, &ours)?;
 
-    record.figure(row_figure(&ours[MAIN], &noise_free[MAIN], &book));
-    record.figure(predicted_figure(&ours, &draws, &book));
-    record.figure(residual_figure(&view, &ours[MAIN]));
+    record.figure(row_figure(&ours[MAIN], &noise_free[MAIN], &book, context.seed));
+    record.figure(predicted_figure(&ours, &draws, &book, context.seed));
+    record.figure(residual_figure(&view, &ours[MAIN], context.seed));
     record.note(
         "The chapter does not say what its single-plane calibration assumes of the distortion centre. Its RMS alone fits a \
          centre held at the middle of the image, (320, 240), a little better, but its affine residual of 0.0329 mm does not: \

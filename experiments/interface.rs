@@ -256,8 +256,11 @@ fn tell_sweep(record: &mut Record, sweep: &[Step]) {
     .points_as("one calibration each", &drawn, Look::series(1))
     .hline("limit", limit)
     .hline("", -limit);
-    let caption = "What a reader who exchanges fy and cx sees in fy's place, in standard deviations of fy, for truths whose focal \
-                   length approaches cx; noise 0.1 px, one calibration a point, seed 1. Notice the blind zone between the limits.";
+    let caption = format!(
+        "What a reader who exchanges fy and cx sees in fy's place, in standard deviations of fy, for truths whose focal length \
+         approaches cx; noise {SIGMA_PX} px, one calibration a point, seed {}. Notice the blind zone between the limits.",
+        record.seed()
+    );
     record.figure(Figure::plot("blind-zone", &plot, caption));
     // cx is estimated with a standard deviation of its own: z has mean -difference / sd(fy) and deviation sd(cx) / sd(fy),
     // which the sweep keeps below 2.

@@ -496,9 +496,8 @@ fn noise_figure(outcomes: &[Outcome]) -> Figure {
         ),
     ];
     let caption = "Extraction noise of a coordinate, px, over 252 dots in the chapter's four poses, each node one photograph a pose, \
-                   seed 3; the sweeps cross at blur 0.5 px, noise 1 % of full scale, dots of 3 mm. Notice that the detector \
-                   stays at the bound up to 1 px of blur and loses against it at 2 px, and that the whole scale ends at a quarter \
-                   of the chapter's 0.1 px.";
+                   seed 3; the sweeps cross at blur 0.5 px, noise 1 % of full scale, dots of 3 mm. Notice where the detector \
+                   leaves the bound, and that the scale ends at a quarter of the chapter's 0.1 px.";
     Figure::panels("noise", &panels, 3, caption)
 }
 
@@ -525,7 +524,6 @@ fn bias_figure(exact: &[Exact], unit: &[f64]) -> Figure {
         .line("corrected", &curve(&|e| largest_deviation(&differences(&e.corrected.camera, &truth), unit)));
     let caption = "Left: RMS distance of detected centres from the true ones, px. Right: error of the worst of the six parameters in \
                    standard deviations under the chapter's noise of 0.1 px. Four poses, blur 0.5 px, nothing drawn at random. Notice \
-                   that the bias grows with the square of the diameter, that the poses take up most of it before it reaches \
-                   the camera, and that correction takes it off.";
+                   what of the bias reaches the camera, and what correction leaves of it.";
     Figure::panels("bias", &[pixels, cameras], 2, caption)
 }

@@ -97,6 +97,41 @@ fn figures_that_no_page_shows_are_found() {
 }
 
 #[test]
+fn unused_names_are_found_where_they_are_defined() {
+    let project = project();
+    let evidence = Evidence::of_records(&project, &[LINE_BENDING], &[]);
+    let mut sources = Sources::load(&project, evidence).unwrap();
+    sources.pages = vec![Page { path: "page.md".into(), number: vec![1], text: "# Title\n".into() }];
+    let findings = compile(&sources).findings;
+    let uncited = sources.references.len();
+    let golden = std::fs::read_to_string(project.root().join("golden/line-bending.snap")).unwrap();
+    let figures = golden.lines().filter(|line| line.starts_with("figure | ")).count();
+    assert!(uncited > 0 && figures > 0);
+    assert_eq!(findings.len(), uncited + figures, "{findings:?}");
+    for finding in &findings {
+        let text = std::fs::read_to_string(project.root().join(&finding.file)).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        let name = finding.message.split('`').nth(1).unwrap();
+        if finding.file == "book/references.toml" {
+            assert_eq!(lines[finding.line - 1], "[[reference]]", "{finding}");
+            assert_eq!(lines[finding.line], format!("key = \"{name}\""), "{finding}");
+        } else {
+            let file = name.strip_prefix("line-bending.").unwrap();
+            assert!(lines[finding.line - 1].starts_with(&format!("figure | {file}.")), "{finding}");
+        }
+    }
+}
+
+#[test]
+fn a_reference_at_the_head_of_a_sentence_is_capitalised() {
+    let page =
+        book_of("# T\n\n$$\nx\n$$ {#eq:x}\n\n{{ref eq:x}} is one. {{ref eq:x}} too; so is {{ref eq:x}}.\n");
+    let content = &page.pages[0].content;
+    let count = |word: &str| content.matches(word).count();
+    assert_eq!((count(">Equation\u{a0}(1.1)<"), count(">equation\u{a0}(1.1)<")), (2, 1), "{content}");
+}
+
+#[test]
 fn the_book_is_built_whole_and_leads_nowhere_outside() {
     let project = project();
     let evidence = Evidence::of_records(&project, &[LINE_BENDING], &[]);

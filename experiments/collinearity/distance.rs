@@ -90,8 +90,8 @@ pub fn tell_distances(record: &mut Record, draws: &[Draw], book: &Book) -> Resul
     ];
     let caption = format!(
         "Largest deviation of the target's top row in pixels, and corrected pixels minus target millimetres, against the \
-         target's distance, without noise; the band is three standard deviations of {TRIALS} draws at 120 mm. Notice that \
-         both published numbers lead to the same distance."
+         target's distance, without noise; the band is three standard deviations of {TRIALS} draws at 120 mm. Notice \
+         where each curve meets its published number."
     );
     record.figure(Figure::panels("distance", &panels, 2, caption));
     Ok(())

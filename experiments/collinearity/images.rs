@@ -149,7 +149,8 @@ pub fn rectify(record: &mut Record, ours: &[Found]) -> Result<(), ExperimentErro
         cases,
         "bilinear interpolation is no steeper than the largest step between neighbouring samples; rounding of both levels",
     ));
-    record.figure(shift_figure(ours)?);
+    let shifts = shift_figure(ours, record.seed())?;
+    record.figure(shifts);
     record.figure(Figure::photo(
         "photo",
         &photo,
@@ -195,43 +196,51 @@ pub fn draw_rectified(
         (128 + 2 * level).clamp(1, 255) as u8
     });
     let caption = |by: &str| {
-        format!("The photograph rectified by {by}, showing {what}. Black: no data. Notice the straight rows.")
+        format!(
+            "The photograph rectified by {by}, showing {what}. Black: no data. Compare its rows with the photograph's."
+        )
     };
     record.figure(Figure::photo(format!("rectified-{view}-true"), &truth.image, caption("the true model")));
     let by = "the single-plane calibration, centre free";
     record.figure(Figure::photo(format!("rectified-{view}-plane"), &plane.image, caption(by)));
     let caption = format!(
-        "True model minus single-plane calibration (seed 1, sigma 0.1 px), showing {what}: grey 128 is no difference, two \
-         levels stand for one; black: no data in one of them. Notice that only edges differ, more towards the border."
+        "True model minus single-plane calibration (seed {}, sigma {SIGMA_PX} px), showing {what}: grey 128 is no difference, two \
+         levels stand for one; black: no data in one of them. Notice at which edges the two differ.",
+        record.seed()
     );
     record.figure(Figure::photo(format!("difference-{view}"), &difference, caption));
 }
 
 /// Distance between the sources of the two maps over the image.
-pub fn shift_figure(ours: &[Found]) -> Result<Figure, ExperimentError> {
+pub fn shift_figure(ours: &[Found], seed: u64) -> Result<Figure, ExperimentError> {
     let truth = Truth::chapter_camera();
     let columns: Vec<u32> = (0..=8).map(|i| 80 * i).collect();
     let rows: Vec<u32> = (0..=6).rev().map(|i| 80 * i).collect();
     let names = |levels: &[u32]| levels.iter().map(u32::to_string).collect();
-    let panel = |title: &str, plane: &Camera| -> Result<Plot, ExperimentError> {
+    let shifts = |plane: &Camera| -> Vec<f64> {
         let shift = |u: u32, v: u32| {
             let pixel = Vec2::new(f64::from(u), f64::from(v));
             // Hundredths of a pixel are all that a cell has room for.
             0.01 * (100.0 * (truth.distort_pixel(&pixel) - plane.distort_pixel(&pixel)).norm()).round()
         };
         let places = rows.iter().flat_map(|&v| columns.iter().map(move |&u| (u, v)));
-        let values = places.map(|(u, v)| shift(u, v)).collect();
+        places.map(|(u, v)| shift(u, v)).collect()
+    };
+    let panel = |title: &str, values: Vec<f64>| -> Result<Plot, ExperimentError> {
         let heat = HeatMap::new("shift (px)", names(&columns), names(&rows), values)
             .map_err(ExperimentError::at("heat map"))?
             .range(0.0, 2.0);
         Ok(Plot::heat_map(title, "u (px)", "v (px)", heat).size(520.0, 380.0))
     };
-    let panels = [
-        panel("centre held at (320, 240)", &ours[0].plane.lens_camera())?,
-        panel("centre free", &ours[MAIN].plane.lens_camera())?,
-    ];
-    let caption = "Distance in the photograph between the places at which the true model and the single-plane calibration \
-                   (seed 1, sigma 0.1 px) sample an output pixel. Notice that a centre held at a wrong place shows in the \
-                   whole image, while a free one leaves less than 0.4 px.";
+    let (held, free) = (shifts(&ours[0].plane.lens_camera()), shifts(&ours[MAIN].plane.lens_camera()));
+    let largest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
+    let caption = format!(
+        "Distance in the photograph between the places at which the true model and the single-plane calibration (seed {seed}, \
+         sigma {SIGMA_PX} px) sample an output pixel: up to {:.2} px with the centre held at a wrong place, up to {:.2} px with a \
+         free one.",
+        largest(&held),
+        largest(&free)
+    );
+    let panels = [panel("centre held at (320, 240)", held)?, panel("centre free", free)?];
     Ok(Figure::panels("map-shift", &panels, 2, caption))
 }

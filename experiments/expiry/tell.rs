@@ -25,6 +25,8 @@ const RATE: f64 = 1e-5;
 const MONTH_DAYS: f64 = 365.25 / 12.0;
 /// Histories drawn in the figure.
 const SHOWN: u64 = 5;
+/// Quarters behind bands and trade-off: the first of them.
+const WATCHED: u64 = 1000;
 
 fn days(shifts: f64) -> f64 {
     shifts / SHIFTS_A_DAY as f64
@@ -333,10 +335,10 @@ pub(crate) fn tables_and_figures(record: &mut Record, r: &Results, seed: u64) {
     record.figure(fleet_figure(r, &exceeds, &asked));
 }
 
-/// `(day, low, median, high)` every week over the first 1000 quarters.
+/// `(day, low, median, high)` every week over the first [`WATCHED`] quarters.
 fn error_bands(r: &Results, seed: u64) -> Vec<[f64; 4]> {
     let histories: Vec<History> =
-        (0..1000).map(|trial| History::of(&r.station, seed, "quarter", trial, QUARTER)).collect();
+        (0..WATCHED).map(|trial| History::of(&r.station, seed, "quarter", trial, QUARTER)).collect();
     // The middle shift of every seventh day, and of the last.
     let shifts = (0..13).map(|week| 7 * SHIFTS_A_DAY * week + 1).chain([QUARTER - 2]);
     shifts
@@ -347,9 +349,9 @@ fn error_bands(r: &Results, seed: u64) -> Vec<[f64; 4]> {
         .collect()
 }
 
-/// `(false-alarm chance, median day by threshold, median day by run rule)` over the first 1000 quarters.
+/// `(false-alarm chance, median day by threshold, median day by run rule)` over the first [`WATCHED`] quarters.
 fn trade_off(r: &Results, seed: u64) -> Vec<[f64; 3]> {
-    let checks: Vec<Vec<f64>> = (0..1000)
+    let checks: Vec<Vec<f64>> = (0..WATCHED)
         .map(|trial| {
             let history = History::of(&r.station, seed, "quarter", trial, QUARTER);
             history.checks(&r.station, seed, "quarter", trial)
@@ -373,7 +375,7 @@ fn error_figure(r: &Results, seed: u64, bands: &[[f64; 4]]) -> Figure {
     let edges: Vec<(f64, f64, f64)> = bands.iter().map(|b| (b[0], b[1], b[3])).collect();
     let median: Vec<(f64, f64)> = bands.iter().map(|b| (b[0], b[2])).collect();
     let mut plot = Plot::new(
-        "Systematic error of the 40 mm reference",
+        format!("Systematic error of the {} mm reference", r.station.reference_mm),
         "days since calibration",
         "error (mm)",
     )
@@ -382,15 +384,16 @@ fn error_figure(r: &Results, seed: u64, bands: &[[f64; 4]]) -> Figure {
         let history = History::of(&r.station, seed, "quarter", trial, QUARTER);
         let middle = (0..QUARTER).skip(1).step_by(SHIFTS_A_DAY);
         let path: Vec<(f64, f64)> = middle.map(|i| (days(i as f64), history.error_mm[i])).collect();
-        plot = plot.line_as("", &path, Look::series(2).dash(Dash::Solid).width(0.7));
+        let name = if trial == 0 { "single stations" } else { "" };
+        plot = plot.line_as(name, &path, Look::series(2).dash(Dash::Solid).width(0.7));
     }
     let plot = plot
         .line_as("median", &median, Look::series(0).width(2.0))
-        .hline("case study: 0.03 mm", TOLERANCE_MM)
-        .x_range(0.0, 91.0);
+        .hline(format!("case study: {TOLERANCE_MM} mm"), TOLERANCE_MM)
+        .x_range(0.0, days(QUARTER as f64));
     let caption = format!(
-        "Length error at the middle shift of every day for {SHOWN} simulated stations, with median and central 95 % of 1000, in \
-         mm; seed {seed}. Notice where the case study's 0.03 mm lies."
+        "Length error at the middle shift of every day for {SHOWN} simulated stations, with median and central 95 % of {WATCHED}, \
+         in mm; seed {seed}. Notice where the case study's {TOLERANCE_MM} mm lies."
     );
     Figure::plot("error", &plot, caption)
 }
@@ -411,11 +414,15 @@ fn alarm_figure(r: &Results) -> Figure {
             .line("threshold on one check", &curve(0))
             .line("run rule (EWMA)", &curve(1))
             .hline("", 0.5)
-            .x_range(0.0, 91.0)
+            .x_range(0.0, days(QUARTER as f64))
             .y_range(0.0, 1.0);
+    let median = |rule: usize| days(quantile(&r.alarm_shifts(rule), 0.5));
     let caption = format!(
-        "Share of {QUARTERS} drifting stations whose check has given an alarm, both rules set to a false-alarm chance of 1 % a \
-         quarter. Notice the lead of the run rule at one half."
+        "Share of {QUARTERS} drifting stations whose check has given an alarm, both rules set to a false-alarm chance of {} % a \
+         quarter. Half of the stations have had their alarm from the threshold by day {:.1}, from the run rule by day {:.1}.",
+        100.0 * FALSE_ALARM,
+        median(0),
+        median(1)
     );
     Figure::plot("alarms", &plot, caption)
 }
@@ -430,9 +437,16 @@ fn trade_off_figure(trade: &[[f64; 3]]) -> Figure {
     .line("threshold on one check", &curve(1))
     .line("run rule (EWMA)", &curve(2))
     .log_x();
-    let caption = "Median day of the alarm over 1000 drifting stations against the chance of a false alarm in a quarter that the \
-                   rule is set to. Notice that the run rule at one false alarm in a thousand quarters is as quick as the \
-                   threshold at far more.";
+    let ends = |column: usize| {
+        let at = |row: Option<&[f64; 3]>| row.map_or(f64::NAN, |row| row[column]);
+        format!("from day {:.1} to day {:.1}", at(trade.first()), at(trade.last()))
+    };
+    let caption = format!(
+        "Median day of the alarm over {WATCHED} drifting stations against the chance of a false alarm in a quarter that the \
+         rule is set to. As that chance grows, the threshold's alarm moves {}, the run rule's {}.",
+        ends(1),
+        ends(2)
+    );
     Figure::plot("trade-off", &plot, caption)
 }
 
@@ -446,13 +460,16 @@ fn fleet_figure(r: &Results, exceeds: &[f64], asked: &[f64]) -> Figure {
             .collect()
     };
     let plot = Plot::new("A fleet over a year", "days since calibration", "share of the fleet")
-        .line("error above 0.03 mm", &curve(exceeds))
+        .line(format!("error above {TOLERANCE_MM} mm"), &curve(exceeds))
         .line("check has asked for calibration", &curve(asked))
-        .vline("calendar at 1 % risk", days(r.calendar_shifts()))
+        .vline(format!("calendar at {} % risk", 100.0 * RISK), days(r.calendar_shifts()))
         .y_range(0.0, 1.0);
     let caption = format!(
-        "{FLEET} stations whose creep and warming lie between none and twice the case study's. Notice that a calendar must serve \
-         the fastest station, while the check lets every station run until its own drift shows."
+        "{FLEET} stations whose creep and warming lie between none and twice the case study's. A calendar with {} % risk \
+         recalibrates all of them after {:.0} days; the check has asked half of them by day {:.0}.",
+        100.0 * RISK,
+        days(r.calendar_shifts()),
+        days(quantile(asked, 0.5))
     );
     Figure::plot("fleet", &plot, caption)
 }

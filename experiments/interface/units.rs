@@ -169,9 +169,11 @@ pub(crate) fn tell(record: &mut Record, examined: &Examined) {
             .line("difference to the target (\u{201c}mm\u{201d})", &direct)
             .line("error of the spacing (%)", &ratio)
             .vline("one pixel a millimetre", Truth::chapter_camera().fx);
-    let caption = "RMS difference of corrected pixels and target millimetres, and error of the spacing of neighbours, against the \
-                   distance of a facing target; nothing is drawn at random. Notice that the spacing alone is blind at 600 mm, \
-                   where the offset still shows.";
+    let caption = format!(
+        "RMS difference of corrected pixels and target millimetres, and error of the spacing of neighbours, against the distance \
+         of a facing target; nothing is drawn at random. Notice what each check shows at {} mm, where a pixel is a millimetre.",
+        Truth::chapter_camera().fx
+    );
     record.figure(Figure::plot("units", &plot, caption));
 }
 

@@ -121,7 +121,7 @@ pub(super) fn claims_table(experiment: &str, claims: &[RecordClaim], places: boo
         let interval = match (low.is_finite(), high.is_finite()) {
             (false, true) => format!("\u{2264}\u{a0}{}{unit}", significant(high, 3)),
             (true, false) => format!("\u{2265}\u{a0}{}{unit}", significant(low, 3)),
-            _ => format!("[{},\u{a0}{}]{unit}", significant(low, 4), significant(high, 4)),
+            _ => format!("[{}, {}]{unit}", significant(low, 4), significant(high, 4)),
         };
         let rate = claim
             .false_alarm_rate
@@ -134,7 +134,7 @@ pub(super) fn claims_table(experiment: &str, claims: &[RecordClaim], places: boo
         let place = if places { format!(" id=\"claim-{}\"", claim.id) } else { String::new() };
         let _ = write!(
             rows,
-            "<tr{place} title=\"{title}\"><td class=\"text\">{}</td><td class=\"value\">{}{unit}</td><td>{interval}</td>\
+            "<tr{place} title=\"{title}\"><td class=\"text\">{}</td><td class=\"value\">{}{unit}</td><td class=\"interval\">{interval}</td>\
              <td class=\"{class}\">{word}</td></tr>",
             inline(&claim.statement),
             significant(number(&claim.value), 4)

@@ -51,7 +51,8 @@ pub fn compile(sources: &Sources) -> Compiled {
     for (page, pieces) in sources.pages.iter().zip(&scanned) {
         let mut content = String::new();
         for piece in pieces {
-            match translate(page, piece, &mathematics, &paths, &mut resolver) {
+            let first = begins_sentence(&content);
+            match translate((page, piece), first, &mathematics, &paths, &mut resolver) {
                 Ok(text) => content.push_str(&text),
                 Err(message) => {
                     findings.push(Finding::new(page.file(), piece.line, message.clone()));
@@ -69,9 +70,18 @@ pub fn compile(sources: &Sources) -> Compiled {
     Compiled { pages, records, assets: resolver.assets, findings }
 }
 
+/// Whether what follows `before` is the first of a sentence.
+fn begins_sentence(before: &str) -> bool {
+    let said = before.trim_end();
+    let between = &before[said.len()..];
+    said.is_empty()
+        || between.matches('\n').count() > 1
+        || !between.is_empty() && said.ends_with(['.', '?', '!'])
+}
+
 fn translate(
-    page: &Page,
-    piece: &Piece<'_>,
+    (page, piece): (&Page, &Piece<'_>),
+    first: bool,
     mathematics: &Mathematics,
     paths: &BTreeSet<String>,
     resolver: &mut Resolver<'_>,
@@ -90,7 +100,7 @@ fn translate(
             let number = format!(r#"<span class="equation-number">{number}</span>"#);
             Ok(format!("<div class=\"equation\" id=\"{id}\">{formula}{number}</div>\n"))
         }
-        Kind::Placeholder(text) => resolver.resolve(text),
+        Kind::Placeholder(text) => resolver.resolve(text, first),
         Kind::Html(text) if text.starts_with("<!--") => Ok(String::new()),
         Kind::Html(text) => Ok(text.to_string()),
         Kind::Target(target) => match links::dead(&page.path, target, paths, &resolver.labels) {

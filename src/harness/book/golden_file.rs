@@ -32,6 +32,17 @@ pub struct GoldenPublished {
     pub expectation: String,
 }
 
+/// A figure as the snapshot locks it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GoldenFigure {
+    /// File name.
+    pub file: String,
+    /// Its hash, or that its bits differ between machines.
+    pub hash: String,
+    /// Line of the snapshot file that locks it, from 1.
+    pub line: usize,
+}
+
 /// A snapshot, read.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct GoldenFile {
@@ -45,22 +56,24 @@ pub struct GoldenFile {
     pub claims: Vec<String>,
     /// Name and hash of every table.
     pub tables: Vec<(String, String)>,
-    /// File name and hash of every figure.
-    pub figures: Vec<(String, String)>,
+    /// Every figure.
+    pub figures: Vec<GoldenFigure>,
 }
 
 impl GoldenFile {
     /// Reads a snapshot as [`golden::snapshot`] writes it; lines of another form are left out.
     pub fn read(file: &str) -> GoldenFile {
         let mut read = GoldenFile::default();
-        for line in golden::contents(file).lines() {
+        let contents = golden::contents(file);
+        let header = file.lines().count() - contents.lines().count();
+        for (i, line) in contents.lines().enumerate() {
             let fields: Vec<&str> = line.split(" | ").map(str::trim).collect();
-            read.take(&fields);
+            read.take(&fields, header + i + 1);
         }
         read
     }
 
-    fn take(&mut self, fields: &[&str]) {
+    fn take(&mut self, fields: &[&str], line: usize) {
         let unit = |text: &str| if text == "1" { String::new() } else { text.to_string() };
         match fields {
             ["seed", seed] => self.seed = seed.parse().unwrap_or(0),
@@ -88,7 +101,9 @@ impl GoldenFile {
             }
             ["claim", id, ..] => self.claims.push(id.to_string()),
             ["table", name, _, hash] => self.tables.push((name.to_string(), hash.to_string())),
-            ["figure", file, hash] => self.figures.push((file.to_string(), hash.to_string())),
+            ["figure", file, hash] => {
+                self.figures.push(GoldenFigure { file: file.to_string(), hash: hash.to_string(), line });
+            }
             _ => {}
         }
     }

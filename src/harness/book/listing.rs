@@ -35,11 +35,14 @@ fn defines(line: &str, keyword: &str, name: &str) -> bool {
 }
 
 /// The last line of the item that begins at `start`: where its brackets are closed and a `}` or `;` ends the line. Code
-/// that rustfmt has seen closes an item at its own indentation.
+/// that rustfmt has seen closes an item at its own indentation; a raw string ends where it is closed.
 fn end_of(lines: &[&str], start: usize) -> usize {
     let margin = lines[start].len() - lines[start].trim_start().len();
     if lines[start].trim_end().ends_with([';', '}']) {
         return start;
+    }
+    if lines[start].trim_end().ends_with("r#\"") {
+        return (start + 1..lines.len()).find(|&i| lines[i].ends_with("\"#;")).unwrap_or(lines.len() - 1);
     }
     let closes = |line: &str| {
         line.len() - line.trim_start().len() == margin
@@ -66,5 +69,8 @@ mod tests {
             (17, "/// Inner.\nfn f(&self) -> i32 {\n    3\n}".to_string())
         );
         assert_eq!(item(SOURCE, "g"), None);
+        let study = "const STUDY: &str = r#\"\n[[factor]]\nlevels = [\n1\n]\n\"#;\n\nfn f() {\n}\n";
+        let quoted = "const STUDY: &str = r#\"\n[[factor]]\nlevels = [\n1\n]\n\"#;";
+        assert_eq!(item(study, "STUDY").unwrap(), (1, quoted.to_string()));
     }
 }

@@ -2,6 +2,7 @@
 
 use super::text::inline;
 use serde::Deserialize;
+use toml::Spanned;
 
 /// A work.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
@@ -22,20 +23,32 @@ pub struct Reference {
     /// Digital object identifier, where there is one.
     #[serde(default)]
     pub doi: String,
+    /// Line of its entry in the file, from 1.
+    #[serde(skip)]
+    pub line: usize,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    reference: Vec<Reference>,
+    reference: Vec<Spanned<Reference>>,
 }
 
 /// The page on which the list of references stands.
 pub(super) const PAGE: &str = "references.md";
 
-/// Reads the list; the message has line and column.
-pub(super) fn parse(text: &str) -> Result<Vec<Reference>, String> {
-    toml::from_str::<File>(text).map(|file| file.reference).map_err(|e| e.to_string())
+/// Reads the list; an error comes with its line.
+pub(super) fn parse(text: &str) -> Result<Vec<Reference>, (usize, String)> {
+    let line = |at: usize| 1 + text.bytes().take(at).filter(|&b| b == b'\n').count();
+    let file = toml::from_str::<File>(text).map_err(|e| {
+        let at = e.span().map_or(1, |span| line(span.start));
+        (at, e.message().to_string())
+    })?;
+    let placed = |entry: Spanned<Reference>| {
+        let line = line(entry.span().start);
+        Reference { line, ..entry.into_inner() }
+    };
+    Ok(file.reference.into_iter().map(placed).collect())
 }
 
 impl Reference {
@@ -74,4 +87,19 @@ pub(super) fn list(references: &[Reference]) -> String {
     sorted.sort_by(|a, b| (&a.authors, a.year).cmp(&(&b.authors, b.year)));
     let entries: Vec<String> = sorted.into_iter().map(Reference::entry).collect();
     format!("<ul class=\"references\">\n{}\n</ul>", entries.join("\n"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ENTRY: &str = "[[reference]]\nkey = \"a\"\nshort = \"A\"\nauthors = \"A\"\nyear = 1900\ntitle = \"t\"\nvenue = \"v\"\n";
+
+    #[test]
+    fn an_entry_knows_its_line_and_so_does_an_error() {
+        let read = parse(&format!("# Works.\n\n{ENTRY}\n{ENTRY}")).unwrap();
+        assert_eq!(read.iter().map(|r| r.line).collect::<Vec<_>>(), [3, 11]);
+        let (line, message) = parse(&format!("{ENTRY}\n[[reference]]\nkey = 1\n")).unwrap_err();
+        assert_eq!(line, 10, "{message}");
+    }
 }

@@ -3,9 +3,9 @@
 use super::constants::constant;
 use super::evidence::ExperimentEvidence;
 use super::finding::Finding;
-use super::golden_file::{GoldenFile, GoldenNumber};
+use super::golden_file::{GoldenFigure, GoldenFile, GoldenNumber};
 use super::labels::Labels;
-use super::sources::Sources;
+use super::sources::{REFERENCES, Sources};
 use super::text::{attribute, escape, inline};
 use super::{appendix, format, listing, references};
 use crate::harness::hash::sha256_hex;
@@ -24,13 +24,16 @@ pub(super) struct Resolver<'a> {
 
 type Resolved = Result<String, String>;
 
+/// Figures wider than this have panels side by side, CSS pixels; a single plot is 560 wide.
+const WIDE_PX: f64 = 700.0;
+
 impl<'a> Resolver<'a> {
     pub(super) fn new(sources: &'a Sources, labels: Labels) -> Resolver<'a> {
         Resolver { sources, labels, assets: BTreeMap::new(), cited: BTreeSet::new(), shown: BTreeSet::new() }
     }
 
-    /// The text of a placeholder.
-    pub(super) fn resolve(&mut self, placeholder: &str) -> Resolved {
+    /// The text of a placeholder, which may be the first of a sentence.
+    pub(super) fn resolve(&mut self, placeholder: &str, begins_sentence: bool) -> Resolved {
         let words: Vec<&str> = placeholder.split_whitespace().collect();
         match words.as_slice() {
             ["num", id, options @ ..] => self.number(id, options),
@@ -44,7 +47,7 @@ impl<'a> Resolver<'a> {
             ["code", file, item] => self.code(file, item),
             ["cite", key] => self.cite(key, false),
             ["citep", key] => self.cite(key, true),
-            ["ref", label] => self.refer(label),
+            ["ref", label] => self.refer(label, begins_sentence),
             ["all-published"] => Ok(appendix::published_table(self.sources)),
             ["all-records"] => Ok(appendix::record_list(self.sources)),
             ["all-references"] => Ok(references::list(&self.sources.references)),
@@ -110,9 +113,8 @@ impl<'a> Resolver<'a> {
     fn figure(&mut self, id: &str) -> Resolved {
         let (experiment, name) = split(id)?;
         let (evidence, golden) = self.golden(experiment)?;
-        let locked =
-            golden.figures.iter().find(|(file, _)| file.rsplit_once('.').is_some_and(|f| f.0 == name));
-        let (file, hash) =
+        let locked = golden.figures.iter().find(|f| stem(&f.file) == name);
+        let GoldenFigure { file, hash, .. } =
             locked.ok_or_else(|| format!("experiment `{experiment}` draws no figure `{name}`"))?;
         let path = format!("figures/{experiment}/{file}");
         let bytes = fs::read(self.sources.root.join(&path))
@@ -120,13 +122,15 @@ impl<'a> Resolver<'a> {
         if hash.strip_prefix("sha256 ").is_some_and(|digits| !sha256_hex(&bytes).starts_with(digits)) {
             return Err(format!("figure {path} is stale: run `calibench run {experiment}`"));
         }
+        // Several panels side by side are too small on a phone to be shrunk to its width: there they scroll.
+        let class = if svg_width(&bytes).is_some_and(|w| w > WIDE_PX) { " class=\"wide\"" } else { "" };
         self.assets.insert(path.clone(), bytes);
         self.shown.insert(id.to_string());
         let caption = inline(evidence.caption(file).unwrap_or_default());
         let number = self.labels.get(&format!("fig:{id}")).map_or(String::new(), |l| l.number.clone());
         let command = command_line(experiment, golden);
         Ok(format!(
-            "<figure id=\"fig:{id}\"><img src=\"{path}\" alt=\"{caption}\"><figcaption><b>{number}.</b> {caption} {command}\
+            "<figure id=\"fig:{id}\"{class}><div class=\"drawing\"><img src=\"{path}\" alt=\"{caption}\"></div><figcaption><b>{number}.</b> {caption} {command}\
              </figcaption></figure>\n"
         ))
     }
@@ -144,7 +148,7 @@ impl<'a> Resolver<'a> {
         self.assets.insert(path.clone(), csv.clone().into_bytes());
         let label = format!("tab:{id}");
         let number = self.labels.get(&label).map_or(String::new(), |l| l.number.clone());
-        let caption = inline(evidence.caption(&format!("{name}.csv")).unwrap_or_default());
+        let caption = inline(&sentence(evidence.caption(&format!("{name}.csv")).unwrap_or_default()));
         let command = command_line(experiment, golden);
         let body = appendix::csv_table(csv, columns, options, &path)?;
         Ok(format!(
@@ -197,25 +201,25 @@ impl<'a> Resolver<'a> {
         Ok(reference.link("", parenthetical))
     }
 
-    fn refer(&mut self, name: &str) -> Resolved {
+    fn refer(&mut self, name: &str, begins_sentence: bool) -> Resolved {
         let label = self.labels.refer(name).ok_or_else(|| format!("nothing is named `{name}`"))?;
-        Ok(format!(r##"<a class="ref" href="{}#{name}">{}</a>"##, label.page, label.words))
+        let words = if begins_sentence { sentence(&label.words) } else { label.words.clone() };
+        Ok(format!(r##"<a class="ref" href="{}#{name}">{words}</a>"##, label.page))
     }
 
     /// Names that nothing uses: references, labels, figures that are drawn for nobody.
     pub(super) fn unused(&self) -> Vec<Finding> {
         let mut findings = self.labels.unused();
         let uncited = self.sources.references.iter().filter(|r| !self.cited.contains(&r.key));
-        findings.extend(
-            uncited.map(|r| Finding::new("book/references.toml", 1, format!("`{}` is never cited", r.key))),
-        );
+        findings
+            .extend(uncited.map(|r| Finding::new(REFERENCES, r.line, format!("`{}` is never cited", r.key))));
         for (experiment, evidence) in &self.sources.evidence.experiments {
             let figures = evidence.golden.iter().flat_map(|g| &g.figures);
-            for (file, _) in figures {
-                let id = format!("{experiment}.{}", file.rsplit_once('.').map_or(file.as_str(), |f| f.0));
+            for GoldenFigure { file, line, .. } in figures {
+                let id = format!("{experiment}.{}", stem(file));
                 if !self.shown.contains(&id) {
                     let message = format!("figure `{id}` is shown on no page: write {{{{figure {id}}}}}");
-                    findings.push(Finding::new(format!("golden/{experiment}.snap"), 1, message));
+                    findings.push(Finding::new(format!("golden/{experiment}.snap"), *line, message));
                 }
             }
         }
@@ -226,6 +230,25 @@ impl<'a> Resolver<'a> {
 /// `experiment.name`.
 fn split(id: &str) -> Result<(&str, &str), String> {
     id.split_once('.').ok_or_else(|| format!("`{id}` is not <experiment>.<name>"))
+}
+
+/// A file's name without its ending.
+fn stem(file: &str) -> &str {
+    file.rsplit_once('.').map_or(file, |(stem, _)| stem)
+}
+
+/// A caption begins as a sentence does, unless its first word is a symbol such as `k2`.
+fn sentence(caption: &str) -> String {
+    let word = caption.split(|c: char| !c.is_alphanumeric()).next().unwrap_or_default();
+    let is_word = word.chars().all(|c| c.is_ascii_lowercase()) && !["fx", "fy", "cx", "cy"].contains(&word);
+    let Some(first) = caption.chars().next().filter(|_| is_word) else { return caption.to_string() };
+    first.to_uppercase().chain(caption.chars().skip(1)).collect()
+}
+
+/// Width of an SVG of ours in CSS pixels, from its first tag.
+fn svg_width(bytes: &[u8]) -> Option<f64> {
+    let tag = std::str::from_utf8(bytes).ok()?.strip_prefix("<svg ")?.split_once('>')?.0;
+    tag.split_once("width=\"")?.1.split_once('"')?.0.parse().ok()
 }
 
 fn names(golden: &GoldenFile) -> String {
@@ -266,4 +289,27 @@ fn provenance(
     lines.push(format!("row {row} of data/{experiment}/numbers.csv"));
     lines.push(format!("calibench run {experiment}"));
     lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sentence_begins_with_a_capital_and_a_symbol_stays_itself() {
+        assert_eq!(sentence("median day of the alarm"), "Median day of the alarm");
+        assert_eq!(sentence("k2 against coverage"), "k2 against coverage");
+        assert_eq!(sentence("fx, fy and cx"), "fx, fy and cx");
+        assert_eq!(sentence("equation\u{a0}(3.2)"), "Equation\u{a0}(3.2)");
+        assert_eq!(sentence(""), "");
+    }
+
+    #[test]
+    fn the_width_of_a_drawing_is_read_from_its_first_tag() {
+        assert_eq!(
+            svg_width(b"<svg xmlns=\"x\" width=\"880\" height=\"340\"><rect width=\"1\"/>"),
+            Some(880.0)
+        );
+        assert_eq!(svg_width(b"\x89PNG width=\"880\""), None);
+    }
 }

@@ -12,7 +12,8 @@ use std::path::PathBuf;
 
 /// Folder of the pages, relative to the project.
 pub(super) const TEXT: &str = "book/text";
-const REFERENCES: &str = "book/references.toml";
+/// The works that may be cited, relative to the project.
+pub(super) const REFERENCES: &str = "book/references.toml";
 
 /// A page as it is written.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -64,8 +65,8 @@ impl Sources {
             });
         }
         let text = fs::read_to_string(project.root().join(REFERENCES));
-        let references = text.map_err(|e| e.to_string()).and_then(|text| references::parse(&text));
-        let references = references.map_err(|e| Finding::new(REFERENCES, 1, e))?;
+        let references = text.map_err(|e| (1, e.to_string())).and_then(|text| references::parse(&text));
+        let references = references.map_err(|(line, e)| Finding::new(REFERENCES, line, e))?;
         let published =
             published::chapter().map_err(|e| Finding::new("golden/published.toml", 1, e.to_string()))?;
         let published = published.to_vec();
