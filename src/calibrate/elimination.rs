@@ -215,6 +215,17 @@ impl Eliminated {
         SVector::from(self.solve_transposed(along))
     }
 
+    /// `L^-1 b`.
+    pub fn whiten(&self, mut b: [f64; 6]) -> [f64; 6] {
+        for i in 0..6 {
+            for k in 0..i {
+                b[i] -= self.factor[i][k] * b[k];
+            }
+            b[i] *= self.factor[i][i];
+        }
+        b
+    }
+
     /// `L^-T b`.
     #[inline(always)]
     fn solve_transposed(&self, mut b: [f64; 6]) -> [f64; 6] {

@@ -2,8 +2,11 @@
 
 use super::Termination;
 use super::conditioning::Conditioning;
-use super::minimise::{Minimum, Problem, State};
+use super::minimise::{Problem, State};
 use super::normal::Observations;
+use super::certificate::Certificate;
+use super::search::{self, Evidence, Judged};
+use super::start::Held;
 use super::report::{STRONG_CORRELATION, UNCERTAIN_FOCAL};
 use super::{
     Calibration, CalibrationError, Covariance, Loss, Settings, Warning, chunks, identifiability, kernel,
@@ -36,7 +39,9 @@ pub fn calibrate(views: &[View], settings: &Settings) -> Result<Calibration, Cal
 fn estimate(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
     let frame = TargetFrame::of(views);
     let (observations, homographies) = homographies(views, &frame)?;
-    let starts = start::starts(&homographies, settings, pixel_frame(&observations))?;
+    let pixel_frame = pixel_frame(&observations);
+    let held = Held::of(settings, pixel_frame.0)?;
+    let starts = start::starts(&homographies, settings, &held, pixel_frame)?;
     let problem = Problem {
         free: settings.free(),
         observations: &observations,
@@ -44,22 +49,8 @@ fn estimate(views: &[View], settings: &Settings) -> Result<Calibration, Calibrat
         max_iterations: settings.max_iterations,
         hold_tilt: false,
     };
-    report(&minimise_from(&problem, starts), &problem, &frame)
-}
-
-/// The minimum from the first start that converges, or else the lowest point reached.
-fn minimise_from(problem: &Problem<'_>, starts: Vec<State>) -> Minimum {
-    let mut best: Option<Minimum> = None;
-    for start in starts {
-        let minimum = problem.minimise(start);
-        if minimum.termination == Termination::Converged {
-            return minimum;
-        }
-        if best.as_ref().is_none_or(|b| minimum.system.cost < b.system.cost) {
-            best = Some(minimum);
-        }
-    }
-    best.expect("there is at least one start")
+    let evidence = Evidence { homographies: &homographies, held: &held, pixel_frame };
+    report(search::best_minimum(&problem, starts, &evidence), &problem, &frame)
 }
 
 fn check_counts(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
@@ -190,11 +181,12 @@ impl TargetFrame {
 }
 
 fn report(
-    minimum: &Minimum,
+    judged: Judged,
     problem: &Problem<'_>,
     frame: &TargetFrame,
 ) -> Result<Calibration, CalibrationError> {
     let observations = problem.observations;
+    let Judged { minimum, reduction, certificate, starts } = judged;
     let State { camera, cam_from_target } = &minimum.state;
     let system = &minimum.system;
     let Fit { residuals, square, largest_radius } = Fit::of(&minimum.state, observations);
@@ -202,11 +194,10 @@ fn report(
     let degrees_of_freedom = 2 * points - system.unknowns();
     let freedom = degrees_of_freedom.max(1) as f64;
     let sigma_px = (square / freedom).sqrt();
-    let reduction = system.reduction();
     let conditioning = reduction.as_ref().and_then(|reduction| Conditioning::of(system, reduction));
     // The cost under the loss in use: gross errors, which a robust loss discounts, say nothing of the noise.
     let noise_px = (system.cost / freedom).sqrt();
-    identifiability::check(problem, minimum, conditioning.as_ref(), noise_px)?;
+    identifiability::check(problem, &minimum, conditioning.as_ref(), noise_px)?;
     let unit = reduction.and_then(|reduction| reduction.covariance()).ok_or_else(|| {
         CalibrationError::NotIdentifiable {
             inseparable: vec!["camera".into(), "poses".into()],
@@ -224,13 +215,23 @@ fn report(
         degrees_of_freedom,
         covariance,
         conditioning,
-        termination: minimum.termination,
+        termination: judged_termination(minimum.termination, certificate.as_ref()),
+        certificate,
+        starts,
         iterations: minimum.iterations,
         warnings: Vec::new(),
         residuals,
     };
     calibration.warnings = warnings(&calibration, largest_radius);
     Ok(calibration)
+}
+
+/// A minimum counts as one only where the certificate holds.
+fn judged_termination(termination: Termination, certificate: Option<&Certificate>) -> Termination {
+    match termination {
+        Termination::Converged if certificate.is_some_and(|c| !c.holds()) => Termination::AboveFloor,
+        other => other,
+    }
 }
 
 /// How the minimum fits the observations.

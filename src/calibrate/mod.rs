@@ -2,8 +2,11 @@
 //!
 //! [`calibrate`] is the whole way; the steps stand in files of their own. Truth never enters here.
 
+mod certificate;
+mod chance;
 mod chunks;
 mod closed_form;
+mod condensed;
 mod conditioning;
 mod covariance;
 mod elimination;
@@ -14,13 +17,17 @@ mod kernel;
 mod loss;
 mod minimise;
 mod normal;
+mod relaxed;
 mod report;
+mod search;
 mod settings;
 pub mod single_plane;
 mod start;
 mod system;
 mod termination;
+mod tilt;
 
+pub use certificate::Certificate;
 pub use closed_form::{ClosedFormError, closed_form, pose_from_homography};
 pub use conditioning::{Conditioning, WeakComponent};
 pub use covariance::Covariance;

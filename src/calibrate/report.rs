@@ -1,6 +1,6 @@
 //! What does a calibration say? The estimate, how sure it is, how it fits, and what to be careful about.
 
-use super::{Conditioning, Covariance, Termination};
+use super::{Certificate, Conditioning, Covariance, Termination};
 use crate::camera::{Camera, FreeParameters, Parameter};
 use crate::geometry::{Pose, Vec2};
 use std::fmt;
@@ -30,6 +30,10 @@ pub struct Calibration {
     pub conditioning: Option<Conditioning>,
     /// How the refinement ended.
     pub termination: Termination,
+    /// How the cost compares with its floor; `None` under a robust loss, which has no floor that is comparable.
+    pub certificate: Option<Certificate>,
+    /// Starts that were refined: 1 where the first left no doubt.
+    pub starts: usize,
     /// Refinement steps.
     pub iterations: usize,
     /// What to be careful about.

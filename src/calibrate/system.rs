@@ -139,6 +139,16 @@ impl System {
 }
 
 impl Reduction {
+    /// The diagonal of the intrinsics' covariance for unit noise; `None` if it is singular.
+    pub fn variances(&self) -> Option<Vec<f64>> {
+        let n = self.free.len();
+        if n == 0 {
+            return Some(Vec::new());
+        }
+        let inverse = self.schur.clone().cholesky()?.inverse();
+        Some((0..n).map(|i| inverse[(i, i)]).collect())
+    }
+
     /// See [`System::covariance`].
     pub fn covariance(&self) -> Option<Covariance> {
         let n = self.free.len();

@@ -1,0 +1,288 @@
+//! Which minimum is the right one? One start where the data leave no doubt, and a search where they do.
+//!
+//! Good data need one start, and the certificate says that it was enough. Otherwise the relaxed model ([`super::relaxed`]) gives the lens and the
+//! homographies without it; focal lengths are tried against both tilts of every plane ([`super::condensed`]); the best are refined, and tilts
+//! that perspective hardly tells are tried the other way round. The least cost wins.
+
+use super::certificate::{self, Certificate};
+use super::closed_form;
+use super::condensed::{self, Hypothesis};
+use super::minimise::{Minimum, Problem, State};
+use super::relaxed::{self, Relaxed};
+use super::start::{Held, focal_from_centre};
+use super::system::Reduction;
+use super::{Termination, tilt};
+use crate::camera::{BrownConrady, Camera, FreeParameters, Parameter};
+use crate::geometry::{Homography, Vec2};
+
+/// A minimum with what is needed to judge it.
+pub(super) struct Judged {
+    pub minimum: Minimum,
+    /// `None` where a pose is undetermined.
+    pub reduction: Option<Reduction>,
+    pub certificate: Option<Certificate>,
+    /// Starts that were refined; 1 on good data.
+    pub starts: usize,
+}
+
+/// What the search starts from.
+pub(super) struct Evidence<'a> {
+    /// Pixels from target points, without distortion.
+    pub homographies: &'a [Homography],
+    pub held: &'a Held,
+    /// Centre and half-width of the pixels seen.
+    pub pixel_frame: (Vec2, f64),
+}
+
+/// A focal length known worse than this may hide another minimum that is nearly as good.
+const WELL_KNOWN: f64 = 0.01;
+
+impl Judged {
+    fn of(problem: &Problem<'_>, minimum: Minimum, starts: usize) -> Judged {
+        let reduction = minimum.system.reduction();
+        let certificate = reduction.as_ref().map(|reduction| {
+            certificate::certify(problem, &minimum.state, &reduction.eliminated, minimum.system.cost)
+        });
+        Judged { minimum, reduction, certificate, starts }
+    }
+
+    /// Whether nothing speaks for another minimum.
+    fn is_clear(&self, problem: &Problem<'_>) -> bool {
+        let certified = self.certificate.as_ref().is_some_and(|c| c.floor_freedom > 0 && c.holds());
+        self.minimum.termination == Termination::Converged
+            && certified
+            && self.focal_is_well_known(problem)
+            && self.doubtful_tilts(problem).is_empty()
+    }
+
+    fn noise_px(&self, problem: &Problem<'_>) -> f64 {
+        let coordinates = 2 * problem.observations.iter().map(|o| o.len()).sum::<usize>();
+        let freedom = coordinates.saturating_sub(self.minimum.system.unknowns()).max(1);
+        (self.minimum.system.cost / freedom as f64).sqrt()
+    }
+
+    fn focal_is_well_known(&self, problem: &Problem<'_>) -> bool {
+        let Some(variances) = self.reduction.as_ref().and_then(Reduction::variances) else { return false };
+        let noise_px = self.noise_px(problem);
+        let camera = &self.minimum.state.camera;
+        problem.free.iter().zip(variances).all(|(parameter, variance)| {
+            let scale = match parameter {
+                Parameter::Fx | Parameter::Cx => camera.fx,
+                Parameter::Fy | Parameter::Cy => camera.fy,
+                _ => return true,
+            };
+            variance.sqrt() * noise_px <= WELL_KNOWN * scale
+        })
+    }
+
+    /// Views whose other tilt might do as well.
+    fn doubtful_tilts(&self, problem: &Problem<'_>) -> Vec<usize> {
+        let State { camera, cam_from_target } = &self.minimum.state;
+        let (focal, noise_px) = (0.5 * (camera.fx + camera.fy), self.noise_px(problem));
+        let views = cam_from_target.iter().zip(problem.observations).enumerate();
+        views
+            .filter(|(_, (pose, observations))| tilt::is_doubtful(pose, observations, focal, noise_px))
+            .map(|(view, _)| view)
+            .collect()
+    }
+}
+
+/// The best minimum that is found; `starts` are tried in order until one converges, and the search goes on if that is in doubt.
+pub(super) fn best_minimum(problem: &Problem<'_>, starts: Vec<State>, evidence: &Evidence<'_>) -> Judged {
+    let (first, tried) = first_converged(problem, starts);
+    let first = Judged::of(problem, first, tried);
+    if first.is_clear(problem) {
+        return first;
+    }
+    let mut count = tried;
+    let mut best = first.minimum;
+    if let Some(relaxed) = relax(problem, evidence) {
+        for start in relaxed_starts(problem, &relaxed, evidence) {
+            count += 1;
+            let minimum = problem.minimise(start);
+            if is_better(&minimum, &best) {
+                best = minimum;
+            }
+        }
+    }
+    let best = with_better_tilts(problem, best);
+    Judged::of(problem, best, count)
+}
+
+/// The minimum from the first start that converges, or else the lowest point reached; and how many were tried.
+fn first_converged(problem: &Problem<'_>, starts: Vec<State>) -> (Minimum, usize) {
+    let mut best: Option<Minimum> = None;
+    let mut tried = 0;
+    for start in starts {
+        tried += 1;
+        let minimum = problem.minimise(start);
+        if minimum.termination == Termination::Converged {
+            return (minimum, tried);
+        }
+        if best.as_ref().is_none_or(|b| minimum.system.cost < b.system.cost) {
+            best = Some(minimum);
+        }
+    }
+    (best.expect("there is at least one start"), tried)
+}
+
+/// A lower cost, by more than rounding; among equals a search that converged.
+fn is_better(new: &Minimum, old: &Minimum) -> bool {
+    const EQUAL: f64 = 1e-9;
+    let converged = |m: &Minimum| m.termination == Termination::Converged;
+    if new.system.cost < old.system.cost * (1.0 - EQUAL) {
+        return true;
+    }
+    converged(new) && !converged(old) && new.system.cost <= old.system.cost * (1.0 + EQUAL)
+}
+
+/// The relaxed model of these data: its gauge is the focal length that is held, or else a wide lens's.
+fn relax(problem: &Problem<'_>, evidence: &Evidence<'_>) -> Option<Relaxed> {
+    use Parameter::{Cx, Cy, Fx, Fy, K1, K2, K3, P1, P2, Skew};
+    let held = evidence.held;
+    let focal_free = problem.free.contains(Fx) || problem.free.contains(Fy);
+    let lens = [K1, K2, P1, P2, K3];
+    // A coefficient held at a value is no number of the relaxed model's unless the focal length is held too.
+    let is_sought = |p: &Parameter| {
+        problem.free.contains(*p) || (focal_free && held.value(*p).is_some_and(|value| value != 0.0))
+    };
+    let mut sought =
+        lens.into_iter().filter(is_sought).fold(FreeParameters::NONE, FreeParameters::with);
+    let distorts = !sought.is_empty() || lens.iter().any(|&p| held.value(p).is_some_and(|v| v != 0.0));
+    if distorts {
+        let shape = [Cx, Cy, Skew].into_iter().filter(|&p| problem.free.contains(p));
+        sought = shape.fold(sought, FreeParameters::with);
+        if focal_free {
+            sought = sought.with(Fy);
+        }
+    }
+    let half_width = evidence.pixel_frame.1;
+    let gauge = held.value(Fx).or(held.value(Fy)).unwrap_or(2.0 * half_width);
+    let start = held.camera(Camera::pinhole(gauge, gauge, held.centre.x, held.centre.y));
+    let start = if focal_free {
+        // The coefficients start at 0: their values belong to another focal length.
+        Camera { fx: gauge, fy: gauge, ..start }.with_distortion(BrownConrady::radial(0.0, 0.0))
+    } else {
+        start
+    };
+    relaxed::relax(problem, evidence.homographies, start, sought)
+}
+
+/// Focal lengths that are tried, in units of the half-width of the pixels seen: from a fisheye to a long lens.
+const SCAN: (f64, f64) = (0.3, 60.0);
+/// Steps of the scan: 14 % each, less than the width of a minimum.
+const SCAN_STEPS: usize = 40;
+/// Minima of the scan that are refined.
+const REFINED: usize = 3;
+
+/// States to refine from, the most promising first.
+fn relaxed_starts(problem: &Problem<'_>, relaxed: &Relaxed, evidence: &Evidence<'_>) -> Vec<State> {
+    let gauge = relaxed.lens.fx;
+    let homographies: Vec<Homography> =
+        relaxed.homographies.iter().map(|h| Homography(relaxed::matrix(h))).collect();
+    let mut cameras = Vec::new();
+    let skew = problem.free.contains(Parameter::Skew);
+    if let Ok(camera) = closed_form::closed_form(&homographies, skew) {
+        cameras.push(camera);
+    }
+    let centred = |focal: f64| Camera::pinhole(focal, focal, 0.0, 0.0);
+    cameras.extend(focal_from_centre(&homographies, Vec2::zeros()).map(centred));
+    let known = cameras.iter().filter_map(|camera| hypothesis(relaxed, evidence, camera));
+    let mut hypotheses: Vec<Hypothesis> = known.collect();
+    let unit = evidence.pixel_frame.1 / gauge;
+    let ratio = libm::log(SCAN.1 / SCAN.0) / (SCAN_STEPS - 1) as f64;
+    let focal = |i: usize| unit * SCAN.0 * libm::exp(ratio * i as f64);
+    let scan: Vec<Option<Hypothesis>> =
+        (0..SCAN_STEPS).map(|i| hypothesis(relaxed, evidence, &centred(focal(i)))).collect();
+    hypotheses.extend(lowest(scan));
+    hypotheses.iter().map(|hypothesis| state_of(relaxed, evidence.held, hypothesis)).collect()
+}
+
+/// The hypothesis of a camera, its held values put in, in units of the gauge.
+fn hypothesis(relaxed: &Relaxed, evidence: &Evidence<'_>, camera: &Camera) -> Option<Hypothesis> {
+    let held = evidence.held;
+    let lens = &relaxed.lens;
+    let value = |parameter: Parameter, of: f64, unit: f64, origin: f64| {
+        held.value(parameter).map_or(of, |value| (value - origin) / unit)
+    };
+    let in_gauge = Camera {
+        skew: camera.skew,
+        ..Camera::pinhole(
+            value(Parameter::Fx, camera.fx, lens.fx, 0.0),
+            value(Parameter::Fy, camera.fy, lens.fy, 0.0),
+            value(Parameter::Cx, camera.cx, lens.fx, lens.cx),
+            value(Parameter::Cy, camera.cy, lens.fy, lens.cy),
+        )
+    };
+    condensed::hypothesis(relaxed, &in_gauge)
+}
+
+/// The lowest minima of a scan, the lowest first.
+fn lowest(scan: Vec<Option<Hypothesis>>) -> Vec<Hypothesis> {
+    let cost = |i: usize| scan.get(i).and_then(Option::as_ref).map_or(f64::INFINITY, |h| h.cost);
+    let is_minimum = |i: usize| {
+        let before = if i == 0 { f64::INFINITY } else { cost(i - 1) };
+        cost(i).is_finite() && cost(i) <= before && cost(i) < cost(i + 1)
+    };
+    let mut minima: Vec<usize> = (0..scan.len()).filter(|&i| is_minimum(i)).collect();
+    minima.sort_by(|&a, &b| cost(a).total_cmp(&cost(b)));
+    minima.truncate(REFINED);
+    minima.into_iter().filter_map(|i| scan[i].clone()).collect()
+}
+
+/// The camera and poses of a hypothesis: with `s = f / f0` the coefficients are `k1 s^2`, `k2 s^4`, `k3 s^6`, `p1 s`, `p2 s`.
+fn state_of(relaxed: &Relaxed, held: &Held, hypothesis: &Hypothesis) -> State {
+    let (lens, k) = (&relaxed.lens, &hypothesis.camera);
+    let s = k.fx;
+    let (s2, d) = (s * s, &lens.distortion);
+    let camera = Camera {
+        skew: lens.skew * s,
+        ..Camera::pinhole(
+            k.fx * lens.fx,
+            k.fy * lens.fy,
+            lens.cx + k.cx * lens.fx,
+            lens.cy + k.cy * lens.fy,
+        )
+    };
+    let distortion = BrownConrady {
+        k1: d.k1 * s2,
+        k2: d.k2 * s2 * s2,
+        k3: d.k3 * s2 * s2 * s2,
+        p1: d.p1 * s,
+        p2: d.p2 * s,
+    };
+    State {
+        camera: held.camera(camera.with_distortion(distortion)),
+        cam_from_target: hypothesis.poses.clone(),
+    }
+}
+
+/// Rounds of turning tilts and refining together.
+const TILT_ROUNDS: usize = 4;
+
+/// Turns planes whose other tilt explains their view better, the camera held, and refines; until none is left.
+fn with_better_tilts(problem: &Problem<'_>, minimum: Minimum) -> Minimum {
+    let mut best = minimum;
+    for _ in 0..TILT_ROUNDS {
+        let mut turned = best.state.clone();
+        let mut gained = false;
+        for view in 0..problem.observations.len() {
+            let (_, cost) = tilt::resected(problem, &best.state, view, best.state.cam_from_target[view]);
+            let other = tilt::mirrored(&best.state.cam_from_target[view]);
+            let (pose, other_cost) = tilt::resected(problem, &best.state, view, other);
+            if other_cost < cost * (1.0 - 1e-9) {
+                turned.cam_from_target[view] = pose;
+                gained = true;
+            }
+        }
+        if !gained {
+            break;
+        }
+        let minimum = problem.minimise(turned);
+        if !is_better(&minimum, &best) {
+            break;
+        }
+        best = minimum;
+    }
+    best
+}
