@@ -363,9 +363,9 @@ pub const FAMILIES: &[Family] = &[
         ..row("ordinary", "seven cameras, eleven sets of views, 9 x 6 marks, centred principal point", 3080)
     },
     Family {
-        cameras: &[camera(550.0, 1280.0, -0.25, 0.0)],
+        cameras: &[camera(550.0, 1280.0, -0.25, 0.06)],
         target: grid(11.0, 8.0),
-        layouts: &[set("50 views 20 deg", 50.0, 20.0, 0.4)],
+        layouts: &[set("50 views 20 deg", 50.0, 20.0, 0.3)],
         noise_px: Is(0.5),
         ..row(
             "wide-many",
@@ -374,9 +374,9 @@ pub const FAMILIES: &[Family] = &[
         )
     },
     Family {
-        cameras: &[Lens { centres: &[Centre::At(-0.19, 0.18)], ..camera(550.0, 1280.0, -0.25, 0.0) }],
+        cameras: &[Lens { centres: &[Centre::At(-0.19, 0.18)], ..camera(550.0, 1280.0, -0.25, 0.06) }],
         target: grid(11.0, 8.0),
-        layouts: &[set("50 views 20 deg", 50.0, 20.0, 0.4)],
+        layouts: &[set("50 views 20 deg", 50.0, 20.0, 0.3)],
         noise_px: Is(0.5),
         ..row(
             "wide-many-off-centre",
