@@ -17,6 +17,7 @@ mod kernel;
 mod loss;
 mod minimise;
 mod normal;
+mod radial_centre;
 mod relaxed;
 mod report;
 mod search;

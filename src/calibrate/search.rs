@@ -8,6 +8,7 @@ use super::certificate::{self, Certificate};
 use super::closed_form;
 use super::condensed::{self, Hypothesis};
 use super::minimise::{Minimum, Problem, State};
+use super::radial_centre::radial_centre;
 use super::relaxed::{self, Relaxed};
 use super::start::{Held, focal_from_centre};
 use super::system::Reduction;
@@ -97,9 +98,18 @@ pub(super) fn best_minimum(problem: &Problem<'_>, starts: Vec<State>, evidence: 
     let mut count = tried;
     let mut best = first.minimum;
     if let Some(relaxed) = relax(problem, evidence) {
+        if std::env::var("DBG").is_ok() {
+            eprintln!("first {:?} cost {} it {} cert {:?}", best.termination, best.system.cost, best.iterations, first.certificate);
+            eprintln!("  cam {:?}", best.state.camera);
+            eprintln!("relaxed cost {} lens {:?}", relaxed.cost, relaxed.lens);
+        }
         for start in relaxed_starts(problem, &relaxed, evidence) {
             count += 1;
+            let c0 = start.camera;
             let minimum = problem.minimise(start);
+            if std::env::var("DBG").is_ok() {
+                eprintln!("start {:?}\n -> {:?} {} it {} fx {}", c0, minimum.termination, minimum.system.cost, minimum.iterations, minimum.state.camera.fx);
+            }
             if is_better(&minimum, &best) {
                 best = minimum;
             }
@@ -165,7 +175,16 @@ fn relax(problem: &Problem<'_>, evidence: &Evidence<'_>) -> Option<Relaxed> {
     } else {
         start
     };
-    relaxed::relax(problem, evidence.homographies, start, sought)
+    let centres = if sought.contains(Cx) && sought.contains(Cy) {
+        vec![evidence.held.centre].into_iter().chain(radial_centre(problem.observations, evidence.pixel_frame)).collect()
+    } else {
+        vec![evidence.held.centre]
+    };
+    let fits = centres.into_iter().filter_map(|centre| {
+        let start = Camera { cx: centre.x, cy: centre.y, ..start };
+        relaxed::relax(problem, evidence.homographies, start, sought)
+    });
+    fits.min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 
 /// Focal lengths that are tried, in units of the half-width of the pixels seen: from a fisheye to a long lens.
