@@ -7,6 +7,7 @@ use super::normal::Observations;
 use super::certificate::Certificate;
 use super::search::{self, Evidence, Judged};
 use super::start::Held;
+use super::retraction::Retraction;
 use super::report::{STRONG_CORRELATION, UNCERTAIN_FOCAL};
 use super::{
     Calibration, CalibrationError, Covariance, Loss, Settings, Warning, chunks, identifiability, kernel,
@@ -48,6 +49,7 @@ fn estimate(views: &[View], settings: &Settings) -> Result<Calibration, Calibrat
         loss: settings.loss,
         max_iterations: settings.max_iterations,
         hold_tilt: false,
+        retraction: Retraction::Straight,
     };
     let evidence = Evidence { homographies: &homographies, held: &held, pixel_frame };
     report(search::best_minimum(&problem, starts, &evidence), &problem, &frame)

@@ -20,6 +20,7 @@ mod normal;
 mod radial_centre;
 mod relaxed;
 mod report;
+mod retraction;
 mod search;
 mod settings;
 pub mod single_plane;

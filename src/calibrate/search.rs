@@ -10,6 +10,7 @@ use super::condensed::{self, Hypothesis};
 use super::minimise::{Minimum, Problem, State};
 use super::radial_centre::radial_centre;
 use super::relaxed::{self, Relaxed};
+use super::retraction::Retraction;
 use super::start::{Held, focal_from_centre};
 use super::system::Reduction;
 use super::{Termination, tilt};
@@ -106,7 +107,8 @@ pub(super) fn best_minimum(problem: &Problem<'_>, starts: Vec<State>, evidence: 
         for start in relaxed_starts(problem, &relaxed, evidence) {
             count += 1;
             let c0 = start.camera;
-            let minimum = problem.minimise(start);
+            let patient = Problem { max_iterations: 10 * problem.max_iterations, retraction: Retraction::Curved, ..*problem };
+            let minimum = patient.minimise(start);
             if std::env::var("DBG").is_ok() {
                 eprintln!("start {:?}\n -> {:?} {} it {} fx {}", c0, minimum.termination, minimum.system.cost, minimum.iterations, minimum.state.camera.fx);
             }
