@@ -18,7 +18,7 @@ use super::chance::fisher_tail;
 use super::elimination::Eliminated;
 use super::kernel::{self, Strain};
 use super::minimise::{Problem, State};
-use super::{Loss, chunks};
+use super::chunks;
 use crate::camera::Parameter;
 
 /// A right minimum of a model that holds misses its certificate with this probability at most: rare among the calibrations of a lifetime,

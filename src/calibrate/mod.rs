@@ -28,6 +28,7 @@ mod start;
 mod system;
 mod termination;
 mod tilt;
+mod walk;
 
 pub use certificate::Certificate;
 pub use closed_form::{ClosedFormError, closed_form, pose_from_homography};

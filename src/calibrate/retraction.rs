@@ -101,14 +101,44 @@ fn curved_pose(pose: &Pose, delta: &SVector<f64, 6>, focal: [f64; 2]) -> Pose {
         let change = delta[0] * r[(1, column)] - delta[1] * r[(0, column)];
         s * (r[(2, column)] * (1.0 - rate) + change)
     };
-    let (a, b) = (row(0), row(1));
+    Pose { rotation: with_axis(&straight.rotation, row(0), row(1)), translation }
+}
+
+/// The rotation turned, the shortest way, so that the optical axis has the components `a`, `b` along the target's axes; unchanged where
+/// there is no such direction.
+fn with_axis(rotation: &Mat3, a: f64, b: f64) -> Mat3 {
     let in_plane = a * a + b * b;
     if in_plane >= 1.0 {
-        return Pose { rotation: straight.rotation, translation };
+        return *rotation;
     }
-    let wanted = Vec3::new(a, b, (1.0 - in_plane).sqrt() * r[(2, 2)].signum());
-    let reached: Vec3 = straight.rotation.row(2).transpose();
-    Pose { rotation: straight.rotation * between(&wanted, &reached), translation }
+    let wanted = Vec3::new(a, b, (1.0 - in_plane).sqrt() * rotation[(2, 2)].signum());
+    let reached: Vec3 = rotation.row(2).transpose();
+    rotation * between(&wanted, &reached)
+}
+
+/// The state with the focal lengths that are free `s` times as long, and all that follows them: distances, tilts, coefficients. Its images
+/// agree to second order in the tilts.
+pub(super) fn scaled(state: &State, free: FreeParameters, s: f64) -> State {
+    let powers = [
+        (Parameter::Fx, 1),
+        (Parameter::Fy, 1),
+        (Parameter::K1, 2),
+        (Parameter::K2, 4),
+        (Parameter::P1, 1),
+        (Parameter::P2, 1),
+        (Parameter::K3, 6),
+    ];
+    let moved = powers.into_iter().filter(|&(p, _)| free.contains(p)).fold(state.camera, |camera, (p, power)| {
+        camera.with(p, (0..power).fold(camera.get(p), |value, _| value * s))
+    });
+    let pose = |pose: &Pose| {
+        let (r, t) = (&pose.rotation, &pose.translation);
+        Pose {
+            rotation: with_axis(r, s * r[(2, 0)], s * r[(2, 1)]),
+            translation: Vec3::new(t.x, t.y, s * t.z),
+        }
+    };
+    State { camera: moved, cam_from_target: state.cam_from_target.iter().map(pose).collect() }
 }
 
 /// The shortest rotation that takes unit vector `from` to unit vector `to`; none where they are opposite.

@@ -13,6 +13,7 @@ use super::relaxed::{self, Relaxed};
 use super::retraction::Retraction;
 use super::start::{Held, focal_from_centre};
 use super::system::Reduction;
+use super::walk::{self, Walked};
 use super::{Termination, tilt};
 use crate::camera::{BrownConrady, Camera, FreeParameters, Parameter};
 use crate::geometry::{Homography, Vec2};
@@ -96,30 +97,34 @@ pub(super) fn best_minimum(problem: &Problem<'_>, starts: Vec<State>, evidence: 
     if first.is_clear(problem) {
         return first;
     }
+    let patient = Problem {
+        max_iterations: PATIENCE * problem.max_iterations,
+        retraction: Retraction::Curved,
+        ..*problem
+    };
     let mut count = tried;
     let mut best = first.minimum;
     if let Some(relaxed) = relax(problem, evidence) {
-        if std::env::var("DBG").is_ok() {
-            eprintln!("first {:?} cost {} it {} cert {:?}", best.termination, best.system.cost, best.iterations, first.certificate);
-            eprintln!("  cam {:?}", best.state.camera);
-            eprintln!("relaxed cost {} lens {:?}", relaxed.cost, relaxed.lens);
-        }
         for start in relaxed_starts(problem, &relaxed, evidence) {
             count += 1;
-            let c0 = start.camera;
-            let patient = Problem { max_iterations: 10 * problem.max_iterations, retraction: Retraction::Curved, ..*problem };
             let minimum = patient.minimise(start);
-            if std::env::var("DBG").is_ok() {
-                eprintln!("start {:?}\n -> {:?} {} it {} fx {}", c0, minimum.termination, minimum.system.cost, minimum.iterations, minimum.state.camera.fx);
-            }
             if is_better(&minimum, &best) {
                 best = minimum;
             }
         }
     }
-    let best = with_better_tilts(problem, best);
-    Judged::of(problem, best, count)
+    let best = walk::with_better_tilts(&patient, best);
+    let judged = Judged::of(problem, best, count);
+    if judged.focal_is_well_known(problem) {
+        return judged;
+    }
+    let noise_px = judged.noise_px(problem);
+    let Walked { best, starts, .. } = walk::along_focal_length(&patient, judged.minimum, noise_px);
+    Judged::of(problem, best, count + starts)
 }
+
+/// A search in doubt may take this many times the iterations.
+const PATIENCE: usize = 10;
 
 /// The minimum from the first start that converges, or else the lowest point reached; and how many were tried.
 fn first_converged(problem: &Problem<'_>, starts: Vec<State>) -> (Minimum, usize) {
@@ -139,7 +144,7 @@ fn first_converged(problem: &Problem<'_>, starts: Vec<State>) -> (Minimum, usize
 }
 
 /// A lower cost, by more than rounding; among equals a search that converged.
-fn is_better(new: &Minimum, old: &Minimum) -> bool {
+pub(super) fn is_better(new: &Minimum, old: &Minimum) -> bool {
     const EQUAL: f64 = 1e-9;
     let converged = |m: &Minimum| m.termination == Termination::Converged;
     if new.system.cost < old.system.cost * (1.0 - EQUAL) {
@@ -276,34 +281,4 @@ fn state_of(relaxed: &Relaxed, held: &Held, hypothesis: &Hypothesis) -> State {
         camera: held.camera(camera.with_distortion(distortion)),
         cam_from_target: hypothesis.poses.clone(),
     }
-}
-
-/// Rounds of turning tilts and refining together.
-const TILT_ROUNDS: usize = 4;
-
-/// Turns planes whose other tilt explains their view better, the camera held, and refines; until none is left.
-fn with_better_tilts(problem: &Problem<'_>, minimum: Minimum) -> Minimum {
-    let mut best = minimum;
-    for _ in 0..TILT_ROUNDS {
-        let mut turned = best.state.clone();
-        let mut gained = false;
-        for view in 0..problem.observations.len() {
-            let (_, cost) = tilt::resected(problem, &best.state, view, best.state.cam_from_target[view]);
-            let other = tilt::mirrored(&best.state.cam_from_target[view]);
-            let (pose, other_cost) = tilt::resected(problem, &best.state, view, other);
-            if other_cost < cost * (1.0 - 1e-9) {
-                turned.cam_from_target[view] = pose;
-                gained = true;
-            }
-        }
-        if !gained {
-            break;
-        }
-        let minimum = problem.minimise(turned);
-        if !is_better(&minimum, &best) {
-            break;
-        }
-        best = minimum;
-    }
-    best
 }
