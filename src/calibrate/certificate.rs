@@ -6,18 +6,20 @@
 //! with at most two degrees of freedom a view (a homography has eight parameters, a pose six).
 //!
 //! At a minimum of the calibration the relaxed model's gradient is left in the two strains of each plane alone
-//! ([`super::kernel::Strain`]). One Gauss-Newton step along them, the lens held, tells how far the cost would fall (Rao's score test): with
+//! ([`super::kernel::Strain`]). A Gauss-Newton step of the whole relaxed model tells how far the cost would fall (Rao's score test): with the
+//! columns `E` of the strains, poses and intrinsics eliminated from them,
 //!
 //! ```text
-//! T = sum_i g_i^T S_i^-1 g_i,   floor F = cost - T,   statistic (T / d1) / (F / d2),   d1 = 2 V,   d2 = 2 N - 8 V - n
+//! T = g^T (E^T E)^-1 g,   floor F = cost - T,   statistic (T / d1) / (F / d2),   d1 = 2 V,   d2 = 2 N - 8 V - n
 //! ```
-//! for `V` views, `N` points and `n` free parameters of the lens, the statistic follows Fisher's distribution at most. Holding the lens makes
-//! `T` smaller, so that the probability told is an upper bound.
+//! for `V` views, `N` points and `n` free parameters of the lens, the statistic follows Fisher's distribution at most: focal length and the
+//! like take some of the `2 V` degrees of freedom, so that the probability told is an upper bound.
 
 use super::chance::fisher_tail;
 use super::elimination::Eliminated;
 use super::kernel::{self, Strain};
 use super::minimise::{Problem, State};
+use super::system::{N, Reduction};
 use super::chunks;
 use crate::camera::Parameter;
 
@@ -66,59 +68,120 @@ impl Certificate {
     }
 }
 
-/// The certificate of a minimum whose pose blocks `eliminated` holds, and whose cost is `cost`.
-pub(super) fn certify(
-    problem: &Problem<'_>,
-    state: &State,
-    eliminated: &[Eliminated],
-    cost: f64,
-) -> Certificate {
+/// The certificate of a minimum: its pose blocks and reduced equations stand in `reduction`, and its cost is `cost`.
+pub(super) fn certify(problem: &Problem<'_>, state: &State, reduction: &Reduction, cost: f64) -> Certificate {
     let views = problem.observations.len();
-    let points: usize = problem.observations.iter().map(kernel_len).sum();
-    let radial = kernel::is_radial(&state.camera, problem.free);
-    let mut gain = 0.0;
-    for part in chunks::map(problem.observations, |view, pairs| {
-        let pose = &state.cam_from_target[view];
-        fall(&kernel::view_strain(&state.camera, pose, pairs, problem.loss, radial), &eliminated[view])
-    }) {
-        gain += part;
-    }
+    let points: usize = problem.observations.iter().map(|pairs| pairs.len()).sum();
     // What rounding leaves of exact data proves nothing.
+    let gain = score(problem, state, reduction);
     let floor = (cost - gain).max(problem.rounding_cost()).min(cost);
     let lens = problem.free.iter().filter(|&p| p >= Parameter::K1).count();
     let floor_freedom = (2 * points).saturating_sub(8 * views + lens);
     Certificate::of(cost, floor, points, 2 * views, floor_freedom)
 }
 
-fn kernel_len(pairs: &super::normal::Observations) -> usize {
-    pairs.len()
+/// `T`: with the strains of a view eliminated after its pose, `S_i = E_i^T E_i - ...`, `U_i` their coupling with the intrinsics and `g_i` their
+/// gradient, `T = sum g_i^T S_i^-1 g_i + w^T (S - sum U_i^T S_i^-1 U_i)^+ w` with `w = sum U_i^T S_i^-1 g_i`. The inverse is a pseudo-inverse:
+/// free homographies know no focal length.
+fn score(problem: &Problem<'_>, state: &State, reduction: &Reduction) -> f64 {
+    let radial = kernel::is_radial(&state.camera, problem.free);
+    let parameters: Vec<usize> = problem.free.iter().map(|p| p as usize).collect();
+    let n = parameters.len();
+    let mut matrix = [[0.0; N]; N];
+    for (i, row) in matrix.iter_mut().enumerate().take(n) {
+        for (j, entry) in row.iter_mut().enumerate().take(n) {
+            *entry = reduction.schur[(i, j)];
+        }
+    }
+    let scale: [f64; N] = std::array::from_fn(|i| if i < n { matrix[i][i] } else { 0.0 });
+    let (mut gain, mut right) = (0.0, [0.0; N]);
+    let shares = chunks::map(problem.observations, |view, pairs| {
+        let strain = kernel::view_strain(&state.camera, &state.cam_from_target[view], pairs, problem.loss, radial);
+        Share::of(&strain, &reduction.eliminated[view], &parameters)
+    });
+    for share in &shares {
+        for (column, gradient) in share.columns.iter().zip(share.gradient) {
+            gain += gradient * gradient;
+            for i in 0..n {
+                right[i] += column[i] * gradient;
+                for j in i..n {
+                    matrix[i][j] -= column[i] * column[j];
+                }
+            }
+        }
+    }
+    gain + quadratic_form(&mut matrix, &mut right, &scale, n)
 }
 
-/// `g^T S^-1 g` of a view: the fall of its cost that a strain of its plane promises.
-fn fall(strain: &Strain, pose: &Eliminated) -> f64 {
-    let [a, b] = strain.pose.map(|column| pose.whiten(column));
-    let dot = |x: &[f64; 6], y: &[f64; 6]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
-    let (aa, ab, bb) = (
-        strain.square[0] - dot(&a, &a),
-        strain.square[1] - dot(&a, &b),
-        strain.square[2] - dot(&b, &b),
-    );
-    let [ga, gb] = strain.gradient;
-    // Without perspective and with few points a strain may be no more than rounding: it then says nothing.
-    let known = |left: f64, whole: f64| left > SMALLEST_SHARE * whole;
-    match (known(aa, strain.square[0]), known(bb, strain.square[2])) {
-        (true, true) => {
-            let rest = bb - ab * ab / aa;
-            let first = ga * ga / aa;
-            let turned = gb - ga * ab / aa;
-            if known(rest, strain.square[2]) { first + turned * turned / rest } else { first }
+/// What the strains of a view say: two orthonormal combinations of them, each with its coupling to the intrinsics and its gradient.
+struct Share {
+    columns: [[f64; N]; 2],
+    gradient: [f64; 2],
+}
+
+impl Share {
+    fn of(strain: &Strain, pose: &Eliminated, parameters: &[usize]) -> Share {
+        let n = parameters.len();
+        let [a, b] = strain.pose.map(|column| pose.whiten(column));
+        let dot = |x: &[f64; 6], y: &[f64; 6]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+        let coupling = |own: &[f64; Parameter::COUNT], whitened: &[f64; 6]| {
+            let through_pose = pose.coupled(whitened, n);
+            let mut left = [0.0; N];
+            for (i, &parameter) in parameters.iter().enumerate() {
+                left[i] = own[parameter] - through_pose[i];
+            }
+            left
+        };
+        let mut columns = [coupling(&strain.intrinsics[0], &a), coupling(&strain.intrinsics[1], &b)];
+        let mut gradient = strain.gradient;
+        let (aa, ab) = (strain.square[0] - dot(&a, &a), strain.square[1] - dot(&a, &b));
+        // Without perspective and with few points a strain may be no more than rounding: it then says nothing.
+        let first = inverse_root(aa, strain.square[0]);
+        columns[0] = columns[0].map(|x| x * first);
+        gradient[0] *= first;
+        let along = ab * first;
+        let rest = strain.square[2] - dot(&b, &b) - along * along;
+        let second = inverse_root(rest, strain.square[2]);
+        for i in 0..n {
+            columns[1][i] = (columns[1][i] - along * columns[0][i]) * second;
         }
-        (true, false) => ga * ga / aa,
-        (false, true) => gb * gb / bb,
-        (false, false) => 0.0,
+        gradient[1] = (gradient[1] - along * gradient[0]) * second;
+        Share { columns, gradient }
     }
 }
 
-/// A strain of which less than this part is left beside the pose is known by rounding only.
-const SMALLEST_SHARE: f64 = 1e-11;
+/// `1 / sqrt(left)`, or 0 where too little is left of the whole.
+fn inverse_root(left: f64, whole: f64) -> f64 {
+    if left > SMALLEST_SHARE * whole { 1.0 / left.sqrt() } else { 0.0 }
+}
 
+/// Of which less than this part is left after an elimination is known by rounding only.
+const SMALLEST_SHARE: f64 = 1e-11;
+/// Likewise for the intrinsics, of which free homographies leave some undetermined: several eliminations' rounding.
+const SMALLEST_PIVOT: f64 = 1e-9;
+
+/// `r^T M^+ r` for a positive semi-definite `M` (upper triangle) and `r` in its range, by elimination with the largest pivot first; what is left
+/// of a parameter is compared with `scale`, its size at first.
+fn quadratic_form(matrix: &mut [[f64; N]; N], right: &mut [f64; N], scale: &[f64; N], n: usize) -> f64 {
+    let mut sum = 0.0;
+    let mut left: [bool; N] = std::array::from_fn(|i| i < n);
+    for _ in 0..n {
+        let share = |i: usize| matrix[i][i] / scale[i];
+        let Some(p) = (0..n).filter(|&i| left[i]).max_by(|&i, &j| share(i).total_cmp(&share(j))) else { break };
+        if share(p).is_nan() || share(p) <= SMALLEST_PIVOT {
+            break;
+        }
+        left[p] = false;
+        let pivot = matrix[p][p];
+        sum += right[p] * right[p] / pivot;
+        let row: [f64; N] = std::array::from_fn(|j| if j < n { matrix[p.min(j)][p.max(j)] } else { 0.0 });
+        for i in (0..n).filter(|&i| left[i]) {
+            let factor = row[i] / pivot;
+            right[i] -= factor * right[p];
+            for j in (i..n).filter(|&j| left[j]) {
+                matrix[i][j] -= factor * row[j];
+            }
+        }
+    }
+    sum
+}

@@ -52,7 +52,7 @@ fn estimate(views: &[View], settings: &Settings) -> Result<Calibration, Calibrat
         retraction: Retraction::Straight,
     };
     let evidence = Evidence { homographies: &homographies, held: &held, pixel_frame };
-    report(search::best_minimum(&problem, starts, &evidence), &problem, &frame)
+    report(search::best_minimum(&problem, starts, &evidence)?, &problem, &frame)
 }
 
 fn check_counts(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
@@ -197,9 +197,9 @@ fn report(
     let freedom = degrees_of_freedom.max(1) as f64;
     let sigma_px = (square / freedom).sqrt();
     let conditioning = reduction.as_ref().and_then(|reduction| Conditioning::of(system, reduction));
-    // The cost under the loss in use: gross errors, which a robust loss discounts, say nothing of the noise.
-    let noise_px = (system.cost / freedom).sqrt();
-    identifiability::check(problem, &minimum, conditioning.as_ref(), noise_px)?;
+    if !problem.free.is_empty() {
+        identifiability::refuse_if_singular(conditioning.as_ref(), || "the normal equations are singular".into())?;
+    }
     let unit = reduction.and_then(|reduction| reduction.covariance()).ok_or_else(|| {
         CalibrationError::NotIdentifiable {
             inseparable: vec!["camera".into(), "poses".into()],

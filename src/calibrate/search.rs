@@ -13,8 +13,8 @@ use super::relaxed::{self, Relaxed};
 use super::retraction::Retraction;
 use super::start::{Held, focal_from_centre};
 use super::system::Reduction;
-use super::walk::{self, Walked};
-use super::{Termination, tilt};
+use super::identifiability::{self, tilts_are_evident};
+use super::{CalibrationError, Termination, tilt, walk};
 use crate::camera::{BrownConrady, Camera, FreeParameters, Parameter};
 use crate::geometry::{Homography, Vec2};
 
@@ -37,6 +37,11 @@ pub(super) struct Evidence<'a> {
     pub pixel_frame: (Vec2, f64),
 }
 
+/// A certificate whose probability is below this is no reason to refuse a minimum, but one to look for a better.
+const CLEAR: f64 = 1e-4;
+/// Good data take five to ten iterations; a search that took more came from far away.
+const SHORT_WAY: usize = 25;
+
 /// A focal length known worse than this may hide another minimum that is nearly as good.
 const WELL_KNOWN: f64 = 0.01;
 
@@ -44,27 +49,28 @@ impl Judged {
     fn of(problem: &Problem<'_>, minimum: Minimum, starts: usize) -> Judged {
         let reduction = minimum.system.reduction();
         let certificate = reduction.as_ref().map(|reduction| {
-            certificate::certify(problem, &minimum.state, &reduction.eliminated, minimum.system.cost)
+            certificate::certify(problem, &minimum.state, reduction, minimum.system.cost)
         });
         Judged { minimum, reduction, certificate, starts }
     }
 
     /// Whether nothing speaks for another minimum.
     fn is_clear(&self, problem: &Problem<'_>) -> bool {
-        let certified = self.certificate.as_ref().is_some_and(|c| c.floor_freedom > 0 && c.holds());
+        let certified = self.certificate.as_ref().is_some_and(|c| c.floor_freedom > 0 && c.p_value > CLEAR);
         self.minimum.termination == Termination::Converged
+            && self.minimum.iterations <= SHORT_WAY
             && certified
-            && self.focal_is_well_known(problem)
+            && self.is_well_known(problem)
+            && tilts_are_evident(problem, &self.minimum.state, self.noise_px(problem))
             && self.doubtful_tilts(problem).is_empty()
     }
 
     fn noise_px(&self, problem: &Problem<'_>) -> f64 {
-        let coordinates = 2 * problem.observations.iter().map(|o| o.len()).sum::<usize>();
-        let freedom = coordinates.saturating_sub(self.minimum.system.unknowns()).max(1);
-        (self.minimum.system.cost / freedom as f64).sqrt()
+        noise_of(problem, &self.minimum)
     }
 
-    fn focal_is_well_known(&self, problem: &Problem<'_>) -> bool {
+    /// Whether focal lengths and principal point are known so well that no other minimum can be nearly as good.
+    fn is_well_known(&self, problem: &Problem<'_>) -> bool {
         let Some(variances) = self.reduction.as_ref().and_then(Reduction::variances) else { return false };
         let noise_px = self.noise_px(problem);
         let camera = &self.minimum.state.camera;
@@ -75,6 +81,15 @@ impl Judged {
                 _ => return true,
             };
             variance.sqrt() * noise_px <= WELL_KNOWN * scale
+        })
+    }
+
+    /// Standard deviations of cx and cy; infinite where nothing is known, `None` where they are held.
+    fn centre_deviations(&self, problem: &Problem<'_>) -> [Option<f64>; 2] {
+        let variances = self.reduction.as_ref().and_then(Reduction::variances);
+        [Parameter::Cx, Parameter::Cy].map(|parameter| {
+            let row = problem.free.position(parameter)?;
+            Some(variances.as_ref().map_or(f64::INFINITY, |v| v[row].sqrt() * self.noise_px(problem)))
         })
     }
 
@@ -90,12 +105,23 @@ impl Judged {
     }
 }
 
+/// Standard deviation of a pixel coordinate, from the cost under the loss in use: gross errors, which a robust loss discounts, say nothing of
+/// the noise.
+pub(super) fn noise_of(problem: &Problem<'_>, minimum: &Minimum) -> f64 {
+    let coordinates = 2 * problem.observations.iter().map(|o| o.len()).sum::<usize>();
+    let freedom = coordinates.saturating_sub(minimum.system.unknowns()).max(1);
+    (minimum.system.cost / freedom as f64).sqrt()
+}
+
 /// The best minimum that is found; `starts` are tried in order until one converges, and the search goes on if that is in doubt.
-pub(super) fn best_minimum(problem: &Problem<'_>, starts: Vec<State>, evidence: &Evidence<'_>) -> Judged {
+///
+/// # Errors
+/// Where the data do not determine focal length or principal point.
+pub(super) fn best_minimum(problem: &Problem<'_>, starts: Vec<State>, evidence: &Evidence<'_>) -> Result<Judged, CalibrationError> {
     let (first, tried) = first_converged(problem, starts);
     let first = Judged::of(problem, first, tried);
     if first.is_clear(problem) {
-        return first;
+        return Ok(first);
     }
     let patient = Problem {
         max_iterations: PATIENCE * problem.max_iterations,
@@ -115,12 +141,16 @@ pub(super) fn best_minimum(problem: &Problem<'_>, starts: Vec<State>, evidence: 
     }
     let best = walk::with_better_tilts(&patient, best);
     let judged = Judged::of(problem, best, count);
-    if judged.focal_is_well_known(problem) {
-        return judged;
-    }
     let noise_px = judged.noise_px(problem);
-    let Walked { best, starts, .. } = walk::along_focal_length(&patient, judged.minimum, noise_px);
-    Judged::of(problem, best, count + starts)
+    if judged.is_well_known(problem) && tilts_are_evident(problem, &judged.minimum.state, noise_px) {
+        return Ok(judged);
+    }
+    let centre_sd = judged.centre_deviations(problem);
+    let walked = walk::far_away(&patient, judged.minimum, noise_px, centre_sd);
+    let noise_px = noise_of(problem, &walked.best);
+    identifiability::refuse_if_flat(problem, &walked, noise_px)?;
+    identifiability::refuse_if_parallel(problem, &walked.best, noise_px)?;
+    Ok(Judged::of(problem, walked.best, count + walked.starts))
 }
 
 /// A search in doubt may take this many times the iterations.

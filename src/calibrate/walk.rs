@@ -4,6 +4,7 @@
 //! the focal length with the better tilt of every plane at each step meets them one after another. The same walk tells how far the
 //! focal length could be off: where the cost does not rise, the data do not determine it.
 
+use super::identifiability::{LEAST_RISE, variance};
 use super::minimise::{Minimum, Problem};
 use super::retraction::scaled;
 use super::search::is_better;
@@ -14,6 +15,10 @@ use crate::camera::Parameter;
 const STEP: f64 = 1.2;
 /// Steps each way: a factor of 3.
 const STEPS: usize = 6;
+/// A principal point this part of the focal length away is far: 27 degrees off the axis.
+const FAR_CENTRE: f64 = 0.5;
+/// A principal point known to this part of the focal length is not asked.
+const KNOWN_CENTRE: f64 = 0.01;
 /// The walk turns where the cost has risen by this many variances: what is farther off is far worse.
 const RISEN: f64 = 100.0;
 /// From steps of the walk whose cost exceeds the least by fewer variances than this, the search goes on with the focal length free.
@@ -26,53 +31,95 @@ pub(super) struct Walked {
     pub best: Minimum,
     /// Searches on the way.
     pub starts: usize,
-    /// `(focal length over the best one's, cost)` of the last walk, in order.
-    pub profile: Vec<(f64, f64)>,
+    /// Where the walk went as far as it goes.
+    pub far: Vec<Far>,
 }
 
-/// Walks both ways from a minimum, and again from any better one, for noise of `noise_px`.
-pub(super) fn along_focal_length(problem: &Problem<'_>, minimum: Minimum, noise_px: f64) -> Walked {
-    let mut walked = Walked { best: minimum, starts: 0, profile: Vec::new() };
-    let Some(focal) = [Parameter::Fx, Parameter::Fy].into_iter().find(|&p| problem.free.contains(p)) else {
-        return walked;
-    };
-    let variance = noise_px * noise_px;
+/// A parameter far from its estimate, the rest refitted.
+pub(super) struct Far {
+    pub parameter: Parameter,
+    pub minimum: Minimum,
+}
+
+/// Walks from a minimum, and again from any better one it meets, for noise of `noise_px`; `centre_sd` are the standard deviations of the
+/// principal point.
+pub(super) fn far_away(problem: &Problem<'_>, minimum: Minimum, noise_px: f64, centre_sd: [Option<f64>; 2]) -> Walked {
+    let mut walked = Walked { best: minimum, starts: 0, far: Vec::new() };
+    let limit = RISEN.max(LEAST_RISE) * variance(problem, noise_px);
     for _ in 0..WALKS {
-        let origin = walked.best.system.cost;
-        let mut profile = Vec::new();
-        let mut better: Option<Minimum> = None;
+        walked.far.clear();
+        let mut better = None;
         for factor in [STEP, 1.0 / STEP] {
-            let mut state = walked.best.state.clone();
-            let mut total = 1.0;
-            for _ in 0..STEPS {
-                total *= factor;
-                let held = Problem { free: problem.free.without(focal), ..*problem };
-                let start = scaled(&state, problem.free, factor);
-                let step = with_better_tilts(&held, held.minimise(start));
-                walked.starts += 1;
-                profile.push((total, step.system.cost));
-                let least = better.as_ref().map_or(origin, |b| b.system.cost);
-                if step.system.cost < least + PROMISING * variance {
-                    let minimum = with_better_tilts(problem, problem.minimise(step.state.clone()));
-                    walked.starts += 1;
-                    if is_better(&minimum, better.as_ref().unwrap_or(&walked.best)) {
-                        better = Some(minimum);
-                    }
-                }
-                if step.system.cost > origin + RISEN * variance {
-                    break;
-                }
-                state = step.state;
+            walk(problem, factor, noise_px, limit, &mut walked, &mut better);
+        }
+        for (parameter, sd) in [Parameter::Cx, Parameter::Cy].into_iter().zip(centre_sd) {
+            if sd.is_some_and(|sd| sd > KNOWN_CENTRE * walked.best.state.camera.fx) {
+                step_aside(problem, parameter, limit, &mut walked);
             }
         }
-        profile.sort_by(|a, b| a.0.total_cmp(&b.0));
-        walked.profile = profile;
         match better {
             Some(minimum) => walked.best = minimum,
             None => break,
         }
     }
     walked
+}
+
+/// Walks along the focal length until the cost has risen by `limit` or the focal length has changed by a factor of 3.
+fn walk(
+    problem: &Problem<'_>,
+    factor: f64,
+    noise_px: f64,
+    limit: f64,
+    walked: &mut Walked,
+    better: &mut Option<Minimum>,
+) {
+    let Some(focal) = [Parameter::Fx, Parameter::Fy].into_iter().find(|&p| problem.free.contains(p)) else {
+        return;
+    };
+    let held = Problem { free: problem.free.without(focal), ..*problem };
+    let origin = walked.best.system.cost;
+    let mut state = walked.best.state.clone();
+    for number in 1..=STEPS {
+        let step = with_better_tilts(&held, held.minimise(scaled(&state, problem.free, factor)));
+        walked.starts += 1;
+        let least = better.as_ref().map_or(origin, |b| b.system.cost);
+        if step.system.cost < least + PROMISING * noise_px * noise_px {
+            let minimum = with_better_tilts(problem, problem.minimise(step.state.clone()));
+            walked.starts += 1;
+            if is_better(&minimum, better.as_ref().unwrap_or(&walked.best)) {
+                *better = Some(minimum);
+            }
+        }
+        if step.system.cost > origin + limit {
+            break;
+        }
+        state = step.state.clone();
+        if number == STEPS {
+            walked.far.push(Far { parameter: focal, minimum: step });
+        }
+    }
+}
+
+/// Moves the principal point far away, both ways, the targets with it.
+fn step_aside(problem: &Problem<'_>, parameter: Parameter, limit: f64, walked: &mut Walked) {
+    let held = Problem { free: problem.free.without(parameter), ..*problem };
+    for side in [FAR_CENTRE, -FAR_CENTRE] {
+        let mut state = walked.best.state.clone();
+        let (focal, row) = match parameter {
+            Parameter::Cx => (state.camera.fx, 0),
+            _ => (state.camera.fy, 1),
+        };
+        state.camera = state.camera.with(parameter, state.camera.get(parameter) + side * focal);
+        for pose in &mut state.cam_from_target {
+            pose.translation[row] -= side * pose.translation.z;
+        }
+        let minimum = held.minimise(state);
+        walked.starts += 1;
+        if minimum.system.cost <= walked.best.system.cost + limit {
+            walked.far.push(Far { parameter, minimum });
+        }
+    }
 }
 
 /// Rounds of turning tilts and refining together.
