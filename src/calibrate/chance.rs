@@ -18,7 +18,7 @@ pub(super) fn fisher_tail(f: f64, numerator_freedom: usize, denominator_freedom:
 }
 
 /// Rounded to nine significant digits, in binary scale: no logarithm is needed.
-fn significant(x: f64) -> f64 {
+pub(super) fn significant(x: f64) -> f64 {
     if x <= 0.0 || !x.is_finite() {
         return 0.0;
     }
@@ -31,10 +31,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tails_are_those_of_tables() {
-        // Quantiles of the F distribution: F(0.95; 2, 20) = 3.4928, F(0.99; 8, 400) = 2.5557 (R: qf).
-        assert!((fisher_tail(3.492828, 2, 20) - 0.05).abs() < 1e-6);
-        assert!((fisher_tail(2.5548, 8, 400) - 0.01).abs() < 2e-5);
+    fn tails_are_those_of_closed_forms() {
+        // With x = d2 / (d2 + d1 f): x^(d2/2) for d1 = 2, and x^(d2/2) (1 + (1 - x) d2 / 2) for d1 = 4.
+        for (f, d2) in [(0.3, 20), (3.5, 20), (2.0, 400), (9.0, 401)] {
+            let x = |d1: f64| f64::from(d2) / (f64::from(d2) + d1 * f);
+            let half = 0.5 * f64::from(d2);
+            let two = libm::pow(x(2.0), half);
+            let four = libm::pow(x(4.0), half) * (1.0 + half * (1.0 - x(4.0)));
+            assert!((fisher_tail(f, 2, d2 as usize) / two - 1.0).abs() < 1e-8);
+            assert!((fisher_tail(f, 4, d2 as usize) / four - 1.0).abs() < 1e-8);
+        }
         assert_eq!(fisher_tail(-1.0, 2, 20), 1.0);
         assert!(fisher_tail(100.0, 8, 400) < 1e-80);
     }

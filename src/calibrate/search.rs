@@ -7,6 +7,7 @@
 use super::certificate::{self, Certificate};
 use super::closed_form;
 use super::condensed::{self, Hypothesis};
+use super::intervals::{Profile, Skewed};
 use super::minimise::{Minimum, Problem, State};
 use super::radial_centre::radial_centre;
 use super::relaxed::{self, Relaxed};
@@ -26,6 +27,8 @@ pub(super) struct Judged {
     pub certificate: Option<Certificate>,
     /// Starts that were refined; 1 on good data.
     pub starts: usize,
+    /// Parameters whose cost is no parabola: asked only where they are known poorly.
+    pub skewed: Vec<Skewed>,
 }
 
 /// What the search starts from.
@@ -51,7 +54,7 @@ impl Judged {
         let certificate = reduction.as_ref().map(|reduction| {
             certificate::certify(problem, &minimum.state, reduction, minimum.system.cost)
         });
-        Judged { minimum, reduction, certificate, starts }
+        Judged { minimum, reduction, certificate, starts, skewed: Vec::new() }
     }
 
     /// Whether nothing speaks for another minimum.
@@ -71,10 +74,12 @@ impl Judged {
 
     /// Whether focal lengths and principal point are known so well that no other minimum can be nearly as good.
     fn is_well_known(&self, problem: &Problem<'_>) -> bool {
-        let Some(variances) = self.reduction.as_ref().and_then(Reduction::variances) else { return false };
+        let Some(covariance) = self.reduction.as_ref().and_then(Reduction::intrinsics_covariance) else {
+            return false;
+        };
         let noise_px = self.noise_px(problem);
         let camera = &self.minimum.state.camera;
-        problem.free.iter().zip(variances).all(|(parameter, variance)| {
+        problem.free.iter().zip(covariance.diagonal().iter()).all(|(parameter, variance)| {
             let scale = match parameter {
                 Parameter::Fx | Parameter::Cx => camera.fx,
                 Parameter::Fy | Parameter::Cy => camera.fy,
@@ -86,10 +91,10 @@ impl Judged {
 
     /// Standard deviations of cx and cy; infinite where nothing is known, `None` where they are held.
     fn centre_deviations(&self, problem: &Problem<'_>) -> [Option<f64>; 2] {
-        let variances = self.reduction.as_ref().and_then(Reduction::variances);
+        let covariance = self.reduction.as_ref().and_then(Reduction::intrinsics_covariance);
         [Parameter::Cx, Parameter::Cy].map(|parameter| {
             let row = problem.free.position(parameter)?;
-            Some(variances.as_ref().map_or(f64::INFINITY, |v| v[row].sqrt() * self.noise_px(problem)))
+            Some(covariance.as_ref().map_or(f64::INFINITY, |c| c[(row, row)].sqrt() * self.noise_px(problem)))
         })
     }
 
@@ -150,7 +155,33 @@ pub(super) fn best_minimum(problem: &Problem<'_>, starts: Vec<State>, evidence: 
     let noise_px = noise_of(problem, &walked.best);
     identifiability::refuse_if_flat(problem, &walked, noise_px)?;
     identifiability::refuse_if_parallel(problem, &walked.best, noise_px)?;
-    Ok(Judged::of(problem, walked.best, count + walked.starts))
+    Ok(with_profiles(&patient, Judged::of(problem, walked.best, count + walked.starts)))
+}
+
+/// Minima that profiles may meet on their way before the search is left as it is.
+const BETTER_BY_PROFILE: usize = 3;
+
+/// Looks along the profile of every parameter: for those that are no parabola, and for lower costs.
+fn with_profiles(problem: &Problem<'_>, mut judged: Judged) -> Judged {
+    for _ in 0..BETTER_BY_PROFILE {
+        let noise_px = judged.noise_px(problem);
+        let Some(reduction) = &judged.reduction else { break };
+        let Some(profile) = Profile::new(problem, &judged.minimum, reduction, noise_px) else { break };
+        match profile.skewed() {
+            Ok(skewed) => {
+                judged.skewed = skewed;
+                break;
+            }
+            Err(state) => {
+                let minimum = problem.minimise(*state);
+                if !is_better(&minimum, &judged.minimum) {
+                    break;
+                }
+                judged = Judged::of(problem, minimum, judged.starts + 1);
+            }
+        }
+    }
+    judged
 }
 
 /// A search in doubt may take this many times the iterations.
