@@ -123,8 +123,14 @@ pub(super) fn noise_of(problem: &Problem<'_>, minimum: &Minimum) -> f64 {
 /// # Errors
 /// Where the data do not determine focal length or principal point.
 pub(super) fn best_minimum(problem: &Problem<'_>, starts: Vec<State>, evidence: &Evidence<'_>) -> Result<Judged, CalibrationError> {
-    let (first, tried) = first_converged(problem, starts);
-    let first = Judged::of(problem, first, tried);
+    let mut starts = starts.into_iter();
+    let first = problem.minimise(starts.next().expect("there is at least one start"));
+    let first = Judged::of(problem, first, 1);
+    if first.is_clear(problem) {
+        return Ok(first);
+    }
+    refuse_early(problem, &first)?;
+    let first = first_converged(problem, first, starts);
     if first.is_clear(problem) {
         return Ok(first);
     }
@@ -133,7 +139,7 @@ pub(super) fn best_minimum(problem: &Problem<'_>, starts: Vec<State>, evidence: 
         retraction: Retraction::Curved,
         ..*problem
     };
-    let mut count = tried;
+    let mut count = first.starts;
     let mut best = first.minimum;
     if let Some(relaxed) = relax(problem, evidence) {
         for start in relaxed_starts(problem, &relaxed, evidence) {
@@ -187,21 +193,32 @@ fn with_profiles(problem: &Problem<'_>, mut judged: Judged) -> Judged {
 /// A search in doubt may take this many times the iterations.
 const PATIENCE: usize = 10;
 
-/// The minimum from the first start that converges, or else the lowest point reached; and how many were tried.
-fn first_converged(problem: &Problem<'_>, starts: Vec<State>) -> (Minimum, usize) {
-    let mut best: Option<Minimum> = None;
-    let mut tried = 0;
+/// Refuses parallel planes before a search that could find nothing, where the noise is known: at a cost that its floor certifies.
+fn refuse_early(problem: &Problem<'_>, judged: &Judged) -> Result<(), CalibrationError> {
+    if judged.certificate.as_ref().is_some_and(|c| c.floor_freedom > 0 && c.holds()) {
+        identifiability::refuse_if_parallel(problem, &judged.minimum, judged.noise_px(problem))?;
+    }
+    Ok(())
+}
+
+/// The first minimum, or that of the next start that converges, or else the lowest point reached.
+fn first_converged(problem: &Problem<'_>, first: Judged, starts: impl Iterator<Item = State>) -> Judged {
+    let converged = |minimum: &Minimum| minimum.termination == Termination::Converged;
+    if converged(&first.minimum) {
+        return first;
+    }
+    let (mut best, mut tried) = (first.minimum, first.starts);
     for start in starts {
         tried += 1;
         let minimum = problem.minimise(start);
-        if minimum.termination == Termination::Converged {
-            return (minimum, tried);
+        if converged(&minimum) || minimum.system.cost < best.system.cost {
+            best = minimum;
         }
-        if best.as_ref().is_none_or(|b| minimum.system.cost < b.system.cost) {
-            best = Some(minimum);
+        if converged(&best) {
+            break;
         }
     }
-    (best.expect("there is at least one start"), tried)
+    Judged::of(problem, best, tried)
 }
 
 /// A lower cost, by more than rounding; among equals a search that converged.

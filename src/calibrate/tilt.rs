@@ -26,24 +26,31 @@ fn to_axis(v: &Vec3) -> Mat3 {
     Mat3::new(1.0 - k * a * a, -k * a * b, -a, -k * a * b, 1.0 - k * b * b, -b, a, b, c)
 }
 
-/// Falls of the cost between these many variances are worth a second look: below, both tilts are one within noise; above, the other tilt
-/// cannot explain the view.
-const DOUBTFUL: (f64, f64) = (4.0, 400.0);
-/// Mean square of `x^2` less its best line over a square of half-width 1, over the perspective that a pose can follow; measured on
-/// rendered views between 0.1 and 0.2 per point.
+/// If turning a plane to its other tilt raises the cost by more variances than this, the other tilt cannot explain the view.
+const TELLING: f64 = 400.0;
+/// If the shortening of a plane by its tilt is worth fewer variances than this, it might as well have none, and both tilts are one.
+const TILTED: f64 = 4.0;
+/// Mean square of the perspective of a unit tilt over a square of half-width 1, less what a pose can follow: `x^2` less its best line has
+/// 4/45, and as much of `x y` is left.
 const CURVED: f64 = 0.16;
+/// Mean square of a unit shortening over the same square, less a change of distance: half of 1/3.
+const SHORTENED: f64 = 0.17;
 
-/// Whether the mirrored pose might explain a view of noise `sigma_px` as well, judged by the size of its perspective alone.
-pub(super) fn is_doubtful(pose: &Pose, observations: &Observations, focal: f64, sigma_px: f64) -> bool {
+/// Whether the mirrored pose might explain a view of noise `noise_px` as well: its tilt shows, and perspective hardly tells its sign.
+pub(super) fn is_doubtful(pose: &Pose, observations: &Observations, focal: f64, noise_px: f64) -> bool {
     let normal = pose.rotation.column(2).into_owned();
     let sight = pose.translation.normalize();
     let (low, high) = observations.to_box();
     let half_width = 0.25 * (high - low).sum();
     let cosine = normal.dot(&sight).abs().max(1e-3);
     let slope = normal.cross(&sight).norm() / cosine;
-    let shift = 2.0 * slope * half_width * half_width / focal / sigma_px;
-    let excess = CURVED * observations.len() as f64 * shift * shift;
-    excess > DOUBTFUL.0 && excess < DOUBTFUL.1
+    let variances = |mean_square: f64, shift_px: f64| {
+        let shift = shift_px / noise_px;
+        mean_square * observations.len() as f64 * shift * shift
+    };
+    let perspective = variances(CURVED, 2.0 * slope * half_width * half_width / focal);
+    let shortening = variances(SHORTENED, half_width * (1.0 - cosine));
+    perspective < TELLING && shortening > TILTED
 }
 
 /// Steps of the pose of one view alone.
