@@ -10,10 +10,10 @@
 //! columns `E` of the strains, poses and intrinsics eliminated from them,
 //!
 //! ```text
-//! T = g^T (E^T E)^-1 g,   floor F = cost - T,   statistic (T / d1) / (F / d2),   d1 = 2 V,   d2 = 2 N - 8 V - n
+//! T = g^T (E^T E)^-1 g,   floor F = cost - T,   statistic (T / d1) / (F / d2),   d1 = 2 V - m,   d2 = 2 N - 8 V - (n - m)
 //! ```
-//! for `V` views, `N` points and `n` free parameters of the lens, the statistic follows Fisher's distribution at most: focal length and the
-//! like take some of the `2 V` degrees of freedom, so that the probability told is an upper bound.
+//! for `V` views, `N` points and `n` free parameters, `m` combinations of which free homographies leave undetermined (the focal length; without
+//! distortion the principal point too). To first order the statistic follows Fisher's distribution.
 
 use super::chance::fisher_tail;
 use super::elimination::Eliminated;
@@ -35,15 +35,21 @@ pub struct Certificate {
     pub floor_rmse_px: f64,
     /// By how much the cost exceeds that floor, in variances of a pixel coordinate.
     pub excess: f64,
-    /// Degrees of freedom that the excess has at most: two a view.
+    /// Degrees of freedom of the excess: two a view less those of the intrinsics that homographies do not determine; at 0 nothing can be
+    /// certified.
     pub freedom: usize,
     /// Degrees of freedom of the floor; 0 where the homographies leave none, and nothing can be certified.
     pub floor_freedom: usize,
-    /// Upper bound of the probability that chance makes such an excess where the minimum is the right one and the lens model holds.
+    /// Probability that chance makes such an excess where the minimum is the right one and the lens model holds.
     pub p_value: f64,
 }
 
 impl Certificate {
+    /// Whether there is anything to be certified by: more measurements than homographies need, and more views than the camera needs.
+    pub fn is_possible(&self) -> bool {
+        self.freedom > 0 && self.floor_freedom > 0
+    }
+
     /// Whether the excess can be chance, at a false-alarm rate of 1e-6.
     pub fn holds(&self) -> bool {
         self.p_value >= FALSE_ALARM
@@ -53,7 +59,7 @@ impl Certificate {
     fn of(cost: f64, floor: f64, points: usize, freedom: usize, floor_freedom: usize) -> Certificate {
         let variance = floor / floor_freedom.max(1) as f64;
         let excess = (cost - floor).max(0.0) / variance;
-        let p_value = if floor_freedom == 0 || excess.is_nan() {
+        let p_value = if floor_freedom == 0 || freedom == 0 || excess.is_nan() {
             1.0
         } else {
             fisher_tail(excess / freedom as f64, freedom, floor_freedom)
@@ -73,17 +79,18 @@ pub(super) fn certify(problem: &Problem<'_>, state: &State, reduction: &Reductio
     let views = problem.observations.len();
     let points: usize = problem.observations.iter().map(|pairs| pairs.len()).sum();
     // What rounding leaves of exact data proves nothing.
-    let gain = score(problem, state, reduction);
+    let (gain, undetermined) = score(problem, state, reduction);
     let floor = (cost - gain).max(problem.rounding_cost()).min(cost);
-    let lens = problem.free.iter().filter(|&p| p >= Parameter::K1).count();
+    let freedom = (2 * views).saturating_sub(undetermined);
+    let lens = problem.free.len() - undetermined;
     let floor_freedom = (2 * points).saturating_sub(8 * views + lens);
-    Certificate::of(cost, floor, points, 2 * views, floor_freedom)
+    Certificate::of(cost, floor, points, freedom, floor_freedom)
 }
 
 /// `T`: with the strains of a view eliminated after its pose, `S_i = E_i^T E_i - ...`, `U_i` their coupling with the intrinsics and `g_i` their
 /// gradient, `T = sum g_i^T S_i^-1 g_i + w^T (S - sum U_i^T S_i^-1 U_i)^+ w` with `w = sum U_i^T S_i^-1 g_i`. The inverse is a pseudo-inverse:
-/// free homographies know no focal length.
-fn score(problem: &Problem<'_>, state: &State, reduction: &Reduction) -> f64 {
+/// free homographies know no focal length. Returns `T` and how many combinations of the intrinsics they leave undetermined.
+fn score(problem: &Problem<'_>, state: &State, reduction: &Reduction) -> (f64, usize) {
     let radial = kernel::is_radial(&state.camera, problem.free);
     let parameters: Vec<usize> = problem.free.iter().map(|p| p as usize).collect();
     let n = parameters.len();
@@ -110,7 +117,8 @@ fn score(problem: &Problem<'_>, state: &State, reduction: &Reduction) -> f64 {
             }
         }
     }
-    gain + quadratic_form(&mut matrix, &mut right, &scale, n)
+    let (through_lens, undetermined) = quadratic_form(&mut matrix, &mut right, &scale, n);
+    (gain + through_lens, undetermined)
 }
 
 /// What the strains of a view say: two orthonormal combinations of them, each with its coupling to the intrinsics and its gradient.
@@ -161,8 +169,13 @@ const SMALLEST_SHARE: f64 = 1e-11;
 const SMALLEST_PIVOT: f64 = 1e-9;
 
 /// `r^T M^+ r` for a positive semi-definite `M` (upper triangle) and `r` in its range, by elimination with the largest pivot first; what is left
-/// of a parameter is compared with `scale`, its size at first.
-fn quadratic_form(matrix: &mut [[f64; N]; N], right: &mut [f64; N], scale: &[f64; N], n: usize) -> f64 {
+/// of a parameter is compared with `scale`, its size at first. Returns also the rank that `M` lacks.
+fn quadratic_form(
+    matrix: &mut [[f64; N]; N],
+    right: &mut [f64; N],
+    scale: &[f64; N],
+    n: usize,
+) -> (f64, usize) {
     let mut sum = 0.0;
     let mut left: [bool; N] = std::array::from_fn(|i| i < n);
     for _ in 0..n {
@@ -183,5 +196,5 @@ fn quadratic_form(matrix: &mut [[f64; N]; N], right: &mut [f64; N], scale: &[f64
             }
         }
     }
-    sum
+    (sum, left.iter().filter(|&&left| left).count())
 }

@@ -11,7 +11,7 @@ use super::start::Held;
 use super::target_frame::TargetFrame;
 use super::{
     Calibration, CalibrationError, Loss, Settings, Termination, Warning, chunks, duplicates, identifiability,
-    kernel, start, warnings,
+    kernel, start, strays, warnings,
 };
 use crate::camera::Parameter;
 use crate::geometry::{Homography, Vec2};
@@ -155,10 +155,12 @@ fn report(
     let Judged { minimum, reduction, certificate, starts, skewed } = judged;
     let State { camera, cam_from_target } = &minimum.state;
     let system = &minimum.system;
-    let Fit { residuals, square, largest_radius } = Fit::of(&minimum.state, observations);
-    let points = residuals.iter().map(Vec::len).sum::<usize>();
+    let fit = Fit::of(&minimum.state, observations);
+    let points = fit.residuals.iter().map(Vec::len).sum::<usize>();
     let degrees_of_freedom = 2 * points - system.unknowns();
     let freedom = degrees_of_freedom.max(1) as f64;
+    let strays = strays::strays(problem, &minimum.state, &fit, fit.square / freedom);
+    let Fit { residuals, square, largest_radius } = fit;
     let sigma_px = (square / freedom).sqrt();
     let conditioning = reduction.as_ref().and_then(|reduction| Conditioning::of(system, reduction));
     if !problem.free.is_empty() {
@@ -197,7 +199,7 @@ fn report(
         warnings: Vec::new(),
         residuals,
     };
-    calibration.warnings = warnings::of(&calibration, largest_radius, problem.loss, &skewed);
+    calibration.warnings = warnings::of(&calibration, largest_radius, strays, &skewed);
     Ok(calibration)
 }
 
@@ -210,8 +212,8 @@ fn judged_termination(termination: Termination, certificate: Option<&Certificate
 }
 
 /// How the minimum fits the observations.
-struct Fit {
-    residuals: Vec<Vec<Vec2>>,
+pub(super) struct Fit {
+    pub residuals: Vec<Vec<Vec2>>,
     /// Sum of squared residuals.
     square: f64,
     /// Largest distance of an ideal point from the axis, in normalised coordinates.
@@ -219,7 +221,12 @@ struct Fit {
 }
 
 impl Fit {
-    fn of(state: &State, observations: &[Observations]) -> Fit {
+    /// The squared residuals, mark by mark.
+    pub fn squares(&self) -> impl Iterator<Item = f64> {
+        self.residuals.iter().flatten().map(|r| r.norm_squared())
+    }
+
+    pub fn of(state: &State, observations: &[Observations]) -> Fit {
         let views = chunks::map(observations, |index, pairs| {
             kernel::view_residuals(&state.camera, &state.cam_from_target[index], pairs)
         });

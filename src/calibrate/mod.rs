@@ -27,6 +27,7 @@ mod search;
 mod settings;
 pub mod single_plane;
 mod start;
+mod strays;
 mod system;
 mod target_frame;
 mod termination;

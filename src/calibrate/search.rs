@@ -42,6 +42,8 @@ pub(super) struct Evidence<'a> {
 
 /// A certificate whose probability is below this is no reason to refuse a minimum, but one to look for a better.
 const CLEAR: f64 = 1e-4;
+/// With fewer degrees of freedom a certificate tells too little to rely on it alone: two views can be explained by another camera entirely.
+const TELLING: usize = 4;
 /// Good data take five to ten iterations; a search that took more came from far away.
 const SHORT_WAY: usize = 25;
 
@@ -59,7 +61,7 @@ impl Judged {
 
     /// Whether nothing speaks for another minimum.
     fn is_clear(&self, problem: &Problem<'_>) -> bool {
-        let certified = self.certificate.as_ref().is_some_and(|c| c.floor_freedom > 0 && c.p_value > CLEAR);
+        let certified = self.certificate.as_ref().is_some_and(|c| c.freedom >= TELLING && c.is_possible() && c.p_value > CLEAR);
         self.minimum.termination == Termination::Converged
             && self.minimum.iterations <= SHORT_WAY
             && certified
@@ -195,7 +197,7 @@ const PATIENCE: usize = 10;
 
 /// Refuses parallel planes before a search that could find nothing, where the noise is known: at a cost that its floor certifies.
 fn refuse_early(problem: &Problem<'_>, judged: &Judged) -> Result<(), CalibrationError> {
-    if judged.certificate.as_ref().is_some_and(|c| c.floor_freedom > 0 && c.holds()) {
+    if judged.certificate.as_ref().is_some_and(|c| c.is_possible() && c.holds()) {
         identifiability::refuse_if_parallel(problem, &judged.minimum, judged.noise_px(problem))?;
     }
     Ok(())

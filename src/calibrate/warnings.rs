@@ -2,16 +2,19 @@
 
 use super::intervals::Skewed;
 use super::report::{STRONG_CORRELATION, UNCERTAIN_FOCAL};
-use super::{Calibration, Covariance, Loss, Termination, Warning};
+use super::{Calibration, Covariance, Termination, Warning};
 use crate::camera::{Camera, FreeParameters, Parameter};
 
-/// The warnings of a calibration; `skewed` are the parameters whose cost is no parabola.
-pub(super) fn of(calibration: &Calibration, largest_radius: f64, loss: Loss, skewed: &[Skewed]) -> Vec<Warning> {
+/// The warnings of a calibration: `strays` is that of its outliers, `skewed` are the parameters whose cost is no parabola.
+pub(super) fn of(
+    calibration: &Calibration,
+    largest_radius: f64,
+    strays: Option<Warning>,
+    skewed: &[Skewed],
+) -> Vec<Warning> {
     let mut warnings = Vec::new();
     warnings.extend(ending(calibration));
-    if loss == Loss::Squares {
-        warnings.extend(outliers(calibration));
-    }
+    warnings.extend(strays);
     if calibration.degrees_of_freedom == 0 {
         warnings.push(Warning::NoDegreesOfFreedom);
     }
@@ -43,33 +46,6 @@ fn ending(calibration: &Calibration) -> Option<Warning> {
             Some(Warning::NotConverged { termination, iterations: calibration.iterations })
         }
     }
-}
-
-/// A squared residual above this many variances is worth a look at the distribution: in 250 marks of noise one in a hundred sets has one.
-const LARGE: f64 = 20.0;
-/// Of noise, one squared residual in 10^8 exceeds the median by this factor: `36 sigma^2` over `2 ln 2 sigma^2`.
-const OUTLYING: f64 = 26.0;
-/// More than this part of the marks are no strays: the model is wrong.
-const FEW: f64 = 0.1;
-
-/// Marks that are no noise, if they are few.
-fn outliers(calibration: &Calibration) -> Option<Warning> {
-    let limit = LARGE * calibration.sigma_px * calibration.sigma_px;
-    let residuals = || calibration.residuals.iter().flatten().map(|r| r.norm_squared());
-    if calibration.degrees_of_freedom == 0 || !residuals().any(|square| square > limit) {
-        return None;
-    }
-    let mut squares: Vec<f64> = residuals().collect();
-    let middle = squares.len() / 2;
-    let median = *squares.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let marks = residuals().filter(|&square| square > OUTLYING * median).count();
-    if marks == 0 || marks as f64 > (FEW * squares.len() as f64).max(1.0) {
-        return None;
-    }
-    let all = calibration.residuals.iter().enumerate();
-    let numbered = all.flat_map(|(view, list)| list.iter().enumerate().map(move |(point, r)| (view, point, r.norm())));
-    let (view, point, residual_px) = numbered.max_by(|a, b| a.2.total_cmp(&b.2))?;
-    Some(Warning::Outliers { marks, view, point, residual_px, median_px: median.sqrt() })
 }
 
 /// Pairs of distortion coefficients, or of any parameters, that trade off against each other.
