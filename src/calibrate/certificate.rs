@@ -55,6 +55,11 @@ impl Certificate {
         self.p_value >= FALSE_ALARM
     }
 
+    /// The same with a floor that was fitted.
+    pub(super) fn with_floor(&self, cost: f64, floor: f64, points: usize) -> Certificate {
+        Certificate::of(cost, floor.min(cost), points, self.freedom, self.floor_freedom)
+    }
+
     /// Compares a cost with a floor.
     fn of(cost: f64, floor: f64, points: usize, freedom: usize, floor_freedom: usize) -> Certificate {
         let variance = floor / floor_freedom.max(1) as f64;

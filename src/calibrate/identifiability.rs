@@ -15,7 +15,7 @@ use super::conditioning::{Conditioning, WeakComponent};
 use super::minimise::{Minimum, Problem, State};
 use super::normal::Observations;
 use super::system::System;
-use super::walk::Walked;
+use super::walk::{Far, Walked};
 use crate::camera::Parameter;
 use crate::geometry::{Pose, Vec2, Vec3, rotation};
 
@@ -25,10 +25,19 @@ const LOG_FALSE_ACCEPTANCE: f64 = 20.7;
 /// parallel by accident, and need no test.
 const EVIDENT_TILT: f64 = 50.0;
 
+/// A cost lower by more variances than this is no rounding.
+const LOWER: f64 = 1e-3;
 /// Iterations of the fit with parallel planes: it starts next to its answer.
 const PARALLEL_ITERATIONS: usize = 50;
-/// The cost rises by the square of so many standard deviations when a parameter that the data determine is moved far away: five.
-pub(super) const LEAST_RISE: f64 = 25.0;
+/// The cost rises by the square of so many standard deviations when a focal length that the data determine is moved far away: three. A factor of three in focal length that costs less is no knowledge of it.
+const FOCAL_RISE: f64 = 9.0;
+/// Likewise for the principal point: two. It may be known poorly while the focal length is known well; then a warning is enough.
+const CENTRE_RISE: f64 = 4.0;
+
+/// The least rise, in variances, that a parameter far away must cause.
+pub(super) fn least_rise(parameter: Parameter) -> f64 {
+    if matches!(parameter, Parameter::Cx | Parameter::Cy) { CENTRE_RISE } else { FOCAL_RISE }
+}
 
 /// A chi-squared variable with `d` degrees of freedom exceeds `d + 2 sqrt(d x) + 2 x` with probability below `exp(-x)`
 /// (Laurent & Massart 2000, lemma 1).
@@ -59,15 +68,22 @@ fn doubtful_slopes(problem: &Problem<'_>, state: &State, noise_px: f64) -> Vec<(
     candidates
 }
 
-/// Refuses if planes that are parallel explain the data and do not determine the parameters.
-pub(super) fn refuse_if_parallel(problem: &Problem<'_>, minimum: &Minimum, noise_px: f64) -> Result<(), CalibrationError> {
+/// Refuses if planes that are parallel explain the data and do not determine the parameters. A state of lower cost, if one is met, is
+/// returned: what was given is then no minimum, and nothing is refused.
+pub(super) fn refuse_if_parallel(
+    problem: &Problem<'_>,
+    minimum: &Minimum,
+    noise_px: f64,
+) -> Result<Option<State>, CalibrationError> {
     if problem.free.is_empty() {
-        return Ok(());
+        return Ok(None);
     }
     for (slope, what) in doubtful_slopes(problem, &minimum.state, noise_px) {
-        refuse_if_fits(problem, minimum, noise_px, slope, what)?;
+        if let Some(lower) = refuse_if_fits(problem, minimum, noise_px, slope, what)? {
+            return Ok(Some(lower));
+        }
     }
-    Ok(())
+    Ok(None)
 }
 
 /// Refuses if planes of the given common slope explain the data and do not determine the parameters.
@@ -80,14 +96,17 @@ fn refuse_if_fits(
     noise_px: f64,
     slope: Vec2,
     what: &str,
-) -> Result<(), CalibrationError> {
+) -> Result<Option<State>, CalibrationError> {
     let parallel = Problem { hold_tilt: true, max_iterations: PARALLEL_ITERATIONS, ..*problem };
     let held = parallel.minimise(turned_to(&minimum.state, slope));
     let degrees_of_freedom = 4 * problem.observations.len();
     let bound = largest_chance_chi_squared(degrees_of_freedom);
     let ratio = (held.system.cost - minimum.system.cost) / variance(problem, noise_px);
+    if ratio < -LOWER {
+        return Ok(Some(held.state));
+    }
     if ratio > bound {
-        return Ok(());
+        return Ok(None);
     }
     let mut exact = System::new(problem.free, problem.observations.len());
     problem.linearise_into(&held.state, &mut exact);
@@ -96,7 +115,8 @@ fn refuse_if_fits(
             "{what} within noise (holding it so raises the cost by {ratio:.1} variances, and up to {bound:.0} could be \
              chance on {degrees_of_freedom} degrees of freedom)"
         )
-    })
+    })?;
+    Ok(None)
 }
 
 /// Variance of a pixel coordinate; exact data leave rounding as noise.
@@ -127,16 +147,18 @@ pub(super) fn refuse_if_flat(
 ) -> Result<(), CalibrationError> {
     let variance = variance(problem, noise_px);
     let rise = |far: &Minimum| (far.system.cost - walked.best.system.cost) / variance;
-    let flattest = walked.far.iter().min_by(|a, b| rise(&a.minimum).total_cmp(&rise(&b.minimum)));
+    let share = |far: &Far| rise(&far.minimum) / least_rise(far.parameter);
+    let flattest = walked.far.iter().min_by(|a, b| share(a).total_cmp(&share(b)));
     match flattest {
-        Some(far) if rise(&far.minimum) < LEAST_RISE => Err(CalibrationError::NotIdentifiable {
+        Some(far) if share(far) < 1.0 => Err(CalibrationError::NotIdentifiable {
             inseparable: moved(&walked.best.state, &far.minimum.state, far.parameter),
             why: format!(
-                "{} {:.5} fits as {:.5} does: the cost rises by {:.1} variances only, and {LEAST_RISE:.0} are needed to rule chance out",
+                "{} {:.5} fits as {:.5} does: the cost rises by {:.1} variances only, and {:.0} are needed to rule chance out",
                 far.parameter.name(),
                 far.minimum.state.camera.get(far.parameter),
                 walked.best.state.camera.get(far.parameter),
                 rise(&far.minimum),
+                least_rise(far.parameter),
             ),
         }),
         _ => Ok(()),

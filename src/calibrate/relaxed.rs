@@ -12,7 +12,7 @@ use super::Loss;
 use super::minimise::Problem;
 use super::normal::Observations;
 use crate::camera::{Camera, FreeParameters, Parameter, intrinsics_columns};
-use crate::geometry::{Homography, Mat3, Vec2, Vec3};
+use crate::geometry::{Homography, Mat3, Pose, Vec2, Vec3};
 use nalgebra::{DMatrix, DVector, Matrix2, SMatrix, SVector};
 
 /// Entries of a homography with the last held at 1.
@@ -31,8 +31,6 @@ pub(super) struct Relaxed {
     pub information: Vec<EntriesBlock>,
     /// Sum of squared residuals under the loss.
     pub cost: f64,
-    /// The parameters of the lens that were fitted.
-    pub fitted: FreeParameters,
 }
 
 /// Steps of a stage.
@@ -78,8 +76,37 @@ pub(super) fn relax(
         homographies: at.homographies,
         information: equations.views.iter().map(|view| view.square).collect(),
         cost: equations.cost,
-        fitted: lens_parameters,
     })
+}
+
+/// The parameters of the relaxed lens for a calibration whose `free` parameters are these; `is_distorting` tells which coefficients are held at
+/// a value other than 0.
+pub(super) fn parameters(free: FreeParameters, is_distorting: impl Fn(Parameter) -> bool) -> FreeParameters {
+    use Parameter::{Cx, Cy, Fx, Fy, K1, K2, K3, P1, P2, Skew};
+    let focal_free = free.contains(Fx) || free.contains(Fy);
+    let lens = [K1, K2, P1, P2, K3];
+    // A coefficient held at a value is no number of the relaxed model's unless the focal length is held too.
+    let is_sought = |p: &Parameter| free.contains(*p) || (focal_free && is_distorting(*p));
+    let sought = lens.into_iter().filter(is_sought).fold(FreeParameters::NONE, FreeParameters::with);
+    if sought.is_empty() && !lens.into_iter().any(is_distorting) {
+        return sought;
+    }
+    let shape = [Cx, Cy, Skew].into_iter().filter(|&p| free.contains(p));
+    let sought = shape.fold(sought, FreeParameters::with);
+    if focal_free { sought.with(Fy) } else { sought }
+}
+
+/// The least cost of the relaxed model next to a calibration.
+pub(super) fn floor(problem: &Problem<'_>, camera: &Camera, cam_from_target: &[Pose]) -> Option<f64> {
+    let homography = |pose: &Pose| {
+        let r = &pose.rotation;
+        let columns = Mat3::from_columns(&[r.column(0).into(), r.column(1).into(), pose.translation]);
+        entries(&columns)
+    };
+    let state = State { lens: *camera, homographies: cam_from_target.iter().map(homography).collect() };
+    let free = parameters(problem.free, |p| camera.get(p) != 0.0);
+    let fit = Fit { observations: problem.observations, loss: problem.loss };
+    Some(fit.equations(&fit.minimise(state, free)?, free).cost)
 }
 
 fn of_both(a: FreeParameters, b: FreeParameters) -> FreeParameters {

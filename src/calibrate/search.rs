@@ -16,7 +16,7 @@ use super::start::{Held, focal_from_centre};
 use super::system::Reduction;
 use super::identifiability::{self, tilts_are_evident};
 use super::{CalibrationError, Termination, tilt, walk};
-use crate::camera::{BrownConrady, Camera, FreeParameters, Parameter};
+use crate::camera::{BrownConrady, Camera, Parameter};
 use crate::geometry::{Homography, Vec2};
 
 /// A minimum with what is needed to judge it.
@@ -57,6 +57,19 @@ impl Judged {
             certificate::certify(problem, &minimum.state, reduction, minimum.system.cost)
         });
         Judged { minimum, reduction, certificate, starts, skewed: Vec::new() }
+    }
+
+    /// With the floor fitted where a step towards it does not certify the minimum: the step is straight, the relaxed model is not.
+    fn certified(mut self, problem: &Problem<'_>) -> Judged {
+        let State { camera, cam_from_target } = &self.minimum.state;
+        let cost = self.minimum.system.cost;
+        if let Some(certificate) = self.certificate.as_mut().filter(|certificate| !certificate.holds())
+            && let Some(floor) = relaxed::floor(problem, camera, cam_from_target)
+        {
+            let points = problem.observations.iter().map(|o| o.len()).sum();
+            *certificate = certificate.with_floor(cost, floor, points);
+        }
+        self
     }
 
     /// Whether nothing speaks for another minimum.
@@ -156,14 +169,20 @@ pub(super) fn best_minimum(problem: &Problem<'_>, starts: Vec<State>, evidence: 
     let judged = Judged::of(problem, best, count);
     let noise_px = judged.noise_px(problem);
     if judged.is_well_known(problem) && tilts_are_evident(problem, &judged.minimum.state, noise_px) {
-        return Ok(judged);
+        return Ok(judged.certified(problem));
     }
     let centre_sd = judged.centre_deviations(problem);
     let walked = walk::far_away(&patient, judged.minimum, noise_px, centre_sd);
     let noise_px = noise_of(problem, &walked.best);
     identifiability::refuse_if_flat(problem, &walked, noise_px)?;
-    identifiability::refuse_if_parallel(problem, &walked.best, noise_px)?;
-    Ok(with_profiles(&patient, Judged::of(problem, walked.best, count + walked.starts)))
+    let mut best = walked.best;
+    if let Some(lower) = identifiability::refuse_if_parallel(problem, &best, noise_px)? {
+        let minimum = patient.minimise(lower);
+        if is_better(&minimum, &best) {
+            best = minimum;
+        }
+    }
+    Ok(with_profiles(&patient, Judged::of(problem, best, count + walked.starts)).certified(problem))
 }
 
 /// Minima that profiles may meet on their way before the search is left as it is.
@@ -235,24 +254,10 @@ pub(super) fn is_better(new: &Minimum, old: &Minimum) -> bool {
 
 /// The relaxed model of these data: its gauge is the focal length that is held, or else a wide lens's.
 fn relax(problem: &Problem<'_>, evidence: &Evidence<'_>) -> Option<Relaxed> {
-    use Parameter::{Cx, Cy, Fx, Fy, K1, K2, K3, P1, P2, Skew};
+    use Parameter::{Cx, Cy, Fx, Fy};
     let held = evidence.held;
     let focal_free = problem.free.contains(Fx) || problem.free.contains(Fy);
-    let lens = [K1, K2, P1, P2, K3];
-    // A coefficient held at a value is no number of the relaxed model's unless the focal length is held too.
-    let is_sought = |p: &Parameter| {
-        problem.free.contains(*p) || (focal_free && held.value(*p).is_some_and(|value| value != 0.0))
-    };
-    let mut sought =
-        lens.into_iter().filter(is_sought).fold(FreeParameters::NONE, FreeParameters::with);
-    let distorts = !sought.is_empty() || lens.iter().any(|&p| held.value(p).is_some_and(|v| v != 0.0));
-    if distorts {
-        let shape = [Cx, Cy, Skew].into_iter().filter(|&p| problem.free.contains(p));
-        sought = shape.fold(sought, FreeParameters::with);
-        if focal_free {
-            sought = sought.with(Fy);
-        }
-    }
+    let sought = relaxed::parameters(problem.free, |p| held.value(p).is_some_and(|value| value != 0.0));
     let half_width = evidence.pixel_frame.1;
     let gauge = held.value(Fx).or(held.value(Fy)).unwrap_or(2.0 * half_width);
     let start = held.camera(Camera::pinhole(gauge, gauge, held.centre.x, held.centre.y));

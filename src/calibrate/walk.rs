@@ -4,7 +4,7 @@
 //! the focal length with the better tilt of every plane at each step meets them one after another. The same walk tells how far the
 //! focal length could be off: where the cost does not rise, the data do not determine it.
 
-use super::identifiability::{LEAST_RISE, variance};
+use super::identifiability::{least_rise, variance};
 use super::minimise::{Minimum, Problem};
 use super::retraction::scaled;
 use super::search::is_better;
@@ -45,7 +45,7 @@ pub(super) struct Far {
 /// principal point.
 pub(super) fn far_away(problem: &Problem<'_>, minimum: Minimum, noise_px: f64, centre_sd: [Option<f64>; 2]) -> Walked {
     let mut walked = Walked { best: minimum, starts: 0, far: Vec::new() };
-    let limit = RISEN.max(LEAST_RISE) * variance(problem, noise_px);
+    let limit = RISEN * variance(problem, noise_px);
     for _ in 0..WALKS {
         walked.far.clear();
         let mut better = None;
@@ -54,7 +54,7 @@ pub(super) fn far_away(problem: &Problem<'_>, minimum: Minimum, noise_px: f64, c
         }
         for (parameter, sd) in [Parameter::Cx, Parameter::Cy].into_iter().zip(centre_sd) {
             if sd.is_some_and(|sd| sd > KNOWN_CENTRE * walked.best.state.camera.fx) {
-                step_aside(problem, parameter, limit, &mut walked);
+                step_aside(problem, parameter, least_rise(parameter) * variance(problem, noise_px), &mut walked);
             }
         }
         match better {
