@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// # Errors
 /// Whatever the file system says, with the path.
 pub fn write_atomically(path: &Path, contents: &[u8]) -> io::Result<()> {
-    let with_path = |e: io::Error| io::Error::new(e.kind(), format!("{}: {e}", path.display()));
+    let with_path = |e: io::Error| io::Error::new(e.kind(), format!("cannot write {}: {e}", path.display()));
     if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
         fs::create_dir_all(folder).map_err(with_path)?;
     }

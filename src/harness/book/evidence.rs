@@ -1,9 +1,9 @@
 //! What do the experiments say? For each: the golden snapshot, and the record with its tables from this run or the last.
 
 use super::golden_file::GoldenFile;
-use crate::harness::hash::sha256_hex;
 use crate::harness::project::Project;
 use crate::harness::{Experiment, Record, emit};
+use crate::io::hash::sha256_hex;
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;

@@ -25,7 +25,7 @@ pub(super) fn typeset(plain: &str) -> String {
 
 /// Significant digits; far from one as a power of ten.
 pub(super) fn significant(value: f64, digits: usize) -> String {
-    let text = crate::harness::significant(value, digits);
+    let text = crate::io::significant(value, digits);
     if text.contains('e') { power_of_ten(value, digits.saturating_sub(1)) } else { typeset(&text) }
 }
 

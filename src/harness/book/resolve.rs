@@ -8,8 +8,8 @@ use super::labels::Labels;
 use super::sources::{REFERENCES, Sources};
 use super::text::{attribute, escape, inline};
 use super::{appendix, format, listing, references};
-use crate::harness::hash::sha256_hex;
 use crate::harness::published::Entry;
+use crate::io::hash::sha256_hex;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 

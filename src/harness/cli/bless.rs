@@ -2,9 +2,8 @@
 
 use super::{Exit, find, print, warn};
 use crate::harness::project::Project;
-use crate::harness::{
-    Context, Experiment, ProgressDisplay, emit, golden, provenance, verdict, write_atomically,
-};
+use crate::harness::{Context, Experiment, ProgressDisplay, emit, golden, verdict};
+use crate::io::{provenance, write_atomically};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {

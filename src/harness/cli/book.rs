@@ -3,7 +3,8 @@
 use super::{Exit, print, warn};
 use crate::harness::book::{self, Evidence, Finding, Sources};
 use crate::harness::project::Project;
-use crate::harness::{Context, Experiment, ProgressDisplay, Record, emit, provenance, verdict};
+use crate::harness::{Context, Experiment, ProgressDisplay, Record, emit, verdict};
+use crate::io::provenance;
 use rayon::prelude::*;
 use std::path::Path;
 

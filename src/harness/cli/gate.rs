@@ -4,14 +4,14 @@ mod compare;
 mod power;
 
 use super::{Exit, print, warn};
-use crate::harness::gate;
 use crate::harness::gate::faults::{Faulty, planted};
 use crate::harness::gate::files::{self, FilesError};
 use crate::harness::gate::{
     Builtin, EXPECTED_FALSE_ALARMS, Plan, Process, Property, QUICK, Report, Solver, THOROUGH, Terms, protocol,
 };
 use crate::harness::project::Project;
-use crate::harness::{ProgressDisplay, provenance, write_atomically};
+use crate::harness::{ProgressDisplay, gate};
+use crate::io::{provenance, write_atomically};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 

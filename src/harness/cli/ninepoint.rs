@@ -130,7 +130,7 @@ fn overlay(image: &crate::raster::Raster<u8>, grid: &DotGrid) -> Overlay {
 
 fn write(folder: &Path, json: &str, overlay: &Overlay) -> Result<(), String> {
     let result = folder.join("result.json");
-    write_atomically(&result, json.as_bytes()).map_err(|error| format!("{}: {error}", result.display()))?;
+    write_atomically(&result, json.as_bytes()).map_err(|error| error.to_string())?;
     overlay.write_png(&folder.join("overlay.png")).map_err(|error| error.to_string())
 }
 

@@ -1,7 +1,8 @@
 //! How is a verdict told to a person? One table over all experiments, then every deviation in full.
 
 use crate::harness::verdict::{Golden, Run, Tally, Verdict};
-use crate::harness::{Reconciliation, Record, significant};
+use crate::harness::{Reconciliation, Record};
+use crate::io::significant;
 use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 
 /// Characters in a line, whatever the terminal: a saved report looks like the one on the screen.

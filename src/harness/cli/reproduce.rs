@@ -3,11 +3,11 @@
 use super::report::{details, reconciliation_table};
 use super::{Exit, print, warn};
 use crate::harness::project::Project;
-use crate::harness::provenance::{self, Commit};
 use crate::harness::verdict::{self, Run, Verdict};
-use crate::harness::{Context, EmitError, Experiment, ProgressDisplay, Record, emit};
+use crate::harness::{Context, Experiment, ProgressDisplay, Record, emit};
+use crate::io::{Commit, provenance};
 use rayon::prelude::*;
-use std::fs;
+use std::{fs, io};
 
 pub(super) fn run(experiments: &[Experiment]) -> Exit {
     let project = match Project::find() {
@@ -19,7 +19,7 @@ pub(super) fn run(experiments: &[Experiment]) -> Exit {
     };
     let commit = provenance::commit(project.root());
     let display = ProgressDisplay::stderr();
-    let finished: Vec<(Run, Result<(), EmitError>)> = experiments
+    let finished: Vec<(Run, io::Result<()>)> = experiments
         .par_iter()
         .map(|experiment| {
             let run = verdict::run(experiment, &Context::of(experiment).with_progress(display.clone()));
@@ -40,7 +40,7 @@ pub(super) fn run(experiments: &[Experiment]) -> Exit {
 }
 
 /// Each experiment is written as soon as it is finished: an interruption keeps what is done.
-fn write(run: &Run, project: &Project, commit: Option<&Commit>) -> Result<(), EmitError> {
+fn write(run: &Run, project: &Project, commit: Option<&Commit>) -> io::Result<()> {
     match &run.result {
         Ok(record) => emit(record, &project.out(), &project.figures(run.experiment.id), commit),
         Err(_) => Ok(()),
@@ -58,7 +58,7 @@ pub(super) fn judge_all(runs: &[Run], project: &Project) -> Vec<Option<Verdict>>
 }
 
 /// What has no record, and what could not be written.
-fn failures(runs: &[Run], written: Vec<Result<(), EmitError>>) -> Vec<String> {
+fn failures(runs: &[Run], written: Vec<io::Result<()>>) -> Vec<String> {
     let no_record = runs.iter().filter_map(|run| {
         let error = run.result.as_ref().err()?;
         Some(format!("FAILED {}: {error}", run.experiment.id))

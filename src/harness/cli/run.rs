@@ -4,7 +4,8 @@ use super::report::{details, summary};
 use super::{Exit, find, print, terminal, warn};
 use crate::harness::project::Project;
 use crate::harness::verdict::{self, Run, Verdict};
-use crate::harness::{Context, Experiment, ProgressDisplay, emit, provenance};
+use crate::harness::{Context, Experiment, ProgressDisplay, emit};
+use crate::io::provenance;
 use clap::{Args, CommandFactory, FromArgMatches, Parser};
 use std::path::{Path, PathBuf};
 

@@ -5,11 +5,12 @@ use super::plan::{Plan, PlanError, Purpose};
 use super::protocol::{Answer, Problem};
 use super::solver::Solver;
 use crate::camera::Parameter;
-use crate::harness::hash::sha256_hex;
-use crate::harness::{EmitError, write_atomically};
+use crate::io::hash::sha256_hex;
+use crate::io::write_atomically;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// What a folder of problems was made from.
@@ -27,7 +28,7 @@ struct Manifest {
 pub enum FilesError {
     /// It cannot be written.
     #[error(transparent)]
-    Write(#[from] EmitError),
+    Write(#[from] io::Error),
     /// It cannot be read.
     #[error("cannot read {path}: {source}", path = path.display())]
     Read {

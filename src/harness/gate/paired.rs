@@ -9,7 +9,7 @@ use super::trial::{Seen, Trial};
 use crate::camera::Parameter;
 use crate::evaluate::distribution::normal_cdf;
 use crate::evaluate::interval::each_of;
-use crate::harness::significant;
+use crate::io::significant;
 use serde::Serialize;
 use std::collections::BTreeMap;
 

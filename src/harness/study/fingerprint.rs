@@ -4,8 +4,8 @@ use super::engine::Engine;
 use super::shard::Shard;
 use super::tables;
 use super::trial::{Trial, run_trial};
-use crate::harness::hash::sha256_hex;
 use crate::harness::provenance::crate_versions;
+use crate::io::hash::sha256_hex;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

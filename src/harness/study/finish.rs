@@ -5,7 +5,7 @@ use super::folder::{Folder, FolderError};
 use super::manifest::Manifest;
 use super::summary::{Summary, summarise};
 use super::{figures, report};
-use crate::harness::hash::sha256_hex;
+use crate::io::hash::sha256_hex;
 
 /// Writes the results of a complete part into its folder.
 pub fn finish(folder: &Folder, engine: &Engine) -> Result<Summary, FolderError> {

@@ -7,7 +7,7 @@ use super::replay::{Lines, Replay, Source};
 use super::tables;
 use super::trial::Trial;
 use super::trial_file::TrialFile;
-use crate::harness::hash::hexadecimal;
+use crate::io::hash::hexadecimal;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fs::{self, File, OpenOptions};

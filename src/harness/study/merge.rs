@@ -7,7 +7,7 @@ use super::reading::Reading;
 use super::shard::Shard;
 use super::tables;
 use super::trial_file::TrialFile;
-use crate::harness::provenance::Commit;
+use crate::io::Commit;
 use std::path::{Path, PathBuf};
 
 /// Parts that do not make a whole.

@@ -5,7 +5,8 @@ use super::manifest::Manifest;
 use super::moments::Estimated;
 use super::shard::Shard;
 use super::summary::{CellSummary, Statistic, Summary};
-use crate::harness::{Figure, significant};
+use crate::harness::Figure;
+use crate::io::significant;
 use std::fmt::Write;
 
 /// Wide tables and figures scroll within the page, which never does: figures keep a size at which they can be read.

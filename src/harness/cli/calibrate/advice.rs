@@ -5,7 +5,7 @@ use crate::calibrate::Calibration;
 use crate::camera::Parameter;
 use crate::geometry::{Vec2, Vec3};
 use crate::harness::photos::Fit;
-use crate::harness::significant;
+use crate::io::significant;
 
 /// Points that end before this part of the corner radius leave half of the image's area without any, and the highest radial
 /// term less than a fifth of its effect in the corner (0.7^5 = 0.17).

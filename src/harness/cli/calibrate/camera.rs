@@ -3,9 +3,9 @@
 use super::{Arguments, Exit, Format, advice, maps, page, plots, print, table};
 use crate::calibrate::{Settings, Termination};
 use crate::camera::Parameter;
+use crate::harness::Figure;
 use crate::harness::photos::{Fit, Fitter};
-use crate::harness::{Figure, significant};
-use crate::io::{CalibrationFields, LeftOut, write_atomically};
+use crate::io::{CalibrationFields, LeftOut, significant, write_atomically};
 use crate::target::{Board, View};
 use std::collections::BTreeMap;
 use std::fmt::Write;

@@ -1,7 +1,8 @@
 //! The report as a page: one HTML file that needs nothing else, light or dark as the reader's system is.
 
 use super::camera::{Told, parameter_rows, summary, weakest};
-use crate::harness::{Figure, significant};
+use crate::harness::Figure;
+use crate::io::significant;
 use std::fmt::Write;
 
 const STYLE: &str = "\

@@ -1,8 +1,7 @@
 //! A map of a plane from a file of point pairs.
 
 use super::{Arguments, Exit, Format, print, table};
-use crate::harness::significant;
-use crate::io::{PointPairs, read_point_pairs, write_atomically};
+use crate::io::{PointPairs, read_point_pairs, significant, write_atomically};
 use crate::planar::{PlaneCalibration, calibrate_plane};
 use std::path::Path;
 

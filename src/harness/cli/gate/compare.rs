@@ -1,10 +1,11 @@
 //! `calibench gate --against`: two solvers on the same problems.
 
 use super::{Arguments, Stop, incomplete, of_files, process, terms};
+use crate::harness::ProgressDisplay;
 use crate::harness::cli::{Exit, print};
 use crate::harness::gate::paired::{self, Paired};
 use crate::harness::gate::{self, Builtin, Plan, Report, Solver, files};
-use crate::harness::{ProgressDisplay, write_atomically};
+use crate::io::write_atomically;
 use std::path::Path;
 
 pub(super) fn run(

@@ -1,11 +1,12 @@
 //! `calibench gate --power`: the gate's own power and false alarms, as committed tables.
 
 use super::{Arguments, Stop, commit, incomplete, usage};
+use crate::harness::ProgressDisplay;
 use crate::harness::cli::{Exit, print, warn};
 use crate::harness::gate::faults::planted;
 use crate::harness::gate::power::{Measured, Sizes};
 use crate::harness::gate::{QUICK, textbook};
-use crate::harness::{ProgressDisplay, write_atomically};
+use crate::io::write_atomically;
 use std::path::Path;
 use std::time::Instant;
 

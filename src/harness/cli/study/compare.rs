@@ -2,8 +2,8 @@
 
 use super::Failure;
 use crate::harness::cli::{Exit, print};
-use crate::harness::significant;
 use crate::harness::study::compare::{CompareError, Comparison, Verdict, compare, compare_levels};
+use crate::io::significant;
 use comfy_table::{Table, presets};
 use std::path::PathBuf;
 

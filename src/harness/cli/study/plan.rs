@@ -1,10 +1,11 @@
 //! `calibench study plan`: what must be photographed for a wanted accuracy?
 
 use super::{Failure, read};
+use crate::harness::ProgressDisplay;
 use crate::harness::cli::{Exit, print};
 use crate::harness::study::plan::{Design, Goal, PlanError, Search, choose, confirm, search};
 use crate::harness::study::{Length, Spec};
-use crate::harness::{ProgressDisplay, significant};
+use crate::io::significant;
 use comfy_table::{Table, presets};
 use std::path::PathBuf;
 

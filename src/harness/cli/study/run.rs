@@ -1,13 +1,14 @@
 //! `calibench study run`, `resume` and `merge`: from a file to a folder of results.
 
 use super::{Failure, read};
+use crate::harness::ProgressDisplay;
 use crate::harness::cli::{Exit, print, warn};
 use crate::harness::project::Project;
 use crate::harness::study::{
     Engine, Folder, Interruption, Manifest, Outcome, RunError, Shard, Summary, TrialFile, Worst, finish,
     merge,
 };
-use crate::harness::{ProgressDisplay, provenance, significant};
+use crate::io::{provenance, significant};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

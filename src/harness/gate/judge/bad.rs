@@ -6,7 +6,7 @@ use crate::harness::gate::bad_input::{BadCase, Fault};
 use crate::harness::gate::plan::{Plan, Purpose};
 use crate::harness::gate::suite::Scenario;
 use crate::harness::gate::trial::{Seen, Trial};
-use crate::harness::significant;
+use crate::io::significant;
 
 /// An error of this many stated standard deviations is not admitted by them: by chance it has 2e-9.
 const ADMITTED_SD: f64 = 6.0;

@@ -5,7 +5,7 @@ use super::{Answers, Terms, equivalent_noise_px, estimate};
 use crate::harness::gate::plan::Purpose;
 use crate::harness::gate::suite::Scenario;
 use crate::harness::gate::trial::Seen;
-use crate::harness::significant;
+use crate::io::significant;
 
 /// An error of exact data that noise of this size on every coordinate would cause: double precision leaves below 1e-10 px,
 /// single precision about 1e-5 px.

@@ -6,7 +6,7 @@ use crate::harness::gate::plan::Purpose;
 use crate::harness::gate::suite::Scenario;
 use crate::harness::gate::trial::Seen;
 use crate::harness::gate::variant::Variant;
-use crate::harness::significant;
+use crate::io::significant;
 
 /// A difference that noise of this size would cause is a hundredth of ordinary corner noise: it cannot matter to a user, and
 /// is far above what single precision (1e-5 px) or a loose stopping rule leaves.

@@ -1,11 +1,10 @@
 //! Which RMSE does the solver state, and is it as large as it should be?
 
-use super::Answers;
-use super::chance;
 use super::checks::{Basis, Check, Property};
+use super::{Answers, chance};
 use crate::harness::gate::suite::Scenario;
 use crate::harness::gate::trial::Trial;
-use crate::harness::significant;
+use crate::io::significant;
 
 /// Two definitions differ by more than this part on every scene of the suite; rounding and stopping rules by far less.
 const SAME_RATIO: f64 = 2e-3;

@@ -9,7 +9,7 @@ use crate::camera::Parameter;
 use crate::harness::gate::plan::Purpose;
 use crate::harness::gate::suite::Scenario;
 use crate::harness::gate::trial::{Seen, Trial};
-use crate::harness::significant;
+use crate::io::significant;
 
 /// Share of good problems that a solver may leave unanswered.
 const UNANSWERED: f64 = 1e-3;

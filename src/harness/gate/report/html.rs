@@ -2,7 +2,7 @@
 
 use super::{Report, Row};
 use crate::harness::gate::judge::{Basis, Verdict};
-use crate::harness::significant;
+use crate::io::significant;
 use std::fmt::Write;
 
 const STYLE: &str = "body{font:15px/1.45 system-ui,sans-serif;max-width:76rem;margin:2rem auto;padding:0 1rem;color:#1a1a1a;\

@@ -10,7 +10,7 @@ use super::bad_input::Fault;
 use super::judge::{self, Basis, Check, Property, Terms, Verdict};
 use super::plan::Plan;
 use super::trial::Seen;
-use crate::harness::provenance::Commit;
+use crate::io::Commit;
 use serde::Serialize;
 
 /// The outcome of a run.

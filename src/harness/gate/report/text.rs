@@ -2,7 +2,7 @@
 
 use super::{Report, Row};
 use crate::harness::gate::judge::{Basis, Check, Verdict};
-use crate::harness::significant;
+use crate::io::significant;
 
 /// Columns where nothing tells how wide the screen is.
 pub const COLUMNS: usize = 132;
