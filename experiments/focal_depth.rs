@@ -11,11 +11,11 @@ use calibench::camera::{FreeParameters, Parameter};
 use calibench::evaluate::interval::each_of;
 use calibench::evaluate::{Interval, cramer_rao};
 use calibench::geometry::{Pose, Vec3, rotation};
-use calibench::harness::study::{CellSummary, Engine, Summary, within};
-use calibench::harness::{
+use calibench::synth::Truth;
+use calibench_harness::{
     Band, Cell, Claim, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
 };
-use calibench::synth::Truth;
+use calibench_study::{CellSummary, Engine, Summary, within};
 
 /// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -28,8 +28,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     takes_image: false,
     run,
 };
-
-calibench::experiment_main!(EXPERIMENT);
 
 const STUDY: &str = r#"
 name = "focal-depth"

@@ -3,7 +3,7 @@
 use super::provenance::crate_versions;
 use super::reconcile::{Expectation, Reconciliation};
 use super::record::Record;
-use crate::io::{Commit, write_atomically};
+use calibench::io::{Commit, write_atomically};
 use serde_json::{Value, json};
 use std::io;
 use std::path::Path;
@@ -21,12 +21,12 @@ pub fn emit(record: &Record, out: &Path, figures: &Path, commit: Option<&Commit>
     for figure in record.figures() {
         write_atomically(&figures.join(figure.file_name()), &figure.bytes)?;
     }
-    let text = format!("{:#}\n", to_json(record, commit));
+    let text = format!("{:#}\n", record_json(record, commit));
     write_atomically(&folder.join("record.json"), text.as_bytes())
 }
 
 /// The record as JSON. A number that is not finite stands as a word, since JSON has none for it.
-pub(super) fn to_json(record: &Record, commit: Option<&Commit>) -> Value {
+pub fn record_json(record: &Record, commit: Option<&Commit>) -> Value {
     let versions: serde_json::Map<String, Value> =
         crate_versions().into_iter().map(|(name, version)| (name, version.into())).collect();
     json!({
@@ -79,14 +79,14 @@ fn number(value: f64) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::harness::{Band, Claim};
+    use crate::{Band, Claim};
 
     #[test]
     fn a_number_that_is_not_finite_is_written_as_a_word() {
         let mut record = Record::new("e", 1);
         record.number("n", f64::INFINITY, "px", Band::Exact, "");
         record.claim(Claim::at_most("c", "", 0.0, 1.0, ""));
-        let json = to_json(&record, None);
+        let json = record_json(&record, None);
         assert_eq!(json["numbers"][0]["value"], "inf");
         assert_eq!(json["claims"][0]["interval"], json!(["-inf", 1.0]));
         assert_eq!(json["provenance"]["commit"], Value::Null);

@@ -1,7 +1,7 @@
 //! From which distribution should a sampled number come? What theory predicts before anything is drawn.
 
-use crate::evaluate::distribution::{ChiSquare, normal_quantile};
-use crate::io::significant;
+use calibench::evaluate::distribution::{ChiSquare, normal_quantile};
+use calibench::io::significant;
 use std::fmt;
 
 /// A predicted distribution of one number.

@@ -2,7 +2,7 @@
 
 use super::predicted::Predicted;
 use super::published::{Entry, Kind};
-use crate::io::significant;
+use calibench::io::significant;
 
 /// What the published number is held against.
 #[derive(Debug, Clone, PartialEq)]

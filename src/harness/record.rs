@@ -7,7 +7,7 @@ use super::predicted::Predicted;
 use super::published::{self, Entry, Kind, PublishedError};
 use super::reconcile::Reconciliation;
 use super::table::Table;
-use crate::io::hash::sha256_hex;
+use calibench::io::hash::sha256_hex;
 
 /// A named number, locked in golden/.
 #[derive(Debug, Clone, PartialEq)]
