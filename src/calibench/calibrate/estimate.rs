@@ -1,0 +1,259 @@
+//! From correspondences to a camera with its uncertainty: the steps of Zhang's method in order.
+
+use super::certificate::Certificate;
+use super::conditioning::Conditioning;
+use super::intervals::Profile;
+use super::minimise::{Problem, State};
+use super::normal::Observations;
+use super::retraction::Retraction;
+use super::search::{self, Evidence, Judged};
+use super::start::Held;
+use super::target_frame::TargetFrame;
+use super::{
+    Calibration, CalibrationError, Loss, Settings, Termination, Warning, chunks, duplicates, identifiability,
+    kernel, start, strays, warnings,
+};
+use crate::board::View;
+use crate::camera::Parameter;
+use crate::geometry::{Homography, Vec2};
+
+/// Homographies of the start are refined until a step promises less than this part of their cost: distortion, which they leave out, is
+/// far larger than what is left to gain.
+const START_GAIN: f64 = 1e-3;
+
+/// Estimates the free parameters of `settings` and the pose of every view.
+///
+/// 1. A homography for each view, of least squared pixel distance.
+/// 2. Intrinsics in closed form, poses from them (Zhang 2000, section 3.1).
+/// 3. All unknowns refined together: the sum of squared pixel distances is least (Zhang 2000, section 3.2, with the full
+///    Brown-Conrady model), which is the maximum-likelihood estimate under Gaussian noise.
+/// 4. Covariance, conditioning, warnings.
+///
+/// # Errors
+/// Data that cannot determine the free parameters are refused; see [`CalibrationError`]. A refinement that does not converge is
+/// no error: the result says so in [`Calibration::termination`] and in a warning.
+pub fn calibrate(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
+    let first = duplicates::first_of_each(views);
+    if first.iter().enumerate().all(|(view, &first)| view == first) {
+        return calibrate_different(views, settings);
+    }
+    let kept: Vec<usize> = (0..views.len()).filter(|&view| first[view] == view).collect();
+    let different: Vec<View> = kept.iter().map(|&view| views[view].clone()).collect();
+    match calibrate_different(&different, settings) {
+        Ok(calibration) => Ok(with_copies(calibration, &first, &kept)),
+        Err(CalibrationError::View { view, source }) => {
+            Err(CalibrationError::View { view: kept[view], source })
+        }
+        Err(CalibrationError::TooFewViews { need, got, linear, .. }) => {
+            Err(CalibrationError::TooFewViews { need, got, linear, copies: views.len() - got })
+        }
+        Err(error) => Err(error),
+    }
+}
+
+fn calibrate_different(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
+    check_counts(views, settings)?;
+    chunks::in_pool(views.len(), || estimate(views, settings))
+}
+
+/// The result for all views: a copy has the pose and the residuals of the view it is a copy of, and counts in no statistic.
+fn with_copies(mut calibration: Calibration, first: &[usize], kept: &[usize]) -> Calibration {
+    let row: Vec<usize> =
+        first.iter().map(|view| kept.binary_search(view).expect("the first of its copies is kept")).collect();
+    fn spread<T: Clone>(list: &[T], row: &[usize]) -> Vec<T> {
+        row.iter().map(|&i| list[i].clone()).collect()
+    }
+    calibration.cam_from_target = spread(&calibration.cam_from_target, &row);
+    calibration.residuals = spread(&calibration.residuals, &row);
+    calibration.covariance.poses = spread(&calibration.covariance.poses, &row);
+    calibration.covariance.cross = spread(&calibration.covariance.cross, &row);
+    for warning in &mut calibration.warnings {
+        if let Warning::Outliers { view, .. } = warning {
+            *view = kept[*view];
+        }
+    }
+    let copies: Vec<usize> = (0..first.len()).filter(|&view| first[view] != view).collect();
+    let view = copies[0];
+    calibration.warnings.push(Warning::Duplicates { view, copy_of: first[view], copies: copies.len() });
+    calibration
+}
+
+fn estimate(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
+    let frame = TargetFrame::of(views);
+    let (observations, homographies) = homographies(views, &frame)?;
+    let pixel_frame = pixel_frame(&observations);
+    let held = Held::of(settings, pixel_frame.0)?;
+    let starts = start::starts(&homographies, settings, &held, pixel_frame)?;
+    let problem = Problem {
+        free: settings.free(),
+        observations: &observations,
+        loss: settings.loss,
+        max_iterations: settings.max_iterations,
+        hold_tilt: false,
+        retraction: Retraction::Straight,
+    };
+    let evidence = Evidence { homographies: &homographies, held: &held, pixel_frame };
+    report(search::best_minimum(&problem, starts, &evidence)?, &problem, &frame, settings.profile_coverage)
+}
+
+fn check_counts(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
+    use Parameter::*;
+    if !settings.loss.is_valid() {
+        return Err(CalibrationError::BadLoss);
+    }
+    let free = settings.free();
+    let linear = [Fx, Fy, Cx, Cy, Skew].into_iter().filter(|&p| free.contains(p)).count();
+    let need = linear.div_ceil(2).max(1);
+    if views.len() < need {
+        return Err(CalibrationError::TooFewViews { need, got: views.len(), linear, copies: 0 });
+    }
+    let coordinates = 2 * views.iter().map(View::len).sum::<usize>();
+    let unknowns = free.len() + 6 * views.len();
+    if coordinates < unknowns {
+        return Err(CalibrationError::TooFewPoints { coordinates, unknowns });
+    }
+    Ok(())
+}
+
+/// The views in the target's frame, and the homography of each.
+fn homographies(
+    views: &[View],
+    frame: &TargetFrame,
+) -> Result<(Vec<Observations>, Vec<Homography>), CalibrationError> {
+    let fits = chunks::map(views, |index, view| {
+        let observations = frame.observations(view);
+        Homography::fit_pairs(&observations, START_GAIN)
+            .map(|fit| (observations, fit.homography))
+            .map_err(|source| CalibrationError::View { view: index, source })
+    });
+    let mut both = (Vec::with_capacity(views.len()), Vec::with_capacity(views.len()));
+    for fit in fits {
+        let (observations, homography) = fit?;
+        both.0.push(observations);
+        both.1.push(homography);
+    }
+    Ok(both)
+}
+
+/// Centre and half-width of the box around all pixels.
+fn pixel_frame(observations: &[Observations]) -> (Vec2, f64) {
+    let outside = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
+    let (low, high) = observations
+        .iter()
+        .map(Observations::to_box)
+        .fold(outside, |(low, high), (l, h)| (low.inf(&l), high.sup(&h)));
+    (0.5 * (low + high), 0.5 * (high - low).max())
+}
+
+fn report(
+    judged: Judged,
+    problem: &Problem<'_>,
+    frame: &TargetFrame,
+    profile_coverage: Option<f64>,
+) -> Result<Calibration, CalibrationError> {
+    let observations = problem.observations;
+    let Judged { minimum, reduction, certificate, starts, skewed } = judged;
+    let State { camera, cam_from_target } = &minimum.state;
+    let system = &minimum.system;
+    let fit = Fit::of(&minimum.state, observations);
+    let points = fit.residuals.iter().map(Vec::len).sum::<usize>();
+    let degrees_of_freedom = 2 * points - system.unknowns();
+    let freedom = degrees_of_freedom.max(1) as f64;
+    let strays = strays::strays(problem, &minimum.state, &fit, fit.square / freedom);
+    let Fit { residuals, square, largest_radius } = fit;
+    let sigma_px = (square / freedom).sqrt();
+    let conditioning = reduction.as_ref().and_then(|reduction| Conditioning::of(system, reduction));
+    if !problem.free.is_empty() {
+        identifiability::refuse_if_singular(conditioning.as_ref(), || {
+            "the normal equations are singular".into()
+        })?;
+    }
+    let variance = noise_variance(&residuals, square, problem.loss, freedom);
+    let intervals = profile_coverage
+        .zip(reduction.as_ref())
+        .and_then(|(coverage, reduction)| {
+            let curved = Problem { retraction: Retraction::Curved, ..*problem };
+            let profile = Profile::new(&curved, &minimum, reduction, variance.sqrt())?;
+            Some(profile.intervals(coverage, degrees_of_freedom))
+        })
+        .unwrap_or_default();
+    let unit = reduction.and_then(|reduction| reduction.covariance()).ok_or_else(|| {
+        CalibrationError::NotIdentifiable {
+            inseparable: vec!["camera".into(), "poses".into()],
+            why: "the normal equations are singular".into(),
+        }
+    })?;
+    let covariance = frame.covariance(unit, cam_from_target, variance);
+    let mut calibration = Calibration {
+        camera: *camera,
+        free: system.free,
+        cam_from_target: cam_from_target.iter().map(|pose| frame.cam_from_target(pose)).collect(),
+        rmse_px: (square / points as f64).sqrt(),
+        sigma_px,
+        degrees_of_freedom,
+        covariance,
+        conditioning,
+        termination: judged_termination(minimum.termination, certificate.as_ref()),
+        certificate,
+        intervals,
+        starts,
+        iterations: minimum.iterations,
+        warnings: Vec::new(),
+        residuals,
+    };
+    calibration.warnings = warnings::of(&calibration, largest_radius, strays, &skewed);
+    Ok(calibration)
+}
+
+/// A minimum counts as one only where the certificate holds.
+fn judged_termination(termination: Termination, certificate: Option<&Certificate>) -> Termination {
+    match termination {
+        Termination::Converged if certificate.is_some_and(|c| !c.holds()) => Termination::AboveFloor,
+        other => other,
+    }
+}
+
+/// How the minimum fits the observations.
+pub(super) struct Fit {
+    pub residuals: Vec<Vec<Vec2>>,
+    /// Sum of squared residuals.
+    square: f64,
+    /// Largest distance of an ideal point from the axis, in normalised coordinates.
+    largest_radius: f64,
+}
+
+impl Fit {
+    /// The squared residuals, mark by mark.
+    pub fn squares(&self) -> impl Iterator<Item = f64> {
+        self.residuals.iter().flatten().map(|r| r.norm_squared())
+    }
+
+    pub fn of(state: &State, observations: &[Observations]) -> Fit {
+        let views = chunks::map(observations, |index, pairs| {
+            kernel::view_residuals(&state.camera, &state.cam_from_target[index], pairs)
+        });
+        let square = views.iter().map(|view| view.square).sum();
+        let largest_radius = views.iter().map(|view| view.largest_radius_sq).fold(0.0, f64::max).sqrt();
+        Fit { residuals: views.into_iter().map(|view| view.residuals).collect(), square, largest_radius }
+    }
+}
+
+/// Factor of the unit covariance: the residual variance, or Huber's correction for a robust loss.
+///
+/// The weighted normal matrix is `sum w J^T J`; with `mean w` it stands for `mean w J^T J`, so the sandwich
+/// `sum w^2 r^2 / (mean psi')^2 (J^T J)^-1` is `sum w^2 r^2 mean w / (mean psi')^2` times its inverse.
+fn noise_variance(residuals: &[Vec<Vec2>], square: f64, loss: Loss, freedom: f64) -> f64 {
+    if loss == Loss::Squares {
+        return square / freedom;
+    }
+    let (mut square, mut weights, mut slopes, mut count) = (0.0, 0.0, 0.0, 0.0);
+    for r in residuals.iter().flatten() {
+        let s = r.norm_squared();
+        let weight = loss.at(s).1;
+        square += weight * weight * s;
+        weights += weight;
+        slopes += loss.slope(s);
+        count += 1.0;
+    }
+    square / freedom * weights * count / (slopes * slopes)
+}
