@@ -92,7 +92,8 @@ fn estimate(views: &[View], settings: &Settings) -> Result<Calibration, Calibrat
         hold_tilt: false,
         retraction: Retraction::Straight,
     };
-    let evidence = Evidence { homographies: &homographies, held: &held, pixel_frame };
+    let evidence =
+        Evidence { homographies: &homographies, held: &held, pixel_frame, search: settings.search };
     report(search::best_minimum(&problem, starts, &evidence)?, &problem, &frame, settings.profile_coverage)
 }
 

