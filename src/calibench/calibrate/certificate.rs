@@ -14,6 +14,7 @@
 //! ```
 //! for `V` views, `N` points and `n` free parameters, `m` combinations of which free homographies leave undetermined (the focal length; without
 //! distortion the principal point too). To first order the statistic follows Fisher's distribution.
+#![allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
 
 use super::blocks::N;
 use super::chance::fisher_tail;

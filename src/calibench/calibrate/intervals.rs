@@ -82,7 +82,8 @@ impl<'a> Profile<'a> {
                 let tau = self.tau(parameter, side * CHECKED_AT * self.deviation(parameter))?;
                 *ratio = CHECKED_AT / tau;
             }
-            if ratios.iter().any(|r| !((r - 1.0).abs() <= TOLERATED)) {
+            // A ratio that is no number counts as far off.
+            if !ratios.iter().all(|r| (r - 1.0).abs() <= TOLERATED) {
                 found.push(Skewed { parameter, ratios });
             }
         }

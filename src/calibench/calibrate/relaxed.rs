@@ -7,6 +7,7 @@
 //! Every camera with every set of poses is one of these, so the least cost here is a floor of the calibration's; and nothing here is ambiguous:
 //! no focal length, no distance, no tilt. With a free homography the focal length is a gauge: `k1` is known as `k1 / f^2`, `k2` as
 //! `k2 / f^4`, and so on. What the data do not fix (a centre without distortion) the damping leaves where it starts.
+#![allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
 
 use super::Loss;
 use super::minimise::Problem;
