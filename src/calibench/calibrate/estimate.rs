@@ -11,7 +11,7 @@ use super::start::Held;
 use super::target_frame::TargetFrame;
 use super::{
     Calibration, CalibrationError, Loss, Settings, Termination, Warning, chunks, duplicates, identifiability,
-    kernel, start, strays, warnings,
+    kernel, polish, start, strays, warnings,
 };
 use crate::board::View;
 use crate::camera::Parameter;
@@ -53,7 +53,8 @@ pub fn calibrate(views: &[View], settings: &Settings) -> Result<Calibration, Cal
 
 fn calibrate_different(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
     check_counts(views, settings)?;
-    chunks::in_pool(views.len(), || estimate(views, settings))
+    let calibration = chunks::in_pool(views.len(), || estimate(views, settings))?;
+    Ok(if settings.polish { polish::polish(views, settings.loss, calibration) } else { calibration })
 }
 
 /// The result for all views: a copy has the pose and the residuals of the view it is a copy of, and counts in no statistic.

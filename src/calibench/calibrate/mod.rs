@@ -20,6 +20,7 @@ mod kernel;
 mod loss;
 mod minimise;
 mod normal;
+mod polish;
 mod radial_centre;
 mod relaxed;
 mod report;

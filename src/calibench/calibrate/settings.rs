@@ -16,6 +16,8 @@ pub struct Settings {
     pub start: Option<Camera>,
     /// Iterations of the refinement before it gives up; a search in doubt may take ten times as many.
     pub max_iterations: usize,
+    /// Whether the minimum is followed to its last digits.
+    pub polish: bool,
     /// Whether the search goes on from other starts where the first minimum is in doubt. Without, the answer is whatever the first start leads
     /// to: for studies of searches.
     pub search: bool,
@@ -36,6 +38,7 @@ impl Settings {
             loss: Loss::Squares,
             start: None,
             max_iterations: DEFAULT_MAX_ITERATIONS,
+            polish: false,
             search: true,
             profile_coverage: None,
         }
@@ -62,6 +65,13 @@ impl Settings {
     /// Chooses the loss.
     pub fn with_loss(mut self, loss: Loss) -> Settings {
         self.loss = loss;
+        self
+    }
+
+    /// Follows the minimum to its last digits, in double-double arithmetic: for comparisons digit by digit. No measurement notices the
+    /// difference, some 1e-7 of a standard deviation, and it takes some twenty times as long.
+    pub fn polished(mut self) -> Settings {
+        self.polish = true;
         self
     }
 
