@@ -14,6 +14,8 @@ mod focal_depth;
 mod four_pose;
 #[path = "gate_power.rs"]
 mod gate_power;
+#[path = "global_minimum.rs"]
+mod global_minimum;
 #[path = "interface.rs"]
 mod interface;
 #[path = "k2_observability.rs"]
@@ -45,4 +47,5 @@ pub const EXPERIMENTS: &[Experiment] = &[
     interface::EXPERIMENT,
     expiry::EXPERIMENT,
     gate_power::EXPERIMENT,
+    global_minimum::EXPERIMENT,
 ];

@@ -23,6 +23,7 @@ pub mod cli;
 mod emit;
 mod experiment;
 pub mod figure;
+pub mod fingerprint;
 pub mod gate;
 pub mod golden;
 pub mod hash;

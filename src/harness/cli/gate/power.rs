@@ -5,7 +5,7 @@ use crate::harness::cli::{Exit, print, warn};
 use crate::harness::gate::faults::planted;
 use crate::harness::gate::power::{Measured, Sizes};
 use crate::harness::gate::{QUICK, textbook};
-use crate::harness::{ProgressDisplay, write_atomically};
+use crate::harness::{ProgressDisplay, fingerprint, write_atomically};
 use std::path::Path;
 use std::time::Instant;
 
@@ -36,9 +36,10 @@ pub(super) fn measure(arguments: &Arguments, folder: &Path, samples: usize) -> R
     let commit = commit().map_or("unknown".to_string(), |c| {
         format!("{}{}", c.hash, if c.dirty { " with changes" } else { "" })
     });
-    let provenance =
+    let command =
         format!("calibench gate --power DIR --samples {samples} --seed {}; commit {commit}", sizes.seed);
-    for (name, text) in measured.to_csv(&provenance) {
+    let head = fingerprint::head(&command, &fingerprint::of_gate_power());
+    for (name, text) in measured.to_csv(&head) {
         write_atomically(&folder.join(name), text.as_bytes()).map_err(incomplete)?;
     }
     print(&measured.to_markdown());
