@@ -6,10 +6,10 @@
 //! alarms hundreds of runs: they are measured by `calibench gate --power golden/gate-power --size thorough`, and what that wrote
 //! is read here. It is refused as stale when a line of the gate or of the solver has changed since.
 
-use calibench::harness::fingerprint;
-use calibench::harness::gate::faults::{Class, Planted, planted};
-use calibench::harness::gate::power::{Catch, FaultRow, Measured, catch, false_alarms};
-use calibench::harness::{Band, Claim, Context, Experiment, ExperimentError, Record, Table};
+use calibench_gate::faults::{Class, Planted, planted};
+use calibench_gate::power::{Catch, FaultRow, Measured, catch, false_alarms};
+use calibench_harness::fingerprint::Fingerprint;
+use calibench_harness::{Band, Claim, Context, Experiment, ExperimentError, Record, Table};
 use rayon::prelude::*;
 
 /// The experiment.
@@ -24,8 +24,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     takes_image: false,
     run,
 };
-
-calibench::experiment_main!(EXPERIMENT);
 
 /// Most samples a scenario: a quarter of a quick run.
 const MOST_SAMPLES: usize = 32;
@@ -168,13 +166,9 @@ fn thorough(record: &mut Record) -> Result<(), ExperimentError> {
 
 /// The committed tables are of the gate and the solver that run now.
 fn is_current() -> Claim {
-    let present = fingerprint::of_gate_power();
-    let files = [("faults", FAULTS), ("false-alarms", FALSE_ALARMS), ("textbook", TEXTBOOK)];
-    let cases = files.map(|(name, text)| {
-        let of_file = fingerprint::in_head(text).unwrap_or("none");
-        let what = format!("{name}.csv has fingerprint {of_file}, the code {present}: run {COMMAND}");
-        (what, of_file == present)
-    });
+    let present = Fingerprint::of_gate_power();
+    let files = [("faults.csv", FAULTS), ("false-alarms.csv", FALSE_ALARMS), ("textbook.csv", TEXTBOOK)];
+    let cases = files.map(|(name, text)| present.case(name, text, COMMAND));
     Claim::all_of(
         "thorough-measurement-is-current",
         "the thorough measurement is of the present gate and the present solver",

@@ -10,32 +10,19 @@
 //! refused as stale when a line of the solver, of the scenes or of the reference has changed.
 
 use calibench::camera::Parameter;
-use calibench::harness::fingerprint;
-use calibench::harness::{Band, Claim, Context, Experiment, ExperimentError, Record, Table};
+use calibench_harness::fingerprint::Fingerprint;
+use calibench_harness::{Band, Cell, Claim, Context, Experiment, ExperimentError, Record, Table};
 use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-#[allow(dead_code, reason = "the whole measurement is the binary of that name")]
-#[path = "global_minimum/campaign.rs"]
 pub mod campaign;
-#[path = "global_minimum/committed.rs"]
 mod committed;
-#[path = "global_minimum/families.rs"]
 mod families;
-#[path = "global_minimum/judged.rs"]
 mod judged;
-#[allow(dead_code, reason = "as above")]
-#[path = "global_minimum/listing.rs"]
 mod listing;
-#[path = "global_minimum/map.rs"]
 mod map;
-#[allow(dead_code, reason = "as above")]
-#[path = "global_minimum/oracle.rs"]
 mod oracle;
-#[allow(dead_code, reason = "as above")]
-#[path = "global_minimum/peers.rs"]
 mod peers;
-#[path = "global_minimum/scenes.rs"]
 mod scenes;
 
 use committed::{DETERMINED, Line};
@@ -54,8 +41,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     takes_image: false,
     run,
 };
-
-calibench::experiment_main!(EXPERIMENT);
 
 /// Seed of every scene; not chosen for its result.
 const SEED: u64 = 11;
@@ -92,16 +77,6 @@ const COMMITTED: [&str; 11] = [
 
 /// What OpenCV made of the first scenes of every family.
 const OPENCV: &str = include_str!("../golden/global-minimum/opencv.csv");
-
-/// The fingerprint of solver, scenes and reference.
-fn present_fingerprint() -> String {
-    fingerprint::fingerprint(include_str!(concat!(env!("OUT_DIR"), "/global-minimum.code")))
-}
-
-/// The fingerprint of scenes and reference alone.
-fn scenes_fingerprint() -> String {
-    fingerprint::fingerprint(include_str!(concat!(env!("OUT_DIR"), "/global-minimum-scenes.code")))
-}
 
 /// A family with what was committed of it.
 struct Measured {
@@ -147,15 +122,13 @@ fn read() -> Result<Vec<Measured>, ExperimentError> {
 
 /// The committed scenes are those of this code: their fingerprint is, and the share that is judged again has the same bits.
 fn claim_current(record: &mut Record, measured: &[Measured], context: &Context) {
-    let present = present_fingerprint();
+    let present = Fingerprint::of_global_minimum();
     record.claim(Claim::all_of(
         "scenes-are-current",
         "every committed scene was judged by the present solver, drawn and referred by the present code",
         measured.iter().map(|m| {
-            let of_file = fingerprint::in_head(m.text).unwrap_or("none");
-            let name =
-                format!("{}.csv has fingerprint {of_file}, the code {present}: run {COMMAND}", m.family.name);
-            (name, of_file == present && m.lines.len() as u64 == m.family.scenes)
+            let (what, held) = present.case(&format!("{}.csv", m.family.name), m.text, COMMAND);
+            (what, held && m.lines.len() as u64 == m.family.scenes)
         }),
         "SHA-256 of the code lines of solver, scenes and reference, and the versions of the numeric crates",
     ));
@@ -300,12 +273,7 @@ fn tell_errors(record: &mut Record, any: &Measured) {
             .collect();
         let mean = z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64;
         let largest = z.iter().fold(0.0f64, |most, z| most.max(z.abs()));
-        table.push([
-            parameter.name().into(),
-            z.len().into(),
-            mean.into(),
-            calibench::harness::Cell::from(largest),
-        ]);
+        table.push([parameter.name().into(), z.len().into(), mean.into(), Cell::from(largest)]);
     }
     record.table(table);
 }
@@ -376,7 +344,9 @@ fn tell_opencv(record: &mut Record, measured: &[Measured]) -> Result<(), Experim
         let they = |ending, known: bool| {
             theirs.iter().filter(|l| l.ending == ending && (!known || l.is_determined())).count()
         };
-        let we = |class, known: bool| ours.iter().filter(|l| l.class == class && (!known || l.is_determined())).count();
+        let we = |class, known: bool| {
+            ours.iter().filter(|l| l.class == class && (!known || l.is_determined())).count()
+        };
         let determined = theirs.iter().filter(|l| l.is_determined()).count();
         let row = [
             theirs.len(),
@@ -390,7 +360,7 @@ fn tell_opencv(record: &mut Record, measured: &[Measured]) -> Result<(), Experim
             they(Ending::Wrong, true),
             we(Class::Wrong, true),
         ];
-        table.push(std::iter::once(m.family.name.into()).chain(row.map(calibench::harness::Cell::from)));
+        table.push(std::iter::once(m.family.name.into()).chain(row.map(Cell::from)));
     }
     record.table(table);
     let any: Vec<&peers::Line> = lines.iter().filter(|l| l.family == FAMILIES[0].name).collect();
@@ -398,20 +368,30 @@ fn tell_opencv(record: &mut Record, measured: &[Measured]) -> Result<(), Experim
     let wrong = any.iter().filter(|l| l.is_determined() && l.ending == Ending::Wrong).count();
     let band = || Band::absolute(any.len() as f64, "counts of another program's answers, committed");
     record.number("opencv-scenes", any.len() as f64, "", band(), "random scenes that OpenCV was asked");
-    record.number("opencv-determined", determined as f64, "", band(), "of them with a bound of sd(fx)/fx below 2 %");
-    record.number("opencv-wrong-of-determined", wrong as f64, "", band(), "of these answered at a higher cost than the reference");
+    record.number(
+        "opencv-determined",
+        determined as f64,
+        "",
+        band(),
+        "of them with a bound of sd(fx)/fx below 2 %",
+    );
+    record.number(
+        "opencv-wrong-of-determined",
+        wrong as f64,
+        "",
+        band(),
+        "of these answered at a higher cost than the reference",
+    );
     Ok(())
 }
 
 /// OpenCV's answers do not depend on this library's solver; the scenes they are to do.
 fn claim_opencv_current() -> Claim {
-    let of_file = fingerprint::in_head(OPENCV).unwrap_or("none");
-    let present = scenes_fingerprint();
-    let case = format!("opencv.csv has fingerprint {of_file}, the scenes {present}: run {}", peers::COMMAND);
+    let case = Fingerprint::of_global_minimum_scenes().case("opencv.csv", OPENCV, peers::COMMAND);
     Claim::all_of(
         "opencv-is-current",
         "OpenCV was asked the scenes of the present code",
-        [(case, of_file == present)],
+        [case],
         "SHA-256 of the code lines of scenes and reference, and the versions of the numeric crates",
     )
 }

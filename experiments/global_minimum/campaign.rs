@@ -6,8 +6,10 @@ use super::judged::{Judged, judge};
 use super::listing;
 use super::peers;
 use super::scenes::Drawn;
-use super::{COMMAND, SEED, present_fingerprint};
-use calibench::harness::{ProgressDisplay, fingerprint, write_atomically};
+use super::{COMMAND, SEED};
+use calibench::io::write_atomically;
+use calibench_harness::ProgressDisplay;
+use calibench_harness::fingerprint::Fingerprint;
 use clap::Parser;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -121,7 +123,7 @@ fn write(folder: &Path) -> Result<(), String> {
         let rows = run(family, SEED, 0, family.scenes);
         println!("{}", listing::summary(family, &rows));
         let lines: Vec<String> = rows.iter().map(|row| Line::of(row).text() + "\n").collect();
-        let head = fingerprint::head(&format!("{COMMAND}; seed {SEED}"), &present_fingerprint());
+        let head = Fingerprint::of_global_minimum().head(&format!("{COMMAND}; seed {SEED}"));
         let text = format!("{head}\n{HEADER}\n{}", lines.concat());
         write_atomically(&folder.join(format!("{}.csv", family.name)), text.as_bytes())
             .map_err(|e| e.to_string())?;

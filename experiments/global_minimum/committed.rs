@@ -1,7 +1,7 @@
 //! What became of every scene? A line each, as it is committed in golden/global-minimum/.
 
 use super::judged::{Class, Judged};
-use calibench::harness::hash::sha256_hex;
+use calibench::io::sha256_hex;
 
 /// The columns of a line.
 pub const HEADER: &str = "index,views,tilt_deg,bound,class,warnings,excess,note,z,bits";

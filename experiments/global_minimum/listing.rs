@@ -4,7 +4,7 @@ use super::committed::DETERMINED;
 use super::families::Family;
 use super::judged::{Class, Judged};
 use calibench::camera::Parameter;
-use calibench::harness::significant;
+use calibench::io::significant;
 
 /// The columns of [`line`].
 pub const HEADER: &str = "family,index,layout,model,views,points,fx,width,noise,tilt,coverage,size_given,bound,freedom,reference,\

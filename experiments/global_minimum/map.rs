@@ -2,7 +2,7 @@
 
 use super::committed::Line;
 use super::judged::Class;
-use calibench::harness::{ExperimentError, Figure, HeatMap, Plot, Record, Table};
+use calibench_harness::{ExperimentError, Figure, HeatMap, Plot, Record, Table};
 
 /// Upper ends of the classes of the bound of sd(fx)/fx; the last has none.
 const BOUNDS: [f64; 8] = [0.001, 0.003, 0.01, 0.02, 0.05, 0.2, 1.0, f64::INFINITY];

@@ -4,10 +4,10 @@
 //! point by point from `camera::project_with_jacobian`, poses eliminated view by view (Schur complement), damping in proportion to the
 //! diagonal (Marquardt 1963). Its unknown poses are those of the target's middle, so that a far origin costs no digits.
 
+use calibench::board::View;
 use calibench::camera::{Camera, FreeParameters, Parameter, project_with_jacobian};
 use calibench::geometry::{Pose, Vec2, Vec3};
 use calibench::synth::Truth;
-use calibench::target::View;
 use nalgebra::{DMatrix, DVector, Matrix6, MatrixXx6, Vector6};
 
 /// Unknowns of one view: all intrinsics and a pose.

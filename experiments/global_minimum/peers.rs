@@ -1,18 +1,20 @@
 //! How do other calibrators end on the same scenes? Asked through the gate's protocol, judged by the same reference.
 
+use super::SEED;
 use super::campaign::FOLDER;
 use super::committed::DETERMINED;
 use super::families::{FAMILIES, Family};
 use super::oracle;
 use super::scenes::Drawn;
-use super::{SEED, scenes_fingerprint};
 use calibench::camera::{Camera, Parameter};
 use calibench::evaluate::cramer_rao;
 use calibench::geometry::Pose;
-use calibench::harness::gate::accept::Outcome;
-use calibench::harness::gate::protocol::{Problem, ProblemView};
-use calibench::harness::gate::{Process, Solver};
-use calibench::harness::{ProgressDisplay, fingerprint, write_atomically};
+use calibench::io::write_atomically;
+use calibench_gate::accept::Outcome;
+use calibench_gate::protocol::{Problem, ProblemView};
+use calibench_gate::{Process, Solver};
+use calibench_harness::ProgressDisplay;
+use calibench_harness::fingerprint::Fingerprint;
 use rayon::prelude::*;
 use std::path::Path;
 use std::time::Duration;
@@ -98,8 +100,7 @@ impl Line {
 }
 
 /// The command that asks OpenCV.
-pub const COMMAND: &str =
-    "cargo run --release --bin global-minimum-scenes -- --peer opencv --solver 'python3 adapters/opencv_solver.py'";
+pub const COMMAND: &str = "cargo run --release --bin global-minimum-scenes -- --peer opencv --solver 'python3 adapters/opencv_solver.py'";
 
 /// Asks a program about the first scenes of every family and writes `<name>.csv` beside the committed scenes. Scenes whose skew is
 /// unknown are left out: few programs know it.
@@ -126,7 +127,8 @@ pub fn measure(command: &str, name: &str, jobs: usize) -> Result<(), String> {
             drawn.iter().for_each(|_| progress.step());
         }
     }
-    let head = fingerprint::head(&format!("global-minimum-scenes --peer {name}; seed {SEED}"), &scenes_fingerprint());
+    let head = Fingerprint::of_global_minimum_scenes()
+        .head(&format!("global-minimum-scenes --peer {name}; seed {SEED}"));
     let path = Path::new(FOLDER).join(format!("{name}.csv"));
     write_atomically(&path, format!("{head}\n{HEADER}\n{lines}").as_bytes()).map_err(|e| e.to_string())
 }
@@ -136,7 +138,7 @@ fn problem(family: &Family, drawn: &Drawn) -> Problem {
     let truth = drawn.truth();
     let held = Parameter::ALL.into_iter().filter(|&p| !drawn.free.contains(p));
     let coordinates = |list: &[calibench::geometry::Vec2]| list.iter().map(|p| [p.x, p.y]).collect();
-    let view = |view: &calibench::target::View| ProblemView {
+    let view = |view: &calibench::board::View| ProblemView {
         target: coordinates(view.points()),
         pixels: coordinates(view.pixels()),
     };
@@ -161,7 +163,8 @@ fn judge(family: &Family, drawn: &Drawn, outcome: &Outcome) -> Option<Line> {
         Outcome::Refused(_) => (Ending::Refused, 0.0, 0.0),
         Outcome::Broken(_) => (Ending::Broken, 0.0, 0.0),
         Outcome::Estimate(estimate) => {
-            let cost = estimate.cam_from_target.as_ref().and_then(|poses| cost(&estimate.camera, poses, drawn));
+            let cost =
+                estimate.cam_from_target.as_ref().and_then(|poses| cost(&estimate.camera, poses, drawn));
             let excess = cost.map_or(f64::INFINITY, |cost| (cost - reference) / variance);
             let same = excess <= SAME_COST_VARIANCES;
             (if same { Ending::Right } else { Ending::Wrong }, excess, estimate.camera.fx)

@@ -1,12 +1,12 @@
 //! Which scene has the number `i`? Truth, noise and settings, drawn from a family by seed and index alone, in any order.
 
 use super::families::{Centre, Draw, Family, Layout, Lens, Model, Places, Second, Target, Tilts, WIDEST};
+use calibench::board::View;
 use calibench::calibrate::Settings;
 use calibench::camera::{BrownConrady, Camera, FreeParameters, Parameter};
 use calibench::geometry::{Mat3, Pose, Vec2, Vec3, rotation};
 use calibench::synth::scene::looking_at_centre;
 use calibench::synth::{Scene, Stream, StreamKey, Truth};
-use calibench::target::View;
 
 /// Places tried for a target before it is put a little farther away.
 const PLACES: usize = 12;
@@ -376,7 +376,8 @@ mod tests {
             let drawn = Drawn::new(&FAMILIES[0], 3, index).unwrap();
             let (width, height) = drawn.truth().image_size;
             for pixel in drawn.scene.pixels().iter().flatten() {
-                let inside = (-0.5..=width as f64 - 0.5).contains(&pixel.x) && (-0.5..=height as f64 - 0.5).contains(&pixel.y);
+                let inside = (-0.5..=width as f64 - 0.5).contains(&pixel.x)
+                    && (-0.5..=height as f64 - 0.5).contains(&pixel.y);
                 assert!(inside, "scene {index}: {pixel}");
             }
             assert!(sees_all(&drawn.truth().camera, width as f64, height as f64));
