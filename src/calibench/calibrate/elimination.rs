@@ -215,6 +215,28 @@ impl Eliminated {
         SVector::from(self.solve_transposed(along))
     }
 
+    /// `W^T y` for a whitened vector, `n` entries: the intrinsics' share of it.
+    pub fn coupled(&self, y: &[f64; 6], n: usize) -> [f64; N] {
+        let mut sum = [0.0; N];
+        for (row, y) in self.whitened.iter().zip(y) {
+            for (sum, w) in sum.iter_mut().zip(row).take(n) {
+                *sum += w * y;
+            }
+        }
+        sum
+    }
+
+    /// `L^-1 b`.
+    pub fn whiten(&self, mut b: [f64; 6]) -> [f64; 6] {
+        for i in 0..6 {
+            for k in 0..i {
+                b[i] -= self.factor[i][k] * b[k];
+            }
+            b[i] *= self.factor[i][i];
+        }
+        b
+    }
+
     /// `L^-T b`.
     #[inline(always)]
     fn solve_transposed(&self, mut b: [f64; 6]) -> [f64; 6] {

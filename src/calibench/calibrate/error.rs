@@ -9,8 +9,9 @@ use crate::geometry::HomographyError;
 pub enum CalibrationError {
     /// Each view gives two constraints on the linear parameters.
     #[error(
-        "{got} view(s) cannot determine {linear} free linear parameters (fx fy cx cy skew): each view gives two constraints, \
-         so at least {need} are needed; add views of other tilt or hold parameters"
+        "{got} view(s){} cannot determine {linear} free linear parameters (fx fy cx cy skew): each view gives two constraints, \
+         so at least {need} are needed; add views of other tilt or hold parameters",
+        if *copies > 0 { format!(", {copies} copies of them not counted,") } else { String::new() }
     )]
     TooFewViews {
         /// Views needed.
@@ -19,6 +20,8 @@ pub enum CalibrationError {
         got: usize,
         /// Free parameters among fx, fy, cx, cy, skew.
         linear: usize,
+        /// Views that are copies of others.
+        copies: usize,
     },
     /// The points are fewer than the unknowns.
     #[error(

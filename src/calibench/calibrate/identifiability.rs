@@ -3,63 +3,87 @@
 //! Views of parallel planes say no more about the linear parameters than one view does (Zhang 2000, section 4), and views
 //! parallel to the image plane leave focal length and distance inseparable. With noise no two planes are exactly parallel,
 //! and a solver finds some camera, with small and meaningless standard deviations: linearised where the noise put it, the
-//! model looks well determined. So the question is put to the data: do they fit worse if all planes are held parallel? If
-//! not, and if the parameters could not be identified were the planes parallel, the data are refused.
+//! model looks well determined. The covariance cannot see this; the cost can, and it is asked twice.
+//!
+//! - A parameter is moved far away and the rest refitted ([`super::walk`]): if the data do not object, the calibration is refused, and what moved
+//!   along is named.
+//! - Where tilts are no larger than noise makes them, all planes are held parallel: if the data fit as well, and the parameters could not be
+//!   identified were the planes parallel, the calibration is refused.
 
 use super::CalibrationError;
-use super::Termination;
 use super::conditioning::{Conditioning, WeakComponent};
 use super::minimise::{Minimum, Problem, State};
 use super::normal::Observations;
 use super::system::System;
+use super::walk::{Far, Walked};
+use crate::camera::Parameter;
 use crate::geometry::{Pose, Vec2, Vec3, rotation};
 
-/// With this probability planes that are parallel pass for tilted: -ln(1e-9).
+/// With this probability data that determine nothing pass: -ln(1e-9).
 const LOG_FALSE_ACCEPTANCE: f64 = 20.7;
 /// Planes whose difference of tilt moves the edge of the target's image by more than this many standard deviations of a pixel are not
 /// parallel by accident, and need no test.
 const EVIDENT_TILT: f64 = 50.0;
+
+/// A cost lower by more variances than this is no rounding.
+const LOWER: f64 = 1e-3;
 /// Iterations of the fit with parallel planes: it starts next to its answer.
 const PARALLEL_ITERATIONS: usize = 50;
+/// The cost rises by the square of so many standard deviations when a focal length that the data determine is moved far away: three. A factor of three in focal length that costs less is no knowledge of it.
+const FOCAL_RISE: f64 = 9.0;
+/// Likewise for the principal point: two. It may be known poorly while the focal length is known well; then a warning is enough.
+const CENTRE_RISE: f64 = 4.0;
 
-/// Refuses if the free parameters are not determined by the data that `problem` holds and `minimum` explains with noise
-/// `sigma_px` on a pixel coordinate; `conditioning` is that of the minimum.
-pub(super) fn check(
-    problem: &Problem<'_>,
-    minimum: &Minimum,
-    conditioning: Option<&Conditioning>,
-    sigma_px: f64,
-) -> Result<(), CalibrationError> {
-    let state = &minimum.state;
-    if problem.free.is_empty() {
-        return Ok(());
-    }
-    refuse_if_singular(conditioning, || "the normal equations are singular".to_string())?;
+/// The least rise, in variances, that a parameter far away must cause.
+pub(super) fn least_rise(parameter: Parameter) -> f64 {
+    if matches!(parameter, Parameter::Cx | Parameter::Cy) { CENTRE_RISE } else { FOCAL_RISE }
+}
+
+/// A chi-squared variable with `d` degrees of freedom exceeds `d + 2 sqrt(d x) + 2 x` with probability below `exp(-x)`
+/// (Laurent & Massart 2000, lemma 1).
+fn largest_chance_chi_squared(degrees_of_freedom: usize) -> f64 {
+    let (d, x) = (degrees_of_freedom as f64, LOG_FALSE_ACCEPTANCE);
+    d + 2.0 * (d * x).sqrt() + 2.0 * x
+}
+
+/// Whether the tilts of a state are so different, and so different from none, that no test is needed; for noise `noise_px` on a coordinate.
+pub(super) fn tilts_are_evident(problem: &Problem<'_>, state: &State, noise_px: f64) -> bool {
+    doubtful_slopes(problem, state, noise_px).is_empty()
+}
+
+/// The common slopes that all planes might have: none, and the mean. Empty where the planes are evidently not parallel.
+fn doubtful_slopes(problem: &Problem<'_>, state: &State, noise_px: f64) -> Vec<(Vec2, &'static str)> {
     let slopes: Vec<Slope> =
         state.cam_from_target.iter().zip(problem.observations).filter_map(|(p, o)| Slope::of(p, o)).collect();
-    if slopes.len() < state.cam_from_target.len() {
-        return Ok(()); // a plane seen edge-on is parallel to no other by accident
+    if slopes.len() < state.cam_from_target.len() || slopes.is_empty() {
+        return Vec::new(); // a plane seen edge-on is parallel to no other by accident
     }
     let focal = 0.5 * (state.camera.fx + state.camera.fy);
-    let unsettled = minimum.termination != Termination::Converged;
-    let suspicious = |common: Vec2| {
-        let evident = |s: &Slope| s.edge_shift_px(&common, focal) > EVIDENT_TILT * sigma_px;
-        unsettled || !slopes.iter().any(evident)
-    };
-    if suspicious(Vec2::zeros()) {
-        refuse_if_fits(
-            problem,
-            minimum,
-            sigma_px,
-            Vec2::zeros(),
-            "the target is parallel to the image plane in every view",
-        )?;
+    let mean = slopes.iter().map(|s| s.value).sum::<Vec2>() / slopes.len() as f64;
+    let mut candidates = vec![(Vec2::zeros(), "the target is parallel to the image plane in every view")];
+    if slopes.len() > 1 {
+        candidates.push((mean, "the target has the same tilt in every view"));
     }
-    let common = slopes.iter().map(|s| s.value).sum::<Vec2>() / slopes.len() as f64;
-    if slopes.len() > 1 && suspicious(common) {
-        refuse_if_fits(problem, minimum, sigma_px, common, "the target has the same tilt in every view")?;
+    candidates.retain(|(common, _)| !slopes.iter().any(|s| s.edge_shift_px(common, focal) > EVIDENT_TILT * noise_px));
+    candidates
+}
+
+/// Refuses if planes that are parallel explain the data and do not determine the parameters. A state of lower cost, if one is met, is
+/// returned: what was given is then no minimum, and nothing is refused.
+pub(super) fn refuse_if_parallel(
+    problem: &Problem<'_>,
+    minimum: &Minimum,
+    noise_px: f64,
+) -> Result<Option<State>, CalibrationError> {
+    if problem.free.is_empty() {
+        return Ok(None);
     }
-    Ok(())
+    for (slope, what) in doubtful_slopes(problem, &minimum.state, noise_px) {
+        if let Some(lower) = refuse_if_fits(problem, minimum, noise_px, slope, what)? {
+            return Ok(Some(lower));
+        }
+    }
+    Ok(None)
 }
 
 /// Refuses if planes of the given common slope explain the data and do not determine the parameters.
@@ -69,19 +93,20 @@ pub(super) fn check(
 fn refuse_if_fits(
     problem: &Problem<'_>,
     minimum: &Minimum,
-    sigma_px: f64,
+    noise_px: f64,
     slope: Vec2,
     what: &str,
-) -> Result<(), CalibrationError> {
+) -> Result<Option<State>, CalibrationError> {
     let parallel = Problem { hold_tilt: true, max_iterations: PARALLEL_ITERATIONS, ..*problem };
     let held = parallel.minimise(turned_to(&minimum.state, slope));
     let degrees_of_freedom = 4 * problem.observations.len();
     let bound = largest_chance_chi_squared(degrees_of_freedom);
-    // Exact data leave rounding as noise: then planes that fit to rounding fit.
-    let variance = (sigma_px * sigma_px).max(problem.rounding_cost());
-    let ratio = (held.system.cost - minimum.system.cost) / variance;
+    let ratio = (held.system.cost - minimum.system.cost) / variance(problem, noise_px);
+    if ratio < -LOWER {
+        return Ok(Some(held.state));
+    }
     if ratio > bound {
-        return Ok(());
+        return Ok(None);
     }
     let mut exact = System::new(problem.free, problem.observations.len());
     problem.linearise_into(&held.state, &mut exact);
@@ -90,16 +115,23 @@ fn refuse_if_fits(
             "{what} within noise (holding it so raises the cost by {ratio:.1} variances, and up to {bound:.0} could be \
              chance on {degrees_of_freedom} degrees of freedom)"
         )
-    })
+    })?;
+    Ok(None)
 }
 
-fn refuse_if_singular(
+/// Variance of a pixel coordinate; exact data leave rounding as noise.
+pub(super) fn variance(problem: &Problem<'_>, noise_px: f64) -> f64 {
+    (noise_px * noise_px).max(problem.rounding_cost())
+}
+
+/// Refuses normal equations that are singular.
+pub(super) fn refuse_if_singular(
     conditioning: Option<&Conditioning>,
     why: impl FnOnce() -> String,
 ) -> Result<(), CalibrationError> {
     match conditioning {
         Some(c) if !c.is_singular() => Ok(()),
-        Some(c) => Err(CalibrationError::NotIdentifiable { inseparable: spoken(&c.weakest), why: why() }),
+        Some(c) => Err(CalibrationError::NotIdentifiable { inseparable: names(&c.weakest), why: why() }),
         None => Err(CalibrationError::NotIdentifiable {
             inseparable: vec!["camera".into(), "poses".into()],
             why: why(),
@@ -107,29 +139,86 @@ fn refuse_if_singular(
     }
 }
 
+/// Refuses where a walk far away met no resistance.
+pub(super) fn refuse_if_flat(
+    problem: &Problem<'_>,
+    walked: &Walked,
+    noise_px: f64,
+) -> Result<(), CalibrationError> {
+    let variance = variance(problem, noise_px);
+    let rise = |far: &Minimum| (far.system.cost - walked.best.system.cost) / variance;
+    let share = |far: &Far| rise(&far.minimum) / least_rise(far.parameter);
+    let flattest = walked.far.iter().min_by(|a, b| share(a).total_cmp(&share(b)));
+    match flattest {
+        Some(far) if share(far) < 1.0 => Err(CalibrationError::NotIdentifiable {
+            inseparable: moved(&walked.best.state, &far.minimum.state, far.parameter),
+            why: format!(
+                "{} {:.5} fits as {:.5} does: the cost rises by {:.1} variances only, and {:.0} are needed to rule chance out",
+                far.parameter.name(),
+                far.minimum.state.camera.get(far.parameter),
+                walked.best.state.camera.get(far.parameter),
+                rise(&far.minimum),
+                least_rise(far.parameter),
+            ),
+        }),
+        _ => Ok(()),
+    }
+}
+
 /// Names for people: fx and fy together are the focal length, and so on; the poses' share last.
-fn spoken(weakest: &[WeakComponent]) -> Vec<String> {
+fn names(weakest: &[WeakComponent]) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for member in weakest {
-        let name = match member.name.as_str() {
-            "fx" | "fy" => "focal length",
-            "cx" | "cy" => "principal point",
-            "k1" | "k2" | "k3" => "radial distortion",
-            "p1" | "p2" => "tangential distortion",
-            other => other,
-        };
-        if !names.iter().any(|n| n == name) {
-            names.push(name.to_string());
-        }
+        add(&mut names, group(&member.name));
     }
     names
 }
 
-/// A chi-squared variable with `d` degrees of freedom exceeds `d + 2 sqrt(d x) + 2 x` with probability below `exp(-x)`
-/// (Laurent & Massart 2000, lemma 1).
-fn largest_chance_chi_squared(degrees_of_freedom: usize) -> f64 {
-    let (d, x) = (degrees_of_freedom as f64, LOG_FALSE_ACCEPTANCE);
-    d + 2.0 * (d * x).sqrt() + 2.0 * x
+fn group(name: &str) -> &str {
+    match name {
+        "fx" | "fy" => "focal length",
+        "cx" | "cy" => "principal point",
+        "k1" | "k2" | "k3" => "radial distortion",
+        "p1" | "p2" => "tangential distortion",
+        other => other,
+    }
+}
+
+fn add(names: &mut Vec<String>, name: &str) {
+    if !names.iter().any(|n| n == name) {
+        names.push(name.to_string());
+    }
+}
+
+/// A parameter or pose that changed by less than this part between two states that fit alike did not move along.
+const MOVED: f64 = 0.1;
+
+/// What moved along when a parameter was moved far away, that parameter first.
+fn moved(near: &State, far: &State, parameter: Parameter) -> Vec<String> {
+    let mut list = Vec::new();
+    add(&mut list, group(parameter.name()));
+    let (a, b) = (&near.camera, &far.camera);
+    let focal = 0.5 * (a.fx + a.fy);
+    if (libm::log(a.fx / b.fx)).abs().max(libm::log(a.fy / b.fy).abs()) > MOVED {
+        add(&mut list, "focal length");
+    }
+    let views = || near.cam_from_target.iter().zip(&far.cam_from_target);
+    let count = near.cam_from_target.len().max(1) as f64;
+    let mean = |of: &dyn Fn(&Pose, &Pose) -> f64| (views().map(|(a, b)| of(a, b)).sum::<f64>() / count).sqrt();
+    let squared = |x: f64| x * x;
+    if mean(&|a, b| squared(libm::log((a.translation.z / b.translation.z).abs()))) > MOVED {
+        add(&mut list, "distance");
+    }
+    if (Vec2::new(a.cx, a.cy) - Vec2::new(b.cx, b.cy)).norm() > MOVED * focal {
+        add(&mut list, "principal point");
+    }
+    if mean(&|a, b| squared((a.translation - b.translation).xy().norm() / a.translation.z)) > MOVED {
+        add(&mut list, "lateral position");
+    }
+    if mean(&|a, b| (a.rotation.column(2) - b.rotation.column(2)).norm_squared()) > MOVED {
+        add(&mut list, "tilt");
+    }
+    list
 }
 
 /// The tilt of a target plane: `(n_x, n_y) / n_z` of its normal in the camera's frame.

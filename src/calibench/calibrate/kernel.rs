@@ -5,6 +5,10 @@
 //! times their own linear parameters, and a handful of scalars. Which of them a problem needs is looked up afterwards.
 #![allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
 
+mod strain;
+
+pub(super) use strain::{Strain, view_strain};
+
 use super::Loss;
 use crate::camera::{Camera, Parameter};
 use crate::geometry::Pose;

@@ -3,30 +3,46 @@
 //! [`calibrate`] is the whole way; the steps stand in files of their own. Truth never enters here.
 
 mod blocks;
+mod certificate;
+mod chance;
 mod chunks;
 mod closed_form;
+mod condensed;
 mod conditioning;
 mod covariance;
 mod elimination;
+mod duplicates;
 mod error;
 mod estimate;
 mod identifiability;
+mod intervals;
 mod kernel;
 mod loss;
 mod minimise;
 mod normal;
+mod radial_centre;
+mod relaxed;
 mod report;
+mod retraction;
+mod search;
 mod settings;
 pub mod single_plane;
 mod start;
+mod strays;
 mod system;
+mod target_frame;
 mod termination;
+mod tilt;
+mod walk;
+mod warnings;
 
+pub use certificate::Certificate;
 pub use closed_form::{ClosedFormError, closed_form, pose_from_homography};
 pub use conditioning::{Conditioning, WeakComponent};
 pub use covariance::Covariance;
 pub use error::CalibrationError;
 pub use estimate::calibrate;
+pub use intervals::ProfileInterval;
 pub use loss::Loss;
 pub use normal::information;
 pub use report::{Calibration, Warning};

@@ -1,6 +1,6 @@
 //! What does a calibration say? The estimate, how sure it is, how it fits, and what to be careful about.
 
-use super::{Conditioning, Covariance, Termination};
+use super::{Certificate, Conditioning, Covariance, ProfileInterval, Termination};
 use crate::camera::{Camera, FreeParameters, Parameter};
 use crate::geometry::{Pose, Vec2};
 use std::fmt;
@@ -30,6 +30,13 @@ pub struct Calibration {
     pub conditioning: Option<Conditioning>,
     /// How the refinement ended.
     pub termination: Termination,
+    /// How the cost compares with its floor; `None` where a pose is undetermined. Under a robust loss it compares weighted residuals, and its
+    /// probability is rough.
+    pub certificate: Option<Certificate>,
+    /// Intervals by the profile of the cost, one a free parameter; empty unless [`super::Settings::with_profile_intervals`] asked for them.
+    pub intervals: Vec<ProfileInterval>,
+    /// Starts that were refined: 1 where the first left no doubt.
+    pub starts: usize,
     /// Refinement steps.
     pub iterations: usize,
     /// What to be careful about.
@@ -45,6 +52,48 @@ pub enum Warning {
         termination: Termination,
         /// After how many steps.
         iterations: usize,
+    },
+    /// The minimum lies above its floor: the lens model does not fit, or a better minimum was not found.
+    AboveFloor {
+        /// Root mean square error, px.
+        rmse_px: f64,
+        /// That of free homographies behind the same lens, px.
+        floor_rmse_px: f64,
+        /// Upper bound of the probability of such a difference by chance.
+        p_value: f64,
+        /// Starts of the search, none of which ended lower.
+        starts: usize,
+    },
+    /// Views that were given more than once, and were counted once.
+    Duplicates {
+        /// One such view.
+        view: usize,
+        /// The view it is a copy of.
+        copy_of: usize,
+        /// How many copies there are in all.
+        copies: usize,
+    },
+    /// A few marks lie so far from where they should that they are no noise.
+    Outliers {
+        /// How many.
+        marks: usize,
+        /// View of the worst.
+        view: usize,
+        /// Its number there.
+        point: usize,
+        /// Its residual, px.
+        residual_px: f64,
+        /// The residual that half of the marks stay below, px.
+        median_px: f64,
+    },
+    /// A standard deviation that misleads: two of them away the cost is no parabola any more.
+    NotLinear {
+        /// Of which parameter.
+        parameter: Parameter,
+        /// True half-width of an interval of two standard deviations over the linear one, below the estimate.
+        below: f64,
+        /// The same above; infinite where the cost never rises.
+        above: f64,
     },
     /// Two parameters cannot be told apart well: an error of one is made up by the other.
     Correlated {
@@ -78,15 +127,48 @@ pub(super) const STRONG_CORRELATION: f64 = 0.98;
 /// A focal length worse than this makes the linearisation behind the covariance doubtful.
 pub(super) const UNCERTAIN_FOCAL: f64 = 0.05;
 
+/// Real boards leave the RMSE up to a seventh above its floor, wrong minima of consequence lie more than a third above.
+pub const GROSS: f64 = 1.25;
+
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Warning::NotConverged { termination, iterations } => {
                 write!(
                     f,
-                    "the refinement did not converge ({termination:?} after {iterations} steps): do not use the result"
+                    "the search did not end in a minimum ({} after {iterations} steps): the estimate may be off by more than its \
+                     standard deviations",
+                    termination.name()
                 )
             }
+            Warning::AboveFloor { rmse_px, floor_rmse_px, p_value, starts } => {
+                let advice = if *rmse_px > GROSS * floor_rmse_px {
+                    "do not use the result: take more views, with evident tilts"
+                } else {
+                    "the model does not explain the marks: is the board flat and its geometry right, is the lens model rich enough?"
+                };
+                write!(
+                    f,
+                    "no other of {starts} starts ended lower, but homographies behind the same lens reach {floor_rmse_px:.4} px where the \
+                     calibration has {rmse_px:.4} px (by chance with probability {p_value:.1e}): {advice}"
+                )
+            }
+            Warning::Duplicates { view, copy_of, copies } => write!(
+                f,
+                "view {view} is a copy of view {copy_of}{}: copies say nothing new and were counted once",
+                if *copies > 1 { format!(", and there are {copies} copies in all") } else { String::new() }
+            ),
+            Warning::Outliers { marks, view, point, residual_px, median_px } => write!(
+                f,
+                "{marks} mark(s) lie too far off to be noise, the worst (view {view}, point {point}) by {residual_px:.2} px where half of all \
+                 stay below {median_px:.2} px: correct or remove them, or use a robust loss (huber:{:.1})",
+                2.0 * median_px
+            ),
+            Warning::NotLinear { parameter, below, above } => write!(
+                f,
+                "the standard deviation of {parameter} misleads: an interval of two of them truly reaches {below:.2} times as far below \
+                 and {above:.2} times above; state intervals by the profile of the cost"
+            ),
             Warning::Correlated { a, b, correlation } => write!(
                 f,
                 "{a} and {b} are correlated {correlation:+.4}: the data hardly tell them apart; cover the image corners, or \

@@ -14,8 +14,10 @@ pub struct Settings {
     pub loss: Loss,
     /// A start for the intrinsics instead of the closed form.
     pub start: Option<Camera>,
-    /// Iterations of the refinement before it gives up.
+    /// Iterations of the refinement before it gives up; a search in doubt may take ten times as many.
     pub max_iterations: usize,
+    /// Coverage of intervals by the profile of the cost, if they are wanted: see [`super::ProfileInterval`].
+    pub profile_coverage: Option<f64>,
 }
 
 /// Good data take five to ten iterations, the worst convergent ones seen about sixty.
@@ -31,6 +33,7 @@ impl Settings {
             loss: Loss::Squares,
             start: None,
             max_iterations: DEFAULT_MAX_ITERATIONS,
+            profile_coverage: None,
         }
     }
 
@@ -55,6 +58,12 @@ impl Settings {
     /// Chooses the loss.
     pub fn with_loss(mut self, loss: Loss) -> Settings {
         self.loss = loss;
+        self
+    }
+
+    /// Asks for intervals by the profile of the cost, each to contain its true value with probability `coverage`.
+    pub fn with_profile_intervals(mut self, coverage: f64) -> Settings {
+        self.profile_coverage = Some(coverage);
         self
     }
 

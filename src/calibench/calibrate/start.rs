@@ -12,9 +12,9 @@ use crate::geometry::{Homography, Mat3, Pose, Vec2};
 pub(super) fn starts(
     homographies: &[Homography],
     settings: &Settings,
+    held: &Held,
     pixel_frame: (Vec2, f64),
 ) -> Result<Vec<State>, CalibrationError> {
-    let held = Held::of(settings, pixel_frame.0)?;
     let half_width = pixel_frame.1;
     let closed = normalised_closed_form(homographies, settings, pixel_frame);
     let centred = |focal: f64| Camera::pinhole(focal, focal, held.centre.x, held.centre.y);
@@ -74,7 +74,7 @@ fn is_plausible(camera: &Camera, (centre, half_width): (Vec2, f64)) -> bool {
 
 /// One focal length from the two constraints of every view when the principal point is known (Zhang 2000, section 3.1 with
 /// `u0, v0` given): `h1^T B h2 = 0` and `h1^T B h1 = h2^T B h2` with `B = diag(w, w, 1)`, least squares in `w = 1/f^2`.
-fn focal_from_centre(homographies: &[Homography], centre: Vec2) -> Option<f64> {
+pub(super) fn focal_from_centre(homographies: &[Homography], centre: Vec2) -> Option<f64> {
     let shift = Mat3::new(1.0, 0.0, -centre.x, 0.0, 1.0, -centre.y, 0.0, 0.0, 1.0);
     let (mut square, mut product) = (0.0, 0.0);
     for h in homographies {
@@ -93,13 +93,14 @@ fn focal_from_centre(homographies: &[Homography], centre: Vec2) -> Option<f64> {
 }
 
 /// The values that are not estimated.
-struct Held {
+pub(super) struct Held {
     values: [Option<f64>; Parameter::COUNT],
-    centre: Vec2,
+    /// The principal point that is held, or else the image's centre, or that of the pixels seen.
+    pub centre: Vec2,
 }
 
 impl Held {
-    fn of(settings: &Settings, pixel_centre: Vec2) -> Result<Held, CalibrationError> {
+    pub fn of(settings: &Settings, pixel_centre: Vec2) -> Result<Held, CalibrationError> {
         let mut values = [None; Parameter::COUNT];
         for parameter in Parameter::ALL {
             values[parameter as usize] = settings.held(parameter)?;
@@ -114,13 +115,23 @@ impl Held {
         Ok(Held { values, centre })
     }
 
-    /// The camera with its held values, and the poses it implies.
-    fn state(&self, camera: Camera, homographies: &[Homography]) -> Option<State> {
+    /// The value a parameter is held at.
+    pub fn value(&self, parameter: Parameter) -> Option<f64> {
+        self.values[parameter as usize]
+    }
+
+    /// The camera with its held values.
+    pub fn camera(&self, camera: Camera) -> Camera {
         let mut parameters = camera.parameters();
         for (parameter, held) in parameters.iter_mut().zip(self.values) {
             *parameter = held.unwrap_or(*parameter);
         }
-        let camera = Camera::from_parameters(parameters);
+        Camera::from_parameters(parameters)
+    }
+
+    /// The camera with its held values, and the poses it implies.
+    fn state(&self, camera: Camera, homographies: &[Homography]) -> Option<State> {
+        let camera = self.camera(camera);
         let poses: Option<Vec<Pose>> =
             homographies.iter().map(|h| closed_form::pose_from_homography(&camera, h)).collect();
         poses.map(|cam_from_target| State { camera, cam_from_target })

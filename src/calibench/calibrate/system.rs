@@ -48,6 +48,13 @@ pub(super) struct Step {
     eliminated: Vec<Eliminated>,
 }
 
+impl Step {
+    /// A step that was not solved for.
+    pub fn along(intrinsics: SVector<f64, N>, poses: Vec<SVector<f64, 6>>) -> Step {
+        Step { intrinsics, poses, ..Step::default() }
+    }
+}
+
 impl System {
     /// An empty system with room for `views` views.
     pub(super) fn new(free: FreeParameters, views: usize) -> System {
@@ -122,10 +129,18 @@ impl System {
 }
 
 impl Reduction {
+    /// The intrinsics' covariance for unit noise; `None` if it is singular.
+    pub fn intrinsics_covariance(&self) -> Option<DMatrix<f64>> {
+        if self.free.is_empty() {
+            return Some(DMatrix::zeros(0, 0));
+        }
+        Some(self.schur.clone().cholesky()?.inverse())
+    }
+
     /// See [`System::covariance`].
     pub fn covariance(&self) -> Option<Covariance> {
         let n = self.free.len();
-        let intrinsics = if n > 0 { self.schur.clone().cholesky()?.inverse() } else { DMatrix::zeros(0, 0) };
+        let intrinsics = self.intrinsics_covariance()?;
         let padded = SMatrix::from_fn(|i, j| if i < n && j < n { intrinsics[(i, j)] } else { 0.0 });
         let blocks: Vec<(PoseBlock, MatrixXx6<f64>)> =
             chunks::map(&self.eliminated, |_, factors| factors.covariance(&padded, n));

@@ -9,4 +9,5 @@ mod projection;
 pub use brown_conrady::{BrownConrady, UndistortError};
 pub use intrinsics::Camera;
 pub use parameter::{FreeParameters, Parameter, UnknownParameter};
+pub(crate) use projection::intrinsics_columns;
 pub use projection::{BehindCamera, ProjectionJacobian, project_with_jacobian};

@@ -64,7 +64,7 @@ pub fn project_with_jacobian(
 }
 
 /// The 2 x 10 block of the intrinsics.
-fn intrinsics_columns(
+pub(crate) fn intrinsics_columns(
     camera: &Camera,
     ideal: &Vec2,
     distorted: &Vec2,

@@ -1,0 +1,205 @@
+//! Is a minimum the right one? Its cost is held against the floor of a model in which nothing is ambiguous.
+//!
+//! Give every view a homography of its own instead of a pose, behind the same lens: the *relaxed model*. It holds every camera and every pose,
+//! and it knows no focal length, no distance and no choice between two tilts, so that its own minimum is easily found. If a minimum of the
+//! calibration is the right one and the model holds, its cost exceeds the relaxed one by chance only: by `sigma^2` times a chi-squared variable
+//! with at most two degrees of freedom a view (a homography has eight parameters, a pose six).
+//!
+//! At a minimum of the calibration the relaxed model's gradient is left in the two strains of each plane alone
+//! ([`super::kernel::Strain`]). A Gauss-Newton step of the whole relaxed model tells how far the cost would fall (Rao's score test): with the
+//! columns `E` of the strains, poses and intrinsics eliminated from them,
+//!
+//! ```text
+//! T = g^T (E^T E)^-1 g,   floor F = cost - T,   statistic (T / d1) / (F / d2),   d1 = 2 V - m,   d2 = 2 N - 8 V - (n - m)
+//! ```
+//! for `V` views, `N` points and `n` free parameters, `m` combinations of which free homographies leave undetermined (the focal length; without
+//! distortion the principal point too). To first order the statistic follows Fisher's distribution.
+
+use super::chance::fisher_tail;
+use super::elimination::Eliminated;
+use super::kernel::{self, Strain};
+use super::minimise::{Problem, State};
+use super::system::{N, Reduction};
+use super::chunks;
+use crate::camera::Parameter;
+
+/// A right minimum of a model that holds misses its certificate with this probability at most: rare among the calibrations of a lifetime,
+/// while wrong minima of consequence lie tens of orders below.
+pub(super) const FALSE_ALARM: f64 = 1e-6;
+
+/// How the cost of a minimum compares with the least that any camera and any poses could reach.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Certificate {
+    /// RMSE per point, px, that the views reach with homographies of their own in place of poses.
+    pub floor_rmse_px: f64,
+    /// By how much the cost exceeds that floor, in variances of a pixel coordinate.
+    pub excess: f64,
+    /// Degrees of freedom of the excess: two a view less those of the intrinsics that homographies do not determine; at 0 nothing can be
+    /// certified.
+    pub freedom: usize,
+    /// Degrees of freedom of the floor; 0 where the homographies leave none, and nothing can be certified.
+    pub floor_freedom: usize,
+    /// Probability that chance makes such an excess where the minimum is the right one and the lens model holds.
+    pub p_value: f64,
+}
+
+impl Certificate {
+    /// Whether there is anything to be certified by: more measurements than homographies need, and more views than the camera needs.
+    pub fn is_possible(&self) -> bool {
+        self.freedom > 0 && self.floor_freedom > 0
+    }
+
+    /// Whether the excess can be chance, at a false-alarm rate of 1e-6.
+    pub fn holds(&self) -> bool {
+        self.p_value >= FALSE_ALARM
+    }
+
+    /// The same with a floor that was fitted.
+    pub(super) fn with_floor(&self, cost: f64, floor: f64, points: usize) -> Certificate {
+        Certificate::of(cost, floor.min(cost), points, self.freedom, self.floor_freedom)
+    }
+
+    /// Compares a cost with a floor.
+    fn of(cost: f64, floor: f64, points: usize, freedom: usize, floor_freedom: usize) -> Certificate {
+        let variance = floor / floor_freedom.max(1) as f64;
+        let excess = (cost - floor).max(0.0) / variance;
+        let p_value = if floor_freedom == 0 || freedom == 0 || excess.is_nan() {
+            1.0
+        } else {
+            fisher_tail(excess / freedom as f64, freedom, floor_freedom)
+        };
+        Certificate {
+            floor_rmse_px: (floor / points as f64).sqrt(),
+            excess: if excess.is_nan() { 0.0 } else { excess },
+            freedom,
+            floor_freedom,
+            p_value,
+        }
+    }
+}
+
+/// The certificate of a minimum: its pose blocks and reduced equations stand in `reduction`, and its cost is `cost`.
+pub(super) fn certify(problem: &Problem<'_>, state: &State, reduction: &Reduction, cost: f64) -> Certificate {
+    let views = problem.observations.len();
+    let points: usize = problem.observations.iter().map(|pairs| pairs.len()).sum();
+    // What rounding leaves of exact data proves nothing.
+    let (gain, undetermined) = score(problem, state, reduction);
+    let floor = (cost - gain).max(problem.rounding_cost()).min(cost);
+    let freedom = (2 * views).saturating_sub(undetermined);
+    let lens = problem.free.len() - undetermined;
+    let floor_freedom = (2 * points).saturating_sub(8 * views + lens);
+    Certificate::of(cost, floor, points, freedom, floor_freedom)
+}
+
+/// `T`: with the strains of a view eliminated after its pose, `S_i = E_i^T E_i - ...`, `U_i` their coupling with the intrinsics and `g_i` their
+/// gradient, `T = sum g_i^T S_i^-1 g_i + w^T (S - sum U_i^T S_i^-1 U_i)^+ w` with `w = sum U_i^T S_i^-1 g_i`. The inverse is a pseudo-inverse:
+/// free homographies know no focal length. Returns `T` and how many combinations of the intrinsics they leave undetermined.
+fn score(problem: &Problem<'_>, state: &State, reduction: &Reduction) -> (f64, usize) {
+    let radial = kernel::is_radial(&state.camera, problem.free);
+    let parameters: Vec<usize> = problem.free.iter().map(|p| p as usize).collect();
+    let n = parameters.len();
+    let mut matrix = [[0.0; N]; N];
+    for (i, row) in matrix.iter_mut().enumerate().take(n) {
+        for (j, entry) in row.iter_mut().enumerate().take(n) {
+            *entry = reduction.schur[(i, j)];
+        }
+    }
+    let scale: [f64; N] = std::array::from_fn(|i| if i < n { matrix[i][i] } else { 0.0 });
+    let (mut gain, mut right) = (0.0, [0.0; N]);
+    let shares = chunks::map(problem.observations, |view, pairs| {
+        let strain = kernel::view_strain(&state.camera, &state.cam_from_target[view], pairs, problem.loss, radial);
+        Share::of(&strain, &reduction.eliminated[view], &parameters)
+    });
+    for share in &shares {
+        for (column, gradient) in share.columns.iter().zip(share.gradient) {
+            gain += gradient * gradient;
+            for i in 0..n {
+                right[i] += column[i] * gradient;
+                for j in i..n {
+                    matrix[i][j] -= column[i] * column[j];
+                }
+            }
+        }
+    }
+    let (through_lens, undetermined) = quadratic_form(&mut matrix, &mut right, &scale, n);
+    (gain + through_lens, undetermined)
+}
+
+/// What the strains of a view say: two orthonormal combinations of them, each with its coupling to the intrinsics and its gradient.
+struct Share {
+    columns: [[f64; N]; 2],
+    gradient: [f64; 2],
+}
+
+impl Share {
+    fn of(strain: &Strain, pose: &Eliminated, parameters: &[usize]) -> Share {
+        let n = parameters.len();
+        let [a, b] = strain.pose.map(|column| pose.whiten(column));
+        let dot = |x: &[f64; 6], y: &[f64; 6]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+        let coupling = |own: &[f64; Parameter::COUNT], whitened: &[f64; 6]| {
+            let through_pose = pose.coupled(whitened, n);
+            let mut left = [0.0; N];
+            for (i, &parameter) in parameters.iter().enumerate() {
+                left[i] = own[parameter] - through_pose[i];
+            }
+            left
+        };
+        let mut columns = [coupling(&strain.intrinsics[0], &a), coupling(&strain.intrinsics[1], &b)];
+        let mut gradient = strain.gradient;
+        let (aa, ab) = (strain.square[0] - dot(&a, &a), strain.square[1] - dot(&a, &b));
+        // Without perspective and with few points a strain may be no more than rounding: it then says nothing.
+        let first = inverse_root(aa, strain.square[0]);
+        columns[0] = columns[0].map(|x| x * first);
+        gradient[0] *= first;
+        let along = ab * first;
+        let rest = strain.square[2] - dot(&b, &b) - along * along;
+        let second = inverse_root(rest, strain.square[2]);
+        for i in 0..n {
+            columns[1][i] = (columns[1][i] - along * columns[0][i]) * second;
+        }
+        gradient[1] = (gradient[1] - along * gradient[0]) * second;
+        Share { columns, gradient }
+    }
+}
+
+/// `1 / sqrt(left)`, or 0 where too little is left of the whole.
+fn inverse_root(left: f64, whole: f64) -> f64 {
+    if left > SMALLEST_SHARE * whole { 1.0 / left.sqrt() } else { 0.0 }
+}
+
+/// Of which less than this part is left after an elimination is known by rounding only.
+const SMALLEST_SHARE: f64 = 1e-11;
+/// Likewise for the intrinsics, of which free homographies leave some undetermined: several eliminations' rounding.
+const SMALLEST_PIVOT: f64 = 1e-9;
+
+/// `r^T M^+ r` for a positive semi-definite `M` (upper triangle) and `r` in its range, by elimination with the largest pivot first; what is left
+/// of a parameter is compared with `scale`, its size at first. Returns also the rank that `M` lacks.
+fn quadratic_form(
+    matrix: &mut [[f64; N]; N],
+    right: &mut [f64; N],
+    scale: &[f64; N],
+    n: usize,
+) -> (f64, usize) {
+    let mut sum = 0.0;
+    let mut left: [bool; N] = std::array::from_fn(|i| i < n);
+    for _ in 0..n {
+        let share = |i: usize| matrix[i][i] / scale[i];
+        let Some(p) = (0..n).filter(|&i| left[i]).max_by(|&i, &j| share(i).total_cmp(&share(j))) else { break };
+        if share(p).is_nan() || share(p) <= SMALLEST_PIVOT {
+            break;
+        }
+        left[p] = false;
+        let pivot = matrix[p][p];
+        sum += right[p] * right[p] / pivot;
+        let row: [f64; N] = std::array::from_fn(|j| if j < n { matrix[p.min(j)][p.max(j)] } else { 0.0 });
+        for i in (0..n).filter(|&i| left[i]) {
+            let factor = row[i] / pivot;
+            right[i] -= factor * right[p];
+            for j in (i..n).filter(|&j| left[j]) {
+                matrix[i][j] -= factor * row[j];
+            }
+        }
+    }
+    (sum, left.iter().filter(|&&left| left).count())
+}

@@ -1,0 +1,168 @@
+//! Between which values does a parameter lie? The profile of the cost, where the covariance alone would mislead.
+//!
+//! A covariance takes the cost for a parabola. Where the data are weak it is none: a long focal length is bounded below and hardly above. The
+//! profile holds one parameter, refits all others, and asks how much the cost has risen: with the signed root
+//!
+//! ```text
+//! tau(v) = sign(v - estimate) sqrt((cost(v) - least cost) / sigma^2)
+//! ```
+//! the interval of coverage `1 - alpha` is `|tau| <= t`, `t` the quantile of Student's distribution (Bates & Watts 1988, section 6.1). Linear
+//! theory has `tau = (v - estimate) / standard deviation`; JCGM 101 (2008), section 8.1, asks for such a comparison before a standard
+//! uncertainty is stated.
+
+use super::minimise::{Minimum, Problem, State};
+use super::system::{Reduction, Step};
+use crate::camera::Parameter;
+use nalgebra::SVector;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// An interval by the profile of the cost, beside the linear one of the same coverage.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct ProfileInterval {
+    /// Of which parameter.
+    pub parameter: Parameter,
+    /// Probability with which such intervals contain the true value.
+    pub coverage: f64,
+    /// Lower end; `None` where the cost never rises enough.
+    pub low: Option<f64>,
+    /// Upper end; `None` where the cost never rises enough.
+    pub high: Option<f64>,
+    /// The linear interval: estimate -+ t standard deviations.
+    pub linear: (f64, f64),
+}
+
+/// Where the check of linearity looks, in standard deviations.
+const CHECKED_AT: f64 = 2.0;
+/// The intervals differ where a half-width does by more than this part.
+const TOLERATED: f64 = 0.1;
+/// Refits of an end.
+const REFITS: usize = 12;
+/// An end is found when `tau` is this close to `t`.
+const CLOSE: f64 = 1e-4;
+/// An end farther away than this many linear half-widths counts as open.
+const FARTHEST: f64 = 50.0;
+
+/// How the profile of a parameter differs from a parabola, two standard deviations away.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Skewed {
+    pub parameter: Parameter,
+    /// True half-width over the linear one, below and above the estimate.
+    pub ratios: [f64; 2],
+}
+
+/// The profile around a minimum.
+pub(super) struct Profile<'a> {
+    pub problem: &'a Problem<'a>,
+    pub minimum: &'a Minimum,
+    pub reduction: &'a Reduction,
+    /// Covariance of the intrinsics for unit noise.
+    covariance: nalgebra::DMatrix<f64>,
+    noise_px: f64,
+}
+
+impl<'a> Profile<'a> {
+    /// `None` where the covariance is singular.
+    pub fn new(
+        problem: &'a Problem<'a>,
+        minimum: &'a Minimum,
+        reduction: &'a Reduction,
+        noise_px: f64,
+    ) -> Option<Profile<'a>> {
+        let covariance = reduction.intrinsics_covariance()?;
+        Some(Profile { problem, minimum, reduction, covariance, noise_px })
+    }
+
+    /// The parameters whose profile is no parabola, or a state of lower cost if one is met.
+    pub fn skewed(&self) -> Result<Vec<Skewed>, Box<State>> {
+        let mut found = Vec::new();
+        for parameter in self.problem.free.iter() {
+            let mut ratios = [1.0; 2];
+            for (ratio, side) in ratios.iter_mut().zip([-1.0, 1.0]) {
+                let tau = self.tau(parameter, side * CHECKED_AT * self.deviation(parameter))?;
+                *ratio = CHECKED_AT / tau;
+            }
+            if ratios.iter().any(|r| !((r - 1.0).abs() <= TOLERATED)) {
+                found.push(Skewed { parameter, ratios });
+            }
+        }
+        Ok(found)
+    }
+
+    /// The interval of each free parameter.
+    pub fn intervals(&self, coverage: f64, degrees_of_freedom: usize) -> Vec<ProfileInterval> {
+        let t = student_quantile(coverage, degrees_of_freedom);
+        let interval = |parameter: Parameter| {
+            let estimate = self.minimum.state.camera.get(parameter);
+            let half = t * self.deviation(parameter);
+            ProfileInterval {
+                parameter,
+                coverage,
+                low: self.end(parameter, -half, t).map(|offset| estimate + offset),
+                high: self.end(parameter, half, t).map(|offset| estimate + offset),
+                linear: (estimate - half, estimate + half),
+            }
+        };
+        self.problem.free.iter().map(interval).collect()
+    }
+
+    fn deviation(&self, parameter: Parameter) -> f64 {
+        let row = self.problem.free.position(parameter).expect("the parameter is free");
+        self.covariance[(row, row)].sqrt() * self.noise_px
+    }
+
+    /// Where `|tau| = t`, starting from the linear end: secants through the estimate, which the profile makes nearly straight.
+    fn end(&self, parameter: Parameter, linear: f64, t: f64) -> Option<f64> {
+        let mut offset = linear;
+        for _ in 0..REFITS {
+            let tau = self.tau(parameter, offset).ok()?;
+            if (tau - t).abs() <= CLOSE * t {
+                return Some(offset);
+            }
+            offset *= (t / tau).clamp(0.4, 2.5);
+            if offset.abs() > FARTHEST * linear.abs() {
+                return None;
+            }
+        }
+        None
+    }
+
+    /// `|tau|` with `parameter` held `offset` away from its estimate; a state of lower cost if one is met.
+    fn tau(&self, parameter: Parameter, offset: f64) -> Result<f64, Box<State>> {
+        let held = Problem { free: self.problem.free.without(parameter), ..*self.problem };
+        let refitted = held.minimise(self.moved(parameter, offset));
+        let rise = (refitted.system.cost - self.minimum.system.cost) / (self.noise_px * self.noise_px);
+        if rise < -LOWER {
+            return Err(Box::new(refitted.state));
+        }
+        Ok(rise.max(0.0).sqrt())
+    }
+
+    /// The state with `parameter` moved and all others following it to first order.
+    fn moved(&self, parameter: Parameter, offset: f64) -> State {
+        let free = self.problem.free;
+        let n = free.len();
+        let row = free.position(parameter).expect("the parameter is free");
+        let mut intrinsics = SVector::zeros();
+        for i in 0..n {
+            intrinsics[i] = self.covariance[(i, row)] / self.covariance[(row, row)] * offset;
+        }
+        let poses = self.reduction.eliminated.iter().map(|factors| -factors.response(&intrinsics, n)).collect();
+        let step = Step::along(intrinsics, poses);
+        let mut state = self.minimum.state.clone();
+        self.problem.retraction.apply(&self.minimum.state, free, &step, &mut state);
+        // A curved path may end beside the value wanted.
+        state.camera = state.camera.with(parameter, self.minimum.state.camera.get(parameter) + offset);
+        state
+    }
+}
+
+/// A rise below minus this many variances is a better minimum and no rounding.
+const LOWER: f64 = 1e-3;
+
+/// Half the width of the interval of Student's distribution that holds `coverage`; to nine digits, the same on every machine.
+fn student_quantile(coverage: f64, degrees_of_freedom: usize) -> f64 {
+    let t = StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1) as f64)
+        .map_or(f64::NAN, |distribution| distribution.inverse_cdf(0.5 + 0.5 * coverage));
+    super::chance::significant(t)
+}

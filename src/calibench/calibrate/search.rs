@@ -1,0 +1,369 @@
+//! Which minimum is the right one? One start where the data leave no doubt, and a search where they do.
+//!
+//! Good data need one start, and the certificate says that it was enough. Otherwise the relaxed model ([`super::relaxed`]) gives the lens and the
+//! homographies without it; focal lengths are tried against both tilts of every plane ([`super::condensed`]); the best are refined, and tilts
+//! that perspective hardly tells are tried the other way round. The least cost wins.
+
+use super::certificate::{self, Certificate};
+use super::closed_form;
+use super::condensed::{self, Hypothesis};
+use super::intervals::{Profile, Skewed};
+use super::minimise::{Minimum, Problem, State};
+use super::radial_centre::radial_centre;
+use super::relaxed::{self, Relaxed};
+use super::retraction::Retraction;
+use super::start::{Held, focal_from_centre};
+use super::system::Reduction;
+use super::identifiability::{self, tilts_are_evident};
+use super::{CalibrationError, Termination, tilt, walk};
+use crate::camera::{BrownConrady, Camera, Parameter};
+use crate::geometry::{Homography, Vec2};
+
+/// A minimum with what is needed to judge it.
+pub(super) struct Judged {
+    pub minimum: Minimum,
+    /// `None` where a pose is undetermined.
+    pub reduction: Option<Reduction>,
+    pub certificate: Option<Certificate>,
+    /// Starts that were refined; 1 on good data.
+    pub starts: usize,
+    /// Parameters whose cost is no parabola: asked only where they are known poorly.
+    pub skewed: Vec<Skewed>,
+}
+
+/// What the search starts from.
+pub(super) struct Evidence<'a> {
+    /// Pixels from target points, without distortion.
+    pub homographies: &'a [Homography],
+    pub held: &'a Held,
+    /// Centre and half-width of the pixels seen.
+    pub pixel_frame: (Vec2, f64),
+}
+
+/// A certificate whose probability is below this is no reason to refuse a minimum, but one to look for a better.
+const CLEAR: f64 = 1e-4;
+/// With fewer degrees of freedom a certificate tells too little to rely on it alone: two views can be explained by another camera entirely.
+const TELLING: usize = 4;
+/// Good data take five to ten iterations; a search that took more came from far away.
+const SHORT_WAY: usize = 25;
+
+/// A focal length known worse than this may hide another minimum that is nearly as good.
+const WELL_KNOWN: f64 = 0.01;
+
+impl Judged {
+    fn of(problem: &Problem<'_>, minimum: Minimum, starts: usize) -> Judged {
+        let reduction = minimum.system.reduction();
+        let certificate = reduction.as_ref().map(|reduction| {
+            certificate::certify(problem, &minimum.state, reduction, minimum.system.cost)
+        });
+        Judged { minimum, reduction, certificate, starts, skewed: Vec::new() }
+    }
+
+    /// With the floor fitted where a step towards it does not certify the minimum: the step is straight, the relaxed model is not.
+    fn certified(mut self, problem: &Problem<'_>) -> Judged {
+        let State { camera, cam_from_target } = &self.minimum.state;
+        let cost = self.minimum.system.cost;
+        if let Some(certificate) = self.certificate.as_mut().filter(|certificate| !certificate.holds())
+            && let Some(floor) = relaxed::floor(problem, camera, cam_from_target)
+        {
+            let points = problem.observations.iter().map(|o| o.len()).sum();
+            *certificate = certificate.with_floor(cost, floor, points);
+        }
+        self
+    }
+
+    /// Whether nothing speaks for another minimum.
+    fn is_clear(&self, problem: &Problem<'_>) -> bool {
+        let certified = self.certificate.as_ref().is_some_and(|c| c.freedom >= TELLING && c.is_possible() && c.p_value > CLEAR);
+        self.minimum.termination == Termination::Converged
+            && self.minimum.iterations <= SHORT_WAY
+            && certified
+            && self.is_well_known(problem)
+            && tilts_are_evident(problem, &self.minimum.state, self.noise_px(problem))
+            && self.doubtful_tilts(problem).is_empty()
+    }
+
+    fn noise_px(&self, problem: &Problem<'_>) -> f64 {
+        noise_of(problem, &self.minimum)
+    }
+
+    /// Whether focal lengths and principal point are known so well that no other minimum can be nearly as good.
+    fn is_well_known(&self, problem: &Problem<'_>) -> bool {
+        let Some(covariance) = self.reduction.as_ref().and_then(Reduction::intrinsics_covariance) else {
+            return false;
+        };
+        let noise_px = self.noise_px(problem);
+        let camera = &self.minimum.state.camera;
+        problem.free.iter().zip(covariance.diagonal().iter()).all(|(parameter, variance)| {
+            let scale = match parameter {
+                Parameter::Fx | Parameter::Cx => camera.fx,
+                Parameter::Fy | Parameter::Cy => camera.fy,
+                _ => return true,
+            };
+            variance.sqrt() * noise_px <= WELL_KNOWN * scale
+        })
+    }
+
+    /// Standard deviations of cx and cy; infinite where nothing is known, `None` where they are held.
+    fn centre_deviations(&self, problem: &Problem<'_>) -> [Option<f64>; 2] {
+        let covariance = self.reduction.as_ref().and_then(Reduction::intrinsics_covariance);
+        [Parameter::Cx, Parameter::Cy].map(|parameter| {
+            let row = problem.free.position(parameter)?;
+            Some(covariance.as_ref().map_or(f64::INFINITY, |c| c[(row, row)].sqrt() * self.noise_px(problem)))
+        })
+    }
+
+    /// Views whose other tilt might do as well.
+    fn doubtful_tilts(&self, problem: &Problem<'_>) -> Vec<usize> {
+        let State { camera, cam_from_target } = &self.minimum.state;
+        let (focal, noise_px) = (0.5 * (camera.fx + camera.fy), self.noise_px(problem));
+        let views = cam_from_target.iter().zip(problem.observations).enumerate();
+        views
+            .filter(|(_, (pose, observations))| tilt::is_doubtful(pose, observations, focal, noise_px))
+            .map(|(view, _)| view)
+            .collect()
+    }
+}
+
+/// Standard deviation of a pixel coordinate, from the cost under the loss in use: gross errors, which a robust loss discounts, say nothing of
+/// the noise.
+pub(super) fn noise_of(problem: &Problem<'_>, minimum: &Minimum) -> f64 {
+    let coordinates = 2 * problem.observations.iter().map(|o| o.len()).sum::<usize>();
+    let freedom = coordinates.saturating_sub(minimum.system.unknowns()).max(1);
+    (minimum.system.cost / freedom as f64).sqrt()
+}
+
+/// The best minimum that is found; `starts` are tried in order until one converges, and the search goes on if that is in doubt.
+///
+/// # Errors
+/// Where the data do not determine focal length or principal point.
+pub(super) fn best_minimum(problem: &Problem<'_>, starts: Vec<State>, evidence: &Evidence<'_>) -> Result<Judged, CalibrationError> {
+    let mut starts = starts.into_iter();
+    let first = problem.minimise(starts.next().expect("there is at least one start"));
+    let first = Judged::of(problem, first, 1);
+    if first.is_clear(problem) {
+        return Ok(first);
+    }
+    refuse_early(problem, &first)?;
+    let first = first_converged(problem, first, starts);
+    if first.is_clear(problem) {
+        return Ok(first);
+    }
+    let patient = Problem {
+        max_iterations: PATIENCE * problem.max_iterations,
+        retraction: Retraction::Curved,
+        ..*problem
+    };
+    let mut count = first.starts;
+    let mut best = first.minimum;
+    if let Some(relaxed) = relax(problem, evidence) {
+        for start in relaxed_starts(problem, &relaxed, evidence) {
+            count += 1;
+            let minimum = patient.minimise(start);
+            if is_better(&minimum, &best) {
+                best = minimum;
+            }
+        }
+    }
+    let best = walk::with_better_tilts(&patient, best);
+    let judged = Judged::of(problem, best, count);
+    let noise_px = judged.noise_px(problem);
+    if judged.is_well_known(problem) && tilts_are_evident(problem, &judged.minimum.state, noise_px) {
+        return Ok(judged.certified(problem));
+    }
+    let centre_sd = judged.centre_deviations(problem);
+    let walked = walk::far_away(&patient, judged.minimum, noise_px, centre_sd);
+    let noise_px = noise_of(problem, &walked.best);
+    identifiability::refuse_if_flat(problem, &walked, noise_px)?;
+    let mut best = walked.best;
+    if let Some(lower) = identifiability::refuse_if_parallel(problem, &best, noise_px)? {
+        let minimum = patient.minimise(lower);
+        if is_better(&minimum, &best) {
+            best = minimum;
+        }
+    }
+    Ok(with_profiles(&patient, Judged::of(problem, best, count + walked.starts)).certified(problem))
+}
+
+/// Minima that profiles may meet on their way before the search is left as it is.
+const BETTER_BY_PROFILE: usize = 3;
+
+/// Looks along the profile of every parameter: for those that are no parabola, and for lower costs.
+fn with_profiles(problem: &Problem<'_>, mut judged: Judged) -> Judged {
+    for _ in 0..BETTER_BY_PROFILE {
+        let noise_px = judged.noise_px(problem);
+        let Some(reduction) = &judged.reduction else { break };
+        let Some(profile) = Profile::new(problem, &judged.minimum, reduction, noise_px) else { break };
+        match profile.skewed() {
+            Ok(skewed) => {
+                judged.skewed = skewed;
+                break;
+            }
+            Err(state) => {
+                let minimum = problem.minimise(*state);
+                if !is_better(&minimum, &judged.minimum) {
+                    break;
+                }
+                judged = Judged::of(problem, minimum, judged.starts + 1);
+            }
+        }
+    }
+    judged
+}
+
+/// A search in doubt may take this many times the iterations.
+const PATIENCE: usize = 10;
+
+/// Refuses parallel planes before a search that could find nothing, where the noise is known: at a cost that its floor certifies.
+fn refuse_early(problem: &Problem<'_>, judged: &Judged) -> Result<(), CalibrationError> {
+    if judged.certificate.as_ref().is_some_and(|c| c.is_possible() && c.holds()) {
+        identifiability::refuse_if_parallel(problem, &judged.minimum, judged.noise_px(problem))?;
+    }
+    Ok(())
+}
+
+/// The first minimum, or that of the next start that converges, or else the lowest point reached.
+fn first_converged(problem: &Problem<'_>, first: Judged, starts: impl Iterator<Item = State>) -> Judged {
+    let converged = |minimum: &Minimum| minimum.termination == Termination::Converged;
+    if converged(&first.minimum) {
+        return first;
+    }
+    let (mut best, mut tried) = (first.minimum, first.starts);
+    for start in starts {
+        tried += 1;
+        let minimum = problem.minimise(start);
+        if converged(&minimum) || minimum.system.cost < best.system.cost {
+            best = minimum;
+        }
+        if converged(&best) {
+            break;
+        }
+    }
+    Judged::of(problem, best, tried)
+}
+
+/// A lower cost, by more than rounding; among equals a search that converged.
+pub(super) fn is_better(new: &Minimum, old: &Minimum) -> bool {
+    const EQUAL: f64 = 1e-9;
+    let converged = |m: &Minimum| m.termination == Termination::Converged;
+    if new.system.cost < old.system.cost * (1.0 - EQUAL) {
+        return true;
+    }
+    converged(new) && !converged(old) && new.system.cost <= old.system.cost * (1.0 + EQUAL)
+}
+
+/// The relaxed model of these data: its gauge is the focal length that is held, or else a wide lens's.
+fn relax(problem: &Problem<'_>, evidence: &Evidence<'_>) -> Option<Relaxed> {
+    use Parameter::{Cx, Cy, Fx, Fy};
+    let held = evidence.held;
+    let focal_free = problem.free.contains(Fx) || problem.free.contains(Fy);
+    let sought = relaxed::parameters(problem.free, |p| held.value(p).is_some_and(|value| value != 0.0));
+    let half_width = evidence.pixel_frame.1;
+    let gauge = held.value(Fx).or(held.value(Fy)).unwrap_or(2.0 * half_width);
+    let start = held.camera(Camera::pinhole(gauge, gauge, held.centre.x, held.centre.y));
+    let start = if focal_free {
+        // The coefficients start at 0: their values belong to another focal length.
+        Camera { fx: gauge, fy: gauge, ..start }.with_distortion(BrownConrady::radial(0.0, 0.0))
+    } else {
+        start
+    };
+    let centres = if sought.contains(Cx) && sought.contains(Cy) {
+        vec![evidence.held.centre].into_iter().chain(radial_centre(problem.observations, evidence.pixel_frame)).collect()
+    } else {
+        vec![evidence.held.centre]
+    };
+    let fits = centres.into_iter().filter_map(|centre| {
+        let start = Camera { cx: centre.x, cy: centre.y, ..start };
+        relaxed::relax(problem, evidence.homographies, start, sought)
+    });
+    fits.min_by(|a, b| a.cost.total_cmp(&b.cost))
+}
+
+/// Focal lengths that are tried, in units of the half-width of the pixels seen: from a fisheye to a long lens.
+const SCAN: (f64, f64) = (0.3, 60.0);
+/// Steps of the scan: 14 % each, less than the width of a minimum.
+const SCAN_STEPS: usize = 40;
+/// Minima of the scan that are refined.
+const REFINED: usize = 3;
+
+/// States to refine from, the most promising first.
+fn relaxed_starts(problem: &Problem<'_>, relaxed: &Relaxed, evidence: &Evidence<'_>) -> Vec<State> {
+    let gauge = relaxed.lens.fx;
+    let homographies: Vec<Homography> =
+        relaxed.homographies.iter().map(|h| Homography(relaxed::matrix(h))).collect();
+    let mut cameras = Vec::new();
+    let skew = problem.free.contains(Parameter::Skew);
+    if let Ok(camera) = closed_form::closed_form(&homographies, skew) {
+        cameras.push(camera);
+    }
+    let centred = |focal: f64| Camera::pinhole(focal, focal, 0.0, 0.0);
+    cameras.extend(focal_from_centre(&homographies, Vec2::zeros()).map(centred));
+    let known = cameras.iter().filter_map(|camera| hypothesis(relaxed, evidence, camera));
+    let mut hypotheses: Vec<Hypothesis> = known.collect();
+    let unit = evidence.pixel_frame.1 / gauge;
+    let ratio = libm::log(SCAN.1 / SCAN.0) / (SCAN_STEPS - 1) as f64;
+    let focal = |i: usize| unit * SCAN.0 * libm::exp(ratio * i as f64);
+    let scan: Vec<Option<Hypothesis>> =
+        (0..SCAN_STEPS).map(|i| hypothesis(relaxed, evidence, &centred(focal(i)))).collect();
+    hypotheses.extend(lowest(scan));
+    hypotheses.iter().map(|hypothesis| state_of(relaxed, evidence.held, hypothesis)).collect()
+}
+
+/// The hypothesis of a camera, its held values put in, in units of the gauge.
+fn hypothesis(relaxed: &Relaxed, evidence: &Evidence<'_>, camera: &Camera) -> Option<Hypothesis> {
+    let held = evidence.held;
+    let lens = &relaxed.lens;
+    let value = |parameter: Parameter, of: f64, unit: f64, origin: f64| {
+        held.value(parameter).map_or(of, |value| (value - origin) / unit)
+    };
+    let in_gauge = Camera {
+        skew: camera.skew,
+        ..Camera::pinhole(
+            value(Parameter::Fx, camera.fx, lens.fx, 0.0),
+            value(Parameter::Fy, camera.fy, lens.fy, 0.0),
+            value(Parameter::Cx, camera.cx, lens.fx, lens.cx),
+            value(Parameter::Cy, camera.cy, lens.fy, lens.cy),
+        )
+    };
+    condensed::hypothesis(relaxed, &in_gauge)
+}
+
+/// The lowest minima of a scan, the lowest first.
+fn lowest(scan: Vec<Option<Hypothesis>>) -> Vec<Hypothesis> {
+    let cost = |i: usize| scan.get(i).and_then(Option::as_ref).map_or(f64::INFINITY, |h| h.cost);
+    let is_minimum = |i: usize| {
+        let before = if i == 0 { f64::INFINITY } else { cost(i - 1) };
+        cost(i).is_finite() && cost(i) <= before && cost(i) < cost(i + 1)
+    };
+    let mut minima: Vec<usize> = (0..scan.len()).filter(|&i| is_minimum(i)).collect();
+    minima.sort_by(|&a, &b| cost(a).total_cmp(&cost(b)));
+    minima.truncate(REFINED);
+    minima.into_iter().filter_map(|i| scan[i].clone()).collect()
+}
+
+/// The camera and poses of a hypothesis: with `s = f / f0` the coefficients are `k1 s^2`, `k2 s^4`, `k3 s^6`, `p1 s`, `p2 s`.
+fn state_of(relaxed: &Relaxed, held: &Held, hypothesis: &Hypothesis) -> State {
+    let (lens, k) = (&relaxed.lens, &hypothesis.camera);
+    let s = k.fx;
+    let (s2, d) = (s * s, &lens.distortion);
+    let camera = Camera {
+        skew: lens.skew * s,
+        ..Camera::pinhole(
+            k.fx * lens.fx,
+            k.fy * lens.fy,
+            lens.cx + k.cx * lens.fx,
+            lens.cy + k.cy * lens.fy,
+        )
+    };
+    let distortion = BrownConrady {
+        k1: d.k1 * s2,
+        k2: d.k2 * s2 * s2,
+        k3: d.k3 * s2 * s2 * s2,
+        p1: d.p1 * s,
+        p2: d.p2 * s,
+    };
+    State {
+        camera: held.camera(camera.with_distortion(distortion)),
+        cam_from_target: hypothesis.poses.clone(),
+    }
+}
