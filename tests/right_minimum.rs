@@ -18,7 +18,8 @@ fn scene_of(poses: Vec<Pose>) -> Scene {
 fn assert_right(result: &Calibration, truth: &Camera) {
     assert_eq!(result.termination, Termination::Converged, "{:?}", result.warnings);
     for parameter in result.free.iter() {
-        let z = (result.camera.get(parameter) - truth.get(parameter)) / result.standard_deviation(parameter).unwrap();
+        let z = (result.camera.get(parameter) - truth.get(parameter))
+            / result.standard_deviation(parameter).unwrap();
         assert!(z.abs() < 6.0, "{parameter} is {z:.1} standard deviations off");
     }
 }
@@ -39,10 +40,8 @@ fn three_facing_views_and_one_tilted_give_the_camera() {
 #[test]
 fn exact_data_far_from_the_image_centre_give_the_exact_camera() {
     let turns = [[20.0, 0.0, 0.0], [0.0, 20.0, 5.0], [-20.0, 10.0, 0.0], [5.0, -20.0, 10.0]];
-    let poses = turns.map(|turn| Pose {
-        translation: Vec3::new(850.0, 630.0, 2000.0),
-        ..looking_at_centre(turn, 2000.0)
-    });
+    let poses = turns
+        .map(|turn| Pose { translation: Vec3::new(850.0, 630.0, 2000.0), ..looking_at_centre(turn, 2000.0) });
     let truth = Truth {
         camera: Camera::pinhole(4000.0, 4000.0, 2000.0, 1500.0),
         image_size: (4000, 3000),
@@ -155,7 +154,8 @@ fn where_the_covariance_misleads_a_warning_says_so_and_the_profile_is_lopsided()
     let settings = Settings::new("fx,fy,cx,cy".parse().unwrap()).with_image_size((1280, 960));
     let (mut warned, mut above, mut below) = (0, 0.0, 0.0);
     for trial in 0..20 {
-        let result = calibrate(&weak_telephoto(trial), &settings.clone().with_profile_intervals(0.95)).unwrap();
+        let result =
+            calibrate(&weak_telephoto(trial), &settings.clone().with_profile_intervals(0.95)).unwrap();
         let is_fx = |w: &Warning| matches!(w, Warning::NotLinear { parameter: Parameter::Fx, .. });
         let interval = result.intervals.iter().find(|i| i.parameter == Parameter::Fx).unwrap();
         let (Some(low), Some(high)) = (interval.low, interval.high) else {

@@ -40,7 +40,9 @@ pub struct Line {
 fn letter(warning: &str) -> Option<char> {
     match warning {
         "Correlated" => None,
+        "AboveFloor" => Some('a'),
         "FocalLengthUncertain" => Some('f'),
+        "NotLinear" => Some('l'),
         "FoldsInsideImage" => Some('b'),
         "NoDegreesOfFreedom" => Some('d'),
         "NotConverged" => Some('n'),

@@ -15,12 +15,13 @@
 //! for `V` views, `N` points and `n` free parameters, `m` combinations of which free homographies leave undetermined (the focal length; without
 //! distortion the principal point too). To first order the statistic follows Fisher's distribution.
 
+use super::blocks::N;
 use super::chance::fisher_tail;
+use super::chunks;
 use super::elimination::Eliminated;
 use super::kernel::{self, Strain};
 use super::minimise::{Problem, State};
-use super::system::{N, Reduction};
-use super::chunks;
+use super::system::Reduction;
 use crate::camera::Parameter;
 
 /// A right minimum of a model that holds misses its certificate with this probability at most: rare among the calibrations of a lifetime,
@@ -108,7 +109,8 @@ fn score(problem: &Problem<'_>, state: &State, reduction: &Reduction) -> (f64, u
     let scale: [f64; N] = std::array::from_fn(|i| if i < n { matrix[i][i] } else { 0.0 });
     let (mut gain, mut right) = (0.0, [0.0; N]);
     let shares = chunks::map(problem.observations, |view, pairs| {
-        let strain = kernel::view_strain(&state.camera, &state.cam_from_target[view], pairs, problem.loss, radial);
+        let strain =
+            kernel::view_strain(&state.camera, &state.cam_from_target[view], pairs, problem.loss, radial);
         Share::of(&strain, &reduction.eliminated[view], &parameters)
     });
     for share in &shares {
@@ -185,7 +187,9 @@ fn quadratic_form(
     let mut left: [bool; N] = std::array::from_fn(|i| i < n);
     for _ in 0..n {
         let share = |i: usize| matrix[i][i] / scale[i];
-        let Some(p) = (0..n).filter(|&i| left[i]).max_by(|&i, &j| share(i).total_cmp(&share(j))) else { break };
+        let Some(p) = (0..n).filter(|&i| left[i]).max_by(|&i, &j| share(i).total_cmp(&share(j))) else {
+            break;
+        };
         if share(p).is_nan() || share(p) <= SMALLEST_PIVOT {
             break;
         }

@@ -114,10 +114,8 @@ mod tests {
     #[test]
     fn derivatives_agree_with_central_differences() {
         let k = Camera { skew: 0.1, ..Camera::pinhole(1.3, 1.2, 0.2, -0.1) }.k();
-        let pose = Pose {
-            rotation: rotation::from_xyz_rad(0.3, -0.4, 0.2),
-            translation: Vec3::new(0.3, -0.2, 4.0),
-        };
+        let pose =
+            Pose { rotation: rotation::from_xyz_rad(0.3, -0.4, 0.2), translation: Vec3::new(0.3, -0.2, 4.0) };
         let j = derivative(&k, &pose);
         for i in 0..6 {
             let step = Vector6::ith(i, 1e-6);

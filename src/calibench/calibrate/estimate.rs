@@ -13,9 +13,9 @@ use super::{
     Calibration, CalibrationError, Loss, Settings, Termination, Warning, chunks, duplicates, identifiability,
     kernel, start, strays, warnings,
 };
+use crate::board::View;
 use crate::camera::Parameter;
 use crate::geometry::{Homography, Vec2};
-use crate::board::View;
 
 /// Homographies of the start are refined until a step promises less than this part of their cost: distortion, which they leave out, is
 /// far larger than what is left to gain.
@@ -164,7 +164,9 @@ fn report(
     let sigma_px = (square / freedom).sqrt();
     let conditioning = reduction.as_ref().and_then(|reduction| Conditioning::of(system, reduction));
     if !problem.free.is_empty() {
-        identifiability::refuse_if_singular(conditioning.as_ref(), || "the normal equations are singular".into())?;
+        identifiability::refuse_if_singular(conditioning.as_ref(), || {
+            "the normal equations are singular".into()
+        })?;
     }
     let variance = noise_variance(&residuals, square, problem.loss, freedom);
     let intervals = profile_coverage

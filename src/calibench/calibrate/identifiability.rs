@@ -64,7 +64,9 @@ fn doubtful_slopes(problem: &Problem<'_>, state: &State, noise_px: f64) -> Vec<(
     if slopes.len() > 1 {
         candidates.push((mean, "the target has the same tilt in every view"));
     }
-    candidates.retain(|(common, _)| !slopes.iter().any(|s| s.edge_shift_px(common, focal) > EVIDENT_TILT * noise_px));
+    candidates.retain(|(common, _)| {
+        !slopes.iter().any(|s| s.edge_shift_px(common, focal) > EVIDENT_TILT * noise_px)
+    });
     candidates
 }
 
@@ -204,7 +206,8 @@ fn moved(near: &State, far: &State, parameter: Parameter) -> Vec<String> {
     }
     let views = || near.cam_from_target.iter().zip(&far.cam_from_target);
     let count = near.cam_from_target.len().max(1) as f64;
-    let mean = |of: &dyn Fn(&Pose, &Pose) -> f64| (views().map(|(a, b)| of(a, b)).sum::<f64>() / count).sqrt();
+    let mean =
+        |of: &dyn Fn(&Pose, &Pose) -> f64| (views().map(|(a, b)| of(a, b)).sum::<f64>() / count).sqrt();
     let squared = |x: f64| x * x;
     if mean(&|a, b| squared(libm::log((a.translation.z / b.translation.z).abs()))) > MOVED {
         add(&mut list, "distance");

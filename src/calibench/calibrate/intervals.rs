@@ -147,7 +147,8 @@ impl<'a> Profile<'a> {
         for i in 0..n {
             intrinsics[i] = self.covariance[(i, row)] / self.covariance[(row, row)] * offset;
         }
-        let poses = self.reduction.eliminated.iter().map(|factors| -factors.response(&intrinsics, n)).collect();
+        let poses =
+            self.reduction.eliminated.iter().map(|factors| -factors.response(&intrinsics, n)).collect();
         let step = Step::along(intrinsics, poses);
         let mut state = self.minimum.state.clone();
         self.problem.retraction.apply(&self.minimum.state, free, &step, &mut state);

@@ -51,7 +51,8 @@ mod tests {
 
     #[test]
     fn the_centre_is_found_without_knowing_the_distortion() {
-        let camera = Camera::pinhole(550.0, 550.0, 396.0, 653.0).with_distortion(BrownConrady::radial(-0.25, 0.06));
+        let camera =
+            Camera::pinhole(550.0, 550.0, 396.0, 653.0).with_distortion(BrownConrady::radial(-0.25, 0.06));
         let view = |x: f64, y: f64| {
             let pose = Pose {
                 rotation: rotation::from_xyz_rad(x, y, 0.1),

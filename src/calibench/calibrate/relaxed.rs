@@ -222,8 +222,7 @@ impl Fit<'_> {
                 return view;
             }
             let inverse = 1.0 / w;
-            let ideal =
-                Vec2::new(h[0] * p.x + h[1] * p.y + h[2], h[3] * p.x + h[4] * p.y + h[5]) * inverse;
+            let ideal = Vec2::new(h[0] * p.x + h[1] * p.y + h[2], h[3] * p.x + h[4] * p.y + h[5]) * inverse;
             let distorted = lens.distortion.distort(&ideal);
             let residual = lens.pixel_from_normalised(&distorted) - pixel;
             let (rho, weight) = self.loss.at(residual.norm_squared());
@@ -343,8 +342,7 @@ impl Equations {
 
 impl State {
     fn stepped(&self, free: FreeParameters, step: &Step) -> State {
-        let homographies =
-            self.homographies.iter().zip(&step.homographies).map(|(h, d)| h + d).collect();
+        let homographies = self.homographies.iter().zip(&step.homographies).map(|(h, d)| h + d).collect();
         State { lens: self.lens.stepped(free, step.lens.as_slice()), homographies }
     }
 }

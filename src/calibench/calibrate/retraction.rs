@@ -91,9 +91,8 @@ fn curved_pose(pose: &Pose, delta: &SVector<f64, 6>, focal: [f64; 2]) -> Pose {
     let s = libm::exp(rate);
     let z = t.z * s;
     // f x = f t_x / t_z changes by f (dx + x df / f) with dx = (dt_x - t_x dt_z / t_z) / t_z; over the new f, times the new t_z.
-    let across = |own: f64, step: f64, focal: f64| {
-        (own * (1.0 + focal - rate) + step) / t.z * libm::exp(-focal) * z
-    };
+    let across =
+        |own: f64, step: f64, focal: f64| (own * (1.0 + focal - rate) + step) / t.z * libm::exp(-focal) * z;
     let translation = Vec3::new(across(t.x, delta[3], focal[0]), across(t.y, delta[4], focal[1]), z);
     // The third row of R: the optical axis in the target's frame. d r3 = (delta x R) row 3.
     let r = &pose.rotation;
@@ -128,9 +127,10 @@ pub(super) fn scaled(state: &State, free: FreeParameters, s: f64) -> State {
         (Parameter::P2, 1),
         (Parameter::K3, 6),
     ];
-    let moved = powers.into_iter().filter(|&(p, _)| free.contains(p)).fold(state.camera, |camera, (p, power)| {
-        camera.with(p, (0..power).fold(camera.get(p), |value, _| value * s))
-    });
+    let moved =
+        powers.into_iter().filter(|&(p, _)| free.contains(p)).fold(state.camera, |camera, (p, power)| {
+            camera.with(p, (0..power).fold(camera.get(p), |value, _| value * s))
+        });
     let pose = |pose: &Pose| {
         let (r, t) = (&pose.rotation, &pose.translation);
         Pose {
@@ -158,8 +158,13 @@ mod tests {
 
     #[test]
     fn both_ways_agree_to_first_order_and_keep_a_rotation() {
-        let camera = Camera::pinhole(600.0, 610.0, 320.0, 240.0)
-            .with_distortion(BrownConrady { k1: -0.2, k2: 0.1, p1: 1e-3, p2: -2e-3, k3: 0.03 });
+        let camera = Camera::pinhole(600.0, 610.0, 320.0, 240.0).with_distortion(BrownConrady {
+            k1: -0.2,
+            k2: 0.1,
+            p1: 1e-3,
+            p2: -2e-3,
+            k3: 0.03,
+        });
         let pose = Pose {
             rotation: rotation::from_xyz_rad(0.3, -0.4, 0.2),
             translation: Vec3::new(3.0, -2.0, 12.0),
@@ -170,8 +175,13 @@ mod tests {
         let apart = |h: f64| {
             let step = unit.map(|x| h * x);
             let (a, b) = (camera.stepped(free, &step), curved_camera(&camera, free, &step));
-            let cameras: f64 =
-                a.parameters().iter().zip(b.parameters()).zip(unit).map(|((a, b), u)| ((a - b) / u).abs()).sum();
+            let cameras: f64 = a
+                .parameters()
+                .iter()
+                .zip(b.parameters())
+                .zip(unit)
+                .map(|((a, b), u)| ((a - b) / u).abs())
+                .sum();
             let (p, q) = (pose.perturbed(&(turn * h)), curved_pose(&pose, &(turn * h), [0.05 * h, 0.03 * h]));
             assert!((q.rotation.transpose() * q.rotation - Mat3::identity()).norm() < 1e-13);
             cameras + (p.rotation - q.rotation).norm() + (p.translation - q.translation).norm()

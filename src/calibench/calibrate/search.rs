@@ -7,6 +7,7 @@
 use super::certificate::{self, Certificate};
 use super::closed_form;
 use super::condensed::{self, Hypothesis};
+use super::identifiability::{self, tilts_are_evident};
 use super::intervals::{Profile, Skewed};
 use super::minimise::{Minimum, Problem, State};
 use super::radial_centre::radial_centre;
@@ -14,7 +15,6 @@ use super::relaxed::{self, Relaxed};
 use super::retraction::Retraction;
 use super::start::{Held, focal_from_centre};
 use super::system::Reduction;
-use super::identifiability::{self, tilts_are_evident};
 use super::{CalibrationError, Termination, tilt, walk};
 use crate::camera::{BrownConrady, Camera, Parameter};
 use crate::geometry::{Homography, Vec2};
@@ -53,9 +53,9 @@ const WELL_KNOWN: f64 = 0.01;
 impl Judged {
     fn of(problem: &Problem<'_>, minimum: Minimum, starts: usize) -> Judged {
         let reduction = minimum.system.reduction();
-        let certificate = reduction.as_ref().map(|reduction| {
-            certificate::certify(problem, &minimum.state, reduction, minimum.system.cost)
-        });
+        let certificate = reduction
+            .as_ref()
+            .map(|reduction| certificate::certify(problem, &minimum.state, reduction, minimum.system.cost));
         Judged { minimum, reduction, certificate, starts, skewed: Vec::new() }
     }
 
@@ -74,7 +74,10 @@ impl Judged {
 
     /// Whether nothing speaks for another minimum.
     fn is_clear(&self, problem: &Problem<'_>) -> bool {
-        let certified = self.certificate.as_ref().is_some_and(|c| c.freedom >= TELLING && c.is_possible() && c.p_value > CLEAR);
+        let certified = self
+            .certificate
+            .as_ref()
+            .is_some_and(|c| c.freedom >= TELLING && c.is_possible() && c.p_value > CLEAR);
         self.minimum.termination == Termination::Converged
             && self.minimum.iterations <= SHORT_WAY
             && certified
@@ -137,7 +140,11 @@ pub(super) fn noise_of(problem: &Problem<'_>, minimum: &Minimum) -> f64 {
 ///
 /// # Errors
 /// Where the data do not determine focal length or principal point.
-pub(super) fn best_minimum(problem: &Problem<'_>, starts: Vec<State>, evidence: &Evidence<'_>) -> Result<Judged, CalibrationError> {
+pub(super) fn best_minimum(
+    problem: &Problem<'_>,
+    starts: Vec<State>,
+    evidence: &Evidence<'_>,
+) -> Result<Judged, CalibrationError> {
     let mut starts = starts.into_iter();
     let first = problem.minimise(starts.next().expect("there is at least one start"));
     let first = Judged::of(problem, first, 1);
@@ -268,7 +275,10 @@ fn relax(problem: &Problem<'_>, evidence: &Evidence<'_>) -> Option<Relaxed> {
         start
     };
     let centres = if sought.contains(Cx) && sought.contains(Cy) {
-        vec![evidence.held.centre].into_iter().chain(radial_centre(problem.observations, evidence.pixel_frame)).collect()
+        vec![evidence.held.centre]
+            .into_iter()
+            .chain(radial_centre(problem.observations, evidence.pixel_frame))
+            .collect()
     } else {
         vec![evidence.held.centre]
     };
@@ -348,12 +358,7 @@ fn state_of(relaxed: &Relaxed, held: &Held, hypothesis: &Hypothesis) -> State {
     let (s2, d) = (s * s, &lens.distortion);
     let camera = Camera {
         skew: lens.skew * s,
-        ..Camera::pinhole(
-            k.fx * lens.fx,
-            k.fy * lens.fy,
-            lens.cx + k.cx * lens.fx,
-            lens.cy + k.cy * lens.fy,
-        )
+        ..Camera::pinhole(k.fx * lens.fx, k.fy * lens.fy, lens.cx + k.cx * lens.fx, lens.cy + k.cy * lens.fy)
     };
     let distortion = BrownConrady {
         k1: d.k1 * s2,

@@ -2,8 +2,8 @@
 
 use super::Covariance;
 use super::normal::Observations;
-use crate::geometry::{Mat3, Pose, Vec2, Vec3, rotation};
 use crate::board::View;
+use crate::geometry::{Mat3, Pose, Vec2, Vec3, rotation};
 
 /// The frame in which targets are refined: centred on the points, scaled to unit size, so that neither the unit nor a far
 /// origin of the target costs digits.

@@ -43,7 +43,12 @@ pub(super) struct Far {
 
 /// Walks from a minimum, and again from any better one it meets, for noise of `noise_px`; `centre_sd` are the standard deviations of the
 /// principal point.
-pub(super) fn far_away(problem: &Problem<'_>, minimum: Minimum, noise_px: f64, centre_sd: [Option<f64>; 2]) -> Walked {
+pub(super) fn far_away(
+    problem: &Problem<'_>,
+    minimum: Minimum,
+    noise_px: f64,
+    centre_sd: [Option<f64>; 2],
+) -> Walked {
     let mut walked = Walked { best: minimum, starts: 0, far: Vec::new() };
     let limit = RISEN * variance(problem, noise_px);
     for _ in 0..WALKS {
@@ -54,7 +59,12 @@ pub(super) fn far_away(problem: &Problem<'_>, minimum: Minimum, noise_px: f64, c
         }
         for (parameter, sd) in [Parameter::Cx, Parameter::Cy].into_iter().zip(centre_sd) {
             if sd.is_some_and(|sd| sd > KNOWN_CENTRE * walked.best.state.camera.fx) {
-                step_aside(problem, parameter, least_rise(parameter) * variance(problem, noise_px), &mut walked);
+                step_aside(
+                    problem,
+                    parameter,
+                    least_rise(parameter) * variance(problem, noise_px),
+                    &mut walked,
+                );
             }
         }
         match better {

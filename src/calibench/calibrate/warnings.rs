@@ -42,9 +42,7 @@ fn ending(calibration: &Calibration) -> Option<Warning> {
             p_value: certificate.p_value,
             starts: calibration.starts,
         }),
-        (termination, _) => {
-            Some(Warning::NotConverged { termination, iterations: calibration.iterations })
-        }
+        (termination, _) => Some(Warning::NotConverged { termination, iterations: calibration.iterations }),
     }
 }
 

@@ -85,7 +85,8 @@ impl<const RADIAL: bool, const ROBUST: bool> Kernel for StrainSums<'_, RADIAL, R
             let linear = &flat[first + SHARED..];
             let lens = &flat[first + 6..];
             [
-                linear[0], linear[1], linear[2], linear[3], linear[4], lens[0], lens[1], lens[2], lens[3], lens[4],
+                linear[0], linear[1], linear[2], linear[3], linear[4], lens[0], lens[1], lens[2], lens[3],
+                lens[4],
             ]
         };
         Strain {
