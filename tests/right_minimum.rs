@@ -1,10 +1,10 @@
 //! Is a minimum the right one, and is what is said of it true? Data on which a search can go wrong, and data that mislead.
 
+use calibench::board::View;
 use calibench::calibrate::{Calibration, CalibrationError, Settings, Termination, Warning, calibrate};
 use calibench::camera::{Camera, FreeParameters, Parameter};
 use calibench::geometry::{Pose, Vec2, Vec3};
 use calibench::synth::{Scene, Stream, StreamKey, Truth, scene::looking_at_centre};
-use calibench::target::View;
 
 fn noise(scenario: &'static str, trial: u64) -> Stream {
     Stream::open(StreamKey { seed: 11, scenario, trial, purpose: "noise" })

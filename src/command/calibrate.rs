@@ -45,6 +45,9 @@ pub(super) struct Arguments {
     /// Leaves out views whose RMSE exceeds FACTOR times the median, worst first, such as 3
     #[arg(long, value_name = "FACTOR", value_parser = parse_factor)]
     reject_views: Option<f64>,
+    /// Intervals of 95 % beside the standard deviations: by the profile of the cost, which holds where the data are weak
+    #[arg(long, value_enum, default_value_t = Intervals::Linear)]
+    intervals: Intervals,
     /// Map of a plane from point pairs
     #[arg(long, value_enum, default_value_t = Mode::Planar)]
     mode: Mode,
@@ -60,6 +63,14 @@ pub(super) struct Arguments {
 pub(super) enum Format {
     Text,
     Json,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Intervals {
+    /// Standard deviations only.
+    Linear,
+    /// Profile intervals too.
+    Profile,
 }
 
 /// The three maps of a plane.

@@ -93,10 +93,7 @@ pub(super) fn answer(id: &str, calibration: &Calibration) -> Answer {
     let flags = calibration.warnings.iter().filter(|w| !matches!(w, Warning::Correlated { .. }));
     Answer {
         id: id.to_string(),
-        status: match calibration.termination {
-            Termination::Converged => Status::Ok,
-            Termination::IterationLimit | Termination::Stalled => Status::NotConverged,
-        },
+        status: if calibration.is_usable() { Status::Ok } else { Status::NotConverged },
         parameters: Parameter::ALL
             .into_iter()
             .map(|p| (p.name().to_string(), calibration.camera.get(p)))

@@ -82,9 +82,10 @@ impl MonteCarlo<'_> {
         let views = self.scene.observe(self.sigma_px, &mut Stream::open(key));
         let calibration = calibrate(&views, self.settings).map_err(|e| refusal(&e))?;
         match calibration.termination {
-            Termination::Converged => Ok(self.against_truth(&calibration)),
+            // Where the world is not the model, as with gross errors, a minimum is a minimum.
+            ending if ending.is_minimum() => Ok(self.against_truth(&calibration)),
             Termination::IterationLimit => Err("iteration limit".to_string()),
-            Termination::Stalled => Err("stalled".to_string()),
+            other => Err(other.name().to_string()),
         }
     }
 

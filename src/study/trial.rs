@@ -50,7 +50,13 @@ pub fn run_trial(cell: &Cell, quantities: &[Quantity], trial: u64) -> Trial {
         Ok(calibration) => Trial {
             cell: cell.index,
             trial,
-            outcome: calibration.termination.name().to_string(),
+            // Where the world is not the model, as with gross errors, a minimum is a minimum.
+            outcome: if calibration.termination.is_minimum() {
+                CONVERGED
+            } else {
+                calibration.termination.name()
+            }
+            .to_string(),
             iterations: calibration.iterations,
             values: quantities.iter().map(|q| measure(*q, cell, scene, &calibration)).collect(),
         },

@@ -128,7 +128,7 @@ pub(super) const STRONG_CORRELATION: f64 = 0.98;
 pub(super) const UNCERTAIN_FOCAL: f64 = 0.05;
 
 /// Real boards leave the RMSE up to a seventh above its floor, wrong minima of consequence lie more than a third above.
-pub const GROSS: f64 = 1.25;
+const GROSS: f64 = 1.25;
 
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -192,6 +192,13 @@ impl fmt::Display for Warning {
 }
 
 impl Calibration {
+    /// Whether the estimate is a minimum whose RMSE lies no more than a quarter above its floor: beyond that it is another minimum than the
+    /// right one, or a model that has little to do with the data.
+    pub fn is_usable(&self) -> bool {
+        let is_gross = |c: &Certificate| !c.holds() && self.rmse_px > GROSS * c.floor_rmse_px;
+        self.termination.is_minimum() && !self.certificate.as_ref().is_some_and(is_gross)
+    }
+
     /// Standard deviation of an estimated parameter; `None` if it was held.
     pub fn standard_deviation(&self, parameter: Parameter) -> Option<f64> {
         self.covariance.standard_deviation(parameter)

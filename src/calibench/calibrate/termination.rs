@@ -1,7 +1,8 @@
 //! Is the estimate a minimum, and if not, why did the search end?
 
-/// How the refinement ended. Every way is a result; only the first is a minimum.
+/// How the refinement ended. Every way is a result; only the first two are minima.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Termination {
     /// A further step would lower the cost by less than 1e-14 of it, or by less than its rounding: the estimate is a minimum to
     /// about a millionth of its standard deviation, or to rounding. And it is certified: see [`super::Certificate`].
@@ -16,7 +17,12 @@ pub enum Termination {
 }
 
 impl Termination {
-    /// `converged`, `iteration-limit` or `stalled`.
+    /// Whether the estimate is a minimum, certified or not.
+    pub const fn is_minimum(self) -> bool {
+        matches!(self, Termination::Converged | Termination::AboveFloor)
+    }
+
+    /// `converged`, `above-floor`, `iteration-limit` or `stalled`.
     pub const fn name(self) -> &'static str {
         match self {
             Termination::Converged => "converged",

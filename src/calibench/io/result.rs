@@ -1,6 +1,6 @@
 //! How is a calibration kept and handed on? `result.json`: the camera by its parameters' names, with all that is known of it.
 
-use crate::calibrate::Calibration;
+use crate::calibrate::{Calibration, Certificate, ProfileInterval};
 use crate::camera::{Camera, Parameter};
 use crate::geometry::{Vec2, rotation};
 use serde::{Deserialize, Serialize};
@@ -72,6 +72,56 @@ pub struct LeftOut {
     pub reason: String,
 }
 
+/// A [`Certificate`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CertificateFields {
+    /// Whether it holds.
+    pub holds: bool,
+    /// RMSE per point of free homographies, px.
+    pub floor_rmse_px: f64,
+    /// Cost above theirs, in variances of a pixel coordinate.
+    pub excess: f64,
+    /// Degrees of freedom of that excess.
+    pub freedom: usize,
+    /// Degrees of freedom of the homographies' fit.
+    pub floor_freedom: usize,
+    /// Probability of such an excess by chance.
+    pub p_value: f64,
+}
+
+impl CertificateFields {
+    fn of(certificate: &Certificate) -> CertificateFields {
+        CertificateFields {
+            holds: certificate.holds(),
+            floor_rmse_px: certificate.floor_rmse_px,
+            excess: certificate.excess,
+            freedom: certificate.freedom,
+            floor_freedom: certificate.floor_freedom,
+            p_value: certificate.p_value,
+        }
+    }
+}
+
+/// A [`ProfileInterval`]; an end is `null` where the cost never rises enough.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct IntervalFields {
+    /// Of which parameter.
+    pub parameter: &'static str,
+    /// Its probability of containing the true value.
+    pub coverage: f64,
+    /// Lower end.
+    pub low: Option<f64>,
+    /// Upper end.
+    pub high: Option<f64>,
+}
+
+impl IntervalFields {
+    fn of(interval: &ProfileInterval) -> IntervalFields {
+        let ProfileInterval { parameter, coverage, low, high, .. } = *interval;
+        IntervalFields { parameter: parameter.name(), coverage, low, high }
+    }
+}
+
 /// The whole of a calibration.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CalibrationFields {
@@ -93,8 +143,15 @@ pub struct CalibrationFields {
     pub sigma_px: f64,
     /// `2 N - p`.
     pub degrees_of_freedom: usize,
-    /// `converged`, `iteration-limit` or `stalled`.
+    /// `converged`, `above-floor`, `iteration-limit` or `stalled`.
     pub termination: &'static str,
+    /// How the cost compares with that of free homographies.
+    pub certificate: Option<CertificateFields>,
+    /// Starts that were refined: 1 where the first left no doubt.
+    pub starts: usize,
+    /// Intervals by the profile of the cost, if they were asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub intervals: Vec<IntervalFields>,
     /// Refinement steps.
     pub iterations: usize,
     /// The combination of parameters the data say least about: names and weights, strongest first.
@@ -130,6 +187,9 @@ impl CalibrationFields {
             sigma_px: calibration.sigma_px,
             degrees_of_freedom: calibration.degrees_of_freedom,
             termination: calibration.termination.name(),
+            certificate: calibration.certificate.as_ref().map(CertificateFields::of),
+            starts: calibration.starts,
+            intervals: calibration.intervals.iter().map(IntervalFields::of).collect(),
             iterations: calibration.iterations,
             weakest_direction: calibration
                 .conditioning

@@ -1,9 +1,9 @@
 //! A camera from views, wherever they come from: the fit, what it is told as, and the files it leaves.
 
 use super::finished::{Told, parameter_rows, summary, weakest};
-use super::{Arguments, Exit, Format, advice, maps, page, plots, print, table};
+use super::{Arguments, Exit, Format, Intervals, advice, maps, page, plots, print, table};
 use calibench::board::{Board, View};
-use calibench::calibrate::{Settings, Termination};
+use calibench::calibrate::{ProfileInterval, Settings};
 use calibench::io::{CalibrationFields, LeftOut, significant, write_atomically};
 use calibench::photos::{Fit, Fitter};
 use calibench_harness::Figure;
@@ -30,9 +30,15 @@ pub(super) struct Observed {
     pub(super) notes: Vec<String>,
 }
 
+/// Coverage of the intervals: what a certificate of measurement states.
+const COVERAGE: f64 = 0.95;
+
 pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, String> {
     let mut settings = Settings::new(arguments.free).with_loss(arguments.loss);
     settings.image_size = observed.image_size;
+    if arguments.intervals == Intervals::Profile {
+        settings = settings.with_profile_intervals(COVERAGE);
+    }
     for &(parameter, value) in &arguments.fix {
         settings = settings.hold(parameter, value);
     }
@@ -50,8 +56,7 @@ pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, Str
         Format::Json => print(&fields.to_json()),
         Format::Text => print(&text(&told)),
     }
-    let converged = told.fit.calibration.termination == Termination::Converged;
-    Ok(if converged { Exit::Held } else { Exit::Incomplete })
+    Ok(if told.fit.calibration.is_usable() { Exit::Held } else { Exit::Incomplete })
 }
 
 fn told(observed: Observed, fit: Fit) -> Told {
@@ -96,12 +101,31 @@ fn figures(told: &Told) -> Vec<Figure> {
     figures
 }
 
+/// Intervals by the profile of the cost, if they were asked for.
+fn interval_table(intervals: &[ProfileInterval]) -> String {
+    let Some(first) = intervals.first() else { return String::new() };
+    let title = format!("{} % from", significant(100.0 * first.coverage, 3));
+    let mut rows = table(&["parameter", &title, "to", "by the standard deviation from", "to"]);
+    let end = |value: Option<f64>| value.map_or("open".to_string(), |value| significant(value, 7));
+    for interval in intervals {
+        rows.add_row([
+            interval.parameter.name().to_string(),
+            end(interval.low),
+            end(interval.high),
+            significant(interval.linear.0, 7),
+            significant(interval.linear.1, 7),
+        ]);
+    }
+    format!("{}\n\n", rows.trim_fmt())
+}
+
 fn text(told: &Told) -> String {
     let calibration = &told.fit.calibration;
     let mut parameters = table(&["parameter", "value", "standard deviation", "unit"]);
     parameter_rows(told).into_iter().for_each(|row| {
         parameters.add_row(row);
     });
+    let intervals = interval_table(&calibration.intervals);
     let mut views = table(&["view", "points", "RMSE (px)", "distance"]);
     for (i, name) in told.names.iter().enumerate() {
         let rmse = calibration.view_rmse_px(i).unwrap_or(f64::NAN);
@@ -109,7 +133,8 @@ fn text(told: &Told) -> String {
         let points = calibration.residuals[i].len().to_string();
         views.add_row([name.clone(), points, significant(rmse, 4), significant(distance, 5)]);
     }
-    let mut text = format!("{}\n\n{}\n\n{}", parameters.trim_fmt(), views.trim_fmt(), summary(told));
+    let mut text =
+        format!("{}\n\n{intervals}{}\n\n{}", parameters.trim_fmt(), views.trim_fmt(), summary(told));
     // Writing to a string cannot fail, here and below.
     if let Some(weakest) = weakest(told) {
         let _ = writeln!(text, "weakest direction: {weakest}");

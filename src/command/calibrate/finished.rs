@@ -1,5 +1,6 @@
 //! What is said of a finished calibration, in the terminal and on the page?
 
+use calibench::calibrate::Certificate;
 use calibench::camera::Parameter;
 use calibench::io::{LeftOut, significant};
 use calibench::photos::Fit;
@@ -57,6 +58,9 @@ pub(super) fn summary(told: &Told) -> String {
         calibration.termination.name(),
         calibration.iterations,
     );
+    if let Some(sentence) = calibration.certificate.as_ref().and_then(certificate) {
+        text.push_str(&sentence);
+    }
     if let Some(bias) = &told.fit.bias {
         // Writing to a string cannot fail.
         let _ = writeln!(
@@ -68,4 +72,16 @@ pub(super) fn summary(told: &Told) -> String {
         );
     }
     text
+}
+
+/// The certificate in a sentence; none where nothing can be certified.
+fn certificate(certificate: &Certificate) -> Option<String> {
+    certificate.is_possible().then(|| {
+        format!(
+            "{}: free homographies behind the same lens reach {} px, by chance with probability {}\n",
+            if certificate.holds() { "certified" } else { "not certified" },
+            significant(certificate.floor_rmse_px, 7),
+            significant(certificate.p_value, 2),
+        )
+    })
 }
