@@ -4,10 +4,11 @@
 //!
 //! What it cannot show: faults of a kind that nobody thought of. The subtle faults need thousands of samples a scenario, and false
 //! alarms hundreds of runs: they are measured by `calibench gate --power golden/gate-power --size thorough`, and what that wrote
-//! is read here and held against what is planted now.
+//! is read here. It is refused as stale when a line of the gate or of the solver has changed since.
 
 use calibench_gate::faults::{Class, Planted, planted};
 use calibench_gate::power::{Catch, FaultRow, Measured, catch, false_alarms};
+use calibench_harness::fingerprint::Fingerprint;
 use calibench_harness::{Band, Claim, Context, Experiment, ExperimentError, Record, Table};
 use rayon::prelude::*;
 
@@ -30,6 +31,9 @@ const MOST_SAMPLES: usize = 32;
 const FALSE_ALARM_RATE: f64 = 1e-4;
 /// Stated rates at which false alarms were counted.
 const STATED_RATES: usize = 4;
+
+/// The command of the thorough measurement.
+const COMMAND: &str = "calibench gate --power golden/gate-power --size thorough";
 
 /// What the thorough measurement wrote.
 const FAULTS: &str = include_str!("../golden/gate-power/faults.csv");
@@ -102,6 +106,7 @@ fn thorough(record: &mut Record) -> Result<(), ExperimentError> {
         .map_err(ExperimentError::at("the thorough measurement"))?;
     record.input("golden/gate-power/faults.csv", FAULTS.as_bytes());
     record.input("golden/gate-power/false-alarms.csv", FALSE_ALARMS.as_bytes());
+    record.claim(is_current());
     let row_of = |fault: &Planted| measured.faults.iter().find(|row| row.fault == fault.id);
     let is_current = |row: &FaultRow, fault: &Planted| row.class == fault.class && row.what == fault.about;
     let caught = |fault: &Planted| {
@@ -157,6 +162,19 @@ fn thorough(record: &mut Record) -> Result<(), ExperimentError> {
     }
     record.table(table);
     Ok(())
+}
+
+/// The committed tables are of the gate and the solver that run now.
+fn is_current() -> Claim {
+    let present = Fingerprint::of_gate_power();
+    let files = [("faults.csv", FAULTS), ("false-alarms.csv", FALSE_ALARMS), ("textbook.csv", TEXTBOOK)];
+    let cases = files.map(|(name, text)| present.case(name, text, COMMAND));
+    Claim::all_of(
+        "thorough-measurement-is-current",
+        "the thorough measurement is of the present gate and the present solver",
+        cases,
+        "SHA-256 of their code lines and the versions of the numeric crates",
+    )
 }
 
 fn table(faults: &[Planted], catches: &[Catch]) -> Table {

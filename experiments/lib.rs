@@ -8,6 +8,7 @@ pub mod expiry;
 pub mod focal_depth;
 pub mod four_pose;
 pub mod gate_power;
+pub mod global_minimum;
 pub mod interface;
 pub mod k2_observability;
 pub mod line_bending;
@@ -32,6 +33,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     interface::EXPERIMENT,
     expiry::EXPERIMENT,
     gate_power::EXPERIMENT,
+    global_minimum::EXPERIMENT,
 ];
 
 /// The README's example, compiled and run with the documentation's tests.

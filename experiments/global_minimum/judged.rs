@@ -1,6 +1,6 @@
 //! What did the solver make of a scene, held against the search from the truth?
 
-use super::oracle;
+use super::oracle::{self, Reference};
 use super::scenes::Drawn;
 use calibench::calibrate::{Calibration, CalibrationError, Termination, calibrate};
 use calibench::camera::{FreeParameters, Parameter};
@@ -87,6 +87,8 @@ pub struct Judged {
     pub found: Option<Found>,
     /// Time of the solver, us.
     pub time_us: f64,
+    /// The bits of the estimate, of its cost and of the reference.
+    pub bits: Vec<u8>,
 }
 
 /// What the solver found.
@@ -121,6 +123,7 @@ pub fn judge(drawn: &Drawn) -> Option<Judged> {
     let start = Instant::now();
     let answer = calibrate(&drawn.views, &settings);
     let time_us = start.elapsed().as_secs_f64() * 1e6;
+    let bits = bits(&answer, &reference);
     let (class, ending) = classify(&answer, reference.cost, variance);
     let points = truth.points.len();
     let views = drawn.views.len();
@@ -146,7 +149,19 @@ pub fn judge(drawn: &Drawn) -> Option<Judged> {
         ending,
         found: answer.ok().map(|c| Found::of(&c, drawn, (cost(&c) - reference.cost) / variance)),
         time_us,
+        bits,
     })
+}
+
+/// Equal exactly when solver and reference gave the same bits.
+fn bits(answer: &Result<Calibration, CalibrationError>, reference: &Reference) -> Vec<u8> {
+    let mut numbers = reference.camera.parameters().to_vec();
+    numbers.push(reference.cost);
+    if let Ok(calibration) = answer {
+        numbers.extend(calibration.camera.parameters());
+        numbers.push(cost(calibration));
+    }
+    numbers.iter().flat_map(|number| number.to_le_bytes()).collect()
 }
 
 fn classify(
@@ -197,68 +212,5 @@ impl Found {
             z,
             warnings: calibration.warnings.iter().map(word).collect(),
         }
-    }
-
-    /// z of a parameter; NaN if it was held.
-    pub fn z_of(&self, free: FreeParameters, parameter: Parameter) -> f64 {
-        free.position(parameter).map_or(f64::NAN, |i| self.z[i])
-    }
-}
-
-/// The header of [`Judged::line`].
-pub fn header() -> String {
-    let z: Vec<String> = Parameter::ALL.iter().map(|p| format!("z_{p}")).collect();
-    format!(
-        "family,index,layout,model,views,points,fx,width,noise,tilt,coverage,size_given,bound,freedom,reference,\
-         reference_converged,reference_fx,class,ending,excess,fx_est,fx_sd,rmse,nees,time_us,warnings,{}",
-        z.join(",")
-    )
-}
-
-impl Judged {
-    /// All of it as a line of CSV.
-    pub fn line(&self, family: &str) -> String {
-        let z = |p| self.found.as_ref().map_or(f64::NAN, |f| f.z_of(self.free, p));
-        let z: Vec<String> = Parameter::ALL.iter().map(|&p| short(z(p))).collect();
-        let found = self.found.as_ref().map_or(",,,,".to_string(), |f| {
-            let numbers = [f.excess, f.fx, f.fx_sd, f.rmse_px, f.nees].map(short);
-            numbers.join(",")
-        });
-        let warnings = self.found.as_ref().map_or(String::new(), |f| f.warnings.join(" "));
-        format!(
-            "{family},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{found},{:.0},{warnings},{}",
-            self.index,
-            self.layout,
-            self.model,
-            self.views,
-            self.points,
-            short(self.fx_true),
-            self.width_px,
-            short(self.noise_px),
-            short(self.tilt_deg),
-            short(self.coverage),
-            u8::from(self.size_given),
-            short(self.bound),
-            self.freedom,
-            short(self.reference),
-            u8::from(self.reference_converged),
-            short(self.reference_fx),
-            self.class,
-            self.ending,
-            self.time_us,
-            z.join(",")
-        )
-    }
-}
-
-/// Six significant digits; empty for NaN.
-fn short(x: f64) -> String {
-    if x.is_nan() {
-        String::new()
-    } else if x == 0.0 || (1e-3..1e6).contains(&x.abs()) {
-        let digits = 5 - if x == 0.0 { 0 } else { libm::floor(libm::log10(x.abs())) as i32 };
-        format!("{x:.*}", digits.max(0) as usize)
-    } else {
-        format!("{x:.5e}")
     }
 }

@@ -67,11 +67,16 @@ impl Drawn {
 }
 
 impl Family {
+    /// What scene `index` estimates.
+    pub fn model(&self, index: u64) -> &'static Model {
+        turn(self.models, index / (self.cameras.len() * self.layouts.len()) as u64)
+    }
+
     /// A scene, or `None` where a rule forbids what was drawn.
     fn draw(&self, index: u64, stream: &mut Stream) -> Option<Drawn> {
         let lens = turn(self.cameras, index);
         let layout = turn(self.layouts, index / self.cameras.len() as u64);
-        let model = turn(self.models, index / (self.cameras.len() * self.layouts.len()) as u64);
+        let model = self.model(index);
         let (camera, image_size) = lens.draw(model, stream)?;
         let points = self.target.draw(stream);
         let views = layout.views.count(stream);
@@ -105,7 +110,7 @@ impl Family {
     }
 }
 
-fn turn<T>(list: &[T], index: u64) -> &T {
+fn turn<T>(list: &'static [T], index: u64) -> &'static T {
     &list[(index % list.len() as u64) as usize]
 }
 
@@ -347,5 +352,52 @@ impl Layout {
         let tilt = Vec3::new(libm::cos(axis), libm::sin(axis), 0.0) * degrees.to_radians();
         let roll = self.roll_deg.draw(stream).to_radians();
         rotation::exp(&tilt) * rotation::exp(&Vec3::new(0.0, 0.0, roll))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::families::FAMILIES;
+    use super::*;
+
+    #[test]
+    fn a_scene_is_the_same_in_any_order() {
+        for family in FAMILIES {
+            let first = Drawn::new(family, 3, 5).unwrap();
+            Drawn::new(family, 3, 4).unwrap();
+            let again = Drawn::new(family, 3, 5).unwrap();
+            assert_eq!((first.views, first.settings()), (again.views, again.settings()), "{}", family.name);
+        }
+    }
+
+    #[test]
+    fn every_mark_of_a_random_scene_is_in_the_image_and_the_lens_reaches_its_corners() {
+        for index in 0..200 {
+            let drawn = Drawn::new(&FAMILIES[0], 3, index).unwrap();
+            let (width, height) = drawn.truth().image_size;
+            for pixel in drawn.scene.pixels().iter().flatten() {
+                let inside = (-0.5..=width as f64 - 0.5).contains(&pixel.x)
+                    && (-0.5..=height as f64 - 0.5).contains(&pixel.y);
+                assert!(inside, "scene {index}: {pixel}");
+            }
+            assert!(sees_all(&drawn.truth().camera, width as f64, height as f64));
+        }
+    }
+
+    #[test]
+    fn the_random_scenes_reach_the_ends_of_what_is_stated() {
+        let drawn: Vec<Drawn> = (0..600).map(|index| Drawn::new(&FAMILIES[0], 3, index).unwrap()).collect();
+        let range = |of: &dyn Fn(&Drawn) -> f64| {
+            drawn.iter().map(of).fold((f64::INFINITY, 0.0f64), |(low, high), x| (low.min(x), high.max(x)))
+        };
+        let (low, high) = range(&|d| d.truth().camera.fx);
+        assert!((250.0..300.0).contains(&low) && (4500.0..=5000.0).contains(&high));
+        assert_eq!(range(&|d| d.views.len() as f64), (2.0, 50.0));
+        let (low, high) = range(&|d| d.noise_px);
+        assert!((0.01..0.012).contains(&low) && (1.8..=2.0).contains(&high));
+        let (low, high) = range(&|d| d.tilt_deg);
+        assert!((2.0..2.2).contains(&low) && (55.0..=60.0).contains(&high));
+        let models: std::collections::BTreeSet<&str> = drawn.iter().map(|d| d.model).collect();
+        assert_eq!(models.len(), 9);
     }
 }

@@ -21,6 +21,7 @@ mod claim;
 mod emit;
 mod experiment;
 pub mod figure;
+pub mod fingerprint;
 pub mod golden;
 pub mod monte_carlo;
 mod predicted;

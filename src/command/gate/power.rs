@@ -7,6 +7,7 @@ use calibench_gate::faults::planted;
 use calibench_gate::power::{Measured, Sizes};
 use calibench_gate::{QUICK, textbook};
 use calibench_harness::ProgressDisplay;
+use calibench_harness::fingerprint::Fingerprint;
 use std::path::Path;
 use std::time::Instant;
 
@@ -37,9 +38,10 @@ pub(super) fn measure(arguments: &Arguments, folder: &Path, samples: usize) -> R
     let commit = commit().map_or("unknown".to_string(), |c| {
         format!("{}{}", c.hash, if c.dirty { " with changes" } else { "" })
     });
-    let provenance =
+    let command =
         format!("calibench gate --power DIR --samples {samples} --seed {}; commit {commit}", sizes.seed);
-    for (name, text) in measured.to_csv(&provenance) {
+    let head = Fingerprint::of_gate_power().head(&command);
+    for (name, text) in measured.to_csv(&head) {
         write_atomically(&folder.join(name), text.as_bytes()).map_err(incomplete)?;
     }
     print(&measured.to_markdown());

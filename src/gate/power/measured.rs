@@ -150,10 +150,10 @@ impl Measured {
         Ok(Measured { faults, alarms: alarm_rows(&clean, sizes), misled, certain: clean.certain })
     }
 
-    /// The three tables as CSV, with their names; `provenance` stands in the first line of each.
-    pub fn to_csv(&self, provenance: &str) -> [(&'static str, String); 3] {
+    /// The three tables as CSV, with their names; `head` is the first line of each.
+    pub fn to_csv(&self, head: &str) -> [(&'static str, String); 3] {
         let tables = [csv_of(&self.faults), csv_of(&self.alarms), csv_of(&self.misled)];
-        let mut files = FILES.into_iter().zip(tables).map(|(name, t)| (name, format!("# {provenance}\n{t}")));
+        let mut files = FILES.into_iter().zip(tables).map(|(name, t)| (name, format!("{head}\n{t}")));
         std::array::from_fn(|_| files.next().expect("three tables have three names"))
     }
 
@@ -274,7 +274,7 @@ mod tests {
             misled: vec![MisledRow { scenario: "s".into(), misled: 2, draws: 100, rate_in_suite: 0.02 }],
             certain: Vec::new(),
         };
-        let files = measured.to_csv("made by hand");
+        let files = measured.to_csv("# made by hand");
         let again = Measured::of_csv([&files[0].1, &files[1].1, &files[2].1]).unwrap();
         assert_eq!(again, measured);
         assert_eq!(again.wrong(), ["missed"]);

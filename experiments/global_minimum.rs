@@ -1,0 +1,397 @@
+//! Does the solver find the right minimum, or refuse honestly, whatever people photograph?
+//!
+//! Expected: wherever the data determine the camera (Cramer-Rao bound of sd(fx) below 2 % of fx) the solver ends at the cost that a search
+//! from the truth reaches; elsewhere it may refuse, and says so.
+//!
+//! What it cannot show: data that break the model. Marks are Gaussian, the lens is of the family that is fitted, held values are true. The
+//! reference itself is a local minimum: where it is not the lowest one, a solver that ends lower counts as right.
+//!
+//! The run judges the first scenes of every family; all of them take minutes, stand in golden/global-minimum/, and are read here. They are
+//! refused as stale when a line of the solver, of the scenes or of the reference has changed.
+
+use calibench::camera::Parameter;
+use calibench_harness::fingerprint::Fingerprint;
+use calibench_harness::{Band, Cell, Claim, Context, Experiment, ExperimentError, Record, Table};
+use rayon::prelude::*;
+use statrs::distribution::{Binomial, DiscreteCDF};
+
+pub mod campaign;
+mod committed;
+mod families;
+mod judged;
+mod listing;
+mod map;
+mod oracle;
+mod peers;
+mod scenes;
+
+use committed::{DETERMINED, Line};
+use families::{FAMILIES, Family};
+use judged::Class;
+use peers::Ending;
+
+/// The experiment.
+pub const EXPERIMENT: Experiment = Experiment {
+    id: "global-minimum",
+    title: "The right minimum, or an honest refusal",
+    question: "Random scenes over what people have: lenses of 250 to 5000 px, 640 to 4000 px wide, barrel and pincushion, 3 x 3 to 20 x 20 \
+               marks, 2 to 50 views, tilts of 2 to 60 degrees, noise of 0.01 to 2 px. How often does the solver accept a minimum of higher \
+               cost than the one next to the truth, not converge, or refuse? Expected: never where the data determine the camera.",
+    seed: SEED,
+    takes_image: false,
+    run,
+};
+
+/// Seed of every scene; not chosen for its result.
+const SEED: u64 = 11;
+/// Scenes of the first family that every run judges.
+const SHARE: u64 = 96;
+/// Scenes of each other family that every run judges.
+const NAMED_SHARE: u64 = 4;
+/// The command that judges all scenes and writes golden/global-minimum/.
+const COMMAND: &str = "cargo run --release --bin global-minimum-scenes -- --write";
+
+/// Accepted at a higher cost, of all scenes.
+const WRONG_OF_ALL: f64 = 1e-4;
+/// Not converged, of the scenes that determine the camera.
+const OPEN_OF_DETERMINED: f64 = 1e-3;
+/// Claims of rates are judged by counts. Their false-alarm rate is that of a solver that keeps a tenth of the claimed rate.
+const TRUE_PART: f64 = 0.1;
+/// Claims that something never happens: the false-alarm rate is that of a solver to which it happens once in a million scenes.
+const NEVER: f64 = 1e-6;
+
+/// What was committed of each family.
+const COMMITTED: [&str; 11] = [
+    include_str!("../golden/global-minimum/any.csv"),
+    include_str!("../golden/global-minimum/ordinary.csv"),
+    include_str!("../golden/global-minimum/wide-many.csv"),
+    include_str!("../golden/global-minimum/wide-many-off-centre.csv"),
+    include_str!("../golden/global-minimum/wide-few.csv"),
+    include_str!("../golden/global-minimum/wide-flat.csv"),
+    include_str!("../golden/global-minimum/tele.csv"),
+    include_str!("../golden/global-minimum/three-and-one.csv"),
+    include_str!("../golden/global-minimum/three-and-three.csv"),
+    include_str!("../golden/global-minimum/corner.csv"),
+    include_str!("../golden/global-minimum/one-place.csv"),
+];
+
+/// What OpenCV made of the first scenes of every family.
+const OPENCV: &str = include_str!("../golden/global-minimum/opencv.csv");
+
+/// A family with what was committed of it.
+struct Measured {
+    family: &'static Family,
+    text: &'static str,
+    lines: Vec<Line>,
+}
+
+fn run(context: &Context) -> Result<Record, ExperimentError> {
+    let mut record = context.record();
+    let measured = read()?;
+    for m in &measured {
+        record.input(format!("golden/global-minimum/{}.csv", m.family.name), m.text.as_bytes());
+    }
+    claim_current(&mut record, &measured, context);
+    let any = &measured[0];
+    tell_counts(&mut record, any);
+    claim_rates(&mut record, any);
+    claim_named(&mut record, &measured[1..]);
+    tell_errors(&mut record, any);
+    record.table(families_table(&measured));
+    tell_opencv(&mut record, &measured)?;
+    map::tell(&mut record, &any.lines)?;
+    Ok(record)
+}
+
+fn read() -> Result<Vec<Measured>, ExperimentError> {
+    FAMILIES
+        .iter()
+        .zip(COMMITTED)
+        .map(|(family, text)| {
+            let lines = text.lines().skip(2).map(Line::read).collect::<Option<Vec<_>>>();
+            let broken = || {
+                ExperimentError::Input(format!(
+                    "golden/global-minimum/{}.csv is broken: run {COMMAND}",
+                    family.name
+                ))
+            };
+            Ok(Measured { family, text, lines: lines.ok_or_else(broken)? })
+        })
+        .collect()
+}
+
+/// The committed scenes are those of this code: their fingerprint is, and the share that is judged again has the same bits.
+fn claim_current(record: &mut Record, measured: &[Measured], context: &Context) {
+    let present = Fingerprint::of_global_minimum();
+    record.claim(Claim::all_of(
+        "scenes-are-current",
+        "every committed scene was judged by the present solver, drawn and referred by the present code",
+        measured.iter().map(|m| {
+            let (what, held) = present.case(&format!("{}.csv", m.family.name), m.text, COMMAND);
+            (what, held && m.lines.len() as u64 == m.family.scenes)
+        }),
+        "SHA-256 of the code lines of solver, scenes and reference, and the versions of the numeric crates",
+    ));
+    if context.seed != SEED {
+        record.note("Another seed draws other scenes than the committed ones: the share is not compared.");
+        return;
+    }
+    let share = |m: &Measured| if m.family.name == FAMILIES[0].name { SHARE } else { NAMED_SHARE };
+    let jobs: Vec<(&Measured, u64)> =
+        measured.iter().flat_map(|m| (0..share(m)).map(move |index| (m, index))).collect();
+    let progress = context.progress("scenes", jobs.len());
+    let cases: Vec<(String, bool)> = jobs
+        .par_iter()
+        .map(|(m, index)| {
+            let now = campaign::judged(m.family, SEED, *index).map(|judged| Line::of(&judged).text());
+            progress.step();
+            let then = m.text.lines().nth(2 + *index as usize);
+            (format!("{} {index}: run {COMMAND}", m.family.name), now.is_some() && now.as_deref() == then)
+        })
+        .collect();
+    record.number("scenes-judged", cases.len() as f64, "", Band::Exact, "scenes judged in every run");
+    record.claim(Claim::all_of(
+        "share-has-the-same-bits",
+        "the scenes judged in this run give the committed estimates, costs and references, bit for bit",
+        cases,
+        "the streams are keyed by seed, family and index, and every sum has its order",
+    ));
+}
+
+fn count(lines: &[Line], class: Class, determined: bool) -> usize {
+    lines.iter().filter(|l| l.class == class && (!determined || l.is_determined())).count()
+}
+
+fn tell_counts(record: &mut Record, any: &Measured) {
+    let reason = "counts over committed scenes: a changed solver moves them, the claims judge them";
+    let band = || Band::absolute(any.lines.len() as f64, reason);
+    let determined = any.lines.iter().filter(|l| l.is_determined()).count();
+    record.number("scenes", any.lines.len() as f64, "", Band::Exact, "random scenes");
+    record.number(
+        "determined",
+        determined as f64,
+        "",
+        Band::Exact,
+        "of them with a bound of sd(fx)/fx below 2 %",
+    );
+    for class in Class::ALL {
+        let (all, known) = (count(&any.lines, class, false), count(&any.lines, class, true));
+        record.number(
+            format!("{class}-of-all"),
+            all as f64,
+            "",
+            band(),
+            format!("{class}, of all random scenes"),
+        );
+        record.number(
+            format!("{class}-of-determined"),
+            known as f64,
+            "",
+            band(),
+            format!("{class}, of the determined ones"),
+        );
+    }
+}
+
+/// Chance of more than `most` in `trials` at `rate`.
+fn more_than(most: usize, trials: usize, rate: f64) -> f64 {
+    Binomial::new(rate, trials as u64).map_or(1.0, |b| b.sf(most as u64))
+}
+
+fn claim_rates(record: &mut Record, any: &Measured) {
+    let lines = &any.lines;
+    let determined = lines.iter().filter(|l| l.is_determined()).count();
+    let mut at_most = |id: &str, statement: &str, value: usize, trials: usize, rate: f64| {
+        let most = libm::floor(rate * trials as f64) as usize;
+        let assumed = if rate == 0.0 { NEVER } else { TRUE_PART * rate };
+        let reason = format!(
+            "count in {trials} scenes; the false-alarm rate is that of a solver with a true rate of {assumed:e}"
+        );
+        record.claim(
+            Claim::at_most(id, statement, value as f64, most as f64, reason)
+                .with_false_alarm_rate(more_than(most, trials, assumed)),
+        );
+    };
+    at_most(
+        "none-wrong-where-determined",
+        "where the data determine the camera, no minimum is accepted at a higher cost than that next to the truth",
+        count(lines, Class::Wrong, true),
+        determined,
+        0.0,
+    );
+    at_most(
+        "hardly-wrong-anywhere",
+        "of all scenes, at most one in ten thousand is accepted at a higher cost",
+        count(lines, Class::Wrong, false),
+        lines.len(),
+        WRONG_OF_ALL,
+    );
+    at_most(
+        "converges-where-determined",
+        "where the data determine the camera, less than one scene in a thousand does not converge",
+        count(lines, Class::NotConverged, true),
+        determined,
+        OPEN_OF_DETERMINED,
+    );
+    at_most(
+        "never-refused-where-determined",
+        "where the data determine the camera, nothing is refused",
+        count(lines, Class::Refused, true),
+        determined,
+        0.0,
+    );
+}
+
+/// The families that were seen to fail: nothing is accepted at a higher cost any more.
+fn claim_named(record: &mut Record, measured: &[Measured]) {
+    let wrong = |m: &Measured| count(&m.lines, Class::Wrong, false);
+    record.claim(
+        Claim::all_of(
+            "named-rows-are-right",
+            "in the sets that were seen to fail, no minimum is accepted at a higher cost than that next to the truth",
+            measured.iter().map(|m| (format!("{}: {} of {}", m.family.name, wrong(m), m.lines.len()), wrong(m) == 0)),
+            "sums of squares against a search from the truth; the false-alarm rate is that of a solver wrong once in a million scenes",
+        )
+        .with_false_alarm_rate(more_than(0, measured.iter().map(|m| m.lines.len()).sum(), NEVER)),
+    );
+}
+
+/// The stated standard deviations against the errors, over accepted scenes without a warning that questions them.
+fn tell_errors(record: &mut Record, any: &Measured) {
+    let columns = [("parameter", ""), ("scenes", ""), ("mean_z_squared", ""), ("largest_z", "")];
+    let mut table = Table::new(
+        "errors",
+        "error over stated standard deviation, right results without a warning that questions it",
+        &columns,
+    );
+    for parameter in Parameter::ALL {
+        let z: Vec<f64> = any
+            .lines
+            .iter()
+            .filter(|l| l.class == Class::Right && l.warnings.is_empty())
+            .filter_map(|l| any.family.model(l.index).free.position(parameter).map(|i| l.z[i]))
+            .collect();
+        let mean = z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64;
+        let largest = z.iter().fold(0.0f64, |most, z| most.max(z.abs()));
+        table.push([parameter.name().into(), z.len().into(), mean.into(), Cell::from(largest)]);
+    }
+    record.table(table);
+}
+
+fn families_table(measured: &[Measured]) -> Table {
+    let columns = [
+        ("family", ""),
+        ("what", ""),
+        ("scenes", ""),
+        ("right", ""),
+        ("wrong", ""),
+        ("not_converged", ""),
+        ("refused", ""),
+        ("determined", ""),
+        ("wrong_determined", ""),
+        ("worst", ""),
+    ];
+    let caption = format!(
+        "every family of scenes: what the solver made of it; determined: bound of sd(fx)/fx below {DETERMINED}"
+    );
+    let mut table = Table::new("families", caption, &columns);
+    for m in measured {
+        let worst =
+            m.lines.iter().filter(|l| l.class == Class::Wrong).max_by(|a, b| a.excess.total_cmp(&b.excess));
+        let [right, wrong, open, refused] = Class::ALL.map(|class| count(&m.lines, class, false).to_string());
+        table.push([
+            m.family.name.to_string(),
+            m.family.about.to_string(),
+            m.lines.len().to_string(),
+            right,
+            wrong,
+            open,
+            refused,
+            m.lines.iter().filter(|l| l.is_determined()).count().to_string(),
+            count(&m.lines, Class::Wrong, true).to_string(),
+            worst.map_or("-".to_string(), |l| l.note.clone()),
+        ]);
+    }
+    table
+}
+
+/// OpenCV and this library on the same scenes.
+fn tell_opencv(record: &mut Record, measured: &[Measured]) -> Result<(), ExperimentError> {
+    let lines = OPENCV.lines().skip(2).map(peers::Line::read).collect::<Option<Vec<_>>>();
+    let lines = lines.ok_or_else(|| {
+        ExperimentError::Input(format!("golden/global-minimum/opencv.csv is broken: run {}", peers::COMMAND))
+    })?;
+    record.input("golden/global-minimum/opencv.csv", OPENCV.as_bytes());
+    record.claim(claim_opencv_current());
+    let columns = [
+        ("family", ""),
+        ("scenes", ""),
+        ("opencv_right", ""),
+        ("opencv_wrong", ""),
+        ("opencv_without", ""),
+        ("right", ""),
+        ("wrong", ""),
+        ("without", ""),
+        ("determined", ""),
+        ("opencv_wrong_determined", ""),
+        ("wrong_determined", ""),
+    ];
+    let caption = "the same scenes through OpenCV's calibrateCamera and through this library; without: refused, not converged, or no answer";
+    let mut table = Table::new("opencv", caption, &columns);
+    for m in measured {
+        let theirs: Vec<&peers::Line> = lines.iter().filter(|l| l.family == m.family.name).collect();
+        let ours: Vec<&Line> = theirs.iter().filter_map(|l| m.lines.get(l.index as usize)).collect();
+        let they = |ending, known: bool| {
+            theirs.iter().filter(|l| l.ending == ending && (!known || l.is_determined())).count()
+        };
+        let we = |class, known: bool| {
+            ours.iter().filter(|l| l.class == class && (!known || l.is_determined())).count()
+        };
+        let determined = theirs.iter().filter(|l| l.is_determined()).count();
+        let row = [
+            theirs.len(),
+            they(Ending::Right, false),
+            they(Ending::Wrong, false),
+            they(Ending::Refused, false) + they(Ending::Broken, false),
+            we(Class::Right, false),
+            we(Class::Wrong, false),
+            we(Class::NotConverged, false) + we(Class::Refused, false),
+            determined,
+            they(Ending::Wrong, true),
+            we(Class::Wrong, true),
+        ];
+        table.push(std::iter::once(m.family.name.into()).chain(row.map(Cell::from)));
+    }
+    record.table(table);
+    let any: Vec<&peers::Line> = lines.iter().filter(|l| l.family == FAMILIES[0].name).collect();
+    let determined = any.iter().filter(|l| l.is_determined()).count();
+    let wrong = any.iter().filter(|l| l.is_determined() && l.ending == Ending::Wrong).count();
+    let band = || Band::absolute(any.len() as f64, "counts of another program's answers, committed");
+    record.number("opencv-scenes", any.len() as f64, "", band(), "random scenes that OpenCV was asked");
+    record.number(
+        "opencv-determined",
+        determined as f64,
+        "",
+        band(),
+        "of them with a bound of sd(fx)/fx below 2 %",
+    );
+    record.number(
+        "opencv-wrong-of-determined",
+        wrong as f64,
+        "",
+        band(),
+        "of these answered at a higher cost than the reference",
+    );
+    Ok(())
+}
+
+/// OpenCV's answers do not depend on this library's solver; the scenes they are to do.
+fn claim_opencv_current() -> Claim {
+    let case = Fingerprint::of_global_minimum_scenes().case("opencv.csv", OPENCV, peers::COMMAND);
+    Claim::all_of(
+        "opencv-is-current",
+        "OpenCV was asked the scenes of the present code",
+        [case],
+        "SHA-256 of the code lines of scenes and reference, and the versions of the numeric crates",
+    )
+}

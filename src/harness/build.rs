@@ -1,0 +1,55 @@
+//! Which code do committed measurements depend on? Its lines are put into the program, so that it can tell whether they are stale.
+
+#[path = "fingerprint/code.rs"]
+mod code;
+
+use std::path::{Path, PathBuf};
+
+/// What draws and photographs scenes.
+const SCENES: &[&str] = &[
+    "src/calibench/board",
+    "src/calibench/camera",
+    "src/calibench/geometry",
+    "src/calibench/synth/scene.rs",
+    "src/calibench/synth/stream.rs",
+];
+/// What a calibration of drawn points and its judgement stand on besides.
+const SOLVER: &[&str] = &["src/calibench/calibrate", "src/calibench/evaluate"];
+/// What draws the scenes of the experiment global-minimum, and searches from their truth.
+const GLOBAL_MINIMUM: &[&str] = &[
+    "experiments/global_minimum/families.rs",
+    "experiments/global_minimum/oracle.rs",
+    "experiments/global_minimum/scenes.rs",
+];
+/// What judges its solver and rounds the result.
+const JUDGED: &[&str] = &["experiments/global_minimum/committed.rs", "experiments/global_minimum/judged.rs"];
+
+/// Measurements by name: the folders and files whose lines change them.
+const MEASUREMENTS: &[(&str, &[&[&str]])] = &[
+    ("global-minimum", &[SCENES, SOLVER, GLOBAL_MINIMUM, JUDGED]),
+    ("global-minimum-scenes", &[SCENES, GLOBAL_MINIMUM]),
+    ("gate-power", &[SCENES, SOLVER, &["src/gate"]]),
+];
+
+fn main() {
+    let variable = |name| PathBuf::from(std::env::var_os(name).expect("cargo sets it"));
+    let root = variable("CARGO_MANIFEST_DIR").join("../..");
+    println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rerun-if-changed=fingerprint/code.rs");
+    for (name, lists) in MEASUREMENTS {
+        let lines = lines_of(&root, &lists.concat());
+        let file = variable("OUT_DIR").join(format!("{name}.code"));
+        std::fs::write(&file, lines).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+    }
+}
+
+/// The code lines below these paths; none where the crate is built outside the source tree.
+fn lines_of(root: &Path, paths: &[&str]) -> String {
+    if !root.join("golden/published.toml").is_file() {
+        return String::new();
+    }
+    for path in paths {
+        println!("cargo:rerun-if-changed={}", root.join(path).display());
+    }
+    code::of_paths(root, paths).unwrap_or_else(|error| panic!("a path of src/harness/build.rs: {error}"))
+}

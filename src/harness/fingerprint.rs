@@ -1,0 +1,92 @@
+//! Were committed measurements made by the code that runs now? A measurement that takes minutes is not repeated by every check: it carries
+//! the fingerprint of the code it depends on, and is stale as soon as a line of that code changes.
+
+#[cfg(test)]
+mod code;
+
+use super::provenance::crate_versions;
+use calibench::io::sha256_hex;
+
+/// Digits that are kept: 64 bits.
+const DIGITS: usize = 16;
+
+/// The code that a measurement depends on: SHA-256 of its lines without comments, blank lines and tests, and of the versions of the numeric
+/// crates; the first 16 hexadecimal digits. None where the program was built outside the source tree: there nothing can have changed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Fingerprint(Option<String>);
+
+impl Fingerprint {
+    /// The gate, and the solver that its planted faults are tried on.
+    pub fn of_gate_power() -> Fingerprint {
+        Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/gate-power.code")))
+    }
+
+    /// The solver, and the scenes and reference of the experiment global-minimum.
+    pub fn of_global_minimum() -> Fingerprint {
+        Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/global-minimum.code")))
+    }
+
+    /// Those scenes and that reference alone.
+    pub fn of_global_minimum_scenes() -> Fingerprint {
+        Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/global-minimum-scenes.code")))
+    }
+
+    fn of(code_lines: &str) -> Fingerprint {
+        let crates: Vec<String> =
+            crate_versions().into_iter().map(|(name, version)| format!("{name} {version}\n")).collect();
+        let hash = || sha256_hex(format!("{code_lines}{}", crates.concat()).as_bytes())[..DIGITS].to_string();
+        Fingerprint((!code_lines.is_empty()).then(hash))
+    }
+
+    /// The first line of a table that `command` writes.
+    pub fn head(&self, command: &str) -> String {
+        format!("# {command}; fingerprint {}", self.0.as_deref().unwrap_or("unknown"))
+    }
+
+    /// A case for a claim: whether `table`, committed as `name`, was written with this fingerprint, and what to do if not.
+    pub fn case(&self, name: &str, table: &str, command: &str) -> (String, bool) {
+        let written = written(table).unwrap_or("none");
+        let Some(present) = &self.0 else { return (format!("{name}: {written}"), true) };
+        let what =
+            format!("{name} is stale: it has fingerprint {written}, the code {present}; run `{command}`");
+        (what, written == present)
+    }
+}
+
+/// The fingerprint in the first line of a table.
+fn written(table: &str) -> Option<&str> {
+    let (_, rest) = table.lines().next()?.rsplit_once("; fingerprint ")?;
+    rest.split([' ', ';']).next()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_changed_line_makes_a_table_stale() {
+        let (before, after) = (Fingerprint::of("fn a() {}\n"), Fingerprint::of("fn b() {}\n"));
+        let table = format!("{}\na,b\n1,2\n", before.head("calibench x"));
+        assert!(before.case("t.csv", &table, "calibench x").1);
+        let (what, held) = after.case("t.csv", &table, "calibench x");
+        assert!(!held && what.contains("run `calibench x`"), "{what}");
+        assert!(!before.case("t.csv", "a,b\n1,2\n", "calibench x").1);
+    }
+
+    #[test]
+    fn outside_the_source_tree_nothing_is_stale() {
+        assert!(Fingerprint::of("").case("t.csv", "# x; fingerprint 01\n", "x").1);
+    }
+
+    #[test]
+    fn every_measurement_has_its_own_code() {
+        let all = [
+            Fingerprint::of_gate_power(),
+            Fingerprint::of_global_minimum(),
+            Fingerprint::of_global_minimum_scenes(),
+        ];
+        for (i, a) in all.iter().enumerate() {
+            assert!(a.0.is_some() && all[i + 1..].iter().all(|b| a != b));
+        }
+    }
+}
