@@ -37,6 +37,34 @@ fn temporary_beside(path: &Path) -> io::Result<PathBuf> {
     Ok(path.with_file_name(hidden))
 }
 
+/// Removes what writes of processes that were killed have left in a folder. Only for a folder that nobody else writes to.
+///
+/// # Errors
+/// Whatever the file system says, with the path. A folder that is not there holds nothing.
+pub fn remove_leftovers(folder: &Path) -> io::Result<()> {
+    let with_path = |path: &Path, e: io::Error| {
+        io::Error::new(e.kind(), format!("cannot remove what a killed run left, {}: {e}", path.display()))
+    };
+    let entries = match fs::read_dir(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        entries => entries.map_err(|error| with_path(folder, error))?,
+    };
+    for entry in entries.flatten() {
+        if is_temporary(&entry.file_name().to_string_lossy()) {
+            fs::remove_file(entry.path()).map_err(|error| with_path(&entry.path(), error))?;
+        }
+    }
+    Ok(())
+}
+
+/// Whether a name is one of [`temporary_beside`].
+fn is_temporary(name: &str) -> bool {
+    let number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    let mut parts = name.strip_suffix(".tmp").unwrap_or_default().rsplitn(3, '.');
+    let numbered = parts.next().is_some_and(number) && parts.next().is_some_and(number);
+    numbered && parts.next().is_some_and(|rest| rest.starts_with('.') && rest.len() > 1)
+}
+
 fn write_through(path: &Path, contents: &[u8]) -> io::Result<()> {
     let mut file = OpenOptions::new().write(true).create(true).truncate(true).open(path)?;
     file.write_all(contents)?;
@@ -60,6 +88,21 @@ mod tests {
         write_atomically(&path, b"new").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"new");
         assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn what_killed_writes_left_is_removed_and_nothing_else() {
+        let folder = folder("leftovers");
+        let temporary = temporary_beside(&folder.join("result.v2.json")).unwrap();
+        fs::create_dir_all(&folder).unwrap();
+        for name in ["result.json", ".lock", ".mine.tmp", "a.1.2.tmp", ".1.2.tmp"] {
+            fs::write(folder.join(name), "").unwrap();
+        }
+        fs::write(temporary, "half").unwrap();
+        remove_leftovers(&folder).unwrap();
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 5);
+        remove_leftovers(&folder.join("not-there")).unwrap();
         fs::remove_dir_all(folder).unwrap();
     }
 
