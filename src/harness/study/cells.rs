@@ -38,7 +38,7 @@ pub struct Cell {
 }
 
 /// Where poses are drawn anew in every trial, the prediction is the mean over those of the first trials.
-const PREDICTION_DRAWS: u64 = 200;
+pub(super) const PREDICTION_DRAWS: u64 = 200;
 
 impl Spec {
     /// The quantities of every trial.

@@ -1,5 +1,7 @@
 //! What varies, and how does a level change the study? A level takes the place of one field or of several together.
 
+use super::cells::PREDICTION_DRAWS;
+use super::limits;
 use super::spec::{Estimator, SceneSpec, Spec};
 use super::spec_error::{SpecError, place};
 use serde::{Deserialize, Serialize};
@@ -121,10 +123,18 @@ pub(super) fn designs(spec: &Spec, text: &str) -> Result<Vec<(Vec<usize>, Design
             return Err(SpecError::DuplicateFactor(factor.name.clone()));
         }
     }
+    limits::check_trials(spec)?;
     let base = Design { scene: spec.scene.clone(), estimator: spec.estimator.clone() };
     let base = Table::try_from(&base).expect("a design came from TOML and goes back into it");
     let counts: Vec<usize> = spec.factor.iter().map(|f| f.levels.len()).collect();
-    (0..counts.iter().product()).map(|index| design(spec, text, &base, digits(index, &counts))).collect()
+    let mut points = limits::Points::default();
+    let mut count = |(levels, design): (Vec<usize>, Design)| {
+        points.add(&design, if design.scene.poses.redraws() { PREDICTION_DRAWS } else { 1 })?;
+        Ok((levels, design))
+    };
+    (0..counts.iter().product())
+        .map(|index| design(spec, text, &base, digits(index, &counts)).and_then(&mut count))
+        .collect()
 }
 
 fn design(

@@ -17,6 +17,7 @@ mod figures;
 mod fingerprint;
 mod finish;
 mod folder;
+pub mod limits;
 mod log;
 mod manifest;
 mod merge;
