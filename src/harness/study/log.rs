@@ -18,6 +18,9 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Checkpoint {
+    /// [`Manifest::identity`] of the run whose trials it counts; empty in files of versions that did not write it.
+    #[serde(default)]
+    run: String,
     batches: u64,
     bytes: u64,
     pub(super) sha256: String,
@@ -29,6 +32,8 @@ pub(super) struct Log {
     path: PathBuf,
     bytes: u64,
     hash: Sha256,
+    /// Identity of the run.
+    run: String,
 }
 
 impl Folder {
@@ -134,9 +139,16 @@ impl Folder {
         Ok((Box::new(lines), hash))
     }
 
+    /// The checkpoint, which must be of the run that the manifest describes: trials of another study, part or code are not taken over.
     pub(super) fn checkpoint(&self) -> Result<Checkpoint, FolderError> {
-        serde_json::from_str(&self.read("checkpoint.json")?)
-            .map_err(|e| self.damaged("checkpoint.json", e.to_string()))
+        let checkpoint: Checkpoint = serde_json::from_str(&self.read("checkpoint.json")?)
+            .map_err(|e| self.damaged("checkpoint.json", e.to_string()))?;
+        let expected = self.manifest()?.identity();
+        if checkpoint.run != expected {
+            let path = self.file("checkpoint.json");
+            return Err(FolderError::Foreign { path, found: checkpoint.run, expected });
+        }
+        Ok(checkpoint)
     }
 
     /// Takes in the trials that the checkpoint vouches for, and cuts off what was written after it.
@@ -144,7 +156,8 @@ impl Folder {
         let path = self.file(TrialFile::Csv.name());
         let located = |source| Located { path: path.clone(), source };
         let file = OpenOptions::new().append(true).create(true).open(&path).map_err(located)?;
-        let mut log = Log { file, path: path.clone(), bytes: 0, hash: Sha256::new() };
+        let run = self.manifest()?.identity();
+        let mut log = Log { file, path: path.clone(), bytes: 0, hash: Sha256::new(), run };
         if !self.file("checkpoint.json").exists() {
             log.file.set_len(0).map_err(located)?;
             self.append(&mut log, tables::header(&engine.quantities).as_bytes(), 0)?;
@@ -181,7 +194,8 @@ impl Folder {
     /// Makes the log durable and counts its batches.
     pub(super) fn count(&self, log: &mut Log, batches: u64) -> Result<(), FolderError> {
         log.file.sync_data().map_err(|source| Located { path: log.path.clone(), source })?;
-        let checkpoint = Checkpoint { batches, bytes: log.bytes, sha256: hexadecimal(&log.hash) };
+        let (run, sha256) = (log.run.clone(), hexadecimal(&log.hash));
+        let checkpoint = Checkpoint { run, batches, bytes: log.bytes, sha256 };
         let text = serde_json::to_string(&checkpoint).expect("a checkpoint holds nothing that JSON cannot");
         self.write("checkpoint.json", text.as_bytes())
     }
