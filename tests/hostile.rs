@@ -1,5 +1,5 @@
 //! What does the command do with input that nobody means well? It says what is wrong, in time and in little memory, and loses nothing.
-#![cfg(all(feature = "harness", target_os = "linux"))]
+#![cfg(target_os = "linux")]
 
 #[allow(dead_code, reason = "other tests use the rest")]
 mod study;

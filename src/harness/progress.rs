@@ -1,7 +1,6 @@
 //! How far is it? A bar on standard error for work that takes over a second, nothing otherwise.
 
-use super::significant;
-use crate::io::shown;
+use calibench::io::{shown, significant};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::fmt::Write;
 use std::sync::OnceLock;
