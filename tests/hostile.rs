@@ -182,6 +182,23 @@ fn corner_file() -> String {
 const PAIRS: &str = "point,px,py,X,Y\n0,0,0,0,0\n1,100,0,1,0\n2,0,100,0,1\n3,100,101,1,1\n";
 
 #[test]
+fn a_photograph_that_needs_more_memory_than_there_is_is_refused_before_it_is_decoded() {
+    let folder = folder("memory");
+    // 14000 x 14000 px of 16 bits, of which the file has none.
+    fs::write(folder.join("large.pgm"), "P5\n14000 14000\n65535\n").expect("written");
+    let camera = r#"{"camera": {"fx": 600, "fy": 600, "cx": 320, "cy": 240}}"#;
+    fs::write(folder.join("camera.json"), camera).expect("written");
+    let need = ["large.pgm: needs some 3136000000 bytes of memory", "limit is 2147483648", "--memory"];
+    refused(&folder, &["calibrate", "--board", "dots:3x3:1", "large.pgm"], &need);
+    refused(&folder, &["ninepoint", "large.pgm"], &need);
+    let more = ["large.pgm: needs some 7840000000 bytes of memory", "--memory"];
+    refused(&folder, &["undistort", "--camera", "camera.json", "--out", "o", "large.pgm"], &more);
+    // With the memory it asks for, the file is found to be cut off.
+    refused(&folder, &["ninepoint", "--memory", "8GiB", "large.pgm"], &["broken image"]);
+    refused(&folder, &["ninepoint", "--memory", "much", "large.pgm"], &["2GiB"]);
+}
+
+#[test]
 fn marks_outside_of_the_image_are_refused_and_swapped_sides_are_named() {
     let folder = folder("image-size");
     fs::write(folder.join("c.csv"), corner_file()).expect("written");
@@ -314,8 +331,9 @@ fn what_a_solver_started_in_sessions_of_its_own_ends_with_the_gate() {
          (setsid sh -c 'echo $$ > b; exec sleep 1000' &) ; \
          (env -i PATH=\"$PATH\" setsid sh -c 'echo $$ > c; exec sleep 1000' &) ; \
          while [ ! -s a ] || [ ! -s b ] || [ ! -s c ]; do sleep 0.05; done; exit 1";
+    // What they started holds the solver's pipes open, so each start lasts until its time is over.
     let gate = Command::new(CALIBENCH)
-        .args(["gate", "--samples", "1", "--solver", solver])
+        .args(["gate", "--samples", "1", "--timeout", "3", "--solver", solver])
         .current_dir(&folder)
         .output()
         .expect("the program starts");

@@ -372,7 +372,7 @@ fn without_the_feature_parquet_is_refused_by_name() {
         .unwrap();
     let error = merge(&[out], &folder.join("whole"), None).map(|_| ()).unwrap_err();
     assert!(
-        matches!(&error, MergeError::Run(calibench_study::RunError::Folder(FolderError::NoParquet))),
+        matches!(&error, MergeError::Run(calibench_study::RunError::Folder(FolderError::NoParquet(_)))),
         "{error}"
     );
     fs::remove_dir_all(folder).unwrap();

@@ -108,7 +108,7 @@ fn end_well_on_interrupt() {
 }
 
 /// Threads, and programs that are judged at the same time. More would only wait for each other, and each takes memory of its own.
-pub(super) const MOST_THREADS: usize = 1024;
+pub const MOST_THREADS: usize = 1024;
 
 /// Sets the size of the thread pool.
 fn set_threads(threads: Option<usize>) -> Result<(), Exit> {

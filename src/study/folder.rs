@@ -3,12 +3,14 @@
 use super::manifest::{Difference, Manifest};
 use super::shard::{Shard, ShardError};
 use super::trial_file::NoParquet;
-use calibench::io::atomic::remove_leftovers;
+use calibench::io::atomic::{remove_leftovers, write_atomically_to};
+use calibench::io::files::{Disk, Files};
 use calibench::io::input::{InputError, MOST_SPEC_BYTES};
-use calibench::io::{read_regular_text, write_atomically};
+use calibench::io::read_regular_text;
 use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// The folder of one run: `spec.toml`, `manifest.json`, `trials.csv` and `checkpoint.json`, and the results once it is complete.
 #[derive(Debug)]
@@ -16,6 +18,7 @@ pub struct Folder {
     path: PathBuf,
     /// Held while the run lasts; the system lets go of it however the process ends.
     _lock: File,
+    pub(super) files: Arc<dyn Files>,
 }
 
 /// A file and what the system said about it.
@@ -109,9 +112,19 @@ const OF_A_RUN: [&str; 3] = ["checkpoint.json", "trials.csv", "trials.parquet"];
 impl Folder {
     /// Begins a run.
     pub fn create(path: &Path, spec_text: &str, manifest: &Manifest) -> Result<Folder, FolderError> {
+        Folder::create_on(Arc::new(Disk), path, spec_text, manifest)
+    }
+
+    /// Begins a run whose files are changed by the given operations.
+    pub fn create_on(
+        files: Arc<dyn Files>,
+        path: &Path,
+        spec_text: &str,
+        manifest: &Manifest,
+    ) -> Result<Folder, FolderError> {
         let located = |source| Located { path: path.to_path_buf(), source };
-        fs::create_dir_all(path).map_err(located)?;
-        let folder = Folder::lock(path)?;
+        files.make_folder(path).map_err(located)?;
+        let folder = Folder::lock(files, path)?;
         if folder.file("manifest.json").exists() {
             return Err(FolderError::Taken(path.to_path_buf()));
         }
@@ -126,18 +139,23 @@ impl Folder {
 
     /// Opens a run that was begun.
     pub fn open(path: &Path) -> Result<Folder, FolderError> {
+        Folder::open_on(Arc::new(Disk), path)
+    }
+
+    /// Opens a run whose files are changed by the given operations.
+    pub fn open_on(files: Arc<dyn Files>, path: &Path) -> Result<Folder, FolderError> {
         if !path.join("manifest.json").is_file() {
             return Err(FolderError::Missing(path.to_path_buf()));
         }
-        Folder::lock(path)
+        Folder::lock(files, path)
     }
 
-    fn lock(path: &Path) -> Result<Folder, FolderError> {
+    fn lock(files: Arc<dyn Files>, path: &Path) -> Result<Folder, FolderError> {
         let name = path.join(".lock");
         let located = |source| Located { path: name.clone(), source };
         let file = OpenOptions::new().create(true).append(true).open(&name).map_err(located)?;
         match file.try_lock() {
-            Ok(()) => Folder { path: path.to_path_buf(), _lock: file }.cleaned(),
+            Ok(()) => Folder { path: path.to_path_buf(), _lock: file, files }.cleaned(),
             Err(fs::TryLockError::WouldBlock) => Err(FolderError::InUse(path.to_path_buf())),
             Err(fs::TryLockError::Error(source)) => Err(located(source).into()),
         }
@@ -163,7 +181,7 @@ impl Folder {
 
     /// Writes a file whole or not at all.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), FolderError> {
-        write_atomically(&self.file(name), bytes).map_err(FolderError::Unwritten)
+        write_atomically_to(self.files.as_ref(), &self.file(name), bytes).map_err(FolderError::Unwritten)
     }
 
     /// Text of a file.

@@ -11,8 +11,8 @@ use super::trial_file::TrialFile;
 use calibench::io::hash::hexadecimal;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, Read, Write};
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 /// What is known to be on the disk.
@@ -73,7 +73,10 @@ impl Folder {
                 let unfinished = self.file(".trials.parquet");
                 let file = File::create(&unfinished).map_err(located)?;
                 super::parquet::write(&file, &path, engine, lines.as_mut())?;
-                file.sync_all().and_then(|()| fs::rename(&unfinished, &path)).map_err(located)?;
+                self.files
+                    .sync(&file)
+                    .and_then(|()| self.files.rename(&unfinished, &path))
+                    .map_err(located)?;
             }
         }
         Ok(hexadecimal(&hash_of(&path, u64::MAX)?.0))
@@ -85,7 +88,7 @@ impl Folder {
             return Ok(());
         }
         for path in [TrialFile::Csv.name(), "checkpoint.json"].map(|name| self.file(name)) {
-            match fs::remove_file(&path) {
+            match self.files.remove(&path) {
                 Err(source) if source.kind() != io::ErrorKind::NotFound => {
                     return Err(Located { path, source }.into());
                 }
@@ -160,13 +163,13 @@ impl Folder {
         let run = self.manifest()?.identity();
         let mut log = Log { file, path: path.clone(), bytes: 0, hash: Sha256::new(), run };
         if !self.file("checkpoint.json").exists() {
-            log.file.set_len(0).map_err(located)?;
+            self.files.cut(&log.file, 0).map_err(located)?;
             self.append(&mut log, tables::header(&engine.quantities).as_bytes(), 0)?;
             return Ok(log);
         }
         let checkpoint = self.checkpoint()?;
         let (source, hash) = self.lines(&checkpoint, engine)?;
-        log.file.set_len(checkpoint.bytes).map_err(located)?;
+        self.files.cut(&log.file, checkpoint.bytes).map_err(located)?;
         (log.bytes, log.hash) = (checkpoint.bytes, hash);
         let mut replay = Replay::new(source, path);
         while replay.batch(engine)? {}
@@ -186,7 +189,9 @@ impl Folder {
 
     /// Trials that no checkpoint counts yet.
     pub(super) fn append_only(&self, log: &mut Log, bytes: &[u8]) -> Result<(), FolderError> {
-        log.file.write_all(bytes).map_err(|source| Located { path: log.path.clone(), source })?;
+        self.files
+            .write(&mut log.file, bytes)
+            .map_err(|source| Located { path: log.path.clone(), source })?;
         log.bytes += bytes.len() as u64;
         log.hash.update(bytes);
         Ok(())
@@ -194,7 +199,7 @@ impl Folder {
 
     /// Makes the log durable and counts its batches.
     pub(super) fn count(&self, log: &mut Log, batches: u64) -> Result<(), FolderError> {
-        log.file.sync_data().map_err(|source| Located { path: log.path.clone(), source })?;
+        self.files.sync(&log.file).map_err(|source| Located { path: log.path.clone(), source })?;
         let (run, sha256) = (log.run.clone(), hexadecimal(&log.hash));
         let checkpoint = Checkpoint { run, batches, bytes: log.bytes, sha256 };
         let text = serde_json::to_string(&checkpoint).expect("a checkpoint holds nothing that JSON cannot");

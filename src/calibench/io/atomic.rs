@@ -1,7 +1,8 @@
 //! How is a file replaced so that nobody ever sees half of it? Written beside its place, then renamed.
 
+use super::files::{Disk, Files};
 use std::fs::{self, OpenOptions};
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -13,15 +14,23 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// # Errors
 /// Whatever the file system says, with the path.
 pub fn write_atomically(path: &Path, contents: &[u8]) -> io::Result<()> {
+    write_atomically_to(&Disk, path, contents)
+}
+
+/// As [`write_atomically`], through the given operations.
+///
+/// # Errors
+/// As there.
+pub fn write_atomically_to(files: &dyn Files, path: &Path, contents: &[u8]) -> io::Result<()> {
     let with_path = |e: io::Error| io::Error::new(e.kind(), format!("cannot write {}: {e}", path.display()));
     if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-        fs::create_dir_all(folder).map_err(with_path)?;
+        files.make_folder(folder).map_err(with_path)?;
     }
     let temporary = temporary_beside(path).map_err(with_path)?;
-    let written = write_through(&temporary, contents).and_then(|()| fs::rename(&temporary, path));
+    let written = write_through(files, &temporary, contents).and_then(|()| files.rename(&temporary, path));
     if written.is_err() {
         // The first error is the one to report.
-        let _ = fs::remove_file(&temporary);
+        let _ = files.remove(&temporary);
     }
     written.map_err(with_path)
 }
@@ -65,11 +74,11 @@ fn is_temporary(name: &str) -> bool {
     numbered && parts.next().is_some_and(|rest| rest.starts_with('.') && rest.len() > 1)
 }
 
-fn write_through(path: &Path, contents: &[u8]) -> io::Result<()> {
+fn write_through(files: &dyn Files, path: &Path, contents: &[u8]) -> io::Result<()> {
     let mut file = OpenOptions::new().write(true).create(true).truncate(true).open(path)?;
-    file.write_all(contents)?;
+    files.write(&mut file, contents)?;
     // On the disk before the rename: else a power cut may leave the new name with no contents.
-    file.sync_all()
+    files.sync(&file)
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ pub mod channels;
 pub mod corners;
 pub mod data;
 pub mod digits;
+pub mod files;
 pub mod hash;
 #[cfg(feature = "photo")]
 pub mod image;
