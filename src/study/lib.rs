@@ -53,6 +53,7 @@ pub use engine::{Engine, Interruption, Outcome, Pace, Worst, in_memory, in_memor
 pub use fingerprint::Fingerprint;
 pub use finish::finish;
 pub use folder::{Folder, FolderError, Located};
+pub use log::Checkpoint;
 pub use manifest::{Difference, Manifest};
 pub use merge::{MergeError, merge};
 pub use moments::{Estimated, Moments};

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 /// What is known to be on the disk.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Checkpoint {
+pub struct Checkpoint {
     /// [`Manifest::identity`] of the run whose trials it counts; empty in files of versions that did not write it.
     #[serde(default)]
     run: String,

@@ -187,6 +187,16 @@ pub fn image_extent(path: &Path) -> Result<Extent, ImageError> {
     Ok(Extent { pixels: u64::from(width) * u64::from(height), bytes: decoder.total_bytes() })
 }
 
+/// As [`image_extent`], from the bytes of a file; `name` stands in errors.
+///
+/// # Errors
+/// See [`ImageError`].
+pub fn parse_extent(bytes: &[u8], name: &str) -> Result<Extent, ImageError> {
+    let decoder = decoder(Cursor::new(bytes), name)?;
+    let (width, height) = decoder.dimensions();
+    Ok(Extent { pixels: u64::from(width) * u64::from(height), bytes: decoder.total_bytes() })
+}
+
 fn of_decoder(error: image::ImageError, name: &str) -> ImageError {
     let (path, reason) = (name.to_string(), error.to_string());
     match error {
