@@ -1,5 +1,6 @@
 //! What does a study lose when everything that can fail does? At every write, by kill -9 at any moment, on a full disk, with a rival.
 
+#[allow(dead_code, reason = "other tests use the rest")]
 mod study;
 
 use calibench::io::files::{Disk, Files};
