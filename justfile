@@ -60,3 +60,7 @@ instructions:
 # Accepts the present counts
 bless-instructions:
     .ci/instructions --bless
+
+# Every reader of untrusted bytes, so many seconds each
+fuzz SECONDS="30":
+    .ci/fuzz {{SECONDS}}

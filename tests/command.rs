@@ -101,6 +101,33 @@ fn a_reader_that_goes_away_is_no_error() {
     assert_eq!((output.status.code(), text(&output.stderr).as_str()), (Some(0), ""));
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn output_that_could_not_be_written_ends_with_three_and_a_sentence() {
+    let study = root().join("studies/noise.toml");
+    let study = study.to_str().expect("the path is text");
+    let verbs: [&[&str]; 6] = [
+        &["list"],
+        &["--help"],
+        &["gate", "--planted", "list"],
+        &["gate", "--samples", "1"],
+        &["study", "plan", study, "--want", "fx=5", "--confirm", "10"],
+        &["study", "measure", study, "--trials", "10"],
+    ];
+    for verb in verbs {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
+        let output = Command::new(CALIBENCH)
+            .args(verb)
+            .current_dir(root())
+            .stdout(full)
+            .stderr(Stdio::piped())
+            .output()
+            .expect("the program starts");
+        assert_eq!(output.status.code(), Some(3), "{verb:?}: {}", text(&output.stderr));
+        assert!(text(&output.stderr).contains("standard output could not be written"), "{verb:?}");
+    }
+}
+
 /// A copy of the golden files in which one number has moved: the tree that `check` must refuse.
 #[test]
 fn a_number_that_moved_ends_with_one_and_is_named() {

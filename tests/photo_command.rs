@@ -235,3 +235,34 @@ fn the_bumblebee_camera_comes_out_of_the_command() {
         assert!(difference.abs() <= tolerance.as_float().unwrap(), "{name} differs by {difference}");
     }
 }
+
+#[test]
+fn the_size_that_most_photographs_with_the_board_have_rules_whatever_comes_first() {
+    let folder = folder("photo-sizes");
+    chapter_photos(&folder);
+    // A foreign photograph that can be read stands in front, as `left.jpg` before `left01.jpg`.
+    write_png(&folder.join("a-foreign.png"), &Raster::filled(320, 240, 200u8)).unwrap();
+    let board = ["--board", "circles:9x7:10mm:3mm", "--out", "out"];
+    let output = calibrate(&folder, &[&board[..], &["a-foreign.png"], &CHAPTER_PHOTOS[..]].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let said = text(&output.stderr);
+    assert!(said.contains("left out: a-foreign.png") && said.contains("320 x 240"), "{said}");
+    assert!(said.contains("4 of the 4 photographs with the board have 640 x 480 px"), "{said}");
+    assert_eq!(result(&folder)["views"].as_array().map(Vec::len), Some(4));
+    // Two cameras, equally many photographs: nothing says which is meant.
+    let cropped = |name: &str, to: &str| {
+        let photo = calibench::io::read_image(&folder.join(name)).unwrap().to_u8();
+        let crop = Raster::from_fn(639, 480, |x, y| photo.get(x, y));
+        write_png(&folder.join(to), &crop).unwrap();
+    };
+    cropped("pose0.png", "other0.png");
+    cropped("pose1.png", "other1.png");
+    let four = ["pose0.png", "pose1.png", "other0.png", "other1.png"];
+    let output = calibrate(&folder, &[&board[..], &four[..]].concat());
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+    assert!(
+        text(&output.stderr).contains("2 photographs of each of the sizes 639x480, 640x480"),
+        "{}",
+        text(&output.stderr)
+    );
+}

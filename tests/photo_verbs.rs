@@ -1,7 +1,7 @@
 //! Do the verbs on photographs do what they say? `calibench ninepoint` and `calibench undistort`, from file to file.
 
 use calibench::geometry::Vec2;
-use calibench::io::{Grey, read_image, write_png, write_png_16};
+use calibench::io::{Channels, Grey, read_channels, read_image, write_png, write_png_16};
 use calibench::raster::Raster;
 use calibench::synth::Truth;
 use calibench::synth::render::nine_dot_stand_in;
@@ -123,4 +123,51 @@ fn a_photograph_that_cannot_be_used_is_named_and_the_others_are_done() {
     let over = calibench(&["undistort", "--camera", text(&camera), "--out", text(&folder), text(&good)]);
     assert_eq!(over.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&over.stderr).contains("overwritten"), "{over:?}");
+}
+
+#[test]
+fn a_camera_that_did_not_converge_and_a_photograph_named_like_a_mask_are_refused() {
+    let folder = folder("undistort-refused");
+    let (camera, out) = (folder.join("result.json"), folder.join("out"));
+    let unconverged = CAMERA.replace("\"something_else\": true", "\"termination\": \"iteration-limit\"");
+    std::fs::write(&camera, unconverged).unwrap();
+    let photo = folder.join("mask-640x480.bmp");
+    write_png(&photo, &Raster::filled(640, 480, 9)).unwrap();
+    let arguments = ["undistort", "--camera", text(&camera), "--out", text(&out)];
+    let run = calibench(&[&arguments[..], &[text(&photo)]].concat());
+    assert_eq!(run.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&run.stderr).contains("iteration-limit"), "{run:?}");
+    std::fs::write(&camera, CAMERA).unwrap();
+    let run = calibench(&[&arguments[..], &["--mask", text(&photo)]].concat());
+    assert_eq!(run.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&run.stderr).contains("name of a mask"), "{run:?}");
+    let run = calibench(&[&arguments[..], &[text(&photo)]].concat());
+    assert_eq!(run.status.code(), Some(0), "{run:?}");
+}
+
+#[test]
+fn colours_alpha_and_depth_are_kept() {
+    let folder = folder("undistort-colour");
+    let (camera, out, photo) = (folder.join("result.json"), folder.join("out"), folder.join("colour.png"));
+    std::fs::write(&camera, CAMERA).unwrap();
+    let ramp = |c: usize| Raster::from_fn(640, 480, move |x, y| (60 * x + 20 * y + 3000 * c) as u16);
+    let channels: Vec<Raster<u16>> = (0..4).map(ramp).collect();
+    Channels::U16(channels).write_png(&photo).unwrap();
+    let run = calibench(&[
+        "undistort",
+        "--camera",
+        text(&camera),
+        "--out",
+        text(&out),
+        "--view",
+        "all",
+        text(&photo),
+    ]);
+    assert_eq!(run.status.code(), Some(0), "{run:?}");
+    let Channels::U16(corrected) = read_channels(&out.join("colour.png")).unwrap() else { panic!("16 bits") };
+    assert_eq!(corrected.len(), 4);
+    // In the middle all channels are the ramp at one place; outside of the photograph alpha is clear.
+    let levels: Vec<u16> = corrected.iter().map(|c| c.get(320, 240)).collect();
+    assert!(levels.windows(2).all(|pair| pair[1].abs_diff(pair[0]).abs_diff(3000) <= 1), "{levels:?}");
+    assert_eq!(corrected[3].get(0, 240), 0);
 }

@@ -205,6 +205,33 @@ fn a_damaged_or_occupied_folder_is_refused() {
 }
 
 #[test]
+fn trials_of_another_run_are_refused_by_name_and_never_taken_over() {
+    let (quiet, loud) = (scratch("foreign-quiet"), scratch("foreign-loud"));
+    run(&quiet, SPEC, Shard::WHOLE);
+    let louder = SPEC.replace("seed = 11", "seed = 12").replace("[0.1, 0.3]", "[1.0, 3.0]");
+    let engine = Engine::new(&louder, Shard::WHOLE).unwrap();
+    let manifest = Manifest::new(&engine.spec, Shard::WHOLE, None);
+    // Trials whose manifest is gone: neither a run nor a merge begins on top of them.
+    fs::remove_file(quiet.join("manifest.json")).unwrap();
+    let error = Folder::create(&quiet, &louder, &manifest).unwrap_err();
+    assert!(matches!(error, FolderError::Leftover { found: "checkpoint.json", .. }), "{error}");
+    run(&loud, &louder, Shard::WHOLE);
+    let error = merge(std::slice::from_ref(&loud), &quiet, None).map(|_| ()).unwrap_err();
+    assert!(error.to_string().contains("checkpoint.json"), "{error}");
+    // Trials and checkpoint that were put under the manifest of another run.
+    for name in ["trials.csv", "checkpoint.json"] {
+        fs::copy(quiet.join(name), loud.join(name)).unwrap();
+    }
+    let folder = Folder::open(&loud).unwrap();
+    let mut engine = Engine::new(&louder, Shard::WHOLE).unwrap();
+    let error = folder.run(&mut engine, &AtomicBool::new(false), |_| {}).unwrap_err();
+    assert!(error.to_string().contains("another study, part or version of the code"), "{error}");
+    assert_eq!(engine.trials(), 0);
+    drop(folder);
+    [quiet, loud].iter().for_each(|p| fs::remove_dir_all(p).unwrap());
+}
+
+#[test]
 fn of_two_paired_runs_the_quieter_is_found_better_and_a_copy_is_not() {
     use calibench_study::compare::{CompareError, Verdict, compare};
     let paths = [scratch("loud"), scratch("copy"), scratch("quiet"), scratch("unpaired")];

@@ -54,6 +54,11 @@ pub use page::CompiledPage;
 pub use render::{build, index_of};
 pub use sources::{Page, Sources};
 
+/// How many pieces a page is made of: its reader alone, for tests that feed it anything.
+pub fn pieces_of(text: &str) -> usize {
+    scan::scan(text).len()
+}
+
 use calibench_harness::project::Project;
 use calibench_harness::{Experiment, Record};
 

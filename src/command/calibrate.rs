@@ -4,15 +4,20 @@ use super::report::table;
 use super::{Exit, print, warn};
 use calibench::calibrate::Loss;
 use calibench::camera::{FreeParameters, Parameter};
-use calibench::io::read_corners;
+use calibench::io::input::{MOST_SIDE_PX, MOST_TABLE_BYTES, read_named};
+use calibench::io::memory::{DEFAULT_MEMORY, parse_bytes};
+use calibench::io::parse_corners;
+use calibench::io::table::columns;
 use calibench::photos::BoardSpec;
 use calibench::planar::PlaneModel;
 use camera::Observed;
 use clap::{Args, ValueEnum};
+use contradictions::Input;
 use std::path::{Path, PathBuf};
 
 mod advice;
 mod camera;
+mod contradictions;
 mod finished;
 mod maps;
 mod page;
@@ -24,33 +29,39 @@ pub(super) use plane::plane_text;
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Corner file with the columns view,point,X,Y,u,v, or point pairs with point,px,py,X,Y; with --board, photographs
+    /// Corner file with the columns view,point,X,Y,u,v, or point pairs with point,px,py,X,Y, or - for one of them on standard input;
+    /// with --board, photographs
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// The board in the photographs: chess:9x6:25mm (inner corners), circles:9x7:10mm:3mm (spacing, diameter) or dots:3x3:1
     #[arg(long, value_name = "BOARD")]
     board: Option<BoardSpec>,
     /// Parameters to estimate, of fx fy cx cy skew k1 k2 p1 p2 k3; the others are held, distortion and skew at 0
-    #[arg(long, value_name = "LIST", default_value = "fx,fy,cx,cy,k1,k2")]
-    free: FreeParameters,
+    /// [default: fx,fy,cx,cy,k1,k2, without those of --fix]
+    #[arg(long, value_name = "LIST")]
+    free: Option<FreeParameters>,
     /// Holds a parameter at a value, such as k3=0; may be repeated
     #[arg(long, value_name = "NAME=VALUE", value_parser = parse_held)]
     fix: Vec<(Parameter, f64)>,
     /// Image size, such as 640x480: where a held principal point lies by default, and the frame of the plots
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     image_size: Option<(usize, usize)>,
-    /// Loss of a residual: squares, huber:PX or cauchy:PX
-    #[arg(long, value_name = "LOSS", default_value = "squares", value_parser = parse_loss)]
-    loss: Loss,
+    /// Loss of a residual: squares, huber:PX or cauchy:PX [default: squares]
+    #[arg(long, value_name = "LOSS", value_parser = parse_loss)]
+    loss: Option<Loss>,
     /// Leaves out views whose RMSE exceeds FACTOR times the median, worst first, such as 3
     #[arg(long, value_name = "FACTOR", value_parser = parse_factor)]
     reject_views: Option<f64>,
-    /// Intervals of 95 % beside the standard deviations: by the profile of the cost, which holds where the data are weak
-    #[arg(long, value_enum, default_value_t = Intervals::Linear)]
-    intervals: Intervals,
-    /// Map of a plane from point pairs
-    #[arg(long, value_enum, default_value_t = Mode::Planar)]
-    mode: Mode,
+    /// Intervals of 95 % beside the standard deviations: by the profile of the cost, which holds where the data are weak [default:
+    /// linear]
+    #[arg(long, value_enum)]
+    intervals: Option<Intervals>,
+    /// Map of a plane from point pairs [default: planar]
+    #[arg(long, value_enum)]
+    mode: Option<Mode>,
+    /// Memory that photographs may take together, such as 500MB or 2GiB; large ones then come one at a time [default: 2GiB]
+    #[arg(long, value_name = "BYTES", value_parser = parse_bytes, default_value_t = DEFAULT_MEMORY, hide_default_value = true)]
+    memory: u64,
     /// Folder for result.json, the page report.html, plots, and the photographs with their marks drawn in
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -116,8 +127,11 @@ fn parse_held(text: &str) -> Result<(Parameter, f64), String> {
 fn parse_size(text: &str) -> Result<(usize, usize), String> {
     let wanted = || "expected WIDTHxHEIGHT in pixels, such as 640x480".to_string();
     let (width, height) = text.split_once('x').ok_or_else(wanted)?;
-    match (width.trim().parse(), height.trim().parse()) {
-        (Ok(width), Ok(height)) if width > 0 && height > 0 => Ok((width, height)),
+    match (width.trim().parse::<usize>(), height.trim().parse::<usize>()) {
+        (Ok(width), Ok(height)) if width.min(height) > 0 && width.max(height) <= MOST_SIDE_PX => {
+            Ok((width, height))
+        }
+        (Ok(_), Ok(_)) => Err(format!("each side must have 1 to {MOST_SIDE_PX} px")),
         _ => Err(wanted()),
     }
 }
@@ -142,35 +156,56 @@ fn parse_factor(text: &str) -> Result<f64, String> {
 
 pub(super) fn run(arguments: &Arguments) -> Exit {
     let outcome = match (&arguments.board, &arguments.files[..]) {
-        (Some(board), photos) => photographs::run(arguments, board, photos),
-        (None, [file]) => match has_views(file) {
-            Ok(true) => corners(arguments, file),
-            Ok(false) => plane::run(arguments, file),
-            Err(message) => Err(message),
-        },
-        (None, files) => Err(format!(
+        (Some(board), photos) => contradictions::refuse(arguments, Input::Photographs)
+            .map_err(Failure::from)
+            .and_then(|()| photographs::run(arguments, board, photos)),
+        (None, [file]) => from_table(arguments, file),
+        (None, files) => Err(Failure::from(format!(
             "{} files but no --board: give one CSV file, or the board that the photographs show",
             files.len()
-        )),
+        ))),
     };
-    outcome.unwrap_or_else(|message| {
-        warn(&message);
-        Exit::Usage
+    outcome.unwrap_or_else(|failure| {
+        warn(&failure.message);
+        failure.exit
     })
 }
 
-/// Point pairs are told from corners by their header.
-fn has_views(path: &Path) -> Result<bool, String> {
-    let bytes = std::fs::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
-    let header =
-        String::from_utf8_lossy(bytes.split(|b| *b == b'\n').next().unwrap_or_default()).into_owned();
-    Ok(!header.split(',').any(|column| column.trim() == "px"))
+/// Why there is no result.
+#[derive(Debug)]
+struct Failure {
+    exit: Exit,
+    message: String,
 }
 
-fn corners(arguments: &Arguments, file: &Path) -> Result<Exit, String> {
-    let corners = read_corners(file).map_err(|error| error.to_string())?;
+/// Input that is the user's to mend.
+impl From<String> for Failure {
+    fn from(message: String) -> Failure {
+        Failure { exit: Exit::Usage, message }
+    }
+}
+
+impl Failure {
+    /// Results that could not be written.
+    fn unwritten(error: impl ToString) -> Failure {
+        Failure { exit: Exit::Incomplete, message: error.to_string() }
+    }
+}
+
+/// Corners or point pairs, told apart by the names of their columns.
+fn from_table(arguments: &Arguments, file: &Path) -> Result<Exit, Failure> {
+    let bytes = read_named(file, MOST_TABLE_BYTES).map_err(|error| error.to_string())?;
+    let name = if file.as_os_str() == "-" { "standard input".into() } else { file.display().to_string() };
+    let columns = columns(&bytes);
+    let has = |names: &[&str]| names.iter().all(|name| columns.iter().any(|column| column == name));
+    if has(&["px"]) && !has(&["view", "u", "v"]) {
+        contradictions::refuse(arguments, Input::PointPairs)?;
+        return plane::run(arguments, &name, &bytes);
+    }
+    contradictions::refuse(arguments, Input::Corners)?;
+    let corners = parse_corners(&name, bytes.as_slice()).map_err(|error| error.to_string())?;
     let observed = Observed {
-        source: file.display().to_string(),
+        source: name,
         names: corners.view_names,
         views: corners.views,
         image_size: arguments.image_size,

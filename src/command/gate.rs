@@ -3,17 +3,21 @@
 mod compare;
 mod power;
 
-use super::{Exit, print, warn};
+use super::{Exit, MOST_THREADS, print, warn};
 use calibench::io::{provenance, write_atomically};
 use calibench_gate::faults::{Faulty, planted};
 use calibench_gate::files::{self, FilesError};
 use calibench_gate::{
-    Builtin, EXPECTED_FALSE_ALARMS, Plan, Process, Property, QUICK, Report, Solver, THOROUGH, Terms, protocol,
+    Builtin, EXPECTED_FALSE_ALARMS, Plan, PlanError, Process, Property, QUICK, Recorder, Report, Solver,
+    THOROUGH, Terms, plan, protocol,
 };
 use calibench_harness::ProgressDisplay;
 use calibench_harness::project::Project;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
+
+/// Longest time for a problem.
+const LONGEST: Duration = Duration::from_secs(86_400);
 
 /// How many problems.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -69,8 +73,8 @@ pub(super) struct Arguments {
     /// Writes the problems to a folder, truth kept apart, for programs that cannot be driven by a pipe
     #[arg(long, value_name = "DIR")]
     export: Option<PathBuf>,
-    /// Writes the problems and the solver's answers to a folder
-    #[arg(long, value_name = "DIR", conflicts_with = "export")]
+    /// Judges as ever, and writes the problems and the solver's answers to a folder
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["export", "against"])]
     record: Option<PathBuf>,
     /// Judges the answers in a folder written by --export: DIR/answers.jsonl, or files in DIR/answers/
     #[arg(long, value_name = "DIR", conflicts_with_all = ["export", "record", "solver"])]
@@ -100,10 +104,13 @@ fn property(name: &str) -> Result<Property, String> {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Exit {
-    dispatch(arguments).unwrap_or_else(|(exit, message)| {
+    calibench_gate::process::adopt_orphans();
+    let exit = dispatch(arguments).unwrap_or_else(|(exit, message)| {
         warn(&message);
         exit
-    })
+    });
+    calibench_gate::process::end_all();
+    exit
 }
 
 /// A way to end before there is a verdict.
@@ -119,6 +126,7 @@ fn incomplete(message: impl ToString) -> Stop {
 
 fn of_files(error: FilesError) -> Stop {
     match error {
+        FilesError::Plan(PlanError::TooManySamples { .. }) => usage(error),
         FilesError::Write(_) | FilesError::Plan(_) => incomplete(error),
         _ => usage(error),
     }
@@ -135,6 +143,12 @@ fn dispatch(arguments: &Arguments) -> Result<Exit, Stop> {
         Size::Quick => QUICK,
         Size::Thorough => THOROUGH,
     });
+    if samples > plan::MOST_SAMPLES {
+        return Err(usage(PlanError::TooManySamples { samples }));
+    }
+    if arguments.jobs > MOST_THREADS {
+        return Err(usage(format!("--jobs {}, and the limit is {MOST_THREADS}", arguments.jobs)));
+    }
     if samples == 0 || !(arguments.false_alarms > 0.0 && arguments.false_alarms < 1.0) {
         return Err(usage("--samples must be at least 1 and --false-alarms between 0 and 1"));
     }
@@ -153,7 +167,7 @@ fn dispatch(arguments: &Arguments) -> Result<Exit, Stop> {
     }
     if let Some(folder) = &arguments.export {
         let plan = Plan::new(arguments.seed, samples).map_err(incomplete)?;
-        files::export(&plan, folder, None).map_err(of_files)?;
+        files::export(&plan, folder).map_err(of_files)?;
         print(&format!("{} problems written to {}\n", plan.cases.len(), folder.display()));
         return Ok(Exit::Held);
     }
@@ -164,9 +178,12 @@ fn dispatch(arguments: &Arguments) -> Result<Exit, Stop> {
     let solver = solver(arguments)?;
     if let Some(folder) = &arguments.record {
         let plan = Plan::new(arguments.seed, samples).map_err(incomplete)?;
-        files::export(&plan, folder, Some(solver.as_ref())).map_err(of_files)?;
+        files::export(&plan, folder).map_err(of_files)?;
+        let recorder = Recorder::new(solver.as_ref());
+        let exit = judge(arguments, &plan, &recorder)?;
+        files::file_answers(&plan, folder, &recorder).map_err(of_files)?;
         print(&format!("{} problems and answers written to {}\n", plan.cases.len(), folder.display()));
-        return Ok(Exit::Held);
+        return Ok(exit);
     }
     if let Some(reference) = &arguments.against {
         return compare::run(arguments, solver.as_ref(), reference, samples);
@@ -189,8 +206,11 @@ fn solver(arguments: &Arguments) -> Result<Box<dyn Solver>, Stop> {
 }
 
 fn process(arguments: &Arguments, command: &str) -> Result<Box<dyn Solver>, Stop> {
-    let timeout = Duration::try_from_secs_f64(arguments.timeout).ok().filter(|t| !t.is_zero());
-    let timeout = timeout.ok_or_else(|| usage("--timeout must be a positive number of seconds"))?;
+    let timeout = Duration::try_from_secs_f64(arguments.timeout)
+        .ok()
+        .filter(|t| (1..=LONGEST.as_nanos()).contains(&t.as_nanos()));
+    let timeout =
+        timeout.ok_or_else(|| usage("--timeout must be a positive number of seconds, at most a day"))?;
     Ok(Box::new(Process::new(command, timeout, arguments.jobs)))
 }
 

@@ -65,7 +65,7 @@ enum Verb {
 pub fn main(experiments: &[Experiment]) -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
-        Err(error) => return terminal::usage(&error).into(),
+        Err(error) => return terminal::ended(terminal::usage(&error)).into(),
     };
     // A study finishes its batch first, and has a handler of its own.
     if !matches!(arguments.verb, Some(Verb::Study(_))) {
@@ -87,13 +87,13 @@ pub fn main(experiments: &[Experiment]) -> ExitCode {
         Some(Verb::Study(arguments)) => study::run(&arguments),
         Some(Verb::Gate(arguments)) => gate::run(&arguments),
     };
-    exit.into()
+    terminal::ended(exit).into()
 }
 
 /// The command of an experiment's own binary: one run, as `calibench run ID` does it.
 pub fn main_for(experiment: &Experiment) -> ExitCode {
     end_well_on_interrupt();
-    run::main_for(experiment).into()
+    terminal::ended(run::main_for(experiment)).into()
 }
 
 /// Ctrl-C ends the program with a code of its own. Files are renamed into place whole, so what is finished stays.
@@ -107,8 +107,19 @@ fn end_well_on_interrupt() {
     let _ = ctrlc::set_handler(handler);
 }
 
+/// Threads, and programs that are judged at the same time. More would only wait for each other, and each takes memory of its own.
+pub const MOST_THREADS: usize = 1024;
+
 /// Sets the size of the thread pool.
 fn set_threads(threads: Option<usize>) -> Result<(), Exit> {
+    // The pool asks this variable itself, without a limit.
+    let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.parse().ok());
+    if let Some(threads) = threads.or(asked).filter(|threads| *threads > MOST_THREADS) {
+        warn(&format!(
+            "{threads} threads, and the limit is {MOST_THREADS}: results do not depend on their number"
+        ));
+        return Err(Exit::Usage);
+    }
     let Some(threads) = threads else { return Ok(()) };
     if threads == 0 {
         warn("--threads 0: at least one thread is needed");

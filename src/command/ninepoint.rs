@@ -2,9 +2,11 @@
 
 use super::calibrate::{Format, Mode, plane_text};
 use super::{Exit, print, warn};
+use calibench::board::Board;
 use calibench::detect::{DotGrid, sparse_dots_of};
 use calibench::geometry::Vec2;
-use calibench::io::{Overlay, read_image, write_atomically};
+use calibench::io::memory::{DEFAULT_MEMORY, parse_bytes};
+use calibench::io::{Memory, Overlay, image_extent, read_image, write_atomically};
 use calibench::photos::ordered_discs;
 use calibench::planar::{PlaneCalibration, calibrate_plane};
 use clap::Args;
@@ -24,6 +26,9 @@ pub(super) struct Arguments {
     /// Rows
     #[arg(long, value_name = "N", default_value_t = 3)]
     rows: usize,
+    /// Memory that the photograph may take, such as 500MB or 2GiB [default: 2GiB]
+    #[arg(long, value_name = "BYTES", value_parser = parse_bytes, default_value_t = DEFAULT_MEMORY, hide_default_value = true)]
+    memory: u64,
     /// Folder for result.json and overlay.png
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -47,6 +52,11 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
 }
 
 fn ninepoint(arguments: &Arguments) -> Result<Exit, String> {
+    // The limits of a board, before any work.
+    Board::chessboard(arguments.columns, arguments.rows, 1.0).map_err(|error| error.to_string())?;
+    let needed = image_extent(&arguments.image).map_err(|error| error.to_string())?.memory_to_detect();
+    let memory = Memory::new(arguments.memory);
+    let _taken = memory.take(&arguments.image, needed).map_err(|error| error.to_string())?;
     let image = read_image(&arguments.image).map_err(|error| error.to_string())?;
     let at_file = |error: &dyn std::fmt::Display| format!("{}: {error}", arguments.image.display());
     let grid = ordered_discs(&image, |discs| sparse_dots_of(discs, arguments.columns, arguments.rows))

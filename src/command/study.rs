@@ -6,8 +6,10 @@ mod plan;
 mod run;
 
 use super::{Exit, warn};
+use calibench::io::input::{InputError, MOST_SPEC_BYTES};
+use calibench::io::read_regular_text;
 use calibench_study::{FolderError, MergeError, RunError};
-use std::path::PathBuf;
+use std::path::Path;
 
 #[derive(Debug, clap::Subcommand)]
 pub(super) enum Verb {
@@ -62,7 +64,9 @@ impl Failure {
 /// What the user gave is the user's to mend; a disk that fails leaves the run incomplete.
 fn exit_of_folder(error: &FolderError) -> Exit {
     match error {
-        FolderError::File(_) => Exit::Incomplete,
+        FolderError::File(_) | FolderError::Unwritten(_) | FolderError::Input(InputError::Open { .. }) => {
+            Exit::Incomplete
+        }
         _ => Exit::Usage,
     }
 }
@@ -94,6 +98,6 @@ impl From<MergeError> for Failure {
 }
 
 /// A file that the user named.
-fn read(path: &PathBuf) -> Result<String, Failure> {
-    std::fs::read_to_string(path).map_err(|error| Failure::usage(format!("{}: {error}", path.display())))
+fn read(path: &Path) -> Result<String, Failure> {
+    read_regular_text(path, MOST_SPEC_BYTES).map_err(|error| Failure::usage(error.to_string()))
 }

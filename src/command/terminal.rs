@@ -1,23 +1,48 @@
-//! How are results told? On standard output, messages on standard error; a reader that has gone away is no error.
+//! How are results told? On standard output, messages on standard error; a reader that has gone away is no error, a disk that is full is.
 
 use super::Exit;
-use std::io::Write;
+use calibench::io::shown;
+use std::io::{self, Write};
+use std::sync::OnceLock;
 
-/// Writes to standard output. Whoever closed the pipe has read enough.
+/// Why standard output could not be written, once it could not. Verbs go on, since their files count for themselves; [`ended`] tells.
+static LOST: OnceLock<String> = OnceLock::new();
+
+/// Writes to standard output. Whoever closed the pipe has read enough; any other failure makes the run incomplete, see [`ended`].
 pub fn print(text: &str) {
-    let mut out = std::io::stdout().lock();
-    // A closed pipe is the reader's choice, and there is nobody left to tell of any other failure.
-    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    let mut out = io::stdout().lock();
+    note(out.write_all(shown(text).as_bytes()).and_then(|()| out.flush()));
 }
 
 /// Writes a line to standard error.
 pub fn warn(text: &str) {
-    // As above.
-    let _ = writeln!(std::io::stderr().lock(), "{text}");
+    // There is nobody left to tell of a failure.
+    let _ = writeln!(io::stderr().lock(), "{}", shown(text));
 }
 
 /// Help and version end well, a wrong argument does not; clap knows which stream each belongs to.
 pub(super) fn usage(error: &clap::Error) -> Exit {
-    let _ = error.print();
-    if error.use_stderr() { Exit::Usage } else { Exit::Held }
+    if error.use_stderr() {
+        // As in `warn`.
+        let _ = error.print();
+        return Exit::Usage;
+    }
+    note(error.print());
+    Exit::Held
+}
+
+/// The exit of a run, which is incomplete if what it printed did not arrive.
+pub(super) fn ended(exit: Exit) -> Exit {
+    let Some(why) = LOST.get() else { return exit };
+    warn(&format!("standard output could not be written, so what was printed is not complete: {why}"));
+    exit.max(Exit::Incomplete)
+}
+
+/// Keeps the first failure that is not the reader's choice.
+fn note(written: io::Result<()>) {
+    if let Err(error) = written
+        && error.kind() != io::ErrorKind::BrokenPipe
+    {
+        LOST.get_or_init(|| error.to_string());
+    }
 }

@@ -2,10 +2,11 @@
 
 use super::{Exit, print, warn};
 use calibench::camera::Camera;
+use calibench::io::memory::{DEFAULT_MEMORY, parse_bytes};
 use calibench::io::result::{CameraFields, read_camera};
-use calibench::io::{Grey, read_image, write_atomically, write_png, write_png_16};
+use calibench::io::{Channels, Memory, image_extent, read_channels, write_atomically, write_png};
 use calibench::raster::Raster;
-use calibench::rectify::{OutputView, RectifyMap, output_camera};
+use calibench::rectify::{OutputView, RectifyError, RectifyMap, Sample, output_camera};
 use clap::{Args, ValueEnum};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -15,7 +16,7 @@ pub(super) struct Arguments {
     /// result.json of `calibench calibrate`, or any JSON with {"camera": {"fx": ..., "fy": ..., "cx": ..., "cy": ...}}
     #[arg(long, value_name = "RESULT.json")]
     camera: PathBuf,
-    /// Photographs: PNG, JPEG, BMP, PGM or TIFF, grey or colour (written grey), 8 or 16 bit
+    /// Photographs: PNG, JPEG, BMP, PGM or TIFF, grey or colour, with or without alpha, 8 or 16 bit; all is kept
     #[arg(required = true, value_name = "PHOTOS")]
     photos: Vec<PathBuf>,
     /// Folder for the corrected photographs, as PNG of the same name, and camera-<W>x<H>.json
@@ -24,9 +25,12 @@ pub(super) struct Arguments {
     /// What the output shows
     #[arg(long, value_enum, default_value_t = View::Same)]
     view: View,
-    /// Grey level, black 0 to white 1, of output pixels without data
+    /// Grey level, black 0 to white 1, of output pixels without data; where the photograph has alpha, they are transparent too
     #[arg(long, value_name = "LEVEL", default_value_t = 0.0, value_parser = parse_level)]
     border: f32,
+    /// Memory that a photograph may take, such as 500MB or 2GiB [default: 2GiB]
+    #[arg(long, value_name = "BYTES", value_parser = parse_bytes, default_value_t = DEFAULT_MEMORY, hide_default_value = true)]
+    memory: u64,
     /// Also writes mask-<W>x<H>.png: white where the output has data
     #[arg(long)]
     mask: bool,
@@ -92,11 +96,26 @@ fn distinct_outputs(arguments: &Arguments) -> Result<(), String> {
         {
             return Err(format!("{} would be overwritten: choose another folder", photo.display()));
         }
+        if arguments.mask && is_mask_name(&output) {
+            return Err(format!(
+                "{} would be written to {}, which is the name of a mask: rename it, or leave --mask out",
+                photo.display(),
+                output.display()
+            ));
+        }
         if !outputs.insert(output.clone()) {
             return Err(format!("two photographs would be written to {}: rename one", output.display()));
         }
     }
     Ok(())
+}
+
+/// Whether the name is `mask-<W>x<H>.png`, in letters of either size, since some file systems do not tell them apart.
+fn is_mask_name(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+    let size = name.strip_prefix("mask-").and_then(|rest| rest.strip_suffix(".png"));
+    let number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    size.and_then(|size| size.split_once('x')).is_some_and(|(w, h)| number(w) && number(h))
 }
 
 fn output_path(folder: &Path, photo: &Path) -> PathBuf {
@@ -122,7 +141,10 @@ type Failure = (Exit, String);
 impl Work<'_> {
     fn undistort(&mut self, photo: &Path) -> Result<(), Failure> {
         let wrong = |message: String| (Exit::Usage, message);
-        let image = read_image(photo).map_err(|error| wrong(error.to_string()))?;
+        let needed = image_extent(photo).map_err(|error| wrong(error.to_string()))?.memory_to_correct();
+        let memory = Memory::new(self.arguments.memory);
+        let _taken = memory.take(photo, needed).map_err(|error| wrong(error.to_string()))?;
+        let image = read_channels(photo).map_err(|error| wrong(error.to_string()))?;
         if let Some(expected) = self.image_size
             && expected != image.size()
         {
@@ -137,20 +159,17 @@ impl Work<'_> {
         let map = &self.maps[&image.size()];
         let output = output_path(&self.arguments.out, photo);
         // A map is made for the size of the image.
-        let same_size = |error: calibench::rectify::RectifyError| wrong(error.to_string());
+        let same_size = |error: RectifyError| wrong(error.to_string());
         let border = self.arguments.border;
-        let written = match &image {
-            Grey::U8(image) => {
-                let level = (255.0 * border).round() as u8;
-                write_png(&output, &map.apply(image, level).map_err(same_size)?)
+        let corrected = match &image {
+            Channels::U8(channels) => all(map, channels, (255.0 * border).round() as u8, 0).map(Channels::U8),
+            Channels::U16(channels) => {
+                all(map, channels, (65535.0 * border).round() as u16, 0).map(Channels::U16)
             }
-            Grey::U16(image) => {
-                let level = (65535.0 * border).round() as u16;
-                write_png_16(&output, &map.apply(image, level).map_err(same_size)?)
-            }
-            Grey::F32(image) => write_png_16(&output, &map.apply(image, border).map_err(same_size)?.to_u16()),
+            Channels::F32(channels) => all(map, channels, border, 0.0).map(Channels::F32),
         };
-        written.map_err(|error| (Exit::Incomplete, format!("{}: {error}", output.display())))?;
+        let written = corrected.map_err(same_size)?.write_png(&output);
+        written.map_err(|error| (Exit::Incomplete, error.to_string()))?;
         print(&format!("{}\n", output.display()));
         Ok(())
     }
@@ -191,6 +210,18 @@ impl Work<'_> {
     }
 }
 
+/// Every channel corrected. Pixels without data get the level `border` in colours and `clear` in alpha, the second or fourth channel.
+fn all<T: Sample>(
+    map: &RectifyMap,
+    channels: &[Raster<T>],
+    border: T,
+    clear: T,
+) -> Result<Vec<Raster<T>>, RectifyError> {
+    let has_alpha = channels.len().is_multiple_of(2);
+    let level = |c: usize| if has_alpha && c + 1 == channels.len() { clear } else { border };
+    channels.iter().enumerate().map(|(c, channel)| map.apply(channel, level(c))).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -198,6 +229,16 @@ mod tests {
     #[test]
     fn the_output_has_the_photographs_name_as_png() {
         assert_eq!(output_path(Path::new("o"), Path::new("a/b.c.jpg")), Path::new("o/b.c.png"));
+    }
+
+    #[test]
+    fn names_of_masks_are_known_in_any_letters() {
+        for name in ["mask-640x480.png", "Mask-1x2.PNG"] {
+            assert!(is_mask_name(Path::new(name)), "{name}");
+        }
+        for name in ["mask-640x480b.png", "mask-x480.png", "mask.png", "unmask-1x2.png"] {
+            assert!(!is_mask_name(Path::new(name)), "{name}");
+        }
     }
 
     #[test]

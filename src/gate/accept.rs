@@ -61,6 +61,20 @@ pub enum Breakage {
         /// Its beginning.
         line: String,
     },
+    /// A line longer than any answer.
+    #[error("a line of more than {limit} bytes")]
+    TooLong {
+        /// Bytes that a line may have.
+        limit: usize,
+    },
+    /// Line after line, and none of them the answer.
+    #[error("{lines} lines and no answer among them; the first: {first}")]
+    Flood {
+        /// Lines that were read.
+        lines: usize,
+        /// What was wrong with the first.
+        first: String,
+    },
     /// The answer to another problem.
     #[error("the answer is for `{got}`")]
     WrongId {
@@ -94,6 +108,9 @@ pub enum Breakage {
     /// Two answers to one problem, in files.
     #[error("answered more than once")]
     Twice,
+    /// What a record says of a question without an answer.
+    #[error("{0}")]
+    Recorded(String),
     /// The solver broke too often and was not asked any more.
     #[error("not asked: {0}")]
     NotAsked(String),

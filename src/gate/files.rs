@@ -3,10 +3,11 @@
 use super::accept::{Breakage, id_in, read_line};
 use super::plan::{Plan, PlanError, Purpose};
 use super::protocol::{Answer, Problem};
+use super::recorder::{self, Recorder};
 use super::solver::Solver;
 use calibench::camera::Parameter;
 use calibench::io::hash::sha256_hex;
-use calibench::io::write_atomically;
+use calibench::io::{InputError, read_regular_text, write_atomically};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -23,6 +24,9 @@ struct Manifest {
     sha256: String,
 }
 
+/// Bytes of a file of answers: those of ten thorough runs.
+const MOST_BYTES: u64 = 1 << 32;
+
 /// Why a folder cannot be written or judged.
 #[derive(Debug, thiserror::Error)]
 pub enum FilesError {
@@ -30,13 +34,8 @@ pub enum FilesError {
     #[error(transparent)]
     Write(#[from] io::Error),
     /// It cannot be read.
-    #[error("cannot read {path}: {source}", path = path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    #[error("cannot read {0}")]
+    Read(#[from] InputError),
     /// The manifest is none.
     #[error("{path} is no manifest of an export: {source}", path = path.display())]
     Manifest {
@@ -60,11 +59,11 @@ pub enum FilesError {
     Plan(#[from] PlanError),
 }
 
-/// Writes `problems.jsonl`, `manifest.json` and `truth/truth.jsonl` to a folder; with a solver, its `answers.jsonl` too.
+/// Writes `problems.jsonl`, `manifest.json` and `truth/truth.jsonl` to a folder.
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn export(plan: &Plan, folder: &Path, solver: Option<&dyn Solver>) -> Result<(), FilesError> {
+pub fn export(plan: &Plan, folder: &Path) -> Result<(), FilesError> {
     let problems = problem_lines(plan);
     let manifest = Manifest {
         seed: plan.seed,
@@ -76,15 +75,16 @@ pub fn export(plan: &Plan, folder: &Path, solver: Option<&dyn Solver>) -> Result
     write_atomically(&folder.join("truth/truth.jsonl"), truth_lines(plan).as_bytes())?;
     let manifest = format!("{:#}\n", serde_json::to_value(&manifest).unwrap_or_default());
     write_atomically(&folder.join("manifest.json"), manifest.as_bytes())?;
-    if let Some(solver) = solver {
-        let lines: Vec<String> = plan
-            .cases
-            .par_iter()
-            .filter_map(|case| solver.ask(&plan.problem(case)).ok())
-            .filter_map(|answer| serde_json::to_string(&answer).ok())
-            .collect();
-        write_atomically(&folder.join("answers.jsonl"), joined(lines).as_bytes())?;
-    }
+    Ok(())
+}
+
+/// Writes the answers that were kept of a run to `answers.jsonl`; a question that broke the protocol has a line that says how.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn file_answers(plan: &Plan, folder: &Path, recorder: &Recorder<'_>) -> Result<(), FilesError> {
+    let lines = plan.cases.iter().filter_map(|case| recorder.line(&plan.id(case)));
+    write_atomically(&folder.join("answers.jsonl"), joined(lines.collect()).as_bytes())?;
     Ok(())
 }
 
@@ -153,7 +153,7 @@ pub fn recorded(folder: &Path) -> Result<(Plan, Recorded), FilesError> {
 }
 
 fn read(path: &Path) -> Result<String, FilesError> {
-    std::fs::read_to_string(path).map_err(|source| FilesError::Read { path: path.to_path_buf(), source })
+    Ok(read_regular_text(path, MOST_BYTES)?)
 }
 
 fn answer_files(folder: &Path) -> Result<Vec<PathBuf>, FilesError> {
@@ -170,6 +170,10 @@ fn answer_files(folder: &Path) -> Result<Vec<PathBuf>, FilesError> {
 impl Recorded {
     /// Files a line under the problem that it answers.
     fn take(&mut self, line: &str, place: impl Fn() -> String) {
+        if let Some((id, breakage)) = recorder::broken(line) {
+            self.answers.insert(id, Err(breakage));
+            return;
+        }
         let answer = read_line(line);
         let id = answer.as_ref().map_or_else(|_| id_in(line).map(str::to_string), |a| Some(a.id.clone()));
         match (id, answer) {

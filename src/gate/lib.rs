@@ -11,6 +11,7 @@
 
 pub mod accept;
 pub mod bad_input;
+mod descendants;
 pub mod faults;
 pub mod files;
 pub mod judge;
@@ -19,6 +20,7 @@ pub mod plan;
 pub mod power;
 pub mod process;
 pub mod protocol;
+pub mod recorder;
 pub mod report;
 pub mod run;
 pub mod solver;
@@ -30,6 +32,7 @@ pub mod variant;
 pub use judge::{Check, EXPECTED_FALSE_ALARMS, Property, Terms, Verdict};
 pub use plan::{Plan, PlanError};
 pub use process::Process;
+pub use recorder::Recorder;
 pub use report::Report;
 pub use run::run;
 pub use solver::{Builtin, Solver};

@@ -56,11 +56,19 @@ pub enum PlanError {
     /// A scenario.
     #[error(transparent)]
     Suite(#[from] SuiteError),
+    /// More problems than a run can hold.
+    #[error("{samples} samples a scenario, and the limit is {MOST_SAMPLES}: ask for fewer")]
+    TooManySamples {
+        /// As asked.
+        samples: usize,
+    },
     /// Bad input that cannot be photographed.
     #[error("bad input: {0}")]
     Bad(#[from] SceneError),
 }
 
+/// Samples a scenario: ten times a thorough run. What was seen of each stays in memory.
+pub const MOST_SAMPLES: usize = 100_000;
 /// Samples a scenario that are asked twice.
 const REPEATS: usize = 4;
 /// Samples a scenario that are asked in every variant.
@@ -71,6 +79,9 @@ const HONEST: usize = 32;
 impl Plan {
     /// `samples` draws of the noise a scenario, and with them the exact, repeated, varied and bad problems.
     pub fn new(seed: u64, samples: usize) -> Result<Plan, PlanError> {
+        if samples > MOST_SAMPLES {
+            return Err(PlanError::TooManySamples { samples });
+        }
         let scenarios = suite()?;
         let bad = bad_cases(seed)?;
         let mut cases: Vec<Case> = Vec::new();

@@ -1,13 +1,14 @@
 //! How is a program judged that is not ours? As a black box behind two pipes, kept alive over all problems.
 
 use super::accept::{Breakage, id_in, read_line};
+use super::descendants;
 use super::protocol::{Answer, Problem};
-use super::solver::{Reply, Solver, reply};
-use std::collections::BTreeSet;
+use super::solver::{Given, Solver};
+use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, Command, Stdio};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -18,21 +19,28 @@ const LONG_PATIENCE: usize = 24;
 /// Bytes of standard error that are quoted.
 const STDERR_TAIL: usize = 400;
 
-/// Process groups that run, to be ended when the gate is interrupted: a group of its own hears no Ctrl-C.
-static GROUPS: Mutex<BTreeSet<u32>> = Mutex::new(BTreeSet::new());
+/// Bytes of a line. The answer to the largest problem, poses of all views and a full covariance, takes 20 kB.
+pub const MOST_LINE_BYTES: usize = 1 << 20;
+/// Lines that are read ahead: with the longest lines 16 MB a program. A program that writes on waits for its pipe.
+const LINES_AHEAD: usize = 16;
+/// Lines that are no answer before a problem is given up: a program that talks much is told from one that never ends.
+const MOST_WRONG_LINES: usize = 1000;
 
-/// Ends every program that any gate of this process started.
-pub fn end_all() {
-    let groups = std::mem::take(&mut *GROUPS.lock().unwrap_or_else(PoisonError::into_inner));
-    groups.into_iter().for_each(end_group);
+/// Programs that run, by process group, each with its mark: to be ended when the gate is interrupted, since a group of its own hears no
+/// Ctrl-C.
+static RUNNING: Mutex<BTreeMap<u32, String>> = Mutex::new(BTreeMap::new());
+
+/// Makes this process the parent of whatever a program leaves behind, so that [`end_all`] finds it. Only for a process that starts no
+/// other programs: they would be ended too.
+pub fn adopt_orphans() {
+    descendants::adopt_orphans();
 }
 
-/// Ends a program and what it started. This fails only where all have ended already.
-fn end_group(id: u32) {
-    #[cfg(unix)]
-    let _ = Command::new("kill").args(["-KILL", "--", &format!("-{id}")]).stderr(Stdio::null()).status();
-    #[cfg(not(unix))]
-    let _ = id;
+/// Ends every program that any gate of this process started, with what they started, and whatever else runs below this process.
+pub fn end_all() {
+    let running = std::mem::take(&mut *RUNNING.lock().unwrap_or_else(PoisonError::into_inner));
+    running.iter().for_each(|(group, mark)| descendants::end(*group, mark));
+    descendants::end_below();
 }
 
 /// A program that reads problems and writes answers, one JSON object a line.
@@ -51,11 +59,21 @@ struct Worker {
     has_answered: bool,
 }
 
+/// What a program wrote.
+#[derive(Debug)]
+enum Heard {
+    Line(String),
+    /// A line that did not end in time; nothing is read after it.
+    TooLong,
+}
+
 #[derive(Debug)]
 struct Running {
     child: Child,
     to_child: Sender<String>,
-    from_child: Receiver<String>,
+    from_child: Receiver<Heard>,
+    /// Its mark in the environment, see [`descendants`].
+    mark: String,
     stderr: Arc<Mutex<Vec<u8>>>,
 }
 
@@ -94,10 +112,16 @@ impl Process {
         }
         let deadline = Instant::now() + self.timeout;
         let mut wrong: Option<Breakage> = None;
+        let mut lines = 0;
         loop {
+            if let Some(first) = wrong.as_ref().filter(|_| lines >= MOST_WRONG_LINES) {
+                return Err(Breakage::Flood { lines, first: first.to_string() });
+            }
+            lines += 1;
             let left = deadline.saturating_duration_since(Instant::now());
             let line = match running.from_child.recv_timeout(left) {
-                Ok(line) => line,
+                Ok(Heard::Line(line)) => line,
+                Ok(Heard::TooLong) => return Err(Breakage::TooLong { limit: MOST_LINE_BYTES }),
                 Err(RecvTimeoutError::Disconnected) => {
                     return Err(wrong.unwrap_or_else(|| running.obituary()));
                 }
@@ -129,9 +153,9 @@ impl Solver for Process {
         self.ask_worker(&mut worker, problem)
     }
 
-    fn ask_all(&self, problems: &[Problem]) -> Vec<Reply> {
+    fn give_all(&self, problems: &[Problem]) -> Vec<Given> {
         let next = AtomicUsize::new(0);
-        let replies: Vec<Mutex<Option<Reply>>> = problems.iter().map(|_| Mutex::new(None)).collect();
+        let answers: Vec<Mutex<Option<Given>>> = problems.iter().map(|_| Mutex::new(None)).collect();
         std::thread::scope(|scope| {
             for worker in &self.workers {
                 scope.spawn(|| {
@@ -139,14 +163,14 @@ impl Solver for Process {
                     while let Some(i) =
                         Some(next.fetch_add(1, Ordering::Relaxed)).filter(|i| *i < problems.len())
                     {
-                        let given = reply(&problems[i], || self.ask_worker(&mut worker, &problems[i]));
-                        *replies[i].lock().unwrap_or_else(PoisonError::into_inner) = Some(given);
+                        let given = Given::taken(|| self.ask_worker(&mut worker, &problems[i]));
+                        *answers[i].lock().unwrap_or_else(PoisonError::into_inner) = Some(given);
                     }
                 });
             }
         });
-        let told = |slot: Mutex<Option<Reply>>| slot.into_inner().unwrap_or_else(PoisonError::into_inner);
-        replies.into_iter().map(|slot| told(slot).expect("every problem was taken by a worker")).collect()
+        let told = |slot: Mutex<Option<Given>>| slot.into_inner().unwrap_or_else(PoisonError::into_inner);
+        answers.into_iter().map(|slot| told(slot).expect("every problem was taken by a worker")).collect()
     }
 }
 
@@ -155,17 +179,20 @@ impl Running {
         let (shell, flag) = if cfg!(windows) { ("cmd", "/C") } else { ("sh", "-c") };
         let mut starter = Command::new(shell);
         starter.args([flag, command]).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        static STARTS: AtomicU64 = AtomicU64::new(0);
+        let mark = format!("{}.{}", std::process::id(), STARTS.fetch_add(1, Ordering::Relaxed));
+        starter.env(descendants::MARK, &mark);
         // A group of its own: what the shell starts can be ended together with it.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut starter, 0);
         let mut child = starter.spawn()?;
-        GROUPS.lock().unwrap_or_else(PoisonError::into_inner).insert(child.id());
+        RUNNING.lock().unwrap_or_else(PoisonError::into_inner).insert(child.id(), mark.clone());
         let broken = || std::io::Error::other("the program has no pipes");
         let mut stdin = child.stdin.take().ok_or_else(broken)?;
         let stdout = child.stdout.take().ok_or_else(broken)?;
         let mut errors = child.stderr.take().ok_or_else(broken)?;
         let (to_child, lines_in) = channel::<String>();
-        let (lines_out, from_child) = channel::<String>();
+        let (lines_out, from_child) = sync_channel::<Heard>(LINES_AHEAD);
         // A thread of its own writes: a program that never reads would block the gate for ever.
         std::thread::spawn(move || {
             while let Ok(mut line) = lines_in.recv() {
@@ -178,10 +205,19 @@ impl Running {
         std::thread::spawn(move || {
             let mut reader = BufReader::new(stdout);
             let mut bytes = Vec::new();
-            while matches!(reader.read_until(b'\n', &mut bytes), Ok(n) if n > 0) {
+            loop {
+                let mut limited = reader.by_ref().take(MOST_LINE_BYTES as u64 + 1);
+                if !matches!(limited.read_until(b'\n', &mut bytes), Ok(n) if n > 0) {
+                    break;
+                }
+                if bytes.len() > MOST_LINE_BYTES {
+                    // The receiver is gone only where nobody asks any more.
+                    let _ = lines_out.send(Heard::TooLong);
+                    break;
+                }
                 let line = String::from_utf8_lossy(&bytes).trim().to_string();
                 bytes.clear();
-                if !line.is_empty() && lines_out.send(line).is_err() {
+                if !line.is_empty() && lines_out.send(Heard::Line(line)).is_err() {
                     break;
                 }
             }
@@ -200,7 +236,7 @@ impl Running {
                 kept.drain(..surplus);
             }
         });
-        Ok(Running { child, to_child, from_child, stderr })
+        Ok(Running { child, to_child, from_child, mark, stderr })
     }
 
     /// How the program ended, and its last words.
@@ -224,8 +260,8 @@ impl Running {
 impl Drop for Running {
     fn drop(&mut self) {
         let id = self.child.id();
-        end_group(id);
-        GROUPS.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
+        descendants::end(id, &self.mark);
+        RUNNING.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
         // As there: it fails only where the program has ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();

@@ -29,18 +29,39 @@ pub trait Solver: Sync {
     /// No answer could be had.
     fn ask(&self, problem: &Problem) -> Result<Answer, Breakage>;
 
-    /// Solves many, in parallel; replies in the order of the problems.
+    /// Solves many, in parallel; answers in the order of the problems.
+    fn give_all(&self, problems: &[Problem]) -> Vec<Given> {
+        problems.par_iter().map(|problem| Given::taken(|| self.ask(problem))).collect()
+    }
+
+    /// The answers to many, checked.
     fn ask_all(&self, problems: &[Problem]) -> Vec<Reply> {
-        problems.par_iter().map(|problem| reply(problem, || self.ask(problem))).collect()
+        problems.iter().zip(self.give_all(problems)).map(|(problem, given)| given.checked(problem)).collect()
     }
 }
 
-/// Asks, takes the time, and checks the answer.
-pub fn reply(problem: &Problem, ask: impl FnOnce() -> Result<Answer, Breakage>) -> Reply {
-    let started = Instant::now();
-    let answer = ask();
-    let seconds = started.elapsed().as_secs_f64();
-    Reply { outcome: answer.map_or_else(Outcome::Broken, |answer| accept(problem, answer)), seconds }
+/// What was given to a question, and the time it took.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Given {
+    /// The answer as it came.
+    pub answer: Result<Answer, Breakage>,
+    /// From question to answer, s.
+    pub seconds: f64,
+}
+
+impl Given {
+    /// Asks and takes the time.
+    pub fn taken(ask: impl FnOnce() -> Result<Answer, Breakage>) -> Given {
+        let started = Instant::now();
+        let answer = ask();
+        Given { answer, seconds: started.elapsed().as_secs_f64() }
+    }
+
+    /// What the answer is to its problem.
+    pub fn checked(self, problem: &Problem) -> Reply {
+        let outcome = self.answer.map_or_else(Outcome::Broken, |answer| accept(problem, answer));
+        Reply { outcome, seconds: self.seconds }
+    }
 }
 
 /// This library's solver.

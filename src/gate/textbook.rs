@@ -9,7 +9,7 @@ use super::accept::Breakage;
 use super::judge::misled;
 use super::plan::{Case, Plan, PlanError, Purpose};
 use super::protocol::{Answer, Problem, Status};
-use super::solver::{Solver, answer, reply, solve};
+use super::solver::{Given, Solver, answer, solve};
 use super::suite::{Demand, Scenario};
 use super::trial::reduce;
 use rayon::prelude::*;
@@ -65,7 +65,7 @@ pub fn measure(draws: u64) -> Result<Vec<Misled>, PlanError> {
     let is_misled = |scenario: usize, trial: u64| {
         let case = Case { scenario, purpose: Purpose::Sample, trial };
         let problem = plan.problem(&case);
-        misled(&reduce(&plan, &case, &problem, reply(&problem, || Textbook.ask(&problem))))
+        misled(&reduce(&plan, &case, &problem, Given::taken(|| Textbook.ask(&problem)).checked(&problem)))
     };
     let doubtful = plan.scenarios.iter().enumerate().filter(|(_, s)| s.demand == Demand::Honesty);
     Ok(doubtful

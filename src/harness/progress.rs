@@ -1,6 +1,6 @@
 //! How far is it? A bar on standard error for work that takes over a second, nothing otherwise.
 
-use calibench::io::significant;
+use calibench::io::{shown, significant};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::fmt::Write;
 use std::sync::OnceLock;
@@ -77,7 +77,7 @@ impl Progress {
 
     /// Says something after the bar, such as what is worst so far.
     pub fn note(&self, text: &str) {
-        self.bar.set_message(text.to_string());
+        self.bar.set_message(shown(text).into_owned());
     }
 
     /// Puts the bar on the display. The note comes last: a narrow terminal cuts it and nothing else.
@@ -90,7 +90,7 @@ impl Progress {
             };
             self.bar.set_style(style.with_key("rate", rate));
         }
-        self.bar.set_prefix(self.label.clone());
+        self.bar.set_prefix(shown(&self.label).into_owned());
         self.display.bars.add(self.bar.clone());
     }
 }

@@ -2,7 +2,7 @@
 
 use super::design::{Design, designs};
 use super::poses::Sight;
-use super::prediction::Prediction;
+use super::prediction::{DRAWS, Prediction};
 use super::quantity::Quantity;
 use super::spec::{Length, Spec};
 use super::spec_error::SpecError;
@@ -37,9 +37,6 @@ pub struct Cell {
     pub(super) seed: u64,
     pub(super) scenario: String,
 }
-
-/// Where poses are drawn anew in every trial, the prediction is the mean over those of the first trials.
-const PREDICTION_DRAWS: u64 = 200;
 
 impl Spec {
     /// The quantities of every trial.
@@ -139,7 +136,7 @@ impl Cell {
         match &self.scene {
             Some(scene) => Ok(of(scene)),
             None => {
-                let sets = (0..PREDICTION_DRAWS)
+                let sets = (0..DRAWS)
                     .map(|trial| self.draw_scene(trial).map(|scene| of(&scene)))
                     .collect::<Result<Vec<_>, _>>()?;
                 Ok(Prediction::mean_of(&sets))

@@ -28,6 +28,9 @@ pub enum CompareError {
         /// In the second.
         b: String,
     },
+    /// One run under both names.
+    #[error("{path} is named twice: a run is no different from itself", path = .0.display())]
+    Same(PathBuf),
     /// Cells that draw numbers of their own.
     #[error("the cells of {path} draw noise of their own (common_random_numbers = false): their trials are no pairs", path = path.display())]
     NotCommon {
@@ -132,6 +135,12 @@ impl Pairs {
 /// Compares the runs in two folders. The intervals are widened so that all together raise a false alarm as rarely as one of the first
 /// run's own intervals (Bonferroni).
 pub fn compare(first: &Path, second: &Path) -> Result<Comparison, CompareError> {
+    // Each is locked while it is read: the second would seem to be in use by another run.
+    if let (Ok(a), Ok(b)) = (first.canonicalize(), second.canonicalize())
+        && a == b
+    {
+        return Err(CompareError::Same(first.to_path_buf()));
+    }
     let (mut a, mut b) = (Reading::open(first)?, Reading::open(second)?);
     check_pairing(&a.engine, &b.engine)?;
     let shared: Vec<(Quantity, usize, usize)> = a

@@ -1,5 +1,7 @@
 //! What does every combination of levels come to? The study with the levels in place of its own values.
 
+use super::limits;
+use super::prediction::DRAWS;
 use super::spec::{Estimator, SceneSpec, Spec};
 use super::spec_error::SpecError;
 use serde::{Deserialize, Serialize};
@@ -22,10 +24,25 @@ pub(super) fn designs(spec: &Spec, text: &str) -> Result<Vec<(Vec<usize>, Design
             return Err(SpecError::DuplicateFactor(factor.name.clone()));
         }
     }
+    limits::check_trials(
+        spec.factor.iter().map(|f| f.levels.len()),
+        spec.trials.per_cell,
+        spec.trials.batch,
+    )?;
     let base = Design { scene: spec.scene.clone(), estimator: spec.estimator.clone() };
     let base = Table::try_from(&base).expect("a design came from TOML and goes back into it");
     let counts: Vec<usize> = spec.factor.iter().map(|f| f.levels.len()).collect();
-    (0..counts.iter().product()).map(|index| design(spec, text, &base, digits(index, &counts))).collect()
+    let mut points = limits::Points::default();
+    let mut count = |(levels, design): (Vec<usize>, Design)| {
+        let scene = &design.scene;
+        // The board was checked: its marks can be counted.
+        let marks = scene.target.columns * scene.target.rows;
+        points.add(marks, scene.poses.views(), if scene.poses.redraws() { DRAWS } else { 1 })?;
+        Ok((levels, design))
+    };
+    (0..counts.iter().product())
+        .map(|index| design(spec, text, &base, digits(index, &counts)).and_then(&mut count))
+        .collect()
 }
 
 fn design(

@@ -95,26 +95,28 @@ impl Engine {
 
     /// Cell and batch that come next; `None` at the end.
     pub(super) fn next(&self) -> Option<(usize, u64)> {
-        let rounds = self.spec.trials.per_cell.div_ceil(self.spec.trials.batch);
-        let whole_cells = self.spec.trials.precision.is_some();
-        let (mut round, mut place) = (self.round, self.place);
-        while round < rounds {
-            if place == self.cells.len() {
-                (round, place) = (round + 1, 0);
-                continue;
-            }
-            if !self.finished[place] && self.shard.holds(place, round, self.cells.len(), whole_cells) {
-                return Some((place, round));
-            }
-            place += 1;
+        let cells = self.cells.len();
+        if self.spec.trials.precision.is_none() {
+            let deal = self.shard.first_from(self.round * cells as u64 + self.place as u64);
+            let unit = ((deal % cells as u64) as usize, deal / cells as u64);
+            return Some(unit).filter(|unit| unit.1 < self.rounds());
         }
-        None
+        let held = |cell: &usize| !self.finished[*cell] && self.shard.holds(*cell, 0, cells, true);
+        let here = (self.place..cells).find(held).map(|cell| (cell, self.round));
+        let unit = here.or_else(|| (0..cells).find(held).map(|cell| (cell, self.round + 1)));
+        unit.filter(|unit| unit.1 < self.rounds())
+    }
+
+    /// Batches of a cell that takes all its trials.
+    fn rounds(&self) -> u64 {
+        self.spec.trials.per_cell.div_ceil(self.spec.trials.batch)
     }
 
     /// The trials of a batch.
     pub(super) fn trials_of(&self, batch: u64) -> std::ops::Range<u64> {
         let size = self.spec.trials.batch;
-        batch * size..((batch + 1) * size).min(self.spec.trials.per_cell)
+        let first = batch * size;
+        first..first.saturating_add(size).min(self.spec.trials.per_cell)
     }
 
     /// Runs the batch that comes next, in parallel; the trials are in order.
@@ -190,19 +192,16 @@ impl Engine {
 
     /// The most trials this part may take.
     pub fn most_trials(&self) -> u64 {
-        let rounds = self.spec.trials.per_cell.div_ceil(self.spec.trials.batch);
-        let whole_cells = self.spec.trials.precision.is_some();
-        let size = |batch: u64| {
-            let range = self.trials_of(batch);
-            range.end - range.start
-        };
-        (0..rounds)
-            .map(|batch| {
-                let held = (0..self.cells.len())
-                    .filter(|&cell| self.shard.holds(cell, batch, self.cells.len(), whole_cells));
-                size(batch) * held.count() as u64
-            })
-            .sum()
+        let (trials, cells) = (&self.spec.trials, self.cells.len());
+        if trials.precision.is_some() {
+            let held = (0..cells).filter(|&cell| self.shard.holds(cell, 0, cells, true));
+            return trials.per_cell * held.count() as u64;
+        }
+        // All batches are whole but those of the last round.
+        let last = self.trials_of(self.rounds() - 1);
+        let before_last = self.shard.held_below((self.rounds() - 1) * cells as u64);
+        let in_last = self.shard.held_below(self.rounds() * cells as u64) - before_last;
+        before_last * trials.batch + in_last * (last.end - last.start)
     }
 
     /// Trials done.

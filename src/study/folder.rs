@@ -3,10 +3,14 @@
 use super::manifest::{Difference, Manifest};
 use super::shard::{Shard, ShardError};
 use super::trial_file::NoParquet;
-use calibench::io::write_atomically;
+use calibench::io::atomic::{remove_leftovers, write_atomically_to};
+use calibench::io::files::{Disk, Files};
+use calibench::io::input::{InputError, MOST_SPEC_BYTES};
+use calibench::io::read_regular_text;
 use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// The folder of one run: `spec.toml`, `manifest.json`, `trials.csv` and `checkpoint.json`, and the results once it is complete.
 #[derive(Debug)]
@@ -14,6 +18,7 @@ pub struct Folder {
     path: PathBuf,
     /// Held while the run lasts; the system lets go of it however the process ends.
     _lock: File,
+    pub(super) files: Arc<dyn Files>,
 }
 
 /// A file and what the system said about it.
@@ -32,9 +37,40 @@ pub enum FolderError {
     /// The file system.
     #[error(transparent)]
     File(#[from] Located),
+    /// A file that cannot be written or removed; the message names it.
+    #[error("{0}")]
+    Unwritten(io::Error),
+    /// A file that cannot be read.
+    #[error(transparent)]
+    Input(#[from] InputError),
     /// There is a run already.
     #[error("{path} holds a run already: `calibench study resume {path}` continues it, or choose another folder", path = .0.display())]
     Taken(PathBuf),
+    /// Trials without the manifest that says whose they are.
+    #[error(
+        "{path} holds {found} but no manifest.json, so nobody knows whose trials they are: choose another folder, or move them away",
+        path = path.display()
+    )]
+    Leftover {
+        /// The folder.
+        path: PathBuf,
+        /// The file of a run that was found.
+        found: &'static str,
+    },
+    /// The trials of another run.
+    #[error(
+        "{path} counts the trials of another study, part or version of the code (fingerprint {}, this run's is {}): they are not taken \
+         over; move it and the trials away, or begin in another folder",
+        short(found), short(expected), path = path.display()
+    )]
+    Foreign {
+        /// The checkpoint.
+        path: PathBuf,
+        /// Fingerprint that it carries, empty if none.
+        found: String,
+        /// Fingerprint of the run that the manifest describes.
+        expected: String,
+    },
     /// There is none.
     #[error("{path} holds no run: `calibench study run` begins one", path = .0.display())]
     Missing(PathBuf),
@@ -65,14 +101,35 @@ pub enum FolderError {
     },
 }
 
+/// The beginning of a fingerprint, enough to tell two apart.
+fn short(fingerprint: &str) -> &str {
+    if fingerprint.is_empty() { "none" } else { fingerprint.get(..12).unwrap_or(fingerprint) }
+}
+
+/// Files that hold trials of a run, or vouch for them.
+const OF_A_RUN: [&str; 3] = ["checkpoint.json", "trials.csv", "trials.parquet"];
+
 impl Folder {
     /// Begins a run.
     pub fn create(path: &Path, spec_text: &str, manifest: &Manifest) -> Result<Folder, FolderError> {
+        Folder::create_on(Arc::new(Disk), path, spec_text, manifest)
+    }
+
+    /// Begins a run whose files are changed by the given operations.
+    pub fn create_on(
+        files: Arc<dyn Files>,
+        path: &Path,
+        spec_text: &str,
+        manifest: &Manifest,
+    ) -> Result<Folder, FolderError> {
         let located = |source| Located { path: path.to_path_buf(), source };
-        fs::create_dir_all(path).map_err(located)?;
-        let folder = Folder::lock(path)?;
+        files.make_folder(path).map_err(located)?;
+        let folder = Folder::lock(files, path)?;
         if folder.file("manifest.json").exists() {
             return Err(FolderError::Taken(path.to_path_buf()));
+        }
+        if let Some(found) = OF_A_RUN.into_iter().find(|name| folder.file(name).exists()) {
+            return Err(FolderError::Leftover { path: path.to_path_buf(), found });
         }
         folder.write("spec.toml", spec_text.as_bytes())?;
         // The manifest last: a folder without one holds no run.
@@ -82,21 +139,34 @@ impl Folder {
 
     /// Opens a run that was begun.
     pub fn open(path: &Path) -> Result<Folder, FolderError> {
+        Folder::open_on(Arc::new(Disk), path)
+    }
+
+    /// Opens a run whose files are changed by the given operations.
+    pub fn open_on(files: Arc<dyn Files>, path: &Path) -> Result<Folder, FolderError> {
         if !path.join("manifest.json").is_file() {
             return Err(FolderError::Missing(path.to_path_buf()));
         }
-        Folder::lock(path)
+        Folder::lock(files, path)
     }
 
-    fn lock(path: &Path) -> Result<Folder, FolderError> {
+    fn lock(files: Arc<dyn Files>, path: &Path) -> Result<Folder, FolderError> {
         let name = path.join(".lock");
         let located = |source| Located { path: name.clone(), source };
         let file = OpenOptions::new().create(true).append(true).open(&name).map_err(located)?;
         match file.try_lock() {
-            Ok(()) => Ok(Folder { path: path.to_path_buf(), _lock: file }),
+            Ok(()) => Folder { path: path.to_path_buf(), _lock: file, files }.cleaned(),
             Err(fs::TryLockError::WouldBlock) => Err(FolderError::InUse(path.to_path_buf())),
             Err(fs::TryLockError::Error(source)) => Err(located(source).into()),
         }
+    }
+
+    /// Without what a run that was killed left half written: the lock says that nobody is writing.
+    fn cleaned(self) -> Result<Folder, FolderError> {
+        for folder in [self.path.clone(), self.file("figures")] {
+            remove_leftovers(&folder).map_err(FolderError::Unwritten)?;
+        }
+        Ok(self)
     }
 
     /// A file of the folder.
@@ -111,14 +181,12 @@ impl Folder {
 
     /// Writes a file whole or not at all.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), FolderError> {
-        let path = self.file(name);
-        write_atomically(&path, bytes).map_err(|source| Located { path, source }.into())
+        write_atomically_to(self.files.as_ref(), &self.file(name), bytes).map_err(FolderError::Unwritten)
     }
 
     /// Text of a file.
     pub fn read(&self, name: &str) -> Result<String, FolderError> {
-        let path = self.file(name);
-        fs::read_to_string(&path).map_err(|source| Located { path, source }.into())
+        Ok(read_regular_text(&self.file(name), MOST_SPEC_BYTES)?)
     }
 
     /// The manifest.

@@ -18,6 +18,7 @@ mod figures;
 mod fingerprint;
 mod finish;
 mod folder;
+pub mod limits;
 mod log;
 mod manifest;
 mod merge;
@@ -52,6 +53,7 @@ pub use engine::{Engine, Interruption, Outcome, Pace, Worst, in_memory, in_memor
 pub use fingerprint::Fingerprint;
 pub use finish::finish;
 pub use folder::{Folder, FolderError, Located};
+pub use log::Checkpoint;
 pub use manifest::{Difference, Manifest};
 pub use merge::{MergeError, merge};
 pub use moments::{Estimated, Moments};

@@ -11,14 +11,17 @@ use super::trial_file::TrialFile;
 use calibench::io::hash::hexadecimal;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, Read, Write};
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 /// What is known to be on the disk.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Checkpoint {
+pub struct Checkpoint {
+    /// [`Manifest::identity`] of the run whose trials it counts; empty in files of versions that did not write it.
+    #[serde(default)]
+    run: String,
     batches: u64,
     bytes: u64,
     pub(super) sha256: String,
@@ -30,6 +33,8 @@ pub(super) struct Log {
     path: PathBuf,
     bytes: u64,
     hash: Sha256,
+    /// Identity of the run.
+    run: String,
 }
 
 impl Folder {
@@ -68,7 +73,10 @@ impl Folder {
                 let unfinished = self.file(".trials.parquet");
                 let file = File::create(&unfinished).map_err(located)?;
                 super::parquet::write(&file, &path, engine, lines.as_mut())?;
-                file.sync_all().and_then(|()| fs::rename(&unfinished, &path)).map_err(located)?;
+                self.files
+                    .sync(&file)
+                    .and_then(|()| self.files.rename(&unfinished, &path))
+                    .map_err(located)?;
             }
         }
         Ok(hexadecimal(&hash_of(&path, u64::MAX)?.0))
@@ -80,7 +88,7 @@ impl Folder {
             return Ok(());
         }
         for path in [TrialFile::Csv.name(), "checkpoint.json"].map(|name| self.file(name)) {
-            match fs::remove_file(&path) {
+            match self.files.remove(&path) {
                 Err(source) if source.kind() != io::ErrorKind::NotFound => {
                     return Err(Located { path, source }.into());
                 }
@@ -135,9 +143,16 @@ impl Folder {
         Ok((Box::new(lines), hash))
     }
 
+    /// The checkpoint, which must be of the run that the manifest describes: trials of another study, part or code are not taken over.
     pub(super) fn checkpoint(&self) -> Result<Checkpoint, FolderError> {
-        serde_json::from_str(&self.read("checkpoint.json")?)
-            .map_err(|e| self.damaged("checkpoint.json", e.to_string()))
+        let checkpoint: Checkpoint = serde_json::from_str(&self.read("checkpoint.json")?)
+            .map_err(|e| self.damaged("checkpoint.json", e.to_string()))?;
+        let expected = self.manifest()?.identity();
+        if checkpoint.run != expected {
+            let path = self.file("checkpoint.json");
+            return Err(FolderError::Foreign { path, found: checkpoint.run, expected });
+        }
+        Ok(checkpoint)
     }
 
     /// Takes in the trials that the checkpoint vouches for, and cuts off what was written after it.
@@ -145,15 +160,16 @@ impl Folder {
         let path = self.file(TrialFile::Csv.name());
         let located = |source| Located { path: path.clone(), source };
         let file = OpenOptions::new().append(true).create(true).open(&path).map_err(located)?;
-        let mut log = Log { file, path: path.clone(), bytes: 0, hash: Sha256::new() };
+        let run = self.manifest()?.identity();
+        let mut log = Log { file, path: path.clone(), bytes: 0, hash: Sha256::new(), run };
         if !self.file("checkpoint.json").exists() {
-            log.file.set_len(0).map_err(located)?;
+            self.files.cut(&log.file, 0).map_err(located)?;
             self.append(&mut log, tables::header(&engine.quantities).as_bytes(), 0)?;
             return Ok(log);
         }
         let checkpoint = self.checkpoint()?;
         let (source, hash) = self.lines(&checkpoint, engine)?;
-        log.file.set_len(checkpoint.bytes).map_err(located)?;
+        self.files.cut(&log.file, checkpoint.bytes).map_err(located)?;
         (log.bytes, log.hash) = (checkpoint.bytes, hash);
         let mut replay = Replay::new(source, path);
         while replay.batch(engine)? {}
@@ -173,7 +189,9 @@ impl Folder {
 
     /// Trials that no checkpoint counts yet.
     pub(super) fn append_only(&self, log: &mut Log, bytes: &[u8]) -> Result<(), FolderError> {
-        log.file.write_all(bytes).map_err(|source| Located { path: log.path.clone(), source })?;
+        self.files
+            .write(&mut log.file, bytes)
+            .map_err(|source| Located { path: log.path.clone(), source })?;
         log.bytes += bytes.len() as u64;
         log.hash.update(bytes);
         Ok(())
@@ -181,8 +199,9 @@ impl Folder {
 
     /// Makes the log durable and counts its batches.
     pub(super) fn count(&self, log: &mut Log, batches: u64) -> Result<(), FolderError> {
-        log.file.sync_data().map_err(|source| Located { path: log.path.clone(), source })?;
-        let checkpoint = Checkpoint { batches, bytes: log.bytes, sha256: hexadecimal(&log.hash) };
+        self.files.sync(&log.file).map_err(|source| Located { path: log.path.clone(), source })?;
+        let (run, sha256) = (log.run.clone(), hexadecimal(&log.hash));
+        let checkpoint = Checkpoint { run, batches, bytes: log.bytes, sha256 };
         let text = serde_json::to_string(&checkpoint).expect("a checkpoint holds nothing that JSON cannot");
         self.write("checkpoint.json", text.as_bytes())
     }

@@ -91,6 +91,12 @@ impl Manifest {
         found
     }
 
+    /// Which trials may stand in the run's folder: SHA-256 of specification, part and code.
+    pub(super) fn identity(&self) -> String {
+        let parts = serde_json::json!([self.spec, self.shard, self.code]);
+        sha256_hex(parts.to_string().as_bytes())
+    }
+
     pub(super) fn to_text(&self) -> String {
         let value = serde_json::to_value(self).expect("a manifest holds nothing that JSON cannot");
         format!("{value:#}\n")

@@ -20,6 +20,12 @@ pub enum MergeError {
     /// Nothing to merge.
     #[error("no parts were given: name the folders of all shards")]
     Nothing,
+    /// The same folder under one name or two.
+    #[error("{path} is named twice: name the folder of each shard once", path = .0.display())]
+    NamedTwice(PathBuf),
+    /// The whole would take the place of a part.
+    #[error("{path} is one of the parts: choose another folder for the whole", path = .0.display())]
+    IntoPart(PathBuf),
     /// A part that has trials left.
     #[error("{path} (shard {shard}) is not complete: `calibench study resume {path}` first", path = path.display())]
     Incomplete {
@@ -54,6 +60,9 @@ impl From<FolderError> for MergeError {
     }
 }
 
+/// Shards that an error names one by one.
+const NAMED: usize = 8;
+
 struct Part {
     folder: Folder,
     manifest: Manifest,
@@ -67,6 +76,7 @@ pub fn merge(
     out: &Path,
     trials: Option<TrialFile>,
 ) -> Result<(Folder, Engine), MergeError> {
+    distinct(parts, out)?;
     let parts = parts.iter().map(|path| open(path)).collect::<Result<Vec<Part>, _>>()?;
     let first = parts.first().ok_or(MergeError::Nothing)?;
     check(&parts, first.shard.count)?;
@@ -101,6 +111,20 @@ pub fn merge(
     Ok((folder, whole))
 }
 
+/// A folder is locked while it is open: what is named twice would seem to be in use by another run.
+fn distinct(parts: &[PathBuf], out: &Path) -> Result<(), MergeError> {
+    // A folder that is not there is reported when it is opened.
+    let place = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+    let places: Vec<PathBuf> = parts.iter().map(|path| place(path)).collect();
+    if let Some((i, _)) = places.iter().enumerate().find(|(i, at)| places[..*i].contains(at)) {
+        return Err(MergeError::NamedTwice(parts[i].clone()));
+    }
+    if places.contains(&place(out)) {
+        return Err(MergeError::IntoPart(out.to_path_buf()));
+    }
+    Ok(())
+}
+
 fn open(path: &Path) -> Result<Part, MergeError> {
     let folder = Folder::open(path)?;
     let (manifest, shard) = (folder.manifest()?, folder.shard()?);
@@ -118,7 +142,11 @@ fn check(parts: &[Part], count: u64) -> Result<(), MergeError> {
             return Err(MergeError::Differs { path: part.folder.path().to_path_buf(), differences });
         }
     }
-    let named = |shards: Vec<String>| if shards.is_empty() { "none".to_string() } else { shards.join(", ") };
+    let named = |shards: Vec<String>| match shards.len() {
+        0 => "none".to_string(),
+        1..=NAMED => shards.join(", "),
+        more => format!("{} and {} more", shards[..NAMED].join(", "), more - NAMED),
+    };
     let held = |index: u64| parts.iter().any(|p| p.shard == Shard { index, count });
     let missing: Vec<String> = (0..count).filter(|&i| !held(i)).map(|i| format!("{i}/{count}")).collect();
     let surplus: Vec<String> = parts

@@ -87,6 +87,8 @@ pub fn search(spec: &Spec, goal: &Goal, search: &Search) -> Result<Vec<Design>, 
             let at =
                 |views: usize| sd_at(&with_poses(spec, views, tilt_deg, coverage, search.distance_mm), goal);
             designs.push(match at(search.most_views) {
+                // No other tilt would need less.
+                Err(error @ PlanError::Spec(SpecError::TooMuch { .. })) => return Err(error),
                 Err(PlanError::Spec(error)) => {
                     Design { tilt_deg, coverage, enough: None, best: Err(error.to_string()) }
                 }

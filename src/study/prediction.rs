@@ -21,6 +21,9 @@ pub struct Predicted {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prediction(pub Vec<Option<Predicted>>);
 
+/// Where poses are drawn anew in every trial, the prediction is the mean over those of the first trials.
+pub(super) const DRAWS: u64 = 200;
+
 /// A central difference over this part of a standard deviation is exact to the square of it.
 const GRADIENT_STEP: f64 = 0.01;
 

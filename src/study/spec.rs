@@ -1,6 +1,7 @@
 //! What is a study? A scene, an estimator, factors to vary, and how many trials: a TOML file, every field named here.
 
 use super::factor::Factor;
+use super::limits;
 use super::names;
 use super::poses::Poses;
 use super::spec_error::SpecError;
@@ -222,6 +223,8 @@ impl SceneSpec {
     pub(super) fn check(&self) -> Result<(), SpecError> {
         let camera = Camera::from(self.camera);
         check("scene.camera.fx", camera.fx, "positive, and every parameter finite", camera.is_valid())?;
+        let side = self.image.0.max(self.image.1);
+        check("scene.image", side as f64, "at most 1048576 px a side", side <= limits::MOST_SIDE)?;
         let noise = self.noise_px;
         check("scene.noise_px", noise, "a positive number", noise > 0.0 && noise.is_finite())?;
         let share = self.outlier_share;

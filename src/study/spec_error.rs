@@ -28,6 +28,18 @@ pub enum SpecError {
         /// Its domain.
         need: &'static str,
     },
+    /// A study that would not end, or not fit into memory.
+    #[error("the study needs {needed} {what}, and the limit is {limit}: {advice}")]
+    TooMuch {
+        /// What it would need.
+        needed: u128,
+        /// The most there may be.
+        limit: u64,
+        /// Of what.
+        what: &'static str,
+        /// What helps.
+        advice: &'static str,
+    },
     /// No such board.
     #[error("scene.target: {0}")]
     Target(String),

@@ -34,6 +34,16 @@ pub enum BoardError {
         /// Marks along Y.
         rows: usize,
     },
+    /// More marks than a board of this library may have.
+    #[error("a board of {columns} x {rows} marks has more than the {most} that a board may have")]
+    TooLarge {
+        /// Marks along X.
+        columns: usize,
+        /// Marks along Y.
+        rows: usize,
+        /// Most marks.
+        most: usize,
+    },
     /// The spacing or the diameter is not a positive number, or the discs would touch.
     #[error(
         "spacing {spacing} and disc diameter {diameter} do not make a board: need 0 < diameter < spacing"
@@ -47,10 +57,16 @@ pub enum BoardError {
 }
 
 impl Board {
+    /// Most marks of a board: a thousand by a thousand, far above what a photograph can show apart. Their places take 16 MB.
+    pub const MOST_MARKS: usize = 1_000_000;
+
     /// A board of `columns x rows` marks, `spacing` apart.
     pub fn new(columns: usize, rows: usize, spacing: f64, pattern: Pattern) -> Result<Board, BoardError> {
         if columns < 2 || rows < 2 {
             return Err(BoardError::TooSmall { columns, rows });
+        }
+        if columns.checked_mul(rows).is_none_or(|marks| marks > Board::MOST_MARKS) {
+            return Err(BoardError::TooLarge { columns, rows, most: Board::MOST_MARKS });
         }
         let diameter = match pattern {
             Pattern::Circles { diameter } => diameter,
@@ -123,6 +139,9 @@ mod tests {
     #[test]
     fn impossible_boards_are_refused() {
         assert!(matches!(Board::chessboard(1, 7, 10.0), Err(BoardError::TooSmall { .. })));
+        for (columns, rows) in [(99_999_999_999, 9), (usize::MAX, usize::MAX), (1001, 1000)] {
+            assert!(matches!(Board::chessboard(columns, rows, 1.0), Err(BoardError::TooLarge { .. })));
+        }
         assert!(matches!(Board::chessboard(3, 7, f64::NAN), Err(BoardError::Geometry { .. })));
         assert!(matches!(Board::circles(3, 7, 10.0, 10.0), Err(BoardError::Geometry { .. })));
     }

@@ -39,8 +39,13 @@ pub fn chessboard_corners(image: &Raster<u8>, columns: usize, rows: usize) -> Re
     }
     let view = GrayImageView { width: image.width(), height: image.height(), data: image.samples() };
     let corners = detect_corners(&view, &default_chess_config());
-    let nothing =
-        GridError::Partial { columns, rows, found: 0, expected: columns * rows, seen: corners.len() };
+    let nothing = GridError::Partial {
+        columns,
+        rows,
+        found: 0,
+        expected: columns.saturating_mul(rows),
+        seen: corners.len(),
+    };
     let params = ChessboardParams::default();
     let detector = ChessboardDetector::new(params).map_err(|_| nothing)?;
     let detection = detector.detect(&corners).ok_or(nothing)?;

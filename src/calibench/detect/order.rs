@@ -136,12 +136,13 @@ fn rectangle(lattice: &Lattice, seen: usize, columns: usize, rows: usize) -> Res
             return Ok(full);
         }
         // A complete grid of another size, unless it is one whose outer row or column is missing.
-        if found > columns * rows || sides.0 > columns.max(rows) || sides.1 > columns.min(rows) {
+        if found > columns.saturating_mul(rows) || sides.0 > columns.max(rows) || sides.1 > columns.min(rows)
+        {
             let (found_columns, found_rows) = sides;
             return Err(GridError::WrongSize { columns, rows, found_columns, found_rows });
         }
     }
-    let expected = columns * rows;
+    let expected = columns.saturating_mul(rows);
     let few_strays = found > expected && found - expected <= columns.min(rows) / 3;
     if few_strays && let Some(only) = only_rectangle(lattice, columns, rows) {
         return Ok(only);

@@ -1,7 +1,8 @@
 //! How is a file replaced so that nobody ever sees half of it? Written beside its place, then renamed.
 
+use super::files::{Disk, Files};
 use std::fs::{self, OpenOptions};
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -13,15 +14,23 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// # Errors
 /// Whatever the file system says, with the path.
 pub fn write_atomically(path: &Path, contents: &[u8]) -> io::Result<()> {
+    write_atomically_to(&Disk, path, contents)
+}
+
+/// As [`write_atomically`], through the given operations.
+///
+/// # Errors
+/// As there.
+pub fn write_atomically_to(files: &dyn Files, path: &Path, contents: &[u8]) -> io::Result<()> {
     let with_path = |e: io::Error| io::Error::new(e.kind(), format!("cannot write {}: {e}", path.display()));
     if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-        fs::create_dir_all(folder).map_err(with_path)?;
+        files.make_folder(folder).map_err(with_path)?;
     }
     let temporary = temporary_beside(path).map_err(with_path)?;
-    let written = write_through(&temporary, contents).and_then(|()| fs::rename(&temporary, path));
+    let written = write_through(files, &temporary, contents).and_then(|()| files.rename(&temporary, path));
     if written.is_err() {
         // The first error is the one to report.
-        let _ = fs::remove_file(&temporary);
+        let _ = files.remove(&temporary);
     }
     written.map_err(with_path)
 }
@@ -37,11 +46,39 @@ fn temporary_beside(path: &Path) -> io::Result<PathBuf> {
     Ok(path.with_file_name(hidden))
 }
 
-fn write_through(path: &Path, contents: &[u8]) -> io::Result<()> {
+/// Removes what writes of processes that were killed have left in a folder. Only for a folder that nobody else writes to.
+///
+/// # Errors
+/// Whatever the file system says, with the path. A folder that is not there holds nothing.
+pub fn remove_leftovers(folder: &Path) -> io::Result<()> {
+    let with_path = |path: &Path, e: io::Error| {
+        io::Error::new(e.kind(), format!("cannot remove what a killed run left, {}: {e}", path.display()))
+    };
+    let entries = match fs::read_dir(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        entries => entries.map_err(|error| with_path(folder, error))?,
+    };
+    for entry in entries.flatten() {
+        if is_temporary(&entry.file_name().to_string_lossy()) {
+            fs::remove_file(entry.path()).map_err(|error| with_path(&entry.path(), error))?;
+        }
+    }
+    Ok(())
+}
+
+/// Whether a name is one of [`temporary_beside`].
+fn is_temporary(name: &str) -> bool {
+    let number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    let mut parts = name.strip_suffix(".tmp").unwrap_or_default().rsplitn(3, '.');
+    let numbered = parts.next().is_some_and(number) && parts.next().is_some_and(number);
+    numbered && parts.next().is_some_and(|rest| rest.starts_with('.') && rest.len() > 1)
+}
+
+fn write_through(files: &dyn Files, path: &Path, contents: &[u8]) -> io::Result<()> {
     let mut file = OpenOptions::new().write(true).create(true).truncate(true).open(path)?;
-    file.write_all(contents)?;
+    files.write(&mut file, contents)?;
     // On the disk before the rename: else a power cut may leave the new name with no contents.
-    file.sync_all()
+    files.sync(&file)
 }
 
 #[cfg(test)]
@@ -60,6 +97,21 @@ mod tests {
         write_atomically(&path, b"new").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"new");
         assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn what_killed_writes_left_is_removed_and_nothing_else() {
+        let folder = folder("leftovers");
+        let temporary = temporary_beside(&folder.join("result.v2.json")).unwrap();
+        fs::create_dir_all(&folder).unwrap();
+        for name in ["result.json", ".lock", ".mine.tmp", "a.1.2.tmp", ".1.2.tmp"] {
+            fs::write(folder.join(name), "").unwrap();
+        }
+        fs::write(temporary, "half").unwrap();
+        remove_leftovers(&folder).unwrap();
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 5);
+        remove_leftovers(&folder.join("not-there")).unwrap();
         fs::remove_dir_all(folder).unwrap();
     }
 

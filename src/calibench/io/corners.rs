@@ -23,7 +23,7 @@ pub struct CornerFile {
 /// See [`TableError`].
 pub fn read_corners(path: &Path) -> Result<CornerFile, TableError> {
     let (file, input) = open(path)?;
-    parse_corners(&file, input)
+    parse_corners(&file, input.as_slice())
 }
 
 /// Reads corners from any source; `file` names it in errors. Lines of one view need not stand together.

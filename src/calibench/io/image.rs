@@ -3,8 +3,11 @@
 //! The format is told by the content, not by the name. Colour becomes grey by Rec. 601 luma,
 //! `(299 R + 587 G + 114 B) / 1000` rounded, the weights of the field's other tools; an alpha channel is ignored.
 
+use super::input::{InputError, MOST_IMAGE_BYTES, open_regular};
 use crate::raster::Raster;
+pub(super) use image::DynamicImage as Decoded;
 use image::{DynamicImage, ImageDecoder, ImageReader};
+use std::fs::File;
 use std::io::{BufReader, Cursor, Seek};
 use std::path::Path;
 
@@ -30,6 +33,9 @@ pub enum ImageError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// The file is none to read.
+    #[error(transparent)]
+    Input(InputError),
     /// The file cannot be written.
     #[error("cannot write {0}")]
     Write(std::io::Error),
@@ -117,13 +123,19 @@ impl Grey {
 /// # Errors
 /// See [`ImageError`]; a damaged file is an error, never a panic, and a forged size allocates nothing.
 pub fn read_image(path: &Path) -> Result<Grey, ImageError> {
-    let name = path.display().to_string();
-    let io = |source| ImageError::Io { path: name.clone(), source };
-    let file = std::fs::File::open(path).map_err(io)?;
-    if file.metadata().map_err(io)?.len() == 0 {
-        return Err(ImageError::Empty { path: name });
+    Ok(grey(decoded(opened(path)?, &path.display().to_string())?))
+}
+
+/// The file of a photograph, which holds at least a byte.
+pub(super) fn opened(path: &Path) -> Result<BufReader<File>, ImageError> {
+    let (file, length) = open_regular(path, MOST_IMAGE_BYTES).map_err(|error| match error {
+        InputError::Open { path, source } => ImageError::Io { path, source },
+        error => ImageError::Input(error),
+    })?;
+    if length == 0 {
+        return Err(ImageError::Empty { path: path.display().to_string() });
     }
-    decode(BufReader::new(file), &name)
+    Ok(BufReader::new(file))
 }
 
 /// Reads a photograph from the bytes of a file; `name` stands in errors.
@@ -134,10 +146,70 @@ pub fn parse_image(bytes: &[u8], name: &str) -> Result<Grey, ImageError> {
     if bytes.is_empty() {
         return Err(ImageError::Empty { path: name.to_string() });
     }
-    decode(Cursor::new(bytes), name)
+    Ok(grey(decoded(Cursor::new(bytes), name)?))
 }
 
-fn decode(source: impl std::io::BufRead + Seek, name: &str) -> Result<Grey, ImageError> {
+pub(super) fn decoded(source: impl std::io::BufRead + Seek, name: &str) -> Result<Decoded, ImageError> {
+    let decoder = decoder(source, name)?;
+    DynamicImage::from_decoder(decoder).map_err(|error| of_decoder(error, name))
+}
+
+/// The size of an image, known before it is decoded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Extent {
+    /// Pixels.
+    pub pixels: u64,
+    /// Bytes of all samples of the file, once they are decoded.
+    pub bytes: u64,
+}
+
+impl Extent {
+    /// Memory that reading the photograph as grey, finding its marks and drawing them in takes at most: the samples, the grey levels, and
+    /// for each pixel eight bytes of detection or four of the overlay and its file.
+    pub fn memory_to_detect(&self) -> u64 {
+        self.bytes.saturating_mul(2).saturating_add(self.pixels.saturating_mul(12))
+    }
+
+    /// Memory that correcting the photograph takes: its samples as they were decoded, by channels, corrected, and as they are written, and
+    /// for each pixel the look-up table and its making.
+    pub fn memory_to_correct(&self) -> u64 {
+        self.bytes.saturating_mul(4).saturating_add(self.pixels.saturating_mul(32))
+    }
+}
+
+/// The size of a photograph, from the beginning of its file.
+///
+/// # Errors
+/// See [`ImageError`].
+pub fn image_extent(path: &Path) -> Result<Extent, ImageError> {
+    let decoder = decoder(opened(path)?, &path.display().to_string())?;
+    let (width, height) = decoder.dimensions();
+    Ok(Extent { pixels: u64::from(width) * u64::from(height), bytes: decoder.total_bytes() })
+}
+
+/// As [`image_extent`], from the bytes of a file; `name` stands in errors.
+///
+/// # Errors
+/// See [`ImageError`].
+pub fn parse_extent(bytes: &[u8], name: &str) -> Result<Extent, ImageError> {
+    let decoder = decoder(Cursor::new(bytes), name)?;
+    let (width, height) = decoder.dimensions();
+    Ok(Extent { pixels: u64::from(width) * u64::from(height), bytes: decoder.total_bytes() })
+}
+
+fn of_decoder(error: image::ImageError, name: &str) -> ImageError {
+    let (path, reason) = (name.to_string(), error.to_string());
+    match error {
+        image::ImageError::Unsupported(_) => ImageError::UnknownFormat { path, reason },
+        _ => ImageError::Broken { path, reason },
+    }
+}
+
+/// A decoder of an image whose size is within the limit.
+fn decoder<'a>(
+    source: impl std::io::BufRead + Seek + 'a,
+    name: &str,
+) -> Result<Box<dyn ImageDecoder + 'a>, ImageError> {
     let path = || name.to_string();
     let reader = ImageReader::new(source)
         .with_guessed_format()
@@ -145,13 +217,7 @@ fn decode(source: impl std::io::BufRead + Seek, name: &str) -> Result<Grey, Imag
     if reader.format().is_none() {
         return Err(ImageError::UnknownFormat { path: path(), reason: "unknown first bytes".into() });
     }
-    let failed = |error: image::ImageError| match error {
-        image::ImageError::Unsupported(error) => {
-            ImageError::UnknownFormat { path: path(), reason: error.to_string() }
-        }
-        error => ImageError::Broken { path: path(), reason: error.to_string() },
-    };
-    let decoder = reader.into_decoder().map_err(failed)?;
+    let decoder = reader.into_decoder().map_err(|error| of_decoder(error, name))?;
     let (width, height) = decoder.dimensions();
     if u64::from(width) * u64::from(height) > LIMIT_PX {
         return Err(ImageError::TooLarge { path: path(), width, height, limit_px: LIMIT_PX });
@@ -162,7 +228,7 @@ fn decode(source: impl std::io::BufRead + Seek, name: &str) -> Result<Grey, Imag
             reason: format!("{width} x {height} px hold no image"),
         });
     }
-    Ok(grey(DynamicImage::from_decoder(decoder).map_err(failed)?))
+    Ok(Box::new(decoder))
 }
 
 /// Grey levels of a decoded image.
@@ -196,7 +262,7 @@ fn grey(image: DynamicImage) -> Grey {
     }
 }
 
-fn raster<T: Copy>(width: usize, height: usize, samples: Vec<T>) -> Raster<T> {
+pub(super) fn raster<T: Copy>(width: usize, height: usize, samples: Vec<T>) -> Raster<T> {
     Raster::from_samples(width, height, samples).expect("a decoded image has a sample for every pixel")
 }
 
@@ -232,6 +298,18 @@ pub fn write_png(path: &Path, image: &Raster<u8>) -> Result<(), ImageError> {
 pub fn write_png_16(path: &Path, image: &Raster<u16>) -> Result<(), ImageError> {
     let bytes: Vec<u8> = image.samples().iter().flat_map(|level| level.to_ne_bytes()).collect();
     write(path, &encoded(&bytes, image.width(), image.height(), image::ExtendedColorType::L16)?)
+}
+
+/// The colour type of so many channels, with 16 bits a sample or 8.
+pub(super) fn colour(channels: usize, deep: bool) -> image::ExtendedColorType {
+    use image::ExtendedColorType::{L8, L16, La8, La16, Rgb8, Rgb16, Rgba8, Rgba16};
+    let [eight, sixteen] = match channels {
+        1 => [L8, L16],
+        2 => [La8, La16],
+        3 => [Rgb8, Rgb16],
+        _ => [Rgba8, Rgba16],
+    };
+    if deep { sixteen } else { eight }
 }
 
 /// Encodes samples as PNG.

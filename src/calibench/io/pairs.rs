@@ -23,7 +23,7 @@ pub struct PointPairs {
 /// See [`TableError`].
 pub fn read_point_pairs(path: &Path) -> Result<PointPairs, TableError> {
     let (file, input) = open(path)?;
-    parse_point_pairs(&file, input)
+    parse_point_pairs(&file, input.as_slice())
 }
 
 /// Reads point pairs from any source; `file` names it in errors.

@@ -1,6 +1,7 @@
 //! How is a calibration kept and handed on? `result.json`: the camera by its parameters' names, with all that is known of it.
 
-use crate::calibrate::{Calibration, Certificate, ProfileInterval};
+use super::input::{InputError, MOST_TABLE_BYTES, read_regular_text};
+use crate::calibrate::{Calibration, Certificate, ProfileInterval, Termination};
 use crate::camera::{Camera, Parameter};
 use crate::geometry::{Vec2, rotation};
 use serde::{Deserialize, Serialize};
@@ -227,24 +228,21 @@ fn view_fields(calibration: &Calibration, names: &[String], i: usize) -> ViewFie
 }
 
 /// What another command needs of a result; further fields are ignored.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 struct CameraOnly {
     camera: CameraFields,
     #[serde(default)]
     image_size: Option<(usize, usize)>,
+    #[serde(default)]
+    termination: Option<String>,
 }
 
 /// Why a result cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ResultError {
     /// The file cannot be read.
-    #[error("{file}: {source}")]
-    Open {
-        /// The file.
-        file: String,
-        /// What the system says.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Input(#[from] InputError),
     /// It is not such a result.
     #[error("{file}:{}:{}: {source}; expected {{\"camera\": {{\"fx\": ..., \"fy\": ..., \"cx\": ..., \"cy\": ...}}}}", source.line(), source.column())]
     Format {
@@ -252,6 +250,16 @@ pub enum ResultError {
         file: String,
         /// What is wrong, with line and column.
         source: serde_json::Error,
+    },
+    /// The calibration found no minimum: its camera is wherever the search ended.
+    #[error(
+        "{file}: the calibration ended as `{termination}`, not `converged`, so its camera is not to be used: calibrate again"
+    )]
+    NotConverged {
+        /// The file.
+        file: String,
+        /// How it ended.
+        termination: String,
     },
     /// No camera has these numbers.
     #[error("{file}: fx and fy must be positive, and every parameter finite")]
@@ -264,15 +272,18 @@ pub enum ResultError {
 /// Reads the camera, and the image size if it is there, of a `result.json`.
 pub fn read_camera(path: &Path) -> Result<(Camera, Option<(usize, usize)>), ResultError> {
     let file = path.display().to_string();
-    let text =
-        std::fs::read_to_string(path).map_err(|source| ResultError::Open { file: file.clone(), source })?;
-    parse_camera(&file, &text)
+    parse_camera(&file, &read_regular_text(path, MOST_TABLE_BYTES)?)
 }
 
 /// As [`read_camera`], from text; `file` names it in errors.
 pub fn parse_camera(file: &str, text: &str) -> Result<(Camera, Option<(usize, usize)>), ResultError> {
     let fields: CameraOnly =
         serde_json::from_str(text).map_err(|source| ResultError::Format { file: file.into(), source })?;
+    let is_minimum =
+        |how: &str| [Termination::Converged, Termination::AboveFloor].iter().any(|t| how == t.name());
+    if let Some(termination) = fields.termination.filter(|how| !is_minimum(how)) {
+        return Err(ResultError::NotConverged { file: file.into(), termination });
+    }
     let camera = Camera::from(fields.camera);
     if camera.is_valid() {
         Ok((camera, fields.image_size))
@@ -292,6 +303,18 @@ mod tests {
         let text =
             serde_json::json!({"camera": CameraFields::from(camera), "image_size": [640, 480], "extra": 1});
         assert_eq!(parse_camera("f", &text.to_string()).unwrap(), (camera, Some((640, 480))));
+    }
+
+    #[test]
+    fn a_calibration_that_did_not_converge_gives_no_camera() {
+        let text = |how: &str| {
+            format!(r#"{{"camera": {{"fx": 600, "fy": 600, "cx": 320, "cy": 240}}, "termination": "{how}"}}"#)
+        };
+        assert!(parse_camera("r.json", &text("converged")).is_ok());
+        for how in ["iteration-limit", "stalled"] {
+            let error = parse_camera("r.json", &text(how)).unwrap_err();
+            assert!(error.to_string().contains(how), "{error}");
+        }
     }
 
     #[test]

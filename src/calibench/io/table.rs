@@ -1,18 +1,24 @@
 //! What stands in a table of numbers? CSV with named columns; every complaint carries file, line and column.
 
+use super::input::{InputError, MOST_TABLE_BYTES, read_regular};
 use crate::board::ViewError;
 use std::io::Read;
 
 /// Why a table cannot be read. Lines count from 1; the header is line 1.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
-    /// The file cannot be opened.
-    #[error("{file}: {source}")]
-    Open {
+    /// The file cannot be opened, or is none to read.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// More lines than a table may have.
+    #[error("{file}:{line}: more than {most} lines: split the table")]
+    TooMany {
         /// The file.
         file: String,
-        /// What the system says.
-        source: std::io::Error,
+        /// The line.
+        line: u64,
+        /// Most lines below the header.
+        most: usize,
     },
     /// Reading stopped in the middle, or a line is not UTF-8 text.
     #[error("{file}:{line}: {message}")]
@@ -132,6 +138,9 @@ pub enum TableError {
     },
 }
 
+/// Lines below the header: 150 000 views of 63 points. Each takes some 200 bytes until its view is made.
+pub const MOST_ROWS: usize = 10_000_000;
+
 /// One line: where it stands, its names and its numbers.
 pub(super) struct Row<const NAMES: usize, const NUMBERS: usize> {
     pub line: u64,
@@ -170,6 +179,9 @@ pub(super) fn read_table<const NAMES: usize, const NUMBERS: usize>(
                 got: record.len(),
             });
         }
+        if rows.len() == MOST_ROWS {
+            return Err(TableError::TooMany { file: file.into(), line, most: MOST_ROWS });
+        }
         let mut row = Row { line, names: names.map(|_| String::new()), numbers: [0.0; NUMBERS] };
         for (i, &field) in name_fields.iter().enumerate() {
             row.names[i] = name(file, line, names[i], field, &record[field])?;
@@ -185,6 +197,9 @@ pub(super) fn read_table<const NAMES: usize, const NUMBERS: usize>(
     Ok(rows)
 }
 
+/// U+FEFF in UTF-8.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
 /// The whole input, without a byte order mark.
 fn read_all(file: &str, mut input: impl Read) -> Result<Vec<u8>, TableError> {
     let mut bytes = Vec::new();
@@ -193,8 +208,8 @@ fn read_all(file: &str, mut input: impl Read) -> Result<Vec<u8>, TableError> {
         line: 0,
         message: e.to_string(),
     })?;
-    if bytes.starts_with(b"\xef\xbb\xbf") {
-        bytes.drain(..3);
+    if bytes.starts_with(BYTE_ORDER_MARK) {
+        bytes.drain(..BYTE_ORDER_MARK.len());
     }
     Ok(bytes)
 }
@@ -270,11 +285,14 @@ fn unreadable(file: &str, lines: &mut LineCounter<'_>, error: &csv::Error) -> Ta
     TableError::Unreadable { file: file.into(), line: lines.line_of(error.position()), message }
 }
 
-/// Opens a file for one of the readers.
-pub(super) fn open(path: &std::path::Path) -> Result<(String, std::fs::File), TableError> {
-    let file = path.display().to_string();
-    match std::fs::File::open(path) {
-        Ok(input) => Ok((file, input)),
-        Err(source) => Err(TableError::Open { file, source }),
-    }
+/// Name and bytes of a file for one of the readers.
+pub(super) fn open(path: &std::path::Path) -> Result<(String, Vec<u8>), TableError> {
+    Ok((path.display().to_string(), read_regular(path, MOST_TABLE_BYTES)?))
+}
+
+/// The names of the columns; none where the first line cannot be read, of which the reader of the table says why.
+pub fn columns(bytes: &[u8]) -> Vec<String> {
+    let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(bytes);
+    reader.headers().map(|header| header.iter().map(String::from).collect()).unwrap_or_default()
 }

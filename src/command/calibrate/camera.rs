@@ -1,9 +1,11 @@
 //! A camera from views, wherever they come from: the fit, what it is told as, and the files it leaves.
 
 use super::finished::{Told, parameter_rows, summary, weakest};
-use super::{Arguments, Exit, Format, Intervals, advice, maps, page, plots, print, table};
+use super::{Arguments, Exit, Failure, Format, Intervals, advice, maps, page, plots, print, table};
 use calibench::board::{Board, View};
-use calibench::calibrate::{ProfileInterval, Settings};
+use calibench::calibrate::{Loss, ProfileInterval, Settings};
+use calibench::camera::FreeParameters;
+use calibench::geometry::Vec2;
 use calibench::io::{CalibrationFields, LeftOut, significant, write_atomically};
 use calibench::photos::{Fit, Fitter};
 use calibench_harness::Figure;
@@ -33,10 +35,46 @@ pub(super) struct Observed {
 /// Coverage of the intervals: what a certificate of measurement states.
 const COVERAGE: f64 = 0.95;
 
-pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, String> {
-    let mut settings = Settings::new(arguments.free).with_loss(arguments.loss);
+/// A mark may lie this far beyond the centres of the outermost pixels: half a pixel to the image's border, and half a pixel more for files
+/// that count pixels from 1.
+const BEYOND_PX: f64 = 1.0;
+
+/// Whether a mark lies in an image.
+fn within(pixel: &Vec2, (width, height): (usize, usize)) -> bool {
+    let on_side = |at: f64, length: usize| (-BEYOND_PX..=length as f64 - 1.0 + BEYOND_PX).contains(&at);
+    on_side(pixel.x, width) && on_side(pixel.y, height)
+}
+
+impl Observed {
+    /// Marks outside of the image are those of another camera or another size, most often of one whose sides were swapped.
+    fn refuse_marks_outside(&self) -> Result<(), String> {
+        let Some(size) = self.image_size else { return Ok(()) };
+        let marks =
+            || self.views.iter().zip(&self.names).flat_map(|(v, n)| v.pixels().iter().map(move |p| (p, n)));
+        let outside = marks().filter(|(pixel, _)| !within(pixel, size)).count();
+        let Some((first, name)) = marks().find(|(pixel, _)| !within(pixel, size)) else { return Ok(()) };
+        let (width, height) = size;
+        let swapped = width != height && marks().all(|(pixel, _)| within(pixel, (height, width)));
+        let help = match swapped {
+            true => format!("all lie in {height}x{width}: were the sides swapped?"),
+            false => "check --image-size and the columns u and v".to_string(),
+        };
+        Err(format!(
+            "{}: {outside} of {} marks lie outside of the image of {width} x {height} px, the first, of view {name}, at ({}, {}): {help}",
+            self.source,
+            marks().count(),
+            significant(first.x, 6),
+            significant(first.y, 6),
+        ))
+    }
+}
+
+pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, Failure> {
+    observed.refuse_marks_outside()?;
+    let free = arguments.free.unwrap_or(FreeParameters::CHAPTER);
+    let mut settings = Settings::new(free).with_loss(arguments.loss.unwrap_or(Loss::Squares));
     settings.image_size = observed.image_size;
-    if arguments.intervals == Intervals::Profile {
+    if arguments.intervals == Some(Intervals::Profile) {
         settings = settings.with_profile_intervals(COVERAGE);
     }
     for &(parameter, value) in &arguments.fix {
@@ -50,7 +88,7 @@ pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, Str
     fields.left_out = told.left_out.clone();
     fields.warnings.extend(told.notes.iter().chain(&told.advice).cloned());
     if let Some(folder) = &arguments.out {
-        write_files(folder, &fields, &told).map_err(|error| error.to_string())?;
+        write_files(folder, &fields, &told).map_err(Failure::unwritten)?;
     }
     match arguments.format {
         Format::Json => print(&fields.to_json()),

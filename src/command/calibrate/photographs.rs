@@ -1,13 +1,15 @@
 //! Photographs of a board: each is read, its marks found and drawn in; one that fails is named and the rest goes on.
 
 use super::camera::{self, Observed};
-use super::{Arguments, Exit, warn};
+use super::{Arguments, Exit, Failure, warn};
 use calibench::board::{View, ViewError};
 use calibench::geometry::Vec2;
-use calibench::io::{Grey, ImageError, LeftOut, Overlay, read_image};
+use calibench::io::{Grey, ImageError, LeftOut, Memory, Overlay, image_extent, read_image};
 use calibench::photos::{BoardSpec, MarkKind, NotFound};
-use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// Photographs wider than this are not enlarged in their overlays: a mark then has pixels enough.
 const ENLARGED_BELOW_PX: usize = 1200;
@@ -25,13 +27,13 @@ enum PhotoError {
     #[error(transparent)]
     NotFound(#[from] NotFound),
     /// Another camera, or another setting of it.
-    #[error("{} x {} px, but {} has {} x {} px: one camera's photographs have one size", got.0, got.1, of, size.0, size.1)]
+    #[error("{} x {} px, but {} {} x {} px: one camera's photographs have one size", got.0, got.1, of, size.0, size.1)]
     Size {
         /// Width and height, px.
         got: (usize, usize),
         /// Expected width and height, px.
         size: (usize, usize),
-        /// Who has that size.
+        /// Who has that size, with the verb.
         of: String,
     },
     /// A mark without a place.
@@ -47,21 +49,42 @@ struct Seen {
     overlay: Option<Result<String, String>>,
 }
 
-pub(super) fn run(arguments: &Arguments, board: &BoardSpec, photos: &[PathBuf]) -> Result<Exit, String> {
+pub(super) fn run(arguments: &Arguments, board: &BoardSpec, photos: &[PathBuf]) -> Result<Exit, Failure> {
     board.check_detector().map_err(|error| error.to_string())?;
-    let seen: Vec<Result<Seen, ImageError>> = photos
-        .par_iter()
-        .enumerate()
-        .map(|(index, path)| see(path, index, board, arguments.out.as_deref()))
-        .collect();
+    let memory = Memory::new(arguments.memory);
+    let seen = each(photos, |index, path| {
+        let needed = image_extent(path)?.memory_to_detect();
+        let _taken = memory.take(path, needed).map_err(ImageError::Input)?;
+        see(path, index, board, arguments.out.as_deref())
+    });
     let observed = observed(arguments, board, photos, seen)?;
     for LeftOut { name, reason } in &observed.left_out {
         warn(&format!("left out: {name}: {reason}"));
     }
     if observed.views.is_empty() {
-        return Err(format!("none of {} photographs shows the {board}", photos.len()));
+        return Err(format!("none of {} photographs shows the {board}", photos.len()).into());
     }
     camera::run(arguments, observed)
+}
+
+/// What `work` gives for each photograph, in their order. Threads of its own: one of a pool that waits for memory may be given the work of
+/// another by whoever it waits for, and then both wait.
+fn each<T: Send>(photos: &[PathBuf], work: impl Fn(usize, &Path) -> T + Sync) -> Vec<T> {
+    let next = AtomicUsize::new(0);
+    let results: Vec<Mutex<Option<T>>> = photos.iter().map(|_| Mutex::new(None)).collect();
+    std::thread::scope(|scope| {
+        for _ in 0..rayon::current_num_threads().min(photos.len()) {
+            scope.spawn(|| {
+                while let Some((index, path)) =
+                    photos.iter().enumerate().nth(next.fetch_add(1, Ordering::Relaxed))
+                {
+                    *results[index].lock().unwrap_or_else(PoisonError::into_inner) = Some(work(index, path));
+                }
+            });
+        }
+    });
+    let done = |slot: Mutex<Option<T>>| slot.into_inner().unwrap_or_else(PoisonError::into_inner);
+    results.into_iter().map(|slot| done(slot).expect("every photograph was taken by a thread")).collect()
 }
 
 /// Reads a photograph, finds the marks, draws them in.
@@ -99,12 +122,10 @@ fn observed(
     board: &BoardSpec,
     photos: &[PathBuf],
     seen: Vec<Result<Seen, ImageError>>,
-) -> Result<Observed, String> {
-    let first = photos.iter().zip(&seen).find_map(|(path, seen)| Some((path, seen.as_ref().ok()?.size)));
-    let expected = match (arguments.image_size, first) {
-        (Some(size), _) => Some((size, "--image-size".to_string())),
-        (None, Some((path, size))) => Some((size, path.display().to_string())),
-        (None, None) => None,
+) -> Result<Observed, Failure> {
+    let expected = match arguments.image_size {
+        Some(size) => Some((size, "--image-size has".to_string())),
+        None => ruling_size(&seen)?,
     };
     let points = board.board().points();
     let mut observed = Observed {
@@ -123,7 +144,7 @@ fn observed(
     for (path, seen) in photos.iter().zip(seen) {
         let name = path.display().to_string();
         if let Some(overlay) = seen.as_ref().ok().and_then(|seen| seen.overlay.clone()) {
-            observed.overlays.insert(name.clone(), overlay?);
+            observed.overlays.insert(name.clone(), overlay.map_err(Failure::unwritten)?);
         }
         match view(seen, expected.as_ref(), &points) {
             Ok(view) => {
@@ -134,6 +155,31 @@ fn observed(
         }
     }
     Ok(observed)
+}
+
+type Size = (usize, usize);
+
+/// The size that most photographs with the board have, and who has it. A photograph that does not show the board may be anything.
+///
+/// # Errors
+/// Two sizes that equally many have: nothing says which camera is meant.
+fn ruling_size(seen: &[Result<Seen, ImageError>]) -> Result<Option<(Size, String)>, String> {
+    let mut groups: BTreeMap<Size, usize> = BTreeMap::new();
+    for seen in seen.iter().flatten().filter(|seen| seen.marks.is_ok()) {
+        *groups.entry(seen.size).or_default() += 1;
+    }
+    let Some(most) = groups.values().copied().max() else { return Ok(None) };
+    let largest: Vec<Size> =
+        groups.iter().filter(|(_, count)| **count == most).map(|(size, _)| *size).collect();
+    if let [size] = largest[..] {
+        let with_board: usize = groups.values().sum();
+        return Ok(Some((size, format!("{most} of the {with_board} photographs with the board have"))));
+    }
+    let named: Vec<String> = largest.iter().map(|(width, height)| format!("{width}x{height}")).collect();
+    Err(format!(
+        "the board is seen in {most} photographs of each of the sizes {}: choose one with --image-size, or name those of one camera",
+        named.join(", ")
+    ))
 }
 
 fn view(

@@ -1,17 +1,17 @@
 //! A map of a plane from a file of point pairs.
 
-use super::{Arguments, Exit, Format, print, table};
-use calibench::io::{PointPairs, read_point_pairs, significant, write_atomically};
+use super::{Arguments, Exit, Failure, Format, Mode, print, table};
+use calibench::io::{PointPairs, parse_point_pairs, significant, write_atomically};
 use calibench::planar::{PlaneCalibration, calibrate_plane};
-use std::path::Path;
 
-pub(super) fn run(arguments: &Arguments, file: &Path) -> Result<Exit, String> {
-    let PointPairs { pixels, world, .. } = read_point_pairs(file).map_err(|error| error.to_string())?;
-    let result = calibrate_plane(arguments.mode.into(), &pixels, &world)
-        .map_err(|error| format!("{}: {error}", file.display()))?;
+pub(super) fn run(arguments: &Arguments, file: &str, bytes: &[u8]) -> Result<Exit, Failure> {
+    let PointPairs { pixels, world, .. } =
+        parse_point_pairs(file, bytes).map_err(|error| error.to_string())?;
+    let mode = arguments.mode.unwrap_or(Mode::Planar);
+    let result = calibrate_plane(mode.into(), &pixels, &world).map_err(|error| format!("{file}: {error}"))?;
     let json = plane_json(&result);
     if let Some(folder) = &arguments.out {
-        write_atomically(&folder.join("result.json"), json.as_bytes()).map_err(|error| error.to_string())?;
+        write_atomically(&folder.join("result.json"), json.as_bytes()).map_err(Failure::unwritten)?;
     }
     match arguments.format {
         Format::Json => print(&json),

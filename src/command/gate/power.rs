@@ -23,7 +23,8 @@ pub(super) fn measure(arguments: &Arguments, folder: &Path, samples: usize) -> R
         seed: arguments.seed,
         most: samples,
         clean_seeds: CLEAN_SEEDS,
-        first_clean_seed: FIRST_CLEAN_SEED + 1000 * (arguments.seed - arguments.seed.min(1)),
+        first_clean_seed: FIRST_CLEAN_SEED
+            .wrapping_add(1000u64.wrapping_mul(arguments.seed.saturating_sub(1))),
         clean_samples: QUICK,
         draws: textbook::DRAWS,
     };

@@ -22,7 +22,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
         Spec::parse(&text).map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.display())))?;
     spec.trials.precision = None;
     let threads = rayon::current_num_threads();
-    for trials in [arguments.trials.max(2), 4 * arguments.trials.max(2)] {
+    for trials in [arguments.trials.max(2), arguments.trials.max(2).saturating_mul(4)] {
         spec.trials.per_cell = trials;
         let (started, processor) = (Instant::now(), processor_seconds());
         let engine = in_memory(spec.clone(), &text, |_| {}).map_err(RunError::from)?;

@@ -1,0 +1,123 @@
+//! Which readers meet untrusted bytes? Each as a function of bytes that must end, and must not panic, whatever they are.
+
+use calibench::camera::FreeParameters;
+use calibench::io::image::{parse_extent, parse_image};
+use calibench::io::result::parse_camera;
+use calibench::io::{memory, parse_corners, parse_point_pairs, table};
+use calibench::photos::BoardSpec;
+use calibench_gate::accept::{accept, id_in, read_line};
+use calibench_gate::protocol::{Problem, ProblemView};
+use calibench_harness::golden;
+use calibench_study::{Checkpoint, Manifest, Shard, Spec};
+
+/// The readers by name; the seeds of each stand in `fuzz/seeds/<name>/`.
+pub const READERS: [(&str, fn(&[u8])); 11] = [
+    ("corners", corners),
+    ("pairs", pairs),
+    ("camera", camera),
+    ("study", study),
+    ("manifest", manifest),
+    ("checkpoint", checkpoint),
+    ("answer", answer),
+    ("image", image),
+    ("words", words),
+    ("snapshot", snapshot),
+    ("page", page),
+];
+
+/// Corner files.
+pub fn corners(bytes: &[u8]) {
+    let _ = table::columns(bytes);
+    let _ = parse_corners("corners", bytes);
+}
+
+/// Point pairs.
+pub fn pairs(bytes: &[u8]) {
+    let _ = parse_point_pairs("pairs", bytes);
+}
+
+/// Results and cameras.
+pub fn camera(bytes: &[u8]) {
+    let _ = parse_camera("camera", &String::from_utf8_lossy(bytes));
+}
+
+/// Most points that a study of these tests places: above, it would take long, and be right to.
+const FEW_POINTS: usize = 5000;
+/// Scenes that are drawn for a cell whose trials draw poses of their own.
+const DRAWS: usize = 200;
+
+/// Studies, and the cells of those that are small.
+pub fn study(bytes: &[u8]) {
+    let text = String::from_utf8_lossy(bytes);
+    let Ok(spec) = Spec::parse(&text) else { return };
+    let levels = spec.factor.iter().fold(1usize, |product, f| product.saturating_mul(f.levels.len()));
+    let target = spec.scene.target;
+    let marks = target.columns.saturating_mul(target.rows);
+    let draws = if spec.scene.poses.redraws() { DRAWS } else { 1 };
+    let size = marks.saturating_mul(spec.scene.poses.views()).saturating_mul(levels).saturating_mul(draws);
+    // Too large is refused before any work, as small is done at once; between them, poses that are drawn anew take long.
+    if size <= FEW_POINTS || marks > calibench::board::Board::MOST_MARKS {
+        let _ = spec.cells(&text);
+    }
+}
+
+/// Manifests.
+pub fn manifest(bytes: &[u8]) {
+    let _ = serde_json::from_slice::<Manifest>(bytes);
+}
+
+/// Checkpoints.
+pub fn checkpoint(bytes: &[u8]) {
+    let _ = serde_json::from_slice::<Checkpoint>(bytes);
+}
+
+/// Answers of a solver, read and checked.
+pub fn answer(bytes: &[u8]) {
+    let line = String::from_utf8_lossy(bytes);
+    let _ = id_in(&line);
+    let problem = Problem {
+        id: "a".into(),
+        image_size: [640, 480],
+        views: vec![ProblemView { target: vec![[0.0, 0.0]], pixels: vec![[0.0, 0.0]] }],
+        free: ["fx", "fy", "cx", "cy"].map(String::from).into(),
+        held: [("k1".to_string(), 0.0)].into(),
+    };
+    if let Ok(answer) = read_line(&line) {
+        let _ = accept(&problem, answer);
+    }
+}
+
+/// Memory for an image in these tests.
+const MEMORY: u64 = 64 << 20;
+
+/// Images behind the limits of size and memory.
+pub fn image(bytes: &[u8]) {
+    if parse_extent(bytes, "image").is_ok_and(|extent| extent.memory_to_detect() <= MEMORY) {
+        let _ = parse_image(bytes, "image");
+    }
+}
+
+/// Boards, parameters, shards and sizes as they stand on the command line.
+pub fn words(bytes: &[u8]) {
+    let text = String::from_utf8_lossy(bytes);
+    if let Ok(board) = text.parse::<BoardSpec>() {
+        let _ = (board.to_string(), board.board().points());
+    }
+    let _ = text.parse::<FreeParameters>();
+    let _ = text.parse::<Shard>();
+    let _ = memory::parse_bytes(&text);
+}
+
+/// Golden snapshots: the first half of the bytes against the second, and against itself.
+pub fn snapshot(bytes: &[u8]) {
+    let text = String::from_utf8_lossy(bytes);
+    let contents = golden::contents(&text);
+    let middle = (0..=contents.len() / 2).rev().find(|at| contents.is_char_boundary(*at)).unwrap_or(0);
+    let _ = golden::compare(&contents[..middle], &contents[middle..]);
+    let _ = golden::compare(contents, contents);
+}
+
+/// Pages of the book with their placeholders.
+pub fn page(bytes: &[u8]) {
+    let _ = calibench_book::pieces_of(&String::from_utf8_lossy(bytes));
+}

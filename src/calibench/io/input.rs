@@ -1,0 +1,143 @@
+//! How much may come in? Regular files of a known length only: nothing blocks, and nothing grows without end.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+/// Pixels along a side of an image, as a file or a user states it: thirty times the widest sensor.
+pub const MOST_SIDE_PX: usize = 1 << 20;
+/// Bytes of a table or a result: a corner file of 100 000 views has 0.4 GB.
+pub const MOST_TABLE_BYTES: u64 = 1 << 30;
+/// Bytes of a study's file, a manifest or a checkpoint.
+pub const MOST_SPEC_BYTES: u64 = 1 << 24;
+/// Bytes of an image file: what a photograph of the largest size takes without compression, at 16 bits a sample and four samples.
+pub const MOST_IMAGE_BYTES: u64 = 1_600_000_000;
+
+/// Why a file is not read.
+#[derive(Debug, thiserror::Error)]
+pub enum InputError {
+    /// The system does not give it.
+    #[error("{path}: {source}")]
+    Open {
+        /// The file.
+        path: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A pipe may block for ever, a device never end, and a folder has no bytes.
+    #[error("{path}: {kind}, not a regular file: copy what it gives into a file{hint}")]
+    NotRegular {
+        /// The path.
+        path: String,
+        /// What it is.
+        kind: &'static str,
+        /// Another way, where there is one.
+        hint: &'static str,
+    },
+    /// More memory than photographs may take.
+    #[error("{path}: needs some {needed} bytes of memory, and the limit is {most}: see --memory")]
+    NeedsMemory {
+        /// The file.
+        path: String,
+        /// What it would take.
+        needed: u64,
+        /// What there is.
+        most: u64,
+    },
+    /// Longer than anything that is meant to be read.
+    #[error("{path}: at least {bytes} bytes, and the limit is {most}")]
+    TooLong {
+        /// The file.
+        path: String,
+        /// Its length, as far as it is known.
+        bytes: u64,
+        /// The most there may be.
+        most: u64,
+    },
+}
+
+/// Opens a regular file of at most `most` bytes, and tells its length. It is looked at before it is opened, since opening a pipe blocks.
+///
+/// # Errors
+/// See [`InputError`].
+pub fn open_regular(path: &Path, most: u64) -> Result<(File, u64), InputError> {
+    let name = || path.display().to_string();
+    let failed = |source| InputError::Open { path: name(), source };
+    let seen = std::fs::metadata(path).map_err(failed)?;
+    if !seen.is_file() {
+        let kind = if seen.is_dir() { "a folder" } else { "a pipe or a device" };
+        return Err(InputError::NotRegular { path: name(), kind, hint: "" });
+    }
+    if seen.len() > most {
+        return Err(InputError::TooLong { path: name(), bytes: seen.len(), most });
+    }
+    Ok((File::open(path).map_err(failed)?, seen.len()))
+}
+
+/// The bytes of a regular file.
+///
+/// # Errors
+/// See [`InputError`]; a file that grows beyond the limit while it is read is too long as well.
+pub fn read_regular(path: &Path, most: u64) -> Result<Vec<u8>, InputError> {
+    let (file, length) = open_regular(path, most)?;
+    read_at_most(file, &path.display().to_string(), length as usize, most)
+}
+
+/// The text of a regular file.
+///
+/// # Errors
+/// See [`InputError`]; text that is not UTF-8 counts as unreadable.
+pub fn read_regular_text(path: &Path, most: u64) -> Result<String, InputError> {
+    String::from_utf8(read_regular(path, most)?).map_err(|error| InputError::Open {
+        path: path.display().to_string(),
+        source: io::Error::new(io::ErrorKind::InvalidData, error.utf8_error()),
+    })
+}
+
+/// All bytes of a file that the user named, where `-` is standard input.
+///
+/// # Errors
+/// See [`InputError`].
+pub fn read_named(path: &Path, most: u64) -> Result<Vec<u8>, InputError> {
+    if path.as_os_str() == "-" {
+        return read_at_most(io::stdin().lock(), "standard input", 0, most);
+    }
+    read_regular(path, most).map_err(|error| match error {
+        InputError::NotRegular { path, kind, .. } => {
+            InputError::NotRegular { path, kind, hint: ", or send it to standard input and name it -" }
+        }
+        error => error,
+    })
+}
+
+fn read_at_most(input: impl Read, name: &str, expected: usize, most: u64) -> Result<Vec<u8>, InputError> {
+    let mut bytes = Vec::with_capacity(expected);
+    let read = input.take(most + 1).read_to_end(&mut bytes);
+    read.map_err(|source| InputError::Open { path: name.to_string(), source })?;
+    if bytes.len() as u64 > most {
+        return Err(InputError::TooLong { path: name.to_string(), bytes: bytes.len() as u64, most });
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_regular_file_or_too_long_is_refused_unread() {
+        let folder = std::env::temp_dir();
+        assert!(matches!(read_regular(&folder, 9), Err(InputError::NotRegular { kind: "a folder", .. })));
+        let long = folder.join(format!("calibench-input-{}", std::process::id()));
+        std::fs::write(&long, [7; 10]).unwrap();
+        assert!(matches!(read_regular(&long, 9), Err(InputError::TooLong { bytes: 10, most: 9, .. })));
+        assert_eq!(read_regular(&long, 10).unwrap(), [7; 10]);
+        std::fs::remove_file(&long).unwrap();
+        assert!(matches!(
+            read_at_most(io::repeat(1), "x", 0, 99),
+            Err(InputError::TooLong { bytes: 100, .. })
+        ));
+        #[cfg(unix)]
+        assert!(matches!(read_regular(Path::new("/dev/zero"), 9), Err(InputError::NotRegular { .. })));
+    }
+}

@@ -1,0 +1,441 @@
+//! What does the command do with input that nobody means well? It says what is wrong, in time and in little memory, and loses nothing.
+#![cfg(target_os = "linux")]
+
+#[allow(dead_code, reason = "other tests use the rest")]
+mod study;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+const CALIBENCH: &str = env!("CARGO_BIN_EXE_calibench");
+
+/// An empty folder of this test's own.
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).expect("a folder is made");
+    folder
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// Address space that a run may take: threads reserve much and use little.
+const ADDRESS_SPACE_KIB: u64 = 4 << 20;
+/// Time within which a refusal must come. It takes a few milliseconds; this is for a machine with other work.
+const PATIENCE: Duration = Duration::from_secs(20);
+/// The same for a small study, which takes a second of work.
+const PATIENCE_FOR_WORK: Duration = Duration::from_secs(300);
+
+/// Runs the command with little memory, to its end.
+fn limited(folder: &Path, arguments: &[&str]) -> Output {
+    within(PATIENCE_FOR_WORK, folder, arguments)
+}
+
+/// Runs the command with little memory and little time.
+fn within(patience: Duration, folder: &Path, arguments: &[&str]) -> Output {
+    let script =
+        format!("ulimit -v {ADDRESS_SPACE_KIB}; exec timeout -s KILL {} \"$0\" \"$@\"", patience.as_secs());
+    let started = Instant::now();
+    let output = Command::new("sh")
+        .args(["-c", &script, CALIBENCH])
+        .args(arguments)
+        .current_dir(folder)
+        .stdin(Stdio::null())
+        .output()
+        .expect("the program starts");
+    assert!(started.elapsed() < patience, "{arguments:?} took {:?}", started.elapsed());
+    output
+}
+
+/// Ends with 2, and says all of `words`.
+fn refused(folder: &Path, arguments: &[&str], words: &[&str]) {
+    let output = within(PATIENCE, folder, arguments);
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+    for word in words {
+        assert!(said.contains(word), "{arguments:?} does not say `{word}`: {said}");
+    }
+    assert!(!said.contains("panicked"), "{said}");
+}
+
+#[test]
+fn sizes_beyond_their_limits_are_refused_at_once_with_what_they_would_need() {
+    let folder = folder("sizes");
+    let change = |name: &str, from: &str, to: &str| {
+        let spec = study::SPEC.replace(from, to);
+        assert_ne!(spec, study::SPEC, "{from}");
+        fs::write(folder.join(name), spec).expect("a study is written");
+    };
+    let levels = |count: usize| (1..=count).map(|i| format!("{i}.0")).collect::<Vec<_>>().join(", ");
+    let factors: String = ["spacing", "outlier"]
+        .iter()
+        .zip(["scene.target.spacing_mm", "scene.outlier_px"])
+        .map(|(name, path)| {
+            format!("[[factor]]\nname = \"{name}\"\nset = [\"{path}\"]\nlevels = [{}]\n", levels(50_000))
+        })
+        .collect();
+    let cases: [(&str, &str, &str, &[&str]); 8] = [
+        (
+            "batch",
+            "per_cell = 45\nbatch = 10",
+            "per_cell = 9000000000\nbatch = 9000000000",
+            &["9000000000 trials a batch", "limit"],
+        ),
+        (
+            "trials",
+            "per_cell = 45",
+            "per_cell = 9223372036854775807",
+            &["18446744073709551614 trials in all cells", "limit"],
+        ),
+        ("columns", "columns = 9", "columns = 1000000000", &["1000000000 x 7", "1000000"]),
+        ("marks", "columns = 9, rows = 7", "columns = 20000, rows = 20000", &["20000 x 20000", "1000000"]),
+        ("views", "views = 3,", "views = 1000000000,", &["63000000000 points a trial", "limit"]),
+        (
+            "level",
+            "set = [\"scene.noise_px\"]\nlevels = [0.1, 0.3]",
+            "set = [\"scene.poses.views\"]\nlevels = [3, 1000000000]",
+            &["63000000000 points a trial", "limit"],
+        ),
+        ("cells", "[[factor]]", &format!("{factors}[[factor]]"), &["5000000000 cells", "limit"]),
+        ("image", "image = [640, 480]", "image = [640, 9000000000]", &["9000000000", "1048576"]),
+    ];
+    for (name, from, to, words) in cases {
+        change(name, from, to);
+        refused(&folder, &["study", "run", name, "--out", "out"], words);
+        assert!(!folder.join("out").exists(), "{name}: nothing is begun");
+    }
+    for board in ["circles:99999999999x9:1", "dots:100000x100000:1", "circles:18446744073709551615x2:1"] {
+        refused(&folder, &["calibrate", "--board", board, "none.png"], &["1000000"]);
+    }
+    fs::write(folder.join("plan.toml"), study::SPEC).expect("a study is written");
+    let plan = ["study", "plan", "plan.toml", "--want", "fx=1"];
+    refused(&folder, &[&plan[..], &["--most-views", "1000000000"]].concat(), &["63000000000 points a trial"]);
+    refused(&folder, &["study", "measure", "plan.toml", "--trials", "18446744073709551615"], &["limit"]);
+    refused(&folder, &["study", "run", "plan.toml", "--shard", "0/1000000000000"], &["1000000"]);
+    refused(&folder, &["gate", "--samples", "1000000000000"], &["100000"]);
+    refused(&folder, &["gate", "--jobs", "1000000000", "--solver", "true"], &["1024"]);
+    refused(&folder, &["gate", "--timeout", "1e300", "--solver", "true"], &["a day"]);
+    let many = ["ninepoint", "none.png", "--columns", "4294967296", "--rows", "4294967296"];
+    refused(&folder, &many, &["1000000"]);
+}
+
+/// The small study with one set of poses for all trials, which begins at once.
+fn fixed_poses() -> String {
+    study::SPEC.replace(", redraw = true", "")
+}
+
+#[test]
+fn a_study_of_a_million_million_trials_begins_at_once_and_hears_an_interrupt() {
+    let folder = folder("long-study");
+    let spec = fixed_poses().replace("per_cell = 45\nbatch = 10", "per_cell = 100000000000000\nbatch = 7");
+    fs::write(folder.join("spec.toml"), &spec).expect("a study is written");
+    // A part of many: batches of other parts are passed over without being looked at.
+    for shard in ["0/1", "999999/1000000"] {
+        let _ = fs::remove_dir_all(folder.join("out"));
+        let mut child = Command::new(CALIBENCH)
+            .args(["study", "run", "spec.toml", "--out", "out", "--shard", shard])
+            .current_dir(&folder)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the program starts");
+        let started = Instant::now();
+        let trials = || fs::read_to_string(folder.join("out/trials.csv")).unwrap_or_default().lines().count();
+        while trials() < 8 && started.elapsed() < PATIENCE_FOR_WORK {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let killed = Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill");
+        assert!(killed.success() && trials() >= 8, "no trials after {:?}", started.elapsed());
+        let status = child.wait().expect("it ends");
+        assert_eq!(status.code(), Some(3), "{shard}");
+    }
+}
+
+#[test]
+fn more_threads_than_any_machine_has_are_refused() {
+    let folder = folder("threads");
+    refused(&folder, &["--threads", "100000000", "list"], &["100000000", "1024"]);
+    let output = Command::new(CALIBENCH)
+        .arg("list")
+        .env("RAYON_NUM_THREADS", "100000000")
+        .output()
+        .expect("the program starts");
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+}
+
+/// The chapter's corners, exact, as a corner file: four views of 640 x 480 px.
+fn corner_file() -> String {
+    let scene = calibench::synth::Scene::chapter();
+    let mut text = "view,point,X,Y,u,v\n".to_string();
+    for (view, seen) in scene.exact().iter().enumerate() {
+        for (point, (at, pixel)) in seen.pairs().enumerate() {
+            text.push_str(&format!("{view},{point},{},{},{},{}\n", at.x, at.y, pixel.x, pixel.y));
+        }
+    }
+    text
+}
+
+const PAIRS: &str = "point,px,py,X,Y\n0,0,0,0,0\n1,100,0,1,0\n2,0,100,0,1\n3,100,101,1,1\n";
+
+#[test]
+fn a_photograph_that_needs_more_memory_than_there_is_is_refused_before_it_is_decoded() {
+    let folder = folder("memory");
+    // 14000 x 14000 px of 16 bits, of which the file has none.
+    fs::write(folder.join("large.pgm"), "P5\n14000 14000\n65535\n").expect("written");
+    let camera = r#"{"camera": {"fx": 600, "fy": 600, "cx": 320, "cy": 240}}"#;
+    fs::write(folder.join("camera.json"), camera).expect("written");
+    let need = ["large.pgm: needs some 3136000000 bytes of memory", "limit is 2147483648", "--memory"];
+    refused(&folder, &["calibrate", "--board", "dots:3x3:1", "large.pgm"], &need);
+    refused(&folder, &["ninepoint", "large.pgm"], &need);
+    let more = ["large.pgm: needs some 7840000000 bytes of memory", "--memory"];
+    refused(&folder, &["undistort", "--camera", "camera.json", "--out", "o", "large.pgm"], &more);
+    // With the memory it asks for, the file is found to be cut off.
+    refused(&folder, &["ninepoint", "--memory", "8GiB", "large.pgm"], &["broken image"]);
+    refused(&folder, &["ninepoint", "--memory", "much", "large.pgm"], &["2GiB"]);
+}
+
+#[test]
+fn marks_outside_of_the_image_are_refused_and_swapped_sides_are_named() {
+    let folder = folder("image-size");
+    fs::write(folder.join("c.csv"), corner_file()).expect("written");
+    let with = |size: &'static str| ["calibrate", "c.csv", "--image-size", size];
+    assert_eq!(limited(&folder, &with("640x480")).status.code(), Some(0));
+    refused(&folder, &with("480x640"), &["outside", "640x480", "swapped"]);
+    refused(&folder, &with("10x10"), &["lie outside of the image of 10 x 10 px"]);
+    refused(&folder, &with("18446744073709551615x18446744073709551615"), &["1048576"]);
+    refused(&folder, &with("36893488147419103232x480"), &["expected WIDTHxHEIGHT"]);
+}
+
+#[test]
+fn options_that_contradict_each_other_or_the_input_are_refused() {
+    let folder = folder("contradictions");
+    fs::write(folder.join("c.csv"), corner_file()).expect("written");
+    fs::write(folder.join("p.csv"), PAIRS).expect("written");
+    let calibrate = |rest: &[&'static str]| [&["calibrate"], rest].concat();
+    let fine: [&[&str]; 3] = [
+        &["c.csv", "--fix", "k2=0.05"],
+        &["c.csv", "--free", "fx,fy", "--fix", "k1=0", "--image-size", "640x480"],
+        &["p.csv"],
+    ];
+    for rest in fine {
+        let output = limited(&folder, &calibrate(rest));
+        assert_eq!(output.status.code(), Some(0), "{rest:?}: {}", text(&output.stderr));
+    }
+    let wrong: [(&[&str], &str); 9] = [
+        (&["c.csv", "--free", "fx,fy", "--fix", "fx=600"], "fx is in --free and in --fix"),
+        (&["c.csv", "--fix", "fx=600", "--fix", "fx=700"], "--fix gives fx more than once"),
+        (&["c.csv", "--mode", "tilted"], "--mode is for point pairs"),
+        (&["--board", "dots:3x3:1", "a.png", "--mode", "planar"], "--mode is for point pairs"),
+        (&["p.csv", "--free", "fx"], "--free is for a camera"),
+        (&["p.csv", "--fix", "fx=600"], "--fix is for a camera"),
+        (&["p.csv", "--image-size", "640x480"], "--image-size is for a camera"),
+        (&["p.csv", "--loss", "huber:1"], "--loss is for a camera"),
+        (&["p.csv", "--reject-views", "3"], "--reject-views is for a camera"),
+    ];
+    for (rest, word) in wrong {
+        refused(&folder, &calibrate(rest), &[word]);
+    }
+    refused(&folder, &["gate", "--record", "r", "--against", "builtin"], &["cannot be used with"]);
+}
+
+#[test]
+fn a_pipe_blocks_nobody_and_headers_are_read_as_csv_has_them() {
+    let folder = folder("inputs");
+    let made = Command::new("mkfifo").arg(folder.join("pipe")).status().expect("mkfifo");
+    assert!(made.success());
+    fs::write(folder.join("camera.json"), r#"{"camera": {"fx": 600, "fy": 600, "cx": 320, "cy": 240}}"#)
+        .expect("written");
+    refused(&folder, &["calibrate", "pipe"], &["pipe", "not a regular file", "name it -"]);
+    refused(&folder, &["calibrate", "--board", "dots:3x3:1", "pipe"], &["not a regular file"]);
+    refused(&folder, &["ninepoint", "pipe"], &["not a regular file"]);
+    refused(&folder, &["undistort", "--camera", "pipe", "--out", "o", "a.png"], &["not a regular file"]);
+    refused(
+        &folder,
+        &["undistort", "--camera", "camera.json", "--out", "o", "pipe"],
+        &["not a regular file"],
+    );
+    refused(&folder, &["study", "run", "pipe"], &["not a regular file"]);
+    refused(&folder, &["calibrate", "/dev/zero"], &["not a regular file"]);
+    refused(&folder, &["calibrate", "."], &["a folder"]);
+    let quoted = PAIRS.replacen("point,px,py,X,Y", "\"point\",\"px\",\"py\",\"X\",\"Y\"", 1);
+    // `px` comes first, behind the mark.
+    let marked = "\u{feff}px,point,py,X,Y\n0,0,0,0,0\n100,1,0,1,0\n0,2,100,0,1\n100,3,101,1,1\n".to_string();
+    for (name, pairs) in [("quoted", quoted), ("marked", marked)] {
+        fs::write(folder.join(name), pairs).expect("written");
+        let output = limited(&folder, &["calibrate", name]);
+        assert!(text(&output.stdout).contains("world from pixel"), "{name}: {}", text(&output.stderr));
+    }
+    let mut child = Command::new(CALIBENCH)
+        .args(["calibrate", "-"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let mut input = child.stdin.take().expect("a pipe");
+    std::io::Write::write_all(&mut input, PAIRS.as_bytes()).expect("it reads");
+    drop(input);
+    let output = child.wait_with_output().expect("it ends");
+    assert!(text(&output.stdout).contains("world from pixel"), "{output:?}");
+}
+
+/// Peak resident memory of a run, KiB, while it was watched.
+fn peak_kib(child: &mut std::process::Child) -> u64 {
+    let path = format!("/proc/{}/status", child.id());
+    let mut peak = 0;
+    while child.try_wait().expect("it is ours").is_none() {
+        let status = fs::read_to_string(&path).unwrap_or_default();
+        let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        peak = peak.max(line.and_then(|l| l.split_whitespace().next()?.parse().ok()).unwrap_or(0));
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    peak
+}
+
+#[test]
+fn a_solver_that_writes_without_end_is_a_finding_and_takes_no_memory() {
+    // Without a newline, and line after line.
+    for (solver, finding) in [
+        ("cat /dev/zero", "a line of more than 1048576 bytes"),
+        ("yes '{\"id\": \"another\", \"status\": \"refused\"}'", "1000 lines and no answer among them"),
+    ] {
+        let mut gate = Command::new(CALIBENCH)
+            .args(["gate", "--samples", "1", "--timeout", "20", "--solver", solver])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        let peak = peak_kib(&mut gate);
+        let output = gate.wait_with_output().expect("it ends");
+        assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+        assert!(text(&output.stderr).contains(finding), "{solver}: {}", text(&output.stderr));
+        // The gate itself takes some 30 MB, lines that are read ahead 16 MB at most.
+        assert!(peak < 200 * 1024, "{solver}: {peak} KiB");
+    }
+}
+
+/// Whether a process runs; one that has ended and was not waited for does not.
+fn runs(id: &str) -> bool {
+    let stat = fs::read_to_string(format!("/proc/{}/stat", id.trim())).unwrap_or_default();
+    stat.rsplit_once(')').is_some_and(|(_, rest)| !rest.trim_start().starts_with('Z'))
+}
+
+#[test]
+fn what_a_solver_started_in_sessions_of_its_own_ends_with_the_gate() {
+    let folder = folder("sessions");
+    // One leaves the process group, one its parent too, one also clears its environment.
+    let solver = "setsid sh -c 'echo $$ > a; exec sleep 1000' & \
+         (setsid sh -c 'echo $$ > b; exec sleep 1000' &) ; \
+         (env -i PATH=\"$PATH\" setsid sh -c 'echo $$ > c; exec sleep 1000' &) ; \
+         while [ ! -s a ] || [ ! -s b ] || [ ! -s c ]; do sleep 0.05; done; exit 1";
+    // What they started holds the solver's pipes open, so each start lasts until its time is over.
+    let gate = Command::new(CALIBENCH)
+        .args(["gate", "--samples", "1", "--timeout", "3", "--solver", solver])
+        .current_dir(&folder)
+        .output()
+        .expect("the program starts");
+    assert_eq!(gate.status.code(), Some(1), "{}", text(&gate.stderr));
+    for name in ["a", "b", "c"] {
+        let id = fs::read_to_string(folder.join(name)).expect("it started");
+        assert!(!runs(&id), "{name} still runs");
+    }
+}
+
+#[test]
+fn what_a_solver_says_cannot_command_the_terminal() {
+    let solver = "printf '\\033]0;owned\\007\\033[2J\\n'; printf '\\033[31mred' >&2; sleep 0.1; exit 1";
+    let gate = Command::new(CALIBENCH)
+        .args(["gate", "--samples", "1", "--solver", solver])
+        .output()
+        .expect("the program starts");
+    for stream in [&gate.stdout, &gate.stderr] {
+        assert!(!stream.contains(&0x1b) && !stream.contains(&0x07), "{}", text(stream));
+    }
+    assert!(text(&gate.stderr).contains("\\u001b"), "{}", text(&gate.stderr));
+}
+
+#[test]
+fn a_recorded_run_is_judged_like_any_other_and_keeps_answers_that_failed() {
+    let folder = folder("record");
+    // This solver answers one problem and ends: the rest is broken.
+    let solver = "read line; echo 'no answer'; exit 1";
+    let gate = |rest: &[&str]| {
+        let arguments = [&["gate", "--samples", "2", "--timeout", "5"][..], rest].concat();
+        Command::new(CALIBENCH).args(arguments).current_dir(&folder).output().expect("the program starts")
+    };
+    let recorded = gate(&["--solver", solver, "--record", "r", "--json", "recorded.json"]);
+    assert_eq!(recorded.status.code(), Some(1), "{}", text(&recorded.stderr));
+    assert!(text(&recorded.stdout).contains("NOT TRUSTED"), "{}", text(&recorded.stdout));
+    let lines =
+        |name: &str| fs::read_to_string(folder.join("r").join(name)).expect("written").lines().count();
+    assert_eq!(lines("answers.jsonl"), lines("problems.jsonl"), "every problem has a line");
+    let again = gate(&["--judge", "r", "--json", "judged.json"]);
+    assert_eq!(again.status.code(), Some(1), "{}", text(&again.stderr));
+    let verdicts = |name: &str| -> Vec<serde_json::Value> {
+        let report = fs::read_to_string(folder.join(name)).expect("written");
+        let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
+        let checks = report["checks"].as_array().expect("checks").iter();
+        checks.map(|c| serde_json::json!([c["property"], c["scenario"], c["verdict"]])).collect()
+    };
+    assert_eq!(verdicts("recorded.json"), verdicts("judged.json"));
+}
+
+#[test]
+fn a_folder_that_is_named_twice_has_a_message_of_its_own() {
+    let folder = folder("twice");
+    fs::write(folder.join("spec.toml"), fixed_poses()).expect("written");
+    for shard in ["0/2", "1/2"] {
+        let out = format!("p{}", &shard[..1]);
+        let run = limited(&folder, &["study", "run", "spec.toml", "--shard", shard, "--out", &out]);
+        assert_eq!(run.status.code(), Some(0), "{}", text(&run.stderr));
+    }
+    refused(&folder, &["study", "merge", "p0", "p1", "./p1", "--out", "w"], &["./p1 is named twice"]);
+    refused(&folder, &["study", "merge", "p0", "p1", "--out", "p1"], &["p1 is one of the parts"]);
+    refused(&folder, &["study", "compare", "p0", "./p0"], &["named twice"]);
+}
+
+#[test]
+fn what_a_killed_write_left_is_removed_when_the_run_goes_on() {
+    let folder = folder("leftovers");
+    fs::write(folder.join("spec.toml"), fixed_poses()).expect("written");
+    assert_eq!(limited(&folder, &["study", "run", "spec.toml", "--out", "r"]).status.code(), Some(0));
+    let left =
+        [".checkpoint.json.4242.7.tmp", "figures/.spread.svg.4242.9.tmp"].map(|n| folder.join("r").join(n));
+    left.iter().for_each(|path| fs::write(path, "half").expect("written"));
+    assert_eq!(limited(&folder, &["study", "resume", "r"]).status.code(), Some(0));
+    left.iter().for_each(|path| assert!(!path.exists(), "{} is still there", path.display()));
+}
+
+/// A file system of 64 kB, or `None` where this user may not mount one.
+fn small_disk(folder: &Path) -> Option<PathBuf> {
+    let disk = folder.join("disk");
+    fs::create_dir_all(&disk).expect("a folder is made");
+    let mount =
+        Command::new("mount").args(["-t", "tmpfs", "-o", "size=64k", "calibench"]).arg(&disk).output();
+    mount.ok()?.status.success().then_some(disk)
+}
+
+#[test]
+fn a_full_disk_is_not_wrong_usage_and_its_file_is_named_once() {
+    let folder = folder("full-disk");
+    let Some(disk) = small_disk(&folder) else {
+        println!("skipped: this user may not mount a small file system");
+        return;
+    };
+    fs::write(disk.join("fill"), vec![0; 60_000]).expect("the disk takes so much");
+    fs::write(folder.join("c.csv"), corner_file()).expect("written");
+    fs::write(folder.join("spec.toml"), fixed_poses()).expect("written");
+    let cases: [&[&str]; 2] =
+        [&["calibrate", "c.csv", "--out", "disk/out"], &["study", "run", "spec.toml", "--out", "disk/run"]];
+    let outputs = cases.map(|arguments| limited(&folder, arguments));
+    let unmounted = Command::new("umount").arg(&disk).status().expect("umount");
+    assert!(unmounted.success());
+    for output in outputs {
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(3), "{said}");
+        assert_eq!(said.matches("disk/").count(), 1, "the path stands once: {said}");
+    }
+}

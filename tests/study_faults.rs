@@ -1,0 +1,269 @@
+//! What does a study lose when everything that can fail does? At every write, by kill -9 at any moment, on a full disk, with a rival.
+
+#[allow(dead_code, reason = "other tests use the rest")]
+mod study;
+
+use calibench::io::files::{Disk, Files};
+use calibench::synth::{Stream, StreamKey};
+use calibench_study::{Engine, Folder, FolderError, Manifest, Outcome, RunError, Shard, TrialFile, finish};
+use std::fs::{self, File};
+use std::io;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
+use std::time::Duration;
+use study::{assert_same, scratch};
+
+/// How an operation fails.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Fault {
+    /// As if the process were killed: a write is torn, and nothing is done after it.
+    Killed,
+    /// The disk is full: writes are torn from here on, all else works.
+    Full,
+}
+
+/// A disk on which the operation of a given number fails.
+#[derive(Debug)]
+struct Failing {
+    left: AtomicI64,
+    fault: Fault,
+}
+
+impl Failing {
+    fn at(operation: i64, fault: Fault) -> Arc<Failing> {
+        Arc::new(Failing { left: AtomicI64::new(operation), fault })
+    }
+
+    /// Whether the operations that still work are used up.
+    fn fails(&self) -> bool {
+        self.left.fetch_sub(1, Ordering::SeqCst) <= 0
+    }
+
+    fn has_failed(&self) -> bool {
+        self.left.load(Ordering::SeqCst) < 0
+    }
+
+    /// An operation that needs no room.
+    fn do_unless_killed(&self, work: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
+        if self.fails() && self.fault == Fault::Killed {
+            return Err(io::Error::other("killed"));
+        }
+        work()
+    }
+}
+
+impl Files for Failing {
+    fn make_folder(&self, path: &Path) -> io::Result<()> {
+        self.do_unless_killed(|| Disk.make_folder(path))
+    }
+
+    fn write(&self, file: &mut File, bytes: &[u8]) -> io::Result<()> {
+        let was_killed = self.has_failed() && self.fault == Fault::Killed;
+        if !self.fails() {
+            return Disk.write(file, bytes);
+        }
+        if !was_killed {
+            Disk.write(file, &bytes[..bytes.len() / 2])?;
+        }
+        Err(io::Error::from(io::ErrorKind::StorageFull))
+    }
+
+    fn sync(&self, file: &File) -> io::Result<()> {
+        self.do_unless_killed(|| Disk.sync(file))
+    }
+
+    fn cut(&self, file: &File, length: u64) -> io::Result<()> {
+        self.do_unless_killed(|| Disk.cut(file, length))
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        self.do_unless_killed(|| Disk.rename(from, to))
+    }
+
+    fn remove(&self, path: &Path) -> io::Result<()> {
+        self.do_unless_killed(|| Disk.remove(path))
+    }
+}
+
+/// Two cells, three batches each, one set of poses: many runs take little time.
+fn spec() -> String {
+    study::SPEC
+        .replace(", redraw = true", "")
+        .replace("per_cell = 45", "per_cell = 10")
+        .replace("batch = 10", "batch = 4")
+}
+
+const BATCH: u64 = 4;
+
+/// Begins the run, or goes on where it is, through the given operations; trials that were told of.
+fn go_on(files: Arc<dyn Files>, path: &Path, manifest: &Manifest, told: &mut u64) -> Result<(), RunError> {
+    let folder = match path.join("manifest.json").exists() {
+        true => Folder::open_on(files, path)?,
+        false => Folder::create_on(files, path, &spec(), manifest)?,
+    };
+    folder.check(manifest)?;
+    let mut engine = Engine::new(&folder.read("spec.toml")?, Shard::WHOLE)?;
+    let outcome =
+        folder.run(&mut engine, &AtomicBool::new(false), |pace| *told = pace.before + pace.trials)?;
+    assert_eq!(outcome, Outcome::Complete);
+    finish(&folder, &engine)?;
+    Ok(())
+}
+
+/// Trials that the checkpoint vouches for.
+fn kept(path: &Path) -> u64 {
+    let text = fs::read_to_string(path.join("checkpoint.json")).unwrap_or_default();
+    let checkpoint: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
+    checkpoint["batches"].as_u64().unwrap_or(0)
+}
+
+#[test]
+fn a_run_that_fails_at_any_operation_loses_its_last_batch_at_most_and_ends_in_the_same_bytes() {
+    let whole = scratch("faults-whole");
+    study::run(&whole, &spec(), Shard::WHOLE, TrialFile::Csv);
+    let engine = Engine::new(&spec(), Shard::WHOLE).unwrap();
+    let manifest = Manifest::new(&engine.spec, Shard::WHOLE, None);
+    for fault in [Fault::Killed, Fault::Full] {
+        let mut operation = 0;
+        loop {
+            let path = scratch("faults");
+            let (failing, mut told) = (Failing::at(operation, fault), 0);
+            let ended = go_on(failing.clone(), &path, &manifest, &mut told);
+            if ended.is_ok() && !failing.has_failed() {
+                fs::remove_dir_all(path).unwrap();
+                break;
+            }
+            // On a full disk what follows the last write may well succeed.
+            assert!(
+                ended.is_err() || fault == Fault::Full,
+                "operation {operation} failed and nobody said so"
+            );
+            assert!(kept(&path) * BATCH >= told.saturating_sub(BATCH), "{fault:?} at {operation}");
+            go_on(Arc::new(Disk), &path, &manifest, &mut told).unwrap();
+            assert_same(&whole, &path);
+            let leftover = fs::read_dir(&path)
+                .unwrap()
+                .flatten()
+                .any(|entry| entry.file_name().to_string_lossy().ends_with(".tmp"));
+            assert!(!leftover, "{fault:?} at {operation}");
+            fs::remove_dir_all(path).unwrap();
+            operation += 1;
+        }
+        assert!(operation > 40, "{fault:?}: {operation} operations are too few to be all");
+    }
+    fs::remove_dir_all(whole).unwrap();
+}
+
+fn command(arguments: &[&str], folder: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_calibench"));
+    command.args(arguments).current_dir(folder).stdout(Stdio::null()).stderr(Stdio::piped());
+    command
+}
+
+/// Times that a run is killed.
+const KILLS: u64 = 200;
+
+#[test]
+fn a_run_that_is_killed_two_hundred_times_ends_in_the_same_bytes() {
+    let folder = scratch("kills");
+    fs::create_dir_all(&folder).unwrap();
+    let long = study::SPEC
+        .replace(", redraw = true", "")
+        .replace("per_cell = 45", "per_cell = 4000")
+        .replace("batch = 10", "batch = 5");
+    fs::write(folder.join("spec.toml"), long).unwrap();
+    let run = |arguments: &[&str]| command(arguments, &folder).spawn().unwrap();
+    let ended = |child: Child| child.wait_with_output().unwrap();
+    assert!(ended(run(&["study", "run", "spec.toml", "--out", "whole"])).status.success());
+    let mut moments = Stream::open(StreamKey { seed: 1, scenario: "kills", trial: 0, purpose: "moment" });
+    let mut killed = 0;
+    for _ in 0..KILLS {
+        let begun = folder.join("killed/manifest.json").exists();
+        let mut child = run(if begun {
+            &["study", "resume", "killed"]
+        } else {
+            &["study", "run", "spec.toml", "--out", "killed"]
+        });
+        // From before the first write to some batches later.
+        std::thread::sleep(Duration::from_micros((150_000.0 * moments.uniform()) as u64));
+        // SIGKILL: no handler runs. It fails where the run has ended.
+        let _ = child.kill();
+        let output = ended(child);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code().is_none_or(|code| code == 0), "{said}");
+        killed += u64::from(output.status.code().is_none());
+    }
+    assert!(killed > KILLS / 2, "{killed} of {KILLS} were killed: the run is too short");
+    let last = ended(run(&["study", "resume", "killed"]));
+    assert!(last.status.success(), "{}", String::from_utf8_lossy(&last.stderr));
+    assert_same(&folder.join("whole"), &folder.join("killed"));
+    fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn of_two_runs_at_once_in_one_folder_one_is_refused_and_the_other_is_whole() {
+    let folder = scratch("rivals");
+    fs::create_dir_all(&folder).unwrap();
+    fs::write(folder.join("spec.toml"), spec()).unwrap();
+    let whole = folder.join("whole");
+    study::run(&whole, &spec(), Shard::WHOLE, TrialFile::Csv);
+    let rival = || command(&["study", "run", "spec.toml", "--out", "one"], &folder).spawn().unwrap();
+    let outputs = [rival(), rival()].map(|child| child.wait_with_output().unwrap());
+    let held = outputs.iter().filter(|output| output.status.success()).count();
+    assert_eq!(held, 1, "{outputs:?}");
+    let refused = outputs.iter().find(|output| !output.status.success()).unwrap();
+    let said = String::from_utf8_lossy(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{said}");
+    assert!(said.contains("in use by another run") || said.contains("holds a run already"), "{said}");
+    // The manifest of a command names the commit, which a run in a test does not.
+    for name in ["trials.csv", "summary.csv", "outcomes.csv", "correlations.csv", "checkpoint.json"] {
+        let bytes = |of: &Path| fs::read(of.join(name)).unwrap();
+        assert!(bytes(&whole) == bytes(&folder.join("one")), "{name} differs");
+    }
+    fs::remove_dir_all(folder).unwrap();
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_disk_that_became_read_only_ends_with_three_and_the_run_goes_on_later() {
+    let folder = scratch("read-only");
+    let disk = folder.join("disk");
+    fs::create_dir_all(&disk).unwrap();
+    let mount = |options: &str| {
+        let mut mount = Command::new("mount");
+        mount.args(["-t", "tmpfs", "-o", options, "calibench"]).arg(&disk);
+        mount.output().is_ok_and(|output| output.status.success())
+    };
+    if !mount("size=4m") {
+        println!("skipped: this user may not mount a file system");
+        return;
+    }
+    let engine = Engine::new(&spec(), Shard::WHOLE).unwrap();
+    let manifest = Manifest::new(&engine.spec, Shard::WHOLE, None);
+    drop(Folder::create(&disk.join("run"), &spec(), &manifest).unwrap());
+    let resume = || command(&["study", "resume", "disk/run"], &folder).output().unwrap();
+    let outputs = (mount("remount,ro"), resume(), mount("remount,rw"), resume());
+    let same = kept(&disk.join("run"));
+    assert!(Command::new("umount").arg(&disk).status().unwrap().success());
+    let (read_only, first, writable, second) = outputs;
+    assert!(read_only && writable);
+    let said = String::from_utf8_lossy(&first.stderr);
+    assert_eq!(first.status.code(), Some(3), "{said}");
+    assert_eq!(said.matches("disk/run").count(), 1, "{said}");
+    assert_eq!(second.status.code(), Some(0), "{}", String::from_utf8_lossy(&second.stderr));
+    assert_eq!(same, 6);
+    fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn a_folder_that_is_in_use_is_refused_through_any_operations() {
+    let path = scratch("in-use");
+    let engine = Engine::new(&spec(), Shard::WHOLE).unwrap();
+    let manifest = Manifest::new(&engine.spec, Shard::WHOLE, None);
+    let held = Folder::create(&path, &spec(), &manifest).unwrap();
+    assert!(matches!(Folder::open(&path), Err(FolderError::InUse(_))));
+    drop(held);
+    fs::remove_dir_all(path).unwrap();
+}
