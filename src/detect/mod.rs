@@ -3,7 +3,6 @@
 mod bias;
 mod blob;
 mod centre;
-#[cfg(feature = "chessboard")]
 mod chessboard;
 mod components;
 mod corner;
@@ -19,8 +18,7 @@ mod threshold;
 
 pub use bias::{disc_bias, disc_biases};
 pub use blob::{Blob, BlobOptions, blobs};
-#[cfg(feature = "chessboard")]
-pub use chessboard::chessboard_corners;
+pub use chessboard::{Chessboard, ChessboardError, Orientation, chessboard};
 pub use components::Polarity;
 pub use corner::{RefineError, refine_corner};
 pub use grid::{DotGrid, circle_grid, circle_grid_of, sparse_dots, sparse_dots_of};
