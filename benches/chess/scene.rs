@@ -23,7 +23,8 @@ const MARGIN_PX: f64 = 6.0;
 
 /// A trial of a case; `None` where no pose of it fits the image.
 pub fn photo(case: &Case, trial: u64) -> Option<Photo> {
-    let stream = |purpose: &'static str| Stream::open(StreamKey { seed: 16, scenario: case.name, trial, purpose });
+    let stream =
+        |purpose: &'static str| Stream::open(StreamKey { seed: 16, scenario: case.name, trial, purpose });
     let board = Board::chessboard(BOARD.0, BOARD.1, SQUARE).ok()?;
     let camera = camera(case);
     let mut random = stream("pose");
@@ -34,7 +35,11 @@ pub fn photo(case: &Case, trial: u64) -> Option<Photo> {
     let imaging = Imaging {
         appearance: Appearance { paper, ink, surround: Some(Surround { level, margin }) },
         blur_px: case.blur_px,
-        shading: Shading { slope_x: case.light * libm::cos(turn), slope_y: case.light * libm::sin(turn), falloff: 0.0 },
+        shading: Shading {
+            slope_x: case.light * libm::cos(turn),
+            slope_y: case.light * libm::sin(turn),
+            falloff: 0.0,
+        },
     };
     let photo = photograph(&camera, case.size, &board, &pose, &imaging).ok()?;
     let mut image = moved(&photo.image, case.motion_px, random.uniform_in(0.0, std::f64::consts::PI));
@@ -60,7 +65,10 @@ fn pose(case: &Case, camera: &Camera, random: &mut Stream) -> Option<Pose> {
         * rotation::from_xyz_rad(0.0, 0.0, -axis);
     let (side_x, side_y) = (random.uniform_in(-0.2, 0.2), random.uniform_in(-0.15, 0.15));
     let far = random.uniform_in(1.0, case.far);
-    let at = |distance: f64| Pose { rotation, translation: Vec3::new(side_x * distance, side_y * distance, distance) };
+    let at = |distance: f64| Pose {
+        rotation,
+        translation: Vec3::new(side_x * distance, side_y * distance, distance),
+    };
     let (mut near, mut beyond) = (10.0, 4000.0);
     if !fits(case, camera, &at(beyond)) {
         return None;
@@ -77,7 +85,12 @@ fn fits(case: &Case, camera: &Camera, pose: &Pose) -> bool {
     let (half_x, half_y) = (0.5 * SQUARE * (BOARD.0 + 1) as f64, 0.5 * SQUARE * (BOARD.1 + 1) as f64);
     let steps = || (0..=10).map(|i| f64::from(i) / 5.0 - 1.0);
     let outline = steps().flat_map(|t| {
-        [Vec2::new(t * half_x, -half_y), Vec2::new(t * half_x, half_y), Vec2::new(-half_x, t * half_y), Vec2::new(half_x, t * half_y)]
+        [
+            Vec2::new(t * half_x, -half_y),
+            Vec2::new(t * half_x, half_y),
+            Vec2::new(-half_x, t * half_y),
+            Vec2::new(half_x, t * half_y),
+        ]
     });
     // The sheet is larger than the squares, and must be in front of the lens's fold too.
     let sheet = 1.2;

@@ -15,6 +15,7 @@ mod growth;
 mod level;
 mod probe;
 mod refine;
+mod smoothness;
 
 use super::lattice::Lattice;
 use crate::geometry::Vec2;
@@ -108,6 +109,16 @@ pub enum ChessboardError {
         /// Places that look like corners.
         seen: usize,
     },
+    /// The board is there, but the edges at some corner are not clear enough for a place better than a pixel.
+    #[error(
+        "found a {columns} x {rows} chessboard whose edges are too blurred or noisy for exact corners: hold it still, or use more light"
+    )]
+    Unclear {
+        /// Asked corners along a row.
+        columns: usize,
+        /// Asked rows.
+        rows: usize,
+    },
     /// Enough corners, but not exactly one rectangle of the asked size.
     #[error(
         "found a lattice of {found} corners that is not one {columns} x {rows} rectangle: another board, or a pattern beside it"
@@ -141,7 +152,10 @@ pub fn chessboard<T: Sample>(
     let mut best = Failure { found: 0, error: nothing(columns, rows, 0) };
     for level in search_order(image, pyramid.levels()) {
         match search(&pyramid, level, columns, rows) {
-            Ok(seen) => return Ok(finished(image, &pyramid, level, &seen, columns, rows)),
+            Ok(seen) => match finished(image, &pyramid, level, &seen, columns, rows) {
+                Some(board) => return Ok(board),
+                None => best = Failure::unclear(columns, rows),
+            },
             Err(failure) if failure.found > best.found => best = failure,
             Err(_) => {}
         }
@@ -161,6 +175,13 @@ struct Failure {
     /// Corners of its largest lattice.
     found: usize,
     error: ChessboardError,
+}
+
+impl Failure {
+    /// The board was found, but its corners have no fit.
+    fn unclear(columns: usize, rows: usize) -> Failure {
+        Failure { found: columns * rows, error: ChessboardError::Unclear { columns, rows } }
+    }
 }
 
 /// A board in a level.
@@ -183,7 +204,7 @@ fn search<T: Sample>(
     let smoothed = pyramid.smoothed(level);
     let candidates = candidates::candidates(&smoothed);
     let seen = candidates.len();
-    let grown = growth::lattices(&smoothed, candidates);
+    let grown = growth::lattices(&smoothed, candidates, columns * rows);
     let places: Vec<Vec2> = grown.corners.iter().map(|corner| corner.at).collect();
     let mut failure: Option<Failure> = None;
     for lattice in grown.lattices {
@@ -211,10 +232,10 @@ fn finished<T: Sample>(
     seen: &Seen,
     columns: usize,
     rows: usize,
-) -> Chessboard {
+) -> Option<Chessboard> {
     let (marks, orientation, starts_dark) =
         board::ordered(&seen.lattice, &seen.rectangle, &seen.places, (columns, rows));
     let found: Vec<Vec2> = marks.into_iter().map(|mark| seen.places[mark]).collect();
-    let corners_px = refine::refined(image, pyramid, level, &found, columns, starts_dark);
-    Chessboard { columns, rows, corners_px, orientation }
+    let corners_px = refine::refined(image, pyramid, level, &found, columns, starts_dark)?;
+    Some(Chessboard { columns, rows, corners_px, orientation })
 }

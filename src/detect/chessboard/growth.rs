@@ -32,31 +32,30 @@ const SEARCH: f64 = 0.3;
 const LEAST_COSINE: f64 = 0.9;
 
 /// Nearest candidates among which a corner looks for its first neighbours: noise and texture may stand between.
-const NEAREST: usize = 32;
-
-/// Fewest corners that count as a lattice: one square.
-const FEWEST: usize = 4;
+const NEAREST: usize = 20;
 
 /// A larger lattice is no board but a tiled wall, which need not be followed to its end.
 const MOST: usize = 4000;
 
-/// Fewest corners from which on empty places are searched.
-const FEWEST_TO_PROBE: usize = 6;
+/// Least part of the board from which on empty places are searched: texture makes smaller lattices, not worth the time.
+const LEAST_PART_TO_PROBE: f64 = 0.2;
 
 /// How often an empty place is searched: once more when the lattice around it has grown.
 const MOST_TRIES: u8 = 2;
 
-/// The lattices of a level.
-pub fn lattices(level: &Smoothed, candidates: Vec<Candidate>) -> Grown {
+/// The lattices of a level; a board has the expected number of corners.
+pub fn lattices(level: &Smoothed, candidates: Vec<Candidate>, expected: usize) -> Grown {
     let places: Vec<Vec2> = candidates.iter().map(|c| c.at).collect();
     let neighbours = Neighbours::new(&places);
     let taken = vec![false; candidates.len()];
+    let fewest_to_probe = ((LEAST_PART_TO_PROBE * expected as f64) as usize).max(4);
     let mut growth = Growth {
         level,
         neighbours: &neighbours,
         corners: candidates,
         taken,
         lattice: Lattice::new(),
+        fewest_to_probe,
         tried: BTreeMap::new(),
     };
     let mut lattices = Vec::new();
@@ -66,12 +65,7 @@ pub fn lattices(level: &Smoothed, candidates: Vec<Candidate>) -> Grown {
         }
         growth.grow();
         growth.tried.clear();
-        let lattice = std::mem::take(&mut growth.lattice);
-        if lattice.len() < FEWEST {
-            lattice.values().for_each(|&mark| growth.taken[mark] = false);
-        } else {
-            lattices.push(lattice);
-        }
+        lattices.push(std::mem::take(&mut growth.lattice));
     }
     lattices.sort_by_key(|lattice| std::cmp::Reverse(lattice.len()));
     Grown { lattices, corners: growth.corners }
@@ -84,6 +78,7 @@ struct Growth<'a> {
     /// Corners of this lattice or of an earlier one.
     taken: Vec<bool>,
     lattice: Lattice,
+    fewest_to_probe: usize,
     /// How often an empty place was searched in vain.
     tried: BTreeMap<Place, u8>,
 }
@@ -114,7 +109,30 @@ impl Growth<'_> {
             self.lattice.insert(place, mark);
             self.taken[mark] = true;
         }
+        if self.close_square((i, j)) {
+            return true;
+        }
+        self.release();
+        false
+    }
+
+    /// Adds the fourth corner of the first square.
+    fn close_square(&mut self, (i, j): Place) -> bool {
+        let (Some(here), Some(along), Some(across)) = (self.at((0, 0)), self.at((i, 0)), self.at((0, j)))
+        else {
+            return false;
+        };
+        let steps = Matrix2::from_columns(&[(along - here) * f64::from(i), (across - here) * f64::from(j)]);
+        let Some(mark) = self.candidate_for((i, j), &(along + across - here), &steps) else { return false };
+        self.lattice.insert((i, j), mark);
+        self.taken[mark] = true;
         true
+    }
+
+    /// Gives up the lattice.
+    fn release(&mut self) {
+        let lattice = std::mem::take(&mut self.lattice);
+        lattice.values().for_each(|&mark| self.taken[mark] = false);
     }
 
     /// Whether an edge of a corner leads to another corner, in either direction.
@@ -252,7 +270,7 @@ impl Growth<'_> {
 
     /// Searches the empty places; whether a corner was found.
     fn probe_places(&mut self) -> bool {
-        if self.lattice.len() < FEWEST_TO_PROBE {
+        if self.lattice.len() < self.fewest_to_probe {
             return false;
         }
         let mut grew = false;

@@ -56,12 +56,6 @@ pub fn photo_from_level(place: &Vec2, level: usize) -> Vec2 {
     place * scale + Vec2::repeat(0.5 * (scale - 1.0))
 }
 
-/// The place in a level of a place of the photograph.
-pub fn level_from_photo(place: &Vec2, level: usize) -> Vec2 {
-    let scale = scale(level);
-    (place - Vec2::repeat(0.5 * (scale - 1.0))) / scale
-}
-
 /// Side of a level's pixel, px of the photograph.
 pub fn scale(level: usize) -> f64 {
     (1u64 << level) as f64
@@ -148,6 +142,11 @@ impl Smoothed {
     pub fn holds(&self, place: &Vec2, margin: f64) -> bool {
         let fits = |at: f64, size: usize| at >= margin && at + margin + 1.0 < size as f64;
         fits(place.x, self.image.width()) && fits(place.y, self.image.height())
+    }
+
+    /// The level of the pixel at a place that [`holds`](Smoothed::holds) found inside.
+    pub fn nearest(&self, place: &Vec2) -> f64 {
+        f64::from(self.image.get((place.x + 0.5) as usize, (place.y + 0.5) as usize))
     }
 
     /// The level at a place that [`holds`](Smoothed::holds) found inside, bilinear.

@@ -1,7 +1,7 @@
 //! Is there a corner where the lattice predicts one? The place at which the four quadrants differ most, if they differ as squares.
 //!
-//! The lattice tells the directions and lengths of the squares' sides, so each quadrant's level is a mean of nine samples at a
-//! quarter of a side and around. Where a board ends, three quadrants have one level and the fourth another: then the darkest of the
+//! The lattice tells the directions and lengths of the squares' sides, so each quadrant's level is a mean of four samples around
+//! the middle of its nearer half. Where a board ends, three quadrants have one level and the fourth another: then the darkest of the
 //! bright ones is no brighter than the brightest of the dark ones, and there is no corner.
 
 use super::candidates::{Candidate, saddle_offset};
@@ -10,7 +10,7 @@ use crate::geometry::Vec2;
 use nalgebra::Matrix2;
 
 /// Places of a quadrant's samples, in steps from the corner.
-const SAMPLES: [f64; 3] = [0.14, 0.25, 0.36];
+const SAMPLES: [f64; 2] = [0.16, 0.34];
 
 /// Offsets that are tried along each step, in steps.
 const OFFSETS: [f64; 5] = [-0.2, -0.1, 0.0, 0.1, 0.2];
@@ -24,20 +24,20 @@ const LEAST_IN_NOISE: f64 = 6.0;
 /// Least contrast as a fraction of the level's range: half of what a candidate needs.
 const LEAST_IN_RANGE: f64 = 0.01;
 
-/// The levels of the four quadrants, each the mean of nine samples: between +i and +j, then turning on.
+/// The levels of the four quadrants, each the mean of four samples: between +i and +j, then turning on.
 fn quadrants(level: &Smoothed, at: &Vec2, steps: &Matrix2<f64>) -> Option<[f64; 4]> {
-    let reach = SAMPLES[2] * (steps.column(0).abs() + steps.column(1).abs());
-    if !level.holds(at, reach.amax()) {
+    let reach = SAMPLES[1] * (steps.column(0).abs() + steps.column(1).abs());
+    if !level.holds(at, reach.amax() + 1.0) {
         return None;
     }
     Some([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].map(|(a, b)| {
         let mut sum = 0.0;
         for i in SAMPLES {
             for j in SAMPLES {
-                sum += level.at(&(at + steps * Vec2::new(a * i, b * j)));
+                sum += level.nearest(&(at + steps * Vec2::new(a * i, b * j)));
             }
         }
-        sum / 9.0
+        0.25 * sum
     }))
 }
 
@@ -59,7 +59,7 @@ pub fn probe(level: &Smoothed, at: &Vec2, steps: &Matrix2<f64>, dark_between: bo
     let [dark, bright] =
         if dark_between { [[q[0], q[2]], [q[1], q[3]]] } else { [[q[1], q[3]], [q[0], q[2]]] };
     let separation = bright[0].min(bright[1]) - dark[0].max(dark[1]);
-    let least = (LEAST_IN_NOISE * level.noise() / 3.0).max(LEAST_IN_RANGE * level.range());
+    let least = (LEAST_IN_NOISE * level.noise() / 2.0).max(LEAST_IN_RANGE * level.range());
     if separation < LEAST_SEPARATION * contrast || separation < least {
         return None;
     }

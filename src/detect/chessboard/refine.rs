@@ -3,7 +3,8 @@
 //! Directions, window and curvature of the edges come from the corners beside. A corner found in a reduced image is fitted there
 //! first, where it is sharp and its place is near enough, then in the photograph itself.
 
-use super::level::{Pyramid, level_from_photo, photo_from_level, scale};
+use super::level::{Pyramid, photo_from_level, scale};
+use super::smoothness::{expected, out_of_line};
 use crate::detect::edge::SHARPEST_EDGE_PX;
 use crate::detect::saddle::{Crossing, Window, fit_near_edges};
 use crate::geometry::Vec2;
@@ -84,8 +85,8 @@ fn curvature(a: &Vec2, b: &Vec2, c: &Vec2) -> f64 {
     2.0 * ab.perp(&bc) / (ab.norm() * bc.norm() * ac.norm())
 }
 
-/// All corners of a board that was found in a level, fitted in the photograph. `starts_dark`: the square between the first row and column of
-/// corners is dark.
+/// All corners of a board that was found in a level, fitted in the photograph; `None` where one has no fit or lies out of line.
+/// `starts_dark`: the square between the first row and column of corners is dark.
 pub fn refined<T: Sample>(
     photo: &Raster<T>,
     pyramid: &Pyramid<'_, T>,
@@ -93,34 +94,52 @@ pub fn refined<T: Sample>(
     found: &[Vec2],
     columns: usize,
     starts_dark: bool,
-) -> Vec<Vec2> {
-    let in_photo: Vec<Vec2> = found.iter().map(|place| photo_from_level(place, level)).collect();
+) -> Option<Vec<Vec2>> {
     let is_dark = |index: usize| ((index % columns + index / columns) % 2 == 0) == starts_dark;
-    let mut crossings: Vec<Option<Crossing>> = vec![None; found.len()];
-    let mut places = in_photo.clone();
+    let start_edge_px = [1.5 * SHARPEST_EDGE_PX; 2];
+    let mut places: Vec<Vec2> = found.iter().map(|place| photo_from_level(place, level)).collect();
+    let mut edges_px = vec![start_edge_px; found.len()];
     if let Some(reduced) = pyramid.reduced(level) {
-        let corners = Corners { places: found, columns };
-        for index in 0..found.len() {
-            let around = corners.around(index);
-            let start = start(reduced, found[index], &around, is_dark(index), None);
-            crossings[index] = start.and_then(|start| fitted(reduced, &start, &around, LARGEST_START_PX));
-            if let Some(crossing) = crossings[index] {
-                places[index] = photo_from_level(&crossing.corner, level);
-            }
+        let fitting = Fitting { image: reduced, is_dark: &is_dark, columns, largest_px: LARGEST_START_PX };
+        for (index, crossing) in fitting.all(found, &edges_px).into_iter().enumerate() {
+            let Some(crossing) = crossing else { continue };
+            places[index] = photo_from_level(&crossing.corner, level);
+            edges_px[index] = crossing.edges_px.map(|edge_px| edge_px * scale(level) * START_WIDTH);
         }
     }
-    let started = places.clone();
-    let corners = Corners { places: &started, columns };
-    for index in 0..found.len() {
-        let around = corners.around(index);
-        let edges_px = crossings[index].map(|c| c.edges_px.map(|edge_px| edge_px * scale(level) * 0.8));
-        let fit = start(photo, started[index], &around, is_dark(index), edges_px)
-            .and_then(|start| fitted(photo, &start, &around, LARGEST_REACH_PX));
-        if let Some(fit) = fit {
-            places[index] = fit.corner;
-        }
+    let fitting = Fitting { image: photo, is_dark: &is_dark, columns, largest_px: LARGEST_REACH_PX };
+    let fits = fitting.all(&places, &edges_px);
+    let mut good: Vec<Option<Vec2>> = fits.iter().map(|fit| fit.map(|fit| fit.corner)).collect();
+    for index in out_of_line(&mut good, columns) {
+        let (place, tolerance_px) = expected(&good, columns, index)?;
+        places[index] = place;
+        let near = fitting.one(&places, index, edges_px[index])?;
+        good[index] = Some(near.corner).filter(|corner| (corner - place).norm() < tolerance_px);
     }
-    places
+    good.into_iter().collect()
+}
+
+/// Part of an edge's width in a reduced image that the photograph's is thought to have: pixels four times as large add to it.
+const START_WIDTH: f64 = 0.8;
+
+/// The fits of a board's corners in one image.
+struct Fitting<'a, T> {
+    image: &'a Raster<T>,
+    is_dark: &'a dyn Fn(usize) -> bool,
+    columns: usize,
+    largest_px: f64,
+}
+
+impl<T: Sample> Fitting<'_, T> {
+    fn all(&self, places: &[Vec2], edges_px: &[[f64; 2]]) -> Vec<Option<Crossing>> {
+        (0..places.len()).map(|index| self.one(places, index, edges_px[index])).collect()
+    }
+
+    fn one(&self, places: &[Vec2], index: usize, edges_px: [f64; 2]) -> Option<Crossing> {
+        let around = Corners { places, columns: self.columns }.around(index);
+        let start = start(self.image, places[index], &around, (self.is_dark)(index), edges_px)?;
+        fitted(self.image, &start, &around, self.largest_px)
+    }
 }
 
 /// The window of a corner.
@@ -148,7 +167,7 @@ fn start<T: Sample>(
     corner: Vec2,
     around: &Around,
     is_dark: bool,
-    edges_px: Option<[f64; 2]>,
+    edges_px: [f64; 2],
 ) -> Option<Crossing> {
     let [a, b] = sides(around, LARGEST_REACH_PX);
     let level = |s: f64, t: f64| {
@@ -165,14 +184,9 @@ fn start<T: Sample>(
     Some(Crossing {
         corner,
         angles_rad: around.steps.map(|step| libm::atan2(step.y, step.x)),
-        edges_px: edges_px.unwrap_or([1.5 * SHARPEST_EDGE_PX; 2]),
+        edges_px,
         mean: 0.5 * (between + beside),
         amplitude,
         slope: Vec2::zeros(),
     })
-}
-
-/// Places of the photograph in a level.
-pub fn in_level(places: &[Vec2], level: usize) -> Vec<Vec2> {
-    places.iter().map(|place| level_from_photo(place, level)).collect()
 }

@@ -48,7 +48,6 @@ struct Seen {
 }
 
 pub(super) fn run(arguments: &Arguments, board: &BoardSpec, photos: &[PathBuf]) -> Result<Exit, String> {
-    board.check_detector().map_err(|error| error.to_string())?;
     let seen: Vec<Result<Seen, ImageError>> = photos
         .par_iter()
         .enumerate()
