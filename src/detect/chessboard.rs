@@ -13,6 +13,7 @@ mod board;
 mod candidates;
 mod growth;
 mod level;
+mod places;
 mod probe;
 mod refine;
 mod smoothness;

@@ -12,6 +12,7 @@
 
 use super::level::Smoothed;
 use crate::geometry::Vec2;
+use crate::raster::Raster;
 
 /// A place where two edges seem to cross.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,7 +62,8 @@ pub fn candidates(level: &Smoothed) -> Vec<Candidate> {
 }
 
 /// `R` of a row.
-fn responses(image: &crate::raster::Raster<f32>, y: usize, out: &mut [f32]) {
+#[inline]
+fn responses(image: &Raster<f32>, y: usize, out: &mut [f32]) {
     let width = image.width();
     let n = width - 2 * CIRCLE_PX;
     let part = |row: usize, from: usize| &image.row(row)[from..from + n];

@@ -9,6 +9,7 @@
 
 use super::candidates::Candidate;
 use super::level::Smoothed;
+use super::places::Places;
 use super::probe::probe;
 use crate::detect::lattice::{Lattice, Place};
 use crate::detect::neighbours::Neighbours;
@@ -54,7 +55,7 @@ pub fn lattices(level: &Smoothed, candidates: Vec<Candidate>, expected: usize) -
         neighbours: &neighbours,
         corners: candidates,
         taken,
-        lattice: Lattice::new(),
+        lattice: Places::new(),
         fewest_to_probe,
         tried: BTreeMap::new(),
     };
@@ -65,7 +66,7 @@ pub fn lattices(level: &Smoothed, candidates: Vec<Candidate>, expected: usize) -
         }
         growth.grow();
         growth.tried.clear();
-        lattices.push(std::mem::take(&mut growth.lattice));
+        lattices.push(growth.lattice.take());
     }
     lattices.sort_by_key(|lattice| std::cmp::Reverse(lattice.len()));
     Grown { lattices, corners: growth.corners }
@@ -77,7 +78,7 @@ struct Growth<'a> {
     corners: Vec<Candidate>,
     /// Corners of this lattice or of an earlier one.
     taken: Vec<bool>,
-    lattice: Lattice,
+    lattice: Places,
     fewest_to_probe: usize,
     /// How often an empty place was searched in vain.
     tried: BTreeMap<Place, u8>,
@@ -131,8 +132,7 @@ impl Growth<'_> {
 
     /// Gives up the lattice.
     fn release(&mut self) {
-        let lattice = std::mem::take(&mut self.lattice);
-        lattice.values().for_each(|&mark| self.taken[mark] = false);
+        self.lattice.take().values().for_each(|&mark| self.taken[mark] = false);
     }
 
     /// Whether an edge of a corner leads to another corner, in either direction.
@@ -158,9 +158,8 @@ impl Growth<'_> {
             for place in self.empty_places() {
                 let Some((at, steps)) = self.prediction(place) else { continue };
                 if let Some(mark) = self.candidate_for(place, &at, &steps) {
-                    self.lattice.insert(place, mark);
                     self.taken[mark] = true;
-                    grew = true;
+                    grew |= self.lattice.insert(place, mark);
                 }
             }
             let grew = grew || self.probe_places();
@@ -173,15 +172,15 @@ impl Growth<'_> {
     /// Empty places beside the lattice, in order.
     fn empty_places(&self) -> Vec<Place> {
         let beside = |&(i, j): &Place| DIRECTIONS.map(|(di, dj)| (i + di, j + dj));
-        let mut empty: Vec<Place> =
-            self.lattice.keys().flat_map(beside).filter(|place| !self.lattice.contains_key(place)).collect();
+        let is_empty = |place: &Place| self.lattice.get(*place).is_none();
+        let mut empty: Vec<Place> = self.lattice.filled().iter().flat_map(beside).filter(is_empty).collect();
         empty.sort_unstable();
         empty.dedup();
         empty
     }
 
     fn at(&self, (i, j): Place) -> Option<Vec2> {
-        self.lattice.get(&(i, j)).map(|&mark| self.corners[mark].at)
+        self.lattice.get((i, j)).map(|mark| self.corners[mark].at)
     }
 
     /// Where a place should be, and the steps along i and j there.
@@ -263,7 +262,7 @@ impl Growth<'_> {
     fn is_joined_at(&self, (i, j): Place, corner: &Candidate) -> bool {
         let (along, across) = axes_at((i, j));
         DIRECTIONS.iter().all(|(di, dj)| {
-            let Some(&mark) = self.lattice.get(&(i + di, j + dj)) else { return true };
+            let Some(mark) = self.lattice.get((i + di, j + dj)) else { return true };
             self.joined(corner, if *di != 0 { along } else { across }, &self.corners[mark])
         })
     }
@@ -282,16 +281,17 @@ impl Growth<'_> {
             *tried += 1;
             let Some((at, steps)) = self.prediction(place) else { continue };
             let Some(corner) = probe(self.level, &at, &steps, axes_at(place) == (0, 1)) else { continue };
-            let is_new = self.lattice.values().all(|&mark| {
-                let apart = self.corners[mark].at - corner.at;
-                apart.norm_squared()
-                    > 0.25 * steps.column(0).norm_squared().min(steps.column(1).norm_squared())
-            });
+            let shortest = steps.column(0).norm().min(steps.column(1).norm());
+            let is_new = self
+                .lattice
+                .filled()
+                .iter()
+                .filter_map(|&place| self.at(place))
+                .all(|other| (other - corner.at).norm() > 0.5 * shortest);
             if is_new && self.is_joined_at(place, &corner) {
-                self.lattice.insert(place, self.corners.len());
+                grew |= self.lattice.insert(place, self.corners.len());
                 self.corners.push(corner);
                 self.taken.push(true);
-                grew = true;
             }
         }
         grew

@@ -56,6 +56,12 @@ pub fn photo_from_level(place: &Vec2, level: usize) -> Vec2 {
     place * scale + Vec2::repeat(0.5 * (scale - 1.0))
 }
 
+/// The place in a level of a place of the photograph.
+pub fn level_from_photo(place: &Vec2, level: usize) -> Vec2 {
+    let scale = scale(level);
+    (place - Vec2::repeat(0.5 * (scale - 1.0))) / scale
+}
+
 /// Side of a level's pixel, px of the photograph.
 pub fn scale(level: usize) -> f64 {
     (1u64 << level) as f64

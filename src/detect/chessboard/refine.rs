@@ -3,7 +3,7 @@
 //! Directions, window and curvature of the edges come from the corners beside. A corner found in a reduced image is fitted there
 //! first, where it is sharp and its place is near enough, then in the photograph itself.
 
-use super::level::{Pyramid, photo_from_level, scale};
+use super::level::{Pyramid, level_from_photo, photo_from_level, scale};
 use super::smoothness::{expected, out_of_line};
 use crate::detect::edge::SHARPEST_EDGE_PX;
 use crate::detect::saddle::{Crossing, Window, fit_near_edges};
@@ -113,10 +113,33 @@ pub fn refined<T: Sample>(
     for index in out_of_line(&mut good, columns) {
         let (place, tolerance_px) = expected(&good, columns, index)?;
         places[index] = place;
-        let near = fitting.one(&places, index, edges_px[index])?;
-        good[index] = Some(near.corner).filter(|corner| (corner - place).norm() < tolerance_px);
+        let is_near = |corner: &Vec2| (corner - place).norm() < tolerance_px;
+        let fit = fitting.one(&places, index, edges_px[index]).map(|fit| fit.corner).filter(is_near);
+        good[index] = fit.or_else(|| {
+            let in_level = |level| fit_in_level(pyramid, level, &is_dark, &places, columns, index);
+            (1..=BLURRED_LEVELS).find_map(|level| in_level(level).filter(is_near))
+        });
     }
     good.into_iter().collect()
+}
+
+/// Levels in which a corner is fitted that has no fit in the photograph: motion of twelve pixels is one of three there.
+const BLURRED_LEVELS: usize = 2;
+
+/// The fit of a corner in a reduced image, as a place of the photograph.
+fn fit_in_level<T: Sample>(
+    pyramid: &Pyramid<'_, T>,
+    level: usize,
+    is_dark: &dyn Fn(usize) -> bool,
+    places: &[Vec2],
+    columns: usize,
+    index: usize,
+) -> Option<Vec2> {
+    let image = pyramid.reduced(level)?;
+    let in_level: Vec<Vec2> = places.iter().map(|place| level_from_photo(place, level)).collect();
+    let fitting = Fitting { image, is_dark, columns, largest_px: LARGEST_REACH_PX };
+    let fit = fitting.one(&in_level, index, [1.5 * SHARPEST_EDGE_PX; 2])?;
+    Some(photo_from_level(&fit.corner, level))
 }
 
 /// Part of an edge's width in a reduced image that the photograph's is thought to have: pixels four times as large add to it.
