@@ -4,33 +4,30 @@
 //! affine map to the unit grid has scales of 0.0042332 and 0.0042338 units a pixel. The vendor's GUI reports a translation
 //! that differs by 0.002 for the same image; the chapter blames rounding to half pixels.
 //!
-//! The image is not available. A stand-in is rendered from the published geometry (size, spacings, centre), which the matrix
-//! therefore must return; `--image FILE` takes the real one, or any other.
+//! The image is not available. A stand-in is rendered from the published size and spacings and from the centre that follows
+//! from the published translation and scales; the matrix therefore must return them. `--image FILE` takes the real one, or
+//! any other.
 //!
 //! What it cannot show: the residual of the real image, whose noise no stand-in has. Its shape is checked instead: the ratio of
 //! largest to RMS residual does not depend on the size of the noise.
 
 use calibench::detect::{GridError, circle_grid, sparse_dots};
 use calibench::geometry::{Affine, Mat3, Vec2};
-use calibench::harness::figure::Format;
-use calibench::harness::published::{self, Entry};
-use calibench::harness::{
-    Band, Cell, Claim, Context, Experiment, ExperimentError, Figure, Look, Plot, Predicted, Record, Table,
-};
 use calibench::io::image::parse_image;
 use calibench::io::overlay::Overlay;
 use calibench::planar::{PlaneCalibration, PlaneModel, calibrate_plane};
 use calibench::raster::Raster;
 use calibench::synth::render::nine_dot_stand_in;
 use calibench::synth::{Stream, StreamKey};
+use calibench_harness::figure::Format;
+use calibench_harness::published::{self, Entry};
+use calibench_harness::{
+    Band, Cell, Claim, Context, Experiment, ExperimentError, Figure, Look, Plot, Predicted, Record, Table,
+};
 
-#[path = "nine_point/book.rs"]
 mod book;
-#[path = "nine_point/gui.rs"]
 mod gui;
-#[path = "nine_point/shown.rs"]
 mod shown;
-#[path = "nine_point/tell.rs"]
 mod tell;
 
 use book::{claim_published_consistent, claim_residual_shape, entry, reconcile};
@@ -50,8 +47,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     takes_image: true,
     run,
 };
-
-calibench::experiment_main!(EXPERIMENT);
 
 /// The SDK's modes 0, 1 and 2.
 const MODES: [(&str, PlaneModel); 3] = [

@@ -7,10 +7,10 @@
 
 use calibench::evaluate::interval::each_of;
 use calibench::evaluate::{Interval, RmseDistribution};
-use calibench::harness::study::{Cell as Design, Engine, Spec, Summary, Trial, within};
-use calibench::harness::{
+use calibench_harness::{
     Band, Cell, Claim, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
 };
+use calibench_study::{Cell as Design, Engine, Spec, Summary, Trial, within};
 
 /// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -23,8 +23,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     takes_image: false,
     run,
 };
-
-calibench::experiment_main!(EXPERIMENT);
 
 const SCENE: &str = r#"
 question = "Where does the RMSE settle?"
@@ -305,7 +303,7 @@ fn floor_figure(grid: &Swept) -> Figure {
             .iter()
             .map(|&c| (noise(c), over_floor(c, predicted(&grid.engine.cells[c]).mean_px())))
             .collect();
-        let means: Vec<(usize, calibench::harness::study::Estimated)> =
+        let means: Vec<(usize, calibench_study::Estimated)> =
             cells.iter().filter_map(|&c| Some((c, grid.summary.cells[c].of("rmse")?.mean?))).collect();
         let points: Vec<(f64, f64)> =
             means.iter().map(|(c, m)| (noise(*c), over_floor(*c, m.value))).collect();

@@ -1,5 +1,4 @@
 //! Does README.md say what the program says? Its tables and numbers are compared with golden/ and with a run.
-#![cfg(feature = "harness")]
 
 use calibench::io::data_folder;
 use std::collections::BTreeMap;

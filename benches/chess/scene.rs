@@ -2,12 +2,12 @@
 
 use crate::BOARD;
 use crate::cases::Case;
+use calibench::board::Board;
 use calibench::camera::{BrownConrady, Camera};
 use calibench::geometry::{Pose, Vec2, Vec3, rotation};
 use calibench::raster::Raster;
 use calibench::synth::render::{Appearance, Imaging, SensorNoise, Shading, Surround, photograph};
 use calibench::synth::{Stream, StreamKey};
-use calibench::target::Board;
 
 /// A rendered photograph.
 pub struct Photo {

@@ -6,7 +6,7 @@ use super::{
     FALSE_ALARM, FLEET, Fleet, IN_CONTROL, QUARTER, QUARTERS, Quarter, RISK, TOLERANCE_MM, TRADE_OFF, YEAR,
 };
 use calibench::evaluate::Interval;
-use calibench::harness::{Band, Claim, Dash, ExperimentError, Figure, Look, Plot, Record, Table};
+use calibench_harness::{Band, Claim, Dash, ExperimentError, Figure, Look, Plot, Record, Table};
 
 /// Everything that was simulated.
 pub(crate) struct Results {
