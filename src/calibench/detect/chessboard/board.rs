@@ -89,14 +89,12 @@ pub fn find(lattice: &Lattice, columns: usize, rows: usize) -> Found {
 fn largest(lattice: &Lattice) -> Option<Rectangle> {
     let mut best: Option<Rectangle> = None;
     for &low in lattice.keys() {
-        let mut widest = usize::MAX;
-        let mut height = 0;
+        let (mut widest, mut height) = (i32::MAX, 0);
         while widest > 0 {
-            let row =
-                (0..widest as i32).take_while(|i| lattice.contains_key(&(low.0 + i, low.1 + height))).count();
-            widest = row;
+            let is_full = |i: &i32| lattice.contains_key(&(low.0 + i, low.1 + height));
+            widest = (0..widest).take_while(is_full).count() as i32;
             height += 1;
-            let seen = Rectangle { low, width: widest, height: height as usize };
+            let seen = Rectangle { low, width: widest as usize, height: height as usize };
             let area = |r: &Rectangle| r.width * r.height;
             if seen.width.min(seen.height) >= 3 && best.as_ref().is_none_or(|b| area(&seen) > area(b)) {
                 best = Some(seen);
