@@ -5,7 +5,7 @@ use crate::common;
 use calibench::board::{Board, View};
 use calibench::calibrate::{Calibration, Settings, calibrate, information};
 use calibench::camera::{BrownConrady, Camera, FreeParameters};
-use calibench::detect::{circle_grid, sparse_dots};
+use calibench::detect::{chessboard, circle_grid, sparse_dots};
 use calibench::geometry::{Affine, Homography, Vec2};
 use calibench::raster::Raster;
 use calibench::rectify::{RectifyMap, rectify_image};
@@ -103,6 +103,11 @@ pub fn named(row: &str) -> Option<Box<dyn Work>> {
             job(run, |found| flat(&found.centres_px()))
         }
         "study" => Some(Box::new(Study)),
+        "chess" => {
+            let (image, _) = chess();
+            let run = move || chessboard(&image, 9, 6).expect("the board is there");
+            job(run, |found| flat(found.corners_px()))
+        }
         "dots" => {
             let (image, _) = dots();
             let run = move || sparse_dots(&image, 3, 3).expect("the dots are there");
@@ -117,7 +122,7 @@ pub fn rows() -> Vec<String> {
     let calibrations = VIEWS.iter().map(|views| format!("calibrate-{views}"));
     let frames = FRAMES.iter().map(|(width, height)| format!("{width}x{height}"));
     let images = frames.flat_map(|size| [format!("remap-{size}"), format!("undistort-{size}")]);
-    let rest = ["covariance-100", "refusal", "homography", "affine", "points", "grid", "dots"];
+    let rest = ["covariance-100", "refusal", "homography", "affine", "points", "grid", "chess", "dots"];
     let study = Some("study");
     calibrations.chain(images).chain(rest.into_iter().chain(study).map(str::to_string)).collect()
 }
@@ -179,6 +184,12 @@ pub fn frame(size: (usize, usize)) -> Raster<u8> {
 /// The chapter's grid as its camera sees it in the fourth view, 640 x 480, and where its discs' centres truly are.
 pub fn grid() -> (Raster<u8>, Vec<Vec2>) {
     board_image((640, 480), &Truth::chapter_board(), [-15.0, 15.0, 10.0])
+}
+
+/// A chessboard of 9 x 6 inner corners in the same place, and where they truly are.
+pub fn chess() -> (Raster<u8>, Vec<Vec2>) {
+    let board = Board::chessboard(9, 6, 10.0).expect("a board");
+    board_image((640, 480), &board, [-15.0, 15.0, 10.0])
 }
 
 /// The stand-in for the nine-point image, 1571 x 1053, and where its dots' centres truly are.

@@ -45,12 +45,11 @@ fn every_dot_grid_is_found_in_order() {
     }
 }
 
-#[cfg(feature = "chessboard")]
 mod chessboards {
     use super::*;
     use calibench::board::View;
     use calibench::calibrate::{Calibration, Settings, calibrate};
-    use calibench::detect::chessboard_corners;
+    use calibench::detect::{ChessboardError, Orientation, chessboard};
     use calibench::io::read_corners;
 
     #[test]
@@ -61,8 +60,10 @@ mod chessboards {
         assert_eq!(reference.views.len(), numbers.len());
         for (number, view) in numbers.into_iter().zip(&reference.views) {
             let image = photo(folder.join(format!("opencv_left/left{number:02}.jpg")));
-            let corners = chessboard_corners(&image, 9, 6).unwrap_or_else(|e| panic!("left{number:02}: {e}"));
-            let pixels = view.pixels();
+            let board = chessboard(&image, 9, 6).unwrap_or_else(|e| panic!("left{number:02}: {e}"));
+            assert_eq!(board.orientation(), Orientation::Fixed);
+            let (corners, pixels) = (board.corners_px(), view.pixels());
+            // Theirs starts at either end, as OpenCV's finder does.
             let reversed = (corners[0] - pixels[0]).norm() > (corners[0] - pixels[53]).norm();
             let theirs = |i: usize| if reversed { pixels[53 - i] } else { pixels[i] };
             let square: f64 = (0..54).map(|i| (corners[i] - theirs(i)).norm_squared()).sum();
@@ -76,8 +77,8 @@ mod chessboards {
         let views: Vec<View> = (1..=14)
             .map(|number| folder.join(format!("{set}/left{number:02}.jpg")))
             .filter(|path| path.exists())
-            .map(|path| chessboard_corners(&photo(path), board.columns(), board.rows()).unwrap())
-            .map(|corners| View::new(board.points(), corners).unwrap())
+            .map(|path| chessboard(&photo(path), board.columns(), board.rows()).unwrap())
+            .map(|found| View::new(board.points(), found.corners_px().to_vec()).unwrap())
             .collect();
         calibrate(&views, &Settings::new(free.parse().unwrap()).with_image_size((640, 480))).unwrap()
     }
@@ -122,9 +123,11 @@ mod chessboards {
         let board = Board::chessboard(4, 6, 30.0).unwrap();
         for number in 1..=11 {
             let image = photo(folder.join(format!("bumblebee_left/left{number:02}.jpg")));
-            let corners = chessboard_corners(&image, 4, 6).unwrap_or_else(|e| panic!("left{number:02}: {e}"));
-            assert!(worst_misfit_px(&board, &corners) < 4.0, "left{number:02}");
-            assert!(chessboard_corners(&image, 5, 6).is_err() && chessboard_corners(&image, 4, 5).is_err());
+            let found = chessboard(&image, 4, 6).unwrap_or_else(|e| panic!("left{number:02}: {e}"));
+            assert!(worst_misfit_px(&board, found.corners_px()) < 4.0, "left{number:02}");
+            let named = ChessboardError::WrongSize { columns: 5, rows: 6, found_columns: 6, found_rows: 4 };
+            assert_eq!(chessboard(&image, 5, 6), Err(named), "left{number:02}");
+            assert!(chessboard(&image, 4, 5).is_err());
         }
     }
 }

@@ -200,19 +200,6 @@ fn nothing_usable_ends_with_two() {
 }
 
 #[test]
-fn a_chessboard_needs_its_detector() {
-    let board: BoardSpec = "chess:9x6:25mm".parse().unwrap();
-    assert_eq!(board.check_detector().is_ok(), cfg!(feature = "chessboard"));
-    if cfg!(not(feature = "chessboard")) {
-        let folder = folder("photo-command-chess");
-        let output = calibrate(&folder, &["--board", "chess:9x6:25mm", "photo.png"]);
-        assert_eq!(output.status.code(), Some(2));
-        assert!(text(&output.stderr).contains("--features chessboard"), "{}", text(&output.stderr));
-    }
-}
-
-#[cfg(feature = "chessboard")]
-#[test]
 fn the_bumblebee_camera_comes_out_of_the_command() {
     let Some(data) = calibench::io::data_folder().expect("CALIBENCH_DATA names a folder") else {
         eprintln!("SKIPPED: no folder of real data (set CALIBENCH_DATA)");

@@ -6,6 +6,7 @@
 //! some thousandths of a pixel with their phase on the grid. Softer edges are isotropic to that accuracy.
 
 use crate::geometry::Vec2;
+use crate::geometry::lanes::Lanes;
 
 /// Half-width of the soft model that has the variance of a sharp edge, 1/12: `sqrt(5 / 12)` px.
 pub const SHARPEST_EDGE_PX: f64 = 0.645_497_224_367_902_8;
@@ -63,6 +64,72 @@ impl Edge {
             }
             Edge::Sharp { lens_px } => {
                 four_boxes(d, n.x.abs().max(LEAST_BOX_PX), n.y.abs().max(LEAST_BOX_PX), lens_px)
+            }
+        }
+    }
+}
+
+/// An edge of one normal, for four distances at once.
+#[derive(Debug, Clone, Copy)]
+pub enum LaneEdge {
+    /// Offsets of the sixteen corners of the boxes, equal ones together, with their weights.
+    Sharp {
+        /// Offsets and weights.
+        corners: [(f64, f64); 12],
+        /// `a b c^2`.
+        volume: f64,
+        /// [`Edge::reach_px`].
+        reach_px: f64,
+    },
+    /// [`Edge::Soft`].
+    Soft {
+        /// `h`, px.
+        half_width_px: f64,
+    },
+}
+
+impl LaneEdge {
+    /// The edge of this normal.
+    pub fn new(edge: &Edge, n: &Vec2) -> LaneEdge {
+        match *edge {
+            Edge::Soft { half_width_px } => LaneEdge::Soft { half_width_px },
+            Edge::Sharp { lens_px: c } => {
+                let (a, b) = (n.x.abs().max(LEAST_BOX_PX), n.y.abs().max(LEAST_BOX_PX));
+                let pixel = [(a + b, 1.0), (a - b, -1.0), (b - a, -1.0), (-a - b, 1.0)];
+                let lens = [(c, 1.0), (0.0, -2.0), (-c, 1.0)];
+                let corners = std::array::from_fn(|k| {
+                    let ((pixel, sign), (lens, weight)) = (pixel[k / 3], lens[k % 3]);
+                    (0.5 * pixel + lens, sign * weight)
+                });
+                LaneEdge::Sharp { corners, volume: a * b * c * c, reach_px: edge.reach_px() }
+            }
+        }
+    }
+
+    /// [`Edge::coverage`] at any distance: beyond the reach it is that of the reach.
+    #[inline(always)]
+    pub(crate) fn coverage<L: Lanes>(&self, d: L) -> (L, L) {
+        let clamped = |d: L, most: f64| -((-d.max(L::splat(-most))).max(L::splat(-most)));
+        match self {
+            LaneEdge::Soft { half_width_px } => {
+                let t = clamped(d * L::splat(1.0 / half_width_px), 1.0);
+                let square = t * t;
+                let covered = L::splat(0.5) - t * (L::splat(0.75) - L::splat(0.25) * square);
+                (covered, L::splat(0.75 / half_width_px) * (L::splat(1.0) - square))
+            }
+            LaneEdge::Sharp { corners, volume, reach_px } => {
+                let d = clamped(d, *reach_px);
+                let (mut cubes, mut fourths) = (L::zero(), L::zero());
+                for (offset, weight) in corners {
+                    let x = (d + L::splat(*offset)).max(L::zero());
+                    let cube = L::splat(*weight) * (x * x * x);
+                    cubes = cubes + cube;
+                    fourths = fourths + cube * x;
+                }
+                (
+                    L::splat(1.0) - fourths * L::splat(1.0 / (24.0 * volume)),
+                    cubes * L::splat(1.0 / (6.0 * volume)),
+                )
             }
         }
     }

@@ -3,7 +3,6 @@
 mod bias;
 mod blob;
 mod centre;
-#[cfg(feature = "chessboard")]
 mod chessboard;
 mod components;
 mod corner;
@@ -20,8 +19,7 @@ mod threshold;
 
 pub use bias::{disc_bias, disc_biases};
 pub use blob::Blob;
-#[cfg(feature = "chessboard")]
-pub use chessboard::chessboard_corners;
+pub use chessboard::{Chessboard, ChessboardError, Orientation, chessboard};
 pub use components::Polarity;
 pub use corner::{RefineError, refine_corner};
 pub use discs::{BlobOptions, blobs};

@@ -2,7 +2,7 @@
 
 use super::discs::{NotFound, ordered_discs};
 use crate::board::{Board, BoardError, Pattern};
-use crate::detect::{GridError, circle_grid_of, sparse_dots_of};
+use crate::detect::{ChessboardError, GridError, chessboard, circle_grid_of, sparse_dots_of};
 use crate::geometry::Vec2;
 use crate::io::Grey;
 use std::fmt;
@@ -64,12 +64,9 @@ pub enum DetectError {
     /// The board is not seen whole and clearly.
     #[error(transparent)]
     Grid(#[from] GridError),
-    /// The program was built without the detector.
-    #[error(
-        "this program was built without the chessboard detector: build it with `--features chessboard`, or give the corners as \
-         a CSV file"
-    )]
-    NoChessboardDetector,
+    /// The chessboard is not seen whole and clearly.
+    #[error(transparent)]
+    Chessboard(#[from] ChessboardError),
 }
 
 /// A length in a unit: its value in millimetres a unit, if the unit is known.
@@ -163,17 +160,6 @@ impl BoardSpec {
         &self.board
     }
 
-    /// Whether this program has the detector that the board needs.
-    ///
-    /// # Errors
-    /// A chessboard without the feature `chessboard`.
-    pub fn check_detector(&self) -> Result<(), DetectError> {
-        if self.kind == MarkKind::Chess && !cfg!(feature = "chessboard") {
-            return Err(DetectError::NoChessboardDetector);
-        }
-        Ok(())
-    }
-
     /// The marks in a photograph, px, in the order of the board's points.
     ///
     /// # Errors
@@ -191,15 +177,14 @@ impl BoardSpec {
         Ok(grid?.centres_px())
     }
 
-    #[cfg(feature = "chessboard")]
     fn corners(&self, photo: &Grey) -> Result<Vec<Vec2>, DetectError> {
         let (columns, rows) = (self.board.columns(), self.board.rows());
-        Ok(crate::detect::chessboard_corners(&photo.to_u8(), columns, rows)?)
-    }
-
-    #[cfg(not(feature = "chessboard"))]
-    fn corners(&self, _: &Grey) -> Result<Vec<Vec2>, DetectError> {
-        Err(DetectError::NoChessboardDetector)
+        let board = match photo {
+            Grey::U8(image) => chessboard(image, columns, rows),
+            Grey::U16(image) => chessboard(image, columns, rows),
+            Grey::F32(image) => chessboard(image, columns, rows),
+        };
+        Ok(board?.corners_px().to_vec())
     }
 }
 

@@ -5,6 +5,9 @@ pub trait Sample: Copy + PartialOrd {
     /// The level as a number, exactly.
     fn to_f64(self) -> f64;
 
+    /// The level as a number of single precision, exactly.
+    fn to_f32(self) -> f32;
+
     /// The least sample that is not below a level: `x < at_least(level)` holds for the samples with `x < level`.
     fn at_least(level: f64) -> Self;
 
@@ -37,6 +40,10 @@ impl Sample for u8 {
         f64::from(self)
     }
 
+    fn to_f32(self) -> f32 {
+        f32::from(self)
+    }
+
     fn at_least(level: f64) -> u8 {
         libm::ceil(level) as u8
     }
@@ -51,6 +58,10 @@ impl Sample for u16 {
         f64::from(self)
     }
 
+    fn to_f32(self) -> f32 {
+        f32::from(self)
+    }
+
     fn at_least(level: f64) -> u16 {
         libm::ceil(level) as u16
     }
@@ -63,6 +74,10 @@ impl Sample for u16 {
 impl Sample for f32 {
     fn to_f64(self) -> f64 {
         f64::from(self)
+    }
+
+    fn to_f32(self) -> f32 {
+        self
     }
 
     fn at_least(level: f64) -> f32 {

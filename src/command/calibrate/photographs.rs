@@ -50,7 +50,6 @@ struct Seen {
 }
 
 pub(super) fn run(arguments: &Arguments, board: &BoardSpec, photos: &[PathBuf]) -> Result<Exit, Failure> {
-    board.check_detector().map_err(|error| error.to_string())?;
     let memory = Memory::new(arguments.memory);
     let seen = each(photos, |index, path| {
         let needed = image_extent(path)?.memory_to_detect();

@@ -1,0 +1,235 @@
+//! Is the asked board in a lattice, and which corner is its first? A complete rectangle, ordered by the colours of its squares.
+
+use super::Orientation;
+use super::growth::axes_at;
+use crate::detect::lattice::{Lattice, Place};
+use crate::geometry::Vec2;
+
+/// A full rectangle of places of a lattice.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rectangle {
+    /// The place of least i and j.
+    pub low: Place,
+    /// Places along i.
+    pub width: usize,
+    /// Places along j.
+    pub height: usize,
+}
+
+/// What a lattice holds of a board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Found {
+    /// The board.
+    Board(Rectangle),
+    /// A full rectangle that is another board.
+    Other {
+        /// Its larger side.
+        columns: usize,
+        /// Its smaller side.
+        rows: usize,
+    },
+    /// No such rectangle.
+    Incomplete,
+}
+
+/// Corners beside a rectangle that may be chance, as part of the side: texture that looks like one more corner.
+const MOST_STRAYS: f64 = 0.34;
+
+impl Rectangle {
+    fn is_full(&self, lattice: &Lattice) -> bool {
+        self.places().all(|place| lattice.contains_key(&place))
+    }
+
+    fn places(self) -> impl Iterator<Item = Place> {
+        let (width, height) = (self.width as i32, self.height as i32);
+        (0..height).flat_map(move |j| (0..width).map(move |i| (self.low.0 + i, self.low.1 + j)))
+    }
+
+    /// Whether the board goes on beyond a side.
+    fn goes_on(&self, lattice: &Lattice) -> bool {
+        let (w, h) = (self.width as i32, self.height as i32);
+        let along_i =
+            |j: i32| (0..w).filter(|i| lattice.contains_key(&(self.low.0 + i, self.low.1 + j))).count();
+        let along_j =
+            |i: i32| (0..h).filter(|j| lattice.contains_key(&(self.low.0 + i, self.low.1 + j))).count();
+        let many = |count: usize, of: usize| count as f64 > MOST_STRAYS * of as f64;
+        many(along_i(-1), self.width)
+            || many(along_i(h), self.width)
+            || many(along_j(-1), self.height)
+            || many(along_j(w), self.height)
+    }
+}
+
+/// Looks for a board of `columns x rows` in a lattice.
+pub fn find(lattice: &Lattice, columns: usize, rows: usize) -> Found {
+    let full: Vec<Rectangle> = lattice
+        .keys()
+        .flat_map(|&low| {
+            [(columns, rows), (rows, columns)].map(|(width, height)| Rectangle { low, width, height })
+        })
+        .filter(|rectangle| rectangle.is_full(lattice))
+        .collect();
+    let mut boards = full.iter().filter(|rectangle| !rectangle.goes_on(lattice));
+    // Of a square board both ways round are one.
+    let only = boards.next().filter(|first| boards.all(|other| other == *first));
+    if let Some(&board) = only
+        && full.iter().all(|other| *other == board)
+    {
+        return Found::Board(board);
+    }
+    match largest(lattice) {
+        Some(seen) if !seen.goes_on(lattice) => {
+            Found::Other { columns: seen.width.max(seen.height), rows: seen.width.min(seen.height) }
+        }
+        _ => Found::Incomplete,
+    }
+}
+
+/// The full rectangle with the most places, at least 3 x 3.
+fn largest(lattice: &Lattice) -> Option<Rectangle> {
+    let mut best: Option<Rectangle> = None;
+    for &low in lattice.keys() {
+        let (mut widest, mut height) = (i32::MAX, 0);
+        while widest > 0 {
+            let is_full = |i: &i32| lattice.contains_key(&(low.0 + i, low.1 + height));
+            widest = (0..widest).take_while(is_full).count() as i32;
+            height += 1;
+            let seen = Rectangle { low, width: widest as usize, height: height as usize };
+            let area = |r: &Rectangle| r.width * r.height;
+            if seen.width.min(seen.height) >= 3 && best.as_ref().is_none_or(|b| area(&seen) > area(b)) {
+                best = Some(seen);
+            }
+        }
+    }
+    best
+}
+
+/// The rectangle's marks in the board's order, how far the image fixes it, and whether the square before the first mark is dark.
+///
+/// Orders that see the board from its front and have the asked columns and rows: one, of a rectangle, or two of a square, and as
+/// many from the other end. Where some have a dark square at the board's origin, before the first mark, and others a bright one, the
+/// dark ones are the board. Among what remains the first mark is the one nearest to the image's top left.
+pub fn ordered(
+    lattice: &Lattice,
+    rectangle: &Rectangle,
+    places_px: &[Vec2],
+    (columns, rows): (usize, usize),
+) -> (Vec<usize>, Orientation, bool) {
+    let orders: Vec<Order> =
+        Order::all(rectangle).into_iter().filter(|order| order.size == (columns, rows)).collect();
+    let some_dark = orders.iter().any(Order::starts_dark);
+    let first_px = |order: &Order| places_px[lattice[&order.place(0, 0)]];
+    let mut left: Vec<Order> = orders.into_iter().filter(|order| order.starts_dark() == some_dark).collect();
+    left.sort_by(|a, b| first_px(a).sum().total_cmp(&first_px(b).sum()));
+    let orientation = match left.len() {
+        1 => Orientation::Fixed,
+        2 => Orientation::HalfTurn,
+        _ => Orientation::QuarterTurn,
+    };
+    let marks = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
+    let order = left[0];
+    let ordered = marks.map(|(column, row)| lattice[&order.place(column as i32, row as i32)]).collect();
+    (ordered, orientation, some_dark)
+}
+
+/// A way to count a rectangle's places.
+#[derive(Debug, Clone, Copy)]
+struct Order {
+    first: Place,
+    along_row: Place,
+    along_column: Place,
+    size: (usize, usize),
+}
+
+impl Order {
+    /// The four quarter turns; none is mirrored.
+    fn all(rectangle: &Rectangle) -> [Order; 4] {
+        let (w, h) = (rectangle.width, rectangle.height);
+        let corner = |i: usize, j: usize| (rectangle.low.0 + i as i32, rectangle.low.1 + j as i32);
+        let order = |first, along_row, along_column, size| Order { first, along_row, along_column, size };
+        [
+            order(corner(0, 0), (1, 0), (0, 1), (w, h)),
+            order(corner(w - 1, 0), (0, 1), (-1, 0), (h, w)),
+            order(corner(w - 1, h - 1), (-1, 0), (0, -1), (w, h)),
+            order(corner(0, h - 1), (0, -1), (1, 0), (h, w)),
+        ]
+    }
+
+    fn place(&self, column: i32, row: i32) -> Place {
+        let (a, b) = (self.along_row, self.along_column);
+        (self.first.0 + column * a.0 + row * b.0, self.first.1 + column * a.1 + row * b.1)
+    }
+
+    /// Whether the square before the first mark is dark: it has the colour of the square behind it.
+    fn starts_dark(&self) -> bool {
+        let dark_between_i_and_j = axes_at(self.first) == (0, 1);
+        // Quarter turns exchange the colours of the quadrants.
+        let is_half_turn = self.along_row.1 == 0;
+        dark_between_i_and_j == is_half_turn
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lattice(width: i32, height: i32) -> Lattice {
+        (0..height).flat_map(|j| (0..width).map(move |i| ((i, j), (j * width + i) as usize))).collect()
+    }
+
+    fn places_px(width: usize, height: usize) -> Vec<Vec2> {
+        (0..height).flat_map(|j| (0..width).map(move |i| Vec2::new(i as f64, j as f64))).collect()
+    }
+
+    #[test]
+    fn a_board_is_found_in_either_direction_and_another_is_named() {
+        let board = Rectangle { low: (0, 0), width: 9, height: 6 };
+        assert_eq!(find(&lattice(9, 6), 9, 6), Found::Board(board));
+        assert_eq!(find(&lattice(9, 6), 6, 9), Found::Board(board));
+        assert_eq!(find(&lattice(7, 7), 7, 7), Found::Board(Rectangle { low: (0, 0), width: 7, height: 7 }));
+        assert_eq!(find(&lattice(10, 7), 9, 6), Found::Other { columns: 10, rows: 7 });
+        assert_eq!(find(&lattice(9, 6), 10, 7), Found::Other { columns: 9, rows: 6 });
+        assert_eq!(find(&lattice(9, 7), 9, 6), Found::Other { columns: 9, rows: 7 });
+    }
+
+    #[test]
+    fn a_stray_corner_is_left_and_a_hole_or_half_a_row_more_refused() {
+        let mut stray = lattice(9, 6);
+        stray.insert((9, 2), 54);
+        assert!(matches!(find(&stray, 9, 6), Found::Board(_)));
+        stray.insert((9, 3), 55);
+        stray.insert((9, 4), 56);
+        assert!(!matches!(find(&stray, 9, 6), Found::Board(_)));
+        let mut hole = lattice(9, 6);
+        hole.remove(&(4, 3));
+        assert_eq!(find(&hole, 9, 6), Found::Incomplete);
+    }
+
+    #[test]
+    fn the_colour_of_the_corner_square_fixes_odd_by_even_boards() {
+        // The square between +i and +j of place (0, 0) is dark, so that (0, 0) starts the board; one place on, it does not.
+        let (lattice_96, places) = (lattice(9, 6), places_px(9, 6));
+        let board = Rectangle { low: (0, 0), width: 9, height: 6 };
+        let (marks, orientation, _) = ordered(&lattice_96, &board, &places, (9, 6));
+        assert_eq!((marks[0], marks[53], orientation), (0, 53, Orientation::Fixed));
+        let shifted: Lattice = lattice_96.iter().map(|(&(i, j), &mark)| ((i + 1, j), mark)).collect();
+        let (marks, orientation, _) = ordered(&shifted, &Rectangle { low: (1, 0), ..board }, &places, (9, 6));
+        assert_eq!((marks[0], marks[53], orientation), (53, 0, Orientation::Fixed));
+    }
+
+    #[test]
+    fn what_colours_do_not_fix_starts_at_the_top_left_and_says_so() {
+        let both = |width: i32, height: i32, asked: (usize, usize)| {
+            let (lattice, places) = (lattice(width, height), places_px(width as usize, height as usize));
+            let board = Rectangle { low: (0, 0), width: width as usize, height: height as usize };
+            let (marks, orientation, _) = ordered(&lattice, &board, &places, asked);
+            (marks[0], marks[1], orientation)
+        };
+        assert_eq!(both(7, 5, (7, 5)), (0, 1, Orientation::HalfTurn));
+        assert_eq!(both(8, 6, (8, 6)), (0, 1, Orientation::HalfTurn));
+        assert_eq!(both(7, 7, (7, 7)), (0, 1, Orientation::HalfTurn));
+        assert_eq!(both(6, 6, (6, 6)).2, Orientation::QuarterTurn);
+        // Counted across: row by row of the asked size, still seen from the front.
+        assert_eq!(both(9, 6, (6, 9)), (8, 17, Orientation::Fixed));
+    }
+}

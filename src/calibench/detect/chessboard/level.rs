@@ -1,0 +1,208 @@
+//! How does the board look at half the size, a quarter ...? A pyramid of images, and each smoothed for the search.
+//!
+//! A pixel of a level is the mean of 2 x 2 pixels of the level below, which is what a sensor of larger pixels would see: a
+//! level is an image in its own right, with half the blur and half the noise. Pixel `(x, y)` of level `k` is centred on
+//! `(x + 1/2) 2^k - 1/2` of the photograph.
+
+use crate::geometry::Vec2;
+use crate::raster::{Raster, Sample};
+use std::cell::OnceCell;
+
+/// Least side of a level, px: a board of 3 x 3 squares of 8 px, with its surroundings.
+const LEAST_SIDE: usize = 40;
+
+/// The levels of a photograph. Level 0 is the photograph; the others are made when they are first asked for.
+pub struct Pyramid<'a, T> {
+    photo: &'a Raster<T>,
+    reduced: Vec<OnceCell<Raster<f32>>>,
+}
+
+impl<'a, T: Sample> Pyramid<'a, T> {
+    pub fn new(photo: &'a Raster<T>) -> Pyramid<'a, T> {
+        let mut reduced = Vec::new();
+        let mut side = photo.width().min(photo.height()) / 2;
+        while side >= LEAST_SIDE {
+            reduced.push(OnceCell::new());
+            side /= 2;
+        }
+        Pyramid { photo, reduced }
+    }
+
+    /// Number of levels, the photograph included.
+    pub fn levels(&self) -> usize {
+        self.reduced.len() + 1
+    }
+
+    /// A level above the photograph.
+    pub fn reduced(&self, level: usize) -> Option<&Raster<f32>> {
+        let cell = self.reduced.get(level.checked_sub(1)?)?;
+        Some(cell.get_or_init(|| match self.reduced(level - 1) {
+            Some(below) => half(below),
+            None => half(self.photo),
+        }))
+    }
+
+    /// A level smoothed for the search.
+    pub fn smoothed(&self, level: usize) -> Smoothed {
+        match self.reduced(level) {
+            Some(raster) => Smoothed::of(raster),
+            None => Smoothed::of(self.photo),
+        }
+    }
+}
+
+/// The place in the photograph of a place of a level.
+pub fn photo_from_level(place: &Vec2, level: usize) -> Vec2 {
+    let scale = scale(level);
+    place * scale + Vec2::repeat(0.5 * (scale - 1.0))
+}
+
+/// The place in a level of a place of the photograph.
+pub fn level_from_photo(place: &Vec2, level: usize) -> Vec2 {
+    let scale = scale(level);
+    (place - Vec2::repeat(0.5 * (scale - 1.0))) / scale
+}
+
+/// Side of a level's pixel, px of the photograph.
+pub fn scale(level: usize) -> f64 {
+    (1u64 << level) as f64
+}
+
+fn half<T: Sample>(image: &Raster<T>) -> Raster<f32> {
+    let (width, height) = (image.width() / 2, image.height() / 2);
+    let mut samples = Vec::with_capacity(width * height);
+    for y in 0..height {
+        let (upper, lower) = (image.row(2 * y), image.row(2 * y + 1));
+        let pairs = upper.chunks_exact(2).zip(lower.chunks_exact(2));
+        samples.extend(
+            pairs.map(|(a, b)| 0.25 * ((a[0].to_f32() + a[1].to_f32()) + (b[0].to_f32() + b[1].to_f32()))),
+        );
+    }
+    Raster::from_samples(width, height, samples).expect("a sample for every pixel was made")
+}
+
+/// An image convolved with the binomial `(1 4 6 4 1) / 16` along both axes: variance 1 px^2 each.
+pub struct Smoothed {
+    image: Raster<f32>,
+    /// Standard deviation of a sample's noise before smoothing.
+    noise: f64,
+    /// Difference of the greatest and the least smoothed sample.
+    range: f64,
+}
+
+/// Part of a white noise's standard deviation that the smoothing leaves: `70 / 256`.
+const NOISE_LEFT: f64 = 70.0 / 256.0;
+
+impl Smoothed {
+    fn of<T: Sample>(image: &Raster<T>) -> Smoothed {
+        let (width, height) = (image.width(), image.height());
+        let mut across: Vec<f32> = Vec::with_capacity(width * height);
+        let mut row: Vec<f32> = Vec::with_capacity(width + 4);
+        for y in 0..height {
+            row.clear();
+            let samples = image.row(y);
+            let (first, last) = (samples[0].to_f32(), samples[width - 1].to_f32());
+            row.extend([first; 2]);
+            row.extend(samples.iter().map(|sample| sample.to_f32()));
+            row.extend([last; 2]);
+            add_binomial([0, 1, 2, 3, 4].map(|k| &row[k..k + width]), &mut across);
+        }
+        let line = |y: isize| {
+            let y = y.clamp(0, height as isize - 1) as usize;
+            &across[y * width..][..width]
+        };
+        let mut samples: Vec<f32> = Vec::with_capacity(width * height);
+        for y in 0..height as isize {
+            add_binomial([-2, -1, 0, 1, 2].map(|k| line(y + k)), &mut samples);
+        }
+        let low = samples.iter().copied().fold(f32::INFINITY, lesser);
+        let high = samples.iter().copied().fold(f32::NEG_INFINITY, greater);
+        let image_smoothed =
+            Raster::from_samples(width, height, samples).expect("a sample for every pixel was made");
+        let range = f64::from(high) - f64::from(low);
+        Smoothed {
+            image: image_smoothed,
+            noise: noise(image),
+            range: if range.is_finite() { range } else { 0.0 },
+        }
+    }
+
+    pub fn image(&self) -> &Raster<f32> {
+        &self.image
+    }
+
+    /// Standard deviation of a smoothed sample's noise.
+    pub fn noise(&self) -> f64 {
+        NOISE_LEFT * self.noise
+    }
+
+    /// Difference of the greatest and the least sample.
+    pub fn range(&self) -> f64 {
+        self.range
+    }
+
+    /// Whether a place is at least `margin` px inside.
+    pub fn holds(&self, place: &Vec2, margin: f64) -> bool {
+        let fits = |at: f64, size: usize| at >= margin && at + margin + 1.0 < size as f64;
+        fits(place.x, self.image.width()) && fits(place.y, self.image.height())
+    }
+
+    /// The level of the pixel at a place that [`holds`](Smoothed::holds) found inside.
+    pub fn nearest(&self, place: &Vec2) -> f64 {
+        f64::from(self.image.get((place.x + 0.5) as usize, (place.y + 0.5) as usize))
+    }
+
+    /// The level at a place that [`holds`](Smoothed::holds) found inside, bilinear.
+    pub fn at(&self, place: &Vec2) -> f64 {
+        let (x, y) = (place.x as usize, place.y as usize);
+        let (a, b) = (place.x - x as f64, place.y - y as f64);
+        let (upper, lower) = (&self.image.row(y)[x..x + 2], &self.image.row(y + 1)[x..x + 2]);
+        let mix = |row: &[f32]| f64::from(row[0]) + (f64::from(row[1]) - f64::from(row[0])) * a;
+        mix(upper) + (mix(lower) - mix(upper)) * b
+    }
+}
+
+/// Appends the binomial mean of five rows.
+fn add_binomial(rows: [&[f32]; 5], out: &mut Vec<f32>) {
+    let start = out.len();
+    out.resize(start + rows[2].len(), 0.0);
+    let out = &mut out[start..];
+    let [a, b, c, d, e] = rows.map(|row| &row[..out.len()]);
+    for x in 0..out.len() {
+        out[x] = ((a[x] + e[x]) + 4.0 * (b[x] + d[x]) + 6.0 * c[x]) * 0.0625;
+    }
+}
+
+fn lesser(a: f32, b: f32) -> f32 {
+    if b < a { b } else { a }
+}
+
+fn greater(a: f32, b: f32) -> f32 {
+    if b > a { b } else { a }
+}
+
+/// Samples that the noise is estimated from, about.
+const NOISE_SAMPLES: usize = 4000;
+
+/// Standard deviation of white noise: second differences along rows have a variance of `6 sigma^2`, and most of an image has no edge; the
+/// lower quartile of `|N|` is 0.3186 standard deviations.
+fn noise<T: Sample>(image: &Raster<T>) -> f64 {
+    let (width, height) = (image.width(), image.height());
+    if width < 3 {
+        return 0.0;
+    }
+    let step = (width * height).div_ceil(NOISE_SAMPLES).max(1);
+    // Rows and columns in the same proportion; an odd stride along a row, so that no regular pattern is met in step.
+    let stride = (step as f64).sqrt() as usize | 1;
+    let mut differences: Vec<f64> = Vec::with_capacity(2 * NOISE_SAMPLES);
+    for y in (0..height).step_by(stride) {
+        let row = image.row(y);
+        for x in (1..width - 1).step_by(stride) {
+            let second = row[x - 1].to_f64() - 2.0 * row[x].to_f64() + row[x + 1].to_f64();
+            differences.push(second.abs());
+        }
+    }
+    let quarter = differences.len() / 4;
+    let (_, quartile, _) = differences.select_nth_unstable_by(quarter, f64::total_cmp);
+    *quartile / (0.3186 * 6.0f64.sqrt())
+}

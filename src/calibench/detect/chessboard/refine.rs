@@ -1,0 +1,222 @@
+//! Where exactly are the board's corners? Each fitted in a window that has the shape of its squares.
+//!
+//! Directions, window and curvature of the edges come from the corners beside. A corner found in a reduced image is fitted there
+//! first, where it is sharp and its place is near enough, then in the photograph itself.
+
+use super::level::{Pyramid, level_from_photo, photo_from_level, scale};
+use super::smoothness::{expected, out_of_line};
+use crate::detect::edge::SHARPEST_EDGE_PX;
+use crate::detect::saddle::{Crossing, Window, fit_near_edges};
+use crate::geometry::Vec2;
+use crate::raster::{Raster, Sample};
+
+/// Part of the distance to the next corner that a window reaches: beyond the middle, blur of the next edge comes in.
+const WINDOW_FRACTION: f64 = 0.42;
+
+/// Largest reach of a window, px: longer edges bring little that the curvature's own error does not take back.
+const LARGEST_REACH_PX: f64 = 14.0;
+
+/// Largest reach in a reduced image, where the fit is only a start, px.
+const LARGEST_START_PX: f64 = 8.0;
+
+/// How far the fit in a level may lie from where the corner was found, px of the level.
+const LARGEST_MOVE_PX: f64 = 2.0;
+
+/// Corners of a complete board, row by row, px.
+pub struct Corners<'a> {
+    pub places: &'a [Vec2],
+    pub columns: usize,
+}
+
+/// What the corners beside tell of a corner.
+struct Around {
+    /// Steps along a row and down a column.
+    steps: [Vec2; 2],
+    /// Curvature of the row and of the column.
+    curvatures: [f64; 2],
+}
+
+impl Corners<'_> {
+    /// The corners before and behind a corner, along a row (`axis` 0) or a column (1).
+    fn beside(&self, index: usize, axis: usize) -> [Option<Vec2>; 2] {
+        let rows = self.places.len() / self.columns;
+        let (at, count, stride) = if axis == 0 {
+            (index % self.columns, self.columns, 1)
+        } else {
+            (index / self.columns, rows, self.columns)
+        };
+        [(at > 0).then(|| self.places[index - stride]), (at + 1 < count).then(|| self.places[index + stride])]
+    }
+
+    fn around(&self, index: usize) -> Around {
+        let (mut steps, mut curvatures) = ([Vec2::zeros(); 2], [0.0; 2]);
+        for axis in 0..2 {
+            let here = self.places[index];
+            let [before, behind] = self.beside(index, axis);
+            let stride = if axis == 0 { 1 } else { self.columns };
+            (steps[axis], curvatures[axis]) = match (before, behind) {
+                (Some(before), Some(behind)) => ((behind - before) * 0.5, curvature(&before, &here, &behind)),
+                (None, Some(behind)) => end_of_line(here, behind, self.beside(index + stride, axis)[1]),
+                (Some(before), None) => {
+                    let (step, bent) = end_of_line(here, before, self.beside(index - stride, axis)[0]);
+                    // Walked backwards, the line turns the other way.
+                    (-step, -bent)
+                }
+                (None, None) => (Vec2::zeros(), 0.0),
+            };
+        }
+        Around { steps, curvatures }
+    }
+}
+
+/// The step at the end of a line and its curvature: the direction is the chord's, turned by half the angle of the arc.
+fn end_of_line(here: Vec2, next: Vec2, after: Option<Vec2>) -> (Vec2, f64) {
+    let step = next - here;
+    let Some(after) = after else { return (step, 0.0) };
+    let bent = curvature(&here, &next, &after);
+    // The tangent of an arc of curvature k lies k s / 2 before its chord of length s.
+    let turn = -0.5 * bent * step.norm();
+    (step + Vec2::new(-step.y, step.x) * turn, bent)
+}
+
+/// The curvature of the arc through three places, positive where it turns as from u to v (Menger: `4 area / product of sides`).
+fn curvature(a: &Vec2, b: &Vec2, c: &Vec2) -> f64 {
+    let (ab, bc, ac) = (b - a, c - b, c - a);
+    2.0 * ab.perp(&bc) / (ab.norm() * bc.norm() * ac.norm())
+}
+
+/// All corners of a board that was found in a level, fitted in the photograph; `None` where one has no fit or lies out of line.
+/// `starts_dark`: the square between the first row and column of corners is dark.
+pub fn refined<T: Sample>(
+    photo: &Raster<T>,
+    pyramid: &Pyramid<'_, T>,
+    level: usize,
+    found: &[Vec2],
+    columns: usize,
+    starts_dark: bool,
+) -> Option<Vec<Vec2>> {
+    let is_dark = |index: usize| ((index % columns + index / columns) % 2 == 0) == starts_dark;
+    let start_edge_px = [1.5 * SHARPEST_EDGE_PX; 2];
+    let mut places: Vec<Vec2> = found.iter().map(|place| photo_from_level(place, level)).collect();
+    let mut edges_px = vec![start_edge_px; found.len()];
+    if let Some(reduced) = pyramid.reduced(level) {
+        let fitting = Fitting { image: reduced, is_dark: &is_dark, columns, largest_px: LARGEST_START_PX };
+        for (index, crossing) in fitting.all(found, &edges_px).into_iter().enumerate() {
+            let Some(crossing) = crossing else { continue };
+            places[index] = photo_from_level(&crossing.corner, level);
+            edges_px[index] = crossing.edges_px.map(|edge_px| edge_px * scale(level) * START_WIDTH);
+        }
+    }
+    let fitting = Fitting { image: photo, is_dark: &is_dark, columns, largest_px: LARGEST_REACH_PX };
+    let fits = fitting.all(&places, &edges_px);
+    let mut good: Vec<Option<Vec2>> = fits.iter().map(|fit| fit.map(|fit| fit.corner)).collect();
+    for index in out_of_line(&mut good, columns) {
+        let (place, tolerance_px) = expected(&good, columns, index)?;
+        places[index] = place;
+        let is_near = |corner: &Vec2| (corner - place).norm() < tolerance_px;
+        let fit = fitting.one(&places, index, edges_px[index]).map(|fit| fit.corner).filter(is_near);
+        good[index] = fit.or_else(|| {
+            let in_level = |level| fit_in_level(pyramid, level, &is_dark, &places, columns, index);
+            (1..=BLURRED_LEVELS).find_map(|level| in_level(level).filter(is_near))
+        });
+    }
+    good.into_iter().collect()
+}
+
+/// Levels in which a corner is fitted that has no fit in the photograph: motion of twelve pixels is one of three there.
+const BLURRED_LEVELS: usize = 2;
+
+/// The fit of a corner in a reduced image, as a place of the photograph.
+fn fit_in_level<T: Sample>(
+    pyramid: &Pyramid<'_, T>,
+    level: usize,
+    is_dark: &dyn Fn(usize) -> bool,
+    places: &[Vec2],
+    columns: usize,
+    index: usize,
+) -> Option<Vec2> {
+    let image = pyramid.reduced(level)?;
+    let in_level: Vec<Vec2> = places.iter().map(|place| level_from_photo(place, level)).collect();
+    let fitting = Fitting { image, is_dark, columns, largest_px: LARGEST_REACH_PX };
+    let fit = fitting.one(&in_level, index, [1.5 * SHARPEST_EDGE_PX; 2])?;
+    Some(photo_from_level(&fit.corner, level))
+}
+
+/// Part of an edge's width in a reduced image that the photograph's is thought to have: pixels four times as large add to it.
+const START_WIDTH: f64 = 0.8;
+
+/// The fits of a board's corners in one image.
+struct Fitting<'a, T> {
+    image: &'a Raster<T>,
+    is_dark: &'a dyn Fn(usize) -> bool,
+    columns: usize,
+    largest_px: f64,
+}
+
+impl<T: Sample> Fitting<'_, T> {
+    /// Every fit; each starts from the widths of the one before, whose edges have the same blur and direction.
+    fn all(&self, places: &[Vec2], edges_px: &[[f64; 2]]) -> Vec<Option<Crossing>> {
+        let mut before = None;
+        let mut fit = |index: usize| {
+            let crossing = self.one(places, index, before.unwrap_or(edges_px[index]));
+            before = crossing.map(|crossing| crossing.edges_px);
+            crossing
+        };
+        (0..places.len()).map(&mut fit).collect()
+    }
+
+    fn one(&self, places: &[Vec2], index: usize, edges_px: [f64; 2]) -> Option<Crossing> {
+        let around = Corners { places, columns: self.columns }.around(index);
+        let start = start(self.image, places[index], &around, (self.is_dark)(index), edges_px)?;
+        fitted(self.image, &start, &around, self.largest_px)
+    }
+}
+
+/// The window of a corner.
+fn sides(around: &Around, largest_px: f64) -> [Vec2; 2] {
+    around.steps.map(|step| {
+        let length = step.norm();
+        step * (WINDOW_FRACTION * length).min(largest_px) / length
+    })
+}
+
+fn fitted<T: Sample>(
+    image: &Raster<T>,
+    start: &Crossing,
+    around: &Around,
+    largest_px: f64,
+) -> Option<Crossing> {
+    let window = Window::Along(sides(around, largest_px));
+    let shortest = around.steps[0].norm().min(around.steps[1].norm());
+    fit_near_edges(image, start, &window, around.curvatures, LARGEST_MOVE_PX.min(0.3 * shortest))
+}
+
+/// Directions from the corners beside, levels from the pixels in the middle of the quadrants.
+fn start<T: Sample>(
+    image: &Raster<T>,
+    corner: Vec2,
+    around: &Around,
+    is_dark: bool,
+    edges_px: [f64; 2],
+) -> Option<Crossing> {
+    let [a, b] = sides(around, LARGEST_REACH_PX);
+    let level = |s: f64, t: f64| {
+        let place = corner + a * (0.6 * s) + b * (0.6 * t);
+        let (x, y) = (libm::round(place.x), libm::round(place.y));
+        let inside = x >= 0.0 && y >= 0.0 && x < image.width() as f64 && y < image.height() as f64;
+        inside.then(|| image.get(x as usize, y as usize).to_f64())
+    };
+    let between = 0.5 * (level(1.0, 1.0)? + level(-1.0, -1.0)?);
+    let beside = 0.5 * (level(1.0, -1.0)? + level(-1.0, 1.0)?);
+    let least = f64::MIN_POSITIVE;
+    let amplitude =
+        if is_dark { (0.5 * (beside - between)).max(least) } else { (0.5 * (beside - between)).min(-least) };
+    Some(Crossing {
+        corner,
+        angles_rad: around.steps.map(|step| libm::atan2(step.y, step.x)),
+        edges_px,
+        mean: 0.5 * (between + beside),
+        amplitude,
+        slope: Vec2::zeros(),
+    })
+}
