@@ -21,6 +21,7 @@
 //! | `code experiments/line_bending.rs sweep_k1` | that item of that file |
 //! | `cite zhang2000`, `citep zhang2000` | `Zhang (2000)`, `(Zhang 2000)` |
 //! | `ref eq:projection` | `equation (1.1)`, `Figure 2.1`, `Table 3.2` |
+//! | `published-counts` | how many published values hold, by kind of verdict |
 //! | `all-published`, `all-references` | the appendix, the list of references |
 //!
 //! An equation is written between lines of `$$`, the last one followed by its name: `$$ {#eq:projection}`.
