@@ -48,7 +48,7 @@ pub fn claim_published_consistent(record: &mut Record) -> Result<(), ExperimentE
         "the chapter's spacings, scales, translations and residuals follow from each other within their printed digits",
         cases.map(|(name, held)| (name.to_string(), held)),
         "interval arithmetic over half a unit of each last printed digit",
-    ));
+    ).over("relations"));
     Ok(())
 }
 
@@ -91,7 +91,8 @@ pub fn tell_derived(record: &mut Record) -> Result<(), ExperimentError> {
     };
     tell("rms-px", value("rms")? / per_px, "px", "printed residual RMS over the mean printed scale");
     tell("max-px", value("max")? / per_px, "px", "printed largest residual over the mean printed scale");
-    let gap = |ours: &str, gui: &str| -> Result<f64, ExperimentError> { Ok((value(gui)? - value(ours)?).abs()) };
+    let gap =
+        |ours: &str, gui: &str| -> Result<f64, ExperimentError> { Ok((value(gui)? - value(ours)?).abs()) };
     tell("gui-gap", gap("tx", "gui-tx")?, "", "gap of the two printed translations along x");
     tell("gui-gap-y", gap("ty", "gui-ty")?, "", "gap of the two printed translations along y");
     Ok(())
