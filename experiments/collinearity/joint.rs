@@ -35,13 +35,7 @@ fn place(draws: &[Draw], treatment: usize, book: &Book) -> Result<Place, Experim
 }
 
 pub fn tell_joint(record: &mut Record, draws: &[Draw], book: &Book) -> Result<(), ExperimentError> {
-    let columns = [
-        ("centre", ""),
-        ("estimated", ""),
-        ("distance", ""),
-        ("probability", ""),
-        ("verdict", ""),
-    ];
+    let columns = [("centre", ""), ("estimated", ""), ("distance", ""), ("probability", ""), ("verdict", "")];
     let caption = "the five published numbers together against each treatment: squared Mahalanobis distance from the draws' mean, and \
                    the share of draws that lie as far out";
     let mut table = Table::new("joint", caption, &columns);
@@ -70,12 +64,16 @@ pub fn tell_joint(record: &mut Record, draws: &[Draw], book: &Book) -> Result<()
 /// A radial lens whose centre is held, wherever, lacks what the published numbers show; the others do not.
 fn claim(centre: Centre, probability: f64) -> Claim {
     let (name, estimated) = (centre.name(), centre.estimated());
-    let reason = "rank of the published numbers among the draws by Mahalanobis distance; excluded below 0.001";
+    let reason =
+        "rank of the published numbers among the draws by Mahalanobis distance; excluded below 0.001";
     if centre.parameters() == 10 {
-        let statement = format!("{name}, {estimated} estimated: the five published numbers do not occur together");
+        let statement =
+            format!("{name}, {estimated} estimated: the five published numbers do not occur together");
         Claim::at_most(format!("{name}-is-excluded"), statement, probability, EXCLUDED_BELOW, reason)
     } else {
-        let statement = format!("{name}, {estimated} estimated: the five published numbers together are an ordinary draw");
+        let statement = format!(
+            "{name}, {estimated} estimated: the five published numbers together are an ordinary draw"
+        );
         Claim::at_least(format!("{name}-is-possible"), statement, probability, EXCLUDED_BELOW, reason)
     }
 }
