@@ -243,9 +243,7 @@ mod tests {
         let twice = one("e.n", "1.0") + &one("e.n", "1.0");
         assert!(matches!(parse(&twice), Err(PublishedError::Entry { problem: "stands twice", .. })));
         let with = |from: &str, to: &str| parse(&one("e.n", "1.0").replace(from, to));
-        let refused = |parsed: Result<Vec<Entry>, PublishedError>, why: &str| {
-            matches!(parsed, Err(PublishedError::Entry { problem, .. }) if problem.contains(why))
-        };
+        let refused = |parsed: Result<Vec<Entry>, PublishedError>, why: &str| matches!(parsed, Err(PublishedError::Entry { problem, .. }) if problem.contains(why));
         assert!(refused(with("independent", "input"), "because"));
         assert!(refused(with("rule='exact'\n", ""), "needs a rule"));
         assert!(refused(with("independent'", "cannot-be-judged'\nbecause='no data'"), "it has none"));

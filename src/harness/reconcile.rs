@@ -158,8 +158,7 @@ mod tests {
 
     #[test]
     fn ours_must_come_within_the_tolerance() {
-        let at =
-            |ours| Reconciliation::within(&entry("236.2", Rule::Within), ours, 0.05, "rounding".into());
+        let at = |ours| Reconciliation::within(&entry("236.2", Rule::Within), ours, 0.05, "rounding".into());
         assert!(at(236.24).held() && !at(236.26).held() && !at(f64::NAN).held());
     }
 }

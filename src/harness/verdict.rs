@@ -159,8 +159,7 @@ impl Verdict {
                 || format!("{} {} is not in [{low}, {high}]", claim.value, claim.unit),
                 |counted| format!("{counted} only"),
             );
-            let mut text =
-                format!("claim {}: {}; {found} ({})", claim.id, claim.statement, claim.reason);
+            let mut text = format!("claim {}: {}; {found} ({})", claim.id, claim.statement, claim.reason);
             for failure in &claim.failures {
                 text.push_str(&format!("\n    fails: {failure}"));
             }

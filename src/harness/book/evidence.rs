@@ -66,7 +66,6 @@ pub(super) struct RecordClaim {
 pub(super) struct RecordPublished {
     pub id: String,
     pub kind: String,
-    pub ours: Value,
     pub book_held: bool,
     pub ours_held: bool,
 }

@@ -1,13 +1,15 @@
 //! What does a placeholder stand for? One function a verb; an error says what is missing and what to do.
 
 use super::constants::constant;
+use super::contradictions::Contradiction;
 use super::evidence::ExperimentEvidence;
 use super::finding::Finding;
 use super::golden_file::{GoldenFigure, GoldenFile, GoldenNumber};
 use super::labels::Labels;
-use super::sources::{REFERENCES, Sources};
+use super::scan::{Kind, scan};
+use super::sources::{CONTRADICTIONS, REFERENCES, Sources};
 use super::text::{attribute, escape, inline, sentence};
-use super::{appendix, format, listing, references};
+use super::{appendix, contradictions, format, listing, references};
 use crate::harness::hash::sha256_hex;
 use crate::harness::published::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,8 +20,12 @@ pub(super) struct Resolver<'a> {
     sources: &'a Sources,
     pub labels: Labels,
     pub assets: BTreeMap<String, Vec<u8>>,
+    /// The page whose pieces are being resolved.
+    pub page: String,
     cited: BTreeSet<String>,
     shown: BTreeSet<String>,
+    /// Contradictions declared so far, with their pages.
+    declared: BTreeMap<String, String>,
 }
 
 type Resolved = Result<String, String>;
@@ -29,7 +35,15 @@ const WIDE_PX: f64 = 700.0;
 
 impl<'a> Resolver<'a> {
     pub(super) fn new(sources: &'a Sources, labels: Labels) -> Resolver<'a> {
-        Resolver { sources, labels, assets: BTreeMap::new(), cited: BTreeSet::new(), shown: BTreeSet::new() }
+        Resolver {
+            sources,
+            labels,
+            assets: BTreeMap::new(),
+            page: String::new(),
+            cited: BTreeSet::new(),
+            shown: BTreeSet::new(),
+            declared: BTreeMap::new(),
+        }
     }
 
     /// The text of a placeholder, which may be the first of a sentence.
@@ -48,6 +62,8 @@ impl<'a> Resolver<'a> {
             ["cite", key] => self.cite(key, false),
             ["citep", key] => self.cite(key, true),
             ["ref", label] => self.refer(label, begins_sentence),
+            ["contradiction", id] => self.contradiction(id),
+            ["all-contradictions"] => self.contradictions(),
             ["published-counts"] => Ok(appendix::published_counts(self.sources)),
             ["all-published"] => Ok(appendix::published_table(self.sources)),
             ["all-records"] => Ok(appendix::record_list(self.sources)),
@@ -208,12 +224,72 @@ impl<'a> Resolver<'a> {
         Ok(format!(r##"<a class="ref" href="{}#{name}">{words}</a>"##, label.page))
     }
 
-    /// Names that nothing uses: references, labels, figures that are drawn for nobody.
+    fn contradiction(&mut self, id: &str) -> Resolved {
+        let entry = self.sources.contradictions.iter().find(|c| c.id == id);
+        let entry = entry.ok_or_else(|| format!("{CONTRADICTIONS} has no `{id}`"))?;
+        if let Some(page) = self.declared.insert(id.to_string(), self.page.clone()) {
+            return Err(format!("contradiction `{id}` is declared on {page} already"));
+        }
+        Ok(contradictions::declared(entry, &self.within(&entry.found)?, &self.shown_by(entry)?))
+    }
+
+    fn contradictions(&mut self) -> Resolved {
+        let mut rows = String::new();
+        for entry in &self.sources.contradictions {
+            let page = self.declared.get(&entry.id).cloned();
+            let page = page.ok_or_else(|| format!("contradiction `{}` is not declared above", entry.id))?;
+            let (found, shown_by) = (self.within(&entry.found)?, self.shown_by(entry)?);
+            rows.push_str(&contradictions::row(entry, &found, &shown_by, &page));
+        }
+        Ok(contradictions::table(&rows))
+    }
+
+    /// Plain text with placeholders, resolved.
+    fn within(&mut self, text: &str) -> Resolved {
+        let pieces = scan(text);
+        pieces
+            .iter()
+            .map(|piece| match &piece.kind {
+                Kind::Prose(text) => Ok(inline(text)),
+                Kind::Placeholder(text) => self.resolve(text, false),
+                _ => Err(format!("`{text}`: words and placeholders only")),
+            })
+            .collect()
+    }
+
+    /// Links to the claims and works that show a contradiction. A claim must be there and hold.
+    fn shown_by(&mut self, entry: &Contradiction) -> Resolved {
+        let mut shown = Vec::new();
+        for evidence in &entry.evidence {
+            if let Some(key) = evidence.strip_prefix("cite ") {
+                shown.push(self.cite(key, false)?);
+                continue;
+            }
+            let (experiment, claim) = split(evidence)?;
+            let (found, golden) = self.golden(experiment)?;
+            if !golden.claims.iter().any(|c| c == claim) {
+                return Err(format!("experiment `{experiment}` has no claim `{claim}`"));
+            }
+            if found.record.as_ref().is_some_and(|r| r.claims.iter().any(|c| c.id == claim && !c.held)) {
+                return Err(format!("claim `{evidence}`, which shows `{}`, fails", entry.id));
+            }
+            let page = appendix::page_of(experiment);
+            shown.push(format!("<a href=\"{page}#claim-{claim}\"><code>{}</code></a>", inline(evidence)));
+        }
+        Ok(shown.join(", "))
+    }
+
+    /// Names that nothing uses: references, labels, contradictions that no page declares, figures that are drawn for nobody.
     pub(super) fn unused(&self) -> Vec<Finding> {
         let mut findings = self.labels.unused();
         let uncited = self.sources.references.iter().filter(|r| !self.cited.contains(&r.key));
         findings
             .extend(uncited.map(|r| Finding::new(REFERENCES, r.line, format!("`{}` is never cited", r.key))));
+        let silent = self.sources.contradictions.iter().filter(|c| !self.declared.contains_key(&c.id));
+        findings.extend(silent.map(|c| {
+            let message = format!("`{}` is declared on no page: write {{{{contradiction {}}}}}", c.id, c.id);
+            Finding::new(CONTRADICTIONS, c.line, message)
+        }));
         for (experiment, evidence) in &self.sources.evidence.experiments {
             let figures = evidence.golden.iter().flat_map(|g| &g.figures);
             for GoldenFigure { file, line, .. } in figures {

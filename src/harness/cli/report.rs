@@ -33,7 +33,8 @@ fn by_kind(counts: ByKind) -> String {
 
 /// One line an experiment, and the published values of all by kind.
 pub(super) fn reconciliation_table(runs: &[Run], verdicts: &[Option<Verdict>]) -> String {
-    let mut table = table(&["experiment", "golden numbers", "claims", "published, by kind", "time", "verdict"]);
+    let mut table =
+        table(&["experiment", "golden numbers", "claims", "published, by kind", "time", "verdict"]);
     for column in [1, 2, 4] {
         if let Some(column) = table.column_mut(column) {
             column.set_cell_alignment(CellAlignment::Right);
