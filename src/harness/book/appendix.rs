@@ -139,35 +139,35 @@ pub(super) fn claims_table(experiment: &str, claims: &[RecordClaim], places: boo
         };
         let rate = claim
             .false_alarm_rate
-            .map_or("Nothing is drawn.".to_string(), |r| format!("False-alarm rate {r:?}."));
+            .map_or("Nothing is drawn.".to_string(), |r| format!("False-alarm rate {}.", significant(r, 2)));
         let (word, class) = if claim.held { ("held", "held") } else { ("fails", "deviates") };
         let place = if places { format!(" id=\"claim-{}\"", claim.id) } else { String::new() };
         let _ = write!(
             rows,
-            "<tr{place}><td class=\"text\">{}<div class=\"because\">{}. {rate}</div></td><td class=\"value\">{value}</td>\
-             <td class=\"interval\">{}</td><td class=\"{class}\">{word}</td></tr>",
+            "<tr{place}><td class=\"text\">{}<div class=\"because\">{}. {rate}</div></td>\
+             <td class=\"value\">{value}<div class=\"because\">{}</div></td><td class=\"{class}\">{word}</td></tr>",
             inline(&claim.statement),
             inline(&sentence(&claim.reason)),
             interval(claim)
         );
     }
-    let head = "<thead><tr><th>claim, and where its interval comes from</th><th>value</th><th>must lie in</th><th>verdict</th></tr></thead>";
+    let head = "<thead><tr><th>claim, and where its interval comes from</th><th>value, and where it must lie</th><th>verdict</th></tr></thead>";
     format!(
-        "<div class=\"table-wrapper\"><table class=\"claims\" id=\"claims-{experiment}\">{head}<tbody>{rows}</tbody></table></div>\n"
+        "<div class=\"table-wrapper\"><table class=\"claims\">{head}<tbody>{rows}</tbody></table></div>\n"
     )
 }
 
 /// Where the value of a claim must lie.
 fn interval(claim: &RecordClaim) -> String {
     if claim.counted.is_some() {
-        return "all".to_string();
+        return String::new();
     }
     let unit = format::unit(&claim.unit);
     let (low, high) = (number(&claim.interval.0), number(&claim.interval.1));
     match (low.is_finite(), high.is_finite()) {
         (false, true) => format!("\u{2264}\u{a0}{}{unit}", significant(high, 3)),
         (true, false) => format!("\u{2265}\u{a0}{}{unit}", significant(low, 3)),
-        _ => format!("[{}, {}]{unit}", significant(low, 4), significant(high, 4)),
+        _ => format!("in [{}, {}]{unit}", significant(low, 4), significant(high, 4)),
     }
 }
 
@@ -201,39 +201,36 @@ pub(super) fn published_table(sources: &Sources) -> String {
             let page = page_of(entry.experiment());
             format!("<a class=\"num\" href=\"{page}#number-{}\" title=\"{:?}\">{value}</a>", n.id, n.value)
         });
-        let (against, expectation) = locked.map_or((String::new(), String::new()), |p| {
+        let expectation = locked.map_or(String::new(), |p| {
             let (low, high) = p.interval;
-            let against = format!("[{},\u{a0}{}]", significant(low, 6), significant(high, 6));
-            (against, format!("{}.", sentence(&format!("{}: {}", p.rule, p.expectation))))
+            let interval = format!("[{}, {}]", significant(low, 6), significant(high, 6));
+            format!("Ours in {interval}. {}.", inline(&sentence(&format!("{}: {}", p.rule, p.expectation))))
         });
         let because = match entry.because.as_str() {
             "" => String::new(),
-            because => format!(" {}.", sentence(because)),
+            because => format!(" {}.", inline(&sentence(because))),
         };
         let _ = write!(
             rows,
-            "<tr id=\"published-{}\"><td>{}</td><td class=\"text\">{}<div class=\"because\">{}{}</div></td>\
-             <td class=\"value\">{}{}</td><td class=\"value\">{ours}</td><td>{}</td><td>{against}</td>\
-             <td class=\"{class}\">{word}</td></tr>",
+            "<tr id=\"published-{}\"><td class=\"text\">{} {}<div class=\"because\">{expectation}{because}</div></td>\
+             <td class=\"value\">{}{}</td><td class=\"value\">{ours}</td>\
+             <td class=\"{class}\">{word}<div class=\"because\">{}</div></td></tr>",
             entry.id,
             section(&entry.section),
             inline(&entry.what),
-            inline(&expectation),
-            inline(&because),
             typeset(&entry.printed),
             format::unit(&entry.unit),
             entry.kind.name()
         );
     }
-    let head = "<thead><tr><th>section</th><th>what, and what it is held against</th><th>printed</th><th>ours</th><th>kind</th>\
-                <th>interval</th><th>verdict</th></tr></thead>";
+    let head = "<thead><tr><th>what, and what it is held against</th><th>printed</th><th>ours</th><th>verdict</th></tr></thead>";
     format!(
         "<div class=\"table-wrapper\"><table class=\"published\">{head}<tbody>{rows}</tbody></table></div>\n"
     )
 }
 
 /// A section with its sign; `case study` has no number.
-fn section(name: &str) -> String {
+pub(super) fn section(name: &str) -> String {
     let sign = if name.starts_with(|c: char| c.is_ascii_digit()) { "\u{a7}" } else { "" };
     format!("{sign}{}", inline(name))
 }

@@ -1,5 +1,6 @@
 //! Where is the chapter contradicted? book/contradictions.toml, declared where the text says so and listed on one page.
 
+use super::appendix::section;
 use super::text::inline;
 use serde::Deserialize;
 use toml::Spanned;
@@ -53,10 +54,10 @@ pub(super) fn parse(text: &str) -> Result<Vec<Contradiction>, (usize, String)> {
 /// The box in the text. `found` and `shown_by` are resolved already.
 pub(super) fn declared(entry: &Contradiction, found: &str, shown_by: &str) -> String {
     format!(
-        "<div class=\"contradiction\" id=\"contradiction-{}\"><b>Against the chapter</b> (\u{a7}{}): {} {found} \
+        "<div class=\"contradiction\" id=\"contradiction-{}\"><b>Against the chapter</b> ({}): {} {found} \
          <span class=\"source\">Shown by {shown_by}; <a href=\"contradictions.md\">all such places</a>.</span></div>\n",
         entry.id,
-        inline(&entry.section),
+        section(&entry.section),
         inline(&entry.chapter)
     )
 }
@@ -64,10 +65,10 @@ pub(super) fn declared(entry: &Contradiction, found: &str, shown_by: &str) -> St
 /// A row of the list, with the page that declares it.
 pub(super) fn row(entry: &Contradiction, found: &str, shown_by: &str, page: &str) -> String {
     format!(
-        "<tr><td>\u{a7}{}</td><td class=\"text\">{}</td><td class=\"text\">{found}</td><td>{shown_by}</td>\
-         <td><a href=\"{page}#contradiction-{}\">in the text</a></td></tr>",
-        inline(&entry.section),
+        "<tr><td class=\"text\">{}<div class=\"because\">{}; <a href=\"{page}#contradiction-{}\">in the text</a></div></td>\
+         <td class=\"text\">{found}<div class=\"because\">Shown by {shown_by}</div></td></tr>",
         inline(&entry.chapter),
+        section(&entry.section),
         entry.id
     )
 }
@@ -75,8 +76,8 @@ pub(super) fn row(entry: &Contradiction, found: &str, shown_by: &str, page: &str
 /// The list around its rows.
 pub(super) fn table(rows: &str) -> String {
     format!(
-        "<div class=\"table-wrapper\"><table class=\"contradictions\"><thead><tr><th>section</th><th>the chapter</th>\
-         <th>found here</th><th>shown by</th><th>where</th></tr></thead><tbody>{rows}</tbody></table></div>\n"
+        "<div class=\"table-wrapper\"><table class=\"contradictions\"><thead><tr><th>the chapter</th><th>found here</th></tr></thead>\
+         <tbody>{rows}</tbody></table></div>\n"
     )
 }
 
