@@ -9,12 +9,24 @@ ci:
 # Formatter and lints, warnings as errors
 lint:
     cargo fmt --check
-    cargo clippy --all-targets --locked -- -D warnings
+    cargo clippy --locked -- -D warnings
     cargo clippy --no-default-features --locked -- -D warnings
+    cargo clippy --all-features --all-targets --locked -- -D warnings
 
 # The test suite
 test:
     cargo test --locked
+    cargo test --locked --all-features --test study_parquet --test detect_photos --test photo_command
+
+# The book, and every page of it in Chromium
+book:
+    cargo run --release --locked -- book
+    .ci/browser --planted
+    .ci/browser
+
+# This library's solver, OpenCV and SciPy behind the gate
+gate:
+    bash .ci/gate
 
 # The documentation, warnings as errors
 doc:

@@ -7,15 +7,13 @@
 //!
 //! What it cannot show: how other sources of depth, such as a step of known height, would separate the two.
 
-use calibench::camera::{FreeParameters, Parameter};
+use calibench::camera::Parameter;
+use calibench::evaluate::Interval;
 use calibench::evaluate::interval::each_of;
-use calibench::evaluate::{Interval, cramer_rao};
-use calibench::geometry::{Pose, Vec3, rotation};
-use calibench::harness::study::{CellSummary, Engine, Summary, within};
+use calibench::harness::study::{Cell as StudyCell, CellSummary, Engine, Summary, within};
 use calibench::harness::{
     Band, Cell, Claim, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
 };
-use calibench::synth::Truth;
 
 /// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -72,15 +70,14 @@ struct Bound {
 fn run(context: &Context) -> Result<Record, ExperimentError> {
     let mut record = context.record();
     let (engine, summary) = within(context, &mut record, "study", STUDY, |_| {})?;
-    let bounds: Vec<Option<Bound>> =
-        (0..engine.cells.len()).map(|cell| bound(tilt_deg(&engine, cell))).collect();
+    let bounds: Vec<Option<Bound>> = engine.cells.iter().map(bound).collect();
 
     tell_numbers(&mut record, &engine, &summary, &bounds);
     claim_facing_refused(&mut record, &summary);
     claim_tilted_solved(&mut record, &engine, &summary);
     claim_spread(&mut record, &engine, &summary);
     claim_correlation(&mut record, &engine, &summary, &bounds);
-    claim_law(&mut record)?;
+    claim_law(&mut record, &engine, &bounds)?;
     record.table(table(&engine, &summary, &bounds));
     record.figure(figure(&engine, &summary, &bounds));
     Ok(record)
@@ -90,20 +87,9 @@ fn tilt_deg(engine: &Engine, cell: usize) -> f64 {
     engine.spec.factor[0].number(engine.cells[cell].levels[0]).unwrap_or(f64::NAN)
 }
 
-/// Three views tilted about axes a third of a turn apart: for the law, which does not depend on where exactly they point.
-fn bound(tilt_deg: f64) -> Option<Bound> {
-    if tilt_deg == 0.0 {
-        return None;
-    }
-    // The golden angle, as the study's poses have it.
-    const TURN: f64 = 0.381_966_011_250_105_15;
-    let pose = |k: usize| {
-        let (sin, cos) = libm::sincos(std::f64::consts::TAU * TURN * k as f64);
-        let axis = Vec3::new(cos, sin, 0.0) * tilt_deg.to_radians();
-        Pose { rotation: rotation::exp(&axis), translation: Vec3::new(0.0, 0.0, 120.0) }
-    };
-    let truth = Truth { cam_from_target: (0..3).map(pose).collect(), ..Truth::chapter() };
-    let covariance = cramer_rao(&truth, FreeParameters::CHAPTER, 0.1).ok()?;
+/// What the bound of a cell says of the first view.
+fn bound(cell: &StudyCell) -> Option<Bound> {
+    let covariance = cell.bound()?;
     let focal_px = covariance.standard_deviation(Parameter::Fx)?;
     let depth_mm = covariance.poses[0][(5, 5)].sqrt();
     let row = covariance.free.position(Parameter::Fx)?;
@@ -276,8 +262,11 @@ fn claim_correlation(record: &mut Record, engine: &Engine, summary: &Summary, bo
 }
 
 /// `d ln sd / d ln sin(tilt) = -2`.
-fn claim_law(record: &mut Record) -> Result<(), ExperimentError> {
-    let at = |tilt: f64| bound(tilt).ok_or_else(|| ExperimentError::Input(format!("no bound at {tilt} deg")));
+fn claim_law(record: &mut Record, engine: &Engine, bounds: &[Option<Bound>]) -> Result<(), ExperimentError> {
+    let at = |tilt: f64| {
+        let bound = (0..bounds.len()).find(|&i| tilt_deg(engine, i) == tilt).and_then(|i| bounds[i].as_ref());
+        bound.ok_or_else(|| ExperimentError::Input(format!("no bound at {tilt} deg")))
+    };
     let (near, far) = (at(LAW_TILTS_DEG.0)?, at(LAW_TILTS_DEG.1)?);
     let run = libm::log(libm::sin(LAW_TILTS_DEG.1.to_radians()) / libm::sin(LAW_TILTS_DEG.0.to_radians()));
     for (id, what, rise) in [

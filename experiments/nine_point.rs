@@ -4,8 +4,9 @@
 //! affine map to the unit grid has scales of 0.0042332 and 0.0042338 units a pixel. The vendor's GUI reports a translation
 //! that differs by 0.002 for the same image; the chapter blames rounding to half pixels.
 //!
-//! The image is not available. A stand-in is rendered from the published geometry (size, spacings, centre), which the matrix
-//! therefore must return; `--image FILE` takes the real one, or any other.
+//! The image is not available. A stand-in is rendered from the published size and spacings and from the centre that follows
+//! from the published translation and scales; the matrix therefore must return them. `--image FILE` takes the real one, or
+//! any other.
 //!
 //! What it cannot show: the residual of the real image, whose noise no stand-in has. Its shape is checked instead: the ratio of
 //! largest to RMS residual does not depend on the size of the noise.

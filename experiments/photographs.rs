@@ -100,7 +100,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     claim_bias(&mut record, &exact, &unit);
     record.table(noise_table(&outcomes));
     record.table(bias_table(&exact, &unit));
-    record.figure(noise_figure(&outcomes));
+    record.figure(noise_figure(&outcomes, context.seed));
     record.figure(bias_figure(&exact, &unit));
     record.note(
         "0.1 px is not what a sensor makes of dots like these: noise of 1 % of full scale gives less than a twentieth of it. What \
@@ -472,7 +472,7 @@ fn bias_table(exact: &[Exact], unit: &[f64]) -> Table {
     table
 }
 
-fn noise_figure(outcomes: &[Outcome]) -> Figure {
+fn noise_figure(outcomes: &[Outcome], seed: u64) -> Figure {
     let panel = |title: &str, label: &str, at: fn(&Node) -> f64, others: fn(&Node) -> Node| {
         let mut chosen: Vec<&Outcome> = outcomes.iter().filter(|o| others(&o.node) == BASE).collect();
         chosen.sort_by(|a, b| at(&a.node).total_cmp(&at(&b.node)));
@@ -495,9 +495,11 @@ fn noise_figure(outcomes: &[Outcome]) -> Figure {
             |n| Node { diameter_mm: BASE.diameter_mm, ..*n },
         ),
     ];
-    let caption = "Extraction noise of a coordinate, px, over 252 dots in the chapter's four poses, each node one photograph a pose, \
-                   seed 3; the sweeps cross at blur 0.5 px, noise 1 % of full scale, dots of 3 mm. Notice where the detector \
-                   leaves the bound, and that the scale ends at a quarter of the chapter's 0.1 px.";
+    let caption = format!(
+        "Extraction noise of a coordinate, px, over the 252 dots of the chapter's four poses, each node one photograph a pose, seed \
+         {seed}; the sweeps cross at blur 0.5 px, noise 1 % of full scale, dots of 3 mm. Notice where the detector leaves the bound, \
+         and that the scale ends at a quarter of the chapter's 0.1 px."
+    );
     Figure::panels("noise", &panels, 3, caption)
 }
 

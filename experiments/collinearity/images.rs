@@ -72,8 +72,8 @@ impl Difference {
         self.level_max = self.level_max.max(level.abs());
         self.shift_square += shift.norm_squared();
         self.shift_max = self.shift_max.max(shift.norm());
-        // A level is rounded by half on either side; single-precision weights move it by 255 x 2^-22 at most.
-        let explained = slope.0 * shift.x.abs() + slope.1 * shift.y.abs() + 1.0 + 1e-4;
+        // Each level is rounded by half, and mixed with weights that move it by 0.02 at most.
+        let explained = slope.0 * shift.x.abs() + slope.1 * shift.y.abs() + 1.0 + 0.04;
         self.unexplained += usize::from(level.abs() > explained);
     }
 

@@ -185,8 +185,8 @@ impl Photograph {
 }
 
 /// A stand-in for the chapter's nine-point image, which is not available: 1571 x 1053 px, 3 x 3 dark dots, undistorted,
-/// column spacing 236.23 px, row spacing 236.19 px, centre (714.708, 565.993). The dots' diameter is not published; a
-/// quarter of the spacing is taken.
+/// column spacing 236.23 px, row spacing 236.19 px, centre (714.708, 565.993), which follows from the published matrix.
+/// The dots' diameter is not published; a quarter of the spacing is taken.
 pub fn nine_dot_stand_in() -> Photograph {
     let board = Board::circles(3, 3, 1.0, 0.25).expect("a quarter of the spacing is a disc");
     let camera = Camera::pinhole(236.23, 236.19, 714.708, 565.993);

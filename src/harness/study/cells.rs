@@ -6,8 +6,9 @@ use super::prediction::Prediction;
 use super::quantity::Quantity;
 use super::spec::{Length, Spec};
 use super::spec_error::SpecError;
-use crate::calibrate::Settings;
+use crate::calibrate::{Covariance, Settings};
 use crate::camera::{Camera, FreeParameters};
+use crate::evaluate::cramer_rao;
 use crate::geometry::Vec2;
 use crate::synth::{Scene, Stream, StreamKey, Truth};
 
@@ -144,6 +145,11 @@ impl Cell {
                 Ok(Prediction::mean_of(&sets))
             }
         }
+    }
+
+    /// The Cramer-Rao covariance of the cell's scene; `None` where it is singular, and where each trial has poses of its own.
+    pub fn bound(&self) -> Option<Covariance> {
+        cramer_rao(&self.scene.as_ref()?.truth, self.free, self.noise_px()).ok()
     }
 
     /// Standard deviation of a pixel coordinate.
