@@ -8,9 +8,9 @@ ci:
 
 # Formatter and lints, warnings as errors
 lint:
-    cargo fmt --check
+    cargo fmt --all --check
     cargo clippy --locked -- -D warnings
-    cargo clippy --no-default-features --locked -- -D warnings
+    cargo clippy --package calibench --no-default-features --locked -- -D warnings
     cargo clippy --all-features --all-targets --locked -- -D warnings
 
 # The test suite

@@ -1,9 +1,9 @@
 //! The problem that the benches share: the chapter's camera and target, seen from many sides.
 #![allow(dead_code, reason = "every program of this folder takes what it needs")]
 
+use calibench::board::View;
 use calibench::geometry::Pose;
 use calibench::synth::{Scene, Stream, StreamKey, Truth, scene};
-use calibench::target::View;
 
 const KEY: StreamKey = StreamKey { seed: 1, scenario: "bench", trial: 0, purpose: "noise" };
 

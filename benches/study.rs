@@ -2,8 +2,8 @@
 //! its checkpoints. Then the memory that ten thousand trials take beyond what the first thousand took.
 #![allow(missing_docs)]
 
-use calibench::harness::resources::peak_memory_mib;
-use calibench::harness::study::{Engine, Folder, Manifest, Shard, Spec, in_memory};
+use calibench_harness::resources::peak_memory_mib;
+use calibench_study::{Engine, Folder, Manifest, Shard, Spec, in_memory};
 use criterion::{Criterion, Throughput, criterion_group};
 use std::sync::atomic::AtomicBool;
 

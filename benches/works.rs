@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "every program of this folder takes what it needs")]
 
 use crate::common;
+use calibench::board::{Board, View};
 use calibench::calibrate::{Calibration, Settings, calibrate, information};
 use calibench::camera::{BrownConrady, Camera, FreeParameters};
 use calibench::detect::{circle_grid, sparse_dots};
@@ -10,7 +11,6 @@ use calibench::raster::Raster;
 use calibench::rectify::{RectifyMap, rectify_image};
 use calibench::synth::render::{Imaging, SensorNoise, nine_dot_stand_in, photograph};
 use calibench::synth::{Stream, StreamKey, Truth, scene};
-use calibench::target::{Board, View};
 use std::hint::black_box;
 use std::marker::PhantomData;
 
@@ -102,7 +102,6 @@ pub fn named(row: &str) -> Option<Box<dyn Work>> {
             let run = move || circle_grid(&image, 9, 7).expect("the grid is there");
             job(run, |found| flat(&found.centres_px()))
         }
-        #[cfg(feature = "harness")]
         "study" => Some(Box::new(Study)),
         "dots" => {
             let (image, _) = dots();
@@ -119,18 +118,16 @@ pub fn rows() -> Vec<String> {
     let frames = FRAMES.iter().map(|(width, height)| format!("{width}x{height}"));
     let images = frames.flat_map(|size| [format!("remap-{size}"), format!("undistort-{size}")]);
     let rest = ["covariance-100", "refusal", "homography", "affine", "points", "grid", "dots"];
-    let study = cfg!(feature = "harness").then_some("study");
+    let study = Some("study");
     calibrations.chain(images).chain(rest.into_iter().chain(study).map(str::to_string)).collect()
 }
 
 /// Trials of the study of four poses, in one batch as `study run` does them but for the files: a repetition is a trial.
-#[cfg(feature = "harness")]
 struct Study;
 
-#[cfg(feature = "harness")]
 impl Work for Study {
     fn repeat(&mut self, times: usize) {
-        use calibench::harness::study::{Spec, in_memory};
+        use calibench_study::{Spec, in_memory};
         let text = include_str!("../studies/four-pose.toml");
         let mut spec = Spec::parse(text).expect("a study of the project");
         spec.trials.per_cell = times as u64;

@@ -11,37 +11,30 @@
 //! What it cannot show: whether the chapter's program estimates the centre or the tangential terms. And all is computed for a
 //! target that is centred on the optical axis, which the chapter does not say.
 
+use calibench::board::View;
 use calibench::calibrate::single_plane::{SinglePlane, SinglePlaneOptions, calibrate_single_plane};
 use calibench::camera::Camera;
 use calibench::evaluate::{Interval, Sample, distribution::normal_two_sided};
 use calibench::geometry::{Affine, LineFit, Vec2};
-use calibench::harness::figure::density;
-use calibench::harness::published::{self, Entry};
-use calibench::harness::{
-    Band, Cell, Claim, Context, Experiment, ExperimentError, Figure, HeatMap, Look, Plot, Predicted, Record,
-    Table,
-};
 use calibench::raster::Raster;
 use calibench::rectify::{OutputView, RectifyMap, output_camera, rectify_points};
 use calibench::synth::render::{Imaging, photograph};
 use calibench::synth::scene::looking_at_centre;
 use calibench::synth::{Scene, Stream, StreamKey, Truth};
-use calibench::target::View;
+use calibench_harness::figure::density;
+use calibench_harness::published::{self, Entry};
+use calibench_harness::{
+    Band, Cell, Claim, Context, Experiment, ExperimentError, Figure, HeatMap, Look, Plot, Predicted, Record,
+    Table,
+};
 use rayon::prelude::*;
 
-#[path = "collinearity/distance.rs"]
 mod distance;
-#[path = "collinearity/draws.rs"]
 mod draws;
-#[path = "collinearity/figures.rs"]
 mod figures;
-#[path = "collinearity/found.rs"]
 mod found;
-#[path = "collinearity/images.rs"]
 mod images;
-#[path = "collinearity/joint.rs"]
 mod joint;
-#[path = "collinearity/tangential.rs"]
 mod tangential;
 
 use distance::{tell_distances, tell_units_mistake};
@@ -65,8 +58,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     takes_image: false,
     run,
 };
-
-calibench::experiment_main!(EXPERIMENT);
 
 /// Noise on each of u and v.
 const SIGMA_PX: f64 = 0.1;

@@ -14,8 +14,8 @@ use calibench::calibrate::{Calibration, Covariance, Settings, calibrate};
 use calibench::camera::{BrownConrady, Camera, FreeParameters, Parameter};
 use calibench::evaluate::{RmseDistribution, cramer_rao};
 use calibench::geometry::{Affine, Pose, Vec2, Vec3};
-use calibench::harness::{Band, Claim, Context, Experiment, ExperimentError, Figure, Plot, Record, Table};
 use calibench::synth::{Scene, Truth};
+use calibench_harness::{Band, Claim, Context, Experiment, ExperimentError, Figure, Plot, Record, Table};
 use nalgebra::{DMatrix, DVector, Vector2};
 use rayon::prelude::*;
 
@@ -31,8 +31,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     takes_image: false,
     run,
 };
-
-calibench::experiment_main!(EXPERIMENT);
 
 /// Noise that the biases are measured against, px.
 const SIGMA_PX: f64 = 0.1;

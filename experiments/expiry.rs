@@ -10,15 +10,12 @@
 //! sizes below are round numbers, picked so that their sum is of the case study's size, and both are taken to add. That the
 //! sum meets 0.03 mm is therefore no test of anything; what follows for the check and its rules is.
 
-#[path = "expiry/control.rs"]
 mod control;
-#[path = "expiry/station.rs"]
 mod station;
-#[path = "expiry/tell.rs"]
 mod tell;
 
-use calibench::harness::{Context, Experiment, ExperimentError, Record};
 use calibench::synth::{Stream, StreamKey};
+use calibench_harness::{Context, Experiment, ExperimentError, Record};
 use control::{Ewma, Rule, Shewhart};
 use rayon::prelude::*;
 use station::{History, SHIFTS_A_DAY, Station};
@@ -36,8 +33,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     takes_image: false,
     run,
 };
-
-calibench::experiment_main!(EXPERIMENT);
 
 /// Shifts of a quarter: 91 days.
 pub(crate) const QUARTER: usize = 91 * SHIFTS_A_DAY;

@@ -10,10 +10,10 @@
 use calibench::camera::Parameter;
 use calibench::evaluate::Interval;
 use calibench::evaluate::interval::each_of;
-use calibench::harness::study::{Cell as StudyCell, CellSummary, Engine, Summary, within};
-use calibench::harness::{
+use calibench_harness::{
     Band, Cell, Claim, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
 };
+use calibench_study::{Cell as StudyCell, CellSummary, Engine, Summary, within};
 
 /// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -26,8 +26,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     takes_image: false,
     run,
 };
-
-calibench::experiment_main!(EXPERIMENT);
 
 const STUDY: &str = r#"
 name = "focal-depth"

@@ -6,6 +6,7 @@
 //!
 //! What it cannot show: errors of a real target, lens or detector. Here the model is right and the noise is Gaussian.
 
+use calibench::board::View;
 use calibench::calibrate::{Calibration, Settings, calibrate};
 use calibench::camera::{Camera, FreeParameters, Parameter};
 use calibench::evaluate::distribution::{fisher_cdf, normal_cdf, normal_two_sided, round_significant};
@@ -14,20 +15,16 @@ use calibench::evaluate::{
     BoundError, Errors, Interval, RmseDistribution, Sample, cramer_rao, leverages, reconcile,
 };
 use calibench::geometry::Vec2;
-use calibench::harness::figure::density;
-use calibench::harness::monte_carlo::Estimate;
-use calibench::harness::{
+use calibench::synth::{Scene, Stream, StreamKey, Truth, scene::looking_at_centre};
+use calibench_harness::figure::density;
+use calibench_harness::monte_carlo::Estimate;
+use calibench_harness::{
     Band, Cell, Claim, Context, Dash, Experiment, ExperimentError, Figure, Look, Marker, MonteCarlo, Outcome,
     Plot, Predicted, Record, Table,
 };
-use calibench::synth::{Scene, Stream, StreamKey, Truth, scene::looking_at_centre};
-use calibench::target::View;
 
-#[path = "four_pose/figures.rs"]
 mod figures;
-#[path = "four_pose/trials.rs"]
 mod trials;
-#[path = "four_pose/weak.rs"]
 mod weak;
 
 /// The experiment.
@@ -42,8 +39,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     takes_image: false,
     run,
 };
-
-calibench::experiment_main!(EXPERIMENT);
 
 /// Standard deviation of the noise on each of u and v.
 const SIGMA_PX: f64 = 0.1;

@@ -6,9 +6,9 @@
 //! alarms hundreds of runs: they are measured by `calibench gate --power golden/gate-power --size thorough`, and what that wrote
 //! is read here and held against what is planted now.
 
-use calibench::harness::gate::faults::{Class, Planted, planted};
-use calibench::harness::gate::power::{Catch, FaultRow, Measured, catch, false_alarms};
-use calibench::harness::{Band, Claim, Context, Experiment, ExperimentError, Record, Table};
+use calibench_gate::faults::{Class, Planted, planted};
+use calibench_gate::power::{Catch, FaultRow, Measured, catch, false_alarms};
+use calibench_harness::{Band, Claim, Context, Experiment, ExperimentError, Record, Table};
 use rayon::prelude::*;
 
 /// The experiment.
@@ -23,8 +23,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     takes_image: false,
     run,
 };
-
-calibench::experiment_main!(EXPERIMENT);
 
 /// Most samples a scenario: a quarter of a quick run.
 const MOST_SAMPLES: usize = 32;

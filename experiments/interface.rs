@@ -9,20 +9,17 @@
 //!
 //! What it cannot show: that these two are all the faults an interface can have.
 
-#[path = "interface/black_box.rs"]
 mod black_box;
-#[path = "interface/layout.rs"]
 mod layout;
-#[path = "interface/units.rs"]
 mod units;
 
 use black_box::BlackBox;
 use calibench::camera::{BrownConrady, Camera, FreeParameters, Parameter};
 use calibench::evaluate::{cramer_rao, interval::each_of};
-use calibench::harness::{
+use calibench::synth::{Scene, Stream, StreamKey, Truth};
+use calibench_harness::{
     Band, Claim, Context, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
 };
-use calibench::synth::{Scene, Stream, StreamKey, Truth};
 use layout::{DISTORTION, LINEAR, Row};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -39,8 +36,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     takes_image: false,
     run,
 };
-
-calibench::experiment_main!(EXPERIMENT);
 
 /// Noise of a pixel coordinate, px.
 const SIGMA_PX: f64 = 0.1;
@@ -205,7 +200,7 @@ fn tell_layouts(record: &mut Record, cases: &[Case]) {
             case.distortion.predicted_hidden(),
         ];
         let cells = std::iter::once(case.name.into()).chain(numbers.map(Into::into));
-        let cells = cells.chain([swap.into()]).chain(counts.map(calibench::harness::Cell::from));
+        let cells = cells.chain([swap.into()]).chain(counts.map(calibench_harness::Cell::from));
         table.push(cells.collect::<Vec<_>>());
     }
     record.table(table);

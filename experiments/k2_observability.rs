@@ -19,14 +19,12 @@ use calibench::camera::{FreeParameters, Parameter};
 use calibench::evaluate::interval::each_of;
 use calibench::evaluate::{BoundError, Interval, RmseDistribution, cramer_rao};
 use calibench::geometry::{Pose, Vec2, Vec3};
-use calibench::harness::{
+use calibench::synth::{Scene, Truth, scene::looking_at_centre};
+use calibench_harness::{
     Band, Cell, Claim, Context, Experiment, ExperimentError, MonteCarlo, Outcome, Progress, Record, Table,
 };
-use calibench::synth::{Scene, Truth, scene::looking_at_centre};
 
-#[path = "k2_observability/figures.rs"]
 mod figures;
-#[path = "k2_observability/one_distance.rs"]
 mod one_distance;
 
 /// The experiment.
@@ -41,8 +39,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     takes_image: false,
     run,
 };
-
-calibench::experiment_main!(EXPERIMENT);
 
 /// Standard deviation of the noise on each of u and v.
 const SIGMA_PX: f64 = 0.1;

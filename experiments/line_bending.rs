@@ -7,10 +7,10 @@
 
 use calibench::camera::{BrownConrady, Camera};
 use calibench::geometry::{LineFit, Vec2};
-use calibench::harness::{
+use calibench::synth::Truth;
+use calibench_harness::{
     Band, Claim, Context, Dash, Experiment, ExperimentError, Figure, Look, Marker, Plot, Record, Table,
 };
-use calibench::synth::Truth;
 
 /// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -24,8 +24,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     takes_image: false,
     run,
 };
-
-calibench::experiment_main!(EXPERIMENT);
 
 /// The top grid line in ideal pixels: v = 60, u = 20, 30, ..., 620.
 const LINE_V_PX: f64 = 60.0;

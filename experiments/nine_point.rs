@@ -13,25 +13,21 @@
 
 use calibench::detect::{GridError, circle_grid, sparse_dots};
 use calibench::geometry::{Affine, Mat3, Vec2};
-use calibench::harness::figure::Format;
-use calibench::harness::published::{self, Entry};
-use calibench::harness::{
-    Band, Cell, Claim, Context, Experiment, ExperimentError, Figure, Look, Plot, Predicted, Record, Table,
-};
 use calibench::io::image::parse_image;
 use calibench::io::overlay::Overlay;
 use calibench::planar::{PlaneCalibration, PlaneModel, calibrate_plane};
 use calibench::raster::Raster;
 use calibench::synth::render::nine_dot_stand_in;
 use calibench::synth::{Stream, StreamKey};
+use calibench_harness::figure::Format;
+use calibench_harness::published::{self, Entry};
+use calibench_harness::{
+    Band, Cell, Claim, Context, Experiment, ExperimentError, Figure, Look, Plot, Predicted, Record, Table,
+};
 
-#[path = "nine_point/book.rs"]
 mod book;
-#[path = "nine_point/gui.rs"]
 mod gui;
-#[path = "nine_point/shown.rs"]
 mod shown;
-#[path = "nine_point/tell.rs"]
 mod tell;
 
 use book::{
@@ -53,8 +49,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     takes_image: true,
     run,
 };
-
-calibench::experiment_main!(EXPERIMENT);
 
 /// The SDK's modes 0, 1 and 2.
 const MODES: [(&str, PlaneModel); 3] = [

@@ -7,10 +7,10 @@
 
 use calibench::evaluate::interval::each_of;
 use calibench::evaluate::{Interval, RmseDistribution};
-use calibench::harness::study::{Cell as Design, Engine, Estimated, Spec, Statistic, Summary, Trial, within};
-use calibench::harness::{
+use calibench_harness::{
     Band, Cell, Claim, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
 };
+use calibench_study::{Cell as Design, Engine, Estimated, Spec, Statistic, Summary, Trial, within};
 
 /// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -23,8 +23,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     takes_image: false,
     run,
 };
-
-calibench::experiment_main!(EXPERIMENT);
 
 const SCENE: &str = r#"
 question = "Where does the RMSE settle?"

@@ -8,18 +8,18 @@
 //! What it cannot show: lenses that are not sharp alike over the frame, dots that are printed out of place, boards that are not
 //! plane. What they add is not measured here.
 
+use calibench::board::{Board, View};
 use calibench::calibrate::{Calibration, Settings};
 use calibench::camera::{Camera, FreeParameters};
 use calibench::detect::{circle_grid, disc_biases};
 use calibench::evaluate::{cramer_rao, interval};
 use calibench::geometry::{Pose, Vec2, Vec3};
-use calibench::harness::photos::Fitter;
-use calibench::harness::{
-    Band, Claim, Context, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
-};
+use calibench::photos::Fitter;
 use calibench::synth::render::{Imaging, Photograph, SensorNoise, photograph};
 use calibench::synth::{Stream, StreamKey, Truth};
-use calibench::target::{Board, View};
+use calibench_harness::{
+    Band, Claim, Context, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
+};
 use rayon::prelude::*;
 
 /// The experiment.
@@ -34,8 +34,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     takes_image: false,
     run,
 };
-
-calibench::experiment_main!(EXPERIMENT);
 
 /// Where the sweeps cross: blur of a good lens, noise of 40 dB, the dots of the chapter's figure.
 const BASE: Node = Node { blur_px: 0.5, noise: 0.01, diameter_mm: 3.0 };

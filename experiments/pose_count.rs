@@ -9,10 +9,10 @@
 use calibench::camera::{FreeParameters, Parameter};
 use calibench::evaluate::Interval;
 use calibench::evaluate::interval::each_of;
-use calibench::harness::study::{CellSummary, Engine, Summary, within};
-use calibench::harness::{
+use calibench_harness::{
     Band, Claim, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
 };
+use calibench_study::{CellSummary, Engine, Summary, within};
 
 /// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -25,8 +25,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     takes_image: false,
     run,
 };
-
-calibench::experiment_main!(EXPERIMENT);
 
 const STUDY: &str = r#"
 name = "pose-count"
@@ -209,7 +207,7 @@ fn table(engine: &Engine, summary: &Summary) -> Table {
         for parameter in parameters() {
             let Some(sd) = result.of(parameter.name()).and_then(|s| s.sd) else { continue };
             let bound = spread(result, parameter).1;
-            use calibench::harness::Cell;
+            use calibench_harness::Cell;
             table.push([
                 Cell::Integer(views(engine, cell) as i64),
                 parameter.name().into(),

@@ -1,8 +1,8 @@
 //! Does the book notice what is wrong with its sources? One broken page a fault, and the book as it stands.
 
-use calibench::harness::book::{Compiled, Evidence, Page, Sources, build, compile};
-use calibench::harness::project::Project;
-use calibench::harness::{Claim, Context, Experiment, ExperimentError, Record};
+use calibench_book::{Compiled, Evidence, Page, Sources, build, compile};
+use calibench_harness::project::Project;
+use calibench_harness::{Claim, Context, Experiment, ExperimentError, Record};
 use std::path::Path;
 
 const LINE_BENDING: Experiment =
@@ -29,7 +29,7 @@ fn book_of(text: &str) -> Compiled {
 
 /// Findings of the page, as `line: message`.
 fn findings(text: &str) -> Vec<String> {
-    let of_page = |f: &&calibench::harness::book::Finding| f.file == "book/text/page.md";
+    let of_page = |f: &&calibench_book::Finding| f.file == "book/text/page.md";
     book_of(text).findings.iter().filter(of_page).map(|f| format!("{}: {}", f.line, f.message)).collect()
 }
 

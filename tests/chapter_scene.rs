@@ -145,8 +145,8 @@ fn k3_on_weak_data_is_solved_with_a_warning_that_names_the_correlation() {
 
 #[test]
 fn neither_the_unit_nor_the_origin_of_the_target_matters() {
+    use calibench::board::View;
     use calibench::geometry::Vec2;
-    use calibench::target::View;
     let views = Scene::chapter().observe(0.1, &mut noise(2));
     let base = calibrate(&views, &Settings::chapter()).unwrap();
     for (scale, offset) in
@@ -177,9 +177,9 @@ fn neither_the_unit_nor_the_origin_of_the_target_matters() {
 
 #[test]
 fn gross_errors_under_a_robust_loss_are_no_reason_to_refuse_tilted_views() {
+    use calibench::board::View;
     use calibench::calibrate::Loss;
     use calibench::geometry::Vec2;
-    use calibench::target::View;
     let scene = Scene::chapter();
     for trial in 0..50 {
         let mut stream = noise(trial);

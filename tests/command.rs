@@ -1,5 +1,4 @@
 //! Does the command end as it says it does? Exit codes, files and streams of `calibench` and of an experiment's own binary.
-#![cfg(feature = "harness")]
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,6 @@
 //! Circle grids and sparse dots on rendered images: order, refusals, and the accuracy of centres against theory.
 
+use calibench::board::Board;
 use calibench::camera::{BrownConrady, Camera};
 use calibench::detect::{
     BlobOptions, DotGrid, GridError, Polarity, blobs, circle_grid, circle_grid_of, disc_biases, sparse_dots,
@@ -11,7 +12,6 @@ use calibench::synth::render::{
 };
 use calibench::synth::scene::looking_at_centre;
 use calibench::synth::{Stream, StreamKey, Truth};
-use calibench::target::Board;
 
 fn chapter_photo(pose: &Pose, imaging: &Imaging) -> Photograph {
     photograph(&Truth::chapter_camera(), (640, 480), &Truth::chapter_board(), pose, imaging).unwrap()

@@ -1,11 +1,11 @@
 //! Chessboard corners on rendered images: how near the truth the refinement comes.
 
+use calibench::board::Board;
 use calibench::detect::refine_corner;
 use calibench::geometry::Vec2;
 use calibench::synth::Truth;
 use calibench::synth::render::{Imaging, photograph};
 use calibench::synth::scene::looking_at_centre;
-use calibench::target::Board;
 
 #[test]
 fn refined_corners_are_near_the_truth() {

@@ -1,11 +1,10 @@
 //! Real photographs by others: every board is found, in the right order.
-#![cfg(feature = "photo")]
 
+use calibench::board::Board;
 use calibench::detect::{DotGrid, circle_grid};
 use calibench::geometry::{Homography, Vec2};
 use calibench::io::{Grey, data_folder, read_image};
 use calibench::raster::Raster;
-use calibench::target::Board;
 use std::path::PathBuf;
 
 fn folder() -> Option<PathBuf> {
@@ -49,10 +48,10 @@ fn every_dot_grid_is_found_in_order() {
 #[cfg(feature = "chessboard")]
 mod chessboards {
     use super::*;
+    use calibench::board::View;
     use calibench::calibrate::{Calibration, Settings, calibrate};
     use calibench::detect::chessboard_corners;
     use calibench::io::read_corners;
-    use calibench::target::View;
 
     #[test]
     fn opencvs_thirteen_boards_are_found_where_opencv_finds_them() {

@@ -1,12 +1,12 @@
 //! Does the gate treat any program as a black box, and end as it says? Programs that work, hang, crash and babble.
-#![cfg(all(feature = "harness", unix))]
+#![cfg(unix)]
 
-use calibench::harness::gate::accept::{Breakage, Outcome};
-use calibench::harness::gate::faults::{Faulty, planted};
-use calibench::harness::gate::plan::Purpose;
-use calibench::harness::gate::power::Measured;
-use calibench::harness::gate::protocol::{Problem, schemas};
-use calibench::harness::gate::{Builtin, Plan, Process, Property, Report, Solver, Terms, run};
+use calibench_gate::accept::{Breakage, Outcome};
+use calibench_gate::faults::{Faulty, planted};
+use calibench_gate::plan::Purpose;
+use calibench_gate::power::Measured;
+use calibench_gate::protocol::{Problem, schemas};
+use calibench_gate::{Builtin, Plan, Process, Property, Report, Solver, Terms, run};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};

@@ -1,10 +1,7 @@
 //! Is every experiment unchanged, correct, and true to the book? The same comparison as `calibench check`.
-#![cfg(feature = "harness")]
 
-#[path = "../experiments/table.rs"]
-mod table;
-
-use calibench::harness::{Context, Record, golden, published, verdict::Verdict};
+use calibench_harness::verdict::Verdict;
+use calibench_harness::{Context, Record, golden, published};
 use insta::comparator::Comparator;
 use insta::internals::SnapshotContents;
 use insta::{Settings, Snapshot};
@@ -30,10 +27,10 @@ impl Comparator for WithinBands {
 }
 
 fn records() -> Vec<Record> {
-    let run = |e: &calibench::harness::Experiment| {
+    let run = |e: &calibench_harness::Experiment| {
         e.execute(&Context::of(e)).unwrap_or_else(|error| panic!("{}: {error}", e.id))
     };
-    table::EXPERIMENTS.iter().map(run).collect()
+    calibench_experiments::EXPERIMENTS.iter().map(run).collect()
 }
 
 /// Run once for all tests that only look at them.
@@ -76,7 +73,7 @@ fn every_published_value_is_reconciled_exactly_once() {
 
 #[test]
 fn claims_and_published_values_hold_for_another_seed_too() {
-    for experiment in table::EXPERIMENTS {
+    for experiment in calibench_experiments::EXPERIMENTS {
         let context = Context::of(experiment).with_seed(experiment.seed + 1);
         let record =
             experiment.execute(&context).unwrap_or_else(|error| panic!("{}: {error}", experiment.id));

@@ -1,11 +1,7 @@
-//! Was anything forgotten? Every experiment has its file, its three registrations, its snapshot and its figures;
-//! every layer imports only from the layers below it.
-#![cfg(feature = "harness")]
+//! Was anything forgotten? Every experiment has its file, its three registrations, its snapshot and its figures. Between the rooms the
+//! compiler keeps the walls, which are crates; inside the library each folder imports only from those below it.
 
-#[path = "../experiments/table.rs"]
-mod table;
-
-use calibench::harness::Experiment;
+use calibench_harness::Experiment;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -44,7 +40,7 @@ fn source_file(experiment: &Experiment) -> String {
 fn every_experiment_is_registered_everywhere() {
     let manifest = read("Cargo.toml");
     let mut forgotten = Vec::new();
-    for experiment in table::EXPERIMENTS {
+    for experiment in calibench_experiments::EXPERIMENTS {
         let (id, file) = (experiment.id, source_file(experiment));
         let mut need = |there: bool, what: String| {
             if !there {
@@ -52,8 +48,9 @@ fn every_experiment_is_registered_everywhere() {
             }
         };
         need(root().join(&file).is_file(), format!("{file} is missing"));
-        let binary =
-            format!("[[bin]]\nname = \"{id}\"\npath = \"{file}\"\nrequired-features = [\"harness\"]\n");
+        let own = format!("experiments/bin/{}.rs", id.replace('-', "_"));
+        need(root().join(&own).is_file(), format!("{own} is missing"));
+        let binary = format!("[[bin]]\nname = \"{id}\"\npath = \"{own}\"\n");
         need(manifest.contains(&binary), format!("Cargo.toml lacks\n{binary}"));
         need(root().join(format!("golden/{id}.snap")).is_file(), format!("run `calibench bless {id}`"));
     }
@@ -62,33 +59,33 @@ fn every_experiment_is_registered_everywhere() {
 
 #[test]
 fn every_file_of_an_experiment_is_in_the_table() {
-    let known: BTreeSet<String> = table::EXPERIMENTS.iter().map(source_file).collect();
+    let known: BTreeSet<String> = calibench_experiments::EXPERIMENTS.iter().map(source_file).collect();
     for file in fs::read_dir(root().join("experiments")).expect("experiments/ is there").flatten() {
         let name = format!("experiments/{}", file.file_name().to_string_lossy());
-        let shared = ["experiments/main.rs", "experiments/table.rs"].contains(&name.as_str());
-        let experiment = file.path().extension().is_some_and(|e| e == "rs") && !shared;
-        assert!(!experiment || known.contains(&name), "{name} is not in experiments/table.rs");
+        let experiment = file.path().extension().is_some_and(|e| e == "rs") && name != "experiments/lib.rs";
+        assert!(!experiment || known.contains(&name), "{name} is not in experiments/lib.rs");
     }
 }
 
 #[test]
 fn ids_are_unique_and_every_snapshot_has_its_experiment() {
-    let ids: BTreeSet<&str> = table::EXPERIMENTS.iter().map(|e| e.id).collect();
-    assert_eq!(ids.len(), table::EXPERIMENTS.len());
+    let ids: BTreeSet<&str> = calibench_experiments::EXPERIMENTS.iter().map(|e| e.id).collect();
+    assert_eq!(ids.len(), calibench_experiments::EXPERIMENTS.len());
     for snapshot in files("golden", &["snap"]) {
         let id = snapshot.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         assert!(ids.contains(id.as_str()), "golden/{id}.snap belongs to no experiment: delete it");
     }
 }
 
-/// The layers from the ground up. Those of one inner list do not know each other.
+/// The library's folders from the ground up. Those of one inner list do not know each other: `calibrate` never sees the truth that
+/// `synth` makes.
 const LAYERS: [&[&str]; 6] = [
     &["geometry"],
-    &["camera", "target", "raster"],
+    &["camera", "board", "raster"],
     &["synth", "detect", "calibrate", "planar", "rectify"],
     &["evaluate"],
     &["io"],
-    &["harness"],
+    &["photos"],
 ];
 
 /// What `layer` may import; `None` if it is none. The crate's root imports nothing.
@@ -112,8 +109,8 @@ fn imports(source: &str) -> BTreeSet<String> {
 #[test]
 fn layers_import_only_from_the_layers_below() {
     let mut wrong = Vec::new();
-    for path in files("src", &["rs"]) {
-        let inside = path.strip_prefix(root().join("src")).expect("it was found there");
+    for path in files("src/calibench", &["rs"]) {
+        let inside = path.strip_prefix(root().join("src/calibench")).expect("it was found there");
         let first = inside.components().next().expect("a file has a name").as_os_str().to_string_lossy();
         let layer = first.trim_end_matches(".rs").to_string();
         let Some(allowed) = allowed(&layer) else {

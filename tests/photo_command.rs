@@ -1,15 +1,14 @@
 //! Does `calibench calibrate --board` get from image files to a camera, and say what it left out?
-#![cfg(feature = "harness")]
 
+use calibench::board::Board;
 use calibench::camera::Camera;
 use calibench::geometry::Pose;
-use calibench::harness::photos::BoardSpec;
 use calibench::io::{write_png, write_png_16};
+use calibench::photos::BoardSpec;
 use calibench::raster::Raster;
 use calibench::synth::Truth;
 use calibench::synth::render::{Imaging, photograph};
 use calibench::synth::scene::looking_at_centre;
-use calibench::target::Board;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

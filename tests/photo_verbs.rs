@@ -1,18 +1,14 @@
 //! Do the verbs on photographs do what they say? `calibench ninepoint` and `calibench undistort`, from file to file.
-#![cfg(feature = "harness")]
 
 use calibench::geometry::Vec2;
-use calibench::harness::Context;
 use calibench::io::{Grey, read_image, write_png, write_png_16};
 use calibench::raster::Raster;
 use calibench::synth::Truth;
 use calibench::synth::render::nine_dot_stand_in;
+use calibench_harness::Context;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-
-#[path = "../experiments/table.rs"]
-mod table;
 
 fn calibench(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_calibench")).args(arguments).output().expect("the program starts")
@@ -61,7 +57,7 @@ fn the_experiment_takes_an_image_and_records_its_hash() {
     let folder = folder("ninepoint-image");
     let image = folder.join("dots.png");
     write_png(&image, &nine_dot_stand_in().image.to_u8()).unwrap();
-    let experiment = table::EXPERIMENTS.iter().find(|e| e.id == "nine-point").unwrap();
+    let experiment = calibench_experiments::EXPERIMENTS.iter().find(|e| e.id == "nine-point").unwrap();
     let own = experiment.execute(&Context::of(experiment)).unwrap();
     let given = experiment.execute(&Context::of(experiment).with_image(Some(image))).unwrap();
     assert_eq!((given.inputs().len(), given.inputs()[0].name.as_str()), (1, "dots.png"));

@@ -1,5 +1,6 @@
 //! Does the single-plane calibration recover a lens from one view, with the residuals and the spread that theory predicts?
 
+use calibench::board::View;
 use calibench::calibrate::Termination;
 use calibench::calibrate::single_plane::{
     SinglePlane, SinglePlaneError, SinglePlaneOptions, calibrate_single_plane, predicted_rms_px,
@@ -7,7 +8,6 @@ use calibench::calibrate::single_plane::{
 use calibench::camera::{BrownConrady, Camera};
 use calibench::geometry::Vec2;
 use calibench::synth::{Scene, Stream, StreamKey, Truth};
-use calibench::target::View;
 
 const TRUE_CENTRE: Vec2 = Vec2::new(326.0, 243.0);
 const IMAGE_CENTRE: Vec2 = Vec2::new(320.0, 240.0);

@@ -1,9 +1,8 @@
 //! Does README.md say what the program says? Its tables and numbers are compared with golden/ and with a run.
-#![cfg(feature = "harness")]
 
-use calibench::harness::published::{Kind, not_judged};
-use calibench::harness::verdict::ByKind;
 use calibench::io::data_folder;
+use calibench_harness::published::{Kind, not_judged};
+use calibench_harness::verdict::ByKind;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;

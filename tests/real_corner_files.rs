@@ -1,7 +1,5 @@
 //! Are the corner files of others read whole?
 
-#![cfg(feature = "io")]
-
 use calibench::io::{data_folder, read_corners};
 
 #[test]

@@ -1,7 +1,6 @@
 //! Does the solver find what others published for their own measurements?
 //!
 //! Expected values: `published.toml` of the data folder. Skipped, with a message, where the folder is absent.
-#![cfg(feature = "io")]
 
 use calibench::calibrate::{Calibration, Settings, Termination, calibrate, closed_form};
 use calibench::camera::FreeParameters;

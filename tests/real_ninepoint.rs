@@ -1,7 +1,5 @@
 //! Does the plane calibration reproduce what others published for a real nine-point set?
 
-#![cfg(feature = "io")]
-
 use calibench::geometry::Handedness;
 use calibench::io::{data_folder, read_point_pairs};
 use calibench::planar::{PlaneModel, calibrate_plane};

@@ -1,5 +1,6 @@
 //! The virtual camera's images against independent integration of the same scene.
 
+use calibench::board::Board;
 use calibench::camera::{BrownConrady, Camera};
 use calibench::geometry::{Pose, Vec2, Vec3};
 use calibench::synth::render::{
@@ -7,7 +8,6 @@ use calibench::synth::render::{
 };
 use calibench::synth::scene::looking_at_centre;
 use calibench::synth::{Stream, StreamKey, Truth};
-use calibench::target::Board;
 
 /// The board point that a pixel sees: the camera model inverted, then the ray met with the plane Z = 0.
 fn board_point(camera: &Camera, cam_from_target: &Pose, pixel: &Vec2) -> Vec2 {

@@ -2,7 +2,7 @@
 
 mod study;
 
-use calibench::harness::study::{
+use calibench_study::{
     Engine, Folder, FolderError, Interruption, Manifest, MergeError, Outcome, Shard, TrialFile, finish, merge,
 };
 use std::fs;
@@ -206,7 +206,7 @@ fn a_damaged_or_occupied_folder_is_refused() {
 
 #[test]
 fn of_two_paired_runs_the_quieter_is_found_better_and_a_copy_is_not() {
-    use calibench::harness::study::compare::{CompareError, Verdict, compare};
+    use calibench_study::compare::{CompareError, Verdict, compare};
     let paths = [scratch("loud"), scratch("copy"), scratch("quiet"), scratch("unpaired")];
     run(&paths[0], SPEC, Shard::WHOLE);
     run(&paths[1], SPEC, Shard::WHOLE);
@@ -227,7 +227,7 @@ fn of_two_paired_runs_the_quieter_is_found_better_and_a_copy_is_not() {
 
 #[test]
 fn levels_of_a_factor_are_paired_within_a_run() {
-    use calibench::harness::study::compare::{CompareError, Verdict, compare_levels};
+    use calibench_study::compare::{CompareError, Verdict, compare_levels};
     let (path, alone) = (scratch("levels"), scratch("levels-alone"));
     let loss = "[[factor]]\nname = \"loss\"\nset = [\"estimator.loss\"]\nlevels = [{ kind = \"squares\" }, { kind = \"huber\", delta_px = 9.0 }]\n";
     let text = format!("{SPEC}\n{loss}");
@@ -345,10 +345,7 @@ fn without_the_feature_parquet_is_refused_by_name() {
         .unwrap();
     let error = merge(&[out], &folder.join("whole"), None).map(|_| ()).unwrap_err();
     assert!(
-        matches!(
-            &error,
-            MergeError::Run(calibench::harness::study::RunError::Folder(FolderError::NoParquet))
-        ),
+        matches!(&error, MergeError::Run(calibench_study::RunError::Folder(FolderError::NoParquet(_)))),
         "{error}"
     );
     fs::remove_dir_all(folder).unwrap();

@@ -3,7 +3,7 @@
 
 mod study;
 
-use calibench::harness::study::{Engine, Folder, Shard, TrialFile, finish, merge};
+use calibench_study::{Engine, Folder, Shard, TrialFile, finish, merge};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::{Field, Row};
 use std::fs::{self, File};

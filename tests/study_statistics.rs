@@ -1,8 +1,8 @@
 //! Do studies say what is true? Against the Cramer-Rao bound, against theory, and of designs that must fail.
 
 use calibench::evaluate::interval::each_of;
-use calibench::harness::study::plan::{Goal, Search, choose, confirm, search};
-use calibench::harness::study::{Spec, SpecError, in_memory, summarise};
+use calibench_study::plan::{Goal, Search, choose, confirm, search};
+use calibench_study::{Spec, SpecError, in_memory, summarise};
 
 /// Rate at which each test of this file may fail a correct program.
 const FALSE_ALARM: f64 = 1e-5;

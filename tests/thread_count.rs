@@ -1,5 +1,4 @@
 //! Does the number of threads show in a result? Every bit of a calibration, with one thread and with several.
-#![cfg(feature = "parallel")]
 
 use calibench::calibrate::{Calibration, Settings, calibrate};
 use calibench::synth::{Scene, Stream, StreamKey, Truth, scene};

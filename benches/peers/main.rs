@@ -8,10 +8,10 @@ mod common;
 #[path = "../works.rs"]
 mod works;
 
+use calibench::board::View;
 use calibench::calibrate::{Settings, calibrate, closed_form, pose_from_homography};
 use calibench::camera::Camera;
 use calibench::geometry::{Homography, Vec2};
-use calibench::target::View;
 use std::collections::BTreeMap;
 use std::io::{BufRead, Write};
 use std::path::Path;

@@ -8,7 +8,7 @@ use super::{
 };
 use calibench::evaluate::Interval;
 use calibench::evaluate::distribution::normal_two_sided;
-use calibench::harness::{Band, Claim, Dash, ExperimentError, Figure, Look, Plot, Record, Table};
+use calibench_harness::{Band, Claim, Dash, ExperimentError, Figure, Look, Plot, Record, Table};
 
 /// Everything that was simulated.
 pub(crate) struct Results {

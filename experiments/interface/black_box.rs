@@ -1,9 +1,9 @@
 //! The calibrator as a stranger sees it: a matrix of numbers and a call for points.
 
+use calibench::board::View;
 use calibench::calibrate::{Calibration, CalibrationError, Settings, calibrate};
 use calibench::camera::{Camera, FreeParameters, UndistortError};
 use calibench::geometry::Vec2;
-use calibench::target::View;
 
 /// Our solver behind an interface with two faults in its manual, after those that the chapter met.
 pub(crate) struct BlackBox(Calibration);

@@ -4,9 +4,9 @@ use super::black_box::BlackBox;
 use super::{FREE, SIGMA_PX};
 use calibench::camera::Camera;
 use calibench::geometry::{Affine, LineFit, Vec2};
-use calibench::harness::{Band, Claim, ExperimentError, Figure, Plot, Record, Table};
 use calibench::synth::scene::looking_at_centre;
 use calibench::synth::{Scene, Stream, StreamKey, Truth};
+use calibench_harness::{Band, Claim, ExperimentError, Figure, Plot, Record, Table};
 
 /// Distances of the facing target, mm: 60, 80, ..., 800. At 600 a pixel is a millimetre.
 const DISTANCE_TWENTIES_MM: std::ops::RangeInclusive<u32> = 3..=40;

@@ -1,7 +1,7 @@
 //! The figures of the observability experiment: maps over coverage and tilt, and sections through them.
 
 use super::*;
-use calibench::harness::{Dash, Figure, HeatMap, Look, Plot};
+use calibench_harness::{Dash, Figure, HeatMap, Look, Plot};
 
 /// Confidence of the intervals drawn at the trials.
 pub const SHOWN: f64 = 0.05;

@@ -1,7 +1,7 @@
 //! Is it the corners or the distance? The target stays at one distance and is moved, each view towards another corner.
 
 use super::*;
-use calibench::harness::{Dash, Figure, Look, Plot};
+use calibench_harness::{Dash, Figure, Look, Plot};
 
 /// Distances of the target's centre along the optical axis, mm.
 const DISTANCES_MM: [u32; 3] = [260, 200, 160];

@@ -1,27 +1,20 @@
 //! How does a record reach the disk? CSV, JSON and figures, each written beside its place and renamed into it.
 
-use super::provenance::{Commit, crate_versions};
+use super::provenance::crate_versions;
 use super::published::not_judged;
 use super::reconcile::{Expectation, Reconciliation};
 use super::record::Record;
+use calibench::io::{Commit, write_atomically};
 use serde_json::{Value, json};
-use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
-
-/// A file could not be written.
-#[derive(Debug, thiserror::Error)]
-#[error("cannot write {path}: {source}", path = path.display())]
-pub struct EmitError {
-    /// The file or folder.
-    pub path: PathBuf,
-    /// What the system said.
-    pub source: io::Error,
-}
+use std::path::Path;
 
 /// Writes `<out>/<experiment>/*.csv` and `record.json`, and the figures to the folder `figures`. An interrupted run leaves
 /// whole files only.
-pub fn emit(record: &Record, out: &Path, figures: &Path, commit: Option<&Commit>) -> Result<(), EmitError> {
+///
+/// # Errors
+/// What the file system says, with the path.
+pub fn emit(record: &Record, out: &Path, figures: &Path, commit: Option<&Commit>) -> io::Result<()> {
     let folder = out.join(record.experiment());
     for table in record.tables() {
         write_atomically(&folder.join(format!("{}.csv", table.name)), table.to_csv().as_bytes())?;
@@ -29,29 +22,12 @@ pub fn emit(record: &Record, out: &Path, figures: &Path, commit: Option<&Commit>
     for figure in record.figures() {
         write_atomically(&figures.join(figure.file_name()), &figure.bytes)?;
     }
-    let text = format!("{:#}\n", to_json(record, commit));
+    let text = format!("{:#}\n", record_json(record, commit));
     write_atomically(&folder.join("record.json"), text.as_bytes())
 }
 
-/// Writes a file beside its place and renames it into it, making its folder if need be.
-pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), EmitError> {
-    let failed = |source| EmitError { path: path.to_path_buf(), source };
-    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    // The process id keeps two runs at the same time apart.
-    let beside = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(failed)?;
-    }
-    let written = fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, path));
-    written.map_err(|source| {
-        // Nothing more can be done about a file that could not be written.
-        let _ = fs::remove_file(&beside);
-        failed(source)
-    })
-}
-
 /// The record as JSON. A number that is not finite stands as a word, since JSON has none for it.
-pub(super) fn to_json(record: &Record, commit: Option<&Commit>) -> Value {
+pub fn record_json(record: &Record, commit: Option<&Commit>) -> Value {
     let versions: serde_json::Map<String, Value> =
         crate_versions().into_iter().map(|(name, version)| (name, version.into())).collect();
     json!({
@@ -108,14 +84,14 @@ fn number(value: f64) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::harness::{Band, Claim};
+    use crate::{Band, Claim};
 
     #[test]
     fn a_number_that_is_not_finite_is_written_as_a_word() {
         let mut record = Record::new("e", 1);
         record.number("n", f64::INFINITY, "px", Band::Exact, "");
         record.claim(Claim::at_most("c", "", 0.0, 1.0, ""));
-        let json = to_json(&record, None);
+        let json = record_json(&record, None);
         assert_eq!(json["numbers"][0]["value"], "inf");
         assert_eq!(json["claims"][0]["interval"], json!(["-inf", 1.0]));
         assert_eq!(json["provenance"]["commit"], Value::Null);

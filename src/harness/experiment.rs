@@ -141,7 +141,7 @@ fn message(payload: &(dyn Any + Send)) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::harness::Claim;
+    use crate::Claim;
 
     fn experiment(run: fn(&Context) -> Result<Record, ExperimentError>) -> Experiment {
         Experiment { id: "e", title: "", question: "", seed: 5, takes_image: false, run }

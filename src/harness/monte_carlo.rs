@@ -4,10 +4,10 @@
 //! no bit depends on the number of threads.
 
 use super::Progress;
-use crate::calibrate::{Calibration, CalibrationError, Covariance, Settings, Termination, calibrate};
-use crate::camera::FreeParameters;
-use crate::evaluate::{Sample, reconcile};
-use crate::synth::{Scene, Stream, StreamKey};
+use calibench::calibrate::{Calibration, CalibrationError, Covariance, Settings, Termination, calibrate};
+use calibench::camera::FreeParameters;
+use calibench::evaluate::{Sample, reconcile};
+use calibench::synth::{Scene, Stream, StreamKey};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -152,8 +152,9 @@ impl Outcome {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::harness::ProgressDisplay;
-    use crate::synth::{Truth, scene::looking_at_centre};
+    use crate::ProgressDisplay;
+    use calibench::synth::Truth;
+    use calibench::synth::scene::looking_at_centre;
 
     fn run(scene: &Scene, trials: usize, threads: usize) -> Outcome {
         let settings = Settings::chapter();

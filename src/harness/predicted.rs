@@ -1,6 +1,7 @@
 //! From which distribution should a sampled number come? What theory predicts before anything is drawn.
 
-use crate::evaluate::distribution::{ChiSquare, normal_quantile};
+use calibench::evaluate::distribution::{ChiSquare, normal_quantile};
+use calibench::io::significant;
 use std::fmt;
 
 /// A predicted distribution of one number.
@@ -105,21 +106,6 @@ impl fmt::Display for Predicted {
     }
 }
 
-/// A number with `digits` significant digits, in plain notation where that is readable.
-pub fn significant(value: f64, digits: usize) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    let scientific = format!("{value:.*e}", digits.saturating_sub(1));
-    let exponent: i32 = scientific.split_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or(0);
-    if (-4..6).contains(&exponent) {
-        let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
-        format!("{value:.decimals$}")
-    } else {
-        scientific
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -151,13 +137,5 @@ mod tests {
         let z = Predicted::ChiSquared { dof: 10.0 }.z(18.307).unwrap();
         assert!((z - 1.645).abs() < 0.01, "{z}");
         assert_eq!(Predicted::Normal { mean: 1.0, sd: 2.0 }.z(4.0), Some(1.5));
-    }
-
-    #[test]
-    fn significant_digits_are_counted_from_the_first_that_is_not_zero() {
-        assert_eq!(significant(0.0349, 2), "0.035");
-        assert_eq!(significant(-600.123, 4), "-600.1");
-        assert_eq!(significant(1.5e-9, 3), "1.50e-9");
-        assert_eq!(significant(f64::INFINITY, 3), "inf");
     }
 }

@@ -1,6 +1,6 @@
 //! How far is it? A bar on standard error for work that takes over a second, nothing otherwise.
 
-use super::significant;
+use calibench::io::significant;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::fmt::Write;
 use std::sync::OnceLock;

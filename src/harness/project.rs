@@ -68,8 +68,8 @@ mod tests {
 
     #[test]
     fn the_tree_is_found_from_a_folder_inside_it_and_only_there() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-        assert_eq!(Project::above(&root.join("src/harness")).unwrap().root(), root);
+        let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+        assert_eq!(Some(Project::above(here).unwrap().root()), here.ancestors().nth(2));
         assert!(Project::above(Path::new("/")).is_err());
     }
 }

@@ -1,29 +1,6 @@
-//! Where does a record come from? Commit, seed, crate versions and inputs.
+//! With which arithmetic was a record computed? The versions of the numeric crates.
 //!
 //! Only what belongs to the result is locked in golden/ (seed and inputs); commit and versions stand in out/.
-
-use std::path::Path;
-use std::process::Command;
-
-/// The state of the source tree.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Commit {
-    /// Full hash.
-    pub hash: String,
-    /// Whether files differ from that commit.
-    pub dirty: bool,
-}
-
-/// The commit of the source tree, asked of git at run time; `None` where there is no git or no repository.
-pub fn commit(root: &Path) -> Option<Commit> {
-    let git = |args: &[&str]| {
-        let output = Command::new("git").arg("-C").arg(root).args(args).output().ok()?;
-        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_string())
-    };
-    let hash = git(&["rev-parse", "HEAD"])?;
-    let dirty = !git(&["status", "--porcelain", "--untracked-files=no"])?.is_empty();
-    Some(Commit { hash, dirty })
-}
 
 /// Crates whose arithmetic stands in the path of a number.
 const NUMERIC_CRATES: [&str; 6] = ["libm", "nalgebra", "rand", "rand_chacha", "rand_distr", "statrs"];

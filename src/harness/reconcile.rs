@@ -1,7 +1,8 @@
 //! Does our number reproduce the book's? One expectation for each rule.
 
-use super::predicted::{Predicted, significant};
+use super::predicted::Predicted;
 use super::published::{Entry, Rule};
+use calibench::io::significant;
 
 /// What the published number is held against.
 #[derive(Debug, Clone, PartialEq)]

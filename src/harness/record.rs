@@ -3,11 +3,11 @@
 use super::band::Band;
 use super::claim::Claim;
 use super::figure::Figure;
-use super::hash::sha256_hex;
 use super::predicted::Predicted;
 use super::published::{self, Entry, PublishedError, Rule};
 use super::reconcile::Reconciliation;
 use super::table::Table;
+use calibench::io::hash::sha256_hex;
 
 /// A named number, locked in golden/.
 #[derive(Debug, Clone, PartialEq)]

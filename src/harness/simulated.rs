@@ -27,7 +27,7 @@ impl Predicted {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::synth::{Stream, StreamKey};
+    use calibench::synth::{Stream, StreamKey};
 
     #[test]
     fn the_interval_is_left_as_often_as_stated() {

@@ -183,7 +183,7 @@ impl Verdict {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::harness::{Band, Claim};
+    use crate::{Band, Claim};
 
     fn record(value: f64) -> Record {
         let mut record = Record::new("e", 0);

@@ -1,6 +1,6 @@
 //! What the tests of studies share: a small study, its runs, and their comparison byte by byte.
 
-use calibench::harness::study::{Engine, Folder, Manifest, Outcome, Shard, TrialFile, finish};
+use calibench_study::{Engine, Folder, Manifest, Outcome, Shard, TrialFile, finish};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,6 @@
 //! Where do the ticks of an axis stand, and what do they say?
 
-use crate::harness::predicted::significant;
+use calibench::io::significant;
 
 /// How values are spread along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

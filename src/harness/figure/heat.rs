@@ -4,7 +4,7 @@ use super::axis::{Axis, Scale, Span};
 use super::canvas::{Anchor, Canvas, Point, text_width};
 use super::clip::Frame;
 use super::colour::{INK, heat, text_on};
-use crate::harness::predicted::significant;
+use calibench::io::significant;
 
 /// A grid of values over two named lists of levels.
 #[derive(Debug, Clone, PartialEq)]

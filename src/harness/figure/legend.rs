@@ -2,8 +2,8 @@
 
 use super::canvas::{Anchor, Canvas, text_width};
 use super::colour::INK;
+use super::mark::draw_sample;
 use super::plot::Layer;
-use super::render::draw_sample;
 
 const TEXT_PX: f64 = 12.0;
 const SAMPLE_PX: f64 = 28.0;

@@ -7,6 +7,7 @@ mod clip;
 mod colour;
 mod heat;
 mod legend;
+mod mark;
 mod plot;
 mod render;
 
@@ -15,7 +16,7 @@ pub use colour::{Dash, Look, Marker};
 pub use heat::HeatMap;
 pub use plot::Plot;
 
-use crate::raster::Raster;
+use calibench::raster::Raster;
 
 /// The format of a figure's file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 use super::axis::{Axis, Scale};
 use super::colour::{Dash, Look, Marker};
 use super::heat::HeatMap;
-use crate::geometry::Vec2;
+use calibench::geometry::Vec2;
 use nalgebra::Matrix2;
 
 /// One layer; an empty label keeps it out of the legend.

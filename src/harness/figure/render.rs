@@ -3,8 +3,9 @@
 use super::axis::{Scale, Span};
 use super::canvas::{self, Anchor, Canvas, Point, text_width};
 use super::clip::{Frame, dashes};
-use super::colour::{Dash, GRID, INK, Look, Marker, PAPER};
+use super::colour::{Dash, GRID, INK, Look, PAPER};
 use super::legend;
+use super::mark::draw_marker;
 use super::plot::{Layer, Plot};
 
 const TITLE_PX: f64 = 14.0;
@@ -218,67 +219,5 @@ fn widen_to_equal_aspect(x: &mut Span, y: &mut Span, frame: Frame) {
         widen(x, per_px_y * frame.width());
     } else {
         widen(y, per_px_x * frame.height());
-    }
-}
-
-/// One marker.
-fn draw_marker(canvas: &mut Canvas<'_>, (x, y): Point, look: Look) {
-    let (r, colour) = (look.size_px, look.colour);
-    match look.marker {
-        Marker::Disc | Marker::Dot => canvas.circle((x, y), r, colour, true),
-        Marker::Circle => canvas.circle((x, y), r, colour, false),
-        Marker::Square => {
-            let r = 0.9 * r;
-            canvas.polygon(&[(x - r, y - r), (x + r, y - r), (x + r, y + r), (x - r, y + r)], colour, 1.0);
-        }
-        Marker::Triangle => {
-            canvas.polygon(
-                &[(x, y - 1.2 * r), (x + 1.1 * r, y + 0.8 * r), (x - 1.1 * r, y + 0.8 * r)],
-                colour,
-                1.0,
-            );
-        }
-        Marker::Diamond => {
-            let r = 1.25 * r;
-            canvas.polygon(&[(x, y - r), (x + r, y), (x, y + r), (x - r, y)], colour, 1.0);
-        }
-        Marker::Cross => {
-            canvas.line(&[(x - r, y - r), (x + r, y + r)], colour, 1.5);
-            canvas.line(&[(x - r, y + r), (x + r, y - r)], colour, 1.5);
-        }
-        Marker::Plus => {
-            canvas.line(&[(x - 1.2 * r, y), (x + 1.2 * r, y)], colour, 1.5);
-            canvas.line(&[(x, y - 1.2 * r), (x, y + 1.2 * r)], colour, 1.5);
-        }
-    }
-}
-
-/// The sample of a layer in the legend, from `(x, y)` to the right.
-pub(super) fn draw_sample(canvas: &mut Canvas<'_>, layer: &Layer, (x, y): Point, width: f64) {
-    let patch = [(x, y - 5.0), (x + width, y - 5.0), (x + width, y + 5.0), (x, y + 5.0)];
-    match layer {
-        Layer::Line { look, .. } | Layer::Vertical { look, .. } | Layer::Horizontal { look, .. } => {
-            for stroke in dashes(&[(x, y), (x + width, y)], look.dash.pattern()) {
-                canvas.line(&stroke, look.colour, look.width_px);
-            }
-        }
-        Layer::Points { look, .. } => draw_marker(canvas, (x + 0.5 * width, y), *look),
-        Layer::Band { look, .. } => canvas.polygon(&patch, look.colour, 0.2),
-        Layer::Histogram { look, .. } => canvas.polygon(&patch, look.colour, 0.35),
-        Layer::ErrorBars { look, .. } => {
-            canvas.line(
-                &[(x + 0.5 * width, y - 6.0), (x + 0.5 * width, y + 6.0)],
-                look.colour,
-                look.width_px,
-            );
-        }
-        Layer::Arrows { look, .. } => {
-            canvas.line(&[(x, y), (x + width, y)], look.colour, 1.1);
-            canvas.line(
-                &[(x + width - 5.0, y - 3.0), (x + width, y), (x + width - 5.0, y + 3.0)],
-                look.colour,
-                1.1,
-            );
-        }
     }
 }

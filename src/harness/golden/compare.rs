@@ -1,6 +1,6 @@
 //! What moved? Two snapshots compared line by line; the golden one's bands decide.
 
-use crate::harness::Band;
+use crate::Band;
 use std::collections::BTreeMap;
 
 /// The outcome of a comparison.

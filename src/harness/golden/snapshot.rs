@@ -3,8 +3,9 @@
 //! Fields are separated by ` | `. Numbers stand with as many digits as bring the same bits back. Left out, because they do
 //! not belong to the result: time, host, paths, crate versions, and descriptions.
 
-use crate::harness::hash::sha256_hex;
-use crate::harness::{Claim, Expectation, Number, Reconciliation, Record, significant};
+use crate::{Claim, Expectation, Number, Reconciliation, Record};
+use calibench::io::hash::sha256_hex;
+use calibench::io::significant;
 use std::fmt::Write;
 
 /// The snapshot of a record.

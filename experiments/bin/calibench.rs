@@ -1,0 +1,7 @@
+//! The `calibench` command.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    calibench_command::main(calibench_experiments::EXPERIMENTS)
+}

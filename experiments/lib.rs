@@ -1,0 +1,40 @@
+//! Which experiments are there? Adding one is adding its module and its line here, and its binary in `experiments/bin`.
+
+use calibench_harness::Experiment;
+
+pub mod collinearity;
+pub mod distortion_model;
+pub mod expiry;
+pub mod focal_depth;
+pub mod four_pose;
+pub mod gate_power;
+pub mod interface;
+pub mod k2_observability;
+pub mod line_bending;
+pub mod nine_point;
+pub mod noise_floor;
+pub mod photographs;
+pub mod pose_count;
+
+/// All experiments, in the order of the book.
+#[rustfmt::skip]
+pub const EXPERIMENTS: &[Experiment] = &[
+    line_bending::EXPERIMENT,
+    four_pose::EXPERIMENT,
+    k2_observability::EXPERIMENT,
+    pose_count::EXPERIMENT,
+    noise_floor::EXPERIMENT,
+    focal_depth::EXPERIMENT,
+    collinearity::EXPERIMENT,
+    distortion_model::EXPERIMENT,
+    nine_point::EXPERIMENT,
+    photographs::EXPERIMENT,
+    interface::EXPERIMENT,
+    expiry::EXPERIMENT,
+    gate_power::EXPERIMENT,
+];
+
+/// The README's example, compiled and run with the documentation's tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,0 +1,305 @@
+//! What stands in the appendix? A page for every record, and every published number beside ours.
+
+use super::evidence::{ExperimentEvidence, RecordClaim, number};
+use super::format::{self, significant, typeset};
+use super::golden_file::GoldenFile;
+use super::page::CompiledPage;
+use super::sources::Sources;
+use super::text::{attribute, inline, sentence};
+use calibench_harness::published::{Kind, not_judged};
+use calibench_harness::verdict::ByKind;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// The page of an experiment's record, from the root of the book.
+pub(super) fn page_of(experiment: &str) -> String {
+    format!("record-{experiment}.md")
+}
+
+/// One page an experiment with a snapshot, and its numbers as CSV among the assets.
+pub(super) fn record_pages(sources: &Sources, assets: &mut BTreeMap<String, Vec<u8>>) -> Vec<CompiledPage> {
+    let mut pages = Vec::new();
+    for (id, evidence) in &sources.evidence.experiments {
+        let Some(golden) = &evidence.golden else { continue };
+        assets.insert(format!("data/{id}/numbers.csv"), numbers_csv(evidence, golden).into_bytes());
+        for (name, csv) in &evidence.tables {
+            assets.insert(format!("data/{id}/{name}.csv"), csv.clone().into_bytes());
+        }
+        let content = record_page(id, evidence, golden);
+        pages.push(CompiledPage { path: page_of(id), title: format!("Record: {id}"), content });
+    }
+    pages
+}
+
+/// The published values of an experiment by kind, as its last run judged them.
+pub(super) fn by_kind(id: &str, evidence: &ExperimentEvidence) -> ByKind {
+    let mut counts = ByKind::default();
+    for value in evidence.record.iter().flat_map(|r| &r.published) {
+        if let Some(kind) = Kind::ALL.into_iter().find(|k| k.name() == value.kind) {
+            counts.count(kind, value.book_held && value.ours_held);
+        }
+    }
+    not_judged(id).for_each(|entry| counts.count(entry.kind, false));
+    counts
+}
+
+/// Golden, claims and published values in one line.
+pub(super) fn verdict(id: &str, evidence: &ExperimentEvidence, golden: &GoldenFile) -> String {
+    let numbers = golden.numbers.len();
+    let Some(record) = &evidence.record else { return format!("{numbers} locked numbers.") };
+    let held = |held: usize, total: usize, what: &str| match (held, total) {
+        (_, 0) => String::new(),
+        (held, total) if held == total => format!(", all {total} {what} held"),
+        (held, total) => format!(", <b class=\"deviates\">{held} of {total} {what} held</b>"),
+    };
+    let claims = held(record.claims.iter().filter(|c| c.held).count(), record.claims.len(), "claims");
+    let published = match by_kind(id, evidence).to_string() {
+        none if none.is_empty() => String::new(),
+        counts => format!("; published values: {counts}"),
+    };
+    format!("{numbers} locked numbers{claims}{published}.")
+}
+
+fn record_page(id: &str, evidence: &ExperimentEvidence, golden: &GoldenFile) -> String {
+    let mut page =
+        format!("# Record: {id}\n\n**{}.** {}\n\n", inline(&evidence.title), inline(&evidence.question));
+    let verdict = verdict(id, evidence, golden);
+    let _ = writeln!(page, "`calibench run {id}`, seed {}. {verdict}\n", golden.seed);
+    for note in evidence.record.iter().flat_map(|r| &r.notes) {
+        let _ = writeln!(page, "Note: {}\n", inline(note));
+    }
+    let _ = writeln!(page, "## Numbers\n\n{}\n", numbers_table(id, evidence, golden));
+    if let Some(record) = &evidence.record {
+        let _ = writeln!(page, "## Claims\n\n{}\n", claims_table(&record.claims, true));
+    }
+    if !evidence.tables.is_empty() {
+        page.push_str("## Tables\n\n");
+        for name in evidence.tables.keys() {
+            let caption = inline(evidence.caption(&format!("{name}.csv")).unwrap_or_default());
+            let _ = writeln!(page, "- <a href=\"data/{id}/{name}.csv\">{name}.csv</a>: {caption}");
+        }
+    }
+    page
+}
+
+fn numbers_csv(evidence: &ExperimentEvidence, golden: &GoldenFile) -> String {
+    let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
+    let mut csv = String::from("id,value,unit,band,band_reason,description\n");
+    for n in &golden.numbers {
+        let description = evidence.description(&n.id).unwrap_or_default();
+        let (unit, band) = (quoted(&n.unit), quoted(&n.band));
+        let _ = writeln!(
+            csv,
+            "{},{:?},{unit},{band},{},{}",
+            n.id,
+            n.value,
+            quoted(&n.reason),
+            quoted(description)
+        );
+    }
+    csv
+}
+
+fn numbers_table(id: &str, evidence: &ExperimentEvidence, golden: &GoldenFile) -> String {
+    let mut rows = String::new();
+    for (row, n) in golden.numbers.iter().enumerate() {
+        let value = significant(n.value, 7);
+        let what = inline(evidence.description(&n.id).unwrap_or_default());
+        let title = attribute(&format!(
+            "{:?}\nseed {}\nrow {} of data/{id}/numbers.csv\ncalibench run {id}\n{}",
+            n.value,
+            golden.seed,
+            row + 1,
+            n.reason
+        ));
+        let (name, band) = (inline(&n.id), inline(&n.band));
+        let unit = format::unit(&n.unit);
+        let _ = write!(
+            rows,
+            "<tr id=\"number-{}\" title=\"{title}\"><td><code>{name}</code></td><td class=\"value\">{value}{unit}</td>\
+             <td>{band}</td><td>{what}</td></tr>",
+            n.id
+        );
+    }
+    let head = "<thead><tr><th>number</th><th>value</th><th>band</th><th>what</th></tr></thead>";
+    let csv = format!("<a href=\"data/{id}/numbers.csv\">numbers.csv</a>");
+    format!(
+        "<div class=\"table-wrapper\"><table class=\"numbers\"><caption>Locked numbers ({csv})</caption>{head}<tbody>{rows}</tbody></table></div>"
+    )
+}
+
+/// The claims of a record, each with its reason and false-alarm rate. With `places`, every row can be linked to.
+pub(super) fn claims_table(claims: &[RecordClaim], places: bool) -> String {
+    let mut rows = String::new();
+    for claim in claims {
+        let unit = format::unit(&claim.unit);
+        let value = match &claim.counted {
+            Some(counted) => inline(counted),
+            None => format!("{}{unit}", significant(number(&claim.value), 4)),
+        };
+        let rate = claim
+            .false_alarm_rate
+            .map_or("Nothing is drawn.".to_string(), |r| format!("False-alarm rate {}.", significant(r, 2)));
+        let (word, class) = if claim.held { ("held", "held") } else { ("fails", "deviates") };
+        let place = if places { format!(" id=\"claim-{}\"", claim.id) } else { String::new() };
+        let _ = write!(
+            rows,
+            "<tr{place}><td class=\"text\">{}<div class=\"because\">{}. {rate}</div></td>\
+             <td class=\"value\">{value}<div class=\"because\">{}</div></td><td class=\"{class}\">{word}</td></tr>",
+            inline(&claim.statement),
+            inline(&sentence(&claim.reason)),
+            interval(claim)
+        );
+    }
+    let head = "<thead><tr><th>claim, and where its interval comes from</th><th>value, and where it must lie</th><th>verdict</th></tr></thead>";
+    format!(
+        "<div class=\"table-wrapper\"><table class=\"claims\">{head}<tbody>{rows}</tbody></table></div>\n"
+    )
+}
+
+/// Where the value of a claim must lie.
+fn interval(claim: &RecordClaim) -> String {
+    if claim.counted.is_some() {
+        return String::new();
+    }
+    let unit = format::unit(&claim.unit);
+    let (low, high) = (number(&claim.interval.0), number(&claim.interval.1));
+    match (low.is_finite(), high.is_finite()) {
+        (false, true) => format!("\u{2264}\u{a0}{}{unit}", significant(high, 3)),
+        (true, false) => format!("\u{2265}\u{a0}{}{unit}", significant(low, 3)),
+        _ => format!("in [{}, {}]{unit}", significant(low, 4), significant(high, 4)),
+    }
+}
+
+/// The published values of all experiments by kind, as a sentence.
+pub(super) fn published_counts(sources: &Sources) -> String {
+    let experiments = sources.evidence.experiments.iter();
+    let all = experiments.fold(ByKind::default(), |sum, (id, evidence)| sum.plus(&by_kind(id, evidence)));
+    all.to_string()
+}
+
+/// Every number that the chapter prints: ours, what both are held against, what the verdict is worth, and the verdict.
+pub(super) fn published_table(sources: &Sources) -> String {
+    let mut rows = String::new();
+    for entry in &sources.published {
+        let evidence = sources.evidence.experiments.get(entry.experiment());
+        let golden = evidence.and_then(|e| e.golden.as_ref());
+        let ours = golden.and_then(|g| g.number(entry.number())).filter(|_| entry.rule.is_some());
+        let locked = golden.and_then(|g| g.published.iter().find(|p| p.id == entry.number()));
+        let judged = evidence.and_then(|e| e.published(entry.number()));
+        let (word, class) = match judged.map(|p| (p.book_held, p.ours_held)) {
+            None if entry.rule.is_none() => ("not judged", "missing"),
+            None => ("not reproduced yet", "missing"),
+            Some((true, true)) => ("held", "held"),
+            Some((false, true)) => ("book outside", "deviates"),
+            Some((true, false)) => ("ours outside", "deviates"),
+            Some((false, false)) => ("both outside", "deviates"),
+        };
+        let ours = ours.map_or("\u{2013}".to_string(), |(_, n)| {
+            let decimals = entry.decimals() + 1;
+            let value = typeset(&format!("{:.decimals$}", n.value));
+            let page = page_of(entry.experiment());
+            format!("<a class=\"num\" href=\"{page}#number-{}\" title=\"{:?}\">{value}</a>", n.id, n.value)
+        });
+        let expectation = locked.map_or(String::new(), |p| {
+            let (low, high) = p.interval;
+            let interval = format!("[{}, {}]", significant(low, 6), significant(high, 6));
+            format!("Ours in {interval}. {}.", inline(&sentence(&format!("{}: {}", p.rule, p.expectation))))
+        });
+        let because = match entry.because.as_str() {
+            "" => String::new(),
+            because => format!(" {}.", inline(&sentence(because))),
+        };
+        let _ = write!(
+            rows,
+            "<tr id=\"published-{}\"><td class=\"text\">{} {}<div class=\"because\">{expectation}{because}</div></td>\
+             <td class=\"value\">{}{}</td><td class=\"value\">{ours}</td>\
+             <td class=\"{class}\">{word}<div class=\"because\">{}</div></td></tr>",
+            entry.id,
+            section(&entry.section),
+            inline(&entry.what),
+            typeset(&entry.printed),
+            format::unit(&entry.unit),
+            entry.kind.name()
+        );
+    }
+    let head = "<thead><tr><th>what, and what it is held against</th><th>printed</th><th>ours</th><th>verdict</th></tr></thead>";
+    format!(
+        "<div class=\"table-wrapper\"><table class=\"published\">{head}<tbody>{rows}</tbody></table></div>\n"
+    )
+}
+
+/// A section with its sign; `case study` has no number.
+pub(super) fn section(name: &str) -> String {
+    let sign = if name.starts_with(|c: char| c.is_ascii_digit()) { "\u{a7}" } else { "" };
+    format!("{sign}{}", inline(name))
+}
+
+/// Links to the pages of all records.
+pub(super) fn record_list(sources: &Sources) -> String {
+    let mut list = String::new();
+    for (id, evidence) in &sources.evidence.experiments {
+        let Some(golden) = &evidence.golden else { continue };
+        let _ = writeln!(
+            list,
+            "- [{id}]({}): {}. {}",
+            page_of(id),
+            inline(&evidence.title),
+            verdict(id, evidence, golden)
+        );
+    }
+    list
+}
+
+/// Columns and rows of a CSV table as HTML. `columns` names those to show, `*` all; `digits=4`, `rows=1-5`.
+pub(super) fn csv_table(csv: &str, columns: &str, options: &[&str], path: &str) -> Result<String, String> {
+    let (mut digits, mut rows) = (4, (1, usize::MAX));
+    for option in options {
+        let bad = || format!("`{option}` is no option of a table: digits=4, rows=1-5");
+        match option.split_once('=') {
+            Some(("digits", value)) => digits = value.parse().map_err(|_| bad())?,
+            Some(("rows", value)) => {
+                let (first, last) = value.split_once('-').ok_or_else(bad)?;
+                rows = (first.parse().map_err(|_| bad())?, last.parse().map_err(|_| bad())?);
+            }
+            _ => return Err(bad()),
+        }
+    }
+    let mut reader = csv::ReaderBuilder::new().from_reader(csv.as_bytes());
+    let header: Vec<String> =
+        reader.headers().map_err(|e| format!("{path}: {e}"))?.iter().map(str::to_string).collect();
+    let bare = |name: &String| name.split(" [").next().unwrap_or_default().to_string();
+    let known: Vec<String> = header.iter().map(bare).collect();
+    let wanted: Vec<usize> = if columns == "*" {
+        (0..header.len()).collect()
+    } else {
+        let place = |name: &str| {
+            let at = known.iter().position(|k| k == name);
+            at.ok_or_else(|| format!("{path} has no column `{name}`; it has: {}", known.join(", ")))
+        };
+        columns.split(',').map(place).collect::<Result<_, _>>()?
+    };
+    let head: String =
+        wanted.iter().map(|&i| format!("<th>{}</th>", inline(&header[i].replace('_', " ")))).collect();
+    let mut body = String::new();
+    for (i, record) in reader.records().enumerate() {
+        let record = record.map_err(|e| format!("{path}: {e}"))?;
+        let row = i + 1;
+        if !(rows.0..=rows.1).contains(&row) {
+            continue;
+        }
+        let _ = write!(body, "<tr title=\"row {row} of {path}\">");
+        for &column in &wanted {
+            let cell = record.get(column).unwrap_or_default();
+            let _ = match cell.parse::<f64>() {
+                Ok(value) if cell.contains(['.', 'e']) => {
+                    write!(body, "<td class=\"value\">{}</td>", significant(value, digits))
+                }
+                Ok(_) => write!(body, "<td class=\"value\">{}</td>", typeset(cell)),
+                Err(_) => write!(body, "<td>{}</td>", inline(cell)),
+            };
+        }
+        body.push_str("</tr>");
+    }
+    Ok(format!("<thead><tr>{head}</tr></thead><tbody>{body}</tbody>"))
+}

@@ -1,0 +1,341 @@
+//! What is left of a view once its pose is eliminated? Small dense algebra of fixed size, written out.
+#![allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
+
+use super::blocks::{Coupling, Intrinsics, N, PoseBlock, ViewBlock};
+use crate::geometry::lanes::{Kernel, LANES, Lanes, dispatch};
+use nalgebra::{DMatrix, MatrixXx6, SVector};
+
+/// Vectors of lanes in a row.
+const VECTORS: usize = N / LANES;
+
+/// A view's Cholesky factor and whitened coupling.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Eliminated {
+    /// `L`, lower triangle, with the inverse of its diagonal in place of the diagonal.
+    factor: [[f64; 6]; 6],
+    /// `W = L^-1 B^T`, and `z = L^-1 g` in column n.
+    whitened: [[f64; N]; 6],
+}
+
+/// `S` (upper triangle) with the right-hand side `g_a - sum W_i^T z_i` in column n.
+#[derive(Debug, Clone)]
+pub(super) struct Reduced {
+    rows: [[f64; N]; N],
+    right: [f64; N],
+}
+
+impl Reduced {
+    /// The intrinsics' own part.
+    pub fn of(intrinsics: &Intrinsics, gradient: &SVector<f64, N>, damping: f64) -> Reduced {
+        let mut rows = [[0.0; N]; N];
+        for (i, row) in rows.iter_mut().enumerate() {
+            for (j, entry) in row.iter_mut().enumerate().skip(i) {
+                *entry = intrinsics[(i, j)];
+            }
+            row[i] *= 1.0 + damping;
+        }
+        Reduced { rows, right: (*gradient).into() }
+    }
+
+    /// Less the share of some views.
+    pub fn less(mut self, share: &[[f64; N]; N], n: usize) -> Reduced {
+        for (i, row) in share.iter().enumerate().take(n) {
+            for (entry, part) in self.rows[i].iter_mut().zip(row).take(n).skip(i) {
+                *entry -= part;
+            }
+            self.right[i] -= row[n];
+        }
+        self
+    }
+
+    /// `S`.
+    pub fn matrix(&self, n: usize) -> DMatrix<f64> {
+        DMatrix::from_fn(n, n, |i, j| self.rows[i.min(j)][i.max(j)])
+    }
+
+    /// `-S^-1 right`, 0 beyond `n`; `None` if `S` is not positive definite.
+    pub fn solve(&self, n: usize) -> Option<SVector<f64, N>> {
+        let mut lower = [[0.0; N]; N];
+        for (i, row) in lower.iter_mut().enumerate().take(n) {
+            for (j, entry) in row.iter_mut().enumerate().take(i + 1) {
+                *entry = self.rows[j][i];
+            }
+        }
+        factor_in_place(&mut lower, n)?;
+        let mut x = [0.0; N];
+        for i in 0..n {
+            let known: f64 = (0..i).map(|k| lower[i][k] * x[k]).sum();
+            x[i] = (-self.right[i] - known) * lower[i][i];
+        }
+        for i in (0..n).rev() {
+            let known: f64 = (i + 1..n).map(|k| lower[k][i] * x[k]).sum();
+            x[i] = (x[i] - known) * lower[i][i];
+        }
+        Some(SVector::from(x))
+    }
+}
+
+/// Cholesky factor of a lower triangle in its place, with the inverse of the diagonal in place of the diagonal. `None` if not positive
+/// definite.
+#[inline(always)]
+fn factor_in_place<const K: usize>(lower: &mut [[f64; K]; K], n: usize) -> Option<()> {
+    for j in 0..n {
+        let mut pivot = lower[j][j];
+        for k in 0..j {
+            pivot -= lower[j][k] * lower[j][k];
+        }
+        if pivot.is_nan() || pivot <= 0.0 {
+            return None;
+        }
+        let inverse = 1.0 / pivot.sqrt();
+        lower[j][j] = inverse;
+        for i in j + 1..n {
+            let mut entry = lower[i][j];
+            for k in 0..j {
+                entry -= lower[i][k] * lower[j][k];
+            }
+            lower[i][j] = entry * inverse;
+        }
+    }
+    Some(())
+}
+
+/// Eliminates the poses of `views`; returns `sum W^T [W z]`, of which the upper triangle is filled. `None` where a block is not
+/// positive definite.
+pub(super) fn eliminate(
+    views: &[ViewBlock],
+    eliminated: &mut [Eliminated],
+    damping: f64,
+    n: usize,
+) -> Option<[[f64; N]; N]> {
+    if n < 2 * LANES {
+        dispatch(Eliminate::<2> { views, eliminated, damping, n })
+    } else {
+        dispatch(Eliminate::<VECTORS> { views, eliminated, damping, n })
+    }
+}
+
+/// Works on the first `V` vectors of every row; `n < 4 V`.
+struct Eliminate<'a, const V: usize> {
+    views: &'a [ViewBlock],
+    eliminated: &'a mut [Eliminated],
+    damping: f64,
+    n: usize,
+}
+
+impl<const V: usize> Kernel for Eliminate<'_, V> {
+    type Output = Option<[[f64; N]; N]>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Option<[[f64; N]; N]> {
+        let mut squares = [[L::zero(); V]; N];
+        for (view, out) in self.views.iter().zip(self.eliminated) {
+            let mut lower = [[0.0; 6]; 6];
+            for (i, row) in lower.iter_mut().enumerate() {
+                for (j, entry) in row.iter_mut().enumerate().take(i + 1) {
+                    *entry = view.pose[(j, i)];
+                }
+                row[i] *= 1.0 + self.damping;
+            }
+            factor_in_place(&mut lower, 6)?;
+            let mut w = [[L::zero(); V]; 6];
+            for i in 0..6 {
+                w[i] = row_of::<L, V>(&view.coupling, view.gradient[i], i, self.n);
+                for k in 0..i {
+                    let factor = L::splat(lower[i][k]);
+                    for v in 0..V {
+                        w[i][v] = w[i][v] - factor * w[k][v];
+                    }
+                }
+                let inverse = L::splat(lower[i][i]);
+                for v in 0..V {
+                    w[i][v] = w[i][v] * inverse;
+                    store(&mut out.whitened[i], v, w[i][v]);
+                }
+            }
+            out.factor = lower;
+            for k in 0..6 {
+                for i in 0..V * LANES {
+                    let factor = L::splat(out.whitened[k][i]);
+                    for v in i / LANES..V {
+                        squares[i][v] = squares[i][v] + factor * w[k][v];
+                    }
+                }
+            }
+        }
+        let mut sums = [[0.0; N]; N];
+        for (row, target) in squares.iter().zip(&mut sums) {
+            for (v, &lanes) in row.iter().enumerate() {
+                store(target, v, lanes);
+            }
+        }
+        Some(sums)
+    }
+}
+
+/// Column `i` of the coupling as a row, with the gradient in column `n`.
+#[inline(always)]
+fn row_of<L: Lanes, const V: usize>(coupling: &Coupling, gradient: f64, i: usize, n: usize) -> [L; V] {
+    let mut row = [0.0; N];
+    row.copy_from_slice(&coupling.as_slice()[i * N..(i + 1) * N]);
+    row[n] = gradient;
+    std::array::from_fn(|v| load(&row, v))
+}
+
+/// Vector `v` of a row.
+#[inline(always)]
+fn load<L: Lanes>(row: &[f64; N], v: usize) -> L {
+    let at = v * LANES;
+    L::load(&[row[at], row[at + 1], row[at + 2], row[at + 3]])
+}
+
+#[inline(always)]
+fn store<L: Lanes>(row: &mut [f64; N], v: usize, lanes: L) {
+    row[v * LANES..(v + 1) * LANES].copy_from_slice(&lanes.store());
+}
+
+impl Eliminated {
+    /// `-L^-T (z + W d_a)`.
+    pub fn pose_step(&self, intrinsics: &SVector<f64, N>, n: usize) -> SVector<f64, 6> {
+        let mut rest = [0.0; 6];
+        for (r, row) in rest.iter_mut().zip(&self.whitened) {
+            *r = -row[n];
+            for (w, d) in row.iter().zip(intrinsics.iter()).take(n) {
+                *r -= w * d;
+            }
+        }
+        SVector::from(self.solve_transposed(rest))
+    }
+
+    /// `C^-1 B^T a = L^-T W a`: how far the pose follows an intrinsics step, with the opposite sign.
+    pub fn response(&self, intrinsics: &SVector<f64, N>, n: usize) -> SVector<f64, 6> {
+        let along = self
+            .whitened
+            .map(|row| row.iter().zip(intrinsics.iter()).take(n).map(|(w, d)| w * d).sum::<f64>());
+        SVector::from(self.solve_transposed(along))
+    }
+
+    /// `L^-T b`.
+    #[inline(always)]
+    fn solve_transposed(&self, mut b: [f64; 6]) -> [f64; 6] {
+        for i in (0..6).rev() {
+            for k in i + 1..6 {
+                b[i] -= self.factor[k][i] * b[k];
+            }
+            b[i] *= self.factor[i][i];
+        }
+        b
+    }
+
+    /// Covariance of the pose, `C^-1 + Y P Y^T` with `Y = C^-1 B^T` and `P` that of the intrinsics, and theirs with it, `-P Y^T`.
+    pub fn covariance(&self, intrinsics: &Intrinsics, n: usize) -> (PoseBlock, MatrixXx6<f64>) {
+        let (pose, minus_cross) = if n < 2 * LANES {
+            dispatch(PoseCovariance::<2> { view: self, intrinsics })
+        } else {
+            dispatch(PoseCovariance::<VECTORS> { view: self, intrinsics })
+        };
+        let pose = PoseBlock::from_fn(|i, j| 0.5 * (pose[i][j] + pose[j][i]));
+        (pose, MatrixXx6::from_fn(n, |i, j| -minus_cross[j][i]))
+    }
+}
+
+struct PoseCovariance<'a, const V: usize> {
+    view: &'a Eliminated,
+    intrinsics: &'a Intrinsics,
+}
+
+impl<const V: usize> Kernel for PoseCovariance<'_, V> {
+    /// Pose block, and `Y P` row by row; entries beyond those asked for mean nothing.
+    type Output = ([[f64; 2 * LANES]; 6], [[f64; N]; 6]);
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Self::Output {
+        let factor = &self.view.factor;
+        // Y = L^-T W, from the last row up.
+        let mut y: [[L; V]; 6] =
+            std::array::from_fn(|i| std::array::from_fn(|v| load(&self.view.whitened[i], v)));
+        solve_rows_transposed(factor, &mut y);
+        let mut y_rows = [[0.0; N]; 6];
+        for (row, target) in y.iter().zip(&mut y_rows) {
+            for (v, &lanes) in row.iter().enumerate() {
+                store(target, v, lanes);
+            }
+        }
+        // Y P, row by row. P is symmetric, so its columns are its rows.
+        let mut product = [[L::zero(); V]; 6];
+        let columns = self.intrinsics.as_slice();
+        for k in 0..V * LANES {
+            let at: [L; V] = std::array::from_fn(|v| {
+                let first = k * N + v * LANES;
+                L::load(&[columns[first], columns[first + 1], columns[first + 2], columns[first + 3]])
+            });
+            for i in 0..6 {
+                let factor = L::splat(y_rows[i][k]);
+                for v in 0..V {
+                    product[i][v] = product[i][v] + factor * at[v];
+                }
+            }
+        }
+        let mut minus_cross = [[0.0; N]; 6];
+        for (row, target) in product.iter().zip(&mut minus_cross) {
+            for (v, &lanes) in row.iter().enumerate() {
+                store(target, v, lanes);
+            }
+        }
+        // C^-1 = L^-T L^-1, then + (Y P) Y^T.
+        let mut pose: [[L; 2]; 6] = inverse_rows(factor);
+        solve_rows_transposed(factor, &mut pose);
+        for k in 0..V * LANES {
+            let column = |i: usize| if i < 6 { y_rows[i][k] } else { 0.0 };
+            let at: [L; 2] = [
+                L::load(&[column(0), column(1), column(2), column(3)]),
+                L::load(&[column(4), column(5), 0.0, 0.0]),
+            ];
+            for i in 0..6 {
+                let factor = L::splat(minus_cross[i][k]);
+                pose[i] = [pose[i][0] + factor * at[0], pose[i][1] + factor * at[1]];
+            }
+        }
+        let mut rows = [[0.0; 2 * LANES]; 6];
+        for (row, target) in pose.iter().zip(&mut rows) {
+            target[..LANES].copy_from_slice(&row[0].store());
+            target[LANES..].copy_from_slice(&row[1].store());
+        }
+        (rows, minus_cross)
+    }
+}
+
+/// `L^-1` in rows.
+#[inline(always)]
+fn inverse_rows<L: Lanes>(factor: &[[f64; 6]; 6]) -> [[L; 2]; 6] {
+    let unit = |i: usize, v: usize| {
+        L::load(&std::array::from_fn(|lane| if i == v * LANES + lane { 1.0 } else { 0.0 }))
+    };
+    let mut rows: [[L; 2]; 6] = std::array::from_fn(|i| [unit(i, 0), unit(i, 1)]);
+    for i in 0..6 {
+        for k in 0..i {
+            let entry = L::splat(factor[i][k]);
+            rows[i] = [rows[i][0] - entry * rows[k][0], rows[i][1] - entry * rows[k][1]];
+        }
+        let inverse = L::splat(factor[i][i]);
+        rows[i] = [rows[i][0] * inverse, rows[i][1] * inverse];
+    }
+    rows
+}
+
+/// Rows of `L^-T X`.
+#[inline(always)]
+fn solve_rows_transposed<L: Lanes, const V: usize>(factor: &[[f64; 6]; 6], rows: &mut [[L; V]; 6]) {
+    for i in (0..6).rev() {
+        for k in i + 1..6 {
+            let entry = L::splat(factor[k][i]);
+            for v in 0..V {
+                rows[i][v] = rows[i][v] - entry * rows[k][v];
+            }
+        }
+        let inverse = L::splat(factor[i][i]);
+        for v in 0..V {
+            rows[i][v] = rows[i][v] * inverse;
+        }
+    }
+}

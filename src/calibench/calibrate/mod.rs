@@ -1,0 +1,35 @@
+//! Which camera explains the pixels? Zhang's method: homographies, closed form, maximum-likelihood refinement, covariance.
+//!
+//! [`calibrate`] is the whole way; the steps stand in files of their own. Truth never enters here.
+
+mod blocks;
+mod chunks;
+mod closed_form;
+mod conditioning;
+mod covariance;
+mod elimination;
+mod error;
+mod estimate;
+mod identifiability;
+mod kernel;
+mod loss;
+mod minimise;
+mod normal;
+mod report;
+mod settings;
+pub mod single_plane;
+mod start;
+mod system;
+mod termination;
+
+pub use closed_form::{ClosedFormError, closed_form, pose_from_homography};
+pub use conditioning::{Conditioning, WeakComponent};
+pub use covariance::Covariance;
+pub use error::CalibrationError;
+pub use estimate::calibrate;
+pub use loss::Loss;
+pub use normal::information;
+pub use report::{Calibration, Warning};
+pub use settings::Settings;
+pub use system::System;
+pub use termination::Termination;

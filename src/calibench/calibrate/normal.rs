@@ -1,0 +1,141 @@
+//! What does one view say about the unknowns? The normal equations of a view, summed over its points.
+//!
+//! Unknowns of a view: the `n` free intrinsics, then its six pose parameters. With the Jacobian `J = [J_a J_c]` of a point's
+//! residual (predicted - observed) and the weight `w` of the loss, a view contributes
+//! `A += w J_a^T J_a`, `B = sum w J_a^T J_c`, `C = sum w J_c^T J_c` and the gradients `J^T w r`.
+
+use super::Loss;
+use super::blocks::{Intrinsics, N, ViewBlock};
+use super::chunks::{self, CHUNK};
+use super::kernel::{self, INTRINSICS_SLOTS, Sums};
+use super::system::System;
+use crate::camera::{Camera, FreeParameters, Parameter};
+use crate::geometry::lanes::PairBlocks;
+use crate::geometry::{Pose, Vec2};
+use nalgebra::SVector;
+
+/// The observations of one view as the kernel reads them: target point and pixel.
+pub(super) type Observations = PairBlocks;
+
+/// The intrinsics' share of some views.
+struct Share {
+    square: Intrinsics,
+    gradient: SVector<f64, N>,
+    cost: f64,
+}
+
+impl Share {
+    fn zero() -> Share {
+        Share { square: Intrinsics::zeros(), gradient: SVector::zeros(), cost: 0.0 }
+    }
+}
+
+/// Fills the system with the normal equations of all views. `None` where a point is not in front of the camera.
+///
+/// Views are summed in chunks of fixed size, and the chunks in order: the result is the same whoever computes them.
+pub(super) fn fill(
+    system: &mut System,
+    camera: &Camera,
+    cam_from_target: &[Pose],
+    observations: &[Observations],
+    loss: Loss,
+) -> Option<()> {
+    let free = system.free;
+    let radial = kernel::is_radial(camera, free);
+    let columns = Columns::of(free);
+    // Every entry that is ever read is written below; the rest stays 0.
+    system.views.resize_with(observations.len(), ViewBlock::zero);
+    let mut total = Some(Share::zero());
+    let chunk = |index: usize, blocks: &mut [ViewBlock]| {
+        let (mut share, mut sums) = (Share::zero(), kernel::NO_SUMS);
+        for (k, block) in blocks.iter_mut().enumerate() {
+            let view = index * CHUNK + k;
+            let (pose, pairs) = (&cam_from_target[view], &observations[view]);
+            kernel::view_sums(camera, pose, pairs, loss, radial, &mut sums)?;
+            columns.spread(&sums, &mut share, block);
+        }
+        Some(share)
+    };
+    chunks::fold(&mut system.views, chunk, |share| {
+        total = match (total.take(), share) {
+            (Some(mut sum), Some(part)) => {
+                sum.square += part.square;
+                sum.gradient += part.gradient;
+                sum.cost += part.cost;
+                Some(sum)
+            }
+            _ => None,
+        };
+    });
+    let mut total = total?;
+    total.square.fill_lower_triangle_with_upper_triangle();
+    (system.intrinsics, system.gradient, system.cost) = (total.square, total.gradient, total.cost);
+    Some(())
+}
+
+/// The free parameters in order.
+struct Columns {
+    parameters: [Parameter; Parameter::COUNT],
+    n: usize,
+}
+
+impl Columns {
+    fn of(free: FreeParameters) -> Columns {
+        let mut parameters = Parameter::ALL;
+        for (slot, parameter) in parameters.iter_mut().zip(free.iter()) {
+            *slot = parameter;
+        }
+        Columns { parameters, n: free.len() }
+    }
+
+    /// Hands the sums of a view to its block and adds the intrinsics' share (upper triangle).
+    fn spread(&self, sums: &Sums, share: &mut Share, block: &mut ViewBlock) {
+        let parameters = &self.parameters[..self.n];
+        for (i, &a) in parameters.iter().enumerate() {
+            for (j, &b) in parameters.iter().enumerate().skip(i) {
+                let (row, column) = INTRINSICS_SLOTS[a as usize][b as usize];
+                share.square[(i, j)] += sums[usize::from(row)][usize::from(column)];
+            }
+            share.gradient[i] += kernel::gradient(sums, a);
+            for j in 0..6 {
+                block.coupling[(i, j)] = kernel::coupling(sums, a, j);
+            }
+        }
+        share.cost += kernel::cost(sums);
+        for i in 0..6 {
+            for (j, &sum) in sums[i].iter().enumerate().take(6).skip(i) {
+                block.pose[(i, j)] = sum;
+                block.pose[(j, i)] = sum;
+            }
+            block.gradient[i] = kernel::pose_gradient(sums, i);
+        }
+    }
+}
+
+/// The pixel that the kernel predicts, or `None` behind the camera.
+fn predict(camera: &Camera, cam_from_target: &Pose, point: &Vec2) -> Option<Vec2> {
+    let r = &cam_from_target.rotation;
+    let q = r.column(0) * point.x + r.column(1) * point.y;
+    camera.project(&(q + cam_from_target.translation))
+}
+
+/// The Fisher information of a scene: normal equations at given parameters, for unit noise, with every point of `points`
+/// seen in every view. `None` if a point is not in front of the camera.
+///
+/// Divided by `sigma^2` it is the inverse of the Cramer-Rao bound; its [`System::covariance`] times `sigma^2` is the bound.
+pub fn information(
+    camera: &Camera,
+    free: FreeParameters,
+    cam_from_target: &[Pose],
+    points: &[Vec2],
+) -> Option<System> {
+    let mut system = System::new(free, cam_from_target.len());
+    let seen = |pose: &Pose| {
+        let pixels: Vec<Vec2> =
+            points.iter().map(|p| predict(camera, pose, p)).collect::<Option<Vec<Vec2>>>()?;
+        Some(Observations::new(points.iter().copied().zip(pixels)))
+    };
+    let observations: Vec<Observations> = cam_from_target.iter().map(seen).collect::<Option<_>>()?;
+    fill(&mut system, camera, cam_from_target, &observations, Loss::Squares)?;
+    Some(system)
+}

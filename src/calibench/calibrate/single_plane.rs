@@ -1,0 +1,255 @@
+//! How does a lens bend one photograph of a plane? Homography and radial distortion from a single view.
+//!
+//! ```text
+//! i = H X                                         ideal pixel of target point X
+//! m = c + f distort((i - c) / f)                  observed pixel; distort: x (1 + k1 r^2 + k2 r^4)
+//! ```
+//! One plane cannot tell the focal length, so `f` is a gauge: any value fits as well, with `k1` proportional to `f^2` and `k2` to
+//! `f^4`. With the camera's true focal length the coefficients are the camera's own. A free distortion centre `c` is fixed by
+//! the data only as far as there is distortion. (Tsai 1987 is the classical single-view calibration; this is its planar core,
+//! without a pose.)
+
+mod model;
+mod refine;
+
+use super::Termination;
+use crate::board::View;
+use crate::camera::{BrownConrady, Camera, UndistortError};
+use crate::geometry::projective_frame::change_frames;
+use crate::geometry::{Homography, HomographyError, Mat3, Vec2};
+use model::{Frames, PARAMETERS, ParameterVector};
+use nalgebra::{DMatrix, Matrix4, SMatrix};
+use refine::Outcome;
+
+/// What is given, and what is sought.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SinglePlaneOptions {
+    /// Length that makes radii dimensionless, px: the gauge of `k1` and `k2`.
+    pub focal_px: f64,
+    /// The distortion centre, px: held there, or started from there.
+    pub centre_px: Vec2,
+    /// Whether the centre is estimated too.
+    pub centre_free: bool,
+}
+
+/// Why a single view gives no distortion.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SinglePlaneError {
+    /// Fewer coordinates than parameters.
+    #[error("{parameters} parameters need at least {need} points, got {got}")]
+    TooFewPoints {
+        /// Number of parameters.
+        parameters: usize,
+        /// Least number of points.
+        need: usize,
+        /// Number given.
+        got: usize,
+    },
+    /// The gauge length or the centre is unusable.
+    #[error("focal_px {focal_px} must be positive and the centre ({centre_u}, {centre_v}) finite")]
+    Options {
+        /// The length given.
+        focal_px: f64,
+        /// The centre given, u.
+        centre_u: f64,
+        /// The centre given, v.
+        centre_v: f64,
+    },
+    /// Not even a homography can be fitted.
+    #[error(transparent)]
+    Homography(#[from] HomographyError),
+    /// The points do not fix the parameters: too few radii, or too few points in general position.
+    #[error(
+        "{points} points do not fix homography and distortion (smallest pivot {pivot:.1e}): add points at other \
+         radii, or hold the centre"
+    )]
+    NotIdentifiable {
+        /// Number of points.
+        points: usize,
+        /// Smallest relative pivot of the normal equations.
+        pivot: f64,
+    },
+    /// There is too little distortion to see its centre.
+    #[error(
+        "the data show no distortion (chi-square {chi_square:.1} on 2 degrees of freedom, less than {threshold:.1}), so \
+         its centre cannot be found: hold it"
+    )]
+    CentreNotIdentifiable {
+        /// `k^T C^-1 k` of `k = (k1, k2)` with the centre held.
+        chi_square: f64,
+        /// What it takes to release the centre.
+        threshold: f64,
+    },
+}
+
+/// Distortion counts as seen when `k^T C^-1 k` exceeds the 99.9 % quantile of chi-square on 2 degrees of freedom, `-2 ln 0.001`.
+const SEEN_DISTORTION: f64 = 13.815510557964274;
+
+/// Uncertainty to first order, from the residuals.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SinglePlaneSpread {
+    /// Standard deviation of a pixel coordinate: `sqrt(sum |r|^2 / degrees of freedom)`, px.
+    pub sigma_px: f64,
+    /// Covariance of `k1, k2, cu, cv`; zero where the centre was held.
+    pub lens: Matrix4<f64>,
+    /// Covariance of the homography's first eight entries, row by row, at the scale `h33 = 1`, and then `k1, k2, cu, cv`.
+    /// `None` if the target's origin lies on the horizon, where that scale does not exist.
+    pub all: Option<DMatrix<f64>>,
+}
+
+/// A lens, and how it saw one plane.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SinglePlane {
+    /// Ideal pixel of a target point.
+    pub ideal_from_target: Homography,
+    /// `k1`, `k2` in the gauge `focal_px`.
+    pub distortion: BrownConrady,
+    /// The distortion centre, px.
+    pub centre_px: Vec2,
+    /// The gauge length, px.
+    pub focal_px: f64,
+    /// Predicted minus observed pixel, one a point.
+    pub residuals_px: Vec<Vec2>,
+    /// `sqrt(mean |r|^2)`, per point, px.
+    pub rms_px: f64,
+    /// `2 N - p`.
+    pub degrees_of_freedom: usize,
+    /// Uncertainty; `None` without degrees of freedom.
+    pub spread: Option<SinglePlaneSpread>,
+    /// How the refinement ended.
+    pub termination: Termination,
+    /// Refinement steps tried.
+    pub iterations: usize,
+}
+
+impl SinglePlane {
+    /// The lens as a camera: `focal_px` for both focal lengths, the centre as principal point. It is the camera up to the gauge:
+    /// right for correcting and distorting pixels, not for distances.
+    pub fn lens_camera(&self) -> Camera {
+        lens_camera(self.focal_px, &self.centre_px, self.distortion)
+    }
+
+    /// Where an ideal lens would have shown what is seen at `pixel`; in pixels, not in target units.
+    ///
+    /// # Errors
+    /// Outside the monotone radius of the lens model.
+    pub fn correct_pixel(&self, pixel: &Vec2) -> Result<Vec2, UndistortError> {
+        self.lens_camera().correct_pixel(pixel)
+    }
+
+    /// The target point seen at `pixel`; the inner `None` on the horizon.
+    ///
+    /// # Errors
+    /// Outside the monotone radius of the lens model.
+    pub fn target_from_pixel(&self, pixel: &Vec2) -> Result<Option<Vec2>, UndistortError> {
+        let ideal = self.correct_pixel(pixel)?;
+        Ok(self.ideal_from_target.inverse().and_then(|target_from_ideal| target_from_ideal.apply(&ideal)))
+    }
+}
+
+/// The RMS per point to expect from `points` points under noise of `sigma_px` a coordinate, and its standard deviation, px.
+///
+/// `sum |r|^2 / sigma^2` follows chi-square with `n = 2 N - p` degrees of freedom to first order, so
+/// `E[RMS] = sigma sqrt(n / N)` and `sd(RMS) = sigma / sqrt(2 N)`, each short of the exact moment of the chi distribution by
+/// less than `1 / (4 n)` relative.
+pub fn predicted_rms_px(sigma_px: f64, points: usize, parameters: usize) -> (f64, f64) {
+    let degrees = (2 * points).saturating_sub(parameters) as f64;
+    (sigma_px * (degrees / points as f64).sqrt(), sigma_px / (2.0 * points as f64).sqrt())
+}
+
+/// Calibrates the lens from one view of a plane: minimises the squared distances between predicted and observed pixels over the
+/// homography, `k1`, `k2` and, if asked, the centre, by Levenberg-Marquardt from a fitted homography without distortion. A free
+/// centre is released once `k1` and `k2` have settled: without distortion it has no effect to follow.
+///
+/// # Errors
+/// Too few points, no homography, or parameters that the points do not fix.
+pub fn calibrate_single_plane(
+    view: &View,
+    options: &SinglePlaneOptions,
+) -> Result<SinglePlane, SinglePlaneError> {
+    let parameters = if options.centre_free { PARAMETERS } else { PARAMETERS - 2 };
+    let (start, frames) = start(view, options, parameters)?;
+    let mut outcome = refine::refine(&frames, view, start, PARAMETERS - 2)?;
+    if options.centre_free {
+        refuse_unseen_centre(&frames, view, &outcome)?;
+        let held_iterations = outcome.iterations;
+        outcome = refine::refine(&frames, view, outcome.parameters, PARAMETERS)?;
+        outcome.iterations += held_iterations;
+    }
+    let residuals_px: Vec<Vec2> = frames.residuals(view, &outcome.parameters).collect();
+    let square: f64 = residuals_px.iter().map(Vec2::norm_squared).sum();
+    let degrees_of_freedom = 2 * view.len() - parameters;
+    let spread = (degrees_of_freedom > 0).then(|| {
+        let sigma_px = (square / degrees_of_freedom as f64).sqrt();
+        spread(&frames, &outcome.parameters, &(outcome.unit_covariance * (sigma_px * sigma_px)), sigma_px)
+    });
+    Ok(SinglePlane {
+        ideal_from_target: frames.homography(&outcome.parameters),
+        distortion: frames.lens(&outcome.parameters),
+        centre_px: frames.centre(&outcome.parameters),
+        focal_px: options.focal_px,
+        rms_px: (square / view.len() as f64).sqrt(),
+        residuals_px,
+        degrees_of_freedom,
+        spread,
+        termination: outcome.termination,
+        iterations: outcome.iterations,
+    })
+}
+
+/// The homography without distortion, in frames that make all numbers of order one.
+fn start(
+    view: &View,
+    options: &SinglePlaneOptions,
+    parameters: usize,
+) -> Result<(ParameterVector, Frames), SinglePlaneError> {
+    let (focal_px, centre) = (options.focal_px, options.centre_px);
+    if !(focal_px > 0.0 && focal_px.is_finite() && centre.x.is_finite() && centre.y.is_finite()) {
+        return Err(SinglePlaneError::Options { focal_px, centre_u: centre.x, centre_v: centre.y });
+    }
+    let need = parameters.div_ceil(2);
+    if view.len() < need {
+        return Err(SinglePlaneError::TooFewPoints { parameters, need, got: view.len() });
+    }
+    let frames = Frames::of(view, focal_px, centre);
+    let from: Vec<Vec2> = view.points().iter().map(|p| frames.target_offset(p)).collect();
+    let to: Vec<Vec2> = view.pixels().iter().map(|p| frames.pixel_offset(p)).collect();
+    let fit = Homography::fit(&from, &to)?;
+    Ok((frames.start(&fit.homography), frames))
+}
+
+fn spread(
+    frames: &Frames,
+    at: &ParameterVector,
+    covariance: &SMatrix<f64, PARAMETERS, PARAMETERS>,
+    sigma_px: f64,
+) -> SinglePlaneSpread {
+    // The last four parameters: k1, k2 and the centre in units of the gauge length.
+    let mut to_px = SMatrix::<f64, PARAMETERS, PARAMETERS>::identity();
+    to_px[(10, 10)] = frames.focal_px;
+    to_px[(11, 11)] = frames.focal_px;
+    let scaled = to_px * covariance * to_px;
+    let lens = scaled.fixed_view::<4, 4>(8, 8).into_owned();
+    let (left, right): (Mat3, Mat3) = (frames.ideal_from_offset(), frames.offset_from_target());
+    let entries = change_frames(&left, &frames.local(at), &right, &scaled);
+    let all = entries.map(|c| DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| c[(i, j)]));
+    SinglePlaneSpread { sigma_px, lens, all }
+}
+
+/// Without distortion every centre fits: the held fit must show some.
+fn refuse_unseen_centre(frames: &Frames, view: &View, held: &Outcome) -> Result<(), SinglePlaneError> {
+    let square: f64 = frames.residuals(view, &held.parameters).map(|r| r.norm_squared()).sum();
+    let variance = square / (2 * view.len() - (PARAMETERS - 2)) as f64;
+    let covariance = held.unit_covariance.fixed_view::<2, 2>(8, 8) * variance;
+    let k = held.parameters.fixed_rows::<2>(8).into_owned();
+    let chi_square = covariance.cholesky().map_or(f64::INFINITY, |c| k.dot(&c.solve(&k)));
+    if chi_square > SEEN_DISTORTION {
+        Ok(())
+    } else {
+        Err(SinglePlaneError::CentreNotIdentifiable { chi_square, threshold: SEEN_DISTORTION })
+    }
+}
+
+fn lens_camera(focal_px: f64, centre: &Vec2, distortion: BrownConrady) -> Camera {
+    Camera::pinhole(focal_px, focal_px, centre.x, centre.y).with_distortion(distortion)
+}

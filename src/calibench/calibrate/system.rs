@@ -1,0 +1,231 @@
+//! How are thousands of poses solved for without a matrix of thousands of rows? Schur elimination of the pose blocks.
+//!
+//! The normal equations of a calibration are an arrow: intrinsics `A` (n x n), one pose block `C_i` (6 x 6) a view, and
+//! couplings `B_i` (n x 6). Poses do not couple with each other, so with `C_i = L_i L_i^T`, `W_i = L_i^-1 B_i^T`,
+//! `z_i = L_i^-1 g_i`
+//!
+//! ```text
+//! S = A - sum W_i^T W_i,   S d_a = -(g_a - sum W_i^T z_i),   L_i^T d_i = -(z_i + W_i d_a)
+//! ```
+//! and time and memory grow linearly in the number of views.
+
+use super::Covariance;
+use super::blocks::{Intrinsics, N, PoseBlock, ViewBlock};
+use super::chunks::{self, CHUNK};
+use super::elimination::{self, Eliminated, Reduced};
+use crate::camera::FreeParameters;
+use nalgebra::{DMatrix, MatrixXx6, SMatrix, SVector};
+
+/// Normal equations `J^T w J` and gradient `J^T w r` of all views.
+#[derive(Debug, Clone)]
+pub struct System {
+    pub(super) free: FreeParameters,
+    pub(super) intrinsics: Intrinsics,
+    pub(super) gradient: SVector<f64, N>,
+    pub(super) views: Vec<ViewBlock>,
+    pub(super) cost: f64,
+}
+
+/// Normal equations without the poses: what uncertainty and conditioning are both read from.
+pub(super) struct Reduction {
+    free: FreeParameters,
+    /// The views' factors.
+    pub eliminated: Vec<Eliminated>,
+    /// `S`, the intrinsics' information when the poses are unknown too.
+    pub schur: DMatrix<f64>,
+}
+
+/// A step of all unknowns.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Step {
+    /// One entry per free intrinsic parameter.
+    pub intrinsics: SVector<f64, N>,
+    /// Rotation vector and translation of each view.
+    pub poses: Vec<SVector<f64, 6>>,
+    /// Predicted fall of the cost, `-(2 g^T d + d^T H d)`, without the damping.
+    pub predicted_gain: f64,
+    /// The views' factors, kept between the two passes over them.
+    eliminated: Vec<Eliminated>,
+}
+
+impl System {
+    /// An empty system with room for `views` views.
+    pub(super) fn new(free: FreeParameters, views: usize) -> System {
+        System {
+            free,
+            intrinsics: Intrinsics::zeros(),
+            gradient: SVector::zeros(),
+            views: Vec::with_capacity(views),
+            cost: 0.0,
+        }
+    }
+
+    /// Factors the damped pose blocks; returns `S` and the right-hand side. `None` where a block is not positive definite.
+    pub(super) fn eliminate(&self, damping: f64, eliminated: &mut Vec<Eliminated>) -> Option<Reduced> {
+        let n = self.free.len();
+        eliminated.resize_with(self.views.len(), Eliminated::default);
+        let mut reduced = Some(Reduced::of(&self.intrinsics, &self.gradient, damping));
+        let chunk = |index: usize, chunk: &mut [Eliminated]| {
+            let views = &self.views[index * CHUNK..][..chunk.len()];
+            elimination::eliminate(views, chunk, damping, n)
+        };
+        chunks::fold(eliminated, chunk, |part| {
+            reduced = match (reduced.take(), part) {
+                (Some(sum), Some(part)) => Some(sum.less(&part, n)),
+                _ => None,
+            };
+        });
+        reduced
+    }
+
+    /// Solves for the step of `H + damping diag(H)`. `None` where the damped matrix is not positive definite.
+    pub(super) fn solve_into(&self, damping: f64, step: &mut Step) -> Option<()> {
+        let n = self.free.len();
+        let reduced = self.eliminate(damping, &mut step.eliminated)?;
+        step.intrinsics = reduced.solve(n)?;
+        let a = step.intrinsics;
+        // (H + damping D) d = -g turns -(2 g^T d + d^T H d) into -g^T d + damping d^T D d.
+        let gain_of = |g: f64, d: f64, diagonal: f64| d * (damping * diagonal * d - g);
+        let mut gain: f64 = (0..n).map(|i| gain_of(self.gradient[i], a[i], self.intrinsics[(i, i)])).sum();
+        step.poses.resize(self.views.len(), SVector::zeros());
+        let eliminated = &step.eliminated;
+        let chunk = |index: usize, poses: &mut [SVector<f64, 6>]| {
+            let mut gain = 0.0;
+            for (k, pose) in poses.iter_mut().enumerate() {
+                let (view, factors) = (&self.views[index * CHUNK + k], &eliminated[index * CHUNK + k]);
+                *pose = factors.pose_step(&a, n);
+                gain += (0..6).map(|i| gain_of(view.gradient[i], pose[i], view.pose[(i, i)])).sum::<f64>();
+            }
+            gain
+        };
+        chunks::fold(&mut step.poses, chunk, |part| gain += part);
+        step.predicted_gain = gain;
+        Some(())
+    }
+
+    /// The undamped equations with the poses eliminated; `None` where a pose is undetermined.
+    pub(super) fn reduction(&self) -> Option<Reduction> {
+        let mut eliminated = Vec::new();
+        let schur = self.eliminate(0.0, &mut eliminated)?.matrix(self.free.len());
+        Some(Reduction { free: self.free, eliminated, schur })
+    }
+
+    /// The inverse of the normal matrix, block by block, for unit noise; `None` if it is singular.
+    pub fn covariance(&self) -> Option<Covariance> {
+        self.reduction()?.covariance()
+    }
+
+    /// Number of unknowns.
+    pub fn unknowns(&self) -> usize {
+        self.free.len() + 6 * self.views.len()
+    }
+}
+
+impl Reduction {
+    /// See [`System::covariance`].
+    pub fn covariance(&self) -> Option<Covariance> {
+        let n = self.free.len();
+        let intrinsics = if n > 0 { self.schur.clone().cholesky()?.inverse() } else { DMatrix::zeros(0, 0) };
+        let padded = SMatrix::from_fn(|i, j| if i < n && j < n { intrinsics[(i, j)] } else { 0.0 });
+        let blocks: Vec<(PoseBlock, MatrixXx6<f64>)> =
+            chunks::map(&self.eliminated, |_, factors| factors.covariance(&padded, n));
+        let (poses, cross) = blocks.into_iter().unzip();
+        Some(Covariance { free: self.free, intrinsics, poses, cross })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::information;
+    use crate::camera::{BrownConrady, Camera};
+    use crate::geometry::{Pose, Vec2, Vec3, rotation};
+    use nalgebra::DVector;
+
+    fn system() -> System {
+        let camera =
+            Camera::pinhole(600.0, 590.0, 320.0, 240.0).with_distortion(BrownConrady::radial(-0.2, 0.1));
+        let points: Vec<Vec2> =
+            (0..35).map(|i| Vec2::new(f64::from(i % 7) - 3.0, f64::from(i / 7) - 2.0) * 12.0).collect();
+        let poses = [[0.3, 0.0, 0.1], [0.0, -0.3, 0.0], [-0.2, 0.25, 0.4]].map(|[x, y, z]| Pose {
+            rotation: rotation::from_xyz_rad(x, y, z),
+            translation: Vec3::new(2.0, -3.0, 120.0),
+        });
+        information(&camera, FreeParameters::CHAPTER, &poses, &points).unwrap()
+    }
+
+    /// The same matrix written out in full.
+    fn dense(system: &System) -> DMatrix<f64> {
+        let n = system.free.len();
+        let mut full = DMatrix::zeros(system.unknowns(), system.unknowns());
+        for i in 0..n {
+            for j in 0..n {
+                full[(i, j)] = system.intrinsics[(i, j)];
+            }
+        }
+        for (k, view) in system.views.iter().enumerate() {
+            let at = n + 6 * k;
+            full.fixed_view_mut::<6, 6>(at, at).copy_from(&view.pose);
+            for i in 0..n {
+                for j in 0..6 {
+                    full[(i, at + j)] = view.coupling[(i, j)];
+                    full[(at + j, i)] = view.coupling[(i, j)];
+                }
+            }
+        }
+        full
+    }
+
+    #[test]
+    fn elimination_gives_the_inverse_of_the_full_matrix() {
+        let system = system();
+        let inverse = dense(&system).try_inverse().unwrap();
+        let covariance = system.covariance().unwrap();
+        let n = system.free.len();
+        // Both lose digits with the condition number of the scaled matrix (about 1e6): compare at 1e-8 of the scale.
+        let close = |a: f64, b: f64, i: usize, j: usize| {
+            (a - b).abs() <= 1e-8 * (inverse[(i, i)] * inverse[(j, j)]).sqrt()
+        };
+        for i in 0..n {
+            for j in 0..n {
+                assert!(close(covariance.intrinsics[(i, j)], inverse[(i, j)], i, j));
+            }
+        }
+        for k in 0..3 {
+            let at = n + 6 * k;
+            for i in 0..6 {
+                for j in 0..6 {
+                    assert!(close(covariance.poses[k][(i, j)], inverse[(at + i, at + j)], at + i, at + j));
+                }
+                for j in 0..n {
+                    assert!(close(covariance.cross[k][(j, i)], inverse[(j, at + i)], j, at + i));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_step_solves_the_full_equations() {
+        let mut system = system();
+        for (i, g) in system.gradient.iter_mut().take(6).enumerate() {
+            *g = 1.0 + i as f64;
+        }
+        for view in &mut system.views {
+            view.gradient = SVector::from_fn(|i, _| 0.5 - i as f64);
+        }
+        let mut step = Step::default();
+        system.solve_into(0.0, &mut step).unwrap();
+        let n = system.free.len();
+        let mut gradient = DVector::zeros(system.unknowns());
+        let mut stacked = DVector::zeros(system.unknowns());
+        gradient.rows_mut(0, n).copy_from(&system.gradient.rows(0, n));
+        stacked.rows_mut(0, n).copy_from(&step.intrinsics.rows(0, n));
+        for k in 0..3 {
+            gradient.rows_mut(n + 6 * k, 6).copy_from(&system.views[k].gradient);
+            stacked.rows_mut(n + 6 * k, 6).copy_from(&step.poses[k]);
+        }
+        let expected = -dense(&system).lu().solve(&gradient).unwrap();
+        assert!((&stacked - &expected).norm() <= 1e-8 * expected.norm());
+        assert!((step.predicted_gain + gradient.dot(&expected)).abs() <= 1e-8 * step.predicted_gain);
+    }
+}

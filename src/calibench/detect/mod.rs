@@ -1,0 +1,29 @@
+//! Where are the marks in a photograph? Discs, ordered grids of discs, chessboard corners.
+
+mod bias;
+mod blob;
+mod centre;
+#[cfg(feature = "chessboard")]
+mod chessboard;
+mod components;
+mod corner;
+mod discs;
+mod edge;
+mod grid;
+mod lattice;
+mod levels;
+mod neighbours;
+mod order;
+mod region;
+mod saddle;
+mod threshold;
+
+pub use bias::{disc_bias, disc_biases};
+pub use blob::Blob;
+#[cfg(feature = "chessboard")]
+pub use chessboard::chessboard_corners;
+pub use components::Polarity;
+pub use corner::{RefineError, refine_corner};
+pub use discs::{BlobOptions, blobs};
+pub use grid::{DotGrid, circle_grid, circle_grid_of, sparse_dots, sparse_dots_of};
+pub use order::GridError;

@@ -1,0 +1,262 @@
+//! Which mark of a lattice is which mark of the board? A complete rectangle in a stated order, or a reason why not.
+//!
+//! **Order.** Row by row, as [`Board::points`](crate::board::Board::points): along a row first. A symmetric grid looks the
+//! same after half a turn (a square one after a quarter), so the image cannot tell which corner is the board's first. The
+//! convention here: of all orders that see the board from its front (X to Y turns the way u turns to v) and have the asked
+//! number of columns and rows, the one whose first mark has the least `u + v`, the corner nearest to the image's top left.
+//! A calibration is indifferent to the choice: it only turns the board's frame by half a turn about its normal.
+
+use super::lattice::{Lattice, Place};
+use crate::geometry::Vec2;
+
+/// Why there is no complete, unambiguous grid in an image.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum GridError {
+    /// Grids with fewer marks than this on a side, or fewer in the image, cannot be told from chance by their regularity.
+    #[error(
+        "a dense grid needs at least {need} x {need} marks, asked for {columns} x {rows}, found {found}: use the detector \
+         for sparse dots"
+    )]
+    TooFewForGrid {
+        /// Asked marks along a row.
+        columns: usize,
+        /// Asked rows.
+        rows: usize,
+        /// Marks in the image.
+        found: usize,
+        /// Least marks on a side.
+        need: usize,
+    },
+    /// A board needs two marks on each side.
+    #[error("a grid needs at least 2 x 2 marks, asked for {columns} x {rows}")]
+    TooSmall {
+        /// Asked marks along a row.
+        columns: usize,
+        /// Asked rows.
+        rows: usize,
+    },
+    /// Some marks are missing: outside the image, covered, in glare, too small or too blurred.
+    #[error(
+        "found {found} of the {expected} marks of a {columns} x {rows} grid ({seen} in the image): the whole board \
+         must be visible"
+    )]
+    Partial {
+        /// Asked marks along a row.
+        columns: usize,
+        /// Asked rows.
+        rows: usize,
+        /// Marks of the largest lattice.
+        found: usize,
+        /// Asked number of marks.
+        expected: usize,
+        /// Marks in the image.
+        seen: usize,
+    },
+    /// A complete grid of another size.
+    #[error("found a {found_columns} x {found_rows} grid of marks, asked for {columns} x {rows}")]
+    WrongSize {
+        /// Asked marks along a row.
+        columns: usize,
+        /// Asked rows.
+        rows: usize,
+        /// Larger side of the grid that is there.
+        found_columns: usize,
+        /// Its smaller side.
+        found_rows: usize,
+    },
+    /// Enough marks, but they do not form a rectangle.
+    #[error(
+        "found a lattice of {found} marks that is not a {columns} x {rows} rectangle: other marks near the board, or \
+         another board"
+    )]
+    NotRectangular {
+        /// Asked marks along a row.
+        columns: usize,
+        /// Asked rows.
+        rows: usize,
+        /// Marks of the lattice.
+        found: usize,
+    },
+    /// A mark is out of line with its neighbours.
+    #[error(
+        "the mark in column {column}, row {row} is out of line by {deviation:.2} steps (at most {limit:.2}): not a plane grid"
+    )]
+    Irregular {
+        /// Column of the mark, from 0.
+        column: usize,
+        /// Row of the mark, from 0.
+        row: usize,
+        /// Distance from the middle of its neighbours, in steps.
+        deviation: f64,
+        /// Largest distance accepted.
+        limit: f64,
+    },
+}
+
+/// Largest distance of a mark from the middle of its neighbours in a row or column, in steps: 45 deg of tilt at close
+/// range gives 0.1, a lens that bends a line by a tenth of its length less; a mark skipped or taken from a neighbouring
+/// lattice 0.5.
+const LARGEST_DEVIATION: f64 = 0.3;
+
+/// The marks of a lattice in the order of a `columns x rows` board. `centres[mark]` is a mark's place in the image.
+///
+/// # Errors
+/// See [`GridError`].
+pub fn ordered_rectangle(
+    lattice: &Lattice,
+    centres: &[Vec2],
+    columns: usize,
+    rows: usize,
+) -> Result<Vec<usize>, GridError> {
+    let marks =
+        rectangle(lattice, centres.len(), columns, rows)?.first_nearest_top_left(centres, columns, rows);
+    let ordered: Vec<Vec2> = marks.iter().map(|&mark| centres[mark]).collect();
+    check_regular(&ordered, columns, rows)?;
+    Ok(marks)
+}
+
+/// A full rectangle of marks: `marks[j * width + i]`.
+struct Rectangle {
+    width: usize,
+    height: usize,
+    marks: Vec<usize>,
+}
+
+/// The steps that a seed may have taken for rows and columns, undone: none, or a diagonal for one of them.
+const STRAIGHTENINGS: [[i32; 4]; 5] =
+    [[1, 0, 0, 1], [1, 1, 0, 1], [1, -1, 0, 1], [1, 0, 1, 1], [1, 0, -1, 1]];
+
+/// Reads the lattice as a full rectangle of the asked size, either way round.
+fn rectangle(lattice: &Lattice, seen: usize, columns: usize, rows: usize) -> Result<Rectangle, GridError> {
+    let found = lattice.len();
+    let full = STRAIGHTENINGS.iter().find_map(|straightening| full_rectangle(lattice, straightening));
+    if let Some(full) = full {
+        let sides = (full.width.max(full.height), full.width.min(full.height));
+        if sides == (columns.max(rows), columns.min(rows)) {
+            return Ok(full);
+        }
+        // A complete grid of another size, unless it is one whose outer row or column is missing.
+        if found > columns * rows || sides.0 > columns.max(rows) || sides.1 > columns.min(rows) {
+            let (found_columns, found_rows) = sides;
+            return Err(GridError::WrongSize { columns, rows, found_columns, found_rows });
+        }
+    }
+    let expected = columns * rows;
+    let few_strays = found > expected && found - expected <= columns.min(rows) / 3;
+    if few_strays && let Some(only) = only_rectangle(lattice, columns, rows) {
+        return Ok(only);
+    }
+    Err(if found < expected {
+        GridError::Partial { columns, rows, found, expected, seen }
+    } else {
+        GridError::NotRectangular { columns, rows, found }
+    })
+}
+
+/// The one full rectangle of the asked size in a lattice with a few stray marks beside it (texture that happens to lie where
+/// the next mark would). A larger board has at least a whole row more, which is more strays than the caller lets pass.
+fn only_rectangle(lattice: &Lattice, columns: usize, rows: usize) -> Option<Rectangle> {
+    let mut only = None;
+    for [a, b, c, d] in STRAIGHTENINGS {
+        let straight: Lattice =
+            lattice.iter().map(|((i, j), &mark)| ((a * i + b * j, c * i + d * j), mark)).collect();
+        for (width, height) in [(columns, rows), (rows, columns)] {
+            for &(i, j) in straight.keys() {
+                let marks: Option<Vec<usize>> = (0..height as i32)
+                    .flat_map(|dj| (0..width as i32).map(move |di| (i + di, j + dj)))
+                    .map(|place| straight.get(&place).copied())
+                    .collect();
+                let Some(marks) = marks else { continue };
+                if only.is_some() {
+                    return None;
+                }
+                only = Some(Rectangle { width, height, marks });
+            }
+            if columns == rows {
+                break;
+            }
+        }
+    }
+    only
+}
+
+/// The lattice seen in other steps, if it fills its bounding rectangle there.
+fn full_rectangle(lattice: &Lattice, [a, b, c, d]: &[i32; 4]) -> Option<Rectangle> {
+    let straight = |(i, j): &Place| (a * i + b * j, c * i + d * j);
+    let places = || lattice.keys().map(straight);
+    let (low_i, high_i) = (places().map(|p| p.0).min()?, places().map(|p| p.0).max()?);
+    let (low_j, high_j) = (places().map(|p| p.1).min()?, places().map(|p| p.1).max()?);
+    let (width, height) = ((high_i - low_i + 1) as usize, (high_j - low_j + 1) as usize);
+    if width * height != lattice.len() {
+        return None;
+    }
+    let mut marks = vec![usize::MAX; lattice.len()];
+    for (place, &mark) in lattice {
+        let (i, j) = straight(place);
+        marks[(j - low_j) as usize * width + (i - low_i) as usize] = mark;
+    }
+    Some(Rectangle { width, height, marks })
+}
+
+impl Rectangle {
+    fn mark(&self, i: usize, j: usize) -> usize {
+        self.marks[j * self.width + i]
+    }
+
+    /// The marks in the order of the convention above.
+    fn first_nearest_top_left(&self, centres: &[Vec2], columns: usize, rows: usize) -> Vec<usize> {
+        let centre = |i: usize, j: usize| centres[self.mark(i, j)];
+        // Does (i, j) turn the way (u, v) does? Summed over the whole outline, so no single cell decides.
+        let (w, h) = (self.width - 1, self.height - 1);
+        let diagonals = ((centre(w, h) - centre(0, 0)), (centre(0, h) - centre(w, 0)));
+        let is_right_handed = diagonals.0.perp(&diagonals.1) > 0.0;
+        // Orders: swap the axes or not, reverse either. Handedness flips with each swap and each reversal.
+        let mut best: Option<(f64, [bool; 3])> = None;
+        for swap in [false, true] {
+            for (flip_i, flip_j) in [(false, false), (true, false), (false, true), (true, true)] {
+                let size = if swap { (self.height, self.width) } else { (self.width, self.height) };
+                let keeps_hand = is_right_handed ^ swap ^ flip_i ^ flip_j;
+                if size != (columns, rows) || !keeps_hand {
+                    continue;
+                }
+                let first = centre(if flip_i { w } else { 0 }, if flip_j { h } else { 0 });
+                let distance = first.x + first.y;
+                if best.is_none_or(|(least, _)| distance < least) {
+                    best = Some((distance, [swap, flip_i, flip_j]));
+                }
+            }
+        }
+        let [swap, flip_i, flip_j] = best.map_or([false; 3], |(_, order)| order);
+        (0..rows)
+            .flat_map(|row| (0..columns).map(move |column| (column, row)))
+            .map(|(column, row)| {
+                let (i, j) = if swap { (row, column) } else { (column, row) };
+                self.mark(if flip_i { w - i } else { i }, if flip_j { h - j } else { j })
+            })
+            .collect()
+    }
+}
+
+/// Every inner mark of a row or column lies near the middle of its neighbours.
+fn check_regular(centres: &[Vec2], columns: usize, rows: usize) -> Result<(), GridError> {
+    let centre = |column: usize, row: usize| centres[row * columns + column];
+    let deviation = |behind: Vec2, here: Vec2, ahead: Vec2| {
+        ((behind + ahead) * 0.5 - here).norm() / ((ahead - behind).norm() * 0.5)
+    };
+    for row in 0..rows {
+        for column in 0..columns {
+            let here = centre(column, row);
+            let mut worst = 0.0f64;
+            if column > 0 && column + 1 < columns {
+                worst = worst.max(deviation(centre(column - 1, row), here, centre(column + 1, row)));
+            }
+            if row > 0 && row + 1 < rows {
+                worst = worst.max(deviation(centre(column, row - 1), here, centre(column, row + 1)));
+            }
+            if worst > LARGEST_DEVIATION {
+                return Err(GridError::Irregular { column, row, deviation: worst, limit: LARGEST_DEVIATION });
+            }
+        }
+    }
+    Ok(())
+}

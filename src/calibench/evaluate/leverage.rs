@@ -1,0 +1,45 @@
+//! How much of its own noise does a point pull into the fit? Leverages, which say how large each residual should be.
+
+use crate::board::View;
+use crate::calibrate::Calibration;
+use crate::camera::{Parameter, project_with_jacobian};
+use crate::geometry::{Vec2, Vec3};
+use nalgebra::{DVector, SMatrix};
+
+/// The leverage of u and of v of every point, view by view: the diagonal of the hat matrix `J (J^T J)^-1 J^T`.
+///
+/// To first order the residuals are `(I - H)` times the noise, so a coordinate with leverage `h` has a residual of variance
+/// `sigma^2 (1 - h)`, and the leverages sum to the number of unknowns (Hoaglin & Welsch 1978). `J` is taken at the estimate.
+///
+/// `None` if `views` are not those of the calibration, or if it has no residual degrees of freedom. Under a robust loss
+/// the matrix is another; then the result is only indicative.
+pub fn leverages(calibration: &Calibration, views: &[View]) -> Option<Vec<Vec<Vec2>>> {
+    let covariance = &calibration.covariance;
+    let variance = calibration.sigma_px * calibration.sigma_px;
+    if views.len() != calibration.cam_from_target.len() || variance.is_nan() || variance <= 0.0 {
+        return None;
+    }
+    let free: Vec<Parameter> = calibration.free.iter().collect();
+    let of_point = |view: usize, point: &Vec2| {
+        let pose = &calibration.cam_from_target[view];
+        let point = Vec3::new(point.x, point.y, 0.0);
+        let jacobian = project_with_jacobian(&calibration.camera, pose, &point).ok()?;
+        let of_row = |row: usize| {
+            let a = DVector::from_iterator(
+                free.len(),
+                free.iter().map(|&p| jacobian.intrinsics[(row, p as usize)]),
+            );
+            let c: SMatrix<f64, 6, 1> = jacobian.pose.row(row).transpose();
+            let intrinsics = a.dot(&(&covariance.intrinsics * &a));
+            let cross = a.dot(&(&covariance.cross[view] * c));
+            let pose = c.dot(&(covariance.poses[view] * c));
+            (intrinsics + 2.0 * cross + pose) / variance
+        };
+        Some(Vec2::new(of_row(0), of_row(1)))
+    };
+    views
+        .iter()
+        .enumerate()
+        .map(|(i, view)| view.points().iter().map(|point| of_point(i, point)).collect())
+        .collect()
+}

@@ -1,0 +1,152 @@
+//! What was seen where? Corner files: `view,point,X,Y,u,v`, one line an observed point.
+
+use super::table::{Row, TableError, open, read_table};
+use crate::board::View;
+use crate::geometry::Vec2;
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::Path;
+
+/// The views of a corner file, in order of first appearance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CornerFile {
+    /// Name of each view, as it stands in the file.
+    pub view_names: Vec<String>,
+    /// Correspondences of each view, in the file's order. Target coordinates in the target's unit, pixels with (0, 0) at the
+    /// centre of the top-left pixel.
+    pub views: Vec<View>,
+}
+
+/// Reads a corner file.
+///
+/// # Errors
+/// See [`TableError`].
+pub fn read_corners(path: &Path) -> Result<CornerFile, TableError> {
+    let (file, input) = open(path)?;
+    parse_corners(&file, input)
+}
+
+/// Reads corners from any source; `file` names it in errors. Lines of one view need not stand together.
+///
+/// # Errors
+/// See [`TableError`].
+pub fn parse_corners(file: &str, input: impl Read) -> Result<CornerFile, TableError> {
+    let rows = read_table(file, input, ["view", "point"], ["X", "Y", "u", "v"])?;
+    refuse_repeated_points(file, &rows)?;
+    let mut index_of = BTreeMap::new();
+    let mut grouped: Vec<(String, Vec<Vec2>, Vec<Vec2>)> = Vec::new();
+    for Row { names: [view, _], numbers: [x, y, u, v], .. } in rows {
+        let index = *index_of.entry(view.clone()).or_insert_with(|| {
+            grouped.push((view, Vec::new(), Vec::new()));
+            grouped.len() - 1
+        });
+        grouped[index].1.push(Vec2::new(x, y));
+        grouped[index].2.push(Vec2::new(u, v));
+    }
+    let mut corners = CornerFile { view_names: Vec::new(), views: Vec::new() };
+    for (name, points, pixels) in grouped {
+        let view = View::new(points, pixels).map_err(|source| TableError::View {
+            file: file.into(),
+            view: name.clone(),
+            source,
+        })?;
+        corners.view_names.push(name);
+        corners.views.push(view);
+    }
+    Ok(corners)
+}
+
+fn refuse_repeated_points(file: &str, rows: &[Row<2, 4>]) -> Result<(), TableError> {
+    let mut first_line = BTreeMap::new();
+    for row in rows {
+        if let Some(first) = first_line.insert(&row.names, row.line) {
+            let [view, point] = &row.names;
+            return Err(TableError::RepeatedPoint {
+                file: file.into(),
+                line: row.line,
+                point: point.clone(),
+                place: format!("of view '{view}'"),
+                first,
+            });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<CornerFile, TableError> {
+        parse_corners("c.csv", text.as_bytes())
+    }
+
+    fn complaint(text: &str) -> String {
+        parse(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn views_are_grouped_in_order_of_first_appearance() {
+        let corners = parse("view,point,X,Y,u,v\n7,0,0,0,1,2\n3,0,0,0,3,4\n7,1,1,0,5,6\n").unwrap();
+        assert_eq!(corners.view_names, ["7", "3"]);
+        assert_eq!(corners.views[0].pixels(), [Vec2::new(1.0, 2.0), Vec2::new(5.0, 6.0)]);
+        assert_eq!(corners.views[1].points(), [Vec2::zeros()]);
+    }
+
+    #[test]
+    fn marks_blanks_line_ends_and_column_order_are_harmless() {
+        let plain = parse("view,point,X,Y,u,v\n0,0,1,2,3.5,4\n").unwrap();
+        let other = parse("\u{feff}u, v ,note,X,Y,point,view\r\n 3.5 ,4e0,hello,1,2,0,0\r\n\r\n").unwrap();
+        assert_eq!(plain, other);
+    }
+
+    #[test]
+    fn every_complaint_says_where() {
+        let header = "view,point,X,Y,u,v\n";
+        let cases = [
+            ("", "c.csv: no data: expected the header view,point,X,Y,u,v and at least one line below it"),
+            (header, "c.csv: no data: expected the header view,point,X,Y,u,v and at least one line below it"),
+            (
+                "view;point;X;Y;u;v\n0;0;1;2;3;4\n",
+                "c.csv:1: column 'view' is missing: the header is 'view;point;X;Y;u;v', expected view,point,X,Y,u,v \
+                 separated by commas",
+            ),
+            (
+                "view,point,X,Y,u,u,v\n0,0,1,2,3,4,5\n",
+                "c.csv:1: column 'u' stands more than once in the header",
+            ),
+            (&format!("{header}0,0,1,2,3,4\n0,1,1,2,3\n"), "c.csv:3: 5 fields where the header has 6"),
+            (&format!("{header}0,0,1,2,3,4\n\n0,1,1,2,3,4,5\n"), "c.csv:4: 7 fields where the header has 6"),
+            (
+                "view,point,X,Y,u,v\r\n0,0,1,2,3,4\r\n\r\n0,1,1,2,3,x\r\n",
+                "c.csv:4: column 'v' (field 6): 'x' is not a number",
+            ),
+            (&format!("{header}0,0,1,2,3,4px\n"), "c.csv:2: column 'v' (field 6): '4px' is not a number"),
+            (&format!("{header}0,0,1,,3,4\n"), "c.csv:2: column 'Y' (field 4): '' is not a number"),
+            (
+                &format!("{header}0,0,NaN,2,3,4\n"),
+                "c.csv:2: column 'X' (field 3): 'NaN' is not a finite number",
+            ),
+            (
+                &format!("{header}0,0,1,2,1e999,4\n"),
+                "c.csv:2: column 'u' (field 5): '1e999' is not a finite number",
+            ),
+            (&format!("{header},0,1,2,3,4\n"), "c.csv:2: column 'view' (field 1) is empty"),
+            (
+                &format!("{header}0,5,1,2,3,4\n1,5,1,2,3,4\n0,5,1,2,3,4\n"),
+                "c.csv:4: point '5' of view '0' was given on line 2 already",
+            ),
+        ];
+        for (text, expected) in cases {
+            assert_eq!(complaint(text), expected);
+        }
+    }
+
+    #[test]
+    fn text_that_is_not_utf8_and_files_that_are_not_there_are_named() {
+        let error = parse_corners("c.csv", &b"view,point,X,Y,u,v\n0,0,1,2,3,\xff\n"[..]).unwrap_err();
+        assert_eq!(error.to_string(), "c.csv:2: field 6 is not UTF-8 text");
+        let error = read_corners(Path::new("no/such/file.csv")).unwrap_err();
+        assert!(error.to_string().starts_with("no/such/file.csv: "), "{error}");
+    }
+}

@@ -1,0 +1,280 @@
+//! What stands in a table of numbers? CSV with named columns; every complaint carries file, line and column.
+
+use crate::board::ViewError;
+use std::io::Read;
+
+/// Why a table cannot be read. Lines count from 1; the header is line 1.
+#[derive(Debug, thiserror::Error)]
+pub enum TableError {
+    /// The file cannot be opened.
+    #[error("{file}: {source}")]
+    Open {
+        /// The file.
+        file: String,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// Reading stopped in the middle, or a line is not UTF-8 text.
+    #[error("{file}:{line}: {message}")]
+    Unreadable {
+        /// The file.
+        file: String,
+        /// The line, 0 if unknown.
+        line: u64,
+        /// What is wrong.
+        message: String,
+    },
+    /// Nothing below the header, or not even one.
+    #[error("{file}: no data: expected the header {expected} and at least one line below it")]
+    Empty {
+        /// The file.
+        file: String,
+        /// The header it should have.
+        expected: String,
+    },
+    /// A column is missing from the header.
+    #[error(
+        "{file}:1: column '{column}' is missing: the header is '{header}', expected {expected} separated by commas"
+    )]
+    MissingColumn {
+        /// The file.
+        file: String,
+        /// The column.
+        column: &'static str,
+        /// The header as found.
+        header: String,
+        /// The columns needed.
+        expected: String,
+    },
+    /// A column stands twice in the header.
+    #[error("{file}:1: column '{column}' stands more than once in the header")]
+    RepeatedColumn {
+        /// The file.
+        file: String,
+        /// The column.
+        column: &'static str,
+    },
+    /// A line has more or fewer fields than the header.
+    #[error("{file}:{line}: {got} fields where the header has {need}")]
+    Ragged {
+        /// The file.
+        file: String,
+        /// The line.
+        line: u64,
+        /// Number of fields of the header.
+        need: usize,
+        /// Number of fields found.
+        got: usize,
+    },
+    /// A field is not a number.
+    #[error("{file}:{line}: column '{column}' (field {field}): '{text}' is not a number")]
+    NotANumber {
+        /// The file.
+        file: String,
+        /// The line.
+        line: u64,
+        /// The column's name.
+        column: &'static str,
+        /// The column's position, from 1.
+        field: usize,
+        /// The field's text.
+        text: String,
+    },
+    /// A field is NaN or infinite.
+    #[error("{file}:{line}: column '{column}' (field {field}): '{text}' is not a finite number")]
+    NotFinite {
+        /// The file.
+        file: String,
+        /// The line.
+        line: u64,
+        /// The column's name.
+        column: &'static str,
+        /// The column's position, from 1.
+        field: usize,
+        /// The field's text.
+        text: String,
+    },
+    /// A name (of a view or a point) is empty.
+    #[error("{file}:{line}: column '{column}' (field {field}) is empty")]
+    NoName {
+        /// The file.
+        file: String,
+        /// The line.
+        line: u64,
+        /// The column's name.
+        column: &'static str,
+        /// The column's position, from 1.
+        field: usize,
+    },
+    /// The same point stands twice in one view.
+    #[error("{file}:{line}: point '{point}' {place} was given on line {first} already")]
+    RepeatedPoint {
+        /// The file.
+        file: String,
+        /// The line.
+        line: u64,
+        /// The point's name.
+        point: String,
+        /// `of view '...'`, or `of the list`.
+        place: String,
+        /// The line of its first appearance.
+        first: u64,
+    },
+    /// The points of a view do not make a view.
+    #[error("{file}: view '{view}': {source}")]
+    View {
+        /// The file.
+        file: String,
+        /// The view's name.
+        view: String,
+        /// What is wrong.
+        source: ViewError,
+    },
+}
+
+/// One line: where it stands, its names and its numbers.
+pub(super) struct Row<const NAMES: usize, const NUMBERS: usize> {
+    pub line: u64,
+    pub names: [String; NAMES],
+    pub numbers: [f64; NUMBERS],
+}
+
+/// Reads the named columns, in whatever order they stand; further columns are ignored. A byte order mark, line ends of either
+/// kind, blank lines and blanks around fields are harmless.
+pub(super) fn read_table<const NAMES: usize, const NUMBERS: usize>(
+    file: &str,
+    input: impl Read,
+    names: [&'static str; NAMES],
+    numbers: [&'static str; NUMBERS],
+) -> Result<Vec<Row<NAMES, NUMBERS>>, TableError> {
+    let bytes = read_all(file, input)?;
+    let mut lines = LineCounter { bytes: &bytes, counted_to: 0, line: 1 };
+    let mut reader =
+        csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(bytes.as_slice());
+    let header = reader.headers().map_err(|e| unreadable(file, &mut lines, &e))?.clone();
+    let expected = || names.iter().chain(&numbers).copied().collect::<Vec<_>>().join(",");
+    if header.is_empty() {
+        return Err(TableError::Empty { file: file.into(), expected: expected() });
+    }
+    let name_fields = find_columns(file, &header, names, &expected)?;
+    let number_fields = find_columns(file, &header, numbers, &expected)?;
+    let mut rows = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|e| unreadable(file, &mut lines, &e))?;
+        let line = lines.line_of(record.position());
+        if record.len() != header.len() {
+            return Err(TableError::Ragged {
+                file: file.into(),
+                line,
+                need: header.len(),
+                got: record.len(),
+            });
+        }
+        let mut row = Row { line, names: names.map(|_| String::new()), numbers: [0.0; NUMBERS] };
+        for (i, &field) in name_fields.iter().enumerate() {
+            row.names[i] = name(file, line, names[i], field, &record[field])?;
+        }
+        for (i, &field) in number_fields.iter().enumerate() {
+            row.numbers[i] = number(file, line, numbers[i], field, &record[field])?;
+        }
+        rows.push(row);
+    }
+    if rows.is_empty() {
+        return Err(TableError::Empty { file: file.into(), expected: expected() });
+    }
+    Ok(rows)
+}
+
+/// The whole input, without a byte order mark.
+fn read_all(file: &str, mut input: impl Read) -> Result<Vec<u8>, TableError> {
+    let mut bytes = Vec::new();
+    input.read_to_end(&mut bytes).map_err(|e| TableError::Unreadable {
+        file: file.into(),
+        line: 0,
+        message: e.to_string(),
+    })?;
+    if bytes.starts_with(b"\xef\xbb\xbf") {
+        bytes.drain(..3);
+    }
+    Ok(bytes)
+}
+
+/// Counts lines up to a record's first byte. The csv reader's own count stops before the blank lines, and before the line
+/// feed of a carriage return, that it skips to reach the record.
+struct LineCounter<'a> {
+    bytes: &'a [u8],
+    counted_to: usize,
+    line: u64,
+}
+
+impl LineCounter<'_> {
+    /// The line of a record that starts at `position` or after the line ends that follow it; 0 without a position.
+    fn line_of(&mut self, position: Option<&csv::Position>) -> u64 {
+        let Some(position) = position else { return 0 };
+        let start = position.byte() as usize;
+        while self.counted_to < self.bytes.len() {
+            let byte = self.bytes[self.counted_to];
+            if self.counted_to >= start && byte != b'\n' && byte != b'\r' {
+                break;
+            }
+            self.line += u64::from(byte == b'\n');
+            self.counted_to += 1;
+        }
+        self.line
+    }
+}
+
+fn find_columns<const N: usize>(
+    file: &str,
+    header: &csv::StringRecord,
+    columns: [&'static str; N],
+    expected: &impl Fn() -> String,
+) -> Result<[usize; N], TableError> {
+    let mut fields = [0; N];
+    for (place, column) in fields.iter_mut().zip(columns) {
+        let mut found = header.iter().enumerate().filter(|(_, text)| *text == column).map(|(i, _)| i);
+        *place = found.next().ok_or_else(|| TableError::MissingColumn {
+            file: file.into(),
+            column,
+            header: header.iter().collect::<Vec<_>>().join(","),
+            expected: expected(),
+        })?;
+        if found.next().is_some() {
+            return Err(TableError::RepeatedColumn { file: file.into(), column });
+        }
+    }
+    Ok(fields)
+}
+
+fn name(file: &str, line: u64, column: &'static str, field: usize, text: &str) -> Result<String, TableError> {
+    if text.is_empty() {
+        return Err(TableError::NoName { file: file.into(), line, column, field: field + 1 });
+    }
+    Ok(text.into())
+}
+
+fn number(file: &str, line: u64, column: &'static str, field: usize, text: &str) -> Result<f64, TableError> {
+    let (file, field, owned) = (file.to_string(), field + 1, text.to_string());
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        Ok(_) => Err(TableError::NotFinite { file, line, column, field, text: owned }),
+        Err(_) => Err(TableError::NotANumber { file, line, column, field, text: owned }),
+    }
+}
+
+fn unreadable(file: &str, lines: &mut LineCounter<'_>, error: &csv::Error) -> TableError {
+    let message = match error.kind() {
+        csv::ErrorKind::Utf8 { err, .. } => format!("field {} is not UTF-8 text", err.field() + 1),
+        _ => error.to_string(),
+    };
+    TableError::Unreadable { file: file.into(), line: lines.line_of(error.position()), message }
+}
+
+/// Opens a file for one of the readers.
+pub(super) fn open(path: &std::path::Path) -> Result<(String, std::fs::File), TableError> {
+    let file = path.display().to_string();
+    match std::fs::File::open(path) {
+        Ok(input) => Ok((file, input)),
+        Err(source) => Err(TableError::Open { file, source }),
+    }
+}

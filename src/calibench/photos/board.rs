@@ -1,0 +1,237 @@
+//! What does the user say of a board, and where are its marks in a photograph? `chess:9x6:25mm`, `circles:9x7:10mm:3mm`.
+
+use super::discs::{NotFound, ordered_discs};
+use crate::board::{Board, BoardError, Pattern};
+use crate::detect::{GridError, circle_grid_of, sparse_dots_of};
+use crate::geometry::Vec2;
+use crate::io::Grey;
+use std::fmt;
+use std::str::FromStr;
+
+/// How the marks look, and with it which detector finds them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MarkKind {
+    /// Inner corners of a chessboard.
+    Chess,
+    /// A dense grid of discs, at least 4 on a side.
+    Circles,
+    /// A few dots, such as 3 x 3.
+    Dots,
+}
+
+/// A board as it stands on the command line: `KIND:COLUMNSxROWS:SPACING[:DIAMETER]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BoardSpec {
+    /// Look of the marks.
+    pub kind: MarkKind,
+    /// Unit of lengths on the board, empty if none was given.
+    pub unit: String,
+    /// Whether the discs' diameter is known, without which their bias cannot be corrected.
+    pub diameter_known: bool,
+    board: Board,
+}
+
+/// Why a text is no board.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BoardSpecError {
+    /// The text has another form.
+    #[error(
+        "expected KIND:COLUMNSxROWS:SPACING[:DIAMETER], such as chess:9x6:25mm, circles:9x7:10mm:3mm or dots:3x3:1, got `{0}`"
+    )]
+    Form(String),
+    /// A length is not a number with a known unit.
+    #[error("`{0}` is not a length: give a number, with mm, cm, m or no unit behind it")]
+    Length(String),
+    /// Two lengths cannot be compared.
+    #[error("the spacing has no unit, but the diameter is in {0}: give both in one unit")]
+    Unit(String),
+    /// A chessboard's corners have no extent.
+    #[error("the corners of a chessboard have no diameter: give chess:{columns}x{rows}:SQUARE")]
+    CornerDiameter {
+        /// Corners along a row.
+        columns: usize,
+        /// Rows of corners.
+        rows: usize,
+    },
+    /// No such board exists.
+    #[error(transparent)]
+    Board(#[from] BoardError),
+}
+
+/// Why a photograph gives no marks.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DetectError {
+    /// The board is not seen whole and clearly.
+    #[error(transparent)]
+    Grid(#[from] GridError),
+    /// The program was built without the detector.
+    #[error(
+        "this program was built without the chessboard detector: build it with `--features chessboard`, or give the corners as \
+         a CSV file"
+    )]
+    NoChessboardDetector,
+}
+
+/// A length in a unit: its value in millimetres a unit, if the unit is known.
+struct Length {
+    value: f64,
+    unit: &'static str,
+}
+
+/// Units and their length, mm.
+const UNITS: [(&str, f64); 3] = [("mm", 1.0), ("cm", 10.0), ("m", 1000.0)];
+
+fn millimetres(unit: &str) -> Option<f64> {
+    UNITS.iter().find(|(name, _)| *name == unit).map(|(_, length)| *length)
+}
+
+impl FromStr for Length {
+    type Err = BoardSpecError;
+
+    fn from_str(text: &str) -> Result<Length, BoardSpecError> {
+        let (number, unit) =
+            UNITS.iter().find_map(|(name, _)| Some((text.strip_suffix(name)?, *name))).unwrap_or((text, ""));
+        let value = number.trim().parse().map_err(|_| BoardSpecError::Length(text.to_string()))?;
+        Ok(Length { value, unit })
+    }
+}
+
+impl Length {
+    /// The value in another unit; a length without a unit is in any.
+    fn in_unit(&self, unit: &str) -> Result<f64, BoardSpecError> {
+        match (millimetres(self.unit), millimetres(unit)) {
+            (Some(own), Some(other)) => Ok(self.value * own / other),
+            (Some(_), None) => Err(BoardSpecError::Unit(self.unit.to_string())),
+            (None, _) => Ok(self.value),
+        }
+    }
+}
+
+impl FromStr for BoardSpec {
+    type Err = BoardSpecError;
+
+    fn from_str(text: &str) -> Result<BoardSpec, BoardSpecError> {
+        let form = || BoardSpecError::Form(text.to_string());
+        let parts: Vec<&str> = text.split(':').map(str::trim).collect();
+        let (kind, size, spacing, diameter) = match parts[..] {
+            [kind, size, spacing] => (kind, size, spacing, None),
+            [kind, size, spacing, diameter] => (kind, size, spacing, Some(diameter)),
+            _ => return Err(form()),
+        };
+        let kind = match kind {
+            "chess" => MarkKind::Chess,
+            "circles" => MarkKind::Circles,
+            "dots" => MarkKind::Dots,
+            _ => return Err(form()),
+        };
+        let (columns, rows) = size.split_once('x').ok_or_else(form)?;
+        let columns = columns.parse().map_err(|_| form())?;
+        let rows = rows.parse().map_err(|_| form())?;
+        let spacing: Length = spacing.parse()?;
+        let pattern = match (kind, diameter) {
+            (MarkKind::Chess, Some(_)) => return Err(BoardSpecError::CornerDiameter { columns, rows }),
+            (_, Some(diameter)) => {
+                Pattern::Circles { diameter: diameter.parse::<Length>()?.in_unit(spacing.unit)? }
+            }
+            // A disc of unknown size is taken for a point, as a corner is: its bias cannot be told.
+            (_, None) => Pattern::Chessboard,
+        };
+        let board = Board::new(columns, rows, spacing.value, pattern)?;
+        Ok(BoardSpec { kind, unit: spacing.unit.to_string(), diameter_known: diameter.is_some(), board })
+    }
+}
+
+impl fmt::Display for BoardSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (name, marks) = match self.kind {
+            MarkKind::Chess => ("chessboard", "inner corners"),
+            MarkKind::Circles => ("circle grid", "discs"),
+            MarkKind::Dots => ("dots", "marks"),
+        };
+        let (board, unit) = (&self.board, &self.unit);
+        write!(f, "{name} of {} x {} {marks}, {}", board.columns(), board.rows(), board.spacing())?;
+        if !unit.is_empty() {
+            write!(f, " {unit}")?;
+        }
+        f.write_str(" apart")
+    }
+}
+
+impl BoardSpec {
+    /// The board; discs of unknown diameter count as points.
+    pub fn board(&self) -> &Board {
+        &self.board
+    }
+
+    /// Whether this program has the detector that the board needs.
+    ///
+    /// # Errors
+    /// A chessboard without the feature `chessboard`.
+    pub fn check_detector(&self) -> Result<(), DetectError> {
+        if self.kind == MarkKind::Chess && !cfg!(feature = "chessboard") {
+            return Err(DetectError::NoChessboardDetector);
+        }
+        Ok(())
+    }
+
+    /// The marks in a photograph, px, in the order of the board's points.
+    ///
+    /// # Errors
+    /// See [`DetectError`].
+    pub fn detect(&self, photo: &Grey) -> Result<Vec<Vec2>, NotFound> {
+        let (columns, rows) = (self.board.columns(), self.board.rows());
+        let grid = match self.kind {
+            MarkKind::Chess => {
+                let no_candidates = |reason| NotFound { reason, candidates_px: Vec::new() };
+                return self.corners(photo).map_err(no_candidates);
+            }
+            MarkKind::Dots => ordered_discs(photo, |discs| sparse_dots_of(discs, columns, rows)),
+            MarkKind::Circles => ordered_discs(photo, |discs| circle_grid_of(discs, columns, rows)),
+        };
+        Ok(grid?.centres_px())
+    }
+
+    #[cfg(feature = "chessboard")]
+    fn corners(&self, photo: &Grey) -> Result<Vec<Vec2>, DetectError> {
+        let (columns, rows) = (self.board.columns(), self.board.rows());
+        Ok(crate::detect::chessboard_corners(&photo.to_u8(), columns, rows)?)
+    }
+
+    #[cfg(not(feature = "chessboard"))]
+    fn corners(&self, _: &Grey) -> Result<Vec<Vec2>, DetectError> {
+        Err(DetectError::NoChessboardDetector)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_board_is_read_with_its_units() {
+        let spec: BoardSpec = "circles:9x7:1cm:3mm".parse().unwrap();
+        assert_eq!(*spec.board(), Board::circles(9, 7, 1.0, 0.3).unwrap());
+        assert_eq!((spec.kind, spec.unit.as_str()), (MarkKind::Circles, "cm"));
+        let spec: BoardSpec = "chess:9x6:25mm".parse().unwrap();
+        assert_eq!(*spec.board(), Board::chessboard(9, 6, 25.0).unwrap());
+        let spec: BoardSpec = "dots:3x3:1".parse().unwrap();
+        assert!(!spec.diameter_known && spec.kind == MarkKind::Dots);
+        assert_eq!(
+            "dots:3x3:2mm".parse::<BoardSpec>().unwrap().to_string(),
+            "dots of 3 x 3 marks, 2 mm apart"
+        );
+    }
+
+    #[test]
+    fn what_is_no_board_is_refused_with_what_was_expected() {
+        let refused = |text: &str| text.parse::<BoardSpec>().unwrap_err();
+        for text in ["", "chess", "chess:9:25mm", "rings:9x7:1mm", "chess:9x-6:1", "circles:9x7:1:2:3"] {
+            assert!(matches!(refused(text), BoardSpecError::Form(_)), "{text}");
+        }
+        assert!(matches!(refused("chess:9x6:wide"), BoardSpecError::Length(_)));
+        assert!(matches!(refused("circles:9x7:10:3mm"), BoardSpecError::Unit(_)));
+        assert!(matches!(refused("chess:9x6:25mm:3mm"), BoardSpecError::CornerDiameter { .. }));
+        assert!(matches!(refused("circles:9x7:10mm:2cm"), BoardSpecError::Board(_)));
+        assert!(matches!(refused("chess:1x6:25mm"), BoardSpecError::Board(_)));
+    }
+}

@@ -1,0 +1,276 @@
+//! What image does the virtual camera take of a board? Exact area sampling of the projected marks.
+//!
+//! A pixel is the mean of the continuous image over its unit square (fill factor 1), not a point sample. Marks are plane
+//! regions of one level with piecewise smooth outlines, so the mean needs only the outlines: each is projected through
+//! the full camera model and the area it covers in every pixel is summed along it (Green's theorem). With blur, the
+//! continuous image is convolved with a Gaussian before the pixel's square is averaged, again along the outline and in
+//! closed form across it. Nothing is supersampled. The error of a noise-free sample is below 1e-6 of the contrast
+//! without blur and below 1e-7 with it, before rounding to `f32` (3e-8).
+
+mod blur;
+mod coverage;
+mod outline;
+mod sensor;
+
+pub use sensor::{SensorNoise, Shading};
+
+use crate::board::{Board, Pattern};
+use crate::camera::Camera;
+use crate::geometry::{Pose, Vec2, Vec3};
+use crate::raster::Raster;
+use coverage::Coverage;
+use outline::{Outline, Piece};
+
+/// Levels of a board, and what surrounds it. Intensity is linear: black 0, white 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Appearance {
+    /// Level of the board's ground.
+    pub paper: f64,
+    /// Level of the marks.
+    pub ink: f64,
+    /// Where the board ends; `None`: it fills the whole image.
+    pub surround: Option<Surround>,
+}
+
+/// The edge of the board.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surround {
+    /// Level of everything that is not board.
+    pub level: f64,
+    /// Width of the paper around the outermost marks (circles: their centres; chessboard: the outer squares' edges), in
+    /// the board's unit.
+    pub margin: f64,
+}
+
+impl Default for Appearance {
+    /// Black marks on white paper that reflect 10 % and 85 %: neither end of the range clips under noise.
+    fn default() -> Appearance {
+        Appearance { paper: 0.85, ink: 0.1, surround: None }
+    }
+}
+
+/// The optics and the light, apart from the camera's geometry.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Imaging {
+    /// The board's levels.
+    pub appearance: Appearance,
+    /// Standard deviation of the Gaussian point spread function, px; 0 is a perfectly sharp lens.
+    pub blur_px: f64,
+    /// Uneven light or vignetting.
+    pub shading: Shading,
+}
+
+/// A rendered image and its truth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Photograph {
+    /// Linear intensity; [`Raster::to_u8`] and [`Raster::to_u16`] quantise it.
+    pub image: Raster<f32>,
+    /// The projections of the board's marks, in the order of [`Board::points`], px.
+    pub centres_true: Vec<Vec2>,
+}
+
+/// Why a board cannot be photographed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RenderError {
+    /// Part of the board is not in front of the camera.
+    #[error(
+        "board point ({x:.3}, {y:.3}) is not in front of the camera; increase the distance or reduce the tilt"
+    )]
+    BehindCamera {
+        /// Board X.
+        x: f64,
+        /// Board Y.
+        y: f64,
+    },
+    /// Part of the board lies where the lens model folds back.
+    #[error(
+        "board point ({x:.3}, {y:.3}) is seen at undistorted radius {radius:.4}, but the lens model folds back at \
+         {limit:.4}; move the board towards the image centre"
+    )]
+    BeyondMonotoneRadius {
+        /// Board X.
+        x: f64,
+        /// Board Y.
+        y: f64,
+        /// Its undistorted normalised radius.
+        radius: f64,
+        /// Radius up to which the model is one-to-one.
+        limit: f64,
+    },
+    /// A setting is out of its domain.
+    #[error("{name} = {value} cannot be rendered: {need}")]
+    Setting {
+        /// Name of the setting.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Its domain.
+        need: &'static str,
+    },
+}
+
+/// The board's points through the camera, with the reasons why some have no pixel.
+struct Projector<'a> {
+    camera: &'a Camera,
+    cam_from_target: &'a Pose,
+    monotone_radius: f64,
+}
+
+impl Projector<'_> {
+    fn pixel(&self, point: &Vec2) -> Result<Vec2, RenderError> {
+        let (x, y) = (point.x, point.y);
+        let point_cam = self.cam_from_target.apply(&Vec3::new(x, y, 0.0));
+        if point_cam.z.is_nan() || point_cam.z <= 0.0 {
+            return Err(RenderError::BehindCamera { x, y });
+        }
+        let ideal = point_cam.xy() / point_cam.z;
+        let radius = ideal.norm();
+        if radius >= self.monotone_radius {
+            return Err(RenderError::BeyondMonotoneRadius { x, y, radius, limit: self.monotone_radius });
+        }
+        Ok(self.camera.pixel_from_normalised(&self.camera.distortion.distort(&ideal)))
+    }
+}
+
+/// Photographs a board: the noise-free image of `image_size` (width, height) px and the true pixels of its marks.
+///
+/// Chessboards have `(columns + 1) x (rows + 1)` squares; the square towards the board's origin corner (least X, least Y) is
+/// dark.
+///
+/// # Errors
+/// Any outline that reaches behind the camera or beyond the monotone radius of the lens, and settings out of domain.
+pub fn photograph(
+    camera: &Camera,
+    image_size: (usize, usize),
+    board: &Board,
+    cam_from_target: &Pose,
+    imaging: &Imaging,
+) -> Result<Photograph, RenderError> {
+    check(camera, imaging)?;
+    let monotone_radius = camera.distortion.monotone_radius();
+    let projector = Projector { camera, cam_from_target, monotone_radius };
+    let covered_by = |outlines: &[Outline]| -> Result<Coverage, RenderError> {
+        let mut coverage = Coverage::new(image_size.0, image_size.1);
+        for outline in outlines {
+            for piece in &outline.pieces {
+                add_piece(&mut coverage, piece, &projector, imaging.blur_px)?;
+            }
+        }
+        coverage.finish();
+        Ok(coverage)
+    };
+    let appearance = &imaging.appearance;
+    let ink = covered_by(&mark_outlines(board))?;
+    let sheet = appearance
+        .surround
+        .map(|surround| Ok((surround, covered_by(&[sheet_outline(board, surround.margin)])?)))
+        .transpose()?;
+    let image = Raster::from_fn(image_size.0, image_size.1, |x, y| {
+        let ground = sheet.as_ref().map_or(appearance.paper, |(surround, sheet)| {
+            surround.level + (appearance.paper - surround.level) * sheet.at(x, y)
+        });
+        let level = ground + (appearance.ink - appearance.paper) * ink.at(x, y);
+        (level * imaging.shading.gain(x, y, image_size)) as f32
+    });
+    let centres_true = board.points().iter().map(|point| projector.pixel(point)).collect::<Result<_, _>>()?;
+    Ok(Photograph { image, centres_true })
+}
+
+impl Photograph {
+    /// The photograph with sensor noise, one normal draw a pixel, row by row.
+    pub fn with_noise(mut self, noise: &SensorNoise, stream: &mut super::Stream) -> Photograph {
+        noise.add_to(&mut self.image, stream);
+        self
+    }
+}
+
+/// A stand-in for the chapter's nine-point image, which is not available: 1571 x 1053 px, 3 x 3 dark dots, undistorted,
+/// column spacing 236.23 px, row spacing 236.19 px, centre (714.708, 565.993), which follows from the published matrix.
+/// The dots' diameter is not published; a quarter of the spacing is taken.
+pub fn nine_dot_stand_in() -> Photograph {
+    let board = Board::circles(3, 3, 1.0, 0.25).expect("a quarter of the spacing is a disc");
+    let camera = Camera::pinhole(236.23, 236.19, 714.708, 565.993);
+    let cam_from_target = Pose { translation: Vec3::new(0.0, 0.0, 1.0), ..Pose::identity() };
+    photograph(&camera, (1571, 1053), &board, &cam_from_target, &Imaging::default())
+        .expect("a fronto-parallel board at distance 1 is in front of the camera")
+}
+
+fn check(camera: &Camera, imaging: &Imaging) -> Result<(), RenderError> {
+    let setting = |name, value, holds: bool, need| {
+        if holds { Ok(()) } else { Err(RenderError::Setting { name, value, need }) }
+    };
+    let appearance = &imaging.appearance;
+    let focal_px = camera.fx.min(camera.fy);
+    setting(
+        "focal length",
+        focal_px,
+        camera.is_valid(),
+        "a camera has finite parameters and positive focal lengths",
+    )?;
+    let blur_px = imaging.blur_px;
+    setting("blur_px", blur_px, (0.0..=MAX_BLUR_PX).contains(&blur_px), "need 0 ... 50 px")?;
+    setting("paper", appearance.paper, appearance.paper.is_finite(), "a level is a finite number")?;
+    setting("ink", appearance.ink, appearance.ink.is_finite(), "a level is a finite number")?;
+    if let Some(Surround { level, margin }) = appearance.surround {
+        setting("surround level", level, level.is_finite(), "a level is a finite number")?;
+        setting("margin", margin, margin >= 0.0 && margin.is_finite(), "a margin is not negative")?;
+    }
+    setting(
+        "shading",
+        imaging.shading.first_bad().unwrap_or(0.0),
+        imaging.shading.first_bad().is_none(),
+        "need finite",
+    )
+}
+
+/// A blur wider than any board's marks is a mistake of units, and its cost grows with the square.
+const MAX_BLUR_PX: f64 = 50.0;
+
+fn add_piece(
+    coverage: &mut Coverage,
+    piece: &Piece,
+    projector: &Projector<'_>,
+    blur_px: f64,
+) -> Result<(), RenderError> {
+    let curve = |t: f64| projector.pixel(&piece.at(t));
+    if blur_px > 0.0 {
+        let kernel = blur::Kernel::new(blur_px);
+        outline::trace(&curve, piece.start_parts(), &kernel.steps(), &mut |arc| kernel.add(coverage, arc))
+    } else {
+        outline::trace(&curve, piece.start_parts(), &outline::Steps::SHARP, &mut |arc| coverage.add_arc(arc))
+    }
+}
+
+/// Outlines of the marks, all turning the same way.
+fn mark_outlines(board: &Board) -> Vec<Outline> {
+    match board.pattern() {
+        Pattern::Circles { diameter } => {
+            board.points().into_iter().map(|centre| Outline::disc(centre, 0.5 * diameter)).collect()
+        }
+        Pattern::Chessboard => dark_squares(board),
+    }
+}
+
+fn dark_squares(board: &Board) -> Vec<Outline> {
+    let side = board.spacing();
+    let first = board.points()[0] - Vec2::new(side, side);
+    (0..=board.rows())
+        .flat_map(|row| (0..=board.columns()).map(move |column| (column, row)))
+        .filter(|(column, row)| (column + row) % 2 == 0)
+        .map(|(column, row)| {
+            let corner = first + Vec2::new(column as f64, row as f64) * side;
+            Outline::rectangle(corner, corner + Vec2::new(side, side))
+        })
+        .collect()
+}
+
+/// The sheet that carries the marks.
+fn sheet_outline(board: &Board, margin: f64) -> Outline {
+    let beyond_mark = match board.pattern() {
+        Pattern::Circles { .. } => margin,
+        Pattern::Chessboard => margin + board.spacing(),
+    };
+    let points = board.points();
+    let reach = Vec2::new(beyond_mark, beyond_mark);
+    Outline::rectangle(points[0] - reach, points[points.len() - 1] + reach)
+}

@@ -1,0 +1,188 @@
+//! What does the virtual camera photograph, and with what noise?
+
+use super::Stream;
+use crate::board::{Board, View};
+use crate::camera::Camera;
+use crate::geometry::{Mat3, Pose, Vec2, Vec3, rotation};
+
+/// The truth of a synthetic experiment: camera, image size, target points and poses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Truth {
+    /// Intrinsic parameters.
+    pub camera: Camera,
+    /// Image width and height, px.
+    pub image_size: (usize, usize),
+    /// Target points, plane Z = 0.
+    pub points: Vec<Vec2>,
+    /// One pose a view.
+    pub cam_from_target: Vec<Pose>,
+}
+
+/// A scene: noise-free pixels of every view of a truth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    /// What produced the pixels.
+    pub truth: Truth,
+    pixels: Vec<Vec<Vec2>>,
+}
+
+/// Why a scene cannot be photographed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SceneError {
+    /// A target point is not in front of the camera.
+    #[error(
+        "view {view}: target point {point} is not in front of the camera; increase the distance or reduce the tilt"
+    )]
+    BehindCamera {
+        /// Index of the view.
+        view: usize,
+        /// Index of the point.
+        point: usize,
+    },
+    /// A target point lies beyond the radius where the lens model is one-to-one.
+    #[error("view {view}: target point {point} lies beyond the radius where the lens model folds back")]
+    BeyondMonotoneRadius {
+        /// Index of the view.
+        view: usize,
+        /// Index of the point.
+        point: usize,
+    },
+}
+
+impl Truth {
+    /// The chapter's virtual camera: f = 600, principal point (326, 243), k1 = -0.18, k2 = 0.05.
+    pub fn chapter_camera() -> Camera {
+        use crate::camera::BrownConrady;
+        Camera::pinhole(600.0, 600.0, 326.0, 243.0).with_distortion(BrownConrady::radial(-0.18, 0.05))
+    }
+
+    /// The chapter's image size.
+    pub const CHAPTER_IMAGE: (usize, usize) = (640, 480);
+
+    /// The chapter's target: 9 x 7 circles, 10 mm apart. The chapter gives no diameter; 3 mm is what its figure shows best.
+    pub fn chapter_board() -> Board {
+        Board::circles(9, 7, 10.0, 3.0).expect("a 9 x 7 grid of 3 mm discs is a board")
+    }
+
+    /// The chapter's four poses at 120 mm: fronto-parallel, +20 deg about X, -20 deg about Y, and (-15, 15, 10) deg.
+    pub fn chapter_poses() -> Vec<Pose> {
+        [[0.0, 0.0, 0.0], [20.0, 0.0, 0.0], [0.0, -20.0, 0.0], [-15.0, 15.0, 10.0]]
+            .map(|degrees| looking_at_centre(degrees, 120.0))
+            .to_vec()
+    }
+
+    /// The chapter's four-pose scene.
+    pub fn chapter() -> Truth {
+        Truth {
+            camera: Truth::chapter_camera(),
+            image_size: Truth::CHAPTER_IMAGE,
+            points: Truth::chapter_board().points(),
+            cam_from_target: Truth::chapter_poses(),
+        }
+    }
+}
+
+/// The pose of a target whose centre lies on the optical axis at `distance`, turned by `Rz Ry Rx` of the given degrees.
+pub fn looking_at_centre(xyz_degrees: [f64; 3], distance: f64) -> Pose {
+    let [x, y, z] = xyz_degrees.map(f64::to_radians);
+    let rotation: Mat3 = rotation::from_xyz_rad(x, y, z);
+    Pose { rotation, translation: Vec3::new(0.0, 0.0, distance) }
+}
+
+impl Scene {
+    /// Projects every target point in every view.
+    pub fn new(truth: Truth) -> Result<Scene, SceneError> {
+        let radius = truth.camera.distortion.monotone_radius();
+        let see = |view: usize, pose: &Pose| -> Result<Vec<Vec2>, SceneError> {
+            truth
+                .points
+                .iter()
+                .enumerate()
+                .map(|(point, p)| {
+                    let point_cam = pose.apply(&Vec3::new(p.x, p.y, 0.0));
+                    let pixel =
+                        truth.camera.project(&point_cam).ok_or(SceneError::BehindCamera { view, point })?;
+                    let ideal_radius = point_cam.xy().norm() / point_cam.z;
+                    if ideal_radius >= radius {
+                        return Err(SceneError::BeyondMonotoneRadius { view, point });
+                    }
+                    Ok(pixel)
+                })
+                .collect()
+        };
+        let pixels = truth
+            .cam_from_target
+            .iter()
+            .enumerate()
+            .map(|(i, pose)| see(i, pose))
+            .collect::<Result<_, _>>()?;
+        Ok(Scene { truth, pixels })
+    }
+
+    /// The chapter's four-pose scene.
+    pub fn chapter() -> Scene {
+        Scene::new(Truth::chapter()).expect("the chapter's target is in front of its camera")
+    }
+
+    /// Noise-free pixels, view by view.
+    pub fn pixels(&self) -> &[Vec<Vec2>] {
+        &self.pixels
+    }
+
+    /// Number of point observations over all views.
+    pub fn observations(&self) -> usize {
+        self.pixels.iter().map(Vec::len).sum()
+    }
+
+    /// The views without noise.
+    pub fn exact(&self) -> Vec<View> {
+        self.observe_with(|pixel| *pixel)
+    }
+
+    /// The views with Gaussian noise of standard deviation `sigma_px` on each of u and v, drawn view by view, point by
+    /// point, u before v.
+    pub fn observe(&self, sigma_px: f64, stream: &mut Stream) -> Vec<View> {
+        self.observe_with(|pixel| {
+            let du = stream.normal();
+            let dv = stream.normal();
+            pixel + Vec2::new(du, dv) * sigma_px
+        })
+    }
+
+    fn observe_with(&self, mut see: impl FnMut(&Vec2) -> Vec2) -> Vec<View> {
+        self.pixels
+            .iter()
+            .map(|view| {
+                let seen = view.iter().map(&mut see).collect();
+                View::new(self.truth.points.clone(), seen).expect("a scene has one finite pixel a point")
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_chapters_target_fills_the_published_part_of_the_image() {
+        let scene = Scene::chapter();
+        assert_eq!(scene.observations(), 252);
+        let camera = &scene.truth.camera;
+        // CHAPTER: r_max is about 0.44 in normalised coordinates.
+        let largest = scene
+            .pixels()
+            .iter()
+            .flatten()
+            .map(|p| camera.normalised_ray(p).unwrap().norm())
+            .fold(0.0, f64::max);
+        assert!((0.42..0.52).contains(&largest), "r_max {largest}");
+    }
+
+    #[test]
+    fn a_target_behind_the_camera_is_refused() {
+        let mut truth = Truth::chapter();
+        truth.cam_from_target[1].translation.z = -5.0;
+        assert_eq!(Scene::new(truth), Err(SceneError::BehindCamera { view: 1, point: 0 }));
+    }
+}

@@ -1,0 +1,241 @@
+//! `calibench gate`: is a solver to be trusted, ours or anyone's?
+
+mod compare;
+mod power;
+
+use super::{Exit, print, warn};
+use calibench::io::{provenance, write_atomically};
+use calibench_gate::faults::{Faulty, planted};
+use calibench_gate::files::{self, FilesError};
+use calibench_gate::{
+    Builtin, EXPECTED_FALSE_ALARMS, Plan, Process, Property, QUICK, Report, Solver, THOROUGH, Terms, protocol,
+};
+use calibench_harness::ProgressDisplay;
+use calibench_harness::project::Project;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// How many problems.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Size {
+    /// 128 samples a scenario: every gross fault
+    Quick,
+    /// 8192 samples a scenario: a bias of a tenth of a standard deviation, a variance 5 % too large
+    Thorough,
+}
+
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    /// Program to judge: reads problems, writes answers, one JSON object a line (see adapters/PROTOCOL.md)
+    /// [default: this library's solver]
+    #[arg(long, value_name = "COMMAND")]
+    solver: Option<String>,
+    /// Copies of the program that run at the same time
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    jobs: usize,
+    /// Seconds that the program may take for a problem
+    #[arg(long, value_name = "SECONDS", default_value_t = 20.0)]
+    timeout: f64,
+    /// Number of problems
+    #[arg(long, value_enum, default_value_t = Size::Quick)]
+    size: Size,
+    /// Samples a scenario, in place of --size
+    #[arg(long, value_name = "N")]
+    samples: Option<usize>,
+    /// Seed of the noise
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Chance that a correct solver fails the run
+    #[arg(long, value_name = "RATE", default_value_t = EXPECTED_FALSE_ALARMS)]
+    false_alarms: f64,
+    /// Longest median time for a problem in any scenario; without it, time is told and not judged
+    #[arg(long, value_name = "SECONDS")]
+    median_time: Option<f64>,
+    /// Property whose failure is known and does not fail the run; may be repeated
+    #[arg(long, value_name = "PROPERTY", value_parser = property)]
+    accept: Vec<Property>,
+    /// Writes the report as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Writes the report as JUnit XML
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+    /// Writes the report as a page
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Compares with a reference on the same problems: `builtin`, a program, or a folder written by --record
+    #[arg(long, value_name = "REF", conflicts_with_all = ["export", "judge", "power"])]
+    against: Option<String>,
+    /// Writes the problems to a folder, truth kept apart, for programs that cannot be driven by a pipe
+    #[arg(long, value_name = "DIR")]
+    export: Option<PathBuf>,
+    /// Writes the problems and the solver's answers to a folder
+    #[arg(long, value_name = "DIR", conflicts_with = "export")]
+    record: Option<PathBuf>,
+    /// Judges the answers in a folder written by --export: DIR/answers.jsonl, or files in DIR/answers/
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["export", "record", "solver"])]
+    judge: Option<PathBuf>,
+    /// Judges this library's solver with a planted fault; `list` names them
+    #[arg(long, value_name = "FAULT", conflicts_with_all = ["solver", "judge"])]
+    planted: Option<String>,
+    /// Measures the gate itself: every planted fault, false alarms over 200 clean seeds, how often textbook least squares is
+    /// misled; writes three tables to a folder
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["solver", "judge", "export", "record", "planted"])]
+    power: Option<PathBuf>,
+    /// Prints the tables in a folder written by --power as Markdown
+    #[arg(long, value_name = "DIR")]
+    power_table: Option<PathBuf>,
+    /// Writes the JSON schemas of the protocol to a folder
+    #[arg(long, value_name = "DIR")]
+    schema: Option<PathBuf>,
+}
+
+fn property(name: &str) -> Result<Property, String> {
+    let known = || Property::ALL.iter().map(|p| p.name()).collect::<Vec<_>>().join(", ");
+    Property::ALL
+        .iter()
+        .copied()
+        .find(|p| p.name() == name)
+        .ok_or_else(|| format!("no property `{name}`; there are: {}", known()))
+}
+
+pub(super) fn run(arguments: &Arguments) -> Exit {
+    dispatch(arguments).unwrap_or_else(|(exit, message)| {
+        warn(&message);
+        exit
+    })
+}
+
+/// A way to end before there is a verdict.
+type Stop = (Exit, String);
+
+fn usage(message: impl ToString) -> Stop {
+    (Exit::Usage, message.to_string())
+}
+
+fn incomplete(message: impl ToString) -> Stop {
+    (Exit::Incomplete, message.to_string())
+}
+
+fn of_files(error: FilesError) -> Stop {
+    match error {
+        FilesError::Write(_) | FilesError::Plan(_) => incomplete(error),
+        _ => usage(error),
+    }
+}
+
+fn dispatch(arguments: &Arguments) -> Result<Exit, Stop> {
+    if let Some(folder) = &arguments.schema {
+        for (name, text) in protocol::schemas() {
+            write_atomically(&folder.join(name), text.as_bytes()).map_err(incomplete)?;
+        }
+        return Ok(Exit::Held);
+    }
+    let samples = arguments.samples.unwrap_or(match arguments.size {
+        Size::Quick => QUICK,
+        Size::Thorough => THOROUGH,
+    });
+    if samples == 0 || !(arguments.false_alarms > 0.0 && arguments.false_alarms < 1.0) {
+        return Err(usage("--samples must be at least 1 and --false-alarms between 0 and 1"));
+    }
+    if arguments.median_time.is_some_and(|s| !(s > 0.0 && s.is_finite())) {
+        return Err(usage("--median-time must be a positive number of seconds"));
+    }
+    if arguments.planted.as_deref() == Some("list") {
+        planted().iter().for_each(|fault| print(&format!("{:<26} {}\n", fault.id, fault.about)));
+        return Ok(Exit::Held);
+    }
+    if let Some(folder) = &arguments.power_table {
+        return power::print_table(folder);
+    }
+    if let Some(folder) = &arguments.power {
+        return power::measure(arguments, folder, samples);
+    }
+    if let Some(folder) = &arguments.export {
+        let plan = Plan::new(arguments.seed, samples).map_err(incomplete)?;
+        files::export(&plan, folder, None).map_err(of_files)?;
+        print(&format!("{} problems written to {}\n", plan.cases.len(), folder.display()));
+        return Ok(Exit::Held);
+    }
+    if let Some(folder) = &arguments.judge {
+        let (plan, answers) = files::recorded(folder).map_err(of_files)?;
+        return judge(arguments, &plan, &answers);
+    }
+    let solver = solver(arguments)?;
+    if let Some(folder) = &arguments.record {
+        let plan = Plan::new(arguments.seed, samples).map_err(incomplete)?;
+        files::export(&plan, folder, Some(solver.as_ref())).map_err(of_files)?;
+        print(&format!("{} problems and answers written to {}\n", plan.cases.len(), folder.display()));
+        return Ok(Exit::Held);
+    }
+    if let Some(reference) = &arguments.against {
+        return compare::run(arguments, solver.as_ref(), reference, samples);
+    }
+    let plan = Plan::new(arguments.seed, samples).map_err(incomplete)?;
+    judge(arguments, &plan, solver.as_ref())
+}
+
+fn solver(arguments: &Arguments) -> Result<Box<dyn Solver>, Stop> {
+    match (&arguments.solver, &arguments.planted) {
+        (Some(command), _) => process(arguments, command),
+        (None, Some(id)) => {
+            let fault = planted().into_iter().find(|fault| fault.id == id);
+            let fault =
+                fault.ok_or_else(|| usage(format!("no planted fault `{id}`; see `--planted list`")))?;
+            Ok(Box::new(Faulty::new(fault)))
+        }
+        (None, None) => Ok(Box::new(Builtin)),
+    }
+}
+
+fn process(arguments: &Arguments, command: &str) -> Result<Box<dyn Solver>, Stop> {
+    let timeout = Duration::try_from_secs_f64(arguments.timeout).ok().filter(|t| !t.is_zero());
+    let timeout = timeout.ok_or_else(|| usage("--timeout must be a positive number of seconds"))?;
+    Ok(Box::new(Process::new(command, timeout, arguments.jobs)))
+}
+
+fn terms(arguments: &Arguments) -> Terms {
+    Terms {
+        false_alarm_rate: arguments.false_alarms,
+        accepted: arguments.accept.clone(),
+        median_seconds: arguments.median_time,
+    }
+}
+
+/// The commit of the gate, as it stands in reports.
+fn commit() -> Option<provenance::Commit> {
+    Project::find().ok().and_then(|p| provenance::commit(p.root()))
+}
+
+/// Asks every problem of the plan, showing progress.
+fn asked(arguments: &Arguments, plan: &Plan, solver: &dyn Solver) -> Report {
+    let progress = ProgressDisplay::stderr().start("gate", plan.cases.len());
+    let started = Instant::now();
+    let seen = calibench_gate::run(plan, solver, &|done| progress.advance(done));
+    let seconds = started.elapsed().as_secs_f64();
+    Report::new(plan, &solver.name(), &seen, &terms(arguments), seconds).with_commit(commit().as_ref())
+}
+
+/// A report in one form, and where it goes if it is wanted.
+type Output<'a> = (&'a Option<PathBuf>, fn(&Report) -> String);
+
+fn judge(arguments: &Arguments, plan: &Plan, solver: &dyn Solver) -> Result<Exit, Stop> {
+    let report = asked(arguments, plan, solver);
+    let outputs: [Output<'_>; 3] = [
+        (&arguments.json, Report::to_json),
+        (&arguments.junit, Report::to_junit),
+        (&arguments.html, Report::to_html),
+    ];
+    for (path, text) in outputs {
+        if let Some(path) = path {
+            write_atomically(path, text(&report).as_bytes()).map_err(incomplete)?;
+        }
+    }
+    // The width of the terminal, where there is one.
+    let columns = comfy_table::Table::new().width().map_or(calibench_gate::report::COLUMNS, usize::from);
+    print(&report.to_text(columns));
+    if !report.held() {
+        warn(&report.details());
+    }
+    Ok(if report.held() { Exit::Held } else { Exit::Deviates })
+}

@@ -1,0 +1,130 @@
+//! What can a user ask for? The command line: one verb a file, and the exit codes that all share.
+
+mod bless;
+mod book;
+mod calibrate;
+mod check;
+mod exit;
+mod gate;
+mod list;
+mod ninepoint;
+mod report;
+mod reproduce;
+mod run;
+mod study;
+mod terminal;
+mod undistort;
+
+pub use exit::Exit;
+pub use terminal::{print, warn};
+
+use calibench_harness::Experiment;
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// A test bench for camera calibration: every number is reconciled with truth, with theory, with the published values, and
+/// with the last run.
+///
+/// Without a verb, every experiment runs: out/ receives its tables and record, figures/ its figures, out/book
+/// the book, and one table says what holds.
+#[derive(Debug, Parser)]
+#[command(name = "calibench", version, max_term_width = 100, after_help = Exit::HELP)]
+struct Arguments {
+    #[command(subcommand)]
+    verb: Option<Verb>,
+    /// Threads to use; no result depends on it [default: all cores]
+    #[arg(long, global = true, value_name = "N")]
+    threads: Option<usize>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// Names the experiments and the questions they answer
+    List(list::Arguments),
+    /// Runs one experiment
+    Run(run::Arguments),
+    /// Runs everything and compares, writing nothing: golden values, claims, published values, committed figures, the book
+    Check(check::Arguments),
+    /// Accepts the present result of an experiment as its golden snapshot, and its figures with it
+    Bless(bless::Arguments),
+    /// Builds the book into out/book
+    Book(book::Arguments),
+    /// Calibrates a camera from a corner file or from photographs, or a plane from a file of point pairs
+    Calibrate(calibrate::Arguments),
+    /// Finds the dots of a nine-point board in a photograph, and maps its pixels to the unit grid
+    Ninepoint(ninepoint::Arguments),
+    /// Removes a calibrated lens's distortion from photographs
+    Undistort(undistort::Arguments),
+    /// Monte Carlo studies from a file: resumable, sharded, with intervals
+    Study(study::Arguments),
+    /// Judges a solver, this library's or any program, on problems with known answers
+    Gate(Box<gate::Arguments>),
+}
+
+/// The `calibench` command over a table of experiments.
+pub fn main(experiments: &[Experiment]) -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return terminal::usage(&error).into(),
+    };
+    // A study finishes its batch first, and has a handler of its own.
+    if !matches!(arguments.verb, Some(Verb::Study(_))) {
+        end_well_on_interrupt();
+    }
+    if let Err(exit) = set_threads(arguments.threads) {
+        return exit.into();
+    }
+    let exit = match arguments.verb {
+        None => reproduce::run(experiments),
+        Some(Verb::List(arguments)) => list::run(experiments, &arguments),
+        Some(Verb::Run(arguments)) => run::run(experiments, &arguments),
+        Some(Verb::Check(arguments)) => check::run(experiments, &arguments),
+        Some(Verb::Bless(arguments)) => bless::run(experiments, &arguments),
+        Some(Verb::Book(arguments)) => book::run(experiments, &arguments),
+        Some(Verb::Calibrate(arguments)) => calibrate::run(&arguments),
+        Some(Verb::Ninepoint(arguments)) => ninepoint::run(&arguments),
+        Some(Verb::Undistort(arguments)) => undistort::run(&arguments),
+        Some(Verb::Study(arguments)) => study::run(&arguments),
+        Some(Verb::Gate(arguments)) => gate::run(&arguments),
+    };
+    exit.into()
+}
+
+/// The command of an experiment's own binary: one run, as `calibench run ID` does it.
+pub fn main_for(experiment: &Experiment) -> ExitCode {
+    end_well_on_interrupt();
+    run::main_for(experiment).into()
+}
+
+/// Ctrl-C ends the program with a code of its own. Files are renamed into place whole, so what is finished stays.
+fn end_well_on_interrupt() {
+    let handler = || {
+        warn("interrupted: what was finished and written is kept, the rest is missing");
+        calibench_gate::process::end_all();
+        std::process::exit(Exit::Incomplete as i32);
+    };
+    // A handler that was set before stays in charge.
+    let _ = ctrlc::set_handler(handler);
+}
+
+/// Sets the size of the thread pool.
+fn set_threads(threads: Option<usize>) -> Result<(), Exit> {
+    let Some(threads) = threads else { return Ok(()) };
+    if threads == 0 {
+        warn("--threads 0: at least one thread is needed");
+        return Err(Exit::Usage);
+    }
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(|error| {
+        warn(&format!("--threads {threads}: {error}"));
+        Exit::Usage
+    })
+}
+
+/// The experiment of a name, or a message that lists the names.
+fn find<'a>(experiments: &'a [Experiment], id: &str) -> Result<&'a Experiment, Exit> {
+    experiments.iter().find(|e| e.id == id).ok_or_else(|| {
+        let known: Vec<&str> = experiments.iter().map(|e| e.id).collect();
+        warn(&format!("no experiment `{id}`; there are: {}", known.join(", ")));
+        Exit::Usage
+    })
+}

@@ -1,0 +1,78 @@
+//! `calibench` alone: everything is run, written, and reconciled in one table.
+
+use super::report::{details, reconciliation_table};
+use super::{Exit, print, warn};
+use calibench::io::{Commit, provenance};
+use calibench_harness::project::Project;
+use calibench_harness::verdict::{self, Run, Verdict};
+use calibench_harness::{Context, Experiment, ProgressDisplay, Record, emit};
+use rayon::prelude::*;
+use std::{fs, io};
+
+pub(super) fn run(experiments: &[Experiment]) -> Exit {
+    let project = match Project::find() {
+        Ok(project) => project,
+        Err(error) => {
+            warn(&error.to_string());
+            return Exit::Usage;
+        }
+    };
+    let commit = provenance::commit(project.root());
+    let display = ProgressDisplay::stderr();
+    let finished: Vec<(Run, io::Result<()>)> = experiments
+        .par_iter()
+        .map(|experiment| {
+            let run = verdict::run(experiment, &Context::of(experiment).with_progress(display.clone()));
+            let written = write(&run, &project, commit.as_ref());
+            (run, written)
+        })
+        .collect();
+    let (runs, written): (Vec<Run>, Vec<_>) = finished.into_iter().unzip();
+    let verdicts = judge_all(&runs, &project);
+    print(&reconciliation_table(&runs, &verdicts));
+    let failures = failures(&runs, written);
+    let judged: Vec<Verdict> = verdicts.into_iter().flatten().collect();
+    print(&details(&judged));
+    failures.iter().for_each(|failure| warn(failure));
+    let records: Vec<&Record> = runs.iter().filter_map(|run| run.result.as_ref().ok()).collect();
+    let book = super::book::build_of(&project, experiments, &records);
+    exit_of(&judged, !failures.is_empty()).max(book)
+}
+
+/// Each experiment is written as soon as it is finished: an interruption keeps what is done.
+fn write(run: &Run, project: &Project, commit: Option<&Commit>) -> io::Result<()> {
+    match &run.result {
+        Ok(record) => emit(record, &project.out(), &project.figures(run.experiment.id), commit),
+        Err(_) => Ok(()),
+    }
+}
+
+/// The verdict of every run that has a record.
+pub(super) fn judge_all(runs: &[Run], project: &Project) -> Vec<Option<Verdict>> {
+    let judge = |run: &Run| {
+        let record = run.result.as_ref().ok()?;
+        let snapshot = fs::read_to_string(project.snapshot(run.experiment.id)).ok();
+        Some(Verdict::of(record, snapshot.as_deref(), run.locked))
+    };
+    runs.iter().map(judge).collect()
+}
+
+/// What has no record, and what could not be written.
+fn failures(runs: &[Run], written: Vec<io::Result<()>>) -> Vec<String> {
+    let no_record = runs.iter().filter_map(|run| {
+        let error = run.result.as_ref().err()?;
+        Some(format!("FAILED {}: {error}", run.experiment.id))
+    });
+    no_record.chain(written.into_iter().filter_map(Result::err).map(|e| e.to_string())).collect()
+}
+
+/// Incomplete before deviating: what is missing cannot have been judged.
+pub(super) fn exit_of(verdicts: &[Verdict], incomplete: bool) -> Exit {
+    if incomplete {
+        Exit::Incomplete
+    } else if verdicts.iter().all(Verdict::held) {
+        Exit::Held
+    } else {
+        Exit::Deviates
+    }
+}

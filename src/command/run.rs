@@ -1,0 +1,101 @@
+//! `calibench run ID`, and the own binary of every experiment: one run, its files, its verdict.
+
+use super::report::{details, summary};
+use super::{Exit, find, print, terminal, warn};
+use calibench::io::provenance;
+use calibench_harness::project::Project;
+use calibench_harness::verdict::{self, Run, Verdict};
+use calibench_harness::{Context, Experiment, ProgressDisplay, emit};
+use clap::{Args, CommandFactory, FromArgMatches, Parser};
+use std::path::{Path, PathBuf};
+
+/// What a run can be told.
+#[derive(Debug, Args)]
+struct Options {
+    /// Seed of the random streams; golden values hold for the default seed only [default: the experiment's own]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Folder for tables, record and figures [default: out/, with the figures of the locked run in figures/]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Image in place of the experiment's own, for experiments that take one
+    #[arg(long, value_name = "FILE")]
+    image: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Name of the experiment, as `calibench list` gives it
+    id: String,
+    #[command(flatten)]
+    options: Options,
+}
+
+/// Arguments of an experiment's own binary.
+#[derive(Debug, Parser)]
+#[command(version, max_term_width = 100, after_help = Exit::HELP)]
+struct OwnArguments {
+    #[command(flatten)]
+    options: Options,
+}
+
+pub(super) fn run(experiments: &[Experiment], arguments: &Arguments) -> Exit {
+    match find(experiments, &arguments.id) {
+        Ok(experiment) => run_one(experiment, &arguments.options),
+        Err(exit) => exit,
+    }
+}
+
+pub(super) fn main_for(experiment: &Experiment) -> Exit {
+    let about = format!("{}\n\n{}", experiment.title, experiment.question);
+    let command = OwnArguments::command().name(experiment.id).about(about);
+    let parsed = command.try_get_matches().and_then(|matches| OwnArguments::from_arg_matches(&matches));
+    match parsed {
+        Ok(arguments) => run_one(experiment, &arguments.options),
+        Err(error) => terminal::usage(&error),
+    }
+}
+
+fn run_one(experiment: &Experiment, options: &Options) -> Exit {
+    if options.image.is_some() && !experiment.takes_image {
+        warn(&format!("experiment `{}` takes no image", experiment.id));
+        return Exit::Usage;
+    }
+    let context = Context::of(experiment)
+        .with_seed(options.seed.unwrap_or(experiment.seed))
+        .with_image(options.image.clone())
+        .with_progress(ProgressDisplay::stderr());
+    let project = Project::find().ok();
+    let run = verdict::run(experiment, &context);
+    let record = match &run.result {
+        Ok(record) => record,
+        Err(error) => {
+            warn(&format!("{}: {error}", experiment.id));
+            return Exit::of_failure(error);
+        }
+    };
+    let (out, figures) = places(&run, options.out.as_deref(), project.as_ref());
+    let commit = project.as_ref().and_then(|p| provenance::commit(p.root()));
+    if let Err(error) = emit(record, &out, &figures, commit.as_ref()) {
+        warn(&error.to_string());
+        return Exit::Incomplete;
+    }
+    let snapshot = project.as_ref().and_then(|p| std::fs::read_to_string(p.snapshot(experiment.id)).ok());
+    let verdict = Verdict::of(record, snapshot.as_deref(), run.locked && project.is_some());
+    print(&summary(record));
+    let written = out.join(experiment.id);
+    print(&format!("\nwritten: {} and {}\n", written.display(), figures.display()));
+    print(&details(std::slice::from_ref(&verdict)));
+    if verdict.held() { Exit::Held } else { Exit::Deviates }
+}
+
+/// Where tables and figures go. Committed figures are drawn by the locked run only.
+fn places(run: &Run, out: Option<&Path>, project: Option<&Project>) -> (PathBuf, PathBuf) {
+    let id = run.experiment.id;
+    match (out, project) {
+        (None, Some(project)) if run.locked => (project.out(), project.figures(id)),
+        (None, Some(project)) => (project.out(), project.out().join(id).join("figures")),
+        (None, None) => (PathBuf::from("out"), Path::new("out").join(id).join("figures")),
+        (Some(out), _) => (out.to_path_buf(), out.join(id).join("figures")),
+    }
+}

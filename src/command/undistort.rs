@@ -1,0 +1,208 @@
+//! `calibench undistort --camera RESULT.json PHOTOS...`: what an ideal lens would have shown.
+
+use super::{Exit, print, warn};
+use calibench::camera::Camera;
+use calibench::io::result::{CameraFields, read_camera};
+use calibench::io::{Grey, read_image, write_atomically, write_png, write_png_16};
+use calibench::raster::Raster;
+use calibench::rectify::{OutputView, RectifyMap, output_camera};
+use clap::{Args, ValueEnum};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// result.json of `calibench calibrate`, or any JSON with {"camera": {"fx": ..., "fy": ..., "cx": ..., "cy": ...}}
+    #[arg(long, value_name = "RESULT.json")]
+    camera: PathBuf,
+    /// Photographs: PNG, JPEG, BMP, PGM or TIFF, grey or colour (written grey), 8 or 16 bit
+    #[arg(required = true, value_name = "PHOTOS")]
+    photos: Vec<PathBuf>,
+    /// Folder for the corrected photographs, as PNG of the same name, and camera-<W>x<H>.json
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// What the output shows
+    #[arg(long, value_enum, default_value_t = View::Same)]
+    view: View,
+    /// Grey level, black 0 to white 1, of output pixels without data
+    #[arg(long, value_name = "LEVEL", default_value_t = 0.0, value_parser = parse_level)]
+    border: f32,
+    /// Also writes mask-<W>x<H>.png: white where the output has data
+    #[arg(long)]
+    mask: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum View {
+    /// The same focal lengths and principal point: pixels keep their meaning, parts may be lost or empty
+    Same,
+    /// Every pixel of the photograph; parts are empty
+    All,
+    /// No empty pixel
+    Valid,
+}
+
+impl From<View> for OutputView {
+    fn from(view: View) -> OutputView {
+        match view {
+            View::Same => OutputView::SameK,
+            View::All => OutputView::AllPixels,
+            View::Valid => OutputView::OnlyValid,
+        }
+    }
+}
+
+fn parse_level(text: &str) -> Result<f32, String> {
+    let wanted = || format!("`{text}` is not a level from 0 (black) to 1 (white)");
+    let level: f32 = text.parse().map_err(|_| wanted())?;
+    if (0.0..=1.0).contains(&level) { Ok(level) } else { Err(wanted()) }
+}
+
+pub(super) fn run(arguments: &Arguments) -> Exit {
+    let (camera, image_size) = match read_camera(&arguments.camera) {
+        Ok(read) => read,
+        Err(error) => {
+            warn(&error.to_string());
+            return Exit::Usage;
+        }
+    };
+    if let Err(message) = distinct_outputs(arguments) {
+        warn(&message);
+        return Exit::Usage;
+    }
+    let mut work = Work { arguments, camera, image_size, maps: BTreeMap::new() };
+    let mut exit = Exit::Held;
+    // A photograph that cannot be corrected does not keep the others from it.
+    for photo in &arguments.photos {
+        if let Err((failed, message)) = work.undistort(photo) {
+            warn(&message);
+            exit = exit.max(failed);
+        }
+    }
+    exit
+}
+
+/// Two photographs must not be written to one file, nor one over itself.
+fn distinct_outputs(arguments: &Arguments) -> Result<(), String> {
+    let mut outputs = BTreeSet::new();
+    for photo in &arguments.photos {
+        let output = output_path(&arguments.out, photo);
+        if let (Ok(from), Ok(to)) = (photo.canonicalize(), output.canonicalize())
+            && from == to
+        {
+            return Err(format!("{} would be overwritten: choose another folder", photo.display()));
+        }
+        if !outputs.insert(output.clone()) {
+            return Err(format!("two photographs would be written to {}: rename one", output.display()));
+        }
+    }
+    Ok(())
+}
+
+fn output_path(folder: &Path, photo: &Path) -> PathBuf {
+    // Not `with_extension`: a name may hold further dots.
+    let mut name = photo.file_stem().unwrap_or_default().to_os_string();
+    name.push(".png");
+    folder.join(name)
+}
+
+type Size = (usize, usize);
+
+struct Work<'a> {
+    arguments: &'a Arguments,
+    camera: Camera,
+    image_size: Option<Size>,
+    /// One look-up table for all photographs of a size.
+    maps: BTreeMap<Size, RectifyMap>,
+}
+
+/// How to end, and what to say.
+type Failure = (Exit, String);
+
+impl Work<'_> {
+    fn undistort(&mut self, photo: &Path) -> Result<(), Failure> {
+        let wrong = |message: String| (Exit::Usage, message);
+        let image = read_image(photo).map_err(|error| wrong(error.to_string()))?;
+        if let Some(expected) = self.image_size
+            && expected != image.size()
+        {
+            let ((width, height), (w, h)) = (image.size(), expected);
+            let camera = self.arguments.camera.display();
+            return Err(wrong(format!(
+                "{}: {width} x {height} px, but {camera} is of {w} x {h} px images",
+                photo.display()
+            )));
+        }
+        self.prepare(image.size())?;
+        let map = &self.maps[&image.size()];
+        let output = output_path(&self.arguments.out, photo);
+        // A map is made for the size of the image.
+        let same_size = |error: calibench::rectify::RectifyError| wrong(error.to_string());
+        let border = self.arguments.border;
+        let written = match &image {
+            Grey::U8(image) => {
+                let level = (255.0 * border).round() as u8;
+                write_png(&output, &map.apply(image, level).map_err(same_size)?)
+            }
+            Grey::U16(image) => {
+                let level = (65535.0 * border).round() as u16;
+                write_png_16(&output, &map.apply(image, level).map_err(same_size)?)
+            }
+            Grey::F32(image) => write_png_16(&output, &map.apply(image, border).map_err(same_size)?.to_u16()),
+        };
+        written.map_err(|error| (Exit::Incomplete, format!("{}: {error}", output.display())))?;
+        print(&format!("{}\n", output.display()));
+        Ok(())
+    }
+
+    /// Makes the table for a size, and writes the camera of its output.
+    fn prepare(&mut self, size: Size) -> Result<(), Failure> {
+        if self.maps.contains_key(&size) {
+            return Ok(());
+        }
+        let wrong = |error: &dyn std::fmt::Display| (Exit::Usage, error.to_string());
+        let output =
+            output_camera(&self.camera, size, self.arguments.view.into()).map_err(|error| wrong(&error))?;
+        let map = RectifyMap::between(&self.camera, size, &output, size).map_err(|error| wrong(&error))?;
+        self.describe(size, &output, &map).map_err(|message| (Exit::Incomplete, message))?;
+        self.maps.insert(size, map);
+        Ok(())
+    }
+
+    fn describe(&self, size: Size, output: &Camera, map: &RectifyMap) -> Result<(), String> {
+        let (width, height) = size;
+        let mask = map.mask();
+        let empty = mask.samples().iter().filter(|&&has_data| !has_data).count();
+        let result = serde_json::json!({
+            "written_by": format!("calibench {}", env!("CARGO_PKG_VERSION")),
+            "camera": CameraFields::from(*output),
+            "image_size": [width, height],
+            "pixels_without_data": empty,
+        });
+        let file = self.arguments.out.join(format!("camera-{width}x{height}.json"));
+        write_atomically(&file, format!("{result:#}\n").as_bytes())
+            .map_err(|error| format!("{}: {error}", file.display()))?;
+        if self.arguments.mask {
+            let file = self.arguments.out.join(format!("mask-{width}x{height}.png"));
+            let white: Raster<u8> = mask.map(|&has_data| if has_data { 255 } else { 0 });
+            write_png(&file, &white).map_err(|error| format!("{}: {error}", file.display()))?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_output_has_the_photographs_name_as_png() {
+        assert_eq!(output_path(Path::new("o"), Path::new("a/b.c.jpg")), Path::new("o/b.c.png"));
+    }
+
+    #[test]
+    fn a_border_level_is_a_fraction_of_white() {
+        assert_eq!(parse_level("0.5"), Ok(0.5));
+        assert!(parse_level("128").is_err() && parse_level("NaN").is_err() && parse_level("x").is_err());
+    }
+}

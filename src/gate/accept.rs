@@ -1,0 +1,315 @@
+//! Can the answer be read as an estimate? Counts, names and numbers are checked before anything is judged.
+
+use super::protocol::{Answer, AnswerPose, Problem, Status};
+use calibench::camera::{Camera, FreeParameters, Parameter};
+use calibench::geometry::Pose;
+use nalgebra::DMatrix;
+use std::collections::BTreeMap;
+
+/// An answer that keeps the protocol.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// Estimated and held parameters.
+    pub camera: Camera,
+    /// One pose a view, if they were given.
+    pub cam_from_target: Option<Vec<Pose>>,
+    /// Standard deviations of the free parameters, in order.
+    pub standard_deviations: Option<Vec<f64>>,
+    /// Covariance of the free parameters, in order.
+    pub covariance: Option<DMatrix<f64>>,
+    /// Reprojection error as the solver states it, px.
+    pub rmse_px: Option<f64>,
+    /// What the solver warns of.
+    pub warnings: Vec<String>,
+    /// A held parameter whose value was changed: name, wanted, got.
+    pub held_changed: Option<(Parameter, f64, f64)>,
+}
+
+/// What became of a problem.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// An estimate that claims to be usable.
+    Estimate(Box<Estimate>),
+    /// The solver gave no estimate and said so.
+    Refused(String),
+    /// No answer, or one that breaks the protocol.
+    Broken(Breakage),
+}
+
+/// How the protocol was broken.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Breakage {
+    /// No answer in time; the process was ended and started again.
+    #[error("no answer within {seconds} s")]
+    Timeout {
+        /// The limit.
+        seconds: f64,
+    },
+    /// The process ended.
+    #[error("the process ended ({how}){}", if stderr.is_empty() { String::new() } else { format!(": {stderr}") })]
+    Crashed {
+        /// Exit status.
+        how: String,
+        /// The end of its standard error.
+        stderr: String,
+    },
+    /// A line that is no answer.
+    #[error("not an answer: {reason}: `{line}`")]
+    Garbage {
+        /// What is wrong with it.
+        reason: String,
+        /// Its beginning.
+        line: String,
+    },
+    /// The answer to another problem.
+    #[error("the answer is for `{got}`")]
+    WrongId {
+        /// Its id.
+        got: String,
+    },
+    /// A list has another length.
+    #[error("{what}: {need} needed, got {got}")]
+    Count {
+        /// Of what.
+        what: &'static str,
+        /// Wanted.
+        need: usize,
+        /// Given.
+        got: usize,
+    },
+    /// A number is NaN, infinite, or impossible.
+    #[error("{what} is {value}")]
+    BadNumber {
+        /// Of what.
+        what: String,
+        /// The number.
+        value: f64,
+    },
+    /// A value is missing.
+    #[error("{what} is missing")]
+    Missing {
+        /// Which.
+        what: String,
+    },
+    /// Two answers to one problem, in files.
+    #[error("answered more than once")]
+    Twice,
+    /// The solver broke too often and was not asked any more.
+    #[error("not asked: {0}")]
+    NotAsked(String),
+}
+
+/// The free parameters of a problem; names that are unknown are left out.
+pub fn free_of(problem: &Problem) -> FreeParameters {
+    problem
+        .free
+        .iter()
+        .filter_map(|name| name.parse::<Parameter>().ok())
+        .fold(FreeParameters::NONE, |free, p| free.with(p))
+}
+
+/// Characters of a wrong line that are quoted.
+const LINE_HEAD: usize = 80;
+
+/// An answer, or why the line is none.
+pub fn read_line(line: &str) -> Result<Answer, Breakage> {
+    serde_json::from_str(line).map_err(|error| {
+        // JSON has no NaN; most languages write one all the same.
+        for word in ["NaN", "Infinity", "-Infinity", "nan", "inf"] {
+            let stands = |before: &str| line.contains(&format!("{before}{word}"));
+            if line.trim_start().starts_with('{') && [": ", ":", "[", ", "].into_iter().any(stands) {
+                return Breakage::BadNumber { what: "a number of the answer".into(), value: f64::NAN };
+            }
+        }
+        Breakage::Garbage { reason: error.to_string(), line: line.chars().take(LINE_HEAD).collect() }
+    })
+}
+
+/// For which problem a line is meant, even where it is no answer.
+pub fn id_in(line: &str) -> Option<&str> {
+    let after_key = line.trim_start().strip_prefix('{')?.split_once("\"id\"")?.1;
+    after_key.trim_start().strip_prefix(':')?.trim_start().strip_prefix('"')?.split('"').next()
+}
+
+/// Reads an answer as the outcome of a problem.
+pub fn accept(problem: &Problem, answer: Answer) -> Outcome {
+    if answer.id != problem.id {
+        return Outcome::Broken(Breakage::WrongId { got: answer.id });
+    }
+    match answer.status {
+        Status::Ok => {
+            estimate(problem, answer).map_or_else(Outcome::Broken, |e| Outcome::Estimate(Box::new(e)))
+        }
+        Status::Refused => Outcome::Refused(answer.message.unwrap_or_else(|| "refused".into())),
+        Status::NotConverged => {
+            Outcome::Refused(format!("not converged: {}", answer.message.unwrap_or_default()))
+        }
+    }
+}
+
+fn estimate(problem: &Problem, answer: Answer) -> Result<Estimate, Breakage> {
+    let free = free_of(problem);
+    let (camera, held_changed) = camera(problem, &answer, free)?;
+    let covariance = covariance(&answer, free)?;
+    let standard_deviations = match (&answer.standard_deviations, &covariance) {
+        (Some(named), _) => Some(deviations(named, free)?),
+        (None, Some(matrix)) => Some(matrix.diagonal().iter().map(|v| v.sqrt()).collect()),
+        (None, None) => None,
+    };
+    let rmse_px = answer.rmse.map(|x| positive("rmse", x)).transpose()?;
+    let cam_from_target = answer.poses.map(|poses| self::poses(&poses, problem.views.len())).transpose()?;
+    Ok(Estimate {
+        camera,
+        cam_from_target,
+        standard_deviations,
+        covariance,
+        rmse_px,
+        warnings: answer.warnings,
+        held_changed,
+    })
+}
+
+type HeldChange = Option<(Parameter, f64, f64)>;
+
+fn camera(
+    problem: &Problem,
+    answer: &Answer,
+    free: FreeParameters,
+) -> Result<(Camera, HeldChange), Breakage> {
+    let mut values = [0.0; Parameter::COUNT];
+    let mut changed = None;
+    for parameter in Parameter::ALL {
+        let given = answer.parameters.get(parameter.name()).copied();
+        let held = problem.held.get(parameter.name()).copied();
+        values[parameter as usize] = match (free.contains(parameter), given, held) {
+            (true, Some(value), _) => finite(parameter.name(), value)?,
+            (true, None, _) => return Err(Breakage::Missing { what: format!("parameter {parameter}") }),
+            (false, given, held) => {
+                let wanted = held.unwrap_or(0.0);
+                if let Some(got) = given.filter(|got| *got != wanted) {
+                    changed = Some((parameter, wanted, finite(parameter.name(), got)?));
+                }
+                given.unwrap_or(wanted)
+            }
+        };
+    }
+    Ok((Camera::from_parameters(values), changed))
+}
+
+fn covariance(answer: &Answer, free: FreeParameters) -> Result<Option<DMatrix<f64>>, Breakage> {
+    let Some(given) = &answer.covariance else { return Ok(None) };
+    let need = given.parameters.len();
+    if let Some(got) = std::iter::once(given.matrix.len())
+        .chain(given.matrix.iter().map(Vec::len))
+        .find(|&length| length != need)
+    {
+        return Err(Breakage::Count { what: "rows and columns of the covariance", need, got });
+    }
+    let place = |parameter: Parameter| {
+        given
+            .parameters
+            .iter()
+            .position(|name| name == parameter.name())
+            .ok_or_else(|| Breakage::Missing { what: format!("covariance of {parameter}") })
+    };
+    let places = free.iter().map(place).collect::<Result<Vec<usize>, _>>()?;
+    let matrix = DMatrix::from_fn(places.len(), places.len(), |i, j| given.matrix[places[i]][places[j]]);
+    match matrix.iter().find(|x| !x.is_finite()) {
+        Some(&value) => Err(Breakage::BadNumber { what: "an entry of the covariance".into(), value }),
+        None => Ok(Some(matrix)),
+    }
+}
+
+fn deviations(named: &BTreeMap<String, f64>, free: FreeParameters) -> Result<Vec<f64>, Breakage> {
+    free.iter()
+        .map(|parameter| {
+            let what = format!("standard deviation of {parameter}");
+            let value = named.get(parameter.name()).ok_or(Breakage::Missing { what: what.clone() })?;
+            positive(&what, *value)
+        })
+        .collect()
+}
+
+fn poses(given: &[AnswerPose], need: usize) -> Result<Vec<Pose>, Breakage> {
+    if given.len() != need {
+        return Err(Breakage::Count { what: "poses", need, got: given.len() });
+    }
+    given
+        .iter()
+        .enumerate()
+        .map(|(i, pose)| {
+            let pose = pose.pose();
+            let bad = Breakage::BadNumber { what: format!("a number of pose {i}"), value: f64::NAN };
+            pose.is_finite().then_some(pose).ok_or(bad)
+        })
+        .collect()
+}
+
+fn finite(what: &str, value: f64) -> Result<f64, Breakage> {
+    if value.is_finite() { Ok(value) } else { Err(Breakage::BadNumber { what: what.to_string(), value }) }
+}
+
+fn positive(what: &str, value: f64) -> Result<f64, Breakage> {
+    finite(what, value)?;
+    if value >= 0.0 { Ok(value) } else { Err(Breakage::BadNumber { what: what.to_string(), value }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::ProblemView;
+
+    fn problem() -> Problem {
+        Problem {
+            id: "a".into(),
+            image_size: [640, 480],
+            views: vec![ProblemView { target: vec![[0.0, 0.0]], pixels: vec![[0.0, 0.0]] }],
+            free: vec!["fx".into()],
+            held: [("cx".to_string(), 320.0)].into(),
+        }
+    }
+
+    fn read(line: &str) -> Outcome {
+        accept(&problem(), serde_json::from_str(line).unwrap())
+    }
+
+    #[test]
+    fn broken_answers_are_named() {
+        let broken = |line: &str| match read(line) {
+            Outcome::Broken(breakage) => breakage.to_string(),
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(broken(r#"{"id":"b","status":"ok"}"#), "the answer is for `b`");
+        assert_eq!(broken(r#"{"id":"a","status":"ok"}"#), "parameter fx is missing");
+        assert_eq!(
+            broken(r#"{"id":"a","status":"ok","parameters":{"fx":1},"poses":[]}"#),
+            "poses: 1 needed, got 0"
+        );
+        assert_eq!(broken(r#"{"id":"a","status":"ok","parameters":{"fx":1},"rmse":-1}"#), "rmse is -1");
+        let line = r#"{"id":"a","status":"ok","parameters":{"fx":1},"covariance":{"parameters":["fx"],"matrix":[]}}"#;
+        assert_eq!(broken(line), "rows and columns of the covariance: 1 needed, got 0");
+    }
+
+    #[test]
+    fn a_line_that_is_no_json_tells_its_problem_and_its_fault() {
+        for line in [
+            r#"{"id": "a.1", "rmse": NaN}"#,
+            r#"{"rmse":NaN,"id":"a.1"}"#,
+            r#"{"x":[1,-Infinity],"id" : "a.1""#,
+        ] {
+            assert_eq!(id_in(line), Some("a.1"), "{line}");
+        }
+        assert!(matches!(read_line(r#"{"id":"a","x":[NaN]}"#), Err(Breakage::BadNumber { .. })));
+        assert!(matches!(read_line(r#"{"id":"a","x":}"#), Err(Breakage::Garbage { .. })));
+        assert_eq!((id_in("hello"), id_in(r#"{"id":7}"#)), (None, None));
+    }
+
+    #[test]
+    fn a_held_value_that_moved_is_seen() {
+        let Outcome::Estimate(estimate) = read(r#"{"id":"a","status":"ok","parameters":{"fx":2,"cx":321}}"#)
+        else {
+            panic!("the answer keeps the protocol");
+        };
+        assert_eq!(estimate.held_changed, Some((Parameter::Cx, 320.0, 321.0)));
+    }
+}

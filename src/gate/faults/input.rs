@@ -1,0 +1,100 @@
+//! Faults between the data and a good solver: what is measured is not what is used.
+
+use super::{Planted, correct, gross};
+use crate::protocol::{Answer, Problem, Status};
+use crate::solver::{answer, settings, views};
+use calibench::board::View;
+use calibench::calibrate::{Settings, calibrate};
+use calibench::camera::{Camera, FreeParameters, Parameter};
+
+pub(super) const FAULTS: &[Planted] = &[
+    gross("rounded-to-half-pixels", "observations rounded to half pixels", |p, _| {
+        on_pixels(p, |x| 0.5 * (2.0 * x).round())
+    }),
+    gross("rounded-to-f32", "observations in single precision", |p, _| on_pixels(p, |x| f64::from(x as f32))),
+    gross("target-rounded", "target points rounded to a thousandth of a unit", |p, _| {
+        let mut changed = p.clone();
+        let numbers = changed.views.iter_mut().flat_map(|v| v.target.iter_mut().flatten());
+        numbers.for_each(|x| *x = (1000.0 * *x).round() / 1000.0);
+        correct(&changed)
+    }),
+    gross("one-view-dropped", "the last view is not used; its pose is found afterwards", |p, _| {
+        last_view_unused(p)
+    }),
+    gross("last-points-dropped", "the last point of every view is not used", |p, _| {
+        let mut changed = p.clone();
+        changed.views.iter_mut().for_each(|v| {
+            v.target.pop();
+            v.pixels.pop();
+        });
+        correct(&changed)
+    }),
+    gross("first-view-twice", "the first view counts twice", |p, _| {
+        let mut changed = p.clone();
+        changed.views.extend(p.views.first().cloned());
+        let mut given = correct(&changed);
+        given.poses.iter_mut().for_each(|poses| poses.truncate(p.views.len()));
+        given
+    }),
+    gross(
+        "image-centre-offset",
+        "coordinates measured from the image centre, which is not added back",
+        |p, _| {
+            let mut given = correct(p);
+            let [width, height] = p.image_size;
+            for (name, size) in [("cx", width), ("cy", height)] {
+                if let Some(value) =
+                    given.parameters.get_mut(name).filter(|_| p.free.iter().any(|f| f == name))
+                {
+                    *value -= 0.5 * (size as f64 - 1.0);
+                }
+            }
+            given
+        },
+    ),
+    gross("broken-input-mended", "points and pixels that do not pair are left out in silence", |p, _| {
+        mended(p)
+    }),
+];
+
+fn on_pixels(problem: &Problem, how: impl Fn(f64) -> f64) -> Answer {
+    let mut changed = problem.clone();
+    changed.views.iter_mut().flat_map(|v| v.pixels.iter_mut().flatten()).for_each(|x| *x = how(*x));
+    correct(&changed)
+}
+
+fn last_view_unused(problem: &Problem) -> Answer {
+    let whole = correct(problem);
+    let (Status::Ok, Ok(mut all)) = (whole.status, views(problem)) else { return whole };
+    let last: Option<View> = all.pop();
+    let Ok(calibration) = calibrate(&all, &settings(problem)) else { return whole };
+    let mut given = answer(&problem.id, &calibration);
+    let pose = last.and_then(|view| calibrate(&[view], &holding(&calibration.camera)).ok());
+    if let (Some(poses), Some(found)) = (&mut given.poses, pose) {
+        poses.extend(answer("", &found).poses.into_iter().flatten());
+    }
+    given
+}
+
+/// Nothing but poses is free.
+fn holding(camera: &Camera) -> Settings {
+    Parameter::ALL.into_iter().fold(Settings::new(FreeParameters::NONE), |s, p| s.hold(p, camera.get(p)))
+}
+
+fn mended(problem: &Problem) -> Answer {
+    let mut changed = problem.clone();
+    for view in &mut changed.views {
+        let pairs = view.target.iter().zip(&view.pixels).filter(|(_, p)| p.iter().all(|x| x.is_finite()));
+        let (target, pixels) = pairs.map(|(t, p)| (*t, *p)).unzip();
+        (view.target, view.pixels) = (target, pixels);
+    }
+    changed.views.retain(|view| !view.pixels.is_empty());
+    let mut given = correct(&changed);
+    // As many poses as were asked for, like a program that fills a fixed array.
+    if let Some(poses) = &mut given.poses
+        && let Some(last) = poses.last().cloned()
+    {
+        poses.resize(problem.views.len(), last);
+    }
+    given
+}

@@ -1,0 +1,196 @@
+//! How is a program judged that cannot be driven by a pipe? Problems as files, truth kept apart, answers as files.
+
+use super::accept::{Breakage, id_in, read_line};
+use super::plan::{Plan, PlanError, Purpose};
+use super::protocol::{Answer, Problem};
+use super::solver::Solver;
+use calibench::camera::Parameter;
+use calibench::io::hash::sha256_hex;
+use calibench::io::write_atomically;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// What a folder of problems was made from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+struct Manifest {
+    seed: u64,
+    samples: usize,
+    problems: usize,
+    /// SHA-256 of `problems.jsonl`.
+    sha256: String,
+}
+
+/// Why a folder cannot be written or judged.
+#[derive(Debug, thiserror::Error)]
+pub enum FilesError {
+    /// It cannot be written.
+    #[error(transparent)]
+    Write(#[from] io::Error),
+    /// It cannot be read.
+    #[error("cannot read {path}: {source}", path = path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The manifest is none.
+    #[error("{path} is no manifest of an export: {source}", path = path.display())]
+    Manifest {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: serde_json::Error,
+    },
+    /// This version of the gate makes other problems from the same seed.
+    #[error(
+        "the problems were made by another version of the gate: export them again (sha256 {found}, now {now})"
+    )]
+    OtherVersion {
+        /// Of the manifest.
+        found: String,
+        /// Of the problems made now.
+        now: String,
+    },
+    /// A plan that cannot be made.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+}
+
+/// Writes `problems.jsonl`, `manifest.json` and `truth/truth.jsonl` to a folder; with a solver, its `answers.jsonl` too.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn export(plan: &Plan, folder: &Path, solver: Option<&dyn Solver>) -> Result<(), FilesError> {
+    let problems = problem_lines(plan);
+    let manifest = Manifest {
+        seed: plan.seed,
+        samples: plan.samples,
+        problems: plan.cases.len(),
+        sha256: sha256_hex(problems.as_bytes()),
+    };
+    write_atomically(&folder.join("problems.jsonl"), problems.as_bytes())?;
+    write_atomically(&folder.join("truth/truth.jsonl"), truth_lines(plan).as_bytes())?;
+    let manifest = format!("{:#}\n", serde_json::to_value(&manifest).unwrap_or_default());
+    write_atomically(&folder.join("manifest.json"), manifest.as_bytes())?;
+    if let Some(solver) = solver {
+        let lines: Vec<String> = plan
+            .cases
+            .par_iter()
+            .filter_map(|case| solver.ask(&plan.problem(case)).ok())
+            .filter_map(|answer| serde_json::to_string(&answer).ok())
+            .collect();
+        write_atomically(&folder.join("answers.jsonl"), joined(lines).as_bytes())?;
+    }
+    Ok(())
+}
+
+fn joined(lines: Vec<String>) -> String {
+    lines.into_iter().map(|line| line + "\n").collect()
+}
+
+fn problem_lines(plan: &Plan) -> String {
+    joined(plan.cases.par_iter().map(|case| plan.problem(case).to_line()).collect())
+}
+
+/// Camera and poses behind every problem; variants follow from their samples and have no line.
+fn truth_lines(plan: &Plan) -> String {
+    let lines = plan.cases.iter().filter(|c| !matches!(c.purpose, Purpose::Variant(_))).map(|case| {
+        let scenario = &plan.scenarios[case.scenario];
+        let (camera, poses) = match case.purpose {
+            Purpose::Bad(index) => (plan.bad[index].truth, &[][..]),
+            _ => (scenario.scene.truth.camera, &scenario.scene.truth.cam_from_target[..]),
+        };
+        let parameters: BTreeMap<&str, f64> =
+            Parameter::ALL.into_iter().map(|p| (p.name(), camera.get(p))).collect();
+        let poses: Vec<serde_json::Value> = poses
+            .iter()
+            .map(|pose| {
+                let rows: Vec<Vec<f64>> =
+                    pose.rotation.row_iter().map(|r| r.iter().copied().collect()).collect();
+                serde_json::json!({"rotation": rows, "translation": pose.translation.as_slice()})
+            })
+            .collect();
+        serde_json::json!({"id": plan.id(case), "parameters": parameters, "poses": poses}).to_string()
+    });
+    joined(lines.collect())
+}
+
+/// Answers that were given beforehand, as a solver.
+#[derive(Debug)]
+pub struct Recorded {
+    folder: PathBuf,
+    answers: BTreeMap<String, Result<Answer, Breakage>>,
+    /// The first line that is no answer to anything, and where.
+    stray: Option<String>,
+}
+
+/// The plan of a folder, and the answers in it: `answers.jsonl`, and every file in `answers/`.
+///
+/// A line that is no answer is a finding about its problem.
+///
+/// # Errors
+/// A folder without a manifest or answers, or problems of another version.
+pub fn recorded(folder: &Path) -> Result<(Plan, Recorded), FilesError> {
+    let path = folder.join("manifest.json");
+    let manifest: Manifest =
+        serde_json::from_str(&read(&path)?).map_err(|source| FilesError::Manifest { path, source })?;
+    let plan = Plan::new(manifest.seed, manifest.samples)?;
+    let now = sha256_hex(problem_lines(&plan).as_bytes());
+    if now != manifest.sha256 {
+        return Err(FilesError::OtherVersion { found: manifest.sha256, now });
+    }
+    let mut recorded = Recorded { folder: folder.to_path_buf(), answers: BTreeMap::new(), stray: None };
+    for path in answer_files(folder)? {
+        for (i, line) in read(&path)?.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+            recorded.take(line, || format!("{}, line {}", path.display(), i + 1));
+        }
+    }
+    Ok((plan, recorded))
+}
+
+fn read(path: &Path) -> Result<String, FilesError> {
+    std::fs::read_to_string(path).map_err(|source| FilesError::Read { path: path.to_path_buf(), source })
+}
+
+fn answer_files(folder: &Path) -> Result<Vec<PathBuf>, FilesError> {
+    let mut files: Vec<PathBuf> =
+        std::fs::read_dir(folder.join("answers")).into_iter().flatten().flatten().map(|f| f.path()).collect();
+    files.sort();
+    let single = folder.join("answers.jsonl");
+    if files.is_empty() || single.is_file() {
+        files.insert(0, single);
+    }
+    Ok(files)
+}
+
+impl Recorded {
+    /// Files a line under the problem that it answers.
+    fn take(&mut self, line: &str, place: impl Fn() -> String) {
+        let answer = read_line(line);
+        let id = answer.as_ref().map_or_else(|_| id_in(line).map(str::to_string), |a| Some(a.id.clone()));
+        match (id, answer) {
+            (Some(id), answer) => {
+                let filed = if self.answers.contains_key(&id) { Err(Breakage::Twice) } else { answer };
+                self.answers.insert(id, filed);
+            }
+            (None, Err(why)) => _ = self.stray.get_or_insert_with(|| format!("{}: {why}", place())),
+            (None, Ok(_)) => {}
+        }
+    }
+}
+
+impl Solver for Recorded {
+    fn name(&self) -> String {
+        format!("answers in {}", self.folder.display())
+    }
+
+    fn ask(&self, problem: &Problem) -> Result<Answer, Breakage> {
+        let stray = self.stray.as_ref().map_or(String::new(), |stray| format!(" ({stray})"));
+        let missing = || Err(Breakage::Missing { what: format!("the answer to {}{stray}", problem.id) });
+        self.answers.get(&problem.id).cloned().unwrap_or_else(missing)
+    }
+}

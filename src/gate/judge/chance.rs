@@ -1,0 +1,99 @@
+//! How likely is the evidence if the solver is right? p-values that are right for any number of problems.
+
+use calibench::evaluate::distribution::{ChiSquare, normal_cdf};
+use statrs::distribution::{Binomial, ContinuousCDF, DiscreteCDF, FisherSnedecor, Normal};
+
+/// Above this many degrees of freedom the cube root of a chi-squared variable is normal to 1e-5 in probability, and the series
+/// of the incomplete gamma function would take thousands of terms.
+const WILSON_HILFERTY: usize = 20_000;
+
+/// Chance that a normal variable is at least `|z|` from zero.
+pub fn normal(z: f64) -> f64 {
+    if z.is_nan() { 0.0 } else { (2.0 * normal_cdf(-z.abs())).min(1.0) }
+}
+
+/// Chance that a sum of squares of `freedom` standard normal variables exceeds `x`.
+pub fn above(x: f64, freedom: usize) -> f64 {
+    if !x.is_finite() {
+        return 0.0;
+    }
+    if freedom > WILSON_HILFERTY {
+        normal_cdf(-wilson_hilferty(x, freedom))
+    } else {
+        ChiSquare::new(freedom).survival(x)
+    }
+}
+
+/// Chance that it lies at least as far from its middle, both sides counted.
+pub fn both_sides(x: f64, freedom: usize) -> f64 {
+    if !x.is_finite() {
+        return 0.0;
+    }
+    if freedom > WILSON_HILFERTY {
+        return normal(wilson_hilferty(x, freedom));
+    }
+    let chi = ChiSquare::new(freedom);
+    (2.0 * chi.cdf(x).min(chi.survival(x))).min(1.0)
+}
+
+/// Wilson & Hilferty (1931): the standard normal equivalent.
+fn wilson_hilferty(x: f64, freedom: usize) -> f64 {
+    let spread = 2.0 / (9.0 * freedom as f64);
+    (libm::cbrt(x / freedom as f64) - (1.0 - spread)) / spread.sqrt()
+}
+
+/// The normal score of an F-distributed value; within +-8.
+pub fn normal_score_of_f(x: f64, above: usize, below: usize) -> f64 {
+    const LARGEST: f64 = 8.0;
+    let Ok(f) = FisherSnedecor::new(above as f64, below as f64) else { return 0.0 };
+    if !x.is_finite() {
+        return LARGEST;
+    }
+    let x = x.max(0.0);
+    let (low, high) = (f.cdf(x), f.sf(x));
+    let standard = Normal::standard();
+    // The smaller tail keeps its digits.
+    let score = if low < high { standard.inverse_cdf(low) } else { -standard.inverse_cdf(high) };
+    if score.is_nan() { LARGEST } else { score.clamp(-LARGEST, LARGEST) }
+}
+
+/// Chance of at least `count` among `trials` where each happens with `rate`.
+pub fn at_least(count: usize, trials: usize, rate: f64) -> f64 {
+    if count == 0 {
+        return 1.0;
+    }
+    Binomial::new(rate, trials as u64).map_or(1.0, |b| b.sf(count as u64 - 1))
+}
+
+/// The chance that the smallest of `count` p-values is this small (Bonferroni).
+pub fn smallest_of(count: usize, p: f64) -> f64 {
+    (count as f64 * p).min(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tails_agree_where_the_two_ways_meet() {
+        let n = WILSON_HILFERTY;
+        for z in [-4.0, -1.0, 2.0, 4.5] {
+            let x = n as f64 + z * (2.0 * n as f64).sqrt();
+            let (exact, approximate) = (both_sides(x, n), normal(wilson_hilferty(x, n)));
+            assert!((exact / approximate - 1.0).abs() < 1e-2, "{z}: {exact} {approximate}");
+        }
+    }
+
+    #[test]
+    fn the_score_of_the_median_is_zero_and_rises() {
+        assert!(normal_score_of_f(1.0, 40, 40).abs() < 1e-9);
+        assert!(normal_score_of_f(30.0, 6, 474) > normal_score_of_f(2.0, 6, 474));
+        assert_eq!(normal_score_of_f(f64::INFINITY, 6, 474), 8.0);
+    }
+
+    #[test]
+    fn a_binomial_tail_counts_from_the_number_itself() {
+        assert!((at_least(1, 2, 0.5) - 0.75).abs() < 1e-12);
+        assert_eq!(at_least(0, 10, 0.1), 1.0);
+    }
+}

@@ -1,0 +1,104 @@
+//! What needs no statistics? The protocol, held values, exact data, and the same bits twice.
+
+use super::checks::{Basis, Check, Property};
+use super::{Answers, Terms, equivalent_noise_px, estimate};
+use crate::plan::Purpose;
+use crate::suite::Scenario;
+use crate::trial::Seen;
+use calibench::io::significant;
+
+/// An error of exact data that noise of this size on every coordinate would cause: double precision leaves below 1e-10 px,
+/// single precision about 1e-5 px.
+const EXACT_PX: f64 = 1e-6;
+
+/// Whether every problem had a well-formed answer.
+pub(super) fn protocol(scenario: &Scenario, answers: &Answers<'_>) -> Vec<Check> {
+    let broken: Vec<_> = answers
+        .cases
+        .iter()
+        .filter_map(|(_, seen)| match seen {
+            Seen::Broken(breakage) => Some(breakage),
+            _ => None,
+        })
+        .collect();
+    let count = answers.cases.len();
+    let evidence = match broken.first() {
+        None => format!("{count} well-formed answers"),
+        Some(first) => format!("{} of {count} broken, first: {first}", broken.len()),
+    };
+    let protocol =
+        Check::new(Property::Protocol, scenario.id, Basis::Certain(broken.is_empty()), count, evidence);
+    let changed = answers.cases.iter().filter_map(|(_, seen)| estimate(seen)?.held_changed).next();
+    let evidence = match changed {
+        None => "kept".to_string(),
+        Some((parameter, wanted, got)) => format!("{parameter} held at {wanted}, answered {got}"),
+    };
+    let held =
+        Check::new(Property::HeldValues, scenario.id, Basis::Certain(changed.is_none()), count, evidence);
+    vec![protocol, held.gravely()]
+}
+
+pub(super) fn check(scenario: &Scenario, answers: &Answers<'_>, terms: &Terms) -> Vec<Check> {
+    let mut checks = Vec::new();
+    checks.extend(answers.for_purpose(Purpose::Exact).next().map(|(_, seen)| exactness(scenario, seen)));
+    checks.extend(determinism(scenario, answers));
+    checks.extend(time(scenario, answers, terms.median_seconds));
+    checks
+}
+
+fn exactness(scenario: &Scenario, seen: &Seen) -> Check {
+    let Some(trial) = estimate(seen) else {
+        let evidence = "no estimate from exact data";
+        return Check::new(Property::Exactness, scenario.id, Basis::Certain(false), 1, evidence);
+    };
+    let camera_px = equivalent_noise_px(scenario, trial.nees, trial.errors.len());
+    let worst_pose = trial.pose_nees.iter().flatten().fold(0.0f64, |worst, nees| worst.max(*nees));
+    let pose_px = equivalent_noise_px(scenario, worst_pose, 6);
+    // Written so that NaN fails.
+    let held = camera_px <= EXACT_PX && pose_px <= EXACT_PX;
+    let poses = match trial.pose_nees {
+        Some(_) => format!("worst pose {} px", significant(pose_px, 2)),
+        None => "poses not stated".to_string(),
+    };
+    let evidence =
+        format!("error as of noise of {} px, {poses}; limit {EXACT_PX} px", significant(camera_px, 2));
+    Check::new(Property::Exactness, scenario.id, Basis::Certain(held), 1, evidence)
+}
+
+fn determinism(scenario: &Scenario, answers: &Answers<'_>) -> Option<Check> {
+    let first: Vec<_> = answers.for_purpose(Purpose::Sample).collect();
+    let pairs: Vec<(&Seen, &Seen)> = answers
+        .for_purpose(Purpose::Repeat)
+        .filter_map(|(trial, again)| Some((first.iter().find(|(t, _)| *t == trial)?.1, again)))
+        .collect();
+    let differs = |(a, b): &&(&Seen, &Seen)| match (a, b) {
+        (Seen::Estimate(a), Seen::Estimate(b)) => a.bits != b.bits,
+        (Seen::Refused { .. }, Seen::Refused { .. }) => false,
+        // A broken answer is the protocol's business.
+        (Seen::Broken(_), _) | (_, Seen::Broken(_)) => false,
+        _ => true,
+    };
+    let different = pairs.iter().filter(differs).count();
+    let evidence = format!("{different} of {} repeated problems differ in their bits", pairs.len());
+    let basis = Basis::Certain(different == 0);
+    (!pairs.is_empty()).then(|| Check::new(Property::Determinism, scenario.id, basis, pairs.len(), evidence))
+}
+
+fn time(scenario: &Scenario, answers: &Answers<'_>, limit_s: Option<f64>) -> Option<Check> {
+    let mut milliseconds: Vec<f64> = answers
+        .for_purpose(Purpose::Sample)
+        .filter_map(|(_, seen)| match seen {
+            Seen::Estimate(trial) => Some(1e3 * trial.seconds),
+            Seen::Refused { seconds, .. } => Some(1e3 * seconds),
+            Seen::Broken(_) => None,
+        })
+        .collect();
+    milliseconds.sort_by(f64::total_cmp);
+    let last = milliseconds.len().checked_sub(1)?;
+    let at = |share: f64| milliseconds[(share * last as f64) as usize];
+    let limit = limit_s.map_or(String::new(), |s| format!("; limit {} ms", significant(1e3 * s, 3)));
+    let evidence =
+        format!("median {} ms, 95 % within {} ms{limit}", significant(at(0.5), 3), significant(at(0.95), 3));
+    let basis = limit_s.map_or(Basis::Told, |s| Basis::Certain(at(0.5) <= 1e3 * s));
+    Some(Check::new(Property::Time, scenario.id, basis, milliseconds.len(), evidence))
+}

@@ -1,0 +1,71 @@
+//! Which RMSE does the solver state, and is it as large as it should be?
+
+use super::checks::{Basis, Check, Property};
+use super::{Answers, chance};
+use crate::suite::Scenario;
+use crate::trial::Trial;
+use calibench::io::significant;
+
+/// Two definitions differ by more than this part on every scene of the suite; rounding and stopping rules by far less.
+const SAME_RATIO: f64 = 2e-3;
+
+/// The ways in which programs divide a sum of squared residuals over `N` points with `d` degrees of freedom.
+fn definitions(points: f64, freedom: f64) -> [(&'static str, f64); 5] {
+    [
+        ("per point: sqrt(sum / N)", 1.0),
+        ("per coordinate: sqrt(sum / 2N)", std::f64::consts::FRAC_1_SQRT_2),
+        ("by degrees of freedom: sqrt(sum / (2N - p))", (points / freedom).sqrt()),
+        ("per point by degrees of freedom: sqrt(sum / (N - p / 2))", (2.0 * points / freedom).sqrt()),
+        ("root of the sum", points.sqrt()),
+    ]
+}
+
+pub(super) fn check(scenario: &Scenario, answers: &Answers<'_>) -> Vec<Check> {
+    let samples = answers.samples();
+    let stated: Vec<(&Trial, f64)> = samples.iter().filter_map(|t| Some((*t, t.rmse_px?))).collect();
+    if stated.is_empty() {
+        let silent = |property| Check::new(property, scenario.id, Basis::Told, 0, "no RMSE stated");
+        return vec![silent(Property::RmseDefinition), silent(Property::Rmse)];
+    }
+    let points = scenario.scene.observations() as f64;
+    let freedom = scenario.degrees_of_freedom();
+    let ratios: Vec<f64> = stated
+        .iter()
+        .filter_map(|(trial, rmse)| Some(rmse / (trial.refitted_square? / points).sqrt()))
+        .collect();
+    let known = definitions(points, freedom as f64).into_iter().find(|(_, factor)| {
+        !ratios.is_empty() && ratios.iter().all(|r| (r / factor - 1.0).abs() <= SAME_RATIO)
+    });
+    let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+    let evidence = match known {
+        Some((name, _)) => format!("stated {name}"),
+        None => format!("stated is {} times sqrt(sum / N): no definition known", significant(mean, 4)),
+    };
+    let per_point = known.is_some_and(|(_, factor)| factor == 1.0);
+    let definition =
+        Check::new(Property::RmseDefinition, scenario.id, Basis::Certain(per_point), ratios.len(), evidence);
+    let factor = known.map_or(1.0, |(_, factor)| factor);
+    vec![definition, distribution(scenario, &stated, factor, points, freedom)]
+}
+
+/// `sum N rmse^2 / sigma^2` is chi-squared, whatever the definition once it is known.
+fn distribution(
+    scenario: &Scenario,
+    stated: &[(&Trial, f64)],
+    factor: f64,
+    points: f64,
+    freedom: usize,
+) -> Check {
+    let scale = points / (factor * factor * scenario.sigma_px * scenario.sigma_px);
+    let sum: f64 = stated.iter().map(|(_, rmse)| rmse * rmse * scale).sum();
+    let all = freedom * stated.len();
+    let expected = (all as f64 / (stated.len() as f64 * points)).sqrt() * scenario.sigma_px;
+    let seen = (sum / (stated.len() as f64 * points)).sqrt() * scenario.sigma_px;
+    let evidence = format!(
+        "root mean square {} px per point, expected {} px",
+        significant(seen, 5),
+        significant(expected, 5)
+    );
+    let basis = Basis::Chance(chance::both_sides(sum, all));
+    Check::new(Property::Rmse, scenario.id, basis, stated.len(), evidence)
+}

@@ -1,0 +1,235 @@
+//! Do many errors together look as theory says? Bias, variance, joint size, poses and stated covariance against the bound.
+//!
+//! To first order the error of a maximum-likelihood estimate is normal with the Cramer-Rao bound `P` as its covariance, so every
+//! statistic below has a known distribution for any number of samples.
+
+use super::checks::{Basis, Check, Property};
+use super::{Answers, chance};
+use crate::plan::Purpose;
+use crate::suite::Scenario;
+use crate::trial::{Seen, Trial};
+use calibench::camera::Parameter;
+use calibench::io::significant;
+
+/// Share of good problems that a solver may leave unanswered.
+const UNANSWERED: f64 = 1e-3;
+
+pub(super) fn check(scenario: &Scenario, answers: &Answers<'_>) -> Vec<Check> {
+    let samples = answers.samples();
+    let mut checks = vec![convergence(scenario, answers)];
+    if samples.is_empty() {
+        return checks;
+    }
+    let about = About { scenario, samples: &samples };
+    checks.push(about.no_silent_failure());
+    checks.push(about.bias());
+    checks.extend(about.variance());
+    checks.push(about.nees());
+    checks.push(about.poses());
+    checks.push(about.covariance());
+    checks
+}
+
+fn convergence(scenario: &Scenario, answers: &Answers<'_>) -> Check {
+    let mut first = None;
+    let (mut asked, mut refused) = (0, 0);
+    for (_, seen) in answers.for_purpose(Purpose::Sample) {
+        asked += 1;
+        if let Seen::Refused { reason, .. } = seen {
+            refused += 1;
+            first.get_or_insert(reason);
+        }
+    }
+    let p = chance::at_least(refused, asked, UNANSWERED);
+    let evidence = match first {
+        None => format!("no good problem of {asked} left unanswered"),
+        Some(reason) => format!("{refused} of {asked} good problems left unanswered, first: {reason}"),
+    };
+    Check::new(Property::Convergence, scenario.id, Basis::Chance(p), asked, evidence)
+}
+
+/// The samples of a scenario that have an estimate; at least one.
+struct About<'a> {
+    scenario: &'a Scenario,
+    samples: &'a [&'a Trial],
+}
+
+/// The worst of several p-values, with what it belongs to.
+struct Worst {
+    p: f64,
+    parameter: Parameter,
+    value: f64,
+}
+
+impl About<'_> {
+    fn check(&self, property: Property, p: f64, evidence: String) -> Check {
+        Check::new(property, self.scenario.id, Basis::Chance(p), self.samples.len(), evidence)
+    }
+
+    fn n(&self) -> f64 {
+        self.samples.len() as f64
+    }
+
+    fn dimensions(&self) -> usize {
+        self.scenario.free.len()
+    }
+
+    /// Errors of one parameter in standard deviations of the bound.
+    fn standardised(&self, i: usize, parameter: Parameter) -> impl Iterator<Item = f64> {
+        let sd = self.scenario.bound.standard_deviation(parameter).unwrap_or(f64::NAN);
+        self.samples.iter().map(move |trial| trial.errors[i] / sd)
+    }
+
+    /// The parameter with the smallest p-value of `judge`, which gives the value to tell and its p-value.
+    fn worst(&self, judge: impl Fn(usize, Parameter) -> (f64, f64)) -> Option<Worst> {
+        let each = self.scenario.free.iter().enumerate().map(|(i, parameter)| {
+            let (value, p) = judge(i, parameter);
+            Worst { p, parameter, value }
+        });
+        each.min_by(|a, b| a.p.total_cmp(&b.p))
+    }
+
+    fn no_silent_failure(&self) -> Check {
+        let silent = self.samples.iter().filter(|trial| trial.warnings == 0);
+        let worst =
+            silent.map(|trial| trial.nees).fold(0.0f64, |worst, x| if x <= worst { worst } else { x });
+        let p = chance::smallest_of(self.samples.len(), chance::above(worst, self.dimensions()));
+        let evidence = format!(
+            "worst error {} standard deviations (root of its squared Mahalanobis distance)",
+            significant(worst.sqrt(), 3)
+        );
+        self.check(Property::NoSilentFailure, p, evidence).gravely()
+    }
+
+    /// Each parameter's mean is normal, and all means together are chi-squared: a small error of one parameter that others
+    /// should have followed shows in the second only.
+    fn bias(&self) -> Check {
+        let mean = |i: usize| self.samples.iter().map(|t| t.errors[i]).sum::<f64>() / self.n();
+        let means: Vec<f64> = (0..self.dimensions()).map(mean).collect();
+        let square = self.n() * self.scenario.bound.normalised_error_squared(&means).unwrap_or(f64::INFINITY);
+        let joint = chance::above(square, self.dimensions());
+        let worst = self.worst(|i, parameter| {
+            let bias = self.standardised(i, parameter).sum::<f64>() / self.n();
+            (bias, chance::normal(bias * self.n().sqrt()))
+        });
+        let Some(worst) = worst else { return self.check(Property::Bias, joint, "nothing is free".into()) };
+        let p = chance::smallest_of(2, joint.min(chance::smallest_of(self.dimensions(), worst.p)));
+        let evidence = format!(
+            "largest bias {} of {} standard deviations; all together chi-squared {} on {}",
+            worst.parameter,
+            significant(worst.value, 3),
+            significant(square, 3),
+            self.dimensions()
+        );
+        self.check(Property::Bias, p, evidence)
+    }
+
+    fn variance(&self) -> Option<Check> {
+        let freedom = self.samples.len().checked_sub(1).filter(|&f| f > 0)?;
+        let worst = self.worst(|i, parameter| {
+            let mean = self.standardised(i, parameter).sum::<f64>() / self.n();
+            let sum: f64 = self.standardised(i, parameter).map(|z| (z - mean) * (z - mean)).sum();
+            (sum / freedom as f64, chance::both_sides(sum, freedom))
+        })?;
+        let evidence =
+            format!("worst {}: variance {} of the bound's", worst.parameter, significant(worst.value, 4));
+        Some(self.check(Property::Variance, chance::smallest_of(self.dimensions(), worst.p), evidence))
+    }
+
+    fn nees(&self) -> Check {
+        let sum: f64 = self.samples.iter().map(|trial| trial.nees).sum();
+        let p = chance::both_sides(sum, self.dimensions() * self.samples.len());
+        let evidence = format!("mean {}, expected {}", significant(sum / self.n(), 4), self.dimensions());
+        self.check(Property::Nees, p, evidence)
+    }
+
+    /// Residuals of all stated poses, and the error of each sample's first pose: other poses of the sample depend on it.
+    fn poses(&self) -> Check {
+        let stated: Vec<(f64, f64)> =
+            self.samples.iter().filter_map(|t| Some((t.square?, *t.pose_nees.as_ref()?.first()?))).collect();
+        if stated.is_empty() {
+            return Check::new(Property::Poses, self.scenario.id, Basis::Told, 0, "no poses stated");
+        }
+        let count = stated.len();
+        let variance = self.scenario.sigma_px * self.scenario.sigma_px;
+        let residual: f64 = stated.iter().map(|(square, _)| square / variance).sum();
+        let freedom = count * self.scenario.degrees_of_freedom();
+        let error: f64 = stated.iter().map(|(_, nees)| nees).sum();
+        let p = chance::both_sides(residual, freedom).min(chance::both_sides(error, 6 * count));
+        let evidence = format!(
+            "residuals {} of what noise leaves, first pose's mean squared error {} of the bound's",
+            significant((residual / freedom as f64).sqrt(), 4),
+            significant(error / (6 * count) as f64, 4)
+        );
+        self.check(Property::Poses, chance::smallest_of(2, p), evidence)
+    }
+
+    /// A stated variance is the bound's times an estimate of the noise, `chi-squared / d`; and errors in units of the stated
+    /// covariance follow an F distribution, whose normal scores have a mean of zero.
+    fn covariance(&self) -> Check {
+        let stated: Vec<&[f64]> =
+            self.samples.iter().filter_map(|t| t.standard_deviations.as_deref()).collect();
+        if stated.is_empty() {
+            let evidence = "no standard deviations stated";
+            return Check::new(Property::Covariance, self.scenario.id, Basis::Told, 0, evidence);
+        }
+        let freedom = self.scenario.degrees_of_freedom();
+        let all = freedom * stated.len();
+        let worst = self.worst(|i, parameter| {
+            let sd = self.scenario.bound.standard_deviation(parameter).unwrap_or(f64::NAN);
+            let sum: f64 = stated.iter().map(|s| (s[i] / sd) * (s[i] / sd)).sum();
+            (sum / stated.len() as f64, chance::both_sides(sum * freedom as f64, all))
+        });
+        let Some(worst) = worst else {
+            return Check::new(Property::Covariance, self.scenario.id, Basis::Told, 0, "nothing is free");
+        };
+        let mut p = chance::smallest_of(self.dimensions(), worst.p);
+        let mut evidence = format!(
+            "worst {}: stated variance {} of the bound's",
+            worst.parameter,
+            significant(worst.value, 4)
+        );
+        evidence.push_str(self.known_variance_fault(worst.value, stated.len()).unwrap_or_default());
+        let scores: Vec<f64> = self
+            .samples
+            .iter()
+            .filter_map(|t| {
+                Some(chance::normal_score_of_f(
+                    t.own_nees? / self.dimensions() as f64,
+                    self.dimensions(),
+                    freedom,
+                ))
+            })
+            .collect();
+        if !scores.is_empty() {
+            let z = scores.iter().sum::<f64>() / (scores.len() as f64).sqrt();
+            p = chance::smallest_of(2, p.min(chance::normal(z)));
+            evidence.push_str(&format!(
+                "; errors in its units: mean score {}",
+                significant(z / (scores.len() as f64).sqrt(), 3)
+            ));
+        }
+        self.check(Property::Covariance, p, evidence)
+    }
+
+    /// A factor that programs are known for, where the mean of `count` ratios tells it from chance.
+    fn known_variance_fault(&self, ratio: f64, count: usize) -> Option<&'static str> {
+        let freedom = self.scenario.degrees_of_freedom() as f64;
+        let coordinates = 2.0 * self.scene_points();
+        let spread = (2.0 / (freedom * count as f64)).sqrt();
+        let near = |factor: f64| (ratio / factor - 1.0).abs() < 4.0 * spread;
+        let known = [
+            (freedom / coordinates, " (residual variance over 2N instead of 2N - p)"),
+            (2.0 * freedom / coordinates, " (residual variance over N instead of 2N - p)"),
+            (2.0, " (per-point instead of per-coordinate variance)"),
+        ];
+        if near(1.0) {
+            return None;
+        }
+        known.into_iter().find(|(factor, _)| near(*factor)).map(|(_, name)| name)
+    }
+
+    fn scene_points(&self) -> f64 {
+        self.scenario.scene.observations() as f64
+    }
+}

@@ -1,0 +1,297 @@
+//! What did a change of the solver change? Two solvers on the same problems, compared answer by answer.
+//!
+//! The noise is common to both, so it cancels in the difference: a shift far too small for two separate verdicts shows.
+
+use super::judge::{Check, Property, Verdict};
+use super::plan::{Plan, Purpose};
+use super::suite::{Demand, Scenario};
+use super::trial::{Seen, Trial};
+use calibench::camera::Parameter;
+use calibench::evaluate::distribution::normal_cdf;
+use calibench::evaluate::interval::each_of;
+use calibench::io::significant;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// A mean difference or an excess of spread below this part of a standard deviation is no change that matters, however certain.
+const RELEVANT: f64 = 1e-3;
+
+/// One scenario, compared.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Scenario.
+    pub scenario: &'static str,
+    /// Problems that both answered.
+    pub pairs: usize,
+    /// Problems that only the new solver left unanswered.
+    pub lost: usize,
+    /// Problems that only the reference left unanswered.
+    pub gained: usize,
+    /// Answers whose bits differ.
+    pub bits: usize,
+    /// Largest difference of a parameter, in standard deviations of the bound.
+    pub largest: f64,
+    /// Parameter whose mean moved most certainly, its mean difference in standard deviations, and the p-value.
+    pub shift: Option<(String, f64, f64)>,
+    /// Parameter whose spread changed most certainly, the ratio of variances new / reference, and the p-value.
+    pub spread: Option<(String, f64, f64)>,
+    /// Median time new / reference.
+    pub time: f64,
+}
+
+/// The comparison of two runs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Paired {
+    /// The new solver.
+    pub solver: String,
+    /// The reference.
+    pub reference: String,
+    /// Chance that two solvers of the same law are told apart by any test.
+    pub false_alarm_rate: f64,
+    /// Number of tests that share it.
+    pub tests: usize,
+    /// Scenario by scenario.
+    pub comparisons: Vec<Comparison>,
+    /// Checks whose verdict differs: property, scenario, reference's, new.
+    pub verdicts: Vec<(Property, &'static str, Verdict, Verdict)>,
+}
+
+/// Compares what was seen of two solvers on the same plan, and their checks.
+pub fn compare(
+    plan: &Plan,
+    (solver, new, new_checks): (&str, &[Option<Seen>], &[Check]),
+    (reference, old, old_checks): (&str, &[Option<Seen>], &[Check]),
+    false_alarm_rate: f64,
+) -> Paired {
+    let comparisons: Vec<Comparison> = plan
+        .scenarios
+        .iter()
+        .enumerate()
+        .map(|(index, scenario)| {
+            let pairs = plan
+                .cases
+                .iter()
+                .zip(new.iter().zip(old))
+                .filter(|(case, _)| case.scenario == index && case.purpose == Purpose::Sample);
+            of_scenario(scenario, pairs.filter_map(|(_, (n, o))| Some((n.as_ref()?, o.as_ref()?))).collect())
+        })
+        .collect();
+    let parameters: usize = plan.scenarios.iter().map(|s| s.free.len()).sum();
+    let differing = new_checks.iter().zip(old_checks).filter(|(n, o)| n.verdict != o.verdict);
+    Paired {
+        solver: solver.to_string(),
+        reference: reference.to_string(),
+        false_alarm_rate,
+        tests: 2 * parameters,
+        comparisons,
+        verdicts: differing.map(|(n, o)| (n.property, n.scenario, o.verdict, n.verdict)).collect(),
+    }
+}
+
+/// A paired test: what is told, and its p-value.
+type Test = fn(&[(f64, f64)]) -> Option<(f64, f64)>;
+
+fn of_scenario(scenario: &Scenario, replies: Vec<(&Seen, &Seen)>) -> Comparison {
+    let estimate = |seen: &Seen| matches!(seen, Seen::Estimate(_));
+    let both: Vec<(&Trial, &Trial)> = replies
+        .iter()
+        .filter_map(|pair| match pair {
+            (Seen::Estimate(n), Seen::Estimate(o)) => Some((n.as_ref(), o.as_ref())),
+            _ => None,
+        })
+        .collect();
+    let sd: Vec<f64> =
+        scenario.free.iter().map(|p| scenario.bound.standard_deviation(p).unwrap_or(f64::NAN)).collect();
+    let standardised = |i: usize| -> Vec<(f64, f64)> {
+        both.iter().map(|(n, o)| (n.errors[i] / sd[i], o.errors[i] / sd[i])).collect()
+    };
+    let names: Vec<Parameter> = scenario.free.iter().collect();
+    let most_certain = |test: Test| {
+        let each = names.iter().enumerate().filter_map(|(i, name)| {
+            let (value, p) = test(&standardised(i))?;
+            Some((name.name().to_string(), value, p))
+        });
+        each.min_by(|a, b| a.2.total_cmp(&b.2))
+    };
+    let lawful = scenario.demand == Demand::Law;
+    Comparison {
+        scenario: scenario.id,
+        pairs: both.len(),
+        lost: replies.iter().filter(|(n, o)| !estimate(n) && estimate(o)).count(),
+        gained: replies.iter().filter(|(n, o)| estimate(n) && !estimate(o)).count(),
+        bits: both.iter().filter(|(n, o)| n.bits != o.bits).count(),
+        largest: (0..names.len()).flat_map(standardised).map(|(n, o)| (n - o).abs()).fold(0.0, f64::max),
+        shift: most_certain(shift).filter(|_| lawful),
+        spread: most_certain(spread).filter(|_| lawful),
+        time: median(both.iter().map(|(n, _)| n.seconds)) / median(both.iter().map(|(_, o)| o.seconds)),
+    }
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+fn two_sided(z: f64) -> f64 {
+    (2.0 * normal_cdf(-z.abs())).min(1.0)
+}
+
+/// Mean difference, and how likely chance makes it (paired z-test).
+fn shift(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
+    let n = pairs.len() as f64;
+    let mean = pairs.iter().map(|(a, b)| a - b).sum::<f64>() / n;
+    let square: f64 = pairs.iter().map(|(a, b)| (a - b - mean) * (a - b - mean)).sum();
+    // Fewer pairs make the normal approximation of Student's distribution too bold at small probabilities.
+    if pairs.len() < 30 || (square == 0.0 && mean == 0.0) {
+        return None;
+    }
+    let error = (square / (n - 1.0) / n).sqrt();
+    Some((mean, if error > 0.0 { two_sided(mean / error) } else { 0.0 }))
+}
+
+/// Ratio of variances, and how likely chance makes it: sum and difference of two variables of equal variance are uncorrelated
+/// (Pitman 1939; Morgan 1939), their correlation tested by Fisher's transformation (1921).
+fn spread(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
+    let n = pairs.len() as f64;
+    if pairs.len() < 30 {
+        return None;
+    }
+    let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / n;
+    let (a, b) = (mean(|p| p.0), mean(|p| p.1));
+    let (mut aa, mut bb, mut ab) = (0.0, 0.0, 0.0);
+    for (x, y) in pairs {
+        aa += (x - a) * (x - a);
+        bb += (y - b) * (y - b);
+        ab += (x - a) * (y - b);
+    }
+    let (sums, differences) = (aa + bb + 2.0 * ab, aa + bb - 2.0 * ab);
+    if !(sums > 0.0 && differences > 0.0) {
+        return None;
+    }
+    let correlation = ((aa - bb) / (sums * differences).sqrt()).clamp(-1.0, 1.0);
+    let z = libm::atanh(correlation) * (n - 3.0).sqrt();
+    Some((aa / bb, two_sided(z)))
+}
+
+/// Whether a verdict is worse than the one before; what is no longer stated is.
+fn worse(old: Verdict, new: Verdict) -> bool {
+    match (old, new) {
+        (_, Verdict::NotJudged) => true,
+        (Verdict::NotJudged, new) => new >= Verdict::Failed,
+        (old, new) => new > old,
+    }
+}
+
+impl Paired {
+    fn certain(&self, p: f64) -> bool {
+        p <= each_of(self.tests, self.false_alarm_rate)
+    }
+
+    /// Whether a scenario's estimates moved by an amount that matters and that chance does not explain.
+    pub fn moved(&self, c: &Comparison) -> bool {
+        let shifted = c.shift.as_ref().is_some_and(|(_, d, p)| d.abs() > RELEVANT && self.certain(*p));
+        let spread =
+            c.spread.as_ref().is_some_and(|(_, r, p)| (r - 1.0).abs() > RELEVANT && self.certain(*p));
+        shifted || spread || c.lost > 0
+    }
+
+    /// Whether nothing that matters changed: what is no longer stated counts as changed.
+    pub fn held(&self) -> bool {
+        !self.comparisons.iter().any(|c| self.moved(c))
+            && !self.verdicts.iter().any(|(_, _, old, new)| worse(*old, *new))
+    }
+
+    /// One line a scenario, then what follows.
+    pub fn to_text(&self) -> String {
+        let mut text = format!(
+            "gate: {} against {}, same problems\n\n{:<18} {:>6} {:>6} {:>10}  {:<24} {:<24} {:>6}\n",
+            self.solver,
+            self.reference,
+            "scenario",
+            "pairs",
+            "bits",
+            "largest/sd",
+            "mean shift/sd",
+            "variance ratio",
+            "time"
+        );
+        let told = |test: &Option<(String, f64, f64)>| match test {
+            Some((name, value, p)) => format!("{name} {} p={}", significant(*value, 4), significant(*p, 1)),
+            None => "-".to_string(),
+        };
+        for c in &self.comparisons {
+            text.push_str(&format!(
+                "{:<18} {:>6} {:>6} {:>10}  {:<24} {:<24} {:>6}{}\n",
+                c.scenario,
+                c.pairs,
+                c.bits,
+                significant(c.largest, 2),
+                told(&c.shift),
+                told(&c.spread),
+                significant(c.time, 2),
+                if self.moved(c) { "  MOVED" } else { "" }
+            ));
+            if c.lost + c.gained > 0 {
+                text.push_str(&format!("{:<18} {} answers lost, {} gained\n", "", c.lost, c.gained));
+            }
+        }
+        let mut changes: BTreeMap<(Property, Verdict, Verdict), Vec<&str>> = BTreeMap::new();
+        for (property, scenario, old, new) in &self.verdicts {
+            changes.entry((*property, *old, *new)).or_default().push(scenario);
+        }
+        for ((property, old, new), scenarios) in changes {
+            let (first, count) = (scenarios[0], scenarios.len());
+            let others = if count > 1 { format!(" and {} more", count - 1) } else { String::new() };
+            text.push_str(&format!(
+                "{}: {} -> {} ({first}{others})\n",
+                property.name(),
+                old.word(),
+                new.word()
+            ));
+        }
+        let bits: usize = self.comparisons.iter().map(|c| c.bits).sum();
+        let conclusion = match (self.held(), bits) {
+            (true, 0) => "SAME: not a bit differs",
+            (true, _) => "SAME LAW: bits differ, nothing that matters does",
+            (false, _) => "CHANGED",
+        };
+        text.push_str(&format!(
+            "\n{conclusion}; median time {} of the reference's\nby chance two solvers of one law are told apart in one run of {} \
+             ({} tests, Bonferroni)\n",
+            significant(median(self.comparisons.iter().map(|c| c.time)), 3),
+            significant(1.0 / self.false_alarm_rate, 3),
+            self.tests
+        ));
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use calibench::synth::{Stream, StreamKey};
+
+    fn pairs(change: impl Fn(f64, f64) -> f64) -> Vec<(f64, f64)> {
+        let mut stream = Stream::open(StreamKey { seed: 1, scenario: "paired", trial: 0, purpose: "noise" });
+        (0..400).map(|_| (stream.normal(), stream.normal())).map(|(x, y)| (change(x, y), x)).collect()
+    }
+
+    #[test]
+    fn a_shift_far_below_the_noise_is_seen_and_chance_is_not() {
+        // Difference 0.01 + 0.02 y: its mean is 10 standard errors from zero.
+        let (mean, p) = shift(&pairs(|x, y| x + 0.01 + 0.02 * y)).unwrap();
+        assert!((mean - 0.01).abs() < 0.005 && p < 1e-9, "{mean} {p}");
+        let (_, p) = shift(&pairs(|x, y| x + 0.02 * y)).unwrap();
+        assert!(p > 1e-4, "{p}");
+        assert_eq!(shift(&pairs(|x, _| x)), None);
+    }
+
+    #[test]
+    fn two_per_cent_more_spread_are_seen_on_common_noise() {
+        let (ratio, p) = spread(&pairs(|x, y| 1.01 * x + 0.01 * y)).unwrap();
+        assert!((ratio - 1.02).abs() < 0.01 && p < 1e-9, "{ratio} {p}");
+        let (_, p) = spread(&pairs(|x, y| (x + 0.1 * y) / 1.01f64.sqrt())).unwrap();
+        assert!(p > 1e-4, "{p}");
+    }
+}

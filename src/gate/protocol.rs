@@ -1,0 +1,160 @@
+//! What is said between the gate and a solver? One JSON object a line: problems one way, answers the other.
+//!
+//! The page for authors of solvers is `adapters/PROTOCOL.md`; the schemas in `adapters/` are generated from these types.
+
+use calibench::geometry::{Mat3, Pose, Vec3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// A calibration problem: a line on the solver's standard input.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Problem {
+    /// Name of the problem; the answer repeats it.
+    pub id: String,
+    /// Image width and height, px.
+    pub image_size: [usize; 2],
+    /// What was seen in each photograph.
+    pub views: Vec<ProblemView>,
+    /// Names of the parameters to estimate, among `fx fy cx cy skew k1 k2 p1 p2 k3`.
+    pub free: Vec<String>,
+    /// Values of all the other parameters. The answer must keep them.
+    pub held: BTreeMap<String, f64>,
+}
+
+/// One photograph: `target[i]` was seen at `pixels[i]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ProblemView {
+    /// Points of the target's plane Z = 0, in the target's unit.
+    pub target: Vec<[f64; 2]>,
+    /// Pixels (u right, v down; (0, 0) is the centre of the top-left pixel). `null` is a coordinate that was not measured:
+    /// bad input, to be refused.
+    #[schemars(with = "Vec<[Option<f64>; 2]>")]
+    pub pixels: Vec<[f64; 2]>,
+}
+
+/// What became of a problem.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// The answer may be used.
+    Ok,
+    /// The data cannot determine the parameters, or are broken.
+    Refused,
+    /// The search did not end in a minimum.
+    NotConverged,
+}
+
+/// The answer to a problem: a line on the solver's standard output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Answer {
+    /// The problem's id.
+    pub id: String,
+    /// What became of it.
+    pub status: Status,
+    /// Value of every free parameter by name; held ones may be repeated. Needed when the status is `ok`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub parameters: BTreeMap<String, f64>,
+    /// One pose a view, camera from target.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub poses: Option<Vec<AnswerPose>>,
+    /// Standard deviation of every free parameter by name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub standard_deviations: Option<BTreeMap<String, f64>>,
+    /// Covariance of the free parameters; takes the place of `standard_deviations`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<AnswerCovariance>,
+    /// `sqrt(sum |r|^2 / N)` over all N points, px.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rmse: Option<f64>,
+    /// What the user should be careful about; an answer with a warning is flagged, not silent.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
+    /// Why there is no estimate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub message: Option<String>,
+}
+
+/// `X_camera = R X_target + t`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct AnswerPose {
+    /// R, row by row.
+    pub rotation: [[f64; 3]; 3],
+    /// t, in the target's unit.
+    pub translation: [f64; 3],
+}
+
+/// A covariance matrix with the names of its rows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct AnswerCovariance {
+    /// Names of rows and columns.
+    pub parameters: Vec<String>,
+    /// The matrix, row by row.
+    pub matrix: Vec<Vec<f64>>,
+}
+
+impl Answer {
+    /// A problem without an estimate.
+    pub fn without_estimate(id: &str, status: Status, message: impl Into<String>) -> Answer {
+        Answer {
+            id: id.to_string(),
+            status,
+            parameters: BTreeMap::new(),
+            poses: None,
+            standard_deviations: None,
+            covariance: None,
+            rmse: None,
+            warnings: Vec::new(),
+            message: Some(message.into()),
+        }
+    }
+}
+
+impl AnswerPose {
+    /// The pose, camera from target.
+    pub fn pose(&self) -> Pose {
+        Pose {
+            rotation: Mat3::from_fn(|r, c| self.rotation[r][c]),
+            translation: Vec3::from(self.translation),
+        }
+    }
+}
+
+impl Problem {
+    /// Number of points over all views.
+    pub fn points(&self) -> usize {
+        self.views.iter().map(|view| view.pixels.len()).sum()
+    }
+
+    /// The line that is sent, without its end.
+    pub fn to_line(&self) -> String {
+        // A pixel that is not a number is written as `null`.
+        serde_json::to_string(self).expect("a problem has text keys only")
+    }
+}
+
+/// The JSON schemas of problem and answer, as they stand in adapters/.
+pub fn schemas() -> [(&'static str, String); 2] {
+    let text = |schema: schemars::Schema| format!("{:#}\n", schema.to_value());
+    [
+        ("problem.schema.json", text(schemars::schema_for!(Problem))),
+        ("answer.schema.json", text(schemars::schema_for!(Answer))),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unmeasured_coordinate_is_written_as_null() {
+        let view = ProblemView { target: vec![[0.0, 1.0]], pixels: vec![[f64::NAN, 2.5]] };
+        assert_eq!(serde_json::to_string(&view).unwrap(), r#"{"target":[[0.0,1.0]],"pixels":[[null,2.5]]}"#);
+    }
+
+    #[test]
+    fn a_short_answer_is_enough() {
+        let answer: Answer = serde_json::from_str(r#"{"id":"a","status":"refused","extra":1}"#).unwrap();
+        assert_eq!((answer.status, answer.parameters.len()), (Status::Refused, 0));
+    }
+}

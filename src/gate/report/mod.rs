@@ -1,0 +1,144 @@
+//! What did the gate find? All checks of a run, decided; told on one screen, as JSON, as JUnit and as a page.
+
+mod html;
+mod junit;
+mod text;
+
+pub use text::COLUMNS;
+
+use super::bad_input::Fault;
+use super::judge::{self, Basis, Check, Property, Terms, Verdict};
+use super::plan::Plan;
+use super::trial::Seen;
+use calibench::io::Commit;
+use serde::Serialize;
+
+/// The outcome of a run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// Name or command of the solver.
+    pub solver: String,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// Samples a scenario.
+    pub samples: usize,
+    /// Problems asked.
+    pub problems: usize,
+    /// Chance that a correct solver fails this run.
+    pub false_alarm_rate: f64,
+    /// Number of checks that share it.
+    pub statistical_checks: usize,
+    /// The worst verdict.
+    pub verdict: Verdict,
+    /// Wall-clock time, s.
+    pub seconds: f64,
+    /// Commit of the gate.
+    pub commit: Option<String>,
+    /// Every check.
+    pub checks: Vec<Check>,
+    /// What was asked.
+    pub scenarios: Vec<Described>,
+}
+
+/// A scenario or a bad problem in words.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Described {
+    /// Its name in checks.
+    pub name: &'static str,
+    /// What is particular about it.
+    pub about: String,
+}
+
+/// One property over all scenarios.
+#[derive(Debug, Clone, Serialize)]
+pub struct Row<'a> {
+    /// Which.
+    pub property: Property,
+    /// The worst verdict.
+    pub verdict: Verdict,
+    /// Checks that hold, of those that were judged.
+    pub held: (usize, usize),
+    /// The check to tell about: the worst, or else the most doubtful.
+    #[serde(skip)]
+    pub telling: &'a Check,
+}
+
+impl Report {
+    /// Judges what was seen.
+    pub fn new(plan: &Plan, solver: &str, seen: &[Option<Seen>], terms: &Terms, seconds: f64) -> Report {
+        let checks = judge::judged(plan, seen, terms);
+        let statistical = checks.iter().filter(|c| matches!(c.basis, Basis::Chance(_))).count();
+        Report {
+            solver: solver.to_string(),
+            seed: plan.seed,
+            samples: plan.samples,
+            problems: seen.iter().flatten().count(),
+            false_alarm_rate: terms.false_alarm_rate,
+            statistical_checks: statistical,
+            verdict: checks.iter().map(|c| c.verdict).max().unwrap_or(Verdict::NotJudged),
+            seconds,
+            commit: None,
+            checks,
+            scenarios: described(plan),
+        }
+    }
+
+    /// States the commit of the gate.
+    pub fn with_commit(self, commit: Option<&Commit>) -> Report {
+        let text = |c: &Commit| format!("{}{}", c.hash, if c.dirty { " with changes" } else { "" });
+        Report { commit: commit.map(text), ..self }
+    }
+
+    /// Whether nothing fails.
+    pub fn held(&self) -> bool {
+        self.verdict < Verdict::Failed
+    }
+
+    /// Checks that fail, the gravest first.
+    pub fn failures(&self) -> Vec<&Check> {
+        let mut failures: Vec<&Check> = self.checks.iter().filter(|c| c.verdict >= Verdict::Failed).collect();
+        failures.sort_by_key(|c| (std::cmp::Reverse(c.verdict), c.property));
+        failures
+    }
+
+    /// One row a property that was looked at.
+    pub fn rows(&self) -> Vec<Row<'_>> {
+        Property::ALL.iter().filter_map(|&property| self.row(property)).collect()
+    }
+
+    fn row(&self, property: Property) -> Option<Row<'_>> {
+        let of_property = || self.checks.iter().filter(move |c| c.property == property);
+        // The worst verdict first, then the least probable evidence; ties go to the first scenario.
+        let doubt = |c: &Check| match c.basis {
+            Basis::Chance(p) => p,
+            _ => 1.0,
+        };
+        let telling = of_property()
+            .reduce(|a, b| if (b.verdict, -doubt(b)) > (a.verdict, -doubt(a)) { b } else { a })?;
+        let judged = of_property().filter(|c| c.verdict != Verdict::NotJudged).count();
+        let held = of_property().filter(|c| c.verdict == Verdict::Held).count();
+        Some(Row { property, verdict: telling.verdict, held: (held, judged), telling })
+    }
+
+    /// The report as JSON: its fields, and under `properties` a verdict each.
+    pub fn to_json(&self) -> String {
+        // Evidence is text and rates are finite, so nothing can fail.
+        let mut value = serde_json::to_value(self).unwrap_or_default();
+        value["properties"] = serde_json::to_value(self.rows()).unwrap_or_default();
+        format!("{value:#}\n")
+    }
+}
+
+fn described(plan: &Plan) -> Vec<Described> {
+    let scenarios = plan.scenarios.iter().map(|s| Described { name: s.id, about: s.about.to_string() });
+    let bad = plan.bad.iter().map(|case| {
+        let views = case.problem.views.len();
+        let points = case.problem.points();
+        let kind = match case.fault {
+            Fault::Degenerate => "well formed, but determines no camera",
+            Fault::Malformed => "broken",
+        };
+        Described { name: case.id, about: format!("{kind}: {views} views, {points} pixels") }
+    });
+    scenarios.chain(bad).collect()
+}

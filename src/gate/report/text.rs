@@ -1,0 +1,87 @@
+//! The report on one screen.
+
+use super::{Report, Row};
+use crate::judge::{Basis, Check, Verdict};
+use calibench::io::significant;
+
+/// Columns where nothing tells how wide the screen is.
+pub const COLUMNS: usize = 132;
+/// Columns before the evidence, which is cut where the screen ends.
+const BEFORE_EVIDENCE: usize = 38;
+
+impl Report {
+    /// One line a property, no longer than `columns`, then what follows.
+    pub fn to_text(&self, columns: usize) -> String {
+        let mut text = format!(
+            "gate: {} on {} problems, {} samples a scenario, seed {}, {} s\n\n",
+            self.solver,
+            self.problems,
+            self.samples,
+            self.seed,
+            significant(self.seconds, 3)
+        );
+        for row in self.rows() {
+            text.push_str(&line(&row, columns));
+        }
+        text.push_str(&format!("\n{}\n", self.conclusion()));
+        text
+    }
+
+    /// The last line.
+    pub fn conclusion(&self) -> String {
+        let failures = self.failures();
+        let rate = format!(
+            "by chance a correct solver fails one run in {} ({} statistical checks, Holm)",
+            significant(1.0 / self.false_alarm_rate, 3),
+            self.statistical_checks
+        );
+        let accepted = match self.checks.iter().filter(|c| c.verdict == Verdict::Accepted).count() {
+            0 => String::new(),
+            1 => ", but for one that was accepted".to_string(),
+            count => format!(", but for {count} that were accepted"),
+        };
+        match self.verdict {
+            Verdict::Grave | Verdict::Failed => {
+                let grave = failures.iter().filter(|c| c.verdict == Verdict::Grave).count();
+                let fail = if failures.len() == 1 { "check fails" } else { "checks fail" };
+                format!("NOT TRUSTED: {} {fail}, {grave} gravely; {rate}", failures.len())
+            }
+            _ => format!("TRUSTED: every check that could be judged holds{accepted}; {rate}"),
+        }
+    }
+
+    /// Every failing check in full.
+    pub fn details(&self) -> String {
+        let line = |c: &&Check| {
+            let p = match c.basis {
+                Basis::Chance(p) => format!(" (p = {})", significant(p, 2)),
+                _ => String::new(),
+            };
+            format!("{} {} / {}: {}{p}\n", c.verdict.word(), c.property.name(), c.scenario, c.evidence)
+        };
+        self.failures().iter().map(line).collect()
+    }
+}
+
+impl Row<'_> {
+    /// The check to tell about, with its scenario and probability.
+    pub fn told(&self) -> String {
+        let p = match self.telling.basis {
+            Basis::Chance(p) => format!(" p={}", significant(p, 1)),
+            _ => String::new(),
+        };
+        format!("{}{p}: {}", self.telling.scenario, self.telling.evidence)
+    }
+}
+
+fn line(row: &Row<'_>, columns: usize) -> String {
+    let (held, judged) = row.held;
+    let count = if judged == 0 { "-".to_string() } else { format!("{held}/{judged}") };
+    let told = row.told();
+    let room = columns.saturating_sub(BEFORE_EVIDENCE);
+    let evidence = match told.chars().count() > room {
+        true => told.chars().take(room.saturating_sub(1)).chain(['…']).collect(),
+        false => told,
+    };
+    format!("{:<18} {:<10} {count:>6}  {evidence}\n", row.property.name(), row.verdict.word())
+}

@@ -1,0 +1,122 @@
+//! Who answers? Anything that takes a problem and gives an answer: this library's solver, a wrapper of it, a process.
+
+use super::accept::{Breakage, Outcome, accept, free_of};
+use super::protocol::{Answer, AnswerCovariance, AnswerPose, Problem, Status};
+use calibench::board::{View, ViewError};
+use calibench::calibrate::{Calibration, Settings, Termination, Warning, calibrate};
+use calibench::camera::Parameter;
+use calibench::geometry::{Pose, Vec2};
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// An outcome and the time it took.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reply {
+    /// What became of the problem.
+    pub outcome: Outcome,
+    /// From question to answer, s.
+    pub seconds: f64,
+}
+
+/// A calibrator as the gate sees it.
+pub trait Solver: Sync {
+    /// What it is called in reports.
+    fn name(&self) -> String;
+
+    /// Solves one problem.
+    ///
+    /// # Errors
+    /// No answer could be had.
+    fn ask(&self, problem: &Problem) -> Result<Answer, Breakage>;
+
+    /// Solves many, in parallel; replies in the order of the problems.
+    fn ask_all(&self, problems: &[Problem]) -> Vec<Reply> {
+        problems.par_iter().map(|problem| reply(problem, || self.ask(problem))).collect()
+    }
+}
+
+/// Asks, takes the time, and checks the answer.
+pub fn reply(problem: &Problem, ask: impl FnOnce() -> Result<Answer, Breakage>) -> Reply {
+    let started = Instant::now();
+    let answer = ask();
+    let seconds = started.elapsed().as_secs_f64();
+    Reply { outcome: answer.map_or_else(Outcome::Broken, |answer| accept(problem, answer)), seconds }
+}
+
+/// This library's solver.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Builtin;
+
+impl Solver for Builtin {
+    fn name(&self) -> String {
+        "calibench".into()
+    }
+
+    fn ask(&self, problem: &Problem) -> Result<Answer, Breakage> {
+        Ok(match solve(problem, |settings| settings) {
+            Ok(calibration) => answer(&problem.id, &calibration),
+            Err(message) => Answer::without_estimate(&problem.id, Status::Refused, message),
+        })
+    }
+}
+
+/// Calibrates as the problem asks, with settings that `adjust` may change. The error is for people.
+pub(super) fn solve(
+    problem: &Problem,
+    adjust: impl FnOnce(Settings) -> Settings,
+) -> Result<Calibration, String> {
+    let views = views(problem).map_err(|e| e.to_string())?;
+    calibrate(&views, &adjust(settings(problem))).map_err(|e| e.to_string())
+}
+
+/// The problem's correspondences as views.
+pub(super) fn views(problem: &Problem) -> Result<Vec<View>, ViewError> {
+    let points = |list: &[[f64; 2]]| list.iter().map(|&[x, y]| Vec2::new(x, y)).collect();
+    problem.views.iter().map(|view| View::new(points(&view.target), points(&view.pixels))).collect()
+}
+
+/// What the problem wants estimated and held.
+pub(super) fn settings(problem: &Problem) -> Settings {
+    let [width, height] = problem.image_size;
+    let settings = Settings::new(free_of(problem)).with_image_size((width, height));
+    Parameter::ALL
+        .into_iter()
+        .filter_map(|p| problem.held.get(p.name()).map(|&value| (p, value)))
+        .fold(settings, |settings, (parameter, value)| settings.hold(parameter, value))
+}
+
+/// A calibration in the words of the protocol. Only warnings that question the estimate flag it: a correlation between two
+/// coefficients stands in the covariance already.
+pub(super) fn answer(id: &str, calibration: &Calibration) -> Answer {
+    let covariance = &calibration.covariance;
+    let names = || calibration.free.iter().map(|p| p.name().to_string());
+    let flags = calibration.warnings.iter().filter(|w| !matches!(w, Warning::Correlated { .. }));
+    Answer {
+        id: id.to_string(),
+        status: match calibration.termination {
+            Termination::Converged => Status::Ok,
+            Termination::IterationLimit | Termination::Stalled => Status::NotConverged,
+        },
+        parameters: Parameter::ALL
+            .into_iter()
+            .map(|p| (p.name().to_string(), calibration.camera.get(p)))
+            .collect(),
+        poses: Some(calibration.cam_from_target.iter().map(answer_pose).collect()),
+        standard_deviations: None,
+        covariance: Some(AnswerCovariance {
+            parameters: names().collect(),
+            matrix: covariance.intrinsics.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        }),
+        rmse: Some(calibration.rmse_px),
+        warnings: flags.map(ToString::to_string).collect(),
+        message: (calibration.termination != Termination::Converged)
+            .then(|| calibration.termination.name().to_string()),
+    }
+}
+
+fn answer_pose(pose: &Pose) -> AnswerPose {
+    AnswerPose {
+        rotation: std::array::from_fn(|r| std::array::from_fn(|c| pose.rotation[(r, c)])),
+        translation: pose.translation.into(),
+    }
+}

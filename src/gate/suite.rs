@@ -1,0 +1,298 @@
+//! On which scenes is a solver judged? Families of cameras and poses with known truth, as data.
+
+use calibench::board::{Board, BoardError, Pattern};
+use calibench::calibrate::Covariance;
+use calibench::camera::{BrownConrady, Camera, FreeParameters, Parameter};
+use calibench::evaluate::{BoundError, cramer_rao};
+use calibench::geometry::{Pose, Vec2};
+use calibench::synth::scene::looking_at_centre;
+use calibench::synth::{Scene, SceneError, Truth};
+
+/// What can be asked of a solver on a scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Demand {
+    /// The linearised theory holds: every statistical property is judged.
+    Law,
+    /// The data are poor or contaminated: a solver must refuse, warn, or admit its uncertainty.
+    Honesty,
+}
+
+/// A scene with its noise and the parameters to estimate.
+#[derive(Debug, Clone)]
+pub struct Scenario {
+    /// Name, the first part of the ids of its problems.
+    pub id: &'static str,
+    /// What is particular about it.
+    pub about: &'static str,
+    /// What is demanded.
+    pub demand: Demand,
+    /// Truth and exact pixels.
+    pub scene: Scene,
+    /// What is estimated; the rest is held at the truth.
+    pub free: FreeParameters,
+    /// Standard deviation of a pixel coordinate.
+    pub sigma_px: f64,
+    /// Share of points that are displaced by [`OUTLIER_PX`].
+    pub outliers: f64,
+    /// Share of samples to which textbook least squares gives a confidently wrong answer: measured for the doubtful scenes,
+    /// none where the law holds ([`super::textbook`]).
+    pub textbook_misled: f64,
+    /// Most samples for which the second-order terms that the law neglects stay below its resolution.
+    pub most: usize,
+    /// Cramer-Rao bound at `sigma_px`.
+    pub bound: Covariance,
+}
+
+/// A scene of the suite that cannot be built: a mistake in the suite.
+#[derive(Debug, thiserror::Error)]
+pub enum SuiteError {
+    /// The scene cannot be photographed.
+    #[error("{id}: {source}")]
+    Scene {
+        /// Scenario.
+        id: &'static str,
+        /// Why.
+        source: SceneError,
+    },
+    /// The scene determines nothing.
+    #[error("{id}: {source}")]
+    Bound {
+        /// Scenario.
+        id: &'static str,
+        /// Why.
+        source: BoundError,
+    },
+    /// The board does not exist.
+    #[error(transparent)]
+    Board(#[from] BoardError),
+}
+
+/// Noise of the scenes that test the law. The bias of a least-squares estimate is of second order in the noise, so at a
+/// tenth of ordinary corner noise it is a tenth as large against the standard deviation: too small to be seen.
+pub const LAW_SIGMA_PX: f64 = 0.01;
+/// Ordinary corner noise, the chapter's.
+pub const ORDINARY_SIGMA_PX: f64 = 0.1;
+/// Shortest and longest displacement of an outlier, px.
+pub const OUTLIER_PX: (f64, f64) = (5.0, 20.0);
+
+/// A scene as it is written down below.
+struct Draft {
+    id: &'static str,
+    about: &'static str,
+    camera: Camera,
+    image_size: (usize, usize),
+    /// Columns, rows, spacing.
+    board: (usize, usize, f64),
+    /// Degrees about X, Y, Z; then the target centre's X, Y, Z in target units.
+    poses: Vec<[f64; 6]>,
+    free: FreeParameters,
+}
+
+/// The chapter's four poses, as a draft gives them.
+fn four(distance: f64) -> Vec<[f64; 6]> {
+    [[0.0, 0.0, 0.0], [20.0, 0.0, 0.0], [0.0, -20.0, 0.0], [-15.0, 15.0, 10.0]]
+        .map(|[x, y, z]| [x, y, z, 0.0, 0.0, distance])
+        .to_vec()
+}
+
+/// `count` poses round the optical axis: the target leans outwards by `tilt` degrees in turn to every side, and its centre
+/// lies `aside` from the axis. The angle grows by the golden angle, so that any number of poses covers all sides.
+fn ring(count: usize, tilt: f64, aside: f64, distance: f64) -> Vec<[f64; 6]> {
+    const GOLDEN_ANGLE_RAD: f64 = 2.399_963_229_728_653;
+    (0..count)
+        .map(|i| {
+            let angle = GOLDEN_ANGLE_RAD * i as f64;
+            let (sine, cosine) = libm::sincos(angle);
+            let nearer = 1.0 + 0.1 * libm::cos(3.0 * angle);
+            let spin = 15.0 * libm::sin(2.0 * angle);
+            [tilt * sine, tilt * cosine, spin, aside * cosine, aside * sine, distance * nearer]
+        })
+        .collect()
+}
+
+fn chapter_draft(id: &'static str, about: &'static str) -> Draft {
+    Draft {
+        id,
+        about,
+        camera: Truth::chapter_camera(),
+        image_size: Truth::CHAPTER_IMAGE,
+        board: (9, 7, 10.0),
+        poses: four(120.0),
+        free: FreeParameters::CHAPTER,
+    }
+}
+
+fn lawful() -> Vec<Draft> {
+    use Parameter::{Cx, Cy, Fx, Fy, K1};
+    let base = Truth::chapter_camera();
+    let lens = |k1, k2, p1, p2| BrownConrady { k1, k2, p1, p2, k3: 0.0 };
+    vec![
+        chapter_draft("four-pose", "the chapter's camera and four poses"),
+        Draft {
+            poses: ring(20, 25.0, 15.0, 138.0),
+            board: (5, 4, 20.0),
+            ..chapter_draft("many-views", "twenty views")
+        },
+        Draft {
+            poses: ring(6, 30.0, 0.0, 300.0),
+            free: FreeParameters::of(&[Fx, Fy, Cx, Cy, K1]),
+            ..chapter_draft("weak-coverage", "points in the middle of the image only")
+        },
+        Draft {
+            camera: base.with_distortion(lens(-0.32, 0.12, 0.0, 0.0)),
+            poses: ring(6, 25.0, 12.0, 122.0),
+            ..chapter_draft("strong-distortion", "a wide lens, points out to the image corners")
+        },
+        Draft {
+            camera: base.with_distortion(lens(-0.18, 0.05, 0.002, -0.003)),
+            free: FreeParameters::CHAPTER.with(Parameter::P1).with(Parameter::P2),
+            poses: ring(6, 25.0, 12.0, 128.0),
+            ..chapter_draft("tangential", "decentred lens, p1 and p2 free")
+        },
+        Draft { camera: Camera { fy: 450.0, ..base }, ..chapter_draft("non-square", "pixels 4 : 3") },
+        Draft {
+            camera: Camera { cx: 410.0, cy: 170.0, ..base },
+            ..chapter_draft("off-centre", "principal point 114 px from the image centre")
+        },
+        Draft {
+            board: (4, 3, 25.0),
+            poses: ring(5, 25.0, 8.0, 130.0),
+            ..chapter_draft("few-points", "twelve points a view")
+        },
+        Draft {
+            camera: Camera::pinhole(3800.0, 3800.0, 2060.0, 1490.0)
+                .with_distortion(BrownConrady::radial(-0.18, 0.05)),
+            image_size: (4096, 3000),
+            ..chapter_draft("large-image", "12 megapixels")
+        },
+        Draft {
+            board: (7, 5, 4.0),
+            poses: ring(10, 30.0, 35.0, 120.0),
+            ..chapter_draft("small-target", "a small target moved about the image")
+        },
+        Draft {
+            board: (9, 7, 0.01),
+            poses: four(0.12),
+            ..chapter_draft("metres", "the chapter's scene in metres")
+        },
+        Draft {
+            free: FreeParameters::of(&[Fx, Fy, K1]),
+            ..chapter_draft("held", "principal point and k2 held at known values")
+        },
+    ]
+}
+
+/// All scenarios, in the order of reports.
+///
+/// # Errors
+/// A scenario that cannot be built, which is a mistake in this file.
+pub fn suite() -> Result<Vec<Scenario>, SuiteError> {
+    let mut scenarios: Vec<Scenario> =
+        lawful().into_iter().map(|draft| build(draft, LAW_SIGMA_PX)).collect::<Result<_, _>>()?;
+    // Second-order bias grows with the square of the noise. 500 samples would show one of 0.02 standard deviations as
+    // 0.02 sqrt(500) = 0.45 standard errors, a tenth of what is called a deviation.
+    let ordinary = chapter_draft("ordinary-noise", "the chapter's scene with its noise of 0.1 px");
+    scenarios.push(Scenario { most: 500, ..build(ordinary, ORDINARY_SIGMA_PX)? });
+    let near = Draft {
+        poses: vec![
+            [0.0, 0.0, 0.0, 0.0, 0.0, 120.0],
+            [1.5, 0.0, 0.0, 0.0, 0.0, 125.0],
+            [0.0, -1.5, 0.0, 0.0, 0.0, 115.0],
+            [-1.0, 1.0, 10.0, 0.0, 0.0, 120.0],
+        ],
+        ..chapter_draft("near-degenerate", "four views within two degrees of parallel")
+    };
+    scenarios.push(Scenario {
+        demand: Demand::Honesty,
+        textbook_misled: 0.006_47,
+        most: 200,
+        ..build(near, ORDINARY_SIGMA_PX)?
+    });
+    let wrong = chapter_draft("outliers", "two points in a hundred displaced by 5 to 20 px");
+    scenarios.push(Scenario {
+        demand: Demand::Honesty,
+        outliers: 0.02,
+        textbook_misled: 0.002_31,
+        most: 200,
+        ..build(wrong, ORDINARY_SIGMA_PX)?
+    });
+    Ok(scenarios)
+}
+
+fn build(draft: Draft, sigma_px: f64) -> Result<Scenario, SuiteError> {
+    let (columns, rows, spacing) = draft.board;
+    let cam_from_target = draft.poses.iter().map(pose).collect();
+    let truth = Truth {
+        camera: draft.camera,
+        image_size: draft.image_size,
+        points: Board::new(columns, rows, spacing, Pattern::Chessboard)?.points(),
+        cam_from_target,
+    };
+    let bound = cramer_rao(&truth, draft.free, sigma_px)
+        .map_err(|source| SuiteError::Bound { id: draft.id, source })?;
+    let scene = Scene::new(truth).map_err(|source| SuiteError::Scene { id: draft.id, source })?;
+    Ok(Scenario {
+        id: draft.id,
+        about: draft.about,
+        demand: Demand::Law,
+        scene,
+        free: draft.free,
+        sigma_px,
+        outliers: 0.0,
+        textbook_misled: 0.0,
+        most: usize::MAX,
+        bound,
+    })
+}
+
+fn pose(&[x, y, z, across, down, distance]: &[f64; 6]) -> Pose {
+    let mut pose = looking_at_centre([x, y, z], distance);
+    pose.translation.x = across;
+    pose.translation.y = down;
+    pose
+}
+
+impl Scenario {
+    /// Degrees of freedom of the residuals.
+    pub fn degrees_of_freedom(&self) -> usize {
+        2 * self.scene.observations() - self.free.len() - 6 * self.scene.truth.cam_from_target.len()
+    }
+
+    /// Largest distance of a pixel from the image, px; 0 if all lie inside.
+    pub fn outside_image_px(&self) -> f64 {
+        let (width, height) = self.scene.truth.image_size;
+        let beyond = |p: &Vec2| {
+            let over = |x: f64, size: usize| (-0.5 - x).max(x - (size as f64 - 0.5)).max(0.0);
+            over(p.x, width).max(over(p.y, height))
+        };
+        self.scene.pixels().iter().flatten().map(beyond).fold(0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_scene_lies_in_its_image_and_is_named_once() {
+        let suite = suite().unwrap();
+        for (i, scenario) in suite.iter().enumerate() {
+            assert!(suite[..i].iter().all(|other| other.id != scenario.id));
+        }
+        let outside = |s: &Scenario| (s.outside_image_px() > 0.0).then(|| (s.id, s.outside_image_px()));
+        assert_eq!(suite.iter().filter_map(outside).collect::<Vec<_>>(), []);
+    }
+
+    /// The law is linear: a standard deviation must be a small part of what it is compared with, the scale on which the
+    /// projection bends (the focal length itself, and 1 for the distortion coefficients).
+    #[test]
+    fn the_noise_of_the_law_is_small_against_the_curvature() {
+        for s in suite().unwrap().iter().filter(|s| s.demand == Demand::Law) {
+            for parameter in s.free.iter() {
+                let scale = if parameter <= Parameter::Skew { s.scene.truth.camera.fx } else { 1.0 };
+                let sd = s.bound.standard_deviation(parameter).unwrap();
+                assert!(sd / scale < 0.02, "{} {parameter}: {sd}", s.id);
+            }
+        }
+    }
+}

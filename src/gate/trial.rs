@@ -1,0 +1,182 @@
+//! What is kept of an answer? Its distance from the truth in the units of theory, so that a million answers fit in memory.
+
+use super::accept::{Breakage, Estimate, Outcome};
+use super::plan::{Case, Plan, Purpose};
+use super::protocol::Problem;
+use super::solver::{self, Reply};
+use super::suite::Scenario;
+use calibench::calibrate::{Settings, calibrate};
+use calibench::camera::{Camera, FreeParameters, Parameter};
+use calibench::geometry::{Pose, Vec3};
+use nalgebra::DVector;
+
+/// What became of a case.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Seen {
+    /// An estimate, measured.
+    Estimate(Box<Trial>),
+    /// No estimate, and the solver said so.
+    Refused {
+        /// Its reason.
+        reason: String,
+        /// Time it took, s.
+        seconds: f64,
+    },
+    /// The protocol was broken.
+    Broken(Breakage),
+}
+
+/// An estimate against the truth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trial {
+    /// The camera as answered.
+    pub camera: Camera,
+    /// Estimate - truth of the free parameters, in order.
+    pub errors: Vec<f64>,
+    /// `e^T P^-1 e` under the bound: chi-squared with as many degrees of freedom as parameters.
+    pub nees: f64,
+    /// Reported standard deviations.
+    pub standard_deviations: Option<Vec<f64>>,
+    /// `e^T P^-1 e` under the reported covariance.
+    pub own_nees: Option<f64>,
+    /// Reported RMSE, px.
+    pub rmse_px: Option<f64>,
+    /// Sum of squared residuals at the reported camera and poses, px^2.
+    pub square: Option<f64>,
+    /// The same with poses refitted to the reported camera; for the first trials only.
+    pub refitted_square: Option<f64>,
+    /// `e^T P^-1 e` of every reported pose under the bound: chi-squared with six degrees of freedom. Infinite where the matrix
+    /// is no rotation.
+    pub pose_nees: Option<Vec<f64>>,
+    /// Number of warnings.
+    pub warnings: usize,
+    /// A held parameter that was changed.
+    pub held_changed: Option<(Parameter, f64, f64)>,
+    /// A fingerprint of every number of the answer.
+    pub bits: u64,
+    /// Time it took, s.
+    pub seconds: f64,
+}
+
+/// Trials whose poses are refitted, to learn how the solver defines its RMSE.
+pub const REFITTED: u64 = 8;
+/// A rotation matrix whose `R^T R` differs by more than this from the identity is none: single precision leaves 1e-7.
+const NOT_A_ROTATION: f64 = 1e-5;
+
+/// Reduces the reply to a case.
+pub fn reduce(plan: &Plan, case: &Case, problem: &Problem, reply: Reply) -> Seen {
+    let Reply { outcome, seconds } = reply;
+    match outcome {
+        Outcome::Broken(breakage) => Seen::Broken(breakage),
+        Outcome::Refused(reason) => Seen::Refused { reason, seconds },
+        Outcome::Estimate(estimate) => {
+            let scenario = &plan.scenarios[case.scenario];
+            Seen::Estimate(Box::new(match case.purpose {
+                Purpose::Bad(index) => measure_bad(&plan.bad[index].truth, problem, &estimate, seconds),
+                _ => measure(scenario, case, problem, &estimate, seconds),
+            }))
+        }
+    }
+}
+
+fn measure(scenario: &Scenario, case: &Case, problem: &Problem, estimate: &Estimate, seconds: f64) -> Trial {
+    let truth = &scenario.scene.truth;
+    let camera = match case.purpose {
+        Purpose::Variant(variant) => variant.undo(&estimate.camera),
+        _ => estimate.camera,
+    };
+    let errors: Vec<f64> = scenario.free.iter().map(|p| camera.get(p) - truth.camera.get(p)).collect();
+    let plain = !matches!(case.purpose, Purpose::Variant(_));
+    let poses = estimate.cam_from_target.as_ref().filter(|_| plain);
+    Trial {
+        nees: scenario.bound.normalised_error_squared(&errors).unwrap_or(f64::INFINITY),
+        own_nees: own_nees(estimate, &errors),
+        square: poses.map(|poses| square(&estimate.camera, poses, problem)),
+        refitted_square: (case.purpose == Purpose::Sample && case.trial < REFITTED)
+            .then(|| refitted_square(&estimate.camera, problem))
+            .flatten(),
+        pose_nees: poses.map(|poses| pose_nees(scenario, poses)),
+        camera,
+        errors,
+        ..unmeasured(estimate, seconds)
+    }
+}
+
+/// Bad input has no bound: only the camera and what the solver says of it are kept.
+fn measure_bad(truth: &Camera, problem: &Problem, estimate: &Estimate, seconds: f64) -> Trial {
+    let free = super::accept::free_of(problem);
+    Trial {
+        errors: free.iter().map(|p| estimate.camera.get(p) - truth.get(p)).collect(),
+        ..unmeasured(estimate, seconds)
+    }
+}
+
+fn unmeasured(estimate: &Estimate, seconds: f64) -> Trial {
+    Trial {
+        camera: estimate.camera,
+        errors: Vec::new(),
+        nees: f64::NAN,
+        standard_deviations: estimate.standard_deviations.clone(),
+        own_nees: None,
+        rmse_px: estimate.rmse_px,
+        square: None,
+        refitted_square: None,
+        pose_nees: None,
+        warnings: estimate.warnings.len(),
+        held_changed: estimate.held_changed,
+        bits: fingerprint(estimate),
+        seconds,
+    }
+}
+
+fn own_nees(estimate: &Estimate, errors: &[f64]) -> Option<f64> {
+    let e = DVector::from_row_slice(errors);
+    Some(e.dot(&estimate.covariance.clone()?.cholesky()?.solve(&e)))
+}
+
+/// Infinite where a point is not in front of the camera.
+fn square(camera: &Camera, poses: &[Pose], problem: &Problem) -> f64 {
+    let mut sum = 0.0;
+    for (pose, view) in poses.iter().zip(&problem.views) {
+        for (&[x, y], &[u, v]) in view.target.iter().zip(&view.pixels) {
+            let Some(seen) = camera.project(&pose.apply(&Vec3::new(x, y, 0.0))) else { return f64::INFINITY };
+            sum += (seen.x - u) * (seen.x - u) + (seen.y - v) * (seen.y - v);
+        }
+    }
+    sum
+}
+
+/// The least sum of squares that the answered camera allows: only poses are free.
+fn refitted_square(camera: &Camera, problem: &Problem) -> Option<f64> {
+    let settings =
+        Parameter::ALL.into_iter().fold(Settings::new(FreeParameters::NONE), |s, p| s.hold(p, camera.get(p)));
+    let fit = calibrate(&solver::views(problem).ok()?, &settings).ok()?;
+    Some(fit.rmse_px * fit.rmse_px * fit.points() as f64)
+}
+
+fn pose_nees(scenario: &Scenario, poses: &[Pose]) -> Vec<f64> {
+    let truth = &scenario.scene.truth.cam_from_target;
+    let distance = |((estimate, truth), block): ((&Pose, &Pose), &nalgebra::SMatrix<f64, 6, 6>)| {
+        let r = &estimate.rotation;
+        let defect = (r.transpose() * r - nalgebra::Matrix3::identity()).amax();
+        if defect > NOT_A_ROTATION || r.determinant() < 0.0 {
+            return f64::INFINITY;
+        }
+        let e = truth.step_to(estimate);
+        block.cholesky().map_or(f64::INFINITY, |factor| e.dot(&factor.solve(&e)))
+    };
+    poses.iter().zip(truth).zip(&scenario.bound.poses).map(distance).collect()
+}
+
+/// FNV-1a over the bits of every number.
+fn fingerprint(estimate: &Estimate) -> u64 {
+    let poses = estimate.cam_from_target.iter().flatten();
+    let numbers = estimate.camera.parameters().into_iter();
+    let numbers = numbers.chain(poses.flat_map(|p| p.rotation.iter().chain(p.translation.iter()).copied()));
+    let numbers = numbers.chain(estimate.standard_deviations.iter().flatten().copied());
+    let numbers = numbers.chain(estimate.covariance.iter().flat_map(|c| c.iter().copied()));
+    numbers
+        .chain(estimate.rmse_px)
+        .flat_map(|x| x.to_bits().to_le_bytes())
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}

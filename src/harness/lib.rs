@@ -1,0 +1,48 @@
+//! How does a question become a locked, judged and readable result? Experiments, records, claims, figures, golden values.
+//!
+//! ```text
+//! Experiment --run(Context)--> Record { numbers, tables, figures, claims, reconciliations }
+//!   -> emit      out/<id>/, figures/<id>/
+//!   -> golden    unchanged since it was blessed?
+//!   -> claim     correct, by theory or an oracle?
+//!   -> published reproduces the book?
+//! ```
+//!
+//! # Adding an experiment
+//! 1. `experiments/<name>.rs`: `pub const EXPERIMENT: Experiment`, and a `run(&Context) -> Result<Record, ExperimentError>` that
+//!    tells numbers, claims, tables and figures.
+//! 2. Three registrations: `mod` and table entry in `experiments/lib.rs`, and its own binary in `experiments/bin`.
+//! 3. `calibench run <id>`, read and look; then `calibench bless <id>` and commit golden/ and figures/.
+//!
+//! The layout test names whatever was forgotten.
+
+mod band;
+mod claim;
+mod emit;
+mod experiment;
+pub mod figure;
+pub mod golden;
+pub mod monte_carlo;
+mod predicted;
+mod progress;
+pub mod project;
+pub mod provenance;
+pub mod published;
+mod reconcile;
+mod record;
+pub mod resources;
+mod simulated;
+mod table;
+pub mod verdict;
+
+pub use band::Band;
+pub use claim::{Cases, Claim};
+pub use emit::{emit, record_json};
+pub use experiment::{Context, Experiment, ExperimentError};
+pub use figure::{Dash, Figure, HeatMap, Look, Marker, Plot};
+pub use monte_carlo::{MonteCarlo, Outcome};
+pub use predicted::Predicted;
+pub use progress::{Progress, ProgressDisplay};
+pub use reconcile::{Expectation, Reconciliation};
+pub use record::{Input, Number, Record, RecordError};
+pub use table::{Cell, Column, Table};

@@ -1,0 +1,174 @@
+//! Which experiments does a study consist of? The cells of its grid, each ready for its trials.
+
+use super::design::{Design, designs};
+use super::poses::Sight;
+use super::prediction::Prediction;
+use super::quantity::Quantity;
+use super::spec::{Length, Spec};
+use super::spec_error::SpecError;
+use calibench::calibrate::{Covariance, Settings};
+use calibench::camera::{Camera, FreeParameters};
+use calibench::evaluate::cramer_rao;
+use calibench::geometry::Vec2;
+use calibench::synth::{Scene, Stream, StreamKey, Truth};
+
+/// One combination of levels.
+#[derive(Debug, Clone)]
+pub struct Cell {
+    /// Place in the grid.
+    pub index: usize,
+    /// Level of every factor.
+    pub levels: Vec<usize>,
+    /// Labels of the levels.
+    pub labels: Vec<String>,
+    /// `views = 4, tilt = 20`; `-` where nothing varies.
+    pub name: String,
+    /// What theory expects of each quantity of the study.
+    pub prediction: Prediction,
+    pub(super) design: Design,
+    pub(super) settings: Settings,
+    pub(super) free: FreeParameters,
+    pub(super) camera: Camera,
+    pub(super) points: Vec<Vec2>,
+    /// The scene, where every trial meets the same poses.
+    pub(super) scene: Option<Scene>,
+    pub(super) length: Option<(Length, [Vec2; 2])>,
+    /// Seed and name of the streams.
+    pub(super) seed: u64,
+    pub(super) scenario: String,
+}
+
+/// Where poses are drawn anew in every trial, the prediction is the mean over those of the first trials.
+const PREDICTION_DRAWS: u64 = 200;
+
+impl Spec {
+    /// The quantities of every trial.
+    pub fn quantities(&self, cells: &[Cell]) -> Vec<Quantity> {
+        let free = cells.iter().flat_map(|c| c.free.iter()).fold(FreeParameters::NONE, FreeParameters::with);
+        Quantity::list(free, cells.iter().any(|c| c.length.is_some()))
+    }
+
+    /// The cells of the grid, the last factor varying fastest. `text` is the file, for errors that say where.
+    ///
+    /// # Errors
+    /// A level that does not fit the study, poses that cannot be, a precision of something that is not measured.
+    pub fn cells(&self, text: &str) -> Result<Vec<Cell>, SpecError> {
+        let designs = designs(self, text)?;
+        let mut cells = designs
+            .into_iter()
+            .enumerate()
+            .map(|(index, (levels, design))| Cell::new(self, index, levels, design))
+            .collect::<Result<Vec<Cell>, _>>()?;
+        let quantities = self.quantities(&cells);
+        for cell in &mut cells {
+            cell.prediction = cell.predict(&quantities)?;
+            self.check_precision(cell)?;
+        }
+        Ok(cells)
+    }
+
+    fn check_precision(&self, cell: &Cell) -> Result<(), SpecError> {
+        let Some(precision) = &self.trials.precision else { return Ok(()) };
+        let own = Quantity::list(cell.free, cell.length.is_some());
+        if own.iter().any(|q| q.name() == precision.quantity) {
+            return Ok(());
+        }
+        let known: Vec<&str> = own.iter().map(|q| q.name()).collect();
+        Err(SpecError::Precision {
+            quantity: precision.quantity.clone(),
+            cell: cell.name.clone(),
+            known: known.join(", "),
+        })
+    }
+}
+
+impl Cell {
+    fn new(spec: &Spec, index: usize, levels: Vec<usize>, design: Design) -> Result<Cell, SpecError> {
+        let labels: Vec<String> = spec.factor.iter().zip(&levels).map(|(f, &level)| f.label(level)).collect();
+        let named: Vec<String> =
+            spec.factor.iter().zip(&labels).map(|(f, label)| format!("{} = {label}", f.name)).collect();
+        let name = if named.is_empty() { "-".to_string() } else { named.join(", ") };
+        let camera = Camera::from(design.scene.camera);
+        // Without the cell in the key, trial t draws the same numbers in every cell.
+        let scenario =
+            if spec.common_random_numbers { "study".to_string() } else { format!("study: {name}") };
+        let mut cell = Cell {
+            index,
+            levels,
+            labels,
+            prediction: Prediction(Vec::new()),
+            settings: design.estimator.settings(design.scene.image),
+            free: design.estimator.estimated(),
+            camera,
+            points: design.scene.target.points()?,
+            scene: None,
+            length: design.scene.length.and_then(|length| Some((length, length.pixels(&camera)?))),
+            seed: spec.seed,
+            scenario,
+            design,
+            name,
+        };
+        // Every trial's poses are alike: what fails in the first would fail in most.
+        let first = cell.draw_scene(0)?;
+        cell.scene = (!cell.design.scene.poses.redraws()).then_some(first);
+        Ok(cell)
+    }
+
+    /// The noise-free scene of a trial.
+    pub(super) fn draw_scene(&self, trial: u64) -> Result<Scene, SpecError> {
+        let sight = Sight { camera: &self.camera, image: self.design.scene.image, points: &self.points };
+        let poses = self.design.scene.poses.generate(&sight, &mut self.stream(trial, "pose"));
+        let cam_from_target = poses.map_err(|source| SpecError::Poses { cell: self.name.clone(), source })?;
+        let truth = Truth {
+            camera: self.camera,
+            image_size: self.design.scene.image,
+            points: self.points.clone(),
+            cam_from_target,
+        };
+        Ok(Scene::new(truth).expect("generated poses show every point in front of the camera"))
+    }
+
+    pub(super) fn stream(&self, trial: u64, purpose: &str) -> Stream {
+        Stream::open(StreamKey { seed: self.seed, scenario: &self.scenario, trial, purpose })
+    }
+
+    fn predict(&self, quantities: &[Quantity]) -> Result<Prediction, SpecError> {
+        let sigma = self.design.scene.noise_px;
+        let of =
+            |scene: &Scene| Prediction::of(quantities, &scene.truth, self.free, sigma, self.length.as_ref());
+        match &self.scene {
+            Some(scene) => Ok(of(scene)),
+            None => {
+                let sets = (0..PREDICTION_DRAWS)
+                    .map(|trial| self.draw_scene(trial).map(|scene| of(&scene)))
+                    .collect::<Result<Vec<_>, _>>()?;
+                Ok(Prediction::mean_of(&sets))
+            }
+        }
+    }
+
+    /// The Cramer-Rao covariance of the cell's scene; `None` where it is singular, and where each trial has poses of its own.
+    pub fn bound(&self) -> Option<Covariance> {
+        cramer_rao(&self.scene.as_ref()?.truth, self.free, self.noise_px()).ok()
+    }
+
+    /// Standard deviation of a pixel coordinate.
+    pub fn noise_px(&self) -> f64 {
+        self.design.scene.noise_px
+    }
+
+    /// Views and points of each.
+    pub fn size(&self) -> (usize, usize) {
+        let views = match &self.scene {
+            Some(scene) => scene.truth.cam_from_target.len(),
+            None => self.design.scene.poses.views(),
+        };
+        (views, self.points.len())
+    }
+
+    /// The predicted standard deviation of a quantity of the study.
+    pub fn predicted(&self, quantities: &[Quantity], name: &str) -> Option<super::Predicted> {
+        let at = quantities.iter().position(|q| q.name() == name)?;
+        self.prediction.0[at]
+    }
+}

@@ -1,0 +1,59 @@
+//! What does every combination of levels come to? The study with the levels in place of its own values.
+
+use super::spec::{Estimator, SceneSpec, Spec};
+use super::spec_error::SpecError;
+use serde::{Deserialize, Serialize};
+use toml::{Table, Value};
+
+/// The part of a study that factors may change.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Design {
+    pub scene: SceneSpec,
+    #[serde(default)]
+    pub estimator: Estimator,
+}
+
+/// The design of every combination of levels; the last factor varies fastest.
+pub(super) fn designs(spec: &Spec, text: &str) -> Result<Vec<(Vec<usize>, Design)>, SpecError> {
+    for (i, factor) in spec.factor.iter().enumerate() {
+        factor.check(text)?;
+        if spec.factor[..i].iter().any(|f| f.name == factor.name) {
+            return Err(SpecError::DuplicateFactor(factor.name.clone()));
+        }
+    }
+    let base = Design { scene: spec.scene.clone(), estimator: spec.estimator.clone() };
+    let base = Table::try_from(&base).expect("a design came from TOML and goes back into it");
+    let counts: Vec<usize> = spec.factor.iter().map(|f| f.levels.len()).collect();
+    (0..counts.iter().product()).map(|index| design(spec, text, &base, digits(index, &counts))).collect()
+}
+
+fn design(
+    spec: &Spec,
+    text: &str,
+    base: &Table,
+    levels: Vec<usize>,
+) -> Result<(Vec<usize>, Design), SpecError> {
+    let mut tree = base.clone();
+    for (factor, &level) in spec.factor.iter().zip(&levels) {
+        factor.apply(&mut tree, level, text)?;
+    }
+    let design: Design = Value::Table(tree).try_into().map_err(|e: toml::de::Error| {
+        // The tree without factors was read: what is wrong came from a level.
+        let (factor, &level) =
+            spec.factor.iter().zip(&levels).next_back().expect("a tree without factors was read before");
+        factor.error(text, Some(level), format!("with this level: {}", e.message().trim()))
+    })?;
+    design.scene.check()?;
+    Ok((levels, design))
+}
+
+/// A number in mixed radix, least significant last.
+fn digits(mut index: usize, counts: &[usize]) -> Vec<usize> {
+    let mut digits = vec![0; counts.len()];
+    for (digit, count) in digits.iter_mut().zip(counts).rev() {
+        *digit = index % count;
+        index /= count;
+    }
+    digits
+}

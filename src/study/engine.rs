@@ -1,0 +1,254 @@
+//! In which order are trials done, and when is a cell finished? Batches of fixed size, one cell after the other, round by round.
+
+use super::accumulate::Tally;
+use super::cells::Cell;
+use super::quantity::Quantity;
+use super::shard::Shard;
+use super::spec::Spec;
+use super::spec_error::SpecError;
+use super::trial::{Trial, run_trial};
+use rayon::prelude::*;
+use std::convert::Infallible;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A study in progress: what is done, and what comes next.
+#[derive(Debug, Clone)]
+pub struct Engine {
+    /// The study.
+    pub spec: Spec,
+    /// Its cells.
+    pub cells: Vec<Cell>,
+    /// What every trial measures.
+    pub quantities: Vec<Quantity>,
+    /// The part that is done here.
+    pub shard: Shard,
+    /// What the trials say, one a cell.
+    pub tallies: Vec<Tally>,
+    /// Batches absorbed.
+    pub batches: u64,
+    finished: Vec<bool>,
+    round: u64,
+    place: usize,
+}
+
+/// How far a run is, told after each batch.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pace {
+    /// Trials done since the run began or was resumed.
+    pub trials: u64,
+    /// Trials done before it was resumed.
+    pub before: u64,
+    /// Trials that the part will have at its end, as far as can be told: a cell that stops at a precision is taken to approach it by
+    /// the root of its trials.
+    pub expected: u64,
+    /// The cell that is known worst.
+    pub worst: Option<Worst>,
+}
+
+/// The cell whose trials say least.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Worst {
+    /// Its name.
+    pub cell: String,
+    /// Of whose standard deviation.
+    pub quantity: &'static str,
+    /// Half-width of the interval over the value; `None` where too few trials converged to say anything.
+    pub relative_half_width: Option<f64>,
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// All is done.
+    Complete,
+    /// Asked to stop, and stopped after a batch.
+    Interrupted,
+}
+
+/// A request to stop after the present batch.
+pub type Interruption = AtomicBool;
+
+/// The stop rule needs this many batches.
+const LEAST_BATCHES: u64 = 2;
+
+impl Engine {
+    /// The beginning of a study's part; `text` is its file.
+    pub fn new(text: &str, shard: Shard) -> Result<Engine, SpecError> {
+        Engine::of(Spec::parse(text)?, text, shard)
+    }
+
+    /// The same for a study that was read already.
+    pub fn of(spec: Spec, text: &str, shard: Shard) -> Result<Engine, SpecError> {
+        let cells = spec.cells(text)?;
+        let quantities = spec.quantities(&cells);
+        let tallies = cells.iter().map(Tally::new).collect();
+        let finished = vec![false; cells.len()];
+        Ok(Engine { spec, quantities, tallies, finished, cells, shard, batches: 0, round: 0, place: 0 })
+    }
+
+    /// The same study's beginning in another part.
+    pub(super) fn for_shard(&self, shard: Shard) -> Engine {
+        let tallies = self.cells.iter().map(Tally::new).collect();
+        let finished = vec![false; self.cells.len()];
+        Engine { shard, tallies, finished, batches: 0, round: 0, place: 0, ..self.clone() }
+    }
+
+    /// Cell and batch that come next; `None` at the end.
+    pub(super) fn next(&self) -> Option<(usize, u64)> {
+        let rounds = self.spec.trials.per_cell.div_ceil(self.spec.trials.batch);
+        let whole_cells = self.spec.trials.precision.is_some();
+        let (mut round, mut place) = (self.round, self.place);
+        while round < rounds {
+            if place == self.cells.len() {
+                (round, place) = (round + 1, 0);
+                continue;
+            }
+            if !self.finished[place] && self.shard.holds(place, round, self.cells.len(), whole_cells) {
+                return Some((place, round));
+            }
+            place += 1;
+        }
+        None
+    }
+
+    /// The trials of a batch.
+    pub(super) fn trials_of(&self, batch: u64) -> std::ops::Range<u64> {
+        let size = self.spec.trials.batch;
+        batch * size..((batch + 1) * size).min(self.spec.trials.per_cell)
+    }
+
+    /// Runs the batch that comes next, in parallel; the trials are in order.
+    fn run(&self, (cell, batch): (usize, u64)) -> Vec<Trial> {
+        let cell = &self.cells[cell];
+        self.trials_of(batch).into_par_iter().map(|trial| run_trial(cell, &self.quantities, trial)).collect()
+    }
+
+    /// Takes in the trials of the batch that comes next.
+    pub(super) fn absorb(&mut self, (cell, batch): (usize, u64), trials: &[Trial]) {
+        trials.iter().for_each(|trial| self.tallies[cell].add(trial));
+        self.batches += 1;
+        (self.round, self.place) = (batch, cell + 1);
+        if batch + 1 >= LEAST_BATCHES && self.is_precise(cell) {
+            self.finished[cell] = true;
+        }
+    }
+
+    fn is_precise(&self, cell: usize) -> bool {
+        let Some(precision) = &self.spec.trials.precision else { return false };
+        self.relative_half_width(cell, &precision.quantity)
+            .is_some_and(|width| width <= precision.relative_half_width)
+    }
+
+    /// Half-width of the interval of a quantity's standard deviation over that.
+    fn relative_half_width(&self, cell: usize, quantity: &str) -> Option<f64> {
+        let at = self.quantities.iter().position(|q| q.name() == quantity)?;
+        let sd = self.tallies[cell].moments[at].sd_interval(1.0 - self.spec.confidence)?;
+        Some(0.5 * (sd.high - sd.low) / sd.value)
+    }
+
+    /// The cell whose trials say least, by the wanted quantity or else the first estimated parameter. Cells that are precise enough or
+    /// not begun are not asked.
+    fn worst(&self) -> Option<Worst> {
+        let wanted = self.spec.trials.precision.as_ref().map(|p| p.quantity.as_str());
+        let quantity =
+            self.quantities.iter().find(|q| q.is_error() && wanted.is_none_or(|w| w == q.name()))?;
+        let open = (0..self.cells.len()).filter(|&c| !self.finished[c] && self.tallies[c].trials > 0);
+        let width = |cell| self.relative_half_width(cell, quantity.name());
+        let size = |width: &Option<f64>| width.unwrap_or(f64::INFINITY);
+        let (cell, relative_half_width) =
+            open.map(|cell| (cell, width(cell))).max_by(|a, b| size(&a.1).total_cmp(&size(&b.1)))?;
+        let cell = self.cells[cell].name.clone();
+        Some(Worst { cell, quantity: quantity.name(), relative_half_width })
+    }
+
+    /// Cells of this part that took all their trials and are not as precise as was wanted.
+    pub fn imprecise(&self) -> Vec<&Cell> {
+        let held = |cell: &&Cell| self.shard.holds(cell.index, 0, self.cells.len(), true);
+        let wanted = self.spec.trials.precision.is_some();
+        self.cells.iter().filter(|cell| wanted && held(cell) && !self.is_precise(cell.index)).collect()
+    }
+
+    /// Trials at the end, see [`Pace::expected`].
+    fn expected_trials(&self) -> u64 {
+        let Some(precision) = &self.spec.trials.precision else { return self.most_trials() };
+        let trials = &self.spec.trials;
+        let of_cell = |cell: usize| {
+            let done = self.tallies[cell].trials;
+            if self.finished[cell] {
+                return done;
+            }
+            let Some(width) = self.relative_half_width(cell, &precision.quantity) else {
+                return trials.per_cell;
+            };
+            let factor = width / precision.relative_half_width;
+            let needed = libm::ceil(done as f64 * factor * factor) as u64;
+            needed.div_ceil(trials.batch).saturating_mul(trials.batch).clamp(done, trials.per_cell)
+        };
+        let held = (0..self.cells.len()).filter(|&cell| self.shard.holds(cell, 0, self.cells.len(), true));
+        held.map(of_cell).sum()
+    }
+
+    /// The most trials this part may take.
+    pub fn most_trials(&self) -> u64 {
+        let rounds = self.spec.trials.per_cell.div_ceil(self.spec.trials.batch);
+        let whole_cells = self.spec.trials.precision.is_some();
+        let size = |batch: u64| {
+            let range = self.trials_of(batch);
+            range.end - range.start
+        };
+        (0..rounds)
+            .map(|batch| {
+                let held = (0..self.cells.len())
+                    .filter(|&cell| self.shard.holds(cell, batch, self.cells.len(), whole_cells));
+                size(batch) * held.count() as u64
+            })
+            .sum()
+    }
+
+    /// Trials done.
+    pub fn trials(&self) -> u64 {
+        self.tallies.iter().map(|t| t.trials).sum()
+    }
+
+    /// Runs to the end or until asked to stop. `keep` stores each batch before it counts.
+    pub(super) fn drive<E>(
+        &mut self,
+        stop: &Interruption,
+        mut keep: impl FnMut(&[Trial]) -> Result<(), E>,
+        mut tell: impl FnMut(&Pace),
+    ) -> Result<Outcome, E> {
+        let before = self.trials();
+        while let Some(unit) = self.next() {
+            if stop.load(Ordering::Relaxed) {
+                return Ok(Outcome::Interrupted);
+            }
+            let trials = self.run(unit);
+            keep(&trials)?;
+            self.absorb(unit, &trials);
+            let expected = self.expected_trials();
+            tell(&Pace { trials: self.trials() - before, before, expected, worst: self.worst() });
+        }
+        Ok(Outcome::Complete)
+    }
+}
+
+/// Runs a whole study without files: for experiments, plans and measurements.
+pub fn in_memory(spec: Spec, text: &str, tell: impl FnMut(&Pace)) -> Result<Engine, SpecError> {
+    in_memory_seeing(spec, text, |_| {}, tell)
+}
+
+/// As [`in_memory`], showing every trial, in order.
+pub fn in_memory_seeing(
+    spec: Spec,
+    text: &str,
+    mut see: impl FnMut(&Trial),
+    tell: impl FnMut(&Pace),
+) -> Result<Engine, SpecError> {
+    let mut engine = Engine::of(spec, text, Shard::WHOLE)?;
+    let keep = |trials: &[Trial]| {
+        trials.iter().for_each(&mut see);
+        Ok::<(), Infallible>(())
+    };
+    let Ok(_) = engine.drive(&AtomicBool::new(false), keep, tell);
+    Ok(engine)
+}

@@ -1,0 +1,104 @@
+//! What varies, and how does a level change the study? A level takes the place of one field or of several together.
+
+use super::spec_error::{SpecError, place};
+use serde::{Deserialize, Serialize};
+use toml::{Spanned, Table, Value};
+
+/// One factor of a study.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Factor {
+    /// Name in tables and figures.
+    pub name: String,
+    /// Unit of the levels, empty for a pure number or a word.
+    #[serde(default)]
+    pub unit: String,
+    /// Path of the fields that a level sets, such as `["scene.poses.views"]`. With several, each level is a list of as many values.
+    pub set: Vec<String>,
+    /// The levels.
+    pub levels: Vec<Spanned<Value>>,
+    /// Names of the levels; their values otherwise.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub labels: Vec<String>,
+}
+
+impl Factor {
+    /// What a level is called.
+    pub fn label(&self, level: usize) -> String {
+        match (self.labels.get(level), self.levels[level].get_ref()) {
+            (Some(label), _) => label.clone(),
+            (None, Value::String(text)) => text.clone(),
+            (None, value) => value.to_string(),
+        }
+    }
+
+    /// The level as a number, where it is one.
+    pub fn number(&self, level: usize) -> Option<f64> {
+        match self.levels[level].get_ref() {
+            Value::Integer(i) => Some(*i as f64),
+            Value::Float(f) => Some(*f),
+            _ => None,
+        }
+    }
+
+    /// Whether every level is a number.
+    pub fn is_numeric(&self) -> bool {
+        (0..self.levels.len()).all(|level| self.number(level).is_some())
+    }
+
+    pub(super) fn check(&self, text: &str) -> Result<(), SpecError> {
+        if self.levels.is_empty() || self.set.is_empty() {
+            return Err(self.error(
+                text,
+                None,
+                "it needs at least one level, and a field to `set`".to_string(),
+            ));
+        }
+        if !self.labels.is_empty() && self.labels.len() != self.levels.len() {
+            let counts =
+                format!("{} labels for {} levels: give one a level", self.labels.len(), self.levels.len());
+            return Err(self.error(text, None, counts));
+        }
+        Ok(())
+    }
+
+    /// Puts a level into the study's tree.
+    pub(super) fn apply(&self, tree: &mut Table, level: usize, text: &str) -> Result<(), SpecError> {
+        let value = self.levels[level].get_ref();
+        let parts: Vec<&Value> = match (self.set.len(), value) {
+            (1, value) => vec![value],
+            (n, Value::Array(parts)) if parts.len() == n => parts.iter().collect(),
+            (n, other) => {
+                let message =
+                    format!("level {other} must be a list of {n} values, one for each field of `set`");
+                return Err(self.error(text, Some(level), message));
+            }
+        };
+        for (path, part) in self.set.iter().zip(parts) {
+            put(tree, path, part).map_err(|message| self.error(text, Some(level), message))?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn error(&self, text: &str, level: Option<usize>, message: String) -> SpecError {
+        let at = level.or((!self.levels.is_empty()).then_some(0)).map_or(0, |l| self.levels[l].span().start);
+        let (line, column) = place(text, at);
+        SpecError::Factor { line, column, factor: self.name.clone(), message }
+    }
+}
+
+/// Replaces or adds the value at a dotted path. Its parents must be there: a misspelt table is an error, and a misspelt field is found
+/// when the tree is read.
+fn put(tree: &mut Table, path: &str, value: &Value) -> Result<(), String> {
+    let (parents, field) =
+        path.rsplit_once('.').ok_or_else(|| format!("`{path}`: name a field of scene or estimator"))?;
+    let mut table = tree;
+    for parent in parents.split('.') {
+        table = table
+            .get_mut(parent)
+            .and_then(Value::as_table_mut)
+            .ok_or_else(|| format!("`{path}`: there is no table `{parent}` in this study"))?;
+    }
+    table.insert(field.to_string(), value.clone());
+    Ok(())
+}

@@ -1,0 +1,289 @@
+//! How does a reader see a study? Spread against its bound over the factors, and how trials ended where some failed.
+
+use super::engine::Engine;
+use super::moments::Estimated;
+use super::quantity::Quantity;
+use super::summary::{CellSummary, SHARES, Statistic, Summary};
+use calibench::evaluate::distribution::normal_quantile;
+use calibench_harness::{Dash, Figure, HeatMap, Look, Plot};
+
+/// Series beyond this number cannot be told apart in one plot.
+const MOST_SERIES: usize = 6;
+/// Width of a page on a desktop, px: three panels of 400.
+const PAGE: f64 = 1200.0;
+/// Axes that span more than this are logarithmic.
+const WIDE: f64 = 4.0;
+
+/// All figures of a study.
+pub(super) fn draw(engine: &Engine, summary: &Summary) -> Vec<Figure> {
+    let grid = Grid { engine, summary };
+    let mut figures = Vec::new();
+    match grid.x_factor() {
+        _ if engine.spec.factor.is_empty() => figures.push(grid.distributions()),
+        Some(x) if grid.series(x).len() <= MOST_SERIES => {
+            figures.push(grid.spread(x));
+            figures.extend(grid.endings(x));
+        }
+        _ => figures.extend(grid.by_cell()),
+    }
+    if engine.spec.factor.len() == 2 {
+        figures.extend(grid.maps());
+    }
+    figures
+}
+
+struct Grid<'a> {
+    engine: &'a Engine,
+    summary: &'a Summary,
+}
+
+/// Cells that differ in the level of the x factor only, in its order.
+struct Series {
+    label: String,
+    cells: Vec<usize>,
+}
+
+impl Grid<'_> {
+    /// The numeric factor with most levels.
+    fn x_factor(&self) -> Option<usize> {
+        let factors = &self.engine.spec.factor;
+        (0..factors.len())
+            .filter(|&f| factors[f].is_numeric())
+            .max_by_key(|&f| (factors[f].levels.len(), usize::MAX - f))
+    }
+
+    fn series(&self, x: usize) -> Vec<Series> {
+        let mut found: Vec<Series> = Vec::new();
+        for cell in &self.engine.cells {
+            let rest = |separator: &str| {
+                let others =
+                    self.engine.spec.factor.iter().zip(&cell.labels).enumerate().filter(|(f, _)| *f != x);
+                others
+                    .map(|(_, (f, label))| format!("{} {label}", f.name))
+                    .collect::<Vec<_>>()
+                    .join(separator)
+            };
+            let label = rest(", ");
+            match found.iter_mut().find(|s| s.label == label) {
+                Some(series) => series.cells.push(cell.index),
+                None => found.push(Series { label, cells: vec![cell.index] }),
+            }
+        }
+        found
+    }
+
+    fn x_of(&self, x: usize, cell: usize) -> f64 {
+        self.engine.spec.factor[x].number(self.engine.cells[cell].levels[x]).unwrap_or(f64::NAN)
+    }
+
+    fn x_label(&self, x: usize) -> String {
+        let factor = &self.engine.spec.factor[x];
+        if factor.unit.is_empty() {
+            factor.name.clone()
+        } else {
+            format!("{} ({})", factor.name, factor.unit)
+        }
+    }
+
+    fn errors(&self) -> impl Iterator<Item = Quantity> {
+        self.engine.quantities.iter().copied().filter(|q| q.is_error())
+    }
+
+    fn statistic(&self, cell: usize, quantity: Quantity) -> Option<&Statistic> {
+        self.summary.cells[cell].of(quantity.name())
+    }
+
+    /// What the bars of a plot are.
+    fn bars(&self) -> String {
+        format!("Bars are {} % intervals.", libm::round(1e6 * self.engine.spec.confidence) / 1e4)
+    }
+
+    fn caption(&self, what: &str) -> String {
+        let spec = &self.engine.spec;
+        let trials: Vec<u64> = self.summary.cells.iter().map(|c| c.trials).collect();
+        let (least, most) =
+            (trials.iter().min().copied().unwrap_or(0), trials.iter().max().copied().unwrap_or(0));
+        let trials = if least == most { format!("{most}") } else { format!("{least} to {most}") };
+        format!(
+            "{what} {trials} trials a cell, seed {}. Statistics are of the trials that converged.",
+            spec.seed
+        )
+    }
+
+    /// Standard deviation with its interval, and the bound, against the x factor.
+    fn spread(&self, x: usize) -> Figure {
+        let series = self.series(x);
+        let panels: Vec<Plot> =
+            self.errors().map(|quantity| self.spread_panel(x, &series, quantity)).collect();
+        let caption = self.caption(&format!(
+            "Standard deviation of the error of each quantity (marks) and its Cramer-Rao bound (lines), which holds for Gaussian noise \
+             without gross errors. Notice where the marks leave the line. {}",
+            self.bars()
+        ));
+        Figure::panels("spread", &panels, panels.len().min(3), caption)
+    }
+
+    fn spread_panel(&self, x: usize, series: &[Series], quantity: Quantity) -> Plot {
+        let mut all_x = Vec::new();
+        let mut all_y = Vec::new();
+        let unit = if quantity.unit().is_empty() { String::new() } else { format!(" ({})", quantity.unit()) };
+        let title = format!("{} error", quantity.name());
+        let mut plot = Plot::new(title, self.x_label(x), format!("sd{unit}")).size(400.0, 320.0);
+        for (i, s) in series.iter().enumerate() {
+            let at = |cell: &usize| Some((self.x_of(x, *cell), self.statistic(*cell, quantity)?));
+            let values: Vec<(f64, &Statistic)> = s.cells.iter().filter_map(at).collect();
+            let bound: Vec<(f64, f64)> =
+                values.iter().filter_map(|(x, v)| Some((*x, v.predicted?.sd))).collect();
+            let sds: Vec<(f64, Estimated)> = values.iter().filter_map(|(x, v)| Some((*x, v.sd?))).collect();
+            let look = Look::series(i);
+            let bars: Vec<(f64, f64, f64)> = sds.iter().map(|(x, sd)| (*x, sd.low, sd.high)).collect();
+            let points: Vec<(f64, f64)> = sds.iter().map(|(x, sd)| (*x, sd.value)).collect();
+            let label = if s.label.is_empty() { "measured".to_string() } else { s.label.clone() };
+            let bound_label = if i == 0 { "bound" } else { "" };
+            plot = plot
+                .line_as(bound_label, &bound, look)
+                .error_bars_as("", &bars, look)
+                .points_as(label, &points, look);
+            all_x.extend(values.iter().map(|v| v.0));
+            all_y.extend(points.iter().chain(&bound).map(|p| p.1));
+        }
+        if wide(&all_x) {
+            plot = plot.log_x();
+        }
+        if wide(&all_y) { plot.log_y() } else { plot }
+    }
+
+    /// Shares of trials that converged, where not all did.
+    fn endings(&self, x: usize) -> Option<Figure> {
+        let converged = |cell: usize| self.summary.cells[cell].converged();
+        let all = (0..self.summary.cells.len()).all(|cell| converged(cell).is_some_and(|c| c.value == 1.0));
+        if all {
+            return None;
+        }
+        let mut plot = Plot::new("Trials that converged", self.x_label(x), "share of trials");
+        let mut all_x = Vec::new();
+        for (i, s) in self.series(x).iter().enumerate() {
+            let values: Vec<(f64, Estimated)> =
+                s.cells.iter().filter_map(|&cell| Some((self.x_of(x, cell), converged(cell)?))).collect();
+            let bars: Vec<(f64, f64, f64)> = values.iter().map(|(x, v)| (*x, v.low, v.high)).collect();
+            let points: Vec<(f64, f64)> = values.iter().map(|(x, v)| (*x, v.value)).collect();
+            plot = plot.line_as(s.label.clone(), &points, Look::series(i)).error_bars_as(
+                "",
+                &bars,
+                Look::series(i),
+            );
+            all_x.extend(values.iter().map(|v| v.0));
+        }
+        let plot = if wide(&all_x) { plot.log_x() } else { plot }.y_range(-0.02, 1.02);
+        Some(Figure::plot(
+            "converged",
+            &plot,
+            self.caption(&format!(
+                "Share of trials that found a minimum; the others are counted by reason. {}",
+                self.bars()
+            )),
+        ))
+    }
+
+    /// Every cell a column, every quantity a row.
+    fn by_cell(&self) -> Vec<Figure> {
+        let columns: Vec<String> = self.summary.cells.iter().map(|c| c.labels.join(", ")).collect();
+        let ratio = self.matrix(&columns, "sd / bound", |_, s| s.ratio.map(|r| r.value));
+        let bias =
+            self.matrix(&columns, "|bias| / bound", |_, s| Some(s.mean?.value.abs() / s.predicted?.sd));
+        [("ratio", "Spread over its Cramer-Rao bound: 1 is the best that is possible.", ratio),
+         ("bias", "Size of the bias in units of the Cramer-Rao bound: what is wrong with the model, not with the noise.", bias)]
+            .into_iter()
+            .filter_map(|(name, what, plot)| Some(Figure::plot(name, &plot?, self.caption(what))))
+            .collect()
+    }
+
+    fn matrix(
+        &self,
+        columns: &[String],
+        label: &str,
+        value: impl Fn(&CellSummary, &Statistic) -> Option<f64>,
+    ) -> Option<Plot> {
+        let rows: Vec<Quantity> = self.errors().collect();
+        let values: Vec<f64> = rows
+            .iter()
+            .flat_map(|q| self.summary.cells.iter().map(move |c| (q, c)))
+            .map(|(q, c)| c.of(q.name()).and_then(|s| value(c, s)).unwrap_or(f64::NAN))
+            .collect();
+        let names = rows.iter().map(|q| q.name().to_string()).collect();
+        let heat = HeatMap::new(label, columns.to_vec(), names, values).ok()?.digits(3);
+        let width = 160.0 + 110.0 * columns.len() as f64;
+        let x_label = self.engine.spec.factor.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
+        Some(Plot::heat_map(label, x_label, "quantity", heat).size(width.max(520.0), 400.0))
+    }
+
+    /// Two factors across and up: the spread of each estimated quantity.
+    fn maps(&self) -> Option<Figure> {
+        let [across, up] = [&self.engine.spec.factor[1], &self.engine.spec.factor[0]];
+        let labels = |f: &super::factor::Factor| (0..f.levels.len()).map(|l| f.label(l)).collect::<Vec<_>>();
+        let width = (170.0 + 62.0 * across.levels.len() as f64).max(400.0);
+        let panels: Vec<Plot> = self
+            .errors()
+            .filter_map(|q| {
+                let sd =
+                    |cell: usize| self.statistic(cell, q).and_then(|s| s.sd).map_or(f64::NAN, |sd| sd.value);
+                let values: Vec<f64> = (0..self.summary.cells.len()).map(sd).collect();
+                let unit = if q.unit().is_empty() { String::new() } else { format!(" ({})", q.unit()) };
+                let heat = HeatMap::new(format!("sd{unit}"), labels(across), labels(up), values).ok()?;
+                let heat = heat.logarithmic();
+                let named = |f: &super::factor::Factor| {
+                    if f.unit.is_empty() { f.name.clone() } else { format!("{} ({})", f.name, f.unit) }
+                };
+                let title = format!("{} error", q.name());
+                Some(Plot::heat_map(title, named(across), named(up), heat).size(width, 340.0))
+            })
+            .collect();
+        let columns = ((PAGE / width) as usize).clamp(1, panels.len().max(1));
+        (!panels.is_empty()).then(|| {
+            Figure::panels(
+                "map",
+                &panels,
+                columns,
+                self.caption("Standard deviation of the error of each quantity over both factors."),
+            )
+        })
+    }
+
+    /// Without factors: the distribution of each error against the predicted normal one.
+    fn distributions(&self) -> Figure {
+        let panel = |quantity: Quantity| {
+            let unit =
+                if quantity.unit().is_empty() { String::new() } else { format!(" ({})", quantity.unit()) };
+            let title = format!("{} error", quantity.name());
+            let mut plot =
+                Plot::new(title, "share of trials below", format!("error{unit}")).size(400.0, 320.0);
+            let Some(s) = self.statistic(0, quantity) else { return plot };
+            if let Some(predicted) = s.predicted {
+                let curve: Vec<(f64, f64)> = (1..100)
+                    .map(|p| (0.01 * f64::from(p), predicted.sd * normal_quantile(0.01 * f64::from(p))))
+                    .collect();
+                plot = plot.line_as("predicted", &curve, Look::series(0));
+            }
+            let known: Vec<(f64, Estimated)> =
+                s.quantiles.iter().filter_map(|(p, q)| Some((*p, (*q)?))).collect();
+            let bars: Vec<(f64, f64, f64)> = known.iter().map(|(p, q)| (*p, q.low, q.high)).collect();
+            let points: Vec<(f64, f64)> = known.iter().map(|(p, q)| (*p, q.value)).collect();
+            plot.error_bars_as("", &bars, Look::series(1)).points_as(
+                "measured",
+                &points,
+                Look::series(1).dash(Dash::Solid),
+            )
+        };
+        let panels: Vec<Plot> = self.errors().map(panel).collect();
+        let what = format!(
+            "Quantiles of the errors at the shares {SHARES:?}, and those of a normal distribution with the Cramer-Rao bound's spread. {}",
+            self.bars()
+        );
+        Figure::panels("errors", &panels, panels.len().min(3), self.caption(&what))
+    }
+}
+
+fn wide(values: &[f64]) -> bool {
+    let (low, high) = values.iter().fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
+    low > 0.0 && high > WIDE * low
+}

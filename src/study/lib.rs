@@ -1,0 +1,69 @@
+//! What would ten thousand calibrations say? Monte Carlo studies described by data, resumable, sharded, with intervals.
+//!
+//! ```text
+//! Spec (TOML) --cells--> grid of designs --Engine--> trials.csv (in order, the one source of truth)
+//!   --fold--> Tally a cell --summarise--> summary with intervals beside the Cramer-Rao bound --> figures, report
+//! ```
+//! Every number is a function of `trials.csv`: a resumed run replays it, a merge interleaves those of the shards, and both
+//! end with the same bytes as an undivided run. A trial draws from streams of its own, so neither the number of threads nor
+//! the split can move a bit of it.
+
+mod accumulate;
+mod cells;
+pub mod compare;
+mod design;
+mod engine;
+mod factor;
+mod figures;
+mod fingerprint;
+mod finish;
+mod folder;
+mod log;
+mod manifest;
+mod merge;
+mod moments;
+mod names;
+#[cfg(feature = "parquet")]
+mod parquet;
+#[cfg(not(feature = "parquet"))]
+#[path = "parquet_absent.rs"]
+mod parquet;
+pub mod plan;
+mod poses;
+mod prediction;
+mod quantity;
+mod reading;
+mod replay;
+mod report;
+mod run_error;
+mod shard;
+mod sketch;
+mod spec;
+mod spec_error;
+mod summary;
+mod tables;
+mod trial;
+mod trial_file;
+mod within;
+
+pub use accumulate::Tally;
+pub use cells::Cell;
+pub use engine::{Engine, Interruption, Outcome, Pace, Worst, in_memory, in_memory_seeing};
+pub use fingerprint::Fingerprint;
+pub use finish::finish;
+pub use folder::{Folder, FolderError, Located};
+pub use manifest::{Difference, Manifest};
+pub use merge::{MergeError, merge};
+pub use moments::{Estimated, Moments};
+pub use poses::{Poses, PosesError};
+pub use prediction::{Predicted, Prediction};
+pub use quantity::Quantity;
+pub use run_error::RunError;
+pub use shard::{Shard, ShardError};
+pub use sketch::Sketch;
+pub use spec::{Estimator, Length, LossChoice, Precision, SceneSpec, Spec, TargetSpec, Trials};
+pub use spec_error::SpecError;
+pub use summary::{CellSummary, Statistic, Summary, summarise};
+pub use trial::{Trial, run_trial};
+pub use trial_file::{NoParquet, TrialFile, TrialFileError};
+pub use within::within;

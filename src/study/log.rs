@@ -1,0 +1,212 @@
+//! How does a run survive an interruption? Trials are appended, made durable, and only then counted in a checkpoint.
+
+use super::engine::{Engine, Interruption, Outcome, Pace};
+use super::folder::{Folder, FolderError, Located};
+use super::manifest::Manifest;
+use super::replay::{Lines, Replay, Source};
+use super::run_error::RunError;
+use super::tables;
+use super::trial::Trial;
+use super::trial_file::TrialFile;
+use calibench::io::hash::hexadecimal;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+
+/// What is known to be on the disk.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Checkpoint {
+    batches: u64,
+    bytes: u64,
+    pub(super) sha256: String,
+}
+
+/// The end of `trials.csv`, with the running hash of what is before.
+pub(super) struct Log {
+    file: File,
+    path: PathBuf,
+    bytes: u64,
+    hash: Sha256,
+}
+
+impl Folder {
+    /// Continues the trials where the checkpoint says, to the end or until asked to stop.
+    pub fn run(
+        &self,
+        engine: &mut Engine,
+        stop: &Interruption,
+        tell: impl FnMut(&Pace),
+    ) -> Result<Outcome, RunError> {
+        if !self.has_log()? {
+            let mut replay = self.trials(engine)?;
+            while replay.batch(engine)? {}
+            return Ok(Outcome::Complete);
+        }
+        let mut log = self.replay(engine)?;
+        let mut batches = engine.batches;
+        let keep = |trials: &[Trial]| {
+            batches += 1;
+            self.append(&mut log, tables::rows(trials).as_bytes(), batches)?;
+            Ok(())
+        };
+        engine.drive(stop, keep, tell)
+    }
+
+    /// Puts the trials of a complete run into the file that its manifest names; SHA-256 of that.
+    pub(super) fn put_trials(&self, engine: &Engine, manifest: &Manifest) -> Result<String, FolderError> {
+        let path = self.file(manifest.trials.name());
+        match manifest.trials {
+            TrialFile::Csv => return Ok(self.checkpoint()?.sha256),
+            // Complete before, so the log may be gone.
+            TrialFile::Parquet if manifest.complete => {}
+            TrialFile::Parquet => {
+                let mut lines = self.lines(&self.checkpoint()?, engine)?.0;
+                let located = |source| Located { path: path.clone(), source };
+                let unfinished = self.file(".trials.parquet");
+                let file = File::create(&unfinished).map_err(located)?;
+                super::parquet::write(&file, &path, engine, lines.as_mut())?;
+                file.sync_all().and_then(|()| fs::rename(&unfinished, &path)).map_err(located)?;
+            }
+        }
+        Ok(hexadecimal(&hash_of(&path, u64::MAX)?.0))
+    }
+
+    /// Removes the log of a complete run whose trials stand elsewhere.
+    pub(super) fn drop_log(&self, manifest: &Manifest) -> Result<(), FolderError> {
+        if manifest.trials == TrialFile::Csv {
+            return Ok(());
+        }
+        for path in [TrialFile::Csv.name(), "checkpoint.json"].map(|name| self.file(name)) {
+            match fs::remove_file(&path) {
+                Err(source) if source.kind() != io::ErrorKind::NotFound => {
+                    return Err(Located { path, source }.into());
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the run's trials stand in its log; of a complete run whose trials were put elsewhere the log is gone.
+    fn has_log(&self) -> Result<bool, FolderError> {
+        let manifest = self.manifest()?;
+        Ok(!manifest.complete || manifest.trials == TrialFile::Csv)
+    }
+
+    /// The trials on the disk, from the first; their hash is compared before any is read.
+    pub(super) fn trials(&self, engine: &Engine) -> Result<Replay, FolderError> {
+        let manifest = self.manifest()?;
+        let (path, source) = if manifest.complete && manifest.trials == TrialFile::Parquet {
+            let path = self.file(TrialFile::Parquet.name());
+            let expected = manifest.files.get(TrialFile::Parquet.name());
+            let found = hexadecimal(&hash_of(&path, u64::MAX)?.0);
+            if expected != Some(&found) {
+                return Err(changed(&path));
+            }
+            (path.clone(), super::parquet::open(&path, engine)?)
+        } else {
+            let checkpoint = self.checkpoint()?;
+            (self.file(TrialFile::Csv.name()), self.lines(&checkpoint, engine)?.0)
+        };
+        Ok(Replay::new(source, path))
+    }
+
+    /// The log as far as the checkpoint counts it, and the running hash of that.
+    fn lines(
+        &self,
+        checkpoint: &Checkpoint,
+        engine: &Engine,
+    ) -> Result<(Box<dyn Source>, Sha256), FolderError> {
+        let path = self.file(TrialFile::Csv.name());
+        let (hash, length) = hash_of(&path, checkpoint.bytes)?;
+        if length < checkpoint.bytes {
+            let what = format!("{length} bytes, but the checkpoint counts {}", checkpoint.bytes);
+            return Err(self.damaged(TrialFile::Csv.name(), what));
+        }
+        if hexadecimal(&hash) != checkpoint.sha256 {
+            return Err(changed(&path));
+        }
+        let file = File::open(&path).map_err(|source| Located { path: path.clone(), source })?;
+        let header = tables::header(&engine.quantities);
+        let lines = Lines::open(file, checkpoint.bytes, path, &header, engine.quantities.len())?;
+        Ok((Box::new(lines), hash))
+    }
+
+    pub(super) fn checkpoint(&self) -> Result<Checkpoint, FolderError> {
+        serde_json::from_str(&self.read("checkpoint.json")?)
+            .map_err(|e| self.damaged("checkpoint.json", e.to_string()))
+    }
+
+    /// Takes in the trials that the checkpoint vouches for, and cuts off what was written after it.
+    pub(super) fn replay(&self, engine: &mut Engine) -> Result<Log, FolderError> {
+        let path = self.file(TrialFile::Csv.name());
+        let located = |source| Located { path: path.clone(), source };
+        let file = OpenOptions::new().append(true).create(true).open(&path).map_err(located)?;
+        let mut log = Log { file, path: path.clone(), bytes: 0, hash: Sha256::new() };
+        if !self.file("checkpoint.json").exists() {
+            log.file.set_len(0).map_err(located)?;
+            self.append(&mut log, tables::header(&engine.quantities).as_bytes(), 0)?;
+            return Ok(log);
+        }
+        let checkpoint = self.checkpoint()?;
+        let (source, hash) = self.lines(&checkpoint, engine)?;
+        log.file.set_len(checkpoint.bytes).map_err(located)?;
+        (log.bytes, log.hash) = (checkpoint.bytes, hash);
+        let mut replay = Replay::new(source, path);
+        while replay.batch(engine)? {}
+        if engine.batches != checkpoint.batches {
+            let what =
+                format!("it counts {} batches, and trials.csv holds {}", checkpoint.batches, engine.batches);
+            return Err(self.damaged("checkpoint.json", what));
+        }
+        Ok(log)
+    }
+
+    /// Trials first, on the disk; then the checkpoint that counts them.
+    fn append(&self, log: &mut Log, bytes: &[u8], batches: u64) -> Result<(), FolderError> {
+        self.append_only(log, bytes)?;
+        self.count(log, batches)
+    }
+
+    /// Trials that no checkpoint counts yet.
+    pub(super) fn append_only(&self, log: &mut Log, bytes: &[u8]) -> Result<(), FolderError> {
+        log.file.write_all(bytes).map_err(|source| Located { path: log.path.clone(), source })?;
+        log.bytes += bytes.len() as u64;
+        log.hash.update(bytes);
+        Ok(())
+    }
+
+    /// Makes the log durable and counts its batches.
+    pub(super) fn count(&self, log: &mut Log, batches: u64) -> Result<(), FolderError> {
+        log.file.sync_data().map_err(|source| Located { path: log.path.clone(), source })?;
+        let checkpoint = Checkpoint { batches, bytes: log.bytes, sha256: hexadecimal(&log.hash) };
+        let text = serde_json::to_string(&checkpoint).expect("a checkpoint holds nothing that JSON cannot");
+        self.write("checkpoint.json", text.as_bytes())
+    }
+}
+
+fn changed(path: &Path) -> FolderError {
+    let what = "it is not what was written: its SHA-256 has changed".to_string();
+    FolderError::Damaged { path: path.to_path_buf(), what }
+}
+
+/// Hash of the first `bytes` bytes of a file, and how many there were.
+pub(super) fn hash_of(path: &Path, bytes: u64) -> Result<(Sha256, u64), FolderError> {
+    let located = |source: io::Error| Located { path: path.to_path_buf(), source };
+    let mut file = File::open(path).map_err(located)?.take(bytes);
+    let (mut hash, mut length, mut buffer) = (Sha256::new(), 0, vec![0; 1 << 16]);
+    loop {
+        match file.read(&mut buffer) {
+            Ok(0) => return Ok((hash, length)),
+            Ok(count) => {
+                hash.update(&buffer[..count]);
+                length += count as u64;
+            }
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(located(error).into()),
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! What made these results? Specification, part, seed, code and commit; and whether they may be continued.
+
+use super::fingerprint::Fingerprint;
+use super::shard::Shard;
+use super::spec::Spec;
+use super::trial_file::TrialFile;
+use calibench::io::Commit;
+use calibench::io::hash::sha256_hex;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// `manifest.json` of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// Name of the study.
+    pub study: String,
+    /// Seed.
+    pub seed: u64,
+    /// Part of the study, `i/n`.
+    pub shard: String,
+    /// In which file its trials stand once it is complete.
+    #[serde(default)]
+    pub trials: TrialFile,
+    /// Whether every trial of the part is done.
+    pub complete: bool,
+    /// Commit of the source tree, where known.
+    pub commit: Option<String>,
+    /// Whether the tree differed from that commit.
+    pub dirty: Option<bool>,
+    /// Code.
+    pub code: Fingerprint,
+    /// SHA-256 of the canonical specification.
+    pub spec_sha256: String,
+    /// The specification with its defaults.
+    pub spec: Value,
+    /// SHA-256 of the result files; empty until complete.
+    pub files: BTreeMap<String, String>,
+}
+
+/// One thing in which two manifests differ.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Difference {
+    /// Path of the field.
+    pub what: String,
+    /// There.
+    pub then: String,
+    /// Here.
+    pub now: String,
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: was {}, is {}", self.what, self.then, self.now)
+    }
+}
+
+impl Manifest {
+    /// Of a run that begins.
+    pub fn new(spec: &Spec, shard: Shard, commit: Option<&Commit>) -> Manifest {
+        let canonical = spec.canonical();
+        Manifest {
+            study: spec.name.clone(),
+            seed: spec.seed,
+            shard: shard.to_string(),
+            trials: TrialFile::Csv,
+            complete: false,
+            commit: commit.map(|c| c.hash.clone()),
+            dirty: commit.map(|c| c.dirty),
+            code: Fingerprint::current(),
+            spec_sha256: sha256_hex(canonical.to_string().as_bytes()),
+            spec: canonical,
+            files: BTreeMap::new(),
+        }
+    }
+
+    /// The same, with another kind of file for its trials.
+    #[must_use]
+    pub fn with_trials(self, trials: TrialFile) -> Manifest {
+        Manifest { trials, ..self }
+    }
+
+    /// Whatever would make trials of `now` unfit to stand beside those of `self`. Commits may differ as long as the code behaves alike.
+    pub fn differences(&self, now: &Manifest) -> Vec<Difference> {
+        let mut found = Vec::new();
+        differ("spec", &self.spec, &now.spec, &mut found);
+        let code = |manifest: &Manifest| serde_json::to_value(&manifest.code).unwrap_or(Value::Null);
+        differ("code", &code(self), &code(now), &mut found);
+        found
+    }
+
+    pub(super) fn to_text(&self) -> String {
+        let value = serde_json::to_value(self).expect("a manifest holds nothing that JSON cannot");
+        format!("{value:#}\n")
+    }
+}
+
+/// Walks two trees side by side and notes the leaves that differ.
+fn differ(path: &str, then: &Value, now: &Value, found: &mut Vec<Difference>) {
+    match (then, now) {
+        (Value::Object(a), Value::Object(b)) => {
+            let keys: std::collections::BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+            for key in keys {
+                let side =
+                    |map: &serde_json::Map<String, Value>| map.get(key).cloned().unwrap_or(Value::Null);
+                differ(&format!("{path}.{key}"), &side(a), &side(b), found);
+            }
+        }
+        (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
+            for (i, (a, b)) in a.iter().zip(b).enumerate() {
+                differ(&format!("{path}[{i}]"), a, b, found);
+            }
+        }
+        _ if then != now => {
+            found.push(Difference { what: path.to_string(), then: then.to_string(), now: now.to_string() });
+        }
+        _ => {}
+    }
+}

@@ -1,0 +1,141 @@
+//! How do parts become the whole? Their batches are interleaved in the order in which an undivided run does them.
+
+use super::engine::Engine;
+use super::folder::{Folder, FolderError};
+use super::manifest::{Difference, Manifest};
+use super::reading::Reading;
+use super::run_error::RunError;
+use super::shard::Shard;
+use super::tables;
+use super::trial_file::TrialFile;
+use calibench::io::Commit;
+use std::path::{Path, PathBuf};
+
+/// Parts that do not make a whole.
+#[derive(Debug, thiserror::Error)]
+pub enum MergeError {
+    /// A part that cannot be read, or a whole that cannot be written.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// Nothing to merge.
+    #[error("no parts were given: name the folders of all shards")]
+    Nothing,
+    /// A part that has trials left.
+    #[error("{path} (shard {shard}) is not complete: `calibench study resume {path}` first", path = path.display())]
+    Incomplete {
+        /// Its folder.
+        path: PathBuf,
+        /// Its part.
+        shard: String,
+    },
+    /// Not the parts of one division.
+    #[error("{missing} missing, {surplus} given twice or of another division: need each of 0/{count} ... {last}/{count} once", last = count - 1)]
+    Parts {
+        /// Shards that no folder holds.
+        missing: String,
+        /// Shards that do not belong.
+        surplus: String,
+        /// Number of parts of the first folder's division.
+        count: u64,
+    },
+    /// Parts of different studies or code.
+    #[error("{path} differs from the first part:\n{}", differences.iter().map(|d| format!("  {d}")).collect::<Vec<_>>().join("\n"), path = path.display())]
+    Differs {
+        /// The folder.
+        path: PathBuf,
+        /// In what.
+        differences: Vec<Difference>,
+    },
+}
+
+impl From<FolderError> for MergeError {
+    fn from(error: FolderError) -> MergeError {
+        RunError::from(error).into()
+    }
+}
+
+struct Part {
+    folder: Folder,
+    manifest: Manifest,
+    shard: Shard,
+}
+
+/// Joins the runs in `parts` into a new folder `out`, which then holds what an undivided run would, byte for byte. Its trials stand in
+/// the kind of file of the first part, or in that asked for: the one part of an undivided run is put into another file so.
+pub fn merge(
+    parts: &[PathBuf],
+    out: &Path,
+    trials: Option<TrialFile>,
+) -> Result<(Folder, Engine), MergeError> {
+    let parts = parts.iter().map(|path| open(path)).collect::<Result<Vec<Part>, _>>()?;
+    let first = parts.first().ok_or(MergeError::Nothing)?;
+    check(&parts, first.shard.count)?;
+    let trials = trials.unwrap_or(first.manifest.trials);
+    trials.check().map_err(FolderError::from)?;
+    let text = first.folder.read("spec.toml")?;
+    let mut whole = Engine::new(&text, Shard::WHOLE).map_err(RunError::from)?;
+    let manifest = Manifest::new(&whole.spec, Shard::WHOLE, commit(&parts).as_ref()).with_trials(trials);
+    // Bounds and statistics of the whole come from this code, its trials from that of the parts: the manifest names one.
+    first.folder.check(&manifest)?;
+    let shards: Vec<Shard> = parts.iter().map(|part| part.shard).collect();
+    let mut readings = parts
+        .into_iter()
+        .map(|part| Reading::begin(part.folder, whole.for_shard(part.shard)))
+        .collect::<Result<Vec<Reading>, _>>()?;
+    let folder = Folder::create(out, &text, &manifest)?;
+    let mut log = folder.replay(&mut whole)?;
+    while let Some((cell, batch)) = whole.next() {
+        let whole_cells = whole.spec.trials.precision.is_some();
+        let at = shards.iter().position(|s| s.holds(cell, batch, whole.cells.len(), whole_cells));
+        let reading = &mut readings[at.expect("the parts were checked to hold every batch")];
+        let Some((_, trials)) = reading.next()? else {
+            return Err(MergeError::Incomplete {
+                path: reading.folder.path().to_path_buf(),
+                shard: reading.engine.shard.to_string(),
+            });
+        };
+        whole.absorb((cell, batch), &trials);
+        folder.append_only(&mut log, tables::rows(&trials).as_bytes())?;
+    }
+    folder.count(&mut log, whole.batches)?;
+    Ok((folder, whole))
+}
+
+fn open(path: &Path) -> Result<Part, MergeError> {
+    let folder = Folder::open(path)?;
+    let (manifest, shard) = (folder.manifest()?, folder.shard()?);
+    if !manifest.complete {
+        return Err(MergeError::Incomplete { path: path.to_path_buf(), shard: manifest.shard });
+    }
+    Ok(Part { folder, manifest, shard })
+}
+
+fn check(parts: &[Part], count: u64) -> Result<(), MergeError> {
+    let first = &parts[0];
+    for part in &parts[1..] {
+        let differences = first.manifest.differences(&part.manifest);
+        if !differences.is_empty() {
+            return Err(MergeError::Differs { path: part.folder.path().to_path_buf(), differences });
+        }
+    }
+    let named = |shards: Vec<String>| if shards.is_empty() { "none".to_string() } else { shards.join(", ") };
+    let held = |index: u64| parts.iter().any(|p| p.shard == Shard { index, count });
+    let missing: Vec<String> = (0..count).filter(|&i| !held(i)).map(|i| format!("{i}/{count}")).collect();
+    let surplus: Vec<String> = parts
+        .iter()
+        .enumerate()
+        .filter(|(i, p)| p.shard.count != count || parts[..*i].iter().any(|q| q.shard == p.shard))
+        .map(|(_, p)| p.shard.to_string())
+        .collect();
+    if missing.is_empty() && surplus.is_empty() {
+        return Ok(());
+    }
+    Err(MergeError::Parts { missing: named(missing), surplus: named(surplus), count })
+}
+
+/// The commit that all parts share.
+fn commit(parts: &[Part]) -> Option<Commit> {
+    let hash = parts[0].manifest.commit.clone()?;
+    let same = parts.iter().all(|p| p.manifest.commit.as_ref() == Some(&hash));
+    same.then(|| Commit { hash, dirty: parts.iter().any(|p| p.manifest.dirty == Some(true)) })
+}

@@ -1,0 +1,41 @@
+//! How do camera parameters stand in a file? By their names.
+
+/// A set of parameters as a list of names: `["fx", "fy"]`.
+pub(super) mod free {
+    use calibench::camera::{FreeParameters, Parameter};
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    pub fn serialize<S: Serializer>(free: &FreeParameters, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(free.iter().map(Parameter::name))
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<FreeParameters, D::Error> {
+        let names = Vec::<String>::deserialize(deserializer)?;
+        names
+            .iter()
+            .try_fold(FreeParameters::NONE, |set, name| Ok(set.with(name.parse().map_err(D::Error::custom)?)))
+    }
+}
+
+/// Values by parameter: `{ k2 = 0.05 }`.
+pub(super) mod held {
+    use calibench::camera::Parameter;
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serializer};
+    use std::collections::BTreeMap;
+
+    pub fn serialize<S: Serializer>(
+        held: &BTreeMap<Parameter, f64>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(held.iter().map(|(p, v)| (p.name(), v)))
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<BTreeMap<Parameter, f64>, D::Error> {
+        let named = BTreeMap::<String, f64>::deserialize(deserializer)?;
+        named.into_iter().map(|(name, value)| Ok((name.parse().map_err(D::Error::custom)?, value))).collect()
+    }
+}

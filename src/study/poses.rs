@@ -1,0 +1,296 @@
+//! Where is the target held? Generators of poses, from a list to random draws, all with the target inside the image.
+
+use calibench::camera::Camera;
+use calibench::geometry::{Mat3, Pose, Vec2, Vec3, rotation};
+use calibench::synth::Stream;
+use calibench::synth::scene::looking_at_centre;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// A generator of poses.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Poses {
+    /// The chapter's four poses. (Braces, so that a field too many is an error.)
+    Chapter {},
+    /// Views tilted alike about directions that follow the golden angle. The first views of a longer series are those of a shorter one.
+    Spread {
+        /// Number of views.
+        views: usize,
+        /// Angle between the target's normal and the optical axis.
+        tilt_deg: f64,
+        /// How far the target's centre moves from the optical axis towards the place where the target touches the image's
+        /// border: 0 stays, 1 touches.
+        #[serde(default)]
+        coverage: f64,
+        /// Depth of the target's centre.
+        distance_mm: f64,
+    },
+    /// Views drawn at random.
+    Random(RandomPoses),
+    /// These.
+    List {
+        /// The poses.
+        poses: Vec<PoseSpec>,
+    },
+}
+
+/// Views drawn at random: direction of the tilt uniform, its size uniform in `[tilt_min_deg, tilt_deg]`, roll uniform within
+/// `+-roll_deg`, direction and size of the shift uniform, distance uniform within `distance_mm (1 +- distance_spread)`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RandomPoses {
+    /// Number of views.
+    pub views: usize,
+    /// Largest tilt.
+    pub tilt_deg: f64,
+    /// Least tilt.
+    #[serde(default)]
+    pub tilt_min_deg: f64,
+    /// Largest roll about the target's normal, either way.
+    #[serde(default)]
+    pub roll_deg: f64,
+    /// As for `spread`; the largest share.
+    #[serde(default)]
+    pub coverage: f64,
+    /// Middle of the depths.
+    pub distance_mm: f64,
+    /// Half of the range of depths over their middle.
+    #[serde(default)]
+    pub distance_spread: f64,
+    /// Whether every trial meets poses of its own, or all trials the same.
+    #[serde(default)]
+    pub redraw: bool,
+}
+
+/// `R = Rz Ry Rx`, target to camera.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PoseSpec {
+    /// Angles about X, Y, Z.
+    pub rotation_deg: [f64; 3],
+    /// Place of the target's centre in the camera's frame.
+    pub translation_mm: [f64; 3],
+}
+
+/// Poses that cannot be.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PosesError {
+    /// The target does not fit into the image.
+    #[error(
+        "view {view}: the target does not fit into the image: increase the distance, or reduce target, tilt or shift"
+    )]
+    OutsideImage {
+        /// Index of the view.
+        view: usize,
+    },
+    /// A number outside its domain.
+    #[error("{field} is {value}: it must be {need}")]
+    Value {
+        /// Name of the field.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// Its domain.
+        need: &'static str,
+    },
+}
+
+/// The angle that divides the circle in the golden section: any number of multiples is spread evenly (Vogel 1979).
+const GOLDEN_TURN: f64 = 0.381_966_011_250_105_15;
+/// Fraction of sqrt(2), unrelated to the golden section, so that shift and tilt do not go together.
+const SILVER_TURN: f64 = 0.414_213_562_373_095_03;
+/// Halvings of the free room: 2^-24 of it is a fraction of a pixel.
+const HALVINGS: usize = 24;
+
+/// What a pose must respect.
+pub(super) struct Sight<'a> {
+    pub camera: &'a Camera,
+    pub image: (usize, usize),
+    pub points: &'a [Vec2],
+}
+
+impl Poses {
+    /// Whether every trial has poses of its own.
+    pub fn redraws(&self) -> bool {
+        matches!(self, Poses::Random(RandomPoses { redraw: true, .. }))
+    }
+
+    /// Number of views.
+    pub fn views(&self) -> usize {
+        match self {
+            Poses::Chapter {} => 4,
+            Poses::List { poses } => poses.len(),
+            Poses::Spread { views, .. } | Poses::Random(RandomPoses { views, .. }) => *views,
+        }
+    }
+
+    /// The poses; `stream` feeds a random generator.
+    pub(super) fn generate(&self, sight: &Sight<'_>, stream: &mut Stream) -> Result<Vec<Pose>, PosesError> {
+        self.check()?;
+        let poses: Vec<Pose> = match self {
+            Poses::Chapter {} => calibench::synth::Truth::chapter_poses(),
+            Poses::List { poses } => poses.iter().map(PoseSpec::pose).collect(),
+            Poses::Spread { views, tilt_deg, coverage, distance_mm } => {
+                (0..*views).map(|k| spread(k, *tilt_deg, *coverage, *distance_mm, sight)).collect()
+            }
+            Poses::Random(random) => (0..random.views).map(|_| random.draw(sight, stream)).collect(),
+        };
+        match poses.iter().position(|pose| !sight.holds(pose)) {
+            Some(view) => Err(PosesError::OutsideImage { view }),
+            None => Ok(poses),
+        }
+    }
+
+    fn check(&self) -> Result<(), PosesError> {
+        let (views, tilt, share, distance, spread) = match self {
+            Poses::Chapter {} => return Ok(()),
+            Poses::List { poses } => (poses.len(), 0.0, 0.0, 1.0, 0.0),
+            Poses::Spread { views, tilt_deg, coverage, distance_mm } => {
+                (*views, *tilt_deg, *coverage, *distance_mm, 0.0)
+            }
+            Poses::Random(r) => (r.views, r.tilt_deg, r.coverage, r.distance_mm, r.distance_spread),
+        };
+        let check = |field, value, need, held| {
+            if held { Ok(()) } else { Err(PosesError::Value { field, value, need }) }
+        };
+        if let Poses::Random(random) = self {
+            let (least, most) = (random.tilt_min_deg, random.tilt_deg);
+            check("tilt_min_deg", least, "from 0 to tilt_deg", (0.0..=most).contains(&least))?;
+        }
+        check("views", views as f64, "1 or more", views >= 1)?;
+        check("tilt_deg", tilt, "from 0 to below 90", (0.0..90.0).contains(&tilt))?;
+        check("coverage", share, "from 0 to 1", (0.0..=1.0).contains(&share))?;
+        check("distance_mm", distance, "a positive number", distance > 0.0 && distance.is_finite())?;
+        check("distance_spread", spread, "from 0 to below 1", (0.0..1.0).contains(&spread))
+    }
+}
+
+impl RandomPoses {
+    /// A fixed number of draws a view, whatever the ranges: cells that differ in a range meet the same directions.
+    fn draw(&self, sight: &Sight<'_>, stream: &mut Stream) -> Pose {
+        let [direction, size, roll, shift_direction, shift, depth] =
+            std::array::from_fn(|_| stream.uniform());
+        let tilt = self.tilt_min_deg + (self.tilt_deg - self.tilt_min_deg) * size;
+        let roll = self.roll_deg.to_radians() * (2.0 * roll - 1.0);
+        let distance = self.distance_mm * (1.0 + self.distance_spread * (2.0 * depth - 1.0));
+        let rotation = tilted(TAU * direction, tilt.to_radians(), roll);
+        sight.shifted(rotation, distance, TAU * shift_direction, self.coverage * shift)
+    }
+}
+
+impl PoseSpec {
+    fn pose(&self) -> Pose {
+        Pose { translation: Vec3::from(self.translation_mm), ..looking_at_centre(self.rotation_deg, 1.0) }
+    }
+}
+
+/// View `k` of a series: tilt and shift turn by unrelated steps; the shift's size follows van der Corput's sequence (1935), its root
+/// spreading the centres evenly over the area.
+fn spread(k: usize, tilt_deg: f64, coverage: f64, distance: f64, sight: &Sight<'_>) -> Pose {
+    let turns = k as f64;
+    let rotation = tilted(TAU * GOLDEN_TURN * turns, tilt_deg.to_radians(), 0.0);
+    sight.shifted(rotation, distance, TAU * SILVER_TURN * turns, coverage * van_der_corput(k + 1).sqrt())
+}
+
+/// The binary digits of `k` mirrored at the point.
+fn van_der_corput(mut k: usize) -> f64 {
+    let (mut value, mut digit) = (0.0, 0.5);
+    while k > 0 {
+        if k & 1 == 1 {
+            value += digit;
+        }
+        digit *= 0.5;
+        k >>= 1;
+    }
+    value
+}
+
+/// A tilt about the axis at angle `direction` in the image plane, after a roll about the normal.
+fn tilted(direction: f64, tilt: f64, roll: f64) -> Mat3 {
+    let (sin, cos) = libm::sincos(direction);
+    rotation::exp(&(Vec3::new(cos, sin, 0.0) * tilt)) * rotation::exp(&(Vec3::z() * roll))
+}
+
+impl Sight<'_> {
+    /// Whether every point lies within the image, where the lens model is one-to-one.
+    fn holds(&self, pose: &Pose) -> bool {
+        let radius = self.camera.distortion.monotone_radius();
+        let (right, bottom) = (self.image.0 as f64 - 0.5, self.image.1 as f64 - 0.5);
+        self.points.iter().all(|p| {
+            let c = pose.apply(&Vec3::new(p.x, p.y, 0.0));
+            c.z > 0.0
+                && c.xy().norm() < radius * c.z
+                && self.camera.project(&c).is_some_and(|pixel| {
+                    (-0.5..=right).contains(&pixel.x) && (-0.5..=bottom).contains(&pixel.y)
+                })
+        })
+    }
+
+    /// The centre moved off the axis in the given direction, by `share` of the way to the image's border.
+    fn shifted(&self, rotation: Mat3, distance: f64, direction: f64, share: f64) -> Pose {
+        let (sin, cos) = libm::sincos(direction);
+        let at =
+            |shift: f64| Pose { rotation, translation: Vec3::new(cos * shift, sin * shift, 1.0) * distance };
+        if share == 0.0 {
+            return at(0.0);
+        }
+        let (mut inside, mut outside) =
+            (0.0, self.image.0.max(self.image.1) as f64 / self.camera.fx.min(self.camera.fy));
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (inside + outside);
+            if self.holds(&at(middle)) {
+                inside = middle;
+            } else {
+                outside = middle;
+            }
+        }
+        at(share * inside)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use calibench::synth::{StreamKey, Truth};
+
+    fn generate(poses: &Poses) -> Result<Vec<Pose>, PosesError> {
+        let points = Truth::chapter_board().points();
+        let camera = Truth::chapter_camera();
+        let sight = Sight { camera: &camera, image: Truth::CHAPTER_IMAGE, points: &points };
+        poses.generate(
+            &sight,
+            &mut Stream::open(StreamKey { seed: 1, scenario: "poses", trial: 0, purpose: "pose" }),
+        )
+    }
+
+    fn series(views: usize, tilt_deg: f64, coverage: f64) -> Poses {
+        Poses::Spread { views, tilt_deg, coverage, distance_mm: 160.0 }
+    }
+
+    #[test]
+    fn a_shorter_series_is_the_beginning_of_a_longer_one() {
+        let long = generate(&series(20, 25.0, 0.8)).unwrap();
+        assert_eq!(generate(&series(7, 25.0, 0.8)).unwrap(), long[..7]);
+    }
+
+    #[test]
+    fn every_view_has_the_tilt_asked_for() {
+        for pose in generate(&series(12, 25.0, 0.5)).unwrap() {
+            // Two products of a rotation by 0.44 rad: a few roundings, divided by its sine.
+            assert!((libm::acos(pose.rotation[(2, 2)]) - 25f64.to_radians()).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn a_target_that_does_not_fit_is_refused() {
+        let near = Poses::Spread { views: 3, tilt_deg: 20.0, coverage: 0.0, distance_mm: 60.0 };
+        assert_eq!(generate(&near), Err(PosesError::OutsideImage { view: 0 }));
+        assert!(matches!(generate(&series(3, 95.0, 0.0)), Err(PosesError::Value { field: "tilt_deg", .. })));
+    }
+
+    #[test]
+    fn the_radical_inverse_is_van_der_corputs() {
+        assert_eq!([1, 2, 3, 4].map(van_der_corput), [0.5, 0.25, 0.75, 0.125]);
+    }
+}

@@ -1,0 +1,98 @@
+//! What does theory expect of a cell before anything is drawn? The Cramer-Rao bound and the distributions that follow from it.
+
+use super::quantity::Quantity;
+use super::spec::Length;
+use calibench::calibrate::Covariance;
+use calibench::camera::{Camera, FreeParameters};
+use calibench::evaluate::{RmseDistribution, cramer_rao};
+use calibench::geometry::Vec2;
+use calibench::synth::Truth;
+
+/// Mean and standard deviation that theory expects, to first order in the noise and for Gaussian noise without gross errors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Predicted {
+    /// Mean; 0 for an error.
+    pub mean: f64,
+    /// Standard deviation; the Cramer-Rao bound for an error.
+    pub sd: f64,
+}
+
+/// The predictions of a cell, one a quantity; `None` where theory says nothing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prediction(pub Vec<Option<Predicted>>);
+
+/// A central difference over this part of a standard deviation is exact to the square of it.
+const GRADIENT_STEP: f64 = 0.01;
+
+impl Prediction {
+    /// For one set of poses.
+    pub(super) fn of(
+        quantities: &[Quantity],
+        truth: &Truth,
+        free: FreeParameters,
+        sigma_px: f64,
+        length: Option<&(Length, [Vec2; 2])>,
+    ) -> Prediction {
+        let bound = cramer_rao(truth, free, sigma_px).ok();
+        let rmse = RmseDistribution {
+            sigma_px,
+            points: truth.points.len() * truth.cam_from_target.len(),
+            parameters: free.len() + 6 * truth.cam_from_target.len(),
+        };
+        let one = |quantity: &Quantity| match quantity {
+            Quantity::Rmse => (rmse.degrees_of_freedom() > 0)
+                .then(|| Predicted { mean: rmse.mean_px(), sd: rmse.standard_deviation_px() }),
+            Quantity::Nees => nees(free.len() as f64, rmse.degrees_of_freedom() as f64),
+            Quantity::Parameter(p) => error(bound.as_ref()?.standard_deviation(*p)?),
+            Quantity::Depth => error(bound.as_ref()?.poses.first()?[(5, 5)].sqrt()),
+            Quantity::Length => error(length_sd(&truth.camera, free, bound.as_ref()?, length?)?),
+        };
+        Prediction(quantities.iter().map(one).collect())
+    }
+
+    /// The mean over several sets of poses: means of means and of variances. A quantity that one set cannot predict has none.
+    pub(super) fn mean_of(sets: &[Prediction]) -> Prediction {
+        let count = sets.len() as f64;
+        let quantities = sets.first().map_or(0, |s| s.0.len());
+        let mean = |q: usize| {
+            let (mut mean, mut variance) = (0.0, 0.0);
+            for set in sets {
+                let p = set.0[q]?;
+                mean += p.mean / count;
+                variance += p.sd * p.sd / count;
+            }
+            Some(Predicted { mean, sd: variance.sqrt() })
+        };
+        Prediction((0..quantities).map(mean).collect())
+    }
+}
+
+fn error(sd: f64) -> Option<Predicted> {
+    sd.is_finite().then_some(Predicted { mean: 0.0, sd })
+}
+
+/// With sigma estimated from `d` degrees of freedom, `e^T P^-1 e / n` follows Fisher's F with `(n, d)`: mean `d / (d - 2)`, variance
+/// `2 d^2 (n + d - 2) / (n (d - 2)^2 (d - 4))`.
+fn nees(n: f64, d: f64) -> Option<Predicted> {
+    if n == 0.0 || d <= 4.0 {
+        return None;
+    }
+    let variance = 2.0 * d * d * (n + d - 2.0) / (n * (d - 2.0) * (d - 2.0) * (d - 4.0));
+    Some(Predicted { mean: n * d / (d - 2.0), sd: n * variance.sqrt() })
+}
+
+/// `sqrt(g^T P g)` with the gradient `g` of the measured length by the intrinsics.
+fn length_sd(
+    camera: &Camera,
+    free: FreeParameters,
+    bound: &Covariance,
+    (length, pixels): &(Length, [Vec2; 2]),
+) -> Option<f64> {
+    let slope = |p| {
+        let step = GRADIENT_STEP * bound.standard_deviation(p)?;
+        let at = |sign: f64| length.error_mm(&camera.with(p, camera.get(p) + sign * step), pixels);
+        Some((at(1.0)? - at(-1.0)?) / (2.0 * step))
+    };
+    let gradient = nalgebra::DVector::from_vec(free.iter().map(slope).collect::<Option<Vec<f64>>>()?);
+    Some(gradient.dot(&(&bound.intrinsics * &gradient)).sqrt())
+}

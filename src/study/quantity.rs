@@ -1,0 +1,73 @@
+//! What is measured in a trial? Errors of what is estimated, and how well the data were fitted.
+
+use super::spec::Length;
+use calibench::camera::{Camera, FreeParameters, Parameter};
+use calibench::geometry::{Vec2, Vec3};
+
+/// One number of a trial.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Reprojection error per point, px.
+    Rmse,
+    /// Squared error of the intrinsics in units of the covariance that the calibration reports: `e^T P^-1 e`.
+    Nees,
+    /// Estimate - truth of a parameter.
+    Parameter(Parameter),
+    /// Estimate - truth of the depth of the target's centre in the first view, mm.
+    Depth,
+    /// Measured - true length, mm.
+    Length,
+}
+
+impl Quantity {
+    /// What a study measures whose cells estimate `free` at most.
+    pub(super) fn list(free: FreeParameters, length: bool) -> Vec<Quantity> {
+        let parameters = free.iter().map(Quantity::Parameter);
+        let last = [Quantity::Depth].into_iter().chain(length.then_some(Quantity::Length));
+        [Quantity::Rmse, Quantity::Nees].into_iter().chain(parameters).chain(last).collect()
+    }
+
+    /// Name in files: `rmse`, `nees`, `fx`, ..., `depth`, `length`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Quantity::Rmse => "rmse",
+            Quantity::Nees => "nees",
+            Quantity::Parameter(parameter) => parameter.name(),
+            Quantity::Depth => "depth",
+            Quantity::Length => "length",
+        }
+    }
+
+    /// Unit, empty for a pure number.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Quantity::Rmse => "px",
+            Quantity::Nees => "",
+            Quantity::Parameter(parameter) => parameter.unit(),
+            Quantity::Depth | Quantity::Length => "mm",
+        }
+    }
+
+    /// Whether it is an error, whose true value is 0.
+    pub fn is_error(self) -> bool {
+        !matches!(self, Quantity::Rmse | Quantity::Nees)
+    }
+}
+
+impl Length {
+    /// The pixels of both ends in the true camera; `None` where the lens shows none.
+    pub(super) fn pixels(&self, camera: &Camera) -> Option<[Vec2; 2]> {
+        let (sin, cos) = libm::sincos(self.direction_deg.to_radians());
+        let half = Vec3::new(cos, sin, 0.0) * (0.5 * self.length_mm);
+        let centre = Vec3::from(self.centre_mm);
+        let radius = camera.distortion.monotone_radius();
+        let see = |p: Vec3| if p.xy().norm() < radius * p.z { camera.project(&p) } else { None };
+        Some([see(centre - half)?, see(centre + half)?])
+    }
+
+    /// Measured - true length, mm, of the segment seen at `pixels`; `None` where the camera's lens model has no ray.
+    pub(super) fn error_mm(&self, camera: &Camera, pixels: &[Vec2; 2]) -> Option<f64> {
+        let [a, b] = [camera.normalised_ray(&pixels[0]).ok()?, camera.normalised_ray(&pixels[1]).ok()?];
+        Some((b - a).norm() * self.centre_mm[2] - self.length_mm)
+    }
+}

@@ -1,0 +1,162 @@
+//! One page that a colleague can open anywhere: question, answer in figures and tables, and how it was made.
+
+use super::engine::Engine;
+use super::manifest::Manifest;
+use super::moments::Estimated;
+use super::shard::Shard;
+use super::summary::{CellSummary, Statistic, Summary};
+use calibench::io::significant;
+use calibench_harness::Figure;
+use std::fmt::Write;
+
+/// Wide tables and figures scroll within the page, which never does: figures keep a size at which they can be read.
+const STYLE: &str = "body{font:15px/1.5 sans-serif;max-width:1280px;margin:2em auto;padding:0 1em;color:#1a1a1a}\
+h1{font-size:1.6em;margin-bottom:.2em}h2{font-size:1.2em;margin-top:2em}\
+table{border-collapse:collapse;margin:.5em 0;font-variant-numeric:tabular-nums;font-size:13px}\
+th,td{padding:.15em .7em;text-align:right;border-bottom:1px solid #ddd;white-space:nowrap}\
+th:first-child,td:first-child{text-align:left}thead th{border-bottom:2px solid #888}td small{color:#555}\
+.wide{overflow-x:auto}figure{margin:1em 0}figure svg{max-width:none}\
+figcaption{color:#444;font-size:14px}\
+pre{background:#f5f5f5;padding:1em;overflow:auto;font-size:13px}.low{color:#666}.hash{word-break:break-all;white-space:normal}";
+
+/// The page, self-contained.
+pub(super) fn page(
+    engine: &Engine,
+    summary: &Summary,
+    figures: &[Figure],
+    manifest: &Manifest,
+    spec_text: &str,
+) -> String {
+    let mut page = String::new();
+    let name = escape(&engine.spec.name);
+    page.push_str(&format!(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><title>Study {name}</title>\n<style>{STYLE}</style></head><body>\n\
+         <h1>Study {name}</h1>\n<p>{}</p>\n<p class=\"low\">{} trials in {} cells, seed {}; intervals at {} % confidence.{}</p>\n",
+        escape(&engine.spec.question),
+        engine.trials(),
+        engine.cells.len(),
+        engine.spec.seed,
+        percent(summary.confidence),
+        if engine.shard == Shard::WHOLE { String::new() } else { format!(" Part {} only.", engine.shard) },
+    ));
+    let imprecise: Vec<String> = engine.imprecise().iter().map(|cell| escape(&cell.name)).collect();
+    if !imprecise.is_empty() {
+        page.push_str(&format!(
+            "<p>Not as precise as wanted after all trials: {}.</p>\n",
+            imprecise.join("; ")
+        ));
+    }
+    page.push_str("<h2>Figures</h2>\n");
+    for figure in figures {
+        let drawing = String::from_utf8_lossy(&figure.bytes);
+        page.push_str(&format!(
+            "<figure><div class=\"wide\">{drawing}</div><figcaption>{}</figcaption></figure>\n",
+            escape(&figure.caption)
+        ));
+    }
+    page.push_str("<h2>How trials ended</h2>\n");
+    page.push_str(&endings(summary));
+    page.push_str("<h2>Errors</h2>\n<p>sd / bound is the spread over the Cramer-Rao bound: 1 is the best that is possible. \
+                   Bias and sd are of the trials that converged.</p>\n");
+    for statistic in engine.quantities.iter() {
+        page.push_str(&quantity_table(summary, statistic.name()));
+    }
+    page.push_str(&provenance(manifest, spec_text));
+    page.push_str("</body></html>\n");
+    page
+}
+
+/// A share without the rounding of its binary fraction: 95, 99.9.
+fn percent(share: f64) -> f64 {
+    libm::round(1e6 * share) / 1e4
+}
+
+fn endings(summary: &Summary) -> String {
+    let mut rows = String::new();
+    for cell in &summary.cells {
+        for (outcome, count, share) in &cell.outcomes {
+            row(&mut rows, &[escape(&cell.name), escape(outcome), count.to_string(), told(Some(*share))]);
+        }
+    }
+    table(&["cell", "outcome", "trials", "share"], &rows)
+}
+
+fn quantity_table(summary: &Summary, name: &str) -> String {
+    let statistics: Vec<(&CellSummary, &Statistic)> =
+        summary.cells.iter().filter_map(|c| Some((c, c.of(name)?))).filter(|(_, s)| s.count > 0).collect();
+    let Some(&(_, first)) = statistics.first() else { return String::new() };
+    let unit = match first.quantity.unit() {
+        "" => String::new(),
+        unit => format!(" ({unit})"),
+    };
+    let mean = if first.quantity.is_error() { "bias" } else { "mean" };
+    let mut heads = vec!["cell".to_string(), "trials".into(), mean.into(), "sd".into(), "RMS".into()];
+    heads.extend(first.quantiles.iter().map(|(share, _)| match share {
+        0.5 => "median".to_string(),
+        share => format!("{} %", percent(*share)),
+    }));
+    heads.extend(["predicted", "sd / bound"].map(String::from));
+    let mut rows = String::new();
+    for (cell, s) in statistics {
+        let predicted = s.predicted.map_or_else(dash, |p| match first.quantity.is_error() {
+            true => significant(p.sd, 4),
+            false => format!("{}<br><small>\u{b1} {}</small>", significant(p.mean, 4), significant(p.sd, 4)),
+        });
+        let mut entries =
+            vec![escape(&cell.name), s.count.to_string(), told(s.mean), told(s.sd), told(s.rms)];
+        entries.extend(s.quantiles.iter().map(|(_, q)| told(*q)));
+        entries.extend([predicted, told(s.ratio)]);
+        row(&mut rows, &entries);
+    }
+    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
+    format!("<h3>{name}{unit}</h3>\n{}", table(&heads, &rows))
+}
+
+fn provenance(manifest: &Manifest, spec_text: &str) -> String {
+    let mut text = String::from("<h2>How this was made</h2>\n<div class=\"wide\"><table>\n");
+    let commit = manifest.commit.clone().unwrap_or_else(|| "unknown".to_string());
+    let dirty = if manifest.dirty == Some(true) { " (with changes)" } else { "" };
+    let mut tell = |what: &str, is: &str| {
+        row(&mut text, &[escape(what), format!("<span class=\"hash\">{}</span>", escape(is))]);
+    };
+    tell("commit", &format!("{commit}{dirty}"));
+    tell("calibench", &manifest.code.calibench);
+    tell("solver behaviour", &manifest.code.behaviour);
+    manifest.code.crates.iter().for_each(|(name, version)| tell(name, version));
+    tell("specification", &manifest.spec_sha256);
+    manifest.files.iter().for_each(|(name, hash)| tell(name, hash));
+    text.push_str("</table></div>\n<p>Command: <code>calibench study run spec.toml</code> with</p>\n");
+    text + &format!("<pre>{}</pre>\n", escape(spec_text))
+}
+
+/// A table that scrolls where the page is narrower.
+fn table(heads: &[&str], rows: &str) -> String {
+    let heads: String = heads.iter().map(|head| format!("<th>{head}</th>")).collect();
+    format!("<div class=\"wide\"><table><thead><tr>{heads}</tr></thead>\n{rows}</table></div>\n")
+}
+
+/// A row of entries that are HTML already.
+fn row(text: &mut String, entries: &[String]) {
+    text.push_str("<tr>");
+    for entry in entries {
+        write!(text, "<td>{entry}</td>").expect("writing to memory cannot fail");
+    }
+    text.push_str("</tr>\n");
+}
+
+fn dash() -> String {
+    "\u{2013}".to_string()
+}
+
+/// The value, and its interval in a line of its own.
+fn told(estimated: Option<Estimated>) -> String {
+    estimated.map_or_else(dash, |e| {
+        let [value, low, high] = [e.value, e.low, e.high].map(|x| significant(x, 4));
+        format!("{value}<br><small>[{low}, {high}]</small>")
+    })
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}

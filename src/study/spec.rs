@@ -1,0 +1,285 @@
+//! What is a study? A scene, an estimator, factors to vary, and how many trials: a TOML file, every field named here.
+
+use super::factor::Factor;
+use super::names;
+use super::poses::Poses;
+use super::spec_error::SpecError;
+use calibench::board::Board;
+use calibench::calibrate::{Loss, Settings};
+use calibench::camera::{Camera, FreeParameters, Parameter};
+use calibench::geometry::Vec2;
+use calibench::io::result::CameraFields;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// A study as its file says it, defaults filled in.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spec {
+    /// Name in kebab-case.
+    pub name: String,
+    /// What is asked, what answer is expected, and what the study cannot show.
+    pub question: String,
+    /// Seed of every stream.
+    pub seed: u64,
+    /// Whether trial `t` meets the same noise in every cell: comparisons between cells are then paired, and cells are not
+    /// independent of each other.
+    #[serde(default = "yes")]
+    pub common_random_numbers: bool,
+    /// Confidence of every interval.
+    #[serde(default = "ninety_five_percent")]
+    pub confidence: f64,
+    /// Truth.
+    pub scene: SceneSpec,
+    /// Who estimates.
+    #[serde(default)]
+    pub estimator: Estimator,
+    /// How many trials.
+    pub trials: Trials,
+    /// What varies; every combination of levels is a cell.
+    #[serde(default)]
+    pub factor: Vec<Factor>,
+}
+
+/// Truth: camera, target, poses, noise.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneSpec {
+    /// The virtual camera.
+    pub camera: CameraFields,
+    /// Image width and height, px.
+    pub image: (usize, usize),
+    /// The board.
+    pub target: TargetSpec,
+    /// Where it is held.
+    pub poses: Poses,
+    /// Standard deviation of each pixel coordinate, px.
+    pub noise_px: f64,
+    /// Probability that a point is a gross error.
+    #[serde(default)]
+    pub outlier_share: f64,
+    /// A gross error is uniform in a square of this half-width about the point, px.
+    #[serde(default = "ten")]
+    pub outlier_px: f64,
+    /// A length measured with the calibrated camera.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub length: Option<Length>,
+}
+
+/// A grid of marks.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TargetSpec {
+    /// Marks along X.
+    pub columns: usize,
+    /// Marks along Y.
+    pub rows: usize,
+    /// Distance of neighbours.
+    pub spacing_mm: f64,
+}
+
+/// A length parallel to the image plane at a known distance: its ends are seen at their true pixels, and the calibrated
+/// camera measures it on the plane `Z = centre_mm[2]`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Length {
+    /// Middle, in the camera's frame.
+    pub centre_mm: [f64; 3],
+    /// Length.
+    pub length_mm: f64,
+    /// Angle from the image's u axis towards v.
+    #[serde(default)]
+    pub direction_deg: f64,
+}
+
+/// Which parameters are estimated, and by what loss.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Estimator {
+    /// Free parameters.
+    #[serde(default = "chapter_model", with = "names::free")]
+    pub free: FreeParameters,
+    /// Values at which others are held; skew and distortion are held at 0 otherwise, the principal point at the image's centre.
+    #[serde(default, with = "names::held", skip_serializing_if = "BTreeMap::is_empty")]
+    pub hold: BTreeMap<Parameter, f64>,
+    /// Loss of a residual.
+    #[serde(default)]
+    pub loss: LossChoice,
+}
+
+/// See [`Loss`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+#[allow(missing_docs, reason = "the fields are those of `calibrate::Loss`")]
+pub enum LossChoice {
+    Squares {},
+    Huber { delta_px: f64 },
+    Cauchy { scale_px: f64 },
+}
+
+/// How many trials a cell has, and in what batches.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Trials {
+    /// Trials a cell; the most there may be where a precision is wanted.
+    pub per_cell: u64,
+    /// Trials between two checkpoints. The stop rule is judged at the end of a batch only, so its outcome does not depend on
+    /// timing.
+    #[serde(default = "five_hundred")]
+    pub batch: u64,
+    /// Stop a cell early once this is known well enough.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub precision: Option<Precision>,
+}
+
+/// A cell ends when the interval of the standard deviation of `quantity` is narrow enough.
+///
+/// Looking repeatedly and stopping at the first success makes the interval cover slightly less often than it says; two
+/// batches at least, and a fixed batch size, keep the loss below a percent for batches of some hundred trials.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Precision {
+    /// `fx`, ..., `depth`, `length`.
+    pub quantity: String,
+    /// Wanted half-width of the interval over the standard deviation.
+    pub relative_half_width: f64,
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn ten() -> f64 {
+    10.0
+}
+
+fn five_hundred() -> u64 {
+    500
+}
+
+fn ninety_five_percent() -> f64 {
+    0.95
+}
+
+fn chapter_model() -> FreeParameters {
+    FreeParameters::CHAPTER
+}
+
+impl Default for Estimator {
+    fn default() -> Estimator {
+        Estimator { free: chapter_model(), hold: BTreeMap::new(), loss: LossChoice::default() }
+    }
+}
+
+impl Spec {
+    /// Reads a study's file.
+    ///
+    /// # Errors
+    /// What is wrong, where (line and column), and what to do.
+    pub fn parse(text: &str) -> Result<Spec, SpecError> {
+        let spec: Spec = toml::from_str(text).map_err(|e| SpecError::toml(text, &e))?;
+        spec.check()?;
+        Ok(spec)
+    }
+
+    /// The spec with its defaults, the same text however the file was laid out.
+    pub fn canonical(&self) -> serde_json::Value {
+        serde_json::to_value(self).expect("a spec holds nothing that JSON cannot")
+    }
+
+    fn check(&self) -> Result<(), SpecError> {
+        let plain = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-';
+        if self.name.is_empty() || !self.name.bytes().all(plain) {
+            return Err(SpecError::Name(self.name.clone()));
+        }
+        let trials = &self.trials;
+        check("trials.per_cell", trials.per_cell as f64, "2 or more", trials.per_cell >= 2)?;
+        check("trials.batch", trials.batch as f64, "1 or more", trials.batch >= 1)?;
+        check(
+            "confidence",
+            self.confidence,
+            "between 0 and 1",
+            self.confidence > 0.0 && self.confidence < 1.0,
+        )?;
+        if let Some(precision) = &trials.precision {
+            let width = precision.relative_half_width;
+            check(
+                "trials.precision.relative_half_width",
+                width,
+                "between 0 and 1",
+                width > 0.0 && width < 1.0,
+            )?;
+        }
+        Ok(())
+    }
+}
+
+fn check(field: &'static str, value: f64, need: &'static str, held: bool) -> Result<(), SpecError> {
+    if held { Ok(()) } else { Err(SpecError::Value { field, value, need }) }
+}
+
+impl SceneSpec {
+    pub(super) fn check(&self) -> Result<(), SpecError> {
+        let camera = Camera::from(self.camera);
+        check("scene.camera.fx", camera.fx, "positive, and every parameter finite", camera.is_valid())?;
+        let noise = self.noise_px;
+        check("scene.noise_px", noise, "a positive number", noise > 0.0 && noise.is_finite())?;
+        let share = self.outlier_share;
+        check("scene.outlier_share", share, "from 0 to below 1", (0.0..1.0).contains(&share))?;
+        let spread = self.outlier_px;
+        check("scene.outlier_px", spread, "a positive number", spread > 0.0 && spread.is_finite())?;
+        if let Some(length) = &self.length {
+            check("scene.length.length_mm", length.length_mm, "positive", length.length_mm > 0.0)?;
+            check(
+                "scene.length.centre_mm",
+                length.centre_mm[2],
+                "in front of the camera",
+                length.centre_mm[2] > 0.0,
+            )?;
+        }
+        self.target.board().map(|_| ())
+    }
+}
+
+impl TargetSpec {
+    /// The board.
+    pub fn board(&self) -> Result<Board, SpecError> {
+        Board::chessboard(self.columns, self.rows, self.spacing_mm)
+            .map_err(|e| SpecError::Target(e.to_string()))
+    }
+
+    /// Its points.
+    pub fn points(&self) -> Result<Vec<Vec2>, SpecError> {
+        Ok(self.board()?.points())
+    }
+}
+
+impl Estimator {
+    /// The solver's settings.
+    pub fn settings(&self, image: (usize, usize)) -> Settings {
+        let settings = Settings::new(self.free).with_image_size(image).with_loss(self.loss.loss());
+        self.hold.iter().fold(settings, |settings, (&parameter, &value)| settings.hold(parameter, value))
+    }
+
+    /// What is estimated: the free parameters that are not held after all.
+    pub fn estimated(&self) -> FreeParameters {
+        self.hold.keys().fold(self.free, |free, &parameter| free.without(parameter))
+    }
+}
+
+impl Default for LossChoice {
+    fn default() -> LossChoice {
+        LossChoice::Squares {}
+    }
+}
+
+impl LossChoice {
+    /// The solver's loss.
+    pub fn loss(self) -> Loss {
+        match self {
+            LossChoice::Squares {} => Loss::Squares,
+            LossChoice::Huber { delta_px } => Loss::Huber { delta_px },
+            LossChoice::Cauchy { scale_px } => Loss::Cauchy { scale_px },
+        }
+    }
+}

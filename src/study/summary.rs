@@ -1,0 +1,259 @@
+//! What do the trials of a cell say? Every number with its interval, beside what theory expects.
+
+use super::accumulate::Tally;
+use super::engine::Engine;
+use super::moments::Estimated;
+use super::prediction::Predicted;
+use super::quantity::Quantity;
+use super::sketch::Sketch;
+use calibench::evaluate::Interval;
+use calibench::evaluate::distribution::normal_two_sided;
+use calibench_harness::Cell as Entry;
+use calibench_harness::Table;
+
+/// A study's results.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Summary {
+    /// One a cell.
+    pub cells: Vec<CellSummary>,
+    /// Confidence of the intervals.
+    pub confidence: f64,
+}
+
+/// The results of a cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CellSummary {
+    /// Name of the cell.
+    pub name: String,
+    /// Labels of its levels.
+    pub labels: Vec<String>,
+    /// Trials, failed ones included.
+    pub trials: u64,
+    /// Outcome, number of trials, and share of all trials with its interval (Wilson 1927).
+    pub outcomes: Vec<(String, u64, Estimated)>,
+    /// One a quantity of the study.
+    pub statistics: Vec<Statistic>,
+    /// Correlation of the errors of two quantities, with its interval (Fisher 1921).
+    pub correlations: Vec<(Quantity, Quantity, Estimated)>,
+}
+
+/// What converged trials say of one quantity. `None` where too few trials have it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Statistic {
+    /// Of what.
+    pub quantity: Quantity,
+    /// Values.
+    pub count: u64,
+    /// Mean; of an error, the bias.
+    pub mean: Option<Estimated>,
+    /// Standard deviation.
+    pub sd: Option<Estimated>,
+    /// Root mean square; of an error, about the truth.
+    pub rms: Option<Estimated>,
+    /// Share, and the value that so many stay below.
+    pub quantiles: Vec<(f64, Option<Estimated>)>,
+    /// What theory expects.
+    pub predicted: Option<Predicted>,
+    /// Standard deviation over the predicted one.
+    pub ratio: Option<Estimated>,
+}
+
+/// Shares whose quantiles are told.
+pub const SHARES: [f64; 5] = [0.025, 0.25, 0.5, 0.75, 0.975];
+
+/// Summarises a study as far as it is done.
+pub fn summarise(engine: &Engine) -> Summary {
+    let false_alarm = 1.0 - engine.spec.confidence;
+    let one = |cell: &super::Cell| {
+        let tally = &engine.tallies[cell.index];
+        CellSummary {
+            name: cell.name.clone(),
+            labels: cell.labels.clone(),
+            trials: tally.trials,
+            outcomes: outcomes(tally, false_alarm),
+            statistics: engine
+                .quantities
+                .iter()
+                .enumerate()
+                .map(|(q, &quantity)| statistic(quantity, q, tally, cell.prediction.0[q], false_alarm))
+                .collect(),
+            correlations: correlations(&engine.quantities, tally, false_alarm),
+        }
+    };
+    Summary { cells: engine.cells.iter().map(one).collect(), confidence: engine.spec.confidence }
+}
+
+fn outcomes(tally: &Tally, false_alarm: f64) -> Vec<(String, u64, Estimated)> {
+    let share = |count: u64| {
+        let interval = Interval::of_proportion(count as usize, tally.trials as usize, false_alarm);
+        let value = count as f64 / tally.trials as f64;
+        // The interval holds its estimate but for a rounding, which shows at 0 and 1.
+        Estimated { value, low: interval.low.min(value), high: interval.high.max(value) }
+    };
+    let mut counts = tally.outcomes.clone();
+    // Said even where nothing converged.
+    counts.entry(super::trial::CONVERGED.to_string()).or_default();
+    if tally.trials == 0 {
+        return Vec::new();
+    }
+    counts.into_iter().map(|(outcome, count)| (outcome, count, share(count))).collect()
+}
+
+fn statistic(
+    quantity: Quantity,
+    q: usize,
+    tally: &Tally,
+    predicted: Option<Predicted>,
+    false_alarm: f64,
+) -> Statistic {
+    let moments = &tally.moments[q];
+    let sd = moments.sd_interval(false_alarm);
+    let ratio = predicted.filter(|p| p.sd > 0.0).and_then(|p| Some(sd?.scaled(1.0 / p.sd)));
+    Statistic {
+        quantity,
+        count: moments.count(),
+        mean: moments.mean_interval(false_alarm),
+        sd,
+        rms: moments.rms_interval(false_alarm),
+        quantiles: SHARES
+            .map(|share| (share, quantile(&tally.sketches[q], tally.origins[q], share, false_alarm)))
+            .to_vec(),
+        predicted,
+        ratio,
+    }
+}
+
+/// A quantile, and the values at the ranks between which the true one lies: their number below it is binomial (normal approximation).
+/// `None` where a rank would lie outside the sample.
+fn quantile(sketch: &Sketch, origin: f64, share: f64, false_alarm: f64) -> Option<Estimated> {
+    let n = sketch.total() as f64;
+    let middle = n * share;
+    let half = normal_two_sided(false_alarm) * (n * share * (1.0 - share)).sqrt();
+    let rank = |x: f64| if x >= 1.0 { sketch.of_rank(x as u64).map(|v| origin + v) } else { None };
+    Some(Estimated {
+        value: rank(libm::ceil(middle))?,
+        low: rank(libm::floor(middle - half))?,
+        high: rank(libm::ceil(middle + half) + 1.0)?,
+    })
+}
+
+fn correlations(
+    quantities: &[Quantity],
+    tally: &Tally,
+    false_alarm: f64,
+) -> Vec<(Quantity, Quantity, Estimated)> {
+    let joint = &tally.joint;
+    let errors: Vec<usize> =
+        (0..tally.joint_of.len()).filter(|&i| quantities[tally.joint_of[i]].is_error()).collect();
+    if joint.count() < 4 {
+        return Vec::new();
+    }
+    let mut found = Vec::new();
+    for (k, &i) in errors.iter().enumerate() {
+        for &j in &errors[k + 1..] {
+            let value = joint.correlation(i, j);
+            if value.abs() < 1.0 {
+                let interval = Interval::of_correlation(value, joint.count(), false_alarm);
+                let estimated = Estimated { value, low: interval.low, high: interval.high };
+                found.push((quantities[tally.joint_of[i]], quantities[tally.joint_of[j]], estimated));
+            }
+        }
+    }
+    found
+}
+
+impl CellSummary {
+    /// What is said of a quantity.
+    pub fn of(&self, name: &str) -> Option<&Statistic> {
+        self.statistics.iter().find(|s| s.quantity.name() == name)
+    }
+
+    /// Share of trials that converged.
+    pub fn converged(&self) -> Option<Estimated> {
+        self.outcomes.iter().find(|o| o.0 == super::trial::CONVERGED).map(|o| o.2)
+    }
+}
+
+impl Summary {
+    /// The tables `summary`, `outcomes` and `correlations`.
+    pub fn tables(&self) -> [Table; 3] {
+        [self.statistics_table(), self.outcomes_table(), self.correlations_table()]
+    }
+
+    fn statistics_table(&self) -> Table {
+        let mut columns: Vec<String> =
+            ["cell", "levels", "quantity", "unit", "count"].map(String::from).to_vec();
+        let quantiles = SHARES.map(|share| format!("q{}", 1000.0 * share));
+        let estimated = ["mean", "sd", "rms"].into_iter().map(String::from).chain(quantiles);
+        columns.extend(estimated.flat_map(with_ends));
+        columns.extend(["predicted_mean", "predicted_sd"].map(String::from));
+        columns.extend(with_ends("sd_over_predicted".to_string()));
+        let columns: Vec<(&str, &str)> = columns.iter().map(|c| (c.as_str(), "")).collect();
+        let mut table =
+            Table::new("summary", "What converged trials say, a cell and quantity a row", &columns);
+        for (index, cell) in self.cells.iter().enumerate() {
+            for s in &cell.statistics {
+                let (name, unit) = (s.quantity.name(), s.quantity.unit());
+                let mut row: Vec<Entry> = vec![
+                    index.into(),
+                    cell.name.as_str().into(),
+                    name.into(),
+                    unit.into(),
+                    (s.count as i64).into(),
+                ];
+                row.extend([s.mean, s.sd, s.rms].into_iter().flat_map(ends));
+                row.extend(s.quantiles.iter().flat_map(|q| ends(q.1)));
+                row.extend([number(s.predicted.map(|p| p.mean)), number(s.predicted.map(|p| p.sd))]);
+                row.extend(ends(s.ratio));
+                table.push(row);
+            }
+        }
+        table
+    }
+
+    fn outcomes_table(&self) -> Table {
+        let columns =
+            ["cell", "levels", "outcome", "count", "share", "share_low", "share_high"].map(|c| (c, ""));
+        let mut table = Table::new("outcomes", "How the trials of each cell ended", &columns);
+        for (index, cell) in self.cells.iter().enumerate() {
+            for (outcome, count, share) in &cell.outcomes {
+                let mut row: Vec<Entry> = vec![
+                    index.into(),
+                    cell.name.as_str().into(),
+                    outcome.as_str().into(),
+                    (*count as i64).into(),
+                ];
+                row.extend(ends(Some(*share)));
+                table.push(row);
+            }
+        }
+        table
+    }
+
+    fn correlations_table(&self) -> Table {
+        let columns = ["cell", "levels", "a", "b", "correlation", "correlation_low", "correlation_high"]
+            .map(|c| (c, ""));
+        let mut table = Table::new("correlations", "Correlation of the errors of two quantities", &columns);
+        for (index, cell) in self.cells.iter().enumerate() {
+            for (a, b, r) in &cell.correlations {
+                let mut row: Vec<Entry> =
+                    vec![index.into(), cell.name.as_str().into(), a.name().into(), b.name().into()];
+                row.extend(ends(Some(*r)));
+                table.push(row);
+            }
+        }
+        table
+    }
+}
+
+fn with_ends(name: String) -> [String; 3] {
+    [name.clone(), format!("{name}_low"), format!("{name}_high")]
+}
+
+fn number(value: Option<f64>) -> Entry {
+    value.map_or_else(|| Entry::Text(String::new()), Entry::Number)
+}
+
+fn ends(estimated: Option<Estimated>) -> [Entry; 3] {
+    [number(estimated.map(|e| e.value)), number(estimated.map(|e| e.low)), number(estimated.map(|e| e.high))]
+}
