@@ -443,7 +443,7 @@ fn k1_figure(strengths: &[Node], camera: &Camera) -> Figure {
     let caption = format!(
         "Deviation of the top line (v = 60 px) against k1 alone, in pixels; nothing is drawn at random. Notice that the line bends in \
          proportion to k1, alike for both signs. First-order theory misses it by {gap:.2} px at most; the bound, which adds up all \
-         second-order terms as if they had one sign, allows up to {bound:.1} px and says little more than that the theory is one of \
+         second-order terms as if they had one sign, allows {bound:.1} px there and says little more than that the theory is one of \
          small k1."
     );
     Figure::plot("k1", &plot, caption)

@@ -4,7 +4,7 @@ use super::*;
 use calibench_harness::{Dash, Figure, HeatMap, Look, Plot};
 
 /// Confidence of the intervals drawn at the trials.
-pub const SHOWN: f64 = 0.05;
+const SHOWN: f64 = 0.05;
 /// Tilts and coverages of the sections.
 const SECTION_TILTS: [u32; 3] = [5, 20, 45];
 const SECTION_TENTHS: [u32; 4] = [3, 5, 7, 10];

@@ -254,11 +254,11 @@ fn figure(map: &Map, scenes: &[Moved], seed: u64) -> Figure {
             let nodes = row(scenes, mm, SHOWN_DEG);
             let bound: Vec<_> = nodes.iter().map(|n| (n.coverage(), n.bound_sd(p))).collect();
             let trials: Vec<_> = nodes.iter().map(|n| (n.coverage(), n.sampled_sd(p))).collect();
-            let ratio = Interval::of_deviation_ratio(TRIALS, figures::SHOWN);
-            let bars: Vec<_> = trials.iter().map(|&(x, sd)| (x, sd / ratio.high, sd / ratio.low)).collect();
-            plot.line_as(format!("moved at {mm} mm"), &bound, Look::series(i))
-                .error_bars_as("", &bars, Look::series(i))
-                .points_as("", &trials, Look::series(i))
+            plot.line_as(format!("moved at {mm} mm"), &bound, Look::series(i)).points_as(
+                "",
+                &trials,
+                Look::series(i),
+            )
         })
     };
     let panels = [
@@ -266,7 +266,7 @@ fn figure(map: &Map, scenes: &[Moved], seed: u64) -> Figure {
         panel("Focal length", "standard deviation of fx (px)", Parameter::Fx),
     ];
     let caption = format!(
-        "Standard deviation of k2 and fx at a tilt of {SHOWN_DEG}\u{b0}: bound (lines) and {TRIALS} trials (points with 95 % intervals; noise 0.1 px, seed \
+        "Standard deviation of k2 and fx at a tilt of {SHOWN_DEG}\u{b0}: bound (lines) and {TRIALS} trials (points; noise 0.1 px, seed \
          {seed}). Dotted: coverage won by coming nearer, as in the maps. Coloured: the target stays at one distance and each view is \
          moved towards another corner. Notice that k2 falls either way, the focal length's only with the distance."
     );
