@@ -2,6 +2,8 @@
 //!
 //! A lens whose elements are not quite centred distorts tangentially too (Brown 1971). The chapter holds those terms at zero.
 //! Here the truth has them, from none to half of the radial displacement, and the chapter's model, which has none, is fitted.
+//! A displacement of the whole lens is its RMS over all points of the target in all four views: at a single point the ratio depends
+//! on where it lies (opposite corners of the target differ by a factor of three).
 //! Expected: the principal point takes the place of the missing terms; at a tenth of the radial ones it is off by many
 //! standard deviations; the reprojection error tells of it only at a ratio where the harm is long done; and below a ratio
 //! that the linear theory names, leaving them out is the better choice, because two parameters fewer have to be paid for.
@@ -11,7 +13,7 @@
 use calibench::calibrate::{Calibration, Covariance, Settings, calibrate};
 use calibench::camera::{BrownConrady, Camera, FreeParameters, Parameter};
 use calibench::evaluate::{RmseDistribution, cramer_rao};
-use calibench::geometry::{Affine, Vec2};
+use calibench::geometry::{Affine, Pose, Vec2, Vec3};
 use calibench::synth::{Scene, Truth};
 use calibench_harness::{Band, Claim, Context, Experiment, ExperimentError, Figure, Plot, Record, Table};
 use nalgebra::{DMatrix, DVector, Vector2};
@@ -21,7 +23,7 @@ use rayon::prelude::*;
 pub const EXPERIMENT: Experiment = Experiment {
     id: "distortion-model",
     title: "What leaving out the tangential terms costs",
-    question: "The truth has tangential distortion, from none to half of the radial displacement at the target's corners; the \
+    question: "The truth has tangential distortion, from none to half of the radial displacement (RMS over the target); the \
                model that is fitted has none. How far are the parameters off, does the reprojection error tell, what does it \
                cost on the plane, and up to which ratio is the smaller model the better one? Expected: at a tenth the \
                principal point is off by many standard deviations, and the RMSE tells only when the harm is long done.",
@@ -32,13 +34,15 @@ pub const EXPERIMENT: Experiment = Experiment {
 
 /// Noise that the biases are measured against, px.
 const SIGMA_PX: f64 = 0.1;
-/// Tangential over radial displacement at the target's farthest corner, in thousandths.
+/// Tangential over radial displacement, RMS over the target's points in all views, in thousandths.
 const RATIO_THOUSANDTHS: [u32; 12] = [0, 5, 10, 20, 30, 50, 75, 100, 150, 200, 300, 500];
 /// The two ratios that the chapter's question is about, in thousandths.
 const TENTH: u32 = 100;
 const HALF: u32 = 500;
-/// Direction of the decentring in the (p1, p2) plane: neither axis, so that both terms act.
+/// Direction of the decentring in the (p1, p2) plane in which the fits are made: neither axis, so that both terms act.
 const DIRECTION: [f64; 2] = [0.8, 0.6];
+/// Steps of all other directions, degrees; the opposite direction has the opposite effect.
+const DIRECTION_STEP_DEG: usize = 15;
 /// The chapter's parameters, then the two tangential ones, in the order of a covariance matrix.
 const FULL: FreeParameters = {
     use Parameter::*;
@@ -48,17 +52,18 @@ const FULL: FreeParameters = {
 fn run(context: &Context) -> Result<Record, ExperimentError> {
     let mut record = context.record();
     let theory = Theory::of(&Truth::chapter())?;
-    let unit = tangential_per_ratio(&Truth::chapter());
+    let unit = tangential_per_ratio(&Truth::chapter(), Vector2::from(DIRECTION));
     let nodes = RATIO_THOUSANDTHS
         .par_iter()
         .map(|&thousandths| Node::of(thousandths, unit))
         .collect::<Result<Vec<Node>, _>>()?;
     tell_numbers(&mut record, &nodes, &theory, unit);
+    tell_directions(&mut record, &theory);
     claim_linear(&mut record, [&nodes[3], &nodes[2], &nodes[1]], &theory, unit);
     claim_full_model(&mut record, &nodes);
     record.table(bias_table(&nodes, &theory, unit));
     record.figure(bias_figure(&nodes, &theory, unit));
-    record.figure(rmse_figure(&nodes));
+    record.figure(rmse_figure(&nodes, &theory));
     Ok(record)
 }
 
@@ -69,17 +74,18 @@ fn decentred(p: Vector2<f64>) -> Truth {
     Truth { camera: chapter.camera.with_distortion(lens), ..chapter }
 }
 
-/// `(p1, p2)` for a ratio of one: tangential displacement as long as the radial one at the target's farthest corner of the
-/// facing view. Both terms are linear in their coefficients.
-fn tangential_per_ratio(truth: &Truth) -> Vector2<f64> {
-    let distance = truth.cam_from_target[0].translation.z;
-    let corner = truth
-        .points
-        .iter()
-        .map(|p| p / distance)
-        .fold(Vec2::zeros(), |far, p| if p.norm_squared() > far.norm_squared() { p } else { far });
-    let moved = |lens: BrownConrady| (lens.distort(&corner) - corner).norm();
-    let direction = Vector2::from(DIRECTION);
+/// `(p1, p2)` of a direction for a ratio of one: the tangential displacement as long as the radial one, each as RMS over all points
+/// of all views. Both terms are linear in their coefficients.
+fn tangential_per_ratio(truth: &Truth, direction: Vector2<f64>) -> Vector2<f64> {
+    let ideal = |pose: &Pose| -> Vec<Vec2> {
+        let seen = truth.points.iter().map(|p| pose.apply(&Vec3::new(p.x, p.y, 0.0)));
+        seen.map(|p| p.xy() / p.z).collect()
+    };
+    let points: Vec<Vec2> = truth.cam_from_target.iter().flat_map(ideal).collect();
+    let moved = |lens: BrownConrady| -> f64 {
+        let squares = points.iter().map(|p| (lens.distort(p) - p).norm_squared());
+        (squares.sum::<f64>() / points.len() as f64).sqrt()
+    };
     let tangential = moved(BrownConrady { p1: direction.x, p2: direction.y, ..BrownConrady::default() });
     direction * (moved(truth.camera.distortion) / tangential)
 }
@@ -131,12 +137,36 @@ impl Theory {
         self.full.standard_deviation(parameter).unwrap_or(f64::NAN)
     }
 
+    /// What the RMSE of the small model is under noise alone.
+    fn noise(&self) -> RmseDistribution {
+        let free = self.small.free.len() + 6 * self.small.poses.len();
+        RmseDistribution { sigma_px: SIGMA_PX, points: self.observations, parameters: free }
+    }
+
+    /// Root of the expected squared RMSE where `rmse_px` remain without noise: the two add as squares.
+    fn with_noise_px(&self, rmse_px: f64) -> f64 {
+        let noise = self.noise().root_mean_square_px();
+        (rmse_px * rmse_px + noise * noise).sqrt()
+    }
+
     /// The ratio at which noise and what is left together leave the central 99 % of the RMSE that noise alone predicts.
     fn rmse_notices(&self, unit: Vector2<f64>) -> f64 {
-        let free = self.small.free.len() + 6 * self.small.poses.len();
-        let noise = RmseDistribution { sigma_px: SIGMA_PX, points: self.observations, parameters: free };
+        let noise = self.noise();
         let (high, expected) = (noise.interval_px(0.01).high, noise.root_mean_square_px());
         (high * high - expected * expected).sqrt() / self.rmse_px(unit)
+    }
+
+    /// How far the principal point is off at a ratio, px.
+    fn centre_shift_px(&self, p: Vector2<f64>) -> f64 {
+        let bias = self.bias(p);
+        Vector2::new(bias[2], bias[3]).norm()
+    }
+
+    /// The ratio at which both models have the same mean squared distance of the principal point from the truth.
+    fn centre_break_even(&self, unit: Vector2<f64>) -> f64 {
+        let square = |sd: f64| sd * sd;
+        let gain = |p: Parameter| square(self.full_sd(p)) - square(self.small_sd(p));
+        (gain(Parameter::Cx) + gain(Parameter::Cy)).sqrt() / self.centre_shift_px(unit)
     }
 
     /// The ratio at which both models have the same mean squared error of a parameter:
@@ -222,14 +252,14 @@ fn tell_numbers(record: &mut Record, nodes: &[Node], theory: &Theory, unit: Vect
             );
         }
         record.number(format!("{name}-rmse"), node.rmse_px, "px", stop(), "RMSE without noise");
-        let noise = std::f64::consts::SQRT_2 * SIGMA_PX;
-        let with_noise = (node.rmse_px * node.rmse_px + noise * noise).sqrt();
+        let with_noise = theory.with_noise_px(node.rmse_px);
+        record.number(format!("{name}-rmse-noisy"), with_noise, "px", stop(), "RMSE to expect with noise");
         record.number(
             format!("{name}-rmse-rise"),
-            with_noise / noise - 1.0,
+            with_noise / theory.with_noise_px(0.0) - 1.0,
             "",
             stop(),
-            "rise of the RMSE above the noise floor, as a fraction",
+            "rise of the expected RMSE above that of noise alone, as a fraction",
         );
         record.number(
             format!("{name}-plane-mm"),
@@ -254,6 +284,10 @@ fn tell_numbers(record: &mut Record, nodes: &[Node], theory: &Theory, unit: Vect
         theory_band(),
         "ratio at which the expected RMSE leaves the central 99 % of its prediction",
     );
+    let noise = theory.with_noise_px(0.0);
+    record.number("rmse-noise", noise, "px", theory_band(), "RMSE to expect from noise alone");
+    let noisy = theory.with_noise_px(theory.rmse_px(unit * notices));
+    record.number("rmse-notices-px", noisy, "px", theory_band(), "RMSE to expect at that ratio");
     let bias = theory.bias(unit * notices)[2].abs() / theory.small_sd(Cx);
     record.number(
         "rmse-notices-cx-z",
@@ -267,7 +301,14 @@ fn tell_numbers(record: &mut Record, nodes: &[Node], theory: &Theory, unit: Vect
         unit.x,
         "",
         Band::relative(1e-12, "rounding"),
-        "p1 where tangential and radial displacement are equal",
+        "p1 where tangential and radial displacement are equal in the RMS over the target",
+    );
+    record.number(
+        "corners-differ",
+        corners_differ(&Truth::chapter()),
+        "",
+        Band::relative(1e-12, "rounding"),
+        "largest over smallest tangential displacement at the corners of the facing target",
     );
     record.number("p2-per-ratio", unit.y, "", Band::relative(1e-12, "rounding"), "p2 there");
     for p in [Fx, Cx, Cy] {
@@ -281,6 +322,73 @@ fn tell_numbers(record: &mut Record, nodes: &[Node], theory: &Theory, unit: Vect
         );
         let what = format!("ratio below which {p} is better without them: same mean squared error");
         record.number(format!("{p}-break-even"), theory.break_even(p, unit), "", theory_band(), what);
+    }
+}
+
+/// Largest over smallest tangential displacement at the four corners of the facing target: why one corner does not speak for the lens.
+fn corners_differ(truth: &Truth) -> f64 {
+    let direction = Vector2::from(DIRECTION);
+    let lens = BrownConrady { p1: direction.x, p2: direction.y, ..BrownConrady::default() };
+    let distance = truth.cam_from_target[0].translation.z;
+    let farthest = truth.points.iter().map(Vec2::norm_squared).fold(0.0, f64::max);
+    let corners = truth.points.iter().filter(|p| p.norm_squared() == farthest).map(|p| p / distance);
+    let moved: Vec<f64> = corners.map(|p| (lens.distort(&p) - p).norm()).collect();
+    moved.iter().copied().fold(0.0, f64::max) / moved.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+/// What the linear theory says of all directions of the decentring, each at its own ratio of one.
+fn tell_directions(record: &mut Record, theory: &Theory) {
+    let columns = [
+        ("direction", "deg"),
+        ("p1_at_a_tenth", ""),
+        ("p2_at_a_tenth", ""),
+        ("cx_bias", "px"),
+        ("cy_bias", "px"),
+        ("centre_shift", "px"),
+        ("rmse_notices", ""),
+        ("centre_break_even", ""),
+    ];
+    let caption = "linear theory for every direction of the decentring: principal point at a ratio of a tenth, the ratio at which the \
+                   RMSE leaves its range, and that up to which the smaller model has the better principal point";
+    let mut table = Table::new("directions", caption, &columns);
+    let mut found: Vec<[f64; 3]> = Vec::new();
+    for degrees in (0..180).step_by(DIRECTION_STEP_DEG) {
+        let (sin, cos) = libm::sincos((degrees as f64).to_radians());
+        let unit = tangential_per_ratio(&Truth::chapter(), Vector2::new(cos, sin));
+        let tenth = unit * (f64::from(TENTH) / 1000.0);
+        let bias = theory.bias(tenth);
+        let of_direction =
+            [theory.centre_shift_px(tenth), theory.rmse_notices(unit), theory.centre_break_even(unit)];
+        table.push([degrees as f64, tenth.x, tenth.y, bias[2], bias[3]].into_iter().chain(of_direction));
+        found.push(of_direction);
+    }
+    record.table(table);
+    for (i, (id, unit, what)) in [
+        ("tenth-centre-shift", "px", "distance of the principal point from the truth at a tenth"),
+        ("rmse-notices", "", "ratio at which the expected RMSE leaves the central 99 % of its prediction"),
+        (
+            "centre-break-even",
+            "",
+            "ratio below which the principal point is better without the tangential terms",
+        ),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let values = || found.iter().map(|f| f[i]);
+        let band = || Band::relative(1e-8, "inverse of the information matrix");
+        for (end, value) in [
+            ("least", values().fold(f64::INFINITY, f64::min)),
+            ("most", values().fold(f64::NEG_INFINITY, f64::max)),
+        ] {
+            record.number(
+                format!("{id}-{end}"),
+                value,
+                unit,
+                band(),
+                format!("{what}, {end} over the directions"),
+            );
+        }
     }
 }
 
@@ -356,7 +464,7 @@ fn claim_linear(record: &mut Record, nodes: [&Node; 3], theory: &Theory, unit: V
         [("bias", &bias), ("RMSE", &rmse)]
             .map(|(name, a)| (format!("{name}: {} after {}", a.correction, a.before), a.correction < a.before)),
         "powers of the ratio, each removed in turn",
-    ));
+    ).over("extrapolations"));
 }
 
 fn claim_full_model(record: &mut Record, nodes: &[Node]) {
@@ -364,12 +472,15 @@ fn claim_full_model(record: &mut Record, nodes: &[Node]) {
         // Rounding of pixels below 1000 is 1.1e-13 in each of some 40 operations.
         (format!("ratio {}: RMSE {} px", n.ratio, n.full_rmse_px), n.full_rmse_px < 1e-11)
     });
-    record.claim(Claim::all_of(
-        "full-model-is-exact",
-        "with the tangential terms every exact scene is fitted exactly",
-        cases.collect::<Vec<_>>(),
-        "the truth is in the model; rounding of pixels",
-    ));
+    record.claim(
+        Claim::all_of(
+            "full-model-is-exact",
+            "with the tangential terms every exact scene is fitted exactly",
+            cases.collect::<Vec<_>>(),
+            "the truth is in the model; rounding of pixels",
+        )
+        .over("ratios"),
+    );
 }
 
 fn bias_table(nodes: &[Node], theory: &Theory, unit: Vector2<f64>) -> Table {
@@ -407,7 +518,7 @@ fn bias_figure(nodes: &[Node], theory: &Theory, unit: Vector2<f64>) -> Figure {
         shown.iter().map(|n| (n.ratio, theory.bias(unit * n.ratio)[2].abs() / theory.small_sd(Cx))).collect();
     let plot = Plot::new(
         "Bias of a model without tangential terms",
-        "tangential over radial displacement",
+        "tangential over radial displacement (RMS)",
         "bias (standard deviations)",
     )
     .points("cx", &curve(Cx))
@@ -423,17 +534,24 @@ fn bias_figure(nodes: &[Node], theory: &Theory, unit: Vector2<f64>) -> Figure {
     Figure::plot("bias", &plot, caption)
 }
 
-fn rmse_figure(nodes: &[Node]) -> Figure {
-    let noise = std::f64::consts::SQRT_2 * SIGMA_PX;
+fn rmse_figure(nodes: &[Node], theory: &Theory) -> Figure {
     let exact: Vec<(f64, f64)> = nodes.iter().map(|n| (n.ratio, n.rmse_px)).collect();
-    let noisy: Vec<(f64, f64)> =
-        nodes.iter().map(|n| (n.ratio, (n.rmse_px * n.rmse_px + noise * noise).sqrt())).collect();
-    let plot =
-        Plot::new("Does the reprojection error tell?", "tangential over radial displacement", "RMSE (px)")
-            .line("without noise", &exact)
-            .line("with noise of 0.1 px", &noisy)
-            .hline("noise floor", noise);
-    let caption = "RMSE per point of the model without tangential terms, without noise and added to noise of 0.1 px; nothing is \
-                   drawn at random. Notice where it leaves the noise floor.";
+    let noisy: Vec<(f64, f64)> = nodes.iter().map(|n| (n.ratio, theory.with_noise_px(n.rmse_px))).collect();
+    let noise = theory.noise();
+    let plot = Plot::new(
+        "Does the reprojection error tell?",
+        "tangential over radial displacement (RMS)",
+        "RMSE (px)",
+    )
+    .line("without noise", &exact)
+    .line("expected with noise of 0.1 px", &noisy)
+    .hline("noise alone: 99.5 % lie below", noise.interval_px(0.01).high);
+    let caption = format!(
+        "RMSE per point of the model without tangential terms, without noise and as expected with noise of 0.1 px; nothing is drawn \
+         at random. The second begins at {:.4} px, what noise alone leaves after the fit of {} parameters. Notice where it passes \
+         what noise alone explains.",
+        noise.root_mean_square_px(),
+        noise.parameters
+    );
     Figure::plot("rmse", &plot, caption)
 }

@@ -25,10 +25,10 @@ pub const EXPERIMENT: Experiment = Experiment {
     id: "expiry",
     title: "Why calibrations expire, and what a check once per shift buys",
     question: "A station's focal length follows the temperature and its bracket turns with vibration, three shifts a day. How \
-               does the systematic error of a measured length grow over a quarter, when do a threshold and a run rule (EWMA) \
-               on one reference length per shift notice it at the same false-alarm rate, and how much longer may the station \
+               does the systematic error of a measured length grow over a quarter, when do a threshold and a moving average \
+               (EWMA) on one reference length per shift notice it at the same false-alarm rate, and how much longer may the station \
                run between calibrations? Expected: an error near the case study's 0.03 mm after three months, noticed by the \
-               run rule weeks earlier.",
+               moving average weeks earlier.",
     seed: 1,
     takes_image: false,
     run,
@@ -41,7 +41,8 @@ pub(crate) const YEAR: usize = 365 * SHIFTS_A_DAY;
 /// Simulated quarters of the drifting station, and of one that does not drift.
 pub(crate) const QUARTERS: usize = 4000;
 pub(crate) const IN_CONTROL: usize = 20_000;
-/// Stations of a fleet that differ in how fast they drift.
+/// Stations of a fleet that differ in how fast they drift: so many to set the calendar and the action limit by, and as many others to
+/// judge them on.
 pub(crate) const FLEET: usize = 2000;
 /// Chance of a false alarm within a quarter that both rules are set to.
 pub(crate) const FALSE_ALARM: f64 = 0.01;
@@ -51,8 +52,8 @@ pub(crate) const TRADE_OFF: [f64; 5] = [0.001, 0.003, 0.01, 0.03, 0.1];
 pub(crate) const TOLERANCE_MM: f64 = 0.03;
 /// Share of stations that may exceed it unnoticed.
 pub(crate) const RISK: f64 = 0.01;
-/// Weight of the newest value in the run rule (Lucas & Saccucci 1990 recommend 0.05 to 0.25).
-const EWMA_WEIGHT: f64 = 0.2;
+/// Weight of the newest value in the moving average (Lucas & Saccucci 1990 recommend 0.05 to 0.25).
+pub(crate) const EWMA_WEIGHT: f64 = 0.2;
 
 fn run(context: &Context) -> Result<Record, ExperimentError> {
     let mut record = context.record();
@@ -60,7 +61,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     let sd_mm = station.check_sd_mm();
     let threshold = Shewhart::with_false_alarm(FALSE_ALARM, QUARTER);
     let ewma = Ewma::with_false_alarm(EWMA_WEIGHT, FALSE_ALARM, QUARTER);
-    let progress = context.progress("stations", QUARTERS + IN_CONTROL + FLEET);
+    let progress = context.progress("stations", QUARTERS + IN_CONTROL + 2 * FLEET);
 
     let quarters: Vec<Quarter> = (0..QUARTERS)
         .into_par_iter()
@@ -76,7 +77,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
             false_alarms(context.seed, trial as u64, &threshold, &ewma)
         })
         .collect();
-    let fleet: Vec<Fleet> = (0..FLEET)
+    let mut fleet: Vec<Fleet> = (0..2 * FLEET)
         .into_par_iter()
         .map(|trial| {
             progress.step();
@@ -84,10 +85,12 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
         })
         .collect();
 
+    let judged = fleet.split_off(FLEET);
+
     record.note(
         "The sizes of the causes are assumptions, picked round and so that their sum is of the size of the case study's drift.",
     );
-    let results = tell::Results { station, sd_mm, threshold, ewma, quarters, alarms, fleet };
+    let results = tell::Results { station, sd_mm, threshold, ewma, quarters, alarms, fleet, judged };
     tell::numbers(&mut record, &results)?;
     tell::claims(&mut record, &results, context.seed);
     tell::tables_and_figures(&mut record, &results, context.seed);
@@ -98,7 +101,9 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
 pub(crate) struct Quarter {
     /// Systematic error at the quarter's end, and the shares of temperature and bracket alone, mm.
     pub end_mm: [f64; 3],
-    /// Shift of the alarm by threshold and by run rule, and the systematic error then.
+    /// Systematic error at the middle shift of the last day, mm.
+    pub middle_mm: f64,
+    /// Shift of the alarm by threshold and by moving average, and the systematic error then.
     pub alarms: [Option<(usize, f64)>; 2],
 }
 
@@ -112,6 +117,7 @@ impl Quarter {
         let turned = station.error_mm(0.0, history.turn_rad[last]);
         Quarter {
             end_mm: [history.error_mm[last], warm, turned],
+            middle_mm: history.error_mm[last - 1],
             alarms: [at(threshold.first_alarm(&checks)), at(ewma.first_alarm(&checks))],
         }
     }

@@ -189,12 +189,15 @@ fn claim_facing_refused(record: &mut Record, summary: &Summary) {
 
 fn claim_tilted_solved(record: &mut Record, engine: &Engine, summary: &Summary) {
     let linear = summary.cells.iter().enumerate().filter(|(i, _)| tilt_deg(engine, *i) >= LINEAR_TILT_DEG);
-    record.claim(Claim::all_of(
-        "tilted-solved",
-        "from 6 degrees of tilt every trial gives a camera",
-        linear.map(|(_, c)| (c.name.clone(), converged(c) == 1.0)),
-        "6 degrees move the edge of the target by 5 px, fifty times the noise",
-    ));
+    record.claim(
+        Claim::all_of(
+            "tilted-solved",
+            "from 6 degrees of tilt every trial gives a camera",
+            linear.map(|(_, c)| (c.name.clone(), converged(c) == 1.0)),
+            "6 degrees move the edge of the target by 5 px, fifty times the noise",
+        )
+        .over("cells"),
+    );
 }
 
 fn claim_spread(record: &mut Record, engine: &Engine, summary: &Summary) {
@@ -221,7 +224,8 @@ fn claim_spread(record: &mut Record, engine: &Engine, summary: &Summary) {
         "from 6 degrees of tilt focal lengths and distance spread as the Cramer-Rao bound says",
         cases,
         "sqrt(chi2 / (n - 1)), all cases together at 1e-4, and 2 % for terms of second order",
-    );
+    )
+    .over("spreads");
     record.claim(claim.with_false_alarm_rate(FALSE_ALARM));
 }
 
@@ -242,7 +246,8 @@ fn claim_correlation(record: &mut Record, engine: &Engine, summary: &Summary, bo
         "focal length and distance err together as the bound predicts",
         cases,
         "Fisher's interval of a correlation, all tilts together at 1e-4",
-    );
+    )
+    .over("cells");
     record.claim(claim.with_false_alarm_rate(FALSE_ALARM));
     let least = bounds.iter().flatten().map(|b| b.correlation).fold(f64::INFINITY, f64::min);
     record.claim(Claim::at_least(

@@ -74,6 +74,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     trials::claim_rmse_blind(&mut record, &draw, &outcome);
     let grids = weak::few_points(context)?;
     weak::claim_overfitting(&mut record, &grids);
+    weak::claim_two_views(&mut record)?;
     weak::claim_facing_views(&mut record, context)?;
 
     record.figure(figures::views(&draw));

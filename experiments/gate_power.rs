@@ -72,12 +72,15 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
         Band::relative(1e-3, reason),
         "smallest p-value of the correct solver times the number of checks",
     );
-    record.claim(Claim::all_of(
-        "gross-faults-are-caught",
-        "every gross fault fails the gate within 32 samples a scenario",
-        faults.iter().zip(&catches).map(|(f, c)| (f.id.to_string(), c.samples.is_some())),
-        "the gate's own decision: Holm's procedure at its stated overall rate",
-    ));
+    record.claim(
+        Claim::all_of(
+            "gross-faults-are-caught",
+            "every gross fault fails the gate within 32 samples a scenario",
+            faults.iter().zip(&catches).map(|(f, c)| (f.id.to_string(), c.samples.is_some())),
+            "the gate's own decision: Holm's procedure at its stated overall rate",
+        )
+        .over("faults"),
+    );
     record.claim(
         Claim::at_least(
             "correct-solver-passes",
@@ -112,14 +115,44 @@ fn thorough(record: &mut Record) -> Result<(), ExperimentError> {
     let caught = |fault: &Planted| {
         row_of(fault).is_some_and(|row| is_current(row, fault) && row.samples_a_scenario.is_some())
     };
-    record.claim(Claim::all_of(
-        "every-fault-is-caught-thoroughly",
-        "the thorough measurement is of the faults planted now, and catches each",
-        planted().iter().map(|fault| (fault.id.to_string(), caught(fault))),
-        "the gate's own decision, up to 8192 samples a scenario",
-    ));
+    record.claim(
+        Claim::all_of(
+            "every-fault-is-caught-thoroughly",
+            "the thorough measurement is of the faults planted now, and catches each",
+            planted().iter().map(|fault| (fault.id.to_string(), caught(fault))),
+            "the gate's own decision, up to 8192 samples a scenario",
+        )
+        .over("faults"),
+    );
+    let samples = measured.faults.iter().filter_map(|row| row.samples_a_scenario).max().unwrap_or(0);
+    record.number(
+        "most-samples-needed",
+        samples as f64,
+        "",
+        Band::Exact,
+        "samples a scenario that the last planted fault takes, thorough measurement",
+    );
+    if let Some(row) = measured.alarms.first() {
+        let what = "quick runs of the correct solver in which false alarms were counted";
+        record.number("quick-runs", row.seeds as f64, "", Band::Exact, what);
+    }
+    for textbook in &measured.misled {
+        let what = "draws of that scene on which the textbook's error bars were measured";
+        record.number(
+            format!("textbook-draws-{}", textbook.scenario),
+            textbook.draws as f64,
+            "",
+            Band::Exact,
+            what,
+        );
+        let what = "share of them in which the textbook is confidently wrong";
+        let rate = textbook.misled as f64 / textbook.draws as f64;
+        record.number(format!("textbook-misled-{}", textbook.scenario), rate, "", Band::Exact, what);
+    }
     for row in &measured.alarms {
         let per_thousand = 1000.0 * row.stated_rate;
+        let what = "rate at which the gate was told to be wrong";
+        record.number(format!("stated-rate-{per_thousand}"), row.stated_rate, "", Band::Exact, what);
         let name = format!("false-alarms-at-{per_thousand}-per-thousand");
         record.number(
             &name,

@@ -30,7 +30,9 @@ mod gui;
 mod shown;
 mod tell;
 
-use book::{claim_published_consistent, claim_residual_shape, entry, reconcile};
+use book::{
+    claim_published_consistent, claim_residual_shape, claim_scales_differ, entry, reconcile, tell_derived,
+};
 use gui::{GUI, explain_gui};
 use shown::Shown;
 use tell::{modes_table, residual_table, tell_geometry, tell_planar};
@@ -88,6 +90,8 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     }
     claim_published_consistent(&mut record)?;
     claim_residual_shape(&mut record, context)?;
+    tell_derived(&mut record)?;
+    claim_scales_differ(&mut record)?;
     if shown.is_published() {
         explain_gui(&mut record, &centres, &fits[0], shown.band())?;
         reconcile(&mut record, shown.stand_in_text())?;

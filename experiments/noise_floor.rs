@@ -10,7 +10,7 @@ use calibench::evaluate::{Interval, RmseDistribution};
 use calibench_harness::{
     Band, Cell, Claim, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
 };
-use calibench_study::{Cell as Design, Engine, Spec, Summary, Trial, within};
+use calibench_study::{Cell as Design, Engine, Estimated, Spec, Statistic, Summary, Trial, within};
 
 /// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -158,7 +158,7 @@ fn claim_mean(record: &mut Record, name: &str, swept: &Swept) {
         "the mean RMSE is that of sigma sqrt(chi2 / N) with 2N - p degrees of freedom in every cell",
         cases,
         "central limit over 300 trials, all cells together at 1e-4, and half a percent for terms of second order",
-    );
+    ).over("cells");
     record.claim(claim.with_false_alarm_rate(FALSE_ALARM));
 }
 
@@ -233,7 +233,8 @@ fn claim_power(record: &mut Record, overstated: &Swept) {
         "where noise is overstated the alarm rings as often as the distribution says",
         cases,
         "Wilson's interval of the share, all together at 1e-4",
-    );
+    )
+    .over("cells");
     record.claim(claim.with_false_alarm_rate(FALSE_ALARM));
 }
 
@@ -303,7 +304,7 @@ fn floor_figure(grid: &Swept) -> Figure {
             .iter()
             .map(|&c| (noise(c), over_floor(c, predicted(&grid.engine.cells[c]).mean_px())))
             .collect();
-        let means: Vec<(usize, calibench_study::Estimated)> =
+        let means: Vec<(usize, Estimated)> =
             cells.iter().filter_map(|&c| Some((c, grid.summary.cells[c].of("rmse")?.mean?))).collect();
         let points: Vec<(f64, f64)> =
             means.iter().map(|(c, m)| (noise(*c), over_floor(*c, m.value))).collect();
@@ -316,8 +317,9 @@ fn floor_figure(grid: &Swept) -> Figure {
             .points_as(label, &points, Look::series(v));
     }
     let caption = format!(
-        "Mean RMSE over the noise floor sqrt(2) sigma against the noise (marks, 300 trials, 95 % intervals, seed {}) and its prediction sqrt(1 - p/2N) \
-         (lines). Notice that the factor depends on the views, since 6 + 6n parameters absorb noise, and not on the noise.",
+        "Mean RMSE over the noise floor sqrt(2) sigma against the noise (marks, 300 trials, 95 % intervals, seed {}) and its prediction (lines): the \
+         mean of sigma / sqrt(N) times chi with 2N - p degrees of freedom, which lies under sigma sqrt(2 (1 - p / 2N)), the root of the mean \
+         square, by one part in 4 (2N - p). Notice that the factor depends on the views, since 6 + 6n parameters absorb noise, and not on the noise.",
         grid.engine.spec.seed
     );
     Figure::plot("floor", &plot.y_range(0.96, 0.98), caption)
@@ -338,21 +340,31 @@ fn overfitting_figure(marks: &Swept) -> Figure {
         .collect();
     let sds: Vec<(f64, f64)> =
         cells.clone().filter_map(|c| Some((share(c), marks.summary.cells[c].of("fx")?.sd?.value))).collect();
+    let bars = |quantity: &str, of: fn(&Statistic) -> Option<Estimated>| -> Vec<(f64, f64, f64)> {
+        let bar = |c: usize| {
+            let estimated = of(marks.summary.cells[c].of(quantity)?)?;
+            Some((share(c), estimated.low, estimated.high))
+        };
+        cells.clone().filter_map(bar).collect()
+    };
+    let (mean_bars, sd_bars) = (bars("rmse", |s| s.mean), bars("fx", |s| s.sd));
     let bound: Vec<(f64, f64)> =
         cells.filter_map(|c| Some((share(c), marks.summary.cells[c].of("fx")?.predicted?.sd))).collect();
     let panels = [
         Plot::new("RMSE", "parameters per measurement p / 2N", "mean RMSE (px)")
             .size(420.0, 340.0)
             .line_as("\u{221a}2 sigma \u{221a}(1 \u{2212} p/2N)", &curve, Look::series(0))
+            .error_bars_as("", &mean_bars, Look::series(1))
             .points_as("measured", &means, Look::series(1))
             .hline_as("noise floor", floor, Look::ink().dash(Dash::Dotted)),
         Plot::new("Focal length", "parameters per measurement p / 2N", "standard deviation of fx (px)")
             .size(420.0, 340.0)
             .line_as("Cramer-Rao bound", &bound, Look::series(0))
+            .error_bars_as("", &sd_bars, Look::series(1))
             .points_as("measured", &sds, Look::series(1)),
     ];
     let caption = format!(
-        "Targets of 221, 63, 20, 12 and 9 marks, 4 views, 0.1 px of noise, 300 trials each, seed {}. Notice that the RMSE falls where the error grows: \
+        "Targets of 221, 63, 20, 12 and 9 marks, 4 views, 0.1 px of noise, 300 trials each, 95 % intervals, seed {}. Notice that the RMSE falls where the error grows: \
          a small residual is no proof of a good calibration.",
         marks.engine.spec.seed
     );

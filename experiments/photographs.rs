@@ -424,10 +424,10 @@ fn claim_bias(record: &mut Record, exact: &[Exact], unit: &[f64]) {
     };
     let statement = "with correction the camera is true up to what the detector leaves";
     let cases = exact.iter().map(|e| case(e, differences(&e.corrected.camera, &truth)));
-    record.claim(Claim::all_of("corrected-camera-is-true", statement, cases, reason));
+    record.claim(Claim::all_of("corrected-camera-is-true", statement, cases, reason).over("dot sizes"));
     let statement = "without correction the camera is wrong as the bias of the discs alone makes it";
     let cases = exact.iter().map(|e| case(e, differences(&e.uncorrected.camera, &e.predicted.camera)));
-    record.claim(Claim::all_of("uncorrected-camera-is-biased", statement, cases, reason));
+    record.claim(Claim::all_of("uncorrected-camera-is-biased", statement, cases, reason).over("dot sizes"));
 }
 
 fn noise_table(outcomes: &[Outcome]) -> Table {

@@ -62,6 +62,7 @@ fn what_does_not_resolve_is_found_with_its_line() {
         ("{{cite nobody1900}}", "has no `nobody1900`"),
         ("{{ref eq:nonsense}}", "nothing is named"),
         ("{{const nonsense}}", "is no constant"),
+        ("{{contradiction nonsense}}", "has no `nonsense`"),
         ("{{code experiments/line_bending.rs nonsense}}", "has no item"),
         ("{{nonsense}}", "is not understood"),
         ("{{num line-bending.points", "is opened here and never closed"),
@@ -104,10 +105,11 @@ fn unused_names_are_found_where_they_are_defined() {
     sources.pages = vec![Page { path: "page.md".into(), number: vec![1], text: "# Title\n".into() }];
     let findings = compile(&sources).findings;
     let uncited = sources.references.len();
+    let silent = sources.contradictions.len();
     let golden = std::fs::read_to_string(project.root().join("golden/line-bending.snap")).unwrap();
     let figures = golden.lines().filter(|line| line.starts_with("figure | ")).count();
-    assert!(uncited > 0 && figures > 0);
-    assert_eq!(findings.len(), uncited + figures, "{findings:?}");
+    assert!(uncited > 0 && silent > 0 && figures > 0);
+    assert_eq!(findings.len(), uncited + silent + figures, "{findings:?}");
     for finding in &findings {
         let text = std::fs::read_to_string(project.root().join(&finding.file)).unwrap();
         let lines: Vec<&str> = text.lines().collect();
@@ -115,6 +117,9 @@ fn unused_names_are_found_where_they_are_defined() {
         if finding.file == "book/references.toml" {
             assert_eq!(lines[finding.line - 1], "[[reference]]", "{finding}");
             assert_eq!(lines[finding.line], format!("key = \"{name}\""), "{finding}");
+        } else if finding.file == "book/contradictions.toml" {
+            assert_eq!(lines[finding.line - 1], "[[contradiction]]", "{finding}");
+            assert_eq!(lines[finding.line], format!("id = \"{name}\""), "{finding}");
         } else {
             let file = name.strip_prefix("line-bending.").unwrap();
             assert!(lines[finding.line - 1].starts_with(&format!("figure | {file}.")), "{finding}");

@@ -1,6 +1,8 @@
 //! Does README.md say what the program says? Its tables and numbers are compared with golden/ and with a run.
 
 use calibench::io::data_folder;
+use calibench_harness::published::{Kind, not_judged};
+use calibench_harness::verdict::ByKind;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
@@ -13,6 +15,17 @@ fn read(path: &str) -> String {
 fn golden(experiment: &str, kind: &str) -> Vec<Vec<String>> {
     let fields = |line: &str| line.split(" | ").map(str::to_string).collect::<Vec<_>>();
     read(&format!("golden/{experiment}.snap")).lines().map(fields).filter(|f| f[0] == kind).collect()
+}
+
+/// The published values of an experiment by kind, all of which hold.
+fn published(experiment: &str) -> ByKind {
+    let mut counts = ByKind::default();
+    for line in golden(experiment, "published") {
+        let kind = Kind::ALL.into_iter().find(|k| k.name() == line[7]).expect("a kind of verdict");
+        counts.count(kind, true);
+    }
+    not_judged(experiment).for_each(|entry| counts.count(entry.kind, false));
+    counts
 }
 
 #[test]
@@ -33,13 +46,18 @@ fn the_table_of_experiments_counts_what_golden_holds() {
             .filter(|path| path.extension().is_some_and(|e| e == "snap"))
             .map(|path| {
                 let id = path.file_stem().expect("a snapshot has a name").to_string_lossy().into_owned();
-                let counts = ["number", "claim", "published"].map(|kind| of_all(golden(&id, kind).len()));
-                (id, counts.to_vec())
+                let mut counts = ["number", "claim"].map(|kind| of_all(golden(&id, kind).len())).to_vec();
+                let published = published(&id).to_string();
+                counts.push(if published.is_empty() { "–".to_string() } else { published });
+                (id, counts)
             })
             .collect();
     for (id, counts) in &held {
         assert_eq!(counted.get(id), Some(counts), "`{id}` in README.md");
     }
+    let all = held.keys().fold(ByKind::default(), |sum, id| sum.plus(&published(id)));
+    let said = format!("| all | | | {all} |");
+    assert!(read("README.md").contains(&said), "README.md should say: {said}");
 }
 
 #[test]

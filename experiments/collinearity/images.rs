@@ -148,7 +148,7 @@ pub fn rectify(record: &mut Record, ours: &[Found]) -> Result<(), ExperimentErro
         "no grey level differs by more than the shift between the two maps explains",
         cases,
         "bilinear interpolation is no steeper than the largest step between neighbouring samples; rounding of both levels",
-    ));
+    ).over("images"));
     let shifts = shift_figure(ours, record.seed())?;
     record.figure(shifts);
     record.figure(Figure::photo(

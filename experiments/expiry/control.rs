@@ -1,5 +1,5 @@
-//! When does a series of checks leave control? A threshold on each (Shewhart 1931) and a run rule on their exponentially
-//! weighted mean (EWMA; Roberts 1959), both set to the same chance of a false alarm.
+//! When does a series of checks leave control? A threshold on each (Shewhart 1931) and one on their exponentially weighted moving
+//! average (EWMA; Roberts 1959), both set to the same chance of a false alarm.
 
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 

@@ -154,6 +154,8 @@ pub fn claim_rmse_blind(record: &mut Record, draw: &Draw, trials: &Outcome) {
     let predicted = draw.bound.correlation(Parameter::K1, Parameter::K2).unwrap_or(f64::NAN);
     let sampled = trials.errors().correlation(k1, k2);
     record.number("k1-k2-correlation", predicted, "", relative(), "correlation of k1 and k2 in the bound");
+    let focal = draw.bound.correlation(Parameter::Fx, Parameter::Fy).unwrap_or(f64::NAN);
+    record.number("fx-fy-correlation", focal, "", relative(), "correlation of fx and fy in the bound");
     record.number("k1-k2-correlation-trials", sampled, "", relative(), "the same over the trials");
     let around = Interval::of_correlation(predicted, n, RATE);
     let claim = Claim::within(

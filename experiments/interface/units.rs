@@ -142,12 +142,15 @@ pub(crate) fn tell(record: &mut Record, examined: &Examined) {
         let held = (c.spacing_ratio - expected).abs() <= ROUNDING;
         (format!("{} mm: ratio {}, expected {expected}", c.distance_mm, c.spacing_ratio), held)
     });
-    record.claim(Claim::all_of(
-        "spacing-shows-the-scale",
-        "the spacing check sees the scale f / Z: blind only where a pixel is a millimetre",
-        ratios.collect::<Vec<_>>(),
-        "a facing plane is seen at f / Z px a mm",
-    ));
+    record.claim(
+        Claim::all_of(
+            "spacing-shows-the-scale",
+            "the spacing check sees the scale f / Z: blind only where a pixel is a millimetre",
+            ratios.collect::<Vec<_>>(),
+            "a facing plane is seen at f / Z px a mm",
+        )
+        .over("distances"),
+    );
     let blind = sweep.iter().map(|c| {
         (
             format!("{} mm: {} mm, {}", c.distance_mm, c.affine_mm, c.collinearity),

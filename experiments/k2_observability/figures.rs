@@ -60,8 +60,8 @@ pub fn heat_maps(map: &Map, seed: u64) -> Result<Figure, ExperimentError> {
     ];
     let caption = format!(
         "Bound of k2 and fx, correlation of k1 and k2, and mean RMSE of {TRIALS} trials (noise 0.1 px, seed {seed}) over coverage \
-         and tilt; a dash where there is none. {MAP_NOTE} Notice that k2 asks for coverage, fx for tilt, and that the RMSE does \
-         not notice (its colours span what single calibrations scatter over)."
+         and tilt; a dash where there is none. {MAP_NOTE} More coverage means a nearer target here. Notice that k2 falls with \
+         coverage, fx with both, and that the RMSE does not notice (its colours span what single calibrations scatter over)."
     );
     Ok(Figure::panels("maps", &panels, 2, caption))
 }

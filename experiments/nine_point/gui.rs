@@ -136,15 +136,6 @@ pub fn explain_gui(
         let what = format!("{}, from centres on half pixels", entry(id)?.what);
         record.number(*id, number, unit, band.clone(), what);
     }
-    let m = fit.map.matrix();
-    let gap = (numbers[2] - m[(0, 2)]).abs().max((numbers[3] - m[(1, 2)]).abs());
-    record.number(
-        "gui-gap",
-        gap,
-        "",
-        Band::absolute(1e-8, "centres repeat to 1e-6 px"),
-        "larger gap of the two translations",
-    );
     let middle = mean(set);
     let exact = Band::absolute(ROUNDING, "a mean of nine multiples of 0.5");
     record.number("gui-centre-u-18ths", 18.0 * (middle.x - 715.0), "px/18", exact.clone(), "mean u less 715");
@@ -159,11 +150,20 @@ pub fn explain_gui(
     }
     record.table(table);
     record.figure(gui_figure(centres, set));
+    let moved = from_corner.moves.unwrap_or(0);
+    record.number(
+        "gui-moved",
+        moved as f64,
+        "",
+        Band::Exact,
+        "coordinates of the stand-in that must be rounded to the other neighbour for all six printed numbers",
+    );
     record.note(format!(
         "The GUI's six printed numbers are those of an affine fit to half-pixel centres, counted from the corner of the first \
-         pixel. Its translation differs by {gap:.4}, of which half a pixel of the origin makes {:.4}; rounding alone moves the \
-         mean by less than {rounding:.4}. The chapter names the rounding only. Mean v is 566 + 8/18: read from translation and \
-         scale alone it seems to be 566.19, because a dot rounded the other way tilts the map.",
+         pixel; of the stand-in's 18 coordinates {moved} must be rounded to the other neighbour for that. The translations \
+         printed differ by {gap_x:.5} along x, of which half a pixel of the origin makes {:.5}; rounding alone moves the mean by \
+         less than {rounding:.5}. The chapter names the rounding only. Mean v is 566 + 8/18: read from translation and scale \
+         alone it seems to be 566.19, because a dot rounded the other way tilts the map.",
         0.5 * fit.scale_x
     ));
     Ok(())

@@ -46,8 +46,8 @@ pub fn tell_planar(record: &mut Record, fit: &PlaneCalibration, band: Band) {
         record.number(id, value, unit, fine.clone(), what);
     }
     let fine = Band::absolute(3e-6, "centres repeat to 1e-6 px");
-    record.number("rms-px", fit.rms_point / per_px, "px", fine.clone(), "residual RMS in pixels");
-    record.number("max-px", fit.max_point / per_px, "px", fine, "largest residual in pixels");
+    record.number("fit-rms-px", fit.rms_point / per_px, "px", fine.clone(), "residual RMS in pixels");
+    record.number("fit-max-px", fit.max_point / per_px, "px", fine, "largest residual in pixels");
 }
 
 pub fn modes_table(fits: &[PlaneCalibration]) -> Result<Table, ExperimentError> {

@@ -5,7 +5,9 @@ use super::format::{self, significant, typeset};
 use super::golden_file::GoldenFile;
 use super::page::CompiledPage;
 use super::sources::Sources;
-use super::text::{attribute, inline};
+use super::text::{attribute, inline, sentence};
+use calibench_harness::published::{Kind, not_judged};
+use calibench_harness::verdict::ByKind;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -29,8 +31,20 @@ pub(super) fn record_pages(sources: &Sources, assets: &mut BTreeMap<String, Vec<
     pages
 }
 
+/// The published values of an experiment by kind, as its last run judged them.
+pub(super) fn by_kind(id: &str, evidence: &ExperimentEvidence) -> ByKind {
+    let mut counts = ByKind::default();
+    for value in evidence.record.iter().flat_map(|r| &r.published) {
+        if let Some(kind) = Kind::ALL.into_iter().find(|k| k.name() == value.kind) {
+            counts.count(kind, value.book_held && value.ours_held);
+        }
+    }
+    not_judged(id).for_each(|entry| counts.count(entry.kind, false));
+    counts
+}
+
 /// Golden, claims and published values in one line.
-pub(super) fn verdict(evidence: &ExperimentEvidence, golden: &GoldenFile) -> String {
+pub(super) fn verdict(id: &str, evidence: &ExperimentEvidence, golden: &GoldenFile) -> String {
     let numbers = golden.numbers.len();
     let Some(record) = &evidence.record else { return format!("{numbers} locked numbers.") };
     let held = |held: usize, total: usize, what: &str| match (held, total) {
@@ -39,22 +53,24 @@ pub(super) fn verdict(evidence: &ExperimentEvidence, golden: &GoldenFile) -> Str
         (held, total) => format!(", <b class=\"deviates\">{held} of {total} {what} held</b>"),
     };
     let claims = held(record.claims.iter().filter(|c| c.held).count(), record.claims.len(), "claims");
-    let fits = record.published.iter().filter(|p| p.book_held && p.ours_held).count();
-    let published = held(fits, record.published.len(), "published values");
+    let published = match by_kind(id, evidence).to_string() {
+        none if none.is_empty() => String::new(),
+        counts => format!("; published values: {counts}"),
+    };
     format!("{numbers} locked numbers{claims}{published}.")
 }
 
 fn record_page(id: &str, evidence: &ExperimentEvidence, golden: &GoldenFile) -> String {
     let mut page =
         format!("# Record: {id}\n\n**{}.** {}\n\n", inline(&evidence.title), inline(&evidence.question));
-    let verdict = verdict(evidence, golden);
+    let verdict = verdict(id, evidence, golden);
     let _ = writeln!(page, "`calibench run {id}`, seed {}. {verdict}\n", golden.seed);
     for note in evidence.record.iter().flat_map(|r| &r.notes) {
         let _ = writeln!(page, "Note: {}\n", inline(note));
     }
     let _ = writeln!(page, "## Numbers\n\n{}\n", numbers_table(id, evidence, golden));
     if let Some(record) = &evidence.record {
-        let _ = writeln!(page, "## Claims\n\n{}\n", claims_table(id, &record.claims, true));
+        let _ = writeln!(page, "## Claims\n\n{}\n", claims_table(&record.claims, true));
     }
     if !evidence.tables.is_empty() {
         page.push_str("## Tables\n\n");
@@ -112,50 +128,67 @@ fn numbers_table(id: &str, evidence: &ExperimentEvidence, golden: &GoldenFile) -
     )
 }
 
-/// The claims of a record. With `places`, every row can be linked to.
-pub(super) fn claims_table(experiment: &str, claims: &[RecordClaim], places: bool) -> String {
+/// The claims of a record, each with its reason and false-alarm rate. With `places`, every row can be linked to.
+pub(super) fn claims_table(claims: &[RecordClaim], places: bool) -> String {
     let mut rows = String::new();
     for claim in claims {
-        let (low, high) = (number(&claim.interval.0), number(&claim.interval.1));
         let unit = format::unit(&claim.unit);
-        let interval = match (low.is_finite(), high.is_finite()) {
-            (false, true) => format!("\u{2264}\u{a0}{}{unit}", significant(high, 3)),
-            (true, false) => format!("\u{2265}\u{a0}{}{unit}", significant(low, 3)),
-            _ => format!("[{}, {}]{unit}", significant(low, 4), significant(high, 4)),
+        let value = match &claim.counted {
+            Some(counted) => inline(counted),
+            None => format!("{}{unit}", significant(number(&claim.value), 4)),
         };
         let rate = claim
             .false_alarm_rate
-            .map_or("nothing is drawn".to_string(), |r| format!("false-alarm rate {r:?}"));
-        let title = attribute(&format!(
-            "{experiment}, claim {}\n{}\n{rate}\ncalibench run {experiment}",
-            claim.id, claim.reason
-        ));
+            .map_or("Nothing is drawn.".to_string(), |r| format!("False-alarm rate {}.", significant(r, 2)));
         let (word, class) = if claim.held { ("held", "held") } else { ("fails", "deviates") };
         let place = if places { format!(" id=\"claim-{}\"", claim.id) } else { String::new() };
         let _ = write!(
             rows,
-            "<tr{place} title=\"{title}\"><td class=\"text\">{}</td><td class=\"value\">{}{unit}</td><td class=\"interval\">{interval}</td>\
-             <td class=\"{class}\">{word}</td></tr>",
+            "<tr{place}><td class=\"text\">{}<div class=\"because\">{}. {rate}</div></td>\
+             <td class=\"value\">{value}<div class=\"because\">{}</div></td><td class=\"{class}\">{word}</td></tr>",
             inline(&claim.statement),
-            significant(number(&claim.value), 4)
+            inline(&sentence(&claim.reason)),
+            interval(claim)
         );
     }
-    let head = "<thead><tr><th>claim</th><th>value</th><th>must lie in</th><th>verdict</th></tr></thead>";
+    let head = "<thead><tr><th>claim, and where its interval comes from</th><th>value, and where it must lie</th><th>verdict</th></tr></thead>";
     format!(
         "<div class=\"table-wrapper\"><table class=\"claims\">{head}<tbody>{rows}</tbody></table></div>\n"
     )
 }
 
-/// Every number that the chapter prints: ours, what both are held against, the verdict, the record.
+/// Where the value of a claim must lie.
+fn interval(claim: &RecordClaim) -> String {
+    if claim.counted.is_some() {
+        return String::new();
+    }
+    let unit = format::unit(&claim.unit);
+    let (low, high) = (number(&claim.interval.0), number(&claim.interval.1));
+    match (low.is_finite(), high.is_finite()) {
+        (false, true) => format!("\u{2264}\u{a0}{}{unit}", significant(high, 3)),
+        (true, false) => format!("\u{2265}\u{a0}{}{unit}", significant(low, 3)),
+        _ => format!("in [{}, {}]{unit}", significant(low, 4), significant(high, 4)),
+    }
+}
+
+/// The published values of all experiments by kind, as a sentence.
+pub(super) fn published_counts(sources: &Sources) -> String {
+    let experiments = sources.evidence.experiments.iter();
+    let all = experiments.fold(ByKind::default(), |sum, (id, evidence)| sum.plus(&by_kind(id, evidence)));
+    all.to_string()
+}
+
+/// Every number that the chapter prints: ours, what both are held against, what the verdict is worth, and the verdict.
 pub(super) fn published_table(sources: &Sources) -> String {
     let mut rows = String::new();
     for entry in &sources.published {
         let evidence = sources.evidence.experiments.get(entry.experiment());
         let golden = evidence.and_then(|e| e.golden.as_ref());
-        let ours = golden.and_then(|g| g.number(entry.number()));
+        let ours = golden.and_then(|g| g.number(entry.number())).filter(|_| entry.rule.is_some());
         let locked = golden.and_then(|g| g.published.iter().find(|p| p.id == entry.number()));
         let judged = evidence.and_then(|e| e.published(entry.number()));
         let (word, class) = match judged.map(|p| (p.book_held, p.ours_held)) {
+            None if entry.rule.is_none() => ("not judged", "missing"),
             None => ("not reproduced yet", "missing"),
             Some((true, true)) => ("held", "held"),
             Some((false, true)) => ("book outside", "deviates"),
@@ -168,16 +201,20 @@ pub(super) fn published_table(sources: &Sources) -> String {
             let page = page_of(entry.experiment());
             format!("<a class=\"num\" href=\"{page}#number-{}\" title=\"{:?}\">{value}</a>", n.id, n.value)
         });
-        let judged_ours = judged.map_or(String::new(), |p| format!("ours {:?}\n", number(&p.ours)));
-        let (against, title) = locked.map_or((String::new(), String::new()), |p| {
+        let expectation = locked.map_or(String::new(), |p| {
             let (low, high) = p.interval;
-            let against = format!("[{},\u{a0}{}]", significant(low, 6), significant(high, 6));
-            (against, attribute(&format!("{judged_ours}{}: {}", p.kind, p.expectation)))
+            let interval = format!("[{}, {}]", significant(low, 6), significant(high, 6));
+            format!("Ours in {interval}. {}.", inline(&sentence(&format!("{}: {}", p.rule, p.expectation))))
         });
+        let because = match entry.because.as_str() {
+            "" => String::new(),
+            because => format!(" {}.", inline(&sentence(because))),
+        };
         let _ = write!(
             rows,
-            "<tr id=\"published-{}\" title=\"{title}\"><td>{}</td><td>{}</td><td class=\"value\">{}{}</td>\
-             <td class=\"value\">{ours}</td><td>{}</td><td>{against}</td><td class=\"{class}\">{word}</td></tr>",
+            "<tr id=\"published-{}\"><td class=\"text\">{} {}<div class=\"because\">{expectation}{because}</div></td>\
+             <td class=\"value\">{}{}</td><td class=\"value\">{ours}</td>\
+             <td class=\"{class}\">{word}<div class=\"because\">{}</div></td></tr>",
             entry.id,
             section(&entry.section),
             inline(&entry.what),
@@ -186,15 +223,14 @@ pub(super) fn published_table(sources: &Sources) -> String {
             entry.kind.name()
         );
     }
-    let head = "<thead><tr><th>section</th><th>what</th><th>printed</th><th>ours</th><th>kind</th><th>interval</th>\
-                <th>verdict</th></tr></thead>";
+    let head = "<thead><tr><th>what, and what it is held against</th><th>printed</th><th>ours</th><th>verdict</th></tr></thead>";
     format!(
         "<div class=\"table-wrapper\"><table class=\"published\">{head}<tbody>{rows}</tbody></table></div>\n"
     )
 }
 
 /// A section with its sign; `case study` has no number.
-fn section(name: &str) -> String {
+pub(super) fn section(name: &str) -> String {
     let sign = if name.starts_with(|c: char| c.is_ascii_digit()) { "\u{a7}" } else { "" };
     format!("{sign}{}", inline(name))
 }
@@ -209,7 +245,7 @@ pub(super) fn record_list(sources: &Sources) -> String {
             "- [{id}]({}): {}. {}",
             page_of(id),
             inline(&evidence.title),
-            verdict(evidence, golden)
+            verdict(id, evidence, golden)
         );
     }
     list

@@ -40,6 +40,7 @@ pub fn compile(sources: &Sources) -> Compiled {
     let mut pages = Vec::new();
     for (page, pieces) in sources.pages.iter().zip(&scanned) {
         let mut content = String::new();
+        resolver.page.clone_from(&page.path);
         for piece in pieces {
             let first = begins_sentence(&content);
             match translate((page, piece), first, &mathematics, &paths, &mut resolver) {

@@ -57,12 +57,15 @@ pub(super) struct RecordClaim {
     pub reason: String,
     pub false_alarm_rate: Option<f64>,
     pub held: bool,
+    /// `56 of 56 cells`, for a claim about many.
+    #[serde(default)]
+    pub counted: Option<String>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
 pub(super) struct RecordPublished {
     pub id: String,
-    pub ours: Value,
+    pub kind: String,
     pub book_held: bool,
     pub ours_held: bool,
 }

@@ -26,7 +26,9 @@ pub struct GoldenPublished {
     pub interval: (f64, f64),
     /// The digits of the chapter.
     pub printed: String,
-    /// `exact`, `sampled` or `reference`.
+    /// `exact`, `sampled` or `within`.
+    pub rule: String,
+    /// What the verdict is worth, in words.
     pub kind: String,
     /// What both are held against, in words.
     pub expectation: String,
@@ -88,12 +90,13 @@ impl GoldenFile {
                     });
                 }
             }
-            ["published", id, low, high, _, printed, kind, expectation @ ..] => {
+            ["published", id, low, high, _, printed, rule, kind, expectation @ ..] => {
                 if let (Ok(low), Ok(high)) = (low.parse(), high.parse()) {
                     self.published.push(GoldenPublished {
                         id: id.to_string(),
                         interval: (low, high),
                         printed: printed.to_string(),
+                        rule: rule.to_string(),
                         kind: kind.to_string(),
                         expectation: expectation.join(" "),
                     });

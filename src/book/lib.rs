@@ -21,6 +21,9 @@
 //! | `code experiments/line_bending.rs sweep_k1` | that item of that file |
 //! | `cite zhang2000`, `citep zhang2000` | `Zhang (2000)`, `(Zhang 2000)` |
 //! | `ref eq:projection` | `equation (1.1)`, `Figure 2.1`, `Table 3.2` |
+//! | `contradiction two-views` | a statement of the chapter that does not hold, declared where the text says so |
+//! | `all-contradictions` | all of them, with links to where they are declared |
+//! | `published-counts` | how many published values hold, by kind of verdict |
 //! | `all-published`, `all-references` | the appendix, the list of references |
 //!
 //! An equation is written between lines of `$$`, the last one followed by its name: `$$ {#eq:projection}`.
@@ -28,6 +31,7 @@
 mod appendix;
 mod compile;
 mod constants;
+mod contradictions;
 mod evidence;
 mod finding;
 mod format;
@@ -47,6 +51,7 @@ mod sources;
 mod text;
 
 pub use compile::{Compiled, compile};
+pub use contradictions::Contradiction;
 pub use evidence::{Evidence, ExperimentEvidence};
 pub use finding::Finding;
 pub use mdbook::BookError;

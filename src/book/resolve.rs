@@ -1,13 +1,15 @@
 //! What does a placeholder stand for? One function a verb; an error says what is missing and what to do.
 
 use super::constants::constant;
+use super::contradictions::Contradiction;
 use super::evidence::ExperimentEvidence;
 use super::finding::Finding;
 use super::golden_file::{GoldenFigure, GoldenFile, GoldenNumber};
 use super::labels::Labels;
-use super::sources::{REFERENCES, Sources};
-use super::text::{attribute, escape, inline};
-use super::{appendix, format, listing, references};
+use super::scan::{Kind, scan};
+use super::sources::{CONTRADICTIONS, REFERENCES, Sources};
+use super::text::{attribute, escape, inline, sentence};
+use super::{appendix, contradictions, format, listing, references};
 use calibench::io::hash::sha256_hex;
 use calibench_harness::published::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,8 +20,12 @@ pub(super) struct Resolver<'a> {
     sources: &'a Sources,
     pub labels: Labels,
     pub assets: BTreeMap<String, Vec<u8>>,
+    /// The page whose pieces are being resolved.
+    pub page: String,
     cited: BTreeSet<String>,
     shown: BTreeSet<String>,
+    /// Contradictions declared so far, with their pages.
+    declared: BTreeMap<String, String>,
 }
 
 type Resolved = Result<String, String>;
@@ -29,7 +35,15 @@ const WIDE_PX: f64 = 700.0;
 
 impl<'a> Resolver<'a> {
     pub(super) fn new(sources: &'a Sources, labels: Labels) -> Resolver<'a> {
-        Resolver { sources, labels, assets: BTreeMap::new(), cited: BTreeSet::new(), shown: BTreeSet::new() }
+        Resolver {
+            sources,
+            labels,
+            assets: BTreeMap::new(),
+            page: String::new(),
+            cited: BTreeSet::new(),
+            shown: BTreeSet::new(),
+            declared: BTreeMap::new(),
+        }
     }
 
     /// The text of a placeholder, which may be the first of a sentence.
@@ -48,6 +62,9 @@ impl<'a> Resolver<'a> {
             ["cite", key] => self.cite(key, false),
             ["citep", key] => self.cite(key, true),
             ["ref", label] => self.refer(label, begins_sentence),
+            ["contradiction", id] => self.contradiction(id),
+            ["all-contradictions"] => self.contradictions(),
+            ["published-counts"] => Ok(appendix::published_counts(self.sources)),
             ["all-published"] => Ok(appendix::published_table(self.sources)),
             ["all-records"] => Ok(appendix::record_list(self.sources)),
             ["all-references"] => Ok(references::list(&self.sources.references)),
@@ -99,7 +116,7 @@ impl<'a> Resolver<'a> {
         let text = format::typeset(entry.printed.trim_start_matches('+'));
         let unit = format::unit(&entry.unit);
         let title = attribute(&format!(
-            "printed in the chapter, section {}: {} {}\n{}\nkind: {}",
+            "printed in the chapter, section {}: {} {}\n{}\nverdict: {}",
             entry.section,
             entry.printed,
             entry.unit,
@@ -169,12 +186,12 @@ impl<'a> Resolver<'a> {
         let record = evidence.record.as_ref();
         let record = record
             .ok_or_else(|| format!("claims of `{experiment}`: run `calibench run {experiment}` first"))?;
-        Ok(appendix::claims_table(experiment, &record.claims, false))
+        Ok(appendix::claims_table(&record.claims, false))
     }
 
     fn command(&self, experiment: &str) -> Resolved {
         let (evidence, golden) = self.golden(experiment)?;
-        let verdict = appendix::verdict(evidence, golden);
+        let verdict = appendix::verdict(experiment, evidence, golden);
         let href = appendix::page_of(experiment);
         Ok(format!(
             "<div class=\"run\"><b>Reproduce it:</b> <code>calibench run {experiment}</code> (seed {}). {verdict} \
@@ -207,12 +224,72 @@ impl<'a> Resolver<'a> {
         Ok(format!(r##"<a class="ref" href="{}#{name}">{words}</a>"##, label.page))
     }
 
-    /// Names that nothing uses: references, labels, figures that are drawn for nobody.
+    fn contradiction(&mut self, id: &str) -> Resolved {
+        let entry = self.sources.contradictions.iter().find(|c| c.id == id);
+        let entry = entry.ok_or_else(|| format!("{CONTRADICTIONS} has no `{id}`"))?;
+        if let Some(page) = self.declared.insert(id.to_string(), self.page.clone()) {
+            return Err(format!("contradiction `{id}` is declared on {page} already"));
+        }
+        Ok(contradictions::declared(entry, &self.within(&entry.found)?, &self.shown_by(entry)?))
+    }
+
+    fn contradictions(&mut self) -> Resolved {
+        let mut rows = String::new();
+        for entry in &self.sources.contradictions {
+            let page = self.declared.get(&entry.id).cloned();
+            let page = page.ok_or_else(|| format!("contradiction `{}` is not declared above", entry.id))?;
+            let (found, shown_by) = (self.within(&entry.found)?, self.shown_by(entry)?);
+            rows.push_str(&contradictions::row(entry, &found, &shown_by, &page));
+        }
+        Ok(contradictions::table(&rows))
+    }
+
+    /// Plain text with placeholders, resolved.
+    fn within(&mut self, text: &str) -> Resolved {
+        let pieces = scan(text);
+        pieces
+            .iter()
+            .map(|piece| match &piece.kind {
+                Kind::Prose(text) => Ok(inline(text)),
+                Kind::Placeholder(text) => self.resolve(text, false),
+                _ => Err(format!("`{text}`: words and placeholders only")),
+            })
+            .collect()
+    }
+
+    /// Links to the claims and works that show a contradiction. A claim must be there and hold.
+    fn shown_by(&mut self, entry: &Contradiction) -> Resolved {
+        let mut shown = Vec::new();
+        for evidence in &entry.evidence {
+            if let Some(key) = evidence.strip_prefix("cite ") {
+                shown.push(self.cite(key, false)?);
+                continue;
+            }
+            let (experiment, claim) = split(evidence)?;
+            let (found, golden) = self.golden(experiment)?;
+            if !golden.claims.iter().any(|c| c == claim) {
+                return Err(format!("experiment `{experiment}` has no claim `{claim}`"));
+            }
+            if found.record.as_ref().is_some_and(|r| r.claims.iter().any(|c| c.id == claim && !c.held)) {
+                return Err(format!("claim `{evidence}`, which shows `{}`, fails", entry.id));
+            }
+            let page = appendix::page_of(experiment);
+            shown.push(format!("<a href=\"{page}#claim-{claim}\"><code>{}</code></a>", inline(evidence)));
+        }
+        Ok(shown.join(", "))
+    }
+
+    /// Names that nothing uses: references, labels, contradictions that no page declares, figures that are drawn for nobody.
     pub(super) fn unused(&self) -> Vec<Finding> {
         let mut findings = self.labels.unused();
         let uncited = self.sources.references.iter().filter(|r| !self.cited.contains(&r.key));
         findings
             .extend(uncited.map(|r| Finding::new(REFERENCES, r.line, format!("`{}` is never cited", r.key))));
+        let silent = self.sources.contradictions.iter().filter(|c| !self.declared.contains_key(&c.id));
+        findings.extend(silent.map(|c| {
+            let message = format!("`{}` is declared on no page: write {{{{contradiction {}}}}}", c.id, c.id);
+            Finding::new(CONTRADICTIONS, c.line, message)
+        }));
         for (experiment, evidence) in &self.sources.evidence.experiments {
             let figures = evidence.golden.iter().flat_map(|g| &g.figures);
             for GoldenFigure { file, line, .. } in figures {
@@ -235,14 +312,6 @@ fn split(id: &str) -> Result<(&str, &str), String> {
 /// A file's name without its ending.
 fn stem(file: &str) -> &str {
     file.rsplit_once('.').map_or(file, |(stem, _)| stem)
-}
-
-/// A caption begins as a sentence does, unless its first word is a symbol such as `k2`.
-fn sentence(caption: &str) -> String {
-    let word = caption.split(|c: char| !c.is_alphanumeric()).next().unwrap_or_default();
-    let is_word = word.chars().all(|c| c.is_ascii_lowercase()) && !["fx", "fy", "cx", "cy"].contains(&word);
-    let Some(first) = caption.chars().next().filter(|_| is_word) else { return caption.to_string() };
-    first.to_uppercase().chain(caption.chars().skip(1)).collect()
 }
 
 /// Width of an SVG of ours in CSS pixels, from its first tag.
@@ -275,14 +344,14 @@ fn provenance(
     if let Some(published) = golden.published.iter().find(|p| p.id == *id) {
         let (low, high) = published.interval;
         lines
-            .push(format!("published {} ({}): {}", published.printed, published.kind, published.expectation));
+            .push(format!("published {} ({}): {}", published.printed, published.rule, published.expectation));
         let verdict = evidence.published(id).map_or("not judged yet", |p| match (p.book_held, p.ours_held) {
             (true, true) => "held",
             (false, true) => "the book's value is outside",
             (true, false) => "ours is outside",
             (false, false) => "both are outside",
         });
-        lines.push(format!("interval [{low}, {high}]; verdict: {verdict}"));
+        lines.push(format!("interval [{low}, {high}]; verdict: {verdict}, {}", published.kind));
     } else {
         lines.push("verdict: locked in golden/; not printed in the chapter".to_string());
     }
@@ -294,15 +363,6 @@ fn provenance(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_sentence_begins_with_a_capital_and_a_symbol_stays_itself() {
-        assert_eq!(sentence("median day of the alarm"), "Median day of the alarm");
-        assert_eq!(sentence("k2 against coverage"), "k2 against coverage");
-        assert_eq!(sentence("fx, fy and cx"), "fx, fy and cx");
-        assert_eq!(sentence("equation\u{a0}(3.2)"), "Equation\u{a0}(3.2)");
-        assert_eq!(sentence(""), "");
-    }
 
     #[test]
     fn the_width_of_a_drawing_is_read_from_its_first_tag() {

@@ -1,5 +1,6 @@
 //! What is the book made from? Pages in the order of book/text/SUMMARY.md, references, evidence, and the folder of the code.
 
+use super::contradictions::{self, Contradiction};
 use super::evidence::Evidence;
 use super::finding::Finding;
 use super::mdbook::{self, TEXT};
@@ -12,6 +13,9 @@ use std::path::PathBuf;
 
 /// The works that may be cited, relative to the project.
 pub(super) const REFERENCES: &str = "book/references.toml";
+
+/// Where the chapter is contradicted, relative to the project.
+pub(super) const CONTRADICTIONS: &str = "book/contradictions.toml";
 
 /// A page as it is written.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -31,6 +35,8 @@ pub struct Sources {
     pub pages: Vec<Page>,
     /// Works that may be cited.
     pub references: Vec<Reference>,
+    /// Where the chapter is contradicted.
+    pub contradictions: Vec<Contradiction>,
     /// The chapter's published values.
     pub published: Vec<Entry>,
     /// What the experiments say.
@@ -65,9 +71,14 @@ impl Sources {
         let text = fs::read_to_string(project.root().join(REFERENCES));
         let references = text.map_err(|e| (1, e.to_string())).and_then(|text| references::parse(&text));
         let references = references.map_err(|(line, e)| Finding::new(REFERENCES, line, e))?;
+        let text = fs::read_to_string(project.root().join(CONTRADICTIONS));
+        let contradictions =
+            text.map_err(|e| (1, e.to_string())).and_then(|text| contradictions::parse(&text));
+        let contradictions = contradictions.map_err(|(line, e)| Finding::new(CONTRADICTIONS, line, e))?;
         let published =
             published::chapter().map_err(|e| Finding::new("golden/published.toml", 1, e.to_string()))?;
         let published = published.to_vec();
-        Ok(Sources { pages, references, published, evidence, root: project.root().to_path_buf() })
+        let root = project.root().to_path_buf();
+        Ok(Sources { pages, references, contradictions, published, evidence, root })
     }
 }

@@ -31,9 +31,26 @@ pub(super) fn inline(text: &str) -> String {
     shield(&escape(text))
 }
 
+/// A caption begins as a sentence does, unless its first word is a symbol such as `k2`.
+pub(super) fn sentence(caption: &str) -> String {
+    let word = caption.split(|c: char| !c.is_alphanumeric()).next().unwrap_or_default();
+    let is_word = word.chars().all(|c| c.is_ascii_lowercase()) && !["fx", "fy", "cx", "cy"].contains(&word);
+    let Some(first) = caption.chars().next().filter(|_| is_word) else { return caption.to_string() };
+    first.to_uppercase().chain(caption.chars().skip(1)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_sentence_begins_with_a_capital_and_a_symbol_stays_itself() {
+        assert_eq!(sentence("median day of the alarm"), "Median day of the alarm");
+        assert_eq!(sentence("k2 against coverage"), "k2 against coverage");
+        assert_eq!(sentence("fx, fy and cx"), "fx, fy and cx");
+        assert_eq!(sentence("equation\u{a0}(3.2)"), "Equation\u{a0}(3.2)");
+        assert_eq!(sentence(""), "");
+    }
 
     #[test]
     fn nothing_of_markdown_or_html_is_left() {

@@ -5,6 +5,7 @@ use super::reproduce::{exit_of, judge_all};
 use super::{Exit, print, warn};
 use calibench_book::Finding;
 use calibench_harness::project::Project;
+use calibench_harness::published::Kind;
 use calibench_harness::verdict::{self, Golden, Run, Verdict};
 use calibench_harness::{Context, Experiment, ProgressDisplay, Record, published};
 use rayon::prelude::*;
@@ -90,12 +91,19 @@ fn to_json(verdict: &Verdict) -> Value {
         Golden::Skipped(reason) => json!({"skipped": reason}),
         Golden::Missing => json!("missing"),
     };
+    let by_kind: serde_json::Map<String, Value> = Kind::ALL
+        .into_iter()
+        .map(|kind| {
+            let counts = verdict.published.of(kind);
+            (kind.name().to_string(), json!({"held": counts.held, "total": counts.total}))
+        })
+        .collect();
     json!({
         "experiment": verdict.experiment,
         "held": verdict.held(),
         "golden": golden,
         "claims": {"held": verdict.claims.held, "total": verdict.claims.total},
-        "published": {"held": verdict.published.held, "total": verdict.published.total},
+        "published": by_kind,
         "deviations": verdict.deviations,
         "drift": verdict.drift,
     })
@@ -137,7 +145,7 @@ fn unreconciled(record: &Record) -> Vec<String> {
     };
     entries
         .iter()
-        .filter(|e| e.experiment() == record.experiment())
+        .filter(|e| e.experiment() == record.experiment() && e.kind != Kind::CannotBeJudged)
         .filter(|e| record.reconciliations().iter().all(|r| r.entry.id != e.id))
         .map(|e| format!("published {} ({}) is not reconciled", e.id, e.what))
         .collect()

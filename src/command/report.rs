@@ -1,7 +1,8 @@
 //! How is a verdict told to a person? One table over all experiments, then every deviation in full.
 
 use calibench::io::significant;
-use calibench_harness::verdict::{Golden, Run, Tally, Verdict};
+use calibench_harness::published::not_judged;
+use calibench_harness::verdict::{ByKind, Golden, Run, Tally, Verdict};
 use calibench_harness::{Reconciliation, Record};
 use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 
@@ -26,10 +27,16 @@ fn tally(t: Tally) -> String {
     if t.total == 0 { "\u{2013}".to_string() } else { format!("{} of {}", t.held, t.total) }
 }
 
-/// One line an experiment.
+fn by_kind(counts: ByKind) -> String {
+    let text = counts.to_string();
+    if text.is_empty() { "\u{2013}".to_string() } else { text }
+}
+
+/// One line an experiment, and the published values of all by kind.
 pub(super) fn reconciliation_table(runs: &[Run], verdicts: &[Option<Verdict>]) -> String {
-    let mut table = table(&["experiment", "golden numbers", "claims", "published", "time", "verdict"]);
-    for column in 1..5 {
+    let mut table =
+        table(&["experiment", "golden numbers", "claims", "published, by kind", "time", "verdict"]);
+    for column in [1, 2, 4] {
         if let Some(column) = table.column_mut(column) {
             column.set_cell_alignment(CellAlignment::Right);
         }
@@ -46,11 +53,12 @@ pub(super) fn reconciliation_table(runs: &[Run], verdicts: &[Option<Verdict>]) -
                     Golden::Missing => "no snapshot".to_string(),
                 };
                 let word = if verdict.held() { "held" } else { "DEVIATES" };
-                [id, golden, tally(verdict.claims), tally(verdict.published), time, word.to_string()]
+                [id, golden, tally(verdict.claims), by_kind(verdict.published), time, word.to_string()]
             }
         });
     }
-    table.trim_fmt() + "\n"
+    let all = verdicts.iter().flatten().fold(ByKind::default(), |sum, v| sum.plus(&v.published));
+    format!("{}\npublished values: {}\n", table.trim_fmt(), by_kind(all))
 }
 
 /// Every deviation, every drift, and why a comparison was left out.
@@ -84,35 +92,58 @@ pub(super) fn summary(record: &Record) -> String {
     for c in record.claims() {
         let interval =
             format!("[{}, {}] {}", significant(c.interval.0, 4), significant(c.interval.1, 4), c.unit);
+        let (value, interval) = match c.counted() {
+            Some(counted) => (counted, "all".to_string()),
+            None => (significant(c.value, 4), interval),
+        };
         let mark = if c.held { "" } else { "FAILS: " };
         let statement = format!("{mark}{}", c.statement);
-        claims.add_row([c.id.clone(), significant(c.value, 4), interval, statement]);
+        claims.add_row([c.id.clone(), value, interval, statement]);
     }
     text.push_str(&format!("{}\n{}\n", numbers.trim_fmt(), claims.trim_fmt()));
     if !record.reconciliations().is_empty() {
-        text.push_str(&format!("{}\n", published_table(record.reconciliations()).trim_fmt()));
+        text.push_str(&format!("{}\n", published_table(record).trim_fmt()));
     }
     text
 }
 
-fn published_table(reconciliations: &[Reconciliation]) -> Table {
-    let mut published = table(&["published", "section", "book", "ours", "unit", "kind", "verdict"]);
-    for r in reconciliations {
-        let verdict = match (r.book_held, r.ours_held) {
-            (true, true) => "held",
-            (false, true) => "BOOK OUTSIDE",
-            (true, false) => "OURS OUTSIDE",
-            (false, false) => "BOTH OUTSIDE",
-        };
+fn published_table(record: &Record) -> Table {
+    let mut published = table(&["published", "section", "book", "ours", "unit", "rule", "kind", "verdict"]);
+    for r in record.reconciliations() {
         published.add_row([
             r.entry.number().to_string(),
             r.entry.section.clone(),
             r.entry.printed.clone(),
             significant(r.ours, 7),
             r.entry.unit.clone(),
+            r.rule().name().to_string(),
             r.entry.kind.name().to_string(),
-            verdict.to_string(),
+            word(r).to_string(),
+        ]);
+    }
+    for e in not_judged(record.experiment()) {
+        let none = || "\u{2013}".to_string();
+        let (number, section) = (e.number().to_string(), e.section.clone());
+        let (printed, unit) = (e.printed.clone(), e.unit.clone());
+        published.add_row([
+            number,
+            section,
+            printed,
+            none(),
+            unit,
+            none(),
+            e.kind.name().to_string(),
+            "not judged".to_string(),
         ]);
     }
     published
+}
+
+fn word(r: &Reconciliation) -> &'static str {
+    match (r.book_held, r.ours_held) {
+        (true, true) => "held",
+        (false, true) => "BOOK OUTSIDE",
+        (true, false) => "OURS OUTSIDE",
+        (false, false) => "BOTH OUTSIDE",
+    }
 }

@@ -21,8 +21,19 @@ pub struct Claim {
     pub false_alarm_rate: Option<f64>,
     /// Whether the value lies in the interval.
     pub held: bool,
+    /// How many cases a claim about many examined, and what one of them is called; `None` for a claim about one value.
+    pub cases: Option<Cases>,
     /// The cases that failed, for a claim about many.
     pub failures: Vec<String>,
+}
+
+/// The cases of a claim about many.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Cases {
+    /// How many were examined.
+    pub count: usize,
+    /// What they are, in the plural: cells, shifts, rows.
+    pub noun: String,
 }
 
 impl Claim {
@@ -43,6 +54,7 @@ impl Claim {
             reason: reason.into(),
             false_alarm_rate: None,
             held: (low..=high).contains(&value),
+            cases: None,
             failures: Vec::new(),
         }
     }
@@ -88,7 +100,19 @@ impl Claim {
             failures.push("no case was examined".to_string());
         }
         let claim = Claim::within(id, statement, failures.len() as f64, (0.0, 0.0), reason);
-        Claim { failures, ..claim }
+        Claim { failures, cases: Some(Cases { count, noun: "cases".to_string() }), ..claim }
+    }
+
+    /// Says what one of the cases of [`Claim::all_of`] is, in the plural.
+    pub fn over(self, noun: impl Into<String>) -> Claim {
+        let noun = noun.into();
+        Claim { cases: self.cases.map(|cases| Cases { noun, ..cases }), ..self }
+    }
+
+    /// `56 of 56 cells`: the cases that hold; `None` for a claim about one value.
+    pub fn counted(&self) -> Option<String> {
+        let Cases { count, noun } = self.cases.as_ref()?;
+        Some(format!("{} of {count} {noun}", count.saturating_sub(self.failures.len())))
     }
 
     /// The value lies in the central interval of its predicted distribution that a correct program misses at
@@ -137,7 +161,10 @@ mod tests {
         let claim = Claim::all_of("c", "", cases.map(|(n, h)| (n.to_string(), h)), "");
         assert!(!claim.held);
         assert_eq!((claim.value, claim.failures), (2.0, vec!["two".to_string(), "three".to_string()]));
-        assert!(!Claim::all_of("c", "", [], "").held);
+        let cells = [("a".to_string(), true), ("b".to_string(), false)];
+        assert_eq!(Claim::all_of("c", "", cells, "").over("cells").counted().unwrap(), "1 of 2 cells");
+        let none = Claim::all_of("c", "", [], "");
+        assert!(!none.held && none.counted().unwrap() == "0 of 0 cases");
     }
 
     #[test]

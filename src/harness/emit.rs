@@ -1,6 +1,7 @@
 //! How does a record reach the disk? CSV, JSON and figures, each written beside its place and renamed into it.
 
 use super::provenance::crate_versions;
+use super::published::not_judged;
 use super::reconcile::{Expectation, Reconciliation};
 use super::record::Record;
 use calibench::io::{Commit, write_atomically};
@@ -45,9 +46,12 @@ pub fn record_json(record: &Record, commit: Option<&Commit>) -> Value {
         "claims": record.claims().iter().map(|c| json!({
             "id": c.id, "statement": c.statement, "value": number(c.value), "unit": c.unit,
             "interval": [number(c.interval.0), number(c.interval.1)], "reason": c.reason,
-            "false_alarm_rate": c.false_alarm_rate, "held": c.held, "failures": c.failures,
+            "false_alarm_rate": c.false_alarm_rate, "held": c.held, "counted": c.counted(), "failures": c.failures,
         })).collect::<Vec<_>>(),
         "published": record.reconciliations().iter().map(published).collect::<Vec<_>>(),
+        "cannot_be_judged": not_judged(record.experiment()).map(|e| json!({
+            "id": e.id, "section": e.section, "what": e.what, "unit": e.unit, "printed": e.printed, "because": e.because,
+        })).collect::<Vec<_>>(),
         "tables": record.tables().iter().map(|t| json!({
             "file": format!("{}.csv", t.name), "caption": t.caption, "rows": t.rows().len(),
         })).collect::<Vec<_>>(),
@@ -61,7 +65,8 @@ pub fn record_json(record: &Record, commit: Option<&Commit>) -> Value {
 fn published(r: &Reconciliation) -> Value {
     let mut value = json!({
         "id": r.entry.id, "section": r.entry.section, "what": r.entry.what, "unit": r.entry.unit,
-        "printed": r.entry.printed, "kind": r.entry.kind.name(), "ours": number(r.ours),
+        "printed": r.entry.printed, "rule": r.rule().name(),
+        "kind": r.entry.kind.name(), "because": r.entry.because, "ours": number(r.ours),
         "expectation": r.expectation_text(), "book_held": r.book_held, "ours_held": r.ours_held,
     });
     if let Expectation::Distribution { predicted, interval, .. } = &r.expectation {

@@ -37,7 +37,7 @@ mod table;
 pub mod verdict;
 
 pub use band::Band;
-pub use claim::Claim;
+pub use claim::{Cases, Claim};
 pub use emit::{emit, record_json};
 pub use experiment::{Context, Experiment, ExperimentError};
 pub use figure::{Dash, Figure, HeatMap, Look, Marker, Plot};

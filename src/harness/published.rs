@@ -3,25 +3,58 @@
 use serde::Deserialize;
 use std::sync::OnceLock;
 
-/// How a published number is reconciled.
+/// How our value is held against the printed one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
-    /// Follows from the model alone: ours must round to the printed digits.
+pub enum Rule {
+    /// Ours must round to the printed digits.
     Exact,
     /// One draw from a distribution: the book's value and ours must both lie inside the predicted distribution.
     Sampled,
-    /// Depends on data that is not available: something stands in for it, and the difference is stated.
-    Reference,
+    /// Ours must come within a tolerance whose origin the record states.
+    Within,
 }
 
-impl Kind {
+impl Rule {
     /// The word used in files.
     pub fn name(self) -> &'static str {
         match self {
-            Kind::Exact => "exact",
-            Kind::Sampled => "sampled",
-            Kind::Reference => "reference",
+            Rule::Exact => "exact",
+            Rule::Sampled => "sampled",
+            Rule::Within => "within",
+        }
+    }
+}
+
+/// What the verdict on a published number is worth: could it have come out otherwise, and on whose data does it rest?
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// Ours is computed from the model, without use of the printed value.
+    Independent,
+    /// Follows by arithmetic from other numbers of the list: true if they are, and counted once with them.
+    Derived,
+    /// Ours comes from data made by us in the place of the chapter's, with the printed value's help.
+    StandIn,
+    /// The printed value was put in, or something was chosen so that it comes out: it cannot fail.
+    Input,
+    /// Nothing that is available says whether it is right.
+    CannotBeJudged,
+}
+
+impl Kind {
+    /// Every kind, the one that is worth most first.
+    pub const ALL: [Kind; 5] =
+        [Kind::Independent, Kind::Derived, Kind::StandIn, Kind::Input, Kind::CannotBeJudged];
+
+    /// The word for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Independent => "independent",
+            Kind::Derived => "derived",
+            Kind::StandIn => "stand-in",
+            Kind::Input => "input",
+            Kind::CannotBeJudged => "cannot be judged",
         }
     }
 }
@@ -38,8 +71,15 @@ pub struct Entry {
     pub unit: String,
     /// The digits as printed.
     pub printed: String,
-    /// How it is reconciled.
+    /// How it is reconciled; `None` where nothing judges it.
+    #[serde(default)]
+    pub rule: Option<Rule>,
+    /// What the verdict is worth.
     pub kind: Kind,
+    /// Why it is of that kind: from what it is derived, what stands in, what was chosen by it, or what is missing. Empty only
+    /// for an independent number.
+    #[serde(default)]
+    pub because: String,
     /// What the number is.
     pub what: String,
 }
@@ -61,9 +101,9 @@ pub enum PublishedError {
     /// No entry of that id.
     #[error("golden/published.toml has no value `{0}`")]
     Unknown(String),
-    /// An id that is not `<experiment>.<number>`, or stands twice.
-    #[error("golden/published.toml: id `{id}` {problem}")]
-    Id {
+    /// An entry whose parts do not go together.
+    #[error("golden/published.toml: `{id}` {problem}")]
+    Entry {
         /// Id of the entry.
         id: String,
         /// What is wrong with it.
@@ -121,12 +161,18 @@ fn without_sign_of_zero(digits: &str) -> &str {
 pub fn parse(text: &str) -> Result<Vec<Entry>, PublishedError> {
     let file: File = toml::from_str(text).map_err(|e| PublishedError::Syntax(e.to_string()))?;
     for (i, entry) in file.value.iter().enumerate() {
-        let problem = |problem| Err(PublishedError::Id { id: entry.id.clone(), problem });
+        let problem = |problem| Err(PublishedError::Entry { id: entry.id.clone(), problem });
         if entry.experiment().is_empty() || entry.number().is_empty() {
             return problem("is not <experiment>.<number>");
         }
         if file.value[..i].iter().any(|other| other.id == entry.id) {
             return problem("stands twice");
+        }
+        if entry.rule.is_none() != (entry.kind == Kind::CannotBeJudged) {
+            return problem("needs a rule, unless it cannot be judged: then it has none");
+        }
+        if entry.because.is_empty() && entry.kind != Kind::Independent {
+            return problem("does not say why it is not independent (`because`)");
         }
         let plain = |c: char| c.is_ascii_digit() || matches!(c, '.' | '-' | '+');
         if !entry.printed.chars().all(plain) || !entry.value().is_finite() {
@@ -149,6 +195,12 @@ pub fn entry(experiment: &str, number: &str) -> Result<&'static Entry, Published
     chapter()?.iter().find(|entry| entry.id == id).ok_or(PublishedError::Unknown(id))
 }
 
+/// The values of an experiment that nothing judges. None where `published.toml` is broken, which every reconciliation tells.
+pub fn not_judged(experiment: &str) -> impl Iterator<Item = &'static Entry> {
+    let entries = chapter().unwrap_or_default().iter();
+    entries.filter(move |e| e.kind == Kind::CannotBeJudged && e.experiment() == experiment)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -159,7 +211,9 @@ mod tests {
             section: "5.1".into(),
             unit: "px".into(),
             printed: printed.into(),
-            kind: Kind::Exact,
+            rule: Some(Rule::Exact),
+            kind: Kind::Independent,
+            because: String::new(),
             what: "test".into(),
         }
     }
@@ -180,13 +234,19 @@ mod tests {
         assert!(matches!(parse("[[value]]\nid = 3"), Err(PublishedError::Syntax(m)) if m.contains("line 2")));
         let one = |id: &str, printed: &str| {
             format!(
-                "[[value]]\nid='{id}'\nsection='5.1'\nunit='px'\nprinted='{printed}'\nkind='exact'\nwhat=''\n"
+                "[[value]]\nid='{id}'\nsection='5.1'\nunit='px'\nprinted='{printed}'\nrule='exact'\n\
+                 kind='independent'\nwhat=''\n"
             )
         };
         assert!(matches!(parse(&one("e.n", "NaN")), Err(PublishedError::NotANumber { .. })));
-        assert!(matches!(parse(&one("en", "1.0")), Err(PublishedError::Id { .. })));
+        assert!(matches!(parse(&one("en", "1.0")), Err(PublishedError::Entry { .. })));
         let twice = one("e.n", "1.0") + &one("e.n", "1.0");
-        assert!(matches!(parse(&twice), Err(PublishedError::Id { problem: "stands twice", .. })));
+        assert!(matches!(parse(&twice), Err(PublishedError::Entry { problem: "stands twice", .. })));
+        let with = |from: &str, to: &str| parse(&one("e.n", "1.0").replace(from, to));
+        let refused = |parsed: Result<Vec<Entry>, PublishedError>, why: &str| matches!(parsed, Err(PublishedError::Entry { problem, .. }) if problem.contains(why));
+        assert!(refused(with("independent", "input"), "because"));
+        assert!(refused(with("rule='exact'\n", ""), "needs a rule"));
+        assert!(refused(with("independent'", "cannot-be-judged'\nbecause='no data'"), "it has none"));
     }
 
     #[test]

@@ -1,7 +1,7 @@
-//! Does our number reproduce the book's? One rule for each kind of published number.
+//! Does our number reproduce the book's? One expectation for each rule.
 
 use super::predicted::Predicted;
-use super::published::{Entry, Kind};
+use super::published::{Entry, Rule};
 use calibench::io::significant;
 
 /// What the published number is held against.
@@ -18,10 +18,10 @@ pub enum Expectation {
         /// The interval at that rate.
         interval: (f64, f64),
     },
-    /// Something stands in for data that is not available; ours comes within a tolerance.
-    StandIn {
-        /// What stands in for it, and where the tolerance comes from.
-        what: String,
+    /// Ours comes within a tolerance.
+    Within {
+        /// Where the tolerance comes from.
+        reason: String,
         /// Largest accepted difference, in the number's unit.
         tolerance: f64,
     },
@@ -77,22 +77,22 @@ impl Reconciliation {
         }
     }
 
-    pub(super) fn reference(entry: &Entry, ours: f64, tolerance: f64, what: String) -> Reconciliation {
+    pub(super) fn within(entry: &Entry, ours: f64, tolerance: f64, reason: String) -> Reconciliation {
         Reconciliation {
             entry: entry.clone(),
             ours,
             book_held: true,
             ours_held: (ours - entry.value()).abs() <= tolerance,
-            expectation: Expectation::StandIn { what, tolerance },
+            expectation: Expectation::Within { reason, tolerance },
         }
     }
 
-    /// The kind of published number that this expectation serves.
-    pub fn kind(&self) -> Kind {
+    /// The rule that this expectation serves.
+    pub fn rule(&self) -> Rule {
         match self.expectation {
-            Expectation::Rounds => Kind::Exact,
-            Expectation::Distribution { .. } => Kind::Sampled,
-            Expectation::StandIn { .. } => Kind::Reference,
+            Expectation::Rounds => Rule::Exact,
+            Expectation::Distribution { .. } => Rule::Sampled,
+            Expectation::Within { .. } => Rule::Within,
         }
     }
 
@@ -103,7 +103,7 @@ impl Reconciliation {
             Expectation::Distribution { predicted, false_alarm_rate, .. } => {
                 format!("{predicted}, false-alarm rate {false_alarm_rate:?}")
             }
-            Expectation::StandIn { what, tolerance } => format!("within {tolerance:?}: {what}"),
+            Expectation::Within { reason, tolerance } => format!("within {tolerance:?}: {reason}"),
         }
     }
 
@@ -120,9 +120,9 @@ impl Reconciliation {
                 let (low, high) = (significant(*low, 6), significant(*high, 6));
                 format!("{head}; predicted [{low}, {high}] at rate {false_alarm_rate} ({predicted})")
             }
-            Expectation::StandIn { what, tolerance } => {
+            Expectation::Within { reason, tolerance } => {
                 let difference = significant(self.ours - self.entry.value(), 3);
-                format!("{head}; difference {difference}, tolerance {tolerance} ({what})")
+                format!("{head}; difference {difference}, tolerance {tolerance} ({reason})")
             }
         }
     }
@@ -130,15 +130,18 @@ impl Reconciliation {
 
 #[cfg(test)]
 mod tests {
+    use super::super::published::Kind;
     use super::*;
 
-    fn entry(printed: &str, kind: Kind) -> Entry {
+    fn entry(printed: &str, rule: Rule) -> Entry {
         Entry {
             id: "e.n".into(),
             section: "5.3".into(),
             unit: "px".into(),
             printed: printed.into(),
-            kind,
+            rule: Some(rule),
+            kind: Kind::Independent,
+            because: String::new(),
             what: String::new(),
         }
     }
@@ -147,7 +150,7 @@ mod tests {
     fn a_sampled_number_needs_both_values_inside() {
         let normal = || Predicted::Normal { mean: 600.0, sd: 0.681 };
         let at =
-            |printed, ours| Reconciliation::sampled(&entry(printed, Kind::Sampled), ours, normal(), 1e-3);
+            |printed, ours| Reconciliation::sampled(&entry(printed, Rule::Sampled), ours, normal(), 1e-3);
         assert!(at("598.5707", 600.3).held());
         let outside = at("596.0", 600.3);
         assert!(outside.ours_held && !outside.book_held && !outside.held());
@@ -155,9 +158,8 @@ mod tests {
     }
 
     #[test]
-    fn a_stand_in_must_come_within_its_tolerance() {
-        let at =
-            |ours| Reconciliation::reference(&entry("236.2", Kind::Reference), ours, 0.05, "stand-in".into());
+    fn ours_must_come_within_the_tolerance() {
+        let at = |ours| Reconciliation::within(&entry("236.2", Rule::Within), ours, 0.05, "rounding".into());
         assert!(at(236.24).held() && !at(236.26).held() && !at(f64::NAN).held());
     }
 }

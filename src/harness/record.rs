@@ -4,7 +4,7 @@ use super::band::Band;
 use super::claim::Claim;
 use super::figure::Figure;
 use super::predicted::Predicted;
-use super::published::{self, Entry, Kind, PublishedError};
+use super::published::{self, Entry, PublishedError, Rule};
 use super::reconcile::Reconciliation;
 use super::table::Table;
 use calibench::io::hash::sha256_hex;
@@ -71,15 +71,15 @@ pub enum RecordError {
     /// The number to reconcile is not in the record.
     #[error("number `{0}` is not in the record yet: add it before it is reconciled")]
     NoSuchNumber(String),
-    /// A number is reconciled by another rule than its kind asks for.
-    #[error("published value `{id}` is {}, but was reconciled as {}", expected.name(), got.name())]
-    Kind {
+    /// A number is reconciled by another rule than `published.toml` asks for.
+    #[error("published value `{id}` has the rule `{}`, but was reconciled as `{}`", expected.map_or("none", Rule::name), got.name())]
+    Rule {
         /// `<experiment>.<number>`.
         id: String,
-        /// Kind in `published.toml`.
-        expected: Kind,
-        /// Kind of the call.
-        got: Kind,
+        /// Rule in `published.toml`.
+        expected: Option<Rule>,
+        /// Rule of the call.
+        got: Rule,
     },
     /// A row with another number of cells than columns.
     #[error("table `{table}`, row {row}: {need} columns, but {got} cells")]
@@ -155,7 +155,7 @@ impl Record {
 
     /// Holds number `id` against the published value of the same name: ours must round to the printed digits.
     pub fn reconcile_exact(&mut self, id: &str) -> Result<(), RecordError> {
-        let (entry, ours) = self.published(id, Kind::Exact)?;
+        let (entry, ours) = self.published(id, Rule::Exact)?;
         self.reconciliations.push(Reconciliation::exact(entry, ours));
         Ok(())
     }
@@ -168,21 +168,21 @@ impl Record {
         predicted: Predicted,
         false_alarm_rate: f64,
     ) -> Result<(), RecordError> {
-        let (entry, ours) = self.published(id, Kind::Sampled)?;
+        let (entry, ours) = self.published(id, Rule::Sampled)?;
         self.reconciliations.push(Reconciliation::sampled(entry, ours, predicted, false_alarm_rate));
         Ok(())
     }
 
-    /// Holds number `id` against the published value of the same name, which rests on data that is not available:
-    /// `stand_in` says what takes its place and where the tolerance comes from.
-    pub fn reconcile_reference(
+    /// Holds number `id` against the published value of the same name: ours must come within `tolerance`, and `reason` says
+    /// where that comes from.
+    pub fn reconcile_within(
         &mut self,
         id: &str,
         tolerance: f64,
-        stand_in: impl Into<String>,
+        reason: impl Into<String>,
     ) -> Result<(), RecordError> {
-        let (entry, ours) = self.published(id, Kind::Reference)?;
-        self.reconciliations.push(Reconciliation::reference(entry, ours, tolerance, stand_in.into()));
+        let (entry, ours) = self.published(id, Rule::Within)?;
+        self.reconciliations.push(Reconciliation::within(entry, ours, tolerance, reason.into()));
         Ok(())
     }
 
@@ -192,11 +192,11 @@ impl Record {
     }
 
     /// The published value that number `id` reconciles, with the number's value.
-    fn published(&self, id: &str, got: Kind) -> Result<(&'static Entry, f64), RecordError> {
+    fn published(&self, id: &str, got: Rule) -> Result<(&'static Entry, f64), RecordError> {
         let ours = self.value(id).ok_or_else(|| RecordError::NoSuchNumber(id.to_string()))?;
         let entry = published::entry(&self.experiment, id)?;
-        if entry.kind != got {
-            return Err(RecordError::Kind { id: entry.id.clone(), expected: entry.kind, got });
+        if entry.rule != Some(got) {
+            return Err(RecordError::Rule { id: entry.id.clone(), expected: entry.rule, got });
         }
         Ok((entry, ours))
     }
@@ -308,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn only_a_published_number_is_reconciled_and_only_by_its_kind() {
+    fn only_a_published_number_is_reconciled_and_only_by_its_rule() {
         let mut record = with_claim();
         let missing = record.reconcile_exact("max-deviation");
         assert_eq!(missing, Err(RecordError::NoSuchNumber("max-deviation".into())));
@@ -318,8 +318,8 @@ mod tests {
             record.reconcile_exact("other"),
             Err(RecordError::Published(PublishedError::Unknown(_)))
         ));
-        let wrong = record.reconcile_reference("max-deviation", 1.0, "nothing");
-        assert!(matches!(wrong, Err(RecordError::Kind { expected: Kind::Exact, .. })));
+        let wrong = record.reconcile_within("max-deviation", 1.0, "nothing");
+        assert!(matches!(wrong, Err(RecordError::Rule { expected: Some(Rule::Exact), .. })));
         record.reconcile_exact("max-deviation").unwrap();
         assert!(record.reconciliations()[0].held());
     }

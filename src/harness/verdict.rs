@@ -2,7 +2,9 @@
 
 use super::experiment::{Context, Experiment, ExperimentError};
 use super::golden;
+use super::published::{self, Kind};
 use super::record::Record;
+use std::fmt;
 use std::time::{Duration, Instant};
 
 /// How many of how many.
@@ -12,6 +14,49 @@ pub struct Tally {
     pub held: usize,
     /// All.
     pub total: usize,
+}
+
+/// Published values by what their verdicts are worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ByKind([Tally; Kind::ALL.len()]);
+
+impl ByKind {
+    /// Those of one kind. What cannot be judged has a total and none that hold.
+    pub fn of(&self, kind: Kind) -> Tally {
+        self.0[kind as usize]
+    }
+
+    /// Counts one value.
+    pub fn count(&mut self, kind: Kind, held: bool) {
+        let Tally { held: held_so_far, total } = &mut self.0[kind as usize];
+        *held_so_far += usize::from(held);
+        *total += 1;
+    }
+
+    /// Both counts together.
+    pub fn plus(&self, other: &ByKind) -> ByKind {
+        ByKind(std::array::from_fn(|i| Tally {
+            held: self.0[i].held + other.0[i].held,
+            total: self.0[i].total + other.0[i].total,
+        }))
+    }
+}
+
+/// Kinds that occur, such as `independent 7 of 7, derived 11 of 11, input 8 of 8`; empty where nothing is printed.
+impl fmt::Display for ByKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut before = "";
+        for kind in Kind::ALL {
+            let Tally { held, total } = self.of(kind);
+            match (kind, total) {
+                (_, 0) => continue,
+                (Kind::CannotBeJudged, _) => write!(f, "{before}{} {total}", kind.name())?,
+                _ => write!(f, "{before}{} {held} of {total}", kind.name())?,
+            }
+            before = ", ";
+        }
+        Ok(())
+    }
 }
 
 /// What became of the comparison with golden/.
@@ -34,8 +79,8 @@ pub struct Verdict {
     pub golden: Golden,
     /// Claims.
     pub claims: Tally,
-    /// Published values.
-    pub published: Tally,
+    /// Published values, by kind.
+    pub published: ByKind,
     /// Everything that does not hold, one sentence each.
     pub deviations: Vec<String>,
     /// Bits that moved within their bands.
@@ -70,7 +115,7 @@ impl Verdict {
             experiment: record.experiment().to_string(),
             golden: Golden::Skipped("another seed or input than the locked run's"),
             claims: Tally::default(),
-            published: Tally::default(),
+            published: ByKind::default(),
             deviations: Vec::new(),
             drift: Vec::new(),
         };
@@ -110,10 +155,11 @@ impl Verdict {
                 continue;
             }
             let (low, high) = claim.interval;
-            let mut text = format!(
-                "claim {}: {}; {} {} is not in [{low}, {high}] ({})",
-                claim.id, claim.statement, claim.value, claim.unit, claim.reason
+            let found = claim.counted().map_or_else(
+                || format!("{} {} is not in [{low}, {high}]", claim.value, claim.unit),
+                |counted| format!("{counted} only"),
             );
+            let mut text = format!("claim {}: {}; {found} ({})", claim.id, claim.statement, claim.reason);
             for failure in &claim.failures {
                 text.push_str(&format!("\n    fails: {failure}"));
             }
@@ -123,12 +169,13 @@ impl Verdict {
 
     fn judge_published(&mut self, record: &Record) {
         for reconciliation in record.reconciliations() {
-            self.published.total += 1;
-            if reconciliation.held() {
-                self.published.held += 1;
-            } else {
+            self.published.count(reconciliation.entry.kind, reconciliation.held());
+            if !reconciliation.held() {
                 self.deviations.push(format!("published {}", reconciliation.describe()));
             }
+        }
+        for entry in published::not_judged(record.experiment()) {
+            self.published.count(entry.kind, false);
         }
     }
 }
@@ -153,6 +200,20 @@ mod tests {
         assert_eq!((moved.golden, moved.claims.held), (Golden::Compared(Tally { held: 0, total: 1 }), 1));
         let wrong = Verdict::of(&record(2.0), Some(&golden::file_text(&record(2.0))), true);
         assert_eq!((wrong.deviations.len(), wrong.claims), (1, Tally { held: 0, total: 1 }));
+    }
+
+    #[test]
+    fn published_values_are_counted_by_kind() {
+        let mut counts = ByKind::default();
+        counts.count(Kind::Independent, true);
+        counts.count(Kind::Independent, false);
+        counts.count(Kind::CannotBeJudged, false);
+        assert_eq!(counts.to_string(), "independent 1 of 2, cannot be judged 1");
+        assert_eq!(counts.plus(&counts).of(Kind::Independent), Tally { held: 2, total: 4 });
+        assert_eq!(ByKind::default().to_string(), "");
+        for (i, kind) in Kind::ALL.into_iter().enumerate() {
+            assert_eq!(kind as usize, i, "{}", kind.name());
+        }
     }
 
     #[test]

@@ -66,11 +66,11 @@ fn published_line(reconciliation: &Reconciliation) -> String {
     let (low, high) = match &reconciliation.expectation {
         Expectation::Rounds => (entry.value() - entry.rounding(), entry.value() + entry.rounding()),
         Expectation::Distribution { interval, .. } => *interval,
-        Expectation::StandIn { tolerance, .. } => (entry.value() - tolerance, entry.value() + tolerance),
+        Expectation::Within { tolerance, .. } => (entry.value() - tolerance, entry.value() + tolerance),
     };
     let expectation = reconciliation.expectation_text();
     let (low, high) = (significant(low, 8), significant(high, 8));
-    let kind = entry.kind.name();
+    let (rule, kind) = (reconciliation.rule().name(), entry.kind.name());
     line(&[
         "published",
         entry.number(),
@@ -78,6 +78,7 @@ fn published_line(reconciliation: &Reconciliation) -> String {
         &high,
         unit_text(&entry.unit),
         &entry.printed,
+        rule,
         kind,
         &expectation,
     ])
