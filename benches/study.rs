@@ -20,7 +20,7 @@ fn spec(trials: u64) -> Spec {
 fn to_folder() -> u64 {
     let path = std::env::temp_dir().join(format!("calibench-bench-{}", std::process::id()));
     let mut engine = Engine::of(spec(TRIALS), STUDY, Shard::WHOLE).expect("a study that ships");
-    let manifest = Manifest::new(&engine.spec, Shard::WHOLE, None);
+    let manifest = Manifest::new(&engine.spec, Shard::WHOLE, &calibench_experiments::build());
     let folder = Folder::create(&path, STUDY, &manifest).expect("a new folder");
     folder.run(&mut engine, &AtomicBool::new(false), |_| {}).expect("the disk takes a batch");
     drop(folder);

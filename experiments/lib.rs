@@ -1,6 +1,6 @@
 //! Which experiments are there? Adding one is adding its module and its line here, and its binary in `experiments/bin`.
 
-use calibench_harness::Experiment;
+use calibench_harness::{Build, Experiment};
 
 pub mod collinearity;
 pub mod distortion_model;
@@ -33,6 +33,11 @@ pub const EXPERIMENTS: &[Experiment] = &[
     expiry::EXPERIMENT,
     gate_power::EXPERIMENT,
 ];
+
+/// What this program was built from, as `build.rs` found it.
+pub fn build() -> Build {
+    Build::read(env!("CALIBENCH_COMMIT"), env!("CALIBENCH_CHANGED"), env!("CALIBENCH_CRATES"))
+}
 
 /// The README's example, compiled and run with the documentation's tests.
 #[cfg(doctest)]
