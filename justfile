@@ -8,15 +8,12 @@ ci:
 
 # Formatter and lints, warnings as errors
 lint:
-    cargo fmt --all --check
-    cargo clippy --locked -- -D warnings
-    cargo clippy --package calibench --no-default-features --locked -- -D warnings
-    cargo clippy --all-features --all-targets --locked -- -D warnings
+    bash .ci/lint
 
 # The test suite
 test:
     cargo test --locked
-    cargo test --locked --all-features --test study_parquet --test detect_photos --test photo_command
+    cargo test --locked --all-features --test all -- study_parquet detect_photos photo_command
 
 # The book, and every page of it in Chromium
 book:

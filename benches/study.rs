@@ -2,6 +2,7 @@
 //! its checkpoints. Then the memory that ten thousand trials take beyond what the first thousand took.
 #![allow(missing_docs)]
 
+use calibench_harness::Build;
 use calibench_harness::resources::peak_memory_mib;
 use calibench_study::{Engine, Folder, Manifest, Shard, Spec, in_memory};
 use criterion::{Criterion, Throughput, criterion_group};
@@ -20,7 +21,7 @@ fn spec(trials: u64) -> Spec {
 fn to_folder() -> u64 {
     let path = std::env::temp_dir().join(format!("calibench-bench-{}", std::process::id()));
     let mut engine = Engine::of(spec(TRIALS), STUDY, Shard::WHOLE).expect("a study that ships");
-    let manifest = Manifest::new(&engine.spec, Shard::WHOLE, None);
+    let manifest = Manifest::new(&engine.spec, Shard::WHOLE, &Build::default());
     let folder = Folder::create(&path, STUDY, &manifest).expect("a new folder");
     folder.run(&mut engine, &AtomicBool::new(false), |_| {}).expect("the disk takes a batch");
     drop(folder);

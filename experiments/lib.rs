@@ -1,6 +1,6 @@
 //! Which experiments are there? Adding one is adding its module and its line here, and its binary in `experiments/bin`.
 
-use calibench_harness::Experiment;
+use calibench_harness::{Build, Experiment};
 
 pub mod collinearity;
 pub mod distortion_model;
@@ -35,6 +35,11 @@ pub const EXPERIMENTS: &[Experiment] = &[
     gate_power::EXPERIMENT,
     global_minimum::EXPERIMENT,
 ];
+
+/// What this program was built from, as `build.rs` found it.
+pub fn build() -> Build {
+    Build::read(env!("CALIBENCH_COMMIT"), env!("CALIBENCH_CHANGED"), env!("CALIBENCH_CRATES"))
+}
 
 /// The README's example, compiled and run with the documentation's tests.
 #[cfg(doctest)]

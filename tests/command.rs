@@ -31,11 +31,12 @@ fn text(bytes: &[u8]) -> String {
 
 #[test]
 fn check_holds_and_says_so_in_json() {
-    let output = run(CALIBENCH, root(), &["check", "--format", "json"]);
+    let output = run(CALIBENCH, root(), &["check", "line-bending", "interface", "--format", "json"]);
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("standard output is JSON");
     assert_eq!(output.status.code(), Some(0), "{report:#}");
     assert_eq!(report["outcome"], "held");
-    assert!(report["experiments"].as_array().is_some_and(|list| !list.is_empty()));
+    let checked = report["experiments"].as_array().expect("a list");
+    assert_eq!([&checked[0]["experiment"], &checked[1]["experiment"]], ["line-bending", "interface"]);
 }
 
 #[test]
@@ -142,4 +143,30 @@ fn a_number_that_moved_ends_with_one_and_is_named() {
     assert_eq!(output.status.code(), Some(1));
     assert!(text(&output.stdout).contains("number max-deviation"), "{}", text(&output.stdout));
     assert!(tree.join("figures/line-bending/grids.svg").is_file(), "the locked run draws the tree's figures");
+}
+
+/// A program's origin is that of its build, wherever it runs: neither the commit of the folder around it nor none.
+#[test]
+fn a_record_names_the_build_and_not_the_repository_around_it() {
+    let folder = folder("another-repository");
+    let git = |arguments: &[&str]| {
+        let author = ["-c", "user.name=calibench", "-c", "user.email=calibench@example.org"];
+        let run = Command::new("git").current_dir(&folder).args(author).args(arguments).output();
+        run.is_ok_and(|output| output.status.success())
+    };
+    // Without git the folder is none of a repository, which must make no difference either.
+    let _ = git(&["init", "--quiet"])
+        && git(&["commit", "--quiet", "--allow-empty", "--message", "another project"]);
+    // What makes a folder the project's to the program.
+    fs::create_dir(folder.join("golden")).expect("a folder is made");
+    fs::write(folder.join("golden/published.toml"), "").expect("a file is written");
+    let output = run(LINE_BENDING, &folder, &["--seed", "7", "--out", "out"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let record = fs::read(folder.join("out/line-bending/record.json")).expect("a record");
+    let record: serde_json::Value = serde_json::from_slice(&record).expect("JSON");
+    let build = calibench_experiments::build();
+    let stated = |key: &str| record["provenance"][key].clone();
+    assert_eq!(stated("commit"), serde_json::json!(build.commit.as_ref().map(|c| &c.hash)));
+    assert_eq!(stated("dirty"), serde_json::json!(build.commit.as_ref().map(|c| c.dirty)));
+    assert_eq!(stated("crates"), serde_json::json!(build.crates));
 }

@@ -3,17 +3,9 @@
 use calibench::board::Board;
 use calibench::detect::{DotGrid, circle_grid};
 use calibench::geometry::{Homography, Vec2};
-use calibench::io::{Grey, data_folder, read_image};
+use calibench::io::{Grey, read_image};
 use calibench::raster::Raster;
 use std::path::PathBuf;
-
-fn folder() -> Option<PathBuf> {
-    let folder = data_folder().expect("CALIBENCH_DATA names a folder");
-    if folder.is_none() {
-        eprintln!("SKIPPED: no folder of real data (set CALIBENCH_DATA)");
-    }
-    folder
-}
 
 fn photo(path: PathBuf) -> Raster<u8> {
     let image = read_image(&path).unwrap();
@@ -31,8 +23,9 @@ fn worst_misfit_px(board: &Board, centres: &[Vec2]) -> f64 {
 }
 
 #[test]
+#[cfg_attr(not(calibench_data), ignore = "needs the measurements of others: CONTRIBUTING.md, real data")]
 fn every_dot_grid_is_found_in_order() {
-    let Some(folder) = folder() else { return };
+    let folder = crate::data::folder();
     let board = Board::circles(8, 10, 2.5, 1.5).unwrap();
     for i in 0..6 {
         let image = photo(folder.join(format!("dots_photo/image{i:05}.jpg")));
@@ -53,8 +46,9 @@ mod chessboards {
     use calibench::io::read_corners;
 
     #[test]
+    #[cfg_attr(not(calibench_data), ignore = "needs the measurements of others: CONTRIBUTING.md, real data")]
     fn opencvs_thirteen_boards_are_found_where_opencv_finds_them() {
-        let Some(folder) = folder() else { return };
+        let folder = crate::data::folder();
         let reference = read_corners(&folder.join("opencv_left/corners.csv")).unwrap();
         let numbers = [1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 12, 13, 14];
         assert_eq!(reference.views.len(), numbers.len());
@@ -84,8 +78,9 @@ mod chessboards {
     }
 
     #[test]
+    #[cfg_attr(not(calibench_data), ignore = "needs the measurements of others: CONTRIBUTING.md, real data")]
     fn opencvs_camera_is_found_again_from_its_photographs() {
-        let Some(folder) = folder() else { return };
+        let folder = crate::data::folder();
         let board = Board::chessboard(9, 6, 1.0).unwrap();
         let ours = calibrated(&folder, "opencv_left", &board, "fx,fy,cx,cy,k1,k2,p1,p2,k3");
         let reference = read_corners(&folder.join("opencv_left/corners.csv")).unwrap();
@@ -103,8 +98,9 @@ mod chessboards {
     }
 
     #[test]
+    #[cfg_attr(not(calibench_data), ignore = "needs the measurements of others: CONTRIBUTING.md, real data")]
     fn the_bumblebee_camera_is_inside_the_published_tolerance() {
-        let Some(folder) = folder() else { return };
+        let folder = crate::data::folder();
         let board = Board::chessboard(4, 6, 30.0).unwrap();
         let ours = calibrated(&folder, "bumblebee_left", &board, "fx,fy,cx,cy,k1,k2");
         let text = std::fs::read_to_string(folder.join("published.toml")).unwrap();
@@ -118,8 +114,9 @@ mod chessboards {
     }
 
     #[test]
+    #[cfg_attr(not(calibench_data), ignore = "needs the measurements of others: CONTRIBUTING.md, real data")]
     fn all_eleven_bumblebee_boards_are_found() {
-        let Some(folder) = folder() else { return };
+        let folder = crate::data::folder();
         let board = Board::chessboard(4, 6, 30.0).unwrap();
         for number in 1..=11 {
             let image = photo(folder.join(format!("bumblebee_left/left{number:02}.jpg")));

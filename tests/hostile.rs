@@ -1,9 +1,6 @@
 //! What does the command do with input that nobody means well? It says what is wrong, in time and in little memory, and loses nothing.
 #![cfg(target_os = "linux")]
 
-#[allow(dead_code, reason = "other tests use the rest")]
-mod study;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -66,8 +63,8 @@ fn refused(folder: &Path, arguments: &[&str], words: &[&str]) {
 fn sizes_beyond_their_limits_are_refused_at_once_with_what_they_would_need() {
     let folder = folder("sizes");
     let change = |name: &str, from: &str, to: &str| {
-        let spec = study::SPEC.replace(from, to);
-        assert_ne!(spec, study::SPEC, "{from}");
+        let spec = crate::study::SPEC.replace(from, to);
+        assert_ne!(spec, crate::study::SPEC, "{from}");
         fs::write(folder.join(name), spec).expect("a study is written");
     };
     let levels = |count: usize| (1..=count).map(|i| format!("{i}.0")).collect::<Vec<_>>().join(", ");
@@ -111,7 +108,7 @@ fn sizes_beyond_their_limits_are_refused_at_once_with_what_they_would_need() {
     for board in ["circles:99999999999x9:1", "dots:100000x100000:1", "circles:18446744073709551615x2:1"] {
         refused(&folder, &["calibrate", "--board", board, "none.png"], &["1000000"]);
     }
-    fs::write(folder.join("plan.toml"), study::SPEC).expect("a study is written");
+    fs::write(folder.join("plan.toml"), crate::study::SPEC).expect("a study is written");
     let plan = ["study", "plan", "plan.toml", "--want", "fx=1"];
     refused(&folder, &[&plan[..], &["--most-views", "1000000000"]].concat(), &["63000000000 points a trial"]);
     refused(&folder, &["study", "measure", "plan.toml", "--trials", "18446744073709551615"], &["limit"]);
@@ -125,7 +122,7 @@ fn sizes_beyond_their_limits_are_refused_at_once_with_what_they_would_need() {
 
 /// The small study with one set of poses for all trials, which begins at once.
 fn fixed_poses() -> String {
-    study::SPEC.replace(", redraw = true", "")
+    crate::study::SPEC.replace(", redraw = true", "")
 }
 
 #[test]

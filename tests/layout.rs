@@ -77,6 +77,18 @@ fn ids_are_unique_and_every_snapshot_has_its_experiment() {
     }
 }
 
+#[test]
+fn every_file_of_tests_is_run() {
+    let all = read("tests/all.rs");
+    for file in fs::read_dir(root().join("tests")).expect("tests/ is there").flatten() {
+        let name = file.file_name().to_string_lossy().trim_end_matches(".rs").to_string();
+        assert!(
+            name == "all" || all.contains(&format!("mod {name};")),
+            "`mod {name};` is missing in tests/all.rs"
+        );
+    }
+}
+
 /// The library's folders from the ground up. Those of one inner list do not know each other: `calibrate` never sees the truth that
 /// `synth` makes.
 const LAYERS: [&[&str]; 6] = [

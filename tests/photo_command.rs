@@ -200,11 +200,9 @@ fn nothing_usable_ends_with_two() {
 }
 
 #[test]
+#[cfg_attr(not(calibench_data), ignore = "needs the measurements of others: CONTRIBUTING.md, real data")]
 fn the_bumblebee_camera_comes_out_of_the_command() {
-    let Some(data) = calibench::io::data_folder().expect("CALIBENCH_DATA names a folder") else {
-        eprintln!("SKIPPED: no folder of real data (set CALIBENCH_DATA)");
-        return;
-    };
+    let data = crate::data::folder();
     let folder = folder("photo-command-bumblebee");
     let photos: Vec<String> = (1..=11)
         .map(|i| data.join(format!("bumblebee_left/left{i:02}.jpg")).to_string_lossy().into_owned())

@@ -1,6 +1,5 @@
 //! Does README.md say what the program says? Its tables and numbers are compared with golden/ and with a run.
 
-use calibench::io::data_folder;
 use calibench_harness::published::{Kind, not_judged};
 use calibench_harness::verdict::ByKind;
 use std::collections::BTreeMap;
@@ -77,11 +76,9 @@ fn the_chi_squared_of_both_tables_are_the_golden_ones() {
 }
 
 #[test]
+#[cfg_attr(not(calibench_data), ignore = "needs the measurements of others: CONTRIBUTING.md, real data")]
 fn the_output_shown_for_zhangs_data_is_what_the_command_prints() {
-    let Some(folder) = data_folder().expect("a readable folder or none") else {
-        eprintln!("skipped: no ../shared/data and CALIBENCH_DATA is not set");
-        return;
-    };
+    let folder = crate::data::folder();
     let readme = read("README.md");
     let (_, shown) =
         readme.split_once("$ calibench calibrate zhang/points.csv ").expect("the command is shown");

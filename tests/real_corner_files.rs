@@ -1,13 +1,11 @@
 //! Are the corner files of others read whole?
 
-use calibench::io::{data_folder, read_corners};
+use calibench::io::read_corners;
 
 #[test]
+#[cfg_attr(not(calibench_data), ignore = "needs the measurements of others: CONTRIBUTING.md, real data")]
 fn corner_files_have_the_views_and_points_their_authors_state() {
-    let Some(folder) = data_folder().unwrap() else {
-        eprintln!("skipped: no ../shared/data and CALIBENCH_DATA is not set");
-        return;
-    };
+    let folder = crate::data::folder();
     // Views and points a view, from the description of each set.
     for (file, views, points) in
         [("zhang/points.csv", 5, 256), ("opencv_left/corners.csv", 13, 54), ("calib1/points.csv", 7, 35)]

@@ -1,11 +1,12 @@
 //! Does the solver find what others published for their own measurements?
 //!
-//! Expected values: `published.toml` of the data folder. Skipped, with a message, where the folder is absent.
+//! Expected values: `published.toml` of the data folder. Ignored where the folder is absent.
 
+use crate::data;
 use calibench::calibrate::{Calibration, Settings, Termination, calibrate, closed_form};
 use calibench::camera::FreeParameters;
 use calibench::geometry::Homography;
-use calibench::io::{CornerFile, data_folder, read_corners};
+use calibench::io::{CornerFile, read_corners};
 use std::path::PathBuf;
 
 struct Published {
@@ -14,14 +15,10 @@ struct Published {
 }
 
 impl Published {
-    /// `None`, said on standard error, if there are no data.
-    fn load() -> Option<Published> {
-        let Some(folder) = data_folder().expect("CALIBENCH_DATA names a folder") else {
-            eprintln!("SKIPPED: no folder of real data (set CALIBENCH_DATA)");
-            return None;
-        };
+    fn load() -> Published {
+        let folder = data::folder();
         let text = std::fs::read_to_string(folder.join("published.toml")).unwrap();
-        Some(Published { folder, table: text.parse().unwrap() })
+        Published { folder, table: text.parse().unwrap() }
     }
 
     fn set(&self, name: &str) -> &toml::Table {
@@ -61,8 +58,9 @@ fn assert_relative(ours: f64, theirs: f64, tolerance: f64, what: &str) {
 const ZHANG_ORDER: [usize; 7] = [0, 2, 3, 4, 1, 5, 6];
 
 #[test]
+#[cfg_attr(not(calibench_data), ignore = "needs the measurements of others: CONTRIBUTING.md, real data")]
 fn zhangs_optimum_and_standard_deviations_are_found() {
-    let Some(published) = Published::load() else { return };
+    let published = Published::load();
     let result = solve(&published.corners("zhang/points.csv"), "fx,fy,cx,cy,skew,k1,k2");
     let optimum = published.numbers("zhang", "optimum");
     let sigma = published.numbers("zhang", "sigma");
@@ -76,8 +74,9 @@ fn zhangs_optimum_and_standard_deviations_are_found() {
 }
 
 #[test]
+#[cfg_attr(not(calibench_data), ignore = "needs the measurements of others: CONTRIBUTING.md, real data")]
 fn zhangs_closed_form_is_met_to_the_printed_digits() {
-    let Some(published) = Published::load() else { return };
+    let published = Published::load();
     let corners = published.corners("zhang/points.csv");
     let homographies: Vec<Homography> =
         corners.views.iter().map(|v| Homography::fit(v.points(), v.pixels()).unwrap().homography).collect();
@@ -98,8 +97,9 @@ fn zhangs_closed_form_is_met_to_the_printed_digits() {
 }
 
 #[test]
+#[cfg_attr(not(calibench_data), ignore = "needs the measurements of others: CONTRIBUTING.md, real data")]
 fn opencvs_published_camera_is_found() {
-    let Some(published) = Published::load() else { return };
+    let published = Published::load();
     let result = solve(&published.corners("opencv_left/corners.csv"), "fx,fy,cx,cy,k1,k2,p1,p2,k3");
     for (parameter, theirs) in result.free.iter().zip(published.numbers("opencv_left", "published")) {
         assert_relative(result.camera.get(parameter), theirs, 1e-6, parameter.name());
@@ -108,8 +108,9 @@ fn opencvs_published_camera_is_found() {
 }
 
 #[test]
+#[cfg_attr(not(calibench_data), ignore = "needs the measurements of others: CONTRIBUTING.md, real data")]
 fn the_matlab_toolboxs_camera_is_found() {
-    let Some(published) = Published::load() else { return };
+    let published = Published::load();
     let result = solve(&published.corners("calib1/points.csv"), "fx,fy,cx,cy,k1,k2,p1,p2");
     let theirs = published.numbers("calib1", "published");
     // MATLAB stopped 2e-6 short of the optimum in f.

@@ -1,15 +1,13 @@
 //! Does the plane calibration reproduce what others published for a real nine-point set?
 
 use calibench::geometry::Handedness;
-use calibench::io::{data_folder, read_point_pairs};
+use calibench::io::read_point_pairs;
 use calibench::planar::{PlaneModel, calibrate_plane};
 
 #[test]
+#[cfg_attr(not(calibench_data), ignore = "needs the measurements of others: CONTRIBUTING.md, real data")]
 fn the_published_affine_map_is_reproduced() {
-    let Some(folder) = data_folder().unwrap() else {
-        eprintln!("skipped: no ../shared/data and CALIBENCH_DATA is not set");
-        return;
-    };
+    let folder = crate::data::folder();
     let pairs = read_point_pairs(&folder.join("ninepoint/pairs.csv")).unwrap();
     let published = std::fs::read_to_string(folder.join("published.toml")).unwrap();
     let published: toml::Table = published.parse().unwrap();

@@ -1,8 +1,5 @@
 //! What does a study lose when everything that can fail does? At every write, by kill -9 at any moment, on a full disk, with a rival.
 
-#[allow(dead_code, reason = "other tests use the rest")]
-mod study;
-
 use calibench::io::files::{Disk, Files};
 use calibench::synth::{Stream, StreamKey};
 use calibench_study::{Engine, Folder, FolderError, Manifest, Outcome, RunError, Shard, TrialFile, finish};
@@ -13,7 +10,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::time::Duration;
-use study::{assert_same, scratch};
+use crate::study::{assert_same, scratch};
 
 /// How an operation fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -89,7 +86,7 @@ impl Files for Failing {
 
 /// Two cells, three batches each, one set of poses: many runs take little time.
 fn spec() -> String {
-    study::SPEC
+    crate::study::SPEC
         .replace(", redraw = true", "")
         .replace("per_cell = 45", "per_cell = 10")
         .replace("batch = 10", "batch = 4")
@@ -122,7 +119,7 @@ fn kept(path: &Path) -> u64 {
 #[test]
 fn a_run_that_fails_at_any_operation_loses_its_last_batch_at_most_and_ends_in_the_same_bytes() {
     let whole = scratch("faults-whole");
-    study::run(&whole, &spec(), Shard::WHOLE, TrialFile::Csv);
+    crate::study::run(&whole, &spec(), Shard::WHOLE, TrialFile::Csv);
     let engine = Engine::new(&spec(), Shard::WHOLE).unwrap();
     let manifest = Manifest::new(&engine.spec, Shard::WHOLE, None);
     for fault in [Fault::Killed, Fault::Full] {
@@ -169,7 +166,7 @@ const KILLS: u64 = 200;
 fn a_run_that_is_killed_two_hundred_times_ends_in_the_same_bytes() {
     let folder = scratch("kills");
     fs::create_dir_all(&folder).unwrap();
-    let long = study::SPEC
+    let long = crate::study::SPEC
         .replace(", redraw = true", "")
         .replace("per_cell = 45", "per_cell = 4000")
         .replace("batch = 10", "batch = 5");
@@ -208,7 +205,7 @@ fn of_two_runs_at_once_in_one_folder_one_is_refused_and_the_other_is_whole() {
     fs::create_dir_all(&folder).unwrap();
     fs::write(folder.join("spec.toml"), spec()).unwrap();
     let whole = folder.join("whole");
-    study::run(&whole, &spec(), Shard::WHOLE, TrialFile::Csv);
+    crate::study::run(&whole, &spec(), Shard::WHOLE, TrialFile::Csv);
     let rival = || command(&["study", "run", "spec.toml", "--out", "one"], &folder).spawn().unwrap();
     let outputs = [rival(), rival()].map(|child| child.wait_with_output().unwrap());
     let held = outputs.iter().filter(|output| output.status.success()).count();

@@ -1,7 +1,7 @@
 //! Do threads, parts and interruptions leave every byte of a study where it was, and is a changed study refused?
 
-mod study;
-
+use crate::study::{SPEC, assert_same, resume, scratch};
+use calibench_experiments::build;
 use calibench_study::{
     Engine, Folder, FolderError, Interruption, Manifest, MergeError, Outcome, Shard, TrialFile, finish, merge,
 };
@@ -9,15 +9,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
-use study::{SPEC, assert_same, resume, scratch};
 
 /// A run whose trials stand in CSV.
 fn run(path: &Path, text: &str, shard: Shard) {
-    study::run(path, text, shard, TrialFile::Csv);
+    crate::study::run(path, text, shard, TrialFile::Csv);
 }
 
 fn begin(path: &Path, text: &str, shard: Shard) -> (Folder, Engine) {
-    study::begin(path, text, shard, TrialFile::Csv)
+    crate::study::begin(path, text, shard, TrialFile::Csv)
 }
 
 #[test]
@@ -54,7 +53,7 @@ fn parts_join_to_the_bytes_of_the_whole() {
             let joined = scratch(&format!("{kind}-joined-{count}"));
             // The order in which parts are named does not matter.
             let named: Vec<PathBuf> = parts.iter().rev().cloned().collect();
-            let (folder, engine) = merge(&named, &joined, None).unwrap();
+            let (folder, engine) = merge(&named, &joined, None, &build()).unwrap();
             finish(&folder, &engine).unwrap();
             assert_same(&whole, &joined);
             parts.iter().chain([&joined]).for_each(|p| fs::remove_dir_all(p).unwrap());
@@ -113,7 +112,7 @@ fn parts_that_make_no_whole_are_refused() {
     }
     let refuse = |parts: &[&PathBuf]| {
         let out = scratch("refused");
-        let error = merge(&parts.iter().map(|p| p.to_path_buf()).collect::<Vec<_>>(), &out, None)
+        let error = merge(&parts.iter().map(|p| p.to_path_buf()).collect::<Vec<_>>(), &out, None, &build())
             .map(|_| ())
             .unwrap_err();
         assert!(!out.exists(), "nothing is written for parts that are refused");
@@ -134,7 +133,7 @@ fn parts_that_make_no_whole_are_refused() {
     let error = refuse(&[&paths[0], &paths[1], &paths[3]]);
     assert!(error.to_string().contains("code.behaviour"), "{error}");
     // A folder is locked while it is open, so the same part twice is refused as in use.
-    assert!(merge(&[paths[0].clone(), paths[0].clone()], &scratch("twice"), None).is_err());
+    assert!(merge(&[paths[0].clone(), paths[0].clone()], &scratch("twice"), None, &build()).is_err());
     paths.iter().for_each(|p| fs::remove_dir_all(p).unwrap());
 }
 
@@ -165,15 +164,15 @@ fn a_changed_study_or_code_is_refused_by_name() {
     let path = scratch("changed");
     let (folder, engine) = begin(&path, SPEC, Shard::WHOLE);
     let louder = Engine::new(&SPEC.replace("noise_px = 0.1", "noise_px = 0.2"), Shard::WHOLE).unwrap();
-    let error = folder.check(&Manifest::new(&louder.spec, Shard::WHOLE, None)).unwrap_err().to_string();
+    let error = folder.check(&Manifest::new(&louder.spec, Shard::WHOLE, &build())).unwrap_err().to_string();
     assert!(error.contains("spec.scene.noise_px: was 0.1, is 0.2"), "{error}");
-    let mut other_code = Manifest::new(&engine.spec, Shard::WHOLE, None);
+    let mut other_code = Manifest::new(&engine.spec, Shard::WHOLE, &build());
     other_code.code.behaviour = "another".to_string();
     let error = folder.check(&other_code).unwrap_err().to_string();
     assert!(error.contains("code.behaviour"), "{error}");
     // Layout and comments are not the study.
     let same = Engine::new(&format!("# a remark\n{SPEC}"), Shard::WHOLE).unwrap();
-    assert!(folder.check(&Manifest::new(&same.spec, Shard::WHOLE, None)).is_ok());
+    assert!(folder.check(&Manifest::new(&same.spec, Shard::WHOLE, &build())).is_ok());
     drop(folder);
     fs::remove_dir_all(path).unwrap();
 }
@@ -199,7 +198,7 @@ fn a_damaged_or_occupied_folder_is_refused() {
     assert!(matches!(Folder::open(&path), Err(FolderError::InUse(_))));
     drop(held);
     let engine = Engine::new(SPEC, Shard::WHOLE).unwrap();
-    let again = Folder::create(&path, SPEC, &Manifest::new(&engine.spec, Shard::WHOLE, None));
+    let again = Folder::create(&path, SPEC, &Manifest::new(&engine.spec, Shard::WHOLE, &build()));
     assert!(matches!(again, Err(FolderError::Taken(_))));
     fs::remove_dir_all(path).unwrap();
 }
@@ -370,7 +369,7 @@ fn without_the_feature_parquet_is_refused_by_name() {
     let manifest = fs::read_to_string(out.join("manifest.json")).unwrap();
     fs::write(out.join("manifest.json"), manifest.replace("\"trials\": \"csv\"", "\"trials\": \"parquet\""))
         .unwrap();
-    let error = merge(&[out], &folder.join("whole"), None).map(|_| ()).unwrap_err();
+    let error = merge(&[out], &folder.join("whole"), None, &build()).map(|_| ()).unwrap_err();
     assert!(
         matches!(&error, MergeError::Run(calibench_study::RunError::Folder(FolderError::NoParquet(_)))),
         "{error}"

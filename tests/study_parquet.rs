@@ -1,15 +1,14 @@
 //! Do trials in Parquet say what those in CSV say, and survive interruptions, shards and merges as they do?
 #![cfg(feature = "parquet")]
 
-mod study;
-
+use crate::study::{SPEC, assert_same, begin, resume, run, scratch};
+use calibench_experiments::build;
 use calibench_study::{Engine, Folder, Shard, TrialFile, finish, merge};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::{Field, Row};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use study::{SPEC, assert_same, begin, resume, run, scratch};
 
 /// Two models, of which one has no k2, and two tilts, of which one is refused: missing values of both kinds.
 fn with_gaps() -> String {
@@ -74,7 +73,7 @@ fn parts_in_parquet_join_to_the_bytes_of_the_whole() {
         run(part, SPEC, Shard { index: index as u64, count: 3 }, TrialFile::Parquet);
     }
     let joined = scratch("pq-joined");
-    let (folder, engine) = merge(&parts, &joined, None).unwrap();
+    let (folder, engine) = merge(&parts, &joined, None, &build()).unwrap();
     finish(&folder, &engine).unwrap();
     drop(folder);
     assert_same(&whole, &joined);
@@ -86,7 +85,7 @@ fn a_run_is_put_into_the_other_file_and_back() {
     let (csv, packed, back) = (scratch("pq-there"), scratch("pq-over"), scratch("pq-back"));
     run(&csv, SPEC, Shard::WHOLE, TrialFile::Csv);
     for (from, to, trials) in [(&csv, &packed, TrialFile::Parquet), (&packed, &back, TrialFile::Csv)] {
-        let (folder, engine) = merge(std::slice::from_ref(from), to, Some(trials)).unwrap();
+        let (folder, engine) = merge(std::slice::from_ref(from), to, Some(trials), &build()).unwrap();
         finish(&folder, &engine).unwrap();
     }
     assert!(packed.join("trials.parquet").is_file());
@@ -135,7 +134,8 @@ fn a_file_that_was_changed_is_refused() {
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
     fs::write(&trials, bytes).unwrap();
-    let error = merge(std::slice::from_ref(&path), &scratch("pq-refused"), None).map(|_| ()).unwrap_err();
+    let error =
+        merge(std::slice::from_ref(&path), &scratch("pq-refused"), None, &build()).map(|_| ()).unwrap_err();
     assert!(error.to_string().contains("SHA-256 has changed"), "{error}");
     fs::remove_file(&trials).unwrap();
     let folder = Folder::open(&path).unwrap();

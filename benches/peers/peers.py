@@ -21,7 +21,7 @@ from reference import UNITS, Reference
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-OURS = ROOT / "target/release/examples/peers"
+OURS = ROOT / "target/release/peers"
 VIEWS = [4, 20, 100, 500, 2000]
 BEGIN, END = "<!-- peers: begin -->", "<!-- peers: end -->"
 

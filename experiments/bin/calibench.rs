@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    calibench_command::main(calibench_experiments::EXPERIMENTS)
+    calibench_command::main(calibench_experiments::EXPERIMENTS, &calibench_experiments::build())
 }

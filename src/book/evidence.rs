@@ -3,7 +3,7 @@
 use super::golden_file::GoldenFile;
 use calibench::io::hash::sha256_hex;
 use calibench_harness::project::Project;
-use calibench_harness::{Experiment, Record, record_json};
+use calibench_harness::{Build, Experiment, Record, record_json};
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -86,7 +86,7 @@ impl Evidence {
     pub fn of_records(project: &Project, experiments: &[Experiment], records: &[&Record]) -> Evidence {
         let mut evidence = Evidence::named(project, experiments);
         for record in records {
-            let json = record_json(record, None);
+            let json = record_json(record, &Build::default());
             let Some(entry) = evidence.experiments.get_mut(record.experiment()) else { continue };
             entry.record = serde_json::from_value(json).ok();
             entry.tables = record.tables().iter().map(|t| (t.name.clone(), t.to_csv())).collect();

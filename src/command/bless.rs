@@ -1,9 +1,9 @@
 //! `calibench bless ID`: the present result becomes the golden snapshot. Claims are not touched: one that fails stays failed.
 
 use super::{Exit, find, print, warn};
-use calibench::io::{provenance, write_atomically};
+use calibench::io::write_atomically;
 use calibench_harness::project::Project;
-use calibench_harness::{Context, Experiment, ProgressDisplay, emit, golden, verdict};
+use calibench_harness::{Build, Context, Experiment, ProgressDisplay, emit, golden, verdict};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
@@ -15,7 +15,7 @@ pub(super) struct Arguments {
     all: bool,
 }
 
-pub(super) fn run(experiments: &[Experiment], arguments: &Arguments) -> Exit {
+pub(super) fn run(experiments: &[Experiment], arguments: &Arguments, build: &Build) -> Exit {
     let chosen = match &arguments.id {
         None => experiments.to_vec(),
         Some(id) => match find(experiments, id) {
@@ -30,10 +30,10 @@ pub(super) fn run(experiments: &[Experiment], arguments: &Arguments) -> Exit {
             return Exit::Usage;
         }
     };
-    chosen.iter().map(|experiment| bless(experiment, &project)).max().unwrap_or(Exit::Held)
+    chosen.iter().map(|experiment| bless(experiment, &project, build)).max().unwrap_or(Exit::Held)
 }
 
-fn bless(experiment: &Experiment, project: &Project) -> Exit {
+fn bless(experiment: &Experiment, project: &Project, build: &Build) -> Exit {
     let id = experiment.id;
     let context = Context::of(experiment).with_progress(ProgressDisplay::stderr());
     let run = verdict::run(experiment, &context);
@@ -48,8 +48,7 @@ fn bless(experiment: &Experiment, project: &Project) -> Exit {
     let before = std::fs::read_to_string(&path).unwrap_or_default();
     let after = golden::file_text(record);
     let comparison = golden::compare(golden::contents(&before), golden::contents(&after));
-    let commit = provenance::commit(project.root());
-    let written = emit(record, &project.out(), &project.figures(id), commit.as_ref())
+    let written = emit(record, &project.out(), &project.figures(id), build)
         .and_then(|()| write_atomically(&path, after.as_bytes()));
     if let Err(error) = written {
         warn(&error.to_string());

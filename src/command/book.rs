@@ -1,10 +1,9 @@
 //! `calibench book`: the book alone, from the last run; what the last run lacks is run.
 
 use super::{Exit, print, warn};
-use calibench::io::provenance;
 use calibench_book::{Evidence, Finding, Sources};
 use calibench_harness::project::Project;
-use calibench_harness::{Context, Experiment, ProgressDisplay, Record, emit, verdict};
+use calibench_harness::{Build, Context, Experiment, ProgressDisplay, Record, emit, verdict};
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -15,7 +14,7 @@ pub(super) struct Arguments {
     open: bool,
 }
 
-pub(super) fn run(experiments: &[Experiment], arguments: &Arguments) -> Exit {
+pub(super) fn run(experiments: &[Experiment], arguments: &Arguments, build: &Build) -> Exit {
     let project = match Project::find() {
         Ok(project) => project,
         Err(error) => {
@@ -26,7 +25,7 @@ pub(super) fn run(experiments: &[Experiment], arguments: &Arguments) -> Exit {
     let (_, stale) = Evidence::of_last_run(&project, experiments);
     let missing: Vec<&Experiment> =
         experiments.iter().filter(|e| stale.iter().any(|id| id == e.id)).collect();
-    let ran = missing.par_iter().map(|experiment| run_one(experiment, &project)).max();
+    let ran = missing.par_iter().map(|experiment| run_one(experiment, &project, build)).max();
     let (evidence, _) = Evidence::of_last_run(&project, experiments);
     let exit = write(&project, evidence).max(ran.unwrap_or(Exit::Held));
     if arguments.open {
@@ -36,13 +35,13 @@ pub(super) fn run(experiments: &[Experiment], arguments: &Arguments) -> Exit {
 }
 
 /// Runs what the last run lacks.
-fn run_one(experiment: &Experiment, project: &Project) -> Exit {
+fn run_one(experiment: &Experiment, project: &Project, build: &Build) -> Exit {
     let context = Context::of(experiment).with_progress(ProgressDisplay::stderr());
     let run = verdict::run(experiment, &context);
-    let commit = provenance::commit(project.root());
     let written = match &run.result {
-        Ok(record) => emit(record, &project.out(), &project.figures(experiment.id), commit.as_ref())
-            .map_err(|e| e.to_string()),
+        Ok(record) => {
+            emit(record, &project.out(), &project.figures(experiment.id), build).map_err(|e| e.to_string())
+        }
         Err(error) => Err(format!("FAILED {}: {error}", experiment.id)),
     };
     written.map_or_else(

@@ -4,15 +4,14 @@ mod compare;
 mod power;
 
 use super::{Exit, MOST_THREADS, print, warn};
-use calibench::io::{provenance, write_atomically};
+use calibench::io::write_atomically;
 use calibench_gate::faults::{Faulty, planted};
 use calibench_gate::files::{self, FilesError};
 use calibench_gate::{
     Builtin, EXPECTED_FALSE_ALARMS, Plan, PlanError, Process, Property, QUICK, Recorder, Report, Solver,
     THOROUGH, Terms, plan, protocol,
 };
-use calibench_harness::ProgressDisplay;
-use calibench_harness::project::Project;
+use calibench_harness::{Build, ProgressDisplay};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -103,9 +102,9 @@ fn property(name: &str) -> Result<Property, String> {
         .ok_or_else(|| format!("no property `{name}`; there are: {}", known()))
 }
 
-pub(super) fn run(arguments: &Arguments) -> Exit {
+pub(super) fn run(arguments: &Arguments, build: &Build) -> Exit {
     calibench_gate::process::adopt_orphans();
-    let exit = dispatch(arguments).unwrap_or_else(|(exit, message)| {
+    let exit = dispatch(arguments, build).unwrap_or_else(|(exit, message)| {
         warn(&message);
         exit
     });
@@ -132,7 +131,7 @@ fn of_files(error: FilesError) -> Stop {
     }
 }
 
-fn dispatch(arguments: &Arguments) -> Result<Exit, Stop> {
+fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
     if let Some(folder) = &arguments.schema {
         for (name, text) in protocol::schemas() {
             write_atomically(&folder.join(name), text.as_bytes()).map_err(incomplete)?;
@@ -163,7 +162,7 @@ fn dispatch(arguments: &Arguments) -> Result<Exit, Stop> {
         return power::print_table(folder);
     }
     if let Some(folder) = &arguments.power {
-        return power::measure(arguments, folder, samples);
+        return power::measure(arguments, folder, samples, build);
     }
     if let Some(folder) = &arguments.export {
         let plan = Plan::new(arguments.seed, samples).map_err(incomplete)?;
@@ -173,14 +172,14 @@ fn dispatch(arguments: &Arguments) -> Result<Exit, Stop> {
     }
     if let Some(folder) = &arguments.judge {
         let (plan, answers) = files::recorded(folder).map_err(of_files)?;
-        return judge(arguments, &plan, &answers);
+        return judge(arguments, &plan, &answers, build);
     }
     let solver = solver(arguments)?;
     if let Some(folder) = &arguments.record {
         let plan = Plan::new(arguments.seed, samples).map_err(incomplete)?;
         files::export(&plan, folder).map_err(of_files)?;
         let recorder = Recorder::new(solver.as_ref());
-        let exit = judge(arguments, &plan, &recorder)?;
+        let exit = judge(arguments, &plan, &recorder, build)?;
         files::file_answers(&plan, folder, &recorder).map_err(of_files)?;
         print(&format!("{} problems and answers written to {}\n", plan.cases.len(), folder.display()));
         return Ok(exit);
@@ -189,7 +188,7 @@ fn dispatch(arguments: &Arguments) -> Result<Exit, Stop> {
         return compare::run(arguments, solver.as_ref(), reference, samples);
     }
     let plan = Plan::new(arguments.seed, samples).map_err(incomplete)?;
-    judge(arguments, &plan, solver.as_ref())
+    judge(arguments, &plan, solver.as_ref(), build)
 }
 
 fn solver(arguments: &Arguments) -> Result<Box<dyn Solver>, Stop> {
@@ -222,25 +221,20 @@ fn terms(arguments: &Arguments) -> Terms {
     }
 }
 
-/// The commit of the gate, as it stands in reports.
-fn commit() -> Option<provenance::Commit> {
-    Project::find().ok().and_then(|p| provenance::commit(p.root()))
-}
-
 /// Asks every problem of the plan, showing progress.
-fn asked(arguments: &Arguments, plan: &Plan, solver: &dyn Solver) -> Report {
+fn asked(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build) -> Report {
     let progress = ProgressDisplay::stderr().start("gate", plan.cases.len());
     let started = Instant::now();
     let seen = calibench_gate::run(plan, solver, &|done| progress.advance(done));
     let seconds = started.elapsed().as_secs_f64();
-    Report::new(plan, &solver.name(), &seen, &terms(arguments), seconds).with_commit(commit().as_ref())
+    Report::new(plan, &solver.name(), &seen, &terms(arguments), seconds).with_commit(build.commit.as_ref())
 }
 
 /// A report in one form, and where it goes if it is wanted.
 type Output<'a> = (&'a Option<PathBuf>, fn(&Report) -> String);
 
-fn judge(arguments: &Arguments, plan: &Plan, solver: &dyn Solver) -> Result<Exit, Stop> {
-    let report = asked(arguments, plan, solver);
+fn judge(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build) -> Result<Exit, Stop> {
+    let report = asked(arguments, plan, solver, build);
     let outputs: [Output<'_>; 3] = [
         (&arguments.json, Report::to_json),
         (&arguments.junit, Report::to_junit),

@@ -18,7 +18,7 @@ mod undistort;
 pub use exit::Exit;
 pub use terminal::{print, warn};
 
-use calibench_harness::Experiment;
+use calibench_harness::{Build, Experiment};
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -61,8 +61,8 @@ enum Verb {
     Gate(Box<gate::Arguments>),
 }
 
-/// The `calibench` command over a table of experiments.
-pub fn main(experiments: &[Experiment]) -> ExitCode {
+/// The `calibench` command over a table of experiments; `build` is what stands as their origin in what they write.
+pub fn main(experiments: &[Experiment], build: &Build) -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => return terminal::ended(terminal::usage(&error)).into(),
@@ -75,25 +75,25 @@ pub fn main(experiments: &[Experiment]) -> ExitCode {
         return exit.into();
     }
     let exit = match arguments.verb {
-        None => reproduce::run(experiments),
+        None => reproduce::run(experiments, build),
         Some(Verb::List(arguments)) => list::run(experiments, &arguments),
-        Some(Verb::Run(arguments)) => run::run(experiments, &arguments),
+        Some(Verb::Run(arguments)) => run::run(experiments, &arguments, build),
         Some(Verb::Check(arguments)) => check::run(experiments, &arguments),
-        Some(Verb::Bless(arguments)) => bless::run(experiments, &arguments),
-        Some(Verb::Book(arguments)) => book::run(experiments, &arguments),
+        Some(Verb::Bless(arguments)) => bless::run(experiments, &arguments, build),
+        Some(Verb::Book(arguments)) => book::run(experiments, &arguments, build),
         Some(Verb::Calibrate(arguments)) => calibrate::run(&arguments),
         Some(Verb::Ninepoint(arguments)) => ninepoint::run(&arguments),
         Some(Verb::Undistort(arguments)) => undistort::run(&arguments),
-        Some(Verb::Study(arguments)) => study::run(&arguments),
-        Some(Verb::Gate(arguments)) => gate::run(&arguments),
+        Some(Verb::Study(arguments)) => study::run(&arguments, build),
+        Some(Verb::Gate(arguments)) => gate::run(&arguments, build),
     };
     terminal::ended(exit).into()
 }
 
 /// The command of an experiment's own binary: one run, as `calibench run ID` does it.
-pub fn main_for(experiment: &Experiment) -> ExitCode {
+pub fn main_for(experiment: &Experiment, build: &Build) -> ExitCode {
     end_well_on_interrupt();
-    terminal::ended(run::main_for(experiment)).into()
+    terminal::ended(run::main_for(experiment, build)).into()
 }
 
 /// Ctrl-C ends the program with a code of its own. Files are renamed into place whole, so what is finished stays.

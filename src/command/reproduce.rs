@@ -2,14 +2,13 @@
 
 use super::report::{details, reconciliation_table};
 use super::{Exit, print, warn};
-use calibench::io::{Commit, provenance};
 use calibench_harness::project::Project;
 use calibench_harness::verdict::{self, Run, Verdict};
-use calibench_harness::{Context, Experiment, ProgressDisplay, Record, emit};
+use calibench_harness::{Build, Context, Experiment, ProgressDisplay, Record, emit};
 use rayon::prelude::*;
 use std::{fs, io};
 
-pub(super) fn run(experiments: &[Experiment]) -> Exit {
+pub(super) fn run(experiments: &[Experiment], build: &Build) -> Exit {
     let project = match Project::find() {
         Ok(project) => project,
         Err(error) => {
@@ -17,13 +16,12 @@ pub(super) fn run(experiments: &[Experiment]) -> Exit {
             return Exit::Usage;
         }
     };
-    let commit = provenance::commit(project.root());
     let display = ProgressDisplay::stderr();
     let finished: Vec<(Run, io::Result<()>)> = experiments
         .par_iter()
         .map(|experiment| {
             let run = verdict::run(experiment, &Context::of(experiment).with_progress(display.clone()));
-            let written = write(&run, &project, commit.as_ref());
+            let written = write(&run, &project, build);
             (run, written)
         })
         .collect();
@@ -40,9 +38,9 @@ pub(super) fn run(experiments: &[Experiment]) -> Exit {
 }
 
 /// Each experiment is written as soon as it is finished: an interruption keeps what is done.
-fn write(run: &Run, project: &Project, commit: Option<&Commit>) -> io::Result<()> {
+fn write(run: &Run, project: &Project, build: &Build) -> io::Result<()> {
     match &run.result {
-        Ok(record) => emit(record, &project.out(), &project.figures(run.experiment.id), commit),
+        Ok(record) => emit(record, &project.out(), &project.figures(run.experiment.id), build),
         Err(_) => Ok(()),
     }
 }

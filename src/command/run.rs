@@ -2,10 +2,9 @@
 
 use super::report::{details, summary};
 use super::{Exit, find, print, terminal, warn};
-use calibench::io::provenance;
 use calibench_harness::project::Project;
 use calibench_harness::verdict::{self, Run, Verdict};
-use calibench_harness::{Context, Experiment, ProgressDisplay, emit};
+use calibench_harness::{Build, Context, Experiment, ProgressDisplay, emit};
 use clap::{Args, CommandFactory, FromArgMatches, Parser};
 use std::path::{Path, PathBuf};
 
@@ -39,24 +38,24 @@ struct OwnArguments {
     options: Options,
 }
 
-pub(super) fn run(experiments: &[Experiment], arguments: &Arguments) -> Exit {
+pub(super) fn run(experiments: &[Experiment], arguments: &Arguments, build: &Build) -> Exit {
     match find(experiments, &arguments.id) {
-        Ok(experiment) => run_one(experiment, &arguments.options),
+        Ok(experiment) => run_one(experiment, &arguments.options, build),
         Err(exit) => exit,
     }
 }
 
-pub(super) fn main_for(experiment: &Experiment) -> Exit {
+pub(super) fn main_for(experiment: &Experiment, build: &Build) -> Exit {
     let about = format!("{}\n\n{}", experiment.title, experiment.question);
     let command = OwnArguments::command().name(experiment.id).about(about);
     let parsed = command.try_get_matches().and_then(|matches| OwnArguments::from_arg_matches(&matches));
     match parsed {
-        Ok(arguments) => run_one(experiment, &arguments.options),
+        Ok(arguments) => run_one(experiment, &arguments.options, build),
         Err(error) => terminal::usage(&error),
     }
 }
 
-fn run_one(experiment: &Experiment, options: &Options) -> Exit {
+fn run_one(experiment: &Experiment, options: &Options, build: &Build) -> Exit {
     if options.image.is_some() && !experiment.takes_image {
         warn(&format!("experiment `{}` takes no image", experiment.id));
         return Exit::Usage;
@@ -75,8 +74,7 @@ fn run_one(experiment: &Experiment, options: &Options) -> Exit {
         }
     };
     let (out, figures) = places(&run, options.out.as_deref(), project.as_ref());
-    let commit = project.as_ref().and_then(|p| provenance::commit(p.root()));
-    if let Err(error) = emit(record, &out, &figures, commit.as_ref()) {
+    if let Err(error) = emit(record, &out, &figures, build) {
         warn(&error.to_string());
         return Exit::Incomplete;
     }

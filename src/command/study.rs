@@ -8,6 +8,7 @@ mod run;
 use super::{Exit, warn};
 use calibench::io::input::{InputError, MOST_SPEC_BYTES};
 use calibench::io::read_regular_text;
+use calibench_harness::Build;
 use calibench_study::{FolderError, MergeError, RunError};
 use std::path::Path;
 
@@ -33,11 +34,11 @@ pub(super) struct Arguments {
     verb: Verb,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Exit {
+pub(super) fn run(arguments: &Arguments, build: &Build) -> Exit {
     let ended = match &arguments.verb {
-        Verb::Run(arguments) => run::run(arguments),
-        Verb::Resume(arguments) => run::resume(arguments),
-        Verb::Merge(arguments) => run::merge_parts(arguments),
+        Verb::Run(arguments) => run::run(arguments, build),
+        Verb::Resume(arguments) => run::resume(arguments, build),
+        Verb::Merge(arguments) => run::merge_parts(arguments, build),
         Verb::Compare(arguments) => compare::run(arguments),
         Verb::Plan(arguments) => plan::run(arguments),
         Verb::Measure(arguments) => measure::run(arguments),

@@ -1,10 +1,10 @@
 //! How does a record reach the disk? CSV, JSON and figures, each written beside its place and renamed into it.
 
-use super::provenance::crate_versions;
+use super::provenance::Build;
 use super::published::not_judged;
 use super::reconcile::{Expectation, Reconciliation};
 use super::record::Record;
-use calibench::io::{Commit, write_atomically};
+use calibench::io::write_atomically;
 use serde_json::{Value, json};
 use std::io;
 use std::path::Path;
@@ -14,7 +14,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// What the file system says, with the path.
-pub fn emit(record: &Record, out: &Path, figures: &Path, commit: Option<&Commit>) -> io::Result<()> {
+pub fn emit(record: &Record, out: &Path, figures: &Path, build: &Build) -> io::Result<()> {
     let folder = out.join(record.experiment());
     for table in record.tables() {
         write_atomically(&folder.join(format!("{}.csv", table.name)), table.to_csv().as_bytes())?;
@@ -22,21 +22,19 @@ pub fn emit(record: &Record, out: &Path, figures: &Path, commit: Option<&Commit>
     for figure in record.figures() {
         write_atomically(&figures.join(figure.file_name()), &figure.bytes)?;
     }
-    let text = format!("{:#}\n", record_json(record, commit));
+    let text = format!("{:#}\n", record_json(record, build));
     write_atomically(&folder.join("record.json"), text.as_bytes())
 }
 
 /// The record as JSON. A number that is not finite stands as a word, since JSON has none for it.
-pub fn record_json(record: &Record, commit: Option<&Commit>) -> Value {
-    let versions: serde_json::Map<String, Value> =
-        crate_versions().into_iter().map(|(name, version)| (name, version.into())).collect();
+pub fn record_json(record: &Record, build: &Build) -> Value {
     json!({
         "experiment": record.experiment(),
         "provenance": {
-            "commit": commit.map(|c| c.hash.clone()),
-            "dirty": commit.map(|c| c.dirty),
+            "commit": build.commit.as_ref().map(|c| &c.hash),
+            "dirty": build.commit.as_ref().map(|c| c.dirty),
             "seed": record.seed(),
-            "crates": versions,
+            "crates": build.crates,
             "inputs": record.inputs().iter().map(|i| json!({"name": i.name, "sha256": i.sha256})).collect::<Vec<_>>(),
         },
         "numbers": record.numbers().iter().map(|n| json!({
@@ -91,7 +89,7 @@ mod tests {
         let mut record = Record::new("e", 1);
         record.number("n", f64::INFINITY, "px", Band::Exact, "");
         record.claim(Claim::at_most("c", "", 0.0, 1.0, ""));
-        let json = record_json(&record, None);
+        let json = record_json(&record, &Build::default());
         assert_eq!(json["numbers"][0]["value"], "inf");
         assert_eq!(json["claims"][0]["interval"], json!(["-inf", 1.0]));
         assert_eq!(json["provenance"]["commit"], Value::Null);

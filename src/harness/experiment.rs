@@ -29,8 +29,6 @@ pub struct Context {
     experiment: &'static str,
     /// Seed of every random stream.
     pub seed: u64,
-    /// Folder of third-party measurements, when it is there.
-    pub data: Option<PathBuf>,
     /// An image file that takes the place of the experiment's own.
     pub image: Option<PathBuf>,
     display: ProgressDisplay,
@@ -78,12 +76,11 @@ impl ExperimentError {
 }
 
 impl Context {
-    /// A context with the default seed, the data folder of the environment, no image and no progress shown.
+    /// A context with the default seed, no image and no progress shown.
     pub fn of(experiment: &Experiment) -> Context {
         Context {
             experiment: experiment.id,
             seed: experiment.seed,
-            data: super::project::data_folder(),
             image: None,
             display: ProgressDisplay::hidden(),
         }

@@ -55,13 +55,6 @@ impl Project {
     }
 }
 
-/// The folder of third-party measurements: `CALIBENCH_DATA`, else `../shared/data`; `None` when it is not there.
-pub fn data_folder() -> Option<PathBuf> {
-    let named = std::env::var_os("CALIBENCH_DATA").map(PathBuf::from);
-    let folder = named.unwrap_or_else(|| PathBuf::from("../shared/data"));
-    folder.is_dir().then_some(folder)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,30 +1,29 @@
-//! With which arithmetic was a record computed? The versions of the numeric crates.
+//! Which program computed a record? Its commit and its numeric crates, fixed when it was built.
 //!
 //! Only what belongs to the result is locked in golden/ (seed and inputs); commit and versions stand in out/.
 
-/// Crates whose arithmetic stands in the path of a number.
-const NUMERIC_CRATES: [&str; 6] = ["libm", "nalgebra", "rand", "rand_chacha", "rand_distr", "statrs"];
+use calibench::io::Commit;
+use std::collections::BTreeMap;
 
-/// Name and version of the crates whose arithmetic stands in the path of a number, from the committed lock file.
-pub fn crate_versions() -> Vec<(String, String)> {
-    versions_in(include_str!("../../Cargo.lock"))
+/// What a program was built from.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Build {
+    /// The commit; `None` if it was built outside of a repository of its own.
+    pub commit: Option<Commit>,
+    /// Versions of the crates whose arithmetic stands in the path of a number; none if they are not known for certain.
+    pub crates: BTreeMap<String, String>,
 }
 
-fn versions_in(lock: &str) -> Vec<(String, String)> {
-    let field = |line: Option<&str>, key: &str| {
-        line.and_then(|l| l.strip_prefix(key)).map(|v| v.trim_matches('"').to_string())
-    };
-    let mut found = Vec::new();
-    let mut lines = lock.lines();
-    while let Some(line) = lines.next() {
-        let Some(name) = field(Some(line), "name = ") else { continue };
-        if NUMERIC_CRATES.contains(&name.as_str())
-            && let Some(version) = field(lines.next(), "version = ")
-        {
-            found.push((name, version));
+impl Build {
+    /// What a build script found: hash or nothing, `true` or `false`, and `name version` of crates, separated by commas.
+    pub fn read(hash: &str, changed: &str, crates: &str) -> Build {
+        let commit = (!hash.is_empty()).then(|| Commit { hash: hash.to_string(), dirty: changed == "true" });
+        let named = crates.split(',').filter_map(|text| text.split_once(' '));
+        Build {
+            commit,
+            crates: named.map(|(name, version)| (name.to_string(), version.to_string())).collect(),
         }
     }
-    found
 }
 
 #[cfg(test)]
@@ -32,10 +31,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_versions_of_all_numeric_crates_are_known() {
-        let versions = crate_versions();
-        for name in NUMERIC_CRATES {
-            assert_eq!(versions.iter().filter(|v| v.0 == name).count(), 1, "{name}: {versions:?}");
-        }
+    fn what_the_build_script_writes_is_read_back() {
+        let build = Build::read("0123abcd", "true", "libm 0.2.16,nalgebra 0.35.0");
+        assert_eq!(build.commit.unwrap().to_string(), "0123abcd with changes");
+        assert_eq!(build.crates["nalgebra"], "0.35.0");
+        assert_eq!(Build::read("", "false", ""), Build::default());
     }
 }

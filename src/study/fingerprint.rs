@@ -5,7 +5,7 @@ use super::shard::Shard;
 use super::tables;
 use super::trial::{Trial, run_trial};
 use calibench::io::hash::sha256_hex;
-use calibench_harness::provenance::crate_versions;
+use calibench_harness::Build;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -22,11 +22,11 @@ pub struct Fingerprint {
 
 impl Fingerprint {
     /// Of the running code.
-    pub fn current() -> Fingerprint {
+    pub fn of(build: &Build) -> Fingerprint {
         Fingerprint {
             calibench: env!("CARGO_PKG_VERSION").to_string(),
             behaviour: behaviour(),
-            crates: crate_versions().into_iter().collect(),
+            crates: build.crates.clone(),
         }
     }
 }
@@ -82,7 +82,7 @@ mod tests {
 
     #[test]
     fn the_same_code_has_the_same_fingerprint_and_its_trials_give_cameras() {
-        assert_eq!(Fingerprint::current(), Fingerprint::current());
+        assert_eq!(Fingerprint::of(&Build::default()), Fingerprint::of(&Build::default()));
         let engine = Engine::new(STUDY, Shard::WHOLE).unwrap();
         for cell in &engine.cells {
             let trial = run_trial(cell, &engine.quantities, 0);

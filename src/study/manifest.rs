@@ -4,8 +4,8 @@ use super::fingerprint::Fingerprint;
 use super::shard::Shard;
 use super::spec::Spec;
 use super::trial_file::TrialFile;
-use calibench::io::Commit;
 use calibench::io::hash::sha256_hex;
+use calibench_harness::Build;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -59,7 +59,7 @@ impl fmt::Display for Difference {
 
 impl Manifest {
     /// Of a run that begins.
-    pub fn new(spec: &Spec, shard: Shard, commit: Option<&Commit>) -> Manifest {
+    pub fn new(spec: &Spec, shard: Shard, build: &Build) -> Manifest {
         let canonical = spec.canonical();
         Manifest {
             study: spec.name.clone(),
@@ -67,9 +67,9 @@ impl Manifest {
             shard: shard.to_string(),
             trials: TrialFile::Csv,
             complete: false,
-            commit: commit.map(|c| c.hash.clone()),
-            dirty: commit.map(|c| c.dirty),
-            code: Fingerprint::current(),
+            commit: build.commit.as_ref().map(|c| c.hash.clone()),
+            dirty: build.commit.as_ref().map(|c| c.dirty),
+            code: Fingerprint::of(build),
             spec_sha256: sha256_hex(canonical.to_string().as_bytes()),
             spec: canonical,
             files: BTreeMap::new(),

@@ -9,6 +9,7 @@ use super::shard::Shard;
 use super::tables;
 use super::trial_file::TrialFile;
 use calibench::io::Commit;
+use calibench_harness::Build;
 use std::path::{Path, PathBuf};
 
 /// Parts that do not make a whole.
@@ -75,6 +76,7 @@ pub fn merge(
     parts: &[PathBuf],
     out: &Path,
     trials: Option<TrialFile>,
+    build: &Build,
 ) -> Result<(Folder, Engine), MergeError> {
     distinct(parts, out)?;
     let parts = parts.iter().map(|path| open(path)).collect::<Result<Vec<Part>, _>>()?;
@@ -84,7 +86,8 @@ pub fn merge(
     trials.check().map_err(FolderError::from)?;
     let text = first.folder.read("spec.toml")?;
     let mut whole = Engine::new(&text, Shard::WHOLE).map_err(RunError::from)?;
-    let manifest = Manifest::new(&whole.spec, Shard::WHOLE, commit(&parts).as_ref()).with_trials(trials);
+    let build = Build { commit: commit(&parts), ..build.clone() };
+    let manifest = Manifest::new(&whole.spec, Shard::WHOLE, &build).with_trials(trials);
     // Bounds and statistics of the whole come from this code, its trials from that of the parts: the manifest names one.
     first.folder.check(&manifest)?;
     let shards: Vec<Shard> = parts.iter().map(|part| part.shard).collect();

@@ -1,5 +1,6 @@
 //! What the tests of studies share: a small study, its runs, and their comparison byte by byte.
 
+use calibench_experiments::build;
 use calibench_study::{Engine, Folder, Manifest, Outcome, Shard, TrialFile, finish};
 use std::collections::BTreeMap;
 use std::fs;
@@ -39,7 +40,7 @@ pub fn scratch(name: &str) -> PathBuf {
 
 pub fn begin(path: &Path, text: &str, shard: Shard, trials: TrialFile) -> (Folder, Engine) {
     let engine = Engine::new(text, shard).unwrap();
-    let manifest = Manifest::new(&engine.spec, shard, None).with_trials(trials);
+    let manifest = Manifest::new(&engine.spec, shard, &build()).with_trials(trials);
     (Folder::create(path, text, &manifest).unwrap(), engine)
 }
 
@@ -56,7 +57,7 @@ pub fn resume(path: &Path) {
     let folder = Folder::open(path).unwrap();
     let shard = folder.shard().unwrap();
     let mut engine = Engine::new(&folder.read("spec.toml").unwrap(), shard).unwrap();
-    folder.check(&Manifest::new(&engine.spec, shard, None)).unwrap();
+    folder.check(&Manifest::new(&engine.spec, shard, &build())).unwrap();
     folder.run(&mut engine, &AtomicBool::new(false), |_| {}).unwrap();
     finish(&folder, &engine).unwrap();
 }

@@ -14,12 +14,15 @@ pub struct MissingDataFolder {
 }
 
 /// The folder of real data: `CALIBENCH_DATA` if set, else `../shared/data` seen from the package (from the working directory
-/// outside of Cargo). `None` if the variable is unset and the default is absent: a reason to skip, not to fail.
+/// outside of Cargo). `None` if the variable is `none`, or unset and the default is absent: a reason to skip, not to fail.
 ///
 /// # Errors
 /// The variable is set, but not to a folder.
 pub fn data_folder() -> Result<Option<PathBuf>, MissingDataFolder> {
     if let Some(named) = std::env::var_os(VARIABLE) {
+        if named == "none" {
+            return Ok(None);
+        }
         let path = PathBuf::from(named);
         return if path.is_dir() {
             Ok(Some(path))

@@ -1,24 +1,18 @@
-//! From which sources does a result come? Their commit, and whether files differ from it.
+//! From which sources does a result come? Their commit, and whether they differ from it.
 
-use std::path::Path;
-use std::process::Command;
+use std::fmt;
 
-/// The state of the source tree.
+/// The state of the sources that a program was built from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Commit {
     /// Full hash.
     pub hash: String,
-    /// Whether files differ from that commit.
+    /// Whether a source differed from that commit or was unknown to it.
     pub dirty: bool,
 }
 
-/// The commit of the source tree, asked of git at run time; `None` where there is no git or no repository.
-pub fn commit(root: &Path) -> Option<Commit> {
-    let git = |args: &[&str]| {
-        let output = Command::new("git").arg("-C").arg(root).args(args).output().ok()?;
-        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_string())
-    };
-    let hash = git(&["rev-parse", "HEAD"])?;
-    let dirty = !git(&["status", "--porcelain", "--untracked-files=no"])?.is_empty();
-    Some(Commit { hash, dirty })
+impl fmt::Display for Commit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}{}", self.hash, if self.dirty { " with changes" } else { "" })
+    }
 }

@@ -1,13 +1,13 @@
 //! `calibench gate --power`: the gate's own power and false alarms, as committed tables.
 
-use super::{Arguments, Stop, commit, incomplete, usage};
+use super::{Arguments, Stop, incomplete, usage};
 use crate::{Exit, print, warn};
 use calibench::io::write_atomically;
 use calibench_gate::faults::planted;
 use calibench_gate::power::{Measured, Sizes};
 use calibench_gate::{QUICK, textbook};
-use calibench_harness::ProgressDisplay;
 use calibench_harness::fingerprint::Fingerprint;
+use calibench_harness::{Build, ProgressDisplay};
 use std::path::Path;
 use std::time::Instant;
 
@@ -17,7 +17,12 @@ const CLEAN_SEEDS: usize = 200;
 const FIRST_CLEAN_SEED: u64 = 20_001;
 
 /// Measures and writes the tables; a fault that is missed, or a correct solver that is failed for certain, deviates.
-pub(super) fn measure(arguments: &Arguments, folder: &Path, samples: usize) -> Result<Exit, Stop> {
+pub(super) fn measure(
+    arguments: &Arguments,
+    folder: &Path,
+    samples: usize,
+    build: &Build,
+) -> Result<Exit, Stop> {
     let started = Instant::now();
     let sizes = Sizes {
         seed: arguments.seed,
@@ -36,9 +41,7 @@ pub(super) fn measure(arguments: &Arguments, folder: &Path, samples: usize) -> R
     };
     let measured = Measured::take(sizes, &step).map_err(incomplete)?;
     drop(progress);
-    let commit = commit().map_or("unknown".to_string(), |c| {
-        format!("{}{}", c.hash, if c.dirty { " with changes" } else { "" })
-    });
+    let commit = build.commit.as_ref().map_or("unknown".to_string(), ToString::to_string);
     let command =
         format!("calibench gate --power DIR --samples {samples} --seed {}; commit {commit}", sizes.seed);
     let head = Fingerprint::of_gate_power().head(&command);

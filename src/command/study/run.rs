@@ -2,9 +2,9 @@
 
 use super::{Failure, read};
 use crate::{Exit, print, warn};
-use calibench::io::{provenance, significant};
-use calibench_harness::ProgressDisplay;
+use calibench::io::significant;
 use calibench_harness::project::Project;
+use calibench_harness::{Build, ProgressDisplay};
 use calibench_study::{
     Engine, Folder, FolderError, Interruption, Manifest, Outcome, RunError, Shard, Summary, TrialFile, Worst,
     finish, merge,
@@ -48,29 +48,29 @@ pub(crate) struct MergeArguments {
     trials: Option<TrialFile>,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
+pub(super) fn run(arguments: &Arguments, build: &Build) -> Result<Exit, Failure> {
     arguments.trials.check().map_err(FolderError::from)?;
     let text = read(&arguments.spec)?;
     let engine = Engine::new(&text, arguments.shard)
         .map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.display())))?;
     let out = arguments.out.clone().unwrap_or_else(|| default_folder(&engine));
-    let manifest = Manifest::new(&engine.spec, arguments.shard, commit().as_ref());
+    let manifest = Manifest::new(&engine.spec, arguments.shard, build);
     let manifest = manifest.with_trials(arguments.trials);
     let folder = Folder::create(&out, &text, &manifest)?;
     drive(&folder, engine)
 }
 
-pub(super) fn resume(arguments: &ResumeArguments) -> Result<Exit, Failure> {
+pub(super) fn resume(arguments: &ResumeArguments, build: &Build) -> Result<Exit, Failure> {
     let folder = Folder::open(&arguments.run)?;
     folder.manifest()?.trials.check().map_err(FolderError::from)?;
     let shard = folder.shard()?;
     let engine = Engine::new(&folder.read("spec.toml")?, shard).map_err(RunError::from)?;
-    folder.check(&Manifest::new(&engine.spec, shard, None))?;
+    folder.check(&Manifest::new(&engine.spec, shard, build))?;
     drive(&folder, engine)
 }
 
-pub(super) fn merge_parts(arguments: &MergeArguments) -> Result<Exit, Failure> {
-    let (folder, engine) = merge(&arguments.parts, &arguments.out, arguments.trials)?;
+pub(super) fn merge_parts(arguments: &MergeArguments, build: &Build) -> Result<Exit, Failure> {
+    let (folder, engine) = merge(&arguments.parts, &arguments.out, arguments.trials, build)?;
     let summary = finish(&folder, &engine)?;
     tell(&folder, &engine, &summary);
     Ok(Exit::Held)
@@ -84,10 +84,6 @@ fn default_folder(engine: &Engine) -> PathBuf {
         Shard { index, count } => format!("-{index}-of-{count}"),
     };
     out.join("studies").join(format!("{}{part}", engine.spec.name))
-}
-
-fn commit() -> Option<provenance::Commit> {
-    provenance::commit(Project::find().ok()?.root())
 }
 
 /// Set by Ctrl-C and by a request to terminate; a second one ends the process at once, which loses a batch and no more.

@@ -85,8 +85,7 @@ impl Report {
 
     /// States the commit of the gate.
     pub fn with_commit(self, commit: Option<&Commit>) -> Report {
-        let text = |c: &Commit| format!("{}{}", c.hash, if c.dirty { " with changes" } else { "" });
-        Report { commit: commit.map(text), ..self }
+        Report { commit: commit.map(Commit::to_string), ..self }
     }
 
     /// Whether nothing fails.

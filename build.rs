@@ -1,0 +1,96 @@
+//! From which sources is this program built? Asked once, of git and Cargo.lock, while it is built: a program that is older than the
+//! sources beside it still names its own. And are there data for the tests that need some?
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// What the program is made of, relative to the package.
+const SOURCES: [&str; 7] = [
+    "Cargo.toml",
+    "Cargo.lock",
+    "build.rs",
+    "src",
+    "experiments",
+    "golden/published.toml",
+    "golden/gate-power",
+];
+
+/// Crates whose arithmetic stands in the path of a number.
+const NUMERIC_CRATES: [&str; 6] = ["libm", "nalgebra", "rand", "rand_chacha", "rand_distr", "statrs"];
+
+fn main() {
+    let root =
+        PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").expect("Cargo names the package's folder"));
+    for source in SOURCES {
+        println!("cargo::rerun-if-changed={source}");
+    }
+    let tree = Tree::at(&root);
+    let (commit, changed) = tree.as_ref().and_then(Tree::state).unwrap_or_default();
+    // Elsewhere than in its own tree Cargo may have chosen other versions than those of the lock file that came along.
+    let crates = if tree.is_some() { versions(&root.join("Cargo.lock")) } else { String::new() };
+    look_for_data(&root);
+    println!("cargo::rustc-env=CALIBENCH_COMMIT={commit}");
+    println!("cargo::rustc-env=CALIBENCH_CHANGED={changed}");
+    println!("cargo::rustc-env=CALIBENCH_CRATES={crates}");
+}
+
+/// Tests that need the measurements of others are ignored, and counted so, where these are absent or CALIBENCH_DATA is `none`.
+fn look_for_data(root: &Path) {
+    println!("cargo::rustc-check-cfg=cfg(calibench_data)");
+    println!("cargo::rerun-if-env-changed=CALIBENCH_DATA");
+    let named = std::env::var_os("CALIBENCH_DATA");
+    let folder = named.as_ref().map_or_else(|| root.join("../shared/data"), PathBuf::from);
+    // A folder that is named and missing is a mistake: the tests run, and say so.
+    if folder.is_dir() || named.is_some_and(|name| name != "none") {
+        println!("cargo::rustc-cfg=calibench_data");
+    }
+}
+
+/// A working tree of git whose top is the package.
+struct Tree<'a>(&'a Path);
+
+impl Tree<'_> {
+    /// `None` without git, outside of a repository, and inside one that is another project's.
+    fn at(root: &Path) -> Option<Tree<'_>> {
+        let tree = Tree(root);
+        let top = tree.git(&["rev-parse", "--show-toplevel"])?;
+        let same = std::fs::canonicalize(top).ok()? == std::fs::canonicalize(root).ok()?;
+        same.then_some(tree)
+    }
+
+    /// The commit's hash, and whether a source differs from it or is unknown to it. Looked at anew after every commit and checkout.
+    fn state(&self) -> Option<(String, bool)> {
+        for name in ["HEAD", "logs/HEAD"] {
+            let path = self.0.join(self.git(&["rev-parse", "--git-path", name])?);
+            if path.exists() {
+                println!("cargo::rerun-if-changed={}", path.display());
+            }
+        }
+        let status = [&["status", "--porcelain", "--untracked-files=all", "--"], &SOURCES[..]].concat();
+        Some((self.git(&["rev-parse", "HEAD"])?, !self.git(&status)?.is_empty()))
+    }
+
+    fn git(&self, arguments: &[&str]) -> Option<String> {
+        let output = Command::new("git").arg("-C").arg(self.0).args(arguments).output().ok()?;
+        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_string())
+    }
+}
+
+/// `name version` of the numeric crates, separated by commas.
+fn versions(lock: &Path) -> String {
+    let lock = std::fs::read_to_string(lock).unwrap_or_default();
+    let field = |line: Option<&str>, key: &str| {
+        line.and_then(|l| l.strip_prefix(key)).map(|value| value.trim_matches('"').to_string())
+    };
+    let mut found = Vec::new();
+    let mut lines = lock.lines();
+    while let Some(line) = lines.next() {
+        let Some(name) = field(Some(line), "name = ") else { continue };
+        if NUMERIC_CRATES.contains(&name.as_str())
+            && let Some(version) = field(lines.next(), "version = ")
+        {
+            found.push(format!("{name} {version}"));
+        }
+    }
+    found.join(",")
+}

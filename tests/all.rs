@@ -1,0 +1,35 @@
+//! Every test that crosses rooms, in one program: a program of its own for each file would be linked twenty times over.
+//!
+//! `cargo test --test all golden::` runs those of `tests/golden.rs`.
+
+mod book;
+mod chapter_scene;
+mod command;
+mod data;
+mod dependencies;
+mod detect_chessboard;
+mod detect_circles;
+mod detect_corners;
+mod detect_photos;
+mod fuzz_seeds;
+mod gate;
+mod golden;
+mod hostile;
+mod layout;
+mod photo_command;
+mod photo_verbs;
+mod planar_single_plane;
+mod planar_statistics;
+mod readme;
+mod real_corner_files;
+mod real_data;
+mod real_ninepoint;
+mod rectify;
+mod render;
+mod right_minimum;
+mod study;
+mod study_faults;
+mod study_folder;
+mod study_parquet;
+mod study_statistics;
+mod thread_count;
