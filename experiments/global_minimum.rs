@@ -21,7 +21,7 @@ mod families;
 mod judged;
 mod listing;
 mod map;
-mod oracle;
+pub mod oracle;
 mod peers;
 mod scenes;
 
