@@ -4,7 +4,6 @@ use calibench::board::Board;
 use calibench::camera::Camera;
 use calibench::geometry::Pose;
 use calibench::io::{write_png, write_png_16};
-use calibench::photos::BoardSpec;
 use calibench::raster::Raster;
 use calibench::synth::Truth;
 use calibench::synth::render::{Imaging, photograph};

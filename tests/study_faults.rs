@@ -121,7 +121,7 @@ fn a_run_that_fails_at_any_operation_loses_its_last_batch_at_most_and_ends_in_th
     let whole = scratch("faults-whole");
     crate::study::run(&whole, &spec(), Shard::WHOLE, TrialFile::Csv);
     let engine = Engine::new(&spec(), Shard::WHOLE).unwrap();
-    let manifest = Manifest::new(&engine.spec, Shard::WHOLE, None);
+    let manifest = Manifest::new(&engine.spec, Shard::WHOLE, &calibench_experiments::build());
     for fault in [Fault::Killed, Fault::Full] {
         let mut operation = 0;
         loop {
@@ -238,7 +238,7 @@ fn a_disk_that_became_read_only_ends_with_three_and_the_run_goes_on_later() {
         return;
     }
     let engine = Engine::new(&spec(), Shard::WHOLE).unwrap();
-    let manifest = Manifest::new(&engine.spec, Shard::WHOLE, None);
+    let manifest = Manifest::new(&engine.spec, Shard::WHOLE, &calibench_experiments::build());
     drop(Folder::create(&disk.join("run"), &spec(), &manifest).unwrap());
     let resume = || command(&["study", "resume", "disk/run"], &folder).output().unwrap();
     let outputs = (mount("remount,ro"), resume(), mount("remount,rw"), resume());
@@ -258,7 +258,7 @@ fn a_disk_that_became_read_only_ends_with_three_and_the_run_goes_on_later() {
 fn a_folder_that_is_in_use_is_refused_through_any_operations() {
     let path = scratch("in-use");
     let engine = Engine::new(&spec(), Shard::WHOLE).unwrap();
-    let manifest = Manifest::new(&engine.spec, Shard::WHOLE, None);
+    let manifest = Manifest::new(&engine.spec, Shard::WHOLE, &calibench_experiments::build());
     let held = Folder::create(&path, &spec(), &manifest).unwrap();
     assert!(matches!(Folder::open(&path), Err(FolderError::InUse(_))));
     drop(held);

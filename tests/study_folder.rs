@@ -209,13 +209,13 @@ fn trials_of_another_run_are_refused_by_name_and_never_taken_over() {
     run(&quiet, SPEC, Shard::WHOLE);
     let louder = SPEC.replace("seed = 11", "seed = 12").replace("[0.1, 0.3]", "[1.0, 3.0]");
     let engine = Engine::new(&louder, Shard::WHOLE).unwrap();
-    let manifest = Manifest::new(&engine.spec, Shard::WHOLE, None);
+    let manifest = Manifest::new(&engine.spec, Shard::WHOLE, &build());
     // Trials whose manifest is gone: neither a run nor a merge begins on top of them.
     fs::remove_file(quiet.join("manifest.json")).unwrap();
     let error = Folder::create(&quiet, &louder, &manifest).unwrap_err();
     assert!(matches!(error, FolderError::Leftover { found: "checkpoint.json", .. }), "{error}");
     run(&loud, &louder, Shard::WHOLE);
-    let error = merge(std::slice::from_ref(&loud), &quiet, None).map(|_| ()).unwrap_err();
+    let error = merge(std::slice::from_ref(&loud), &quiet, None, &build()).map(|_| ()).unwrap_err();
     assert!(error.to_string().contains("checkpoint.json"), "{error}");
     // Trials and checkpoint that were put under the manifest of another run.
     for name in ["trials.csv", "checkpoint.json"] {

@@ -1,7 +1,7 @@
 //! How does a photograph of a case arise? A random pose that keeps the whole board in the image, rendered, moved, made noisy, rounded.
 
-use crate::BOARD;
-use crate::cases::Case;
+use super::BOARD;
+use super::cases::Case;
 use calibench::board::Board;
 use calibench::camera::{BrownConrady, Camera};
 use calibench::geometry::{Pose, Vec2, Vec3, rotation};

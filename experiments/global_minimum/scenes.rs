@@ -366,7 +366,7 @@ mod tests {
             let first = Drawn::new(family, 3, 5).unwrap();
             Drawn::new(family, 3, 4).unwrap();
             let again = Drawn::new(family, 3, 5).unwrap();
-            assert_eq!((first.views, first.settings()), (again.views, again.settings()), "{}", family.name);
+            assert_eq!((&first.views, first.settings()), (&again.views, again.settings()), "{}", family.name);
         }
     }
 

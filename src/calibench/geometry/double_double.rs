@@ -187,7 +187,8 @@ mod tests {
             prop_assert!(close(a + b - b, a, size_a + size_b));
             prop_assert!(close(a * b / b, a, size_a));
             let root = (b * b).sqrt();
-            prop_assert!(close(root, if b.is_positive() { b } else { -b }, size_b));
+            let size = if b.is_positive() { b } else { -b };
+            prop_assert!(close(root, size, size_b));
         }
 
         #[test]
