@@ -7,7 +7,7 @@ use super::normal::Observations;
 use super::report::{STRONG_CORRELATION, UNCERTAIN_FOCAL};
 use super::{
     Calibration, CalibrationError, Covariance, Loss, Settings, Warning, chunks, identifiability, kernel,
-    start,
+    polish, start,
 };
 use crate::camera::{Camera, FreeParameters, Parameter};
 use crate::geometry::{Homography, Mat3, Pose, Vec2, Vec3, rotation};
@@ -30,7 +30,8 @@ const START_GAIN: f64 = 1e-3;
 /// no error: the result says so in [`Calibration::termination`] and in a warning.
 pub fn calibrate(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
     check_counts(views, settings)?;
-    chunks::in_pool(views.len(), || estimate(views, settings))
+    let calibration = chunks::in_pool(views.len(), || estimate(views, settings))?;
+    Ok(if settings.polish { polish::polish(views, settings.loss, calibration) } else { calibration })
 }
 
 fn estimate(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {

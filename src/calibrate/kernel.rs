@@ -171,6 +171,12 @@ impl<L: Arithmetic> Model<L> {
             t: [L::splat(t.x), L::splat(t.y), L::splat(t.z)],
         }
     }
+
+    /// From numbers of more digits than a [`Camera`] has: the parameters in their order, the first two columns of `R`, and `t`.
+    pub fn of_numbers(parameters: &[L; Parameter::COUNT], r: [[L; 2]; 3], t: [L; 3]) -> Model<L> {
+        let [fx, fy, cx, cy, skew, k1, k2, p1, p2, k3] = *parameters;
+        Model { fx, fy, cx, cy, skew, k1, k2, p1, p2, k3, r, t }
+    }
 }
 
 /// A predicted pixel and the rows of its Jacobian.

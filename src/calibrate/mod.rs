@@ -14,6 +14,7 @@ mod kernel;
 mod loss;
 mod minimise;
 mod normal;
+mod polish;
 mod report;
 mod settings;
 pub mod single_plane;

@@ -71,6 +71,8 @@ pub enum Warning {
     },
     /// No residual degrees of freedom: the fit is exact whatever the noise, and no standard deviation can be told.
     NoDegreesOfFreedom,
+    /// The last digits were asked for, and the steps towards them did not shrink: the estimate is the refinement's.
+    NotPolished,
 }
 
 /// Beyond this two parameters share 96 % of their variance; k1 and k2 of an ordinary set of views stay below it.
@@ -104,6 +106,10 @@ impl fmt::Display for Warning {
             ),
             Warning::NoDegreesOfFreedom => f.write_str(
                 "as many unknowns as measurements: the fit is exact and says nothing about its accuracy",
+            ),
+            Warning::NotPolished => f.write_str(
+                "the last digits could not be had: undamped steps from the minimum do not shrink; the estimate is that of an \
+                 ordinary calibration",
             ),
         }
     }

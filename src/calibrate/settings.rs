@@ -16,6 +16,8 @@ pub struct Settings {
     pub start: Option<Camera>,
     /// Iterations of the refinement before it gives up.
     pub max_iterations: usize,
+    /// Whether the minimum is followed to its last digits.
+    pub polish: bool,
 }
 
 /// Good data take five to ten iterations, the worst convergent ones seen about sixty.
@@ -31,6 +33,7 @@ impl Settings {
             loss: Loss::Squares,
             start: None,
             max_iterations: DEFAULT_MAX_ITERATIONS,
+            polish: false,
         }
     }
 
@@ -55,6 +58,13 @@ impl Settings {
     /// Chooses the loss.
     pub fn with_loss(mut self, loss: Loss) -> Settings {
         self.loss = loss;
+        self
+    }
+
+    /// Follows the minimum to its last digits, in double-double arithmetic: for comparisons digit by digit. No measurement notices the
+    /// difference, some 1e-7 of a standard deviation, and it takes some twenty times as long.
+    pub fn polished(mut self) -> Settings {
+        self.polish = true;
         self
     }
 

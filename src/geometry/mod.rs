@@ -1,6 +1,7 @@
 //! Plane and space geometry that knows nothing of cameras: rotations, poses, homographies, fits.
 
 pub mod affine;
+pub(crate) mod double_double;
 pub mod homography;
 mod homography_system;
 pub(crate) mod lanes;

@@ -11,6 +11,7 @@
 
 pub mod accept;
 pub mod bad_input;
+pub mod certified;
 pub mod faults;
 pub mod files;
 pub mod judge;
