@@ -2,6 +2,8 @@
 
 use calibench::harness::Experiment;
 
+#[path = "certified_digits.rs"]
+mod certified_digits;
 #[path = "collinearity.rs"]
 mod collinearity;
 #[path = "distortion_model.rs"]
@@ -45,4 +47,5 @@ pub const EXPERIMENTS: &[Experiment] = &[
     interface::EXPERIMENT,
     expiry::EXPERIMENT,
     gate_power::EXPERIMENT,
+    certified_digits::EXPERIMENT,
 ];
