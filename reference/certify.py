@@ -548,6 +548,13 @@ MARK = ',\n "certified": '
 EVIDENCE = '"evidence": '
 
 
+def write(path, text):
+    """To a temporary file, which is then renamed: an interruption leaves no half of a file."""
+    part = path.with_suffix(".part")
+    part.write_text(text)
+    part.replace(path)
+
+
 def main(arguments):
     arguments, starts = list(arguments), STARTS
     if "--starts" in arguments:
@@ -558,7 +565,7 @@ def main(arguments):
     if "--sums" in arguments:
         files = sorted(p for p in HERE.iterdir() if p.suffix in (".json", ".py", ".md"))
         sums = [f"{hashlib.sha256(p.read_bytes()).hexdigest()}  {p.name}\n" for p in files]
-        (HERE / "SHA256SUMS").write_text("".join(sums))
+        write(HERE / "SHA256SUMS", "".join(sums))
         return 0
     paths = [HERE / f"{name}.json" for name in names] or sorted(HERE.glob("*.json"))
     different = 0
@@ -575,7 +582,7 @@ def main(arguments):
             different += not same
             print(f"{path.stem}: {'every digit as in the file' if same else 'DIFFERS'}", flush=True)
         else:
-            path.write_text(text)
+            write(path, text)
             print(f"{path.stem}: certified", flush=True)
     return int(different > 0)
 

@@ -457,6 +457,13 @@ def without_certificate(text):
     return head + "\n}\n" if mark else text
 
 
+def write(path, text):
+    """To a temporary file, which is then renamed: an interruption leaves no half of a file."""
+    part = path.with_suffix(".part")
+    part.write_text(text)
+    part.replace(path)
+
+
 def main(arguments):
     check = "--check" in arguments
     names = [a for a in arguments if not a.startswith("-")]
@@ -470,7 +477,7 @@ def main(arguments):
             differing += 1
             print(f"{path.name}: {'differs' if check else 'written'}")
             if not check:
-                path.write_text(text)
+                write(path, text)
     if check:
         print("every file is as this script makes it" if not differing else f"{differing} differ")
     return 1 if check and differing else 0
