@@ -36,7 +36,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Stop> {
     if failed.is_empty() {
         return Ok(Exit::Held);
     }
-    warn(&format!("not answered, or fewer than {} digits: {}", arguments.least_digits, failed.join(", ")));
+    let wanted = match arguments.least_digits {
+        digits if digits > 0.0 => format!("not answered, or fewer than {digits} digits"),
+        _ => "not answered".to_string(),
+    };
+    warn(&format!("{wanted}: {}", failed.join(", ")));
     Ok(Exit::Deviates)
 }
 
