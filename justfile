@@ -50,6 +50,14 @@ all:
 peers *ARGUMENTS:
     benches/peers/run {{ARGUMENTS}}
 
+# Digits of the certified problems that this library, OpenCV, SciPy and the minimal solver reach, for README and book
+digits:
+    cargo run --release --locked -- gate --certified --digits reference/digits.csv --timeout 600
+
+# The certified problems: sums, observations, and one of them certified anew
+certified PROBLEM="nine-points":
+    .ci/certified {{PROBLEM}}
+
 # Instructions of the kernels against golden/instructions.toml
 instructions:
     .ci/instructions

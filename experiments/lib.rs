@@ -2,6 +2,7 @@
 
 use calibench_harness::{Build, Experiment};
 
+pub mod certified_digits;
 pub mod collinearity;
 pub mod distortion_model;
 pub mod expiry;
@@ -33,6 +34,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     interface::EXPERIMENT,
     expiry::EXPERIMENT,
     gate_power::EXPERIMENT,
+    certified_digits::EXPERIMENT,
     global_minimum::EXPERIMENT,
 ];
 

@@ -1,5 +1,6 @@
 //! `calibench gate`: is a solver to be trusted, ours or anyone's?
 
+mod certified;
 mod compare;
 mod power;
 
@@ -88,6 +89,22 @@ pub(super) struct Arguments {
     /// Prints the tables in a folder written by --power as Markdown
     #[arg(long, value_name = "DIR")]
     power_table: Option<PathBuf>,
+    /// Counts the digits that the solver shares with the certified values of reference/ [default solver here: this library's,
+    /// polished to the last digits]
+    #[arg(long, conflicts_with_all = ["export", "judge", "power", "planted", "record", "against"])]
+    certified: bool,
+    /// The only certified problem to put
+    #[arg(long, value_name = "NAME", requires = "certified")]
+    problem: Option<String>,
+    /// Digits that every certified problem must reach
+    #[arg(long, value_name = "N", requires = "certified", default_value_t = 0.0)]
+    least_digits: f64,
+    /// Counts the digits of this library's solver and of the programs in adapters/, and writes the table as CSV
+    #[arg(long, value_name = "FILE", requires = "certified", conflicts_with = "solver")]
+    digits: Option<PathBuf>,
+    /// Prints a table written by --digits as Markdown
+    #[arg(long, value_name = "FILE")]
+    digits_table: Option<PathBuf>,
     /// Writes the JSON schemas of the protocol to a folder
     #[arg(long, value_name = "DIR")]
     schema: Option<PathBuf>,
@@ -157,6 +174,15 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
     if arguments.planted.as_deref() == Some("list") {
         planted().iter().for_each(|fault| print(&format!("{:<26} {}\n", fault.id, fault.about)));
         return Ok(Exit::Held);
+    }
+    if let Some(path) = &arguments.digits_table {
+        return certified::print_table(path);
+    }
+    if let Some(path) = &arguments.digits {
+        return certified::write_table(arguments, path, build);
+    }
+    if arguments.certified {
+        return certified::run(arguments);
     }
     if let Some(folder) = &arguments.power_table {
         return power::print_table(folder);

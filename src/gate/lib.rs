@@ -11,6 +11,7 @@
 
 pub mod accept;
 pub mod bad_input;
+pub mod certified;
 mod descendants;
 pub mod faults;
 pub mod files;

@@ -49,8 +49,10 @@ const TELLING: usize = 4;
 /// Good data take five to ten iterations; a search that took more came from far away.
 const SHORT_WAY: usize = 25;
 
-/// A focal length known worse than this may hide another minimum that is nearly as good.
+/// A focal length or principal point known worse than this part of the focal length may hide another minimum that is nearly as good.
 const WELL_KNOWN: f64 = 0.03;
+/// The same where the lens is free to be crooked (tangential terms, skew) or has a third radial term: such a lens explains more.
+const WELL_KNOWN_FLEXIBLE: f64 = 0.01;
 
 impl Judged {
     fn of(problem: &Problem<'_>, minimum: Minimum, starts: usize) -> Judged {
@@ -108,13 +110,19 @@ impl Judged {
         };
         let noise_px = self.noise_px(problem);
         let camera = &self.minimum.state.camera;
+        let flexible = [Parameter::Skew, Parameter::P1, Parameter::P2, Parameter::K3];
+        let limit = if flexible.iter().any(|&p| problem.free.contains(p)) {
+            WELL_KNOWN_FLEXIBLE
+        } else {
+            WELL_KNOWN
+        };
         problem.free.iter().zip(covariance.diagonal().iter()).all(|(parameter, variance)| {
             let scale = match parameter {
                 Parameter::Fx | Parameter::Cx => camera.fx,
                 Parameter::Fy | Parameter::Cy => camera.fy,
                 _ => return true,
             };
-            variance.sqrt() * noise_px <= WELL_KNOWN * scale
+            variance.sqrt() * noise_px <= limit * scale
         })
     }
 

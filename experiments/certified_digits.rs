@@ -1,0 +1,101 @@
+//! How many digits of certified results do calibrators reach? Problems whose least-squares solution is known to twenty digits.
+//!
+//! Expected: polished, this library's solver reaches what doubles can hold, eleven digits and more; as it is, it stops where a step would gain
+//! less than 1e-14 of the cost, at some six to twelve digits, of which measurements mean three or four.
+//!
+//! What it cannot show: whether the least-squares solution is near the truth; `four-pose` and the gate ask that. The other programs are not
+//! run here: `calibench gate --certified --digits reference/digits.csv` measured them, and what it wrote is read.
+
+use calibench_gate::certified::{Digits, DigitsTable, Level, ReferenceProblem, measure, read};
+use calibench_gate::solver::Polished;
+use calibench_harness::project::Project;
+use calibench_harness::{Band, Claim, Context, Experiment, ExperimentError, Record, Table};
+
+/// The experiment.
+pub const EXPERIMENT: Experiment = Experiment {
+    id: "certified-digits",
+    title: "Digits of certified results",
+    question: "The least-squares solution of each problem in reference/ is certified to twenty digits by an independent program. How \
+               many digits of it do calibrators reach? Expected: polished, this library's solver eleven or more of every parameter, \
+               nine where tilts of two degrees hardly separate focal length from distance.",
+    seed: 1,
+    takes_image: false,
+    run,
+};
+
+/// Digits that the polished solver must reach.
+const WANTED: f64 = 11.0;
+/// The same for the near-degenerate problem.
+const WANTED_NEAR_DEGENERATE: f64 = 9.0;
+
+/// What `--digits` wrote.
+const DIGITS: &str = include_str!("../reference/digits.csv");
+
+fn run(context: &Context) -> Result<Record, ExperimentError> {
+    let mut record = context.record();
+    let project = Project::find().map_err(ExperimentError::at("the source tree"))?;
+    let problems =
+        read(&project.root().join("reference")).map_err(ExperimentError::at("the certified problems"))?;
+    let committed = DigitsTable::of_csv(DIGITS).map_err(ExperimentError::at("the table of digits"))?;
+    record.input("reference/digits.csv", DIGITS.as_bytes());
+
+    let measured = measure(&problems, &Polished);
+    record.number("problems", problems.len() as f64, "", Band::Exact, "certified problems");
+    let reason = "the last digits of doubles: another order of sums moves them";
+    for level in [Level::Lower, Level::Average, Level::Higher] {
+        let of_level = problems.iter().zip(&measured).filter(|(p, _)| p.reference.level == level);
+        let least =
+            of_level.map(|(_, m)| m.as_ref().map_or(0.0, Digits::least)).fold(f64::INFINITY, f64::min);
+        record.number(
+            format!("least-{}", level.name()),
+            least,
+            "",
+            Band::absolute(1.0, reason),
+            format!("least digits of a parameter over the problems of level {}, polished", level.name()),
+        );
+    }
+    let reached = |(p, m): (&ReferenceProblem, &Result<Digits, String>)| {
+        let wanted = if p.problem.id == "near-degenerate" { WANTED_NEAR_DEGENERATE } else { WANTED };
+        (p.problem.id.clone(), m.as_ref().is_ok_and(|digits| digits.least() >= wanted))
+    };
+    record.claim(Claim::all_of(
+        "digits-are-reached",
+        "polished, this library's solver reaches 11 digits of every parameter of every problem, 9 of the near-degenerate one",
+        problems.iter().zip(&measured).map(reached),
+        "certified by an independent program in numbers of 40 and 60 digits: reference/README.md",
+    ));
+    let mut ours = DigitsTable::default();
+    ours.add("calibench, polished", &problems, &measured);
+    let is_current = |row: &calibench_gate::certified::Row| {
+        (row.problem.clone(), committed.row(&row.solver, &row.problem) == Some(row))
+    };
+    record.claim(Claim::all_of(
+        "table-is-current",
+        "the committed table has the digits that the polished solver reaches now",
+        ours.rows.iter().map(is_current),
+        "the same bits on every machine",
+    ));
+    record.table(table(&committed));
+    Ok(record)
+}
+
+/// Least digits, a row a problem and a column a solver.
+fn table(committed: &DigitsTable) -> Table {
+    let name = |solver: &str| solver.to_lowercase().replace([',', ' '], "_").replace("__", "_");
+    let solvers = committed.solvers();
+    let names: Vec<String> =
+        ["problem", "level"].into_iter().map(String::from).chain(solvers.iter().map(|s| name(s))).collect();
+    let columns: Vec<(&str, &str)> = names.iter().map(|name| (name.as_str(), "")).collect();
+    let mut table = Table::new(
+        "digits",
+        "digits that agree with the certified parameters, the least of each problem",
+        &columns,
+    );
+    let first = solvers.first().copied().unwrap_or_default();
+    for row in committed.rows.iter().filter(|row| row.solver == first) {
+        let cell = |solver: &&str| committed.row(solver, &row.problem).map_or("-".into(), |r| r.result());
+        let ends = [row.problem.clone(), row.level.name().to_string()];
+        table.push(ends.into_iter().chain(solvers.iter().map(cell)));
+    }
+    table
+}

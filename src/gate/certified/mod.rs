@@ -1,0 +1,166 @@
+//! What is the right answer, to twenty digits? The problems of `reference/`, each with data, start values and certified results.
+//!
+//! The values were certified by an independent program in numbers of 40 and of 60 digits; `reference/README.md` says how. A file is a
+//! [`Problem`] with more fields, so that whoever reads problems reads it too.
+
+mod digits;
+mod table;
+
+pub use digits::{DIGITS_OF_DOUBLES, Digits, log_relative_error, measure};
+pub use table::{DigitsTable, Row, TableError};
+
+use super::protocol::{AnswerPose, Problem};
+use calibench::io::sha256_hex;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// How hard a problem is, as NIST's StRD divides its regression problems.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Level {
+    /// Every calibrator should solve it.
+    Lower,
+    /// A wide or a long lens, few views, tangential distortion, ragged data.
+    Average,
+    /// Ill-conditioned, strongly curved, or of a model that does not fit.
+    Higher,
+}
+
+impl Level {
+    /// `lower`, `average` or `higher`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Level::Lower => "lower",
+            Level::Average => "average",
+            Level::Higher => "higher",
+        }
+    }
+}
+
+/// A problem of `reference/`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReferenceProblem {
+    /// As it is put to a solver.
+    pub problem: Problem,
+    /// The rest of its file.
+    pub reference: Reference,
+}
+
+/// What a file of `reference/` says besides the problem.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Reference {
+    /// Version of the data.
+    pub version: u32,
+    /// Level of difficulty.
+    pub level: Level,
+    /// What is particular to it.
+    pub about: String,
+    /// Standard deviation of the noise that was drawn, px.
+    pub noise_px: f64,
+    /// `far`: what needs no calibration; `near`: the truth, its parameters to three digits.
+    pub starts: BTreeMap<String, Start>,
+    /// What is certified.
+    pub certified: Certified,
+}
+
+/// A start for programs that want one.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Start {
+    /// Of the free parameters.
+    pub parameters: BTreeMap<String, f64>,
+    /// One a view.
+    pub poses: Vec<StartPose>,
+}
+
+/// A pose: `X_camera = exp([w]x) X_target + t`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct StartPose {
+    /// w, rad.
+    pub rotation_vector: [f64; 3],
+    /// t, in the target's unit.
+    pub translation: [f64; 3],
+}
+
+/// The certified results, as the doubles nearest to the twenty digits of the file.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Certified {
+    /// Version of the certificate.
+    pub version: u32,
+    /// Free parameters at the least sum of squares.
+    pub parameters: BTreeMap<String, f64>,
+    /// First-order standard deviations, `sigma^2 (J^T J)^-1`.
+    pub standard_deviations: BTreeMap<String, f64>,
+    /// `sqrt(sum |r|^2 / N)`, px.
+    pub rmse: f64,
+    /// `sqrt(sum |r|^2 / (2 N - p))`, px.
+    pub sigma: f64,
+    /// `sum |r|^2`, px^2.
+    pub sum_of_squares: f64,
+    /// `2 N - p`.
+    pub degrees_of_freedom: usize,
+    /// One a view.
+    pub poses: Vec<AnswerPose>,
+}
+
+/// Why the reference problems cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ReferenceError {
+    /// A file.
+    #[error("cannot read {path}: {source}", path = path.display())]
+    File {
+        /// Which.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A file that is no reference problem.
+    #[error("{path} is no certified problem: {source}", path = path.display())]
+    Content {
+        /// Which.
+        path: PathBuf,
+        /// What is wrong.
+        source: serde_json::Error,
+    },
+    /// A file that is not what was certified.
+    #[error("{name} is not the file whose SHA-256 stands in SHA256SUMS ({stated}): it has {found}")]
+    Changed {
+        /// Which.
+        name: String,
+        /// In the list; empty if it is not there.
+        stated: String,
+        /// Of the file.
+        found: String,
+    },
+}
+
+/// The problems in a folder, by level and name. Every file must be the one in `SHA256SUMS`.
+///
+/// # Errors
+/// A file that is missing, was changed, or is no certified problem.
+pub fn read(folder: &Path) -> Result<Vec<ReferenceProblem>, ReferenceError> {
+    let sums = text(&folder.join("SHA256SUMS"))?;
+    let listed: Vec<(&str, &str)> = sums.lines().filter_map(|line| line.split_once("  ")).collect();
+    let mut problems = Vec::new();
+    for (stated, name) in listed {
+        let path = folder.join(name);
+        let content = text(&path)?;
+        let found = sha256_hex(content.as_bytes());
+        if found != stated {
+            return Err(ReferenceError::Changed { name: name.into(), stated: stated.into(), found });
+        }
+        if path.extension().is_some_and(|e| e == "json") {
+            let wrong = |source| ReferenceError::Content { path: path.clone(), source };
+            problems.push(ReferenceProblem {
+                problem: serde_json::from_str(&content).map_err(wrong)?,
+                reference: serde_json::from_str(&content).map_err(wrong)?,
+            });
+        }
+    }
+    problems.sort_by(|a, b| (a.reference.level, &a.problem.id).cmp(&(b.reference.level, &b.problem.id)));
+    Ok(problems)
+}
+
+fn text(path: &Path) -> Result<String, ReferenceError> {
+    std::fs::read_to_string(path).map_err(|source| ReferenceError::File { path: path.to_path_buf(), source })
+}
