@@ -1,5 +1,6 @@
 //! Are the certified problems what was certified, and does the polished solver reach their digits from every start?
 
+use calibench::board::View;
 use calibench::calibrate::{Calibration, Settings, calibrate};
 use calibench::camera::{Camera, FreeParameters, Parameter};
 use calibench::geometry::Vec2;
@@ -7,7 +8,6 @@ use calibench_gate::certified::{
     DigitsTable, Level, ReferenceError, ReferenceProblem, log_relative_error, measure, read,
 };
 use calibench_gate::solver::Polished;
-use calibench::board::View;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -1,5 +1,6 @@
 //! What does a study lose when everything that can fail does? At every write, by kill -9 at any moment, on a full disk, with a rival.
 
+use crate::study::{assert_same, scratch};
 use calibench::io::files::{Disk, Files};
 use calibench::synth::{Stream, StreamKey};
 use calibench_study::{Engine, Folder, FolderError, Manifest, Outcome, RunError, Shard, TrialFile, finish};
@@ -10,7 +11,6 @@ use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::time::Duration;
-use crate::study::{assert_same, scratch};
 
 /// How an operation fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

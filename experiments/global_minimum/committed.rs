@@ -43,6 +43,7 @@ fn letter(warning: &str) -> Option<char> {
         "AboveFloor" => Some('a'),
         "FocalLengthUncertain" => Some('f'),
         "NotLinear" => Some('l'),
+        "Ambiguous" => Some('m'),
         "FoldsInsideImage" => Some('b'),
         "NoDegreesOfFreedom" => Some('d'),
         "NotConverged" => Some('n'),

@@ -62,7 +62,8 @@ const NUMERIC_CRATES: [&str; 6] = ["libm", "nalgebra", "rand", "rand_chacha", "r
 
 /// `name version` of the numeric crates, a line each.
 fn versions(lock: &str) -> String {
-    let field = |line: &str, key: &str| line.strip_prefix(key).map(|value| value.trim_matches('"').to_string());
+    let field =
+        |line: &str, key: &str| line.strip_prefix(key).map(|value| value.trim_matches('"').to_string());
     let mut found = String::new();
     let mut lines = lock.lines();
     while let Some(line) = lines.next() {

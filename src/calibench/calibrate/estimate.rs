@@ -154,7 +154,7 @@ fn report(
     profile_coverage: Option<f64>,
 ) -> Result<Calibration, CalibrationError> {
     let observations = problem.observations;
-    let Judged { minimum, reduction, certificate, starts, skewed } = judged;
+    let Judged { minimum, reduction, certificate, starts, skewed, rival } = judged;
     let State { camera, cam_from_target } = &minimum.state;
     let system = &minimum.system;
     let fit = Fit::of(&minimum.state, observations);
@@ -203,7 +203,7 @@ fn report(
         warnings: Vec::new(),
         residuals,
     };
-    calibration.warnings = warnings::of(&calibration, largest_radius, strays, &skewed);
+    calibration.warnings = warnings::of(&calibration, largest_radius, strays, &skewed, rival);
     Ok(calibration)
 }
 

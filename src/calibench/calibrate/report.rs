@@ -86,6 +86,17 @@ pub enum Warning {
         /// The residual that half of the marks stay below, px.
         median_px: f64,
     },
+    /// Another camera explains the data nearly as well: the standard deviations speak of this one only.
+    Ambiguous {
+        /// The parameter that differs most.
+        parameter: Parameter,
+        /// Its value here.
+        value: f64,
+        /// Its value there.
+        other: f64,
+        /// By how many variances the cost is higher there.
+        excess: f64,
+    },
     /// A standard deviation that misleads: two of them away the cost is no parabola any more.
     NotLinear {
         /// Of which parameter.
@@ -165,6 +176,11 @@ impl fmt::Display for Warning {
                 "{marks} mark(s) lie too far off to be noise, the worst (view {view}, point {point}) by {residual_px:.2} px where half of all \
                  stay below {median_px:.2} px: correct or remove them, or use a robust loss (huber:{:.1})",
                 2.0 * median_px
+            ),
+            Warning::Ambiguous { parameter, value, other, excess } => write!(
+                f,
+                "another camera explains the data nearly as well: {parameter} = {other:.6} instead of {value:.6} costs {excess:.1} variances \
+                 more; the standard deviations speak of one of the two only. Take more views, with tilts about different axes"
             ),
             Warning::NotLinear { parameter, below, above } => write!(
                 f,

@@ -16,8 +16,9 @@ use super::retraction::Retraction;
 use super::start::{Held, focal_from_centre};
 use super::system::Reduction;
 use super::{CalibrationError, Termination, tilt, walk};
-use crate::camera::{BrownConrady, Camera, Parameter};
+use crate::camera::{BrownConrady, Camera, FreeParameters, Parameter};
 use crate::geometry::{Homography, Vec2};
+use nalgebra::DMatrix;
 
 /// A minimum with what is needed to judge it.
 pub(super) struct Judged {
@@ -29,6 +30,8 @@ pub(super) struct Judged {
     pub starts: usize,
     /// Parameters whose cost is no parabola: asked only where they are known poorly.
     pub skewed: Vec<Skewed>,
+    /// The best of the other minima, if it is nearly as good.
+    pub rival: Option<Rival>,
 }
 
 /// What the search starts from.
@@ -60,7 +63,7 @@ impl Judged {
         let certificate = reduction
             .as_ref()
             .map(|reduction| certificate::certify(problem, &minimum.state, reduction, minimum.system.cost));
-        Judged { minimum, reduction, certificate, starts, skewed: Vec::new() }
+        Judged { minimum, reduction, certificate, starts, skewed: Vec::new(), rival: None }
     }
 
     /// With the floor fitted where a step towards it does not certify the minimum: the step is straight, the relaxed model is not.
@@ -89,6 +92,30 @@ impl Judged {
             && self.doubtful_tilts(problem).is_empty()
     }
 
+    /// With the best of the minima met that is another camera and nearly as good.
+    fn with_rival(mut self, problem: &Problem<'_>, met: &[Met]) -> Judged {
+        let Some(covariance) = self.reduction.as_ref().and_then(Reduction::intrinsics_covariance) else {
+            return self;
+        };
+        let (noise_px, camera) = (self.noise_px(problem), self.minimum.state.camera);
+        let variance = identifiability::variance(problem, noise_px);
+        let apart = |met: &Met| {
+            let differences = problem.free.iter().enumerate().map(|(i, parameter)| {
+                let difference = (met.camera.get(parameter) - camera.get(parameter)).abs();
+                (parameter, difference / (covariance[(i, i)].sqrt() * noise_px))
+            });
+            differences.max_by(|a, b| a.1.total_cmp(&b.1))
+        };
+        let rivals = met.iter().filter(|met| met.converged).filter_map(|met| {
+            let excess = (met.cost - self.minimum.system.cost) / variance;
+            let (parameter, deviations) = apart(met)?;
+            let is_rival = excess < RIVALS && deviations > SAME;
+            is_rival.then(|| Rival { parameter, value: met.camera.get(parameter), excess })
+        });
+        self.rival = rivals.min_by(|a, b| a.excess.total_cmp(&b.excess));
+        self
+    }
+
     /// Whether the minimum is clear, and the planes are not parallel. Parallel planes that determine nothing are refused at once, before a
     /// search that could find nothing, where the noise is known: at a cost that its floor certifies.
     fn is_settled(&self, problem: &Problem<'_>) -> Result<bool, CalibrationError> {
@@ -111,11 +138,11 @@ impl Judged {
         let noise_px = self.noise_px(problem);
         let camera = &self.minimum.state.camera;
         let flexible = [Parameter::Skew, Parameter::P1, Parameter::P2, Parameter::K3];
-        let limit = if flexible.iter().any(|&p| problem.free.contains(p)) {
-            WELL_KNOWN_FLEXIBLE
-        } else {
-            WELL_KNOWN
-        };
+        let is_flexible = flexible.iter().any(|&p| problem.free.contains(p));
+        if is_flexible && trades_off(problem.free, &covariance) {
+            return false;
+        }
+        let limit = if is_flexible { WELL_KNOWN_FLEXIBLE } else { WELL_KNOWN };
         problem.free.iter().zip(covariance.diagonal().iter()).all(|(parameter, variance)| {
             let scale = match parameter {
                 Parameter::Fx | Parameter::Cx => camera.fx,
@@ -145,6 +172,18 @@ impl Judged {
             .map(|(view, _)| view)
             .collect()
     }
+}
+
+/// Beyond this correlation a crooked lens can take the place of the principal point: there may be two of them.
+const TRADES_OFF: f64 = 0.98;
+
+/// Whether the principal point is hardly told from the tangential terms.
+fn trades_off(free: FreeParameters, covariance: &DMatrix<f64>) -> bool {
+    let rows = |list: [Parameter; 2]| list.into_iter().filter_map(|p| free.position(p)).collect::<Vec<_>>();
+    let correlation =
+        |i: usize, j: usize| covariance[(i, j)] / (covariance[(i, i)] * covariance[(j, j)]).sqrt();
+    let (centre, tangential) = (rows([Parameter::Cx, Parameter::Cy]), rows([Parameter::P1, Parameter::P2]));
+    centre.iter().any(|&i| tangential.iter().any(|&j| correlation(i, j).abs() > TRADES_OFF))
 }
 
 /// Standard deviation of a pixel coordinate, from the cost under the loss in use: gross errors, which a robust loss discounts, say nothing of
@@ -181,10 +220,12 @@ pub(super) fn best_minimum(
     };
     let mut count = first.starts;
     let mut best = first.minimum;
+    let mut met = vec![Met::of(&best)];
     if let Some(relaxed) = relax(problem, evidence) {
         for start in relaxed_starts(problem, &relaxed, evidence) {
             count += 1;
             let minimum = patient.minimise(start);
+            met.push(Met::of(&minimum));
             if is_better(&minimum, &best) {
                 best = minimum;
             }
@@ -194,7 +235,7 @@ pub(super) fn best_minimum(
     let judged = Judged::of(problem, best, count);
     let noise_px = judged.noise_px(problem);
     if judged.is_well_known(problem) && tilts_are_evident(problem, &judged.minimum.state, noise_px) {
-        return Ok(judged.certified(problem));
+        return Ok(judged.certified(problem).with_rival(problem, &met));
     }
     let centre_sd = judged.centre_deviations(problem);
     let walked = walk::far_away(&patient, judged.minimum, noise_px, centre_sd);
@@ -208,8 +249,44 @@ pub(super) fn best_minimum(
             best = minimum;
         }
     }
-    Ok(with_profiles(&patient, Judged::of(problem, best, count + walked.starts)).certified(problem))
+    met.extend(walked.met);
+    let judged = Judged::of(problem, best, count + walked.starts);
+    Ok(with_profiles(&patient, judged).certified(problem).with_rival(problem, &met))
 }
+
+/// A minimum that the search met.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Met {
+    camera: Camera,
+    cost: f64,
+    converged: bool,
+}
+
+impl Met {
+    pub fn of(minimum: &Minimum) -> Met {
+        Met {
+            camera: minimum.state.camera,
+            cost: minimum.system.cost,
+            converged: minimum.termination == Termination::Converged,
+        }
+    }
+}
+
+/// Another camera that explains the data nearly as well.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Rival {
+    /// The parameter that differs most, in standard deviations.
+    pub parameter: Parameter,
+    /// Its value there.
+    pub value: f64,
+    /// By how many variances the cost is higher there.
+    pub excess: f64,
+}
+
+/// A minimum whose cost is higher by fewer variances than this is a rival: four standard deviations.
+const RIVALS: f64 = 16.0;
+/// A minimum whose parameters all lie within this many standard deviations is the same one.
+const SAME: f64 = 6.0;
 
 /// Minima that profiles may meet on their way before the search is left as it is.
 const BETTER_BY_PROFILE: usize = 3;

@@ -7,7 +7,7 @@
 use super::identifiability::{least_rise, variance};
 use super::minimise::{Minimum, Problem};
 use super::retraction::scaled;
-use super::search::is_better;
+use super::search::{Met, is_better};
 use super::tilt;
 use crate::camera::Parameter;
 
@@ -33,6 +33,8 @@ pub(super) struct Walked {
     pub starts: usize,
     /// Where the walk went as far as it goes.
     pub far: Vec<Far>,
+    /// Minima met on the way.
+    pub met: Vec<Met>,
 }
 
 /// A parameter far from its estimate, the rest refitted.
@@ -49,7 +51,7 @@ pub(super) fn far_away(
     noise_px: f64,
     centre_sd: [Option<f64>; 2],
 ) -> Walked {
-    let mut walked = Walked { best: minimum, starts: 0, far: Vec::new() };
+    let mut walked = Walked { best: minimum, starts: 0, far: Vec::new(), met: Vec::new() };
     let limit = RISEN * variance(problem, noise_px);
     for _ in 0..WALKS {
         walked.far.clear();
@@ -68,7 +70,10 @@ pub(super) fn far_away(
             }
         }
         match better {
-            Some(minimum) => walked.best = minimum,
+            Some(minimum) => {
+                walked.met.push(Met::of(&walked.best));
+                walked.best = minimum;
+            }
             None => break,
         }
     }
@@ -97,6 +102,7 @@ fn walk(
         if step.system.cost < least + PROMISING * noise_px * noise_px {
             let minimum = with_better_tilts(problem, problem.minimise(step.state.clone()));
             walked.starts += 1;
+            walked.met.push(Met::of(&minimum));
             if is_better(&minimum, better.as_ref().unwrap_or(&walked.best)) {
                 *better = Some(minimum);
             }

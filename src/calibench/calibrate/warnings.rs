@@ -2,15 +2,18 @@
 
 use super::intervals::Skewed;
 use super::report::{STRONG_CORRELATION, UNCERTAIN_FOCAL};
+use super::search::Rival;
 use super::{Calibration, Covariance, Termination, Warning};
 use crate::camera::{Camera, FreeParameters, Parameter};
 
-/// The warnings of a calibration: `strays` is that of its outliers, `skewed` are the parameters whose cost is no parabola.
+/// The warnings of a calibration: `strays` is that of its outliers, `skewed` are the parameters whose cost is no parabola, `rival`
+/// is another camera.
 pub(super) fn of(
     calibration: &Calibration,
     largest_radius: f64,
     strays: Option<Warning>,
     skewed: &[Skewed],
+    rival: Option<Rival>,
 ) -> Vec<Warning> {
     let mut warnings = Vec::new();
     warnings.extend(ending(calibration));
@@ -28,6 +31,12 @@ pub(super) fn of(
         parameter: s.parameter,
         below: s.ratios[0],
         above: s.ratios[1],
+    }));
+    warnings.extend(rival.map(|Rival { parameter, value, excess }| Warning::Ambiguous {
+        parameter,
+        value: calibration.camera.get(parameter),
+        other: value,
+        excess,
     }));
     warnings
 }

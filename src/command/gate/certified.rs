@@ -1,13 +1,13 @@
 //! `calibench gate --certified`: the digits that a solver shares with the certified values of `reference/`.
 
-use super::{Arguments, Stop, incomplete, process, usage};
 use super::super::{Exit, print, warn};
+use super::{Arguments, Stop, incomplete, process, usage};
+use calibench::io::write_atomically;
 use calibench_gate::certified::{DigitsTable, ReferenceProblem, measure, read};
 use calibench_gate::solver::Polished;
 use calibench_gate::{Builtin, Solver};
 use calibench_harness::Build;
 use calibench_harness::project::Project;
-use calibench::io::write_atomically;
 use std::path::Path;
 
 /// Programs of the table besides this library's two, by the names that the table has.

@@ -1,9 +1,9 @@
 //! How many digits of an answer are right? The logarithm of its relative error, as McCullough (1998) measures statistical programs.
 
 use super::{Certified, ReferenceProblem};
-use calibench::camera::Parameter;
 use crate::accept::{Estimate, Outcome};
 use crate::solver::Solver;
+use calibench::camera::Parameter;
 
 /// More than a double can say of a number: where the digits stop counting.
 pub const DIGITS_OF_DOUBLES: f64 = 15.0;
@@ -56,17 +56,16 @@ impl Digits {
 /// Puts the problems to a solver: the digits of every answer, or why there are none.
 pub fn measure(problems: &[ReferenceProblem], solver: &dyn Solver) -> Vec<Result<Digits, String>> {
     let asked: Vec<_> = problems.iter().map(|p| p.problem.clone()).collect();
-    let of_reply =
-        |(reply, problem): (crate::solver::Reply, &ReferenceProblem)| match reply.outcome {
-            Outcome::Estimate(estimate) => match estimate.held_changed {
-                Some((parameter, wanted, got)) => {
-                    Err(format!("changed {parameter}, which is held at {wanted}, to {got}"))
-                }
-                None => Ok(Digits::of(&estimate, &problem.reference.certified)),
-            },
-            Outcome::Refused(why) => Err(format!("refused: {why}")),
-            Outcome::Broken(why) => Err(format!("no answer: {why}")),
-        };
+    let of_reply = |(reply, problem): (crate::solver::Reply, &ReferenceProblem)| match reply.outcome {
+        Outcome::Estimate(estimate) => match estimate.held_changed {
+            Some((parameter, wanted, got)) => {
+                Err(format!("changed {parameter}, which is held at {wanted}, to {got}"))
+            }
+            None => Ok(Digits::of(&estimate, &problem.reference.certified)),
+        },
+        Outcome::Refused(why) => Err(format!("refused: {why}")),
+        Outcome::Broken(why) => Err(format!("no answer: {why}")),
+    };
     solver.ask_all(&asked).into_iter().zip(problems).map(of_reply).collect()
 }
 
