@@ -2,6 +2,7 @@
 //!
 //! `cargo run --release --no-default-features --example chess -- [--trials N] [--write FOLDER] [--cases PART] [--wrong-sizes N]`;
 //! `benches/chess/opencv.py FOLDER` then measures OpenCV's finders on the same images.
+#![allow(clippy::print_stdout, reason = "a program whose output is its result")]
 
 mod cases;
 mod scene;

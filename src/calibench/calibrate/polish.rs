@@ -4,6 +4,7 @@
 //! notices. To compare solvers digit by digit, or with certified values, the rest of the way is gone here: residuals, normal
 //! equations and their solution in double-double arithmetic, until a step moves no residual by more than 1e-20 px. It costs
 //! some twenty refinements, and is done only when it is asked for.
+#![allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
 
 use super::kernel::{self, Model, Rows};
 use super::{Calibration, Covariance, Loss, Warning};

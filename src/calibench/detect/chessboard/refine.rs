@@ -95,7 +95,7 @@ pub fn refined<T: Sample>(
     columns: usize,
     starts_dark: bool,
 ) -> Option<Vec<Vec2>> {
-    let is_dark = |index: usize| ((index % columns + index / columns) % 2 == 0) == starts_dark;
+    let is_dark = |index: usize| (index % columns + index / columns).is_multiple_of(2) == starts_dark;
     let start_edge_px = [1.5 * SHARPEST_EDGE_PX; 2];
     let mut places: Vec<Vec2> = found.iter().map(|place| photo_from_level(place, level)).collect();
     let mut edges_px = vec![start_edge_px; found.len()];
