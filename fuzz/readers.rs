@@ -10,8 +10,11 @@ use calibench_gate::protocol::{Problem, ProblemView};
 use calibench_harness::golden;
 use calibench_study::{Checkpoint, Manifest, Shard, Spec};
 
+/// A reader under its name: it is given bytes, and must return.
+pub type Reader = (&'static str, fn(&[u8]));
+
 /// The readers by name; the seeds of each stand in `fuzz/seeds/<name>/`.
-pub const READERS: [(&str, fn(&[u8])); 11] = [
+pub const READERS: [Reader; 11] = [
     ("corners", corners),
     ("pairs", pairs),
     ("camera", camera),

@@ -137,7 +137,8 @@ fn the_digits_are_reached_from_the_starts_of_the_files() {
                     .unwrap_or(f64::NAN)
             };
             let camera = Camera::from_parameters(Parameter::ALL.map(value));
-            let settings = Settings { start: Some(camera), ..settings(&problem) }.polished();
+            let mut settings = settings(&problem).polished();
+            settings.start = Some(camera);
             let calibration = calibrate(&views(&problem), &settings).expect("the data determine a camera");
             let digits = least_digits(&problem, &calibration);
             let id = &problem.problem.id;

@@ -419,7 +419,7 @@ fn small_disk(folder: &Path) -> Option<PathBuf> {
 fn a_full_disk_is_not_wrong_usage_and_its_file_is_named_once() {
     let folder = folder("full-disk");
     let Some(disk) = small_disk(&folder) else {
-        println!("skipped: this user may not mount a small file system");
+        eprintln!("skipped: this user may not mount a small file system");
         return;
     };
     fs::write(disk.join("fill"), vec![0; 60_000]).expect("the disk takes so much");

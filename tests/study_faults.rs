@@ -234,7 +234,7 @@ fn a_disk_that_became_read_only_ends_with_three_and_the_run_goes_on_later() {
         mount.output().is_ok_and(|output| output.status.success())
     };
     if !mount("size=4m") {
-        println!("skipped: this user may not mount a file system");
+        eprintln!("skipped: this user may not mount a file system");
         return;
     }
     let engine = Engine::new(&spec(), Shard::WHOLE).unwrap();
