@@ -18,6 +18,7 @@ use statrs::distribution::{Binomial, DiscreteCDF};
 pub mod campaign;
 mod committed;
 mod families;
+mod intervals;
 mod judged;
 mod listing;
 mod map;
@@ -97,6 +98,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     claim_rates(&mut record, any);
     claim_named(&mut record, &measured[1..]);
     tell_errors(&mut record, any);
+    intervals::tell(&mut record, context.seed)?;
     record.table(families_table(&measured));
     tell_opencv(&mut record, &measured)?;
     map::tell(&mut record, &any.lines)?;
