@@ -99,9 +99,27 @@ impl Fitter<'_> {
                 Err(CalibrationError::View { view, source }) => {
                     return Err(CalibrationError::View { view: kept[view], source });
                 }
+                // A view so wrong that under its errors nothing seems determined.
+                Err(error @ CalibrationError::NotIdentifiable { .. }) if may_drop => {
+                    let Some(place) = self.best_without_one(&chosen) else { return Err(error) };
+                    let reason =
+                        format!("without it the other views determine the camera, with it not: {error}");
+                    rejected.push(Rejected { view: kept.remove(place), reason });
+                }
                 Err(error) => return Err(error),
             }
         }
+    }
+
+    /// The view without which the others have the least RMSE; `None` if they determine nothing without any one.
+    fn best_without_one(&self, views: &[View]) -> Option<usize> {
+        let without = |place: usize| {
+            let others: Vec<View> =
+                views.iter().enumerate().filter(|(i, _)| *i != place).map(|(_, view)| view.clone()).collect();
+            Some((place, self.fit_all(&others).ok()?.0.rmse_px))
+        };
+        let fits = (0..views.len()).filter_map(without);
+        fits.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(place, _)| place)
     }
 
     /// The worst view, if its RMSE exceeds the factor times the median of all.
@@ -228,7 +246,8 @@ mod tests {
         assert_eq!(fit.rejected.iter().map(|r| r.view).collect::<Vec<_>>(), [5]);
         assert_eq!(fit.kept, [0, 1, 2, 3, 4, 6, 7]);
         assert!((fit.calibration.camera.fx - 600.0).abs() < 1e-6);
-        let all = Fitter { reject_factor: None, ..fitter }.fit(&views).unwrap();
-        assert!(all.calibration.rmse_px > 1.0);
+        // With it the errors are too large for anything to be determined, or the fit shows them.
+        let all = Fitter { reject_factor: None, ..fitter }.fit(&views);
+        assert!(all.is_err() || all.unwrap().calibration.rmse_px > 1.0);
     }
 }
