@@ -58,11 +58,12 @@ fn every_claim_and_every_published_value_holds() {
 }
 
 #[test]
-fn every_published_value_is_reconciled_exactly_once() {
+fn every_published_value_that_can_be_judged_is_reconciled_exactly_once() {
     let reconciliations = RECORDS.iter().flat_map(|record| record.reconciliations());
     let mut reconciled: Vec<&str> = reconciliations.map(|r| r.entry.id.as_str()).collect();
     let published = published::chapter().expect("golden/published.toml is well formed");
-    let mut listed: Vec<&str> = published.iter().map(|entry| entry.id.as_str()).collect();
+    let judged = published.iter().filter(|entry| entry.kind != published::Kind::CannotBeJudged);
+    let mut listed: Vec<&str> = judged.map(|entry| entry.id.as_str()).collect();
     reconciled.sort_unstable();
     listed.sort_unstable();
     assert_eq!(reconciled, listed);
