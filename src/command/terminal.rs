@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 /// Why standard output could not be written, once it could not. Verbs go on, since their files count for themselves; [`ended`] tells.
 static LOST: OnceLock<String> = OnceLock::new();
 
-/// Writes to standard output. Whoever closed the pipe has read enough; any other failure makes the run incomplete, see [`ended`].
+/// Writes to standard output. Whoever closed the pipe has read enough; any other failure makes the run incomplete, see `ended`.
 pub fn print(text: &str) {
     let mut out = io::stdout().lock();
     note(out.write_all(shown(text).as_bytes()).and_then(|()| out.flush()));

@@ -11,6 +11,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// The folder of one run: `spec.toml`, `manifest.json`, `trials.csv` and `checkpoint.json`, and the results once it is complete.
 #[derive(Debug)]
@@ -109,6 +110,23 @@ fn short(fingerprint: &str) -> &str {
 /// Files that hold trials of a run, or vouch for them.
 const OF_A_RUN: [&str; 3] = ["checkpoint.json", "trials.csv", "trials.parquet"];
 
+/// Times a lock is tried before the folder counts as in use.
+const TRIES: usize = 20;
+/// Pause between them: a second in all.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// Locks a file. A program that this one is starting at this moment holds all of its open files, and the locks of those that were just closed,
+/// until it has begun.
+fn patiently(file: &File) -> Result<(), fs::TryLockError> {
+    for _ in 1..TRIES {
+        match file.try_lock() {
+            Err(fs::TryLockError::WouldBlock) => std::thread::sleep(PAUSE),
+            other => return other,
+        }
+    }
+    file.try_lock()
+}
+
 impl Folder {
     /// Begins a run.
     pub fn create(path: &Path, spec_text: &str, manifest: &Manifest) -> Result<Folder, FolderError> {
@@ -154,7 +172,7 @@ impl Folder {
         let name = path.join(".lock");
         let located = |source| Located { path: name.clone(), source };
         let file = OpenOptions::new().create(true).append(true).open(&name).map_err(located)?;
-        match file.try_lock() {
+        match patiently(&file) {
             Ok(()) => Folder { path: path.to_path_buf(), _lock: file, files }.cleaned(),
             Err(fs::TryLockError::WouldBlock) => Err(FolderError::InUse(path.to_path_buf())),
             Err(fs::TryLockError::Error(source)) => Err(located(source).into()),
