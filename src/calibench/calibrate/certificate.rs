@@ -57,6 +57,11 @@ impl Certificate {
         self.p_value >= FALSE_ALARM
     }
 
+    /// Least cost that the views' homographies reach, over `points` marks.
+    pub(super) fn floor(&self, points: usize) -> f64 {
+        self.floor_rmse_px * self.floor_rmse_px * points as f64
+    }
+
     /// The same with a floor that was fitted.
     pub(super) fn with_floor(&self, cost: f64, floor: f64, points: usize) -> Certificate {
         Certificate::of(cost, floor.min(cost), points, self.freedom, self.floor_freedom)

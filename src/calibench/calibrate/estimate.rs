@@ -92,6 +92,7 @@ fn estimate(views: &[View], settings: &Settings) -> Result<Calibration, Calibrat
         max_iterations: settings.max_iterations,
         hold_tilt: false,
         retraction: Retraction::Straight,
+        focal_limits: (0.0, f64::INFINITY),
     };
     let evidence =
         Evidence { homographies: &homographies, held: &held, pixel_frame, search: settings.search };
@@ -105,7 +106,7 @@ fn check_counts(views: &[View], settings: &Settings) -> Result<(), CalibrationEr
     }
     let free = settings.free();
     let linear = [Fx, Fy, Cx, Cy, Skew].into_iter().filter(|&p| free.contains(p)).count();
-    let need = linear.div_ceil(2).max(1);
+    let need = if is_distorting(settings)? { 1 } else { linear.div_ceil(2).max(1) };
     if views.len() < need {
         return Err(CalibrationError::TooFewViews { need, got: views.len(), linear, copies: 0 });
     }
@@ -115,6 +116,18 @@ fn check_counts(views: &[View], settings: &Settings) -> Result<(), CalibrationEr
         return Err(CalibrationError::TooFewPoints { coordinates, unknowns });
     }
     Ok(())
+}
+
+/// Whether the lens may distort: homographies give two constraints a view, and a distortion tells its centre and the aspect ratio besides, so
+/// that only the rank of the equations can say whether the views are too few.
+fn is_distorting(settings: &Settings) -> Result<bool, CalibrationError> {
+    use Parameter::*;
+    for parameter in [K1, K2, P1, P2, K3] {
+        if settings.held(parameter)? != Some(0.0) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// The views in the target's frame, and the homography of each.

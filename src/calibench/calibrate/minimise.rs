@@ -25,6 +25,8 @@ pub(super) struct Problem<'a> {
     pub hold_tilt: bool,
     /// How steps are taken.
     pub retraction: Retraction,
+    /// Focal lengths, px, outside of which a search has run away and ends.
+    pub focal_limits: (f64, f64),
 }
 
 /// A minimum, or where the search ended.
@@ -86,6 +88,11 @@ impl Problem<'_> {
             .sum()
     }
 
+    fn has_run_away(&self, camera: &Camera) -> bool {
+        let (shortest, longest) = self.focal_limits;
+        camera.fx.min(camera.fy) < shortest || camera.fx.max(camera.fy) > longest
+    }
+
     /// Levenberg-Marquardt (Levenberg 1944; Marquardt 1963) with damping `lambda diag(J^T J)`.
     pub fn minimise(&self, start: State) -> Minimum {
         let rounding_cost = self.rounding_cost();
@@ -128,6 +135,9 @@ impl Problem<'_> {
                 }
                 .max(FIRST_DAMPING / 1e6);
                 growth = FIRST_GROWTH;
+                if self.has_run_away(&state.camera) {
+                    break Termination::Stalled;
+                }
             } else if step.predicted_gain <= ROUNDINGS * f64::EPSILON * system.cost + rounding_cost {
                 // The promised gain is below what the sum of squares can show.
                 break Termination::Converged;

@@ -36,13 +36,15 @@ pub(super) struct Relaxed {
 
 /// Steps of a stage.
 const ITERATIONS: usize = 60;
+/// Steps of the last one: few marks leave narrow valleys.
+const LAST_ITERATIONS: usize = 300;
 /// A stage ends when a step gains less than this part of the cost: a hundredth of a variance in ten thousand points.
 const RELATIVE_GAIN: f64 = 1e-7;
 const FIRST_DAMPING: f64 = 1e-3;
 const SMALLEST_DAMPING: f64 = 1e-9;
 const LARGEST_DAMPING: f64 = 1e8;
 
-/// Fits the relaxed model, in stages: radial distortion about the given centre, then the centre, then all that is free.
+/// Fits the relaxed model from `start`, in stages: radial distortion about the given centre, then the centre, then all that is free.
 ///
 /// `homographies` are those of the views without distortion, pixels from target points. `None` if no view can be linearised.
 pub(super) fn relax(
@@ -53,7 +55,8 @@ pub(super) fn relax(
 ) -> Option<Relaxed> {
     use Parameter::{Cx, Cy, K1, K2};
     let inverse = gauge.k().try_inverse()?;
-    let start: Vec<Entries> = homographies.iter().map(|h| entries(&(inverse * h.0))).collect();
+    let views = homographies.iter().zip(problem.observations);
+    let start: Vec<Entries> = views.map(|(h, pairs)| in_front(entries(&(inverse * h.0)), pairs)).collect();
     let fit = Fit { observations: problem.observations, loss: problem.loss };
     let stages = [
         FreeParameters::of(&[K1]),
@@ -68,16 +71,11 @@ pub(super) fn relax(
         if free == last && !free.is_empty() {
             continue;
         }
-        at = fit.minimise(at, free)?;
+        let iterations = if free == lens_parameters { LAST_ITERATIONS } else { ITERATIONS };
+        at = fit.minimise(at, free, iterations)?;
         last = free;
     }
-    let equations = fit.equations(&at, lens_parameters);
-    equations.cost.is_finite().then(|| Relaxed {
-        lens: at.lens,
-        homographies: at.homographies,
-        information: equations.views.iter().map(|view| view.square).collect(),
-        cost: equations.cost,
-    })
+    fit.relaxed(at, lens_parameters)
 }
 
 /// The parameters of the relaxed lens for a calibration whose `free` parameters are these; `is_distorting` tells which coefficients are held at
@@ -97,8 +95,8 @@ pub(super) fn parameters(free: FreeParameters, is_distorting: impl Fn(Parameter)
     if focal_free { sought.with(Fy) } else { sought }
 }
 
-/// The least cost of the relaxed model next to a calibration.
-pub(super) fn floor(problem: &Problem<'_>, camera: &Camera, cam_from_target: &[Pose]) -> Option<f64> {
+/// The minimum of the relaxed model next to a calibration.
+pub(super) fn beside(problem: &Problem<'_>, camera: &Camera, cam_from_target: &[Pose]) -> Option<Relaxed> {
     let homography = |pose: &Pose| {
         let r = &pose.rotation;
         let columns = Mat3::from_columns(&[r.column(0).into(), r.column(1).into(), pose.translation]);
@@ -107,7 +105,16 @@ pub(super) fn floor(problem: &Problem<'_>, camera: &Camera, cam_from_target: &[P
     let state = State { lens: *camera, homographies: cam_from_target.iter().map(homography).collect() };
     let free = parameters(problem.free, |p| camera.get(p) != 0.0);
     let fit = Fit { observations: problem.observations, loss: problem.loss };
-    Some(fit.equations(&fit.minimise(state, free)?, free).cost)
+    fit.relaxed(fit.minimise(state, free, LAST_ITERATIONS)?, free)
+}
+
+/// A homography under which every point lies in front of the camera: where noise has bent one of few points beyond that, its affine part.
+fn in_front(mut h: Entries, pairs: &Observations) -> Entries {
+    let is_in_front = |p: Vec2| h[6] * p.x + h[7] * p.y + 1.0 > SMALLEST_DENOMINATOR;
+    if !pairs.iter().all(|(p, _)| is_in_front(p)) {
+        (h[6], h[7]) = (0.0, 0.0);
+    }
+    h
 }
 
 fn of_both(a: FreeParameters, b: FreeParameters) -> FreeParameters {
@@ -152,14 +159,25 @@ struct Fit<'a> {
 }
 
 impl Fit<'_> {
-    fn minimise(&self, start: State, free: FreeParameters) -> Option<State> {
+    /// The relaxed model at a minimum, with what its views say; `None` where a point is behind the camera.
+    fn relaxed(&self, at: State, free: FreeParameters) -> Option<Relaxed> {
+        let equations = self.equations(&at, free);
+        equations.cost.is_finite().then(|| Relaxed {
+            lens: at.lens,
+            homographies: at.homographies,
+            information: equations.views.iter().map(|view| view.square).collect(),
+            cost: equations.cost,
+        })
+    }
+
+    fn minimise(&self, start: State, free: FreeParameters, iterations: usize) -> Option<State> {
         let mut state = start;
         let mut equations = self.equations(&state, free);
         if !equations.cost.is_finite() {
             return None;
         }
         let mut damping = FIRST_DAMPING;
-        for _ in 0..ITERATIONS {
+        for _ in 0..iterations {
             let Some((step, gain)) = equations.solve(damping, free.len()) else {
                 damping *= 10.0;
                 if damping > LARGEST_DAMPING {

@@ -67,28 +67,36 @@ impl Judged {
         Judged { minimum, reduction, certificate, starts, skewed: Vec::new(), rival: None }
     }
 
-    /// With the floor fitted where a step towards it does not certify the minimum: the step is straight, the relaxed model is not.
-    fn certified(mut self, problem: &Problem<'_>) -> Judged {
-        let State { camera, cam_from_target } = &self.minimum.state;
+    /// With the floor fitted where a step towards it does not certify the minimum: the step is straight, the relaxed model is not. A lower
+    /// cost of the relaxed model that was met elsewhere is a floor too.
+    fn certified(mut self, problem: &Problem<'_>, lowest_relaxed: f64) -> Judged {
         let cost = self.minimum.system.cost;
-        if let Some(certificate) = self.certificate.as_mut().filter(|certificate| !certificate.holds())
-            && let Some(floor) = relaxed::floor(problem, camera, cam_from_target)
-        {
-            let points = problem.observations.iter().map(|o| o.len()).sum();
-            *certificate = certificate.with_floor(cost, floor, points);
+        let points = problem.observations.iter().map(|o| o.len()).sum();
+        if let Some(certificate) = self.certificate.as_mut() {
+            if !certificate.holds()
+                && let Some(beside) = beside(problem, &self.minimum)
+            {
+                *certificate = certificate.with_floor(cost, beside.cost, points);
+            }
+            if lowest_relaxed < certificate.floor(points) {
+                *certificate = certificate.with_floor(cost, lowest_relaxed, points);
+            }
         }
         self
     }
 
+    /// Whether the certificate holds and tells enough to rely on.
+    fn is_certified(&self) -> bool {
+        self.certificate
+            .as_ref()
+            .is_some_and(|c| c.freedom >= TELLING && c.is_possible() && c.p_value > CLEAR)
+    }
+
     /// Whether nothing speaks for another minimum, but perhaps parallel planes.
     fn is_clear(&self, problem: &Problem<'_>) -> bool {
-        let certified = self
-            .certificate
-            .as_ref()
-            .is_some_and(|c| c.freedom >= TELLING && c.is_possible() && c.p_value > CLEAR);
         self.minimum.termination == Termination::Converged
             && self.minimum.iterations <= SHORT_WAY
-            && certified
+            && self.is_certified()
             && self.is_well_known(problem)
             && self.doubtful_tilts(problem).is_empty()
     }
@@ -214,29 +222,19 @@ pub(super) fn best_minimum(
     if first.is_settled(problem)? {
         return Ok(first);
     }
+    let half_width = evidence.pixel_frame.1;
     let patient = Problem {
         max_iterations: PATIENCE * problem.max_iterations,
         retraction: Retraction::Curved,
+        focal_limits: (SHORTEST * half_width, LONGEST * half_width),
         ..*problem
     };
-    let mut count = first.starts;
-    let mut best = first.minimum;
-    let mut met = vec![Met::of(&best)];
-    if let Some(relaxed) = relax(problem, evidence) {
-        for start in relaxed_starts(problem, &relaxed, evidence) {
-            count += 1;
-            let minimum = patient.minimise(start);
-            met.push(Met::of(&minimum));
-            if is_better(&minimum, &best) {
-                best = minimum;
-            }
-        }
-    }
+    let Found { best, starts: count, mut met, lowest_relaxed } = from_relaxed(&patient, first, evidence);
     let best = walk::with_better_tilts(&patient, best);
     let judged = Judged::of(problem, best, count);
     let noise_px = judged.noise_px(problem);
     if judged.is_well_known(problem) && tilts_are_evident(problem, &judged.minimum.state, noise_px) {
-        return Ok(judged.certified(problem).with_rival(problem, &met));
+        return Ok(judged.certified(problem, lowest_relaxed).with_rival(problem, &met));
     }
     let centre_sd = judged.centre_deviations(problem);
     let walked = walk::far_away(&patient, judged.minimum, noise_px, centre_sd);
@@ -251,7 +249,78 @@ pub(super) fn best_minimum(
     }
     met.extend(walked.met);
     let judged = Judged::of(problem, best, count + walked.starts);
-    Ok(with_profiles(&patient, judged).certified(problem).with_rival(problem, &met))
+    Ok(with_profiles(&patient, judged).certified(problem, lowest_relaxed).with_rival(problem, &met))
+}
+
+/// What the relaxed model led to.
+struct Found {
+    best: Minimum,
+    starts: usize,
+    met: Vec<Met>,
+    /// Least cost of the relaxed model.
+    lowest_relaxed: f64,
+}
+
+/// Cells of a camera, height over width, that are tried where square ones lead to nothing.
+const ASPECTS: [f64; 4] = [0.5, 0.7, 1.4, 2.0];
+/// A cost this many times that of the relaxed model is no minimum of a model that holds.
+const FAR_ABOVE: f64 = 3.0;
+
+impl Found {
+    /// Refines from every start and keeps the best.
+    fn try_all(&mut self, problem: &Problem<'_>, starts: Vec<State>) {
+        for start in starts {
+            self.starts += 1;
+            let minimum = problem.minimise(start);
+            self.met.push(Met::of(&minimum));
+            if is_better(&minimum, &self.best) {
+                self.best = minimum;
+            }
+        }
+    }
+
+    fn is_far_above_floor(&self) -> bool {
+        self.best.system.cost > FAR_ABOVE * self.lowest_relaxed
+    }
+}
+
+/// Rounds of the search: each from a relaxed model that explains the data better than the one before.
+const ROUNDS: usize = 4;
+/// A relaxed model is better if its cost is lower by more than this part.
+const LOWER: f64 = 1e-4;
+
+/// Refines from the relaxed model's starts; where the relaxed model next to the best of them is lower than the one known, again from that.
+fn from_relaxed(problem: &Problem<'_>, first: Judged, evidence: &Evidence<'_>) -> Found {
+    let is_certified = first.is_certified();
+    let best = if first.minimum.termination == Termination::IterationLimit {
+        problem.minimise(first.minimum.state)
+    } else {
+        first.minimum
+    };
+    let met = vec![Met::of(&best)];
+    let mut found = Found { best, starts: first.starts, met, lowest_relaxed: f64::INFINITY };
+    let mut next = relax(problem, evidence, is_certified);
+    for _ in 0..ROUNDS {
+        let least = next.first().map_or(f64::INFINITY, |relaxed| relaxed.cost);
+        if least >= found.lowest_relaxed * (1.0 - LOWER) {
+            break;
+        }
+        found.lowest_relaxed = least;
+        let starts: Vec<State> =
+            next.iter().flat_map(|relaxed| relaxed_starts(problem, relaxed, evidence, 1.0)).collect();
+        found.try_all(problem, starts);
+        if found.is_far_above_floor() {
+            let stretched = |relaxed: &Relaxed| ASPECTS.map(|aspect| relaxed_starts(problem, relaxed, evidence, aspect));
+            found.try_all(problem, next.iter().flat_map(stretched).flatten().collect());
+        }
+        next = beside(problem, &found.best).into_iter().collect();
+    }
+    found
+}
+
+/// The relaxed model next to a minimum.
+fn beside(problem: &Problem<'_>, minimum: &Minimum) -> Option<Relaxed> {
+    relaxed::beside(problem, &minimum.state.camera, &minimum.state.cam_from_target)
 }
 
 /// Refuses what the data do not determine, where the noise is known: at a cost that its floor certifies. Gross errors would pass for noise
@@ -336,6 +405,10 @@ fn with_profiles(problem: &Problem<'_>, mut judged: Judged) -> Judged {
 
 /// A search in doubt may take this many times the iterations.
 const PATIENCE: usize = 10;
+/// A focal length shorter than this many half-widths of the pixels seen is no lens's: a search that comes there has run away.
+const SHORTEST: f64 = 0.02;
+/// Likewise a longer one.
+const LONGEST: f64 = 1e4;
 
 /// The first minimum, or that of the next start that converges, or else the lowest point reached.
 fn first_converged(problem: &Problem<'_>, first: Judged, starts: impl Iterator<Item = State>) -> Judged {
@@ -367,45 +440,83 @@ pub(super) fn is_better(new: &Minimum, old: &Minimum) -> bool {
     converged(new) && !converged(old) && new.system.cost <= old.system.cost * (1.0 + EQUAL)
 }
 
-/// The relaxed model of these data: its gauge is the focal length that is held, or else a wide lens's.
-fn relax(problem: &Problem<'_>, evidence: &Evidence<'_>) -> Option<Relaxed> {
-    use Parameter::{Cx, Cy, Fx, Fy};
+/// Where the relaxed model leaves fewer degrees of freedom it has minima of its own, and is fitted from more starts unless the first minimum is
+/// certified: with few marks these cost little.
+const FEW: usize = 100;
+/// Radial distortions to start from where marks are few, at the gauge focal length: none, a barrel and a pincushion.
+const BENT: [f64; 3] = [0.0, -0.2, 0.2];
+
+/// The relaxed model of these data, its least minimum first and then that of an ordinary camera: square pixels, and its centre in the middle.
+fn relax(problem: &Problem<'_>, evidence: &Evidence<'_>, is_certified: bool) -> Vec<Relaxed> {
+    use Parameter::{Cx, Cy, Fx, Fy, Skew};
     let held = evidence.held;
-    let focal_free = problem.free.contains(Fx) || problem.free.contains(Fy);
     let sought = relaxed::parameters(problem.free, |p| held.value(p).is_some_and(|value| value != 0.0));
+    let gauge = gauge_lens(problem, evidence);
+    let middle = held.centre;
+    let is_centred = !(sought.contains(Cx) && sought.contains(Cy));
+    let mut centres = vec![middle];
+    if !is_centred {
+        centres.extend(radial_centre(problem.observations, evidence.pixel_frame));
+    }
+    let fit = |centre: Vec2, k1: f64, sought: FreeParameters| {
+        let mut start = Camera { cx: centre.x, cy: centre.y, ..gauge };
+        start.distortion.k1 += k1;
+        relaxed::relax(problem, evidence.homographies, start, sought)
+    };
+    let marks: usize = problem.observations.iter().map(|o| o.len()).sum();
+    let freedom = (2 * marks).saturating_sub(8 * problem.observations.len() + sought.len());
+    let is_bendable = sought.contains(Parameter::K1);
+    let has_more_minima = freedom < FEW && !is_certified;
+    let bent: &[f64] = if has_more_minima && is_bendable { &BENT } else { &BENT[..1] };
+    if has_more_minima && !is_centred {
+        centres.extend(spread_over(evidence.pixel_frame));
+    }
+    let starts = centres.iter().flat_map(|&centre| bent.iter().map(move |&k1| (centre, k1)));
+    let fits = starts.filter_map(|(centre, k1)| fit(centre, k1, sought));
+    let least = fits.min_by(|a, b| a.cost.total_cmp(&b.cost));
+    let unusual = [Fx, Fy, Cx, Cy, Skew].into_iter().filter(|&p| sought.contains(p));
+    let ordinary = unusual.fold(sought, FreeParameters::without);
+    let usual = (ordinary != sought).then(|| fit(middle, 0.0, ordinary)).flatten();
+    least.into_iter().chain(usual).collect()
+}
+
+/// A centre in the middle of the pixels seen and eight around it.
+fn spread_over((middle, half_width): (Vec2, f64)) -> impl Iterator<Item = Vec2> {
+    const ASIDE: f64 = 0.6;
+    let offsets = [0.0, -ASIDE, ASIDE];
+    let pairs = offsets.into_iter().flat_map(move |y| offsets.into_iter().map(move |x| Vec2::new(x, y)));
+    pairs.map(move |offset| middle + offset * half_width)
+}
+
+/// The lens that the relaxed model starts from. Its gauge is the focal length that is held, or else a wide lens's.
+fn gauge_lens(problem: &Problem<'_>, evidence: &Evidence<'_>) -> Camera {
+    use Parameter::{Fx, Fy};
+    let held = evidence.held;
     let half_width = evidence.pixel_frame.1;
     let gauge = held.value(Fx).or(held.value(Fy)).unwrap_or(2.0 * half_width);
     let start = held.camera(Camera::pinhole(gauge, gauge, held.centre.x, held.centre.y));
-    let start = if focal_free {
+    if problem.free.contains(Fx) || problem.free.contains(Fy) {
         // The coefficients start at 0: their values belong to another focal length.
         Camera { fx: gauge, fy: gauge, ..start }.with_distortion(BrownConrady::radial(0.0, 0.0))
     } else {
         start
-    };
-    let centres = if sought.contains(Cx) && sought.contains(Cy) {
-        vec![evidence.held.centre]
-            .into_iter()
-            .chain(radial_centre(problem.observations, evidence.pixel_frame))
-            .collect()
-    } else {
-        vec![evidence.held.centre]
-    };
-    let fits = centres.into_iter().filter_map(|centre| {
-        let start = Camera { cx: centre.x, cy: centre.y, ..start };
-        relaxed::relax(problem, evidence.homographies, start, sought)
-    });
-    fits.min_by(|a, b| a.cost.total_cmp(&b.cost))
+    }
 }
 
 /// Focal lengths that are tried, in units of the half-width of the pixels seen: from a fisheye to a long lens.
-const SCAN: (f64, f64) = (0.3, 60.0);
+const SCAN: (f64, f64) = (0.3, 300.0);
 /// Steps of the scan: 14 % each, less than the width of a minimum.
-const SCAN_STEPS: usize = 40;
+const SCAN_STEPS: usize = 52;
 /// Minima of the scan that are refined.
 const REFINED: usize = 3;
 
-/// States to refine from, the most promising first.
-fn relaxed_starts(problem: &Problem<'_>, relaxed: &Relaxed, evidence: &Evidence<'_>) -> Vec<State> {
+/// States to refine from, the most promising first; `aspect` is that of the cameras tried, relative to the relaxed lens's.
+fn relaxed_starts(
+    problem: &Problem<'_>,
+    relaxed: &Relaxed,
+    evidence: &Evidence<'_>,
+    aspect: f64,
+) -> Vec<State> {
     let gauge = relaxed.lens.fx;
     let homographies: Vec<Homography> =
         relaxed.homographies.iter().map(|h| Homography(relaxed::matrix(h))).collect();
@@ -414,7 +525,7 @@ fn relaxed_starts(problem: &Problem<'_>, relaxed: &Relaxed, evidence: &Evidence<
     if let Ok(camera) = closed_form::closed_form(&homographies, skew) {
         cameras.push(camera);
     }
-    let centred = |focal: f64| Camera::pinhole(focal, focal, 0.0, 0.0);
+    let centred = |focal: f64| Camera::pinhole(focal, focal * aspect, 0.0, 0.0);
     cameras.extend(focal_from_centre(&homographies, Vec2::zeros()).map(centred));
     let known = cameras.iter().filter_map(|camera| hypothesis(relaxed, evidence, camera));
     let mut hypotheses: Vec<Hypothesis> = known.collect();
