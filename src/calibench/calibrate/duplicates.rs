@@ -1,52 +1,226 @@
-//! Which views were given more than once? A copy says nothing new, and counted again it would shrink every standard deviation.
+//! Which views and marks were given more than once? A copy says nothing new, and counted again it would shrink every standard deviation.
 
 use crate::board::View;
+use crate::geometry::Vec2;
 
-/// For each view the first that is the same to the last bit: itself unless it is a copy.
-pub(super) fn first_of_each(views: &[View]) -> Vec<usize> {
+/// Two photographs differ by their noise, some 0.01 px at the least; pixels that agree to this many px are one measurement, written twice.
+const SAME_PX: f64 = 1e-6;
+/// Coordinates of a target that agree to this part of its size are those of one mark.
+const SAME_PART: f64 = 1e-9;
+
+/// What is left of the views when copies are taken away, and where each given one went.
+pub(super) struct Distinct {
+    /// The given views that were kept, in order.
+    pub kept: Vec<usize>,
+    /// For each given view its place among those kept.
+    pub place: Vec<usize>,
+    /// For each given view the kept view's mark that each of its marks is: `None` where they are the same, in the same order.
+    marks: Vec<Option<Vec<usize>>>,
+    /// The kept views whose marks were not all different, without the copies.
+    thinned: Vec<(usize, View)>,
+    /// Marks that were given more than once in their view: how many, and the first, as view and number.
+    pub repeated: Option<(usize, usize, usize)>,
+}
+
+impl Distinct {
+    /// `None` where nothing was given twice.
+    pub fn of(views: &[View]) -> Option<Distinct> {
+        let first = first_of_each(views);
+        let thin: Vec<Option<Thinned>> = {
+            let mut keys = Vec::new();
+            views.iter().map(|view| Thinned::of(view, &mut keys)).collect()
+        };
+        if thin.iter().all(Option::is_none) && first.iter().enumerate().all(|(i, &first)| i == first) {
+            return None;
+        }
+        let kept: Vec<usize> = (0..views.len()).filter(|&view| first[view] == view).collect();
+        let place = first.iter().map(|view| kept.partition_point(|kept| kept < view)).collect();
+        let marks = (0..views.len()).map(|view| marks_in(views, &thin, view, first[view])).collect();
+        let repeats = || thin.iter().enumerate().filter_map(|(view, thin)| Some((view, thin.as_ref()?)));
+        let count = repeats().map(|(view, thin)| views[view].len() - thin.view.len()).sum();
+        let repeated = repeats().next().map(|(view, thin)| (count, view, thin.first));
+        let thinned =
+            kept.iter().filter_map(|&view| Some((view, thin[view].as_ref()?.view.clone()))).collect();
+        Some(Distinct { kept, place, marks, thinned, repeated })
+    }
+
+    /// The views to calibrate from.
+    pub fn views(&self, given: &[View]) -> Vec<View> {
+        let thinned = |view: usize| self.thinned.iter().find(|(index, _)| *index == view).map(|(_, v)| v);
+        self.kept.iter().map(|&view| thinned(view).unwrap_or(&given[view]).clone()).collect()
+    }
+
+    /// What was found for the marks of the kept views, for the marks of a given one.
+    pub fn spread<T: Clone>(&self, view: usize, found: &[Vec<T>]) -> Vec<T> {
+        let found = &found[self.place[view]];
+        match &self.marks[view] {
+            Some(marks) => marks.iter().map(|&mark| found[mark].clone()).collect(),
+            None => found.clone(),
+        }
+    }
+
+    /// The first given mark that is a mark of a kept view.
+    pub fn given_mark(&self, kept: usize, mark: usize) -> (usize, usize) {
+        let view = self.kept[kept];
+        let given = self.marks[view].as_ref().and_then(|marks| marks.iter().position(|&m| m == mark));
+        (view, given.unwrap_or(mark))
+    }
+}
+
+/// A view without its marks' copies.
+struct Thinned {
+    view: View,
+    /// For each given mark its number in `view`.
+    marks: Vec<usize>,
+    /// The first mark that is a copy.
+    first: usize,
+}
+
+impl Thinned {
+    /// `None` where all marks are different, which is told by sorted keys without looking at them in pairs.
+    fn of(view: &View, keys: &mut Vec<u64>) -> Option<Thinned> {
+        keys.clear();
+        keys.extend(view.pairs().map(key));
+        keys.sort_unstable();
+        if keys.windows(2).all(|pair| pair[0] != pair[1]) {
+            return None;
+        }
+        let (mut points, mut pixels, mut marks): (Vec<Vec2>, Vec<Vec2>, Vec<usize>) = Default::default();
+        let mut first = None;
+        for (index, (point, pixel)) in view.pairs().enumerate() {
+            let same = points.iter().zip(&pixels).position(|(p, q)| p == point && q == pixel);
+            if same.is_some() {
+                first = first.or(Some(index));
+            } else {
+                points.push(*point);
+                pixels.push(*pixel);
+            }
+            marks.push(same.unwrap_or(points.len() - 1));
+        }
+        let view = View::new(points, pixels).expect("a part of a view is one");
+        first.map(|first| Thinned { view, marks, first })
+    }
+}
+
+/// Equal for equal pairs, and hardly ever for others.
+fn key((point, pixel): (&Vec2, &Vec2)) -> u64 {
+    let turned = |x: f64, by: u32| x.to_bits().rotate_left(by);
+    turned(point.x, 0) ^ turned(point.y, 17) ^ turned(pixel.x, 31) ^ turned(pixel.y, 47)
+}
+
+/// For each mark of `view` its number in the kept view `first`, thinned; `None` where nothing changes.
+fn marks_in(views: &[View], thin: &[Option<Thinned>], view: usize, first: usize) -> Option<Vec<usize>> {
+    let in_first = |mark: usize| thin[first].as_ref().map_or(mark, |thin| thin.marks[mark]);
+    if view == first {
+        return thin[first].as_ref().map(|thin| thin.marks.clone());
+    }
+    let (own, other) = (in_order(&views[view]), in_order(&views[first]));
+    let mut marks = vec![0; own.len()];
+    for (mine, theirs) in own.into_iter().zip(other) {
+        marks[mine] = in_first(theirs);
+    }
+    Some(marks)
+}
+
+/// For each view the first that is the same but for rounding and the order of its marks: itself unless it is a copy.
+fn first_of_each(views: &[View]) -> Vec<usize> {
     let mut first: Vec<usize> = (0..views.len()).collect();
-    let key = |view: &View| {
-        let pixel = view.pixels().first().map_or((0, 0), |p| (p.x.to_bits(), p.y.to_bits()));
-        (pixel, view.len())
-    };
-    // Only views whose first pixels agree are compared whole: time grows as that of sorting.
-    let mut order: Vec<((u64, u64), usize, usize)> =
-        views.iter().enumerate().map(|(index, view)| (key(view).0, key(view).1, index)).collect();
-    order.sort_unstable();
-    for group in order.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-        mark_copies(views, group.iter().map(|entry| entry.2).collect(), &mut first);
+    // Only views whose leftmost pixels agree are compared whole: time grows as that of sorting.
+    let leftmost = |view: &View| view.pixels().iter().map(|p| p.x).fold(f64::INFINITY, f64::min);
+    let mut order: Vec<(f64, usize)> =
+        views.iter().enumerate().map(|(index, view)| (leftmost(view), index)).collect();
+    order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    for (i, &(left, a)) in order.iter().enumerate() {
+        if first[a] != a {
+            continue;
+        }
+        for &(_, b) in order[i + 1..].iter().take_while(|(other, _)| other - left <= SAME_PX) {
+            if first[b] == b && is_copy(&views[a], &views[b]) {
+                first[a.max(b)] = a.min(b);
+            }
+        }
+    }
+    // Copies of copies point to the first of all.
+    for view in 0..first.len() {
+        first[view] = first[first[view]];
     }
     first
 }
 
-/// Among views alike at first sight, in order.
-fn mark_copies(views: &[View], mut left: Vec<usize>, first: &mut [usize]) {
-    while left.len() > 1 {
-        let original = left.remove(0);
-        left.retain(|&view| {
-            let is_copy = views[view] == views[original];
-            if is_copy {
-                first[view] = original;
-            }
-            !is_copy
-        });
+fn is_copy(a: &View, b: &View) -> bool {
+    if a.len() != b.len() {
+        return false;
     }
+    let size = extent(a);
+    let same = |i: usize, j: usize| {
+        (a.points()[i] - b.points()[j]).abs().max() <= SAME_PART * size
+            && (a.pixels()[i] - b.pixels()[j]).abs().max() <= SAME_PX
+    };
+    (0..a.len()).all(|i| same(i, i)) || in_order(a).into_iter().zip(in_order(b)).all(|(i, j)| same(i, j))
+}
+
+/// The largest coordinate of the target.
+fn extent(view: &View) -> f64 {
+    view.points().iter().map(|p| p.abs().max()).fold(0.0, f64::max)
+}
+
+/// The numbers of the marks in an order that depends on where they are only.
+fn in_order(view: &View) -> Vec<usize> {
+    let step = (2.0 * SAME_PART * extent(view)).max(f64::MIN_POSITIVE);
+    let cell = |i: usize| {
+        let (p, q) = (view.points()[i], view.pixels()[i]);
+        [p.x / step, p.y / step, q.x / SAME_PX, q.y / SAME_PX].map(libm::round)
+    };
+    let mut order: Vec<usize> = (0..view.len()).collect();
+    order.sort_by(|&i, &j| {
+        let pairs = cell(i).into_iter().zip(cell(j));
+        pairs.map(|(a, b)| a.total_cmp(&b)).find(|order| order.is_ne()).unwrap_or(i.cmp(&j))
+    });
+    order
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vec2;
+
+    fn view(seed: f64) -> View {
+        let points: Vec<Vec2> = (0..6).map(|i| Vec2::new(f64::from(i % 3), f64::from(i / 3))).collect();
+        let mut pixels: Vec<Vec2> = points.iter().map(|p| p * 10.0).collect();
+        pixels[5].x += seed;
+        View::new(points, pixels).unwrap()
+    }
+
+    fn reordered(view: &View, order: &[usize], shift: f64) -> View {
+        let points = order.iter().map(|&i| view.points()[i]).collect();
+        View::new(points, order.iter().map(|&i| view.pixels()[i] + Vec2::repeat(shift)).collect()).unwrap()
+    }
 
     #[test]
     fn copies_point_to_the_first_of_them() {
-        let view = |seed: f64| {
-            let points: Vec<Vec2> = (0..6).map(|i| Vec2::new(f64::from(i % 3), f64::from(i / 3))).collect();
-            let mut pixels: Vec<Vec2> = points.iter().map(|p| p * 10.0).collect();
-            pixels[5].x += seed;
-            View::new(points, pixels).unwrap()
-        };
         let views = [view(0.0), view(1.0), view(0.0), view(1.0), view(2.0), view(0.0)];
         assert_eq!(first_of_each(&views), [0, 1, 0, 1, 4, 0]);
+        assert!(Distinct::of(&[view(0.0), view(1.0), view(2.0)]).is_none());
+    }
+
+    #[test]
+    fn neither_rounding_nor_another_order_hides_a_copy_and_noise_is_none() {
+        let order = [3, 1, 5, 0, 2, 4];
+        let views = [view(0.0), reordered(&view(0.0), &order, 1e-9), reordered(&view(0.0), &order, 1e-3)];
+        let distinct = Distinct::of(&views).unwrap();
+        assert_eq!((distinct.kept.as_slice(), distinct.place.as_slice()), (&[0, 2][..], &[0, 0, 1][..]));
+        let found: Vec<Vec<usize>> = vec![(0..6).collect(), (10..16).collect()];
+        assert_eq!(distinct.spread(1, &found), order);
+        assert_eq!(distinct.spread(2, &found), (10..16).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_mark_given_twice_counts_once() {
+        let twice = reordered(&view(0.0), &[0, 1, 2, 2, 3, 4, 0, 5], 0.0);
+        let distinct = Distinct::of(&[view(1.0), twice.clone()]).unwrap();
+        assert_eq!(distinct.repeated, Some((2, 1, 3)));
+        assert_eq!(distinct.views(&[view(1.0), twice])[1], view(0.0));
+        let found = vec![vec![0; 6], (0..6).collect::<Vec<_>>()];
+        assert_eq!(distinct.spread(1, &found), [0, 1, 2, 2, 3, 4, 0, 5]);
+        assert_eq!(distinct.given_mark(1, 3), (1, 4));
     }
 }

@@ -60,6 +60,35 @@ pub enum CalibrationError {
     /// The loss has no positive scale.
     #[error("a robust loss needs a positive scale in px")]
     BadLoss,
+    /// A robust loss under which nearly every mark counts as a stray.
+    #[error(
+        "the scale of the robust loss, {scale_px:e} px, lies far below the residuals, half of which exceed {median_px:.2e} px: every mark \
+         would count as a stray; use a scale of about {:.2e}", 2.0 * median_px
+    )]
+    NarrowLoss {
+        /// Scale of the loss, px.
+        scale_px: f64,
+        /// The residual that half of the marks stay below, px.
+        median_px: f64,
+    },
+    /// Gross errors that hide what the other marks could tell.
+    #[error(
+        "{marks} mark(s) lie too far off to be noise, the worst (view {view}, point {point}) by {residual_px:.2} px where half of all stay \
+         below {median_px:.2} px, and with them nothing is determined: correct or remove them, or use a robust loss (huber:{:.2})",
+        2.0 * median_px
+    )]
+    Strays {
+        /// How many.
+        marks: usize,
+        /// View of the worst.
+        view: usize,
+        /// Its number there.
+        point: usize,
+        /// Its residual, px.
+        residual_px: f64,
+        /// The residual that half of the marks stay below, px.
+        median_px: f64,
+    },
     /// The data do not tell the free parameters apart.
     #[error(
         "the data cannot separate {}: {why}. Tilt the target by 20 degrees or more, about different axes, in some views, or \

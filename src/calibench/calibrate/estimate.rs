@@ -2,6 +2,7 @@
 
 use super::certificate::Certificate;
 use super::conditioning::Conditioning;
+use super::duplicates::Distinct;
 use super::intervals::Profile;
 use super::minimise::{Problem, State};
 use super::normal::Observations;
@@ -10,8 +11,8 @@ use super::search::{self, Evidence, Judged};
 use super::start::Held;
 use super::target_frame::TargetFrame;
 use super::{
-    Calibration, CalibrationError, Loss, Settings, Termination, Warning, chunks, duplicates, identifiability,
-    kernel, polish, start, strays, warnings,
+    Calibration, CalibrationError, Loss, Settings, Termination, Warning, chunks, identifiability, kernel,
+    polish, start, strays, warnings,
 };
 use crate::board::View;
 use crate::camera::Parameter;
@@ -33,19 +34,18 @@ const START_GAIN: f64 = 1e-3;
 /// Data that cannot determine the free parameters are refused; see [`CalibrationError`]. A refinement that does not converge is
 /// no error: the result says so in [`Calibration::termination`] and in a warning.
 pub fn calibrate(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
-    let first = duplicates::first_of_each(views);
-    if first.iter().enumerate().all(|(view, &first)| view == first) {
-        return calibrate_different(views, settings);
-    }
-    let kept: Vec<usize> = (0..views.len()).filter(|&view| first[view] == view).collect();
-    let different: Vec<View> = kept.iter().map(|&view| views[view].clone()).collect();
-    match calibrate_different(&different, settings) {
-        Ok(calibration) => Ok(with_copies(calibration, &first, &kept)),
+    let Some(distinct) = Distinct::of(views) else { return calibrate_different(views, settings) };
+    match calibrate_different(&distinct.views(views), settings) {
+        Ok(calibration) => Ok(with_copies(calibration, &distinct)),
         Err(CalibrationError::View { view, source }) => {
-            Err(CalibrationError::View { view: kept[view], source })
+            Err(CalibrationError::View { view: distinct.kept[view], source })
         }
         Err(CalibrationError::TooFewViews { need, got, linear, .. }) => {
             Err(CalibrationError::TooFewViews { need, got, linear, copies: views.len() - got })
+        }
+        Err(CalibrationError::Strays { marks, view, point, residual_px, median_px }) => {
+            let (view, point) = distinct.given_mark(view, point);
+            Err(CalibrationError::Strays { marks, view, point, residual_px, median_px })
         }
         Err(error) => Err(error),
     }
@@ -57,25 +57,32 @@ fn calibrate_different(views: &[View], settings: &Settings) -> Result<Calibratio
     Ok(if settings.polish { polish::polish(views, settings.loss, calibration) } else { calibration })
 }
 
-/// The result for all views: a copy has the pose and the residuals of the view it is a copy of, and counts in no statistic.
-fn with_copies(mut calibration: Calibration, first: &[usize], kept: &[usize]) -> Calibration {
-    let row: Vec<usize> =
-        first.iter().map(|view| kept.binary_search(view).expect("the first of its copies is kept")).collect();
-    fn spread<T: Clone>(list: &[T], row: &[usize]) -> Vec<T> {
-        row.iter().map(|&i| list[i].clone()).collect()
+/// The result for all that was given: a copy has the pose and the residuals of what it is a copy of, and counts in no statistic.
+fn with_copies(mut calibration: Calibration, distinct: &Distinct) -> Calibration {
+    fn at<T: Clone>(list: &[T], place: &[usize]) -> Vec<T> {
+        place.iter().map(|&i| list[i].clone()).collect()
     }
-    calibration.cam_from_target = spread(&calibration.cam_from_target, &row);
-    calibration.residuals = spread(&calibration.residuals, &row);
-    calibration.covariance.poses = spread(&calibration.covariance.poses, &row);
-    calibration.covariance.cross = spread(&calibration.covariance.cross, &row);
+    let place = &distinct.place;
+    calibration.cam_from_target = at(&calibration.cam_from_target, place);
+    calibration.residuals =
+        (0..place.len()).map(|view| distinct.spread(view, &calibration.residuals)).collect();
+    calibration.covariance.poses = at(&calibration.covariance.poses, place);
+    calibration.covariance.cross = at(&calibration.covariance.cross, place);
     for warning in &mut calibration.warnings {
-        if let Warning::Outliers { view, .. } = warning {
-            *view = kept[*view];
+        match warning {
+            Warning::Outliers { view, point, .. } => (*view, *point) = distinct.given_mark(*view, *point),
+            Warning::TwinPose { view, .. } | Warning::FromBehind { view, .. } => *view = distinct.kept[*view],
+            _ => {}
         }
     }
-    let copies: Vec<usize> = (0..first.len()).filter(|&view| first[view] != view).collect();
-    let view = copies[0];
-    calibration.warnings.push(Warning::Duplicates { view, copy_of: first[view], copies: copies.len() });
+    let copies = place.len() - distinct.kept.len();
+    if let Some(view) = (0..place.len()).find(|&view| distinct.kept[place[view]] != view) {
+        let copy_of = distinct.kept[place[view]];
+        calibration.warnings.push(Warning::Duplicates { view, copy_of, copies });
+    }
+    if let Some((marks, view, point)) = distinct.repeated {
+        calibration.warnings.push(Warning::RepeatedMarks { marks, view, point });
+    }
     calibration
 }
 
@@ -106,7 +113,8 @@ fn check_counts(views: &[View], settings: &Settings) -> Result<(), CalibrationEr
     }
     let free = settings.free();
     let linear = [Fx, Fy, Cx, Cy, Skew].into_iter().filter(|&p| free.contains(p)).count();
-    let need = if is_distorting(settings)? { 1 } else { linear.div_ceil(2).max(1) };
+    let most = if is_distorting(settings)? { 2 } else { usize::MAX };
+    let need = linear.div_ceil(2).clamp(1, most);
     if views.len() < need {
         return Err(CalibrationError::TooFewViews { need, got: views.len(), linear, copies: 0 });
     }
@@ -119,7 +127,7 @@ fn check_counts(views: &[View], settings: &Settings) -> Result<(), CalibrationEr
 }
 
 /// Whether the lens may distort: homographies give two constraints a view, and a distortion tells its centre and the aspect ratio besides, so
-/// that only the rank of the equations can say whether the views are too few.
+/// that two views may tell all; the rank of the equations has the last word.
 fn is_distorting(settings: &Settings) -> Result<bool, CalibrationError> {
     use Parameter::*;
     for parameter in [K1, K2, P1, P2, K3] {
@@ -167,13 +175,14 @@ fn report(
     profile_coverage: Option<f64>,
 ) -> Result<Calibration, CalibrationError> {
     let observations = problem.observations;
-    let Judged { minimum, reduction, certificate, starts, skewed, rival } = judged;
+    let Judged { minimum, reduction, certificate, starts, skewed, rival, twins } = judged;
     let State { camera, cam_from_target } = &minimum.state;
     let system = &minimum.system;
     let fit = Fit::of(&minimum.state, observations);
     let points = fit.residuals.iter().map(Vec::len).sum::<usize>();
     let degrees_of_freedom = 2 * points - system.unknowns();
     let freedom = degrees_of_freedom.max(1) as f64;
+    strays::refuse_narrow_loss(problem.loss, &fit)?;
     let strays = strays::strays(problem, &minimum.state, &fit, fit.square / freedom);
     let Fit { residuals, square, largest_radius } = fit;
     let sigma_px = (square / freedom).sqrt();
@@ -216,7 +225,8 @@ fn report(
         warnings: Vec::new(),
         residuals,
     };
-    calibration.warnings = warnings::of(&calibration, largest_radius, strays, &skewed, rival);
+    let strays = strays.map(Warning::from);
+    calibration.warnings = warnings::of(&calibration, largest_radius, strays, &skewed, rival, twins);
     Ok(calibration)
 }
 

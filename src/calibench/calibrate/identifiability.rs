@@ -11,6 +11,7 @@
 //!   identified were the planes parallel, the calibration is refused.
 
 use super::CalibrationError;
+use super::chance::chi_squared_quantile;
 use super::conditioning::{Conditioning, WeakComponent};
 use super::minimise::{Minimum, Problem, State};
 use super::normal::Observations;
@@ -19,8 +20,8 @@ use super::walk::{Far, Walked};
 use crate::camera::Parameter;
 use crate::geometry::{Pose, Vec2, Vec3, rotation};
 
-/// With this probability data that determine nothing pass: -ln(1e-9).
-const LOG_FALSE_ACCEPTANCE: f64 = 20.7;
+/// With this probability at most data that determine nothing pass.
+const FALSE_ACCEPTANCE: f64 = 1e-6;
 /// Planes whose difference of tilt moves the edge of the target's image by more than this many standard deviations of a pixel are not
 /// parallel by accident, and need no test.
 const EVIDENT_TILT: f64 = 50.0;
@@ -39,11 +40,9 @@ pub(super) fn least_rise(parameter: Parameter) -> f64 {
     if matches!(parameter, Parameter::Cx | Parameter::Cy) { CENTRE_RISE } else { FOCAL_RISE }
 }
 
-/// A chi-squared variable with `d` degrees of freedom exceeds `d + 2 sqrt(d x) + 2 x` with probability below `exp(-x)`
-/// (Laurent & Massart 2000, lemma 1).
+/// What a chi-squared variable with `d` degrees of freedom exceeds with probability [`FALSE_ACCEPTANCE`].
 fn largest_chance_chi_squared(degrees_of_freedom: usize) -> f64 {
-    let (d, x) = (degrees_of_freedom as f64, LOG_FALSE_ACCEPTANCE);
-    d + 2.0 * (d * x).sqrt() + 2.0 * x
+    chi_squared_quantile(1.0 - FALSE_ACCEPTANCE, degrees_of_freedom)
 }
 
 /// Whether the tilts of a state are so different, and so different from none, that no test is needed; for noise `noise_px` on a coordinate.
@@ -107,7 +106,8 @@ fn refuse_if_fits(
     if ratio < -LOWER {
         return Ok(Some(held.state));
     }
-    if ratio > bound {
+    // No number where the planes held parallel put a mark behind the camera.
+    if ratio.is_nan() || ratio > bound {
         return Ok(None);
     }
     let mut exact = System::new(problem.free, problem.observations.len());

@@ -163,7 +163,7 @@ impl<'a> Profile<'a> {
 const LOWER: f64 = 1e-3;
 
 /// Half the width of the interval of Student's distribution that holds `coverage`; to nine digits, the same on every machine.
-fn student_quantile(coverage: f64, degrees_of_freedom: usize) -> f64 {
+pub(super) fn student_quantile(coverage: f64, degrees_of_freedom: usize) -> f64 {
     let t = StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1) as f64)
         .map_or(f64::NAN, |distribution| distribution.inverse_cdf(0.5 + 0.5 * coverage));
     super::chance::significant(t)

@@ -73,10 +73,48 @@ pub enum Warning {
         /// How many copies there are in all.
         copies: usize,
     },
+    /// Marks that were given more than once in a view, and were counted once.
+    RepeatedMarks {
+        /// How many copies there are in all.
+        marks: usize,
+        /// View of the first.
+        view: usize,
+        /// Its number there.
+        point: usize,
+    },
+    /// Nothing certifies the minimum: free homographies leave no degrees of freedom.
+    NotCertified,
+    /// So few degrees of freedom that intervals are wider than the standard deviations suggest.
+    FewDegreesOfFreedom {
+        /// How many.
+        degrees_of_freedom: usize,
+        /// Standard deviations that an interval of 95 % reaches (Student 1908); 1.96 where they are many.
+        student: f64,
+    },
+    /// Views whose target may as well be tilted the other way.
+    TwinPose {
+        /// The view whose other tilt costs least.
+        view: usize,
+        /// How many such views there are.
+        views: usize,
+        /// By how many degrees its plane is turned there.
+        degrees: f64,
+        /// By how many variances its cost is higher there.
+        excess: f64,
+    },
+    /// Views that show the target from its other side than most do.
+    FromBehind {
+        /// The first.
+        view: usize,
+        /// How many.
+        views: usize,
+    },
     /// A few marks lie so far from where they should that they are no noise.
     Outliers {
         /// How many.
         marks: usize,
+        /// Which part of all marks.
+        share: f64,
         /// View of the worst.
         view: usize,
         /// Its number there.
@@ -140,6 +178,9 @@ pub(super) const STRONG_CORRELATION: f64 = 0.98;
 /// A focal length worse than this makes the linearisation behind the covariance doubtful.
 pub(super) const UNCERTAIN_FOCAL: f64 = 0.05;
 
+/// A larger part of the marks than this goes astray by itself seldom.
+const MANY: f64 = 0.1;
+
 /// Real boards leave the RMSE up to a seventh above its floor, wrong minima of consequence lie more than a third above.
 const GROSS: f64 = 1.25;
 
@@ -156,7 +197,8 @@ impl fmt::Display for Warning {
             }
             Warning::AboveFloor { rmse_px, floor_rmse_px, p_value, starts } => {
                 let advice = if *rmse_px > GROSS * floor_rmse_px {
-                    "do not use the result: take more views, with evident tilts"
+                    "do not use the result: check the board's geometry (spacing in both directions, order of the marks) and the values \
+                     held; if they are right, take more views, with evident tilts"
                 } else {
                     "the model does not explain the marks: is the board flat and its geometry right, is the lens model rich enough?"
                 };
@@ -171,11 +213,35 @@ impl fmt::Display for Warning {
                 "view {view} is a copy of view {copy_of}{}: copies say nothing new and were counted once",
                 if *copies > 1 { format!(", and there are {copies} copies in all") } else { String::new() }
             ),
-            Warning::Outliers { marks, view, point, residual_px, median_px } => write!(
+            Warning::RepeatedMarks { marks, view, point } => write!(
+                f,
+                "{marks} mark(s) were given more than once in their view, the first (view {view}, point {point}): they were counted once"
+            ),
+            Warning::NotCertified => f.write_str(
+                "nothing certifies this minimum: with so few marks and views free homographies fit as well whatever the camera, so neither \
+                 the lens model nor the search could be checked",
+            ),
+            Warning::FewDegreesOfFreedom { degrees_of_freedom, student } => write!(
+                f,
+                "the standard deviations rest on {degrees_of_freedom} degrees of freedom: an interval of 95 % reaches {student:.2} of them, not 1.96"
+            ),
+            Warning::TwinPose { view, views, degrees, excess } => write!(
+                f,
+                "the target of view {view} may as well be tilted the other way, turned by {degrees:.0} degrees ({excess:.1} variances \
+                 more){}: the standard deviations of such a pose speak of one of its two tilts only",
+                if *views > 1 { format!(", and {views} views in all are like it") } else { String::new() }
+            ),
+            Warning::FromBehind { view, views } => write!(
+                f,
+                "view {view}{} shows the target from its other side: is the order of its marks that of the others?",
+                if *views > 1 { format!(" (and {views} views in all)") } else { String::new() }
+            ),
+            Warning::Outliers { marks, share, view, point, residual_px, median_px } => write!(
                 f,
                 "{marks} mark(s) lie too far off to be noise, the worst (view {view}, point {point}) by {residual_px:.2} px where half of all \
-                 stay below {median_px:.2} px: correct or remove them, or use a robust loss (huber:{:.1})",
-                2.0 * median_px
+                 stay below {median_px:.2} px: correct or remove them, or use a robust loss (huber:{:.2}){}",
+                2.0 * median_px,
+                if *share > MANY { "; so many may also mean that lens model or board do not hold there" } else { "" }
             ),
             Warning::Ambiguous { parameter, value, other, excess } => write!(
                 f,

@@ -16,7 +16,7 @@ use super::retraction::Retraction;
 use super::start::{Held, focal_from_centre};
 use super::system::Reduction;
 use super::walk::Walked;
-use super::{CalibrationError, Termination, tilt, walk};
+use super::{CalibrationError, Termination, strays, tilt, walk};
 use crate::camera::{BrownConrady, Camera, FreeParameters, Parameter};
 use crate::geometry::{Homography, Vec2};
 use nalgebra::DMatrix;
@@ -33,6 +33,8 @@ pub(super) struct Judged {
     pub skewed: Vec<Skewed>,
     /// The best of the other minima, if it is nearly as good.
     pub rival: Option<Rival>,
+    /// Views whose other tilt is nearly as good.
+    pub twins: Vec<Twin>,
 }
 
 /// What the search starts from.
@@ -64,7 +66,7 @@ impl Judged {
         let certificate = reduction
             .as_ref()
             .map(|reduction| certificate::certify(problem, &minimum.state, reduction, minimum.system.cost));
-        Judged { minimum, reduction, certificate, starts, skewed: Vec::new(), rival: None }
+        Judged { minimum, reduction, certificate, starts, skewed: Vec::new(), rival: None, twins: Vec::new() }
     }
 
     /// With the floor fitted where a step towards it does not certify the minimum: the step is straight, the relaxed model is not. A lower
@@ -125,13 +127,30 @@ impl Judged {
         self
     }
 
+    /// With the views whose other tilt, the camera held, is nearly as good.
+    fn with_twins(mut self, problem: &Problem<'_>) -> Judged {
+        let variance = identifiability::variance(problem, self.noise_px(problem));
+        let state = &self.minimum.state;
+        let twin = |view: usize| {
+            let pose = state.cam_from_target[view];
+            let (own, cost) = tilt::resected(problem, state, view, pose);
+            let (other, other_cost) = tilt::resected(problem, state, view, tilt::mirrored(&own));
+            let excess = (other_cost - cost) / variance;
+            let degrees = tilt::angle_between(&own, &other).to_degrees();
+            (excess < RIVALS && degrees > APART_DEGREES).then_some(Twin { view, degrees, excess })
+        };
+        self.twins = self.doubtful_tilts(problem).into_iter().filter_map(twin).collect();
+        self
+    }
+
     /// Whether the minimum is clear, and the planes are not parallel. Parallel planes that determine nothing are refused at once, before a
     /// search that could find nothing, where the noise is known: at a cost that its floor certifies.
     fn is_settled(&self, problem: &Problem<'_>) -> Result<bool, CalibrationError> {
         if !self.certificate.as_ref().is_some_and(|c| c.is_possible() && c.holds()) {
             return Ok(false);
         }
-        let lower = identifiability::refuse_if_parallel(problem, &self.minimum, self.noise_px(problem))?;
+        let lower = identifiability::refuse_if_parallel(problem, &self.minimum, self.noise_px(problem));
+        let lower = strays::or_blamed(problem, &self.minimum.state, lower)?;
         Ok(lower.is_none() && self.is_clear(problem))
     }
 
@@ -234,7 +253,7 @@ pub(super) fn best_minimum(
     let judged = Judged::of(problem, best, count);
     let noise_px = judged.noise_px(problem);
     if judged.is_well_known(problem) && tilts_are_evident(problem, &judged.minimum.state, noise_px) {
-        return Ok(judged.certified(problem, lowest_relaxed).with_rival(problem, &met));
+        return Ok(judged.certified(problem, lowest_relaxed).with_rival(problem, &met).with_twins(problem));
     }
     let centre_sd = judged.centre_deviations(problem);
     let walked = walk::far_away(&patient, judged.minimum, noise_px, centre_sd);
@@ -249,7 +268,10 @@ pub(super) fn best_minimum(
     }
     met.extend(walked.met);
     let judged = Judged::of(problem, best, count + walked.starts);
-    Ok(with_profiles(&patient, judged).certified(problem, lowest_relaxed).with_rival(problem, &met))
+    Ok(with_profiles(&patient, judged)
+        .certified(problem, lowest_relaxed)
+        .with_rival(problem, &met)
+        .with_twins(problem))
 }
 
 /// What the relaxed model led to.
@@ -310,7 +332,8 @@ fn from_relaxed(problem: &Problem<'_>, first: Judged, evidence: &Evidence<'_>) -
             next.iter().flat_map(|relaxed| relaxed_starts(problem, relaxed, evidence, 1.0)).collect();
         found.try_all(problem, starts);
         if found.is_far_above_floor() {
-            let stretched = |relaxed: &Relaxed| ASPECTS.map(|aspect| relaxed_starts(problem, relaxed, evidence, aspect));
+            let stretched =
+                |relaxed: &Relaxed| ASPECTS.map(|aspect| relaxed_starts(problem, relaxed, evidence, aspect));
             found.try_all(problem, next.iter().flat_map(stretched).flatten().collect());
         }
         next = beside(problem, &found.best).into_iter().collect();
@@ -338,9 +361,9 @@ fn refuse_undetermined(
     if !certified {
         return Ok(None);
     }
-    let lower = identifiability::refuse_if_parallel(problem, &walked.best, noise_px)?;
-    identifiability::refuse_if_flat(problem, walked, noise_px)?;
-    Ok(lower)
+    let refused = identifiability::refuse_if_parallel(problem, &walked.best, noise_px)
+        .and_then(|lower| identifiability::refuse_if_flat(problem, walked, noise_px).map(|()| lower));
+    strays::or_blamed(problem, &walked.best.state, refused)
 }
 
 /// A minimum that the search met.
@@ -372,6 +395,18 @@ pub(super) struct Rival {
     pub excess: f64,
 }
 
+/// A view's other tilt.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Twin {
+    pub view: usize,
+    /// By how much its plane is turned there.
+    pub degrees: f64,
+    /// By how many variances the cost is higher there.
+    pub excess: f64,
+}
+
+/// Planes that differ by less are one and the same.
+const APART_DEGREES: f64 = 1.0;
 /// A minimum whose cost is higher by fewer variances than this is a rival: four standard deviations.
 const RIVALS: f64 = 16.0;
 /// A minimum whose parameters all lie within this many standard deviations is the same one.

@@ -26,6 +26,12 @@ fn to_axis(v: &Vec3) -> Mat3 {
     Mat3::new(1.0 - k * a * a, -k * a * b, -a, -k * a * b, 1.0 - k * b * b, -b, a, b, c)
 }
 
+/// Angle between the planes of two poses, rad.
+pub(super) fn angle_between(a: &Pose, b: &Pose) -> f64 {
+    let (a, b) = (a.rotation.column(2).into_owned(), b.rotation.column(2).into_owned());
+    libm::atan2(a.cross(&b).norm(), a.dot(&b))
+}
+
 /// If turning a plane to its other tilt raises the cost by more variances than this, the other tilt cannot explain the view.
 const TELLING: f64 = 400.0;
 /// If the shortening of a plane by its tilt is worth fewer variances than this, it might as well have none, and both tilts are one.

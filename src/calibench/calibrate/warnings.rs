@@ -1,10 +1,12 @@
 //! What should a user know before trusting a calibration? The conditions behind each warning.
 
 use super::intervals::Skewed;
+use super::intervals::student_quantile;
 use super::report::{STRONG_CORRELATION, UNCERTAIN_FOCAL};
-use super::search::Rival;
-use super::{Calibration, Covariance, Termination, Warning};
+use super::search::{Rival, Twin};
+use super::{Calibration, Certificate, Covariance, Termination, Warning};
 use crate::camera::{Camera, FreeParameters, Parameter};
+use crate::geometry::Pose;
 
 /// The warnings of a calibration: `strays` is that of its outliers, `skewed` are the parameters whose cost is no parabola, `rival`
 /// is another camera.
@@ -14,13 +16,23 @@ pub(super) fn of(
     strays: Option<Warning>,
     skewed: &[Skewed],
     rival: Option<Rival>,
+    twins: Vec<Twin>,
 ) -> Vec<Warning> {
     let mut warnings = Vec::new();
     warnings.extend(ending(calibration));
     warnings.extend(strays);
     if calibration.degrees_of_freedom == 0 {
         warnings.push(Warning::NoDegreesOfFreedom);
+    } else {
+        warnings.extend(few_degrees_of_freedom(calibration.degrees_of_freedom));
     }
+    if calibration.termination.is_minimum()
+        && !calibration.certificate.as_ref().is_some_and(Certificate::is_possible)
+    {
+        warnings.push(Warning::NotCertified);
+    }
+    warnings.extend(twin_pose(&twins));
+    warnings.extend(from_behind(calibration));
     warnings.extend(correlated(&calibration.covariance, calibration.free));
     warnings.extend([Parameter::Fx, Parameter::Fy].into_iter().filter_map(|parameter| {
         let relative = calibration.standard_deviation(parameter)? / calibration.camera.get(parameter);
@@ -39,6 +51,40 @@ pub(super) fn of(
         excess,
     }));
     warnings
+}
+
+/// Coverage of the interval that few degrees of freedom widen.
+const COVERAGE: f64 = 0.95;
+/// Half the width of such an interval where the degrees of freedom are many.
+const NORMAL: f64 = 1.959964;
+/// Intervals wider by more than this factor are worth a word.
+const WIDER: f64 = 1.1;
+/// With this many degrees of freedom they are not: Student's quantile is 1.0995 times the normal one at 13.
+const ENOUGH: usize = 14;
+
+fn few_degrees_of_freedom(degrees_of_freedom: usize) -> Option<Warning> {
+    if degrees_of_freedom >= ENOUGH {
+        return None;
+    }
+    let student = student_quantile(COVERAGE, degrees_of_freedom);
+    (student > WIDER * NORMAL).then_some(Warning::FewDegreesOfFreedom { degrees_of_freedom, student })
+}
+
+fn twin_pose(twins: &[Twin]) -> Option<Warning> {
+    let nearest = twins.iter().min_by(|a, b| a.excess.total_cmp(&b.excess))?;
+    let Twin { view, degrees, excess } = *nearest;
+    Some(Warning::TwinPose { view, views: twins.len(), degrees, excess })
+}
+
+/// Views whose target faces the camera with the other side than most targets do: a mirrored order of marks looks like this.
+fn from_behind(calibration: &Calibration) -> Option<Warning> {
+    let faces_away = |pose: &Pose| pose.rotation.column(2).dot(&pose.translation) > 0.0;
+    let away: Vec<bool> = calibration.cam_from_target.iter().map(faces_away).collect();
+    let count = away.iter().filter(|&&away| away).count();
+    let odd = 2 * count <= away.len();
+    let mut views = (0..away.len()).filter(|&view| away[view] == odd);
+    let views_in_all = if odd { count } else { away.len() - count };
+    Some(Warning::FromBehind { view: views.next()?, views: views_in_all })
 }
 
 /// What the ending of the search asks to be told.
