@@ -15,6 +15,7 @@ mod detect_photos;
 mod fuzz_seeds;
 mod gate;
 mod golden;
+mod hard_sets;
 mod hostile;
 mod layout;
 mod photo_command;

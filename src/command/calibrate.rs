@@ -27,7 +27,12 @@ mod plots;
 
 pub(super) use plane::plane_text;
 
+/// What the exit codes mean here.
+const EXIT_CODES: &str = "Exit codes: 0 a minimum whose RMSE lies at most a quarter above that of free homographies (warnings say what to be careful about), 2 \
+     wrong usage or data that do not determine the camera, 3 no minimum, or one far above them: the result is printed and must not be used";
+
 #[derive(Debug, Args)]
+#[command(after_help = EXIT_CODES)]
 pub(super) struct Arguments {
     /// Corner file with the columns view,point,X,Y,u,v, or point pairs with point,px,py,X,Y, or - for one of them on standard input;
     /// with --board, photographs

@@ -113,8 +113,10 @@ fn refusal(error: &CalibrationError) -> String {
         CalibrationError::TooFewPoints { .. } => "refused: too few points".to_string(),
         CalibrationError::View { .. } => "refused: a view has no homography".to_string(),
         CalibrationError::NoStart { .. } => "refused: no starting values".to_string(),
+        CalibrationError::Strays { .. } => "refused: gross errors".to_string(),
         CalibrationError::HeldWithoutValue { .. }
         | CalibrationError::BadHeldValue { .. }
+        | CalibrationError::NarrowLoss { .. }
         | CalibrationError::BadLoss => "refused: impossible settings".to_string(),
     }
 }

@@ -117,7 +117,8 @@ fn reason(error: &CalibrationError) -> &'static str {
         CalibrationError::TooFewPoints { .. } => "too-few-points",
         CalibrationError::View { .. } => "homography",
         CalibrationError::HeldWithoutValue { .. } | CalibrationError::BadHeldValue { .. } => "held-value",
-        CalibrationError::BadLoss => "loss",
+        CalibrationError::BadLoss | CalibrationError::NarrowLoss { .. } => "loss",
+        CalibrationError::Strays { .. } => "gross-errors",
         CalibrationError::NotIdentifiable { .. } => "not-identifiable",
         CalibrationError::NoStart { .. } => "no-start",
     }

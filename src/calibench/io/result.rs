@@ -188,7 +188,11 @@ impl CalibrationFields {
             sigma_px: calibration.sigma_px,
             degrees_of_freedom: calibration.degrees_of_freedom,
             termination: calibration.termination.name(),
-            certificate: calibration.certificate.as_ref().map(CertificateFields::of),
+            certificate: calibration
+                .certificate
+                .as_ref()
+                .filter(|c| c.is_possible())
+                .map(CertificateFields::of),
             starts: calibration.starts,
             intervals: calibration.intervals.iter().map(IntervalFields::of).collect(),
             iterations: calibration.iterations,

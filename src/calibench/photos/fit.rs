@@ -77,7 +77,7 @@ pub struct Fit {
 }
 
 impl Fitter<'_> {
-    /// Calibrates. With a factor of rejection, the view that stands out most is dropped and all others fitted again until
+    /// Calibrates, without the views whose marks do not span a plane. With a factor of rejection, the view that stands out most is dropped and all others fitted again until
     /// none stands out, so that a view that spoils the fit does not take others with it. At least half of the views stay.
     ///
     /// # Errors
@@ -87,20 +87,24 @@ impl Fitter<'_> {
         let mut rejected: Vec<Rejected> = Vec::new();
         loop {
             let chosen: Vec<View> = kept.iter().map(|&view| views[view].clone()).collect();
-            let may_drop = self.reject_factor.is_some() && 2 * (kept.len() - 1) >= views.len();
+            let half_stay = 2 * (kept.len() - 1) >= views.len();
+            let may_drop = self.reject_factor.is_some() && half_stay;
             match self.fit_all(&chosen) {
                 Ok((calibration, views, bias)) => match self.stray(&calibration).filter(|_| may_drop) {
                     Some((place, reason)) => rejected.push(Rejected { view: kept.remove(place), reason }),
                     None => return Ok(Fit { calibration, views, kept, rejected, bias }),
                 },
-                Err(CalibrationError::View { view, source }) if may_drop => {
+                // Marks on a line say next to nothing, whatever the fit.
+                Err(CalibrationError::View { view, source }) if half_stay => {
                     rejected.push(Rejected { view: kept.remove(view), reason: source.to_string() });
                 }
                 Err(CalibrationError::View { view, source }) => {
                     return Err(CalibrationError::View { view: kept[view], source });
                 }
                 // A view so wrong that under its errors nothing seems determined.
-                Err(error @ CalibrationError::NotIdentifiable { .. }) if may_drop => {
+                Err(error @ (CalibrationError::NotIdentifiable { .. } | CalibrationError::Strays { .. }))
+                    if may_drop =>
+                {
                     let Some(place) = self.best_without_one(&chosen) else { return Err(error) };
                     let reason =
                         format!("without it the other views determine the camera, with it not: {error}");

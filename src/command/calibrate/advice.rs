@@ -91,7 +91,7 @@ fn tilt(calibration: &Calibration) -> Option<String> {
     let largest =
         pairs.map(|(a, b)| libm::atan2(a.cross(b).norm(), a.dot(b)).to_degrees()).fold(0.0, f64::max);
     let focal = calibration.free.contains(Parameter::Fx) || calibration.free.contains(Parameter::Fy);
-    (focal && largest < LEAST_TILT_DEGREES).then(|| {
+    (focal && normals.len() > 1 && largest < LEAST_TILT_DEGREES).then(|| {
         format!(
             "no two boards are tilted by more than {largest:.0} degrees against each other: focal length and distance are hardly \
              told apart; tilt the board by 20 to 45 degrees about different axes"

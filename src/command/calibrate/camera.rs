@@ -35,13 +35,14 @@ pub(super) struct Observed {
 /// Coverage of the intervals: what a certificate of measurement states.
 const COVERAGE: f64 = 0.95;
 
-/// A mark may lie this far beyond the centres of the outermost pixels: half a pixel to the image's border, and half a pixel more for files
-/// that count pixels from 1.
-const BEYOND_PX: f64 = 1.0;
+/// A mark may lie this part of the image's longer side beyond the centres of the outermost pixels, one pixel at least: its border is half a
+/// pixel away, files that count pixels from 1 add half a pixel, and what noise adds to marks at the border is no other image's size.
+const BEYOND: f64 = 0.02;
 
-/// Whether a mark lies in an image.
+/// Whether a mark lies in an image, or as little outside as noise puts it.
 fn within(pixel: &Vec2, (width, height): (usize, usize)) -> bool {
-    let on_side = |at: f64, length: usize| (-BEYOND_PX..=length as f64 - 1.0 + BEYOND_PX).contains(&at);
+    let beyond = (BEYOND * width.max(height) as f64).max(1.0);
+    let on_side = |at: f64, length: usize| (-beyond..=length as f64 - 1.0 + beyond).contains(&at);
     on_side(pixel.x, width) && on_side(pixel.y, height)
 }
 
