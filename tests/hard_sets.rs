@@ -12,7 +12,9 @@ fn views(name: &str) -> Vec<View> {
 
 fn calibrated(name: &str, free: &str, image_size: Option<(usize, usize)>) -> Result<Calibration, CalibrationError> {
     let free: FreeParameters = free.parse().unwrap();
-    calibrate(&views(name), &Settings { image_size, ..Settings::new(free) })
+    let mut settings = Settings::new(free);
+    settings.image_size = image_size;
+    calibrate(&views(name), &settings)
 }
 
 const CHAPTER: &str = "fx,fy,cx,cy,k1,k2";

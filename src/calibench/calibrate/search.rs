@@ -74,14 +74,16 @@ impl Judged {
     fn certified(mut self, problem: &Problem<'_>, lowest_relaxed: f64) -> Judged {
         let cost = self.minimum.system.cost;
         let points = problem.observations.iter().map(|o| o.len()).sum();
+        // What rounding leaves of exact data proves nothing.
+        let rounding = problem.rounding_cost();
         if let Some(certificate) = self.certificate.as_mut() {
             if !certificate.holds()
                 && let Some(beside) = beside(problem, &self.minimum)
             {
-                *certificate = certificate.with_floor(cost, beside.cost, points);
+                *certificate = certificate.with_floor(cost, beside.cost.max(rounding), points);
             }
-            if lowest_relaxed < certificate.floor(points) {
-                *certificate = certificate.with_floor(cost, lowest_relaxed, points);
+            if lowest_relaxed.max(rounding) < certificate.floor(points) {
+                *certificate = certificate.with_floor(cost, lowest_relaxed.max(rounding), points);
             }
         }
         self
