@@ -10,7 +10,11 @@ fn views(name: &str) -> Vec<View> {
     parse_corners(name, std::fs::read(path).unwrap().as_slice()).unwrap().views
 }
 
-fn calibrated(name: &str, free: &str, image_size: Option<(usize, usize)>) -> Result<Calibration, CalibrationError> {
+fn calibrated(
+    name: &str,
+    free: &str,
+    image_size: Option<(usize, usize)>,
+) -> Result<Calibration, CalibrationError> {
     let free: FreeParameters = free.parse().unwrap();
     let mut settings = Settings::new(free);
     settings.image_size = image_size;

@@ -26,10 +26,7 @@ impl Distinct {
     /// `None` where nothing was given twice.
     pub fn of(views: &[View]) -> Option<Distinct> {
         let first = first_of_each(views);
-        let thin: Vec<Option<Thinned>> = {
-            let mut keys = Vec::new();
-            views.iter().map(|view| Thinned::of(view, &mut keys)).collect()
-        };
+        let thin: Vec<Option<Thinned>> = views.iter().map(Thinned::of).collect();
         if thin.iter().all(Option::is_none) && first.iter().enumerate().all(|(i, &first)| i == first) {
             return None;
         }
@@ -77,12 +74,9 @@ struct Thinned {
 }
 
 impl Thinned {
-    /// `None` where all marks are different, which is told by sorted keys without looking at them in pairs.
-    fn of(view: &View, keys: &mut Vec<u64>) -> Option<Thinned> {
-        keys.clear();
-        keys.extend(view.pairs().map(key));
-        keys.sort_unstable();
-        if keys.windows(2).all(|pair| pair[0] != pair[1]) {
+    /// `None` where all marks are different.
+    fn of(view: &View) -> Option<Thinned> {
+        if are_different(view) {
             return None;
         }
         let (mut points, mut pixels, mut marks): (Vec<Vec2>, Vec<Vec2>, Vec<usize>) = Default::default();
@@ -100,6 +94,28 @@ impl Thinned {
         let view = View::new(points, pixels).expect("a part of a view is one");
         first.map(|first| Thinned { view, marks, first })
     }
+}
+
+/// Bits of the table in which marks are looked up: few enough to clear for every view, and so many that of 63 different marks two share one in
+/// a view of eight.
+const TABLE_BITS: u32 = 14;
+
+/// Whether no mark is a copy of another: by a table of their keys' bits, and by sorted keys where two share a bit.
+fn are_different(view: &View) -> bool {
+    let mut table = [0_u64; 1 << (TABLE_BITS - 6)];
+    let is_new = |pair| {
+        let at = key(pair).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - TABLE_BITS);
+        let (word, bit) = (&mut table[(at >> 6) as usize], 1 << (at & 63));
+        let is_new = *word & bit == 0;
+        *word |= bit;
+        is_new
+    };
+    if view.pairs().all(is_new) {
+        return true;
+    }
+    let mut keys: Vec<u64> = view.pairs().map(key).collect();
+    keys.sort_unstable();
+    keys.windows(2).all(|pair| pair[0] != pair[1])
 }
 
 /// Equal for equal pairs, and hardly ever for others.
