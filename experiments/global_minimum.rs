@@ -266,6 +266,7 @@ fn tell_errors(record: &mut Record, any: &Measured) {
         "error over stated standard deviation, right results without a warning that questions it",
         &columns,
     );
+    let mut cases = Vec::new();
     for parameter in Parameter::ALL {
         let z: Vec<f64> = any
             .lines
@@ -276,9 +277,28 @@ fn tell_errors(record: &mut Record, any: &Measured) {
         let mean = z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64;
         let largest = z.iter().fold(0.0f64, |most, z| most.max(z.abs()));
         table.push([parameter.name().into(), z.len().into(), mean.into(), Cell::from(largest)]);
+        let chance = MEAN_DEVIATIONS * (2.0 / z.len() as f64).sqrt();
+        cases.push((format!("{parameter}: {mean:.3} of {}", z.len()), (mean - 1.0).abs() <= MEAN_OFF + chance));
     }
     record.table(table);
+    let rate = cases.len() as f64 * MEAN_CHANCE;
+    record.claim(
+        Claim::all_of(
+            "deviations-are-true",
+            "without a warning that questions them, the mean squared error over the stated variance is 1 within five per cent, parameter by parameter",
+            cases,
+            "a mean of n squared standard normal numbers has a standard deviation of sqrt(2 / n), and 3.3 of them are allowed besides",
+        )
+        .with_false_alarm_rate(rate),
+    );
 }
+
+/// How far a mean squared error over the stated variance may be off.
+const MEAN_OFF: f64 = 0.05;
+/// And chance besides, in standard deviations of such a mean.
+const MEAN_DEVIATIONS: f64 = 3.3;
+/// A normal number lies farther out with this probability.
+const MEAN_CHANCE: f64 = 9.7e-4;
 
 fn families_table(measured: &[Measured]) -> Table {
     let columns = [

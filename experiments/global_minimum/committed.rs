@@ -46,6 +46,9 @@ fn letter(warning: &str) -> Option<char> {
         "Ambiguous" => Some('m'),
         "FoldsInsideImage" => Some('b'),
         "NoDegreesOfFreedom" => Some('d'),
+        "FewDegreesOfFreedom" => Some('s'),
+        "NotCertified" => Some('c'),
+        "TwinPose" => Some('t'),
         "NotConverged" => Some('n'),
         _ => Some('o'),
     }
