@@ -278,7 +278,10 @@ fn tell_errors(record: &mut Record, any: &Measured) {
         let largest = z.iter().fold(0.0f64, |most, z| most.max(z.abs()));
         table.push([parameter.name().into(), z.len().into(), mean.into(), Cell::from(largest)]);
         let chance = MEAN_DEVIATIONS * (2.0 / z.len() as f64).sqrt();
-        cases.push((format!("{parameter}: {mean:.3} of {}", z.len()), (mean - 1.0).abs() <= MEAN_OFF + chance));
+        cases.push((
+            format!("{parameter}: {mean:.3} of {}", z.len()),
+            (mean - 1.0).abs() <= MEAN_OFF + chance,
+        ));
     }
     record.table(table);
     let rate = cases.len() as f64 * MEAN_CHANCE;

@@ -64,6 +64,14 @@ fn without_anything_to_certify_by_a_warning_says_so() {
     assert!(result.warnings.iter().any(few), "{:?}", result.warnings);
 }
 
+/// Homographies bend along with a board, so that the certificate holds; neighbours' residuals do not.
+#[test]
+fn a_bent_board_shows_in_the_residuals() {
+    let result = calibrated("bent-board", CHAPTER, None).unwrap();
+    let is_structured = |w: &Warning| matches!(w, Warning::Structured { correlation } if *correlation > 0.5);
+    assert!(result.warnings.iter().any(is_structured), "{:?}", result.warnings);
+}
+
 #[test]
 fn copies_are_found_behind_their_rounding() {
     let error = calibrated("copies-with-rounding", CHAPTER, None).unwrap_err();

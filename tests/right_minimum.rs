@@ -188,6 +188,17 @@ fn a_bent_board_is_above_the_floor_and_the_result_says_so() {
     assert!(result.warnings.iter().any(|w| matches!(w, Warning::AboveFloor { .. })));
 }
 
+/// Of white noise: the warning is to come once in a million sets.
+#[test]
+fn the_residuals_of_a_model_that_holds_show_no_structure() {
+    let scene = Scene::chapter();
+    for trial in 0..500 {
+        let result =
+            calibrate(&scene.observe(0.1, &mut noise("structure", trial)), &Settings::chapter()).unwrap();
+        assert!(!result.warnings.iter().any(|w| matches!(w, Warning::Structured { .. })), "{trial}");
+    }
+}
+
 /// The certificate's probability is an upper bound: at 5 % it refuses no more than 5 % of right minima.
 #[test]
 fn the_certificate_refuses_no_more_than_it_says() {

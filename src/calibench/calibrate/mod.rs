@@ -30,6 +30,7 @@ mod settings;
 pub mod single_plane;
 mod start;
 mod strays;
+mod structure;
 mod system;
 mod target_frame;
 mod termination;

@@ -144,6 +144,11 @@ pub enum Warning {
         /// The same above; infinite where the cost never rises.
         above: f64,
     },
+    /// Residuals of neighbouring marks agree: something that is no noise is left out of the model.
+    Structured {
+        /// Correlation coefficient of a mark's residual with the next one's.
+        correlation: f64,
+    },
     /// Two parameters cannot be told apart well: an error of one is made up by the other.
     Correlated {
         /// One.
@@ -252,6 +257,11 @@ impl fmt::Display for Warning {
                 f,
                 "the standard deviation of {parameter} misleads: an interval of two of them truly reaches {below:.2} times as far below \
                  and {above:.2} times above; state intervals by the profile of the cost"
+            ),
+            Warning::Structured { correlation } => write!(
+                f,
+                "residuals of neighbouring marks agree (correlation {correlation:+.2}), which noise does not: the model leaves something out (a richer \
+                 lens, a board that is not flat or not as given, noise that marks share), and the standard deviations are too small"
             ),
             Warning::Correlated { a, b, correlation } => write!(
                 f,

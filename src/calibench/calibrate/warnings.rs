@@ -4,7 +4,7 @@ use super::intervals::Skewed;
 use super::intervals::student_quantile;
 use super::report::{STRONG_CORRELATION, UNCERTAIN_FOCAL};
 use super::search::{Rival, Twin};
-use super::{Calibration, Certificate, Covariance, Termination, Warning};
+use super::{Calibration, Certificate, Covariance, Termination, Warning, structure};
 use crate::camera::{Camera, FreeParameters, Parameter};
 use crate::geometry::Pose;
 
@@ -31,6 +31,7 @@ pub(super) fn of(
     {
         warnings.push(Warning::NotCertified);
     }
+    warnings.extend(structure::structure(&calibration.residuals));
     warnings.extend(twin_pose(&twins));
     warnings.extend(from_behind(calibration));
     warnings.extend(correlated(&calibration.covariance, calibration.free));
