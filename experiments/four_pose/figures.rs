@@ -38,8 +38,9 @@ pub fn views(draw: &Draw) -> Figure {
         })
         .collect();
     let caption = format!(
-        "The target's 63 points in the four views of the virtual camera, 120 mm away, with 0.1 px of noise (seed {}), in \
-         pixels. Notice that no point comes near a corner of the image, where the distortion is largest.",
+        "The target's 63 points in the four views of the virtual camera, 120 mm away, with 0.1 px \
+            of noise (seed {}), in pixels. Notice that no point comes near a corner of the image, \
+            where the distortion is largest.",
         draw.seed
     );
     Figure::panels("views", &panels, 2, caption)
@@ -70,9 +71,9 @@ pub fn residuals(draw: &Draw) -> Figure {
         })
         .collect();
     let caption = format!(
-        "Residuals (predicted minus observed) of the calibrated camera in the four views, drawn {ARROW_SCALE} times longer \
-         than they are; the arrow at the lower left is {REFERENCE_PX} px long. Seed {}, noise 0.1 px. Notice that they have no \
-         pattern: what is left is noise.",
+        "Residuals (predicted minus observed) of the calibrated camera in the four views, drawn \
+            {ARROW_SCALE} times longer than they are; the arrow at the lower left is {REFERENCE_PX} \
+            px long. Seed {}, noise 0.1 px. Notice that they have no pattern: what is left is noise.",
         draw.seed
     );
     Figure::panels("residuals", &panels, 2, caption)
@@ -112,9 +113,10 @@ pub fn residual_distribution(draw: &Draw) -> Figure {
     .error_bars_as("expected, two standard deviations of a bin", &expected, Look::ink())
     .line_as("standard normal", &curve, Look::series(1).dash(Dash::Solid).width(2.0));
     let caption = format!(
-        "Every residual coordinate of the calibrated camera over its own predicted standard deviation, 0.1 px times \
-         sqrt(1 - leverage), with the standard normal density (seed {}). Notice that the noise model is met once the \
-         leverage, 30 in 504 on average, is allowed for.",
+        "Every residual coordinate of the calibrated camera over its own predicted standard \
+            deviation, 0.1 px times sqrt(1 - leverage), with the standard normal density (seed {}). \
+            Notice that the noise model is met once the leverage, 30 in 504 on average, is allowed \
+            for.",
         draw.seed
     );
     Figure::plot("residual-distribution", &plot, caption)
@@ -150,8 +152,9 @@ pub fn ellipse(draw: &Draw, book: &Book, trials: &Outcome) -> Figure {
         .points_as("ours", &of(&draw.calibration.camera), Look::series(0).marker(Marker::Square).size(5.0))
         .points_as("book", &of(&book.camera), Look::series(1).marker(Marker::Diamond).size(5.0));
     let caption = format!(
-        "k1 and k2 of our draw (seed {}), of the book's and of {CLOUD} trials, about the truth, with the regions that the \
-         Cramer-Rao bound predicts to hold 68, 95 and 99.7 % of draws. Notice that an error of one is made up by the other.",
+        "k1 and k2 of our draw (seed {}), of the book's and of {CLOUD} trials, about the truth, \
+            with the regions that the Cramer-Rao bound predicts to hold 68, 95 and 99.7 % of draws. \
+            Notice that an error of one is made up by the other.",
         draw.seed
     );
     Figure::plot("k1-k2", &plot, caption)
@@ -186,9 +189,9 @@ pub fn rmse(draw: &Draw, book: &Book, trials: &Outcome) -> Figure {
             Look::ink().dash(Dash::Dotted).width(2.0),
         );
     let caption = format!(
-        "RMSE of {TRIALS} calibrations of the four views with fresh noise of 0.1 px (seed {}), in pixels, and the predicted \
-         density: chi with 474 degrees of freedom. Notice that it lies just under the noise floor, as 30 parameters absorb \
-         noise.",
+        "RMSE of {TRIALS} calibrations of the four views with fresh noise of 0.1 px (seed {}), in \
+            pixels, and the predicted density: chi with 474 degrees of freedom. Notice that it lies \
+            just under the noise floor, as 30 parameters absorb noise.",
         draw.seed
     );
     Figure::plot("rmse", &plot, caption)
@@ -208,8 +211,9 @@ pub fn blind(draw: &Draw, trials: &Outcome) -> Figure {
     .hline_as("noise floor", draw.rmse.noise_floor_px(), Look::ink().dash(Dash::Dotted).width(2.0))
     .x_range(0.0, normal_quantile(0.9999));
     let caption = format!(
-        "RMSE against the size of the error of k2 (one standard deviation is {sd:.4}) in {CLOUD} trials (seed {}). Notice that \
-         a calibration with a large error of k2 reprojects as well as one without.",
+        "RMSE against the size of the error of k2 (one standard deviation is {sd:.4}) in {CLOUD} \
+            trials (seed {}). Notice that a calibration with a large error of k2 reprojects as well \
+            as one without.",
         draw.seed
     );
     Figure::plot("rmse-and-k2", &plot, caption)
@@ -253,8 +257,9 @@ pub fn overfitting(grids: &[Grid]) -> Figure {
         .log_x()
         .log_y()
         .y_range(0.01, 0.1);
-    let caption = "The four views with fewer points on the same 80 x 60 mm (3 x 3 to 9 x 7), 300 trials each: RMSE in pixels and \
-                   spread of k2, with 95 % intervals and predictions. Notice that the RMSE falls far under the floor just \
-                   where the parameters are worst: it is low because they fit the noise.";
+    let caption = "The four views with fewer points on the same 80 x 60 mm (3 x 3 to 9 x 7), 300 trials \
+        each: RMSE in pixels and spread of k2, with 95 % intervals and predictions. Notice that \
+        the RMSE falls far under the floor just where the parameters are worst: it is low \
+        because they fit the noise.";
     Figure::panels("few-points", &[rmse, k2], 2, caption)
 }

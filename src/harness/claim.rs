@@ -1,8 +1,12 @@
-//! Is the number correct? A statement about one value, with the interval that theory or an oracle gives and its reason.
+//! Is the number correct? A statement about one value, with the interval that theory or an oracle gives and
+//! its reason.
 
 use super::predicted::Predicted;
+use super::record::Record;
+use calibench::evaluate::Interval;
 
-/// A statement that holds or does not. Blessing never changes it: a claim that fails is a finding about the code.
+/// A statement that holds or does not. Blessing never changes it: a claim that fails is a finding about the
+/// code.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Claim {
     /// Name within the experiment, in kebab-case.
@@ -21,7 +25,8 @@ pub struct Claim {
     pub false_alarm_rate: Option<f64>,
     /// Whether the value lies in the interval.
     pub held: bool,
-    /// How many cases a claim about many examined, and what one of them is called; `None` for a claim about one value.
+    /// How many cases a claim about many examined, and what one of them is called; `None` for a claim about
+    /// one value.
     pub cases: Option<Cases>,
     /// The cases that failed, for a claim about many.
     pub failures: Vec<String>,
@@ -139,6 +144,102 @@ impl Claim {
     /// States the unit of the value and the interval.
     pub fn in_unit(self, unit: impl Into<String>) -> Claim {
         Claim { unit: unit.into(), ..self }
+    }
+}
+
+/// A claim whose statement is said: what must hold, and at which rate it may fail by chance.
+/// [`ClaimDraft::because`] closes it, so that no claim is without a reason.
+///
+/// ```text
+/// record
+///     .claim_that("fx-unbiased", "the mean error of fx is zero within the uncertainty of the mean")
+///     .within(bias, interval)
+///     .unit("px")
+///     .at_rate(1e-4)
+///     .because("the bound's standard deviation over the root of the number of trials, normal");
+/// ```
+#[derive(Debug)]
+#[must_use = "a claim counts once its reason is said: `because`"]
+pub struct ClaimDraft<'a> {
+    record: &'a mut Record,
+    /// Value, interval and cases are those of a claim that nothing fulfils until one of the conditions is
+    /// said.
+    claim: Claim,
+    /// What stands before the reason: a predicted distribution.
+    prediction: Option<String>,
+}
+
+impl Record {
+    /// Begins a claim: its name within the experiment, and what is claimed, as a sentence.
+    pub fn claim_that(&mut self, id: impl Into<String>, statement: impl Into<String>) -> ClaimDraft<'_> {
+        let claim = Claim::within(id, statement, f64::NAN, (f64::NAN, f64::NAN), "");
+        ClaimDraft { record: self, claim, prediction: None }
+    }
+}
+
+impl ClaimDraft<'_> {
+    fn holds(self, value: f64, (low, high): (f64, f64)) -> Self {
+        let held = (low..=high).contains(&value);
+        Self { claim: Claim { value, interval: (low, high), held, ..self.claim }, ..self }
+    }
+
+    /// `value` lies in the interval, both ends included. NaN is never within.
+    pub fn within(self, value: f64, interval: Interval) -> Self {
+        self.holds(value, (interval.low, interval.high))
+    }
+
+    /// `value <= bound`.
+    pub fn at_most(self, value: f64, bound: f64) -> Self {
+        self.holds(value, (f64::NEG_INFINITY, bound))
+    }
+
+    /// `value >= bound`.
+    pub fn at_least(self, value: f64, bound: f64) -> Self {
+        self.holds(value, (bound, f64::INFINITY))
+    }
+
+    /// Every named case holds; `noun` says in the plural what they are. The value is the number of cases that
+    /// fail; no case at all is a failure too.
+    pub fn every<N: Into<String>>(self, noun: &str, cases: impl IntoIterator<Item = (N, bool)>) -> Self {
+        let mut count = 0;
+        let mut failures = Vec::new();
+        for (name, held) in cases {
+            count += 1;
+            if !held {
+                failures.push(name.into());
+            }
+        }
+        if count == 0 {
+            failures.push("no case was examined".to_string());
+        }
+        let all = self.holds(failures.len() as f64, (0.0, 0.0));
+        let cases = Some(Cases { count, noun: noun.to_string() });
+        Self { claim: Claim { failures, cases, ..all.claim }, ..all }
+    }
+
+    /// `value` lies in the central interval of its predicted distribution that a correct program misses at
+    /// `false_alarm_rate`. The distribution stands before the reason.
+    pub fn drawn_from(self, value: f64, predicted: &Predicted, false_alarm_rate: f64) -> Self {
+        let judged = self.holds(value, predicted.interval(false_alarm_rate));
+        Self { prediction: Some(predicted.to_string()), ..judged }
+            .at_rate(predicted.effective_rate(false_alarm_rate))
+    }
+
+    /// How often a correct program fails the claim.
+    pub fn at_rate(self, false_alarm_rate: f64) -> Self {
+        Self { claim: Claim { false_alarm_rate: Some(false_alarm_rate), ..self.claim }, ..self }
+    }
+
+    /// The unit of the value and the interval.
+    pub fn unit(self, unit: impl Into<String>) -> Self {
+        Self { claim: Claim { unit: unit.into(), ..self.claim }, ..self }
+    }
+
+    /// Where the interval comes from. Adds the claim to the record.
+    pub fn because(self, reason: impl Into<String>) {
+        let reason = reason.into();
+        let reason = self.prediction.map_or(reason.clone(), |predicted| format!("{predicted}; {reason}"));
+        self.record.claim(Claim { reason, ..self.claim });
     }
 }
 
