@@ -18,10 +18,10 @@ use calibench_harness::{Band, Context, Experiment, ExperimentError, Record, Tabl
 pub const EXPERIMENT: Experiment = Experiment {
     id: "certified-digits",
     title: "Digits of certified results",
-    question: "The least-squares solution of each problem in reference/ is certified to twenty digits \
-        by an independent program. How many digits of it do calibrators reach? Expected: \
-        polished, this library's solver eleven or more of every parameter, nine where tilts of \
-        two degrees hardly separate focal length from distance.",
+    question: "The least-squares solution of each problem in reference/ is certified to twenty digits by an \
+               independent program. How many digits of it do calibrators reach? Expected: polished, this \
+               library's solver eleven or more of every parameter, nine where tilts of two degrees hardly \
+               separate focal length from distance.",
     seed: 1,
     takes_image: false,
     run,
@@ -63,8 +63,8 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     record
         .claim_that(
             "digits-are-reached",
-            "polished, this library's solver reaches 11 digits of every parameter of every problem, 9 \
-        of the near-degenerate one",
+            "polished, this library's solver reaches 11 digits of every parameter of every problem, 9 of \
+             the near-degenerate one",
         )
         .every("cases", problems.iter().zip(&measured).map(reached))
         .because("certified by an independent program in numbers of 40 and 60 digits: reference/README.md");

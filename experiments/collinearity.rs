@@ -15,7 +15,7 @@
 use calibench::board::View;
 use calibench::calibrate::single_plane::{SinglePlane, SinglePlaneOptions, calibrate_single_plane};
 use calibench::camera::Camera;
-use calibench::evaluate::{Interval, Sample, distribution::normal_two_sided};
+use calibench::evaluate::Sample;
 use calibench::geometry::{Affine, LineFit, Vec2};
 use calibench::raster::Raster;
 use calibench::rectify::{OutputView, RectifyMap, output_camera, rectify_points};
@@ -24,6 +24,7 @@ use calibench::synth::scene::looking_at_centre;
 use calibench::synth::{Scene, Stream, StreamKey, Truth};
 use calibench_harness::figure::density;
 use calibench_harness::published::{self, Entry};
+use calibench_harness::stats::{Interval, normal_two_sided};
 use calibench_harness::{
     Band, Cell, Context, Experiment, ExperimentError, Figure, HeatMap, Look, Plot, Predicted, Record, Table,
 };
@@ -49,12 +50,12 @@ use tangential::with_tangential;
 pub const EXPERIMENT: Experiment = Experiment {
     id: "collinearity",
     title: "How straight a single-plane calibration makes what the lens bent",
-    question: "One fronto-parallel photograph of the target, 63 noisy points, calibrates homography, k1 \
-        and k2. How large are its residuals, how straight does it make the target's top row, \
-        how well do corrected points fit the target in millimetres, and do the images agree that \
-        it and the true model rectify? Expected: 0.1493 px, 1.635 px before and 0.121 px after, \
-        0.0329 mm RMS and 0.0782 mm at most, each inside its predicted distribution; and \
-        corrected pixels read as millimetres are wrong by 427.",
+    question: "One fronto-parallel photograph of the target, 63 noisy points, calibrates homography, k1 and \
+               k2. How large are its residuals, how straight does it make the target's top row, how well do \
+               corrected points fit the target in millimetres, and do the images agree that it and the true \
+               model rectify? Expected: 0.1493 px, 1.635 px before and 0.121 px after, 0.0329 mm RMS and \
+               0.0782 mm at most, each inside its predicted distribution; and corrected pixels read as \
+               millimetres are wrong by 427.",
     seed: 1,
     takes_image: false,
     run,
@@ -114,17 +115,16 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     record.figure(predicted_figure(&ours, &draws, &book, context.seed));
     record.figure(residual_figure(&view, &ours[MAIN], context.seed));
     record.note(
-        "The chapter does not say what its single-plane calibration estimates. Taken together, \
-            its five numbers exclude a radial lens whose centre is held, at the image's centre or at \
-            the true one; a free centre, and a centre held at the image's with p1 and p2 estimated, \
-            fit them equally well (table `joint`). The five numbers are reconciled with a free \
-            centre. (RMS is per point, the chapter's definition; table `readings` has the other \
-            reading.)",
+        "The chapter does not say what its single-plane calibration estimates. Taken together, its five \
+         numbers exclude a radial lens whose centre is held, at the image's centre or at the true one; a \
+         free centre, and a centre held at the image's with p1 and p2 estimated, fit them equally well \
+         (table `joint`). The five numbers are reconciled with a free centre. (RMS is per point, the \
+         chapter's definition; table `readings` has the other reading.)",
     );
     record.note(
-        "With the same K, a barrel lens leaves no pixel of the rectified image without data: \
-            every output pixel was seen nearer to the centre. Pixels without data near the border, \
-            of which the chapter speaks, appear when the output shows every pixel of the photograph.",
+        "With the same K, a barrel lens leaves no pixel of the rectified image without data: every output \
+         pixel was seen nearer to the centre. Pixels without data near the border, of which the chapter \
+         speaks, appear when the output shows every pixel of the photograph.",
     );
     Ok(record)
 }
@@ -223,7 +223,7 @@ fn centres_table(ours: &[Found], noise_free: &[Found], draws: &[Draw], book: &Bo
         ("draws_below_book", "%"),
     ];
     let caption = "the five quantities for each treatment of the distortion centre: without noise, over the \
-        draws, ours, the book's";
+                   draws, ours, the book's";
     let mut table = Table::new("centres", caption, &columns);
     for (i, centre) in CENTRES.iter().enumerate() {
         let (exact, drawn) = (noise_free[i].quantities(), ours[i].quantities());

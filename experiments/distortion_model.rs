@@ -25,11 +25,11 @@ use rayon::prelude::*;
 pub const EXPERIMENT: Experiment = Experiment {
     id: "distortion-model",
     title: "What leaving out the tangential terms costs",
-    question: "The truth has tangential distortion, from none to half of the radial displacement (RMS \
-        over the target); the model that is fitted has none. How far are the parameters off, \
-        does the reprojection error tell, what does it cost on the plane, and up to which ratio \
-        is the smaller model the better one? Expected: at a tenth the principal point is off by \
-        many standard deviations, and the RMSE tells only when the harm is long done.",
+    question: "The truth has tangential distortion, from none to half of the radial displacement (RMS over \
+               the target); the model that is fitted has none. How far are the parameters off, does the \
+               reprojection error tell, what does it cost on the plane, and up to which ratio is the \
+               smaller model the better one? Expected: at a tenth the principal point is off by many \
+               standard deviations, and the RMSE tells only when the harm is long done.",
     seed: 0,
     takes_image: false,
     run,
@@ -350,8 +350,8 @@ fn report_directions(record: &mut Record, theory: &Theory) {
     let directions: Vec<Direction> =
         (0..180).step_by(DIRECTION_STEP_DEG).map(|degrees| Direction::of(degrees as f64, theory)).collect();
     let caption = "linear theory for every direction of the decentring: principal point at a ratio of a \
-        tenth, the ratio at which the RMSE leaves its range, and that up to which the smaller \
-        model has the better principal point";
+                   tenth, the ratio at which the RMSE leaves its range, and that up to which the smaller \
+                   model has the better principal point";
     record.table(
         Table::of("directions", caption, &directions)
             .column("direction", "deg", |d| d.degrees)
@@ -437,16 +437,16 @@ fn claim_linear(record: &mut Record, nodes: [&Node; 3], theory: &Theory, unit: V
     record
         .claim_that(
             "bias-is-linear",
-            "the bias is the linear theory's: extrapolated to a ratio of zero, bias per ratio meets \
-        it, relative to its length",
+            "the bias is the linear theory's: extrapolated to a ratio of zero, bias per ratio meets it, \
+             relative to its length",
         )
         .at_most(
             (&bias.value - &predicted).norm() / predicted.norm(),
             (bias.correction + solver) / predicted.norm(),
         )
         .because(
-            "the last correction of the extrapolation, from this run, and the solver's end: a \
-            relative gain of 1e-14",
+            "the last correction of the extrapolation, from this run, and the solver's end: a relative gain \
+             of 1e-14",
         );
     let rmse =
         AtZero::of(nodes.map(|n| DVector::from_element(1, n.rmse_px / theory.rmse_px(unit * n.ratio))));
@@ -456,16 +456,16 @@ fn claim_linear(record: &mut Record, nodes: [&Node; 3], theory: &Theory, unit: V
     record
         .claim_that(
             "rmse-is-predicted",
-            "without noise the RMSE is that of the linear theory, p' C^-1 p: extrapolated to a ratio \
-        of zero, their quotient is one",
+            "without noise the RMSE is that of the linear theory, p' C^-1 p: extrapolated to a ratio of \
+             zero, their quotient is one",
         )
         .at_most((rmse.value[0] - 1.0).abs(), rmse.correction + rounding)
         .because("the last correction of the extrapolation, from this run, and rounding of the pixels");
     record
         .claim_that(
             "extrapolation-converges",
-            "the corrections of both extrapolations fall from step to step, so that the last of them \
-        bounds what is left",
+            "the corrections of both extrapolations fall from step to step, so that the last of them bounds \
+             what is left",
         )
         .every(
             "extrapolations",
@@ -527,8 +527,8 @@ fn bias_figure(nodes: &[Node], theory: &Theory, unit: Vector2<f64>) -> Figure {
     .log_x()
     .log_y();
     let caption = "Bias of the chapter's model on exact pixels of a decentred lens, in standard deviations \
-        for noise of 0.1 px; nothing is drawn at random. Notice where each parameter reaches one \
-        standard deviation.";
+                   for noise of 0.1 px; nothing is drawn at random. Notice where each parameter reaches one \
+                   standard deviation.";
     Figure::plot("bias", &plot, caption)
 }
 
@@ -545,10 +545,9 @@ fn rmse_figure(nodes: &[Node], theory: &Theory) -> Figure {
     .line("expected with noise of 0.1 px", &noisy)
     .hline("noise alone: 99.5 % lie below", noise.interval_px(0.01).high);
     let caption = format!(
-        "RMSE per point of the model without tangential terms, without noise and as expected with \
-            noise of 0.1 px; nothing is drawn at random. The second begins at {:.4} px, what noise \
-            alone leaves after the fit of {} parameters. Notice where it passes what noise alone \
-            explains.",
+        "RMSE per point of the model without tangential terms, without noise and as expected with noise of \
+         0.1 px; nothing is drawn at random. The second begins at {:.4} px, what noise alone leaves after \
+         the fit of {} parameters. Notice where it passes what noise alone explains.",
         noise.root_mean_square_px(),
         noise.parameters
     );

@@ -25,12 +25,12 @@ use station::{History, SHIFTS_A_DAY, Station};
 pub const EXPERIMENT: Experiment = Experiment {
     id: "expiry",
     title: "Why calibrations expire, and what a check once per shift buys",
-    question: "A station's focal length follows the temperature and its bracket turns with vibration, \
-        three shifts a day. How does the systematic error of a measured length grow over a \
-        quarter, when do a threshold and a moving average (EWMA) on one reference length per \
-        shift notice it at the same false-alarm rate, and how much longer may the station run \
-        between calibrations? Expected: an error near the case study's 0.03 mm after three \
-        months, noticed by the moving average weeks earlier.",
+    question: "A station's focal length follows the temperature and its bracket turns with vibration, three \
+               shifts a day. How does the systematic error of a measured length grow over a quarter, when \
+               do a threshold and a moving average (EWMA) on one reference length per shift notice it at \
+               the same false-alarm rate, and how much longer may the station run between calibrations? \
+               Expected: an error near the case study's 0.03 mm after three months, noticed by the moving \
+               average weeks earlier.",
     seed: 1,
     takes_image: false,
     run,
@@ -90,8 +90,8 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     let judged = fleet.split_off(FLEET);
 
     record.note(
-        "The sizes of the causes are assumptions, picked round and so that their sum is of the \
-            size of the case study's drift.",
+        "The sizes of the causes are assumptions, picked round and so that their sum is of the size of the \
+         case study's drift.",
     );
     let found = results::Results { station, sd_mm, threshold, ewma, quarters, alarms, fleet, judged };
     results::numbers(&mut record, &found);

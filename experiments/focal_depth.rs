@@ -9,8 +9,7 @@
 //! What it cannot show: how other sources of depth, such as a step of known height, would separate the two.
 
 use calibench::camera::Parameter;
-use calibench::evaluate::Interval;
-use calibench::evaluate::interval::each_of;
+use calibench_harness::stats::{Interval, each_of};
 use calibench_harness::{
     Band, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
 };
@@ -20,10 +19,10 @@ use calibench_study::{Cell as StudyCell, CellSummary, Engine, Summary, within};
 pub const EXPERIMENT: Experiment = Experiment {
     id: "focal-depth",
     title: "Focal length and distance as the tilt goes to zero",
-    question: "Three views, tilted alike by 0 to 30 degrees about three axes: how well are focal length \
-        and distance known, and how do their errors go together? Expected: both spread as one \
-        over the squared sine of the tilt, their correlation goes to one, and views that face \
-        the camera are refused.",
+    question: "Three views, tilted alike by 0 to 30 degrees about three axes: how well are focal length and \
+               distance known, and how do their errors go together? Expected: both spread as one over the \
+               squared sine of the tilt, their correlation goes to one, and views that face the camera are \
+               refused.",
     seed: 22,
     takes_image: false,
     run,
@@ -247,8 +246,8 @@ fn claim_correlation(record: &mut Record, engine: &Engine, summary: &Summary, bo
         )
         .at_least(least, 0.9)
         .because(
-            "the size of the image gives f / Z at any tilt: with correlation r it is known sqrt(1 - \
-        r^2) as badly as f, 0.44 at r = 0.9",
+            "the size of the image gives f / Z at any tilt: with correlation r it is known sqrt(1 - r^2) as \
+             badly as f, 0.44 at r = 0.9",
         );
 }
 
@@ -279,8 +278,8 @@ fn claim_law(record: &mut Record, engine: &Engine, bounds: &[Option<Bound>]) -> 
             .within(exponent, Interval { low: -2.05, high: -1.95 })
             .because(
                 "tilt is known by foreshortening, cos(tilt), whose slope is the sine, and distance by \
-            sin(tilt) / Z; at 4 deg terms of fourth order are 1 % of the information from \
-            convergence, and lens distortion adds as much",
+                 sin(tilt) / Z; at 4 deg terms of fourth order are 1 % of the information from convergence, \
+                 and lens distortion adds as much",
             );
     }
     Ok(())
@@ -361,10 +360,10 @@ fn figure(engine: &Engine, summary: &Summary, bounds: &[Option<Bound>]) -> Figur
             .y_range(-0.03, 1.03),
     ];
     let caption = format!(
-        "Three views at 120 mm tilted alike, 0.1 px of noise, {} trials a tilt, seed {}, 95 % \
-            intervals; statistics of the trials that gave a camera. Notice the slope of the squared \
-            sine, the correlation that goes to one, the refusals near zero tilt, and that the few \
-            trials accepted there spread less than the bound: they are a selection.",
+        "Three views at 120 mm tilted alike, 0.1 px of noise, {} trials a tilt, seed {}, 95 % intervals; \
+         statistics of the trials that gave a camera. Notice the slope of the squared sine, the correlation \
+         that goes to one, the refusals near zero tilt, and that the few trials accepted there spread less \
+         than the bound: they are a selection.",
         summary.cells[0].trials, engine.spec.seed
     );
     Figure::panels("tilt", &panels, 2, caption)

@@ -12,15 +12,13 @@
 use calibench::board::View;
 use calibench::calibrate::{Calibration, Settings, calibrate};
 use calibench::camera::{Camera, FreeParameters, Parameter};
-use calibench::evaluate::distribution::{fisher_cdf, normal_cdf, normal_two_sided, round_significant};
-use calibench::evaluate::interval::each_of;
-use calibench::evaluate::{
-    BoundError, Errors, Interval, RmseDistribution, Sample, cramer_rao, leverages, reconcile,
-};
+use calibench::evaluate::distribution::{fisher_cdf, round_significant};
+use calibench::evaluate::{BoundError, Errors, RmseDistribution, Sample, cramer_rao, leverages, reconcile};
 use calibench::geometry::Vec2;
 use calibench::synth::{Scene, Stream, StreamKey, Truth, scene::looking_at_centre};
 use calibench_harness::figure::density;
 use calibench_harness::monte_carlo::Estimate;
+use calibench_harness::stats::{Interval, each_of, normal_cdf, normal_two_sided};
 use calibench_harness::{
     Band, Cell, Context, Dash, Experiment, ExperimentError, Figure, Look, Marker, MonteCarlo, Outcome, Plot,
     Predicted, Record, Table,
@@ -34,11 +32,11 @@ mod weak;
 pub const EXPERIMENT: Experiment = Experiment {
     id: "four-pose",
     title: "The camera from four views",
-    question: "Four views of 63 points with 0.1 px of noise: how close do fx, fy, cx, cy, k1 and k2 \
-        come to the truth, is the book's table one plausible draw, does the solver attain the \
-        Cramer-Rao bound, and does the reprojection error tell? Expected: both tables inside the \
-        predicted distribution, RMSE 0.1371 +- 0.0045 px just under the floor of 0.1414 px, and \
-        no relation between RMSE and the errors of k1 and k2.",
+    question: "Four views of 63 points with 0.1 px of noise: how close do fx, fy, cx, cy, k1 and k2 come to \
+               the truth, is the book's table one plausible draw, does the solver attain the Cramer-Rao \
+               bound, and does the reprojection error tell? Expected: both tables inside the predicted \
+               distribution, RMSE 0.1371 +- 0.0045 px just under the floor of 0.1414 px, and no relation \
+               between RMSE and the errors of k1 and k2.",
     seed: 1,
     takes_image: false,
     run,
@@ -327,7 +325,7 @@ fn claim_residuals(record: &mut Record, draw: &Draw) {
         .within(draw.leverage_sum, Interval::around(parameters, convergence))
         .because(
             "trace of the hat matrix; each leverage to the 1e-6 of a standard deviation to which the \
-        refinement converges",
+             refinement converges",
         );
     let largest = draw.standardised.iter().fold(0.0f64, |m, z| m.max(z.abs()));
     let bound = normal_two_sided(each_of(draw.standardised.len(), RATE));
@@ -342,8 +340,8 @@ fn claim_residuals(record: &mut Record, draw: &Draw) {
         .unit("sd")
         .at_rate(RATE)
         .because(
-            "each is standard normal once divided by sigma sqrt(1 - leverage); Bonferroni over all, \
-        valid whatever their correlations",
+            "each is standard normal once divided by sigma sqrt(1 - leverage); Bonferroni over all, valid \
+             whatever their correlations",
         );
 }
 

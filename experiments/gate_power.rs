@@ -20,10 +20,10 @@ pub const EXPERIMENT: Experiment = Experiment {
     id: "gate-power",
     title: "What the gate catches, and how soon",
     question: "Faults of the kinds that calibrators have are planted in the correct solver: exchanged \
-        parameters, wrong signs, definitions and units, lost views, rounded data, searches that \
-        end too early, confident answers to degenerate data. Which of them does the gate catch, \
-        after how many problems, and by which property? Expected: every gross one within 32 \
-        samples a scenario, and the correct solver not at all.",
+               parameters, wrong signs, definitions and units, lost views, rounded data, searches that end \
+               too early, confident answers to degenerate data. Which of them does the gate catch, after \
+               how many problems, and by which property? Expected: every gross one within 32 samples a \
+               scenario, and the correct solver not at all.",
     seed: 1,
     takes_image: false,
     run,
@@ -152,7 +152,7 @@ fn thorough(record: &mut Record) -> Result<(), ExperimentError> {
                 &name,
                 format!(
                     "at a stated rate of {per_thousand} in a thousand, no more quick runs of the correct \
-                        solver fail than that"
+                     solver fail than that"
                 ),
             )
             .at_most(row.alarms as f64, row.most(FALSE_ALARM_RATE / STATED_RATES as f64) as f64)

@@ -15,8 +15,9 @@ mod units;
 
 use black_box::BlackBox;
 use calibench::camera::{BrownConrady, Camera, FreeParameters, Parameter};
-use calibench::evaluate::{cramer_rao, interval::each_of};
+use calibench::evaluate::cramer_rao;
 use calibench::synth::{Scene, Stream, StreamKey, Truth};
+use calibench_harness::stats::each_of;
 use calibench_harness::{Band, Context, Experiment, ExperimentError, Figure, Look, Plot, Record, Table};
 use layout::{DISTORTION, LINEAR, Row};
 use rayon::prelude::*;
@@ -26,11 +27,11 @@ use statrs::distribution::{ContinuousCDF, Normal};
 pub const EXPERIMENT: Experiment = Experiment {
     id: "interface",
     title: "Which truths expose a misread interface",
-    question: "A black box returns its camera in a matrix of undocumented layout and corrects points \
-        into undocumented units. Which synthetic truths expose an exchange of fy and cx, and \
-        every other order of the row, and which hide it? Which checks of a point call notice \
-        that its millimetres are pixels? Expected: a truth hides the layouts that exchange equal \
-        values and no others; the pixels differ from the millimetres by 427.",
+    question: "A black box returns its camera in a matrix of undocumented layout and corrects points into \
+               undocumented units. Which synthetic truths expose an exchange of fy and cx, and every other \
+               order of the row, and which hide it? Which checks of a point call notice that its \
+               millimetres are pixels? Expected: a truth hides the layouts that exchange equal values and \
+               no others; the pixels differ from the millimetres by 427.",
     seed: 1,
     takes_image: false,
     run,
@@ -161,7 +162,7 @@ fn report_layouts(record: &mut Record, cases: &[Case]) {
     record.group("", count()).number("hidden-chapter-distortion", chapter.distortion.hidden() as f64, what);
 
     let caption = "what every truth says of the layouts of both rows; wrong layouts that stay hidden, found \
-        and predicted";
+                   and predicted";
     record.table(
         Table::of("layouts", caption, cases)
             .column("truth", "", |case| case.name)
@@ -195,7 +196,7 @@ fn report_layouts(record: &mut Record, cases: &[Case]) {
 
 fn report_sweep(record: &mut Record, sweep: &[Step]) {
     let caption = "deviation of the number read as fy from the true fy when fy and cx are exchanged, in \
-        standard deviations";
+                   standard deviations";
     record.table(
         Table::of("sweep", caption, sweep)
             .column("fy_minus_cx", "px", |step| step.difference_px)
@@ -222,9 +223,9 @@ fn report_sweep(record: &mut Record, sweep: &[Step]) {
     .hline("limit", limit)
     .hline("", -limit);
     let caption = format!(
-        "What a reader who exchanges fy and cx sees in fy's place, in standard deviations of fy, \
-            for truths whose focal length approaches cx; noise {SIGMA_PX} px, one calibration a \
-            point, seed {}. Notice the blind zone between the limits.",
+        "What a reader who exchanges fy and cx sees in fy's place, in standard deviations of fy, for truths \
+         whose focal length approaches cx; noise {SIGMA_PX} px, one calibration a point, seed {}. Notice \
+         the blind zone between the limits.",
         record.seed()
     );
     record.figure(Figure::plot("blind-zone", &plot, caption));

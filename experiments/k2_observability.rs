@@ -19,10 +19,10 @@
 
 use calibench::calibrate::{Covariance, Settings};
 use calibench::camera::{FreeParameters, Parameter};
-use calibench::evaluate::interval::each_of;
-use calibench::evaluate::{BoundError, Interval, RmseDistribution, cramer_rao};
+use calibench::evaluate::{BoundError, RmseDistribution, cramer_rao};
 use calibench::geometry::{Pose, Vec2, Vec3};
 use calibench::synth::{Scene, Truth, scene::looking_at_centre};
+use calibench_harness::stats::{Interval, each_of};
 use calibench_harness::{
     Band, Context, Experiment, ExperimentError, MonteCarlo, Outcome, Progress, Record, Rows, Table,
 };
@@ -34,11 +34,11 @@ mod one_distance;
 pub const EXPERIMENT: Experiment = Experiment {
     id: "k2-observability",
     title: "What makes k2 and the focal length observable",
-    question: "Four views, from a third of the way to the image's corners to all of it, and from no \
-        tilt to 45 degrees: how well are k2 and fx known, how strongly are k1 and k2 correlated, \
-        and does the RMSE tell? Expected: the solver attains the Cramer-Rao bound wherever \
-        there is one; the standard deviation of k2 changes by orders of magnitude while the RMSE \
-        stays flat; without tilt the data are refused.",
+    question: "Four views, from a third of the way to the image's corners to all of it, and from no tilt to \
+               45 degrees: how well are k2 and fx known, how strongly are k1 and k2 correlated, and does \
+               the RMSE tell? Expected: the solver attains the Cramer-Rao bound wherever there is one; the \
+               standard deviation of k2 changes by orders of magnitude while the RMSE stays flat; without \
+               tilt the data are refused.",
     seed: 1,
     takes_image: false,
     run,
@@ -340,8 +340,8 @@ fn claim_no_tilt(record: &mut Record, map: &Map) {
     record
         .claim_that(
             "no-tilt-is-refused",
-            "without tilt every trial is refused, at any coverage, and focal length and distance are \
-        named as inseparable",
+            "without tilt every trial is refused, at any coverage, and focal length and distance are named \
+             as inseparable",
         )
         .at_least(refused as f64, trials as f64)
         .at_rate(trials as f64 * 1e-9)
@@ -380,7 +380,7 @@ fn claim_bound_attained(record: &mut Record, map: &Map) {
             .at_rate(RATE)
             .because(format!(
                 "sample deviation over {TRIALS} Gaussian values: ratio in [{:.4}, {:.4}], Bonferroni over \
-                    {} nodes",
+                 {} nodes",
                 ratio.low,
                 ratio.high,
                 nodes.len()
@@ -415,7 +415,7 @@ fn claim_flat_rmse(record: &mut Record, map: &Map) {
         .at_rate(RATE)
         .because(
             "252 points and 30 parameters everywhere: sigma / sqrt(N) times chi with 474 degrees of \
-        freedom; Bonferroni over the nodes",
+             freedom; Bonferroni over the nodes",
         );
     let (k2, fx) = (map.range(|n| n.bound_sd(Parameter::K2)), map.range(|n| n.bound_sd(Parameter::Fx)));
     let rmse = map.range(Node::sampled_rmse_px);
@@ -427,13 +427,13 @@ fn claim_flat_rmse(record: &mut Record, map: &Map) {
     record
         .claim_that(
             "k2-changes-by-orders-of-magnitude",
-            "among nodes of equal RMSE the standard deviation of k2 changes by two orders of \
-        magnitude or more",
+            "among nodes of equal RMSE the standard deviation of k2 changes by two orders of magnitude or \
+             more",
         )
         .at_least(k2, 100.0)
         .because(
-            "k2 moves a point by r^5: reaching 1 / 0.3 times as far is worth 3.3^5 = 410, or less \
-            where k1 takes part of it up",
+            "k2 moves a point by r^5: reaching 1 / 0.3 times as far is worth 3.3^5 = 410, or less where k1 \
+             takes part of it up",
         );
 }
 

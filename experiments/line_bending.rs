@@ -18,9 +18,9 @@ pub const EXPERIMENT: Experiment = Experiment {
     id: "line-bending",
     title: "How far the lens bends a straight line",
     question: "61 points of a straight line near the top of the image are distorted with the chapter's \
-        lens. How far do they leave a straight line, how does that depend on the line's height \
-        and on k1, and does correction with the true model bring it back? Expected: 4.678 px at \
-        most, 2.249 px RMS, and nothing but rounding after correction.",
+               lens. How far do they leave a straight line, how does that depend on the line's height and \
+               on k1, and does correction with the true model bring it back? Expected: 4.678 px at most, \
+               2.249 px RMS, and nothing but rounding after correction.",
     seed: 0,
     takes_image: false,
     run,
@@ -251,8 +251,8 @@ fn claim_directions(record: &mut Record, bent: &Bent, opposite: &Bent) {
         )
         .every("cases", cases)
         .because(
-            "the ends are farther from the centre than the middle: a barrel lens draws them in more \
-        (Brown 1971)",
+            "the ends are farther from the centre than the middle: a barrel lens draws them in more (Brown \
+             1971)",
         );
 }
 
@@ -286,16 +286,16 @@ fn claim_first_order(record: &mut Record, strengths: &[Node]) {
     record
         .claim_that(
             "first-order-theory",
-            "at every k1 the largest deviation agrees with first-order theory, within its \
-        second-order remainder",
+            "at every k1 the largest deviation agrees with first-order theory, within its second-order \
+             remainder",
         )
         .every(
             "values of k1",
             strengths.iter().map(|n| (format!("k1 = {:.2}: {} px", n.at, n.max_px), holds(n))),
         )
         .because(
-            "expansion in k1: twice the second-order terms of shift along the line and of change of \
-            slope, all of one sign",
+            "expansion in k1: twice the second-order terms of shift along the line and of change of slope, \
+             all of one sign",
         );
 }
 
@@ -364,9 +364,9 @@ fn grid_figure(barrel: &Camera, pincushion: &Camera) -> Figure {
         panel("pincushion, k1 = +0.18", &|p| pincushion.distort_pixel(p)),
     ];
     let caption = "A grid seen through an ideal lens, the chapter's lens (k1 = -0.18, k2 = 0.05) and its \
-        opposite (k1 = +0.18, k2 = 0.05), in pixels. Nothing is drawn at random. Notice that the \
-        two dashed lines, through the principal point (326, 243), stay straight while the top \
-        line bows.";
+                   opposite (k1 = +0.18, k2 = 0.05), in pixels. Nothing is drawn at random. Notice that the \
+                   two dashed lines, through the principal point (326, 243), stay straight while the top \
+                   line bows.";
     Figure::panels("grids", &panels, 3, caption)
 }
 
@@ -386,8 +386,8 @@ fn deviation_figure(ideal: &[Vec2], bent: &Bent, opposite: &Bent, printed_max_px
     .hline(format!("\u{b1}{printed_max_px} px, as published"), printed_max_px)
     .hline("", -printed_max_px);
     let caption = "Signed distance of the 61 points (v = 60 px, u = 20 ... 620 px) from their \
-        orthogonal-regression line, in pixels; nothing is drawn at random. Notice the largest \
-        deviation at an end of the line, and none after correction.";
+                   orthogonal-regression line, in pixels; nothing is drawn at random. Notice the largest \
+                   deviation at an end of the line, and none after correction.";
     Figure::plot("deviation", &plot, caption)
 }
 
@@ -415,8 +415,8 @@ fn height_figure(heights: &[Node], camera: &Camera, (max_px, rms_px): (f64, f64)
                 Look::ink(),
             );
     let caption = "Largest and RMS deviation of a horizontal line (u = 20 ... 620 px) under the chapter's \
-        lens against its height, in pixels; nothing is drawn at random. Notice the zero at the \
-        principal point's row, and the nearly linear growth away from it.";
+                   lens against its height, in pixels; nothing is drawn at random. Notice the zero at the \
+                   principal point's row, and the nearly linear growth away from it.";
     Figure::plot("height", &plot, caption)
 }
 
@@ -447,11 +447,10 @@ fn k1_figure(strengths: &[Node], camera: &Camera) -> Figure {
     let gap = strengths.iter().map(|n| (n.max_px - n.first_order.max_px).abs()).fold(0.0, f64::max);
     let bound = strengths.iter().map(|n| n.first_order.bound_px).fold(0.0, f64::max);
     let caption = format!(
-        "Deviation of the top line (v = 60 px) against k1 alone, in pixels; nothing is drawn at \
-            random. Notice that the line bends in proportion to k1, alike for both signs. \
-            First-order theory misses it by {gap:.2} px at most; the bound, which adds up all \
-            second-order terms as if they had one sign, allows {bound:.1} px there and says little \
-            more than that the theory is one of small k1."
+        "Deviation of the top line (v = 60 px) against k1 alone, in pixels; nothing is drawn at random. \
+         Notice that the line bends in proportion to k1, alike for both signs. First-order theory misses it \
+         by {gap:.2} px at most; the bound, which adds up all second-order terms as if they had one sign, \
+         allows {bound:.1} px there and says little more than that the theory is one of small k1."
     );
     Figure::plot("k1", &plot, caption)
 }

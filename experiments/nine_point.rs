@@ -45,10 +45,10 @@ pub const EXPERIMENT: Experiment = Experiment {
     id: "nine-point",
     title: "Nine-point calibration, and half a pixel between two programs",
     question: "An image of 3 x 3 dark dots (a stand-in rendered from the published geometry, or --image \
-        FILE) is mapped to the unit grid by an affine map, a projective map and a similarity. \
-        Do matrix and scales agree with the chapter's, and what explains the 0.002 by which the \
-        vendor's GUI differs? Expected: scales 0.0042332 and 0.0042338; dense-grid detection \
-        refuses nine dots; the GUI's numbers are those of centres rounded to half pixels.",
+               FILE) is mapped to the unit grid by an affine map, a projective map and a similarity. Do \
+               matrix and scales agree with the chapter's, and what explains the 0.002 by which the \
+               vendor's GUI differs? Expected: scales 0.0042332 and 0.0042338; dense-grid detection refuses \
+               nine dots; the GUI's numbers are those of centres rounded to half pixels.",
     seed: 1,
     takes_image: true,
     run,
@@ -118,16 +118,15 @@ fn claim_refusal(record: &mut Record, image: &Raster<f32>) {
     record
         .claim_that(
             "dense-grid-refuses",
-            "the detector for dense grids refuses a 3 x 3 board with a typed error that names the \
-        detector to use",
+            "the detector for dense grids refuses a 3 x 3 board with a typed error that names the detector \
+             to use",
         )
         .every(
             "cases",
             [(said, matches!(answer, Err(GridError::TooFewForGrid { columns: 3, rows: 3, found: 9, .. })))],
         )
         .because(
-            "three marks in a row leave one step to confirm another: too few to tell a grid from \
-            chance",
+            "three marks in a row leave one step to confirm another: too few to tell a grid from chance",
         );
 }
 
@@ -148,7 +147,7 @@ fn claim_nesting(record: &mut Record, fits: &[PlaneCalibration]) {
         )
         .because(
             "a similarity is an affine map, an affine map is projective; all minimise the same sum of \
-            squares",
+             squares",
         );
 }
 
@@ -186,8 +185,8 @@ fn marks_figure(shown: &Shown, centres: &[Vec2]) -> Result<Figure, ExperimentErr
     Ok(Figure {
         name: if shown.centres_true.is_some() { "stand-in-marks" } else { "marks" }.to_string(),
         caption: format!(
-            "The nine dots as found ({}): crosses at the centres, rows joined in their order, the \
-                first dot circled. Notice that no dense-grid detector is needed for nine dots.",
+            "The nine dots as found ({}): crosses at the centres, rows joined in their order, the first dot \
+             circled. Notice that no dense-grid detector is needed for nine dots.",
             if shown.centres_true.is_some() {
                 "a stand-in rendered from the published geometry, not the published image"
             } else {
@@ -222,9 +221,8 @@ fn residual_figure(centres: &[Vec2], fits: &[PlaneCalibration], name: &str) -> F
         })
         .collect();
     let caption = format!(
-        "Residuals of the three modes at the nine target points ({name}, {} centres), target \
-            units. Notice the scales, and that a similarity leaves the difference of the two \
-            spacings.",
+        "Residuals of the three modes at the nine target points ({name}, {} centres), target units. Notice \
+         the scales, and that a similarity leaves the difference of the two spacings.",
         centres.len()
     );
     Figure::panels("residuals", &panels, 3, caption)

@@ -7,8 +7,8 @@
 //! What it cannot show: an RMSE that is right says nothing about the parameters; with few points RMSE shrinks
 //! while their errors grow.
 
-use calibench::evaluate::interval::each_of;
-use calibench::evaluate::{Interval, RmseDistribution};
+use calibench::evaluate::RmseDistribution;
+use calibench_harness::stats::{Interval, each_of, normal_two_sided};
 use calibench_harness::{
     Band, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
 };
@@ -19,9 +19,9 @@ pub const EXPERIMENT: Experiment = Experiment {
     id: "noise-floor",
     title: "The reprojection error and its floor",
     question: "Noise from 0.02 to 0.5 px, 3 to 16 views, and targets of 9 to 221 marks: does the RMSE \
-        follow sigma sqrt(2 (1 - p / 2N)), and how far below the noise floor is alarming? \
-        Expected: it does, and the 1 % quantile of its distribution raises a false alarm once in \
-        a hundred calibrations, wherever it is applied.",
+               follow sigma sqrt(2 (1 - p / 2N)), and how far below the noise floor is alarming? Expected: \
+               it does, and the 1 % quantile of its distribution raises a false alarm once in a hundred \
+               calibrations, wherever it is applied.",
     seed: 21,
     takes_image: false,
     run,
@@ -161,14 +161,13 @@ fn claim_mean(record: &mut Record, name: &str, swept: &Swept) {
     record
         .claim_that(
             format!("mean-rmse-{name}"),
-            "the mean RMSE is that of sigma sqrt(chi2 / N) with 2N - p degrees of freedom in every \
-        cell",
+            "the mean RMSE is that of sigma sqrt(chi2 / N) with 2N - p degrees of freedom in every cell",
         )
         .every("cells", cases)
         .at_rate(FALSE_ALARM)
         .because(
-            "central limit over 300 trials, all cells together at 1e-4, and half a percent for terms \
-            of second order",
+            "central limit over 300 trials, all cells together at 1e-4, and half a percent for terms of \
+             second order",
         );
 }
 
@@ -198,8 +197,7 @@ fn claim_alarm_rate(record: &mut Record, grid: &Swept) {
     );
     let interval = Interval::around(
         ALARM_RATE,
-        calibench::evaluate::distribution::normal_two_sided(FALSE_ALARM)
-            * (ALARM_RATE * (1.0 - ALARM_RATE) / trials as f64).sqrt(),
+        normal_two_sided(FALSE_ALARM) * (ALARM_RATE * (1.0 - ALARM_RATE) / trials as f64).sqrt(),
     );
     record
         .claim_that("alarm-rate", "the threshold raises a false alarm in one of a hundred right calibrations")
@@ -266,8 +264,8 @@ fn claim_overfitting(record: &mut Record, marks: &Swept) {
         )
         .every("cases", cases)
         .because(
-            "9 marks: p/2N = 30/72, RMSE factor 0.76, spread 5 times as wide; both far beyond their \
-        95 % intervals",
+            "9 marks: p/2N = 30/72, RMSE factor 0.76, spread 5 times as wide; both far beyond their 95 % \
+             intervals",
         );
 }
 
@@ -317,11 +315,11 @@ fn floor_figure(grid: &Swept) -> Figure {
             .points_as(label, &points, Look::series(v));
     }
     let caption = format!(
-        "Mean RMSE over the noise floor sqrt(2) sigma against the noise (marks, 300 trials, 95 % \
-            intervals, seed {}) and its prediction (lines): the mean of sigma / sqrt(N) times chi \
-            with 2N - p degrees of freedom, which lies under sigma sqrt(2 (1 - p / 2N)), the root of \
-            the mean square, by one part in 4 (2N - p). Notice that the factor depends on the \
-            views, since 6 + 6n parameters absorb noise, and not on the noise.",
+        "Mean RMSE over the noise floor sqrt(2) sigma against the noise (marks, 300 trials, 95 % intervals, \
+         seed {}) and its prediction (lines): the mean of sigma / sqrt(N) times chi with 2N - p degrees of \
+         freedom, which lies under sigma sqrt(2 (1 - p / 2N)), the root of the mean square, by one part in \
+         4 (2N - p). Notice that the factor depends on the views, since 6 + 6n parameters absorb noise, and \
+         not on the noise.",
         grid.engine.spec.seed
     );
     Figure::plot("floor", &plot.y_range(0.96, 0.98), caption)
@@ -366,9 +364,9 @@ fn overfitting_figure(marks: &Swept) -> Figure {
             .points_as("measured", &sds, Look::series(1)),
     ];
     let caption = format!(
-        "Targets of 221, 63, 20, 12 and 9 marks, 4 views, 0.1 px of noise, 300 trials each, 95 % \
-            intervals, seed {}. Notice that the RMSE falls where the error grows: a small residual \
-            is no proof of a good calibration.",
+        "Targets of 221, 63, 20, 12 and 9 marks, 4 views, 0.1 px of noise, 300 trials each, 95 % intervals, \
+         seed {}. Notice that the RMSE falls where the error grows: a small residual is no proof of a good \
+         calibration.",
         marks.engine.spec.seed
     );
     Figure::panels("overfitting", &panels, 2, caption)
@@ -389,10 +387,10 @@ fn alarm_figure() -> Figure {
     }
     let below = |views: usize| 100.0 * (1.0 - at(views).quantile_px(ALARM_RATE) / at(views).noise_floor_px());
     let caption = format!(
-        "Expected RMSE over the noise floor, and the values under which it falls in 5, 1 and 0.1 \
-            percent of right calibrations, against the number of views of a 9 x 7 target with six \
-            intrinsics free. Nothing is drawn at random. Notice that the RMSE of four views must lie \
-            {:.1} percent below the floor, that of 64 views {:.1} percent, to be alarming at 1 %.",
+        "Expected RMSE over the noise floor, and the values under which it falls in 5, 1 and 0.1 percent of \
+         right calibrations, against the number of views of a 9 x 7 target with six intrinsics free. \
+         Nothing is drawn at random. Notice that the RMSE of four views must lie {:.1} percent below the \
+         floor, that of 64 views {:.1} percent, to be alarming at 1 %.",
         below(4),
         below(64)
     );

@@ -13,11 +13,12 @@ use calibench::board::{Board, View};
 use calibench::calibrate::{Calibration, Settings};
 use calibench::camera::{Camera, FreeParameters};
 use calibench::detect::{circle_grid, disc_biases};
-use calibench::evaluate::{cramer_rao, interval};
+use calibench::evaluate::cramer_rao;
 use calibench::geometry::{Pose, Vec2, Vec3};
 use calibench::photos::Fitter;
 use calibench::synth::render::{Imaging, Photograph, SensorNoise, photograph};
 use calibench::synth::{Stream, StreamKey, Truth};
+use calibench_harness::stats::{Interval, each_of};
 use calibench_harness::{
     Band, Context, Experiment, ExperimentError, Figure, Look, Plot, Record, Rows, Table,
 };
@@ -27,12 +28,11 @@ use rayon::prelude::*;
 pub const EXPERIMENT: Experiment = Experiment {
     id: "photographs",
     title: "From photographs to a camera",
-    question: "The chapter's four poses are photographed, their dots detected, the camera calibrated. \
-        What extraction noise results against blur, image noise and dot size; what does the bias \
-        of imaged discs do without correction and with it; is the chapter's 0.1 px realistic? \
-        Expected: a few thousandths of a pixel of noise, a bias of more than that without \
-        correction and none with it, most of it taken up by the poses. A sensor does not make \
-        0.1 px.",
+    question: "The chapter's four poses are photographed, their dots detected, the camera calibrated. What \
+               extraction noise results against blur, image noise and dot size; what does the bias of \
+               imaged discs do without correction and with it; is the chapter's 0.1 px realistic? Expected: \
+               a few thousandths of a pixel of noise, a bias of more than that without correction and none \
+               with it, most of it taken up by the poses. A sensor does not make 0.1 px.",
     seed: 3,
     takes_image: false,
     run,
@@ -106,13 +106,12 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     record.figure(noise_figure(&outcomes, context.seed));
     record.figure(bias_figure(&exact, &unit));
     record.note(
-        "0.1 px is not what a sensor makes of dots like these: noise of 1 % of full scale gives \
-            less than a twentieth of it. What print, flatness and uneven sharpness add is not \
-            rendered here.",
+        "0.1 px is not what a sensor makes of dots like these: noise of 1 % of full scale gives less than a \
+         twentieth of it. What print, flatness and uneven sharpness add is not rendered here.",
     );
     let photo = &album.photos(&BASE)[3];
     let caption = "The chapter's target in its compound pose, dots of 3 mm, blur 0.5 px, without noise: \
-        what the detector sees.";
+                   what the detector sees.";
     record.figure(Figure::photo("photograph", &photo.image.to_u8(), caption));
     Ok(record)
 }
@@ -373,9 +372,9 @@ fn name(node: &Node) -> String {
 
 fn claim_noise(record: &mut Record, outcomes: &[Outcome]) {
     let coordinates = 2 * outcomes[0].errors.len();
-    let rate = interval::each_of(outcomes.len(), FALSE_ALARM);
+    let rate = each_of(outcomes.len(), FALSE_ALARM);
     // The mean is known to be zero, so every coordinate is a degree of freedom.
-    let chance = interval::Interval::of_deviation_ratio(coordinates + 1, rate);
+    let chance = Interval::of_deviation_ratio(coordinates + 1, rate);
     let (low, high) = (chance.low * (1.0 - BOUND_ERROR), chance.high * (1.0 + BOUND_ERROR) * LOSS);
     let sharp = outcomes.iter().filter(|o| o.node.blur_px <= SHARP_PX);
     let cases = sharp.map(|o| {
@@ -383,11 +382,11 @@ fn claim_noise(record: &mut Record, outcomes: &[Outcome]) {
         (format!("{}: {ratio:.3} of the bound", name(&o.node)), (low..=high).contains(&ratio))
     });
     let reason = format!(
-        "chi-squared interval of {coordinates} coordinates a node, 2 % for the bound's Gaussian \
-            edge, and a quarter that the detector may lose: {low:.3} to {high:.3}"
+        "chi-squared interval of {coordinates} coordinates a node, 2 % for the bound's Gaussian edge, and a \
+         quarter that the detector may lose: {low:.3} to {high:.3}"
     );
     let statement = "up to 1 px of blur, noise moves centres as much as the information in the dots' edges \
-        demands, and hardly more";
+                     demands, and hardly more";
     record
         .claim_that("noise-is-at-the-bound", statement)
         .every("cases", cases)
@@ -413,7 +412,7 @@ fn claim_bias(record: &mut Record, exact: &[Exact], unit: &[f64]) {
     let reason = "the project's target for noise-free images, 0.01 px RMS";
     record.claim_that("bias-is-predicted", statement).at_most(worst, 0.01).unit("px").because(reason);
     let reason = "least squares moves a parameter by at most the length of the pixels' error vector times \
-        its standard deviation for unit noise (Cauchy-Schwarz), and a tenth for second order";
+                  its standard deviation for unit noise (Cauchy-Schwarz), and a tenth for second order";
     let case = |e: &Exact, moved: Vec<f64>| {
         (format!("dots of {} mm: {moved:?}", e.diameter_mm), within(&moved, &e.reach(unit)))
     };
@@ -476,10 +475,10 @@ fn noise_figure(outcomes: &[Outcome], seed: u64) -> Figure {
         ),
     ];
     let caption = format!(
-        "Extraction noise of a coordinate, px, over the 252 dots of the chapter's four poses, \
-            each node one photograph a pose, seed {seed}; the sweeps cross at blur 0.5 px, noise 1 % \
-            of full scale, dots of 3 mm. Notice where the detector leaves the bound, and that the \
-            scale ends at a quarter of the chapter's 0.1 px."
+        "Extraction noise of a coordinate, px, over the 252 dots of the chapter's four poses, each node one \
+         photograph a pose, seed {seed}; the sweeps cross at blur 0.5 px, noise 1 % of full scale, dots of \
+         3 mm. Notice where the detector leaves the bound, and that the scale ends at a quarter of the \
+         chapter's 0.1 px."
     );
     Figure::panels("noise", &panels, 3, caption)
 }
@@ -505,8 +504,8 @@ fn bias_figure(exact: &[Exact], unit: &[f64]) -> Figure {
         .points("predicted", &curve(&|e| largest_deviation(&differences(&e.predicted.camera, &truth), unit)))
         .line("corrected", &curve(&|e| largest_deviation(&differences(&e.corrected.camera, &truth), unit)));
     let caption = "Left: RMS distance of detected centres from the true ones, px. Right: error of the worst \
-        of the six parameters in standard deviations under the chapter's noise of 0.1 px. Four \
-        poses, blur 0.5 px, nothing drawn at random. Notice what of the bias reaches the camera, \
-        and what correction leaves of it.";
+                   of the six parameters in standard deviations under the chapter's noise of 0.1 px. Four \
+                   poses, blur 0.5 px, nothing drawn at random. Notice what of the bias reaches the camera, \
+                   and what correction leaves of it.";
     Figure::panels("bias", &[pixels, cameras], 2, caption)
 }

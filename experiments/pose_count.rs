@@ -18,10 +18,10 @@ use calibench_study::{CellSummary, Engine, Summary, within};
 pub const EXPERIMENT: Experiment = Experiment {
     id: "pose-count",
     title: "Accuracy against the number of views",
-    question: "A 9 x 7 target is photographed 3 to 64 times, tilted by 20 degrees in directions that \
-        follow the golden angle, with 0.1 px of noise. How do the standard deviations of the six \
-        parameters fall, and does the solver attain the Cramer-Rao bound? Expected: as one over \
-        the root of the number of views, and yes.",
+    question: "A 9 x 7 target is photographed 3 to 64 times, tilted by 20 degrees in directions that follow \
+               the golden angle, with 0.1 px of noise. How do the standard deviations of the six parameters \
+               fall, and does the solver attain the Cramer-Rao bound? Expected: as one over the root of the \
+               number of views, and yes.",
     seed: 20,
     takes_image: false,
     run,
@@ -225,10 +225,9 @@ fn figure(engine: &Engine, summary: &Summary) -> Figure {
     };
     let panels: Vec<Plot> = parameters().map(panel).collect();
     let caption = format!(
-        "Standard deviation of the six parameters against the number of views, {} trials a point \
-            with 95 % intervals, seed {}, noise 0.1 px, tilt 20 degrees, distance 120 mm. Notice \
-            that the marks lie on the bound from three views on, and that the bound joins the law of \
-            the root.",
+        "Standard deviation of the six parameters against the number of views, {} trials a point with 95 % \
+         intervals, seed {}, noise 0.1 px, tilt 20 degrees, distance 120 mm. Notice that the marks lie on \
+         the bound from three views on, and that the bound joins the law of the root.",
         summary.cells[0].trials, engine.spec.seed
     );
     Figure::panels("spread", &panels, 3, caption)

@@ -58,8 +58,8 @@ pub fn report_distances(record: &mut Record, draws: &[Draw], book: &Book) -> Res
     record
         .claim_that(
             "distance-is-120-mm",
-            "the printed 427 leaves 119, 120 and 121 mm of all whole distances, and the published top \
-        row agrees with 120",
+            "the printed 427 leaves 119, 120 and 121 mm of all whole distances, and the published top row \
+             agrees with 120",
         )
         .every(
             "cases",
@@ -72,8 +72,8 @@ pub fn report_distances(record: &mut Record, draws: &[Draw], book: &Book) -> Res
             ],
         )
         .because(
-            "the 'residual' in pixels minus millimetres falls by 0.4 a millimetre, so its printed \
-            digits allow a range of 2.4 mm",
+            "the 'residual' in pixels minus millimetres falls by 0.4 a millimetre, so its printed digits \
+             allow a range of 2.4 mm",
         );
     let band: Vec<(f64, f64, f64)> = rows.iter().map(|&(z, d)| (z, d - 3.0 * sd, d + 3.0 * sd)).collect();
     let size = |plot: Plot| plot.size(440.0, 340.0);
@@ -89,9 +89,8 @@ pub fn report_distances(record: &mut Record, draws: &[Draw], book: &Book) -> Res
     ];
     let caption = format!(
         "Largest deviation of the target's top row in pixels, and corrected pixels minus target \
-            millimetres, against the target's distance, without noise; the band is three standard \
-            deviations of {TRIALS} draws at 120 mm. Notice where each curve meets its published \
-            number."
+         millimetres, against the target's distance, without noise; the band is three standard deviations \
+         of {TRIALS} draws at 120 mm. Notice where each curve meets its published number."
     );
     record.figure(Figure::panels("distance", &panels, 2, caption));
     Ok(())

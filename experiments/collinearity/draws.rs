@@ -51,7 +51,7 @@ pub fn readings_table(draws: &[Draw], book: &Book) -> Table {
         ("draws_below_ratio", "%"),
     ];
     let caption = "the published affine residual read as RMS per point and per coordinate: where it and its \
-        ratio to the largest residual lie among the draws";
+                   ratio to the largest residual lie among the draws";
     let mut table = Table::new("readings", caption, &columns);
     for (i, centre) in CENTRES.iter().enumerate() {
         let (rms, max) = (column(draws, i, 3), column(draws, i, 4));
@@ -93,8 +93,8 @@ pub fn claim_theory(record: &mut Record, ours: &[Found], noise_free: &[Found], d
             .within(sample.mean(0), mean)
             .at_rate(THEORY_RATE)
             .because(format!(
-                "{freedom} degrees of freedom, non-centrality {lambda:.3} from a fit without noise; \
-                        central limit"
+                "{freedom} degrees of freedom, non-centrality {lambda:.3} from a fit without noise; central \
+                 limit"
             ));
         let excess = 12.0 * (freedom + 4.0 * lambda) / ((freedom + 2.0 * lambda) * (freedom + 2.0 * lambda));
         let half = normal_two_sided(THEORY_RATE) * ((2.0 + excess) / TRIALS as f64).sqrt();
@@ -127,8 +127,8 @@ pub fn claim_theory(record: &mut Record, ours: &[Found], noise_free: &[Found], d
     record
         .claim_that(
             "exact-without-noise",
-            "without noise the model with its true or a free centre straightens the top row and \
-        leaves no residual",
+            "without noise the model with its true or a free centre straightens the top row and leaves no \
+             residual",
         )
         .at_most(worst, bound)
         .unit("px")

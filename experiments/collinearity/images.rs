@@ -122,7 +122,7 @@ pub fn rectify(record: &mut Record, ours: &[Found]) -> Result<(), ExperimentErro
         ("level_max", "grey"),
     ];
     let caption = "images rectified by the single-plane calibration against those by the true model, where \
-        both have data";
+                   both have data";
     let mut table = Table::new("rectified", caption, &columns);
     let mut cases = Vec::new();
     for (view, ideal) in [("same", &same as &dyn Fn(&Vec2) -> Vec2), ("all", &all)] {
@@ -152,15 +152,15 @@ pub fn rectify(record: &mut Record, ours: &[Found]) -> Result<(), ExperimentErro
         .every("images", cases)
         .because(
             "bilinear interpolation is no steeper than the largest step between neighbouring samples; \
-        rounding of both levels",
+             rounding of both levels",
         );
     let shifts = shift_figure(ours, record.seed())?;
     record.figure(shifts);
     record.figure(Figure::photo(
         "photo",
         &photo,
-        "The target through the chapter's lens at 120 mm, rendered without noise, 640 x 480 px. \
-            Notice the bowed rows.",
+        "The target through the chapter's lens at 120 mm, rendered without noise, 640 x 480 px. Notice the \
+         bowed rows.",
     ));
     Ok(())
 }
@@ -211,17 +211,17 @@ pub fn draw_rectified(
     });
     let caption = |by: &str| {
         format!(
-            "The photograph rectified by {by}, showing {what}. Black: no data. Compare its rows with \
-                the photograph's."
+            "The photograph rectified by {by}, showing {what}. Black: no data. Compare its rows with the \
+             photograph's."
         )
     };
     record.figure(Figure::photo(format!("rectified-{view}-true"), &truth.image, caption("the true model")));
     let by = "the single-plane calibration, centre free";
     record.figure(Figure::photo(format!("rectified-{view}-plane"), &plane.image, caption(by)));
     let caption = format!(
-        "True model minus single-plane calibration (seed {}, sigma {SIGMA_PX} px), showing \
-            {what}: grey 128 is no difference, two levels stand for one; black: no data in one of \
-            them. Notice at which edges the two differ.",
+        "True model minus single-plane calibration (seed {}, sigma {SIGMA_PX} px), showing {what}: grey 128 \
+         is no difference, two levels stand for one; black: no data in one of them. Notice at which edges \
+         the two differ.",
         record.seed()
     );
     record.figure(Figure::photo(format!("difference-{view}"), &difference, caption));
@@ -251,9 +251,9 @@ pub fn shift_figure(ours: &[Found], seed: u64) -> Result<Figure, ExperimentError
     let (held, free) = (shifts(&ours[0].plane.lens_camera()), shifts(&ours[MAIN].plane.lens_camera()));
     let largest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
     let caption = format!(
-        "Distance in the photograph between the places at which the true model and the \
-            single-plane calibration (seed {seed}, sigma {SIGMA_PX} px) sample an output pixel: up \
-            to {:.2} px with the centre held at a wrong place, up to {:.2} px with a free one.",
+        "Distance in the photograph between the places at which the true model and the single-plane \
+         calibration (seed {seed}, sigma {SIGMA_PX} px) sample an output pixel: up to {:.2} px with the \
+         centre held at a wrong place, up to {:.2} px with a free one.",
         largest(&held),
         largest(&free)
     );

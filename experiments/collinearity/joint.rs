@@ -39,7 +39,7 @@ fn place(draws: &[Draw], treatment: usize, book: &Book) -> Result<Place, Experim
 pub fn report_joint(record: &mut Record, draws: &[Draw], book: &Book) -> Result<(), ExperimentError> {
     let columns = [("centre", ""), ("estimated", ""), ("distance", ""), ("probability", ""), ("verdict", "")];
     let caption = "the five published numbers together against each treatment: squared Mahalanobis distance \
-        from the draws' mean, and the share of draws that lie as far out";
+                   from the draws' mean, and the share of draws that lie as far out";
     let mut table = Table::new("joint", caption, &columns);
     for (i, centre) in CENTRES.iter().enumerate() {
         let name = centre.name();

@@ -111,9 +111,9 @@ fn drift_numbers(record: &mut Record, r: &Results) {
     let middle: Vec<f64> = r.quarters.iter().map(|q| q.middle_mm).collect();
     let (low, high) = (quantile(&r.ends(0), 0.025), quantile(&r.ends(0), 0.975));
     let at_the_end = "systematic error of the reference at the last shift of a quarter, the hottest of its \
-        day, mean of all stations";
+                      day, mean of all stations";
     let simulated = "a simulated station with round causes (30 ppm/K, 8 K, 5 urad a shift); tolerance: half \
-        the central 95 % of its stations";
+                     the central 95 % of its stations";
     let opposed = "what would be left had the bracket turned the other way, first order";
     record
         .group("mm", rounding_of_sums())
@@ -264,9 +264,9 @@ pub(crate) fn claims(record: &mut Record, r: &Results, seed: u64) {
     for (id, statement, alarms) in rules {
         let interval = Interval::of_proportion(alarms, IN_CONTROL, RATE);
         let reason = format!(
-            "{alarms} of {IN_CONTROL} simulated quarters, Wilson interval of the rate behind them; \
-                the rate that the limit was computed for (product of probabilities; Crowder's integral \
-                equation) must lie inside"
+            "{alarms} of {IN_CONTROL} simulated quarters, Wilson interval of the rate behind them; the rate \
+             that the limit was computed for (product of probabilities; Crowder's integral equation) must \
+             lie inside"
         );
         record.claim_that(id, statement).within(FALSE_ALARM, interval).at_rate(RATE).because(reason);
     }
@@ -279,8 +279,8 @@ pub(crate) fn claims(record: &mut Record, r: &Results, seed: u64) {
         ("calendar-keeps-its-risk", r.risk(|_| r.calendar_shifts() as usize)),
         ("check-keeps-its-risk", r.risk_of_check()),
     ] {
-        let statement = "on stations it was not set by, it lets no more exceed the tolerance unnoticed than it \
-            was set to";
+        let statement = "on stations it was not set by, it lets no more exceed the tolerance unnoticed than \
+                         it was set to";
         let highest = RISK + normal_two_sided(2.0 * RATE) * spread;
         record.claim_that(id, statement).at_most(risk, highest).at_rate(RATE).because(reason);
     }
@@ -292,7 +292,7 @@ pub(crate) fn claims(record: &mut Record, r: &Results, seed: u64) {
     let interval = Interval::of_mean(slope * turn, slope.abs() * spread, QUARTERS, RATE);
     let interval = Interval { low: interval.low - remainder, high: interval.high + remainder };
     let reason = "a random walk with drift: mean n m, standard deviation sqrt(n) s, over the first-order \
-        slope; widened by the second-order remainder";
+                  slope; widened by the second-order remainder";
     let statement = "the bracket's mean share is that of a random walk with drift";
     record
         .claim_that("bracket-walk", statement)
@@ -335,8 +335,8 @@ pub(crate) fn tables_and_figures(record: &mut Record, r: &Results, seed: u64) {
     );
     let asked = r.asked_shifts();
     let exceeds: Vec<f64> = r.judged.iter().map(|f| f.exceeds.unwrap_or(YEAR) as f64).collect();
-    let caption = "day by which a share of the fleet exceeds the tolerance, and by which the check has asked; \
-                   365 means never in the year";
+    let caption = "day by which a share of the fleet exceeds the tolerance, and by which the check has \
+                   asked; 365 means never in the year";
     record.table(
         Table::of("fleet", caption, (0..=100).map(|percent| f64::from(percent) / 100.0))
             .column("share", "", |share| *share)
@@ -408,9 +408,9 @@ fn error_figure(r: &Results, seed: u64, bands: &[[f64; 4]]) -> Figure {
         .hline(format!("case study: {TOLERANCE_MM} mm"), TOLERANCE_MM)
         .x_range(0.0, days(QUARTER as f64));
     let caption = format!(
-        "Length error at the middle shift of every day, neither the coldest nor the hottest, for \
-            {SHOWN} simulated stations, with median and central 95 % of {WATCHED}, in mm; seed \
-            {seed}. Notice where the case study's {TOLERANCE_MM} mm lies."
+        "Length error at the middle shift of every day, neither the coldest nor the hottest, for {SHOWN} \
+         simulated stations, with median and central 95 % of {WATCHED}, in mm; seed {seed}. Notice where \
+         the case study's {TOLERANCE_MM} mm lies."
     );
     Figure::plot("error", &plot, caption)
 }
@@ -435,9 +435,9 @@ fn alarm_figure(r: &Results) -> Figure {
             .y_range(0.0, 1.0);
     let median_day = |rule: usize| days(median(&r.alarm_shifts(rule)));
     let caption = format!(
-        "Share of {QUARTERS} drifting stations whose check has given an alarm, both rules set to \
-            a false-alarm chance of {} % a quarter. Half of the stations have had their alarm from \
-            the threshold by day {:.1}, from the moving average by day {:.1}.",
+        "Share of {QUARTERS} drifting stations whose check has given an alarm, both rules set to a \
+         false-alarm chance of {} % a quarter. Half of the stations have had their alarm from the threshold \
+         by day {:.1}, from the moving average by day {:.1}.",
         100.0 * FALSE_ALARM,
         median_day(0),
         median_day(1)
@@ -460,9 +460,9 @@ fn trade_off_figure(trade: &[[f64; 3]]) -> Figure {
         format!("from day {:.1} to day {:.1}", at(trade.first()), at(trade.last()))
     };
     let caption = format!(
-        "Median day of the alarm over {WATCHED} drifting stations against the chance of a false \
-            alarm in a quarter that the rule is set to. As that chance grows, the threshold's alarm \
-            moves {}, the moving average's {}.",
+        "Median day of the alarm over {WATCHED} drifting stations against the chance of a false alarm in a \
+         quarter that the rule is set to. As that chance grows, the threshold's alarm moves {}, the moving \
+         average's {}.",
         ends(1),
         ends(2)
     );
@@ -484,10 +484,9 @@ fn fleet_figure(r: &Results, exceeds: &[f64], asked: &[f64]) -> Figure {
         .vline(format!("calendar at {} % risk", 100.0 * RISK), days(r.calendar_shifts()))
         .y_range(0.0, 1.0);
     let caption = format!(
-        "{FLEET} stations whose creep and warming lie between none and twice the case study's; \
-            calendar and action limit were set on {FLEET} others. A calendar with {} % risk \
-            recalibrates all of them after {:.0} days; the check has asked half of them by day \
-            {:.0}.",
+        "{FLEET} stations whose creep and warming lie between none and twice the case study's; calendar and \
+         action limit were set on {FLEET} others. A calendar with {} % risk recalibrates all of them after \
+         {:.0} days; the check has asked half of them by day {:.0}.",
         100.0 * RISK,
         days(r.calendar_shifts()),
         days(quantile(asked, 0.5))

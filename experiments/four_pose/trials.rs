@@ -98,14 +98,13 @@ fn claim_consistent(record: &mut Record, draw: &Draw, trials: &Outcome) {
     record
         .claim_that(
             "own-covariance-covers",
-            "the 95 % region that each estimate states of itself holds the truth in 95 % of the \
-        trials",
+            "the 95 % region that each estimate states of itself holds the truth in 95 % of the trials",
         )
         .within(share, interval)
         .at_rate(RATE)
         .because(
-            "F distribution with 6 and 474 degrees of freedom, as sigma is estimated too; binomial, \
-            normal approximation",
+            "F distribution with 6 and 474 degrees of freedom, as sigma is estimated too; binomial, normal \
+             approximation",
         );
 }
 
@@ -120,15 +119,14 @@ pub fn claim_rmse_blind(record: &mut Record, draw: &Draw, trials: &Outcome) {
     record
         .claim_that(
             "rmse-settles-under-the-floor",
-            "the mean RMSE is the predicted one, under the noise floor because 30 parameters absorb \
-        noise",
+            "the mean RMSE is the predicted one, under the noise floor because 30 parameters absorb noise",
         )
         .within(settled, Interval { low: interval.low, high: interval.high.min(floor) })
         .unit("px")
         .at_rate(RATE)
         .because(
-            "sigma / sqrt(N) times the mean of chi with 2 N - 30 degrees of freedom; cut off at the \
-            floor sqrt(2) sigma",
+            "sigma / sqrt(N) times the mean of chi with 2 N - 30 degrees of freedom; cut off at the floor \
+             sqrt(2) sigma",
         );
 
     let values: Vec<f64> = trials.estimates.iter().map(|e| e.rmse_px).collect();
@@ -183,8 +181,8 @@ pub fn claim_rmse_blind(record: &mut Record, draw: &Draw, trials: &Outcome) {
         .within(blind, Interval::around(0.0, chance))
         .at_rate(RATE)
         .because(
-            "residuals of a linear Gaussian fit are independent of its estimate; Fisher's interval \
-        about zero",
+            "residuals of a linear Gaussian fit are independent of its estimate; Fisher's interval about \
+             zero",
         );
 }
 

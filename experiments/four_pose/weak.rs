@@ -86,14 +86,14 @@ pub fn claim_overfitting(record: &mut Record, grids: &[Grid]) {
     record
         .claim_that(
             "low-rmse-is-overfitting",
-            "with fewer points on the same target the RMSE falls under the floor as sqrt(1 - 30 / 2N) \
-        says, while k2 gets worse as the bound says",
+            "with fewer points on the same target the RMSE falls under the floor as sqrt(1 - 30 / 2N) says, \
+             while k2 gets worse as the bound says",
         )
         .every("cases", cases)
         .at_rate(RATE)
         .because(
             "mean of chi with 2 N - 30 degrees of freedom, and sample deviation of Gaussian values, \
-            Bonferroni over all grids",
+             Bonferroni over all grids",
         );
     let (few, all) = (&grids[0], &grids[grids.len() - 1]);
     let floor = few.rmse.noise_floor_px();
@@ -134,8 +134,8 @@ pub fn claim_facing_views(record: &mut Record, context: &Context) -> Result<(), 
     record
         .claim_that(
             "facing-views-are-refused",
-            "four views that face the camera, at 100, 120, 140 and 160 mm, are refused, and focal \
-        length and distance are named as inseparable",
+            "four views that face the camera, at 100, 120, 140 and 160 mm, are refused, and focal length \
+             and distance are named as inseparable",
         )
         .at_least(refused, FACING_TRIALS as f64)
         .at_rate(FACING_TRIALS as f64 * 1e-9)

@@ -111,7 +111,7 @@ pub(crate) fn report(record: &mut Record, examined: &Examined) {
         );
 
     let caption = "what four checks say when corrected pixels are taken for millimetres, target facing the \
-        camera, no noise";
+                   camera, no noise";
     record.table(
         Table::of("units", caption, sweep)
             .column("distance", "mm", |c| c.distance_mm)
@@ -160,9 +160,9 @@ pub(crate) fn report(record: &mut Record, examined: &Examined) {
             .line("error of the spacing (%)", &ratio)
             .vline("one pixel a millimetre", Truth::chapter_camera().fx);
     let caption = format!(
-        "RMS difference of corrected pixels and target millimetres, and error of the spacing of \
-            neighbours, against the distance of a facing target; nothing is drawn at random. Notice \
-            what each check shows at {} mm, where a pixel is a millimetre.",
+        "RMS difference of corrected pixels and target millimetres, and error of the spacing of neighbours, \
+         against the distance of a facing target; nothing is drawn at random. Notice what each check shows \
+         at {} mm, where a pixel is a millimetre.",
         Truth::chapter_camera().fx
     );
     record.figure(Figure::plot("units", &plot, caption));

@@ -49,8 +49,8 @@ pub fn claim_published_consistent(record: &mut Record) -> Result<(), ExperimentE
     record
         .claim_that(
             "book-agrees-with-itself",
-            "the chapter's spacings, scales, translations and residuals follow from each other within \
-        their printed digits",
+            "the chapter's spacings, scales, translations and residuals follow from each other within their \
+             printed digits",
         )
         .every("relations", cases)
         .because("interval arithmetic over half a unit of each last printed digit");
@@ -79,8 +79,8 @@ pub fn claim_residual_shape(record: &mut Record, context: &Context) -> Result<()
     record
         .claim_that(
             "book-residuals-look-like-noise",
-            "the published largest residual stands to the RMS as it does for nine centres with \
-        Gaussian errors",
+            "the published largest residual stands to the RMS as it does for nine centres with Gaussian \
+             errors",
         )
         .drawn_from(ratio, &predicted, FALSE_ALARM_RATE)
         .because("the ratio does not depend on the size of the errors");
@@ -130,8 +130,8 @@ pub fn claim_scales_differ(record: &mut Record) -> Result<(), ExperimentError> {
         )
         .at_least((gui.0 / sy.1 - 1.0).abs().min((gui.1 / sy.0 - 1.0).abs()), SAID_TO_AGREE)
         .because(
-            "the smallest relative difference that the printed digits allow, against the accuracy \
-        that the chapter states",
+            "the smallest relative difference that the printed digits allow, against the accuracy that the \
+             chapter states",
         );
     Ok(())
 }

@@ -98,8 +98,8 @@ pub fn explain_gui(
     record
         .claim_that(
             "gui-is-half-pixels-from-the-corner",
-            "centres rounded to half pixels and counted from the first pixel's corner print all six \
-        numbers of the GUI, counted from its centre they do not",
+            "centres rounded to half pixels and counted from the first pixel's corner print all six numbers \
+             of the GUI, counted from its centre they do not",
         )
         .every(
             "cases",
@@ -109,8 +109,8 @@ pub fn explain_gui(
             ],
         )
         .because(
-            "exhaustive search: at most 3 of 18 coordinates rounded to the other neighbour, every \
-            printed digit compared",
+            "exhaustive search: at most 3 of 18 coordinates rounded to the other neighbour, every printed \
+             digit compared",
         );
     // Rounding alone moves each centre by a quarter of a pixel at most, so their mean as well.
     let rounding = 0.25 * fit.scale_x;
@@ -157,13 +157,12 @@ pub fn explain_gui(
         "coordinates of the stand-in that must be rounded to the other neighbour for all six printed numbers",
     );
     record.note(format!(
-        "The GUI's six printed numbers are those of an affine fit to half-pixel centres, counted \
-            from the corner of the first pixel; of the stand-in's 18 coordinates {moved} must be \
-            rounded to the other neighbour for that. The translations printed differ by {gap_x:.5} \
-            along x, of which half a pixel of the origin makes {:.5}; rounding alone moves the mean \
-            by less than {rounding:.5}. The chapter names the rounding only. Mean v is 566 + 8/18: \
-            read from translation and scale alone it seems to be 566.19, because a dot rounded the \
-            other way tilts the map.",
+        "The GUI's six printed numbers are those of an affine fit to half-pixel centres, counted from the \
+         corner of the first pixel; of the stand-in's 18 coordinates {moved} must be rounded to the other \
+         neighbour for that. The translations printed differ by {gap_x:.5} along x, of which half a pixel \
+         of the origin makes {:.5}; rounding alone moves the mean by less than {rounding:.5}. The chapter \
+         names the rounding only. Mean v is 566 + 8/18: read from translation and scale alone it seems to \
+         be 566.19, because a dot rounded the other way tilts the map.",
         0.5 * fit.scale_x
     ));
     Ok(())
@@ -174,7 +173,7 @@ pub fn hypotheses_table(hypotheses: &[HalfPixels]) -> Result<Table, ExperimentEr
     let names: Vec<String> = GUI.iter().map(|id| format!("rounded_{}", id.replace('-', "_"))).collect();
     columns.extend(names.iter().map(|name| (name.as_str(), "")));
     let caption = "half-pixel centres by the place of the origin: sets of at most three other roundings \
-        that print the GUI's six numbers, and the numbers of plain rounding";
+                   that print the GUI's six numbers, and the numbers of plain rounding";
     let mut table = Table::new("gui-origins", caption, &columns);
     for h in hypotheses {
         let moves = h.moves.map_or(Cell::from("none"), Cell::from);
@@ -214,7 +213,7 @@ pub fn gui_figure(centres: &[Vec2], gui: &[Vec2]) -> Figure {
             Look::series(3).size(6.0),
         );
     let caption = "Half-pixel centres that print the GUI's six numbers, less ours, in pixels; nothing is \
-        drawn at random. Notice that their mean lies half a pixel away in both directions: the \
-        origin differs, not the rounding alone.";
+                   drawn at random. Notice that their mean lies half a pixel away in both directions: the \
+                   origin differs, not the rounding alone.";
     Figure::plot("gui-shift", &plot, caption)
 }

@@ -72,8 +72,8 @@ impl Numbers<'_> {
     /// Holds the last number against the published value of the same name: ours must round to the printed
     /// digits.
     ///
-    /// What is wrong with a reconciliation (no such entry, or one of another rule) is told when the record is
-    /// closed.
+    /// What is wrong with a reconciliation (no such entry, or one of another rule) is reported when the
+    /// record is closed.
     pub fn rounds_to_printed(&mut self) -> &mut Self {
         self.reconcile(Rule::Exact, |entry, ours| Reconciliation::exact(entry, ours))
     }
@@ -124,11 +124,11 @@ mod tests {
             .number("c", 3.0, "")
             .band(Band::Exact)
             .number("d", 4.0, "");
-        let told: Vec<_> =
+        let found: Vec<_> =
             record.numbers().iter().map(|n| (n.unit.as_str(), n.value, n.band.width())).collect();
         let width = |text: &str| text.to_string();
         assert_eq!(
-            told,
+            found,
             [
                 ("px", 1.0, width("exact")),
                 ("", 2.0, width("exact")),

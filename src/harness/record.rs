@@ -33,7 +33,7 @@ pub struct Input {
     pub sha256: String,
 }
 
-/// The result of one run of one experiment, in the order in which it was told.
+/// The result of one run of one experiment, in the order in which it was recorded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
     experiment: String,
@@ -45,7 +45,7 @@ pub struct Record {
     reconciliations: Vec<Reconciliation>,
     inputs: Vec<Input>,
     notes: Vec<String>,
-    /// What is wrong with a reconciliation, told when the record is closed.
+    /// What is wrong with a reconciliation, reported when the record is closed.
     mistakes: Vec<RecordError>,
 }
 
@@ -64,8 +64,8 @@ pub enum RecordError {
     },
     /// A name that is not lower-case letters, digits, `-` and `.`.
     #[error(
-        "`{0}` is no name for a number, claim, table or figure: use lower-case letters, digits, \
-            `-` and `.`"
+        "`{0}` is no name for a number, claim, table or figure: use lower-case letters, digits, `-` and \
+         `.`"
     )]
     Name(String),
     /// An experiment without a claim shows nothing.
@@ -118,20 +118,6 @@ impl Record {
         }
     }
 
-    /// Adds a number and gives its value back.
-    pub fn number(
-        &mut self,
-        id: impl Into<String>,
-        value: f64,
-        unit: impl Into<String>,
-        band: Band,
-        description: impl Into<String>,
-    ) -> f64 {
-        let (id, unit, description) = (id.into(), unit.into(), description.into());
-        self.numbers.push(Number { id, value, unit, band, description });
-        value
-    }
-
     pub(super) fn add_number(&mut self, number: Number) {
         self.numbers.push(number);
     }
@@ -159,8 +145,7 @@ impl Record {
         self.figures.push(figure);
     }
 
-    /// Adds a claim.
-    pub fn claim(&mut self, claim: Claim) {
+    pub(super) fn add_claim(&mut self, claim: Claim) {
         self.claims.push(claim);
     }
 
@@ -281,7 +266,7 @@ mod tests {
 
     fn with_claim() -> Record {
         let mut record = Record::new("line-bending", 0);
-        record.claim(Claim::at_most("c", "zero is small", 0.0, 1.0, "definition"));
+        record.claim_that("c", "zero is small").at_most(0.0, 1.0).because("definition");
         record
     }
 
@@ -290,11 +275,10 @@ mod tests {
         assert_eq!(Record::new("e", 0).validate(), Err(RecordError::NoClaim("e".into())));
         let mut record = with_claim();
         assert_eq!(record.validate(), Ok(()));
-        record.number("n", 1.0, "px", Band::Exact, "");
-        record.number("n", 2.0, "px", Band::Exact, "");
+        record.exact("px").number("n", 1.0, "").number("n", 2.0, "");
         assert!(matches!(record.validate(), Err(RecordError::Duplicate { what: "numbers", .. })));
         let mut record = with_claim();
-        record.number("Not | a name", 1.0, "", Band::Exact, "");
+        record.exact("").number("Not | a name", 1.0, "");
         assert!(matches!(record.validate(), Err(RecordError::Name(_))));
     }
 }
