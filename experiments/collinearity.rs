@@ -154,35 +154,30 @@ fn report_quantities(record: &mut Record, ours: &[Found], noise_free: &[Found], 
         let affine = column(draws, i, 3);
         let sample = moments(&affine);
         let mean = format!("mean RMS of the affine fit over the draws, {name}");
-        record.group("mm", converged()).number(format!("affine-rms-mean-{name}"), sample.mean(0), mean);
         let sd = format!("standard deviation of the RMS of the affine fit over the draws, {name}");
-        record.group("mm", converged()).number(
-            format!("affine-rms-sd-{name}"),
-            sample.standard_deviation(0),
-            sd,
-        );
         let below = percent_below(&affine, book[3].value());
         let what = format!("share of the draws whose affine residual is below the published one, {name}");
-        record.exact("%").number(format!("affine-rms-below-{name}"), below, what);
+        record
+            .group("mm", converged())
+            .number(format!("affine-rms-mean-{name}"), sample.mean(0), mean)
+            .number(format!("affine-rms-sd-{name}"), sample.standard_deviation(0), sd)
+            .exact("%")
+            .number(format!("affine-rms-below-{name}"), below, what);
         if i != MAIN {
             let what = format!("RMS of the single-plane calibration, {name}");
             record.group("px", converged()).number(format!("plane-rms-{name}"), ours[i].plane.rms_px, what);
         }
         let sample = moments(&column(draws, i, 0));
         let mean = format!("mean RMS over the draws, {name}");
-        record.group("px", converged()).number(format!("plane-rms-mean-{name}"), sample.mean(0), mean);
         let sd = format!("standard deviation of the RMS over the draws, {name}");
-        record.group("px", converged()).number(
-            format!("plane-rms-sd-{name}"),
-            sample.standard_deviation(0),
-            sd,
-        );
         let lens = &ours[i].plane.distortion;
-        record.group("", converged()).number(format!("k1-{name}"), lens.k1, format!("k1, {name}")).number(
-            format!("k2-{name}"),
-            lens.k2,
-            format!("k2, {name}"),
-        );
+        record
+            .group("px", converged())
+            .number(format!("plane-rms-mean-{name}"), sample.mean(0), mean)
+            .number(format!("plane-rms-sd-{name}"), sample.standard_deviation(0), sd)
+            .unit("")
+            .number(format!("k1-{name}"), lens.k1, format!("k1, {name}"))
+            .number(format!("k2-{name}"), lens.k2, format!("k2, {name}"));
     }
     let free = ours[2].plane.centre_px;
     record.group("px", converged()).number("free-cx", free.x, "estimated distortion centre, u").number(

@@ -242,22 +242,17 @@ fn report_numbers(record: &mut Record, nodes: &[Node], theory: &Theory, unit: Ve
         };
         for p in [Fx, Cx, Cy, K1, K2] {
             let bias = node.bias_of(p);
-            record.group(p.unit(), stop()).number(
-                format!("{name}-{p}-bias"),
-                bias,
-                format!("{p}, estimate minus truth"),
-            );
             let z = bias.abs() / theory.small_sd(p);
-            record.group("", stop()).number(
-                format!("{name}-{p}-z"),
-                z,
-                format!("the same in standard deviations of {p}"),
-            );
+            record
+                .group(p.unit(), stop())
+                .number(format!("{name}-{p}-bias"), bias, format!("{p}, estimate minus truth"))
+                .unit("")
+                .number(format!("{name}-{p}-z"), z, format!("the same in standard deviations of {p}"));
         }
-        record.group("px", stop()).number(format!("{name}-rmse"), node.rmse_px, "RMSE without noise");
         let with_noise = theory.with_noise_px(node.rmse_px);
         record
             .group("px", stop())
+            .number(format!("{name}-rmse"), node.rmse_px, "RMSE without noise")
             .number(format!("{name}-rmse-noisy"), with_noise, "RMSE to expect with noise")
             .unit("")
             .number(
@@ -270,18 +265,20 @@ fn report_numbers(record: &mut Record, nodes: &[Node], theory: &Theory, unit: Ve
             .number(format!("{name}-plane-max-mm"), node.plane_mm.1, "largest residual on the plane");
     }
     let notices = theory.rmse_notices(unit);
-    record.group("", theory_band()).number(
-        "rmse-notices",
-        notices,
-        "ratio at which the expected RMSE leaves the central 99 % of its prediction",
-    );
     let noise = theory.with_noise_px(0.0);
-    record.group("px", theory_band()).number("rmse-noise", noise, "RMSE to expect from noise alone");
     let noisy = theory.with_noise_px(theory.rmse_px(unit * notices));
-    record.group("px", theory_band()).number("rmse-notices-px", noisy, "RMSE to expect at that ratio");
     let bias = theory.bias(unit * notices)[2].abs() / theory.small_sd(Cx);
     record
         .group("", theory_band())
+        .number(
+            "rmse-notices",
+            notices,
+            "ratio at which the expected RMSE leaves the central 99 % of its prediction",
+        )
+        .unit("px")
+        .number("rmse-noise", noise, "RMSE to expect from noise alone")
+        .number("rmse-notices-px", noisy, "RMSE to expect at that ratio")
+        .unit("")
         .number("rmse-notices-cx-z", bias, "bias of cx at that ratio, in standard deviations")
         .band(Band::relative(1e-12, "rounding"))
         .number(

@@ -204,8 +204,7 @@ fn report_inputs(record: &mut Record, draw: &Draw) {
     record
         .group("deg", last_bits)
         .number("field-of-view-deg", field_of_view, "horizontal field of view")
-        .rounds_to_printed();
-    record
+        .rounds_to_printed()
         .exact("")
         .count("points-per-view", truth.points.len(), "points of the target")
         .rounds_to_printed()
@@ -232,8 +231,7 @@ fn report_table(record: &mut Record, draw: &Draw, book: &Book) {
             .drawn_as_printed(Predicted::Normal { mean: 0.0, sd }, RATE)
             .band(relative())
             .number(format!("{name}-sd"), sd, format!("Cramer-Rao standard deviation of {name} at the truth"))
-            .unit("")
-            .band(of_deviation(1.0))
+            .group("", of_deviation(1.0))
             .number(format!("{name}-z"), ours.z, "our error over its standard deviation")
             .number(format!("{name}-book-z"), theirs.z, "the book's error over it");
     }

@@ -278,10 +278,10 @@ fn relative() -> Band {
 }
 
 fn report_numbers(record: &mut Record, map: &Map) {
-    record.exact("").count("nodes", map.nodes.len(), "scenes of the sweep");
     let identifiable = map.identifiable().len() as f64;
     record
         .exact("")
+        .count("nodes", map.nodes.len(), "scenes of the sweep")
         .number("identifiable-nodes", identifiable, "scenes whose bound of fx is below 3 %")
         .count("trials", TRIALS, "trials of a node");
     for (tenths, tilt_deg) in [(3, 20), (6, 5), (6, 20), (6, 45), (10, 5), (10, 20), (10, 45)] {
@@ -289,16 +289,15 @@ fn report_numbers(record: &mut Record, map: &Map) {
         let id = |what: &str| format!("{what}-c{tenths}-t{tilt_deg}");
         let at = node.name();
         let [k2, fx] = [Parameter::K2, Parameter::Fx].map(|p| (node.bound_sd(p), node.sampled_sd(p)));
+        let correlation = node.bound_correlation();
         record
             .group("", relative())
             .number(id("k2-sd"), k2.0, format!("bound of k2, {at}"))
             .number(id("k2-sd-trials"), k2.1, format!("spread of k2, {at}"))
             .unit("px")
             .number(id("fx-sd"), fx.0, format!("bound of fx, {at}"))
-            .number(id("fx-sd-trials"), fx.1, format!("spread of fx, {at}"));
-        let correlation = node.bound_correlation();
-        record
-            .group("", relative())
+            .number(id("fx-sd-trials"), fx.1, format!("spread of fx, {at}"))
+            .unit("")
             .number(id("k1-k2"), correlation, format!("correlation of k1 and k2, {at}"))
             .unit("px")
             .number(id("rmse"), node.sampled_rmse_px(), format!("mean RMSE, {at}"));

@@ -191,6 +191,7 @@ fn sweep_k1(camera: &Camera) -> Result<Vec<Node>, ExperimentError> {
 fn report_numbers(record: &mut Record, bent: &Bent, opposite: &Bent, barrel: &Camera) {
     let band = || Band::absolute(ROUNDING_PX, "rounding of coordinates below 640 px over 40 operations");
     let points = bent.distorted.deviations.len() as f64;
+    let (max, rms) = (bent.distorted.max_deviation(), bent.distorted.rms_deviation());
     record
         .exact("")
         .number("points", points, "points on the line")
@@ -198,22 +199,18 @@ fn report_numbers(record: &mut Record, bent: &Bent, opposite: &Bent, barrel: &Ca
         .number("k1-barrel", barrel.distortion.k1, "k1 of the chapter's lens")
         .rounds_to_printed()
         .number("k1-pincushion", PINCUSHION_K1, "k1 of the pincushion grid")
-        .rounds_to_printed();
-    let (max, rms) = (bent.distorted.max_deviation(), bent.distorted.rms_deviation());
-    record
+        .rounds_to_printed()
         .group("px", band())
         .number("max-deviation", max, "largest distance of the distorted line from its regression line")
         .rounds_to_printed()
         .number("rms-deviation", rms, "RMS distance of the distorted line")
         .rounds_to_printed();
     let (max, rms) = (opposite.distorted.max_deviation(), opposite.distorted.rms_deviation());
-    record
-        .group("px", band())
-        .number("pincushion-max-deviation", max, "the same line under the pincushion lens")
-        .number("pincushion-rms-deviation", rms, "RMS under the pincushion lens");
     let corrected = bent.corrected.max_deviation();
     record
         .group("px", band())
+        .number("pincushion-max-deviation", max, "the same line under the pincushion lens")
+        .number("pincushion-rms-deviation", rms, "RMS under the pincushion lens")
         .number("max-after-correction", corrected, "largest distance after correction with the true model")
         .rounds_to_printed()
         .number(
@@ -270,18 +267,12 @@ fn claim_first_order(record: &mut Record, strengths: &[Node]) {
     let gap = |n: &Node| (n.max_px - n.first_order.max_px).abs();
     let band = || Band::absolute(1e-10, "differences of sums of 61 coordinates");
     let largest = strengths.iter().map(gap).fold(0.0, f64::max);
-    record.group("px", band()).number(
-        "first-order-gap",
-        largest,
-        "largest gap of the deviation to first-order theory",
-    );
     let bounds = strengths.iter().map(|n| n.first_order.bound_px);
     let widest = bounds.fold(0.0, f64::max);
-    record.group("px", band()).number(
-        "first-order-bound",
-        widest,
-        "largest bound of the second-order remainder",
-    );
+    record
+        .group("px", band())
+        .number("first-order-gap", largest, "largest gap of the deviation to first-order theory")
+        .number("first-order-bound", widest, "largest bound of the second-order remainder");
     let holds = |n: &Node| (n.max_px - n.first_order.max_px).abs() <= n.first_order.bound_px + ROUNDING_PX;
     record
         .claim_that(
@@ -385,9 +376,19 @@ fn deviation_figure(ideal: &[Vec2], bent: &Bent, opposite: &Bent, printed_max_px
     .line("barrel, corrected", &along(&bent.corrected))
     .hline(format!("\u{b1}{printed_max_px} px, as published"), printed_max_px)
     .hline("", -printed_max_px);
-    let caption = "Signed distance of the 61 points (v = 60 px, u = 20 ... 620 px) from their \
-                   orthogonal-regression line, in pixels; nothing is drawn at random. Notice the largest \
-                   deviation at an end of the line, and none after correction.";
+    let end = |fit: &LineFit| fit.deviations[0].abs().max(fit.deviations[ideal.len() - 1].abs());
+    let caption = format!(
+        "Signed distance of the {} points (v = {LINE_V_PX} px, u = {} ... {} px) from their \
+         orthogonal-regression line, in pixels; nothing is drawn at random. Notice that the barrel lens \
+         makes {:.3} px at an end of the line, the pincushion lens {:.3} px, and that {:.0e} px are left \
+         after correction.",
+        ideal.len(),
+        ideal[0].x,
+        ideal[ideal.len() - 1].x,
+        end(&bent.distorted),
+        end(&opposite.distorted),
+        bent.corrected.max_deviation()
+    );
     Figure::plot("deviation", &plot, caption)
 }
 

@@ -315,12 +315,12 @@ fn floor_figure(grid: &Swept) -> Figure {
             .points_as(label, &points, Look::series(v));
     }
     let caption = format!(
-        "Mean RMSE over the noise floor sqrt(2) sigma against the noise (marks, 300 trials, 95 % intervals, \
+        "Mean RMSE over the noise floor sqrt(2) sigma against the noise (marks, {} trials, 95 % intervals, \
          seed {}) and its prediction (lines): the mean of sigma / sqrt(N) times chi with 2N - p degrees of \
          freedom, which lies under sigma sqrt(2 (1 - p / 2N)), the root of the mean square, by one part in \
          4 (2N - p). Notice that the factor depends on the views, since 6 + 6n parameters absorb noise, and \
          not on the noise.",
-        grid.engine.spec.seed
+        grid.summary.cells[0].trials, grid.engine.spec.seed
     );
     Figure::plot("floor", &plot.y_range(0.96, 0.98), caption)
 }
@@ -363,11 +363,17 @@ fn overfitting_figure(marks: &Swept) -> Figure {
             .error_bars_as("", &sd_bars, Look::series(1))
             .points_as("measured", &sds, Look::series(1)),
     ];
+    let factor = &marks.engine.spec.factor[0];
+    let targets: Vec<String> = (0..factor.levels.len()).rev().map(|i| factor.label(i).to_string()).collect();
     let caption = format!(
-        "Targets of 221, 63, 20, 12 and 9 marks, 4 views, 0.1 px of noise, 300 trials each, 95 % intervals, \
-         seed {}. Notice that the RMSE falls where the error grows: a small residual is no proof of a good \
-         calibration.",
-        marks.engine.spec.seed
+        "Targets of {} marks, 4 views, 0.1 px of noise, {} trials each, 95 % intervals, seed {}. Notice \
+         that the RMSE falls to {:.2} of the noise floor where the standard deviation of fx is {:.1} times \
+         that of the largest target: a small residual is no proof of a good calibration.",
+        targets.join(", "),
+        marks.summary.cells[0].trials,
+        marks.engine.spec.seed,
+        means[0].1 / floor,
+        sds[0].1 / sds[sds.len() - 1].1
     );
     Figure::panels("overfitting", &panels, 2, caption)
 }

@@ -308,29 +308,19 @@ fn band() -> Band {
 fn report_noise(record: &mut Record, outcomes: &[Outcome]) -> Result<(), ExperimentError> {
     let base = base(outcomes)?;
     let noise = rms_coordinate(&base.errors);
+    let needed = CHAPTER_NOISE_PX / base.bound_px * BASE.noise;
+    let blurred = outcomes.iter().max_by(|a, b| a.node.blur_px.total_cmp(&b.node.blur_px)).unwrap_or(base);
+    let ratio = rms_coordinate(&blurred.errors) / blurred.bound_px;
+    let worst = outcomes.iter().map(|o| rms_coordinate(&o.errors)).fold(0.0, f64::max);
     record
         .group("px", band())
         .number("extraction-noise", noise, "RMS of a coordinate: blur 0.5 px, noise 1 %, dots of 3 mm")
-        .number("extraction-bound", base.bound_px, "what the information in the dots' edges allows there");
-    let needed = CHAPTER_NOISE_PX / base.bound_px * BASE.noise;
-    record.group("", band()).number(
-        "noise-for-a-tenth",
-        needed,
-        "image noise, of full scale, at which the bound reaches 0.1 px",
-    );
-    let blurred = outcomes.iter().max_by(|a, b| a.node.blur_px.total_cmp(&b.node.blur_px)).unwrap_or(base);
-    let ratio = rms_coordinate(&blurred.errors) / blurred.bound_px;
-    record.group("", band()).number(
-        "loss-under-blur",
-        ratio,
-        "extraction noise over its bound at the heaviest blur, 2 px",
-    );
-    let worst = outcomes.iter().map(|o| rms_coordinate(&o.errors)).fold(0.0, f64::max);
-    record.group("px", band()).number(
-        "largest-extraction-noise",
-        worst,
-        "the same in the worst node of the sweeps",
-    );
+        .number("extraction-bound", base.bound_px, "what the information in the dots' edges allows there")
+        .unit("")
+        .number("noise-for-a-tenth", needed, "image noise, of full scale, at which the bound reaches 0.1 px")
+        .number("loss-under-blur", ratio, "extraction noise over its bound at the heaviest blur, 2 px")
+        .unit("px")
+        .number("largest-extraction-noise", worst, "the same in the worst node of the sweeps");
     Ok(())
 }
 
@@ -340,16 +330,12 @@ fn report_bias(record: &mut Record, exact: &[Exact], unit: &[f64]) -> Result<(),
         .find(|e| e.diameter_mm == BASE.diameter_mm)
         .ok_or(ExperimentError::Input("the base's dot size is missing".into()))?;
     let bias = rms(&chapter.displacements);
+    let remainder = rms(&chapter.remainder());
     record
         .group("px", band())
         .number("bias-rms", bias, "RMS displacement of uncorrected centres, 3 mm dots, four poses")
-        .number("bias-largest", largest(&chapter.displacements), "largest displacement");
-    let remainder = rms(&chapter.remainder());
-    record.group("px", band()).number(
-        "remainder-rms",
-        remainder,
-        "RMS distance from the true centres once corrected",
-    );
+        .number("bias-largest", largest(&chapter.displacements), "largest displacement")
+        .number("remainder-rms", remainder, "RMS distance from the true centres once corrected");
     let truth = Truth::chapter_camera();
     let (before, after) =
         (differences(&chapter.uncorrected.camera, &truth), differences(&chapter.corrected.camera, &truth));

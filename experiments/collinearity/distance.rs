@@ -23,13 +23,13 @@ pub fn report_units_mistake(
     let mistake = pixels_minus_millimetres(&corrected(&truth, exact.pixels())?, exact.points());
     let band = Band::absolute(ROUNDING_PX, "rounding of coordinates below 640 px over 40 operations");
     let what = "RMS per point of corrected pixel minus target millimetre, true model, no noise";
-    record.group("", band).number("units-mistake", mistake, what).rounds_to_printed();
     let noisy = pixels_minus_millimetres(&ours.corrected, view.points());
-    record.group("", converged()).number(
-        "units-mistake-calibrated",
-        noisy,
-        "the same of our noisy single-plane calibration",
-    );
+    record
+        .group("", band)
+        .number("units-mistake", mistake, what)
+        .rounds_to_printed()
+        .band(converged())
+        .number("units-mistake-calibrated", noisy, "the same of our noisy single-plane calibration");
     // That it is the geometry and no accuracy is a claim of `interface`.
     Ok(())
 }

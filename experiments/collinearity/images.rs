@@ -179,18 +179,13 @@ pub fn report_rectified(
     count("empty-single-plane", plane.without_data(), "pixels without data, single-plane calibration");
     count("data-in-one-only", d.masks_differ, "pixels with data in one of the two images only");
     let shift = d.mean(d.shift_square).sqrt();
-    record.group("px", converged()).number(
-        format!("{view}-shift-rms"),
-        shift,
-        "RMS shift between the two maps",
-    );
     let grey = d.mean(d.level_square).sqrt();
     let band = Band::relative(1e-3, "a source that moves by 1e-8 px turns the rounding of few levels");
-    record.group("grey", band).number(
-        format!("{view}-grey-rms"),
-        grey,
-        "RMS difference of the two images, of 255 levels",
-    );
+    record
+        .group("px", converged())
+        .number(format!("{view}-shift-rms"), shift, "RMS shift between the two maps")
+        .group("grey", band)
+        .number(format!("{view}-grey-rms"), grey, "RMS difference of the two images, of 255 levels");
 }
 
 pub fn draw_rectified(

@@ -44,13 +44,16 @@ pub fn report_joint(record: &mut Record, draws: &[Draw], book: &Book) -> Result<
     for (i, centre) in CENTRES.iter().enumerate() {
         let name = centre.name();
         let Place { distance, probability } = place(draws, i, book)?;
-        record.group("", Band::relative(1e-6, "an inverse of a covariance of five quantities")).number(
-            format!("joint-distance-{name}"),
-            distance,
-            format!("squared Mahalanobis distance of the five published numbers, {name}"),
-        );
         let what = format!("share of draws as far out as the five published numbers, {name}");
-        record.exact("").number(format!("joint-probability-{name}"), probability, what);
+        record
+            .group("", Band::relative(1e-6, "an inverse of a covariance of five quantities"))
+            .number(
+                format!("joint-distance-{name}"),
+                distance,
+                format!("squared Mahalanobis distance of the five published numbers, {name}"),
+            )
+            .band(Band::Exact)
+            .number(format!("joint-probability-{name}"), probability, what);
         let verdict = if probability < EXCLUDED_BELOW { "excluded" } else { "possible" };
         let names = [name, centre.estimated()].map(Cell::from);
         let found = [Cell::from(distance), Cell::from(probability), Cell::from(verdict)];

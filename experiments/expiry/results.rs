@@ -115,6 +115,7 @@ fn drift_numbers(record: &mut Record, r: &Results) {
     let simulated = "a simulated station with round causes (30 ppm/K, 8 K, 5 urad a shift); tolerance: half \
                      the central 95 % of its stations";
     let opposed = "what would be left had the bracket turned the other way, first order";
+    let quarter = "a quarter of 91 days of three shifts; tolerance: half a week";
     record
         .group("mm", rounding_of_sums())
         .number("drift-mm", end, at_the_end)
@@ -128,9 +129,7 @@ fn drift_numbers(record: &mut Record, r: &Results) {
         .number("drift-bracket-mm", bracket, "share of the bracket's turn alone")
         .number("drift-opposed-mm", thermal - bracket, opposed)
         .number("drift-low-mm", low, "2.5 % quantile over stations")
-        .number("drift-high-mm", high, "97.5 % quantile over stations");
-    let quarter = "a quarter of 91 days of three shifts; tolerance: half a week";
-    record
+        .number("drift-high-mm", high, "97.5 % quantile over stations")
         .exact("months")
         .number("drift-months", days(QUARTER as f64) / MONTH_DAYS, "length of the quarter")
         .near_printed(3.5 / MONTH_DAYS, quarter);
@@ -139,29 +138,30 @@ fn drift_numbers(record: &mut Record, r: &Results) {
 /// What was assumed.
 fn station_numbers(record: &mut Record, r: &Results) {
     let s = &r.station;
+    let walk = "standard deviation of the bracket's turn in a shift";
     record
         .exact("mm")
         .number("tolerance-mm", TOLERANCE_MM, "error that may not go unnoticed")
         .number("reference-mm", s.reference_mm, "length of the reference")
         .unit("")
-        .count("frames", s.frames, "frames averaged by one check");
-    record.group("ppm/K", one_product()).number(
-        "focal-ppm-per-kelvin",
-        1e6 * s.focal_per_kelvin,
-        "relative drift of the focal length",
-    );
-    record.exact("mm").number("distance-mm", s.distance_mm, "distance of the plane").unit("").number(
-        "ewma-weight",
-        EWMA_WEIGHT,
-        "weight of the newest value in the moving average",
-    );
-    let walk = "standard deviation of the bracket's turn in a shift";
-    record.group("\u{b5}rad", one_product()).number("creep-sd-urad", 1e6 * s.creep_sd_rad, walk);
-    record.exact("K").number("season-kelvin", s.season_kelvin, "warming within the quarter");
+        .count("frames", s.frames, "frames averaged by one check")
+        .group("ppm/K", one_product())
+        .number("focal-ppm-per-kelvin", 1e6 * s.focal_per_kelvin, "relative drift of the focal length")
+        .exact("mm")
+        .number("distance-mm", s.distance_mm, "distance of the plane")
+        .unit("")
+        .number("ewma-weight", EWMA_WEIGHT, "weight of the newest value in the moving average")
+        .group("\u{b5}rad", one_product())
+        .number("creep-sd-urad", 1e6 * s.creep_sd_rad, walk)
+        .exact("K")
+        .number("season-kelvin", s.season_kelvin, "warming within the quarter");
     let creep = "mean turn of the bracket in a shift";
-    record.group("\u{b5}rad", one_product()).number("creep-urad", 1e6 * s.creep_rad, creep);
     let band = Band::relative(1e-15, "three operations");
-    record.group("mm", band).number("check-sd-mm", r.sd_mm, "standard deviation of one check");
+    record
+        .group("\u{b5}rad", one_product())
+        .number("creep-urad", 1e6 * s.creep_rad, creep)
+        .group("mm", band)
+        .number("check-sd-mm", r.sd_mm, "standard deviation of one check");
 }
 
 fn rule_numbers(record: &mut Record, r: &Results) {
@@ -188,11 +188,9 @@ fn rule_numbers(record: &mut Record, r: &Results) {
             .group("days", counted())
             .number(format!("{name}-median-days"), day(0.5), "median day of the alarm")
             .number(format!("{name}-late-days"), day(0.95), late)
-            .unit("mm")
-            .band(rounding_of_sums())
+            .group("mm", rounding_of_sums())
             .number(format!("{name}-error-mm"), median(&errors), "median systematic error at the alarm")
-            .unit("")
-            .band(counted())
+            .group("", counted())
             .number(format!("{name}-missed"), missed, "share of quarters without an alarm");
     }
 }
@@ -223,11 +221,9 @@ fn fleet_numbers(record: &mut Record, r: &Results) {
             days(median(&asked)),
             "median interval when the check asks, stations not used to set its limit",
         )
-        .unit("mm")
-        .band(rounding_of_sums())
+        .group("mm", rounding_of_sums())
         .number("check-action-mm", r.action_limit() * r.sd_mm, action)
-        .unit("")
-        .band(counted())
+        .group("", counted())
         .number("check-never", never, "share of the fleet that needs no calibration within a year")
         .number("check-gain", median(&asked) / calendar, "median interval over the calendar's");
 }

@@ -17,16 +17,11 @@ pub fn claim_attained(record: &mut Record, draw: &Draw, trials: &Outcome) {
         let (name, sd) = (parameter.name(), draw.sd(parameter));
         let (bias, ratio) = (errors.bias(i), errors.standard_deviation(i) / sd);
         let no_bias = Interval::of_mean(0.0, sd, trials.converged(), each);
-        record.group(parameter.unit(), of_deviation(sd)).number(
-            format!("{name}-bias"),
-            bias,
-            "mean error of the trials",
-        );
-        record.group("", relative()).number(
-            format!("{name}-sd-ratio"),
-            ratio,
-            "spread of the trials over the bound",
-        );
+        record
+            .group(parameter.unit(), of_deviation(sd))
+            .number(format!("{name}-bias"), bias, "mean error of the trials")
+            .group("", relative())
+            .number(format!("{name}-sd-ratio"), ratio, "spread of the trials over the bound");
         record
             .claim_that(
                 format!("{name}-unbiased"),
@@ -149,14 +144,10 @@ pub fn claim_rmse_blind(record: &mut Record, draw: &Draw, trials: &Outcome) {
     let (k1, k2) = (position(Parameter::K1), position(Parameter::K2));
     let predicted = draw.bound.correlation(Parameter::K1, Parameter::K2).unwrap_or(f64::NAN);
     let sampled = trials.errors().correlation(k1, k2);
-    record.group("", relative()).number(
-        "k1-k2-correlation",
-        predicted,
-        "correlation of k1 and k2 in the bound",
-    );
     let focal = draw.bound.correlation(Parameter::Fx, Parameter::Fy).unwrap_or(f64::NAN);
     record
         .group("", relative())
+        .number("k1-k2-correlation", predicted, "correlation of k1 and k2 in the bound")
         .number("fx-fy-correlation", focal, "correlation of fx and fy in the bound")
         .number("k1-k2-correlation-trials", sampled, "the same over the trials");
     let around = Interval::of_correlation(predicted, n, RATE);

@@ -95,8 +95,7 @@ pub(crate) fn report(record: &mut Record, examined: &Examined) {
         .band(stop())
         .number("units-direct-box", black_box.direct, "the same from the black box")
         .band(rounding())
-        .number("units-spacing-ratio", chapter.spacing_ratio, "spacing of the answer over the target's");
-    record
+        .number("units-spacing-ratio", chapter.spacing_ratio, "spacing of the answer over the target's")
         .group("mm", stop())
         .number(
             "units-affine-mm",

@@ -185,6 +185,7 @@ pub fn hypotheses_table(hypotheses: &[HalfPixels]) -> Result<Table, ExperimentEr
 }
 
 pub fn gui_figure(centres: &[Vec2], gui: &[Vec2]) -> Figure {
+    let apart = mean(gui) - mean(centres);
     let shifts: Vec<(f64, f64)> = centres.iter().zip(gui).map(|(c, g)| (g.x - c.x, g.y - c.y)).collect();
     let square = |at: f64| {
         [
@@ -204,16 +205,12 @@ pub fn gui_figure(centres: &[Vec2], gui: &[Vec2]) -> Figure {
         .line_as("rounding to half pixels", &square(0.0), Look::series(0))
         .line_as("the same from the pixel's corner", &square(0.5), Look::series(1))
         .points_as("nine centres", &shifts, Look::series(2))
-        .points_as(
-            "mean",
-            &[{
-                let m = mean(gui) - mean(centres);
-                (m.x, m.y)
-            }],
-            Look::series(3).size(6.0),
-        );
-    let caption = "Half-pixel centres that print the GUI's six numbers, less ours, in pixels; nothing is \
-                   drawn at random. Notice that their mean lies half a pixel away in both directions: the \
-                   origin differs, not the rounding alone.";
+        .points_as("mean", &[(apart.x, apart.y)], Look::series(3).size(6.0));
+    let caption = format!(
+        "Half-pixel centres that print the GUI's six numbers, less ours, in pixels; nothing is drawn at \
+         random. Notice that their mean lies {:.2} px away along u and {:.2} px along v, where rounding \
+         alone moves it by a quarter of a pixel at most: the origin differs.",
+        apart.x, apart.y
+    );
     Figure::plot("gui-shift", &plot, caption)
 }

@@ -3,14 +3,12 @@
 use super::*;
 
 pub fn report_geometry(record: &mut Record, image: &Raster<f32>, centres: &[Vec2], band: Band) {
-    record.exact("px").count("image-width", image.width(), "width of the image").count(
-        "image-height",
-        image.height(),
-        "height of the image",
-    );
     let (along, between) = spacings(centres);
     record
-        .group("px", band.clone())
+        .exact("px")
+        .count("image-width", image.width(), "width of the image")
+        .count("image-height", image.height(), "height of the image")
+        .band(band.clone())
         .number("spacing", 0.5 * (along + between), "mean spacing of the dots")
         .number("spacing-rows", between, "mean spacing from row to row")
         .number("spacing-columns", along, "mean spacing from column to column");

@@ -82,7 +82,6 @@ fn number(value: f64) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Band;
 
     #[test]
     fn a_number_that_is_not_finite_is_written_as_a_word() {

@@ -57,6 +57,16 @@ impl Numbers<'_> {
         self.number(id, count as f64, what)
     }
 
+    /// Unit and band of the numbers that follow.
+    pub fn group(&mut self, unit: impl Into<String>, band: Band) -> &mut Self {
+        self.unit(unit).band(band)
+    }
+
+    /// The unit of the numbers that follow, of which not a bit may change.
+    pub fn exact(&mut self, unit: impl Into<String>) -> &mut Self {
+        self.group(unit, Band::Exact)
+    }
+
     /// The unit of the numbers that follow.
     pub fn unit(&mut self, unit: impl Into<String>) -> &mut Self {
         self.unit = unit.into();

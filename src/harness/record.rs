@@ -75,7 +75,11 @@ pub enum RecordError {
     #[error("number `{0}` is not in the record yet: add it before it is reconciled")]
     NoSuchNumber(String),
     /// A number is reconciled by another rule than `published.toml` asks for.
-    #[error("published value `{id}` has the rule `{}`, but was reconciled as `{}`", expected.map_or("none", Rule::name), got.name())]
+    #[error(
+        "published value `{id}` has the rule `{}`, but was reconciled as `{}`",
+        expected.map_or("none", Rule::name),
+        got.name()
+    )]
     Rule {
         /// `<experiment>.<number>`.
         id: String,
