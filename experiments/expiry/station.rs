@@ -82,10 +82,10 @@ impl Station {
 
     /// The same to first order, and a bound of what is left out.
     ///
-    /// With `t = reference / distance`, warming stretches by `a` and a turn `w` takes `tan` of one end to `(t
-    /// - w') / (1 + t w')`, `w' = tan w`: the error is `Z [(1 + a) ((t - w') / (1 + t w') + w') - t]`, that
-    /// is `Z (a t - t^2 w)` and terms of second order. Expanding, those are `Z (t (1 + t^2) w^2 + |a| t^2
-    /// |w|)`; twice that covers the higher orders while `w < 0.01`.
+    /// With `t = reference / distance`, warming stretches by `a` and a turn `w` takes `tan` of one end to
+    /// `(t - w') / (1 + t w')`, `w' = tan w`: the error is `Z [(1 + a) ((t - w') / (1 + t w') + w') - t]`,
+    /// that is `Z (a t - t^2 w)` and terms of second order. Expanding, those are
+    /// `Z (t (1 + t^2) w^2 + |a| t^2 |w|)`; twice that covers the higher orders while `w < 0.01`.
     pub(crate) fn first_order_mm(&self, kelvin: f64, turn_rad: f64) -> (f64, f64) {
         let (z, t) = (self.distance_mm, self.reference_mm / self.distance_mm);
         let a = self.focal_per_kelvin * kelvin;

@@ -85,7 +85,7 @@ impl Numbers<'_> {
     /// What is wrong with a reconciliation (no such entry, or one of another rule) is reported when the
     /// record is closed.
     pub fn rounds_to_printed(&mut self) -> &mut Self {
-        self.reconcile(Rule::Exact, |entry, ours| Reconciliation::exact(entry, ours))
+        self.reconcile(Rule::Exact, Reconciliation::exact)
     }
 
     /// Holds the last number and the published value of the same name against a predicted distribution, each
