@@ -384,8 +384,8 @@ fn report_directions(record: &mut Record, theory: &Theory) {
 }
 
 /// A smooth function of the ratio at a ratio of zero, from its values at `h`, `h / 2` and `h / 4` (Richardson
-/// 1911): each step removes the lowest power that is left, `2 f(h/2) - f(h)` the first and `(4 g(h/2) - g(h))
-/// / 3` the second.
+/// 1911): each step removes the lowest power that is left, `2 f(h/2) - f(h)` the first and
+/// `(4 g(h/2) - g(h)) / 3` the second.
 struct AtZero {
     value: DVector<f64>,
     /// What the last step changed. It is all of the second power, of which the value is free: where powers

@@ -5,9 +5,9 @@
 //! correct solver passes.
 //!
 //! What it cannot show: faults of a kind that nobody thought of. The subtle faults need thousands of samples
-//! a scenario, and false alarms hundreds of runs: they are measured by `calibench gate --power
-//! golden/gate-power --size thorough`, and what that wrote is read here. It is refused as stale when a line
-//! of the gate or of the solver has changed since.
+//! a scenario, and false alarms hundreds of runs: they are measured by
+//! `calibench gate --power golden/gate-power --size thorough`, and what that wrote is read here. It is
+//! refused as stale when a line of the gate or of the solver has changed since.
 
 use calibench_gate::faults::{Class, Planted, planted};
 use calibench_gate::power::{Catch, FaultRow, Measured, catch, false_alarms};

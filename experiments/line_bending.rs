@@ -119,8 +119,9 @@ struct FirstOrder {
 }
 
 impl FirstOrder {
-    /// To first order in the coefficients a point of the line moves by `(du, dv) = f (x, y) (k1 r^2 + k2
-    /// r^4)`, and its deviation is `dv` less the regression line of `dv` on `u`.
+    /// To first order in the coefficients a point of the line moves by
+    /// `(du, dv) = f (x, y) (k1 r^2 + k2 r^4)`, and its deviation is `dv` less the regression line of `dv` on
+    /// `u`.
     ///
     /// The rest is of second order: with the ideal `u` spread over `+-L` and variance `s^2`, `du` and `dv`
     /// within D and E of their means, and slope `b` of the regression, `b D` comes from the shift along the

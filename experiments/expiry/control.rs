@@ -42,8 +42,8 @@ pub(crate) struct Ewma {
 }
 
 /// Nodes of Simpson's rule across the region without alarm. The kernel is a normal density of width `weight`
-/// over a region of about `2 x 1.2`: a step of 0.012 against 0.2 leaves a relative error near `(0.06)^4 / 180
-/// = 7e-8` a check, 2e-5 a quarter.
+/// over a region of about `2 x 1.2`: a step of 0.012 against 0.2 leaves a relative error near
+/// `(0.06)^4 / 180 = 7e-8` a check, 2e-5 a quarter.
 const NODES: usize = 201;
 
 impl Ewma {
