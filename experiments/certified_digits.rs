@@ -1,23 +1,27 @@
-//! How many digits of certified results do calibrators reach? Problems whose least-squares solution is known to twenty digits.
+//! How many digits of certified results do calibrators reach? Problems whose least-squares solution is known
+//! to twenty digits.
 //!
-//! Expected: polished, this library's solver reaches what doubles can hold, eleven digits and more; as it is, it stops where a step would gain
-//! less than 1e-14 of the cost, at some six to twelve digits, of which measurements mean three or four.
+//! Expected: polished, this library's solver reaches what doubles can hold, eleven digits and more; as it is,
+//! it stops where a step would gain less than 1e-14 of the cost, at some six to twelve digits, of which
+//! measurements mean three or four.
 //!
-//! What it cannot show: whether the least-squares solution is near the truth; `four-pose` and the gate ask that. The other programs are not
-//! run here: `calibench gate --certified --digits reference/digits.csv` measured them, and what it wrote is read.
+//! What it cannot show: whether the least-squares solution is near the truth; `four-pose` and the gate ask
+//! that. The other programs are not run here: `calibench gate --certified --digits reference/digits.csv`
+//! measured them, and what it wrote is read.
 
 use calibench_gate::certified::{Digits, DigitsTable, Level, ReferenceProblem, measure, read};
 use calibench_gate::solver::Polished;
 use calibench_harness::project::Project;
-use calibench_harness::{Band, Claim, Context, Experiment, ExperimentError, Record, Table};
+use calibench_harness::{Band, Context, Experiment, ExperimentError, Record, Table};
 
 /// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
     id: "certified-digits",
     title: "Digits of certified results",
-    question: "The least-squares solution of each problem in reference/ is certified to twenty digits by an independent program. How \
-               many digits of it do calibrators reach? Expected: polished, this library's solver eleven or more of every parameter, \
-               nine where tilts of two degrees hardly separate focal length from distance.",
+    question: "The least-squares solution of each problem in reference/ is certified to twenty digits by an \
+               independent program. How many digits of it do calibrators reach? Expected: polished, this \
+               library's solver eleven or more of every parameter, nine where tilts of two degrees hardly \
+               separate focal length from distance.",
     seed: 1,
     takes_image: false,
     run,
@@ -40,17 +44,15 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     record.input("reference/digits.csv", DIGITS.as_bytes());
 
     let measured = measure(&problems, &Polished);
-    record.number("problems", problems.len() as f64, "", Band::Exact, "certified problems");
+    record.exact("").count("problems", problems.len(), "certified problems");
     let reason = "the last digits of doubles: another order of sums moves them";
     for level in [Level::Lower, Level::Average, Level::Higher] {
         let of_level = problems.iter().zip(&measured).filter(|(p, _)| p.reference.level == level);
         let least =
             of_level.map(|(_, m)| m.as_ref().map_or(0.0, Digits::least)).fold(f64::INFINITY, f64::min);
-        record.number(
+        record.group("", Band::absolute(1.0, reason)).number(
             format!("least-{}", level.name()),
             least,
-            "",
-            Band::absolute(1.0, reason),
             format!("least digits of a parameter over the problems of level {}, polished", level.name()),
         );
     }
@@ -58,23 +60,26 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
         let wanted = if p.problem.id == "near-degenerate" { WANTED_NEAR_DEGENERATE } else { WANTED };
         (p.problem.id.clone(), m.as_ref().is_ok_and(|digits| digits.least() >= wanted))
     };
-    record.claim(Claim::all_of(
-        "digits-are-reached",
-        "polished, this library's solver reaches 11 digits of every parameter of every problem, 9 of the near-degenerate one",
-        problems.iter().zip(&measured).map(reached),
-        "certified by an independent program in numbers of 40 and 60 digits: reference/README.md",
-    ));
+    record
+        .claim_that(
+            "digits-are-reached",
+            "polished, this library's solver reaches 11 digits of every parameter of every problem, 9 of \
+             the near-degenerate one",
+        )
+        .every("cases", problems.iter().zip(&measured).map(reached))
+        .because("certified by an independent program in numbers of 40 and 60 digits: reference/README.md");
     let mut ours = DigitsTable::default();
     ours.add("calibench, polished", &problems, &measured);
     let is_current = |row: &calibench_gate::certified::Row| {
         (row.problem.clone(), committed.row(&row.solver, &row.problem) == Some(row))
     };
-    record.claim(Claim::all_of(
-        "table-is-current",
-        "the committed table has the digits that the polished solver reaches now",
-        ours.rows.iter().map(is_current),
-        "the same bits on every machine",
-    ));
+    record
+        .claim_that(
+            "table-is-current",
+            "the committed table has the digits that the polished solver reaches now",
+        )
+        .every("cases", ours.rows.iter().map(is_current))
+        .because("the same bits on every machine");
     record.table(table(&committed));
     Ok(record)
 }

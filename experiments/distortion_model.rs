@@ -1,12 +1,13 @@
 //! What does it cost to leave the tangential terms out of the lens model?
 //!
-//! A lens whose elements are not quite centred distorts tangentially too (Brown 1971). The chapter holds those terms at zero.
-//! Here the truth has them, from none to half of the radial displacement, and the chapter's model, which has none, is fitted.
-//! A displacement of the whole lens is its RMS over all points of the target in all four views: at a single point the ratio depends
-//! on where it lies (opposite corners of the target differ by a factor of three).
-//! Expected: the principal point takes the place of the missing terms; at a tenth of the radial ones it is off by many
-//! standard deviations; the reprojection error tells of it only at a ratio where the harm is long done; and below a ratio
-//! that the linear theory names, leaving them out is the better choice, because two parameters fewer have to be paid for.
+//! A lens whose elements are not quite centred distorts tangentially too (Brown 1971). The chapter holds
+//! those terms at zero. Here the truth has them, from none to half of the radial displacement, and the
+//! chapter's model, which has none, is fitted. A displacement of the whole lens is its RMS over all points of
+//! the target in all four views: at a single point the ratio depends on where it lies (opposite corners of
+//! the target differ by a factor of three). Expected: the principal point takes the place of the missing
+//! terms; at a tenth of the radial ones it is off by many standard deviations; the reprojection error tells
+//! of it only at a ratio where the harm is long done; and below a ratio that the linear theory names, leaving
+//! them out is the better choice, because two parameters fewer have to be paid for.
 //!
 //! What it cannot show: lenses that no Brown-Conrady model describes (Steger, Ulrich & Wiedemann 2018).
 
@@ -15,7 +16,8 @@ use calibench::camera::{BrownConrady, Camera, FreeParameters, Parameter};
 use calibench::evaluate::{RmseDistribution, cramer_rao};
 use calibench::geometry::{Affine, Pose, Vec2, Vec3};
 use calibench::synth::{Scene, Truth};
-use calibench_harness::{Band, Claim, Context, Experiment, ExperimentError, Figure, Plot, Record, Table};
+use calibench_harness::stats;
+use calibench_harness::{Band, Context, Experiment, ExperimentError, Figure, Plot, Record, Table};
 use nalgebra::{DMatrix, DVector, Vector2};
 use rayon::prelude::*;
 
@@ -23,10 +25,11 @@ use rayon::prelude::*;
 pub const EXPERIMENT: Experiment = Experiment {
     id: "distortion-model",
     title: "What leaving out the tangential terms costs",
-    question: "The truth has tangential distortion, from none to half of the radial displacement (RMS over the target); the \
-               model that is fitted has none. How far are the parameters off, does the reprojection error tell, what does it \
-               cost on the plane, and up to which ratio is the smaller model the better one? Expected: at a tenth the \
-               principal point is off by many standard deviations, and the RMSE tells only when the harm is long done.",
+    question: "The truth has tangential distortion, from none to half of the radial displacement (RMS over \
+               the target); the model that is fitted has none. How far are the parameters off, does the \
+               reprojection error tell, what does it cost on the plane, and up to which ratio is the \
+               smaller model the better one? Expected: at a tenth the principal point is off by many \
+               standard deviations, and the RMSE tells only when the harm is long done.",
     seed: 0,
     takes_image: false,
     run,
@@ -39,7 +42,8 @@ const RATIO_THOUSANDTHS: [u32; 12] = [0, 5, 10, 20, 30, 50, 75, 100, 150, 200, 3
 /// The two ratios that the chapter's question is about, in thousandths.
 const TENTH: u32 = 100;
 const HALF: u32 = 500;
-/// Direction of the decentring in the (p1, p2) plane in which the fits are made: neither axis, so that both terms act.
+/// Direction of the decentring in the (p1, p2) plane in which the fits are made: neither axis, so that both
+/// terms act.
 const DIRECTION: [f64; 2] = [0.8, 0.6];
 /// Steps of all other directions, degrees; the opposite direction has the opposite effect.
 const DIRECTION_STEP_DEG: usize = 15;
@@ -57,8 +61,8 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
         .par_iter()
         .map(|&thousandths| Node::of(thousandths, unit))
         .collect::<Result<Vec<Node>, _>>()?;
-    tell_numbers(&mut record, &nodes, &theory, unit);
-    tell_directions(&mut record, &theory);
+    report_numbers(&mut record, &nodes, &theory, unit);
+    report_directions(&mut record, &theory);
     claim_linear(&mut record, [&nodes[3], &nodes[2], &nodes[1]], &theory, unit);
     claim_full_model(&mut record, &nodes);
     record.table(bias_table(&nodes, &theory, unit));
@@ -74,8 +78,8 @@ fn decentred(p: Vector2<f64>) -> Truth {
     Truth { camera: chapter.camera.with_distortion(lens), ..chapter }
 }
 
-/// `(p1, p2)` of a direction for a ratio of one: the tangential displacement as long as the radial one, each as RMS over all points
-/// of all views. Both terms are linear in their coefficients.
+/// `(p1, p2)` of a direction for a ratio of one: the tangential displacement as long as the radial one, each
+/// as RMS over all points of all views. Both terms are linear in their coefficients.
 fn tangential_per_ratio(truth: &Truth, direction: Vector2<f64>) -> Vector2<f64> {
     let ideal = |pose: &Pose| -> Vec<Vec2> {
         let seen = truth.points.iter().map(|p| pose.apply(&Vec3::new(p.x, p.y, 0.0)));
@@ -92,9 +96,9 @@ fn tangential_per_ratio(truth: &Truth, direction: Vector2<f64>) -> Vector2<f64> 
 
 /// First-order theory of a fit without the tangential terms.
 ///
-/// With the covariance `C` of the full model at the truth, split into the chapter's parameters `a` and the tangential ones
-/// `p`, holding `p` at zero moves the estimate by `-C_ap C_pp^-1 p` and leaves a sum of squares `sigma^2 p' C_pp^-1 p`, as
-/// for any linear restriction of a least-squares fit.
+/// With the covariance `C` of the full model at the truth, split into the chapter's parameters `a` and the
+/// tangential ones `p`, holding `p` at zero moves the estimate by `-C_ap C_pp^-1 p` and leaves a sum of
+/// squares `sigma^2 p' C_pp^-1 p`, as for any linear restriction of a least-squares fit.
 struct Theory {
     full: Covariance,
     small: Covariance,
@@ -149,7 +153,8 @@ impl Theory {
         (rmse_px * rmse_px + noise * noise).sqrt()
     }
 
-    /// The ratio at which noise and what is left together leave the central 99 % of the RMSE that noise alone predicts.
+    /// The ratio at which noise and what is left together leave the central 99 % of the RMSE that noise alone
+    /// predicts.
     fn rmse_notices(&self, unit: Vector2<f64>) -> f64 {
         let noise = self.noise();
         let (high, expected) = (noise.interval_px(0.01).high, noise.root_mean_square_px());
@@ -162,7 +167,8 @@ impl Theory {
         Vector2::new(bias[2], bias[3]).norm()
     }
 
-    /// The ratio at which both models have the same mean squared distance of the principal point from the truth.
+    /// The ratio at which both models have the same mean squared distance of the principal point from the
+    /// truth.
     fn centre_break_even(&self, unit: Vector2<f64>) -> f64 {
         let square = |sd: f64| sd * sd;
         let gain = |p: Parameter| square(self.full_sd(p)) - square(self.small_sd(p));
@@ -211,8 +217,8 @@ impl Node {
     }
 }
 
-/// Corrects the facing view with a camera and maps it to the target: what is left is distortion that the camera did not
-/// explain.
+/// Corrects the facing view with a camera and maps it to the target: what is left is distortion that the
+/// camera did not explain.
 fn plane_residual_mm(scene: &Scene, camera: &Camera) -> Result<(f64, f64), ExperimentError> {
     let corrected = scene.pixels()[0].iter().map(|pixel| camera.correct_pixel(pixel));
     let corrected = corrected.collect::<Result<Vec<Vec2>, _>>().map_err(ExperimentError::at("correction"))?;
@@ -223,9 +229,10 @@ fn plane_residual_mm(scene: &Scene, camera: &Camera) -> Result<(f64, f64), Exper
     Ok((square.sqrt(), distances.iter().fold(0.0, |largest, d| d.max(largest))))
 }
 
-fn tell_numbers(record: &mut Record, nodes: &[Node], theory: &Theory, unit: Vector2<f64>) {
+fn report_numbers(record: &mut Record, nodes: &[Node], theory: &Theory, unit: Vector2<f64>) {
     use Parameter::*;
-    // The solver stops where a step is below 1e-6 standard deviations or so; a bias of many of them moves by less than 1e-6.
+    // The solver stops where a step is below 1e-6 standard deviations or so; a bias of many of them moves by
+    // less than 1e-6.
     let stop = || Band::relative(1e-6, "where the solver stops");
     let theory_band = || Band::relative(1e-8, "inverse of the information matrix");
     for (name, thousandths) in [("tenth", TENTH), ("half", HALF)] {
@@ -235,97 +242,70 @@ fn tell_numbers(record: &mut Record, nodes: &[Node], theory: &Theory, unit: Vect
         };
         for p in [Fx, Cx, Cy, K1, K2] {
             let bias = node.bias_of(p);
-            record.number(
-                format!("{name}-{p}-bias"),
-                bias,
-                p.unit(),
-                stop(),
-                format!("{p}, estimate minus truth"),
-            );
             let z = bias.abs() / theory.small_sd(p);
-            record.number(
-                format!("{name}-{p}-z"),
-                z,
-                "",
-                stop(),
-                format!("the same in standard deviations of {p}"),
-            );
+            record
+                .group(p.unit(), stop())
+                .number(format!("{name}-{p}-bias"), bias, format!("{p}, estimate minus truth"))
+                .unit("")
+                .number(format!("{name}-{p}-z"), z, format!("the same in standard deviations of {p}"));
         }
-        record.number(format!("{name}-rmse"), node.rmse_px, "px", stop(), "RMSE without noise");
         let with_noise = theory.with_noise_px(node.rmse_px);
-        record.number(format!("{name}-rmse-noisy"), with_noise, "px", stop(), "RMSE to expect with noise");
-        record.number(
-            format!("{name}-rmse-rise"),
-            with_noise / theory.with_noise_px(0.0) - 1.0,
-            "",
-            stop(),
-            "rise of the expected RMSE above that of noise alone, as a fraction",
-        );
-        record.number(
-            format!("{name}-plane-mm"),
-            node.plane_mm.0,
-            "mm",
-            stop(),
-            "RMS residual on the plane after correction",
-        );
-        record.number(
-            format!("{name}-plane-max-mm"),
-            node.plane_mm.1,
-            "mm",
-            stop(),
-            "largest residual on the plane",
-        );
+        record
+            .group("px", stop())
+            .number(format!("{name}-rmse"), node.rmse_px, "RMSE without noise")
+            .number(format!("{name}-rmse-noisy"), with_noise, "RMSE to expect with noise")
+            .unit("")
+            .number(
+                format!("{name}-rmse-rise"),
+                with_noise / theory.with_noise_px(0.0) - 1.0,
+                "rise of the expected RMSE above that of noise alone, as a fraction",
+            )
+            .unit("mm")
+            .number(format!("{name}-plane-mm"), node.plane_mm.0, "RMS residual on the plane after correction")
+            .number(format!("{name}-plane-max-mm"), node.plane_mm.1, "largest residual on the plane");
     }
     let notices = theory.rmse_notices(unit);
-    record.number(
-        "rmse-notices",
-        notices,
-        "",
-        theory_band(),
-        "ratio at which the expected RMSE leaves the central 99 % of its prediction",
-    );
     let noise = theory.with_noise_px(0.0);
-    record.number("rmse-noise", noise, "px", theory_band(), "RMSE to expect from noise alone");
     let noisy = theory.with_noise_px(theory.rmse_px(unit * notices));
-    record.number("rmse-notices-px", noisy, "px", theory_band(), "RMSE to expect at that ratio");
     let bias = theory.bias(unit * notices)[2].abs() / theory.small_sd(Cx);
-    record.number(
-        "rmse-notices-cx-z",
-        bias,
-        "",
-        theory_band(),
-        "bias of cx at that ratio, in standard deviations",
-    );
-    record.number(
-        "p1-per-ratio",
-        unit.x,
-        "",
-        Band::relative(1e-12, "rounding"),
-        "p1 where tangential and radial displacement are equal in the RMS over the target",
-    );
-    record.number(
-        "corners-differ",
-        corners_differ(&Truth::chapter()),
-        "",
-        Band::relative(1e-12, "rounding"),
-        "largest over smallest tangential displacement at the corners of the facing target",
-    );
-    record.number("p2-per-ratio", unit.y, "", Band::relative(1e-12, "rounding"), "p2 there");
+    record
+        .group("", theory_band())
+        .number(
+            "rmse-notices",
+            notices,
+            "ratio at which the expected RMSE leaves the central 99 % of its prediction",
+        )
+        .unit("px")
+        .number("rmse-noise", noise, "RMSE to expect from noise alone")
+        .number("rmse-notices-px", noisy, "RMSE to expect at that ratio")
+        .unit("")
+        .number("rmse-notices-cx-z", bias, "bias of cx at that ratio, in standard deviations")
+        .band(Band::relative(1e-12, "rounding"))
+        .number(
+            "p1-per-ratio",
+            unit.x,
+            "p1 where tangential and radial displacement are equal in the RMS over the target",
+        )
+        .number(
+            "corners-differ",
+            corners_differ(&Truth::chapter()),
+            "largest over smallest tangential displacement at the corners of the facing target",
+        )
+        .number("p2-per-ratio", unit.y, "p2 there");
     for p in [Fx, Cx, Cy] {
         let what = format!("standard deviation of {p} with the tangential terms over that without");
-        record.number(
+        record.group("", theory_band()).number(
             format!("{p}-inflation"),
             theory.full_sd(p) / theory.small_sd(p),
-            "",
-            theory_band(),
             what,
         );
         let what = format!("ratio below which {p} is better without them: same mean squared error");
-        record.number(format!("{p}-break-even"), theory.break_even(p, unit), "", theory_band(), what);
+        record.group("", theory_band()).number(format!("{p}-break-even"), theory.break_even(p, unit), what);
     }
 }
 
-/// Largest over smallest tangential displacement at the four corners of the facing target: why one corner does not speak for the lens.
+/// Largest over smallest tangential displacement at the four corners of the facing target: why one corner
+/// does not speak for the lens.
 fn corners_differ(truth: &Truth) -> f64 {
     let direction = Vector2::from(DIRECTION);
     let lens = BrownConrady { p1: direction.x, p2: direction.y, ..BrownConrady::default() };
@@ -336,68 +316,80 @@ fn corners_differ(truth: &Truth) -> f64 {
     moved.iter().copied().fold(0.0, f64::max) / moved.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
-/// What the linear theory says of all directions of the decentring, each at its own ratio of one.
-fn tell_directions(record: &mut Record, theory: &Theory) {
-    let columns = [
-        ("direction", "deg"),
-        ("p1_at_a_tenth", ""),
-        ("p2_at_a_tenth", ""),
-        ("cx_bias", "px"),
-        ("cy_bias", "px"),
-        ("centre_shift", "px"),
-        ("rmse_notices", ""),
-        ("centre_break_even", ""),
-    ];
-    let caption = "linear theory for every direction of the decentring: principal point at a ratio of a tenth, the ratio at which the \
-                   RMSE leaves its range, and that up to which the smaller model has the better principal point";
-    let mut table = Table::new("directions", caption, &columns);
-    let mut found: Vec<[f64; 3]> = Vec::new();
-    for degrees in (0..180).step_by(DIRECTION_STEP_DEG) {
-        let (sin, cos) = libm::sincos((degrees as f64).to_radians());
+/// What the linear theory says of one direction of the decentring, at its own ratio of one.
+struct Direction {
+    degrees: f64,
+    /// `(p1, p2)` at a ratio of a tenth, and the bias there.
+    tenth: Vector2<f64>,
+    bias: DVector<f64>,
+    centre_shift_px: f64,
+    rmse_notices: f64,
+    centre_break_even: f64,
+}
+
+impl Direction {
+    fn of(degrees: f64, theory: &Theory) -> Direction {
+        let (sin, cos) = libm::sincos(degrees.to_radians());
         let unit = tangential_per_ratio(&Truth::chapter(), Vector2::new(cos, sin));
         let tenth = unit * (f64::from(TENTH) / 1000.0);
-        let bias = theory.bias(tenth);
-        let of_direction =
-            [theory.centre_shift_px(tenth), theory.rmse_notices(unit), theory.centre_break_even(unit)];
-        table.push([degrees as f64, tenth.x, tenth.y, bias[2], bias[3]].into_iter().chain(of_direction));
-        found.push(of_direction);
-    }
-    record.table(table);
-    for (i, (id, unit, what)) in [
-        ("tenth-centre-shift", "px", "distance of the principal point from the truth at a tenth"),
-        ("rmse-notices", "", "ratio at which the expected RMSE leaves the central 99 % of its prediction"),
-        (
-            "centre-break-even",
-            "",
-            "ratio below which the principal point is better without the tangential terms",
-        ),
-    ]
-    .into_iter()
-    .enumerate()
-    {
-        let values = || found.iter().map(|f| f[i]);
-        let band = || Band::relative(1e-8, "inverse of the information matrix");
-        for (end, value) in [
-            ("least", values().fold(f64::INFINITY, f64::min)),
-            ("most", values().fold(f64::NEG_INFINITY, f64::max)),
-        ] {
-            record.number(
-                format!("{id}-{end}"),
-                value,
-                unit,
-                band(),
-                format!("{what}, {end} over the directions"),
-            );
+        Direction {
+            degrees,
+            tenth,
+            bias: theory.bias(tenth),
+            centre_shift_px: theory.centre_shift_px(tenth),
+            rmse_notices: theory.rmse_notices(unit),
+            centre_break_even: theory.centre_break_even(unit),
         }
     }
 }
 
-/// A smooth function of the ratio at a ratio of zero, from its values at `h`, `h / 2` and `h / 4` (Richardson 1911): each step
-/// removes the lowest power that is left, `2 f(h/2) - f(h)` the first and `(4 g(h/2) - g(h)) / 3` the second.
+fn report_directions(record: &mut Record, theory: &Theory) {
+    let directions: Vec<Direction> =
+        (0..180).step_by(DIRECTION_STEP_DEG).map(|degrees| Direction::of(degrees as f64, theory)).collect();
+    let caption = "linear theory for every direction of the decentring: principal point at a ratio of a \
+                   tenth, the ratio at which the RMSE leaves its range, and that up to which the smaller \
+                   model has the better principal point";
+    record.table(
+        Table::of("directions", caption, &directions)
+            .column("direction", "deg", |d| d.degrees)
+            .column("p1_at_a_tenth", "", |d| d.tenth.x)
+            .column("p2_at_a_tenth", "", |d| d.tenth.y)
+            .column("cx_bias", "px", |d| d.bias[2])
+            .column("cy_bias", "px", |d| d.bias[3])
+            .column("centre_shift", "px", |d| d.centre_shift_px)
+            .column("rmse_notices", "", |d| d.rmse_notices)
+            .column("centre_break_even", "", |d| d.centre_break_even),
+    );
+    let mut ends = |id: &str, unit: &str, value: fn(&Direction) -> f64, what: &str| {
+        let values = || directions.iter().map(value);
+        record
+            .group(unit, Band::relative(1e-8, "inverse of the information matrix"))
+            .number(
+                format!("{id}-least"),
+                stats::smallest(values()),
+                format!("{what}, least over the directions"),
+            )
+            .number(
+                format!("{id}-most"),
+                stats::largest(values()),
+                format!("{what}, most over the directions"),
+            );
+    };
+    let shift = "distance of the principal point from the truth at a tenth";
+    ends("tenth-centre-shift", "px", |d| d.centre_shift_px, shift);
+    let notices = "ratio at which the expected RMSE leaves the central 99 % of its prediction";
+    ends("rmse-notices", "", |d| d.rmse_notices, notices);
+    let break_even = "ratio below which the principal point is better without the tangential terms";
+    ends("centre-break-even", "", |d| d.centre_break_even, break_even);
+}
+
+/// A smooth function of the ratio at a ratio of zero, from its values at `h`, `h / 2` and `h / 4` (Richardson
+/// 1911): each step removes the lowest power that is left, `2 f(h/2) - f(h)` the first and
+/// `(4 g(h/2) - g(h)) / 3` the second.
 struct AtZero {
     value: DVector<f64>,
-    /// What the last step changed. It is all of the second power, of which the value is free: where powers fall from step
-    /// to step, what the value still lacks is smaller.
+    /// What the last step changed. It is all of the second power, of which the value is free: where powers
+    /// fall from step to step, what the value still lacks is smaller.
     correction: f64,
     /// What the step before changed.
     before: f64,
@@ -415,10 +407,11 @@ impl AtZero {
 /// The gain relative to the cost below which the solver ends.
 const RELATIVE_GAIN: f64 = 1e-14;
 
-/// The linear theory is exact at a ratio of zero. So bias and RMSE, each per ratio, are extrapolated to zero from three ratios
-/// of which each is half the one before, and must meet the theory within the extrapolation's own last correction and what
-/// the solver leaves. A cost of `c` (in units of the noise's variance) ends the search within `sqrt(1e-14 c)` standard
-/// deviations of the minimum, in the metric of the covariance; six parameters share it.
+/// The linear theory is exact at a ratio of zero. So bias and RMSE, each per ratio, are extrapolated to zero
+/// from three ratios of which each is half the one before, and must meet the theory within the
+/// extrapolation's own last correction and what the solver leaves. A cost of `c` (in units of the noise's
+/// variance) ends the search within `sqrt(1e-14 c)` standard deviations of the minimum, in the metric of the
+/// covariance; six parameters share it.
 fn claim_linear(record: &mut Record, nodes: [&Node; 3], theory: &Theory, unit: Vector2<f64>) {
     let sds: Vec<f64> = FreeParameters::CHAPTER.iter().map(|p| theory.small_sd(p)).collect();
     let in_sds =
@@ -428,11 +421,9 @@ fn claim_linear(record: &mut Record, nodes: [&Node; 3], theory: &Theory, unit: V
     let linear = theory.bias(unit * smallest.ratio);
     let rest = smallest.bias.iter().zip(&linear).zip(&sds).map(|((b, l), sd)| (b - l) / sd);
     let remainder = rest.map(|z| z * z).sum::<f64>().sqrt();
-    record.number(
+    record.group("", Band::relative(1e-3, "where the solver stops")).number(
         "linear-remainder",
         remainder,
-        "",
-        Band::relative(1e-3, "where the solver stops"),
         "bias less its linear prediction at the smallest ratio, in standard deviations",
     );
     let bias = AtZero::of(nodes.map(|n| in_sds(&n.bias) / n.ratio));
@@ -440,31 +431,46 @@ fn claim_linear(record: &mut Record, nodes: [&Node; 3], theory: &Theory, unit: V
     // The weights of the three values, 1/3, 2 and 8/3, add up to five.
     let left = |n: &Node| (sds.len() as f64 * RELATIVE_GAIN * cost(n)).sqrt() / n.ratio;
     let solver = 5.0 * nodes.iter().map(|n| left(n)).fold(0.0, f64::max);
-    record.claim(Claim::at_most(
-        "bias-is-linear",
-        "the bias is the linear theory's: extrapolated to a ratio of zero, bias per ratio meets it, relative to its length",
-        (&bias.value - &predicted).norm() / predicted.norm(),
-        (bias.correction + solver) / predicted.norm(),
-        "the last correction of the extrapolation, from this run, and the solver's end: a relative gain of 1e-14",
-    ));
+    record
+        .claim_that(
+            "bias-is-linear",
+            "the bias is the linear theory's: extrapolated to a ratio of zero, bias per ratio meets it, \
+             relative to its length",
+        )
+        .at_most(
+            (&bias.value - &predicted).norm() / predicted.norm(),
+            (bias.correction + solver) / predicted.norm(),
+        )
+        .because(
+            "the last correction of the extrapolation, from this run, and the solver's end: a relative gain \
+             of 1e-14",
+        );
     let rmse =
         AtZero::of(nodes.map(|n| DVector::from_element(1, n.rmse_px / theory.rmse_px(unit * n.ratio))));
-    // Rounding of pixels below 1000 is 1.1e-13 in each of some 40 operations, against the RMSE of the smallest ratio.
+    // Rounding of pixels below 1000 is 1.1e-13 in each of some 40 operations, against the RMSE of the
+    // smallest ratio.
     let rounding = 5.0 * 1e-11 / smallest.rmse_px;
-    record.claim(Claim::at_most(
-        "rmse-is-predicted",
-        "without noise the RMSE is that of the linear theory, p' C^-1 p: extrapolated to a ratio of zero, their quotient is one",
-        (rmse.value[0] - 1.0).abs(),
-        rmse.correction + rounding,
-        "the last correction of the extrapolation, from this run, and rounding of the pixels",
-    ));
-    record.claim(Claim::all_of(
-        "extrapolation-converges",
-        "the corrections of both extrapolations fall from step to step, so that the last of them bounds what is left",
-        [("bias", &bias), ("RMSE", &rmse)]
-            .map(|(name, a)| (format!("{name}: {} after {}", a.correction, a.before), a.correction < a.before)),
-        "powers of the ratio, each removed in turn",
-    ).over("extrapolations"));
+    record
+        .claim_that(
+            "rmse-is-predicted",
+            "without noise the RMSE is that of the linear theory, p' C^-1 p: extrapolated to a ratio of \
+             zero, their quotient is one",
+        )
+        .at_most((rmse.value[0] - 1.0).abs(), rmse.correction + rounding)
+        .because("the last correction of the extrapolation, from this run, and rounding of the pixels");
+    record
+        .claim_that(
+            "extrapolation-converges",
+            "the corrections of both extrapolations fall from step to step, so that the last of them bounds \
+             what is left",
+        )
+        .every(
+            "extrapolations",
+            [("bias", &bias), ("RMSE", &rmse)].map(|(name, a)| {
+                (format!("{name}: {} after {}", a.correction, a.before), a.correction < a.before)
+            }),
+        )
+        .because("powers of the ratio, each removed in turn");
 }
 
 fn claim_full_model(record: &mut Record, nodes: &[Node]) {
@@ -472,40 +478,28 @@ fn claim_full_model(record: &mut Record, nodes: &[Node]) {
         // Rounding of pixels below 1000 is 1.1e-13 in each of some 40 operations.
         (format!("ratio {}: RMSE {} px", n.ratio, n.full_rmse_px), n.full_rmse_px < 1e-11)
     });
-    record.claim(
-        Claim::all_of(
-            "full-model-is-exact",
-            "with the tangential terms every exact scene is fitted exactly",
-            cases.collect::<Vec<_>>(),
-            "the truth is in the model; rounding of pixels",
-        )
-        .over("ratios"),
-    );
+    record
+        .claim_that("full-model-is-exact", "with the tangential terms every exact scene is fitted exactly")
+        .every("ratios", cases.collect::<Vec<_>>())
+        .because("the truth is in the model; rounding of pixels");
 }
 
 fn bias_table(nodes: &[Node], theory: &Theory, unit: Vector2<f64>) -> Table {
-    let columns = [
-        ("ratio", ""),
-        ("cx_bias", "px"),
-        ("cx_predicted", "px"),
-        ("cy_bias", "px"),
-        ("fx_bias", "px"),
-        ("k1_bias", ""),
-        ("k2_bias", ""),
-        ("rmse", "px"),
-        ("plane_rms", "mm"),
-        ("plane_max", "mm"),
-    ];
+    use Parameter::*;
     let caption =
         "what a fit without the tangential terms costs, against their ratio to the radial ones; no noise";
-    let mut table = Table::new("bias", caption, &columns);
-    for n in nodes {
-        use Parameter::*;
-        let predicted = theory.bias(unit * n.ratio)[2];
-        let [cx, cy, fx, k1, k2] = [Cx, Cy, Fx, K1, K2].map(|p| n.bias_of(p));
-        table.push([n.ratio, cx, predicted, cy, fx, k1, k2, n.rmse_px, n.plane_mm.0, n.plane_mm.1]);
-    }
-    table
+    Table::of("bias", caption, nodes)
+        .column("ratio", "", |n| n.ratio)
+        .column("cx_bias", "px", |n| n.bias_of(Cx))
+        .column("cx_predicted", "px", |n| theory.bias(unit * n.ratio)[2])
+        .column("cy_bias", "px", |n| n.bias_of(Cy))
+        .column("fx_bias", "px", |n| n.bias_of(Fx))
+        .column("k1_bias", "", |n| n.bias_of(K1))
+        .column("k2_bias", "", |n| n.bias_of(K2))
+        .column("rmse", "px", |n| n.rmse_px)
+        .column("plane_rms", "mm", |n| n.plane_mm.0)
+        .column("plane_max", "mm", |n| n.plane_mm.1)
+        .into()
 }
 
 fn bias_figure(nodes: &[Node], theory: &Theory, unit: Vector2<f64>) -> Figure {
@@ -529,8 +523,9 @@ fn bias_figure(nodes: &[Node], theory: &Theory, unit: Vector2<f64>) -> Figure {
     .hline("one standard deviation", 1.0)
     .log_x()
     .log_y();
-    let caption = "Bias of the chapter's model on exact pixels of a decentred lens, in standard deviations for noise of 0.1 px; \
-                   nothing is drawn at random. Notice where each parameter reaches one standard deviation.";
+    let caption = "Bias of the chapter's model on exact pixels of a decentred lens, in standard deviations \
+                   for noise of 0.1 px; nothing is drawn at random. Notice where each parameter reaches one \
+                   standard deviation.";
     Figure::plot("bias", &plot, caption)
 }
 
@@ -547,9 +542,9 @@ fn rmse_figure(nodes: &[Node], theory: &Theory) -> Figure {
     .line("expected with noise of 0.1 px", &noisy)
     .hline("noise alone: 99.5 % lie below", noise.interval_px(0.01).high);
     let caption = format!(
-        "RMSE per point of the model without tangential terms, without noise and as expected with noise of 0.1 px; nothing is drawn \
-         at random. The second begins at {:.4} px, what noise alone leaves after the fit of {} parameters. Notice where it passes \
-         what noise alone explains.",
+        "RMSE per point of the model without tangential terms, without noise and as expected with noise of \
+         0.1 px; nothing is drawn at random. The second begins at {:.4} px, what noise alone leaves after \
+         the fit of {} parameters. Notice where it passes what noise alone explains.",
         noise.root_mean_square_px(),
         noise.parameters
     );

@@ -1,18 +1,19 @@
 //! How long does a calibration last, and what does a check once per shift buy?
 //!
-//! A station measures a length on a fixed plane. Its lens drifts with temperature, vibration turns its bracket, and the
-//! calibration of day one no longer fits. Expected: after a quarter the systematic error is some hundredths of a millimetre,
-//! as in the chapter's case study (0.03 mm in three months); a fixed reference of known length, measured once a shift, tells
-//! of it weeks before; and to recalibrate when the check asks for it is needed less often than by a calendar that must serve
-//! the fastest station.
+//! A station measures a length on a fixed plane. Its lens drifts with temperature, vibration turns its
+//! bracket, and the calibration of day one no longer fits. Expected: after a quarter the systematic error is
+//! some hundredths of a millimetre, as in the chapter's case study (0.03 mm in three months); a fixed
+//! reference of known length, measured once a shift, tells of it weeks before; and to recalibrate when the
+//! check asks for it is needed less often than by a calendar that must serve the fastest station.
 //!
-//! What it cannot show: how large the causes are at a given station. The chapter gives the drift and not its causes; the
-//! sizes below are round numbers, picked so that their sum is of the case study's size, and both are taken to add. That the
-//! sum meets 0.03 mm is therefore no test of anything; what follows for the check and its rules is.
+//! What it cannot show: how large the causes are at a given station. The chapter gives the drift and not its
+//! causes; the sizes below are round numbers, picked so that their sum is of the case study's size, and both
+//! are taken to add. That the sum meets 0.03 mm is therefore no test of anything; what follows for the check
+//! and its rules is.
 
 mod control;
+mod results;
 mod station;
-mod tell;
 
 use calibench::synth::{Stream, StreamKey};
 use calibench_harness::{Context, Experiment, ExperimentError, Record};
@@ -24,11 +25,12 @@ use station::{History, SHIFTS_A_DAY, Station};
 pub const EXPERIMENT: Experiment = Experiment {
     id: "expiry",
     title: "Why calibrations expire, and what a check once per shift buys",
-    question: "A station's focal length follows the temperature and its bracket turns with vibration, three shifts a day. How \
-               does the systematic error of a measured length grow over a quarter, when do a threshold and a moving average \
-               (EWMA) on one reference length per shift notice it at the same false-alarm rate, and how much longer may the station \
-               run between calibrations? Expected: an error near the case study's 0.03 mm after three months, noticed by the \
-               moving average weeks earlier.",
+    question: "A station's focal length follows the temperature and its bracket turns with vibration, three \
+               shifts a day. How does the systematic error of a measured length grow over a quarter, when \
+               do a threshold and a moving average (EWMA) on one reference length per shift notice it at \
+               the same false-alarm rate, and how much longer may the station run between calibrations? \
+               Expected: an error near the case study's 0.03 mm after three months, noticed by the moving \
+               average weeks earlier.",
     seed: 1,
     takes_image: false,
     run,
@@ -41,8 +43,8 @@ pub(crate) const YEAR: usize = 365 * SHIFTS_A_DAY;
 /// Simulated quarters of the drifting station, and of one that does not drift.
 pub(crate) const QUARTERS: usize = 4000;
 pub(crate) const IN_CONTROL: usize = 20_000;
-/// Stations of a fleet that differ in how fast they drift: so many to set the calendar and the action limit by, and as many others to
-/// judge them on.
+/// Stations of a fleet that differ in how fast they drift: so many to set the calendar and the action limit
+/// by, and as many others to judge them on.
 pub(crate) const FLEET: usize = 2000;
 /// Chance of a false alarm within a quarter that both rules are set to.
 pub(crate) const FALSE_ALARM: f64 = 0.01;
@@ -88,12 +90,13 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     let judged = fleet.split_off(FLEET);
 
     record.note(
-        "The sizes of the causes are assumptions, picked round and so that their sum is of the size of the case study's drift.",
+        "The sizes of the causes are assumptions, picked round and so that their sum is of the size of the \
+         case study's drift.",
     );
-    let results = tell::Results { station, sd_mm, threshold, ewma, quarters, alarms, fleet, judged };
-    tell::numbers(&mut record, &results)?;
-    tell::claims(&mut record, &results, context.seed);
-    tell::tables_and_figures(&mut record, &results, context.seed);
+    let found = results::Results { station, sd_mm, threshold, ewma, quarters, alarms, fleet, judged };
+    results::numbers(&mut record, &found);
+    results::claims(&mut record, &found, context.seed);
+    results::tables_and_figures(&mut record, &found, context.seed);
     Ok(record)
 }
 
@@ -134,7 +137,8 @@ fn false_alarms(seed: u64, trial: u64, threshold: &Shewhart, ewma: &Ewma) -> (bo
 pub(crate) struct Fleet {
     /// First shift at which the error exceeds the tolerance.
     pub exceeds: Option<usize>,
-    /// Largest value of the smoothed check before that, in standard deviations of one check; the year's largest if never.
+    /// Largest value of the smoothed check before that, in standard deviations of one check; the year's
+    /// largest if never.
     pub largest_before: f64,
     /// Every shift at which the smoothed check reaches a new largest value, with that value.
     pub records: Vec<(usize, f64)>,

@@ -1,17 +1,17 @@
 //! Why must the target be tilted? Focal length against distance as the tilt goes to zero.
 //!
-//! Expected: a plane that faces the camera shows `f / Z` only. Tilt shows in two ways: lines converge, by `sin(tilt) / Z`, and the target is
-//! foreshortened, by `cos(tilt)`. Convergence alone does not tell a small tilt near from a large one far; only foreshortening knows the
-//! tilt, and its slope is `sin(tilt)`. So `sd(f) / f` grows as `1 / sin^2(tilt)`, sd(Z) with it, and their correlation goes to one.
-//! Three facing views are refused.
+//! Expected: a plane that faces the camera shows `f / Z` only. Tilt shows in two ways: lines converge, by
+//! `sin(tilt) / Z`, and the target is foreshortened, by `cos(tilt)`. Convergence alone does not tell a small
+//! tilt near from a large one far; only foreshortening knows the tilt, and its slope is `sin(tilt)`. So
+//! `sd(f) / f` grows as `1 / sin^2(tilt)`, sd(Z) with it, and their correlation goes to one. Three facing
+//! views are refused.
 //!
 //! What it cannot show: how other sources of depth, such as a step of known height, would separate the two.
 
 use calibench::camera::Parameter;
-use calibench::evaluate::Interval;
-use calibench::evaluate::interval::each_of;
+use calibench_harness::stats::{Interval, each_of};
 use calibench_harness::{
-    Band, Cell, Claim, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
+    Band, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
 };
 use calibench_study::{Cell as StudyCell, CellSummary, Engine, Summary, within};
 
@@ -19,9 +19,10 @@ use calibench_study::{Cell as StudyCell, CellSummary, Engine, Summary, within};
 pub const EXPERIMENT: Experiment = Experiment {
     id: "focal-depth",
     title: "Focal length and distance as the tilt goes to zero",
-    question: "Three views, tilted alike by 0 to 30 degrees about three axes: how well are focal length and distance known, and how do their errors \
-               go together? Expected: both spread as one over the squared sine of the tilt, their correlation goes to one, and views \
-               that face the camera are refused.",
+    question: "Three views, tilted alike by 0 to 30 degrees about three axes: how well are focal length and \
+               distance known, and how do their errors go together? Expected: both spread as one over the \
+               squared sine of the tilt, their correlation goes to one, and views that face the camera are \
+               refused.",
     seed: 22,
     takes_image: false,
     run,
@@ -53,7 +54,8 @@ const FALSE_ALARM: f64 = 1e-4;
 const LINEAR_TILT_DEG: f64 = 6.0;
 /// Terms of second order, relative to the spread: sd(f)/f of 1 % at 6 degrees, and twice that.
 const NONLINEARITY: f64 = 0.02;
-/// Tilts between which the law of the squared sine is read off the bound: `cos(tilt)` and terms of fourth order in the sine stay within 1 %.
+/// Tilts between which the law of the squared sine is read off the bound: `cos(tilt)` and terms of fourth
+/// order in the sine stay within 1 %.
 const LAW_TILTS_DEG: (f64, f64) = (1.0, 4.0);
 /// The refinement ends within a millionth of a standard deviation of the minimum.
 const SOLVER: f64 = 1e-6;
@@ -70,7 +72,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     let (engine, summary) = within(context, &mut record, "study", STUDY, |_| {})?;
     let bounds: Vec<Option<Bound>> = engine.cells.iter().map(bound).collect();
 
-    tell_numbers(&mut record, &engine, &summary, &bounds);
+    report_numbers(&mut record, &engine, &summary, &bounds);
     claim_facing_refused(&mut record, &summary);
     claim_tilted_solved(&mut record, &engine, &summary);
     claim_spread(&mut record, &engine, &summary);
@@ -107,15 +109,13 @@ fn converged(cell: &CellSummary) -> f64 {
     cell.converged().map_or(f64::NAN, |c| c.value)
 }
 
-fn tell_numbers(record: &mut Record, engine: &Engine, summary: &Summary, bounds: &[Option<Bound>]) {
+fn report_numbers(record: &mut Record, engine: &Engine, summary: &Summary, bounds: &[Option<Bound>]) {
     for (cell, result) in summary.cells.iter().enumerate() {
         let tilt = tilt_deg(engine, cell);
         let share = Band::absolute(1.5 / result.trials as f64, "one trial that changes sides by a rounding");
-        record.number(
+        record.group("", share).number(
             format!("converged-{tilt}"),
             converged(result),
-            "",
-            share,
             format!("share of trials with a camera, tilt {tilt} deg"),
         );
         let Some(bound) = &bounds[cell] else { continue };
@@ -123,27 +123,21 @@ fn tell_numbers(record: &mut Record, engine: &Engine, summary: &Summary, bounds:
         if converged(result) == 1.0 {
             let band =
                 || Band::relative(SOLVER, "the refinement ends within a millionth of a standard deviation");
-            record.number(
-                format!("sd-fx-{tilt}"),
-                sd(result, "fx"),
-                "px",
-                band(),
-                format!("sd of fx, tilt {tilt} deg"),
-            );
-            record.number(
-                format!("sd-depth-{tilt}"),
-                sd(result, "depth"),
-                "mm",
-                band(),
-                format!("sd of the distance, tilt {tilt} deg"),
-            );
-            record.number(
-                format!("correlation-{tilt}"),
-                correlation(result),
-                "",
-                band(),
-                format!("correlation of fx and distance, tilt {tilt} deg"),
-            );
+            record
+                .group("px", band())
+                .number(format!("sd-fx-{tilt}"), sd(result, "fx"), format!("sd of fx, tilt {tilt} deg"))
+                .unit("mm")
+                .number(
+                    format!("sd-depth-{tilt}"),
+                    sd(result, "depth"),
+                    format!("sd of the distance, tilt {tilt} deg"),
+                )
+                .unit("")
+                .number(
+                    format!("correlation-{tilt}"),
+                    correlation(result),
+                    format!("correlation of fx and distance, tilt {tilt} deg"),
+                );
         }
         let band = || {
             Band::relative(
@@ -151,53 +145,51 @@ fn tell_numbers(record: &mut Record, engine: &Engine, summary: &Summary, bounds:
                 "the normal equations lose as many digits as they have condition, 1e8 at half a degree",
             )
         };
-        record.number(
-            format!("bound-fx-{tilt}"),
-            bound.focal_px,
-            "px",
-            band(),
-            format!("Cramer-Rao bound of fx, tilt {tilt} deg"),
-        );
-        record.number(
-            format!("bound-depth-{tilt}"),
-            bound.depth_mm,
-            "mm",
-            band(),
-            format!("Cramer-Rao bound of the distance, tilt {tilt} deg"),
-        );
-        record.number(
-            format!("bound-correlation-{tilt}"),
-            bound.correlation,
-            "",
-            band(),
-            format!("predicted correlation, tilt {tilt} deg"),
-        );
+        record
+            .group("px", band())
+            .number(
+                format!("bound-fx-{tilt}"),
+                bound.focal_px,
+                format!("Cramer-Rao bound of fx, tilt {tilt} deg"),
+            )
+            .unit("mm")
+            .number(
+                format!("bound-depth-{tilt}"),
+                bound.depth_mm,
+                format!("Cramer-Rao bound of the distance, tilt {tilt} deg"),
+            )
+            .unit("")
+            .number(
+                format!("bound-correlation-{tilt}"),
+                bound.correlation,
+                format!("predicted correlation, tilt {tilt} deg"),
+            );
     }
 }
 
 fn claim_facing_refused(record: &mut Record, summary: &Summary) {
     let refused =
         summary.cells[0].outcomes.iter().find(|o| o.0 == "refused-not-identifiable").map_or(0, |o| o.1);
-    record.claim(Claim::within(
-        "facing-refused",
-        "three views that face the camera are refused as not identifiable, every time",
-        refused as f64,
-        (summary.cells[0].trials as f64, summary.cells[0].trials as f64),
-        "parallel planes give f / Z only (Zhang 2000, section 4); the solver's test lets one pass in 1e9",
-    ));
+    record
+        .claim_that(
+            "facing-refused",
+            "three views that face the camera are refused as not identifiable, every time",
+        )
+        .within(
+            refused as f64,
+            Interval { low: summary.cells[0].trials as f64, high: summary.cells[0].trials as f64 },
+        )
+        .because(
+            "parallel planes give f / Z only (Zhang 2000, section 4); the solver's test lets one pass in 1e9",
+        );
 }
 
 fn claim_tilted_solved(record: &mut Record, engine: &Engine, summary: &Summary) {
     let linear = summary.cells.iter().enumerate().filter(|(i, _)| tilt_deg(engine, *i) >= LINEAR_TILT_DEG);
-    record.claim(
-        Claim::all_of(
-            "tilted-solved",
-            "from 6 degrees of tilt every trial gives a camera",
-            linear.map(|(_, c)| (c.name.clone(), converged(c) == 1.0)),
-            "6 degrees move the edge of the target by 5 px, fifty times the noise",
-        )
-        .over("cells"),
-    );
+    record
+        .claim_that("tilted-solved", "from 6 degrees of tilt every trial gives a camera")
+        .every("cells", linear.map(|(_, c)| (c.name.clone(), converged(c) == 1.0)))
+        .because("6 degrees move the edge of the target by 5 px, fifty times the noise");
 }
 
 fn claim_spread(record: &mut Record, engine: &Engine, summary: &Summary) {
@@ -219,14 +211,14 @@ fn claim_spread(record: &mut Record, engine: &Engine, summary: &Summary) {
             (format!("{quantity}, {}: sd over bound {ratio:.4}", cell.name), range.contains(&ratio))
         })
     });
-    let claim = Claim::all_of(
-        "bound-attained",
-        "from 6 degrees of tilt focal lengths and distance spread as the Cramer-Rao bound says",
-        cases,
-        "sqrt(chi2 / (n - 1)), all cases together at 1e-4, and 2 % for terms of second order",
-    )
-    .over("spreads");
-    record.claim(claim.with_false_alarm_rate(FALSE_ALARM));
+    record
+        .claim_that(
+            "bound-attained",
+            "from 6 degrees of tilt focal lengths and distance spread as the Cramer-Rao bound says",
+        )
+        .every("spreads", cases)
+        .at_rate(FALSE_ALARM)
+        .because("sqrt(chi2 / (n - 1)), all cases together at 1e-4, and 2 % for terms of second order");
 }
 
 fn claim_correlation(record: &mut Record, engine: &Engine, summary: &Summary, bounds: &[Option<Bound>]) {
@@ -241,22 +233,22 @@ fn claim_correlation(record: &mut Record, engine: &Engine, summary: &Summary, bo
             interval.contains(expected),
         )
     });
-    let claim = Claim::all_of(
-        "correlation",
-        "focal length and distance err together as the bound predicts",
-        cases,
-        "Fisher's interval of a correlation, all tilts together at 1e-4",
-    )
-    .over("cells");
-    record.claim(claim.with_false_alarm_rate(FALSE_ALARM));
+    record
+        .claim_that("correlation", "focal length and distance err together as the bound predicts")
+        .every("cells", cases)
+        .at_rate(FALSE_ALARM)
+        .because("Fisher's interval of a correlation, all tilts together at 1e-4");
     let least = bounds.iter().flatten().map(|b| b.correlation).fold(f64::INFINITY, f64::min);
-    record.claim(Claim::at_least(
-        "correlated-throughout",
-        "even at 30 degrees the errors of focal length and distance go together",
-        least,
-        0.9,
-        "the size of the image gives f / Z at any tilt: with correlation r it is known sqrt(1 - r^2) as badly as f, 0.44 at r = 0.9",
-    ));
+    record
+        .claim_that(
+            "correlated-throughout",
+            "even at 30 degrees the errors of focal length and distance go together",
+        )
+        .at_least(least, 0.9)
+        .because(
+            "the size of the image gives f / Z at any tilt: with correlation r it is known sqrt(1 - r^2) as \
+             badly as f, 0.44 at r = 0.9",
+        );
 }
 
 /// `d ln sd / d ln sin(tilt) = -2`.
@@ -272,55 +264,41 @@ fn claim_law(record: &mut Record, engine: &Engine, bounds: &[Option<Bound>]) -> 
         ("depth", "distance", libm::log(far.depth_mm / near.depth_mm)),
     ] {
         let band = Band::relative(1e-6, "a difference of logarithms of numbers known to 1e-7");
-        let exponent = record.number(
+        let exponent = rise / run;
+        record.group("", band).number(
             format!("exponent-{id}"),
-            rise / run,
-            "",
-            band,
+            exponent,
             format!("slope of ln bound of the {what} over ln sin(tilt), 1 to 4 deg"),
         );
-        record.claim(Claim::within(
-            format!("squared-sine-{id}"),
-            format!("the bound of the {what} falls as one over the squared sine of the tilt"),
-            exponent,
-            (-2.05, -1.95),
-            "tilt is known by foreshortening, cos(tilt), whose slope is the sine, and distance by sin(tilt) / Z; at 4 deg terms of \
-             fourth order are 1 % of the information from convergence, and lens distortion adds as much",
-        ));
+        record
+            .claim_that(
+                format!("squared-sine-{id}"),
+                format!("the bound of the {what} falls as one over the squared sine of the tilt"),
+            )
+            .within(exponent, Interval { low: -2.05, high: -1.95 })
+            .because(
+                "tilt is known by foreshortening, cos(tilt), whose slope is the sine, and distance by \
+                 sin(tilt) / Z; at 4 deg terms of fourth order are 1 % of the information from convergence, \
+                 and lens distortion adds as much",
+            );
     }
     Ok(())
 }
 
 fn table(engine: &Engine, summary: &Summary, bounds: &[Option<Bound>]) -> Table {
-    let columns = [
-        ("tilt", "deg"),
-        ("converged", ""),
-        ("sd_fx", "px"),
-        ("bound_fx", "px"),
-        ("sd_depth", "mm"),
-        ("bound_depth", "mm"),
-        ("correlation", ""),
-        ("bound_correlation", ""),
-    ];
-    let mut table = Table::new(
-        "tilt",
-        "Spread of focal length and distance, and their correlation; statistics of converged trials",
-        &columns,
-    );
-    for (i, result) in summary.cells.iter().enumerate() {
-        let of = |value: fn(&Bound) -> f64| Cell::Number(bounds[i].as_ref().map_or(f64::NAN, value));
-        table.push([
-            tilt_deg(engine, i).into(),
-            converged(result).into(),
-            sd(result, "fx").into(),
-            of(|b| b.focal_px),
-            sd(result, "depth").into(),
-            of(|b| b.depth_mm),
-            correlation(result).into(),
-            of(|b| b.correlation),
-        ]);
-    }
-    table
+    let of = |i: usize, value: fn(&Bound) -> f64| bounds[i].as_ref().map_or(f64::NAN, value);
+    let caption =
+        "Spread of focal length and distance, and their correlation; statistics of converged trials";
+    Table::of("tilt", caption, summary.cells.iter().enumerate())
+        .column("tilt", "deg", |(i, _)| tilt_deg(engine, *i))
+        .column("converged", "", |(_, cell)| converged(cell))
+        .column("sd_fx", "px", |(_, cell)| sd(cell, "fx"))
+        .column("bound_fx", "px", |(i, _)| of(*i, |b| b.focal_px))
+        .column("sd_depth", "mm", |(_, cell)| sd(cell, "depth"))
+        .column("bound_depth", "mm", |(i, _)| of(*i, |b| b.depth_mm))
+        .column("correlation", "", |(_, cell)| correlation(cell))
+        .column("bound_correlation", "", |(i, _)| of(*i, |b| b.correlation))
+        .into()
 }
 
 fn figure(engine: &Engine, summary: &Summary, bounds: &[Option<Bound>]) -> Figure {
@@ -382,9 +360,10 @@ fn figure(engine: &Engine, summary: &Summary, bounds: &[Option<Bound>]) -> Figur
             .y_range(-0.03, 1.03),
     ];
     let caption = format!(
-        "Three views at 120 mm tilted alike, 0.1 px of noise, {} trials a tilt, seed {}, 95 % intervals; statistics of the trials that gave a camera. Notice \
-         the slope of the squared sine, the correlation that goes to one, the refusals near zero tilt, and that the few trials accepted there spread less than \
-         the bound: they are a selection.",
+        "Three views at 120 mm tilted alike, 0.1 px of noise, {} trials a tilt, seed {}, 95 % intervals; \
+         statistics of the trials that gave a camera. Notice the slope of the squared sine, the correlation \
+         that goes to one, the refusals near zero tilt, and that the few trials accepted there spread less \
+         than the bound: they are a selection.",
         summary.cells[0].trials, engine.spec.seed
     );
     Figure::panels("tilt", &panels, 2, caption)

@@ -1,26 +1,27 @@
-//! How well do four views of the target determine the camera, and what does the reprojection error say about that?
+//! How well do four views of the target determine the camera, and what does the reprojection error say about
+//! that?
 //!
-//! Expected: the chapter's Table 5.1 and ours are two plausible draws from the distribution that the Cramer-Rao bound
-//! predicts, and over many draws the solver attains that bound. The RMSE settles a little under the noise floor whatever
-//! the errors of k1 and k2, and lies far under it only if few points feed many parameters (section 5.3).
+//! Expected: the chapter's Table 5.1 and ours are two plausible draws from the distribution that the
+//! Cramer-Rao bound predicts, and over many draws the solver attains that bound. The RMSE settles a little
+//! under the noise floor whatever the errors of k1 and k2, and lies far under it only if few points feed many
+//! parameters (section 5.3).
 //!
-//! What it cannot show: errors of a real target, lens or detector. Here the model is right and the noise is Gaussian.
+//! What it cannot show: errors of a real target, lens or detector. Here the model is right and the noise is
+//! Gaussian.
 
 use calibench::board::View;
 use calibench::calibrate::{Calibration, Settings, calibrate};
 use calibench::camera::{Camera, FreeParameters, Parameter};
-use calibench::evaluate::distribution::{fisher_cdf, normal_cdf, normal_two_sided, round_significant};
-use calibench::evaluate::interval::each_of;
-use calibench::evaluate::{
-    BoundError, Errors, Interval, RmseDistribution, Sample, cramer_rao, leverages, reconcile,
-};
+use calibench::evaluate::distribution::{fisher_cdf, round_significant};
+use calibench::evaluate::{BoundError, Errors, RmseDistribution, Sample, cramer_rao, leverages, reconcile};
 use calibench::geometry::Vec2;
 use calibench::synth::{Scene, Stream, StreamKey, Truth, scene::looking_at_centre};
 use calibench_harness::figure::density;
 use calibench_harness::monte_carlo::Estimate;
+use calibench_harness::stats::{Interval, each_of, normal_cdf, normal_two_sided};
 use calibench_harness::{
-    Band, Cell, Claim, Context, Dash, Experiment, ExperimentError, Figure, Look, Marker, MonteCarlo, Outcome,
-    Plot, Predicted, Record, Table,
+    Band, Cell, Context, Dash, Experiment, ExperimentError, Figure, Look, Marker, MonteCarlo, Outcome, Plot,
+    Predicted, Record, Table,
 };
 
 mod figures;
@@ -31,10 +32,11 @@ mod weak;
 pub const EXPERIMENT: Experiment = Experiment {
     id: "four-pose",
     title: "The camera from four views",
-    question: "Four views of 63 points with 0.1 px of noise: how close do fx, fy, cx, cy, k1 and k2 come to the truth, is the \
-               book's table one plausible draw, does the solver attain the Cramer-Rao bound, and does the reprojection \
-               error tell? Expected: both tables inside the predicted distribution, RMSE 0.1371 +- 0.0045 px just under \
-               the floor of 0.1414 px, and no relation between RMSE and the errors of k1 and k2.",
+    question: "Four views of 63 points with 0.1 px of noise: how close do fx, fy, cx, cy, k1 and k2 come to \
+               the truth, is the book's table one plausible draw, does the solver attain the Cramer-Rao \
+               bound, and does the reprojection error tell? Expected: both tables inside the predicted \
+               distribution, RMSE 0.1371 +- 0.0045 px just under the floor of 0.1414 px, and no relation \
+               between RMSE and the errors of k1 and k2.",
     seed: 1,
     takes_image: false,
     run,
@@ -64,9 +66,9 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     let mut record = context.record();
     let draw = Draw::new(context.seed)?;
     let book = Book::new(&record, &draw)?;
-    tell_inputs(&mut record, &draw);
-    tell_table(&mut record, &draw, &book)?;
-    tell_rmse(&mut record, &draw)?;
+    report_inputs(&mut record, &draw);
+    report_table(&mut record, &draw, &book);
+    report_rmse(&mut record, &draw)?;
     claim_residuals(&mut record, &draw);
 
     let outcome = draw.monte_carlo(context);
@@ -187,157 +189,158 @@ fn relative() -> Band {
     Band::relative(1e-6, "convergence of the refinement and rounding of the prediction")
 }
 
-fn tell_inputs(record: &mut Record, draw: &Draw) {
+fn report_inputs(record: &mut Record, draw: &Draw) {
     let truth = &draw.scene.truth;
     for parameter in FreeParameters::CHAPTER.iter() {
         let (name, unit) = (parameter.name(), parameter.unit());
-        record.number(format!("{name}-true"), truth.camera.get(parameter), unit, Band::Exact, "truth");
+        record
+            .exact(unit)
+            .number(format!("{name}-true"), truth.camera.get(parameter), "truth")
+            .rounds_to_printed();
     }
     let half_width = 0.5 * truth.image_size.0 as f64;
     let field_of_view = 2.0 * libm::atan(half_width / truth.camera.fx).to_degrees();
     let last_bits = Band::absolute(1e-12, "rounding of an angle below 180 degrees");
-    record.number("field-of-view-deg", field_of_view, "deg", last_bits, "horizontal field of view");
-    record.number("points-per-view", truth.points.len() as f64, "", Band::Exact, "points of the target");
-    record.number("pairs", draw.rmse.points as f64, "", Band::Exact, "point pairs of the four views");
-    record.number("sigma", SIGMA_PX, "px", Band::Exact, "standard deviation of the noise on each of u and v");
-    record.number("noise-floor", draw.rmse.noise_floor_px(), "px", Band::Exact, "sqrt(2) sigma");
-    record.number("trials", TRIALS as f64, "", Band::Exact, "trials of the Monte Carlo");
+    record
+        .group("deg", last_bits)
+        .number("field-of-view-deg", field_of_view, "horizontal field of view")
+        .rounds_to_printed()
+        .exact("")
+        .count("points-per-view", truth.points.len(), "points of the target")
+        .rounds_to_printed()
+        .count("pairs", draw.rmse.points, "point pairs of the four views")
+        .rounds_to_printed()
+        .unit("px")
+        .number("sigma", SIGMA_PX, "standard deviation of the noise on each of u and v")
+        .rounds_to_printed()
+        .number("noise-floor", draw.rmse.noise_floor_px(), "sqrt(2) sigma")
+        .rounds_to_printed()
+        .unit("")
+        .count("trials", TRIALS, "trials of the Monte Carlo");
 }
 
-fn tell_table(record: &mut Record, draw: &Draw, book: &Book) -> Result<(), ExperimentError> {
-    for name in ["field-of-view-deg", "points-per-view", "pairs", "sigma", "noise-floor"] {
-        record.reconcile_exact(name)?;
-    }
-    let columns = [
-        ("parameter", ""),
-        ("unit", ""),
-        ("truth", ""),
-        ("ours", ""),
-        ("error", ""),
-        ("predicted_sd", ""),
-        ("z", ""),
-        ("book", ""),
-        ("book_error", ""),
-        ("book_z", ""),
-    ];
-    let mut table = Table::new("table-5-1", "truth, ours and the book's, in the parameter's unit", &columns);
+fn report_table(record: &mut Record, draw: &Draw, book: &Book) {
     for (ours, theirs) in draw.errors.items.iter().zip(&book.errors.items) {
         let (parameter, sd) = (ours.parameter, ours.standard_deviation);
         let (name, unit) = (parameter.name(), parameter.unit());
-        record.number(name, ours.estimate, unit, of_deviation(sd), format!("calibrated {name}"));
-        let error = format!("{name}-error");
-        record.number(&error, ours.error, unit, of_deviation(sd), format!("calibrated minus true {name}"));
-        let sd_text = format!("Cramer-Rao standard deviation of {name} at the truth");
-        record.number(format!("{name}-sd"), sd, unit, relative(), sd_text);
-        record.number(
-            format!("{name}-z"),
-            ours.z,
-            "",
-            of_deviation(1.0),
-            "our error over its standard deviation",
-        );
-        record.number(format!("{name}-book-z"), theirs.z, "", of_deviation(1.0), "the book's error over it");
-        record.reconcile_exact(&format!("{name}-true"))?;
-        record.reconcile_sampled(name, Predicted::Normal { mean: ours.truth, sd }, RATE)?;
-        record.reconcile_sampled(&error, Predicted::Normal { mean: 0.0, sd }, RATE)?;
-        let numbers =
-            [ours.truth, ours.estimate, ours.error, sd, ours.z, theirs.estimate, theirs.error, theirs.z];
-        table.push([Cell::from(name), Cell::from(unit)].into_iter().chain(numbers.map(Cell::from)));
+        record
+            .group(unit, of_deviation(sd))
+            .number(name, ours.estimate, format!("calibrated {name}"))
+            .drawn_as_printed(Predicted::Normal { mean: ours.truth, sd }, RATE)
+            .number(format!("{name}-error"), ours.error, format!("calibrated minus true {name}"))
+            .drawn_as_printed(Predicted::Normal { mean: 0.0, sd }, RATE)
+            .band(relative())
+            .number(format!("{name}-sd"), sd, format!("Cramer-Rao standard deviation of {name} at the truth"))
+            .group("", of_deviation(1.0))
+            .number(format!("{name}-z"), ours.z, "our error over its standard deviation")
+            .number(format!("{name}-book-z"), theirs.z, "the book's error over it");
     }
-    record.table(table);
-    tell_percent(record, draw, Parameter::Fx, "focal-error-percent")?;
-    tell_percent(record, draw, Parameter::K2, "k2-error-percent")?;
+    let pairs = draw.errors.items.iter().zip(&book.errors.items);
+    record.table(
+        Table::of("table-5-1", "truth, ours and the book's, in the parameter's unit", pairs)
+            .column("parameter", "", |(ours, _)| ours.parameter.name())
+            .column("unit", "", |(ours, _)| ours.parameter.unit())
+            .column("truth", "", |(ours, _)| ours.truth)
+            .column("ours", "", |(ours, _)| ours.estimate)
+            .column("error", "", |(ours, _)| ours.error)
+            .column("predicted_sd", "", |(ours, _)| ours.standard_deviation)
+            .column("z", "", |(ours, _)| ours.z)
+            .column("book", "", |(_, book)| book.estimate)
+            .column("book_error", "", |(_, book)| book.error)
+            .column("book_z", "", |(_, book)| book.z),
+    );
+    report_percent(record, draw, Parameter::Fx, "focal-error-percent");
+    report_percent(record, draw, Parameter::K2, "k2-error-percent");
     claim_joint(record, "ours", &draw.errors);
     claim_joint(record, "book", &book.errors);
-    Ok(())
 }
 
-/// `|error| / |truth|` in percent: half-normal, the root of a chi-squared variable with one degree of freedom.
-fn tell_percent(
-    record: &mut Record,
-    draw: &Draw,
-    parameter: Parameter,
-    id: &str,
-) -> Result<(), ExperimentError> {
+/// `|error| / |truth|` in percent: half-normal, the root of a chi-squared variable with one degree of
+/// freedom.
+fn report_percent(record: &mut Record, draw: &Draw, parameter: Parameter, id: &str) {
     let percent = 100.0 / draw.scene.truth.camera.get(parameter).abs();
     let error = draw.errors.items.iter().find(|i| i.parameter == parameter).map_or(f64::NAN, |i| i.error);
     let scale = percent * draw.sd(parameter);
     let what = format!("|error of {parameter}| over {parameter}");
-    record.number(id, percent * error.abs(), "%", of_deviation(scale), what);
-    record.reconcile_sampled(id, Predicted::Chi { scale, dof: 1.0 }, RATE)?;
-    Ok(())
+    record
+        .group("%", of_deviation(scale))
+        .number(id, percent * error.abs(), what)
+        .drawn_as_printed(Predicted::Chi { scale, dof: 1.0 }, RATE);
 }
 
 fn claim_joint(record: &mut Record, whose: &str, errors: &Errors) {
     let dof = errors.items.len();
     let value = errors.chi_squared;
-    record.number(
-        format!("chi-squared-{whose}"),
-        value,
-        "",
-        relative(),
-        "squared Mahalanobis distance from the truth",
-    );
-    record.number(format!("p-value-{whose}"), errors.p_value, "", relative(), "chance of a larger one");
-    record.claim(Claim::drawn_from(
-        format!("table-plausible-{whose}"),
-        format!("the six errors ({whose}) are jointly one plausible draw under the Cramer-Rao covariance"),
-        value,
-        &Predicted::ChiSquared { dof: dof as f64 },
-        RATE,
-        "the maximum-likelihood estimate is Gaussian about the truth to first order in the noise",
-    ));
+    record
+        .group("", relative())
+        .number(format!("chi-squared-{whose}"), value, "squared Mahalanobis distance from the truth")
+        .number(format!("p-value-{whose}"), errors.p_value, "chance of a larger one");
+    record
+        .claim_that(
+            format!("table-plausible-{whose}"),
+            format!(
+                "the six errors ({whose}) are jointly one plausible draw under the Cramer-Rao covariance"
+            ),
+        )
+        .drawn_from(value, &Predicted::ChiSquared { dof: dof as f64 }, RATE)
+        .because("the maximum-likelihood estimate is Gaussian about the truth to first order in the noise");
 }
 
-fn tell_rmse(record: &mut Record, draw: &Draw) -> Result<(), ExperimentError> {
-    record.number("rmse", draw.calibration.rmse_px, "px", relative(), "reprojection RMSE per point");
-    record.number("rmse-expected", draw.rmse.mean_px(), "px", relative(), "its expectation");
-    record.number("rmse-sd", draw.rmse.standard_deviation_px(), "px", relative(), "its standard deviation");
+fn report_rmse(record: &mut Record, draw: &Draw) -> Result<(), ExperimentError> {
+    record
+        .group("px", relative())
+        .number("rmse", draw.calibration.rmse_px, "reprojection RMSE per point")
+        .drawn_as_printed(draw.predicted_rmse(), RATE)
+        .number("rmse-expected", draw.rmse.mean_px(), "its expectation")
+        .number("rmse-sd", draw.rmse.standard_deviation_px(), "its standard deviation");
     let p = |rmse: f64| draw.rmse.p_value(rmse);
     let (ours, book) = (p(draw.calibration.rmse_px), p(record.printed("rmse")?));
-    record.number("rmse-p-value-ours", ours, "", Band::absolute(1e-5, "convergence"), "two-sided, ours");
-    record.number("rmse-p-value-book", book, "", relative(), "two-sided, the book's");
-    record.reconcile_sampled("rmse", draw.predicted_rmse(), RATE)?;
+    record
+        .group("", Band::absolute(1e-5, "convergence"))
+        .number("rmse-p-value-ours", ours, "two-sided, ours")
+        .band(relative())
+        .number("rmse-p-value-book", book, "two-sided, the book's");
     Ok(())
 }
 
 /// What the residuals of the one draw must satisfy, whatever their correlations.
 fn claim_residuals(record: &mut Record, draw: &Draw) {
     let parameters = draw.rmse.parameters as f64;
-    // The trace of a projection is its rank. Covariance and Jacobian are taken one last step of the refinement apart, 1e-6 of
-    // a standard deviation at most; a whole standard deviation would not change the derivatives by as much as themselves.
+    // The trace of a projection is its rank. Covariance and Jacobian are taken one last step of the
+    // refinement apart, 1e-6 of a standard deviation at most; a whole standard deviation would not change the
+    // derivatives by as much as themselves.
     let convergence = 1e-6 * parameters;
-    record.number(
+    record.group("", relative()).number(
         "leverage-sum",
         draw.leverage_sum,
-        "",
-        relative(),
         "sum of the leverages of all coordinates",
     );
-    record.claim(Claim::within(
-        "leverages-count-the-parameters",
-        "the leverages of the 504 coordinates sum to the 30 parameters that absorb noise",
-        draw.leverage_sum,
-        (parameters - convergence, parameters + convergence),
-        "trace of the hat matrix; each leverage to the 1e-6 of a standard deviation to which the refinement converges",
-    ));
+    record
+        .claim_that(
+            "leverages-count-the-parameters",
+            "the leverages of the 504 coordinates sum to the 30 parameters that absorb noise",
+        )
+        .within(draw.leverage_sum, Interval::around(parameters, convergence))
+        .because(
+            "trace of the hat matrix; each leverage to the 1e-6 of a standard deviation to which the \
+             refinement converges",
+        );
     let largest = draw.standardised.iter().fold(0.0f64, |m, z| m.max(z.abs()));
     let bound = normal_two_sided(each_of(draw.standardised.len(), RATE));
-    record.number(
+    record.group("sd", relative()).number(
         "largest-residual",
         largest,
-        "sd",
-        relative(),
         "largest residual in its own standard deviations",
     );
-    let claim = Claim::at_most(
-        "no-outlier",
-        "no residual is larger than the noise model allows for 504 of them",
-        largest,
-        bound,
-        "each is standard normal once divided by sigma sqrt(1 - leverage); Bonferroni over all, valid whatever their correlations",
-    );
-    record.claim(claim.in_unit("sd").with_false_alarm_rate(RATE));
+    record
+        .claim_that("no-outlier", "no residual is larger than the noise model allows for 504 of them")
+        .at_most(largest, bound)
+        .unit("sd")
+        .at_rate(RATE)
+        .because(
+            "each is standard normal once divided by sigma sqrt(1 - leverage); Bonferroni over all, valid \
+             whatever their correlations",
+        );
 }
 
 fn position(parameter: Parameter) -> usize {

@@ -1,25 +1,29 @@
-//! Does the gate notice a faulty calibrator, and after how many problems? Does it leave a correct one in peace?
+//! Does the gate notice a faulty calibrator, and after how many problems? Does it leave a correct one in
+//! peace?
 //!
-//! Expected: every gross fault fails the gate within a few hundred problems, far inside a quick run; the correct solver passes.
+//! Expected: every gross fault fails the gate within a few hundred problems, far inside a quick run; the
+//! correct solver passes.
 //!
-//! What it cannot show: faults of a kind that nobody thought of. The subtle faults need thousands of samples a scenario, and false
-//! alarms hundreds of runs: they are measured by `calibench gate --power golden/gate-power --size thorough`, and what that wrote
-//! is read here. It is refused as stale when a line of the gate or of the solver has changed since.
+//! What it cannot show: faults of a kind that nobody thought of. The subtle faults need thousands of samples
+//! a scenario, and false alarms hundreds of runs: they are measured by
+//! `calibench gate --power golden/gate-power --size thorough`, and what that wrote is read here. It is
+//! refused as stale when a line of the gate or of the solver has changed since.
 
 use calibench_gate::faults::{Class, Planted, planted};
 use calibench_gate::power::{Catch, FaultRow, Measured, catch, false_alarms};
 use calibench_harness::fingerprint::Fingerprint;
-use calibench_harness::{Band, Claim, Context, Experiment, ExperimentError, Record, Table};
+use calibench_harness::{Band, Context, Experiment, ExperimentError, Record, Table};
 use rayon::prelude::*;
 
 /// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
     id: "gate-power",
     title: "What the gate catches, and how soon",
-    question: "Faults of the kinds that calibrators have are planted in the correct solver: exchanged parameters, wrong \
-               signs, definitions and units, lost views, rounded data, searches that end too early, confident answers to \
-               degenerate data. Which of them does the gate catch, after how many problems, and by which property? \
-               Expected: every gross one within 32 samples a scenario, and the correct solver not at all.",
+    question: "Faults of the kinds that calibrators have are planted in the correct solver: exchanged \
+               parameters, wrong signs, definitions and units, lost views, rounded data, searches that end \
+               too early, confident answers to degenerate data. Which of them does the gate catch, after \
+               how many problems, and by which property? Expected: every gross one within 32 samples a \
+               scenario, and the correct solver not at all.",
     seed: 1,
     takes_image: false,
     run,
@@ -60,175 +64,153 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     let caught = catches.iter().filter(|c| c.samples.is_some()).count();
     let largest = catches.iter().map(|c| c.problems).max().unwrap_or(0);
     let all = planted().len();
-    record.number("planted-faults", all as f64, "", Band::Exact, "planted faults, gross and subtle");
-    record.number("gross-faults", faults.len() as f64, "", Band::Exact, "gross faults");
-    record.number("gross-caught", caught as f64, "", Band::Exact, "gross faults caught");
-    record.number("most-problems", largest as f64, "", Band::Exact, "problems asked for the last of them");
     let reason = "p-value of sums over the solver's results: bits of the solver move it in its last digits";
-    record.number(
-        "clean-p-value",
-        smallest,
-        "",
-        Band::relative(1e-3, reason),
-        "smallest p-value of the correct solver times the number of checks",
-    );
-    record.claim(
-        Claim::all_of(
+    record
+        .exact("")
+        .count("planted-faults", all, "planted faults, gross and subtle")
+        .count("gross-faults", faults.len(), "gross faults")
+        .count("gross-caught", caught, "gross faults caught")
+        .count("most-problems", largest, "problems asked for the last of them")
+        .band(Band::relative(1e-3, reason))
+        .number(
+            "clean-p-value",
+            smallest,
+            "smallest p-value of the correct solver times the number of checks",
+        );
+    record
+        .claim_that(
             "gross-faults-are-caught",
             "every gross fault fails the gate within 32 samples a scenario",
-            faults.iter().zip(&catches).map(|(f, c)| (f.id.to_string(), c.samples.is_some())),
-            "the gate's own decision: Holm's procedure at its stated overall rate",
         )
-        .over("faults"),
-    );
-    record.claim(
-        Claim::at_least(
-            "correct-solver-passes",
-            "the correct solver is not failed by any statistical check",
-            smallest,
-            FALSE_ALARM_RATE,
-            "Bonferroni over all statistical checks of the run",
+        .every("faults", faults.iter().zip(&catches).map(|(f, c)| (f.id.to_string(), c.samples.is_some())))
+        .because("the gate's own decision: Holm's procedure at its stated overall rate");
+    record
+        .claim_that("correct-solver-passes", "the correct solver is not failed by any statistical check")
+        .at_least(smallest, FALSE_ALARM_RATE)
+        .at_rate(FALSE_ALARM_RATE)
+        .because("Bonferroni over all statistical checks of the run");
+    record
+        .claim_that(
+            "correct-solver-fails-nothing-certain",
+            "the correct solver fails no check that leaves nothing to chance",
         )
-        .with_false_alarm_rate(FALSE_ALARM_RATE),
-    );
-    record.claim(Claim::all_of(
-        "correct-solver-fails-nothing-certain",
-        "the correct solver fails no check that leaves nothing to chance",
-        std::iter::once(("correct solver".to_string(), clean.certain.is_empty()))
-            .chain(clean.certain.iter().map(|line| (line.clone(), false))),
-        "exact data, the same bits twice, invariances, refusals",
-    ));
+        .every(
+            "cases",
+            std::iter::once(("correct solver".to_string(), clean.certain.is_empty()))
+                .chain(clean.certain.iter().map(|line| (line.clone(), false))),
+        )
+        .because("exact data, the same bits twice, invariances, refusals");
     record.table(table(&faults, &catches));
     thorough(&mut record)?;
     Ok(record)
 }
 
-/// The committed measurement: is it of the faults that are planted now, does it catch them, do false alarms keep their rate?
+/// The committed measurement: is it of the faults that are planted now, does it catch them, do false alarms
+/// keep their rate?
 fn thorough(record: &mut Record) -> Result<(), ExperimentError> {
     let measured = Measured::of_csv([FAULTS, FALSE_ALARMS, TEXTBOOK])
         .map_err(ExperimentError::at("the thorough measurement"))?;
     record.input("golden/gate-power/faults.csv", FAULTS.as_bytes());
     record.input("golden/gate-power/false-alarms.csv", FALSE_ALARMS.as_bytes());
-    record.claim(is_current());
+    claim_current(record);
     let row_of = |fault: &Planted| measured.faults.iter().find(|row| row.fault == fault.id);
     let is_current = |row: &FaultRow, fault: &Planted| row.class == fault.class && row.what == fault.about;
     let caught = |fault: &Planted| {
         row_of(fault).is_some_and(|row| is_current(row, fault) && row.samples_a_scenario.is_some())
     };
-    record.claim(
-        Claim::all_of(
+    record
+        .claim_that(
             "every-fault-is-caught-thoroughly",
             "the thorough measurement is of the faults planted now, and catches each",
-            planted().iter().map(|fault| (fault.id.to_string(), caught(fault))),
-            "the gate's own decision, up to 8192 samples a scenario",
         )
-        .over("faults"),
-    );
+        .every("faults", planted().iter().map(|fault| (fault.id.to_string(), caught(fault))))
+        .because("the gate's own decision, up to 8192 samples a scenario");
     let samples = measured.faults.iter().filter_map(|row| row.samples_a_scenario).max().unwrap_or(0);
-    record.number(
+    record.exact("").count(
         "most-samples-needed",
-        samples as f64,
-        "",
-        Band::Exact,
+        samples,
         "samples a scenario that the last planted fault takes, thorough measurement",
     );
     if let Some(row) = measured.alarms.first() {
         let what = "quick runs of the correct solver in which false alarms were counted";
-        record.number("quick-runs", row.seeds as f64, "", Band::Exact, what);
+        record.exact("").count("quick-runs", row.seeds, what);
     }
     for textbook in &measured.misled {
         let what = "draws of that scene on which the textbook's error bars were measured";
-        record.number(
-            format!("textbook-draws-{}", textbook.scenario),
-            textbook.draws as f64,
-            "",
-            Band::Exact,
-            what,
-        );
+        record.exact("").number(format!("textbook-draws-{}", textbook.scenario), textbook.draws as f64, what);
         let what = "share of them in which the textbook is confidently wrong";
         let rate = textbook.misled as f64 / textbook.draws as f64;
-        record.number(format!("textbook-misled-{}", textbook.scenario), rate, "", Band::Exact, what);
+        record.exact("").number(format!("textbook-misled-{}", textbook.scenario), rate, what);
     }
     for row in &measured.alarms {
         let per_thousand = 1000.0 * row.stated_rate;
         let what = "rate at which the gate was told to be wrong";
-        record.number(format!("stated-rate-{per_thousand}"), row.stated_rate, "", Band::Exact, what);
         let name = format!("false-alarms-at-{per_thousand}-per-thousand");
-        record.number(
+        record.exact("").number(format!("stated-rate-{per_thousand}"), row.stated_rate, what).count(
             &name,
-            row.alarms as f64,
-            "",
-            Band::Exact,
+            row.alarms,
             "failed runs of the correct solver, thorough measurement",
         );
-        record.claim(
-            Claim::at_most(
+        record
+            .claim_that(
                 &name,
                 format!(
-                    "at a stated rate of {per_thousand} in a thousand, no more quick runs of the correct solver fail than that"
-                ),
-                row.alarms as f64,
-                row.most(FALSE_ALARM_RATE / STATED_RATES as f64) as f64,
-                format!(
-                    "binomial over {} seeds from {}; Holm's procedure keeps the rate or stays below",
-                    row.seeds, row.first_seed
+                    "at a stated rate of {per_thousand} in a thousand, no more quick runs of the correct \
+                     solver fail than that"
                 ),
             )
-            .with_false_alarm_rate(FALSE_ALARM_RATE / STATED_RATES as f64),
-        );
+            .at_most(row.alarms as f64, row.most(FALSE_ALARM_RATE / STATED_RATES as f64) as f64)
+            .at_rate(FALSE_ALARM_RATE / STATED_RATES as f64)
+            .because(format!(
+                "binomial over {} seeds from {}; Holm's procedure keeps the rate or stays below",
+                row.seeds, row.first_seed
+            ));
     }
-    let columns =
-        [("fault", ""), ("class", ""), ("problems", ""), ("verdict", ""), ("property", ""), ("what", "")];
-    let mut table = Table::new(
-        "thorough",
-        "every planted fault, up to 8192 samples a scenario: when and by what it is caught",
-        &columns,
+    let class = |class: &Class| match class {
+        Class::Gross => "gross",
+        Class::Subtle => "subtle",
+    };
+    let problems = |row: &FaultRow| {
+        let asked = row.problems.to_string();
+        if row.samples_a_scenario.is_some() { asked } else { format!("not in {asked}") }
+    };
+    let caption = "every planted fault, up to 8192 samples a scenario: when and by what it is caught";
+    record.table(
+        Table::of("thorough", caption, &measured.faults)
+            .column("fault", "", |row| row.fault.clone())
+            .column("class", "", |row| class(&row.class))
+            .column("problems", "", |row| problems(row))
+            .column("verdict", "", |row| row.verdict.clone())
+            .column("property", "", |row| row.property.clone())
+            .column("what", "", |row| row.what.clone()),
     );
-    for row in &measured.faults {
-        let class = match row.class {
-            Class::Gross => "gross",
-            Class::Subtle => "subtle",
-        };
-        let problems = row.problems.to_string();
-        let after = if row.samples_a_scenario.is_some() { problems } else { format!("not in {problems}") };
-        table.push([row.fault.as_str(), class, &after, &row.verdict, &row.property, &row.what]);
-    }
-    record.table(table);
     Ok(())
 }
 
 /// The committed tables are of the gate and the solver that run now.
-fn is_current() -> Claim {
+fn claim_current(record: &mut Record) {
     let present = Fingerprint::of_gate_power();
     let files = [("faults.csv", FAULTS), ("false-alarms.csv", FALSE_ALARMS), ("textbook.csv", TEXTBOOK)];
     let cases = files.map(|(name, text)| present.case(name, text, COMMAND));
-    Claim::all_of(
-        "thorough-measurement-is-current",
-        "the thorough measurement is of the present gate and the present solver",
-        cases,
-        "SHA-256 of their code lines and the versions of the numeric crates",
-    )
+    record
+        .claim_that(
+            "thorough-measurement-is-current",
+            "the thorough measurement is of the present gate and the present solver",
+        )
+        .every("cases", cases)
+        .because("SHA-256 of their code lines and the versions of the numeric crates");
 }
 
 fn table(faults: &[Planted], catches: &[Catch]) -> Table {
-    let columns = [
-        ("fault", ""),
-        ("samples_a_scenario", ""),
-        ("problems", ""),
-        ("verdict", ""),
-        ("property", ""),
-        ("what", ""),
-    ];
-    let mut table = Table::new("faults", "gross faults: when and by what each is caught", &columns);
-    for (fault, caught) in faults.iter().zip(catches) {
-        table.push([
-            fault.id.to_string(),
-            caught.samples.map_or("not caught".to_string(), |n| n.to_string()),
-            caught.problems.to_string(),
-            caught.verdict.word().to_string(),
-            caught.by.first().map_or("-", |p| p.name()).to_string(),
-            fault.about.to_string(),
-        ]);
-    }
-    table
+    let caption = "gross faults: when and by what each is caught";
+    Table::of("faults", caption, faults.iter().zip(catches))
+        .column("fault", "", |(fault, _)| fault.id)
+        .column("samples_a_scenario", "", |(_, caught)| {
+            caught.samples.map_or("not caught".to_string(), |n| n.to_string())
+        })
+        .column("problems", "", |(_, caught)| caught.problems.to_string())
+        .column("verdict", "", |(_, caught)| caught.verdict.word())
+        .column("property", "", |(_, caught)| caught.by.first().map_or("-", |p| p.name()))
+        .column("what", "", |(fault, _)| fault.about)
+        .into()
 }

@@ -1,17 +1,19 @@
 //! Does the solver find the right minimum, or refuse honestly, whatever people photograph?
 //!
-//! Expected: wherever the data determine the camera (Cramer-Rao bound of sd(fx) below 2 % of fx) the solver ends at the cost that a search
-//! from the truth reaches; elsewhere it may refuse, and says so.
+//! Expected: wherever the data determine the camera (Cramer-Rao bound of sd(fx) below 2 % of fx) the solver
+//! ends at the cost that a search from the truth reaches; elsewhere it may refuse, and says so.
 //!
-//! What it cannot show: data that break the model. Marks are Gaussian, the lens is of the family that is fitted, held values are true. The
-//! reference itself is a local minimum: where it is not the lowest one, a solver that ends lower counts as right.
+//! What it cannot show: data that break the model. Marks are Gaussian, the lens is of the family that is
+//! fitted, held values are true. The reference itself is a local minimum: where it is not the lowest one, a
+//! solver that ends lower counts as right.
 //!
-//! The run judges the first scenes of every family; all of them take minutes, stand in golden/global-minimum/, and are read here. They are
-//! refused as stale when a line of the solver, of the scenes or of the reference has changed.
+//! The run judges the first scenes of every family; all of them take minutes, stand in
+//! golden/global-minimum/, and are read here. They are refused as stale when a line of the solver, of the
+//! scenes or of the reference has changed.
 
 use calibench::camera::Parameter;
 use calibench_harness::fingerprint::Fingerprint;
-use calibench_harness::{Band, Cell, Claim, Context, Experiment, ExperimentError, Record, Table};
+use calibench_harness::{Band, Cell, Context, Experiment, ExperimentError, Record, Table};
 use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
@@ -35,9 +37,10 @@ use peers::Ending;
 pub const EXPERIMENT: Experiment = Experiment {
     id: "global-minimum",
     title: "The right minimum, or an honest refusal",
-    question: "Random scenes over what people have: lenses of 250 to 5000 px, 640 to 4000 px wide, barrel and pincushion, 3 x 3 to 20 x 20 \
-               marks, 2 to 50 views, tilts of 2 to 60 degrees, noise of 0.01 to 2 px. How often does the solver accept a minimum of higher \
-               cost than the one next to the truth, not converge, or refuse? Expected: never where the data determine the camera.",
+    question: "Random scenes over what people have: lenses of 250 to 5000 px, 640 to 4000 px wide, barrel \
+               and pincushion, 3 x 3 to 20 x 20 marks, 2 to 50 views, tilts of 2 to 60 degrees, noise of \
+               0.01 to 2 px. How often does the solver accept a minimum of higher cost than the one next to \
+               the truth, not converge, or refuse? Expected: never where the data determine the camera.",
     seed: SEED,
     takes_image: false,
     run,
@@ -56,9 +59,11 @@ const COMMAND: &str = "cargo run --release --bin global-minimum-scenes -- --writ
 const WRONG_OF_ALL: f64 = 1e-4;
 /// Not converged, of the scenes that determine the camera.
 const OPEN_OF_DETERMINED: f64 = 1e-3;
-/// Claims of rates are judged by counts. Their false-alarm rate is that of a solver that keeps a tenth of the claimed rate.
+/// Claims of rates are judged by counts. Their false-alarm rate is that of a solver that keeps a tenth of the
+/// claimed rate.
 const TRUE_PART: f64 = 0.1;
-/// Claims that something never happens: the false-alarm rate is that of a solver to which it happens once in a million scenes.
+/// Claims that something never happens: the false-alarm rate is that of a solver to which it happens once in
+/// a million scenes.
 const NEVER: f64 = 1e-6;
 
 /// What was committed of each family.
@@ -94,14 +99,14 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     }
     claim_current(&mut record, &measured, context);
     let any = &measured[0];
-    tell_counts(&mut record, any);
+    report_counts(&mut record, any);
     claim_rates(&mut record, any);
     claim_named(&mut record, &measured[1..]);
-    tell_errors(&mut record, any);
-    intervals::tell(&mut record, context.seed)?;
+    report_errors(&mut record, any);
+    intervals::report(&mut record, context.seed)?;
     record.table(families_table(&measured));
-    tell_opencv(&mut record, &measured)?;
-    map::tell(&mut record, &any.lines)?;
+    report_opencv(&mut record, &measured)?;
+    map::report(&mut record, &any.lines)?;
     Ok(record)
 }
 
@@ -122,18 +127,27 @@ fn read() -> Result<Vec<Measured>, ExperimentError> {
         .collect()
 }
 
-/// The committed scenes are those of this code: their fingerprint is, and the share that is judged again has the same bits.
+/// The committed scenes are those of this code: their fingerprint is, and the share that is judged again has
+/// the same bits.
 fn claim_current(record: &mut Record, measured: &[Measured], context: &Context) {
     let present = Fingerprint::of_global_minimum();
-    record.claim(Claim::all_of(
-        "scenes-are-current",
-        "every committed scene was judged by the present solver, drawn and referred by the present code",
-        measured.iter().map(|m| {
-            let (what, held) = present.case(&format!("{}.csv", m.family.name), m.text, COMMAND);
-            (what, held && m.lines.len() as u64 == m.family.scenes)
-        }),
-        "SHA-256 of the code lines of solver, scenes and reference, and the versions of the numeric crates",
-    ));
+    record
+        .claim_that(
+            "scenes-are-current",
+            "every committed scene was judged by the present solver, drawn and referred by the present \
+             code",
+        )
+        .every(
+            "cases",
+            measured.iter().map(|m| {
+                let (what, held) = present.case(&format!("{}.csv", m.family.name), m.text, COMMAND);
+                (what, held && m.lines.len() as u64 == m.family.scenes)
+            }),
+        )
+        .because(
+            "SHA-256 of the code lines of solver, scenes and reference, and the versions of the numeric \
+             crates",
+        );
     if context.seed != SEED {
         record.note("Another seed draws other scenes than the committed ones: the share is not compared.");
         return;
@@ -151,47 +165,39 @@ fn claim_current(record: &mut Record, measured: &[Measured], context: &Context) 
             (format!("{} {index}: run {COMMAND}", m.family.name), now.is_some() && now.as_deref() == then)
         })
         .collect();
-    record.number("scenes-judged", cases.len() as f64, "", Band::Exact, "scenes judged in every run");
-    record.claim(Claim::all_of(
-        "share-has-the-same-bits",
-        "the scenes judged in this run give the committed estimates, costs and references, bit for bit",
-        cases,
-        "the streams are keyed by seed, family and index, and every sum has its order",
-    ));
+    record.exact("").count("scenes-judged", cases.len(), "scenes judged in every run");
+    record
+        .claim_that(
+            "share-has-the-same-bits",
+            "the scenes judged in this run give the committed estimates, costs and references, bit for bit",
+        )
+        .every("cases", cases)
+        .because("the streams are keyed by seed, family and index, and every sum has its order");
 }
 
 fn count(lines: &[Line], class: Class, determined: bool) -> usize {
     lines.iter().filter(|l| l.class == class && (!determined || l.is_determined())).count()
 }
 
-fn tell_counts(record: &mut Record, any: &Measured) {
+fn report_counts(record: &mut Record, any: &Measured) {
     let reason = "counts over committed scenes: a changed solver moves them, the claims judge them";
     let band = || Band::absolute(any.lines.len() as f64, reason);
     let determined = any.lines.iter().filter(|l| l.is_determined()).count();
-    record.number("scenes", any.lines.len() as f64, "", Band::Exact, "random scenes");
-    record.number(
+    record.exact("").count("scenes", any.lines.len(), "random scenes").count(
         "determined",
-        determined as f64,
-        "",
-        Band::Exact,
+        determined,
         "of them with a bound of sd(fx)/fx below 2 %",
     );
     for class in Class::ALL {
         let (all, known) = (count(&any.lines, class, false), count(&any.lines, class, true));
-        record.number(
-            format!("{class}-of-all"),
-            all as f64,
-            "",
-            band(),
-            format!("{class}, of all random scenes"),
-        );
-        record.number(
-            format!("{class}-of-determined"),
-            known as f64,
-            "",
-            band(),
-            format!("{class}, of the determined ones"),
-        );
+        record
+            .group("", band())
+            .number(format!("{class}-of-all"), all as f64, format!("{class}, of all random scenes"))
+            .number(
+                format!("{class}-of-determined"),
+                known as f64,
+                format!("{class}, of the determined ones"),
+            );
     }
 }
 
@@ -209,14 +215,16 @@ fn claim_rates(record: &mut Record, any: &Measured) {
         let reason = format!(
             "count in {trials} scenes; the false-alarm rate is that of a solver with a true rate of {assumed:e}"
         );
-        record.claim(
-            Claim::at_most(id, statement, value as f64, most as f64, reason)
-                .with_false_alarm_rate(more_than(most, trials, assumed)),
-        );
+        record
+            .claim_that(id, statement)
+            .at_most(value as f64, most as f64)
+            .at_rate(more_than(most, trials, assumed))
+            .because(reason);
     };
     at_most(
         "none-wrong-where-determined",
-        "where the data determine the camera, no minimum is accepted at a higher cost than that next to the truth",
+        "where the data determine the camera, no minimum is accepted at a higher cost than that next to the \
+         truth",
         count(lines, Class::Wrong, true),
         determined,
         0.0,
@@ -247,19 +255,28 @@ fn claim_rates(record: &mut Record, any: &Measured) {
 /// The families that were seen to fail: nothing is accepted at a higher cost any more.
 fn claim_named(record: &mut Record, measured: &[Measured]) {
     let wrong = |m: &Measured| count(&m.lines, Class::Wrong, false);
-    record.claim(
-        Claim::all_of(
+    record
+        .claim_that(
             "named-rows-are-right",
-            "in the sets that were seen to fail, no minimum is accepted at a higher cost than that next to the truth",
-            measured.iter().map(|m| (format!("{}: {} of {}", m.family.name, wrong(m), m.lines.len()), wrong(m) == 0)),
-            "sums of squares against a search from the truth; the false-alarm rate is that of a solver wrong once in a million scenes",
+            "in the sets that were seen to fail, no minimum is accepted at a higher cost than that next to \
+             the truth",
         )
-        .with_false_alarm_rate(more_than(0, measured.iter().map(|m| m.lines.len()).sum(), NEVER)),
-    );
+        .every(
+            "cases",
+            measured
+                .iter()
+                .map(|m| (format!("{}: {} of {}", m.family.name, wrong(m), m.lines.len()), wrong(m) == 0)),
+        )
+        .at_rate(more_than(0, measured.iter().map(|m| m.lines.len()).sum(), NEVER))
+        .because(
+            "sums of squares against a search from the truth; the false-alarm rate is that of a solver \
+             wrong once in a million scenes",
+        );
 }
 
-/// The stated standard deviations against the errors, over accepted scenes without a warning that questions them.
-fn tell_errors(record: &mut Record, any: &Measured) {
+/// The stated standard deviations against the errors, over accepted scenes without a warning that questions
+/// them.
+fn report_errors(record: &mut Record, any: &Measured) {
     let columns = [("parameter", ""), ("scenes", ""), ("mean_z_squared", ""), ("largest_z", "")];
     let mut table = Table::new(
         "errors",
@@ -341,13 +358,13 @@ fn families_table(measured: &[Measured]) -> Table {
 }
 
 /// OpenCV and this library on the same scenes.
-fn tell_opencv(record: &mut Record, measured: &[Measured]) -> Result<(), ExperimentError> {
+fn report_opencv(record: &mut Record, measured: &[Measured]) -> Result<(), ExperimentError> {
     let lines = OPENCV.lines().skip(2).map(peers::Line::read).collect::<Option<Vec<_>>>();
     let lines = lines.ok_or_else(|| {
         ExperimentError::Input(format!("golden/global-minimum/opencv.csv is broken: run {}", peers::COMMAND))
     })?;
     record.input("golden/global-minimum/opencv.csv", OPENCV.as_bytes());
-    record.claim(claim_opencv_current());
+    claim_opencv_current(record);
     let columns = [
         ("family", ""),
         ("scenes", ""),
@@ -361,7 +378,8 @@ fn tell_opencv(record: &mut Record, measured: &[Measured]) -> Result<(), Experim
         ("opencv_wrong_determined", ""),
         ("wrong_determined", ""),
     ];
-    let caption = "the same scenes through OpenCV's calibrateCamera and through this library; without: refused, not converged, or no answer";
+    let caption = "the same scenes through OpenCV's calibrateCamera and through this library; without: \
+                   refused, not converged, or no answer";
     let mut table = Table::new("opencv", caption, &columns);
     for m in measured {
         let theirs: Vec<&peers::Line> = lines.iter().filter(|l| l.family == m.family.name).collect();
@@ -392,31 +410,23 @@ fn tell_opencv(record: &mut Record, measured: &[Measured]) -> Result<(), Experim
     let determined = any.iter().filter(|l| l.is_determined()).count();
     let wrong = any.iter().filter(|l| l.is_determined() && l.ending == Ending::Wrong).count();
     let band = || Band::absolute(any.len() as f64, "counts of another program's answers, committed");
-    record.number("opencv-scenes", any.len() as f64, "", band(), "random scenes that OpenCV was asked");
-    record.number(
-        "opencv-determined",
-        determined as f64,
-        "",
-        band(),
-        "of them with a bound of sd(fx)/fx below 2 %",
-    );
-    record.number(
-        "opencv-wrong-of-determined",
-        wrong as f64,
-        "",
-        band(),
-        "of these answered at a higher cost than the reference",
-    );
+    record
+        .group("", band())
+        .number("opencv-scenes", any.len() as f64, "random scenes that OpenCV was asked")
+        .number("opencv-determined", determined as f64, "of them with a bound of sd(fx)/fx below 2 %")
+        .number(
+            "opencv-wrong-of-determined",
+            wrong as f64,
+            "of these answered at a higher cost than the reference",
+        );
     Ok(())
 }
 
 /// OpenCV's answers do not depend on this library's solver; the scenes they are to do.
-fn claim_opencv_current() -> Claim {
+fn claim_opencv_current(record: &mut Record) {
     let case = Fingerprint::of_global_minimum_scenes().case("opencv.csv", OPENCV, peers::COMMAND);
-    Claim::all_of(
-        "opencv-is-current",
-        "OpenCV was asked the scenes of the present code",
-        [case],
-        "SHA-256 of the code lines of scenes and reference, and the versions of the numeric crates",
-    )
+    record
+        .claim_that("opencv-is-current", "OpenCV was asked the scenes of the present code")
+        .every("cases", [case])
+        .because("SHA-256 of the code lines of scenes and reference, and the versions of the numeric crates");
 }

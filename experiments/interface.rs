@@ -1,11 +1,11 @@
 //! Which data with known answers expose a misread interface, and which hide it?
 //!
-//! A calibrator is often a black box: it returns numbers in a matrix, and its manual says which is which. The chapter found
-//! two faults of such a manual. Here both are rebuilt around our own solver: a matrix whose row holds `_, fx, cx, fy, cy` while
-//! the reader takes it for `_, fx, fy, cx, cy`, and a call that corrects a point, said to answer in millimetres, that answers
-//! in pixels. Expected: a truth hides every layout that only exchanges parameters of equal value, so that a truth of four
-//! different values exposes all, and the chapter's own (fx = fy) hides one; the millimetres are 427 off, yet no check that fits
-//! a scale sees it.
+//! A calibrator is often a black box: it returns numbers in a matrix, and its manual says which is which. The
+//! chapter found two faults of such a manual. Here both are rebuilt around our own solver: a matrix whose row
+//! holds `_, fx, cx, fy, cy` while the reader takes it for `_, fx, fy, cx, cy`, and a call that corrects a
+//! point, said to answer in millimetres, that answers in pixels. Expected: a truth hides every layout that
+//! only exchanges parameters of equal value, so that a truth of four different values exposes all, and the
+//! chapter's own (fx = fy) hides one; the millimetres are 427 off, yet no check that fits a scale sees it.
 //!
 //! What it cannot show: that these two are all the faults an interface can have.
 
@@ -15,11 +15,10 @@ mod units;
 
 use black_box::BlackBox;
 use calibench::camera::{BrownConrady, Camera, FreeParameters, Parameter};
-use calibench::evaluate::{cramer_rao, interval::each_of};
+use calibench::evaluate::cramer_rao;
 use calibench::synth::{Scene, Stream, StreamKey, Truth};
-use calibench_harness::{
-    Band, Claim, Context, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
-};
+use calibench_harness::stats::each_of;
+use calibench_harness::{Band, Context, Experiment, ExperimentError, Figure, Look, Plot, Record, Table};
 use layout::{DISTORTION, LINEAR, Row};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -28,10 +27,11 @@ use statrs::distribution::{ContinuousCDF, Normal};
 pub const EXPERIMENT: Experiment = Experiment {
     id: "interface",
     title: "Which truths expose a misread interface",
-    question: "A black box returns its camera in a matrix of undocumented layout and corrects points into undocumented units. \
-               Which synthetic truths expose an exchange of fy and cx, and every other order of the row, and which hide it? \
-               Which checks of a point call notice that its millimetres are pixels? Expected: a truth hides the layouts that \
-               exchange equal values and no others; the pixels differ from the millimetres by 427.",
+    question: "A black box returns its camera in a matrix of undocumented layout and corrects points into \
+               undocumented units. Which synthetic truths expose an exchange of fy and cx, and every other \
+               order of the row, and which hide it? Which checks of a point call notice that its \
+               millimetres are pixels? Expected: a truth hides the layouts that exchange equal values and \
+               no others; the pixels differ from the millimetres by 427.",
     seed: 1,
     takes_image: false,
     run,
@@ -71,9 +71,9 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
         .collect::<Result<Vec<Step>, _>>()?;
     let units = units::examine(context.seed)?;
 
-    tell_layouts(&mut record, &cases);
-    tell_sweep(&mut record, &sweep);
-    units::tell(&mut record, &units);
+    report_layouts(&mut record, &cases);
+    report_sweep(&mut record, &sweep);
+    units::report(&mut record, &units);
     Ok(record)
 }
 
@@ -146,97 +146,68 @@ impl Step {
     }
 }
 
-fn tell_layouts(record: &mut Record, cases: &[Case]) {
+fn report_layouts(record: &mut Record, cases: &[Case]) {
     let count = || Band::Exact;
-    record.number(
-        "layouts",
-        cases[0].linear.layouts() as f64,
-        "",
-        count(),
-        "orders of the four numbers of a row",
-    );
-    record.number(
-        "limit",
-        limit(),
-        "",
-        Band::relative(1e-9, "inverse of the normal distribution"),
-        "largest deviation of the right layout, in standard deviations",
-    );
+    record
+        .group("", count())
+        .number("layouts", cases[0].linear.layouts() as f64, "orders of the four numbers of a row")
+        .band(Band::relative(1e-9, "inverse of the normal distribution"))
+        .number("limit", limit(), "largest deviation of the right layout, in standard deviations");
     let [chapter, different, square, .., worst] = cases else { return };
     for (id, case) in [("chapter", chapter), ("different", different), ("square", square), ("worst", worst)] {
         let what = format!("wrong layouts of the focal lengths' row that this truth hides: {}", case.name);
-        record.number(format!("hidden-{id}"), case.linear.hidden() as f64, "", count(), what);
+        record.group("", count()).number(format!("hidden-{id}"), case.linear.hidden() as f64, what);
     }
     let what = "wrong layouts of the distortion's row that the chapter's truth hides";
-    record.number("hidden-chapter-distortion", chapter.distortion.hidden() as f64, "", count(), what);
+    record.group("", count()).number("hidden-chapter-distortion", chapter.distortion.hidden() as f64, what);
 
-    let columns = [
-        ("truth", ""),
-        ("fx", "px"),
-        ("fy", "px"),
-        ("cx", "px"),
-        ("cy", "px"),
-        ("p1", ""),
-        ("p2", ""),
-        ("swap_of_fy_and_cx", ""),
-        ("hidden", ""),
-        ("predicted", ""),
-        ("hidden_distortion", ""),
-        ("predicted_distortion", ""),
-    ];
-    let mut table = Table::new(
-        "layouts",
-        "what every truth says of the layouts of both rows; wrong layouts that stay hidden, found and predicted",
-        &columns,
+    let caption = "what every truth says of the layouts of both rows; wrong layouts that stay hidden, found \
+                   and predicted";
+    record.table(
+        Table::of("layouts", caption, cases)
+            .column("truth", "", |case| case.name)
+            .column("fx", "px", |case| case.camera.fx)
+            .column("fy", "px", |case| case.camera.fy)
+            .column("cx", "px", |case| case.camera.cx)
+            .column("cy", "px", |case| case.camera.cy)
+            .column("p1", "", |case| case.camera.distortion.p1)
+            .column("p2", "", |case| case.camera.distortion.p2)
+            .column("swap_of_fy_and_cx", "", |case| if case.exposes_swap() { "exposed" } else { "hidden" })
+            .column("hidden", "", |case| case.linear.hidden())
+            .column("predicted", "", |case| case.linear.predicted_hidden())
+            .column("hidden_distortion", "", |case| case.distortion.hidden())
+            .column("predicted_distortion", "", |case| case.distortion.predicted_hidden()),
     );
-    for case in cases {
-        let c = &case.camera;
-        let numbers = [c.fx, c.fy, c.cx, c.cy, c.distortion.p1, c.distortion.p2];
-        let swap = if case.exposes_swap() { "exposed" } else { "hidden" };
-        let counts = [
-            case.linear.hidden(),
-            case.linear.predicted_hidden(),
-            case.distortion.hidden(),
-            case.distortion.predicted_hidden(),
-        ];
-        let cells = std::iter::once(case.name.into()).chain(numbers.map(Into::into));
-        let cells = cells.chain([swap.into()]).chain(counts.map(calibench_harness::Cell::from));
-        table.push(cells.collect::<Vec<_>>());
-    }
-    record.table(table);
 
     let rows = cases.iter().flat_map(|case| [(case, &case.linear), (case, &case.distortion)]);
     let cases = rows.map(|(case, row)| {
         let name = format!("{}: {} hidden, {} predicted", case.name, row.hidden(), row.predicted_hidden());
         (name, row.hidden() == row.predicted_hidden() && row.right_is_accepted())
     });
-    record.claim(
-        Claim::all_of(
+    record
+        .claim_that(
             "hidden-layouts-are-symmetries",
             "every truth accepts the right layout and hides exactly those that exchange equal values",
-            cases.collect::<Vec<_>>(),
-            "values that occur m times can be exchanged in m! ways: the product of the m!, less one",
         )
-        .with_false_alarm_rate(FALSE_ALARM),
-    );
+        .every("cases", cases.collect::<Vec<_>>())
+        .at_rate(FALSE_ALARM)
+        .because("values that occur m times can be exchanged in m! ways: the product of the m!, less one");
 }
 
-fn tell_sweep(record: &mut Record, sweep: &[Step]) {
-    let columns = [("fy_minus_cx", "px"), ("z", ""), ("sd_fy", "px")];
-    let mut table = Table::new(
-        "sweep",
-        "deviation of the number read as fy from the true fy when fy and cx are exchanged, in standard deviations",
-        &columns,
+fn report_sweep(record: &mut Record, sweep: &[Step]) {
+    let caption = "deviation of the number read as fy from the true fy when fy and cx are exchanged, in \
+                   standard deviations";
+    record.table(
+        Table::of("sweep", caption, sweep)
+            .column("fy_minus_cx", "px", |step| step.difference_px)
+            .column("z", "", |step| step.z)
+            .column("sd_fy", "px", |step| step.sd_px),
     );
-    sweep.iter().for_each(|s| table.push([s.difference_px, s.z, s.sd_px]));
-    record.table(table);
     let limit = limit();
     let middle = &sweep[sweep.len() / 2];
-    record.number(
+    record.group("px", Band::relative(1e-6, "inverse of the information matrix")).number(
         "blind-px",
         limit * middle.sd_px,
-        "px",
-        Band::relative(1e-6, "inverse of the information matrix"),
         "difference of fy and cx below which an exchange stays hidden",
     );
     let drawn: Vec<(f64, f64)> = sweep.iter().map(|s| (s.difference_px, s.z)).collect();
@@ -252,19 +223,18 @@ fn tell_sweep(record: &mut Record, sweep: &[Step]) {
     .hline("limit", limit)
     .hline("", -limit);
     let caption = format!(
-        "What a reader who exchanges fy and cx sees in fy's place, in standard deviations of fy, for truths whose focal length \
-         approaches cx; noise {SIGMA_PX} px, one calibration a point, seed {}. Notice the blind zone between the limits.",
+        "What a reader who exchanges fy and cx sees in fy's place, in standard deviations of fy, for truths \
+         whose focal length approaches cx; noise {SIGMA_PX} px, one calibration a point, seed {}. Notice \
+         the blind zone between the limits.",
         record.seed()
     );
     record.figure(Figure::plot("blind-zone", &plot, caption));
-    // cx is estimated with a standard deviation of its own: z has mean -difference / sd(fy) and deviation sd(cx) / sd(fy),
-    // which the sweep keeps below 2.
+    // cx is estimated with a standard deviation of its own: z has mean -difference / sd(fy) and deviation
+    // sd(cx) / sd(fy), which the sweep keeps below 2.
     let rate = each_of(sweep.len(), 1e-6);
     let bound = -2.0 * Normal::standard().inverse_cdf(0.5 * rate);
     let worst = sweep.iter().map(|s| (s.z + s.difference_px / s.sd_px).abs()).fold(0.0, f64::max);
     let reason = "noise of cx in units of fy's deviation, below 2, at a rate of 1e-6 over all steps";
     let statement = "what the reader sees is the difference of the two truths and noise";
-    record.claim(
-        Claim::at_most("sweep-follows-theory", statement, worst, bound, reason).with_false_alarm_rate(1e-6),
-    );
+    record.claim_that("sweep-follows-theory", statement).at_most(worst, bound).at_rate(1e-6).because(reason);
 }

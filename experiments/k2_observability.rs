@@ -1,27 +1,30 @@
 //! What makes k2 and the focal length observable, and does the reprojection error show that they are not?
 //!
-//! Expected: the standard deviation of k2 falls steeply with how far towards the corners the points reach, that of the focal
-//! length with the tilt; without tilt the focal length is lost. The RMSE is the same everywhere (section 5.3).
+//! Expected: the standard deviation of k2 falls steeply with how far towards the corners the points reach,
+//! that of the focal length with the tilt; without tilt the focal length is lost. The RMSE is the same
+//! everywhere (section 5.3).
 //!
-//! Coverage `c` is a factor of its own: every view is photographed from the distance at which its outermost point touches a
-//! rectangle `c` times as wide and high as the largest one about the principal point that the image holds. In the view that
-//! faces the camera the target's corners then reach the fraction `c` of the way to the image's. Tilt `t` is the second: the
-//! chapter's poses with (20, 20, 15) degrees replaced by (t, t, 3/4 t).
+//! Coverage `c` is a factor of its own: every view is photographed from the distance at which its outermost
+//! point touches a rectangle `c` times as wide and high as the largest one about the principal point that the
+//! image holds. In the view that faces the camera the target's corners then reach the fraction `c` of the way
+//! to the image's. Tilt `t` is the second: the chapter's poses with (20, 20, 15) degrees replaced by (t, t,
+//! 3/4 t).
 //!
-//! Coverage won that way is bought with distance: the farther the points shall reach, the nearer the target. A second sweep keeps the
-//! distance and moves the target instead, each view towards another corner, so that either cause stands alone.
+//! Coverage won that way is bought with distance: the farther the points shall reach, the nearer the target.
+//! A second sweep keeps the distance and moves the target instead, each view towards another corner, so that
+//! either cause stands alone.
 //!
-//! What it cannot show: what happens with wider lenses or more coefficients, or with points that are hard to see at the
-//! border.
+//! What it cannot show: what happens with wider lenses or more coefficients, or with points that are hard to
+//! see at the border.
 
 use calibench::calibrate::{Covariance, Settings};
 use calibench::camera::{FreeParameters, Parameter};
-use calibench::evaluate::interval::each_of;
-use calibench::evaluate::{BoundError, Interval, RmseDistribution, cramer_rao};
+use calibench::evaluate::{BoundError, RmseDistribution, cramer_rao};
 use calibench::geometry::{Pose, Vec2, Vec3};
 use calibench::synth::{Scene, Truth, scene::looking_at_centre};
+use calibench_harness::stats::{Interval, each_of};
 use calibench_harness::{
-    Band, Cell, Claim, Context, Experiment, ExperimentError, MonteCarlo, Outcome, Progress, Record, Table,
+    Band, Context, Experiment, ExperimentError, MonteCarlo, Outcome, Progress, Record, Rows, Table,
 };
 
 mod figures;
@@ -31,10 +34,11 @@ mod one_distance;
 pub const EXPERIMENT: Experiment = Experiment {
     id: "k2-observability",
     title: "What makes k2 and the focal length observable",
-    question: "Four views, from a third of the way to the image's corners to all of it, and from no tilt to 45 degrees: how \
-               well are k2 and fx known, how strongly are k1 and k2 correlated, and does the RMSE tell? Expected: the \
-               solver attains the Cramer-Rao bound wherever there is one; the standard deviation of k2 changes by orders of \
-               magnitude while the RMSE stays flat; without tilt the data are refused.",
+    question: "Four views, from a third of the way to the image's corners to all of it, and from no tilt to \
+               45 degrees: how well are k2 and fx known, how strongly are k1 and k2 correlated, and does \
+               the RMSE tell? Expected: the solver attains the Cramer-Rao bound wherever there is one; the \
+               standard deviation of k2 changes by orders of magnitude while the RMSE stays flat; without \
+               tilt the data are refused.",
     seed: 1,
     takes_image: false,
     run,
@@ -44,7 +48,8 @@ pub const EXPERIMENT: Experiment = Experiment {
 const SIGMA_PX: f64 = 0.1;
 /// Trials of a node.
 const TRIALS: usize = 200;
-/// Trials of a node without tilt: each is refused, after a search that takes many times longer than a calibration.
+/// Trials of a node without tilt: each is refused, after a search that takes many times longer than a
+/// calibration.
 const TRIALS_WITHOUT_TILT: usize = 25;
 /// Coverage in tenths: how far towards the corners the points reach.
 const COVERAGE_TENTHS: [u32; 8] = [3, 4, 5, 6, 7, 8, 9, 10];
@@ -52,8 +57,8 @@ const COVERAGE_TENTHS: [u32; 8] = [3, 4, 5, 6, 7, 8, 9, 10];
 const TILT_DEG: [u32; 7] = [0, 5, 10, 15, 20, 30, 45];
 /// Chance that a correct program fails one family of claims.
 const RATE: f64 = 1e-4;
-/// Where the bound of fx, a first-order prediction, is small enough to be trusted: its relative error is of the order of
-/// twice the square of this, a tenth of what the trials of a node can tell.
+/// Where the bound of fx, a first-order prediction, is small enough to be trusted: its relative error is of
+/// the order of twice the square of this, a tenth of what the trials of a node can tell.
 const FIRST_ORDER: f64 = 0.03;
 
 fn run(context: &Context) -> Result<Record, ExperimentError> {
@@ -68,7 +73,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     }
     drop(progress);
     let map = Map { nodes };
-    tell_numbers(&mut record, &map);
+    report_numbers(&mut record, &map);
     record.table(node_table(&map));
     claim_no_tilt(&mut record, &map);
     claim_bound_attained(&mut record, &map);
@@ -79,7 +84,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     record.figure(figures::k2_sections(&map, context.seed));
     record.figure(figures::focal_sections(&map, context.seed));
     record.figure(figures::rmse_sections(&map, context.seed));
-    one_distance::tell(&mut record, &map, context)?;
+    one_distance::report(&mut record, &map, context)?;
     Ok(record)
 }
 
@@ -215,15 +220,16 @@ fn turns(tilt_deg: f64) -> [[f64; 3]; 4] {
     [[0.0, 0.0, 0.0], [t, 0.0, 0.0], [0.0, -t, 0.0], [-0.75 * t, 0.75 * t, 10.0]]
 }
 
-/// The chapter's camera and target, tilted by `tilt_deg` and photographed from where they have the given coverage.
+/// The chapter's camera and target, tilted by `tilt_deg` and photographed from where they have the given
+/// coverage.
 fn truth(coverage: f64, tilt_deg: f64) -> Truth {
     let chapter = Truth::chapter();
     let cam_from_target = turns(tilt_deg).map(|turn| framed(&chapter, turn, coverage)).to_vec();
     Truth { cam_from_target, ..chapter }
 }
 
-/// The pose at the distance where the outermost point touches the rectangle of `coverage`, by bisection: coming nearer,
-/// every point moves outwards.
+/// The pose at the distance where the outermost point touches the rectangle of `coverage`, by bisection:
+/// coming nearer, every point moves outwards.
 fn framed(truth: &Truth, turn_deg: [f64; 3], coverage: f64) -> Pose {
     let (mut near, mut far) = (0.0, FARTHEST_MM);
     loop {
@@ -242,8 +248,8 @@ fn framed(truth: &Truth, turn_deg: [f64; 3], coverage: f64) -> Pose {
 /// From here the target is a tenth of the least coverage.
 const FARTHEST_MM: f64 = 3000.0;
 
-/// How far the outermost point reaches, as a fraction of the way from the principal point to the nearer image border in
-/// its direction; infinite if a point is not in front of the camera.
+/// How far the outermost point reaches, as a fraction of the way from the principal point to the nearer image
+/// border in its direction; infinite if a point is not in front of the camera.
 fn reach(truth: &Truth, cam_from_target: &Pose) -> f64 {
     let (camera, (width, height)) = (&truth.camera, truth.image_size);
     let half = |size: usize, centre: f64| (centre + 0.5).min(size as f64 - 0.5 - centre);
@@ -265,74 +271,57 @@ fn largest_radius(truth: &Truth) -> f64 {
         .fold(0.0, |most, p| (p.xy().norm() / p.z).max(most))
 }
 
-/// Convergence leaves 1e-6 of a standard deviation; bounds and means over trials know the rest to more digits.
+/// Convergence leaves 1e-6 of a standard deviation; bounds and means over trials know the rest to more
+/// digits.
 fn relative() -> Band {
     Band::relative(1e-5, "convergence of the refinement to 1e-6 of a standard deviation")
 }
 
-fn tell_numbers(record: &mut Record, map: &Map) {
-    record.number("nodes", map.nodes.len() as f64, "", Band::Exact, "scenes of the sweep");
+fn report_numbers(record: &mut Record, map: &Map) {
     let identifiable = map.identifiable().len() as f64;
-    record.number(
-        "identifiable-nodes",
-        identifiable,
-        "",
-        Band::Exact,
-        "scenes whose bound of fx is below 3 %",
-    );
-    record.number("trials", TRIALS as f64, "", Band::Exact, "trials of a node");
+    record
+        .exact("")
+        .count("nodes", map.nodes.len(), "scenes of the sweep")
+        .number("identifiable-nodes", identifiable, "scenes whose bound of fx is below 3 %")
+        .count("trials", TRIALS, "trials of a node");
     for (tenths, tilt_deg) in [(3, 20), (6, 5), (6, 20), (6, 45), (10, 5), (10, 20), (10, 45)] {
         let node = map.at(tenths, tilt_deg);
         let id = |what: &str| format!("{what}-c{tenths}-t{tilt_deg}");
         let at = node.name();
         let [k2, fx] = [Parameter::K2, Parameter::Fx].map(|p| (node.bound_sd(p), node.sampled_sd(p)));
-        record.number(id("k2-sd"), k2.0, "", relative(), format!("bound of k2, {at}"));
-        record.number(id("k2-sd-trials"), k2.1, "", relative(), format!("spread of k2, {at}"));
-        record.number(id("fx-sd"), fx.0, "px", relative(), format!("bound of fx, {at}"));
-        record.number(id("fx-sd-trials"), fx.1, "px", relative(), format!("spread of fx, {at}"));
         let correlation = node.bound_correlation();
-        record.number(id("k1-k2"), correlation, "", relative(), format!("correlation of k1 and k2, {at}"));
-        record.number(id("rmse"), node.sampled_rmse_px(), "px", relative(), format!("mean RMSE, {at}"));
+        record
+            .group("", relative())
+            .number(id("k2-sd"), k2.0, format!("bound of k2, {at}"))
+            .number(id("k2-sd-trials"), k2.1, format!("spread of k2, {at}"))
+            .unit("px")
+            .number(id("fx-sd"), fx.0, format!("bound of fx, {at}"))
+            .number(id("fx-sd-trials"), fx.1, format!("spread of fx, {at}"))
+            .unit("")
+            .number(id("k1-k2"), correlation, format!("correlation of k1 and k2, {at}"))
+            .unit("px")
+            .number(id("rmse"), node.sampled_rmse_px(), format!("mean RMSE, {at}"));
     }
 }
 
-fn node_table(map: &Map) -> Table {
-    let columns = [
-        ("coverage", ""),
-        ("tilt", "deg"),
-        ("largest_radius", ""),
-        ("k2_sd_bound", ""),
-        ("k2_sd_trials", ""),
-        ("fx_sd_bound", "px"),
-        ("fx_sd_trials", "px"),
-        ("k1_k2_bound", ""),
-        ("k1_k2_trials", ""),
-        ("rmse_mean", "px"),
-        ("trials", ""),
-        ("converged", ""),
-        ("endings", ""),
-    ];
-    let mut table = Table::new("nodes", "bound and trials at every coverage and tilt", &columns);
-    for n in &map.nodes {
-        let numbers = [
-            n.coverage(),
-            f64::from(n.tilt_deg),
-            n.largest_radius,
-            n.bound_sd(Parameter::K2),
-            n.sampled_sd(Parameter::K2),
-            n.bound_sd(Parameter::Fx),
-            n.sampled_sd(Parameter::Fx),
-            n.bound_correlation(),
-            n.sampled_correlation(),
-            n.sampled_rmse_px(),
-        ];
-        let endings: Vec<String> =
-            n.outcome.endings.iter().map(|(e, count)| format!("{e}: {count}")).collect();
-        let counts =
-            [Cell::from(n.outcome.trials), Cell::from(n.outcome.converged()), Cell::from(endings.join("; "))];
-        table.push(numbers.map(Cell::from).into_iter().chain(counts));
-    }
-    table
+fn node_table(map: &Map) -> Rows<&Node> {
+    let endings = |n: &Node| -> Vec<String> {
+        n.outcome.endings.iter().map(|(ending, count)| format!("{ending}: {count}")).collect()
+    };
+    Table::of("nodes", "bound and trials at every coverage and tilt", &map.nodes)
+        .column("coverage", "", |n| n.coverage())
+        .column("tilt", "deg", |n| f64::from(n.tilt_deg))
+        .column("largest_radius", "", |n| n.largest_radius)
+        .column("k2_sd_bound", "", |n| n.bound_sd(Parameter::K2))
+        .column("k2_sd_trials", "", |n| n.sampled_sd(Parameter::K2))
+        .column("fx_sd_bound", "px", |n| n.bound_sd(Parameter::Fx))
+        .column("fx_sd_trials", "px", |n| n.sampled_sd(Parameter::Fx))
+        .column("k1_k2_bound", "", |n| n.bound_correlation())
+        .column("k1_k2_trials", "", |n| n.sampled_correlation())
+        .column("rmse_mean", "px", |n| n.sampled_rmse_px())
+        .column("trials", "", |n| n.outcome.trials)
+        .column("converged", "", |n| n.outcome.converged())
+        .column("endings", "", |n| endings(n).join("; "))
 }
 
 /// Without tilt there is no bound, and every trial is refused for the right reason.
@@ -340,72 +329,75 @@ fn claim_no_tilt(record: &mut Record, map: &Map) {
     let flat: Vec<&Node> = map.nodes.iter().filter(|n| n.tilt_deg == 0).collect();
     let refused: usize = flat.iter().map(|n| n.outcome.refused_naming(&["focal length", "distance"])).sum();
     let trials: usize = flat.iter().map(|n| n.outcome.trials).sum();
-    record.number(
+    record.exact("").count(
         "no-tilt-refused",
-        refused as f64,
-        "",
-        Band::Exact,
+        refused,
         "trials without tilt refused for focal length and distance",
     );
     let endings = flat.iter().map(|n| format!("{}: {:?}", n.name(), n.outcome.endings));
     let endings: Vec<String> = endings.collect();
-    let claim = Claim::at_least(
-        "no-tilt-is-refused",
-        "without tilt every trial is refused, at any coverage, and focal length and distance are named as inseparable",
-        refused as f64,
-        trials as f64,
-        format!(
+    record
+        .claim_that(
+            "no-tilt-is-refused",
+            "without tilt every trial is refused, at any coverage, and focal length and distance are named \
+             as inseparable",
+        )
+        .at_least(refused as f64, trials as f64)
+        .at_rate(trials as f64 * 1e-9)
+        .because(format!(
             "1e-9 a trial, the solver's rate of taking parallel planes for tilted; {}",
             endings.join("; ")
-        ),
-    );
-    record.claim(claim.with_false_alarm_rate(trials as f64 * 1e-9));
+        ));
     // That their information is singular is a claim of `four-pose`.
 }
 
 fn claim_bound_attained(record: &mut Record, map: &Map) {
     let nodes = map.identifiable();
-    record.claim(
-        Claim::all_of(
+    record
+        .claim_that(
             "identifiable-nodes-converge",
             "wherever the bound of fx is below 3 % every trial converges",
+        )
+        .every(
+            "nodes",
             nodes
                 .iter()
                 .map(|n| (format!("{}: {:?}", n.name(), n.outcome.endings), n.outcome.converged() == TRIALS)),
-            "nothing is refused or lost where the camera is determined",
         )
-        .over("nodes"),
-    );
+        .because("nothing is refused or lost where the camera is determined");
     let each = each_of(nodes.len(), RATE);
     let ratio = Interval::of_deviation_ratio(TRIALS, each);
     for parameter in [Parameter::K2, Parameter::Fx] {
         let over = |n: &Node| n.sampled_sd(parameter) / n.bound_sd(parameter);
         let cases = nodes.iter().map(|n| (format!("{}: {}", n.name(), over(n)), ratio.contains(over(n))));
-        let claim = Claim::all_of(
-            format!("{parameter}-attains-bound"),
-            format!("the spread of {parameter} equals the Cramer-Rao bound at every identifiable node"),
-            cases,
-            format!(
-                "sample deviation over {TRIALS} Gaussian values: ratio in [{:.4}, {:.4}], Bonferroni over {} nodes",
+        record
+            .claim_that(
+                format!("{parameter}-attains-bound"),
+                format!("the spread of {parameter} equals the Cramer-Rao bound at every identifiable node"),
+            )
+            .every("nodes", cases)
+            .at_rate(RATE)
+            .because(format!(
+                "sample deviation over {TRIALS} Gaussian values: ratio in [{:.4}, {:.4}], Bonferroni over \
+                 {} nodes",
                 ratio.low,
                 ratio.high,
                 nodes.len()
-            ),
-        );
-        record.claim(claim.over("nodes").with_false_alarm_rate(RATE));
+            ));
     }
     let cases = nodes.iter().map(|n| {
         let (bound, sampled) = (n.bound_correlation(), n.sampled_correlation());
         let around = Interval::of_correlation(bound, TRIALS, each);
         (format!("{}: {sampled} against {bound}", n.name()), around.contains(sampled))
     });
-    let claim = Claim::all_of(
-        "k1-k2-correlation-attains-bound",
-        "the correlation of k1 and k2 is the bound's at every identifiable node",
-        cases,
-        "Fisher's transformation of the sample correlation, Bonferroni over the nodes",
-    );
-    record.claim(claim.over("nodes").with_false_alarm_rate(RATE));
+    record
+        .claim_that(
+            "k1-k2-correlation-attains-bound",
+            "the correlation of k1 and k2 is the bound's at every identifiable node",
+        )
+        .every("nodes", cases)
+        .at_rate(RATE)
+        .because("Fisher's transformation of the sample correlation, Bonferroni over the nodes");
 }
 
 fn claim_flat_rmse(record: &mut Record, map: &Map) {
@@ -416,31 +408,32 @@ fn claim_flat_rmse(record: &mut Record, map: &Map) {
         let around = Interval::of_mean(n.rmse.mean_px(), n.rmse.standard_deviation_px(), TRIALS, each);
         (format!("{}: {rmse} px", n.name()), around.contains(rmse))
     });
-    let claim = Claim::all_of(
-        "rmse-stays-flat",
-        "the mean RMSE is the same predicted one at every identifiable node",
-        cases,
-        "252 points and 30 parameters everywhere: sigma / sqrt(N) times chi with 474 degrees of freedom; Bonferroni over the nodes",
-    );
-    record.claim(claim.over("nodes").with_false_alarm_rate(RATE));
+    record
+        .claim_that("rmse-stays-flat", "the mean RMSE is the same predicted one at every identifiable node")
+        .every("nodes", cases)
+        .at_rate(RATE)
+        .because(
+            "252 points and 30 parameters everywhere: sigma / sqrt(N) times chi with 474 degrees of \
+             freedom; Bonferroni over the nodes",
+        );
     let (k2, fx) = (map.range(|n| n.bound_sd(Parameter::K2)), map.range(|n| n.bound_sd(Parameter::Fx)));
     let rmse = map.range(Node::sampled_rmse_px);
-    record.number(
-        "k2-sd-range",
-        k2,
-        "",
-        relative(),
-        "largest over smallest bound of k2 at identifiable nodes",
-    );
-    record.number("fx-sd-range", fx, "", relative(), "the same of fx");
-    record.number("rmse-range", rmse, "", relative(), "the same of the mean RMSE");
-    record.claim(Claim::at_least(
-        "k2-changes-by-orders-of-magnitude",
-        "among nodes of equal RMSE the standard deviation of k2 changes by two orders of magnitude or more",
-        k2,
-        100.0,
-        "k2 moves a point by r^5: reaching 1 / 0.3 times as far is worth 3.3^5 = 410, or less where k1 takes part of it up",
-    ));
+    record
+        .group("", relative())
+        .number("k2-sd-range", k2, "largest over smallest bound of k2 at identifiable nodes")
+        .number("fx-sd-range", fx, "the same of fx")
+        .number("rmse-range", rmse, "the same of the mean RMSE");
+    record
+        .claim_that(
+            "k2-changes-by-orders-of-magnitude",
+            "among nodes of equal RMSE the standard deviation of k2 changes by two orders of magnitude or \
+             more",
+        )
+        .at_least(k2, 100.0)
+        .because(
+            "k2 moves a point by r^5: reaching 1 / 0.3 times as far is worth 3.3^5 = 410, or less where k1 \
+             takes part of it up",
+        );
 }
 
 /// More coverage always helps k2, more tilt always helps the focal length.
@@ -449,32 +442,35 @@ fn claim_cures(record: &mut Record, map: &Map) {
     let along_coverage = tilts.flat_map(|&t| {
         COVERAGE_TENTHS.windows(2).map(move |w| (map.at(w[0], t), map.at(w[1], t), Parameter::K2))
     });
-    record.claim(better_and_better(
+    better_and_better(
+        record,
         "coverage-cures-k2",
         "at every tilt the bound of k2 falls with every step of coverage",
         along_coverage,
         "the same directions seen farther out: every derivative by k2 grows",
-    ));
+    );
     let along_tilt = COVERAGE_TENTHS.iter().flat_map(|&c| {
         TILT_DEG[1..].windows(2).map(move |w| (map.at(c, w[0]), map.at(c, w[1]), Parameter::Fx))
     });
-    record.claim(better_and_better(
+    better_and_better(
+        record,
         "tilt-cures-the-focal-length",
         "at every coverage the bound of fx falls with every step of tilt",
         along_tilt,
         "the perspective that tells f from Z grows with the sine of the tilt",
-    ));
+    );
 }
 
 fn better_and_better<'a>(
+    record: &mut Record,
     id: &str,
     statement: &str,
     pairs: impl Iterator<Item = (&'a Node, &'a Node, Parameter)>,
     reason: &str,
-) -> Claim {
+) {
     let cases = pairs.map(|(worse, better, parameter)| {
         let (before, after) = (worse.bound_sd(parameter), better.bound_sd(parameter));
         (format!("{} to {}: {before} to {after}", worse.name(), better.name()), after < before)
     });
-    Claim::all_of(id, statement, cases, reason).over("steps")
+    record.claim_that(id, statement).every("steps", cases).because(reason);
 }

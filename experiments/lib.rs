@@ -1,4 +1,5 @@
-//! Which experiments are there? Adding one is adding its module and its line here, and its binary in `experiments/bin`.
+//! Which experiments are there? Adding one is adding its module and its line here, and its binary in
+//! `experiments/bin`.
 
 use calibench_harness::{Build, Experiment};
 

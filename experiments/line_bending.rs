@@ -1,25 +1,26 @@
 //! How far does the chapter's lens bend a straight line, and does the true model straighten it again?
 //!
-//! Expected: the top grid line leaves its regression line by 4.678 px at most and 2.249 px RMS (chapter, section 5.1), and
-//! by nothing but rounding once corrected. Nothing is drawn here, so every number is exact.
+//! Expected: the top grid line leaves its regression line by 4.678 px at most and 2.249 px RMS (chapter,
+//! section 5.1), and by nothing but rounding once corrected. Nothing is drawn here, so every number is exact.
 //!
-//! What it cannot show: how well a lens model that was estimated, not known, straightens lines (see `collinearity`).
+//! What it cannot show: how well a lens model that was estimated, not known, straightens lines (see
+//! `collinearity`).
 
 use calibench::camera::{BrownConrady, Camera};
 use calibench::geometry::{LineFit, Vec2};
 use calibench::synth::Truth;
 use calibench_harness::{
-    Band, Claim, Context, Dash, Experiment, ExperimentError, Figure, Look, Marker, Plot, Record, Table,
+    Band, Context, Dash, Experiment, ExperimentError, Figure, Look, Marker, Plot, Record, Table,
 };
 
 /// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
     id: "line-bending",
     title: "How far the lens bends a straight line",
-    question: "61 points of a straight line near the top of the image are distorted with the chapter's lens. How far do they \
-               leave a straight line, how does that depend on the line's height and on k1, and does correction with the \
-               true model bring it back? Expected: 4.678 px at most, 2.249 px RMS, and nothing but rounding after \
-               correction.",
+    question: "61 points of a straight line near the top of the image are distorted with the chapter's \
+               lens. How far do they leave a straight line, how does that depend on the line's height and \
+               on k1, and does correction with the true model bring it back? Expected: 4.678 px at most, \
+               2.249 px RMS, and nothing but rounding after correction.",
     seed: 0,
     takes_image: false,
     run,
@@ -38,8 +39,9 @@ const K1_HUNDREDTHS: std::ops::RangeInclusive<i32> = -30..=30;
 const GRID_U_PX: [f64; 11] = [20.0, 80.0, 140.0, 200.0, 260.0, 320.0, 380.0, 440.0, 500.0, 560.0, 620.0];
 const GRID_V_PX: [f64; 7] = [60.0, 120.0, 180.0, 240.0, 300.0, 360.0, 420.0];
 
-/// A coordinate below 640 px is rounded by half of 2^-43 px at most. A pixel is distorted and corrected in fewer than 40
-/// operations, whose errors the lens's slope (above 0.8 on the line) hardly enlarges: 40 x 2^-44 / 0.8 = 2.9e-12 px.
+/// A coordinate below 640 px is rounded by half of 2^-43 px at most. A pixel is distorted and corrected in
+/// fewer than 40 operations, whose errors the lens's slope (above 0.8 on the line) hardly enlarges: 40 x
+/// 2^-44 / 0.8 = 2.9e-12 px.
 const ROUNDING_PX: f64 = 3e-12;
 
 fn run(context: &Context) -> Result<Record, ExperimentError> {
@@ -50,13 +52,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     let bent = Bent::new(&barrel, &ideal)?;
     let opposite = Bent::new(&pincushion, &ideal)?;
 
-    tell_numbers(&mut record, &bent, &opposite, &barrel);
-    record.reconcile_exact("points")?;
-    record.reconcile_exact("max-deviation")?;
-    record.reconcile_exact("rms-deviation")?;
-    record.reconcile_exact("max-after-correction")?;
-    record.reconcile_exact("k1-barrel")?;
-    record.reconcile_exact("k1-pincushion")?;
+    report_numbers(&mut record, &bent, &opposite, &barrel);
 
     let heights = sweep_heights(&barrel)?;
     let strengths = sweep_k1(&barrel)?;
@@ -123,12 +119,14 @@ struct FirstOrder {
 }
 
 impl FirstOrder {
-    /// To first order in the coefficients a point of the line moves by `(du, dv) = f (x, y) (k1 r^2 + k2 r^4)`, and
-    /// its deviation is `dv` less the regression line of `dv` on `u`.
+    /// To first order in the coefficients a point of the line moves by
+    /// `(du, dv) = f (x, y) (k1 r^2 + k2 r^4)`, and its deviation is `dv` less the regression line of `dv` on
+    /// `u`.
     ///
-    /// The rest is of second order: with the ideal `u` spread over `+-L` and variance `s^2`, `du` and `dv` within D and E
-    /// of their means, and slope `b` of the regression, `b D` comes from the shift along the line, and
-    /// `L (D E + 2 s D |b|) / s^2` from the change of slope. Twice that covers the higher orders while `D / s < 0.2`.
+    /// The rest is of second order: with the ideal `u` spread over `+-L` and variance `s^2`, `du` and `dv`
+    /// within D and E of their means, and slope `b` of the regression, `b D` comes from the shift along the
+    /// line, and `L (D E + 2 s D |b|) / s^2` from the change of slope. Twice that covers the higher orders
+    /// while `D / s < 0.2`.
     fn of(camera: &Camera, ideal: &[Vec2]) -> FirstOrder {
         let shifts: Vec<Vec2> = ideal
             .iter()
@@ -191,39 +189,36 @@ fn sweep_k1(camera: &Camera) -> Result<Vec<Node>, ExperimentError> {
         .collect()
 }
 
-fn tell_numbers(record: &mut Record, bent: &Bent, opposite: &Bent, barrel: &Camera) {
+fn report_numbers(record: &mut Record, bent: &Bent, opposite: &Bent, barrel: &Camera) {
     let band = || Band::absolute(ROUNDING_PX, "rounding of coordinates below 640 px over 40 operations");
     let points = bent.distorted.deviations.len() as f64;
-    record.number("points", points, "", Band::Exact, "points on the line");
-    record.number("k1-barrel", barrel.distortion.k1, "", Band::Exact, "k1 of the chapter's lens");
-    record.number("k1-pincushion", PINCUSHION_K1, "", Band::Exact, "k1 of the pincushion grid");
     let (max, rms) = (bent.distorted.max_deviation(), bent.distorted.rms_deviation());
-    record.number(
-        "max-deviation",
-        max,
-        "px",
-        band(),
-        "largest distance of the distorted line from its regression line",
-    );
-    record.number("rms-deviation", rms, "px", band(), "RMS distance of the distorted line");
+    record
+        .exact("")
+        .number("points", points, "points on the line")
+        .rounds_to_printed()
+        .number("k1-barrel", barrel.distortion.k1, "k1 of the chapter's lens")
+        .rounds_to_printed()
+        .number("k1-pincushion", PINCUSHION_K1, "k1 of the pincushion grid")
+        .rounds_to_printed()
+        .group("px", band())
+        .number("max-deviation", max, "largest distance of the distorted line from its regression line")
+        .rounds_to_printed()
+        .number("rms-deviation", rms, "RMS distance of the distorted line")
+        .rounds_to_printed();
     let (max, rms) = (opposite.distorted.max_deviation(), opposite.distorted.rms_deviation());
-    record.number("pincushion-max-deviation", max, "px", band(), "the same line under the pincushion lens");
-    record.number("pincushion-rms-deviation", rms, "px", band(), "RMS under the pincushion lens");
     let corrected = bent.corrected.max_deviation();
-    record.number(
-        "max-after-correction",
-        corrected,
-        "px",
-        band(),
-        "largest distance after correction with the true model",
-    );
-    record.number(
-        "round-trip",
-        bent.round_trip_px,
-        "px",
-        band(),
-        "largest distance of a corrected point from its ideal place",
-    );
+    record
+        .group("px", band())
+        .number("pincushion-max-deviation", max, "the same line under the pincushion lens")
+        .number("pincushion-rms-deviation", rms, "RMS under the pincushion lens")
+        .number("max-after-correction", corrected, "largest distance after correction with the true model")
+        .rounds_to_printed()
+        .number(
+            "round-trip",
+            bent.round_trip_px,
+            "largest distance of a corrected point from its ideal place",
+        );
 }
 
 /// That the corrected line is straight follows: its regression line minimises the sum of squares.
@@ -232,7 +227,11 @@ fn claim_exact_correction(record: &mut Record, bent: &Bent, opposite: &Bent) {
     let statement =
         "correction with the true model returns every point of the line to its place, up to rounding";
     let worst = bent.round_trip_px.max(opposite.round_trip_px);
-    record.claim(Claim::at_most("correction-is-exact", statement, worst, ROUNDING_PX, reason).in_unit("px"));
+    record
+        .claim_that("correction-is-exact", statement)
+        .at_most(worst, ROUNDING_PX)
+        .unit("px")
+        .because(reason);
 }
 
 fn claim_directions(record: &mut Record, bent: &Bent, opposite: &Bent) {
@@ -243,26 +242,25 @@ fn claim_directions(record: &mut Record, bent: &Bent, opposite: &Bent) {
             opposite.bow_px() > 0.0,
         ),
     ];
-    record.claim(Claim::all_of(
-        "direction-of-bending",
-        "a negative k1 bows lines away from the centre, a positive one towards it",
-        cases.map(|(name, held)| (name.to_string(), held)),
-        "the ends are farther from the centre than the middle: a barrel lens draws them in more (Brown 1971)",
-    ));
+    record
+        .claim_that(
+            "direction-of-bending",
+            "a negative k1 bows lines away from the centre, a positive one towards it",
+        )
+        .every("cases", cases)
+        .because(
+            "the ends are farther from the centre than the middle: a barrel lens draws them in more (Brown \
+             1971)",
+        );
 }
 
 fn claim_centre_line(record: &mut Record, camera: &Camera) -> Result<(), ExperimentError> {
     let centre = Bent::new(camera, &line_at(camera.cy))?;
-    record.claim(
-        Claim::at_most(
-            "centre-line-stays-straight",
-            "a line through the distortion centre stays straight",
-            centre.distorted.max_deviation(),
-            ROUNDING_PX,
-            "radial distortion moves points along rays from the centre; what remains is rounding",
-        )
-        .in_unit("px"),
-    );
+    record
+        .claim_that("centre-line-stays-straight", "a line through the distortion centre stays straight")
+        .at_most(centre.distorted.max_deviation(), ROUNDING_PX)
+        .unit("px")
+        .because("radial distortion moves points along rays from the centre; what remains is rounding");
     Ok(())
 }
 
@@ -270,49 +268,48 @@ fn claim_first_order(record: &mut Record, strengths: &[Node]) {
     let gap = |n: &Node| (n.max_px - n.first_order.max_px).abs();
     let band = || Band::absolute(1e-10, "differences of sums of 61 coordinates");
     let largest = strengths.iter().map(gap).fold(0.0, f64::max);
-    record.number(
-        "first-order-gap",
-        largest,
-        "px",
-        band(),
-        "largest gap of the deviation to first-order theory",
-    );
     let bounds = strengths.iter().map(|n| n.first_order.bound_px);
     let widest = bounds.fold(0.0, f64::max);
-    record.number("first-order-bound", widest, "px", band(), "largest bound of the second-order remainder");
+    record
+        .group("px", band())
+        .number("first-order-gap", largest, "largest gap of the deviation to first-order theory")
+        .number("first-order-bound", widest, "largest bound of the second-order remainder");
     let holds = |n: &Node| (n.max_px - n.first_order.max_px).abs() <= n.first_order.bound_px + ROUNDING_PX;
-    record.claim(Claim::all_of(
-        "first-order-theory",
-        "at every k1 the largest deviation agrees with first-order theory, within its second-order remainder",
-        strengths.iter().map(|n| (format!("k1 = {:.2}: {} px", n.at, n.max_px), holds(n))),
-        "expansion in k1: twice the second-order terms of shift along the line and of change of slope, all of one sign",
-    ).over("values of k1"));
+    record
+        .claim_that(
+            "first-order-theory",
+            "at every k1 the largest deviation agrees with first-order theory, within its second-order \
+             remainder",
+        )
+        .every(
+            "values of k1",
+            strengths.iter().map(|n| (format!("k1 = {:.2}: {} px", n.at, n.max_px), holds(n))),
+        )
+        .because(
+            "expansion in k1: twice the second-order terms of shift along the line and of change of slope, \
+             all of one sign",
+        );
 }
 
 fn deviation_table(ideal: &[Vec2], bent: &Bent, opposite: &Bent) -> Table {
-    let columns =
-        [("u", "px"), ("v", "px"), ("barrel", "px"), ("pincushion", "px"), ("barrel_corrected", "px")];
-    let mut table =
-        Table::new("deviation", "signed distance of every point from its regression line", &columns);
-    for (i, p) in ideal.iter().enumerate() {
-        table.push([
-            p.x,
-            p.y,
-            bent.distorted.deviations[i],
-            opposite.distorted.deviations[i],
-            bent.corrected.deviations[i],
-        ]);
-    }
-    table
+    let caption = "signed distance of every point from its regression line";
+    Table::of("deviation", caption, ideal.iter().enumerate())
+        .column("u", "px", |(_, p)| p.x)
+        .column("v", "px", |(_, p)| p.y)
+        .column("barrel", "px", |(i, _)| bent.distorted.deviations[*i])
+        .column("pincushion", "px", |(i, _)| opposite.distorted.deviations[*i])
+        .column("barrel_corrected", "px", |(i, _)| bent.corrected.deviations[*i])
+        .into()
 }
 
 fn sweep_table(name: &str, what: &str, axis: (&str, &str), nodes: &[Node]) -> Table {
-    let columns = [axis, ("max", "px"), ("rms", "px"), ("first_order_max", "px"), ("remainder_bound", "px")];
-    let mut table = Table::new(name, format!("deviation of the line against {what}"), &columns);
-    for n in nodes {
-        table.push([n.at, n.max_px, n.rms_px, n.first_order.max_px, n.first_order.bound_px]);
-    }
-    table
+    Table::of(name, format!("deviation of the line against {what}"), nodes)
+        .column(axis.0, axis.1, |n| n.at)
+        .column("max", "px", |n| n.max_px)
+        .column("rms", "px", |n| n.rms_px)
+        .column("first_order_max", "px", |n| n.first_order.max_px)
+        .column("remainder_bound", "px", |n| n.first_order.bound_px)
+        .into()
 }
 
 /// Lines of the grid, fine enough to look smooth.
@@ -358,9 +355,10 @@ fn grid_figure(barrel: &Camera, pincushion: &Camera) -> Figure {
         panel("barrel, k1 = \u{2212}0.18", &|p| barrel.distort_pixel(p)),
         panel("pincushion, k1 = +0.18", &|p| pincushion.distort_pixel(p)),
     ];
-    let caption = "A grid seen through an ideal lens, the chapter's lens (k1 = -0.18, k2 = 0.05) and its opposite (k1 = +0.18, \
-                   k2 = 0.05), in pixels. Nothing is drawn at random. Notice that the two dashed lines, through the principal point \
-                   (326, 243), stay straight while the top line bows.";
+    let caption = "A grid seen through an ideal lens, the chapter's lens (k1 = -0.18, k2 = 0.05) and its \
+                   opposite (k1 = +0.18, k2 = 0.05), in pixels. Nothing is drawn at random. Notice that the \
+                   two dashed lines, through the principal point (326, 243), stay straight while the top \
+                   line bows.";
     Figure::panels("grids", &panels, 3, caption)
 }
 
@@ -379,9 +377,19 @@ fn deviation_figure(ideal: &[Vec2], bent: &Bent, opposite: &Bent, printed_max_px
     .line("barrel, corrected", &along(&bent.corrected))
     .hline(format!("\u{b1}{printed_max_px} px, as published"), printed_max_px)
     .hline("", -printed_max_px);
-    let caption = "Signed distance of the 61 points (v = 60 px, u = 20 ... 620 px) from their orthogonal-regression line, in \
-                   pixels; nothing is drawn at random. Notice the largest deviation at an end of the line, and none after \
-                   correction.";
+    let end = |fit: &LineFit| fit.deviations[0].abs().max(fit.deviations[ideal.len() - 1].abs());
+    let caption = format!(
+        "Signed distance of the {} points (v = {LINE_V_PX} px, u = {} ... {} px) from their \
+         orthogonal-regression line, in pixels; nothing is drawn at random. Notice that the barrel lens \
+         makes {:.3} px at an end of the line, the pincushion lens {:.3} px, and that {:.0e} px are left \
+         after correction.",
+        ideal.len(),
+        ideal[0].x,
+        ideal[ideal.len() - 1].x,
+        end(&bent.distorted),
+        end(&opposite.distorted),
+        bent.corrected.max_deviation()
+    );
     Figure::plot("deviation", &plot, caption)
 }
 
@@ -408,9 +416,9 @@ fn height_figure(heights: &[Node], camera: &Camera, (max_px, rms_px): (f64, f64)
                 &[(LINE_V_PX, max_px), (LINE_V_PX, rms_px)],
                 Look::ink(),
             );
-    let caption = "Largest and RMS deviation of a horizontal line (u = 20 ... 620 px) under the chapter's lens against its \
-                   height, in pixels; nothing is drawn at random. Notice the zero at the principal point's row, and the nearly \
-                   linear growth away from it.";
+    let caption = "Largest and RMS deviation of a horizontal line (u = 20 ... 620 px) under the chapter's \
+                   lens against its height, in pixels; nothing is drawn at random. Notice the zero at the \
+                   principal point's row, and the nearly linear growth away from it.";
     Figure::plot("height", &plot, caption)
 }
 
@@ -441,10 +449,10 @@ fn k1_figure(strengths: &[Node], camera: &Camera) -> Figure {
     let gap = strengths.iter().map(|n| (n.max_px - n.first_order.max_px).abs()).fold(0.0, f64::max);
     let bound = strengths.iter().map(|n| n.first_order.bound_px).fold(0.0, f64::max);
     let caption = format!(
-        "Deviation of the top line (v = 60 px) against k1 alone, in pixels; nothing is drawn at random. Notice that the line bends in \
-         proportion to k1, alike for both signs. First-order theory misses it by {gap:.2} px at most; the bound, which adds up all \
-         second-order terms as if they had one sign, allows {bound:.1} px there and says little more than that the theory is one of \
-         small k1."
+        "Deviation of the top line (v = 60 px) against k1 alone, in pixels; nothing is drawn at random. \
+         Notice that the line bends in proportion to k1, alike for both signs. First-order theory misses it \
+         by {gap:.2} px at most; the bound, which adds up all second-order terms as if they had one sign, \
+         allows {bound:.1} px there and says little more than that the theory is one of small k1."
     );
     Figure::plot("k1", &plot, caption)
 }

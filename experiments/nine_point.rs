@@ -1,15 +1,17 @@
-//! What does a nine-point calibration of one undistorted image give, and why does another program give something else?
+//! What does a nine-point calibration of one undistorted image give, and why does another program give
+//! something else?
 //!
-//! Expected (chapter, section 5.5): a detector for dense grids refuses nine dots, the centres of dark blobs take over, and an
-//! affine map to the unit grid has scales of 0.0042332 and 0.0042338 units a pixel. The vendor's GUI reports a translation
-//! that differs by 0.002 for the same image; the chapter blames rounding to half pixels.
+//! Expected (chapter, section 5.5): a detector for dense grids refuses nine dots, the centres of dark blobs
+//! take over, and an affine map to the unit grid has scales of 0.0042332 and 0.0042338 units a pixel. The
+//! vendor's GUI reports a translation that differs by 0.002 for the same image; the chapter blames rounding
+//! to half pixels.
 //!
-//! The image is not available. A stand-in is rendered from the published size and spacings and from the centre that follows
-//! from the published translation and scales; the matrix therefore must return them. `--image FILE` takes the real one, or
-//! any other.
+//! The image is not available. A stand-in is rendered from the published size and spacings and from the
+//! centre that follows from the published translation and scales; the matrix therefore must return them.
+//! `--image FILE` takes the real one, or any other.
 //!
-//! What it cannot show: the residual of the real image, whose noise no stand-in has. Its shape is checked instead: the ratio of
-//! largest to RMS residual does not depend on the size of the noise.
+//! What it cannot show: the residual of the real image, whose noise no stand-in has. Its shape is checked
+//! instead: the ratio of largest to RMS residual does not depend on the size of the noise.
 
 use calibench::detect::{GridError, circle_grid, sparse_dots};
 use calibench::geometry::{Affine, Mat3, Vec2};
@@ -21,30 +23,32 @@ use calibench::synth::render::nine_dot_stand_in;
 use calibench::synth::{Stream, StreamKey};
 use calibench_harness::figure::Format;
 use calibench_harness::published::{self, Entry};
+use calibench_harness::stats::Interval;
 use calibench_harness::{
-    Band, Cell, Claim, Context, Experiment, ExperimentError, Figure, Look, Plot, Predicted, Record, Table,
+    Band, Cell, Context, Experiment, ExperimentError, Figure, Look, Plot, Predicted, Record, Table,
 };
 
 mod book;
 mod gui;
+mod modes;
 mod shown;
-mod tell;
 
 use book::{
-    claim_published_consistent, claim_residual_shape, claim_scales_differ, entry, reconcile, tell_derived,
+    claim_published_consistent, claim_residual_shape, claim_scales_differ, entry, reconcile, report_derived,
 };
 use gui::{GUI, explain_gui};
+use modes::{modes_table, report_geometry, report_planar, residual_table};
 use shown::Shown;
-use tell::{modes_table, residual_table, tell_geometry, tell_planar};
 
 /// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
     id: "nine-point",
     title: "Nine-point calibration, and half a pixel between two programs",
-    question: "An image of 3 x 3 dark dots (a stand-in rendered from the published geometry, or --image FILE) is mapped to the \
-               unit grid by an affine map, a projective map and a similarity. Do matrix and scales agree with the chapter's, \
-               and what explains the 0.002 by which the vendor's GUI differs? Expected: scales 0.0042332 and 0.0042338; \
-               dense-grid detection refuses nine dots; the GUI's numbers are those of centres rounded to half pixels.",
+    question: "An image of 3 x 3 dark dots (a stand-in rendered from the published geometry, or --image \
+               FILE) is mapped to the unit grid by an affine map, a projective map and a similarity. Do \
+               matrix and scales agree with the chapter's, and what explains the 0.002 by which the \
+               vendor's GUI differs? Expected: scales 0.0042332 and 0.0042338; dense-grid detection refuses \
+               nine dots; the GUI's numbers are those of centres rounded to half pixels.",
     seed: 1,
     takes_image: true,
     run,
@@ -61,8 +65,9 @@ const MODES: [(&str, PlaneModel); 3] = [
 const PUBLISHED_SIZE: (usize, usize) = (1571, 1053);
 /// Published spacings along u and v, px; printed to 0.01.
 const SPACING_PX: (f64, f64) = (236.23, 236.19);
-/// Largest error of a dot's centre from rounding to 8 bits, if all roundings conspire: about 236 edge pixels of a dot of 59 px
-/// diameter, half a level of the contrast's 191 each, at a mean distance of 18.8 px, over an area of 2739 px.
+/// Largest error of a dot's centre from rounding to 8 bits, if all roundings conspire: about 236 edge pixels
+/// of a dot of 59 px diameter, half a level of the contrast's 191 each, at a mean distance of 18.8 px, over
+/// an area of 2739 px.
 const DETECTION_PX: f64 = 0.005;
 /// Rounding of a fit of nine points: coordinates near 1000 px carry 1.1e-13 px, some tens of operations.
 const ROUNDING: f64 = 1e-11;
@@ -80,8 +85,8 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
         .collect::<Result<Vec<_>, _>>()
         .map_err(ExperimentError::at("plane calibration"))?;
 
-    tell_geometry(&mut record, &shown.image, &centres, shown.band());
-    tell_planar(&mut record, &fits[0], shown.band());
+    report_geometry(&mut record, &shown.image, &centres, shown.band());
+    report_planar(&mut record, &fits[0], shown.band());
     record.table(modes_table(&fits)?);
     record.table(residual_table(&centres, &fits));
     claim_nesting(&mut record, &fits);
@@ -90,7 +95,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     }
     claim_published_consistent(&mut record)?;
     claim_residual_shape(&mut record, context)?;
-    tell_derived(&mut record)?;
+    report_derived(&mut record)?;
     claim_scales_differ(&mut record)?;
     if shown.is_published() {
         explain_gui(&mut record, &centres, &fits[0], shown.band())?;
@@ -110,12 +115,19 @@ fn claim_refusal(record: &mut Record, image: &Raster<f32>) {
     let answer = circle_grid(image, 3, 3);
     let said = answer.as_ref().map_or_else(ToString::to_string, |_| "accepted".to_string());
     record.note(format!("The detector for dense grids says of nine dots: {said}"));
-    record.claim(Claim::all_of(
-        "dense-grid-refuses",
-        "the detector for dense grids refuses a 3 x 3 board with a typed error that names the detector to use",
-        [(said, matches!(answer, Err(GridError::TooFewForGrid { columns: 3, rows: 3, found: 9, .. })))],
-        "three marks in a row leave one step to confirm another: too few to tell a grid from chance",
-    ));
+    record
+        .claim_that(
+            "dense-grid-refuses",
+            "the detector for dense grids refuses a 3 x 3 board with a typed error that names the detector \
+             to use",
+        )
+        .every(
+            "cases",
+            [(said, matches!(answer, Err(GridError::TooFewForGrid { columns: 3, rows: 3, found: 9, .. })))],
+        )
+        .because(
+            "three marks in a row leave one step to confirm another: too few to tell a grid from chance",
+        );
 }
 
 fn mean(points: &[Vec2]) -> Vec2 {
@@ -124,15 +136,19 @@ fn mean(points: &[Vec2]) -> Vec2 {
 
 fn claim_nesting(record: &mut Record, fits: &[PlaneCalibration]) {
     let [planar, tilted, similarity] = [fits[0].rms_point, fits[1].rms_point, fits[2].rms_point];
-    record.claim(Claim::all_of(
-        "families-nest",
-        "each family that holds another fits at least as well",
-        [
-            ("similarity <= planar".to_string(), planar <= similarity + ROUNDING),
-            ("planar <= tilted".to_string(), tilted <= planar + ROUNDING),
-        ],
-        "a similarity is an affine map, an affine map is projective; all minimise the same sum of squares",
-    ));
+    record
+        .claim_that("families-nest", "each family that holds another fits at least as well")
+        .every(
+            "cases",
+            [
+                ("similarity <= planar".to_string(), planar <= similarity + ROUNDING),
+                ("planar <= tilted".to_string(), tilted <= planar + ROUNDING),
+            ],
+        )
+        .because(
+            "a similarity is an affine map, an affine map is projective; all minimise the same sum of \
+             squares",
+        );
 }
 
 fn claim_stand_in(
@@ -144,20 +160,20 @@ fn claim_stand_in(
     let worst = centres.iter().zip(centres_true).map(|(c, t)| (c - t).amax()).fold(0.0, f64::max);
     let reason = "rounding to 8 bits: half a level of 191 on 236 edge pixels, if all conspire";
     let statement = "every dot's centre is found where it was rendered";
-    record.claim(Claim::at_most("centres-are-true", statement, worst, DETECTION_PX, reason).in_unit("px"));
+    record.claim_that("centres-are-true", statement).at_most(worst, DETECTION_PX).unit("px").because(reason);
     // u = p X, v = -q Y: the best common scale is (p + q) / (p^2 + q^2), and mean X^2 = mean Y^2 = 2/3.
     let (p, q) = SPACING_PX;
     let scale = (p + q) / (p * p + q * q);
     let theory =
         (2.0 / 3.0 * ((scale * p - 1.0) * (scale * p - 1.0) + (scale * q - 1.0) * (scale * q - 1.0))).sqrt();
     let units = std::f64::consts::SQRT_2 * DETECTION_PX * scale;
-    record.claim(Claim::within(
-        "similarity-residual",
-        "a similarity leaves what the two spacings differ by, as its closed form says",
-        similarity.rms_point,
-        (theory - units, theory + units),
-        "closed form for spacings 236.23 and 236.19 px; detection error of every centre",
-    ));
+    record
+        .claim_that(
+            "similarity-residual",
+            "a similarity leaves what the two spacings differ by, as its closed form says",
+        )
+        .within(similarity.rms_point, Interval::around(theory, units))
+        .because("closed form for spacings 236.23 and 236.19 px; detection error of every centre");
 }
 
 fn marks_figure(shown: &Shown, centres: &[Vec2]) -> Result<Figure, ExperimentError> {
@@ -169,8 +185,8 @@ fn marks_figure(shown: &Shown, centres: &[Vec2]) -> Result<Figure, ExperimentErr
     Ok(Figure {
         name: if shown.centres_true.is_some() { "stand-in-marks" } else { "marks" }.to_string(),
         caption: format!(
-            "The nine dots as found ({}): crosses at the centres, rows joined in their order, the first dot circled. Notice \
-             that no dense-grid detector is needed for nine dots.",
+            "The nine dots as found ({}): crosses at the centres, rows joined in their order, the first dot \
+             circled. Notice that no dense-grid detector is needed for nine dots.",
             if shown.centres_true.is_some() {
                 "a stand-in rendered from the published geometry, not the published image"
             } else {
@@ -205,8 +221,8 @@ fn residual_figure(centres: &[Vec2], fits: &[PlaneCalibration], name: &str) -> F
         })
         .collect();
     let caption = format!(
-        "Residuals of the three modes at the nine target points ({name}, {} centres), target units. Notice the scales, and that \
-         a similarity leaves the difference of the two spacings.",
+        "Residuals of the three modes at the nine target points ({name}, {} centres), target units. Notice \
+         the scales, and that a similarity leaves the difference of the two spacings.",
         centres.len()
     );
     Figure::panels("residuals", &panels, 3, caption)

@@ -1,14 +1,16 @@
 //! How small should the reprojection error be, and when is it too small?
 //!
-//! Expected: `RMSE = sigma sqrt(2 (1 - p / 2N))`, under the noise floor `sqrt(2) sigma` because p parameters absorb noise. The distribution is known,
-//! so "alarmingly far below the floor" is a quantile of it: a threshold with a false-alarm rate.
+//! Expected: `RMSE = sigma sqrt(2 (1 - p / 2N))`, under the noise floor `sqrt(2) sigma` because p parameters
+//! absorb noise. The distribution is known, so "alarmingly far below the floor" is a quantile of it: a
+//! threshold with a false-alarm rate.
 //!
-//! What it cannot show: an RMSE that is right says nothing about the parameters; with few points RMSE shrinks while their errors grow.
+//! What it cannot show: an RMSE that is right says nothing about the parameters; with few points RMSE shrinks
+//! while their errors grow.
 
-use calibench::evaluate::interval::each_of;
-use calibench::evaluate::{Interval, RmseDistribution};
+use calibench::evaluate::RmseDistribution;
+use calibench_harness::stats::{Interval, each_of, normal_two_sided};
 use calibench_harness::{
-    Band, Cell, Claim, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
+    Band, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
 };
 use calibench_study::{Cell as Design, Engine, Estimated, Spec, Statistic, Summary, Trial, within};
 
@@ -16,8 +18,9 @@ use calibench_study::{Cell as Design, Engine, Estimated, Spec, Statistic, Summar
 pub const EXPERIMENT: Experiment = Experiment {
     id: "noise-floor",
     title: "The reprojection error and its floor",
-    question: "Noise from 0.02 to 0.5 px, 3 to 16 views, and targets of 9 to 221 marks: does the RMSE follow sigma sqrt(2 (1 - p / 2N)), and how far below \
-               the noise floor is alarming? Expected: it does, and the 1 % quantile of its distribution raises a false alarm once in a hundred \
+    question: "Noise from 0.02 to 0.5 px, 3 to 16 views, and targets of 9 to 221 marks: does the RMSE \
+               follow sigma sqrt(2 (1 - p / 2N)), and how far below the noise floor is alarming? Expected: \
+               it does, and the 1 % quantile of its distribution raises a false alarm once in a hundred \
                calibrations, wherever it is applied.",
     seed: 21,
     takes_image: false,
@@ -72,9 +75,11 @@ levels = [0.1, 0.09, 0.08]
 const FALSE_ALARM: f64 = 1e-4;
 /// Rate of the overfitting alarm itself, one calibration in a hundred.
 const ALARM_RATE: f64 = 0.01;
-/// Terms of second order in the noise, relative: `(sigma / 600 px)` over the tilt's lever, at most 5e-3 at 0.5 px.
+/// Terms of second order in the noise, relative: `(sigma / 600 px)` over the tilt's lever, at most 5e-3 at
+/// 0.5 px.
 const NONLINEARITY: f64 = 0.005;
-/// The refinement ends within a millionth of a standard deviation of the minimum; the RMSE is second order in that.
+/// The refinement ends within a millionth of a standard deviation of the minimum; the RMSE is second order in
+/// that.
 const SOLVER: f64 = 1e-6;
 
 /// A study, its results, and for each cell the share of trials whose RMSE lies under the alarm threshold.
@@ -92,7 +97,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
 
     for (name, swept) in [("grid", &grid), ("marks", &marks)] {
         claim_mean(&mut record, name, swept);
-        tell_means(&mut record, name, swept);
+        report_means(&mut record, name, swept);
     }
     claim_alarm_rate(&mut record, &grid);
     claim_power(&mut record, &overstated);
@@ -153,26 +158,28 @@ fn claim_mean(record: &mut Record, name: &str, swept: &Swept) {
         let held = (interval.low - slack..=interval.high + slack).contains(&statistic);
         (format!("{}: {statistic:.6} px, expected {:.6}", result.name, theory.mean_px()), held)
     });
-    let claim = Claim::all_of(
-        format!("mean-rmse-{name}"),
-        "the mean RMSE is that of sigma sqrt(chi2 / N) with 2N - p degrees of freedom in every cell",
-        cases,
-        "central limit over 300 trials, all cells together at 1e-4, and half a percent for terms of second order",
-    ).over("cells");
-    record.claim(claim.with_false_alarm_rate(FALSE_ALARM));
+    record
+        .claim_that(
+            format!("mean-rmse-{name}"),
+            "the mean RMSE is that of sigma sqrt(chi2 / N) with 2N - p degrees of freedom in every cell",
+        )
+        .every("cells", cases)
+        .at_rate(FALSE_ALARM)
+        .because(
+            "central limit over 300 trials, all cells together at 1e-4, and half a percent for terms of \
+             second order",
+        );
 }
 
-fn tell_means(record: &mut Record, name: &str, swept: &Swept) {
+fn report_means(record: &mut Record, name: &str, swept: &Swept) {
     for (result, cell) in swept.summary.cells.iter().zip(&swept.engine.cells) {
         let theory = predicted(cell);
         let mean = result.of("rmse").and_then(|s| s.mean).map_or(f64::NAN, |m| m.value);
         let id = format!("{name}-{}", result.labels.join("-"));
         let band = Band::relative(SOLVER, "the refinement ends within a millionth of a standard deviation");
-        record.number(
+        record.group("", band).number(
             format!("mean-over-floor-{id}"),
             mean / theory.noise_floor_px(),
-            "",
-            band,
             format!("mean RMSE over sqrt(2) sigma, {}", result.name),
         );
     }
@@ -181,28 +188,22 @@ fn tell_means(record: &mut Record, name: &str, swept: &Swept) {
 fn claim_alarm_rate(record: &mut Record, grid: &Swept) {
     let trials: u64 = grid.summary.cells.iter().map(|c| c.trials).sum();
     let alarms: u64 = grid.alarms.iter().sum();
-    let share = record.number(
+    let share = alarms as f64 / trials as f64;
+    let band = Band::absolute(1.5 / trials as f64, "one trial that changes sides by a rounding");
+    record.group("", band).number(
         "false-alarm-share",
-        alarms as f64 / trials as f64,
-        "",
-        Band::absolute(1.5 / trials as f64, "one trial that changes sides by a rounding"),
+        share,
         "share of right calibrations whose RMSE lies under the 1 % threshold, all cells",
     );
     let interval = Interval::around(
         ALARM_RATE,
-        calibench::evaluate::distribution::normal_two_sided(FALSE_ALARM)
-            * (ALARM_RATE * (1.0 - ALARM_RATE) / trials as f64).sqrt(),
+        normal_two_sided(FALSE_ALARM) * (ALARM_RATE * (1.0 - ALARM_RATE) / trials as f64).sqrt(),
     );
-    record.claim(
-        Claim::within(
-            "alarm-rate",
-            "the threshold raises a false alarm in one of a hundred right calibrations",
-            share,
-            (interval.low, interval.high),
-            "binomial over all trials of the grid, normal approximation at 60 expected alarms",
-        )
-        .with_false_alarm_rate(FALSE_ALARM),
-    );
+    record
+        .claim_that("alarm-rate", "the threshold raises a false alarm in one of a hundred right calibrations")
+        .within(share, interval)
+        .at_rate(FALSE_ALARM)
+        .because("binomial over all trials of the grid, normal approximation at 60 expected alarms");
 }
 
 /// Where the noise is overstated, RMSE falls under the threshold as often as theory says.
@@ -215,27 +216,33 @@ fn claim_power(record: &mut Record, overstated: &Swept) {
             let threshold = RmseDistribution { sigma_px: 0.1, ..own }.quantile_px(ALARM_RATE);
             let power = own.cdf(threshold);
             let interval = Interval::of_proportion(alarms as usize, result.trials as usize, each);
-            record.number(
-                format!("alarm-share-{}", result.labels.join("-")),
-                alarms as f64 / result.trials as f64,
-                "",
-                Band::absolute(1.5 / result.trials as f64, "one trial that changes sides by a rounding"),
-                format!("share of alarms where 0.1 px is assumed and the truth is {} px", cell.noise_px()),
-            );
+            record
+                .group(
+                    "",
+                    Band::absolute(1.5 / result.trials as f64, "one trial that changes sides by a rounding"),
+                )
+                .number(
+                    format!("alarm-share-{}", result.labels.join("-")),
+                    alarms as f64 / result.trials as f64,
+                    format!(
+                        "share of alarms where 0.1 px is assumed and the truth is {} px",
+                        cell.noise_px()
+                    ),
+                );
             (
                 format!("{}: {alarms} alarms of {}, expected share {power:.4}", result.name, result.trials),
                 interval.contains(power),
             )
         })
         .collect();
-    let claim = Claim::all_of(
-        "alarm-power",
-        "where noise is overstated the alarm rings as often as the distribution says",
-        cases,
-        "Wilson's interval of the share, all together at 1e-4",
-    )
-    .over("cells");
-    record.claim(claim.with_false_alarm_rate(FALSE_ALARM));
+    record
+        .claim_that(
+            "alarm-power",
+            "where noise is overstated the alarm rings as often as the distribution says",
+        )
+        .every("cells", cases)
+        .at_rate(FALSE_ALARM)
+        .because("Wilson's interval of the share, all together at 1e-4");
 }
 
 /// Fewer marks: a smaller RMSE and a larger error.
@@ -250,44 +257,35 @@ fn claim_overfitting(record: &mut Record, marks: &Swept) {
         ("RMSE with 9 marks lies under that with 221".to_string(), rmse(0).1 < rmse(last).0),
         ("the focal length with 9 marks is worse than with 221".to_string(), sd(0).0 > sd(last).1),
     ];
-    record.claim(Claim::all_of(
-        "smaller-is-not-better",
-        "with fewer marks the RMSE falls and the error of the focal length grows",
-        cases,
-        "9 marks: p/2N = 30/72, RMSE factor 0.76, spread 5 times as wide; both far beyond their 95 % intervals",
-    ));
+    record
+        .claim_that(
+            "smaller-is-not-better",
+            "with fewer marks the RMSE falls and the error of the focal length grows",
+        )
+        .every("cases", cases)
+        .because(
+            "9 marks: p/2N = 30/72, RMSE factor 0.76, spread 5 times as wide; both far beyond their 95 % \
+             intervals",
+        );
 }
 
 fn table(name: &str, swept: &Swept) -> Table {
-    let columns = [
-        ("levels", ""),
-        ("points", ""),
-        ("parameters", ""),
-        ("rmse_mean", "px"),
-        ("rmse_predicted", "px"),
-        ("rmse_sd", "px"),
-        ("rmse_sd_predicted", "px"),
-        ("noise_floor", "px"),
-        ("alarm_share", ""),
-    ];
-    let mut table = Table::new(name, "RMSE against its predicted distribution", &columns);
-    for ((result, cell), &alarms) in swept.summary.cells.iter().zip(&swept.engine.cells).zip(&swept.alarms) {
-        let theory = predicted(cell);
-        let Some(s) = result.of("rmse") else { continue };
-        let (Some(mean), Some(sd)) = (s.mean, s.sd) else { continue };
-        table.push([
-            Cell::from(result.name.as_str()),
-            theory.points.into(),
-            theory.parameters.into(),
-            mean.value.into(),
-            theory.mean_px().into(),
-            sd.value.into(),
-            theory.standard_deviation_px().into(),
-            theory.noise_floor_px().into(),
-            (alarms as f64 / result.trials as f64).into(),
-        ]);
-    }
-    table
+    let cells = swept.summary.cells.iter().zip(&swept.engine.cells).zip(&swept.alarms);
+    let rows = cells.filter_map(|((result, cell), &alarms)| {
+        let rmse = result.of("rmse")?;
+        Some((result, predicted(cell), rmse.mean?.value, rmse.sd?.value, alarms))
+    });
+    Table::of(name, "RMSE against its predicted distribution", rows)
+        .column("levels", "", |(result, ..)| result.name.clone())
+        .column("points", "", |(_, theory, ..)| theory.points)
+        .column("parameters", "", |(_, theory, ..)| theory.parameters)
+        .column("rmse_mean", "px", |(_, _, mean, ..)| *mean)
+        .column("rmse_predicted", "px", |(_, theory, ..)| theory.mean_px())
+        .column("rmse_sd", "px", |(_, _, _, sd, _)| *sd)
+        .column("rmse_sd_predicted", "px", |(_, theory, ..)| theory.standard_deviation_px())
+        .column("noise_floor", "px", |(_, theory, ..)| theory.noise_floor_px())
+        .column("alarm_share", "", |(result, .., alarms)| *alarms as f64 / result.trials as f64)
+        .into()
 }
 
 fn floor_figure(grid: &Swept) -> Figure {
@@ -317,10 +315,12 @@ fn floor_figure(grid: &Swept) -> Figure {
             .points_as(label, &points, Look::series(v));
     }
     let caption = format!(
-        "Mean RMSE over the noise floor sqrt(2) sigma against the noise (marks, 300 trials, 95 % intervals, seed {}) and its prediction (lines): the \
-         mean of sigma / sqrt(N) times chi with 2N - p degrees of freedom, which lies under sigma sqrt(2 (1 - p / 2N)), the root of the mean \
-         square, by one part in 4 (2N - p). Notice that the factor depends on the views, since 6 + 6n parameters absorb noise, and not on the noise.",
-        grid.engine.spec.seed
+        "Mean RMSE over the noise floor sqrt(2) sigma against the noise (marks, {} trials, 95 % intervals, \
+         seed {}) and its prediction (lines): the mean of sigma / sqrt(N) times chi with 2N - p degrees of \
+         freedom, which lies under sigma sqrt(2 (1 - p / 2N)), the root of the mean square, by one part in \
+         4 (2N - p). Notice that the factor depends on the views, since 6 + 6n parameters absorb noise, and \
+         not on the noise.",
+        grid.summary.cells[0].trials, grid.engine.spec.seed
     );
     Figure::plot("floor", &plot.y_range(0.96, 0.98), caption)
 }
@@ -363,10 +363,17 @@ fn overfitting_figure(marks: &Swept) -> Figure {
             .error_bars_as("", &sd_bars, Look::series(1))
             .points_as("measured", &sds, Look::series(1)),
     ];
+    let factor = &marks.engine.spec.factor[0];
+    let targets: Vec<String> = (0..factor.levels.len()).rev().map(|i| factor.label(i).to_string()).collect();
     let caption = format!(
-        "Targets of 221, 63, 20, 12 and 9 marks, 4 views, 0.1 px of noise, 300 trials each, 95 % intervals, seed {}. Notice that the RMSE falls where the error grows: \
-         a small residual is no proof of a good calibration.",
-        marks.engine.spec.seed
+        "Targets of {} marks, 4 views, 0.1 px of noise, {} trials each, 95 % intervals, seed {}. Notice \
+         that the RMSE falls to {:.2} of the noise floor where the standard deviation of fx is {:.1} times \
+         that of the largest target: a small residual is no proof of a good calibration.",
+        targets.join(", "),
+        marks.summary.cells[0].trials,
+        marks.engine.spec.seed,
+        means[0].1 / floor,
+        sds[0].1 / sds[sds.len() - 1].1
     );
     Figure::panels("overfitting", &panels, 2, caption)
 }
@@ -386,9 +393,10 @@ fn alarm_figure() -> Figure {
     }
     let below = |views: usize| 100.0 * (1.0 - at(views).quantile_px(ALARM_RATE) / at(views).noise_floor_px());
     let caption = format!(
-        "Expected RMSE over the noise floor, and the values under which it falls in 5, 1 and 0.1 percent of right calibrations, against the \
-         number of views of a 9 x 7 target with six intrinsics free. Nothing is drawn at random. Notice that the RMSE of four views must lie \
-         {:.1} percent below the floor, that of 64 views {:.1} percent, to be alarming at 1 %.",
+        "Expected RMSE over the noise floor, and the values under which it falls in 5, 1 and 0.1 percent of \
+         right calibrations, against the number of views of a 9 x 7 target with six intrinsics free. \
+         Nothing is drawn at random. Notice that the RMSE of four views must lie {:.1} percent below the \
+         floor, that of 64 views {:.1} percent, to be alarming at 1 %.",
         below(4),
         below(64)
     );

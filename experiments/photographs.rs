@@ -1,24 +1,26 @@
-//! How well do photographs of dots give their centres and a camera, and is the chapter's noise of 0.1 px realistic?
+//! How well do photographs of dots give their centres and a camera, and is the chapter's noise of 0.1 px
+//! realistic?
 //!
-//! Expected: image noise moves centres by little more than the information in the dots' edges allows, a few thousandths of a
-//! pixel, far below 0.1 px. Without correction, the bias of imaged discs (the centre of the ellipse is not the image of the
-//! centre) is as large as that noise or larger, and it does not average out, though the poses take up most of it; with
-//! correction the camera is exact up to what the detector leaves.
+//! Expected: image noise moves centres by little more than the information in the dots' edges allows, a few
+//! thousandths of a pixel, far below 0.1 px. Without correction, the bias of imaged discs (the centre of the
+//! ellipse is not the image of the centre) is as large as that noise or larger, and it does not average out,
+//! though the poses take up most of it; with correction the camera is exact up to what the detector leaves.
 //!
-//! What it cannot show: lenses that are not sharp alike over the frame, dots that are printed out of place, boards that are not
-//! plane. What they add is not measured here.
+//! What it cannot show: lenses that are not sharp alike over the frame, dots that are printed out of place,
+//! boards that are not plane. What they add is not measured here.
 
 use calibench::board::{Board, View};
 use calibench::calibrate::{Calibration, Settings};
 use calibench::camera::{Camera, FreeParameters};
 use calibench::detect::{circle_grid, disc_biases};
-use calibench::evaluate::{cramer_rao, interval};
+use calibench::evaluate::cramer_rao;
 use calibench::geometry::{Pose, Vec2, Vec3};
 use calibench::photos::Fitter;
 use calibench::synth::render::{Imaging, Photograph, SensorNoise, photograph};
 use calibench::synth::{Stream, StreamKey, Truth};
+use calibench_harness::stats::{Interval, each_of};
 use calibench_harness::{
-    Band, Claim, Context, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
+    Band, Context, Experiment, ExperimentError, Figure, Look, Plot, Record, Rows, Table,
 };
 use rayon::prelude::*;
 
@@ -26,10 +28,11 @@ use rayon::prelude::*;
 pub const EXPERIMENT: Experiment = Experiment {
     id: "photographs",
     title: "From photographs to a camera",
-    question: "The chapter's four poses are photographed, their dots detected, the camera calibrated. What extraction noise \
-               results against blur, image noise and dot size; what does the bias of imaged discs do without correction and \
-               with it; is the chapter's 0.1 px realistic? Expected: a few thousandths of a pixel of noise, a bias of more than \
-               that without correction and none with it, most of it taken up by the poses. A sensor does not make 0.1 px.",
+    question: "The chapter's four poses are photographed, their dots detected, the camera calibrated. What \
+               extraction noise results against blur, image noise and dot size; what does the bias of \
+               imaged discs do without correction and with it; is the chapter's 0.1 px realistic? Expected: \
+               a few thousandths of a pixel of noise, a bias of more than that without correction and none \
+               with it, most of it taken up by the poses. A sensor does not make 0.1 px.",
     seed: 3,
     takes_image: false,
     run,
@@ -45,13 +48,15 @@ const DIAMETERS_MM: [f64; 4] = [2.0, 3.0, 5.0, 7.0];
 const CHAPTER_NOISE_PX: f64 = 0.1;
 /// False-alarm rate of the claim about noise, all nodes together.
 const FALSE_ALARM: f64 = 1e-4;
-/// What the detector may lose against the bound, which knows levels and outline: a quarter, as its tests claim up to this blur.
+/// What the detector may lose against the bound, which knows levels and outline: a quarter, as its tests
+/// claim up to this blur.
 const LOSS: f64 = 1.25;
 const SHARP_PX: f64 = 1.0;
-/// What the bound itself leaves open: pixel and blur together are taken for a Gaussian of their variance, which changes the
-/// information of a sharp edge by 4 % at most, along the diagonal.
+/// What the bound itself leaves open: pixel and blur together are taken for a Gaussian of their variance,
+/// which changes the information of a sharp edge by 4 % at most, along the diagonal.
 const BOUND_ERROR: f64 = 0.02;
-/// First-order bounds are widened by this: the errors are thousandths of what would bend the model noticeably.
+/// First-order bounds are widened by this: the errors are thousandths of what would bend the model
+/// noticeably.
 const SECOND_ORDER: f64 = 1.1;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,8 +97,8 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     let exact: Vec<Exact> =
         DIAMETERS_MM.par_iter().map(|&diameter| noise_free(diameter, &album)).collect::<Result<_, _>>()?;
     let unit = unit_deviations()?;
-    tell_noise(&mut record, &outcomes)?;
-    tell_bias(&mut record, &exact, &unit)?;
+    report_noise(&mut record, &outcomes)?;
+    report_bias(&mut record, &exact, &unit)?;
     claim_noise(&mut record, &outcomes);
     claim_bias(&mut record, &exact, &unit);
     record.table(noise_table(&outcomes));
@@ -101,11 +106,12 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     record.figure(noise_figure(&outcomes, context.seed));
     record.figure(bias_figure(&exact, &unit));
     record.note(
-        "0.1 px is not what a sensor makes of dots like these: noise of 1 % of full scale gives less than a twentieth of it. What \
-         print, flatness and uneven sharpness add is not rendered here.",
+        "0.1 px is not what a sensor makes of dots like these: noise of 1 % of full scale gives less than a \
+         twentieth of it. What print, flatness and uneven sharpness add is not rendered here.",
     );
     let photo = &album.photos(&BASE)[3];
-    let caption = "The chapter's target in its compound pose, dots of 3 mm, blur 0.5 px, without noise: what the detector sees.";
+    let caption = "The chapter's target in its compound pose, dots of 3 mm, blur 0.5 px, without noise: \
+                   what the detector sees.";
     record.figure(Figure::photo("photograph", &photo.image.to_u8(), caption));
     Ok(record)
 }
@@ -124,7 +130,8 @@ fn board(diameter_mm: f64) -> Result<Board, ExperimentError> {
     Board::circles(9, 7, 10.0, diameter_mm).map_err(ExperimentError::at("board"))
 }
 
-/// The noise-free photographs of the chapter's poses, each rendered once: nodes that differ in noise alone share theirs.
+/// The noise-free photographs of the chapter's poses, each rendered once: nodes that differ in noise alone
+/// share theirs.
 struct Album(Vec<(Node, Vec<Photograph>)>);
 
 impl Album {
@@ -192,9 +199,9 @@ fn outcome(node: Node, album: &Album, seed: u64) -> Result<Outcome, ExperimentEr
     Ok(Outcome { node, errors, bound_px })
 }
 
-/// The Cramer-Rao bound of a disc's centre, px^2, mean of both coordinates: an edge of contrast `C` blurred by a Gaussian of
-/// variance `s^2 = blur^2 + 1/12` (the pixel's square) holds `C^2 / (2 sqrt(pi) s sigma^2)` of information a pixel of its
-/// length about its place along the normal `n`; the outline sums `n n^T`.
+/// The Cramer-Rao bound of a disc's centre, px^2, mean of both coordinates: an edge of contrast `C` blurred
+/// by a Gaussian of variance `s^2 = blur^2 + 1/12` (the pixel's square) holds `C^2 / (2 sqrt(pi) s sigma^2)`
+/// of information a pixel of its length about its place along the normal `n`; the outline sums `n n^T`.
 fn edge_variance(pose: &Pose, centre: &Vec2, node: &Node) -> f64 {
     const SIDES: u32 = 64;
     let camera = Truth::chapter_camera();
@@ -259,6 +266,11 @@ fn rms_coordinate(errors: &[Vec2]) -> f64 {
     (0.5 * errors.iter().map(Vec2::norm_squared).sum::<f64>() / errors.len() as f64).sqrt()
 }
 
+/// Root mean square of the lengths.
+fn rms(vectors: &[Vec2]) -> f64 {
+    std::f64::consts::SQRT_2 * rms_coordinate(vectors)
+}
+
 fn largest(vectors: &[Vec2]) -> f64 {
     vectors.iter().map(|v| v.norm()).fold(0.0, f64::max)
 }
@@ -269,8 +281,9 @@ impl Exact {
         self.displacements.iter().zip(&self.biases).map(|(d, b)| d - b).collect()
     }
 
-    /// How far errors of the pixels can move each parameter: least squares is linear to first order, so an error vector `e`
-    /// moves it by `|e|` times its standard deviation for unit noise at most (Cauchy-Schwarz).
+    /// How far errors of the pixels can move each parameter: least squares is linear to first order, so an
+    /// error vector `e` moves it by `|e|` times its standard deviation for unit noise at most
+    /// (Cauchy-Schwarz).
     fn reach(&self, unit: &[f64]) -> Vec<f64> {
         let length = self.remainder().iter().map(Vec2::norm_squared).sum::<f64>().sqrt();
         unit.iter().map(|sd| SECOND_ORDER * length * sd).collect()
@@ -292,87 +305,50 @@ fn band() -> Band {
     )
 }
 
-fn tell_noise(record: &mut Record, outcomes: &[Outcome]) -> Result<(), ExperimentError> {
+fn report_noise(record: &mut Record, outcomes: &[Outcome]) -> Result<(), ExperimentError> {
     let base = base(outcomes)?;
     let noise = rms_coordinate(&base.errors);
-    record.number(
-        "extraction-noise",
-        noise,
-        "px",
-        band(),
-        "RMS of a coordinate: blur 0.5 px, noise 1 %, dots of 3 mm",
-    );
-    record.number(
-        "extraction-bound",
-        base.bound_px,
-        "px",
-        band(),
-        "what the information in the dots' edges allows there",
-    );
     let needed = CHAPTER_NOISE_PX / base.bound_px * BASE.noise;
-    record.number(
-        "noise-for-a-tenth",
-        needed,
-        "",
-        band(),
-        "image noise, of full scale, at which the bound reaches 0.1 px",
-    );
     let blurred = outcomes.iter().max_by(|a, b| a.node.blur_px.total_cmp(&b.node.blur_px)).unwrap_or(base);
     let ratio = rms_coordinate(&blurred.errors) / blurred.bound_px;
-    record.number(
-        "loss-under-blur",
-        ratio,
-        "",
-        band(),
-        "extraction noise over its bound at the heaviest blur, 2 px",
-    );
     let worst = outcomes.iter().map(|o| rms_coordinate(&o.errors)).fold(0.0, f64::max);
-    record.number(
-        "largest-extraction-noise",
-        worst,
-        "px",
-        band(),
-        "the same in the worst node of the sweeps",
-    );
+    record
+        .group("px", band())
+        .number("extraction-noise", noise, "RMS of a coordinate: blur 0.5 px, noise 1 %, dots of 3 mm")
+        .number("extraction-bound", base.bound_px, "what the information in the dots' edges allows there")
+        .unit("")
+        .number("noise-for-a-tenth", needed, "image noise, of full scale, at which the bound reaches 0.1 px")
+        .number("loss-under-blur", ratio, "extraction noise over its bound at the heaviest blur, 2 px")
+        .unit("px")
+        .number("largest-extraction-noise", worst, "the same in the worst node of the sweeps");
     Ok(())
 }
 
-fn tell_bias(record: &mut Record, exact: &[Exact], unit: &[f64]) -> Result<(), ExperimentError> {
+fn report_bias(record: &mut Record, exact: &[Exact], unit: &[f64]) -> Result<(), ExperimentError> {
     let chapter = exact
         .iter()
         .find(|e| e.diameter_mm == BASE.diameter_mm)
         .ok_or(ExperimentError::Input("the base's dot size is missing".into()))?;
-    let rms = std::f64::consts::SQRT_2 * rms_coordinate(&chapter.displacements);
-    record.number(
-        "bias-rms",
-        rms,
-        "px",
-        band(),
-        "RMS displacement of uncorrected centres, 3 mm dots, four poses",
-    );
-    record.number("bias-largest", largest(&chapter.displacements), "px", band(), "largest displacement");
-    let remainder = std::f64::consts::SQRT_2 * rms_coordinate(&chapter.remainder());
-    record.number(
-        "remainder-rms",
-        remainder,
-        "px",
-        band(),
-        "RMS distance from the true centres once corrected",
-    );
+    let bias = rms(&chapter.displacements);
+    let remainder = rms(&chapter.remainder());
+    record
+        .group("px", band())
+        .number("bias-rms", bias, "RMS displacement of uncorrected centres, 3 mm dots, four poses")
+        .number("bias-largest", largest(&chapter.displacements), "largest displacement")
+        .number("remainder-rms", remainder, "RMS distance from the true centres once corrected");
     let truth = Truth::chapter_camera();
     let (before, after) =
         (differences(&chapter.uncorrected.camera, &truth), differences(&chapter.corrected.camera, &truth));
     for (i, p) in FreeParameters::CHAPTER.iter().enumerate() {
         let what = format!("error of {p} from uncorrected centres, 3 mm dots");
-        record.number(format!("{p}-uncorrected"), before[i], p.unit(), band(), what);
+        record.group(p.unit(), band()).number(format!("{p}-uncorrected"), before[i], what);
         let what = format!("error of {p} from corrected centres, 3 mm dots");
-        record.number(format!("{p}-corrected"), after[i], p.unit(), band(), what);
+        record.group(p.unit(), band()).number(format!("{p}-corrected"), after[i], what);
     }
-    let worst =
-        before.iter().zip(unit).map(|(e, sd)| (e / (CHAPTER_NOISE_PX * sd)).abs()).fold(0.0, f64::max);
+    let worst = largest_deviation(&before, unit);
     let what =
         "largest error from uncorrected centres, in standard deviations under the chapter's noise of 0.1 px";
-    record.number("bias-in-deviations", worst, "", band(), what);
+    record.group("", band()).number("bias-in-deviations", worst, what);
     Ok(())
 }
 
@@ -382,9 +358,9 @@ fn name(node: &Node) -> String {
 
 fn claim_noise(record: &mut Record, outcomes: &[Outcome]) {
     let coordinates = 2 * outcomes[0].errors.len();
-    let rate = interval::each_of(outcomes.len(), FALSE_ALARM);
+    let rate = each_of(outcomes.len(), FALSE_ALARM);
     // The mean is known to be zero, so every coordinate is a degree of freedom.
-    let chance = interval::Interval::of_deviation_ratio(coordinates + 1, rate);
+    let chance = Interval::of_deviation_ratio(coordinates + 1, rate);
     let (low, high) = (chance.low * (1.0 - BOUND_ERROR), chance.high * (1.0 + BOUND_ERROR) * LOSS);
     let sharp = outcomes.iter().filter(|o| o.node.blur_px <= SHARP_PX);
     let cases = sharp.map(|o| {
@@ -392,52 +368,55 @@ fn claim_noise(record: &mut Record, outcomes: &[Outcome]) {
         (format!("{}: {ratio:.3} of the bound", name(&o.node)), (low..=high).contains(&ratio))
     });
     let reason = format!(
-        "chi-squared interval of {coordinates} coordinates a node, 2 % for the bound's Gaussian edge, and a quarter that the detector \
-         may lose: {low:.3} to {high:.3}"
+        "chi-squared interval of {coordinates} coordinates a node, 2 % for the bound's Gaussian edge, and a \
+         quarter that the detector may lose: {low:.3} to {high:.3}"
     );
-    let statement = "up to 1 px of blur, noise moves centres as much as the information in the dots' edges demands, and hardly more";
-    record.claim(
-        Claim::all_of("noise-is-at-the-bound", statement, cases, reason).with_false_alarm_rate(FALSE_ALARM),
-    );
+    let statement = "up to 1 px of blur, noise moves centres as much as the information in the dots' edges \
+                     demands, and hardly more";
+    record
+        .claim_that("noise-is-at-the-bound", statement)
+        .every("cases", cases)
+        .at_rate(FALSE_ALARM)
+        .because(reason);
     let worst = outcomes.iter().map(|o| rms_coordinate(&o.errors)).fold(0.0, f64::max);
     let statement = "no blur, noise and dot size of the sweeps makes the chapter's 0.1 px";
     let reason = "the largest bound of the sweeps, widened as above, is below it";
-    record.claim(
-        Claim::at_most("below-a-tenth", statement, worst, CHAPTER_NOISE_PX, reason)
-            .in_unit("px")
-            .with_false_alarm_rate(FALSE_ALARM),
-    );
+    record
+        .claim_that("below-a-tenth", statement)
+        .at_most(worst, CHAPTER_NOISE_PX)
+        .unit("px")
+        .at_rate(FALSE_ALARM)
+        .because(reason);
 }
 
 fn claim_bias(record: &mut Record, exact: &[Exact], unit: &[f64]) {
     let truth = Truth::chapter_camera();
     let within = |moved: &[f64], reach: &[f64]| moved.iter().zip(reach).all(|(m, r)| m.abs() <= *r);
-    let remainder = |e: &Exact| std::f64::consts::SQRT_2 * rms_coordinate(&e.remainder());
+    let remainder = |e: &Exact| rms(&e.remainder());
     let worst = exact.iter().map(remainder).fold(0.0, f64::max);
     let statement = "centres less the predicted bias lie on the true ones, for every dot size";
     let reason = "the project's target for noise-free images, 0.01 px RMS";
-    record.claim(Claim::at_most("bias-is-predicted", statement, worst, 0.01, reason).in_unit("px"));
-    let reason = "least squares moves a parameter by at most the length of the pixels' error vector times its standard deviation for \
-                  unit noise (Cauchy-Schwarz), and a tenth for second order";
+    record.claim_that("bias-is-predicted", statement).at_most(worst, 0.01).unit("px").because(reason);
+    let reason = "least squares moves a parameter by at most the length of the pixels' error vector times \
+                  its standard deviation for unit noise (Cauchy-Schwarz), and a tenth for second order";
     let case = |e: &Exact, moved: Vec<f64>| {
         (format!("dots of {} mm: {moved:?}", e.diameter_mm), within(&moved, &e.reach(unit)))
     };
     let statement = "with correction the camera is true up to what the detector leaves";
     let cases = exact.iter().map(|e| case(e, differences(&e.corrected.camera, &truth)));
-    record.claim(Claim::all_of("corrected-camera-is-true", statement, cases, reason).over("dot sizes"));
+    record.claim_that("corrected-camera-is-true", statement).every("dot sizes", cases).because(reason);
     let statement = "without correction the camera is wrong as the bias of the discs alone makes it";
     let cases = exact.iter().map(|e| case(e, differences(&e.uncorrected.camera, &e.predicted.camera)));
-    record.claim(Claim::all_of("uncorrected-camera-is-biased", statement, cases, reason).over("dot sizes"));
+    record.claim_that("uncorrected-camera-is-biased", statement).every("dot sizes", cases).because(reason);
 }
 
-fn noise_table(outcomes: &[Outcome]) -> Table {
-    let columns =
-        [("blur", "px"), ("noise", ""), ("diameter", "mm"), ("extraction_noise", "px"), ("bound", "px")];
-    let mut table = Table::new("noise", "extraction noise against blur, image noise and dot size", &columns);
-    for o in outcomes {
-        table.push([o.node.blur_px, o.node.noise, o.node.diameter_mm, rms_coordinate(&o.errors), o.bound_px]);
-    }
-    table
+fn noise_table(outcomes: &[Outcome]) -> Rows<&Outcome> {
+    Table::of("noise", "extraction noise against blur, image noise and dot size", outcomes)
+        .column("blur", "px", |o| o.node.blur_px)
+        .column("noise", "", |o| o.node.noise)
+        .column("diameter", "mm", |o| o.node.diameter_mm)
+        .column("extraction_noise", "px", |o| rms_coordinate(&o.errors))
+        .column("bound", "px", |o| o.bound_px)
 }
 
 /// Largest error of a parameter, in standard deviations under the chapter's noise.
@@ -445,29 +424,17 @@ fn largest_deviation(moved: &[f64], unit: &[f64]) -> f64 {
     moved.iter().zip(unit).map(|(m, sd)| (m / (CHAPTER_NOISE_PX * sd)).abs()).fold(0.0, f64::max)
 }
 
-fn bias_table(exact: &[Exact], unit: &[f64]) -> Table {
-    let columns = [
-        ("diameter", "mm"),
-        ("bias_rms", "px"),
-        ("bias_largest", "px"),
-        ("remainder_rms", "px"),
-        ("uncorrected_error", "standard deviations at 0.1 px"),
-        ("corrected_error", "standard deviations at 0.1 px"),
-    ];
-    let mut table =
-        Table::new("bias", "bias of discs without noise, and the worst parameter it leaves", &columns);
+fn bias_table<'a>(exact: &'a [Exact], unit: &[f64]) -> Rows<&'a Exact> {
     let truth = Truth::chapter_camera();
-    for e in exact {
-        table.push([
-            e.diameter_mm,
-            std::f64::consts::SQRT_2 * rms_coordinate(&e.displacements),
-            largest(&e.displacements),
-            std::f64::consts::SQRT_2 * rms_coordinate(&e.remainder()),
-            largest_deviation(&differences(&e.uncorrected.camera, &truth), unit),
-            largest_deviation(&differences(&e.corrected.camera, &truth), unit),
-        ]);
-    }
-    table
+    let error = |camera: &Camera| largest_deviation(&differences(camera, &truth), unit);
+    let deviations = "standard deviations at 0.1 px";
+    Table::of("bias", "bias of discs without noise, and the worst parameter it leaves", exact)
+        .column("diameter", "mm", |e| e.diameter_mm)
+        .column("bias_rms", "px", |e| rms(&e.displacements))
+        .column("bias_largest", "px", |e| largest(&e.displacements))
+        .column("remainder_rms", "px", |e| rms(&e.remainder()))
+        .column("uncorrected_error", deviations, |e| error(&e.uncorrected.camera))
+        .column("corrected_error", deviations, |e| error(&e.corrected.camera))
 }
 
 fn noise_figure(outcomes: &[Outcome], seed: u64) -> Figure {
@@ -494,9 +461,10 @@ fn noise_figure(outcomes: &[Outcome], seed: u64) -> Figure {
         ),
     ];
     let caption = format!(
-        "Extraction noise of a coordinate, px, over the 252 dots of the chapter's four poses, each node one photograph a pose, seed \
-         {seed}; the sweeps cross at blur 0.5 px, noise 1 % of full scale, dots of 3 mm. Notice where the detector leaves the bound, \
-         and that the scale ends at a quarter of the chapter's 0.1 px."
+        "Extraction noise of a coordinate, px, over the 252 dots of the chapter's four poses, each node one \
+         photograph a pose, seed {seed}; the sweeps cross at blur 0.5 px, noise 1 % of full scale, dots of \
+         3 mm. Notice where the detector leaves the bound, and that the scale ends at a quarter of the \
+         chapter's 0.1 px."
     );
     Figure::panels("noise", &panels, 3, caption)
 }
@@ -506,7 +474,6 @@ fn bias_figure(exact: &[Exact], unit: &[f64]) -> Figure {
     let curve = |value: &dyn Fn(&Exact) -> f64| -> Vec<(f64, f64)> {
         exact.iter().map(|e| (e.diameter_mm, value(e))).collect()
     };
-    let rms = |vectors: &[Vec2]| std::f64::consts::SQRT_2 * rms_coordinate(vectors);
     let pixels = Plot::new("centres", "diameter (mm)", "RMS distance from the truth (px)")
         .size(480.0, 360.0)
         .log_y()
@@ -522,8 +489,9 @@ fn bias_figure(exact: &[Exact], unit: &[f64]) -> Figure {
         )
         .points("predicted", &curve(&|e| largest_deviation(&differences(&e.predicted.camera, &truth), unit)))
         .line("corrected", &curve(&|e| largest_deviation(&differences(&e.corrected.camera, &truth), unit)));
-    let caption = "Left: RMS distance of detected centres from the true ones, px. Right: error of the worst of the six parameters in \
-                   standard deviations under the chapter's noise of 0.1 px. Four poses, blur 0.5 px, nothing drawn at random. Notice \
-                   what of the bias reaches the camera, and what correction leaves of it.";
+    let caption = "Left: RMS distance of detected centres from the true ones, px. Right: error of the worst \
+                   of the six parameters in standard deviations under the chapter's noise of 0.1 px. Four \
+                   poses, blur 0.5 px, nothing drawn at random. Notice what of the bias reaches the camera, \
+                   and what correction leaves of it.";
     Figure::panels("bias", &[pixels, cameras], 2, caption)
 }

@@ -2,7 +2,7 @@
 
 use calibench_book::{Compiled, Evidence, Page, Sources, build, compile};
 use calibench_harness::project::Project;
-use calibench_harness::{Claim, Context, Experiment, ExperimentError, Record};
+use calibench_harness::{Context, Experiment, ExperimentError, Record};
 use std::path::Path;
 
 const LINE_BENDING: Experiment =
@@ -10,7 +10,7 @@ const LINE_BENDING: Experiment =
 
 fn run(context: &Context) -> Result<Record, ExperimentError> {
     let mut record = context.record();
-    record.claim(Claim::at_most("c", "zero is small", 0.0, 1.0, "definition"));
+    record.claim_that("c", "zero is small").at_most(0.0, 1.0).because("definition");
     Ok(record)
 }
 

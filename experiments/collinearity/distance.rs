@@ -1,4 +1,5 @@
-//! The distance of the target, which two published numbers fix, one of them the mistake of reading pixels as millimetres.
+//! The distance of the target, which two published numbers fix, one of them the mistake of reading pixels as
+//! millimetres.
 
 use super::*;
 
@@ -10,8 +11,9 @@ pub fn pixels_minus_millimetres(corrected: &[Vec2], points: &[Vec2]) -> f64 {
     rms(&corrected.iter().zip(points).map(|(pixel, point)| pixel - point).collect::<Vec<_>>())
 }
 
-/// The chapter's second finding about its interface: a call documented to return world coordinates returns corrected pixels.
-pub fn tell_units_mistake(
+/// The chapter's second finding about its interface: a call documented to return world coordinates returns
+/// corrected pixels.
+pub fn report_units_mistake(
     record: &mut Record,
     exact: &View,
     ours: &Found,
@@ -21,22 +23,19 @@ pub fn tell_units_mistake(
     let mistake = pixels_minus_millimetres(&corrected(&truth, exact.pixels())?, exact.points());
     let band = Band::absolute(ROUNDING_PX, "rounding of coordinates below 640 px over 40 operations");
     let what = "RMS per point of corrected pixel minus target millimetre, true model, no noise";
-    record.number("units-mistake", mistake, "", band, what);
-    record.reconcile_exact("units-mistake")?;
     let noisy = pixels_minus_millimetres(&ours.corrected, view.points());
-    record.number(
-        "units-mistake-calibrated",
-        noisy,
-        "",
-        converged(),
-        "the same of our noisy single-plane calibration",
-    );
+    record
+        .group("", band)
+        .number("units-mistake", mistake, what)
+        .rounds_to_printed()
+        .band(converged())
+        .number("units-mistake-calibrated", noisy, "the same of our noisy single-plane calibration");
     // That it is the geometry and no accuracy is a claim of `interface`.
     Ok(())
 }
 
 /// Two published numbers fix the distance that the chapter does not give.
-pub fn tell_distances(record: &mut Record, draws: &[Draw], book: &Book) -> Result<(), ExperimentError> {
+pub fn report_distances(record: &mut Record, draws: &[Draw], book: &Book) -> Result<(), ExperimentError> {
     let truth = Truth::chapter_camera();
     let columns = [("distance", "mm"), ("top_row_before", "px"), ("units_mistake", "")];
     let mut table =
@@ -56,15 +55,26 @@ pub fn tell_distances(record: &mut Record, draws: &[Draw], book: &Book) -> Resul
     let sigmas = |z: f64| {
         rows.iter().find(|(at, _)| *at == z).map_or(f64::NAN, |(_, d)| (d - book[1].value()).abs() / sd)
     };
-    record.claim(Claim::all_of(
-        "distance-is-120-mm",
-        "the printed 427 leaves 119, 120 and 121 mm of all whole distances, and the published top row agrees with 120",
-        [
-            (format!("427 at {whole:?} mm"), whole == [DISTANCE_MM - 1.0, DISTANCE_MM, DISTANCE_MM + 1.0]),
-            ("top row within 3 standard deviations at 120 mm".to_string(), sigmas(DISTANCE_MM) < 3.0),
-        ],
-        "the 'residual' in pixels minus millimetres falls by 0.4 a millimetre, so its printed digits allow a range of 2.4 mm",
-    ));
+    record
+        .claim_that(
+            "distance-is-120-mm",
+            "the printed 427 leaves 119, 120 and 121 mm of all whole distances, and the published top row \
+             agrees with 120",
+        )
+        .every(
+            "cases",
+            [
+                (
+                    format!("427 at {whole:?} mm"),
+                    whole == [DISTANCE_MM - 1.0, DISTANCE_MM, DISTANCE_MM + 1.0],
+                ),
+                ("top row within 3 standard deviations at 120 mm".to_string(), sigmas(DISTANCE_MM) < 3.0),
+            ],
+        )
+        .because(
+            "the 'residual' in pixels minus millimetres falls by 0.4 a millimetre, so its printed digits \
+             allow a range of 2.4 mm",
+        );
     let band: Vec<(f64, f64, f64)> = rows.iter().map(|&(z, d)| (z, d - 3.0 * sd, d + 3.0 * sd)).collect();
     let size = |plot: Plot| plot.size(440.0, 340.0);
     let panels = [
@@ -78,9 +88,9 @@ pub fn tell_distances(record: &mut Record, draws: &[Draw], book: &Book) -> Resul
             .vline("120 mm", DISTANCE_MM),
     ];
     let caption = format!(
-        "Largest deviation of the target's top row in pixels, and corrected pixels minus target millimetres, against the \
-         target's distance, without noise; the band is three standard deviations of {TRIALS} draws at 120 mm. Notice \
-         where each curve meets its published number."
+        "Largest deviation of the target's top row in pixels, and corrected pixels minus target \
+         millimetres, against the target's distance, without noise; the band is three standard deviations \
+         of {TRIALS} draws at 120 mm. Notice where each curve meets its published number."
     );
     record.figure(Figure::panels("distance", &panels, 2, caption));
     Ok(())

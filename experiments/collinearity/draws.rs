@@ -1,4 +1,5 @@
-//! Other draws of the noise: the distributions that book and harness are held against, and theory for the RMS.
+//! Other draws of the noise: the distributions that book and harness are held against, and theory for the
+//! RMS.
 
 use super::*;
 
@@ -31,17 +32,15 @@ pub fn moments(values: &[f64]) -> Sample {
     sample
 }
 
-pub fn reconcile(record: &mut Record, draws: &[Draw]) -> Result<(), ExperimentError> {
-    for (quantity, (id, _, _)) in QUANTITIES.iter().enumerate() {
-        let what = "single-plane calibration of the fronto-parallel pose, centre free";
-        let predicted = Predicted::from_draws(&column(draws, MAIN, quantity), 1, what);
-        record.reconcile_sampled(id, predicted, FALSE_ALARM_RATE)?;
-    }
-    Ok(())
+/// The distribution of a quantity over the draws, with a free centre: what book and harness are held against.
+pub fn predicted(draws: &[Draw], quantity: usize) -> Predicted {
+    let what = "single-plane calibration of the fronto-parallel pose, centre free";
+    Predicted::from_draws(&column(draws, MAIN, quantity), 1, what)
 }
 
-/// The chapter does not say whether the RMS of its affine fit is per point, as all its others, or per coordinate, smaller by the
-/// root of two. The ratio of the largest residual to the RMS depends little on the noise, so it tells the readings apart.
+/// The chapter does not say whether the RMS of its affine fit is per point, as all its others, or per
+/// coordinate, smaller by the root of two. The ratio of the largest residual to the RMS depends little on the
+/// noise, so it tells the readings apart.
 pub fn readings_table(draws: &[Draw], book: &Book) -> Table {
     let columns = [
         ("centre", ""),
@@ -51,8 +50,8 @@ pub fn readings_table(draws: &[Draw], book: &Book) -> Table {
         ("book_max_over_rms", ""),
         ("draws_below_ratio", "%"),
     ];
-    let caption = "the published affine residual read as RMS per point and per coordinate: where it and its ratio to the largest \
-                   residual lie among the draws";
+    let caption = "the published affine residual read as RMS per point and per coordinate: where it and its \
+                   ratio to the largest residual lie among the draws";
     let mut table = Table::new("readings", caption, &columns);
     for (i, centre) in CENTRES.iter().enumerate() {
         let (rms, max) = (column(draws, i, 3), column(draws, i, 4));
@@ -72,9 +71,9 @@ pub fn percent_below(values: &[f64], x: f64) -> f64 {
     100.0 * values.iter().filter(|&&v| v < x).count() as f64 / values.len() as f64
 }
 
-/// `N RMS^2 / sigma^2` follows chi-squared with `d = 2 N - p` degrees of freedom, non-central where the centre is held at a
-/// wrong place: `lambda` is the same sum of a fit without noise. Mean `d + lambda`, variance `2 (d + 2 lambda)`, excess
-/// kurtosis `12 (d + 4 lambda) / (d + 2 lambda)^2`.
+/// `N RMS^2 / sigma^2` follows chi-squared with `d = 2 N - p` degrees of freedom, non-central where the
+/// centre is held at a wrong place: `lambda` is the same sum of a fit without noise. Mean `d + lambda`,
+/// variance `2 (d + 2 lambda)`, excess kurtosis `12 (d + 4 lambda) / (d + 2 lambda)^2`.
 pub fn claim_theory(record: &mut Record, ours: &[Found], noise_free: &[Found], draws: &[Draw]) {
     for (i, centre) in CENTRES.iter().enumerate() {
         let name = centre.name();
@@ -86,57 +85,52 @@ pub fn claim_theory(record: &mut Record, ours: &[Found], noise_free: &[Found], d
         let sample = moments(&sums);
         let variance = 2.0 * (freedom + 2.0 * lambda);
         let mean = Interval::of_mean(freedom + lambda, variance.sqrt(), TRIALS, THEORY_RATE);
-        record.claim(
-            Claim::within(
+        record
+            .claim_that(
                 format!("chi-squared-mean-{name}"),
                 "over the draws the sum of squares has the mean of its chi-squared distribution",
-                sample.mean(0),
-                (mean.low, mean.high),
-                format!(
-                    "{freedom} degrees of freedom, non-centrality {lambda:.3} from a fit without noise; central limit"
-                ),
             )
-            .with_false_alarm_rate(THEORY_RATE),
-        );
+            .within(sample.mean(0), mean)
+            .at_rate(THEORY_RATE)
+            .because(format!(
+                "{freedom} degrees of freedom, non-centrality {lambda:.3} from a fit without noise; central \
+                 limit"
+            ));
         let excess = 12.0 * (freedom + 4.0 * lambda) / ((freedom + 2.0 * lambda) * (freedom + 2.0 * lambda));
         let half = normal_two_sided(THEORY_RATE) * ((2.0 + excess) / TRIALS as f64).sqrt();
-        record.claim(
-            Claim::within(
+        record
+            .claim_that(
                 format!("chi-squared-variance-{name}"),
                 "over the draws the sum of squares has the variance of its chi-squared distribution",
-                sample.covariance(0, 0) / variance,
-                (1.0 - half, 1.0 + half),
-                "ratio of sample variance to 2 (d + 2 lambda); its spread from the kurtosis, central limit",
             )
-            .with_false_alarm_rate(THEORY_RATE),
-        );
+            .within(sample.covariance(0, 0) / variance, Interval::around(1.0, half))
+            .at_rate(THEORY_RATE)
+            .because(
+                "ratio of sample variance to 2 (d + 2 lambda); its spread from the kurtosis, central limit",
+            );
         if centre.is_exact() {
             let predicted = Predicted::Chi { scale: SIGMA_PX / points.sqrt(), dof: freedom };
-            record.claim(
-                Claim::drawn_from(
+            record
+                .claim_that(
                     format!("rms-{name}"),
                     "our RMS comes from the distribution of residuals under the right model",
-                    ours[i].plane.rms_px,
-                    &predicted,
-                    FALSE_ALARM_RATE,
-                    "2 N coordinates less the parameters",
                 )
-                .in_unit("px"),
-            );
+                .drawn_from(ours[i].plane.rms_px, &predicted, FALSE_ALARM_RATE)
+                .unit("px")
+                .because("2 N coordinates less the parameters");
         }
     }
     // Half of the digits of a coordinate near 640 px: where the sum of squares stops to show a change.
     let bound = 640.0 * f64::EPSILON.sqrt();
     let exact = noise_free.iter().zip(CENTRES).filter(|(_, centre)| centre.is_exact());
     let worst = exact.map(|(f, _)| f.row_after.max_deviation().max(f.plane.rms_px)).fold(0.0, f64::max);
-    record.claim(
-        Claim::at_most(
+    record
+        .claim_that(
             "exact-without-noise",
-            "without noise the model with its true or a free centre straightens the top row and leaves no residual",
-            worst,
-            bound,
-            "a minimum is found to half of the digits of a coordinate",
+            "without noise the model with its true or a free centre straightens the top row and leaves no \
+             residual",
         )
-        .in_unit("px"),
-    );
+        .at_most(worst, bound)
+        .unit("px")
+        .because("a minimum is found to half of the digits of a coordinate");
 }

@@ -23,8 +23,9 @@ pub fn row_figure(ours: &Found, exact: &Found, book: &Book, seed: u64) -> Figure
             .hline("", -book[2].value()),
     ];
     let caption = format!(
-        "Signed distance of the nine points of the target's top row from their regression line, in pixels, before and after \
-         correction by the single-plane calibration (seed {seed}, sigma {SIGMA_PX} px, centre free). Notice the two scales."
+        "Signed distance of the nine points of the target's top row from their regression line, in pixels, \
+         before and after correction by the single-plane calibration (seed {seed}, sigma {SIGMA_PX} px, \
+         centre free). Notice the two scales."
     );
     Figure::panels("top-row", &panels, 2, caption)
 }
@@ -58,9 +59,10 @@ pub fn predicted_figure(ours: &[Found], draws: &[Draw], book: &Book, seed: u64) 
         })
         .collect();
     let caption = format!(
-        "Predicted distributions of the five published quantities over {TRIALS} draws of the noise (seed {seed}, sigma {SIGMA_PX} \
-         px), for four treatments of the lens. Shares of the draws whose affine residual is below the published one: centre held \
-         at the image's {:.1} %, the same with p1, p2 free {:.1} %, held at truth {:.1} %, free {:.1} %.",
+        "Predicted distributions of the five published quantities over {TRIALS} draws of the noise (seed \
+         {seed}, sigma {SIGMA_PX} px), for four treatments of the lens. Shares of the draws whose affine \
+         residual is below the published one: centre held at the image's {:.1} %, the same with p1, p2 free \
+         {:.1} %, held at truth {:.1} %, free {:.1} %.",
         percent_below(&column(draws, 0, 3), book[3].value()),
         percent_below(&column(draws, 3, 3), book[3].value()),
         percent_below(&column(draws, 1, 3), book[3].value()),
@@ -86,8 +88,9 @@ pub fn residual_figure(view: &View, found: &Found, seed: u64) -> Figure {
             .arrows("fitted minus target, x 100", &arrows(view.points(), &found.affine_residuals, 100.0)),
     ];
     let caption = format!(
-        "Residuals of the {} points of our draw (seed {seed}, sigma {SIGMA_PX} px, centre free): of the calibration in pixels, and \
-         of the affine fit of corrected points in millimetres. Look for a pattern: noise has none.",
+        "Residuals of the {} points of our draw (seed {seed}, sigma {SIGMA_PX} px, centre free): of the \
+         calibration in pixels, and of the affine fit of corrected points in millimetres. Look for a \
+         pattern: noise has none.",
         view.len()
     );
     Figure::panels("residuals", &panels, 2, caption)

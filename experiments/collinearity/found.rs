@@ -11,15 +11,16 @@ pub enum Centre {
     Truth,
     /// Estimated.
     Free,
-    /// Held at the middle of the image, and p1, p2 estimated beside k1, k2: the chapter's program has slots for them.
+    /// Held at the middle of the image, and p1, p2 estimated beside k1, k2: the chapter's program has slots
+    /// for them.
     ImageTangential,
 }
 
 pub const CENTRES: [Centre; 4] = [Centre::Image, Centre::Truth, Centre::Free, Centre::ImageTangential];
 
-/// The treatment that the published numbers are reconciled with: a free centre. The five numbers together exclude a radial lens
-/// whose centre is held; a centre held at the image's with tangential terms they do not exclude (table `joint`), and its
-/// distributions are the same to the line's width.
+/// The treatment that the published numbers are reconciled with: a free centre. The five numbers together
+/// exclude a radial lens whose centre is held; a centre held at the image's with tangential terms they do not
+/// exclude (table `joint`), and its distributions are the same to the line's width.
 pub const MAIN: usize = 2;
 
 impl Centre {

@@ -121,7 +121,8 @@ pub fn rectify(record: &mut Record, ours: &[Found]) -> Result<(), ExperimentErro
         ("level_rms", "grey"),
         ("level_max", "grey"),
     ];
-    let caption = "images rectified by the single-plane calibration against those by the true model, where both have data";
+    let caption = "images rectified by the single-plane calibration against those by the true model, where \
+                   both have data";
     let mut table = Table::new("rectified", caption, &columns);
     let mut cases = Vec::new();
     for (view, ideal) in [("same", &same as &dyn Fn(&Vec2) -> Vec2), ("all", &all)] {
@@ -137,46 +138,54 @@ pub fn rectify(record: &mut Record, ours: &[Found]) -> Result<(), ExperimentErro
             table.push(row);
             cases.push((format!("{view}, {}: {} pixels", centre.name(), d.unexplained), d.unexplained == 0));
             if centre == CENTRES[MAIN] {
-                tell_rectified(record, view, &by_truth, &by_plane, &d);
+                report_rectified(record, view, &by_truth, &by_plane, &d);
                 draw_rectified(record, view, &photo, &by_truth, &by_plane);
             }
         }
     }
     record.table(table);
-    record.claim(Claim::all_of(
-        "images-agree-as-their-maps-do",
-        "no grey level differs by more than the shift between the two maps explains",
-        cases,
-        "bilinear interpolation is no steeper than the largest step between neighbouring samples; rounding of both levels",
-    ).over("images"));
+    record
+        .claim_that(
+            "images-agree-as-their-maps-do",
+            "no grey level differs by more than the shift between the two maps explains",
+        )
+        .every("images", cases)
+        .because(
+            "bilinear interpolation is no steeper than the largest step between neighbouring samples; \
+             rounding of both levels",
+        );
     let shifts = shift_figure(ours, record.seed())?;
     record.figure(shifts);
     record.figure(Figure::photo(
         "photo",
         &photo,
-        "The target through the chapter's lens at 120 mm, rendered without noise, 640 x 480 px. Notice the bowed rows.",
+        "The target through the chapter's lens at 120 mm, rendered without noise, 640 x 480 px. Notice the \
+         bowed rows.",
     ));
     Ok(())
 }
 
-pub fn tell_rectified(record: &mut Record, view: &str, truth: &Rectified, plane: &Rectified, d: &Difference) {
+pub fn report_rectified(
+    record: &mut Record,
+    view: &str,
+    truth: &Rectified,
+    plane: &Rectified,
+    d: &Difference,
+) {
     let mut count = |id: &str, value: usize, what: &str| {
-        record.number(format!("{view}-{id}"), value as f64, "px", Band::Exact, what);
+        record.exact("px").count(format!("{view}-{id}"), value, what);
     };
     count("empty-true-model", truth.without_data(), "pixels without data, true model");
     count("empty-single-plane", plane.without_data(), "pixels without data, single-plane calibration");
     count("data-in-one-only", d.masks_differ, "pixels with data in one of the two images only");
     let shift = d.mean(d.shift_square).sqrt();
-    record.number(format!("{view}-shift-rms"), shift, "px", converged(), "RMS shift between the two maps");
     let grey = d.mean(d.level_square).sqrt();
     let band = Band::relative(1e-3, "a source that moves by 1e-8 px turns the rounding of few levels");
-    record.number(
-        format!("{view}-grey-rms"),
-        grey,
-        "grey",
-        band,
-        "RMS difference of the two images, of 255 levels",
-    );
+    record
+        .group("px", converged())
+        .number(format!("{view}-shift-rms"), shift, "RMS shift between the two maps")
+        .group("grey", band)
+        .number(format!("{view}-grey-rms"), grey, "RMS difference of the two images, of 255 levels");
 }
 
 pub fn draw_rectified(
@@ -197,15 +206,17 @@ pub fn draw_rectified(
     });
     let caption = |by: &str| {
         format!(
-            "The photograph rectified by {by}, showing {what}. Black: no data. Compare its rows with the photograph's."
+            "The photograph rectified by {by}, showing {what}. Black: no data. Compare its rows with the \
+             photograph's."
         )
     };
     record.figure(Figure::photo(format!("rectified-{view}-true"), &truth.image, caption("the true model")));
     let by = "the single-plane calibration, centre free";
     record.figure(Figure::photo(format!("rectified-{view}-plane"), &plane.image, caption(by)));
     let caption = format!(
-        "True model minus single-plane calibration (seed {}, sigma {SIGMA_PX} px), showing {what}: grey 128 is no difference, two \
-         levels stand for one; black: no data in one of them. Notice at which edges the two differ.",
+        "True model minus single-plane calibration (seed {}, sigma {SIGMA_PX} px), showing {what}: grey 128 \
+         is no difference, two levels stand for one; black: no data in one of them. Notice at which edges \
+         the two differ.",
         record.seed()
     );
     record.figure(Figure::photo(format!("difference-{view}"), &difference, caption));
@@ -235,9 +246,9 @@ pub fn shift_figure(ours: &[Found], seed: u64) -> Result<Figure, ExperimentError
     let (held, free) = (shifts(&ours[0].plane.lens_camera()), shifts(&ours[MAIN].plane.lens_camera()));
     let largest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
     let caption = format!(
-        "Distance in the photograph between the places at which the true model and the single-plane calibration (seed {seed}, \
-         sigma {SIGMA_PX} px) sample an output pixel: up to {:.2} px with the centre held at a wrong place, up to {:.2} px with a \
-         free one.",
+        "Distance in the photograph between the places at which the true model and the single-plane \
+         calibration (seed {seed}, sigma {SIGMA_PX} px) sample an output pixel: up to {:.2} px with the \
+         centre held at a wrong place, up to {:.2} px with a free one.",
         largest(&held),
         largest(&free)
     );

@@ -1,9 +1,11 @@
-//! Could the five published numbers have come from this treatment, all at once? Five intervals, one by one, do not ask that.
+//! Could the five published numbers have come from this treatment, all at once? Five intervals, one by one,
+//! do not ask that.
 
 use super::*;
 use nalgebra::{SMatrix, SVector};
 
-/// A treatment is called excluded where fewer than one draw in a thousand lies as far out as the published numbers.
+/// A treatment is called excluded where fewer than one draw in a thousand lies as far out as the published
+/// numbers.
 const EXCLUDED_BELOW: f64 = 1e-3;
 
 /// Where the book's five numbers lie among the draws of one treatment.
@@ -14,9 +16,9 @@ struct Place {
     probability: f64,
 }
 
-/// The five quantities are correlated, some closely: a set of values may be impossible of which each alone is ordinary. Their squared
-/// Mahalanobis distance takes the correlations in. Its distribution needs no theory: one more draw takes each place among the
-/// others with the same chance, so the probability is its rank.
+/// The five quantities are correlated, some closely: a set of values may be impossible of which each alone is
+/// ordinary. Their squared Mahalanobis distance takes the correlations in. Its distribution needs no theory:
+/// one more draw takes each place among the others with the same chance, so the probability is its rank.
 fn place(draws: &[Draw], treatment: usize, book: &Book) -> Result<Place, ExperimentError> {
     let mut sample = Sample::about(&draws[0][treatment]);
     draws.iter().for_each(|d| sample.add(&d[treatment]));
@@ -34,46 +36,53 @@ fn place(draws: &[Draw], treatment: usize, book: &Book) -> Result<Place, Experim
     Ok(Place { distance, probability: (farther + 1) as f64 / (draws.len() + 1) as f64 })
 }
 
-pub fn tell_joint(record: &mut Record, draws: &[Draw], book: &Book) -> Result<(), ExperimentError> {
+pub fn report_joint(record: &mut Record, draws: &[Draw], book: &Book) -> Result<(), ExperimentError> {
     let columns = [("centre", ""), ("estimated", ""), ("distance", ""), ("probability", ""), ("verdict", "")];
-    let caption = "the five published numbers together against each treatment: squared Mahalanobis distance from the draws' mean, and \
-                   the share of draws that lie as far out";
+    let caption = "the five published numbers together against each treatment: squared Mahalanobis distance \
+                   from the draws' mean, and the share of draws that lie as far out";
     let mut table = Table::new("joint", caption, &columns);
     for (i, centre) in CENTRES.iter().enumerate() {
         let name = centre.name();
         let Place { distance, probability } = place(draws, i, book)?;
-        record.number(
-            format!("joint-distance-{name}"),
-            distance,
-            "",
-            Band::relative(1e-6, "an inverse of a covariance of five quantities"),
-            format!("squared Mahalanobis distance of the five published numbers, {name}"),
-        );
         let what = format!("share of draws as far out as the five published numbers, {name}");
-        record.number(format!("joint-probability-{name}"), probability, "", Band::Exact, what);
+        record
+            .group("", Band::relative(1e-6, "an inverse of a covariance of five quantities"))
+            .number(
+                format!("joint-distance-{name}"),
+                distance,
+                format!("squared Mahalanobis distance of the five published numbers, {name}"),
+            )
+            .band(Band::Exact)
+            .number(format!("joint-probability-{name}"), probability, what);
         let verdict = if probability < EXCLUDED_BELOW { "excluded" } else { "possible" };
         let names = [name, centre.estimated()].map(Cell::from);
         let found = [Cell::from(distance), Cell::from(probability), Cell::from(verdict)];
         table.push(names.into_iter().chain(found));
-        record.claim(claim(*centre, probability));
+        claim(record, *centre, probability);
     }
     record.table(table);
     Ok(())
 }
 
 /// A radial lens whose centre is held, wherever, lacks what the published numbers show; the others do not.
-fn claim(centre: Centre, probability: f64) -> Claim {
+fn claim(record: &mut Record, centre: Centre, probability: f64) {
     let (name, estimated) = (centre.name(), centre.estimated());
     let reason =
         "rank of the published numbers among the draws by Mahalanobis distance; excluded below 0.001";
     if centre.parameters() == 10 {
         let statement =
             format!("{name}, {estimated} estimated: the five published numbers do not occur together");
-        Claim::at_most(format!("{name}-is-excluded"), statement, probability, EXCLUDED_BELOW, reason)
+        record
+            .claim_that(format!("{name}-is-excluded"), statement)
+            .at_most(probability, EXCLUDED_BELOW)
+            .because(reason);
     } else {
         let statement = format!(
             "{name}, {estimated} estimated: the five published numbers together are an ordinary draw"
         );
-        Claim::at_least(format!("{name}-is-possible"), statement, probability, EXCLUDED_BELOW, reason)
+        record
+            .claim_that(format!("{name}-is-possible"), statement)
+            .at_least(probability, EXCLUDED_BELOW)
+            .because(reason);
     }
 }

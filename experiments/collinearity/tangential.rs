@@ -1,7 +1,8 @@
 //! The single-plane calibration with the two tangential terms of the chapter's output, and the centre held.
 //!
-//! The same sum of squares as [`calibrate_single_plane`], over the homography, k1, k2, p1 and p2: Gauss-Newton from the fit without
-//! p1 and p2. Those two do nearly what a moved centre does, so that few steps are left to do.
+//! The same sum of squares as [`calibrate_single_plane`], over the homography, k1, k2, p1 and p2:
+//! Gauss-Newton from the fit without p1 and p2. Those two do nearly what a moved centre does, so that few
+//! steps are left to do.
 
 use super::*;
 use calibench::camera::BrownConrady;
@@ -17,8 +18,8 @@ const MAX_STEPS: usize = 50;
 /// A step that promises to lower the sum of squares by a smaller share than this is lost in its rounding.
 const RELATIVE_GAIN: f64 = 1e-14;
 
-/// Target points with centroid 0 and RMS radius 1, pixels as offsets from the centre in units of the focal length: numbers of
-/// order one.
+/// Target points with centroid 0 and RMS radius 1, pixels as offsets from the centre in units of the focal
+/// length: numbers of order one.
 struct Frames<'a> {
     view: &'a View,
     scatter: Scatter,
@@ -102,8 +103,9 @@ fn ideal(at: &Vector, point: &Vec3) -> Vec2 {
     Vec2::new(image.x / image.z, image.y / image.z)
 }
 
-/// `J^T J`, `J^T r` and `|r|^2`. With `x` the ideal offset, `D` the lens's Jacobian there and `s = |x|^2`, a pixel moves by
-/// `D dx/dh`, `x s`, `x s^2`, `(2 x y, s + 2 y^2)` and `(s + 2 x^2, 2 x y)` with the parameters in turn.
+/// `J^T J`, `J^T r` and `|r|^2`. With `x` the ideal offset, `D` the lens's Jacobian there and `s = |x|^2`, a
+/// pixel moves by `D dx/dh`, `x s`, `x s^2`, `(2 x y, s + 2 y^2)` and `(s + 2 x^2, 2 x y)` with the
+/// parameters in turn.
 fn normal_equations(frames: &Frames, at: &Vector) -> (SMatrix<f64, PARAMETERS, PARAMETERS>, Vector, f64) {
     let (mut matrix, mut gradient, mut cost) = (SMatrix::zeros(), Vector::zeros(), 0.0);
     for (point, seen) in frames.pairs() {

@@ -1,5 +1,5 @@
-//! When does a series of checks leave control? A threshold on each (Shewhart 1931) and one on their exponentially weighted moving
-//! average (EWMA; Roberts 1959), both set to the same chance of a false alarm.
+//! When does a series of checks leave control? A threshold on each (Shewhart 1931) and one on their
+//! exponentially weighted moving average (EWMA; Roberts 1959), both set to the same chance of a false alarm.
 
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
@@ -41,8 +41,9 @@ pub(crate) struct Ewma {
     pub limit: f64,
 }
 
-/// Nodes of Simpson's rule across the region without alarm. The kernel is a normal density of width `weight` over a region
-/// of about `2 x 1.2`: a step of 0.012 against 0.2 leaves a relative error near `(0.06)^4 / 180 = 7e-8` a check, 2e-5 a quarter.
+/// Nodes of Simpson's rule across the region without alarm. The kernel is a normal density of width `weight`
+/// over a region of about `2 x 1.2`: a step of 0.012 against 0.2 leaves a relative error near
+/// `(0.06)^4 / 180 = 7e-8` a check, 2e-5 a quarter.
 const NODES: usize = 201;
 
 impl Ewma {
@@ -62,9 +63,9 @@ impl Ewma {
         Ewma { weight, limit: 0.5 * (low + high) }
     }
 
-    /// Chance of an alarm among `checks` when nothing drifts. The chance `S_n(z)` to pass `n` more checks from `z` obeys
-    /// `S_n(z) = integral S_{n-1}(y) phi((y - (1 - w) z) / w) / w dy` over the region without alarm (Crowder 1987), here by
-    /// Simpson's rule on fixed nodes.
+    /// Chance of an alarm among `checks` when nothing drifts. The chance `S_n(z)` to pass `n` more checks
+    /// from `z` obeys `S_n(z) = integral S_{n-1}(y) phi((y - (1 - w) z) / w) / w dy` over the region without
+    /// alarm (Crowder 1987), here by Simpson's rule on fixed nodes.
     pub(crate) fn false_alarm(&self, checks: usize) -> f64 {
         let step = 2.0 * self.limit / (NODES - 1) as f64;
         let at = |i: usize| step * i as f64 - self.limit;

@@ -1,4 +1,5 @@
-//! How does the station err? Its camera, its surroundings, and what it measures with the calibration of day one.
+//! How does the station err? Its camera, its surroundings, and what it measures with the calibration of day
+//! one.
 
 use calibench::camera::Camera;
 use calibench::geometry::{Pose, Vec2, Vec3, rotation};
@@ -35,9 +36,9 @@ pub(crate) struct Station {
 }
 
 impl Station {
-    /// The chapter's camera at the chapter's distance, with causes in round numbers: an aluminium mount (30 ppm/K), a summer
-    /// 8 K warmer than the spring, and 5 urad of creep a shift. The bracket turns away from the reference's far end, the worse
-    /// case: its share then adds to that of the warmth.
+    /// The chapter's camera at the chapter's distance, with causes in round numbers: an aluminium mount (30
+    /// ppm/K), a summer 8 K warmer than the spring, and 5 urad of creep a shift. The bracket turns away from
+    /// the reference's far end, the worse case: its share then adds to that of the warmth.
     pub(crate) fn case_study() -> Station {
         Station {
             camera: Camera::pinhole(600.0, 600.0, 326.0, 243.0),
@@ -62,8 +63,9 @@ impl Station {
         self.distance_mm / self.camera.fx * self.sigma_px * (2.0 / self.frames as f64).sqrt()
     }
 
-    /// Systematic error of the reference's length when the camera is `kelvin` warmer and turned by `turn_rad`: the
-    /// camera as it is takes the picture, the calibration of day one turns it into millimetres.
+    /// Systematic error of the reference's length when the camera is `kelvin` warmer and turned by
+    /// `turn_rad`: the camera as it is takes the picture, the calibration of day one turns it into
+    /// millimetres.
     pub(crate) fn error_mm(&self, kelvin: f64, turn_rad: f64) -> f64 {
         let stretch = 1.0 + self.focal_per_kelvin * kelvin;
         let now = Camera { fx: self.camera.fx * stretch, fy: self.camera.fy * stretch, ..self.camera };
@@ -81,9 +83,9 @@ impl Station {
     /// The same to first order, and a bound of what is left out.
     ///
     /// With `t = reference / distance`, warming stretches by `a` and a turn `w` takes `tan` of one end to
-    /// `(t - w') / (1 + t w')`, `w' = tan w`: the error is `Z [(1 + a) ((t - w') / (1 + t w') + w') - t]`, that is
-    /// `Z (a t - t^2 w)` and terms of second order. Expanding, those are `Z (t (1 + t^2) w^2 + |a| t^2 |w|)`; twice that
-    /// covers the higher orders while `w < 0.01`.
+    /// `(t - w') / (1 + t w')`, `w' = tan w`: the error is `Z [(1 + a) ((t - w') / (1 + t w') + w') - t]`,
+    /// that is `Z (a t - t^2 w)` and terms of second order. Expanding, those are
+    /// `Z (t (1 + t^2) w^2 + |a| t^2 |w|)`; twice that covers the higher orders while `w < 0.01`.
     pub(crate) fn first_order_mm(&self, kelvin: f64, turn_rad: f64) -> (f64, f64) {
         let (z, t) = (self.distance_mm, self.reference_mm / self.distance_mm);
         let a = self.focal_per_kelvin * kelvin;

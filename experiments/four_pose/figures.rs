@@ -2,7 +2,7 @@
 
 use super::weak::Grid;
 use super::*;
-use calibench::evaluate::distribution::normal_quantile;
+use calibench_harness::stats::{self, normal_quantile};
 
 const POSE_NAMES: [&str; 4] = [
     "facing the camera",
@@ -37,9 +37,17 @@ pub fn views(draw: &Draw) -> Figure {
                 .points_as("principal point", &[(camera.cx, camera.cy)], Look::ink())
         })
         .collect();
+    let corners = &border(truth.image_size)[1..];
+    let to_corner =
+        |p: &Vec2| corners.iter().map(|&(u, v)| (p - Vec2::new(u, v)).norm()).fold(f64::INFINITY, f64::min);
+    let nearest = stats::smallest(draw.views.iter().flat_map(|view| view.pixels().iter().map(to_corner)));
     let caption = format!(
-        "The target's 63 points in the four views of the virtual camera, 120 mm away, with 0.1 px of noise (seed {}), in \
-         pixels. Notice that no point comes near a corner of the image, where the distortion is largest.",
+        "The target's {} points in the {} views of the virtual camera, {} mm away, with {SIGMA_PX} px of \
+         noise (seed {}), in pixels. Notice that no point comes nearer to a corner of the image, where the \
+         distortion is largest, than {nearest:.0} px.",
+        truth.points.len(),
+        draw.views.len(),
+        truth.cam_from_target[0].translation.z,
         draw.seed
     );
     Figure::panels("views", &panels, 2, caption)
@@ -70,9 +78,9 @@ pub fn residuals(draw: &Draw) -> Figure {
         })
         .collect();
     let caption = format!(
-        "Residuals (predicted minus observed) of the calibrated camera in the four views, drawn {ARROW_SCALE} times longer \
-         than they are; the arrow at the lower left is {REFERENCE_PX} px long. Seed {}, noise 0.1 px. Notice that they have no \
-         pattern: what is left is noise.",
+        "Residuals (predicted minus observed) of the calibrated camera in the four views, drawn \
+         {ARROW_SCALE} times longer than they are; the arrow at the lower left is {REFERENCE_PX} px long. \
+         Seed {}, noise {SIGMA_PX} px. Notice that they have no pattern: what is left is noise.",
         draw.seed
     );
     Figure::panels("residuals", &panels, 2, caption)
@@ -108,14 +116,16 @@ pub fn residual_distribution(draw: &Draw) -> Figure {
         "density",
     )
     .x_range(range.0, range.1)
-    .histogram("504 residual coordinates", &bars)
+    .histogram(format!("{} residual coordinates", draw.standardised.len()), &bars)
     .error_bars_as("expected, two standard deviations of a bin", &expected, Look::ink())
     .line_as("standard normal", &curve, Look::series(1).dash(Dash::Solid).width(2.0));
     let caption = format!(
-        "Every residual coordinate of the calibrated camera over its own predicted standard deviation, 0.1 px times \
-         sqrt(1 - leverage), with the standard normal density (seed {}). Notice that the noise model is met once the \
-         leverage, 30 in 504 on average, is allowed for.",
-        draw.seed
+        "Every residual coordinate of the calibrated camera over its own predicted standard deviation, \
+         {SIGMA_PX} px times sqrt(1 - leverage), with the standard normal density (seed {}). Notice that \
+         the noise model is met once the leverage, {} in {} on average, is allowed for.",
+        draw.seed,
+        draw.rmse.parameters,
+        draw.standardised.len()
     );
     Figure::plot("residual-distribution", &plot, caption)
 }
@@ -150,8 +160,9 @@ pub fn ellipse(draw: &Draw, book: &Book, trials: &Outcome) -> Figure {
         .points_as("ours", &of(&draw.calibration.camera), Look::series(0).marker(Marker::Square).size(5.0))
         .points_as("book", &of(&book.camera), Look::series(1).marker(Marker::Diamond).size(5.0));
     let caption = format!(
-        "k1 and k2 of our draw (seed {}), of the book's and of {CLOUD} trials, about the truth, with the regions that the \
-         Cramer-Rao bound predicts to hold 68, 95 and 99.7 % of draws. Notice that an error of one is made up by the other.",
+        "k1 and k2 of our draw (seed {}), of the book's and of {CLOUD} trials, about the truth, with the \
+         regions that the Cramer-Rao bound predicts to hold 68, 95 and 99.7 % of draws. Notice that an \
+         error of one is made up by the other.",
         draw.seed
     );
     Figure::plot("k1-k2", &plot, caption)
@@ -186,10 +197,12 @@ pub fn rmse(draw: &Draw, book: &Book, trials: &Outcome) -> Figure {
             Look::ink().dash(Dash::Dotted).width(2.0),
         );
     let caption = format!(
-        "RMSE of {TRIALS} calibrations of the four views with fresh noise of 0.1 px (seed {}), in pixels, and the predicted \
-         density: chi with 474 degrees of freedom. Notice that it lies just under the noise floor, as 30 parameters absorb \
-         noise.",
-        draw.seed
+        "RMSE of {TRIALS} calibrations of the four views with fresh noise of {SIGMA_PX} px (seed {}), in \
+         pixels, and the predicted density: chi with {} degrees of freedom. Notice that it lies just under \
+         the noise floor, as {} parameters absorb noise.",
+        draw.seed,
+        predicted.degrees_of_freedom(),
+        predicted.parameters
     );
     Figure::plot("rmse", &plot, caption)
 }
@@ -208,8 +221,8 @@ pub fn blind(draw: &Draw, trials: &Outcome) -> Figure {
     .hline_as("noise floor", draw.rmse.noise_floor_px(), Look::ink().dash(Dash::Dotted).width(2.0))
     .x_range(0.0, normal_quantile(0.9999));
     let caption = format!(
-        "RMSE against the size of the error of k2 (one standard deviation is {sd:.4}) in {CLOUD} trials (seed {}). Notice that \
-         a calibration with a large error of k2 reprojects as well as one without.",
+        "RMSE against the size of the error of k2 (one standard deviation is {sd:.4}) in {CLOUD} trials \
+         (seed {}). Notice that a calibration with a large error of k2 reprojects as well as one without.",
         draw.seed
     );
     Figure::plot("rmse-and-k2", &plot, caption)
@@ -241,20 +254,39 @@ pub fn overfitting(grids: &[Grid]) -> Figure {
     let rmse = Plot::new("RMSE with fewer points", "points a view", "RMSE (px)")
         .size(430.0, 380.0)
         .line_as("predicted", &over(&|g| g.rmse.mean_px()), theory)
-        .points_as("mean of 300 trials, 95 %", &over(&|g| g.trials.mean(|e| e.rmse_px)), sampled)
+        .points_as(
+            format!("mean of {GRID_TRIALS} trials, 95 %"),
+            &over(&|g| g.trials.mean(|e| e.rmse_px)),
+            sampled,
+        )
         .error_bars_as("", &intervals, sampled)
         .line_as("noise floor", &over(&floor), Look::ink().dash(Dash::Dotted).width(2.0))
         .log_x();
     let k2 = Plot::new("k2 with fewer points", "points a view", "standard deviation of k2")
         .size(430.0, 380.0)
         .line_as("Cramer-Rao bound", &over(&|g| g.k2_sd), theory)
-        .points_as("300 trials, 95 %", &over(&|g| g.trials.errors().standard_deviation(k2)), sampled)
+        .points_as(
+            format!("{GRID_TRIALS} trials, 95 %"),
+            &over(&|g| g.trials.errors().standard_deviation(k2)),
+            sampled,
+        )
         .error_bars_as("", &spreads, sampled)
         .log_x()
         .log_y()
         .y_range(0.01, 0.1);
-    let caption = "The four views with fewer points on the same 80 x 60 mm (3 x 3 to 9 x 7), 300 trials each: RMSE in pixels and \
-                   spread of k2, with 95 % intervals and predictions. Notice that the RMSE falls far under the floor just \
-                   where the parameters are worst: it is low because they fit the noise.";
+    let grid_name = |(columns, rows): (usize, usize)| format!("{columns} x {rows}");
+    let (few, all) = (&grids[0], &grids[grids.len() - 1]);
+    let caption = format!(
+        "The four views with fewer points on the same 80 x 60 mm ({} to {}), {GRID_TRIALS} trials each: \
+         RMSE in pixels and spread of k2, with 95 % intervals and predictions. Notice that with {} points a \
+         view the RMSE falls to {:.2} of the floor, while the bound of k2 is {:.1} times that with {}: the \
+         RMSE is low because the parameters fit the noise.",
+        grid_name(GRIDS[0]),
+        grid_name(GRIDS[GRIDS.len() - 1]),
+        few.points_per_view,
+        few.trials.mean(|e| e.rmse_px) / few.rmse.noise_floor_px(),
+        few.k2_sd / all.k2_sd,
+        all.points_per_view
+    );
     Figure::panels("few-points", &[rmse, k2], 2, caption)
 }

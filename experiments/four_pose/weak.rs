@@ -1,5 +1,5 @@
-//! Scenes that say little: fewer points, which overfit, two views, which suffice, and views that face the camera, which determine no
-//! camera.
+//! Scenes that say little: fewer points, which overfit, two views, which suffice, and views that face the
+//! camera, which determine no camera.
 
 use super::*;
 
@@ -83,30 +83,32 @@ pub fn claim_overfitting(record: &mut Record, grids: &[Grid]) {
         table.push(row.chain([Cell::from(n)]));
     }
     record.table(table);
-    let claim = Claim::all_of(
-        "low-rmse-is-overfitting",
-        "with fewer points on the same target the RMSE falls under the floor as sqrt(1 - 30 / 2N) says, while k2 gets worse as \
-         the bound says",
-        cases,
-        "mean of chi with 2 N - 30 degrees of freedom, and sample deviation of Gaussian values, Bonferroni over all grids",
-    );
-    record.claim(claim.with_false_alarm_rate(RATE));
+    record
+        .claim_that(
+            "low-rmse-is-overfitting",
+            "with fewer points on the same target the RMSE falls under the floor as sqrt(1 - 30 / 2N) says, \
+             while k2 gets worse as the bound says",
+        )
+        .every("cases", cases)
+        .at_rate(RATE)
+        .because(
+            "mean of chi with 2 N - 30 degrees of freedom, and sample deviation of Gaussian values, \
+             Bonferroni over all grids",
+        );
     let (few, all) = (&grids[0], &grids[grids.len() - 1]);
     let floor = few.rmse.noise_floor_px();
-    record.number(
-        "few-points-rmse-over-floor",
-        few.trials.mean(|e| e.rmse_px) / floor,
-        "",
-        relative(),
-        "mean RMSE over the noise floor with 9 points a view",
-    );
-    record.number(
-        "few-points-k2-sd-factor",
-        few.k2_sd / all.k2_sd,
-        "",
-        relative(),
-        "growth of the bound of k2 from 63 points a view to 9",
-    );
+    record
+        .group("", relative())
+        .number(
+            "few-points-rmse-over-floor",
+            few.trials.mean(|e| e.rmse_px) / floor,
+            "mean RMSE over the noise floor with 9 points a view",
+        )
+        .number(
+            "few-points-k2-sd-factor",
+            few.k2_sd / all.k2_sd,
+            "growth of the bound of k2 from 63 points a view to 9",
+        );
 }
 
 pub fn claim_facing_views(record: &mut Record, context: &Context) -> Result<(), ExperimentError> {
@@ -124,41 +126,43 @@ pub fn claim_facing_views(record: &mut Record, context: &Context) -> Result<(), 
     }
     .run(&context.progress("views that face the camera", FACING_TRIALS));
     let refused = trials.refused_naming(&["focal length", "distance"]) as f64;
-    record.number(
+    record.exact("").number(
         "facing-refused",
         refused,
-        "",
-        Band::Exact,
         "of 200 trials with facing views only, those refused for focal length and distance",
     );
-    let claim = Claim::at_least(
-        "facing-views-are-refused",
-        "four views that face the camera, at 100, 120, 140 and 160 mm, are refused, and focal length and distance are named as \
-         inseparable",
-        refused,
-        FACING_TRIALS as f64,
-        format!(
+    record
+        .claim_that(
+            "facing-views-are-refused",
+            "four views that face the camera, at 100, 120, 140 and 160 mm, are refused, and focal length \
+             and distance are named as inseparable",
+        )
+        .at_least(refused, FACING_TRIALS as f64)
+        .at_rate(FACING_TRIALS as f64 * 1e-9)
+        .because(format!(
             "1e-9 a trial: the rate at which planes that are parallel pass for tilted; endings: {:?}",
             trials.endings
-        ),
-    );
-    record.claim(claim.with_false_alarm_rate(FACING_TRIALS as f64 * 1e-9));
+        ));
     let bound = cramer_rao(&scene.truth, FreeParameters::CHAPTER, SIGMA_PX);
-    record.claim(Claim::all_of(
-        "facing-views-have-no-bound",
-        "the information of these views is singular: no unbiased estimate exists",
-        [(
-            format!("{:?}", bound.as_ref().map(|b| b.standard_deviation(Parameter::Fx))),
-            matches!(bound, Err(BoundError::Singular { .. })),
-        )],
-        "f and the distances enter only through their ratio (Zhang 2000, section 4)",
-    ));
+    record
+        .claim_that(
+            "facing-views-have-no-bound",
+            "the information of these views is singular: no unbiased estimate exists",
+        )
+        .every(
+            "cases",
+            [(
+                format!("{:?}", bound.as_ref().map(|b| b.standard_deviation(Parameter::Fx))),
+                matches!(bound, Err(BoundError::Singular { .. })),
+            )],
+        )
+        .because("f and the distances enter only through their ratio (Zhang 2000, section 4)");
     Ok(())
 }
 
-/// Largest error of a focal length or a coordinate of the principal point from exact pixels, px: coordinates below 1000 px are rounded
-/// by 1.1e-13 px, and the worst pair of views makes 25 px of a pixel's error; the refinement ends within the square root of that
-/// relative gain.
+/// Largest error of a focal length or a coordinate of the principal point from exact pixels, px: coordinates
+/// below 1000 px are rounded by 1.1e-13 px, and the worst pair of views makes 25 px of a pixel's error; the
+/// refinement ends within the square root of that relative gain.
 const TWO_VIEWS_PX: f64 = 1e-4;
 
 /// Four unknowns of K, and two equations from every view: two views are enough, and three are not needed.
@@ -187,20 +191,18 @@ pub fn claim_two_views(record: &mut Record) -> Result<(), ExperimentError> {
     }
     let best = sds.iter().copied().fold(f64::INFINITY, f64::min);
     let worst = sds.iter().copied().fold(0.0, f64::max);
-    record.number(
-        "two-views-fx-sd-best",
-        best,
-        "px",
-        relative(),
-        "bound of fx from the best pair of the four views",
-    );
-    record.number("two-views-fx-sd-worst", worst, "px", relative(), "bound of fx from the worst pair");
-    let claim = Claim::all_of(
-        "two-views-suffice",
-        "without noise every pair of the four views gives the camera exactly",
-        cases,
-        "without skew K has four unknowns, and each view gives two equations (Zhang 2000, section 3.1)",
-    );
-    record.claim(claim.over("pairs"));
+    record
+        .group("px", relative())
+        .number("two-views-fx-sd-best", best, "bound of fx from the best pair of the four views")
+        .number("two-views-fx-sd-worst", worst, "bound of fx from the worst pair");
+    record
+        .claim_that(
+            "two-views-suffice",
+            "without noise every pair of the four views gives the camera exactly",
+        )
+        .every("pairs", cases)
+        .because(
+            "without skew K has four unknowns, and each view gives two equations (Zhang 2000, section 3.1)",
+        );
     Ok(())
 }

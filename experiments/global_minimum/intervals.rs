@@ -1,14 +1,16 @@
-//! Do intervals by the profile of the cost contain the truth as often as they say, where the standard deviation misleads?
+//! Do intervals by the profile of the cost contain the truth as often as they say, where the standard
+//! deviation misleads?
 //!
-//! Four views of a target tilted by four degrees through a long lens: the focal length is known to some eight per cent, and is bounded better
-//! below than above. Intervals by the standard deviation are then too low, and miss on one side.
+//! Four views of a target tilted by four degrees through a long lens: the focal length is known to some eight
+//! per cent, and is bounded better below than above. Intervals by the standard deviation are then too low,
+//! and miss on one side.
 
 use calibench::calibrate::{Settings, calibrate};
 use calibench::camera::{Camera, Parameter};
-use calibench::evaluate::Interval;
 use calibench::synth::scene::looking_at_centre;
 use calibench::synth::{Scene, Stream, StreamKey, Truth};
-use calibench_harness::{Band, Claim, ExperimentError, Record};
+use calibench_harness::stats::Interval;
+use calibench_harness::{Band, ExperimentError, Record};
 use rayon::prelude::*;
 
 /// Draws of the noise.
@@ -43,7 +45,7 @@ impl Misses {
 }
 
 /// Draws, counts and claims.
-pub fn tell(record: &mut Record, seed: u64) -> Result<(), ExperimentError> {
+pub fn report(record: &mut Record, seed: u64) -> Result<(), ExperimentError> {
     let truth = Truth {
         camera: Camera::pinhole(3000.0, 3000.0, 640.0, 480.0),
         image_size: (1280, 960),
@@ -68,36 +70,43 @@ pub fn tell(record: &mut Record, seed: u64) -> Result<(), ExperimentError> {
         by_deviation.add(scene.truth.camera.fx, Some(fx.linear.0), Some(fx.linear.1));
     }
     let count = |record: &mut Record, id: &str, value: usize, what: &str| {
-        record.number(id, value as f64, "", Band::Exact, what);
+        record.exact("").count(id, value, what);
     };
     count(record, "intervals-draws", answered, "draws of the weak long lens that were answered");
     let sides = [("profile", by_profile), ("deviation", by_deviation)];
     for (name, misses) in sides {
-        let told = format!("intervals of 95 % for fx that lie above the true one, by the {name}");
-        count(record, &format!("intervals-{name}-above"), misses.above, &told);
-        let told = format!("intervals of 95 % for fx that lie below the true one, by the {name}");
-        count(record, &format!("intervals-{name}-below"), misses.below, &told);
+        let what = format!("intervals of 95 % for fx that lie above the true one, by the {name}");
+        count(record, &format!("intervals-{name}-above"), misses.above, &what);
+        let what = format!("intervals of 95 % for fx that lie below the true one, by the {name}");
+        count(record, &format!("intervals-{name}-below"), misses.below, &what);
     }
     let share = by_profile.covered(answered) as f64 / answered.max(1) as f64;
     let possible = Interval::of_proportion(by_profile.covered(answered), answered, FALSE_ALARM);
-    record.number(
+    record.group("1", Band::absolute(1e-9, "a share of counts")).number(
         "intervals-coverage",
         share,
-        "1",
-        Band::absolute(1e-9, "a share of counts"),
         "share of the intervals by the profile of the cost that contain the true fx; 0.95 was asked for",
     );
-    record.claim(
-        Claim::all_of(
+    record
+        .claim_that(
             "profile-intervals-cover",
-            "where the standard deviation misleads, intervals by the profile contain the true focal length as often as they say",
+            "where the standard deviation misleads, intervals by the profile contain the true focal length \
+             as often as they say",
+        )
+        .every(
+            "cases",
             [(
-                format!("{:.4} of {answered}, compatible with {:.4} to {:.4}", share, possible.low, possible.high),
+                format!(
+                    "{:.4} of {answered}, compatible with {:.4} to {:.4}",
+                    share, possible.low, possible.high
+                ),
                 possible.contains(COVERAGE) && answered == DRAWS,
             )],
-            "Wilson's interval (1927) of the counted share contains the stated coverage; every draw is answered",
         )
-        .with_false_alarm_rate(FALSE_ALARM),
-    );
+        .at_rate(FALSE_ALARM)
+        .because(
+            "Wilson's interval (1927) of the counted share contains the stated coverage; every draw is \
+             answered",
+        );
     Ok(())
 }

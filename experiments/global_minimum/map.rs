@@ -19,7 +19,7 @@ fn place(ends: &[f64], value: f64) -> usize {
 }
 
 /// The map as table and figure.
-pub fn tell(record: &mut Record, lines: &[Line]) -> Result<(), ExperimentError> {
+pub fn report(record: &mut Record, lines: &[Line]) -> Result<(), ExperimentError> {
     record.table(by_bound(lines));
     record.figure(figure(lines)?);
     Ok(())

@@ -14,8 +14,8 @@ impl BlackBox {
         calibrate(views, &Settings::new(free)).map(BlackBox)
     }
 
-    /// The camera. The manual: "row 0 holds the focal lengths and the principal point, row 1 the distortion". What it does
-    /// not say: row 0 is `_, fx, cx, fy, cy`, row 1 is `k1, k2, p1, p2, _`.
+    /// The camera. The manual: "row 0 holds the focal lengths and the principal point, row 1 the distortion".
+    /// What it does not say: row 0 is `_, fx, cx, fy, cy`, row 1 is `k1, k2, p1, p2, _`.
     pub(crate) fn matrix(&self) -> [[f64; 5]; 2] {
         let Camera { fx, fy, cx, cy, distortion: lens, .. } = self.0.camera;
         [[0.0, fx, cx, fy, cy], [lens.k1, lens.k2, lens.p1, lens.p2, 0.0]]

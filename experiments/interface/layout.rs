@@ -20,9 +20,9 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    /// Judges every order. A layout is refused if any entry lies more than `limit` standard deviations from the truth of the
-    /// parameter that it is taken for. Parameters of equal truth share the largest of their deviations: which of them an
-    /// entry belongs to cannot be told, so it may carry the noise of any.
+    /// Judges every order. A layout is refused if any entry lies more than `limit` standard deviations from
+    /// the truth of the parameter that it is taken for. Parameters of equal truth share the largest of their
+    /// deviations: which of them an entry belongs to cannot be told, so it may carry the noise of any.
     pub(crate) fn judge(
         entries: &[f64],
         parameters: Layout,

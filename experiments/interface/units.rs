@@ -6,7 +6,8 @@ use calibench::camera::Camera;
 use calibench::geometry::{Affine, LineFit, Vec2};
 use calibench::synth::scene::looking_at_centre;
 use calibench::synth::{Scene, Stream, StreamKey, Truth};
-use calibench_harness::{Band, Claim, ExperimentError, Figure, Plot, Record, Table};
+use calibench_harness::stats::Interval;
+use calibench_harness::{Band, ExperimentError, Figure, Plot, Record, Table};
 
 /// Distances of the facing target, mm: 60, 80, ..., 800. At 600 a pixel is a millimetre.
 const DISTANCE_TWENTIES_MM: std::ops::RangeInclusive<u32> = 3..=40;
@@ -78,91 +79,76 @@ fn rms(differences: impl ExactSizeIterator<Item = Vec2>) -> f64 {
     (differences.map(|d| d.norm_squared()).sum::<f64>() / n).sqrt()
 }
 
-/// Coordinates below 1000 carry roundings of `2^-44` in each of some 60 operations of projection and correction.
+/// Coordinates below 1000 carry roundings of `2^-44` in each of some 60 operations of projection and
+/// correction.
 const ROUNDING: f64 = 60.0 * 5.7e-14;
 
-pub(crate) fn tell(record: &mut Record, examined: &Examined) {
+pub(crate) fn report(record: &mut Record, examined: &Examined) {
     let rounding = || Band::absolute(ROUNDING, "60 roundings of coordinates below 1000");
-    // The solver stops within 1e-6 standard deviations of the minimum, and a corrected point moves by less than a pixel a
-    // standard deviation.
+    // The solver stops within 1e-6 standard deviations of the minimum, and a corrected point moves by less
+    // than a pixel a standard deviation.
     let stop = || Band::absolute(1e-6, "where the solver stops");
     let Examined { chapter, black_box, sweep } = examined;
-    record.number(
-        "units-direct",
-        chapter.direct,
-        "",
-        rounding(),
-        "RMS of corrected pixels minus millimetres, true camera",
-    );
-    record.number("units-direct-box", black_box.direct, "", stop(), "the same from the black box");
-    record.number(
-        "units-spacing-ratio",
-        chapter.spacing_ratio,
-        "",
-        rounding(),
-        "spacing of the answer over the target's",
-    );
-    record.number(
-        "units-affine-mm",
-        black_box.affine_mm,
-        "mm",
-        stop(),
-        "RMS residual of an affine fit of the black box's answer",
-    );
-    record.number(
-        "units-collinearity",
-        black_box.collinearity,
-        "",
-        stop(),
-        "largest distance from the top row's line, black box",
-    );
+    record
+        .group("", rounding())
+        .number("units-direct", chapter.direct, "RMS of corrected pixels minus millimetres, true camera")
+        .band(stop())
+        .number("units-direct-box", black_box.direct, "the same from the black box")
+        .band(rounding())
+        .number("units-spacing-ratio", chapter.spacing_ratio, "spacing of the answer over the target's")
+        .group("mm", stop())
+        .number(
+            "units-affine-mm",
+            black_box.affine_mm,
+            "RMS residual of an affine fit of the black box's answer",
+        )
+        .unit("")
+        .number(
+            "units-collinearity",
+            black_box.collinearity,
+            "largest distance from the top row's line, black box",
+        );
 
-    let columns = [
-        ("distance", "mm"),
-        ("difference", ""),
-        ("spacing_ratio", ""),
-        ("affine_residual", "mm"),
-        ("collinearity", ""),
-    ];
-    let caption = "what four checks say when corrected pixels are taken for millimetres, target facing the camera, no noise";
-    let mut table = Table::new("units", caption, &columns);
-    for c in sweep {
-        table.push([c.distance_mm, c.direct, c.spacing_ratio, c.affine_mm, c.collinearity]);
-    }
-    record.table(table);
+    let caption = "what four checks say when corrected pixels are taken for millimetres, target facing the \
+                   camera, no noise";
+    record.table(
+        Table::of("units", caption, sweep)
+            .column("distance", "mm", |c| c.distance_mm)
+            .column("difference", "", |c| c.direct)
+            .column("spacing_ratio", "", |c| c.spacing_ratio)
+            .column("affine_residual", "mm", |c| c.affine_mm)
+            .column("collinearity", "", |c| c.collinearity),
+    );
 
     let expected = expected_difference(&Truth::chapter_camera(), 120.0);
-    let bound = ROUNDING;
     let reason = "sqrt(cx^2 + cy^2 + (f/Z - 1)^2 (mean X^2 + mean Y^2)) of a centred grid, by hand; rounding";
-    let range = (expected - bound, expected + bound);
     let statement = "the difference of pixels and millimetres is that of the geometry";
-    record.claim(Claim::within("units-difference", statement, chapter.direct, range, reason));
+    record
+        .claim_that("units-difference", statement)
+        .within(chapter.direct, Interval::around(expected, ROUNDING))
+        .because(reason);
     let ratios = sweep.iter().map(|c| {
         let expected = Truth::chapter_camera().fx / c.distance_mm;
         let held = (c.spacing_ratio - expected).abs() <= ROUNDING;
         (format!("{} mm: ratio {}, expected {expected}", c.distance_mm, c.spacing_ratio), held)
     });
-    record.claim(
-        Claim::all_of(
+    record
+        .claim_that(
             "spacing-shows-the-scale",
             "the spacing check sees the scale f / Z: blind only where a pixel is a millimetre",
-            ratios.collect::<Vec<_>>(),
-            "a facing plane is seen at f / Z px a mm",
         )
-        .over("distances"),
-    );
+        .every("distances", ratios.collect::<Vec<_>>())
+        .because("a facing plane is seen at f / Z px a mm");
     let blind = sweep.iter().map(|c| {
         (
             format!("{} mm: {} mm, {}", c.distance_mm, c.affine_mm, c.collinearity),
             c.affine_mm.max(c.collinearity) <= ROUNDING,
         )
     });
-    record.claim(Claim::all_of(
-        "fits-are-blind",
-        "an affine fit and a collinearity check see nothing at any distance",
-        blind.collect::<Vec<_>>(),
-        "both are invariant under a change of scale; rounding",
-    ));
+    record
+        .claim_that("fits-are-blind", "an affine fit and a collinearity check see nothing at any distance")
+        .every("cases", blind.collect::<Vec<_>>())
+        .because("both are invariant under a change of scale; rounding");
 
     let direct: Vec<(f64, f64)> = sweep.iter().map(|c| (c.distance_mm, c.direct)).collect();
     let ratio: Vec<(f64, f64)> =
@@ -173,15 +159,16 @@ pub(crate) fn tell(record: &mut Record, examined: &Examined) {
             .line("error of the spacing (%)", &ratio)
             .vline("one pixel a millimetre", Truth::chapter_camera().fx);
     let caption = format!(
-        "RMS difference of corrected pixels and target millimetres, and error of the spacing of neighbours, against the distance \
-         of a facing target; nothing is drawn at random. Notice what each check shows at {} mm, where a pixel is a millimetre.",
+        "RMS difference of corrected pixels and target millimetres, and error of the spacing of neighbours, \
+         against the distance of a facing target; nothing is drawn at random. Notice what each check shows \
+         at {} mm, where a pixel is a millimetre.",
         Truth::chapter_camera().fx
     );
     record.figure(Figure::plot("units", &plot, caption));
 }
 
-/// By hand: corrected pixel `f/Z X + cx` minus `X`, over a centred grid of 9 x 7 points 10 mm apart, whose mean squares are
-/// `(n^2 - 1) / 12` spacings squared.
+/// By hand: corrected pixel `f/Z X + cx` minus `X`, over a centred grid of 9 x 7 points 10 mm apart, whose
+/// mean squares are `(n^2 - 1) / 12` spacings squared.
 fn expected_difference(camera: &Camera, distance_mm: f64) -> f64 {
     let mean_square = |n: f64| 100.0 * (n * n - 1.0) / 12.0;
     let scale = camera.fx / distance_mm - 1.0;

@@ -1,6 +1,7 @@
 //! The figures of the observability experiment: maps over coverage and tilt, and sections through them.
 
 use super::*;
+use calibench_harness::stats;
 use calibench_harness::{Dash, Figure, HeatMap, Look, Plot};
 
 /// Confidence of the intervals drawn at the trials.
@@ -9,8 +10,8 @@ const SHOWN: f64 = 0.05;
 const SECTION_TILTS: [u32; 3] = [5, 20, 45];
 const SECTION_TENTHS: [u32; 4] = [3, 5, 7, 10];
 
-const MAP_NOTE: &str = "Coverage is the fraction of the way to the image's border that the points reach in every view, tilt the \
-                        chapter's 20 degrees replaced.";
+const MAP_NOTE: &str = "Coverage is the fraction of the way to the image's border that the points reach in \
+                        every view, tilt the chapter's 20 degrees replaced.";
 
 fn map_plot(
     map: &Map,
@@ -59,9 +60,15 @@ pub fn heat_maps(map: &Map, seed: u64) -> Result<Figure, ExperimentError> {
         map_plot(map, "RMSE", "mean RMSE of the trials (px)", as_wide_as_one_draw, Node::sampled_rmse_px)?,
     ];
     let caption = format!(
-        "Bound of k2 and fx, correlation of k1 and k2, and mean RMSE of {TRIALS} trials (noise 0.1 px, seed {seed}) over coverage \
-         and tilt; a dash where there is none. {MAP_NOTE} More coverage means a nearer target here. Notice that k2 falls with \
-         coverage, fx with both, and that the RMSE does not notice (its colours span what single calibrations scatter over)."
+        "Bound of k2 and fx, correlation of k1 and k2, and mean RMSE of {TRIALS} trials (noise {SIGMA_PX} \
+         px, seed {seed}) over coverage and tilt; a dash where there is none. {MAP_NOTE} More coverage \
+         means a nearer target here. Notice that, where the bound of fx is below {:.0} %, that of k2 \
+         changes by a factor of {:.0}, that of fx by {:.0}, and the RMSE by {:.3} (its colours span what \
+         single calibrations scatter over).",
+        100.0 * FIRST_ORDER,
+        map.range(|n| n.bound_sd(Parameter::K2)),
+        map.range(|n| n.bound_sd(Parameter::Fx)),
+        map.range(Node::sampled_rmse_px)
     );
     Ok(Figure::panels("maps", &panels, 2, caption))
 }
@@ -85,9 +92,12 @@ pub fn ratios(map: &Map, seed: u64) -> Result<Figure, ExperimentError> {
         )?,
     ];
     let caption = format!(
-        "Spread of {TRIALS} trials over the Cramer-Rao bound (noise 0.1 px, seed {seed}; one standard deviation of the ratio is \
-         0.05). A dash where the bound of fx exceeds 3 %, and without tilt, where all trials are refused. {MAP_NOTE} Notice that \
-         the ratios scatter about 1 without pattern."
+        "Spread of {TRIALS} trials over the Cramer-Rao bound (noise {SIGMA_PX} px, seed {seed}; one \
+         standard deviation of the ratio is {:.2}). A dash where the bound of fx exceeds {:.0} %, and \
+         without tilt, where all trials are refused. {MAP_NOTE} Notice that the ratios scatter about 1 \
+         without pattern.",
+        (0.5 / (TRIALS - 1) as f64).sqrt(),
+        100.0 * FIRST_ORDER
     );
     Ok(Figure::panels("against-the-bound", &panels, 2, caption))
 }
@@ -125,10 +135,14 @@ pub fn k2_sections(map: &Map, seed: u64) -> Figure {
     let plot = sections(plot, &levels, Parameter::K2, |t| {
         COVERAGE_TENTHS.iter().map(|&c| map.at(c, t)).map(|n| (n.coverage(), n)).collect()
     });
+    let sd = |tenths: u32, tilt_deg: u32| map.at(tenths, tilt_deg).bound_sd(Parameter::K2);
+    let falls = || SECTION_TILTS.iter().map(|&t| sd(COVERAGE_TENTHS[0], t) / sd(10, t));
     let caption = format!(
-        "Standard deviation of k2 against coverage: Cramer-Rao bound (lines) and {TRIALS} trials (points with 95 % intervals; \
-         noise 0.1 px, seed {seed}). {MAP_NOTE} Notice two orders of magnitude between a target in the middle and one that \
-         fills the image."
+        "Standard deviation of k2 against coverage: Cramer-Rao bound (lines) and {TRIALS} trials (points \
+         with 95 % intervals; noise {SIGMA_PX} px, seed {seed}). {MAP_NOTE} Notice that between a target in \
+         the middle and one that fills the image the bound falls by a factor of {:.0} to {:.0}, by tilt.",
+        stats::smallest(falls()),
+        stats::largest(falls())
     );
     Figure::plot("k2-sections", &plot, caption)
 }
@@ -139,10 +153,17 @@ pub fn focal_sections(map: &Map, seed: u64) -> Figure {
     let plot = sections(plot, &levels, Parameter::Fx, |c| {
         TILT_DEG.iter().map(|&t| (f64::from(t), map.at(c, t))).collect()
     });
+    let sd = |tenths: u32, tilt_deg: u32| map.at(tenths, tilt_deg).bound_sd(Parameter::Fx);
+    let grows = || SECTION_TENTHS.iter().map(|&c| sd(c, TILT_DEG[1]) / sd(c, TILT_DEG[TILT_DEG.len() - 1]));
     let caption = format!(
-        "Standard deviation of fx against tilt: Cramer-Rao bound (lines) and {TRIALS} trials (points with 95 % intervals, where \
-         none was refused; noise 0.1 px, seed {seed}). {MAP_NOTE} Notice that it grows without limit towards no tilt, where \
-         every trial is refused."
+        "Standard deviation of fx against tilt: Cramer-Rao bound (lines) and {TRIALS} trials (points with \
+         95 % intervals, where none was refused; noise {SIGMA_PX} px, seed {seed}). {MAP_NOTE} Notice that \
+         it grows {:.0} to {:.0} times from {} to {} degrees of tilt, by coverage, and that every trial \
+         without tilt is refused.",
+        stats::smallest(grows()),
+        stats::largest(grows()),
+        TILT_DEG[TILT_DEG.len() - 1],
+        TILT_DEG[1]
     );
     Figure::plot("focal-sections", &plot, caption)
 }
@@ -173,9 +194,11 @@ pub fn rmse_sections(map: &Map, seed: u64) -> Figure {
     let plot =
         plot.hline_as("noise floor", any.rmse.noise_floor_px(), Look::ink().dash(Dash::Dotted).width(2.0));
     let caption = format!(
-        "Mean RMSE of {TRIALS} trials against coverage, with the interval that holds 95 % of such means if the model is right \
-         (noise 0.1 px, seed {seed}). {MAP_NOTE} Notice that it is flat while the standard deviation of k2 changes by two \
-         orders of magnitude."
+        "Mean RMSE of {TRIALS} trials against coverage, with the interval that holds 95 % of such means if \
+         the model is right (noise {SIGMA_PX} px, seed {seed}). {MAP_NOTE} Notice that its largest value is \
+         {:.3} of its smallest, while the bound of k2 changes by a factor of {:.0}.",
+        map.range(Node::sampled_rmse_px),
+        map.range(|n| n.bound_sd(Parameter::K2))
     );
     Figure::plot("rmse-sections", &plot, caption)
 }

@@ -1,4 +1,5 @@
-//! Is it the corners or the distance? The target stays at one distance and is moved, each view towards another corner.
+//! Is it the corners or the distance? The target stays at one distance and is moved, each view towards
+//! another corner.
 
 use super::*;
 use calibench_harness::{Dash, Figure, Look, Plot};
@@ -40,7 +41,8 @@ fn sweep(context: &Context) -> Result<Vec<Moved>, ExperimentError> {
     scenes.into_iter().map(moved).collect()
 }
 
-/// Four poses at the distance, each moved until its outermost point has the coverage; `None` where one has more before.
+/// Four poses at the distance, each moved until its outermost point has the coverage; `None` where one has
+/// more before.
 fn moved_poses(distance_mm: f64, tilt_deg: f64, coverage: f64) -> Option<Vec<Pose>> {
     let chapter = Truth::chapter();
     let views = turns(tilt_deg).into_iter().zip(CORNERS);
@@ -76,9 +78,9 @@ fn moved(
     }
 }
 
-pub fn tell(record: &mut Record, map: &Map, context: &Context) -> Result<(), ExperimentError> {
+pub fn report(record: &mut Record, map: &Map, context: &Context) -> Result<(), ExperimentError> {
     let scenes = sweep(context)?;
-    tell_numbers(record, map, &scenes);
+    report_numbers(record, map, &scenes);
     record.table(table(&scenes));
     claim_attained(record, &scenes);
     claim_separate(record, &scenes);
@@ -92,18 +94,18 @@ fn row(scenes: &[Moved], distance_mm: u32, tilt_deg: u32) -> Vec<&Node> {
     scenes.iter().filter(of_row).map(|m| &m.node).collect()
 }
 
-fn tell_numbers(record: &mut Record, map: &Map, scenes: &[Moved]) {
+fn report_numbers(record: &mut Record, map: &Map, scenes: &[Moved]) {
     for tenths in [COVERAGE_TENTHS[0], COVERAGE_TENTHS[COVERAGE_TENTHS.len() - 1]] {
         let distance = framed(&Truth::chapter(), [0.0; 3], f64::from(tenths) / 10.0).translation.z;
         let what =
             format!("distance of the facing view at coverage {:.1}, centred", f64::from(tenths) / 10.0);
-        record.number(format!("distance-c{tenths}"), distance, "mm", relative(), what);
+        record.group("mm", relative()).number(format!("distance-c{tenths}"), distance, what);
     }
     let gain = |from: &Node, to: &Node, p: Parameter| from.bound_sd(p) / to.bound_sd(p);
     for (p, tilt) in [(Parameter::Fx, 5), (Parameter::Fx, 45), (Parameter::K2, 45)] {
         let ratio = gain(map.at(3, tilt), map.at(10, tilt), p);
         let what = format!("bound of {p} at coverage 0.3 over that at 1.0, tilt {tilt} deg, coming nearer");
-        record.number(format!("{p}-gain-nearer-t{tilt}"), ratio, "", relative(), what);
+        record.group("", relative()).number(format!("{p}-gain-nearer-t{tilt}"), ratio, what);
     }
     let shown = row(scenes, SHOWN_MM, SHOWN_DEG);
     let ends = shown.first().zip(shown.last());
@@ -111,59 +113,36 @@ fn tell_numbers(record: &mut Record, map: &Map, scenes: &[Moved]) {
         let Some((least, most)) = ends else { continue };
         for (name, node) in [("least", least), ("most", most)] {
             let what = format!("bound of {p} at {SHOWN_MM} mm, {}", node.name());
-            record.number(format!("{p}-moved-{name}"), node.bound_sd(p), p.unit(), relative(), what);
+            record.group(p.unit(), relative()).number(format!("{p}-moved-{name}"), node.bound_sd(p), what);
         }
         let what = format!("bound of {p} at {SHOWN_MM} mm and {SHOWN_DEG} deg, least over most coverage");
-        record.number(format!("{p}-gain-moved"), gain(least, most, p), "", relative(), what);
+        record.group("", relative()).number(format!("{p}-gain-moved"), gain(least, most, p), what);
         let at = |mm: u32| row(scenes, mm, SHOWN_DEG).into_iter().find(|n| n.tenths == 8);
         if let Some((far, near)) = at(DISTANCES_MM[0]).zip(at(DISTANCES_MM[2])) {
             let what = format!(
                 "bound of {p} at {} mm over that at {} mm, coverage 0.8, tilt {SHOWN_DEG} deg",
                 DISTANCES_MM[0], DISTANCES_MM[2]
             );
-            record.number(format!("{p}-gain-distance"), gain(far, near, p), "", relative(), what);
+            record.group("", relative()).number(format!("{p}-gain-distance"), gain(far, near, p), what);
         }
     }
-    record.number(
-        "moved-distance",
-        f64::from(SHOWN_MM),
-        "mm",
-        Band::Exact,
-        "distance that the text speaks of",
-    );
+    record.exact("mm").number("moved-distance", f64::from(SHOWN_MM), "distance that the text speaks of");
     if let Some((least, _)) = ends {
-        record.number(
-            "moved-least-coverage",
-            least.coverage(),
-            "",
-            Band::Exact,
-            "least coverage at that distance",
-        );
+        record.exact("").number("moved-least-coverage", least.coverage(), "least coverage at that distance");
     }
 }
 
-fn table(scenes: &[Moved]) -> Table {
-    let columns = [
-        ("distance", "mm"),
-        ("tilt", "deg"),
-        ("coverage", ""),
-        ("k2_sd_bound", ""),
-        ("k2_sd_trials", ""),
-        ("fx_sd_bound", "px"),
-        ("fx_sd_trials", "px"),
-        ("converged", ""),
-    ];
+fn table(scenes: &[Moved]) -> Rows<&Moved> {
     let caption = "bound and trials with the target at one distance, each view moved towards another corner";
-    let mut table = Table::new("one-distance", caption, &columns);
-    for Moved { distance_mm, node: n } in scenes {
-        let place = [f64::from(*distance_mm), f64::from(n.tilt_deg), n.coverage()];
-        let k2 = [n.bound_sd(Parameter::K2), n.sampled_sd(Parameter::K2)];
-        let fx = [n.bound_sd(Parameter::Fx), n.sampled_sd(Parameter::Fx)];
-        let converged = Cell::from(n.outcome.converged());
-        let numbers = place.into_iter().chain(k2).chain(fx).map(Cell::from);
-        table.push(numbers.chain([converged]));
-    }
-    table
+    Table::of("one-distance", caption, scenes)
+        .column("distance", "mm", |m| f64::from(m.distance_mm))
+        .column("tilt", "deg", |m| f64::from(m.node.tilt_deg))
+        .column("coverage", "", |m| m.node.coverage())
+        .column("k2_sd_bound", "", |m| m.node.bound_sd(Parameter::K2))
+        .column("k2_sd_trials", "", |m| m.node.sampled_sd(Parameter::K2))
+        .column("fx_sd_bound", "px", |m| m.node.bound_sd(Parameter::Fx))
+        .column("fx_sd_trials", "px", |m| m.node.sampled_sd(Parameter::Fx))
+        .column("converged", "", |m| m.node.outcome.converged())
 }
 
 fn claim_attained(record: &mut Record, scenes: &[Moved]) {
@@ -175,16 +154,19 @@ fn claim_attained(record: &mut Record, scenes: &[Moved]) {
             (format!("{p}, {} mm, {}: {over}", m.distance_mm, m.node.name()), ratio.contains(over))
         })
     });
-    let claim = Claim::all_of(
-        "moved-attains-bound",
-        "at one distance too the spread of k2 and of fx equals the bound, wherever the bound of fx is below 3 %",
-        cases,
-        format!(
-            "sample deviation over {TRIALS} Gaussian values: ratio in [{:.4}, {:.4}], Bonferroni over both and all scenes",
+    record
+        .claim_that(
+            "moved-attains-bound",
+            "at one distance too the spread of k2 and of fx equals the bound, wherever the bound of fx is \
+             below 3 %",
+        )
+        .every("spreads", cases)
+        .at_rate(RATE)
+        .because(format!(
+            "sample deviation over {TRIALS} Gaussian values: ratio in [{:.4}, {:.4}], Bonferroni over both \
+             and all scenes",
             ratio.low, ratio.high
-        ),
-    );
-    record.claim(claim.over("spreads").with_false_alarm_rate(RATE));
+        ));
 }
 
 /// Moving the target outwards helps k2 and not the focal length; coming nearer helps the focal length.
@@ -202,24 +184,25 @@ fn claim_separate(record: &mut Record, scenes: &[Moved]) {
         let (before, after) = (a.bound_sd(p), b.bound_sd(p));
         (format!("{name}: {before} to {after}"), (after < before) == falls)
     };
-    record.claim(
-        Claim::all_of(
+    record
+        .claim_that(
             "corners-cure-k2",
             "at one distance the bound of k2 falls with every step towards the corners, at 20 and 45 degrees",
-            steps(&[20, 45]).iter().map(|step| compare(Parameter::K2, true, step)),
-            "the radius grows; at 5 degrees the camera itself gets lost among the corners, and k2 with it",
         )
-        .over("steps"),
-    );
-    record.claim(
-        Claim::all_of(
+        .every("steps", steps(&[20, 45]).iter().map(|step| compare(Parameter::K2, true, step)))
+        .because(
+            "the radius grows; at 5 degrees the camera itself gets lost among the corners, and k2 with it",
+        );
+    record
+        .claim_that(
             "corners-do-not-help-the-focal-length",
             "at one distance the bound of fx falls with no step towards the corners",
-            steps(&TILTS_DEG).iter().map(|step| compare(Parameter::Fx, false, step)),
-            "what tells f from Z is how much depths differ relative to the distance, and moving sideways changes neither",
         )
-        .over("steps"),
-    );
+        .every("steps", steps(&TILTS_DEG).iter().map(|step| compare(Parameter::Fx, false, step)))
+        .because(
+            "what tells f from Z is how much depths differ relative to the distance, and moving sideways \
+             changes neither",
+        );
     let nearer = TILTS_DEG.iter().flat_map(|&t| {
         DISTANCES_MM.windows(2).flat_map(move |mm| {
             let (far, near) = (row(scenes, mm[0], t), row(scenes, mm[1], t));
@@ -228,15 +211,13 @@ fn claim_separate(record: &mut Record, scenes: &[Moved]) {
             pairs.into_iter().map(move |(f, n)| (format!("{} to {} mm, {}", mm[0], mm[1], n.name()), f, n))
         })
     });
-    record.claim(
-        Claim::all_of(
+    record
+        .claim_that(
             "nearness-helps-the-focal-length",
             "at the same coverage and tilt the bound of fx falls as the target comes nearer",
-            nearer.collect::<Vec<_>>().iter().map(|step| compare(Parameter::Fx, true, step)),
-            "the same tilt makes depths differ more, relative to the distance",
         )
-        .over("steps"),
-    );
+        .every("steps", nearer.collect::<Vec<_>>().iter().map(|step| compare(Parameter::Fx, true, step)))
+        .because("the same tilt makes depths differ more, relative to the distance");
 }
 
 fn figure(map: &Map, scenes: &[Moved], seed: u64) -> Figure {
@@ -265,10 +246,21 @@ fn figure(map: &Map, scenes: &[Moved], seed: u64) -> Figure {
         panel("k2", "standard deviation of k2", Parameter::K2),
         panel("Focal length", "standard deviation of fx (px)", Parameter::Fx),
     ];
+    let shown = row(scenes, SHOWN_MM, SHOWN_DEG);
+    let over = |from: &Node, to: &Node, p: Parameter| from.bound_sd(p) / to.bound_sd(p);
+    let moved =
+        |p: Parameter| shown.first().zip(shown.last()).map_or(f64::NAN, |(least, most)| over(least, most, p));
+    let nearer = |p: Parameter| over(map.at(3, SHOWN_DEG), map.at(10, SHOWN_DEG), p);
     let caption = format!(
-        "Standard deviation of k2 and fx at a tilt of {SHOWN_DEG}\u{b0}: bound (lines) and {TRIALS} trials (points; noise 0.1 px, seed \
-         {seed}). Dotted: coverage won by coming nearer, as in the maps. Coloured: the target stays at one distance and each view is \
-         moved towards another corner. Notice that k2 falls either way, the focal length's only with the distance."
+        "Standard deviation of k2 and fx at a tilt of {SHOWN_DEG}\u{b0}: bound (lines) and {TRIALS} trials \
+         (points; noise {SIGMA_PX} px, seed {seed}). Dotted: coverage won by coming nearer, as in the maps. \
+         Coloured: the target stays at one distance and each view is moved towards another corner. Notice \
+         that at {SHOWN_MM} mm the least coverage has {:.1} times the bound of k2 of the most, and {:.2} \
+         times that of fx, where coming nearer makes {:.0} and {:.1}.",
+        moved(Parameter::K2),
+        moved(Parameter::Fx),
+        nearer(Parameter::K2),
+        nearer(Parameter::Fx)
     );
     Figure::panels("one-distance", &panels, 2, caption)
 }

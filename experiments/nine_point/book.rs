@@ -4,11 +4,13 @@ use super::*;
 
 pub const SPACING_ROUNDING_PX: f64 = 0.005;
 
-/// The mean of the nine centres, to 0.001 px: not printed, but it follows from the printed translation and scales.
+/// The mean of the nine centres, to 0.001 px: not printed, but it follows from the printed translation and
+/// scales.
 const CENTRE_PX: (f64, f64) = (714.708, 565.993);
 pub const CENTRE_ROUNDING_PX: f64 = 0.0005;
 
-/// Draws behind the distribution of the residuals' shape; one more leaves it with probability 2 / (TRIALS + 1) = 1e-4.
+/// Draws behind the distribution of the residuals' shape; one more leaves it with probability 2 / (TRIALS +
+/// 1) = 1e-4.
 pub const TRIALS: usize = 19_999;
 
 pub const FALSE_ALARM_RATE: f64 = 1e-4;
@@ -44,16 +46,19 @@ pub fn claim_published_consistent(record: &mut Record) -> Result<(), ExperimentE
         ("RMS in pixels", overlap(over(before_rounding("rms")?, both), before_rounding("rms-px")?)),
         ("maximum in pixels", overlap(over(before_rounding("max")?, both), before_rounding("max-px")?)),
     ];
-    record.claim(Claim::all_of(
-        "book-agrees-with-itself",
-        "the chapter's spacings, scales, translations and residuals follow from each other within their printed digits",
-        cases.map(|(name, held)| (name.to_string(), held)),
-        "interval arithmetic over half a unit of each last printed digit",
-    ).over("relations"));
+    record
+        .claim_that(
+            "book-agrees-with-itself",
+            "the chapter's spacings, scales, translations and residuals follow from each other within their \
+             printed digits",
+        )
+        .every("relations", cases)
+        .because("interval arithmetic over half a unit of each last printed digit");
     Ok(())
 }
 
-/// The size of a residual is the real image's, but largest over RMS of nine points is the same for any size of the noise.
+/// The size of a residual is the real image's, but largest over RMS of nine points is the same for any size
+/// of the noise.
 pub fn claim_residual_shape(record: &mut Record, context: &Context) -> Result<(), ExperimentError> {
     let key = StreamKey { seed: context.seed, scenario: "nine-point", trial: 0, purpose: "noise" };
     let mut stream = Stream::open(key);
@@ -69,61 +74,65 @@ pub fn claim_residual_shape(record: &mut Record, context: &Context) -> Result<()
         ratios.push((largest * 9.0 / squares.iter().sum::<f64>()).sqrt());
     }
     let ratio = entry("max")?.value() / entry("rms")?.value();
-    record.number("book-max-over-rms", ratio, "", Band::Exact, "largest over RMS residual, as published");
+    record.exact("").number("book-max-over-rms", ratio, "largest over RMS residual, as published");
     let predicted = Predicted::from_draws(&ratios, 1, "affine fits of nine points with Gaussian errors");
-    record.claim(Claim::drawn_from(
-        "book-residuals-look-like-noise",
-        "the published largest residual stands to the RMS as it does for nine centres with Gaussian errors",
-        ratio,
-        &predicted,
-        FALSE_ALARM_RATE,
-        "the ratio does not depend on the size of the errors",
-    ));
+    record
+        .claim_that(
+            "book-residuals-look-like-noise",
+            "the published largest residual stands to the RMS as it does for nine centres with Gaussian \
+             errors",
+        )
+        .drawn_from(ratio, &predicted, FALSE_ALARM_RATE)
+        .because("the ratio does not depend on the size of the errors");
     Ok(())
 }
 
 /// Printed numbers that follow from other printed ones.
-pub fn tell_derived(record: &mut Record) -> Result<(), ExperimentError> {
+pub fn report_derived(record: &mut Record) -> Result<(), ExperimentError> {
     let value = |id: &str| entry(id).map(Entry::value);
     let per_px = 0.5 * (value("sx")? + value("sy")?);
     let rounding = || Band::relative(1e-12, "a few operations on printed digits");
-    let mut tell = |id: &str, value: f64, unit: &str, what: &str| {
-        record.number(id, value, unit, rounding(), what);
+    let mut number = |id: &str, value: f64, unit: &str, what: &str| {
+        record.group(unit, rounding()).number(id, value, what);
     };
-    tell("rms-px", value("rms")? / per_px, "px", "printed residual RMS over the mean printed scale");
-    tell("max-px", value("max")? / per_px, "px", "printed largest residual over the mean printed scale");
+    number("rms-px", value("rms")? / per_px, "px", "printed residual RMS over the mean printed scale");
+    number("max-px", value("max")? / per_px, "px", "printed largest residual over the mean printed scale");
     let gap =
         |ours: &str, gui: &str| -> Result<f64, ExperimentError> { Ok((value(gui)? - value(ours)?).abs()) };
-    tell("gui-gap", gap("tx", "gui-tx")?, "", "gap of the two printed translations along x");
-    tell("gui-gap-y", gap("ty", "gui-ty")?, "", "gap of the two printed translations along y");
+    number("gui-gap", gap("tx", "gui-tx")?, "", "gap of the two printed translations along x");
+    number("gui-gap-y", gap("ty", "gui-ty")?, "", "gap of the two printed translations along y");
     Ok(())
 }
 
 /// Accuracy to which the chapter says that the two programs' scales agree.
 const SAID_TO_AGREE: f64 = 1e-6;
 
-/// The chapter says that the linear coefficients and scales of both programs agree to the level of 1e-6. Differences of scales are to
-/// be judged relative to the scale: 1e-6 units a pixel is one part in four thousand.
+/// The chapter says that the linear coefficients and scales of both programs agree to the level of 1e-6.
+/// Differences of scales are to be judged relative to the scale: 1e-6 units a pixel is one part in four
+/// thousand.
 pub fn claim_scales_differ(record: &mut Record) -> Result<(), ExperimentError> {
     let value = |id: &str| entry(id).map(Entry::value);
     let rounding = || Band::relative(1e-9, "a difference of printed digits");
     for (axis, ours, gui) in [("x", "sx", "gui-sx"), ("y", "sy", "gui-sy")] {
         let relative = (value(gui)? / value(ours)? - 1.0).abs();
         let what = format!("relative difference of the two printed scales along {axis}");
-        record.number(format!("gui-scale-{axis}-percent"), 100.0 * relative, "%", rounding(), what);
+        record.group("%", rounding()).number(format!("gui-scale-{axis}-percent"), 100.0 * relative, what);
         // A cell of the grid is one unit: 1 / s pixels.
         let px = relative / value(ours)?;
         let what = format!("what that makes of one spacing along {}", if axis == "x" { "u" } else { "v" });
-        record.number(format!("gui-scale-{axis}-px"), px, "px", rounding(), what);
+        record.group("px", rounding()).number(format!("gui-scale-{axis}-px"), px, what);
     }
     let (sy, gui) = (before_rounding("sy")?, before_rounding("gui-sy")?);
-    record.claim(Claim::at_least(
-        "scales-do-not-agree-to-a-millionth",
-        "the two printed scales along y differ by far more than a millionth of their value",
-        (gui.0 / sy.1 - 1.0).abs().min((gui.1 / sy.0 - 1.0).abs()),
-        SAID_TO_AGREE,
-        "the smallest relative difference that the printed digits allow, against the accuracy that the chapter states",
-    ));
+    record
+        .claim_that(
+            "scales-do-not-agree-to-a-millionth",
+            "the two printed scales along y differ by far more than a millionth of their value",
+        )
+        .at_least((gui.0 / sy.1 - 1.0).abs().min((gui.1 / sy.0 - 1.0).abs()), SAID_TO_AGREE)
+        .because(
+            "the smallest relative difference that the printed digits allow, against the accuracy that the \
+             chapter states",
+        );
     Ok(())
 }
 
@@ -131,25 +140,25 @@ pub fn reconcile(record: &mut Record, stand_in: &str) -> Result<(), ExperimentEr
     let relative = (SPACING_ROUNDING_PX + DETECTION_PX) / SPACING_PX.1;
     let pixels = "; tolerance from the printed digits and 0.005 px of detection";
     for id in ["image-width", "image-height"] {
-        record.reconcile_within(id, 0.0, stand_in)?;
+        record.reconcile(id).near_printed(0.0, stand_in);
     }
     for id in ["spacing", "spacing-rows", "spacing-columns", "m11", "m22", "sx", "sy"] {
         let entry = entry(id)?;
         let tolerance = entry.rounding() + relative * entry.value().abs();
-        record.reconcile_within(id, tolerance, format!("{stand_in}{pixels}"))?;
+        record.reconcile(id).near_printed(tolerance, format!("{stand_in}{pixels}"));
     }
     for id in ["tx", "ty"] {
         let entry = entry(id)?;
         let shift = (CENTRE_ROUNDING_PX + DETECTION_PX) / SPACING_PX.1;
         let tolerance = entry.rounding() + relative * entry.value().abs() + shift;
-        record.reconcile_within(id, tolerance, format!("{stand_in}{pixels}"))?;
+        record.reconcile(id).near_printed(tolerance, format!("{stand_in}{pixels}"));
     }
     for id in GUI {
         let reason = "affine fit to centres on half pixels near ours; must print the published digits";
-        record.reconcile_within(id, entry(id)?.rounding(), reason)?;
+        record.reconcile(id).near_printed(entry(id)?.rounding(), reason);
     }
     for id in ["rms-px", "max-px", "gui-gap"] {
-        record.reconcile_exact(id)?;
+        record.reconcile(id).rounds_to_printed();
     }
     Ok(())
 }

@@ -18,12 +18,12 @@ pub fn gui_numbers(centres: &[Vec2], world: &[Vec2]) -> Result<[f64; 6], Experim
 /// Centres on half pixels, counted from an origin.
 pub struct HalfPixels {
     pub name: &'static str,
-    /// What is added to our coordinates before rounding: 0 where pixel (0, 0) is the first pixel's centre, 0.5 where it is its
-    /// corner.
+    /// What is added to our coordinates before rounding: 0 where pixel (0, 0) is the first pixel's centre,
+    /// 0.5 where it is its corner.
     pub origin_px: f64,
     pub rounded: Vec<Vec2>,
-    /// The fewest coordinates that must be rounded to the other neighbour for all six printed numbers; `None` up to
-    /// [`MOST_MOVES`].
+    /// The fewest coordinates that must be rounded to the other neighbour for all six printed numbers; `None`
+    /// up to [`MOST_MOVES`].
     pub moves: Option<usize>,
     pub tried: usize,
     /// All sets of centres with that few moves that print the GUI's numbers.
@@ -95,51 +95,51 @@ pub fn explain_gui(
     ];
     record.table(hypotheses_table(&hypotheses)?);
     let [from_centre, from_corner] = &hypotheses;
-    record.claim(Claim::all_of(
-        "gui-is-half-pixels-from-the-corner",
-        "centres rounded to half pixels and counted from the first pixel's corner print all six numbers of the GUI, counted \
-         from its centre they do not",
-        [
-            ("from the corner".to_string(), from_corner.moves.is_some()),
-            ("not from the centre".to_string(), from_centre.moves.is_none()),
-        ],
-        "exhaustive search: at most 3 of 18 coordinates rounded to the other neighbour, every printed digit compared",
-    ));
+    record
+        .claim_that(
+            "gui-is-half-pixels-from-the-corner",
+            "centres rounded to half pixels and counted from the first pixel's corner print all six numbers \
+             of the GUI, counted from its centre they do not",
+        )
+        .every(
+            "cases",
+            [
+                ("from the corner".to_string(), from_corner.moves.is_some()),
+                ("not from the centre".to_string(), from_centre.moves.is_none()),
+            ],
+        )
+        .because(
+            "exhaustive search: at most 3 of 18 coordinates rounded to the other neighbour, every printed \
+             digit compared",
+        );
     // Rounding alone moves each centre by a quarter of a pixel at most, so their mean as well.
     let rounding = 0.25 * fit.scale_x;
     let gap_x = (entry("gui-tx")?.value() - entry("tx")?.value()).abs();
-    record.number(
-        "gui-gap-by-rounding-at-most",
-        rounding,
-        "",
-        band.clone(),
-        "translation that rounding can explain",
-    );
-    record.number(
-        "gui-gap-by-origin",
-        0.5 * fit.scale_x,
-        "",
-        band.clone(),
-        "translation by half a pixel of the origin",
-    );
-    record.claim(Claim::at_least(
-        "rounding-alone-is-too-small",
-        "the published gap along x is more than rounding every centre to half pixels can move the mean",
-        gap_x - rounding,
-        entry("tx")?.rounding() + entry("gui-tx")?.rounding(),
-        "a quarter of a pixel times the scale; half a unit of the last printed digits",
-    ));
+    record
+        .group("", band.clone())
+        .number("gui-gap-by-rounding-at-most", rounding, "translation that rounding can explain")
+        .number("gui-gap-by-origin", 0.5 * fit.scale_x, "translation by half a pixel of the origin");
+    record
+        .claim_that(
+            "rounding-alone-is-too-small",
+            "the published gap along x is more than rounding every centre to half pixels can move the mean",
+        )
+        .at_least(gap_x - rounding, entry("tx")?.rounding() + entry("gui-tx")?.rounding())
+        .because("a quarter of a pixel times the scale; half a unit of the last printed digits");
 
     let set = from_corner.nearest(centres).unwrap_or(&from_corner.rounded);
     let numbers = gui_numbers(set, &unit_grid())?;
     for ((id, number), unit) in GUI.iter().zip(numbers).zip(["1/px", "1/px", "", "", "1/px", "1/px"]) {
         let what = format!("{}, from centres on half pixels", entry(id)?.what);
-        record.number(*id, number, unit, band.clone(), what);
+        record.group(unit, band.clone()).number(*id, number, what);
     }
     let middle = mean(set);
     let exact = Band::absolute(ROUNDING, "a mean of nine multiples of 0.5");
-    record.number("gui-centre-u-18ths", 18.0 * (middle.x - 715.0), "px/18", exact.clone(), "mean u less 715");
-    record.number("gui-centre-v-18ths", 18.0 * (middle.y - 566.0), "px/18", exact, "mean v less 566");
+    record
+        .group("px/18", exact.clone())
+        .number("gui-centre-u-18ths", 18.0 * (middle.x - 715.0), "mean u less 715")
+        .band(exact)
+        .number("gui-centre-v-18ths", 18.0 * (middle.y - 566.0), "mean v less 566");
     let mut table = Table::new(
         "gui-centres",
         "centres on half pixels that print the GUI's six numbers, nearest to ours",
@@ -151,19 +151,18 @@ pub fn explain_gui(
     record.table(table);
     record.figure(gui_figure(centres, set));
     let moved = from_corner.moves.unwrap_or(0);
-    record.number(
+    record.exact("").count(
         "gui-moved",
-        moved as f64,
-        "",
-        Band::Exact,
+        moved,
         "coordinates of the stand-in that must be rounded to the other neighbour for all six printed numbers",
     );
     record.note(format!(
-        "The GUI's six printed numbers are those of an affine fit to half-pixel centres, counted from the corner of the first \
-         pixel; of the stand-in's 18 coordinates {moved} must be rounded to the other neighbour for that. The translations \
-         printed differ by {gap_x:.5} along x, of which half a pixel of the origin makes {:.5}; rounding alone moves the mean by \
-         less than {rounding:.5}. The chapter names the rounding only. Mean v is 566 + 8/18: read from translation and scale \
-         alone it seems to be 566.19, because a dot rounded the other way tilts the map.",
+        "The GUI's six printed numbers are those of an affine fit to half-pixel centres, counted from the \
+         corner of the first pixel; of the stand-in's 18 coordinates {moved} must be rounded to the other \
+         neighbour for that. The translations printed differ by {gap_x:.5} along x, of which half a pixel \
+         of the origin makes {:.5}; rounding alone moves the mean by less than {rounding:.5}. The chapter \
+         names the rounding only. Mean v is 566 + 8/18: read from translation and scale alone it seems to \
+         be 566.19, because a dot rounded the other way tilts the map.",
         0.5 * fit.scale_x
     ));
     Ok(())
@@ -173,8 +172,8 @@ pub fn hypotheses_table(hypotheses: &[HalfPixels]) -> Result<Table, ExperimentEr
     let mut columns = vec![("origin", ""), ("sets_tried", ""), ("fewest_moves", ""), ("sets_that_match", "")];
     let names: Vec<String> = GUI.iter().map(|id| format!("rounded_{}", id.replace('-', "_"))).collect();
     columns.extend(names.iter().map(|name| (name.as_str(), "")));
-    let caption = "half-pixel centres by the place of the origin: sets of at most three other roundings that print the GUI's six \
-                   numbers, and the numbers of plain rounding";
+    let caption = "half-pixel centres by the place of the origin: sets of at most three other roundings \
+                   that print the GUI's six numbers, and the numbers of plain rounding";
     let mut table = Table::new("gui-origins", caption, &columns);
     for h in hypotheses {
         let moves = h.moves.map_or(Cell::from("none"), Cell::from);
@@ -186,6 +185,7 @@ pub fn hypotheses_table(hypotheses: &[HalfPixels]) -> Result<Table, ExperimentEr
 }
 
 pub fn gui_figure(centres: &[Vec2], gui: &[Vec2]) -> Figure {
+    let apart = mean(gui) - mean(centres);
     let shifts: Vec<(f64, f64)> = centres.iter().zip(gui).map(|(c, g)| (g.x - c.x, g.y - c.y)).collect();
     let square = |at: f64| {
         [
@@ -205,15 +205,12 @@ pub fn gui_figure(centres: &[Vec2], gui: &[Vec2]) -> Figure {
         .line_as("rounding to half pixels", &square(0.0), Look::series(0))
         .line_as("the same from the pixel's corner", &square(0.5), Look::series(1))
         .points_as("nine centres", &shifts, Look::series(2))
-        .points_as(
-            "mean",
-            &[{
-                let m = mean(gui) - mean(centres);
-                (m.x, m.y)
-            }],
-            Look::series(3).size(6.0),
-        );
-    let caption = "Half-pixel centres that print the GUI's six numbers, less ours, in pixels; nothing is drawn at random. Notice \
-                   that their mean lies half a pixel away in both directions: the origin differs, not the rounding alone.";
+        .points_as("mean", &[(apart.x, apart.y)], Look::series(3).size(6.0));
+    let caption = format!(
+        "Half-pixel centres that print the GUI's six numbers, less ours, in pixels; nothing is drawn at \
+         random. Notice that their mean lies {:.2} px away along u and {:.2} px along v, where rounding \
+         alone moves it by a quarter of a pixel at most: the origin differs.",
+        apart.x, apart.y
+    );
     Figure::plot("gui-shift", &plot, caption)
 }

@@ -13,10 +13,11 @@ impl Shown {
     pub fn new(context: &Context, record: &mut Record) -> Result<Shown, ExperimentError> {
         let Some(path) = &context.image else {
             record.note(
-                "The published image is not available: this is a STAND-IN, rendered from the published size and spacings and \
-                 the centre that follows from the published matrix, without distortion and noise (dot diameter: a quarter of the spacing, not published). That its matrix \
-                 agrees with the book's shows that the chapter's numbers agree with each other and with our detector, not what \
-                 the real image holds.",
+                "The published image is not available: this is a STAND-IN, rendered from the published size \
+                 and spacings and the centre that follows from the published matrix, without distortion and \
+                 noise (dot diameter: a quarter of the spacing, not published). That its matrix agrees with \
+                 the book's shows that the chapter's numbers agree with each other and with our detector, \
+                 not what the real image holds.",
             );
             let photograph = nine_dot_stand_in();
             // A camera's file has 8 bits.

@@ -120,14 +120,16 @@ impl GoldenFile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use calibench_harness::{Band, Claim, Record};
+    use calibench_harness::{Band, Record};
 
     #[test]
     fn what_a_record_locks_is_read_back() {
         let mut record = Record::new("line-bending", 5);
-        record.number("max-deviation", 4.677_75, "px", Band::absolute(1e-9, "rounding"), "");
-        record.reconcile_exact("max-deviation").unwrap();
-        record.claim(Claim::at_most("c", "s", 0.0, 1.0, "r"));
+        record
+            .group("px", Band::absolute(1e-9, "rounding"))
+            .number("max-deviation", 4.677_75, "")
+            .rounds_to_printed();
+        record.claim_that("c", "s").at_most(0.0, 1.0).because("r");
         let read = GoldenFile::read(&golden::file_text(&record));
         assert_eq!(read.seed, 5);
         let (row, number) = read.number("max-deviation").unwrap();

@@ -82,13 +82,12 @@ fn number(value: f64) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Band, Claim};
 
     #[test]
     fn a_number_that_is_not_finite_is_written_as_a_word() {
         let mut record = Record::new("e", 1);
-        record.number("n", f64::INFINITY, "px", Band::Exact, "");
-        record.claim(Claim::at_most("c", "", 0.0, 1.0, ""));
+        record.exact("px").number("n", f64::INFINITY, "");
+        record.claim_that("c", "").at_most(0.0, 1.0).because("");
         let json = record_json(&record, &Build::default());
         assert_eq!(json["numbers"][0]["value"], "inf");
         assert_eq!(json["claims"][0]["interval"], json!(["-inf", 1.0]));

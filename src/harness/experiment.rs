@@ -138,7 +138,6 @@ fn message(payload: &(dyn Any + Send)) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Claim;
 
     fn experiment(run: fn(&Context) -> Result<Record, ExperimentError>) -> Experiment {
         Experiment { id: "e", title: "", question: "", seed: 5, takes_image: false, run }
@@ -151,7 +150,7 @@ mod tests {
         assert!(matches!(result, Err(ExperimentError::Record(RecordError::NoClaim(_)))));
         let complete = experiment(|context| {
             let mut record = context.record();
-            record.claim(Claim::at_most("c", "", 0.0, 1.0, ""));
+            record.claim_that("c", "").at_most(0.0, 1.0).because("");
             Ok(record)
         });
         let record = complete.execute(&Context::of(&complete).with_seed(9)).unwrap();

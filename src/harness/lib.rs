@@ -1,4 +1,5 @@
-//! How does a question become a locked, judged and readable result? Experiments, records, claims, figures, golden values.
+//! How does a question become a locked, judged and readable result? Experiments, records, claims, figures,
+//! golden values.
 //!
 //! ```text
 //! Experiment --run(Context)--> Record { numbers, tables, figures, claims, reconciliations }
@@ -10,7 +11,7 @@
 //!
 //! # Adding an experiment
 //! 1. `experiments/<name>.rs`: `pub const EXPERIMENT: Experiment`, and a `run(&Context) -> Result<Record, ExperimentError>` that
-//!    tells numbers, claims, tables and figures.
+//!    reports numbers, claims, tables and figures.
 //! 2. Three registrations: `mod` and table entry in `experiments/lib.rs`, and its own binary in `experiments/bin`.
 //! 3. `calibench run <id>`, read and look; then `calibench bless <id>` and commit golden/ and figures/.
 //!
@@ -24,6 +25,7 @@ pub mod figure;
 pub mod fingerprint;
 pub mod golden;
 pub mod monte_carlo;
+mod numbers;
 mod predicted;
 mod progress;
 pub mod project;
@@ -33,18 +35,20 @@ mod reconcile;
 mod record;
 pub mod resources;
 mod simulated;
+pub mod stats;
 mod table;
 pub mod verdict;
 
 pub use band::Band;
-pub use claim::{Cases, Claim};
+pub use claim::{Cases, Claim, ClaimDraft};
 pub use emit::{emit, record_json};
 pub use experiment::{Context, Experiment, ExperimentError};
 pub use figure::{Dash, Figure, HeatMap, Look, Marker, Plot};
 pub use monte_carlo::{MonteCarlo, Outcome};
+pub use numbers::Numbers;
 pub use predicted::Predicted;
 pub use progress::{Progress, ProgressDisplay};
 pub use provenance::Build;
 pub use reconcile::{Expectation, Reconciliation};
 pub use record::{Input, Number, Record, RecordError};
-pub use table::{Cell, Column, Table};
+pub use table::{Cell, Column, Rows, Table};

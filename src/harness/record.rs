@@ -3,7 +3,6 @@
 use super::band::Band;
 use super::claim::Claim;
 use super::figure::Figure;
-use super::predicted::Predicted;
 use super::published::{self, Entry, PublishedError, Rule};
 use super::reconcile::Reconciliation;
 use super::table::Table;
@@ -12,7 +11,8 @@ use calibench::io::hash::sha256_hex;
 /// A named number, locked in golden/.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Number {
-    /// Name within the experiment, in kebab-case; the book and `published.toml` know it as `<experiment>.<id>`.
+    /// Name within the experiment, in kebab-case; the book and `published.toml` know it as
+    /// `<experiment>.<id>`.
     pub id: String,
     /// The value.
     pub value: f64,
@@ -33,7 +33,7 @@ pub struct Input {
     pub sha256: String,
 }
 
-/// The result of one run of one experiment, in the order in which it was told.
+/// The result of one run of one experiment, in the order in which it was recorded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
     experiment: String,
@@ -45,6 +45,8 @@ pub struct Record {
     reconciliations: Vec<Reconciliation>,
     inputs: Vec<Input>,
     notes: Vec<String>,
+    /// What is wrong with a reconciliation, reported when the record is closed.
+    mistakes: Vec<RecordError>,
 }
 
 /// A record that contradicts itself or `published.toml`: a mistake in the experiment's file.
@@ -62,7 +64,8 @@ pub enum RecordError {
     },
     /// A name that is not lower-case letters, digits, `-` and `.`.
     #[error(
-        "`{0}` is no name for a number, claim, table or figure: use lower-case letters, digits, `-` and `.`"
+        "`{0}` is no name for a number, claim, table or figure: use lower-case letters, digits, `-` and \
+         `.`"
     )]
     Name(String),
     /// An experiment without a claim shows nothing.
@@ -72,7 +75,11 @@ pub enum RecordError {
     #[error("number `{0}` is not in the record yet: add it before it is reconciled")]
     NoSuchNumber(String),
     /// A number is reconciled by another rule than `published.toml` asks for.
-    #[error("published value `{id}` has the rule `{}`, but was reconciled as `{}`", expected.map_or("none", Rule::name), got.name())]
+    #[error(
+        "published value `{id}` has the rule `{}`, but was reconciled as `{}`",
+        expected.map_or("none", Rule::name),
+        got.name()
+    )]
     Rule {
         /// `<experiment>.<number>`.
         id: String,
@@ -111,26 +118,30 @@ impl Record {
             reconciliations: Vec::new(),
             inputs: Vec::new(),
             notes: Vec::new(),
+            mistakes: Vec::new(),
         }
     }
 
-    /// Adds a number and gives its value back.
-    pub fn number(
-        &mut self,
-        id: impl Into<String>,
-        value: f64,
-        unit: impl Into<String>,
-        band: Band,
-        description: impl Into<String>,
-    ) -> f64 {
-        let (id, unit, description) = (id.into(), unit.into(), description.into());
-        self.numbers.push(Number { id, value, unit, band, description });
-        value
+    pub(super) fn add_number(&mut self, number: Number) {
+        self.numbers.push(number);
     }
 
-    /// Adds a table.
-    pub fn table(&mut self, table: Table) {
-        self.tables.push(table);
+    /// Holds a number against the published value of the same name.
+    pub(super) fn hold_against_printed(
+        &mut self,
+        id: &str,
+        rule: Rule,
+        judge: impl FnOnce(&Entry, f64) -> Reconciliation,
+    ) {
+        match self.published(id, rule) {
+            Ok((entry, ours)) => self.reconciliations.push(judge(entry, ours)),
+            Err(mistake) => self.mistakes.push(mistake),
+        }
+    }
+
+    /// Adds a table, or rows with their columns.
+    pub fn table(&mut self, table: impl Into<Table>) {
+        self.tables.push(table.into());
     }
 
     /// Adds a figure.
@@ -138,8 +149,7 @@ impl Record {
         self.figures.push(figure);
     }
 
-    /// Adds a claim.
-    pub fn claim(&mut self, claim: Claim) {
+    pub(super) fn add_claim(&mut self, claim: Claim) {
         self.claims.push(claim);
     }
 
@@ -151,39 +161,6 @@ impl Record {
     /// Adds a remark for the reader, such as that a stand-in was used.
     pub fn note(&mut self, note: impl Into<String>) {
         self.notes.push(note.into());
-    }
-
-    /// Holds number `id` against the published value of the same name: ours must round to the printed digits.
-    pub fn reconcile_exact(&mut self, id: &str) -> Result<(), RecordError> {
-        let (entry, ours) = self.published(id, Rule::Exact)?;
-        self.reconciliations.push(Reconciliation::exact(entry, ours));
-        Ok(())
-    }
-
-    /// Holds number `id` and the published value of the same name against a predicted distribution, each at
-    /// `false_alarm_rate`.
-    pub fn reconcile_sampled(
-        &mut self,
-        id: &str,
-        predicted: Predicted,
-        false_alarm_rate: f64,
-    ) -> Result<(), RecordError> {
-        let (entry, ours) = self.published(id, Rule::Sampled)?;
-        self.reconciliations.push(Reconciliation::sampled(entry, ours, predicted, false_alarm_rate));
-        Ok(())
-    }
-
-    /// Holds number `id` against the published value of the same name: ours must come within `tolerance`, and `reason` says
-    /// where that comes from.
-    pub fn reconcile_within(
-        &mut self,
-        id: &str,
-        tolerance: f64,
-        reason: impl Into<String>,
-    ) -> Result<(), RecordError> {
-        let (entry, ours) = self.published(id, Rule::Within)?;
-        self.reconciliations.push(Reconciliation::within(entry, ours, tolerance, reason.into()));
-        Ok(())
     }
 
     /// The value that the book prints for number `id`, to be drawn beside ours.
@@ -256,6 +233,9 @@ impl Record {
         if self.claims.is_empty() {
             return Err(RecordError::NoClaim(self.experiment.clone()));
         }
+        if let Some(mistake) = self.mistakes.first() {
+            return Err(mistake.clone());
+        }
         self.unique("numbers", self.numbers.iter().map(|n| n.id.as_str()))?;
         self.unique("claims", self.claims.iter().map(|c| c.id.as_str()))?;
         self.unique("tables", self.tables.iter().map(|t| t.name.as_str()))?;
@@ -290,7 +270,7 @@ mod tests {
 
     fn with_claim() -> Record {
         let mut record = Record::new("line-bending", 0);
-        record.claim(Claim::at_most("c", "zero is small", 0.0, 1.0, "definition"));
+        record.claim_that("c", "zero is small").at_most(0.0, 1.0).because("definition");
         record
     }
 
@@ -299,28 +279,10 @@ mod tests {
         assert_eq!(Record::new("e", 0).validate(), Err(RecordError::NoClaim("e".into())));
         let mut record = with_claim();
         assert_eq!(record.validate(), Ok(()));
-        record.number("n", 1.0, "px", Band::Exact, "");
-        record.number("n", 2.0, "px", Band::Exact, "");
+        record.exact("px").number("n", 1.0, "").number("n", 2.0, "");
         assert!(matches!(record.validate(), Err(RecordError::Duplicate { what: "numbers", .. })));
         let mut record = with_claim();
-        record.number("Not | a name", 1.0, "", Band::Exact, "");
+        record.exact("").number("Not | a name", 1.0, "");
         assert!(matches!(record.validate(), Err(RecordError::Name(_))));
-    }
-
-    #[test]
-    fn only_a_published_number_is_reconciled_and_only_by_its_rule() {
-        let mut record = with_claim();
-        let missing = record.reconcile_exact("max-deviation");
-        assert_eq!(missing, Err(RecordError::NoSuchNumber("max-deviation".into())));
-        record.number("max-deviation", 4.677_75, "px", Band::Exact, "");
-        record.number("other", 1.0, "px", Band::Exact, "");
-        assert!(matches!(
-            record.reconcile_exact("other"),
-            Err(RecordError::Published(PublishedError::Unknown(_)))
-        ));
-        let wrong = record.reconcile_within("max-deviation", 1.0, "nothing");
-        assert!(matches!(wrong, Err(RecordError::Rule { expected: Some(Rule::Exact), .. })));
-        record.reconcile_exact("max-deviation").unwrap();
-        assert!(record.reconciliations()[0].held());
     }
 }

@@ -136,6 +136,47 @@ impl Table {
     }
 }
 
+/// A table whose columns are being said, each with its name, its unit and the cell it takes from a row: what
+/// belongs together stands in one line, which a struct with a field, a unit and a value for each column would
+/// need three places for.
+#[derive(Debug)]
+pub struct Rows<R> {
+    table: Table,
+    rows: Vec<R>,
+}
+
+impl Table {
+    /// Begins a table of such rows; [`Record::table`](super::Record::table) takes it once all columns are
+    /// said.
+    pub fn of<R>(
+        name: impl Into<String>,
+        caption: impl Into<String>,
+        rows: impl IntoIterator<Item = R>,
+    ) -> Rows<R> {
+        let rows: Vec<R> = rows.into_iter().collect();
+        let mut table = Table::new(name, caption, &[]);
+        table.rows = vec![Vec::new(); rows.len()];
+        Rows { table, rows }
+    }
+}
+
+impl<R> Rows<R> {
+    /// Adds a column.
+    pub fn column<C: Into<Cell>>(mut self, name: &str, unit: &str, cell: impl Fn(&R) -> C) -> Rows<R> {
+        self.table.columns.push(Column { name: name.to_string(), unit: unit.to_string() });
+        for (row, cells) in self.rows.iter().zip(&mut self.table.rows) {
+            cells.push(cell(row).into());
+        }
+        self
+    }
+}
+
+impl<R> From<Rows<R>> for Table {
+    fn from(rows: Rows<R>) -> Table {
+        rows.table
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -147,6 +188,13 @@ mod tests {
         table.push([Cell::from(1.0 / 3.0), Cell::from(2usize)]);
         assert_eq!(table.to_csv(), "u [px],label\n0.1,\"a, b\"\n0.3333333333333333,2\n");
         assert!(table.validate().is_ok());
+    }
+
+    #[test]
+    fn columns_take_their_cells_from_rows() {
+        let rows = [(0.1, "a, b"), (1.0 / 3.0, "c")];
+        let table = Table::of("t", "two rows", rows).column("u", "px", |r| r.0).column("label", "", |r| r.1);
+        assert_eq!(Table::from(table).to_csv(), "u [px],label\n0.1,\"a, b\"\n0.3333333333333333,c\n");
     }
 
     #[test]

@@ -183,12 +183,12 @@ impl Verdict {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Band, Claim};
+    use crate::Band;
 
     fn record(value: f64) -> Record {
         let mut record = Record::new("e", 0);
-        record.number("n", value, "px", Band::absolute(0.1, "test"), "");
-        record.claim(Claim::at_most("small", "n is small", value, 1.0, "test"));
+        record.group("px", Band::absolute(0.1, "test")).number("n", value, "");
+        record.claim_that("small", "n is small").at_most(value, 1.0).because("test");
         record
     }
 

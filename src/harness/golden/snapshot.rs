@@ -114,7 +114,7 @@ mod tests {
     #[test]
     fn the_header_of_a_snapshot_file_is_taken_off() {
         let mut record = Record::new("e", 3);
-        record.claim(Claim::at_most("c", "with | bar\nand break", 0.0, 1.0, "definition"));
+        record.claim_that("c", "with | bar\nand break").at_most(0.0, 1.0).because("definition");
         let text = snapshot(&record);
         assert_eq!(contents(&file_text(&record)), text);
         assert_eq!(contents(&text), text);

@@ -2,16 +2,22 @@
 
 use super::*;
 
-pub fn tell_geometry(record: &mut Record, image: &Raster<f32>, centres: &[Vec2], band: Band) {
-    record.number("image-width", image.width() as f64, "px", Band::Exact, "width of the image");
-    record.number("image-height", image.height() as f64, "px", Band::Exact, "height of the image");
+pub fn report_geometry(record: &mut Record, image: &Raster<f32>, centres: &[Vec2], band: Band) {
     let (along, between) = spacings(centres);
-    record.number("spacing", 0.5 * (along + between), "px", band.clone(), "mean spacing of the dots");
-    record.number("spacing-rows", between, "px", band.clone(), "mean spacing from row to row");
-    record.number("spacing-columns", along, "px", band.clone(), "mean spacing from column to column");
+    record
+        .exact("px")
+        .count("image-width", image.width(), "width of the image")
+        .count("image-height", image.height(), "height of the image")
+        .band(band.clone())
+        .number("spacing", 0.5 * (along + between), "mean spacing of the dots")
+        .number("spacing-rows", between, "mean spacing from row to row")
+        .number("spacing-columns", along, "mean spacing from column to column");
     let mean = mean(centres);
-    record.number("centre-u", mean.x, "px", band.clone(), "mean of the nine centres, u");
-    record.number("centre-v", mean.y, "px", band, "mean of the nine centres, v");
+    record
+        .group("px", band.clone())
+        .number("centre-u", mean.x, "mean of the nine centres, u")
+        .band(band)
+        .number("centre-v", mean.y, "mean of the nine centres, v");
 }
 
 /// Mean distance of neighbours along the rows, and from row to row.
@@ -24,17 +30,17 @@ pub fn spacings(centres: &[Vec2]) -> (f64, f64) {
     (along_rows, row_to_row)
 }
 
-pub fn tell_planar(record: &mut Record, fit: &PlaneCalibration, band: Band) {
+pub fn report_planar(record: &mut Record, fit: &PlaneCalibration, band: Band) {
     let m = fit.map.matrix();
-    let mut tell = |id: &str, value: f64, unit: &str, what: &str| {
-        record.number(id, value, unit, band.clone(), what);
+    let mut number = |id: &str, value: f64, unit: &str, what: &str| {
+        record.group(unit, band.clone()).number(id, value, what);
     };
-    tell("m11", m[(0, 0)], "1/px", "matrix, row 1, column 1");
-    tell("m22", m[(1, 1)], "1/px", "matrix, row 2, column 2");
-    tell("tx", m[(0, 2)], "", "matrix, translation along x");
-    tell("ty", m[(1, 2)], "", "matrix, translation along y");
-    tell("sx", fit.scale_x, "1/px", "scale along u");
-    tell("sy", fit.scale_y, "1/px", "scale along v");
+    number("m11", m[(0, 0)], "1/px", "matrix, row 1, column 1");
+    number("m22", m[(1, 1)], "1/px", "matrix, row 2, column 2");
+    number("tx", m[(0, 2)], "", "matrix, translation along x");
+    number("ty", m[(1, 2)], "", "matrix, translation along y");
+    number("sx", fit.scale_x, "1/px", "scale along u");
+    number("sy", fit.scale_y, "1/px", "scale along v");
     let fine = Band::absolute(1e-8, "centres repeat to 1e-6 px, 4e-9 units");
     let per_px = 0.5 * (fit.scale_x + fit.scale_y);
     for (id, value, unit, what) in [
@@ -43,11 +49,14 @@ pub fn tell_planar(record: &mut Record, fit: &PlaneCalibration, band: Band) {
         ("m12", m[(0, 1)], "1/px", "matrix, row 1, column 2"),
         ("m21", m[(1, 0)], "1/px", "matrix, row 2, column 1"),
     ] {
-        record.number(id, value, unit, fine.clone(), what);
+        record.group(unit, fine.clone()).number(id, value, what);
     }
     let fine = Band::absolute(3e-6, "centres repeat to 1e-6 px");
-    record.number("fit-rms-px", fit.rms_point / per_px, "px", fine.clone(), "residual RMS in pixels");
-    record.number("fit-max-px", fit.max_point / per_px, "px", fine, "largest residual in pixels");
+    record
+        .group("px", fine.clone())
+        .number("fit-rms-px", fit.rms_point / per_px, "residual RMS in pixels")
+        .band(fine)
+        .number("fit-max-px", fit.max_point / per_px, "largest residual in pixels");
 }
 
 pub fn modes_table(fits: &[PlaneCalibration]) -> Result<Table, ExperimentError> {
