@@ -302,15 +302,14 @@ fn report_errors(record: &mut Record, any: &Measured) {
     }
     record.table(table);
     let rate = cases.len() as f64 * MEAN_CHANCE;
-    record.claim(
-        Claim::all_of(
+    record
+        .claim_that(
             "deviations-are-true",
             "without a warning that questions them, the mean squared error over the stated variance is 1 within five per cent, parameter by parameter",
-            cases,
-            "a mean of n squared standard normal numbers has a standard deviation of sqrt(2 / n), and 3.3 of them are allowed besides",
         )
-        .with_false_alarm_rate(rate),
-    );
+        .every("parameters", cases)
+        .at_rate(rate)
+        .because("a mean of n squared standard normal numbers has a standard deviation of sqrt(2 / n), and 3.3 of them are allowed besides");
 }
 
 /// How far a mean squared error over the stated variance may be off.
