@@ -1,88 +1,16 @@
 //! What does a study lose when everything that can fail does? At every write, by kill -9 at any moment, on a full disk, with a rival.
 
+use crate::failing_disk::{Failing, Fault};
 use crate::study::{assert_same, scratch};
 use calibench::io::files::{Disk, Files};
 use calibench::synth::{Stream, StreamKey};
 use calibench_study::{Engine, Folder, FolderError, Manifest, Outcome, RunError, Shard, TrialFile, finish};
-use std::fs::{self, File};
-use std::io;
+use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
-
-/// How an operation fails.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Fault {
-    /// As if the process were killed: a write is torn, and nothing is done after it.
-    Killed,
-    /// The disk is full: writes are torn from here on, all else works.
-    Full,
-}
-
-/// A disk on which the operation of a given number fails.
-#[derive(Debug)]
-struct Failing {
-    left: AtomicI64,
-    fault: Fault,
-}
-
-impl Failing {
-    fn at(operation: i64, fault: Fault) -> Arc<Failing> {
-        Arc::new(Failing { left: AtomicI64::new(operation), fault })
-    }
-
-    /// Whether the operations that still work are used up.
-    fn fails(&self) -> bool {
-        self.left.fetch_sub(1, Ordering::SeqCst) <= 0
-    }
-
-    fn has_failed(&self) -> bool {
-        self.left.load(Ordering::SeqCst) < 0
-    }
-
-    /// An operation that needs no room.
-    fn do_unless_killed(&self, work: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
-        if self.fails() && self.fault == Fault::Killed {
-            return Err(io::Error::other("killed"));
-        }
-        work()
-    }
-}
-
-impl Files for Failing {
-    fn make_folder(&self, path: &Path) -> io::Result<()> {
-        self.do_unless_killed(|| Disk.make_folder(path))
-    }
-
-    fn write(&self, file: &mut File, bytes: &[u8]) -> io::Result<()> {
-        let was_killed = self.has_failed() && self.fault == Fault::Killed;
-        if !self.fails() {
-            return Disk.write(file, bytes);
-        }
-        if !was_killed {
-            Disk.write(file, &bytes[..bytes.len() / 2])?;
-        }
-        Err(io::Error::from(io::ErrorKind::StorageFull))
-    }
-
-    fn sync(&self, file: &File) -> io::Result<()> {
-        self.do_unless_killed(|| Disk.sync(file))
-    }
-
-    fn cut(&self, file: &File, length: u64) -> io::Result<()> {
-        self.do_unless_killed(|| Disk.cut(file, length))
-    }
-
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        self.do_unless_killed(|| Disk.rename(from, to))
-    }
-
-    fn remove(&self, path: &Path) -> io::Result<()> {
-        self.do_unless_killed(|| Disk.remove(path))
-    }
-}
 
 /// Two cells, three batches each, one set of poses: many runs take little time.
 fn spec() -> String {

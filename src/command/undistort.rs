@@ -199,12 +199,11 @@ impl Work<'_> {
             "pixels_without_data": empty,
         });
         let file = self.arguments.out.join(format!("camera-{width}x{height}.json"));
-        write_atomically(&file, format!("{result:#}\n").as_bytes())
-            .map_err(|error| format!("{}: {error}", file.display()))?;
+        write_atomically(&file, format!("{result:#}\n").as_bytes()).map_err(|error| error.to_string())?;
         if self.arguments.mask {
             let file = self.arguments.out.join(format!("mask-{width}x{height}.png"));
             let white: Raster<u8> = mask.map(|&has_data| if has_data { 255 } else { 0 });
-            write_png(&file, &white).map_err(|error| format!("{}: {error}", file.display()))?;
+            write_png(&file, &white).map_err(|error| error.to_string())?;
         }
         Ok(())
     }

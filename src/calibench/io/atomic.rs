@@ -1,15 +1,16 @@
 //! How is a file replaced so that nobody ever sees half of it? Written beside its place, then renamed.
 
 use super::files::{Disk, Files};
-use std::fs::{self, OpenOptions};
+use std::ffi::{OsStr, OsString};
+use std::fs::{self, DirEntry, File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Writes a file whole or not at all: a reader, or a run after a crash, finds the old contents or the new.
 ///
-/// The temporary file lies in the same folder, so that the rename stays on one file system; it is removed if writing fails.
-/// Folders on the way are created.
+/// The temporary file lies in the same folder, so that the rename stays on one file system. It is removed if writing fails; what a write
+/// of the same file that was killed has left is removed first. Folders on the way are created.
 ///
 /// # Errors
 /// Whatever the file system says, with the path.
@@ -23,11 +24,16 @@ pub fn write_atomically(path: &Path, contents: &[u8]) -> io::Result<()> {
 /// As there.
 pub fn write_atomically_to(files: &dyn Files, path: &Path, contents: &[u8]) -> io::Result<()> {
     let with_path = |e: io::Error| io::Error::new(e.kind(), format!("cannot write {}: {e}", path.display()));
-    if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-        files.make_folder(folder).map_err(with_path)?;
-    }
-    let temporary = temporary_beside(path).map_err(with_path)?;
-    let written = write_through(files, &temporary, contents).and_then(|()| files.rename(&temporary, path));
+    let folder = folder_of(path);
+    files.make_folder(folder).map_err(with_path)?;
+    // What cannot be removed is in nobody's way.
+    let _ = remove_leftovers_of(files, folder, path.file_name());
+    let (mut file, temporary) = open_beside(path).map_err(with_path)?;
+    let written = files
+        .write(&mut file, contents)
+        // On the disk before the rename: else a power cut may leave the new name with no contents.
+        .and_then(|()| files.sync(&file))
+        .and_then(|()| files.rename(&temporary, path));
     if written.is_err() {
         // The first error is the one to report.
         let _ = files.remove(&temporary);
@@ -35,22 +41,52 @@ pub fn write_atomically_to(files: &dyn Files, path: &Path, contents: &[u8]) -> i
     written.map_err(with_path)
 }
 
+/// The folder in which a file stands.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// A new temporary file beside `path`. It is locked as long as it is open: one that nobody locks was left by a process that was killed.
+fn open_beside(path: &Path) -> io::Result<(File, PathBuf)> {
+    loop {
+        let temporary = temporary_beside(path)?;
+        match OpenOptions::new().write(true).create_new(true).open(&temporary) {
+            // A process of this number in another container, or one that was killed.
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(error),
+            Ok(file) => {
+                // Where the file system knows no locks, nobody can tell what was left, and nothing is removed.
+                let _ = file.lock();
+                // Another process may have removed it before it was locked.
+                if temporary.exists() {
+                    return Ok((file, temporary));
+                }
+            }
+        }
+    }
+}
+
 /// `.name.process.count.tmp` in the folder of `path`: unique among processes and threads.
 fn temporary_beside(path: &Path) -> io::Result<PathBuf> {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let name =
         path.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "is not a file name"))?;
-    let mut hidden = std::ffi::OsString::from(".");
+    let mut hidden = OsString::from(".");
     hidden.push(name);
     hidden.push(format!(".{}.{}.tmp", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed)));
     Ok(path.with_file_name(hidden))
 }
 
-/// Removes what writes of processes that were killed have left in a folder. Only for a folder that nobody else writes to.
+/// Removes what writes of processes that were killed have left in a folder, whichever file they wrote.
 ///
 /// # Errors
 /// Whatever the file system says, with the path. A folder that is not there holds nothing.
 pub fn remove_leftovers(folder: &Path) -> io::Result<()> {
+    remove_leftovers_of(&Disk, folder, None)
+}
+
+/// The same for the writes of one file, or of any.
+fn remove_leftovers_of(files: &dyn Files, folder: &Path, name: Option<&OsStr>) -> io::Result<()> {
     let with_path = |path: &Path, e: io::Error| {
         io::Error::new(e.kind(), format!("cannot remove what a killed run left, {}: {e}", path.display()))
     };
@@ -58,27 +94,41 @@ pub fn remove_leftovers(folder: &Path) -> io::Result<()> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
         entries => entries.map_err(|error| with_path(folder, error))?,
     };
+    let name = name.map(OsStr::to_string_lossy);
     for entry in entries.flatten() {
-        if is_temporary(&entry.file_name().to_string_lossy()) {
-            fs::remove_file(entry.path()).map_err(|error| with_path(&entry.path(), error))?;
+        let temporary = entry.file_name();
+        let temporary = temporary.to_string_lossy();
+        let Some(target) = target_of(&temporary) else { continue };
+        if name.as_ref().is_none_or(|name| *name == target) {
+            remove_abandoned(files, &entry).map_err(|error| with_path(&entry.path(), error))?;
         }
     }
     Ok(())
 }
 
-/// Whether a name is one of [`temporary_beside`].
-fn is_temporary(name: &str) -> bool {
+/// The name of the file for which one of [`temporary_beside`] stands.
+fn target_of(temporary: &str) -> Option<&str> {
     let number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
-    let mut parts = name.strip_suffix(".tmp").unwrap_or_default().rsplitn(3, '.');
-    let numbered = parts.next().is_some_and(number) && parts.next().is_some_and(number);
-    numbered && parts.next().is_some_and(|rest| rest.starts_with('.') && rest.len() > 1)
+    let mut parts = temporary.strip_suffix(".tmp")?.rsplitn(3, '.');
+    let numbered = number(parts.next()?) && number(parts.next()?);
+    parts.next()?.strip_prefix('.').filter(|name| numbered && !name.is_empty())
 }
 
-fn write_through(files: &dyn Files, path: &Path, contents: &[u8]) -> io::Result<()> {
-    let mut file = OpenOptions::new().write(true).create(true).truncate(true).open(path)?;
-    files.write(&mut file, contents)?;
-    // On the disk before the rename: else a power cut may leave the new name with no contents.
-    files.sync(&file)
+/// Removes a temporary file unless somebody is still writing to it.
+fn remove_abandoned(files: &dyn Files, entry: &DirEntry) -> io::Result<()> {
+    // Only a regular file is opened: a pipe would wait for its other end.
+    if !entry.file_type()?.is_file() {
+        return Ok(());
+    }
+    // It may just have got its name; or it is another user's.
+    let Ok(file) = File::open(entry.path()) else { return Ok(()) };
+    if file.try_lock().is_err() {
+        return Ok(());
+    }
+    match files.remove(&entry.path()) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]
@@ -104,14 +154,61 @@ mod tests {
     fn what_killed_writes_left_is_removed_and_nothing_else() {
         let folder = folder("leftovers");
         let temporary = temporary_beside(&folder.join("result.v2.json")).unwrap();
-        fs::create_dir_all(&folder).unwrap();
+        fs::create_dir_all(folder.join(".a.1.2.tmp")).unwrap();
         for name in ["result.json", ".lock", ".mine.tmp", "a.1.2.tmp", ".1.2.tmp"] {
             fs::write(folder.join(name), "").unwrap();
         }
         fs::write(temporary, "half").unwrap();
         remove_leftovers(&folder).unwrap();
-        assert_eq!(fs::read_dir(&folder).unwrap().count(), 5);
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 6);
         remove_leftovers(&folder.join("not-there")).unwrap();
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_write_removes_what_a_killed_write_of_the_same_file_left() {
+        let folder = folder("same-file");
+        let path = folder.join("result.json");
+        fs::create_dir_all(&folder).unwrap();
+        let left = |name: &str| {
+            let left = folder.join(name);
+            fs::write(&left, "half").unwrap();
+            left
+        };
+        let (of_this, of_another) = (left(".result.json.42.7.tmp"), left(".report.html.42.8.tmp"));
+        write_atomically(&path, b"whole").unwrap();
+        assert!(!of_this.exists() && of_another.exists());
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_file_that_is_being_written_is_not_removed_by_another_write_of_it() {
+        let folder = folder("rivals");
+        let path = folder.join("result.json");
+        fs::create_dir_all(&folder).unwrap();
+        let (file, slow) = open_beside(&path).unwrap();
+        write_atomically(&path, b"quick").unwrap();
+        remove_leftovers(&folder).unwrap();
+        assert!(slow.exists());
+        drop(file);
+        remove_leftovers(&folder).unwrap();
+        assert!(!slow.exists());
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn many_writes_of_one_file_at_once_all_succeed_and_leave_one_of_them_whole() {
+        let folder = folder("many");
+        let path = folder.join("result.json");
+        std::thread::scope(|scope| {
+            for writer in 0..8u8 {
+                let path = &path;
+                scope.spawn(move || (0..50).for_each(|_| write_atomically(path, &[writer; 1000]).unwrap()));
+            }
+        });
+        let bytes = fs::read(&path).unwrap();
+        assert!(bytes.len() == 1000 && bytes.iter().all(|byte| *byte == bytes[0]));
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
         fs::remove_dir_all(folder).unwrap();
     }
 

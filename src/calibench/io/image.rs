@@ -37,7 +37,7 @@ pub enum ImageError {
     #[error(transparent)]
     Input(InputError),
     /// The file cannot be written.
-    #[error("cannot write {0}")]
+    #[error("{0}")]
     Write(std::io::Error),
     /// The file has no bytes.
     #[error("{path}: the file is empty (0 bytes)")]

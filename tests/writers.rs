@@ -1,0 +1,340 @@
+//! What does each verb that writes leave where the disk is full or read-only, or where it is killed? Files as they were, or whole ones.
+#![cfg(target_os = "linux")]
+
+use crate::failing_disk::{Failing, Fault};
+use calibench::io::atomic::write_atomically_to;
+use calibench::io::write_png;
+use calibench::raster::Raster;
+use calibench::synth::render::nine_dot_stand_in;
+use calibench::synth::{Scene, Stream, StreamKey};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// Every file below a folder by its path there, locks left out.
+type Tree = BTreeMap<String, Vec<u8>>;
+
+/// A verb that writes, run in a folder that is a source tree and beside its input; what it writes lies there.
+struct Verb {
+    name: &'static str,
+    arguments: &'static [&'static str],
+}
+
+const VERBS: [Verb; 8] = [
+    Verb {
+        name: "camera",
+        arguments: &["calibrate", "../corners.csv", "--image-size", "640x480", "--out", "out"],
+    },
+    Verb { name: "plane", arguments: &["calibrate", "../pairs.csv", "--out", "out"] },
+    Verb { name: "ninepoint", arguments: &["ninepoint", "../dots.png", "--out", "out"] },
+    Verb {
+        name: "undistort",
+        arguments: &["undistort", "--camera", "../camera.json", "--mask", "--out", "out", "../photo.png"],
+    },
+    Verb {
+        name: "gate",
+        arguments: &[
+            "gate",
+            "--samples",
+            "1",
+            "--record",
+            "out",
+            "--json",
+            "out/report.json",
+            "--junit",
+            "out/report.xml",
+            "--html",
+            "out/report.html",
+        ],
+    },
+    Verb { name: "schema", arguments: &["gate", "--schema", "out"] },
+    Verb { name: "run", arguments: &["run", "line-bending"] },
+    Verb { name: "bless", arguments: &["bless", "line-bending"] },
+];
+
+/// The input of all verbs, in an empty folder of this test's own.
+fn with_input(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(folder.join("disk")).expect("a folder is made");
+    let mut corners = "view,point,X,Y,u,v\n".to_string();
+    for (view, seen) in Scene::chapter().exact().iter().enumerate() {
+        for (point, (at, pixel)) in seen.pairs().enumerate() {
+            writeln!(corners, "{view},{point},{},{},{},{}", at.x, at.y, pixel.x, pixel.y)
+                .expect("text grows");
+        }
+    }
+    let camera = r#"{"camera": {"fx": 600, "fy": 600, "cx": 326, "cy": 243, "k1": -0.18}}"#;
+    let pairs = "point,px,py,X,Y\n0,0,0,0,0\n1,100,0,1,0\n2,0,100,0,1\n3,100,101,1,1\n";
+    for (name, text) in [("corners.csv", corners.as_str()), ("camera.json", camera), ("pairs.csv", pairs)] {
+        fs::write(folder.join(name), text).expect("written");
+    }
+    let photo = Raster::from_fn(160, 120, |x, y| (x + y) as u8);
+    write_png(&folder.join("photo.png"), &photo).expect("written");
+    write_png(&folder.join("dots.png"), &nine_dot_stand_in().image.to_u8()).expect("written");
+    folder
+}
+
+/// What makes a folder a source tree, with a golden number that has moved, and `old` in place of every file of `whole`.
+fn fill(disk: &Path, whole: &Tree) {
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("golden");
+    fs::create_dir_all(disk.join("golden")).expect("a folder is made");
+    fs::copy(golden.join("published.toml"), disk.join("golden/published.toml")).expect("copied");
+    let snapshot = fs::read_to_string(golden.join("line-bending.snap")).expect("a snapshot");
+    let moved = snapshot.replace("number | max-deviation | 4.6", "number | max-deviation | 4.5");
+    assert_ne!(snapshot, moved);
+    fs::write(disk.join("golden/line-bending.snap"), moved).expect("written");
+    for name in whole.keys().filter(|name| !name.starts_with("golden/")) {
+        let path = disk.join(name);
+        fs::create_dir_all(path.parent().expect("it lies in a folder")).expect("a folder is made");
+        fs::write(path, "old").expect("written");
+    }
+}
+
+fn read(folder: &Path) -> Tree {
+    let mut tree = Tree::new();
+    let mut folders = vec![folder.to_path_buf()];
+    while let Some(next) = folders.pop() {
+        for entry in fs::read_dir(next).expect("a folder").flatten() {
+            if entry.path().is_dir() {
+                folders.push(entry.path());
+            } else {
+                let name = entry.path().strip_prefix(folder).expect("below").to_string_lossy().into_owned();
+                tree.insert(name, fs::read(entry.path()).expect("a file"));
+            }
+        }
+    }
+    tree
+}
+
+fn command(verb: &Verb, disk: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_calibench"));
+    command.args(verb.arguments).current_dir(disk).stdin(Stdio::null());
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+fn run(verb: &Verb, disk: &Path) -> Output {
+    command(verb, disk).output().expect("the program starts")
+}
+
+/// The files of a run that nothing disturbed, and how long it took.
+fn undisturbed(verb: &Verb, folder: &Path) -> (Tree, Duration) {
+    let disk = folder.join("undisturbed");
+    let _ = fs::remove_dir_all(&disk);
+    fill(&disk, &Tree::new());
+    let begun = Instant::now();
+    let output = run(verb, &disk);
+    let took = begun.elapsed();
+    // `run` finds the number that has moved.
+    let expected = if verb.name == "run" { 1 } else { 0 };
+    assert_eq!(output.status.code(), Some(expected), "{}: {}", verb.name, said(&output));
+    (read(&disk), took)
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// What a report says but for its numbers: it tells how long problems took.
+fn without_numbers(bytes: &[u8]) -> Vec<u8> {
+    bytes.iter().copied().filter(|byte| !byte.is_ascii_digit() && !b".-e".contains(byte)).collect()
+}
+
+/// Whether a file of that name says the same in both.
+fn same(name: &str, one: &Tree, other: &Tree) -> bool {
+    match (one.get(name), other.get(name)) {
+        (Some(a), Some(b)) if name.starts_with("out/report.") => without_numbers(a) == without_numbers(b),
+        (a, b) => a == b,
+    }
+}
+
+fn assert_same(verb: &Verb, found: &Tree, whole: &Tree) {
+    let names = |tree: &Tree| tree.keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(found), names(whole), "{}", verb.name);
+    for name in whole.keys() {
+        assert!(same(name, found, whole), "{}: {name}", verb.name);
+    }
+}
+
+/// Every file is what it was or what it should become; temporary ones only where they are allowed.
+fn assert_old_or_whole(verb: &Verb, found: &Tree, old: &Tree, whole: &Tree, temporary: bool) {
+    for name in found.keys() {
+        let known = [old, whole].iter().any(|tree| same(name, found, tree));
+        let unfinished = name.ends_with(".tmp");
+        assert!(known || (unfinished && temporary), "{}: {name} is neither old nor whole", verb.name);
+    }
+    for name in old.keys() {
+        assert!(found.contains_key(name), "{}: {name} is gone", verb.name);
+    }
+}
+
+#[test]
+fn a_file_is_old_or_whole_whichever_operation_fails() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("writers-operations");
+    let _ = fs::remove_dir_all(&folder);
+    let path = folder.join("deep/result.json");
+    for fault in [Fault::Killed, Fault::Full] {
+        for old in [None, Some("old")] {
+            let mut operation = 0;
+            loop {
+                let _ = fs::remove_dir_all(&folder);
+                if let Some(old) = old {
+                    fs::create_dir_all(path.parent().expect("a folder")).expect("a folder is made");
+                    fs::write(&path, old).expect("written");
+                }
+                let failing = Failing::at(operation, fault);
+                let written = write_atomically_to(failing.as_ref(), &path, b"whole");
+                let found = fs::read_to_string(&path).ok();
+                if !failing.has_failed() {
+                    assert_eq!(found.as_deref(), Some("whole"));
+                    break;
+                }
+                let expected = if written.is_ok() { Some("whole") } else { old };
+                assert_eq!(found.as_deref(), expected, "{fault:?} at {operation}");
+                // The next write goes through, and nothing else is left.
+                calibench::io::write_atomically(&path, b"next").expect("written");
+                let left = read(&folder);
+                assert_eq!(left, Tree::from([("deep/result.json".to_string(), b"next".to_vec())]));
+                operation += 1;
+            }
+            assert!(operation >= 4, "folder, write, sync, rename: {operation}");
+        }
+    }
+    fs::remove_dir_all(folder).expect("removed");
+}
+
+/// Size of a page of a file system in memory.
+const PAGE: usize = 4096;
+/// Sizes of the disk that are tried for each verb, from one without room to one with enough.
+const SIZES: usize = 12;
+
+/// What a tree takes on such a disk.
+fn room(tree: &Tree) -> usize {
+    tree.values().map(|bytes| bytes.len().div_ceil(PAGE) * PAGE).sum()
+}
+
+/// Mounts a file system in memory; whether this user may.
+fn mount(disk: &Path, options: &str) -> bool {
+    let mut mount = Command::new("mount");
+    mount.args(["-t", "tmpfs", "-o", options, "calibench"]).arg(disk);
+    mount.output().is_ok_and(|output| output.status.success())
+}
+
+/// Runs `work` on a disk of its own, which goes however that ends.
+fn on_disk(disk: &Path, options: &str, work: impl FnOnce()) -> bool {
+    struct Mounted<'a>(&'a Path);
+    impl Drop for Mounted<'_> {
+        fn drop(&mut self) {
+            let _ = Command::new("umount").arg("-l").arg(self.0).status();
+        }
+    }
+    if !mount(disk, options) {
+        eprintln!("skipped: this user may not mount a file system");
+        return false;
+    }
+    let _mounted = Mounted(disk);
+    work();
+    true
+}
+
+#[test]
+fn a_full_disk_ends_with_three_and_leaves_old_files_or_whole_ones() {
+    let folder = with_input("writers-full");
+    let disk = folder.join("disk");
+    for verb in &VERBS {
+        let whole = undisturbed(verb, &folder).0;
+        let (mut refused, mut held) = (0, 0);
+        let filled = folder.join("filled");
+        let _ = fs::remove_dir_all(&filled);
+        fill(&filled, &whole);
+        // Old files and new ones at most, for a moment both; a page more would hide the first fault.
+        let (least, most) = (room(&read(&filled)), room(&read(&filled)) + 2 * room(&whole));
+        for step in 0..SIZES {
+            let size = least + (most - least) * step / (SIZES - 1);
+            let there = on_disk(&disk, &format!("size={size}"), || {
+                fill(&disk, &whole);
+                let old = read(&disk);
+                let output = run(verb, &disk);
+                assert_old_or_whole(verb, &read(&disk), &old, &whole, false);
+                match output.status.code() {
+                    Some(3) => refused += 1,
+                    Some(0 | 1) => held += 1,
+                    code => panic!("{} ended with {code:?}: {}", verb.name, said(&output)),
+                }
+                if output.status.code() == Some(3) {
+                    assert_named_once(verb, &said(&output), &whole);
+                } else {
+                    assert_same(verb, &read(&disk), &whole);
+                }
+            });
+            if !there {
+                return;
+            }
+        }
+        assert!(refused > 0 && held > 0, "{}: {refused} refused, {held} held", verb.name);
+    }
+    fs::remove_dir_all(folder).expect("removed");
+}
+
+/// The message names one of the files, and once.
+fn assert_named_once(verb: &Verb, said: &str, whole: &Tree) {
+    let counts = whole.keys().map(|name| said.matches(name.as_str()).count());
+    assert_eq!(counts.sum::<usize>(), said.lines().count(), "{}: {said}", verb.name);
+}
+
+#[test]
+fn a_read_only_disk_ends_with_three_and_changes_nothing() {
+    let folder = with_input("writers-read-only");
+    let disk = folder.join("disk");
+    for verb in &VERBS {
+        let whole = undisturbed(verb, &folder).0;
+        let there = on_disk(&disk, "size=16m", || {
+            fill(&disk, &whole);
+            let old = read(&disk);
+            assert!(mount(&disk, "remount,ro"));
+            let output = run(verb, &disk);
+            assert_eq!(output.status.code(), Some(3), "{}: {}", verb.name, said(&output));
+            assert_named_once(verb, &said(&output), &whole);
+            assert_eq!(read(&disk), old, "{}", verb.name);
+        });
+        if !there {
+            return;
+        }
+    }
+    fs::remove_dir_all(folder).expect("removed");
+}
+
+/// Times that each verb is killed: 200 in all.
+const KILLS: usize = 25;
+
+#[test]
+fn a_verb_that_is_killed_at_any_moment_leaves_old_files_or_whole_ones_and_the_next_run_nothing_else() {
+    let folder = with_input("writers-killed");
+    let disk = folder.join("disk");
+    let mut moments = Stream::open(StreamKey { seed: 1, scenario: "writers", trial: 0, purpose: "moment" });
+    let mut killed = 0;
+    for verb in &VERBS {
+        let (whole, took) = undisturbed(verb, &folder);
+        fs::remove_dir_all(&disk).expect("removed");
+        fill(&disk, &whole);
+        let old = read(&disk);
+        for _ in 0..KILLS {
+            let mut child = command(verb, &disk).spawn().expect("the program starts");
+            std::thread::sleep(took.mul_f64(moments.uniform()));
+            // SIGKILL: no handler runs. It fails where the run has ended.
+            let _ = child.kill();
+            let output = child.wait_with_output().expect("it ends");
+            killed += usize::from(output.status.code().is_none());
+            assert_old_or_whole(verb, &read(&disk), &old, &whole, true);
+        }
+        assert!(run(verb, &disk).status.code().is_some_and(|code| code < 2), "{}", verb.name);
+        // Also what the killed runs had left is gone.
+        assert_same(verb, &read(&disk), &whole);
+    }
+    assert!(killed > KILLS * VERBS.len() / 4, "{killed} were killed before they had ended: too few");
+    fs::remove_dir_all(folder).expect("removed");
+}
