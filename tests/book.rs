@@ -155,3 +155,29 @@ fn the_book_is_built_whole_and_leads_nowhere_outside() {
         assert!(folder.join(file).is_file(), "{file} is missing");
     }
 }
+
+#[test]
+fn what_a_killed_build_left_is_gone_after_the_next_and_of_two_at_once_both_end_well() {
+    let project = project();
+    let compiled = book_of("# One page");
+    let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("book-killed");
+    let _ = std::fs::remove_dir_all(&out);
+    // Killed while it wrote, and between the two steps that put the new book in the place of the old.
+    for left in [".book.new", ".book.old"] {
+        std::fs::create_dir_all(out.join(left)).unwrap();
+        std::fs::write(out.join(left).join("half.html"), "half").unwrap();
+    }
+    std::thread::scope(|scope| {
+        let built = [(); 2].map(|()| scope.spawn(|| build(&project, &compiled, &out.join("book"))));
+        built.into_iter().for_each(|build| build.join().unwrap().unwrap());
+    });
+    let entries = std::fs::read_dir(&out).unwrap().flatten();
+    let mut names: Vec<String> = entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    assert_eq!(names, [".book.lock", "book"]);
+    assert!(out.join("book/index.html").is_file() && !out.join("book/half.html").exists());
+    // A build that fails leaves the book that is there: a file stands where a folder is to be made.
+    std::fs::write(out.join(".book.new"), "in the way").unwrap();
+    assert!(build(&project, &compiled, &out.join("book")).is_err());
+    assert!(out.join("book/index.html").is_file());
+}

@@ -6,7 +6,8 @@ use super::page::CompiledPage;
 use calibench_harness::project::Project;
 use mdbook_driver::MDBook;
 use mdbook_driver::book::{BookItem, Chapter};
-use std::fs;
+use std::fs::{self, File, OpenOptions};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// The generated pages stand below this page of the summary.
@@ -19,21 +20,58 @@ pub fn index_of(folder: &Path) -> PathBuf {
     folder.join("index.html")
 }
 
-/// Writes the book to `folder`, replacing what is there only once all is written.
+/// Writes the book to `folder`, replacing what is there only once all is written. Of two at once one waits.
 pub fn build(project: &Project, compiled: &Compiled, folder: &Path) -> Result<(), BookError> {
-    let told = |e: mdbook_driver::errors::Error| BookError::MdBook(format!("{e:#}"));
+    let failed = |source| BookError::File { path: folder.to_path_buf(), source };
+    let _lock = lock(&beside(folder, "lock")).map_err(failed)?;
+    let (new, old) = (beside(folder, "new"), beside(folder, "old"));
+    // What a build that was killed has left: half of a new book, or the old one beside its place.
+    if old.exists() && !folder.exists() {
+        fs::rename(&old, folder).map_err(failed)?;
+    }
+    remove(&new).and_then(|()| remove(&old)).map_err(failed)?;
+    let written = write(project, compiled, &new);
+    if written.is_err() {
+        // The first error is the one to report.
+        let _ = remove(&new);
+    }
+    written?;
+    if folder.exists() {
+        fs::rename(folder, &old).map_err(failed)?;
+    }
+    fs::rename(&new, folder).and_then(|()| remove(&old)).map_err(failed)
+}
+
+/// `.name.role` in the folder in which the book stands.
+fn beside(folder: &Path, role: &str) -> PathBuf {
     let name = folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let beside = folder.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
+    folder.with_file_name(format!(".{name}.{role}"))
+}
+
+/// A file that one process at a time holds; the system lets go of it however the process ends.
+fn lock(path: &Path) -> io::Result<File> {
+    path.parent().map_or(Ok(()), fs::create_dir_all)?;
+    let file = OpenOptions::new().create(true).append(true).open(path)?;
+    file.lock()?;
+    Ok(file)
+}
+
+/// Removes a folder that may not be there.
+fn remove(folder: &Path) -> io::Result<()> {
+    match fs::remove_dir_all(folder) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Writes all pages and what they show.
+fn write(project: &Project, compiled: &Compiled, folder: &Path) -> Result<(), BookError> {
+    let told = |e: mdbook_driver::errors::Error| BookError::MdBook(format!("{e:#}"));
     let root = project.root().join("book");
-    let mut book = MDBook::load_with_config(root, configuration(&beside).map_err(told)?).map_err(told)?;
+    let mut book = MDBook::load_with_config(root, configuration(folder).map_err(told)?).map_err(told)?;
     book.book.for_each_mut(|item| fill(item, compiled));
     book.build().map_err(told)?;
-    write_assets(project, compiled, &beside)?;
-    let failed = |source| BookError::File { path: folder.to_path_buf(), source };
-    if folder.exists() {
-        fs::remove_dir_all(folder).map_err(failed)?;
-    }
-    fs::rename(&beside, folder).map_err(failed)
+    write_assets(project, compiled, folder)
 }
 
 /// Gives a chapter its resolved content, and the page of the records its children.
