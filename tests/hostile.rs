@@ -279,6 +279,31 @@ fn a_pipe_blocks_nobody_and_headers_are_read_as_csv_has_them() {
     assert!(text(&output.stdout).contains("world from pixel"), "{output:?}");
 }
 
+#[test]
+fn a_pipe_in_a_run_folder_blocks_nobody() {
+    let folder = folder("run-folder-pipes");
+    fs::write(folder.join("spec.toml"), fixed_poses()).expect("written");
+    for name in ["trials.csv", ".lock", "checkpoint.json", "manifest.json", "spec.toml"] {
+        let _ = fs::remove_dir_all(folder.join("r"));
+        assert_eq!(limited(&folder, &["study", "run", "spec.toml", "--out", "r"]).status.code(), Some(0));
+        let pipe = folder.join("r").join(name);
+        fs::remove_file(&pipe).expect("removed");
+        assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo").success());
+        // A folder whose manifest is no file holds no run.
+        let word = if name == "manifest.json" { "holds no run" } else { "not a regular file" };
+        for verb in [
+            &["study", "resume", "r"][..],
+            &["study", "merge", "r", "--out", "w"],
+            &["study", "compare", "r", "r"],
+        ] {
+            let output = within(PATIENCE, &folder, verb);
+            let said = text(&output.stderr);
+            assert_eq!(output.status.code(), Some(2), "{name}: {verb:?}: {said}");
+            assert!(verb[1] != "resume" || said.contains(word), "{name}: {said}");
+        }
+    }
+}
+
 /// Peak resident memory of a run, KiB, while it was watched.
 fn peak_kib(child: &mut std::process::Child) -> u64 {
     let path = format!("/proc/{}/status", child.id());

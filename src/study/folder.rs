@@ -5,7 +5,7 @@ use super::shard::{Shard, ShardError};
 use super::trial_file::NoParquet;
 use calibench::io::atomic::{remove_leftovers, write_atomically_to};
 use calibench::io::files::{Disk, Files};
-use calibench::io::input::{InputError, MOST_SPEC_BYTES};
+use calibench::io::input::{InputError, MOST_SPEC_BYTES, regular_or_absent};
 use calibench::io::read_regular_text;
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -170,6 +170,10 @@ impl Folder {
 
     fn lock(files: Arc<dyn Files>, path: &Path) -> Result<Folder, FolderError> {
         let name = path.join(".lock");
+        // What is opened without being read whole; other files are looked at when they are read.
+        for opened in OF_A_RUN.map(|name| path.join(name)).iter().chain([&name]) {
+            regular_or_absent(opened)?;
+        }
         let located = |source| Located { path: name.clone(), source };
         let file = OpenOptions::new().create(true).append(true).open(&name).map_err(located)?;
         match patiently(&file) {

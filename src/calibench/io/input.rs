@@ -1,6 +1,6 @@
 //! How much may come in? Regular files of a known length only: nothing blocks, and nothing grows without end.
 
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io::{self, Read};
 use std::path::Path;
 
@@ -56,6 +56,22 @@ pub enum InputError {
     },
 }
 
+/// Refuses what is there and is no regular file: opening a pipe blocks until somebody opens its other end, for writing too.
+///
+/// # Errors
+/// [`InputError::NotRegular`].
+pub fn regular_or_absent(path: &Path) -> Result<(), InputError> {
+    std::fs::metadata(path).map_or(Ok(()), |seen| regular(path, &seen))
+}
+
+fn regular(path: &Path, seen: &Metadata) -> Result<(), InputError> {
+    if seen.is_file() {
+        return Ok(());
+    }
+    let kind = if seen.is_dir() { "a folder" } else { "a pipe or a device" };
+    Err(InputError::NotRegular { path: path.display().to_string(), kind, hint: "" })
+}
+
 /// Opens a regular file of at most `most` bytes, and tells its length. It is looked at before it is opened, since opening a pipe blocks.
 ///
 /// # Errors
@@ -64,10 +80,7 @@ pub fn open_regular(path: &Path, most: u64) -> Result<(File, u64), InputError> {
     let name = || path.display().to_string();
     let failed = |source| InputError::Open { path: name(), source };
     let seen = std::fs::metadata(path).map_err(failed)?;
-    if !seen.is_file() {
-        let kind = if seen.is_dir() { "a folder" } else { "a pipe or a device" };
-        return Err(InputError::NotRegular { path: name(), kind, hint: "" });
-    }
+    regular(path, &seen)?;
     if seen.len() > most {
         return Err(InputError::TooLong { path: name(), bytes: seen.len(), most });
     }
