@@ -77,9 +77,11 @@ impl<'a> Scanner<'a> {
                 self.at += 2;
                 self.flush(self.at);
                 self.until(0, ")", "link", Kind::Target, false);
-                // The bracket goes back to the prose.
-                self.at -= 1;
-                self.prose_from = self.at;
+                // The bracket goes back to the prose, if there is one.
+                if matches!(self.pieces.last(), Some(Piece { kind: Kind::Target(_), .. })) {
+                    self.at -= 1;
+                    self.prose_from = self.at;
+                }
                 true
             }
             _ => false,
@@ -169,6 +171,10 @@ mod tests {
     fn lines_are_counted_and_what_is_not_closed_is_told() {
         let pieces = scan("a\n\n{{num");
         assert_eq!(pieces[1], Piece { line: 3, kind: Kind::Unclosed("placeholder") });
+        // The last letter takes two bytes: there is no bracket to put back.
+        let open = [Kind::Prose("[t]("), Kind::Unclosed("link")];
+        assert_eq!(kinds("[t](caf\u{e9}"), open);
+        assert_eq!(kinds("[t](x"), open);
         let pieces = scan("a\n```rust\n{{x}}\n```\nb {{y}}");
         assert_eq!(pieces[1].line, 2);
         assert_eq!(pieces[3], Piece { line: 5, kind: Kind::Placeholder("y") });
