@@ -69,3 +69,7 @@ bless-instructions:
 # Every reader of untrusted bytes, so many seconds each
 fuzz SECONDS="30":
     .ci/fuzz {{SECONDS}}
+
+# The registers of floating-point lanes under Miri
+miri:
+    .ci/miri
