@@ -114,17 +114,17 @@ fn chapter_draft(id: &'static str, about: &'static str) -> Draft {
     Draft {
         id,
         about,
-        camera: Truth::chapter_camera(),
-        image_size: Truth::CHAPTER_IMAGE,
+        camera: Truth::example_camera(),
+        image_size: Truth::EXAMPLE_IMAGE,
         board: (9, 7, 10.0),
         poses: four(120.0),
-        free: FreeParameters::CHAPTER,
+        free: FreeParameters::STANDARD,
     }
 }
 
 fn lawful() -> Vec<Draft> {
     use Parameter::{Cx, Cy, Fx, Fy, K1};
-    let base = Truth::chapter_camera();
+    let base = Truth::example_camera();
     let lens = |k1, k2, p1, p2| BrownConrady { k1, k2, p1, p2, k3: 0.0 };
     vec![
         chapter_draft("four-pose", "the chapter's camera and four poses"),
@@ -145,7 +145,7 @@ fn lawful() -> Vec<Draft> {
         },
         Draft {
             camera: base.with_distortion(lens(-0.18, 0.05, 0.002, -0.003)),
-            free: FreeParameters::CHAPTER.with(Parameter::P1).with(Parameter::P2),
+            free: FreeParameters::STANDARD.with(Parameter::P1).with(Parameter::P2),
             poses: ring(6, 25.0, 12.0, 128.0),
             ..chapter_draft("tangential", "decentred lens, p1 and p2 free")
         },

@@ -164,7 +164,7 @@ impl Cell {
     }
 
     /// The predicted standard deviation of a quantity of the study.
-    pub fn predicted(&self, quantities: &[Quantity], name: &str) -> Option<super::Predicted> {
+    pub fn predicted(&self, quantities: &[Quantity], name: &str) -> Option<super::Expected> {
         let at = quantities.iter().position(|q| q.name() == name)?;
         self.prediction.0[at]
     }

@@ -24,6 +24,7 @@ pub enum Grey {
 
 /// Why a file is not an image that can be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ImageError {
     /// The file cannot be opened or read.
     #[error("{path}: {source}")]

@@ -15,6 +15,7 @@ pub const MOST_IMAGE_BYTES: u64 = 1_600_000_000;
 
 /// Why a file is not read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum InputError {
     /// The system does not give it.
     #[error("{path}: {source}")]

@@ -243,6 +243,7 @@ struct CameraOnly {
 
 /// Why a result cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ResultError {
     /// The file cannot be read.
     #[error(transparent)]

@@ -6,6 +6,7 @@ use std::io::Read;
 
 /// Why a table cannot be read. Lines count from 1; the header is line 1.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum TableError {
     /// The file cannot be opened, or is none to read.
     #[error(transparent)]

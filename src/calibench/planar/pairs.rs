@@ -4,6 +4,7 @@ use crate::geometry::{HomographyError, LinearFitError, Scatter, Vec2};
 
 /// Why a plane cannot be calibrated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PlaneError {
     /// Four pairs are the least for every model, so that the affine and similarity maps leave something to check.
     #[error("a plane calibration needs at least {need} point pairs, got {got}")]

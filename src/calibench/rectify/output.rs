@@ -16,6 +16,7 @@ pub enum OutputView {
 
 /// Why there is no such camera.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum OutputCameraError {
     /// The lens model does not reach the image's border.
     #[error("the border pixel ({u}, {v}) cannot be corrected: {source}; keep the same K instead")]
