@@ -38,7 +38,7 @@ fn main() {
 /// Folders that the command carries with it, so that it works outside the source tree.
 const CARRIED: [&str; 4] = ["book", "figures", "golden", "reference"];
 /// What of them is read there.
-const CARRIED_ENDINGS: [&str; 8] = ["css", "json", "md", "png", "snap", "svg", "toml", "woff2"];
+const CARRIED_ENDINGS: [&str; 9] = ["css", "json", "md", "png", "py", "snap", "svg", "toml", "woff2"];
 
 /// Writes the list of the files that are carried, as `carried.rs`, with the code that the book quotes.
 fn carry(root: &Path) {

@@ -11,18 +11,14 @@ const TITLE: &str = "Camera calibration, checked against truth";
 pub(super) fn page(pages: &[&CompiledPage], at: usize, text: &str) -> String {
     let contents: String =
         pages.iter().enumerate().map(|(i, page)| line_of_contents(page, i == at)).collect();
-    let neighbour = |page: Option<&&CompiledPage>, class: &str, word: &str| {
+    let neighbour = |page: Option<&&CompiledPage>, class: &str, [before, after]: [&str; 2]| {
         page.map_or(String::new(), |page| {
-            format!(
-                "<a class=\"{class}\" rel=\"{class}\" href=\"{}\">{word}{}</a>",
-                page.file(),
-                escape(&page.title)
-            )
+            let (file, title) = (page.file(), escape(&page.title));
+            format!("<a rel=\"{class}\" href=\"{file}\">{before}{title}{after}</a>")
         })
     };
-    let before = neighbour(at.checked_sub(1).and_then(|i| pages.get(i)), "prev", "\u{2190} ");
-    let after = neighbour(pages.get(at + 1), "next", "");
-    let arrow = if after.is_empty() { "" } else { " \u{2192}" };
+    let before = neighbour(at.checked_sub(1).and_then(|i| pages.get(i)), "prev", ["\u{2190} ", ""]);
+    let after = neighbour(pages.get(at + 1), "next", ["", " \u{2192}"]);
     document(
         &format!("{} \u{2013} {TITLE}", pages[at].title),
         &format!(
@@ -30,7 +26,7 @@ pub(super) fn page(pages: &[&CompiledPage], at: usize, text: &str) -> String {
              <a href=\"index.html\">{TITLE}</a><a href=\"print.html\">All on one page</a></header>\n\
              <nav class=\"contents\" aria-label=\"Contents\"><ol>\n{contents}</ol></nav>\n\
              <div class=\"content\"><main>\n{text}</main>\n\
-             <nav class=\"neighbours\" aria-label=\"Neighbouring pages\">{before}<span></span>{after}{arrow}</nav></div>\n"
+             <nav class=\"neighbours\" aria-label=\"Neighbouring pages\">{before}<span></span>{after}</nav></div>\n"
         ),
     )
 }

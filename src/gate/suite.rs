@@ -47,20 +47,20 @@ pub struct Scenario {
 #[derive(Debug, thiserror::Error)]
 pub enum SuiteError {
     /// The scene cannot be photographed.
-    #[error("{id}: {source}")]
+    #[error("{id}: {cause}")]
     Scene {
         /// Scenario.
         id: &'static str,
         /// Why.
-        source: SceneError,
+        cause: SceneError,
     },
     /// The scene determines nothing.
-    #[error("{id}: {source}")]
+    #[error("{id}: {cause}")]
     Bound {
         /// Scenario.
         id: &'static str,
         /// Why.
-        source: BoundError,
+        cause: BoundError,
     },
     /// The board does not exist.
     #[error(transparent)]
@@ -229,8 +229,8 @@ fn build(draft: Draft, sigma_px: f64) -> Result<Scenario, SuiteError> {
         cam_from_target,
     };
     let bound = cramer_rao(&truth, draft.free, sigma_px)
-        .map_err(|source| SuiteError::Bound { id: draft.id, source })?;
-    let scene = Scene::new(truth).map_err(|source| SuiteError::Scene { id: draft.id, source })?;
+        .map_err(|cause| SuiteError::Bound { id: draft.id, cause })?;
+    let scene = Scene::new(truth).map_err(|cause| SuiteError::Scene { id: draft.id, cause })?;
     Ok(Scenario {
         id: draft.id,
         about: draft.about,

@@ -128,14 +128,14 @@ pub enum TableError {
         first: u64,
     },
     /// The points of a view do not make a view.
-    #[error("{file}: view '{view}': {source}")]
+    #[error("{file}: view '{view}': {cause}")]
     View {
         /// The file.
         file: String,
         /// The view's name.
         view: String,
         /// What is wrong.
-        source: ViewError,
+        cause: ViewError,
     },
 }
 

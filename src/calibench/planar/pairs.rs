@@ -60,10 +60,10 @@ pub enum PlaneError {
     },
     /// The projective map is not fixed by the pairs.
     #[error("the projective map is not fixed: {0}")]
-    Projective(#[from] HomographyError),
+    Projective(HomographyError),
     /// The affine or similarity map is not fixed by the pairs.
     #[error("the map is not fixed: {0}")]
-    Linear(#[from] LinearFitError),
+    Linear(LinearFitError),
     /// The fitted map flattens the plane onto a line.
     #[error(
         "the fitted map is singular: pixels and world points do not correspond; check the order of the points"
@@ -77,6 +77,18 @@ pub enum PlaneError {
         /// Position in the list.
         index: usize,
     },
+}
+
+impl From<HomographyError> for PlaneError {
+    fn from(error: HomographyError) -> PlaneError {
+        PlaneError::Projective(error)
+    }
+}
+
+impl From<LinearFitError> for PlaneError {
+    fn from(error: LinearFitError) -> PlaneError {
+        PlaneError::Linear(error)
+    }
 }
 
 /// Pairs as offsets from an origin on each side.

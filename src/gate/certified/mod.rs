@@ -107,20 +107,20 @@ pub struct Certified {
 #[derive(Debug, thiserror::Error)]
 pub enum ReferenceError {
     /// A file.
-    #[error("cannot read {path}: {source}", path = path.display())]
+    #[error("cannot read {path}: {cause}", path = path.display())]
     File {
         /// Which.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        cause: std::io::Error,
     },
     /// A file that is no reference problem.
-    #[error("{path} is no certified problem: {source}", path = path.display())]
+    #[error("{path} is no certified problem: {cause}", path = path.display())]
     Content {
         /// Which.
         path: PathBuf,
         /// What is wrong.
-        source: serde_json::Error,
+        cause: serde_json::Error,
     },
     /// A file that is not what was certified.
     #[error("{name} is not the file whose SHA-256 stands in SHA256SUMS ({stated}): it has {found}")]
@@ -149,8 +149,7 @@ pub fn read(folder: &Path) -> Result<Vec<ReferenceProblem>, ReferenceError> {
 pub fn read_with(
     text_of: impl Fn(&str) -> std::io::Result<String>,
 ) -> Result<Vec<ReferenceProblem>, ReferenceError> {
-    let text =
-        |name: &str| text_of(name).map_err(|source| ReferenceError::File { path: name.into(), source });
+    let text = |name: &str| text_of(name).map_err(|cause| ReferenceError::File { path: name.into(), cause });
     let sums = text("SHA256SUMS")?;
     let listed: Vec<(&str, &str)> = sums.lines().filter_map(|line| line.split_once("  ")).collect();
     let mut problems = Vec::new();
@@ -161,7 +160,7 @@ pub fn read_with(
             return Err(ReferenceError::Changed { name: name.into(), stated: stated.into(), found });
         }
         if name.ends_with(".json") {
-            let wrong = |source| ReferenceError::Content { path: name.into(), source };
+            let wrong = |cause| ReferenceError::Content { path: name.into(), cause };
             problems.push(ReferenceProblem {
                 problem: serde_json::from_str(&content).map_err(wrong)?,
                 reference: serde_json::from_str(&content).map_err(wrong)?,
