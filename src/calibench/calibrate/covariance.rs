@@ -8,7 +8,6 @@ use nalgebra::{DMatrix, MatrixXx6, SMatrix};
 /// To first order the estimate is Gaussian with covariance `sigma^2 (J^T J)^-1`; poses are marginal over the intrinsics and the
 /// other way round. Pose entries: rotation vector of `R <- exp(delta) R` in rad, then translation in the target's unit.
 #[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Covariance {
     /// Which parameters the rows of `intrinsics` are, in order.
     pub free: FreeParameters,

@@ -7,7 +7,6 @@ use std::fmt;
 
 /// The result of a calibration.
 #[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Calibration {
     /// The estimate; parameters that were not free have the values they were held at.
