@@ -1,5 +1,5 @@
 //! From which sources is this program built? Asked once, of git and Cargo.lock, while it is built: a program that is older than the
-//! sources beside it still names its own. And are there data for the tests that need some?
+//! sources beside it still names its own. What does the command carry with it? And are there data for the tests that need some?
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -29,9 +29,58 @@ fn main() {
     // Elsewhere than in its own tree Cargo may have chosen other versions than those of the lock file that came along.
     let crates = if tree.is_some() { versions(&root.join("Cargo.lock")) } else { String::new() };
     look_for_data(&root);
+    carry(&root);
     println!("cargo::rustc-env=CALIBENCH_COMMIT={commit}");
     println!("cargo::rustc-env=CALIBENCH_CHANGED={changed}");
     println!("cargo::rustc-env=CALIBENCH_CRATES={crates}");
+}
+
+/// Folders that the command carries with it, so that it works outside the source tree.
+const CARRIED: [&str; 4] = ["book", "figures", "golden", "reference"];
+/// What of them is read there.
+const CARRIED_ENDINGS: [&str; 9] = ["css", "json", "md", "png", "py", "snap", "svg", "toml", "woff2"];
+
+/// Writes the list of the files that are carried, as `carried.rs`, with the code that the book quotes.
+fn carry(root: &Path) {
+    let mut paths = Vec::new();
+    for folder in CARRIED {
+        println!("cargo::rerun-if-changed={folder}");
+        files_below(&root.join(folder), &mut paths);
+    }
+    let carried = |path: &PathBuf| {
+        let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+        CARRIED_ENDINGS.contains(&ending)
+            || path.ends_with("SHA256SUMS")
+            || path.ends_with("CalibenchMath-LICENSE.txt")
+    };
+    paths.retain(carried);
+    let pages: Vec<String> = paths.iter().filter_map(|path| std::fs::read_to_string(path).ok()).collect();
+    paths.extend(pages.iter().flat_map(|page| quoted_code(page)).map(|file| root.join(file)));
+    paths.retain(|path| path.is_file());
+    paths.sort();
+    paths.dedup();
+    let list: String = paths.iter().map(|path| line_of_list(root, path)).collect();
+    let out = PathBuf::from(std::env::var_os("OUT_DIR").expect("Cargo names a folder")).join("carried.rs");
+    std::fs::write(&out, format!("&[\n{list}]\n"))
+        .unwrap_or_else(|error| panic!("{}: {error}", out.display()));
+}
+
+/// Name and bytes; the name has `/` on every system.
+fn line_of_list(root: &Path, path: &Path) -> String {
+    let name = path.strip_prefix(root).expect("it lies below").to_string_lossy().replace('\\', "/");
+    format!("    ({name:?}, include_bytes!({:?})),\n", path.display().to_string())
+}
+
+fn files_below(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if path.is_dir() { files_below(&path, found) } else { found.push(path) }
+    }
+}
+
+/// The files of `{{code FILE item}}`.
+fn quoted_code(page: &str) -> Vec<&str> {
+    page.split("{{code ").skip(1).filter_map(|rest| rest.split(' ').next()).collect()
 }
 
 /// Tests that need the measurements of others are ignored, and counted so, where these are absent or CALIBENCH_DATA is `none`.

@@ -25,6 +25,10 @@ book:
 gate:
     bash .ci/gate
 
+# What is published: packages, licences, the oldest Rust, the interface since the last release
+package:
+    bash .ci/package
+
 # The documentation, warnings as errors
 doc:
     RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --locked

@@ -10,7 +10,7 @@ const KEY: StreamKey = StreamKey { seed: 1, scenario: "bench", trial: 0, purpose
 /// The chapter's four poses, or random tilts up to 30 degrees at 110 to 160 mm.
 pub fn poses(views: usize) -> Vec<Pose> {
     if views <= 4 {
-        return Truth::chapter_poses();
+        return Truth::example_poses();
     }
     let mut stream = Stream::open(StreamKey { purpose: "pose", ..KEY });
     (0..views)
@@ -32,7 +32,7 @@ pub fn facing_views() -> Vec<View> {
 }
 
 fn observed(cam_from_target: Vec<Pose>) -> Vec<View> {
-    let truth = Truth { cam_from_target, ..Truth::chapter() };
+    let truth = Truth { cam_from_target, ..Truth::example() };
     let scene = Scene::new(truth).expect("every view lies in front of the camera");
     scene.observe(0.1, &mut Stream::open(KEY))
 }

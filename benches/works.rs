@@ -58,18 +58,18 @@ pub fn named(row: &str) -> Option<Box<dyn Work>> {
     match kind {
         "calibrate" => {
             let views = common::views(size.parse().ok()?);
-            job(move || calibrate(&views, &Settings::chapter()).expect("it can be calibrated"), intrinsics)
+            job(move || calibrate(&views, &Settings::standard()).expect("it can be calibrated"), intrinsics)
         }
         "covariance" => {
             let poses = common::poses(size.parse().ok()?);
-            let points = Truth::chapter_board().points();
-            let system = information(&Truth::chapter_camera(), FreeParameters::CHAPTER, &poses, &points)
+            let points = Truth::example_board().points();
+            let system = information(&Truth::example_camera(), FreeParameters::STANDARD, &poses, &points)
                 .expect("every view lies in front of the camera");
             job(move || system.covariance(), |_| Vec::new())
         }
         "refusal" => {
             let views = common::facing_views();
-            job(move || calibrate(&views, &Settings::chapter()).expect_err("nothing tilts"), |_| Vec::new())
+            job(move || calibrate(&views, &Settings::standard()).expect_err("nothing tilts"), |_| Vec::new())
         }
         "homography" => {
             let view = common::views(4).remove(3);
@@ -82,7 +82,7 @@ pub fn named(row: &str) -> Option<Box<dyn Work>> {
             job(run, |map| map.matrix().transpose().iter().take(6).copied().collect())
         }
         "points" => {
-            let (camera, pixels) = (Truth::chapter_camera(), pixels());
+            let (camera, pixels) = (Truth::example_camera(), pixels());
             job(move || camera.correct_pixels(&pixels).expect("inside the lens model"), |p| flat(&p))
         }
         "remap" => {
@@ -147,7 +147,7 @@ impl Work for Study {
 
 /// The six free intrinsics.
 fn intrinsics(calibration: Calibration) -> Vec<f64> {
-    FreeParameters::CHAPTER.iter().map(|p| calibration.camera.get(p)).collect()
+    FreeParameters::STANDARD.iter().map(|p| calibration.camera.get(p)).collect()
 }
 
 fn flat(points: &[Vec2]) -> Vec<f64> {
@@ -171,19 +171,19 @@ pub fn pixels() -> Vec<Vec2> {
 /// The chapter's camera for an image of this size, and the pinhole camera of the rectified image.
 pub fn cameras((width, _): (usize, usize)) -> (Camera, Camera) {
     let scale = width as f64 / 640.0;
-    let c = Truth::chapter_camera();
+    let c = Truth::example_camera();
     let pinhole = Camera::pinhole(c.fx * scale, c.fy * scale, c.cx * scale, c.cy * scale);
     (pinhole.with_distortion(BrownConrady::radial(c.distortion.k1, c.distortion.k2)), pinhole)
 }
 
 /// A tilted circle grid in front of the chapter's camera, with noise of four grey levels: edges, flats and texture.
 pub fn frame(size: (usize, usize)) -> Raster<u8> {
-    board_image(size, &Truth::chapter_board(), [-15.0, 15.0, 10.0]).0
+    board_image(size, &Truth::example_board(), [-15.0, 15.0, 10.0]).0
 }
 
 /// The chapter's grid as its camera sees it in the fourth view, 640 x 480, and where its discs' centres truly are.
 pub fn grid() -> (Raster<u8>, Vec<Vec2>) {
-    board_image((640, 480), &Truth::chapter_board(), [-15.0, 15.0, 10.0])
+    board_image((640, 480), &Truth::example_board(), [-15.0, 15.0, 10.0])
 }
 
 /// A chessboard of 9 x 6 inner corners in the same place, and where they truly are.

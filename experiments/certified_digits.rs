@@ -9,7 +9,7 @@
 //! that. The other programs are not run here: `calibench gate --certified --digits reference/digits.csv`
 //! measured them, and what it wrote is read.
 
-use calibench_gate::certified::{Digits, DigitsTable, Level, ReferenceProblem, measure, read};
+use calibench_gate::certified::{Digits, DigitsTable, Level, ReferenceProblem, measure, read_with};
 use calibench_gate::solver::Polished;
 use calibench_harness::project::Project;
 use calibench_harness::{Band, Context, Experiment, ExperimentError, Record, Table};
@@ -38,8 +38,8 @@ const DIGITS: &str = include_str!("../reference/digits.csv");
 fn run(context: &Context) -> Result<Record, ExperimentError> {
     let mut record = context.record();
     let project = Project::find().map_err(ExperimentError::at("the source tree"))?;
-    let problems =
-        read(&project.root().join("reference")).map_err(ExperimentError::at("the certified problems"))?;
+    let problems = read_with(|name| project.read_text(&format!("reference/{name}")))
+        .map_err(ExperimentError::at("the certified problems"))?;
     let committed = DigitsTable::of_csv(DIGITS).map_err(ExperimentError::at("the table of digits"))?;
     record.input("reference/digits.csv", DIGITS.as_bytes());
 

@@ -79,7 +79,7 @@ const ROUNDING_PX: f64 = 3e-12;
 /// The target, fronto-parallel, its centre on the optical axis.
 fn scene(distance_mm: f64) -> Result<Scene, ExperimentError> {
     let pose = looking_at_centre([0.0; 3], distance_mm);
-    Scene::new(Truth { cam_from_target: vec![pose], ..Truth::chapter() })
+    Scene::new(Truth { cam_from_target: vec![pose], ..Truth::example() })
         .map_err(ExperimentError::at("scene"))
 }
 
@@ -268,7 +268,7 @@ fn points_table(view: &View, found: &Found) -> Table {
 /// The chapter's 61 points of the line v = 60, through the point correction; that it is exact is a claim of
 /// `line-bending`.
 fn report_top_line(record: &mut Record) -> Result<(), ExperimentError> {
-    let truth = Truth::chapter_camera();
+    let truth = Truth::example_camera();
     let bent: Vec<Vec2> =
         (2..=62).map(|tens| truth.distort_pixel(&Vec2::new(10.0 * f64::from(tens), 60.0))).collect();
     let before = line(&bent)?.max_deviation();

@@ -55,8 +55,8 @@ const FULL: FreeParameters = {
 
 fn run(context: &Context) -> Result<Record, ExperimentError> {
     let mut record = context.record();
-    let theory = Theory::of(&Truth::chapter())?;
-    let unit = tangential_per_ratio(&Truth::chapter(), Vector2::from(DIRECTION));
+    let theory = Theory::of(&Truth::example())?;
+    let unit = tangential_per_ratio(&Truth::example(), Vector2::from(DIRECTION));
     let nodes = RATIO_THOUSANDTHS
         .par_iter()
         .map(|&thousandths| Node::of(thousandths, unit))
@@ -73,7 +73,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
 
 /// The chapter's scene through a lens with tangential terms.
 fn decentred(p: Vector2<f64>) -> Truth {
-    let chapter = Truth::chapter();
+    let chapter = Truth::example();
     let lens = BrownConrady { p1: p.x, p2: p.y, ..chapter.camera.distortion };
     Truth { camera: chapter.camera.with_distortion(lens), ..chapter }
 }
@@ -112,7 +112,7 @@ struct Theory {
 impl Theory {
     fn of(truth: &Truth) -> Result<Theory, ExperimentError> {
         let bound = |free| cramer_rao(truth, free, SIGMA_PX).map_err(ExperimentError::at("bound"));
-        let (full, small) = (bound(FULL)?, bound(FreeParameters::CHAPTER)?);
+        let (full, small) = (bound(FULL)?, bound(FreeParameters::STANDARD)?);
         let n = small.free.len();
         let tangential = full.intrinsics.view((n, n), (2, 2)).into_owned();
         let weight = tangential
@@ -205,15 +205,15 @@ impl Node {
         let fit = |free: FreeParameters| -> Result<Calibration, ExperimentError> {
             calibrate(&scene.exact(), &Settings::new(free)).map_err(ExperimentError::at("calibration"))
         };
-        let (small, full) = (fit(FreeParameters::CHAPTER)?, fit(FULL)?);
+        let (small, full) = (fit(FreeParameters::STANDARD)?, fit(FULL)?);
         let truth = &scene.truth.camera;
-        let bias = FreeParameters::CHAPTER.iter().map(|p| small.camera.get(p) - truth.get(p)).collect();
+        let bias = FreeParameters::STANDARD.iter().map(|p| small.camera.get(p) - truth.get(p)).collect();
         let plane_mm = plane_residual_mm(&scene, &small.camera)?;
         Ok(Node { ratio, bias, rmse_px: small.rmse_px, full_rmse_px: full.rmse_px, plane_mm })
     }
 
     fn bias_of(&self, parameter: Parameter) -> f64 {
-        FreeParameters::CHAPTER.position(parameter).map_or(f64::NAN, |i| self.bias[i])
+        FreeParameters::STANDARD.position(parameter).map_or(f64::NAN, |i| self.bias[i])
     }
 }
 
@@ -288,7 +288,7 @@ fn report_numbers(record: &mut Record, nodes: &[Node], theory: &Theory, unit: Ve
         )
         .number(
             "corners-differ",
-            corners_differ(&Truth::chapter()),
+            corners_differ(&Truth::example()),
             "largest over smallest tangential displacement at the corners of the facing target",
         )
         .number("p2-per-ratio", unit.y, "p2 there");
@@ -330,7 +330,7 @@ struct Direction {
 impl Direction {
     fn of(degrees: f64, theory: &Theory) -> Direction {
         let (sin, cos) = libm::sincos(degrees.to_radians());
-        let unit = tangential_per_ratio(&Truth::chapter(), Vector2::new(cos, sin));
+        let unit = tangential_per_ratio(&Truth::example(), Vector2::new(cos, sin));
         let tenth = unit * (f64::from(TENTH) / 1000.0);
         Direction {
             degrees,
@@ -413,7 +413,7 @@ const RELATIVE_GAIN: f64 = 1e-14;
 /// variance) ends the search within `sqrt(1e-14 c)` standard deviations of the minimum, in the metric of the
 /// covariance; six parameters share it.
 fn claim_linear(record: &mut Record, nodes: [&Node; 3], theory: &Theory, unit: Vector2<f64>) {
-    let sds: Vec<f64> = FreeParameters::CHAPTER.iter().map(|p| theory.small_sd(p)).collect();
+    let sds: Vec<f64> = FreeParameters::STANDARD.iter().map(|p| theory.small_sd(p)).collect();
     let in_sds =
         |bias: &[f64]| DVector::from_iterator(sds.len(), bias.iter().zip(&sds).map(|(b, sd)| b / sd));
     let predicted = in_sds(theory.bias(unit).as_slice());

@@ -13,7 +13,7 @@ use calibench::board::View;
 use calibench::calibrate::{Calibration, Settings, calibrate};
 use calibench::camera::{Camera, FreeParameters, Parameter};
 use calibench::evaluate::distribution::{fisher_cdf, round_significant};
-use calibench::evaluate::{BoundError, Errors, RmseDistribution, Sample, cramer_rao, leverages, reconcile};
+use calibench::evaluate::{BoundError, Errors, RmseDistribution, Sample, cramer_rao, errors_of, leverages};
 use calibench::geometry::Vec2;
 use calibench::synth::{Scene, Stream, StreamKey, Truth, scene::looking_at_centre};
 use calibench_harness::figure::density;
@@ -105,15 +105,15 @@ struct Draw {
 
 impl Draw {
     fn new(seed: u64) -> Result<Draw, ExperimentError> {
-        let scene = Scene::chapter();
+        let scene = Scene::example();
         let key = StreamKey { seed, scenario: "four-pose", trial: 0, purpose: "noise" };
         let views = scene.observe(SIGMA_PX, &mut Stream::open(key));
         let calibration =
-            calibrate(&views, &Settings::chapter()).map_err(ExperimentError::at("calibration"))?;
-        let bound = cramer_rao(&scene.truth, FreeParameters::CHAPTER, SIGMA_PX)
+            calibrate(&views, &Settings::standard()).map_err(ExperimentError::at("calibration"))?;
+        let bound = cramer_rao(&scene.truth, FreeParameters::STANDARD, SIGMA_PX)
             .map_err(ExperimentError::at("Cramer-Rao bound"))?;
         let singular = || ExperimentError::Input("the Cramer-Rao bound is singular".to_string());
-        let errors = reconcile(&scene.truth.camera, &calibration.camera, &bound).ok_or_else(singular)?;
+        let errors = errors_of(&scene.truth.camera, &calibration.camera, &bound).ok_or_else(singular)?;
         let leverages = leverages(&calibration, &views).ok_or_else(singular)?;
         let leverage: Vec<f64> = leverages.iter().flatten().flat_map(|h| [h.x, h.y]).collect();
         let residuals = calibration.residuals.iter().flatten().flat_map(|r| [r.x, r.y]);
@@ -138,7 +138,7 @@ impl Draw {
     }
 
     fn monte_carlo(&self, context: &Context) -> Outcome {
-        let settings = Settings::chapter();
+        let settings = Settings::standard();
         MonteCarlo {
             scene: &self.scene,
             settings: &settings,
@@ -153,7 +153,7 @@ impl Draw {
 
 /// Six intrinsics and six numbers for every pose.
 fn unknowns(views: usize) -> usize {
-    FreeParameters::CHAPTER.len() + 6 * views
+    FreeParameters::STANDARD.len() + 6 * views
 }
 
 /// The book's table against the same truth and bound.
@@ -166,11 +166,11 @@ struct Book {
 impl Book {
     fn new(record: &Record, draw: &Draw) -> Result<Book, ExperimentError> {
         let mut values = [0.0; Parameter::COUNT];
-        for parameter in FreeParameters::CHAPTER.iter() {
+        for parameter in FreeParameters::STANDARD.iter() {
             values[parameter as usize] = record.printed(parameter.name())?;
         }
         let camera = Camera::from_parameters(values);
-        let errors = reconcile(&draw.scene.truth.camera, &camera, &draw.bound)
+        let errors = errors_of(&draw.scene.truth.camera, &camera, &draw.bound)
             .ok_or_else(|| ExperimentError::Input("the Cramer-Rao bound is singular".to_string()))?;
         Ok(Book { camera, errors, rmse_px: record.printed("rmse")? })
     }
@@ -191,7 +191,7 @@ fn relative() -> Band {
 
 fn report_inputs(record: &mut Record, draw: &Draw) {
     let truth = &draw.scene.truth;
-    for parameter in FreeParameters::CHAPTER.iter() {
+    for parameter in FreeParameters::STANDARD.iter() {
         let (name, unit) = (parameter.name(), parameter.unit());
         record
             .exact(unit)
@@ -344,5 +344,5 @@ fn claim_residuals(record: &mut Record, draw: &Draw) {
 }
 
 fn position(parameter: Parameter) -> usize {
-    FreeParameters::CHAPTER.position(parameter).expect("k1 and k2 are free in the chapter's model")
+    FreeParameters::STANDARD.position(parameter).expect("k1 and k2 are free in the chapter's model")
 }

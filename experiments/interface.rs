@@ -79,7 +79,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
 
 /// The chapter's scene with another camera.
 fn truth_of(&[fx, fy, cx, cy, p1, p2]: &[f64; 6]) -> Truth {
-    let chapter = Truth::chapter();
+    let chapter = Truth::example();
     let lens = BrownConrady { p1, p2, ..chapter.camera.distortion };
     Truth { camera: Camera { fx, fy, cx, cy, ..chapter.camera }.with_distortion(lens), ..chapter }
 }
@@ -130,9 +130,9 @@ struct Step {
 
 impl Step {
     fn of(difference_px: f64, seed: u64) -> Result<Step, ExperimentError> {
-        let focal = Truth::chapter_camera().cx + difference_px;
-        let truth = truth_of(&[focal, focal, Truth::chapter_camera().cx, 243.0, 0.0, 0.0]);
-        let free = FreeParameters::CHAPTER;
+        let focal = Truth::example_camera().cx + difference_px;
+        let truth = truth_of(&[focal, focal, Truth::example_camera().cx, 243.0, 0.0, 0.0]);
+        let free = FreeParameters::STANDARD;
         let bound = cramer_rao(&truth, free, SIGMA_PX).map_err(ExperimentError::at("bound"))?;
         let sd_px = bound.standard_deviation(Parameter::Fy).unwrap_or(f64::NAN);
         let scene = Scene::new(truth).map_err(ExperimentError::at("scene"))?;

@@ -120,12 +120,12 @@ impl Node {
         progress: &Progress,
     ) -> Result<Node, ExperimentError> {
         let scene = Scene::new(truth).map_err(ExperimentError::at("scene of a node"))?;
-        let bound = match cramer_rao(&scene.truth, FreeParameters::CHAPTER, SIGMA_PX) {
+        let bound = match cramer_rao(&scene.truth, FreeParameters::STANDARD, SIGMA_PX) {
             Ok(bound) => Some(bound),
             Err(BoundError::Singular { .. }) => None,
             Err(error) => return Err(ExperimentError::at("Cramer-Rao bound of a node")(error)),
         };
-        let settings = Settings::chapter();
+        let settings = Settings::standard();
         let outcome = MonteCarlo {
             scene: &scene,
             settings: &settings,
@@ -138,7 +138,7 @@ impl Node {
         let rmse = RmseDistribution {
             sigma_px: SIGMA_PX,
             points: scene.observations(),
-            parameters: FreeParameters::CHAPTER.len() + 6 * scene.pixels().len(),
+            parameters: FreeParameters::STANDARD.len() + 6 * scene.pixels().len(),
         };
         let largest_radius = largest_radius(&scene.truth);
         Ok(Node { tenths, tilt_deg, largest_radius, bound, outcome, rmse })
@@ -181,12 +181,12 @@ impl Node {
 
     /// Whether a first-order prediction holds here: decided by the bound alone, before any trial.
     fn is_identifiable(&self) -> bool {
-        self.bound_sd(Parameter::Fx) / Truth::chapter_camera().fx < FIRST_ORDER
+        self.bound_sd(Parameter::Fx) / Truth::example_camera().fx < FIRST_ORDER
     }
 }
 
 fn position(parameter: Parameter) -> usize {
-    FreeParameters::CHAPTER.position(parameter).expect("only free parameters are asked for")
+    FreeParameters::STANDARD.position(parameter).expect("only free parameters are asked for")
 }
 
 /// All nodes, tilt by tilt.
@@ -223,7 +223,7 @@ fn turns(tilt_deg: f64) -> [[f64; 3]; 4] {
 /// The chapter's camera and target, tilted by `tilt_deg` and photographed from where they have the given
 /// coverage.
 fn truth(coverage: f64, tilt_deg: f64) -> Truth {
-    let chapter = Truth::chapter();
+    let chapter = Truth::example();
     let cam_from_target = turns(tilt_deg).map(|turn| framed(&chapter, turn, coverage)).to_vec();
     Truth { cam_from_target, ..chapter }
 }

@@ -46,7 +46,7 @@ const ROUNDING_PX: f64 = 3e-12;
 
 fn run(context: &Context) -> Result<Record, ExperimentError> {
     let mut record = context.record();
-    let barrel = Truth::chapter_camera();
+    let barrel = Truth::example_camera();
     let pincushion = with_k1(&barrel, PINCUSHION_K1);
     let ideal = line_at(LINE_V_PX);
     let bent = Bent::new(&barrel, &ideal)?;
@@ -329,7 +329,7 @@ fn grid_lines(see: impl Fn(&Vec2) -> Vec2) -> Vec<Vec<(f64, f64)>> {
 
 fn grid_figure(barrel: &Camera, pincushion: &Camera) -> Figure {
     let panel = |title: &str, see: &dyn Fn(&Vec2) -> Vec2| {
-        let (width, height) = Truth::CHAPTER_IMAGE;
+        let (width, height) = Truth::EXAMPLE_IMAGE;
         let (right, bottom) = (width as f64 - 0.5, height as f64 - 0.5);
         let border = [(-0.5, -0.5), (right, -0.5), (right, bottom), (-0.5, bottom), (-0.5, -0.5)];
         let plot = Plot::new(title, "u (px)", "v (px)").size(400.0, 350.0).equal_aspect().y_down().line_as(

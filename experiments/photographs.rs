@@ -142,7 +142,7 @@ impl Album {
                 scenes.push(scene);
             }
         }
-        let poses = Truth::chapter_poses();
+        let poses = Truth::example_poses();
         let progress = context.progress("photographs", scenes.len() * poses.len());
         let sheets: Vec<(&Node, &Pose)> =
             scenes.iter().flat_map(|node| poses.iter().map(move |pose| (node, pose))).collect();
@@ -171,7 +171,7 @@ impl Node {
 
 fn photo(pose: &Pose, node: &Node) -> Result<Photograph, ExperimentError> {
     let imaging = Imaging { blur_px: node.blur_px, ..Imaging::default() };
-    photograph(&Truth::chapter_camera(), Truth::CHAPTER_IMAGE, &board(node.diameter_mm)?, pose, &imaging)
+    photograph(&Truth::example_camera(), Truth::EXAMPLE_IMAGE, &board(node.diameter_mm)?, pose, &imaging)
         .map_err(ExperimentError::at("rendering"))
 }
 
@@ -180,19 +180,19 @@ fn detected(photo: &Photograph) -> Result<Vec<Vec2>, ExperimentError> {
 }
 
 fn biases(pose: &Pose, board: &Board) -> Result<Vec<Vec2>, ExperimentError> {
-    disc_biases(&Truth::chapter_camera(), pose, board).map_err(ExperimentError::at("bias of the discs"))
+    disc_biases(&Truth::example_camera(), pose, board).map_err(ExperimentError::at("bias of the discs"))
 }
 
 fn outcome(node: Node, album: &Album, seed: u64) -> Result<Outcome, ExperimentError> {
     let scenario = format!("blur {} noise {} diameter {}", node.blur_px, node.noise, node.diameter_mm);
     let (mut errors, mut variances) = (Vec::new(), Vec::new());
-    for ((pose, photo), trial) in Truth::chapter_poses().iter().zip(album.photos(&node)).zip(0..) {
+    for ((pose, photo), trial) in Truth::example_poses().iter().zip(album.photos(&node)).zip(0..) {
         let key = StreamKey { seed, scenario: &scenario, trial, purpose: "image noise" };
         let photo = photo.clone().with_noise(&SensorNoise::constant(node.noise), &mut Stream::open(key));
         let seen = detected(&photo)?;
         let biases = biases(pose, &board(node.diameter_mm)?)?;
         errors.extend(seen.iter().zip(&photo.centres_true).zip(&biases).map(|((s, t), b)| s - t - b));
-        let points = Truth::chapter_board().points();
+        let points = Truth::example_board().points();
         variances.extend(points.iter().map(|point| edge_variance(pose, point, &node)));
     }
     let bound_px = (variances.iter().sum::<f64>() / variances.len() as f64).sqrt();
@@ -204,7 +204,7 @@ fn outcome(node: Node, album: &Album, seed: u64) -> Result<Outcome, ExperimentEr
 /// of information a pixel of its length about its place along the normal `n`; the outline sums `n n^T`.
 fn edge_variance(pose: &Pose, centre: &Vec2, node: &Node) -> f64 {
     const SIDES: u32 = 64;
-    let camera = Truth::chapter_camera();
+    let camera = Truth::example_camera();
     let appearance = Imaging::default().appearance;
     let snr = (appearance.paper - appearance.ink) / node.noise;
     let spread = (node.blur_px * node.blur_px + 1.0 / 12.0).sqrt();
@@ -229,7 +229,7 @@ fn noise_free(diameter_mm: f64, album: &Album) -> Result<Exact, ExperimentError>
     let node = Node { diameter_mm, ..BASE };
     let (mut seen_views, mut predicted_views) = (Vec::new(), Vec::new());
     let (mut all_biases, mut displacements) = (Vec::new(), Vec::new());
-    for (pose, photo) in Truth::chapter_poses().iter().zip(album.photos(&node)) {
+    for (pose, photo) in Truth::example_poses().iter().zip(album.photos(&node)) {
         let seen = detected(photo)?;
         let biases = biases(pose, &board)?;
         displacements.extend(seen.iter().zip(&photo.centres_true).map(|(s, t)| s - t));
@@ -239,7 +239,7 @@ fn noise_free(diameter_mm: f64, album: &Album) -> Result<Exact, ExperimentError>
         seen_views.push(view(seen)?);
         predicted_views.push(view(biased)?);
     }
-    let settings = Settings::chapter();
+    let settings = Settings::standard();
     let fit = |views: &[View], discs: Option<&Board>| {
         let fitter = Fitter { settings: &settings, discs, reject_factor: None };
         fitter.fit(views).map(|fit| fit.calibration).map_err(ExperimentError::at("calibration"))
@@ -256,9 +256,9 @@ fn noise_free(diameter_mm: f64, album: &Album) -> Result<Exact, ExperimentError>
 
 /// Standard deviations of the parameters for noise of 1 px a coordinate.
 fn unit_deviations() -> Result<Vec<f64>, ExperimentError> {
-    let bound = cramer_rao(&Truth::chapter(), FreeParameters::CHAPTER, 1.0)
+    let bound = cramer_rao(&Truth::example(), FreeParameters::STANDARD, 1.0)
         .map_err(ExperimentError::at("Cramer-Rao bound"))?;
-    Ok(FreeParameters::CHAPTER.iter().filter_map(|p| bound.standard_deviation(p)).collect())
+    Ok(FreeParameters::STANDARD.iter().filter_map(|p| bound.standard_deviation(p)).collect())
 }
 
 /// Root mean square of a coordinate.
@@ -291,7 +291,7 @@ impl Exact {
 }
 
 fn differences(a: &Camera, b: &Camera) -> Vec<f64> {
-    FreeParameters::CHAPTER.iter().map(|p| a.get(p) - b.get(p)).collect()
+    FreeParameters::STANDARD.iter().map(|p| a.get(p) - b.get(p)).collect()
 }
 
 fn base(outcomes: &[Outcome]) -> Result<&Outcome, ExperimentError> {
@@ -336,10 +336,10 @@ fn report_bias(record: &mut Record, exact: &[Exact], unit: &[f64]) -> Result<(),
         .number("bias-rms", bias, "RMS displacement of uncorrected centres, 3 mm dots, four poses")
         .number("bias-largest", largest(&chapter.displacements), "largest displacement")
         .number("remainder-rms", remainder, "RMS distance from the true centres once corrected");
-    let truth = Truth::chapter_camera();
+    let truth = Truth::example_camera();
     let (before, after) =
         (differences(&chapter.uncorrected.camera, &truth), differences(&chapter.corrected.camera, &truth));
-    for (i, p) in FreeParameters::CHAPTER.iter().enumerate() {
+    for (i, p) in FreeParameters::STANDARD.iter().enumerate() {
         let what = format!("error of {p} from uncorrected centres, 3 mm dots");
         record.group(p.unit(), band()).number(format!("{p}-uncorrected"), before[i], what);
         let what = format!("error of {p} from corrected centres, 3 mm dots");
@@ -390,7 +390,7 @@ fn claim_noise(record: &mut Record, outcomes: &[Outcome]) {
 }
 
 fn claim_bias(record: &mut Record, exact: &[Exact], unit: &[f64]) {
-    let truth = Truth::chapter_camera();
+    let truth = Truth::example_camera();
     let within = |moved: &[f64], reach: &[f64]| moved.iter().zip(reach).all(|(m, r)| m.abs() <= *r);
     let remainder = |e: &Exact| rms(&e.remainder());
     let worst = exact.iter().map(remainder).fold(0.0, f64::max);
@@ -425,7 +425,7 @@ fn largest_deviation(moved: &[f64], unit: &[f64]) -> f64 {
 }
 
 fn bias_table<'a>(exact: &'a [Exact], unit: &[f64]) -> Rows<&'a Exact> {
-    let truth = Truth::chapter_camera();
+    let truth = Truth::example_camera();
     let error = |camera: &Camera| largest_deviation(&differences(camera, &truth), unit);
     let deviations = "standard deviations at 0.1 px";
     Table::of("bias", "bias of discs without noise, and the worst parameter it leaves", exact)
@@ -470,7 +470,7 @@ fn noise_figure(outcomes: &[Outcome], seed: u64) -> Figure {
 }
 
 fn bias_figure(exact: &[Exact], unit: &[f64]) -> Figure {
-    let truth = Truth::chapter_camera();
+    let truth = Truth::example_camera();
     let curve = |value: &dyn Fn(&Exact) -> f64| -> Vec<(f64, f64)> {
         exact.iter().map(|e| (e.diameter_mm, value(e))).collect()
     };

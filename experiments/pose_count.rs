@@ -85,7 +85,7 @@ fn spread(cell: &CellSummary, parameter: Parameter) -> (f64, f64) {
 }
 
 fn parameters() -> impl Iterator<Item = Parameter> {
-    FreeParameters::CHAPTER.iter()
+    FreeParameters::STANDARD.iter()
 }
 
 fn report_numbers(record: &mut Record, engine: &Engine, summary: &Summary) {

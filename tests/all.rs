@@ -12,6 +12,7 @@ mod detect_chessboard;
 mod detect_circles;
 mod detect_corners;
 mod detect_photos;
+mod examples;
 mod failing_disk;
 mod fuzz_seeds;
 mod gate;

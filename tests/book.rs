@@ -18,13 +18,17 @@ fn project() -> Project {
     Project::above(Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap()
 }
 
+fn page_of(text: &str) -> Page {
+    Page { path: "page.md".into(), title: "Page".into(), number: Some(1), text: text.into() }
+}
+
 /// A book of one page, with the golden values of line bending and no record.
 fn book_of(text: &str) -> Compiled {
     let project = project();
-    let page = Page { path: "page.md".into(), number: vec![1], text: text.into() };
+    let page = page_of(text);
     let evidence = Evidence::of_records(&project, &[LINE_BENDING], &[]);
-    let root = project.root().to_path_buf();
-    compile(&Sources { pages: vec![page], evidence, root, ..Sources::default() })
+    let sources = Sources::load(&project, evidence).unwrap();
+    compile(&Sources { pages: vec![page], references: Vec::new(), contradictions: Vec::new(), ..sources })
 }
 
 /// Findings of the page, as `line: message`.
@@ -102,7 +106,7 @@ fn unused_names_are_found_where_they_are_defined() {
     let project = project();
     let evidence = Evidence::of_records(&project, &[LINE_BENDING], &[]);
     let mut sources = Sources::load(&project, evidence).unwrap();
-    sources.pages = vec![Page { path: "page.md".into(), number: vec![1], text: "# Title\n".into() }];
+    sources.pages = vec![page_of("# Title\n")];
     let findings = compile(&sources).findings;
     let uncited = sources.references.len();
     let silent = sources.contradictions.len();

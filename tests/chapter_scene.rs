@@ -10,15 +10,15 @@ fn noise(trial: u64) -> Stream {
 }
 
 fn scene_of(poses: Vec<Pose>) -> Scene {
-    Scene::new(Truth { cam_from_target: poses, ..Truth::chapter() }).unwrap()
+    Scene::new(Truth { cam_from_target: poses, ..Truth::example() }).unwrap()
 }
 
 #[test]
 fn exact_data_give_the_exact_camera() {
-    let scene = Scene::chapter();
-    let result = calibrate(&scene.exact(), &Settings::chapter()).unwrap();
+    let scene = Scene::example();
+    let result = calibrate(&scene.exact(), &Settings::standard()).unwrap();
     assert_eq!(result.termination, Termination::Converged);
-    for parameter in FreeParameters::CHAPTER.iter() {
+    for parameter in FreeParameters::STANDARD.iter() {
         let error = result.camera.get(parameter) - scene.truth.camera.get(parameter);
         // Rounding of pixels near 600 is 1e-13; the bound turns 0.1 px into at most 0.7 px of focal length, so 1e-11 is safe.
         assert!(error.abs() < 1e-10, "{parameter}: {error:e}");
@@ -31,11 +31,11 @@ fn exact_data_give_the_exact_camera() {
 
 #[test]
 fn the_predicted_standard_deviations_are_those_of_the_chapter() {
-    let result = calibrate(&Scene::chapter().observe(0.1, &mut noise(0)), &Settings::chapter()).unwrap();
+    let result = calibrate(&Scene::example().observe(0.1, &mut noise(0)), &Settings::standard()).unwrap();
     // CHAPTER 5.3, Cramer-Rao standard deviations at the truth, to their printed digits; sigma is estimated here with 474
     // degrees of freedom (standard error 3.2 %, five of them 16 %) and the point of linearisation differs a little.
     let expected = [0.681, 0.684, 0.392, 0.376, 0.0035, 0.0157];
-    for (parameter, sd) in FreeParameters::CHAPTER.iter().zip(expected) {
+    for (parameter, sd) in FreeParameters::STANDARD.iter().zip(expected) {
         let ours = result.standard_deviation(parameter).unwrap();
         assert!((ours / sd - 1.0).abs() < 0.2, "{parameter}: {ours} against {sd}");
     }
@@ -46,7 +46,7 @@ fn facing_views_alone_are_refused_for_focal_length_and_distance() {
     for distances in [[100.0, 120.0, 140.0], [120.0, 120.0, 120.0], [60.0, 120.0, 240.0]] {
         let scene = scene_of(distances.map(|z| looking_at_centre([0.0, 0.0, 5.0], z)).to_vec());
         for trial in 0..20 {
-            let error = calibrate(&scene.observe(0.1, &mut noise(trial)), &Settings::chapter())
+            let error = calibrate(&scene.observe(0.1, &mut noise(trial)), &Settings::standard())
                 .map(|r| r.camera)
                 .unwrap_err();
             let CalibrationError::NotIdentifiable { inseparable, .. } = &error else { panic!("{error}") };
@@ -54,7 +54,7 @@ fn facing_views_alone_are_refused_for_focal_length_and_distance() {
             assert!(inseparable.iter().any(|n| n == "distance"), "{error}");
         }
         // Without noise, views from one distance are copies of each other, and count as one.
-        let error = calibrate(&scene.exact(), &Settings::chapter()).map(|r| r.camera).unwrap_err();
+        let error = calibrate(&scene.exact(), &Settings::standard()).map(|r| r.camera).unwrap_err();
         let is_expected = match error {
             CalibrationError::TooFewViews { copies, .. } => copies == 2 && distances[0] == distances[2],
             CalibrationError::NotIdentifiable { .. } => distances[0] != distances[2],
@@ -70,7 +70,7 @@ fn off_centre_facing_views_are_refused_too() {
         .map(|[x, y, z]| Pose { translation: Vec3::new(x, y, z), ..looking_at_centre([0.0; 3], z) });
     for trial in 0..20 {
         let views = scene_of(poses.to_vec()).observe(0.1, &mut noise(trial));
-        let result = calibrate(&views, &Settings::chapter());
+        let result = calibrate(&views, &Settings::standard());
         assert!(
             matches!(result, Err(CalibrationError::NotIdentifiable { .. })),
             "{:?}",
@@ -91,7 +91,7 @@ fn views_of_one_tilt_are_refused_though_each_is_tilted() {
     let pinhole = Truth {
         camera: calibench::camera::Camera::pinhole(600.0, 600.0, 326.0, 243.0),
         cam_from_target: one_tilt(),
-        ..Truth::chapter()
+        ..Truth::example()
     };
     let scene = Scene::new(pinhole).unwrap();
     use Parameter::*;
@@ -110,7 +110,7 @@ fn views_of_one_tilt_are_refused_though_each_is_tilted() {
 #[test]
 fn distortion_makes_views_of_one_tilt_identifiable() {
     let views = scene_of(one_tilt()).observe(0.1, &mut noise(0));
-    let result = calibrate(&views, &Settings::chapter()).unwrap();
+    let result = calibrate(&views, &Settings::standard()).unwrap();
     let z = (result.camera.fx - 600.0) / result.standard_deviation(Parameter::Fx).unwrap();
     assert!(z.abs() < 5.0, "z = {z}");
 }
@@ -119,7 +119,7 @@ fn distortion_makes_views_of_one_tilt_identifiable() {
 fn a_small_tilt_is_accepted_with_large_standard_deviations() {
     let poses = [[0.0; 3], [3.0, 0.0, 0.0], [0.0, -3.0, 0.0], [-2.0, 2.0, 5.0]];
     let scene = scene_of(poses.map(|p| looking_at_centre(p, 120.0)).to_vec());
-    let result = calibrate(&scene.observe(0.1, &mut noise(0)), &Settings::chapter()).unwrap();
+    let result = calibrate(&scene.observe(0.1, &mut noise(0)), &Settings::standard()).unwrap();
     assert!(result.standard_deviation(Parameter::Fx).unwrap() > 2.0);
 }
 
@@ -127,9 +127,9 @@ fn a_small_tilt_is_accepted_with_large_standard_deviations() {
 fn one_view_is_enough_only_if_enough_is_held() {
     let scene = scene_of(vec![looking_at_centre([25.0, 15.0, 0.0], 120.0)]);
     let views = scene.observe(0.1, &mut noise(0));
-    let refused = calibrate(&views, &Settings::chapter()).unwrap_err();
+    let refused = calibrate(&views, &Settings::standard()).unwrap_err();
     assert!(matches!(refused, CalibrationError::TooFewViews { need: 2, got: 1, linear: 4, copies: 0 }));
-    let settings = Settings::chapter().hold(Parameter::Cx, 326.0).hold(Parameter::Cy, 243.0);
+    let settings = Settings::standard().hold(Parameter::Cx, 326.0).hold(Parameter::Cy, 243.0);
     let result = calibrate(&views, &settings).unwrap();
     let z = (result.camera.fx - 600.0) / result.standard_deviation(Parameter::Fx).unwrap();
     assert!(z.abs() < 5.0, "z = {z}");
@@ -141,8 +141,8 @@ fn one_view_is_enough_only_if_enough_is_held() {
 
 #[test]
 fn k3_on_weak_data_is_solved_with_a_warning_that_names_the_correlation() {
-    let settings = Settings::new(FreeParameters::CHAPTER.with(Parameter::K3));
-    let result = calibrate(&Scene::chapter().observe(0.1, &mut noise(1)), &settings).unwrap();
+    let settings = Settings::new(FreeParameters::STANDARD.with(Parameter::K3));
+    let result = calibrate(&Scene::example().observe(0.1, &mut noise(1)), &settings).unwrap();
     assert!(result.warnings.iter().any(|w| matches!(
         w,
         Warning::Correlated { a: Parameter::K2, b: Parameter::K3, correlation } if correlation.abs() > 0.98
@@ -153,8 +153,8 @@ fn k3_on_weak_data_is_solved_with_a_warning_that_names_the_correlation() {
 fn neither_the_unit_nor_the_origin_of_the_target_matters() {
     use calibench::board::View;
     use calibench::geometry::Vec2;
-    let views = Scene::chapter().observe(0.1, &mut noise(2));
-    let base = calibrate(&views, &Settings::chapter()).unwrap();
+    let views = Scene::example().observe(0.1, &mut noise(2));
+    let base = calibrate(&views, &Settings::standard()).unwrap();
     for (scale, offset) in
         [(1e-3, Vec2::zeros()), (25.4, Vec2::new(1e5, -3e5)), (1.0, Vec2::new(-40.0, -30.0))]
     {
@@ -165,8 +165,8 @@ fn neither_the_unit_nor_the_origin_of_the_target_matters() {
                 View::new(points, v.pixels().to_vec()).unwrap()
             })
             .collect();
-        let result = calibrate(&moved, &Settings::chapter()).unwrap();
-        for parameter in FreeParameters::CHAPTER.iter() {
+        let result = calibrate(&moved, &Settings::standard()).unwrap();
+        for parameter in FreeParameters::STANDARD.iter() {
             let sd = base.standard_deviation(parameter).unwrap();
             let change = (result.camera.get(parameter) - base.camera.get(parameter)) / sd;
             // Offsets of 4e5 over a target of 2000 cost 2 to 3 digits of 16; convergence leaves 1e-6 of a standard deviation.
@@ -186,7 +186,7 @@ fn gross_errors_under_a_robust_loss_are_no_reason_to_refuse_tilted_views() {
     use calibench::board::View;
     use calibench::calibrate::Loss;
     use calibench::geometry::Vec2;
-    let scene = Scene::chapter();
+    let scene = Scene::example();
     for trial in 0..50 {
         let mut stream = noise(trial);
         let views: Vec<View> = scene
@@ -201,7 +201,7 @@ fn gross_errors_under_a_robust_loss_are_no_reason_to_refuse_tilted_views() {
             })
             .collect();
         for loss in [Loss::Cauchy { scale_px: 0.3 }, Loss::Huber { delta_px: 0.3 }] {
-            let result = calibrate(&views, &Settings::chapter().with_loss(loss));
+            let result = calibrate(&views, &Settings::standard().with_loss(loss));
             // 0.7 px is the bound without gross errors; ten times that is far from what they do to plain least squares.
             let fx = result.unwrap_or_else(|error| panic!("trial {trial}, {loss:?}: {error}")).camera.fx;
             assert!((fx - 600.0).abs() < 7.0, "trial {trial}, {loss:?}: fx {fx}");

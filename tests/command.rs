@@ -52,10 +52,22 @@ fn wrong_usage_ends_with_two_and_names_what_there_is() {
 }
 
 #[test]
-fn check_outside_the_source_tree_says_where_to_go() {
-    let output = run(CALIBENCH, Path::new("/"), &["check"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output.stderr).contains("source tree"));
+fn outside_the_source_tree_everything_works_but_bless() {
+    let away = std::env::temp_dir().join(format!("calibench-away-{}", std::process::id()));
+    fs::create_dir_all(&away).expect("a folder is made");
+    let check = run(CALIBENCH, &away, &["check", "line-bending", "certified-digits"]);
+    assert_eq!(check.status.code(), Some(0), "{}{}", text(&check.stdout), text(&check.stderr));
+    assert_eq!(fs::read_dir(&away).expect("the folder is there").count(), 0, "check writes nothing");
+    let ran = run(CALIBENCH, &away, &["run", "line-bending"]);
+    assert_eq!(ran.status.code(), Some(0), "{}{}", text(&ran.stdout), text(&ran.stderr));
+    assert!(away.join("out/line-bending/record.json").is_file());
+    let book = run(CALIBENCH, &away, &["book"]);
+    assert_eq!(book.status.code(), Some(0), "{}{}", text(&book.stdout), text(&book.stderr));
+    assert!(away.join("out/book/line-bending.html").is_file());
+    let bless = run(CALIBENCH, &away, &["bless", "line-bending"]);
+    assert_eq!(bless.status.code(), Some(2));
+    assert!(text(&bless.stderr).contains("source tree"));
+    fs::remove_dir_all(&away).expect("the folder is removed");
 }
 
 #[test]

@@ -14,7 +14,7 @@ use calibench::synth::scene::looking_at_centre;
 use calibench::synth::{Stream, StreamKey, Truth};
 
 fn chapter_photo(pose: &Pose, imaging: &Imaging) -> Photograph {
-    photograph(&Truth::chapter_camera(), (640, 480), &Truth::chapter_board(), pose, imaging).unwrap()
+    photograph(&Truth::example_camera(), (640, 480), &Truth::example_board(), pose, imaging).unwrap()
 }
 
 /// RMS distance of detected centres, corrected for the bias of their discs, to the true ones.
@@ -35,7 +35,7 @@ fn corrected_centres_are_within_a_hundredth_of_a_pixel() {
         [0.0, 40.0, 0.0],
     ] {
         let pose = looking_at_centre(tilt, 120.0);
-        let biases = disc_biases(&Truth::chapter_camera(), &pose, &Truth::chapter_board()).unwrap();
+        let biases = disc_biases(&Truth::example_camera(), &pose, &Truth::example_board()).unwrap();
         for blur_px in [0.0, 0.5, 1.0] {
             let photo = chapter_photo(&pose, &Imaging { blur_px, ..Imaging::default() });
             // The target of the project. Measured: 0.0005 to 0.0014 px.
@@ -54,7 +54,7 @@ fn without_correction_the_bias_of_tilted_discs_remains() {
     let photo = chapter_photo(&pose, &Imaging::default());
     let grid = circle_grid(&photo.image, 9, 7).unwrap();
     let none = vec![Vec2::zeros(); 63];
-    let biases = disc_biases(&Truth::chapter_camera(), &pose, &Truth::chapter_board()).unwrap();
+    let biases = disc_biases(&Truth::example_camera(), &pose, &Truth::example_board()).unwrap();
     let predicted = (biases.iter().map(Vec2::norm_squared).sum::<f64>() / 63.0).sqrt();
     let seen = corrected_rms_px(&grid, &photo, &none);
     assert!(predicted > 0.04 && (seen - predicted).abs() < 0.003, "{seen} {predicted}");
@@ -64,9 +64,9 @@ fn without_correction_the_bias_of_tilted_discs_remains() {
 /// `g` the image's derivative by a shift, from renders shifted by `+-h`. RMS over the discs of the distance, px.
 fn bound_px(pose: &Pose, imaging: &Imaging, sigma: f64) -> f64 {
     let h = 0.02;
-    let board = Truth::chapter_board();
+    let board = Truth::example_board();
     let shifted = |du: f64, dv: f64| -> Photograph {
-        let camera = Truth::chapter_camera();
+        let camera = Truth::example_camera();
         let moved = Camera { cx: camera.cx + du, cy: camera.cy + dv, ..camera };
         photograph(&moved, (640, 480), &board, pose, imaging).unwrap()
     };
@@ -99,7 +99,7 @@ fn noise_moves_centres_hardly_more_than_the_bound() {
         let pose = looking_at_centre([tilt, 0.0, 0.0], 120.0);
         let imaging = Imaging { blur_px, ..Imaging::default() };
         let photo = chapter_photo(&pose, &imaging);
-        let biases = disc_biases(&Truth::chapter_camera(), &pose, &Truth::chapter_board()).unwrap();
+        let biases = disc_biases(&Truth::example_camera(), &pose, &Truth::example_board()).unwrap();
         let square: f64 = (0..trials)
             .map(|trial| {
                 let key = StreamKey { seed: 1, scenario: "centres", trial, purpose: "noise" };
@@ -122,7 +122,7 @@ fn light_that_falls_off_moves_centres_little() {
     let pose = looking_at_centre([20.0, 0.0, 0.0], 120.0);
     let shading = Shading { slope_x: 0.4, slope_y: -0.2, falloff: -0.3 };
     let photo = chapter_photo(&pose, &Imaging { shading, ..Imaging::default() });
-    let biases = disc_biases(&Truth::chapter_camera(), &pose, &Truth::chapter_board()).unwrap();
+    let biases = disc_biases(&Truth::example_camera(), &pose, &Truth::example_board()).unwrap();
     let rms = corrected_rms_px(&circle_grid(&photo.image, 9, 7).unwrap(), &photo, &biases);
     assert!(rms < 0.01, "{rms}");
 }
@@ -142,9 +142,9 @@ fn assert_ordered(grid: &DotGrid, centres_true: &[Vec2], what: &str) {
 fn any_rotation_tilt_and_lens_gives_the_order_of_the_convention() {
     let lenses =
         [BrownConrady::radial(-0.25, 0.07), BrownConrady::default(), BrownConrady::radial(0.25, 0.0)];
-    let board = Truth::chapter_board();
+    let board = Truth::example_board();
     for (lens, distortion) in lenses.into_iter().enumerate() {
-        let camera = Truth::chapter_camera().with_distortion(distortion);
+        let camera = Truth::example_camera().with_distortion(distortion);
         for turn in (0..360).step_by(15) {
             for tilt in [[0.0, 0.0], [45.0, 0.0], [-45.0, 0.0], [0.0, 45.0], [-30.0, 32.0]] {
                 let pose = looking_at_centre([tilt[0], tilt[1], f64::from(turn)], 190.0);
@@ -163,7 +163,7 @@ fn a_square_grid_starts_at_the_corner_nearest_to_the_top_left() {
     for turn in (0..360).step_by(20) {
         let pose = looking_at_centre([20.0, 10.0, f64::from(turn)], 150.0);
         let photo =
-            photograph(&Truth::chapter_camera(), (640, 480), &board, &pose, &Imaging::default()).unwrap();
+            photograph(&Truth::example_camera(), (640, 480), &board, &pose, &Imaging::default()).unwrap();
         let centres = circle_grid(&photo.image, 6, 6).unwrap().centres_px();
         let corners = [centres[0], centres[5], centres[30], centres[35]];
         assert!(corners.iter().all(|corner| corner.sum() >= centres[0].sum()));
@@ -228,7 +228,7 @@ fn a_grid_of_another_size_is_refused() {
 fn a_stray_disc_beside_the_grid_does_no_harm_but_a_row_of_them_does() {
     let big = Board::circles(10, 7, 10.0, 3.0).unwrap();
     let pose = looking_at_centre([10.0, 0.0, 0.0], 150.0);
-    let photo = photograph(&Truth::chapter_camera(), (640, 480), &big, &pose, &Imaging::default()).unwrap();
+    let photo = photograph(&Truth::example_camera(), (640, 480), &big, &pose, &Imaging::default()).unwrap();
     let mut image = photo.image.clone();
     for row in 0..7 {
         if row != 3 {
@@ -270,7 +270,7 @@ fn what_holds_no_discs_gives_none() {
     // The squares of a chessboard are not discs.
     let board = Board::chessboard(9, 6, 10.0).unwrap();
     let pose = looking_at_centre([20.0, 0.0, 10.0], 150.0);
-    let photo = photograph(&Truth::chapter_camera(), (640, 480), &board, &pose, &Imaging::default()).unwrap();
+    let photo = photograph(&Truth::example_camera(), (640, 480), &board, &pose, &Imaging::default()).unwrap();
     assert!(circle_grid_of(&blobs(&photo.image, &BlobOptions::default()), 5, 4).is_err());
     assert!(blobs(&photo.image, &BlobOptions::default()).is_empty());
 }
@@ -282,7 +282,7 @@ fn bright_discs_on_dark_ground_are_found_when_asked_for() {
     let photo = chapter_photo(&pose, &Imaging { appearance, ..Imaging::default() });
     let bright = BlobOptions { polarity: Polarity::Bright, ..BlobOptions::default() };
     let grid = circle_grid_of(&blobs(&photo.image, &bright), 9, 7).unwrap();
-    let biases = disc_biases(&Truth::chapter_camera(), &pose, &Truth::chapter_board()).unwrap();
+    let biases = disc_biases(&Truth::example_camera(), &pose, &Truth::example_board()).unwrap();
     assert!(corrected_rms_px(&grid, &photo, &biases) < 0.01);
     assert!(circle_grid(&photo.image, 9, 7).is_err());
 }

@@ -13,7 +13,7 @@ fn refined_corners_are_near_the_truth() {
     for tilt in [[0.0; 3], [20.0, 0.0, 0.0], [-30.0, 25.0, 10.0]] {
         let pose = looking_at_centre(tilt, 150.0);
         let imaging = Imaging { blur_px: 0.5, ..Imaging::default() };
-        let photo = photograph(&Truth::chapter_camera(), (640, 480), &board, &pose, &imaging).unwrap();
+        let photo = photograph(&Truth::example_camera(), (640, 480), &board, &pose, &imaging).unwrap();
         let square: f64 = photo
             .centres_true
             .iter()

@@ -275,20 +275,15 @@ fn the_same_seed_gives_the_same_problems_and_another_does_not() {
 }
 
 #[test]
-fn the_committed_schemas_are_those_of_the_program_and_know_every_field() {
-    for (name, text) in schemas() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("adapters").join(name);
-        let committed = std::fs::read_to_string(&path).expect("a committed schema");
-        assert_eq!(committed, text, "run `calibench gate --schema adapters`");
-    }
+fn the_schemas_know_every_field_that_is_sent() {
     let [(_, problem), (_, answer)] = schemas();
     let fields = |schema: &str| -> Vec<String> {
         let schema: serde_json::Value = serde_json::from_str(schema).expect("JSON");
         schema["properties"].as_object().expect("an object").keys().cloned().collect()
     };
     let problem_line: serde_json::Value = serde_json::from_str(&problems(1)[0].to_line()).expect("JSON");
-    assert!(problem_line.as_object().expect("an object").keys().all(|key| fields(&problem).contains(key)));
+    assert!(problem_line.as_object().expect("an object").keys().all(|key| fields(problem).contains(key)));
     let given = Builtin.ask(&problems(1)[0]).expect("an answer");
     let given = serde_json::to_value(given).expect("JSON");
-    assert!(given.as_object().expect("an object").keys().all(|key| fields(&answer).contains(key)));
+    assert!(given.as_object().expect("an object").keys().all(|key| fields(answer).contains(key)));
 }

@@ -166,7 +166,7 @@ fn more_threads_than_any_machine_has_are_refused() {
 
 /// The chapter's corners, exact, as a corner file: four views of 640 x 480 px.
 fn corner_file() -> String {
-    let scene = calibench::synth::Scene::chapter();
+    let scene = calibench::synth::Scene::example();
     let mut text = "view,point,X,Y,u,v\n".to_string();
     for (view, seen) in scene.exact().iter().enumerate() {
         for (point, (at, pixel)) in seen.pairs().enumerate() {

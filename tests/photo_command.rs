@@ -39,15 +39,15 @@ fn text(bytes: &[u8]) -> String {
 
 fn rendered(board: &Board, pose: &Pose) -> Raster<f32> {
     let imaging = Imaging { blur_px: 0.5, ..Imaging::default() };
-    photograph(&Truth::chapter_camera(), Truth::CHAPTER_IMAGE, board, pose, &imaging)
+    photograph(&Truth::example_camera(), Truth::EXAMPLE_IMAGE, board, pose, &imaging)
         .expect("it is seen")
         .image
 }
 
 /// The chapter's four photographs, 16 bits each: `pose0.png` to `pose3.png`.
 fn chapter_photos(folder: &Path) {
-    for (i, pose) in Truth::chapter_poses().iter().enumerate() {
-        let photo = rendered(&Truth::chapter_board(), pose).to_u16();
+    for (i, pose) in Truth::example_poses().iter().enumerate() {
+        let photo = rendered(&Truth::example_board(), pose).to_u16();
         write_png_16(&folder.join(format!("pose{i}.png")), &photo).expect("it is written");
     }
 }
@@ -133,15 +133,15 @@ fn a_mis_detected_view_is_rejected_on_request() {
     chapter_photos(&folder);
     for i in 0..3 {
         let pose = looking_at_centre([12.0 * f64::from(i) - 20.0, 18.0, 5.0], 125.0);
-        write_png(&folder.join(format!("more{i}.png")), &rendered(&Truth::chapter_board(), &pose).to_u8())
+        write_png(&folder.join(format!("more{i}.png")), &rendered(&Truth::example_board(), &pose).to_u8())
             .unwrap();
     }
     // A grid that the detector takes for the board, though it is not: its rows are a tenth farther apart, which a camera of
     // longer fy shows.
-    let stretching = Camera { fy: 660.0, ..Truth::chapter_camera() };
+    let stretching = Camera { fy: 660.0, ..Truth::example_camera() };
     let pose = looking_at_centre([25.0, 0.0, 0.0], 140.0);
     let stretched =
-        photograph(&stretching, Truth::CHAPTER_IMAGE, &Truth::chapter_board(), &pose, &Imaging::default());
+        photograph(&stretching, Truth::EXAMPLE_IMAGE, &Truth::example_board(), &pose, &Imaging::default());
     let photo = stretched.expect("it is seen").image;
     write_png(&folder.join("other.png"), &photo.to_u8()).unwrap();
     let mut arguments =
@@ -161,8 +161,8 @@ fn a_mis_detected_view_is_rejected_on_request() {
 #[test]
 fn colour_and_bright_discs_on_dark_ground_are_read_too() {
     let folder = folder("photo-command-bright");
-    for (i, pose) in Truth::chapter_poses().iter().enumerate() {
-        let dark = rendered(&Truth::chapter_board(), pose).to_u8();
+    for (i, pose) in Truth::example_poses().iter().enumerate() {
+        let dark = rendered(&Truth::example_board(), pose).to_u8();
         let colours = dark.samples().iter().flat_map(|&level| {
             let bright = 255 - level;
             // Red, green and blue differ, as under coloured light.

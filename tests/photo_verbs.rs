@@ -98,7 +98,7 @@ fn photographs_are_corrected_and_the_new_camera_is_told() {
             assert_eq!((mask.get(0, 240), corrected.get(0, 240)), (0, u16::MAX));
         }
         if view == "same" {
-            let source = Truth::chapter_camera().distort_pixel(&Vec2::new(40.0, 60.0));
+            let source = Truth::example_camera().distort_pixel(&Vec2::new(40.0, 60.0));
             // The ramp is linear, so interpolation is exact; the level is rounded.
             assert!((f64::from(corrected.get(40, 60)) - 100.0 * source.x).abs() <= 0.51);
         }

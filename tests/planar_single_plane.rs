@@ -20,7 +20,7 @@ fn options(centre_px: Vec2, centre_free: bool) -> SinglePlaneOptions {
 
 /// The chapter's camera and target, one of its four poses only.
 fn scene(pose: usize) -> Scene {
-    let chapter = Truth::chapter();
+    let chapter = Truth::example();
     Scene::new(Truth { cam_from_target: vec![chapter.cam_from_target[pose]], ..chapter }).unwrap()
 }
 
@@ -234,7 +234,7 @@ fn views_that_fix_no_lens_are_refused() {
 
 #[test]
 fn without_distortion_a_free_centre_is_refused_and_a_held_one_is_not() {
-    let truth = Truth { camera: Camera::pinhole(600.0, 600.0, 326.0, 243.0), ..Truth::chapter() };
+    let truth = Truth { camera: Camera::pinhole(600.0, 600.0, 326.0, 243.0), ..Truth::example() };
     let scene = Scene::new(Truth { cam_from_target: vec![truth.cam_from_target[0]], ..truth }).unwrap();
     let released = (0..200)
         .filter(|&trial| {

@@ -7,7 +7,7 @@ use calibench::raster::Raster;
 use calibench::rectify::{OutputView, RectifyMap, output_camera, rectify_points};
 use calibench::synth::{Scene, Truth};
 
-const SIZE: (usize, usize) = Truth::CHAPTER_IMAGE;
+const SIZE: (usize, usize) = Truth::EXAMPLE_IMAGE;
 
 /// A photograph of a grey edge that is straight for an ideal lens: intensity rises by 1/8 a pixel across the line
 /// `v = 60 + 0.05 u`, from black to white.
@@ -34,7 +34,7 @@ fn edge_of(image: &Raster<f32>, mask: &Raster<bool>) -> Vec<Vec2> {
 
 #[test]
 fn a_bent_edge_is_straight_in_the_rectified_image() {
-    let camera = Truth::chapter_camera();
+    let camera = Truth::example_camera();
     let output = output_camera(&camera, SIZE, OutputView::SameK).unwrap();
     let map = RectifyMap::between(&camera, SIZE, &output, SIZE).unwrap();
     let photograph = photograph_of_an_edge(&camera);
@@ -53,7 +53,7 @@ fn a_bent_edge_is_straight_in_the_rectified_image() {
 
 #[test]
 fn the_chapters_line_is_recovered_exactly() {
-    let camera = Truth::chapter_camera();
+    let camera = Truth::example_camera();
     let output = camera.with_distortion(BrownConrady::default());
     let ideal: Vec<Vec2> = (0..61).map(|i| Vec2::new(20.0 + 10.0 * f64::from(i), 60.0)).collect();
     let seen: Vec<Vec2> = ideal.iter().map(|p| camera.distort_pixel(p)).collect();
@@ -65,7 +65,7 @@ fn the_chapters_line_is_recovered_exactly() {
 
 #[test]
 fn a_lens_calibrated_from_one_exact_view_rectifies_as_the_true_one() {
-    let chapter = Truth::chapter();
+    let chapter = Truth::example();
     let scene = Scene::new(Truth { cam_from_target: vec![chapter.cam_from_target[0]], ..chapter }).unwrap();
     let truth = scene.truth.camera;
     let options =

@@ -30,7 +30,7 @@ fn supersampled(level: &dyn Fn(&Vec2) -> f64, pixel: (usize, usize), n: usize) -
 
 /// Largest difference between a rendered image and supersampling, over a scatter of pixels with partial coverage.
 fn largest_difference(board: &Board, ink: &dyn Fn(&Vec2) -> bool) -> (f64, usize) {
-    let camera = Truth::chapter_camera().with_distortion(BrownConrady {
+    let camera = Truth::example_camera().with_distortion(BrownConrady {
         k1: -0.18,
         k2: 0.05,
         p1: 2e-3,
@@ -59,7 +59,7 @@ const SUPERSAMPLING_PX: f64 = 5.0 * 3e-3 * 0.75;
 
 #[test]
 fn discs_cover_what_supersampling_finds() {
-    let board = Truth::chapter_board();
+    let board = Truth::example_board();
     let centres = board.points();
     let ink = |p: &Vec2| centres.iter().any(|c| (p - c).norm() < 1.5);
     let (largest, tested) = largest_difference(&board, &ink);
@@ -81,7 +81,7 @@ fn squares_cover_what_supersampling_finds() {
 fn a_board_seen_from_behind_keeps_its_levels() {
     let pose = looking_at_centre([180.0, 0.0, 0.0], 120.0);
     let photo =
-        photograph(&Truth::chapter_camera(), (640, 480), &Truth::chapter_board(), &pose, &Imaging::default());
+        photograph(&Truth::example_camera(), (640, 480), &Truth::example_board(), &pose, &Imaging::default());
     let image = photo.unwrap().image;
     let darkest = image.samples().iter().copied().fold(1.0, f32::min);
     let brightest = image.samples().iter().copied().fold(0.0, f32::max);
@@ -92,9 +92,9 @@ fn a_board_seen_from_behind_keeps_its_levels() {
 fn blur_moves_light_but_makes_none() {
     let total = |blur_px: f64| -> f64 {
         let imaging = Imaging { blur_px, ..Imaging::default() };
-        let board = Truth::chapter_board();
-        let pose = Truth::chapter_poses()[3];
-        let photo = photograph(&Truth::chapter_camera(), (640, 480), &board, &pose, &imaging).unwrap();
+        let board = Truth::example_board();
+        let pose = Truth::example_poses()[3];
+        let photo = photograph(&Truth::example_camera(), (640, 480), &board, &pose, &imaging).unwrap();
         photo.image.samples().iter().map(|&x| 0.85 - f64::from(x)).sum()
     };
     // 307 200 samples rounded to f32 near 0.85: each 3e-8 at most, the same for all paper pixels.
@@ -111,7 +111,7 @@ fn the_surround_shading_and_noise_enter_where_they_should() {
     let imaging = Imaging { appearance, shading, ..Imaging::default() };
     let pose = looking_at_centre([0.0; 3], 150.0);
     let photo =
-        photograph(&Truth::chapter_camera(), (640, 480), &Truth::chapter_board(), &pose, &imaging).unwrap();
+        photograph(&Truth::example_camera(), (640, 480), &Truth::example_board(), &pose, &imaging).unwrap();
     let left = f64::from(photo.image.get(0, 240));
     assert!((left / 0.3 - 0.8).abs() < 1e-3, "{left}");
     let key = StreamKey { seed: 3, scenario: "render", trial: 0, purpose: "noise" };
@@ -136,9 +136,9 @@ fn the_nine_dot_stand_in_has_the_published_geometry() {
 #[test]
 fn what_cannot_be_seen_is_refused_with_its_place() {
     let see = |camera: &Camera, pose: &Pose, imaging: &Imaging| {
-        photograph(camera, (640, 480), &Truth::chapter_board(), pose, imaging).unwrap_err()
+        photograph(camera, (640, 480), &Truth::example_board(), pose, imaging).unwrap_err()
     };
-    let camera = Truth::chapter_camera();
+    let camera = Truth::example_camera();
     let close = looking_at_centre([80.0, 0.0, 0.0], 20.0);
     assert!(matches!(see(&camera, &close, &Imaging::default()), RenderError::BehindCamera { .. }));
     let folding = camera.with_distortion(BrownConrady::radial(-2.0, 0.0));

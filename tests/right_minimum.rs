@@ -11,7 +11,7 @@ fn noise(scenario: &'static str, trial: u64) -> Stream {
 }
 
 fn scene_of(poses: Vec<Pose>) -> Scene {
-    Scene::new(Truth { cam_from_target: poses, ..Truth::chapter() }).unwrap()
+    Scene::new(Truth { cam_from_target: poses, ..Truth::example() }).unwrap()
 }
 
 /// The free parameters within six standard deviations of the truth, at a certified minimum.
@@ -46,7 +46,7 @@ fn exact_data_far_from_the_image_centre_give_the_exact_camera() {
         camera: Camera::pinhole(4000.0, 4000.0, 2000.0, 1500.0),
         image_size: (4000, 3000),
         cam_from_target: poses.to_vec(),
-        ..Truth::chapter()
+        ..Truth::example()
     };
     let scene = Scene::new(truth).unwrap();
     let result = calibrate(&scene.exact(), &Settings::new("fx,fy,cx,cy".parse().unwrap())).unwrap();
@@ -60,13 +60,13 @@ fn exact_data_far_from_the_image_centre_give_the_exact_camera() {
 
 #[test]
 fn copies_of_a_view_count_once_and_are_named() {
-    let scene = Scene::chapter();
+    let scene = Scene::example();
     for trial in 0..20 {
         let views = scene.observe(0.1, &mut noise("copies", trial));
-        let once = calibrate(&views, &Settings::chapter()).unwrap();
+        let once = calibrate(&views, &Settings::standard()).unwrap();
         let mut more = views.clone();
         more.extend([views[1].clone(), views[1].clone(), views[3].clone()]);
-        let copied = calibrate(&more, &Settings::chapter()).unwrap();
+        let copied = calibrate(&more, &Settings::standard()).unwrap();
         assert_eq!(copied.camera, once.camera);
         assert_eq!(copied.covariance.intrinsics, once.covariance.intrinsics);
         assert_eq!((copied.rmse_px, copied.degrees_of_freedom), (once.rmse_px, once.degrees_of_freedom));
@@ -76,7 +76,7 @@ fn copies_of_a_view_count_once_and_are_named() {
         assert!(copied.warnings.contains(&Warning::Duplicates { view: 4, copy_of: 1, copies: 3 }));
     }
     let view = scene.observe(0.1, &mut noise("copies", 0)).remove(0);
-    let error = calibrate(&vec![view; 5], &Settings::chapter()).map(|r| r.camera).unwrap_err();
+    let error = calibrate(&vec![view; 5], &Settings::standard()).map(|r| r.camera).unwrap_err();
     assert_eq!(error, CalibrationError::TooFewViews { need: 2, got: 1, linear: 4, copies: 4 });
     assert!(error.to_string().contains("4 copies"), "{error}");
 }
@@ -94,12 +94,12 @@ fn with_strays(views: &[View], view: usize, strays: &[(usize, Vec2)]) -> Vec<Vie
 
 #[test]
 fn one_stray_mark_is_named_as_one() {
-    let scene = Scene::chapter();
+    let scene = Scene::example();
     for trial in 0..20 {
         let views = scene.observe(0.1, &mut noise("stray", trial));
         for size in [3.0, 20.0, 100.0] {
             let stray = with_strays(&views, 2, &[(17, Vec2::new(size, -0.5 * size))]);
-            let result = calibrate(&stray, &Settings::chapter()).unwrap();
+            let result = calibrate(&stray, &Settings::standard()).unwrap();
             let found = result.warnings.iter().find_map(|w| match w {
                 Warning::Outliers { marks, view, point, .. } => Some((*marks, *view, *point)),
                 _ => None,
@@ -107,17 +107,17 @@ fn one_stray_mark_is_named_as_one() {
             let (marks, view, point) = found.unwrap_or_else(|| panic!("{size} px: {:?}", result.warnings));
             assert_eq!((marks, view, point), (1, 2, 17), "{size} px");
         }
-        let clean = calibrate(&views, &Settings::chapter()).unwrap();
+        let clean = calibrate(&views, &Settings::standard()).unwrap();
         assert!(!clean.warnings.iter().any(|w| matches!(w, Warning::Outliers { .. })));
     }
 }
 
 #[test]
 fn two_per_cent_of_strays_suggest_the_robust_loss() {
-    let views = Scene::chapter().observe(0.1, &mut noise("strays", 0));
+    let views = Scene::example().observe(0.1, &mut noise("strays", 0));
     let shifts = [(3, 14.0), (20, -11.0), (31, 9.0), (44, -13.0), (60, 12.0)];
     let strays = with_strays(&views, 1, &shifts.map(|(point, size)| (point, Vec2::new(size, 0.7 * size))));
-    let result = calibrate(&strays, &Settings::chapter()).unwrap();
+    let result = calibrate(&strays, &Settings::standard()).unwrap();
     assert!(result.rmse_px > 1.0);
     let text: Vec<String> = result.warnings.iter().map(ToString::to_string).collect();
     assert!(text.iter().any(|t| t.contains("robust loss (huber:")), "{text:?}");
@@ -125,8 +125,8 @@ fn two_per_cent_of_strays_suggest_the_robust_loss() {
 
 #[test]
 fn on_good_data_profiles_agree_with_the_covariance() {
-    let views = Scene::chapter().observe(0.1, &mut noise("profile", 0));
-    let result = calibrate(&views, &Settings::chapter().with_profile_intervals(0.95)).unwrap();
+    let views = Scene::example().observe(0.1, &mut noise("profile", 0));
+    let result = calibrate(&views, &Settings::standard().with_profile_intervals(0.95)).unwrap();
     assert_eq!(result.intervals.len(), 6);
     for interval in &result.intervals {
         let (low, high) = (interval.low.unwrap(), interval.high.unwrap());
@@ -144,7 +144,7 @@ fn weak_telephoto(trial: u64) -> Vec<View> {
         camera: Camera::pinhole(3000.0, 3000.0, 640.0, 480.0),
         image_size: (1280, 960),
         cam_from_target: turns.map(|turn| looking_at_centre(turn, 1200.0)).to_vec(),
-        ..Truth::chapter()
+        ..Truth::example()
     };
     Scene::new(truth).unwrap().observe(0.1, &mut noise("telephoto", trial))
 }
@@ -173,14 +173,14 @@ fn where_the_covariance_misleads_a_warning_says_so_and_the_profile_is_lopsided()
 /// A board bent by far more than the noise: no camera explains it, and that is said.
 #[test]
 fn a_bent_board_is_above_the_floor_and_the_result_says_so() {
-    let truth = Truth::chapter();
+    let truth = Truth::example();
     let bent = |pose: &Pose| {
         let mark = |p: &Vec2| pose.apply(&Vec3::new(p.x, p.y, 1.5 * p.x * p.x / 1600.0));
         let pixels = truth.points.iter().map(|p| truth.camera.project(&mark(p)).unwrap()).collect();
         View::new(truth.points.clone(), pixels).unwrap()
     };
     let views: Vec<View> = truth.cam_from_target.iter().map(bent).collect();
-    let result = calibrate(&views, &Settings::chapter()).unwrap();
+    let result = calibrate(&views, &Settings::standard()).unwrap();
     assert_eq!(result.termination, Termination::AboveFloor);
     let certificate = result.certificate.unwrap();
     assert!(!certificate.holds() && certificate.floor_rmse_px < result.rmse_px);
@@ -191,10 +191,10 @@ fn a_bent_board_is_above_the_floor_and_the_result_says_so() {
 /// Of white noise: the warning is to come once in a million sets.
 #[test]
 fn the_residuals_of_a_model_that_holds_show_no_structure() {
-    let scene = Scene::chapter();
+    let scene = Scene::example();
     for trial in 0..500 {
         let result =
-            calibrate(&scene.observe(0.1, &mut noise("structure", trial)), &Settings::chapter()).unwrap();
+            calibrate(&scene.observe(0.1, &mut noise("structure", trial)), &Settings::standard()).unwrap();
         assert!(!result.warnings.iter().any(|w| matches!(w, Warning::Structured { .. })), "{trial}");
     }
 }
@@ -202,12 +202,12 @@ fn the_residuals_of_a_model_that_holds_show_no_structure() {
 /// The certificate's probability is an upper bound: at 5 % it refuses no more than 5 % of right minima.
 #[test]
 fn the_certificate_refuses_no_more_than_it_says() {
-    let scene = Scene::chapter();
+    let scene = Scene::example();
     let trials = 2000;
     let low = (0..trials)
         .filter(|&trial| {
             let views = scene.observe(0.1, &mut noise("certificate", trial));
-            calibrate(&views, &Settings::chapter()).unwrap().certificate.unwrap().p_value < 0.05
+            calibrate(&views, &Settings::standard()).unwrap().certificate.unwrap().p_value < 0.05
         })
         .count();
     // Binomial(2000, 0.05): mean 100, standard deviation 9.7; 148 is exceeded with probability 1e-6.

@@ -9,7 +9,7 @@ const VIEWS: usize = 151;
 fn with_threads(count: usize) -> Calibration {
     let key = StreamKey { seed: 7, scenario: "threads", trial: 0, purpose: "noise" };
     let mut stream = Stream::open(StreamKey { purpose: "pose", ..key });
-    let mut truth = Truth::chapter();
+    let mut truth = Truth::example();
     truth.cam_from_target = (0..VIEWS)
         .map(|_| {
             let turn = std::array::from_fn(|_| stream.uniform_in(-30.0, 30.0));
@@ -18,7 +18,7 @@ fn with_threads(count: usize) -> Calibration {
         .collect();
     let views = Scene::new(truth).unwrap().observe(0.1, &mut Stream::open(key));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap();
-    pool.install(|| calibrate(&views, &Settings::chapter())).unwrap()
+    pool.install(|| calibrate(&views, &Settings::standard())).unwrap()
 }
 
 #[test]

@@ -61,7 +61,7 @@ fn with_input(name: &str) -> PathBuf {
     let _ = fs::remove_dir_all(&folder);
     fs::create_dir_all(folder.join("disk")).expect("a folder is made");
     let mut corners = "view,point,X,Y,u,v\n".to_string();
-    for (view, seen) in Scene::chapter().exact().iter().enumerate() {
+    for (view, seen) in Scene::example().exact().iter().enumerate() {
         for (point, (at, pixel)) in seen.pairs().enumerate() {
             writeln!(corners, "{view},{point},{},{},{},{}", at.x, at.y, pixel.x, pixel.y)
                 .expect("text grows");

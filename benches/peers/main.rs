@@ -111,7 +111,7 @@ fn closed_form_state(views: &[View]) -> Vec<f64> {
 
 /// This library's estimate, which the reference begins from.
 fn optimum(views: &[View]) -> Vec<f64> {
-    let found = calibrate(views, &Settings::chapter()).expect("it can be calibrated");
+    let found = calibrate(views, &Settings::standard()).expect("it can be calibrated");
     state(&found.camera, found.cam_from_target.iter().copied())
 }
 

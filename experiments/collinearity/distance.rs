@@ -19,7 +19,7 @@ pub fn report_units_mistake(
     ours: &Found,
     view: &View,
 ) -> Result<(), ExperimentError> {
-    let truth = Truth::chapter_camera();
+    let truth = Truth::example_camera();
     let mistake = pixels_minus_millimetres(&corrected(&truth, exact.pixels())?, exact.points());
     let band = Band::absolute(ROUNDING_PX, "rounding of coordinates below 640 px over 40 operations");
     let what = "RMS per point of corrected pixel minus target millimetre, true model, no noise";
@@ -36,7 +36,7 @@ pub fn report_units_mistake(
 
 /// Two published numbers fix the distance that the chapter does not give.
 pub fn report_distances(record: &mut Record, draws: &[Draw], book: &Book) -> Result<(), ExperimentError> {
-    let truth = Truth::chapter_camera();
+    let truth = Truth::example_camera();
     let columns = [("distance", "mm"), ("top_row_before", "px"), ("units_mistake", "")];
     let mut table =
         Table::new("distances", "both numbers without noise against the target's distance", &columns);

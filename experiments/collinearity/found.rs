@@ -48,8 +48,8 @@ impl Centre {
     }
 
     pub fn options(self) -> SinglePlaneOptions {
-        let truth = Truth::chapter_camera();
-        let (width, height) = Truth::CHAPTER_IMAGE;
+        let truth = Truth::example_camera();
+        let (width, height) = Truth::EXAMPLE_IMAGE;
         let image = Vec2::new(0.5 * width as f64, 0.5 * height as f64);
         let centre_px = if self == Centre::Truth { Vec2::new(truth.cx, truth.cy) } else { image };
         SinglePlaneOptions { focal_px: truth.fx, centre_px, centre_free: self == Centre::Free }

@@ -98,10 +98,10 @@ pub fn steepest(photo: &Raster<u8>) -> (f64, f64) {
 }
 
 pub fn rectify(record: &mut Record, ours: &[Found]) -> Result<(), ExperimentError> {
-    let truth = Truth::chapter_camera();
-    let size = Truth::CHAPTER_IMAGE;
+    let truth = Truth::example_camera();
+    let size = Truth::EXAMPLE_IMAGE;
     let pose = looking_at_centre([0.0; 3], DISTANCE_MM);
-    let photo = photograph(&truth, size, &Truth::chapter_board(), &pose, &Imaging::default())
+    let photo = photograph(&truth, size, &Truth::example_board(), &pose, &Imaging::default())
         .map_err(ExperimentError::at("photograph"))?
         .image
         .to_u8();
@@ -224,7 +224,7 @@ pub fn draw_rectified(
 
 /// Distance between the sources of the two maps over the image.
 pub fn shift_figure(ours: &[Found], seed: u64) -> Result<Figure, ExperimentError> {
-    let truth = Truth::chapter_camera();
+    let truth = Truth::example_camera();
     let columns: Vec<u32> = (0..=8).map(|i| 80 * i).collect();
     let rows: Vec<u32> = (0..=6).rev().map(|i| 80 * i).collect();
     let names = |levels: &[u32]| levels.iter().map(u32::to_string).collect();

@@ -11,9 +11,9 @@ pub fn claim_attained(record: &mut Record, draw: &Draw, trials: &Outcome) {
         .at_least(trials.converged() as f64, TRIALS as f64)
         .because(format!("the scene is well conditioned; endings: {:?}", trials.endings));
     let errors = trials.errors();
-    let each = each_of(2 * FreeParameters::CHAPTER.len(), RATE);
+    let each = each_of(2 * FreeParameters::STANDARD.len(), RATE);
     let ratio_interval = Interval::of_deviation_ratio(trials.converged(), each);
-    for (i, parameter) in FreeParameters::CHAPTER.iter().enumerate() {
+    for (i, parameter) in FreeParameters::STANDARD.iter().enumerate() {
         let (name, sd) = (parameter.name(), draw.sd(parameter));
         let (bias, ratio) = (errors.bias(i), errors.standard_deviation(i) / sd);
         let no_bias = Interval::of_mean(0.0, sd, trials.converged(), each);
@@ -45,7 +45,7 @@ pub fn claim_attained(record: &mut Record, draw: &Draw, trials: &Outcome) {
     let predicted = |parameter: &Parameter| draw.sd(*parameter);
     let no_bias = |p: &Parameter| Interval::of_mean(0.0, predicted(p), trials.converged(), each);
     record.table(
-        Table::of("monte-carlo", caption, FreeParameters::CHAPTER.iter().enumerate())
+        Table::of("monte-carlo", caption, FreeParameters::STANDARD.iter().enumerate())
             .column("parameter", "", |(_, p)| p.name())
             .column("mean_error", "", |(i, _)| errors.bias(*i))
             .column("mean_error_bound", "", |(_, p)| no_bias(p).high)
@@ -60,7 +60,7 @@ pub fn claim_attained(record: &mut Record, draw: &Draw, trials: &Outcome) {
 
 /// The errors are jointly as large as the bound says, and as each estimate says of itself.
 fn claim_consistent(record: &mut Record, draw: &Draw, trials: &Outcome) {
-    let (n, dof) = (trials.converged(), FreeParameters::CHAPTER.len());
+    let (n, dof) = (trials.converged(), FreeParameters::STANDARD.len());
     let mean = trials.mean_normalised_error_squared(&draw.bound);
     let interval = Interval::of_mean_chi_squared(dof, n, RATE);
     record.group("", relative()).number(

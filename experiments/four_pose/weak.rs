@@ -22,11 +22,11 @@ pub fn few_points(context: &Context) -> Result<Vec<Grid>, ExperimentError> {
                 .map(|(i, j)| Vec2::new(at(i, columns, 80.0), at(j, rows, 60.0)))
                 .collect();
             let scene =
-                Scene::new(Truth { points, ..Truth::chapter() }).map_err(ExperimentError::at("scene"))?;
-            let bound = cramer_rao(&scene.truth, FreeParameters::CHAPTER, SIGMA_PX)
+                Scene::new(Truth { points, ..Truth::example() }).map_err(ExperimentError::at("scene"))?;
+            let bound = cramer_rao(&scene.truth, FreeParameters::STANDARD, SIGMA_PX)
                 .map_err(ExperimentError::at("Cramer-Rao bound"))?;
             let scenario = format!("four-pose/grid-{columns}x{rows}");
-            let settings = Settings::chapter();
+            let settings = Settings::standard();
             let trials = MonteCarlo {
                 scene: &scene,
                 settings: &settings,
@@ -113,9 +113,9 @@ pub fn claim_overfitting(record: &mut Record, grids: &[Grid]) {
 
 pub fn claim_facing_views(record: &mut Record, context: &Context) -> Result<(), ExperimentError> {
     let poses = FACING_MM.map(|z| looking_at_centre([0.0; 3], z)).to_vec();
-    let scene = Scene::new(Truth { cam_from_target: poses, ..Truth::chapter() })
+    let scene = Scene::new(Truth { cam_from_target: poses, ..Truth::example() })
         .map_err(ExperimentError::at("views that face the camera"))?;
-    let settings = Settings::chapter();
+    let settings = Settings::standard();
     let trials = MonteCarlo {
         scene: &scene,
         settings: &settings,
@@ -143,7 +143,7 @@ pub fn claim_facing_views(record: &mut Record, context: &Context) -> Result<(), 
             "1e-9 a trial: the rate at which planes that are parallel pass for tilted; endings: {:?}",
             trials.endings
         ));
-    let bound = cramer_rao(&scene.truth, FreeParameters::CHAPTER, SIGMA_PX);
+    let bound = cramer_rao(&scene.truth, FreeParameters::STANDARD, SIGMA_PX);
     record
         .claim_that(
             "facing-views-have-no-bound",
@@ -167,18 +167,18 @@ const TWO_VIEWS_PX: f64 = 1e-4;
 
 /// Four unknowns of K, and two equations from every view: two views are enough, and three are not needed.
 pub fn claim_two_views(record: &mut Record) -> Result<(), ExperimentError> {
-    let chapter = Truth::chapter();
+    let chapter = Truth::example();
     let mut cases = Vec::new();
     let mut sds = Vec::new();
     for first in 0..chapter.cam_from_target.len() {
         for second in first + 1..chapter.cam_from_target.len() {
             let poses = vec![chapter.cam_from_target[first], chapter.cam_from_target[second]];
             let truth = Truth { cam_from_target: poses, ..chapter.clone() };
-            let bound = cramer_rao(&truth, FreeParameters::CHAPTER, SIGMA_PX)
+            let bound = cramer_rao(&truth, FreeParameters::STANDARD, SIGMA_PX)
                 .map_err(ExperimentError::at("Cramer-Rao bound of two views"))?;
             sds.push(bound.standard_deviation(Parameter::Fx).unwrap_or(f64::NAN));
             let scene = Scene::new(truth).map_err(ExperimentError::at("two views"))?;
-            let found = calibrate(&scene.exact(), &Settings::chapter());
+            let found = calibrate(&scene.exact(), &Settings::standard());
             let error = found.as_ref().map_or(f64::INFINITY, |c| {
                 let off = |p: Parameter| (c.camera.get(p) - scene.truth.camera.get(p)).abs();
                 [Parameter::Fx, Parameter::Fy, Parameter::Cx, Parameter::Cy]

@@ -167,7 +167,7 @@ const fn model(name: &'static str, free: FreeParameters) -> Model {
     Model { name, free, ideal: false }
 }
 
-const CHAPTER: Model = model("k1-k2", FreeParameters::CHAPTER);
+const CHAPTER: Model = model("k1-k2", FreeParameters::STANDARD);
 const LINEAR: Model = model("lens-held", FreeParameters::of(&[Fx, Fy, Cx, Cy]));
 
 /// Half of all users fit two radial terms; the others everything else that is common.

@@ -50,7 +50,7 @@ pub fn report(record: &mut Record, seed: u64) -> Result<(), ExperimentError> {
         camera: Camera::pinhole(3000.0, 3000.0, 640.0, 480.0),
         image_size: (1280, 960),
         cam_from_target: TURNS_DEG.map(|turn| looking_at_centre(turn, DISTANCE_MM)).to_vec(),
-        ..Truth::chapter()
+        ..Truth::example()
     };
     let scene = Scene::new(truth).map_err(ExperimentError::at("the long lens"))?;
     let free = "fx,fy,cx,cy".parse().map_err(ExperimentError::at("the free parameters"))?;

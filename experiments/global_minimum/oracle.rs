@@ -243,10 +243,11 @@ mod tests {
 
     #[test]
     fn exact_views_lead_back_to_the_truth() {
-        let scene = Scene::chapter();
+        let scene = Scene::example();
         let truth = &scene.truth;
         let start = Camera { fx: 640.0, fy: 560.0, cx: 310.0, ..truth.camera };
-        let found = descend(&start, &truth.cam_from_target, &scene.exact(), FreeParameters::CHAPTER).unwrap();
+        let found =
+            descend(&start, &truth.cam_from_target, &scene.exact(), FreeParameters::STANDARD).unwrap();
         assert!((found.camera.fx - 600.0).abs() < 1e-6 && (found.camera.distortion.k2 - 0.05).abs() < 1e-7);
         // 504 coordinates near 600 px, each with some roundings: 504 (600 eps)^2 is 1e-23.
         assert!(found.cost < 1e-20, "{}", found.cost);
@@ -254,14 +255,14 @@ mod tests {
 
     #[test]
     fn the_minimum_is_lower_than_anything_next_to_it() {
-        let scene = Scene::chapter();
+        let scene = Scene::example();
         let key = StreamKey { seed: 1, scenario: "oracle", trial: 0, purpose: "noise" };
         let views = scene.observe(0.1, &mut Stream::open(key));
-        let found = from_truth(&scene.truth, &views, FreeParameters::CHAPTER).unwrap();
+        let found = from_truth(&scene.truth, &views, FreeParameters::STANDARD).unwrap();
         assert!(found.converged);
         let least = cost(&found.camera, &found.cam_from_target, &views).unwrap();
         assert!((least - found.cost).abs() < 1e-12 * least);
-        for parameter in FreeParameters::CHAPTER.iter() {
+        for parameter in FreeParameters::STANDARD.iter() {
             for side in [-1.0, 1.0] {
                 let moved = found.camera.with(parameter, found.camera.get(parameter) * (1.0 + 1e-4 * side));
                 assert!(cost(&moved, &found.cam_from_target, &views).unwrap() > least, "{parameter}");
@@ -274,7 +275,7 @@ mod tests {
             .map(|v| View::new(v.points().iter().map(|p| p + shift).collect(), v.pixels().to_vec()).unwrap())
             .collect();
         let poses: Vec<Pose> = scene.truth.cam_from_target.iter().map(|pose| moved(pose, &-shift)).collect();
-        let again = descend(&scene.truth.camera, &poses, &far, FreeParameters::CHAPTER).unwrap();
+        let again = descend(&scene.truth.camera, &poses, &far, FreeParameters::STANDARD).unwrap();
         assert!((again.cost - found.cost).abs() < 1e-10 * found.cost);
     }
 }

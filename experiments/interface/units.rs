@@ -38,10 +38,10 @@ pub(crate) struct Examined {
 
 pub(crate) fn examine(seed: u64) -> Result<Examined, ExperimentError> {
     let mut stream = Stream::open(StreamKey { seed, scenario: "units", trial: 0, purpose: "noise" });
-    let views = Scene::chapter().observe(SIGMA_PX, &mut stream);
+    let views = Scene::example().observe(SIGMA_PX, &mut stream);
     let black_box =
         BlackBox::calibrate(&views, FREE).map_err(ExperimentError::at("calibration in the black box"))?;
-    let truth = Truth::chapter_camera();
+    let truth = Truth::example_camera();
     let exact = |distance| checks(distance, |pixel| truth.correct_pixel(pixel));
     let sweep = DISTANCE_TWENTIES_MM.map(|twenties| exact(20.0 * f64::from(twenties)));
     Ok(Examined {
@@ -57,7 +57,7 @@ fn checks<E: std::error::Error + Send + Sync + 'static>(
     correct: impl Fn(&Vec2) -> Result<Vec2, E>,
 ) -> Result<Checks, ExperimentError> {
     let facing = vec![looking_at_centre([0.0; 3], distance_mm)];
-    let scene = Scene::new(Truth { cam_from_target: facing, ..Truth::chapter() });
+    let scene = Scene::new(Truth { cam_from_target: facing, ..Truth::example() });
     let scene = scene.map_err(ExperimentError::at("scene of the facing target"))?;
     let points = &scene.truth.points;
     let answers = scene.pixels()[0].iter().map(correct).collect::<Result<Vec<Vec2>, E>>();
@@ -120,7 +120,7 @@ pub(crate) fn report(record: &mut Record, examined: &Examined) {
             .column("collinearity", "", |c| c.collinearity),
     );
 
-    let expected = expected_difference(&Truth::chapter_camera(), 120.0);
+    let expected = expected_difference(&Truth::example_camera(), 120.0);
     let reason = "sqrt(cx^2 + cy^2 + (f/Z - 1)^2 (mean X^2 + mean Y^2)) of a centred grid, by hand; rounding";
     let statement = "the difference of pixels and millimetres is that of the geometry";
     record
@@ -128,7 +128,7 @@ pub(crate) fn report(record: &mut Record, examined: &Examined) {
         .within(chapter.direct, Interval::around(expected, ROUNDING))
         .because(reason);
     let ratios = sweep.iter().map(|c| {
-        let expected = Truth::chapter_camera().fx / c.distance_mm;
+        let expected = Truth::example_camera().fx / c.distance_mm;
         let held = (c.spacing_ratio - expected).abs() <= ROUNDING;
         (format!("{} mm: ratio {}, expected {expected}", c.distance_mm, c.spacing_ratio), held)
     });
@@ -157,12 +157,12 @@ pub(crate) fn report(record: &mut Record, examined: &Examined) {
         Plot::new("Pixels taken for millimetres", "distance of the target (mm)", "what the check shows")
             .line("difference to the target (\u{201c}mm\u{201d})", &direct)
             .line("error of the spacing (%)", &ratio)
-            .vline("one pixel a millimetre", Truth::chapter_camera().fx);
+            .vline("one pixel a millimetre", Truth::example_camera().fx);
     let caption = format!(
         "RMS difference of corrected pixels and target millimetres, and error of the spacing of neighbours, \
          against the distance of a facing target; nothing is drawn at random. Notice what each check shows \
          at {} mm, where a pixel is a millimetre.",
-        Truth::chapter_camera().fx
+        Truth::example_camera().fx
     );
     record.figure(Figure::plot("units", &plot, caption));
 }

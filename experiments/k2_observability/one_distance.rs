@@ -33,7 +33,7 @@ fn sweep(context: &Context) -> Result<Vec<Moved>, ExperimentError> {
     }
     let progress = context.progress("one distance", scenes.len() * TRIALS);
     let moved = |(distance_mm, tilt_deg, tenths, poses): (u32, u32, u32, Vec<Pose>)| {
-        let truth = Truth { cam_from_target: poses, ..Truth::chapter() };
+        let truth = Truth { cam_from_target: poses, ..Truth::example() };
         let scenario = format!("k2-observability/distance-{distance_mm}/coverage-{tenths}/tilt-{tilt_deg}");
         let node = Node::of(truth, (tenths, tilt_deg), (context.seed, &scenario), &progress)?;
         Ok(Moved { distance_mm, node })
@@ -44,7 +44,7 @@ fn sweep(context: &Context) -> Result<Vec<Moved>, ExperimentError> {
 /// Four poses at the distance, each moved until its outermost point has the coverage; `None` where one has
 /// more before.
 fn moved_poses(distance_mm: f64, tilt_deg: f64, coverage: f64) -> Option<Vec<Pose>> {
-    let chapter = Truth::chapter();
+    let chapter = Truth::example();
     let views = turns(tilt_deg).into_iter().zip(CORNERS);
     views.map(|(turn, corner)| moved(&chapter, (turn, distance_mm), corner, coverage)).collect()
 }
@@ -96,7 +96,7 @@ fn row(scenes: &[Moved], distance_mm: u32, tilt_deg: u32) -> Vec<&Node> {
 
 fn report_numbers(record: &mut Record, map: &Map, scenes: &[Moved]) {
     for tenths in [COVERAGE_TENTHS[0], COVERAGE_TENTHS[COVERAGE_TENTHS.len() - 1]] {
-        let distance = framed(&Truth::chapter(), [0.0; 3], f64::from(tenths) / 10.0).translation.z;
+        let distance = framed(&Truth::example(), [0.0; 3], f64::from(tenths) / 10.0).translation.z;
         let what =
             format!("distance of the facing view at coverage {:.1}, centred", f64::from(tenths) / 10.0);
         record.group("mm", relative()).number(format!("distance-c{tenths}"), distance, what);

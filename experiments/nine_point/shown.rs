@@ -25,7 +25,7 @@ impl Shown {
             return Ok(Shown { image, centres_true: Some(photograph.centres_true) });
         };
         let bytes =
-            std::fs::read(path).map_err(|source| ExperimentError::File { path: path.clone(), source })?;
+            std::fs::read(path).map_err(|cause| ExperimentError::File { path: path.clone(), cause })?;
         let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         let image = parse_image(&bytes, &name).map_err(|error| ExperimentError::Input(error.to_string()))?;
         record.input(name, &bytes);

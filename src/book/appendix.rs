@@ -26,7 +26,13 @@ pub(super) fn record_pages(sources: &Sources, assets: &mut BTreeMap<String, Vec<
             assets.insert(format!("data/{id}/{name}.csv"), csv.clone().into_bytes());
         }
         let content = record_page(id, evidence, golden);
-        pages.push(CompiledPage { path: page_of(id), title: format!("Record: {id}"), content });
+        pages.push(CompiledPage {
+            path: page_of(id),
+            title: format!("Record: {id}"),
+            number: None,
+            below: true,
+            content,
+        });
     }
     pages
 }

@@ -32,7 +32,7 @@ pub fn compile(sources: &Sources) -> Compiled {
     let mut labels = Labels::default();
     let scanned: Vec<Vec<Piece<'_>>> = sources.pages.iter().map(|p| scan(&p.text)).collect();
     for (page, pieces) in sources.pages.iter().zip(&scanned) {
-        labels.take((&page.path, &page.file()), &page.number, pieces, &mut findings);
+        labels.take((&page.path, &page.file()), page.number, pieces, &mut findings);
     }
     let paths: BTreeSet<String> = sources.pages.iter().map(|p| p.path.clone()).collect();
     let mathematics = Mathematics::new();
@@ -53,7 +53,13 @@ pub fn compile(sources: &Sources) -> Compiled {
             }
             findings.extend(typed_in(page, piece));
         }
-        pages.push(CompiledPage { path: page.path.clone(), title: String::new(), content });
+        pages.push(CompiledPage {
+            path: page.path.clone(),
+            title: page.title.clone(),
+            number: page.number,
+            below: false,
+            content,
+        });
     }
     findings.extend(resolver.unused());
     let records = appendix::record_pages(sources, &mut resolver.assets);

@@ -9,12 +9,12 @@ pub(super) fn constant(name: &str) -> Option<String> {
 
 /// All scene constants, by name.
 fn constants() -> Vec<(&'static str, String)> {
-    let camera = Truth::chapter_camera();
-    let board = Truth::chapter_board();
+    let camera = Truth::example_camera();
+    let board = Truth::example_board();
     let points = board.points();
     let spacing = (points[1] - points[0]).norm();
-    let views = Truth::chapter_poses().len();
-    let (width, height) = Truth::CHAPTER_IMAGE;
+    let views = Truth::example_poses().len();
+    let (width, height) = Truth::EXAMPLE_IMAGE;
     let minus = |value: f64| value.to_string().replace('-', "\u{2212}");
     vec![
         ("fx", format!("{}", camera.fx)),
@@ -29,7 +29,7 @@ fn constants() -> Vec<(&'static str, String)> {
         ("points-per-view", points.len().to_string()),
         ("views", views.to_string()),
         ("pairs", (views * points.len()).to_string()),
-        ("distance", format!("{}", Truth::chapter_poses()[0].translation.z)),
+        ("distance", format!("{}", Truth::example_poses()[0].translation.z)),
     ]
 }
 

@@ -109,7 +109,7 @@ impl Evidence {
 
     fn named(project: &Project, experiments: &[Experiment]) -> Evidence {
         let entry = |e: &Experiment| {
-            let golden = fs::read_to_string(project.snapshot(e.id)).ok().map(|text| GoldenFile::read(&text));
+            let golden = project.snapshot_text(e.id).map(|text| GoldenFile::read(&text));
             let evidence = ExperimentEvidence {
                 title: e.title.to_string(),
                 question: e.question.to_string(),

@@ -42,7 +42,7 @@ impl Labels {
     pub(super) fn take(
         &mut self,
         (page, file): (&str, &str),
-        chapter: &[u32],
+        chapter: Option<u32>,
         pieces: &[Piece<'_>],
         findings: &mut Vec<Finding>,
     ) {
@@ -60,10 +60,10 @@ impl Labels {
             };
             let class = name.split_once(':').map_or("", |(class, _)| class);
             let class = ["eq", "fig", "tab"].into_iter().find(|c| *c == class).unwrap_or("");
-            let counts = if chapter.is_empty() { &mut self.unnumbered } else { &mut in_chapter };
+            let counts = if chapter.is_none() { &mut self.unnumbered } else { &mut in_chapter };
             let count = counts.entry(class).or_insert(0);
             *count += 1;
-            let prefix = chapter.first().map(|n| format!("{n}.")).unwrap_or_default();
+            let prefix = chapter.map(|n| format!("{n}.")).unwrap_or_default();
             let count = format!("{prefix}{count}");
             let (words, number) = match class {
                 "eq" => (format!("equation\u{a0}({count})"), format!("({count})")),

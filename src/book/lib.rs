@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! book/text/*.md --scan--> pieces --label--> names of equations, figures, tables, places
-//!                                 --resolve (evidence, references, constants, code)--> markdown --mdBook--> out/book
+//!                                 --resolve (evidence, references, constants, code)--> markdown --html, layout--> out/book
 //! ```
 //!
 //! Placeholders, all in double braces:
@@ -36,11 +36,12 @@ mod evidence;
 mod finding;
 mod format;
 mod golden_file;
+mod html;
 mod labels;
+mod layout;
 mod links;
 mod listing;
 mod math;
-mod mdbook;
 mod page;
 mod prose;
 mod references;
@@ -48,15 +49,15 @@ mod render;
 mod resolve;
 mod scan;
 mod sources;
+mod summary;
 mod text;
 
 pub use compile::{Compiled, compile};
 pub use contradictions::Contradiction;
 pub use evidence::{Evidence, ExperimentEvidence};
 pub use finding::Finding;
-pub use mdbook::BookError;
 pub use page::CompiledPage;
-pub use render::{build, index_of};
+pub use render::{BookError, build, index_of};
 pub use sources::{Page, Sources};
 
 /// How many pieces a page is made of: its reader alone, for tests that feed it anything.

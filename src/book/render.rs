@@ -1,19 +1,27 @@
-//! How does the compiled book become a folder that a browser opens? mdBook sets the pages; everything stands beside them.
+//! How does the compiled book become a folder that a browser opens? Every page as HTML, and all on one; what they show stands beside them.
 
 use super::compile::Compiled;
-use super::mdbook::{BookError, configuration};
 use super::page::CompiledPage;
+use super::{html, layout};
 use calibench_harness::project::Project;
-use mdbook_driver::MDBook;
-use mdbook_driver::book::{BookItem, Chapter};
-use std::fs::{self, File, OpenOptions};
-use std::io;
+use std::fs::{File, OpenOptions};
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 /// The generated pages stand below this page of the summary.
 const RECORDS: &str = "records.md";
-/// Files of the looks that the style sheet asks for, below book/style.
-const STYLE_FILES: [&str; 2] = ["CalibenchMath.woff2", "CalibenchMath-LICENSE.txt"];
+/// Files of the looks, below book/style.
+const STYLE_FILES: [&str; 3] = ["book.css", "CalibenchMath.woff2", "CalibenchMath-LICENSE.txt"];
+
+/// Why the book cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[error("{path}: {cause}", path = path.display())]
+pub struct BookError {
+    /// The file.
+    path: PathBuf,
+    /// What the system said.
+    cause: io::Error,
+}
 
 /// The page to open.
 pub fn index_of(folder: &Path) -> PathBuf {
@@ -21,8 +29,11 @@ pub fn index_of(folder: &Path) -> PathBuf {
 }
 
 /// Writes the book to `folder`, replacing what is there only once all is written. Of two at once one waits.
+///
+/// # Errors
+/// A file cannot be read or written.
 pub fn build(project: &Project, compiled: &Compiled, folder: &Path) -> Result<(), BookError> {
-    let failed = |source| BookError::File { path: folder.to_path_buf(), source };
+    let failed = |cause| BookError { path: folder.to_path_buf(), cause };
     let _lock = lock(&beside(folder, "lock")).map_err(failed)?;
     let (new, old) = (beside(folder, "new"), beside(folder, "old"));
     // What a build that was killed has left: half of a new book, or the old one beside its place.
@@ -30,7 +41,7 @@ pub fn build(project: &Project, compiled: &Compiled, folder: &Path) -> Result<()
         fs::rename(&old, folder).map_err(failed)?;
     }
     remove(&new).and_then(|()| remove(&old)).map_err(failed)?;
-    let written = write(project, compiled, &new);
+    let written = write_all(project, compiled, &new);
     if written.is_err() {
         // The first error is the one to report.
         let _ = remove(&new);
@@ -65,44 +76,37 @@ fn remove(folder: &Path) -> io::Result<()> {
 }
 
 /// Writes all pages and what they show.
-fn write(project: &Project, compiled: &Compiled, folder: &Path) -> Result<(), BookError> {
-    let told = |e: mdbook_driver::errors::Error| BookError::MdBook(format!("{e:#}"));
-    let root = project.root().join("book");
-    let mut book = MDBook::load_with_config(root, configuration(folder).map_err(told)?).map_err(told)?;
-    book.book.for_each_mut(|item| fill(item, compiled));
-    book.build().map_err(told)?;
-    write_assets(project, compiled, folder)
-}
-
-/// Gives a chapter its resolved content, and the page of the records its children.
-fn fill(item: &mut BookItem, compiled: &Compiled) {
-    let BookItem::Chapter(chapter) = item else { return };
-    let path = chapter.source_path.as_ref().map(|p| p.to_string_lossy().into_owned()).unwrap_or_default();
-    if let Some(page) = compiled.pages.iter().find(|p| p.path == path) {
-        chapter.content = page.content.clone();
+fn write_all(project: &Project, compiled: &Compiled, folder: &Path) -> Result<(), BookError> {
+    let pages = in_order(compiled);
+    let texts: Vec<String> = pages.iter().map(|page| html::html(&page.content)).collect();
+    for (i, page) in pages.iter().enumerate() {
+        write(&folder.join(page.file()), layout::page(&pages, i, &texts[i]).as_bytes())?;
     }
-    if path == RECORDS {
-        let parents = vec![chapter.name.clone()];
-        let child = |page: &CompiledPage| {
-            let content = page.content.clone();
-            BookItem::Chapter(Chapter::new(&page.title, content, PathBuf::from(&page.path), parents.clone()))
-        };
-        chapter.sub_items = compiled.records.iter().map(child).collect();
-    }
-}
-
-fn write_assets(project: &Project, compiled: &Compiled, folder: &Path) -> Result<(), BookError> {
-    let write = |path: PathBuf, bytes: &[u8]| {
-        let made = path.parent().map_or(Ok(()), fs::create_dir_all);
-        made.and_then(|()| fs::write(&path, bytes)).map_err(|source| BookError::File { path, source })
-    };
+    write(&folder.join("print.html"), layout::print(&pages, &texts).as_bytes())?;
     for (name, bytes) in &compiled.assets {
-        write(folder.join(name), bytes)?;
+        write(&folder.join(name), bytes)?;
     }
     for name in STYLE_FILES {
-        let path = project.root().join("book/style").join(name);
-        let bytes = fs::read(&path).map_err(|source| BookError::File { path, source })?;
-        write(folder.join("style").join(name), &bytes)?;
+        let path = format!("book/style/{name}");
+        let bytes = project.read(&path).map_err(|cause| BookError { path: path.into(), cause })?;
+        write(&folder.join("style").join(name), &bytes)?;
     }
     Ok(())
+}
+
+/// All pages in the order of reading: those of the records stand behind the page that lists them.
+fn in_order(compiled: &Compiled) -> Vec<&CompiledPage> {
+    let mut pages = Vec::new();
+    for page in &compiled.pages {
+        pages.push(page);
+        if page.path == RECORDS {
+            pages.extend(&compiled.records);
+        }
+    }
+    pages
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), BookError> {
+    let made = path.parent().map_or(Ok(()), fs::create_dir_all);
+    made.and_then(|()| fs::write(path, bytes)).map_err(|cause| BookError { path: path.to_path_buf(), cause })
 }

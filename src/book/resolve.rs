@@ -13,7 +13,6 @@ use super::{appendix, contradictions, format, listing, references};
 use calibench::io::hash::sha256_hex;
 use calibench_harness::published::Entry;
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 
 /// Resolves placeholders and remembers what was used.
 pub(super) struct Resolver<'a> {
@@ -134,7 +133,10 @@ impl<'a> Resolver<'a> {
         let GoldenFigure { file, hash, .. } =
             locked.ok_or_else(|| format!("experiment `{experiment}` draws no figure `{name}`"))?;
         let path = format!("figures/{experiment}/{file}");
-        let bytes = fs::read(self.sources.root.join(&path))
+        let bytes = self
+            .sources
+            .project
+            .read(&path)
             .map_err(|e| format!("figure {path}: {e}; run `calibench run {experiment}`"))?;
         if hash.strip_prefix("sha256 ").is_some_and(|digits| !sha256_hex(&bytes).starts_with(digits)) {
             return Err(format!("figure {path} is stale: run `calibench run {experiment}`"));
@@ -201,8 +203,7 @@ impl<'a> Resolver<'a> {
     }
 
     fn code(&self, file: &str, item: &str) -> Resolved {
-        let source =
-            fs::read_to_string(self.sources.root.join(file)).map_err(|e| format!("code {file}: {e}"))?;
+        let source = self.sources.project.read_text(file).map_err(|e| format!("code {file}: {e}"))?;
         let (line, text) =
             listing::item(&source, item).ok_or_else(|| format!("{file} has no item `{item}`"))?;
         Ok(format!(

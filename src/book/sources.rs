@@ -3,13 +3,13 @@
 use super::contradictions::{self, Contradiction};
 use super::evidence::Evidence;
 use super::finding::Finding;
-use super::mdbook::{self, TEXT};
 use super::references::{self, Reference};
+use super::summary;
 use calibench_harness::project::Project;
 use calibench_harness::published::{self, Entry};
-use mdbook_driver::book::BookItem;
-use std::fs;
-use std::path::PathBuf;
+
+/// Folder of the pages, relative to the project.
+pub(super) const TEXT: &str = "book/text";
 
 /// The works that may be cited, relative to the project.
 pub(super) const REFERENCES: &str = "book/references.toml";
@@ -22,14 +22,16 @@ pub(super) const CONTRADICTIONS: &str = "book/contradictions.toml";
 pub struct Page {
     /// Path below book/text.
     pub path: String,
-    /// Number of the chapter, empty for pages before and after.
-    pub number: Vec<u32>,
+    /// Title in the contents.
+    pub title: String,
+    /// Number of the chapter; `None` for pages before and after.
+    pub number: Option<u32>,
     /// Markdown with placeholders.
     pub text: String,
 }
 
 /// Everything that goes into the book.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Sources {
     /// Pages in reading order.
     pub pages: Vec<Page>,
@@ -41,8 +43,8 @@ pub struct Sources {
     pub published: Vec<Entry>,
     /// What the experiments say.
     pub evidence: Evidence,
-    /// Folder of the project: code and figures are read below it.
-    pub root: PathBuf,
+    /// The project: code and figures are read from it.
+    pub project: Project,
 }
 
 impl Page {
@@ -55,30 +57,28 @@ impl Page {
 impl Sources {
     /// Reads the pages and the references.
     pub fn load(project: &Project, evidence: Evidence) -> Result<Sources, Finding> {
-        let summary = format!("{TEXT}/SUMMARY.md");
-        let at_summary = |e: &dyn std::fmt::Display| Finding::new(&summary, 1, format!("{e:#}"));
-        let book = mdbook::load(project).map_err(|e| at_summary(&e))?;
+        let order = format!("{TEXT}/SUMMARY.md");
         let mut pages = Vec::new();
-        for item in book.iter() {
-            let BookItem::Chapter(chapter) = item else { continue };
-            let Some(path) = &chapter.source_path else { continue };
-            pages.push(Page {
-                path: path.to_string_lossy().into_owned(),
-                number: chapter.number.as_ref().map(|n| n.to_vec()).unwrap_or_default(),
-                text: chapter.content.clone(),
-            });
+        for summary::Entry { title, path, number } in read(project, &order, summary::parse)? {
+            let text = read(project, &format!("{TEXT}/{path}"), |text| Ok(text.to_string()))?;
+            pages.push(Page { path, title, number, text });
         }
-        let text = fs::read_to_string(project.root().join(REFERENCES));
-        let references = text.map_err(|e| (1, e.to_string())).and_then(|text| references::parse(&text));
-        let references = references.map_err(|(line, e)| Finding::new(REFERENCES, line, e))?;
-        let text = fs::read_to_string(project.root().join(CONTRADICTIONS));
-        let contradictions =
-            text.map_err(|e| (1, e.to_string())).and_then(|text| contradictions::parse(&text));
-        let contradictions = contradictions.map_err(|(line, e)| Finding::new(CONTRADICTIONS, line, e))?;
+        let references = read(project, REFERENCES, references::parse)?;
+        let contradictions = read(project, CONTRADICTIONS, contradictions::parse)?;
         let published =
             published::chapter().map_err(|e| Finding::new("golden/published.toml", 1, e.to_string()))?;
         let published = published.to_vec();
-        let root = project.root().to_path_buf();
-        Ok(Sources { pages, references, contradictions, published, evidence, root })
+        let project = project.clone();
+        Ok(Sources { pages, references, contradictions, published, evidence, project })
     }
+}
+
+/// A file of the project, read by `parse`, which says on which line it fails.
+fn read<T>(
+    project: &Project,
+    file: &str,
+    parse: impl Fn(&str) -> Result<T, (usize, String)>,
+) -> Result<T, Finding> {
+    let text = project.read_text(file).map_err(|error| (1, error.to_string()));
+    text.and_then(|text| parse(&text)).map_err(|(line, error)| Finding::new(file, line, error))
 }

@@ -12,6 +12,28 @@
 //! target points lie in Z = 0; `cam_from_target` takes target coordinates to camera coordinates; rotations are perturbed on
 //! the left; residual = predicted - observed; RMSE is per point.
 
+//! # A calibration
+//!
+//! ```
+//! use calibench::board::View;
+//! use calibench::calibrate::{Settings, calibrate};
+//! use calibench::camera::Parameter;
+//! use calibench::synth::{Scene, Stream, StreamKey};
+//!
+//! // Four photographs of a grid by a virtual camera, with noise of a tenth of a pixel; yours come from a detector.
+//! let scene = Scene::example();
+//! let mut stream = Stream::open(StreamKey { seed: 1, scenario: "example", trial: 0, purpose: "noise" });
+//! let views: Vec<View> = scene.observe(0.1, &mut stream);
+//!
+//! let result = calibrate(&views, &Settings::standard().with_image_size((640, 480)))?;
+//! let deviation = result.covariance.standard_deviation(Parameter::Fx).expect("fx is free");
+//! assert!((result.camera.fx - scene.truth.camera.fx).abs() < 4.0 * deviation);
+//! # Ok::<(), calibench::calibrate::CalibrationError>(())
+//! ```
+
+/// The linear algebra of this library's types, for programs that must name the same version.
+pub use nalgebra;
+
 pub mod board;
 pub mod calibrate;
 pub mod camera;

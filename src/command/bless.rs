@@ -23,7 +23,7 @@ pub(super) fn run(experiments: &[Experiment], arguments: &Arguments, build: &Bui
             Err(exit) => return exit,
         },
     };
-    let project = match Project::find() {
+    let project = match Project::here() {
         Ok(project) => project,
         Err(error) => {
             warn(&error.to_string());

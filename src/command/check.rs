@@ -123,12 +123,11 @@ fn to_json(verdict: &Verdict) -> Value {
 /// Committed figures that are not what the experiment draws now: changed, missing, or drawn by nobody.
 fn stale_figures(record: &Record, project: &Project) -> Vec<String> {
     let id = record.experiment();
-    let folder = project.figures(id);
     let mut stale = Vec::new();
     let mut drawn = BTreeSet::new();
     for figure in record.figures() {
         let name = figure.file_name();
-        let committed = fs::read(folder.join(&name));
+        let committed = project.read(&format!("figures/{id}/{name}"));
         match committed {
             Ok(bytes) if !figure.reproducible || bytes == figure.bytes => {}
             Ok(_) => {
@@ -138,7 +137,10 @@ fn stale_figures(record: &Record, project: &Project) -> Vec<String> {
         }
         drawn.insert(name);
     }
-    let names = fs::read_dir(folder).into_iter().flatten().flatten();
+    if !project.is_source_tree() {
+        return stale;
+    }
+    let names = fs::read_dir(project.figures(id)).into_iter().flatten().flatten();
     let mut strays: Vec<String> = names.map(|f| f.file_name().to_string_lossy().into_owned()).collect();
     strays.retain(|name| !drawn.contains(name));
     strays.sort();

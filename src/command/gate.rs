@@ -13,6 +13,7 @@ use calibench_gate::{
     THOROUGH, Terms, plan, protocol,
 };
 use calibench_harness::{Build, ProgressDisplay};
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -271,11 +272,20 @@ fn judge(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build)
             write_atomically(path, text(&report).as_bytes()).map_err(incomplete)?;
         }
     }
-    // The width of the terminal, where there is one.
-    let columns = comfy_table::Table::new().width().map_or(calibench_gate::report::COLUMNS, usize::from);
-    print(&report.to_text(columns));
+    print(&report.to_text(columns()));
     if !report.held() {
         warn(&report.details());
     }
     Ok(if report.held() { Exit::Held } else { Exit::Deviates })
 }
+
+/// Characters in a line: what the shell says, else what most terminals have; a file gets the whole.
+fn columns() -> usize {
+    let said = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
+    let most =
+        if std::io::stdout().is_terminal() { TERMINAL_COLUMNS } else { calibench_gate::report::COLUMNS };
+    said.unwrap_or(most)
+}
+
+/// Characters in a line of a terminal that does not say.
+const TERMINAL_COLUMNS: usize = 100;

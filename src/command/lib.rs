@@ -18,6 +18,7 @@ mod undistort;
 pub use exit::Exit;
 pub use terminal::{print, warn};
 
+use calibench_harness::project::Files;
 use calibench_harness::{Build, Experiment};
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -61,8 +62,10 @@ enum Verb {
     Gate(Box<gate::Arguments>),
 }
 
-/// The `calibench` command over a table of experiments; `build` is what stands as their origin in what they write.
-pub fn main(experiments: &[Experiment], build: &Build) -> ExitCode {
+/// The `calibench` command over a table of experiments; `build` is what stands as their origin in what they write, `carried` what is read
+/// outside the source tree.
+pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCode {
+    calibench_harness::project::carry(carried);
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => return terminal::ended(terminal::usage(&error)).into(),

@@ -6,7 +6,7 @@ use calibench_harness::project::Project;
 use calibench_harness::verdict::{self, Run, Verdict};
 use calibench_harness::{Build, Context, Experiment, ProgressDisplay, Record, emit};
 use rayon::prelude::*;
-use std::{fs, io};
+use std::io;
 
 pub(super) fn run(experiments: &[Experiment], build: &Build) -> Exit {
     let project = match Project::find() {
@@ -49,7 +49,7 @@ fn write(run: &Run, project: &Project, build: &Build) -> io::Result<()> {
 pub(super) fn judge_all(runs: &[Run], project: &Project) -> Vec<Option<Verdict>> {
     let judge = |run: &Run| {
         let record = run.result.as_ref().ok()?;
-        let snapshot = fs::read_to_string(project.snapshot(run.experiment.id)).ok();
+        let snapshot = project.snapshot_text(run.experiment.id);
         Some(Verdict::of(record, snapshot.as_deref(), run.locked))
     };
     runs.iter().map(judge).collect()

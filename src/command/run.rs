@@ -78,7 +78,7 @@ fn run_one(experiment: &Experiment, options: &Options, build: &Build) -> Exit {
         warn(&error.to_string());
         return Exit::Incomplete;
     }
-    let snapshot = project.as_ref().and_then(|p| std::fs::read_to_string(p.snapshot(experiment.id)).ok());
+    let snapshot = project.as_ref().and_then(|p| p.snapshot_text(experiment.id));
     let verdict = Verdict::of(record, snapshot.as_deref(), run.locked && project.is_some());
     print(&summary(record));
     let written = out.join(experiment.id);

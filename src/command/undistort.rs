@@ -6,7 +6,7 @@ use calibench::io::memory::{DEFAULT_MEMORY, parse_bytes};
 use calibench::io::result::{CameraFields, read_camera};
 use calibench::io::{Channels, Memory, image_extent, read_channels, write_atomically, write_png};
 use calibench::raster::Raster;
-use calibench::rectify::{OutputView, RectifyError, RectifyMap, Sample, output_camera};
+use calibench::rectify::{Interpolated, OutputView, RectifyError, RectifyMap, output_camera};
 use clap::{Args, ValueEnum};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -210,7 +210,7 @@ impl Work<'_> {
 }
 
 /// Every channel corrected. Pixels without data get the level `border` in colours and `clear` in alpha, the second or fourth channel.
-fn all<T: Sample>(
+fn all<T: Interpolated>(
     map: &RectifyMap,
     channels: &[Raster<T>],
     border: T,

@@ -47,10 +47,10 @@ fn degenerate(seed: u64) -> Result<Vec<BadCase>, SceneError> {
         distances.iter().map(|&z| looking_at_centre([0.0; 3], z)).collect()
     };
     let tilted = |degrees: [f64; 3]| looking_at_centre(degrees, 120.0);
-    let grid = Truth::chapter_board().points();
+    let grid = Truth::example_board().points();
     let line: Vec<Vec2> = (0..9).map(|i| Vec2::new(10.0 * f64::from(i) - 40.0, 0.0)).collect();
     let corners = vec![grid[0], grid[8], grid[62]];
-    let four = Truth::chapter_poses();
+    let four = Truth::example_poses();
     let sets: [(&'static str, Vec<Pose>, Vec<Vec2>); 10] = [
         ("three-parallel-views", facing(&[110.0, 120.0, 135.0]), grid.clone()),
         (
@@ -73,7 +73,7 @@ fn degenerate(seed: u64) -> Result<Vec<BadCase>, SceneError> {
     ];
     sets.into_iter()
         .map(|(id, cam_from_target, points)| {
-            let truth = Truth { cam_from_target, points, ..Truth::chapter() };
+            let truth = Truth { cam_from_target, points, ..Truth::example() };
             let problem = observed(id, &truth, seed)?;
             Ok(BadCase { id, fault: Fault::Degenerate, problem, truth: truth.camera })
         })
@@ -81,7 +81,7 @@ fn degenerate(seed: u64) -> Result<Vec<BadCase>, SceneError> {
 }
 
 fn malformed(seed: u64) -> Result<Vec<BadCase>, SceneError> {
-    let truth = Truth::chapter();
+    let truth = Truth::example();
     let case = |id: &'static str, spoil: &dyn Fn(&mut Problem)| {
         let mut problem = observed(id, &truth, seed)?;
         spoil(&mut problem);

@@ -27,7 +27,7 @@ pub(super) fn end(group: u32, value: &str) {
 pub(super) fn adopt_orphans() {
     // Where the system refuses, the marks remain.
     #[cfg(target_os = "linux")]
-    let _ = rustix::process::set_child_subreaper(Some(rustix::process::getpid()));
+    let _ = nix::sys::prctl::set_child_subreaper(true);
 }
 
 /// Ends whatever still runs below this process.
@@ -36,19 +36,12 @@ pub(super) fn end_below() {
     linux::end_while_found(|process| process.parent == std::process::id());
 }
 
-#[cfg(target_os = "linux")]
+#[cfg(unix)]
 fn end_group(id: u32) {
-    if let Some(group) = linux::pid(id) {
-        // It fails only where all have ended.
-        let _ = rustix::process::kill_process_group(group, rustix::process::Signal::KILL);
-    }
-}
-
-#[cfg(all(unix, not(target_os = "linux")))]
-fn end_group(id: u32) {
-    use std::process::{Command, Stdio};
-    // As above.
-    let _ = Command::new("kill").args(["-KILL", "--", &format!("-{id}")]).stderr(Stdio::null()).status();
+    use nix::sys::signal::{Signal, killpg};
+    let Ok(group) = i32::try_from(id) else { return };
+    // It fails only where all have ended.
+    let _ = killpg(nix::unistd::Pid::from_raw(group), Signal::SIGKILL);
 }
 
 #[cfg(not(unix))]
@@ -57,7 +50,8 @@ fn end_group(_: u32) {}
 #[cfg(target_os = "linux")]
 mod linux {
     use super::{LOOKS, MARK};
-    use rustix::process::{Pid, Signal, kill_process};
+    use nix::sys::signal::{Signal, kill};
+    use nix::unistd::Pid;
 
     /// A running process.
     pub struct Process {
@@ -73,10 +67,6 @@ mod linux {
             let environment = std::fs::read(format!("/proc/{}/environ", self.id)).unwrap_or_default();
             environment.split(|byte| *byte == 0).any(|variable| variable == wanted.as_bytes())
         }
-    }
-
-    pub fn pid(id: u32) -> Option<Pid> {
-        Pid::from_raw(i32::try_from(id).ok()?)
     }
 
     /// Every process that has not ended.
@@ -96,13 +86,17 @@ mod linux {
     /// Ends the processes that `wanted` names, until none is found.
     pub fn end_while_found(wanted: impl Fn(&Process) -> bool) {
         for _ in 0..LOOKS {
-            let found: Vec<Pid> = running().iter().filter(|p| wanted(p)).filter_map(|p| pid(p.id)).collect();
+            let found: Vec<Pid> = running()
+                .iter()
+                .filter(|p| wanted(p))
+                .filter_map(|p| i32::try_from(p.id).ok().map(Pid::from_raw))
+                .collect();
             if found.is_empty() {
                 return;
             }
             for &id in &found {
                 // Each fails only where the process has ended, or is another's child.
-                let _ = kill_process(id, Signal::KILL);
+                let _ = kill(id, Signal::SIGKILL);
             }
             std::thread::sleep(std::time::Duration::from_millis(2));
         }

@@ -37,12 +37,12 @@ pub enum FilesError {
     #[error("cannot read {0}")]
     Read(#[from] InputError),
     /// The manifest is none.
-    #[error("{path} is no manifest of an export: {source}", path = path.display())]
+    #[error("{path} is no manifest of an export: {cause}", path = path.display())]
     Manifest {
         /// The file.
         path: PathBuf,
         /// What is wrong.
-        source: serde_json::Error,
+        cause: serde_json::Error,
     },
     /// This version of the gate makes other problems from the same seed.
     #[error(
@@ -137,7 +137,7 @@ pub struct Recorded {
 pub fn recorded(folder: &Path) -> Result<(Plan, Recorded), FilesError> {
     let path = folder.join("manifest.json");
     let manifest: Manifest =
-        serde_json::from_str(&read(&path)?).map_err(|source| FilesError::Manifest { path, source })?;
+        serde_json::from_str(&read(&path)?).map_err(|cause| FilesError::Manifest { path, cause })?;
     let plan = Plan::new(manifest.seed, manifest.samples)?;
     let now = sha256_hex(problem_lines(&plan).as_bytes());
     if now != manifest.sha256 {

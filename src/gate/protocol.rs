@@ -1,14 +1,14 @@
 //! What is said between the gate and a solver? One JSON object a line: problems one way, answers the other.
 //!
-//! The page for authors of solvers is `adapters/PROTOCOL.md`; the schemas in `adapters/` are generated from these types.
+//! The page for authors of solvers is `adapters/PROTOCOL.md`; the schemas in `src/gate/schema` are those of these types, which a test checks.
 
 use calibench::geometry::{Mat3, Pose, Vec3};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// A calibration problem: a line on the solver's standard input.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Problem {
     /// Name of the problem; the answer repeats it.
     pub id: String,
@@ -23,18 +23,20 @@ pub struct Problem {
 }
 
 /// One photograph: `target[i]` was seen at `pixels[i]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ProblemView {
     /// Points of the target's plane Z = 0, in the target's unit.
     pub target: Vec<[f64; 2]>,
     /// Pixels (u right, v down; (0, 0) is the centre of the top-left pixel). `null` is a coordinate that was not measured:
     /// bad input, to be refused.
-    #[schemars(with = "Vec<[Option<f64>; 2]>")]
+    #[cfg_attr(test, schemars(with = "Vec<[Option<f64>; 2]>"))]
     pub pixels: Vec<[f64; 2]>,
 }
 
 /// What became of a problem.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
     /// The answer may be used.
@@ -46,7 +48,8 @@ pub enum Status {
 }
 
 /// The answer to a problem: a line on the solver's standard output.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Answer {
     /// The problem's id.
     pub id: String,
@@ -76,7 +79,8 @@ pub struct Answer {
 }
 
 /// `X_camera = R X_target + t`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct AnswerPose {
     /// R, row by row.
     pub rotation: [[f64; 3]; 3],
@@ -85,7 +89,8 @@ pub struct AnswerPose {
 }
 
 /// A covariance matrix with the names of its rows.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct AnswerCovariance {
     /// Names of rows and columns.
     pub parameters: Vec<String>,
@@ -133,18 +138,26 @@ impl Problem {
     }
 }
 
-/// The JSON schemas of problem and answer, as they stand in adapters/.
-pub fn schemas() -> [(&'static str, String); 2] {
-    let text = |schema: schemars::Schema| format!("{:#}\n", schema.to_value());
+/// The JSON schemas of problem and answer, name and text.
+pub fn schemas() -> [(&'static str, &'static str); 2] {
     [
-        ("problem.schema.json", text(schemars::schema_for!(Problem))),
-        ("answer.schema.json", text(schemars::schema_for!(Answer))),
+        ("problem.schema.json", include_str!("schema/problem.schema.json")),
+        ("answer.schema.json", include_str!("schema/answer.schema.json")),
     ]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_schemas_are_those_of_the_types() {
+        let generated = [schemars::schema_for!(Problem), schemars::schema_for!(Answer)];
+        for ((name, text), schema) in schemas().into_iter().zip(generated) {
+            let expected = format!("{:#}\n", schema.to_value());
+            assert_eq!(text, expected, "src/gate/schema/{name} is not what the types say");
+        }
+    }
 
     #[test]
     fn an_unmeasured_coordinate_is_written_as_null() {

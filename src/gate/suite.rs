@@ -47,20 +47,20 @@ pub struct Scenario {
 #[derive(Debug, thiserror::Error)]
 pub enum SuiteError {
     /// The scene cannot be photographed.
-    #[error("{id}: {source}")]
+    #[error("{id}: {cause}")]
     Scene {
         /// Scenario.
         id: &'static str,
         /// Why.
-        source: SceneError,
+        cause: SceneError,
     },
     /// The scene determines nothing.
-    #[error("{id}: {source}")]
+    #[error("{id}: {cause}")]
     Bound {
         /// Scenario.
         id: &'static str,
         /// Why.
-        source: BoundError,
+        cause: BoundError,
     },
     /// The board does not exist.
     #[error(transparent)]
@@ -114,17 +114,17 @@ fn chapter_draft(id: &'static str, about: &'static str) -> Draft {
     Draft {
         id,
         about,
-        camera: Truth::chapter_camera(),
-        image_size: Truth::CHAPTER_IMAGE,
+        camera: Truth::example_camera(),
+        image_size: Truth::EXAMPLE_IMAGE,
         board: (9, 7, 10.0),
         poses: four(120.0),
-        free: FreeParameters::CHAPTER,
+        free: FreeParameters::STANDARD,
     }
 }
 
 fn lawful() -> Vec<Draft> {
     use Parameter::{Cx, Cy, Fx, Fy, K1};
-    let base = Truth::chapter_camera();
+    let base = Truth::example_camera();
     let lens = |k1, k2, p1, p2| BrownConrady { k1, k2, p1, p2, k3: 0.0 };
     vec![
         chapter_draft("four-pose", "the chapter's camera and four poses"),
@@ -145,7 +145,7 @@ fn lawful() -> Vec<Draft> {
         },
         Draft {
             camera: base.with_distortion(lens(-0.18, 0.05, 0.002, -0.003)),
-            free: FreeParameters::CHAPTER.with(Parameter::P1).with(Parameter::P2),
+            free: FreeParameters::STANDARD.with(Parameter::P1).with(Parameter::P2),
             poses: ring(6, 25.0, 12.0, 128.0),
             ..chapter_draft("tangential", "decentred lens, p1 and p2 free")
         },
@@ -229,8 +229,8 @@ fn build(draft: Draft, sigma_px: f64) -> Result<Scenario, SuiteError> {
         cam_from_target,
     };
     let bound = cramer_rao(&truth, draft.free, sigma_px)
-        .map_err(|source| SuiteError::Bound { id: draft.id, source })?;
-    let scene = Scene::new(truth).map_err(|source| SuiteError::Scene { id: draft.id, source })?;
+        .map_err(|cause| SuiteError::Bound { id: draft.id, cause })?;
+    let scene = Scene::new(truth).map_err(|cause| SuiteError::Scene { id: draft.id, cause })?;
     Ok(Scenario {
         id: draft.id,
         about: draft.about,

@@ -8,6 +8,7 @@ use super::suite::Scenario;
 use calibench::calibrate::{Settings, calibrate};
 use calibench::camera::{Camera, FreeParameters, Parameter};
 use calibench::geometry::{Pose, Vec3};
+use calibench::synth::fnv1a;
 use nalgebra::DVector;
 
 /// What became of a case.
@@ -175,8 +176,5 @@ fn fingerprint(estimate: &Estimate) -> u64 {
     let numbers = numbers.chain(poses.flat_map(|p| p.rotation.iter().chain(p.translation.iter()).copied()));
     let numbers = numbers.chain(estimate.standard_deviations.iter().flatten().copied());
     let numbers = numbers.chain(estimate.covariance.iter().flat_map(|c| c.iter().copied()));
-    numbers
-        .chain(estimate.rmse_px)
-        .flat_map(|x| x.to_bits().to_le_bytes())
-        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    fnv1a(numbers.chain(estimate.rmse_px).flat_map(|x| x.to_bits().to_le_bytes()))
 }

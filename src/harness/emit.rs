@@ -20,7 +20,11 @@ pub fn emit(record: &Record, out: &Path, figures: &Path, build: &Build) -> io::R
         write_atomically(&folder.join(format!("{}.csv", table.name)), table.to_csv().as_bytes())?;
     }
     for figure in record.figures() {
-        write_atomically(&figures.join(figure.file_name()), &figure.bytes)?;
+        let path = figures.join(figure.file_name());
+        // A figure that is what it was keeps its time: the program carries the committed ones, and is not built anew for them.
+        if !std::fs::read(&path).is_ok_and(|old| old == figure.bytes) {
+            write_atomically(&path, &figure.bytes)?;
+        }
     }
     let text = format!("{:#}\n", record_json(record, build));
     write_atomically(&folder.join("record.json"), text.as_bytes())

@@ -41,12 +41,12 @@ pub enum ExperimentError {
     #[error(transparent)]
     Record(#[from] RecordError),
     /// A file cannot be read or written.
-    #[error("{path}: {source}", path = path.display())]
+    #[error("{path}: {cause}", path = path.display())]
     File {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        cause: std::io::Error,
     },
     /// The user's input cannot be used.
     #[error("{0}")]
@@ -55,12 +55,12 @@ pub enum ExperimentError {
     #[error("the experiment panicked, which is a defect: {0}")]
     Panicked(String),
     /// A step failed that should not.
-    #[error("{step}: {source}")]
+    #[error("{step}: {cause}")]
     Step {
         /// What was being done.
         step: &'static str,
         /// Why it failed.
-        source: Box<dyn std::error::Error + Send + Sync>,
+        cause: Box<dyn std::error::Error + Send + Sync>,
     },
 }
 
@@ -71,7 +71,7 @@ impl ExperimentError {
         E: Into<Box<dyn std::error::Error + Send + Sync>>,
     {
         // `Fn` because it is handed to `map_err` inside loops and iterators as well.
-        move |source| ExperimentError::Step { step, source: source.into() }
+        move |cause| ExperimentError::Step { step, cause: cause.into() }
     }
 }
 

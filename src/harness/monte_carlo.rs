@@ -6,7 +6,7 @@
 use super::Progress;
 use calibench::calibrate::{Calibration, CalibrationError, Covariance, Settings, Termination, calibrate};
 use calibench::camera::FreeParameters;
-use calibench::evaluate::{Sample, reconcile};
+use calibench::evaluate::{Sample, errors_of};
 use calibench::synth::{Scene, Stream, StreamKey};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -92,7 +92,7 @@ impl MonteCarlo<'_> {
     fn against_truth(&self, calibration: &Calibration) -> Estimate {
         let truth = &self.scene.truth.camera;
         let errors = calibration.free.iter().map(|p| calibration.camera.get(p) - truth.get(p)).collect();
-        let joint = reconcile(truth, &calibration.camera, &calibration.covariance);
+        let joint = errors_of(truth, &calibration.camera, &calibration.covariance);
         Estimate {
             errors,
             rmse_px: calibration.rmse_px,
@@ -118,6 +118,7 @@ fn refusal(error: &CalibrationError) -> String {
         | CalibrationError::BadHeldValue { .. }
         | CalibrationError::NarrowLoss { .. }
         | CalibrationError::BadLoss => "refused: impossible settings".to_string(),
+        _ => "refused: another reason".to_string(),
     }
 }
 
@@ -160,7 +161,7 @@ mod tests {
     use calibench::synth::scene::looking_at_centre;
 
     fn run(scene: &Scene, trials: usize, threads: usize) -> Outcome {
-        let settings = Settings::chapter();
+        let settings = Settings::standard();
         let study =
             MonteCarlo { scene, settings: &settings, sigma_px: 0.1, seed: 3, scenario: "test", trials };
         let progress = ProgressDisplay::hidden().start("test", trials);
@@ -170,7 +171,7 @@ mod tests {
 
     #[test]
     fn the_number_of_threads_changes_no_bit() {
-        let scene = Scene::chapter();
+        let scene = Scene::example();
         let alone = run(&scene, 12, 1);
         assert_eq!(alone.converged(), 12);
         assert_eq!(alone, run(&scene, 12, 5));
@@ -179,7 +180,7 @@ mod tests {
     #[test]
     fn refusals_are_counted_by_reason() {
         let poses = [100.0, 120.0, 140.0].map(|z| looking_at_centre([0.0; 3], z)).to_vec();
-        let scene = Scene::new(Truth { cam_from_target: poses, ..Truth::chapter() }).unwrap();
+        let scene = Scene::new(Truth { cam_from_target: poses, ..Truth::example() }).unwrap();
         let outcome = run(&scene, 8, 2);
         assert_eq!(outcome.refused_naming(&["focal length", "distance"]), 8, "{:?}", outcome.endings);
         assert_eq!(outcome.endings.values().sum::<usize>(), 8);

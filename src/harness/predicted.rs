@@ -1,6 +1,6 @@
 //! From which distribution should a sampled number come? What theory predicts before anything is drawn.
 
-use calibench::evaluate::distribution::{ChiSquare, normal_quantile};
+use calibench::evaluate::distribution::{ChiSquare, normal_quantile, wilson_hilferty};
 use calibench::io::significant;
 use std::fmt;
 
@@ -76,7 +76,6 @@ impl Predicted {
     pub fn z(&self, value: f64) -> Option<f64> {
         match self {
             Predicted::Normal { mean, sd } => Some((value - mean) / sd),
-            // Wilson & Hilferty (1931): the cube root of chi2 / dof is nearly normal.
             Predicted::ChiSquared { dof } => Some(wilson_hilferty(value, *dof)),
             Predicted::Chi { scale, dof } => {
                 let root = value / scale;
@@ -85,12 +84,6 @@ impl Predicted {
             Predicted::Simulated { .. } => None,
         }
     }
-}
-
-/// The standard normal equivalent of a chi-squared value.
-fn wilson_hilferty(chi_squared: f64, dof: f64) -> f64 {
-    let spread = 2.0 / (9.0 * dof);
-    (libm::cbrt(chi_squared / dof) - (1.0 - spread)) / spread.sqrt()
 }
 
 impl fmt::Display for Predicted {

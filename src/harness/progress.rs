@@ -1,51 +1,79 @@
-//! How far is it? A bar on standard error for work that takes over a second, nothing otherwise.
+//! How far is it? A line on standard error for work that takes over a second, nothing otherwise.
 
 use calibench::io::{shown, significant};
-use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
-use std::fmt::Write;
-use std::sync::OnceLock;
+use std::io::{IsTerminal, Write};
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Work that is done within this time is not shown.
 const PATIENCE: Duration = Duration::from_secs(1);
+/// The line is drawn no more often than this: a person reads no faster.
+const PAUSE: Duration = Duration::from_millis(100);
+/// Characters of the line: one less than the narrowest terminal in use, since a full line would wrap.
+const COLUMNS: usize = 79;
 
-/// Where bars are drawn. Standard error only, and only when it is a terminal.
+/// Where the line is drawn. Standard error only, and only when it is a terminal.
 #[derive(Debug, Clone)]
 pub struct ProgressDisplay {
-    bars: MultiProgress,
+    screen: Option<Arc<Screen>>,
 }
 
-/// One piece of work. Dropping it removes the bar.
+/// One piece of work. Dropping it ends its line.
 #[derive(Debug)]
 pub struct Progress {
-    display: ProgressDisplay,
-    bar: ProgressBar,
+    screen: Option<Arc<Screen>>,
+    work: Arc<Work>,
+}
+
+/// The one line, which all work of a display shares: the oldest piece is shown.
+#[derive(Debug, Default)]
+struct Screen {
+    state: Mutex<State>,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    running: Vec<Arc<Work>>,
+    drawn: Option<Instant>,
+}
+
+#[derive(Debug)]
+struct Work {
     label: String,
+    total: AtomicUsize,
+    done: AtomicUsize,
+    /// Steps that were done before, which say nothing of the rate.
+    before: AtomicUsize,
     started: Instant,
-    shown: OnceLock<()>,
+    note: Mutex<String>,
 }
 
 impl ProgressDisplay {
     /// Draws nothing.
     pub fn hidden() -> ProgressDisplay {
-        ProgressDisplay { bars: MultiProgress::with_draw_target(ProgressDrawTarget::hidden()) }
+        ProgressDisplay { screen: None }
     }
 
     /// Draws on standard error.
     pub fn stderr() -> ProgressDisplay {
-        ProgressDisplay { bars: MultiProgress::new() }
+        ProgressDisplay { screen: std::io::stderr().is_terminal().then(Arc::default) }
     }
 
     /// Announces `total` steps of work.
     pub fn start(&self, label: &str, total: usize) -> Progress {
-        let bar = ProgressBar::with_draw_target(Some(total as u64), ProgressDrawTarget::hidden());
-        Progress {
-            display: self.clone(),
-            bar,
-            label: label.to_string(),
+        let work = Arc::new(Work {
+            label: shown(label).into_owned(),
+            total: AtomicUsize::new(total),
+            done: AtomicUsize::new(0),
+            before: AtomicUsize::new(0),
             started: Instant::now(),
-            shown: OnceLock::new(),
+            note: Mutex::default(),
+        });
+        if let Some(screen) = &self.screen {
+            screen.state().running.push(Arc::clone(&work));
         }
+        Progress { screen: self.screen.clone(), work }
     }
 }
 
@@ -57,46 +85,95 @@ impl Progress {
 
     /// `steps` steps are done.
     pub fn advance(&self, steps: usize) {
-        if self.started.elapsed() >= PATIENCE {
-            self.shown.get_or_init(|| self.show());
+        self.work.done.fetch_add(steps, Relaxed);
+        if let Some(screen) = &self.screen
+            && self.work.started.elapsed() >= PATIENCE
+        {
+            screen.draw();
         }
-        self.bar.inc(steps as u64);
     }
 
     /// So many steps were done before, in no time: they count, but say nothing of the rate.
     pub fn already(&self, steps: usize) {
-        self.bar.set_position(steps as u64);
-        self.bar.tick();
-        self.bar.reset_eta();
+        self.work.done.store(steps, Relaxed);
+        self.work.before.store(steps, Relaxed);
     }
 
     /// The work is now known to be so many steps.
     pub fn expect(&self, total: usize) {
-        self.bar.set_length(total as u64);
+        self.work.total.store(total, Relaxed);
     }
 
-    /// Says something after the bar, such as what is worst so far.
+    /// Says something after the counts, such as what is worst so far.
     pub fn note(&self, text: &str) {
-        self.bar.set_message(shown(text).into_owned());
-    }
-
-    /// Puts the bar on the display. The note comes last: a narrow terminal cuts it and nothing else.
-    fn show(&self) {
-        let template = "{prefix} {bar:20} {pos}/{len} {rate} eta {eta} {wide_msg}";
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            let rate = |state: &ProgressState, out: &mut dyn Write| {
-                // A failure would be that of the terminal, and there is nobody left to tell.
-                let _ = write!(out, "{}/s", significant(state.per_sec(), 3));
-            };
-            self.bar.set_style(style.with_key("rate", rate));
-        }
-        self.bar.set_prefix(shown(&self.label).into_owned());
-        self.display.bars.add(self.bar.clone());
+        *self.work.note.lock().unwrap_or_else(PoisonError::into_inner) = shown(text).into_owned();
     }
 }
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        self.bar.finish_and_clear();
+        let Some(screen) = &self.screen else { return };
+        let mut state = screen.state();
+        state.running.retain(|work| !Arc::ptr_eq(work, &self.work));
+        if state.drawn.is_some() && state.running.is_empty() {
+            state.drawn = None;
+            put("");
+        }
+    }
+}
+
+impl Screen {
+    fn state(&self) -> std::sync::MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Draws the line, unless another thread does or it was drawn just now.
+    fn draw(&self) {
+        let Ok(mut state) = self.state.try_lock() else { return };
+        if state.drawn.is_some_and(|at| at.elapsed() < PAUSE) {
+            return;
+        }
+        let Some(oldest) = state.running.first() else { return };
+        put(&oldest.line(oldest.started.elapsed(), state.running.len() - 1));
+        state.drawn = Some(Instant::now());
+    }
+}
+
+impl Work {
+    /// Counts, rate, time left and note, after `took`, with so many other pieces under way. The note comes last: a narrow line cuts it.
+    fn line(&self, took: Duration, others: usize) -> String {
+        let (done, total) = (self.done.load(Relaxed), self.total.load(Relaxed));
+        let rate = done.saturating_sub(self.before.load(Relaxed)) as f64 / took.as_secs_f64();
+        let left = total.saturating_sub(done) as f64 / rate;
+        let left = if left.is_finite() { format!(", {left:.0} s left") } else { String::new() };
+        let others = if others > 0 { format!(" (and {others} more)") } else { String::new() };
+        let note = self.note.lock().unwrap_or_else(PoisonError::into_inner);
+        let line = format!("{}{others} {done}/{total} {}/s{left} {note}", self.label, significant(rate, 3));
+        line.trim_end().chars().take(COLUMNS).collect()
+    }
+}
+
+/// Puts a line in the place of the last one. Spaces clear what was longer: no terminal needs to know an escape sequence.
+fn put(line: &str) {
+    let mut stderr = std::io::stderr().lock();
+    // A failure would be that of the terminal, and there is nobody left to tell.
+    let _ = write!(stderr, "\r{line:COLUMNS$}\r");
+    let _ = stderr.flush();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rate_is_that_of_the_steps_done_now_and_a_long_note_is_cut() {
+        let progress = ProgressDisplay::hidden().start("study", 100);
+        progress.already(40);
+        progress.advance(20);
+        progress.note("worst: cell 3");
+        let line = progress.work.line(Duration::from_secs(10), 0);
+        assert_eq!(line, format!("study 60/100 {}/s, 20 s left worst: cell 3", significant(2.0, 3)));
+        progress.note(&"x".repeat(200));
+        assert_eq!(progress.work.line(Duration::from_secs(10), 2).chars().count(), COLUMNS);
     }
 }

@@ -115,7 +115,7 @@ impl Cell {
     pub(super) fn draw_scene(&self, trial: u64) -> Result<Scene, SpecError> {
         let sight = Sight { camera: &self.camera, image: self.design.scene.image, points: &self.points };
         let poses = self.design.scene.poses.generate(&sight, &mut self.stream(trial, "pose"));
-        let cam_from_target = poses.map_err(|source| SpecError::Poses { cell: self.name.clone(), source })?;
+        let cam_from_target = poses.map_err(|cause| SpecError::Poses { cell: self.name.clone(), cause })?;
         let truth = Truth {
             camera: self.camera,
             image_size: self.design.scene.image,
@@ -164,7 +164,7 @@ impl Cell {
     }
 
     /// The predicted standard deviation of a quantity of the study.
-    pub fn predicted(&self, quantities: &[Quantity], name: &str) -> Option<super::Predicted> {
+    pub fn predicted(&self, quantities: &[Quantity], name: &str) -> Option<super::Expected> {
         let at = quantities.iter().position(|q| q.name() == name)?;
         self.prediction.0[at]
     }

@@ -24,12 +24,12 @@ pub struct Folder {
 
 /// A file and what the system said about it.
 #[derive(Debug, thiserror::Error)]
-#[error("{path}: {source}", path = path.display())]
+#[error("{path}: {cause}", path = path.display())]
 pub struct Located {
     /// The file.
     pub path: PathBuf,
     /// What the system said.
-    pub source: io::Error,
+    pub cause: io::Error,
 }
 
 /// A folder that cannot be used.
@@ -140,7 +140,7 @@ impl Folder {
         spec_text: &str,
         manifest: &Manifest,
     ) -> Result<Folder, FolderError> {
-        let located = |source| Located { path: path.to_path_buf(), source };
+        let located = |cause| Located { path: path.to_path_buf(), cause };
         files.make_folder(path).map_err(located)?;
         let folder = Folder::lock(files, path)?;
         if folder.file("manifest.json").exists() {
@@ -174,12 +174,12 @@ impl Folder {
         for opened in OF_A_RUN.map(|name| path.join(name)).iter().chain([&name]) {
             regular_or_absent(opened)?;
         }
-        let located = |source| Located { path: name.clone(), source };
+        let located = |cause| Located { path: name.clone(), cause };
         let file = OpenOptions::new().create(true).append(true).open(&name).map_err(located)?;
         match patiently(&file) {
             Ok(()) => Folder { path: path.to_path_buf(), _lock: file, files }.cleaned(),
             Err(fs::TryLockError::WouldBlock) => Err(FolderError::InUse(path.to_path_buf())),
-            Err(fs::TryLockError::Error(source)) => Err(located(source).into()),
+            Err(fs::TryLockError::Error(cause)) => Err(located(cause).into()),
         }
     }
 

@@ -58,7 +58,7 @@ pub use manifest::{Difference, Manifest};
 pub use merge::{MergeError, merge};
 pub use moments::{Estimated, Moments};
 pub use poses::{Poses, PosesError};
-pub use prediction::{Predicted, Prediction};
+pub use prediction::{Expected, Prediction};
 pub use quantity::Quantity;
 pub use run_error::RunError;
 pub use shard::{Shard, ShardError};

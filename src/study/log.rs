@@ -69,7 +69,7 @@ impl Folder {
             TrialFile::Parquet if manifest.complete => {}
             TrialFile::Parquet => {
                 let mut lines = self.lines(&self.checkpoint()?, engine)?.0;
-                let located = |source| Located { path: path.clone(), source };
+                let located = |cause| Located { path: path.clone(), cause };
                 let unfinished = self.file(".trials.parquet");
                 let file = File::create(&unfinished).map_err(located)?;
                 super::parquet::write(&file, &path, engine, lines.as_mut())?;
@@ -89,8 +89,8 @@ impl Folder {
         }
         for path in [TrialFile::Csv.name(), "checkpoint.json"].map(|name| self.file(name)) {
             match self.files.remove(&path) {
-                Err(source) if source.kind() != io::ErrorKind::NotFound => {
-                    return Err(Located { path, source }.into());
+                Err(cause) if cause.kind() != io::ErrorKind::NotFound => {
+                    return Err(Located { path, cause }.into());
                 }
                 _ => {}
             }
@@ -107,7 +107,7 @@ impl Folder {
     /// The trials on the disk, from the first; their hash is compared before any is read.
     pub(super) fn trials(&self, engine: &Engine) -> Result<Replay, FolderError> {
         let manifest = self.manifest()?;
-        let (path, source) = if manifest.complete && manifest.trials == TrialFile::Parquet {
+        let (path, cause) = if manifest.complete && manifest.trials == TrialFile::Parquet {
             let path = self.file(TrialFile::Parquet.name());
             let expected = manifest.files.get(TrialFile::Parquet.name());
             let found = hexadecimal(&hash_of(&path, u64::MAX)?.0);
@@ -119,7 +119,7 @@ impl Folder {
             let checkpoint = self.checkpoint()?;
             (self.file(TrialFile::Csv.name()), self.lines(&checkpoint, engine)?.0)
         };
-        Ok(Replay::new(source, path))
+        Ok(Replay::new(cause, path))
     }
 
     /// The log as far as the checkpoint counts it, and the running hash of that.
@@ -137,7 +137,7 @@ impl Folder {
         if hexadecimal(&hash) != checkpoint.sha256 {
             return Err(changed(&path));
         }
-        let file = File::open(&path).map_err(|source| Located { path: path.clone(), source })?;
+        let file = File::open(&path).map_err(|cause| Located { path: path.clone(), cause })?;
         let header = tables::header(&engine.quantities);
         let lines = Lines::open(file, checkpoint.bytes, path, &header, engine.quantities.len())?;
         Ok((Box::new(lines), hash))
@@ -158,7 +158,7 @@ impl Folder {
     /// Takes in the trials that the checkpoint vouches for, and cuts off what was written after it.
     pub(super) fn replay(&self, engine: &mut Engine) -> Result<Log, FolderError> {
         let path = self.file(TrialFile::Csv.name());
-        let located = |source| Located { path: path.clone(), source };
+        let located = |cause| Located { path: path.clone(), cause };
         let file = OpenOptions::new().append(true).create(true).open(&path).map_err(located)?;
         let run = self.manifest()?.identity();
         let mut log = Log { file, path: path.clone(), bytes: 0, hash: Sha256::new(), run };
@@ -168,10 +168,10 @@ impl Folder {
             return Ok(log);
         }
         let checkpoint = self.checkpoint()?;
-        let (source, hash) = self.lines(&checkpoint, engine)?;
+        let (cause, hash) = self.lines(&checkpoint, engine)?;
         self.files.cut(&log.file, checkpoint.bytes).map_err(located)?;
         (log.bytes, log.hash) = (checkpoint.bytes, hash);
-        let mut replay = Replay::new(source, path);
+        let mut replay = Replay::new(cause, path);
         while replay.batch(engine)? {}
         if engine.batches != checkpoint.batches {
             let what =
@@ -189,9 +189,7 @@ impl Folder {
 
     /// Trials that no checkpoint counts yet.
     pub(super) fn append_only(&self, log: &mut Log, bytes: &[u8]) -> Result<(), FolderError> {
-        self.files
-            .write(&mut log.file, bytes)
-            .map_err(|source| Located { path: log.path.clone(), source })?;
+        self.files.write(&mut log.file, bytes).map_err(|cause| Located { path: log.path.clone(), cause })?;
         log.bytes += bytes.len() as u64;
         log.hash.update(bytes);
         Ok(())
@@ -199,7 +197,7 @@ impl Folder {
 
     /// Makes the log durable and counts its batches.
     pub(super) fn count(&self, log: &mut Log, batches: u64) -> Result<(), FolderError> {
-        self.files.sync(&log.file).map_err(|source| Located { path: log.path.clone(), source })?;
+        self.files.sync(&log.file).map_err(|cause| Located { path: log.path.clone(), cause })?;
         let (run, sha256) = (log.run.clone(), hexadecimal(&log.hash));
         let checkpoint = Checkpoint { run, batches, bytes: log.bytes, sha256 };
         let text = serde_json::to_string(&checkpoint).expect("a checkpoint holds nothing that JSON cannot");
@@ -214,7 +212,7 @@ fn changed(path: &Path) -> FolderError {
 
 /// Hash of the first `bytes` bytes of a file, and how many there were.
 pub(super) fn hash_of(path: &Path, bytes: u64) -> Result<(Sha256, u64), FolderError> {
-    let located = |source: io::Error| Located { path: path.to_path_buf(), source };
+    let located = |cause: io::Error| Located { path: path.to_path_buf(), cause };
     let mut file = File::open(path).map_err(located)?.take(bytes);
     let (mut hash, mut length, mut buffer) = (Sha256::new(), 0, vec![0; 1 << 16]);
     loop {

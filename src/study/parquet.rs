@@ -27,12 +27,12 @@ const GROUP: usize = 1 << 14;
 /// Columns before the quantities: cell, trial, outcome, iterations.
 const LEADING: usize = 4;
 
-/// Writes all trials of `source` to `sink`.
+/// Writes all trials of `cause` to `sink`.
 pub(super) fn write(
     sink: impl Write + Send,
     path: &Path,
     engine: &Engine,
-    source: &mut dyn Source,
+    cause: &mut dyn Source,
 ) -> Result<(), FolderError> {
     let failed = |error: ParquetError| unwritten(path, error);
     let columns = tables::columns(&engine.quantities);
@@ -41,7 +41,7 @@ pub(super) fn write(
     loop {
         let mut trials = Vec::with_capacity(GROUP);
         while trials.len() < GROUP
-            && let Some(trial) = source.next()?
+            && let Some(trial) = cause.next()?
         {
             trials.push(trial);
         }
@@ -119,7 +119,7 @@ fn counter(trial: &Trial, column: usize) -> i64 {
 
 /// Opens a file for reading; its columns must be those of the study.
 pub(super) fn open(path: &Path, engine: &Engine) -> Result<Box<dyn Source>, FolderError> {
-    let file = File::open(path).map_err(|source| Located { path: path.to_path_buf(), source })?;
+    let file = File::open(path).map_err(|cause| Located { path: path.to_path_buf(), cause })?;
     let reader = SerializedFileReader::new(file).map_err(|error| damaged(path, error.to_string()))?;
     let found = reader.metadata().file_metadata().schema_descr().columns();
     let found: Vec<&str> = found.iter().map(|c| c.name()).collect();
@@ -223,5 +223,5 @@ fn damaged(path: &Path, what: String) -> FolderError {
 
 /// Only the disk can fail here.
 fn unwritten(path: &Path, error: ParquetError) -> FolderError {
-    Located { path: path.to_path_buf(), source: std::io::Error::other(error) }.into()
+    Located { path: path.to_path_buf(), cause: std::io::Error::other(error) }.into()
 }

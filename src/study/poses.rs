@@ -129,7 +129,7 @@ impl Poses {
     pub(super) fn generate(&self, sight: &Sight<'_>, stream: &mut Stream) -> Result<Vec<Pose>, PosesError> {
         self.check()?;
         let poses: Vec<Pose> = match self {
-            Poses::Chapter {} => calibench::synth::Truth::chapter_poses(),
+            Poses::Chapter {} => calibench::synth::Truth::example_poses(),
             Poses::List { poses } => poses.iter().map(PoseSpec::pose).collect(),
             Poses::Spread { views, tilt_deg, coverage, distance_mm } => {
                 (0..*views).map(|k| spread(k, *tilt_deg, *coverage, *distance_mm, sight)).collect()
@@ -255,9 +255,9 @@ mod tests {
     use calibench::synth::{StreamKey, Truth};
 
     fn generate(poses: &Poses) -> Result<Vec<Pose>, PosesError> {
-        let points = Truth::chapter_board().points();
-        let camera = Truth::chapter_camera();
-        let sight = Sight { camera: &camera, image: Truth::CHAPTER_IMAGE, points: &points };
+        let points = Truth::example_board().points();
+        let camera = Truth::example_camera();
+        let sight = Sight { camera: &camera, image: Truth::EXAMPLE_IMAGE, points: &points };
         poses.generate(
             &sight,
             &mut Stream::open(StreamKey { seed: 1, scenario: "poses", trial: 0, purpose: "pose" }),

@@ -10,7 +10,7 @@ use calibench::synth::Truth;
 
 /// Mean and standard deviation that theory expects, to first order in the noise and for Gaussian noise without gross errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Predicted {
+pub struct Expected {
     /// Mean; 0 for an error.
     pub mean: f64,
     /// Standard deviation; the Cramer-Rao bound for an error.
@@ -19,7 +19,7 @@ pub struct Predicted {
 
 /// The predictions of a cell, one a quantity; `None` where theory says nothing.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Prediction(pub Vec<Option<Predicted>>);
+pub struct Prediction(pub Vec<Option<Expected>>);
 
 /// Where poses are drawn anew in every trial, the prediction is the mean over those of the first trials.
 pub(super) const DRAWS: u64 = 200;
@@ -44,7 +44,7 @@ impl Prediction {
         };
         let one = |quantity: &Quantity| match quantity {
             Quantity::Rmse => (rmse.degrees_of_freedom() > 0)
-                .then(|| Predicted { mean: rmse.mean_px(), sd: rmse.standard_deviation_px() }),
+                .then(|| Expected { mean: rmse.mean_px(), sd: rmse.standard_deviation_px() }),
             Quantity::Nees => nees(free.len() as f64, rmse.degrees_of_freedom() as f64),
             Quantity::Parameter(p) => error(bound.as_ref()?.standard_deviation(*p)?),
             Quantity::Depth => error(bound.as_ref()?.poses.first()?[(5, 5)].sqrt()),
@@ -64,24 +64,24 @@ impl Prediction {
                 mean += p.mean / count;
                 variance += p.sd * p.sd / count;
             }
-            Some(Predicted { mean, sd: variance.sqrt() })
+            Some(Expected { mean, sd: variance.sqrt() })
         };
         Prediction((0..quantities).map(mean).collect())
     }
 }
 
-fn error(sd: f64) -> Option<Predicted> {
-    sd.is_finite().then_some(Predicted { mean: 0.0, sd })
+fn error(sd: f64) -> Option<Expected> {
+    sd.is_finite().then_some(Expected { mean: 0.0, sd })
 }
 
 /// With sigma estimated from `d` degrees of freedom, `e^T P^-1 e / n` follows Fisher's F with `(n, d)`: mean `d / (d - 2)`, variance
 /// `2 d^2 (n + d - 2) / (n (d - 2)^2 (d - 4))`.
-fn nees(n: f64, d: f64) -> Option<Predicted> {
+fn nees(n: f64, d: f64) -> Option<Expected> {
     if n == 0.0 || d <= 4.0 {
         return None;
     }
     let variance = 2.0 * d * d * (n + d - 2.0) / (n * (d - 2.0) * (d - 2.0) * (d - 4.0));
-    Some(Predicted { mean: n * d / (d - 2.0), sd: n * variance.sqrt() })
+    Some(Expected { mean: n * d / (d - 2.0), sd: n * variance.sqrt() })
 }
 
 /// `sqrt(g^T P g)` with the gradient `g` of the measured length by the intrinsics.

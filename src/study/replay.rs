@@ -91,7 +91,7 @@ impl Lines {
     fn next_line(&mut self) -> Result<Option<&str>, FolderError> {
         self.line.clear();
         let read = self.reader.read_line(&mut self.line);
-        let count = read.map_err(|source| Located { path: self.path.clone(), source })?;
+        let count = read.map_err(|cause| Located { path: self.path.clone(), cause })?;
         self.number += 1;
         Ok((count > 0).then(|| self.line.trim_end()))
     }

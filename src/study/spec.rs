@@ -163,7 +163,7 @@ fn ninety_five_percent() -> f64 {
 }
 
 fn chapter_model() -> FreeParameters {
-    FreeParameters::CHAPTER
+    FreeParameters::STANDARD
 }
 
 impl Default for Estimator {

@@ -59,12 +59,12 @@ pub enum SpecError {
     #[error("two factors are named `{0}`: give each a name of its own")]
     DuplicateFactor(String),
     /// A cell whose poses do not exist.
-    #[error("cell {cell}: {source}")]
+    #[error("cell {cell}: {cause}")]
     Poses {
         /// The cell's levels.
         cell: String,
         /// What is wrong.
-        source: PosesError,
+        cause: PosesError,
     },
     /// The precision is wanted of a quantity that is not estimated in every cell.
     #[error("trials.precision.quantity `{quantity}` is not measured in cell {cell}; there are: {known}")]

@@ -3,7 +3,7 @@
 use super::accumulate::Tally;
 use super::engine::Engine;
 use super::moments::Estimated;
-use super::prediction::Predicted;
+use super::prediction::Expected;
 use super::quantity::Quantity;
 use super::sketch::Sketch;
 use calibench::evaluate::Interval;
@@ -53,7 +53,7 @@ pub struct Statistic {
     /// Share, and the value that so many stay below.
     pub quantiles: Vec<(f64, Option<Estimated>)>,
     /// What theory expects.
-    pub predicted: Option<Predicted>,
+    pub predicted: Option<Expected>,
     /// Standard deviation over the predicted one.
     pub ratio: Option<Estimated>,
 }
@@ -103,7 +103,7 @@ fn statistic(
     quantity: Quantity,
     q: usize,
     tally: &Tally,
-    predicted: Option<Predicted>,
+    predicted: Option<Expected>,
     false_alarm: f64,
 ) -> Statistic {
     let moments = &tally.moments[q];

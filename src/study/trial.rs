@@ -121,5 +121,6 @@ fn reason(error: &CalibrationError) -> &'static str {
         CalibrationError::Strays { .. } => "gross-errors",
         CalibrationError::NotIdentifiable { .. } => "not-identifiable",
         CalibrationError::NoStart { .. } => "no-start",
+        _ => "refused",
     }
 }

@@ -4,6 +4,7 @@ use crate::geometry::Vec2;
 
 /// What the marks of a board look like.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Pattern {
     /// Dark discs of this diameter, in the board's unit.
     Circles {
@@ -25,6 +26,7 @@ pub struct Board {
 
 /// Why a board cannot exist.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum BoardError {
     /// Fewer than two marks in a direction do not fix a plane coordinate system.
     #[error("a board needs at least 2 x 2 marks, got {columns} x {rows}")]

@@ -11,6 +11,7 @@ pub struct View {
 
 /// Why correspondences cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ViewError {
     /// Points and pixels do not pair up.
     #[error("{points} target points but {pixels} pixels: every point needs its pixel")]

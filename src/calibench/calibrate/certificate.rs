@@ -31,6 +31,7 @@ pub(super) const FALSE_ALARM: f64 = 1e-6;
 
 /// How the cost of a minimum compares with the least that any camera and any poses could reach.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Certificate {
     /// RMSE per point, px, that the views reach with homographies of their own in place of poses.

@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, SVector};
 
 /// Why the closed form has no answer.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ClosedFormError {
     /// Two constraints a view against five unknowns, four without skew.
     #[error("the closed form needs at least {need} views ({}), got {got}", if *skew { "with skew" } else { "zero skew" })]

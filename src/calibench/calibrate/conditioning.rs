@@ -7,6 +7,8 @@ use nalgebra::{DMatrix, DVector, SVector};
 
 /// How well the data separate the intrinsics, and the direction in which they do worst.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct Conditioning {
     /// Smallest eigenvalue of the intrinsics' information after the poses are eliminated, scaled to unit diagonal before
     /// the elimination: the part of the information about the weakest combination that is left when the poses and the
@@ -20,6 +22,7 @@ pub struct Conditioning {
 
 /// One member of the weakest combination.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WeakComponent {
     /// `fx`, ..., `k3`, or the pose component that moves with it: `tilt`, `roll`, `lateral position`, `distance`.
     pub name: String,

@@ -6,6 +6,7 @@ use crate::geometry::HomographyError;
 
 /// A calibration that is refused. Every variant carries the numbers and says what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CalibrationError {
     /// Each view gives two constraints on the linear parameters.
     #[error(

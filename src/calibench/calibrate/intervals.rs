@@ -18,6 +18,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// An interval by the profile of the cost, beside the linear one of the same coverage.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct ProfileInterval {
     /// Of which parameter.

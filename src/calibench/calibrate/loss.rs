@@ -2,6 +2,8 @@
 
 /// The loss `rho(s)` of a point with squared residual `s = |r|^2` in px^2; the cost is its sum over points.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum Loss {
     /// `rho = s`: maximum likelihood under Gaussian noise.
     #[default]

@@ -7,6 +7,7 @@ use std::fmt;
 
 /// The result of a calibration.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Calibration {
     /// The estimate; parameters that were not free have the values they were held at.
     pub camera: Camera,
@@ -16,7 +17,7 @@ pub struct Calibration {
     pub cam_from_target: Vec<Pose>,
     /// Predicted - observed, px, view by view, point by point.
     pub residuals: Vec<Vec<Vec2>>,
-    /// `sqrt(sum |r|^2 / N)` over all N points, px: the chapter's RMSE, and OpenCV's.
+    /// `sqrt(sum |r|^2 / N)` over all N points, px: as in OpenCV.
     pub rmse_px: f64,
     /// Estimated standard deviation of one pixel coordinate: `sqrt(sum |r|^2 / (2 N - p))`, px. Under a robust loss see
     /// [`Calibration::covariance`].
@@ -45,6 +46,8 @@ pub struct Calibration {
 
 /// Something a user should know before trusting the numbers.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum Warning {
     /// The search did not end in a minimum.
     NotConverged {

@@ -5,6 +5,7 @@ use crate::camera::{Camera, FreeParameters, Parameter};
 
 /// What to estimate and how.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Settings {
     free: FreeParameters,
     held: [Option<f64>; Parameter::COUNT],
@@ -44,9 +45,9 @@ impl Settings {
         }
     }
 
-    /// The chapter's model: fx, fy, cx, cy, k1, k2 free.
-    pub fn chapter() -> Settings {
-        Settings::new(FreeParameters::CHAPTER)
+    /// fx, fy, cx, cy, k1, k2 free: what most lenses need and most data determine.
+    pub fn standard() -> Settings {
+        Settings::new(FreeParameters::STANDARD)
     }
 
     /// Holds `parameter` at `value`.

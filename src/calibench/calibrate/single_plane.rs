@@ -34,6 +34,7 @@ pub struct SinglePlaneOptions {
 
 /// Why a single view gives no distortion.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SinglePlaneError {
     /// Fewer coordinates than parameters.
     #[error("{parameters} parameters need at least {need} points, got {got}")]

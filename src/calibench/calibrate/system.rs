@@ -166,7 +166,7 @@ mod tests {
             rotation: rotation::from_xyz_rad(x, y, z),
             translation: Vec3::new(2.0, -3.0, 120.0),
         });
-        information(&camera, FreeParameters::CHAPTER, &poses, &points).unwrap()
+        information(&camera, FreeParameters::STANDARD, &poses, &points).unwrap()
     }
 
     /// The same matrix written out in full.

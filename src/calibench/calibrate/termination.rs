@@ -2,6 +2,7 @@
 
 /// How the refinement ended. Every way is a result; only the first two are minima.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Termination {
     /// A further step would lower the cost by less than 1e-14 of it, or by less than its rounding: the estimate is a minimum to

@@ -15,6 +15,7 @@ use nalgebra::Matrix2;
 
 /// Brown-Conrady distortion coefficients; all zero is an ideal lens.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BrownConrady {
     /// Radial, third order.
     pub k1: f64,
@@ -30,6 +31,7 @@ pub struct BrownConrady {
 
 /// Why a distorted point has no undistorted one.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum UndistortError {
     /// The point lies outside the image of the region in which the model is one-to-one.
     #[error(
@@ -362,16 +364,16 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const CHAPTER: BrownConrady = BrownConrady { k1: -0.18, k2: 0.05, p1: 0.0, p2: 0.0, k3: 0.0 };
+    const LENS: BrownConrady = BrownConrady { k1: -0.18, k2: 0.05, p1: 0.0, p2: 0.0, k3: 0.0 };
 
     #[test]
     fn the_monotone_radius_is_where_the_slope_vanishes() {
-        // 1 - 0.54 s + 0.25 s^2 has no real root: the chapter's lens never folds.
-        assert_eq!(CHAPTER.monotone_radius(), f64::INFINITY);
+        // 1 - 0.54 s + 0.25 s^2 has no real root: this lens never folds.
+        assert_eq!(LENS.monotone_radius(), f64::INFINITY);
         // 1 - 0.9 s = 0 at s = 10/9.
         let barrel = BrownConrady::radial(-0.3, 0.0);
         assert!((barrel.monotone_radius() - (10.0f64 / 9.0).sqrt()).abs() < 1e-15);
-        let with_k3 = BrownConrady { k3: -0.1, ..CHAPTER };
+        let with_k3 = BrownConrady { k3: -0.1, ..LENS };
         assert!(with_k3.radial_slope(with_k3.monotone_radius().powi_2()).abs() < 1e-12);
     }
 
@@ -395,10 +397,7 @@ mod tests {
         );
         let tangential = BrownConrady { p1: 1e-3, ..barrel };
         assert!(tangential.undistort(&Vec2::new(0.9, 0.5)).is_err());
-        assert!(matches!(
-            CHAPTER.undistort(&Vec2::new(f64::NAN, 0.0)),
-            Err(UndistortError::NotFinite { .. })
-        ));
+        assert!(matches!(LENS.undistort(&Vec2::new(f64::NAN, 0.0)), Err(UndistortError::NotFinite { .. })));
     }
 
     proptest! {

@@ -11,6 +11,7 @@ use crate::geometry::{Mat3, Vec2, Vec3};
 
 /// Intrinsic parameters of a camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Camera {
     /// Focal length along u, px.
     pub fx: f64,
@@ -104,7 +105,7 @@ impl Camera {
         self.pixel_from_normalised(&self.distortion.distort(&self.normalised_from_pixel(ideal)))
     }
 
-    /// Where an ideal lens with the same `K` would have shown what is seen at `pixel`: the chapter's point correction.
+    /// Where an ideal lens with the same `K` would have shown what is seen at `pixel`: the correction of a point.
     /// The result is in pixels, not in target units.
     ///
     /// # Errors

@@ -5,6 +5,8 @@ use std::str::FromStr;
 
 /// One intrinsic parameter, in the order of every parameter vector and covariance matrix of this library.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
 #[repr(u8)]
 pub enum Parameter {
     /// Focal length along u, in px.
@@ -74,14 +76,16 @@ impl FromStr for Parameter {
 
 /// A set of parameters: those that an estimator may change. The others keep the values they are given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(into = "String", try_from = "String"))]
 pub struct FreeParameters(u16);
 
 impl FreeParameters {
     /// Nothing is free: only poses are estimated.
     pub const NONE: FreeParameters = FreeParameters(0);
 
-    /// The chapter's model: fx, fy, cx, cy, k1, k2.
-    pub const CHAPTER: FreeParameters = {
+    /// What most lenses need and most data determine: fx, fy, cx, cy, k1, k2.
+    pub const STANDARD: FreeParameters = {
         use Parameter::*;
         FreeParameters::of(&[Fx, Fy, Cx, Cy, K1, K2])
     };
@@ -137,6 +141,22 @@ impl fmt::Display for FreeParameters {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let names: Vec<&str> = self.iter().map(Parameter::name).collect();
         f.write_str(&names.join(","))
+    }
+}
+
+#[cfg(feature = "serde")]
+impl From<FreeParameters> for String {
+    fn from(set: FreeParameters) -> String {
+        set.to_string()
+    }
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<String> for FreeParameters {
+    type Error = UnknownParameter;
+
+    fn try_from(list: String) -> Result<FreeParameters, UnknownParameter> {
+        list.parse()
     }
 }
 

@@ -13,7 +13,7 @@ use super::edge::{Edge, SHARPEST_EDGE_PX, SPREAD_PER_WIDTH};
 use super::levels::{Levels, PlaneFit};
 use super::region::{Region, around};
 use crate::geometry::Vec2;
-use crate::raster::{Raster, Sample};
+use crate::raster::{Level, Raster};
 use nalgebra::Matrix2;
 
 /// An ellipse as a quadratic form: `rho^2 = (p - centre)^T form (p - centre)`, 1 on the ellipse.
@@ -59,7 +59,7 @@ impl Ellipse {
     }
 
     /// Levels inside of the edge by `clear_px`, and outside of it from there to a few pixels on.
-    fn levels<T: Sample>(&self, image: &Raster<T>, clear_px: f64) -> Option<Levels> {
+    fn levels<T: Level>(&self, image: &Raster<T>, clear_px: f64) -> Option<Levels> {
         let (inner, clear) = (self.grown(-clear_px)?, self.grown(clear_px)?);
         let outer = self.grown(outer_px(self, clear_px))?;
         Levels::fit(image, &self.centre, &inner, &clear, &outer)
@@ -67,7 +67,7 @@ impl Ellipse {
 }
 
 /// The pixels of `outer` that are not in `inner`, if there is one.
-fn for_each_between<T: Sample>(
+fn for_each_between<T: Level>(
     image: &Raster<T>,
     centre: &Vec2,
     inner: Option<&Region>,
@@ -89,7 +89,7 @@ fn for_each_between<T: Sample>(
 }
 
 /// Moments of the coverage: a better ellipse, and the edge's half-width. Pixels within `ring_px` of the edge are looked at.
-fn moments<T: Sample>(
+fn moments<T: Level>(
     image: &Raster<T>,
     ellipse: &Ellipse,
     levels: &Levels,
@@ -128,12 +128,7 @@ fn moments<T: Sample>(
 }
 
 /// The Gauss-Newton step of the centre, and the RMS residual it was computed from.
-fn step<T: Sample>(
-    image: &Raster<T>,
-    ellipse: &Ellipse,
-    levels: &Levels,
-    edge: &Edge,
-) -> Option<(Vec2, f64)> {
+fn step<T: Level>(image: &Raster<T>, ellipse: &Ellipse, levels: &Levels, edge: &Edge) -> Option<(Vec2, f64)> {
     let (mut normal, mut gradient) = (Matrix2::zeros(), Vec2::zeros());
     let (mut square, mut count) = (0.0, 0.0);
     let reach_px = edge.reach_px();
@@ -156,7 +151,7 @@ fn step<T: Sample>(
 }
 
 /// Refines centre and ellipse of a blob; `None` where it is too small or has no contrast.
-pub(super) fn refine<T: Sample>(image: &Raster<T>, centre: Vec2, covariance: Matrix2<f64>) -> Option<Blob> {
+pub(super) fn refine<T: Level>(image: &Raster<T>, centre: Vec2, covariance: Matrix2<f64>) -> Option<Blob> {
     let rough = Ellipse::new(centre, covariance)?;
     // First look: the edge may be soft, the blob small.
     let clear_px = 2.5f64.min(0.5 * rough.short_px);

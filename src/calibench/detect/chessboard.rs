@@ -20,7 +20,7 @@ mod smoothness;
 
 use super::lattice::Lattice;
 use crate::geometry::Vec2;
-use crate::raster::{Raster, Sample};
+use crate::raster::{Level, Raster};
 use board::{Found, Rectangle};
 use candidates::Strength;
 use level::{Pyramid, Smoothed};
@@ -70,6 +70,7 @@ impl Chessboard {
 
 /// Why there is no complete chessboard of the asked size in an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ChessboardError {
     /// A board needs two inner corners on each side.
     #[error("a chessboard needs at least 2 x 2 inner corners, asked for {columns} x {rows}")]
@@ -142,7 +143,7 @@ const FIRST_LEVEL_PIXELS: usize = 1_200_000;
 ///
 /// # Errors
 /// See [`ChessboardError`]; a board is returned complete and ordered, or not at all.
-pub fn chessboard<T: Sample>(
+pub fn chessboard<T: Level>(
     image: &Raster<T>,
     columns: usize,
     rows: usize,
@@ -166,7 +167,7 @@ pub fn chessboard<T: Sample>(
 }
 
 /// The level of about a megapixel, finer ones, coarser ones.
-fn search_order<T: Sample>(image: &Raster<T>, levels: usize) -> impl Iterator<Item = usize> {
+fn search_order<T: Level>(image: &Raster<T>, levels: usize) -> impl Iterator<Item = usize> {
     let pixels = image.width().saturating_mul(image.height());
     let first = (0..levels).find(|level| pixels >> (2 * level) <= FIRST_LEVEL_PIXELS).unwrap_or(levels - 1);
     (0..=first).rev().chain(first + 1..levels)
@@ -198,7 +199,7 @@ fn nothing(columns: usize, rows: usize, seen: usize) -> ChessboardError {
 }
 
 /// Strong corners first; where they do not make the board, all.
-fn search<T: Sample>(
+fn search<T: Level>(
     pyramid: &Pyramid<'_, T>,
     level: usize,
     columns: usize,
@@ -240,7 +241,7 @@ fn search_among(
     Err(failure.unwrap_or(Failure { found: 0, error: nothing(columns, rows, seen) }))
 }
 
-fn finished<T: Sample>(
+fn finished<T: Level>(
     image: &Raster<T>,
     pyramid: &Pyramid<'_, T>,
     level: usize,

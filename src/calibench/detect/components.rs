@@ -5,7 +5,7 @@
 //! with the outline, not with the area. (Run-based labelling: He, Chao & Suzuki 2008.)
 
 use super::threshold::{Side, TILE_PX, Thresholds};
-use crate::raster::{Raster, Sample};
+use crate::raster::{Level, Raster};
 
 /// Which side of the threshold is the mark?
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -70,7 +70,7 @@ impl Component {
 }
 
 /// The components of an image, in the order of their topmost, leftmost run.
-pub fn components<T: Sample>(
+pub fn components<T: Level>(
     image: &Raster<T>,
     thresholds: &Thresholds<T>,
     polarity: Polarity,
@@ -100,7 +100,7 @@ struct Stretch<T> {
 }
 
 /// The stretches of a row of tiles, left to right: one for every mixed tile, one for neighbouring tiles of the mark's side.
-fn find_stretches<T: Sample>(
+fn find_stretches<T: Level>(
     tiles: impl Iterator<Item = (T, Side)>,
     width: usize,
     polarity: Polarity,
@@ -121,7 +121,7 @@ fn find_stretches<T: Sample>(
 }
 
 /// Cuts a row into runs of marked pixels.
-fn find_runs<T: Sample>(row: &[T], stretches: &[Stretch<T>], polarity: Polarity, runs: &mut Vec<Run>) {
+fn find_runs<T: Level>(row: &[T], stretches: &[Stretch<T>], polarity: Polarity, runs: &mut Vec<Run>) {
     let mut close = |start: Option<usize>, end: usize| {
         if let Some(start) = start {
             runs.push(Run { start: start as u32, end: end as u32, component: 0 });
@@ -154,7 +154,7 @@ fn find_runs<T: Sample>(row: &[T], stretches: &[Stretch<T>], polarity: Polarity,
 }
 
 /// Which of a tile's samples are marked: bit `i` for sample `i`.
-fn marks<T: Sample>(samples: &[T], level: T, polarity: Polarity) -> u32 {
+fn marks<T: Level>(samples: &[T], level: T, polarity: Polarity) -> u32 {
     let dark = samples.iter().rev().fold(0, |bits, &sample| bits << 1 | u32::from(sample < level));
     if polarity == Polarity::Dark { dark } else { !dark }
 }

@@ -8,11 +8,12 @@
 
 use super::saddle;
 use crate::geometry::Vec2;
-use crate::raster::{Raster, Sample};
+use crate::raster::{Level, Raster};
 use nalgebra::Matrix2;
 
 /// Why a corner cannot be refined.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RefineError {
     /// The window leaves the image.
     #[error("the window of {half_px} px around the corner at ({u:.1}, {v:.1}) leaves the image")]
@@ -59,7 +60,7 @@ const LEAST_FLATNESS: f64 = 0.01;
 ///
 /// # Errors
 /// See [`RefineError`].
-pub fn refine_corner<T: Sample>(image: &Raster<T>, start: Vec2, half_px: usize) -> Result<Vec2, RefineError> {
+pub fn refine_corner<T: Level>(image: &Raster<T>, start: Vec2, half_px: usize) -> Result<Vec2, RefineError> {
     let mut corner = start;
     for _ in 0..MAX_STEPS {
         let next = step(image, corner, half_px)?;
@@ -78,7 +79,7 @@ pub fn refine_corner<T: Sample>(image: &Raster<T>, start: Vec2, half_px: usize) 
 }
 
 /// One solution of the linear problem around a place.
-fn step<T: Sample>(image: &Raster<T>, at: Vec2, half_px: usize) -> Result<Vec2, RefineError> {
+fn step<T: Level>(image: &Raster<T>, at: Vec2, half_px: usize) -> Result<Vec2, RefineError> {
     let (u, v) = (at.x, at.y);
     let patch = patch(image, at, half_px + 1).ok_or(RefineError::OutsideImage { u, v, half_px })?;
     let side = 2 * half_px + 3;
@@ -100,7 +101,7 @@ fn step<T: Sample>(image: &Raster<T>, at: Vec2, half_px: usize) -> Result<Vec2, 
 }
 
 /// Levels on a unit raster centred on a place, bilinear; `None` where it leaves the image.
-fn patch<T: Sample>(image: &Raster<T>, centre: Vec2, half: usize) -> Option<Vec<f64>> {
+fn patch<T: Level>(image: &Raster<T>, centre: Vec2, half: usize) -> Option<Vec<f64>> {
     let first = centre - Vec2::repeat(half as f64);
     let (x0, y0) = (libm::floor(first.x), libm::floor(first.y));
     let side = 2 * half + 1;

@@ -5,7 +5,7 @@ use super::centre;
 use super::components::{Component, Polarity, components};
 use super::threshold::Thresholds;
 use crate::geometry::Vec2;
-use crate::raster::{Raster, Sample};
+use crate::raster::{Level, Raster};
 use nalgebra::Matrix2;
 
 /// What counts as a disc.
@@ -33,7 +33,7 @@ const AREA_TOLERANCE: f64 = 0.1;
 const LARGEST_MISFIT: f64 = 0.2;
 
 /// The discs of an image, top to bottom by their highest pixel. Marks that touch the image's border are left out.
-pub fn blobs<T: Sample>(image: &Raster<T>, options: &BlobOptions) -> Vec<Blob> {
+pub fn blobs<T: Level>(image: &Raster<T>, options: &BlobOptions) -> Vec<Blob> {
     let Some(thresholds) = Thresholds::of(image) else { return Vec::new() };
     components(image, &thresholds, options.polarity)
         .iter()

@@ -5,7 +5,7 @@ use super::discs::{BlobOptions, blobs};
 use super::lattice::largest;
 use super::order::{GridError, ordered_rectangle};
 use crate::geometry::Vec2;
-use crate::raster::{Raster, Sample};
+use crate::raster::{Level, Raster};
 
 /// A complete grid of discs.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,7 +44,7 @@ const DENSE_SIDE: usize = 4;
 ///
 /// # Errors
 /// See [`GridError`]; a grid is returned complete and ordered, or not at all.
-pub fn circle_grid<T: Sample>(image: &Raster<T>, columns: usize, rows: usize) -> Result<DotGrid, GridError> {
+pub fn circle_grid<T: Level>(image: &Raster<T>, columns: usize, rows: usize) -> Result<DotGrid, GridError> {
     circle_grid_of(&blobs(image, &BlobOptions::default()), columns, rows)
 }
 
@@ -64,7 +64,7 @@ pub fn circle_grid_of(discs: &[Blob], columns: usize, rows: usize) -> Result<Dot
 ///
 /// # Errors
 /// See [`GridError`]; a grid is returned complete and ordered, or not at all.
-pub fn sparse_dots<T: Sample>(image: &Raster<T>, columns: usize, rows: usize) -> Result<DotGrid, GridError> {
+pub fn sparse_dots<T: Level>(image: &Raster<T>, columns: usize, rows: usize) -> Result<DotGrid, GridError> {
     sparse_dots_of(&blobs(image, &BlobOptions::default()), columns, rows)
 }
 

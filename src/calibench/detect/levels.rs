@@ -2,7 +2,7 @@
 
 use super::region::{Region, around};
 use crate::geometry::Vec2;
-use crate::raster::{Raster, Sample};
+use crate::raster::{Level, Raster};
 use nalgebra::{Matrix3, Vector3};
 use std::ops::Range;
 
@@ -37,7 +37,7 @@ impl PlaneFit {
     }
 
     /// Adds the pixels of a row, the first at `(x, y)`.
-    fn add<T: Sample>(&mut self, x: f64, y: f64, samples: &[T]) {
+    fn add<T: Level>(&mut self, x: f64, y: f64, samples: &[T]) {
         if samples.is_empty() {
             return;
         }
@@ -78,7 +78,7 @@ pub struct Levels {
 impl Levels {
     /// Fits the ground between `clear` and `outer` and the mark within `inner`, places counted from `centre`; `None` where either has no
     /// pixel.
-    pub fn fit<T: Sample>(
+    pub fn fit<T: Level>(
         image: &Raster<T>,
         centre: &Vec2,
         inner: &Region,

@@ -11,6 +11,7 @@ use crate::geometry::Vec2;
 
 /// Why there is no complete, unambiguous grid in an image.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum GridError {
     /// Grids with fewer marks than this on a side, or fewer in the image, cannot be told from chance by their regularity.
     #[error(

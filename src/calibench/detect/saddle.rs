@@ -13,7 +13,7 @@
 use super::edge::{Edge, LaneEdge, SHARPEST_EDGE_PX};
 use crate::geometry::Vec2;
 use crate::geometry::lanes::{Kernel, LANES, Lanes, dispatch};
-use crate::raster::{Raster, Sample};
+use crate::raster::{Level, Raster};
 use nalgebra::{Matrix2, SMatrix, SVector};
 
 /// Corner (2), directions (2), edge widths (2), mean, amplitude, slope (2).
@@ -68,7 +68,7 @@ pub(super) enum Window {
 type Pixel = (Vec2, f64);
 
 /// Refines a corner within a disc of radius `half_px`; `None` where no crossing fits or it leaves the start by a pixel.
-pub(super) fn refine<T: Sample>(image: &Raster<T>, start: Vec2, half_px: usize) -> Option<Vec2> {
+pub(super) fn refine<T: Level>(image: &Raster<T>, start: Vec2, half_px: usize) -> Option<Vec2> {
     let pixels = pixels_in(image, start, &Window::Disc(half_px))?;
     let crossing = initial(&pixels, start)?;
     Some(fit(&pixels, crossing, [0.0; 2], half_px as f64, 1.0)?.corner)
@@ -76,7 +76,7 @@ pub(super) fn refine<T: Sample>(image: &Raster<T>, start: Vec2, half_px: usize) 
 
 /// Fits a crossing to the pixels of a window near its edges, which bend by the curvatures; `None` where none fits or it leaves the
 /// start by more than `most_px`. Where the edges prove wider than was thought, more pixels are taken.
-pub(super) fn fit_near_edges<T: Sample>(
+pub(super) fn fit_near_edges<T: Level>(
     image: &Raster<T>,
     start: &Crossing,
     window: &Window,
@@ -137,7 +137,7 @@ fn fit(
     (crossing.amplitude * start.amplitude > 0.0).then_some(crossing)
 }
 
-fn pixels_in<T: Sample>(image: &Raster<T>, centre: Vec2, window: &Window) -> Option<Vec<Pixel>> {
+fn pixels_in<T: Level>(image: &Raster<T>, centre: Vec2, window: &Window) -> Option<Vec<Pixel>> {
     let (reach, inverse) = match window {
         Window::Disc(half_px) => (Vec2::repeat(*half_px as f64), None),
         Window::Along([first, second]) => {

@@ -5,7 +5,7 @@
 //! than tiles. One pass over the pixels (extremes), the rest over tiles. (Local extremes on tiles as in AprilTag 2,
 //! Wang & Olson 2016; the inheritance is ours.)
 
-use crate::raster::{Raster, Sample};
+use crate::raster::{Level, Raster};
 
 /// Side of a tile, px. A neighbourhood of 3 x 3 tiles, 48 px, sees mark and ground of every mark up to about that size at
 /// its edge; larger tiles follow shading less well, smaller ones see more noise and less contrast.
@@ -34,7 +34,7 @@ pub struct Thresholds<T> {
     sides: Vec<Side>,
 }
 
-impl<T: Sample> Thresholds<T> {
+impl<T: Level> Thresholds<T> {
     /// The thresholds of an image; `None` where the image is empty or has a single level.
     pub fn of(image: &Raster<T>) -> Option<Thresholds<T>> {
         let tiles = Extremes::of(image)?;
@@ -73,7 +73,7 @@ struct Extremes<T> {
     high: Vec<T>,
 }
 
-impl<T: Sample> Extremes<T> {
+impl<T: Level> Extremes<T> {
     fn of(image: &Raster<T>) -> Option<Extremes<T>> {
         let columns = image.width().div_ceil(TILE_PX);
         let rows = image.height().div_ceil(TILE_PX);
@@ -121,7 +121,7 @@ impl<T: Sample> Extremes<T> {
 }
 
 /// The one of a tile's samples that wins against all others, in halves: each is one operation on short vectors.
-fn pick_one<T: Sample>(tile: &[T], pick: impl Fn(T, T) -> T) -> T {
+fn pick_one<T: Level>(tile: &[T], pick: impl Fn(T, T) -> T) -> T {
     let Some(samples) = tile.first_chunk::<TILE_PX>() else {
         return tile[1..].iter().fold(tile[0], |best, &x| pick(x, best));
     };
@@ -131,7 +131,7 @@ fn pick_one<T: Sample>(tile: &[T], pick: impl Fn(T, T) -> T) -> T {
 }
 
 /// Every value combined with its eight neighbours, those there are: first along columns, then along rows.
-fn over_neighbours<T: Sample>(values: &[T], columns: usize, pick: impl Fn(T, T) -> T) -> Vec<T> {
+fn over_neighbours<T: Level>(values: &[T], columns: usize, pick: impl Fn(T, T) -> T) -> Vec<T> {
     let mut upright = values.to_vec();
     for (row, &value) in upright[columns..].iter_mut().zip(values) {
         *row = pick(value, *row);
@@ -152,12 +152,12 @@ fn over_neighbours<T: Sample>(values: &[T], columns: usize, pick: impl Fn(T, T) 
 }
 
 /// The first if it is less, else the second.
-fn lesser<T: Sample>(a: T, b: T) -> T {
+fn lesser<T: Level>(a: T, b: T) -> T {
     if a < b { a } else { b }
 }
 
 /// The first if it is greater, else the second.
-fn greater<T: Sample>(a: T, b: T) -> T {
+fn greater<T: Level>(a: T, b: T) -> T {
     if a > b { a } else { b }
 }
 

@@ -55,6 +55,13 @@ pub fn fisher_cdf(f: f64, numerator_freedom: usize, denominator_freedom: usize) 
         .map_or(f64::NAN, |d| stable(d.cdf(f.max(0.0))))
 }
 
+/// The standard normal equivalent of a chi-squared value: the cube root of chi-squared over its degrees of freedom is nearly normal
+/// (Wilson & Hilferty 1931).
+pub fn wilson_hilferty(chi_squared: f64, degrees_of_freedom: f64) -> f64 {
+    let spread = 2.0 / (9.0 * degrees_of_freedom);
+    (libm::cbrt(chi_squared / degrees_of_freedom) - (1.0 - spread)) / spread.sqrt()
+}
+
 /// A chi-squared distribution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChiSquare {

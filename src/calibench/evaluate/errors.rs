@@ -33,7 +33,7 @@ pub struct Errors {
 }
 
 /// Compares `estimate` with `truth` under the covariance `predicted`. `None` if the covariance is singular.
-pub fn reconcile(truth: &Camera, estimate: &Camera, predicted: &Covariance) -> Option<Errors> {
+pub fn errors_of(truth: &Camera, estimate: &Camera, predicted: &Covariance) -> Option<Errors> {
     let items: Vec<Item> = predicted
         .free
         .iter()
@@ -65,12 +65,12 @@ mod tests {
 
     #[test]
     fn the_published_table_is_one_plausible_draw() {
-        // CHAPTER 5.3: Mahalanobis chi2 = 9.0 on 6 degrees of freedom, p = 0.17.
-        let truth = Truth::chapter();
-        let bound = cramer_rao(&truth, FreeParameters::CHAPTER, 0.1).unwrap();
+        // Printed for this scene: Mahalanobis chi2 = 9.0 on 6 degrees of freedom, p = 0.17.
+        let truth = Truth::example();
+        let bound = cramer_rao(&truth, FreeParameters::STANDARD, 0.1).unwrap();
         let published = Camera::pinhole(598.5707, 598.5468, 325.5661, 243.2207)
             .with_distortion(BrownConrady::radial(-0.1832, 0.0663));
-        let errors = reconcile(&truth.camera, &published, &bound).unwrap();
+        let errors = errors_of(&truth.camera, &published, &bound).unwrap();
         assert!((errors.chi_squared - 9.0).abs() < 0.05, "{}", errors.chi_squared);
         assert!((errors.p_value - 0.17).abs() < 0.005);
     }

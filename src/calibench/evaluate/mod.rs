@@ -9,7 +9,7 @@ pub mod rmse;
 pub mod sample;
 
 pub use bound::{BoundError, cramer_rao};
-pub use errors::{Errors, reconcile};
+pub use errors::{Errors, errors_of};
 pub use interval::Interval;
 pub use leverage::leverages;
 pub use rmse::RmseDistribution;

@@ -77,8 +77,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_chapters_prediction_is_met() {
-        // CHAPTER 5.3: E[RMSE] = 0.1371 +- 0.0045 for 252 points and 30 parameters; noise floor 0.1414.
+    fn the_examples_prediction_is_met() {
+        // Printed for this scene: E[RMSE] = 0.1371 +- 0.0045 for 252 points and 30 parameters; noise floor 0.1414.
         let predicted = RmseDistribution { sigma_px: 0.1, points: 252, parameters: 30 };
         assert!((predicted.mean_px() - 0.1371).abs() < 5e-5);
         assert!((predicted.standard_deviation_px() - 0.0045).abs() < 5e-5);

@@ -15,6 +15,7 @@ pub struct Affine {
 
 /// Why an affine map or a similarity cannot be fitted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LinearFitError {
     /// Not enough pairs for the parameters.
     #[error("the map needs at least {need} point pairs, got {got}")]

@@ -6,6 +6,7 @@ use super::{Mat3, Vec2, Vec3};
 
 /// A projective map of the plane: `s [u v 1]^T = H [X Y 1]^T`, defined up to scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Homography(pub Mat3);
 
 /// A fitted homography with its fit quality.
@@ -21,6 +22,7 @@ pub struct HomographyFit {
 
 /// Why no homography can be found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum HomographyError {
     /// Four pairs are the least.
     #[error("a homography needs at least {need} point pairs, got {got}")]

@@ -15,6 +15,7 @@ pub struct LineFit {
 
 /// Why points fix no line.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LineError {
     /// Two points are the least.
     #[error("a line needs at least 2 points, got {got}")]

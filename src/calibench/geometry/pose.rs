@@ -5,6 +5,7 @@ use super::{Mat3, Vec3, rotation};
 /// A rigid motion `x_a = R x_b + t`. A variable of this type names both frames, target first to be applied last:
 /// `cam_from_target` takes target coordinates to camera coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pose {
     /// `R`, a proper rotation.
     pub rotation: Mat3,

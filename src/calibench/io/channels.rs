@@ -1,7 +1,7 @@
 //! How does a photograph keep its colours? As one raster a channel, with the depth of its file.
 
 use super::image::{self, Decoded, ImageError, opened};
-use crate::raster::{Raster, Sample};
+use crate::raster::{Level, Raster};
 use std::path::Path;
 
 /// A photograph by its channels: grey, grey and alpha, red green blue, or red green blue and alpha. All have the same size.
@@ -79,7 +79,7 @@ fn size_of<T: Copy>(channels: &[Raster<T>]) -> (usize, usize) {
 }
 
 /// The samples of all channels side by side, as bytes.
-fn joined<T: Sample, const N: usize>(channels: &[Raster<T>], bytes_of: impl Fn(T) -> [u8; N]) -> Vec<u8> {
+fn joined<T: Level, const N: usize>(channels: &[Raster<T>], bytes_of: impl Fn(T) -> [u8; N]) -> Vec<u8> {
     let pixels = size_of(channels).0 * size_of(channels).1;
     let mut bytes = Vec::with_capacity(pixels * channels.len() * N);
     for pixel in 0..pixels {

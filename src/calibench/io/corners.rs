@@ -45,10 +45,10 @@ pub fn parse_corners(file: &str, input: impl Read) -> Result<CornerFile, TableEr
     }
     let mut corners = CornerFile { view_names: Vec::new(), views: Vec::new() };
     for (name, points, pixels) in grouped {
-        let view = View::new(points, pixels).map_err(|source| TableError::View {
+        let view = View::new(points, pixels).map_err(|cause| TableError::View {
             file: file.into(),
             view: name.clone(),
-            source,
+            cause,
         })?;
         corners.view_names.push(name);
         corners.views.push(view);

@@ -24,14 +24,15 @@ pub enum Grey {
 
 /// Why a file is not an image that can be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ImageError {
     /// The file cannot be opened or read.
-    #[error("{path}: {source}")]
+    #[error("{path}: {cause}")]
     Io {
         /// The file.
         path: String,
         /// What the system said.
-        source: std::io::Error,
+        cause: std::io::Error,
     },
     /// The file is none to read.
     #[error(transparent)]
@@ -129,7 +130,7 @@ pub fn read_image(path: &Path) -> Result<Grey, ImageError> {
 /// The file of a photograph, which holds at least a byte.
 pub(super) fn opened(path: &Path) -> Result<BufReader<File>, ImageError> {
     let (file, length) = open_regular(path, MOST_IMAGE_BYTES).map_err(|error| match error {
-        InputError::Open { path, source } => ImageError::Io { path, source },
+        InputError::Open { path, cause } => ImageError::Io { path, cause },
         error => ImageError::Input(error),
     })?;
     if length == 0 {
@@ -213,7 +214,7 @@ fn decoder<'a>(
     let path = || name.to_string();
     let reader = ImageReader::new(source)
         .with_guessed_format()
-        .map_err(|source| ImageError::Io { path: path(), source })?;
+        .map_err(|cause| ImageError::Io { path: path(), cause })?;
     if reader.format().is_none() {
         return Err(ImageError::UnknownFormat { path: path(), reason: "unknown first bytes".into() });
     }

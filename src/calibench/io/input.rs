@@ -15,14 +15,15 @@ pub const MOST_IMAGE_BYTES: u64 = 1_600_000_000;
 
 /// Why a file is not read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum InputError {
     /// The system does not give it.
-    #[error("{path}: {source}")]
+    #[error("{path}: {cause}")]
     Open {
         /// The file.
         path: String,
         /// What the system said.
-        source: io::Error,
+        cause: io::Error,
     },
     /// A pipe may block for ever, a device never end, and a folder has no bytes.
     #[error("{path}: {kind}, not a regular file: copy what it gives into a file{hint}")]
@@ -78,7 +79,7 @@ fn regular(path: &Path, seen: &Metadata) -> Result<(), InputError> {
 /// See [`InputError`].
 pub fn open_regular(path: &Path, most: u64) -> Result<(File, u64), InputError> {
     let name = || path.display().to_string();
-    let failed = |source| InputError::Open { path: name(), source };
+    let failed = |cause| InputError::Open { path: name(), cause };
     let seen = std::fs::metadata(path).map_err(failed)?;
     regular(path, &seen)?;
     if seen.len() > most {
@@ -103,7 +104,7 @@ pub fn read_regular(path: &Path, most: u64) -> Result<Vec<u8>, InputError> {
 pub fn read_regular_text(path: &Path, most: u64) -> Result<String, InputError> {
     String::from_utf8(read_regular(path, most)?).map_err(|error| InputError::Open {
         path: path.display().to_string(),
-        source: io::Error::new(io::ErrorKind::InvalidData, error.utf8_error()),
+        cause: io::Error::new(io::ErrorKind::InvalidData, error.utf8_error()),
     })
 }
 
@@ -126,7 +127,7 @@ pub fn read_named(path: &Path, most: u64) -> Result<Vec<u8>, InputError> {
 fn read_at_most(input: impl Read, name: &str, expected: usize, most: u64) -> Result<Vec<u8>, InputError> {
     let mut bytes = Vec::with_capacity(expected);
     let read = input.take(most + 1).read_to_end(&mut bytes);
-    read.map_err(|source| InputError::Open { path: name.to_string(), source })?;
+    read.map_err(|cause| InputError::Open { path: name.to_string(), cause })?;
     if bytes.len() as u64 > most {
         return Err(InputError::TooLong { path: name.to_string(), bytes: bytes.len() as u64, most });
     }
@@ -136,6 +137,14 @@ fn read_at_most(input: impl Read, name: &str, expected: usize, most: u64) -> Res
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_the_system_said_is_told_once() {
+        use std::error::Error;
+        let error = read_regular(Path::new("no/such/file"), 10).unwrap_err();
+        assert!(error.to_string().contains("no/such/file: "), "{error}");
+        assert!(error.source().is_none(), "a report of the chain would print it again");
+    }
 
     #[test]
     fn what_is_no_regular_file_or_too_long_is_refused_unread() {

@@ -243,17 +243,18 @@ struct CameraOnly {
 
 /// Why a result cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ResultError {
     /// The file cannot be read.
     #[error(transparent)]
     Input(#[from] InputError),
     /// It is not such a result.
-    #[error("{file}:{}:{}: {source}; expected {{\"camera\": {{\"fx\": ..., \"fy\": ..., \"cx\": ..., \"cy\": ...}}}}", source.line(), source.column())]
+    #[error("{file}:{}:{}: {cause}; expected {{\"camera\": {{\"fx\": ..., \"fy\": ..., \"cx\": ..., \"cy\": ...}}}}", cause.line(), cause.column())]
     Format {
         /// The file.
         file: String,
         /// What is wrong, with line and column.
-        source: serde_json::Error,
+        cause: serde_json::Error,
     },
     /// The calibration found no minimum: its camera is wherever the search ended.
     #[error(
@@ -282,7 +283,7 @@ pub fn read_camera(path: &Path) -> Result<(Camera, Option<(usize, usize)>), Resu
 /// As [`read_camera`], from text; `file` names it in errors.
 pub fn parse_camera(file: &str, text: &str) -> Result<(Camera, Option<(usize, usize)>), ResultError> {
     let fields: CameraOnly =
-        serde_json::from_str(text).map_err(|source| ResultError::Format { file: file.into(), source })?;
+        serde_json::from_str(text).map_err(|cause| ResultError::Format { file: file.into(), cause })?;
     let is_minimum =
         |how: &str| [Termination::Converged, Termination::AboveFloor].iter().any(|t| how == t.name());
     if let Some(termination) = fields.termination.filter(|how| !is_minimum(how)) {

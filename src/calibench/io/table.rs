@@ -6,6 +6,7 @@ use std::io::Read;
 
 /// Why a table cannot be read. Lines count from 1; the header is line 1.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum TableError {
     /// The file cannot be opened, or is none to read.
     #[error(transparent)]
@@ -127,14 +128,14 @@ pub enum TableError {
         first: u64,
     },
     /// The points of a view do not make a view.
-    #[error("{file}: view '{view}': {source}")]
+    #[error("{file}: view '{view}': {cause}")]
     View {
         /// The file.
         file: String,
         /// The view's name.
         view: String,
         /// What is wrong.
-        source: ViewError,
+        cause: ViewError,
     },
 }
 

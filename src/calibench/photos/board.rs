@@ -33,6 +33,7 @@ pub struct BoardSpec {
 
 /// Why a text is no board.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum BoardSpecError {
     /// The text has another form.
     #[error(
@@ -60,6 +61,7 @@ pub enum BoardSpecError {
 
 /// Why a photograph gives no marks.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DetectError {
     /// The board is not seen whole and clearly.
     #[error(transparent)]

@@ -4,7 +4,7 @@ use super::DetectError;
 use crate::detect::{Blob, BlobOptions, DotGrid, GridError, Polarity, blobs};
 use crate::geometry::Vec2;
 use crate::io::Grey;
-use crate::raster::{Raster, Sample};
+use crate::raster::{Level, Raster};
 
 /// A board that was not found, and what might have been its marks.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -31,7 +31,7 @@ pub fn ordered_discs(
     }
 }
 
-fn of_either_polarity<T: Sample>(
+fn of_either_polarity<T: Level>(
     image: &Raster<T>,
     order: impl Fn(&[Blob]) -> Result<DotGrid, GridError>,
 ) -> Result<DotGrid, NotFound> {

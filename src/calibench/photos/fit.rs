@@ -207,9 +207,9 @@ mod tests {
     use crate::synth::{Scene, Truth};
 
     fn biased_views() -> Vec<View> {
-        let truth = Truth::chapter();
-        let board = Truth::chapter_board();
-        let scene = Scene::chapter();
+        let truth = Truth::example();
+        let board = Truth::example_board();
+        let scene = Scene::example();
         (truth.cam_from_target.iter().zip(scene.pixels()))
             .map(|(pose, pixels)| {
                 let biases = disc_biases(&truth.camera, pose, &board).unwrap();
@@ -221,8 +221,8 @@ mod tests {
 
     #[test]
     fn the_bias_of_discs_is_taken_off_and_the_camera_is_exact() {
-        let settings = Settings::chapter();
-        let board = Truth::chapter_board();
+        let settings = Settings::standard();
+        let board = Truth::example_board();
         let fitter = Fitter { settings: &settings, discs: Some(&board), reject_factor: None };
         let fit = fitter.fit(&biased_views()).unwrap();
         let bias = fit.bias.unwrap();
@@ -238,13 +238,13 @@ mod tests {
 
     #[test]
     fn a_mis_detected_view_is_left_out_and_no_other() {
-        let mut views = Scene::chapter().exact();
-        views.extend(Scene::chapter().exact());
+        let mut views = Scene::example().exact();
+        views.extend(Scene::example().exact());
         // The detector took the board to start one row further down: the marks' names are shifted by a row.
         let mut pixels = views[5].pixels().to_vec();
         pixels.rotate_left(9);
         views[5] = View::new(views[5].points().to_vec(), pixels).unwrap();
-        let settings = Settings::chapter();
+        let settings = Settings::standard();
         let fitter = Fitter { settings: &settings, discs: None, reject_factor: Some(3.0) };
         let fit = fitter.fit(&views).unwrap();
         assert_eq!(fit.rejected.iter().map(|r| r.view).collect::<Vec<_>>(), [5]);

@@ -7,6 +7,7 @@ use nalgebra::{Matrix2, SMatrix};
 ///
 /// Its 3 x 3 matrix between absolute coordinates loses digits where world coordinates are large; this form does not.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PlaneMap {
     pub(super) pixel_origin: Vec2,
     pub(super) world_origin: Vec2,

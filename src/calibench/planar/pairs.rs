@@ -4,6 +4,7 @@ use crate::geometry::{HomographyError, LinearFitError, Scatter, Vec2};
 
 /// Why a plane cannot be calibrated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PlaneError {
     /// Four pairs are the least for every model, so that the affine and similarity maps leave something to check.
     #[error("a plane calibration needs at least {need} point pairs, got {got}")]
@@ -59,10 +60,10 @@ pub enum PlaneError {
     },
     /// The projective map is not fixed by the pairs.
     #[error("the projective map is not fixed: {0}")]
-    Projective(#[from] HomographyError),
+    Projective(HomographyError),
     /// The affine or similarity map is not fixed by the pairs.
     #[error("the map is not fixed: {0}")]
-    Linear(#[from] LinearFitError),
+    Linear(LinearFitError),
     /// The fitted map flattens the plane onto a line.
     #[error(
         "the fitted map is singular: pixels and world points do not correspond; check the order of the points"
@@ -76,6 +77,18 @@ pub enum PlaneError {
         /// Position in the list.
         index: usize,
     },
+}
+
+impl From<HomographyError> for PlaneError {
+    fn from(error: HomographyError) -> PlaneError {
+        PlaneError::Projective(error)
+    }
+}
+
+impl From<LinearFitError> for PlaneError {
+    fn from(error: LinearFitError) -> PlaneError {
+        PlaneError::Linear(error)
+    }
 }
 
 /// Pairs as offsets from an origin on each side.

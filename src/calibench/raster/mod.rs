@@ -2,9 +2,9 @@
 
 mod sample;
 
-pub use sample::Sample;
+pub use sample::Level;
 
-/// A grey image, row by row. Sample `(x, y)` is centred on pixel coordinate `(x, y)`.
+/// A grey image, row by row. Level `(x, y)` is centred on pixel coordinate `(x, y)`.
 ///
 /// `Raster<f32>` holds linear intensity with black 0 and white 1; `Raster<u8>` and `Raster<u16>` hold grey levels.
 #[derive(Debug, Clone, PartialEq)]

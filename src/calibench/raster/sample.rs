@@ -1,7 +1,7 @@
 //! What can a sample of an image be? Any of the three types that images come in, read as a number.
 
 /// A grey sample. Levels keep their own unit: 0 ... 255, 0 ... 65535, or intensity.
-pub trait Sample: Copy + PartialOrd {
+pub trait Level: Copy + PartialOrd {
     /// The level as a number, exactly.
     fn to_f64(self) -> f64;
 
@@ -19,7 +19,7 @@ pub trait Sample: Copy + PartialOrd {
 /// Samples of a part whose sums fit 32 bits: 65535 * (0 + 1 + ... + 255) < 2^32.
 const PART: usize = 256;
 
-/// [`Sample::sums`] of whole levels.
+/// [`Level::sums`] of whole levels.
 fn whole_sums<T: Copy + Into<u32>>(run: &[T]) -> (f64, f64) {
     let (mut total, mut weighted) = (0.0, 0.0);
     for (part, samples) in run.chunks(PART).enumerate() {
@@ -35,7 +35,7 @@ fn whole_sums<T: Copy + Into<u32>>(run: &[T]) -> (f64, f64) {
     (total, weighted)
 }
 
-impl Sample for u8 {
+impl Level for u8 {
     fn to_f64(self) -> f64 {
         f64::from(self)
     }
@@ -53,7 +53,7 @@ impl Sample for u8 {
     }
 }
 
-impl Sample for u16 {
+impl Level for u16 {
     fn to_f64(self) -> f64 {
         f64::from(self)
     }
@@ -71,7 +71,7 @@ impl Sample for u16 {
     }
 }
 
-impl Sample for f32 {
+impl Level for f32 {
     fn to_f64(self) -> f64 {
         f64::from(self)
     }

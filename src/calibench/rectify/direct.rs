@@ -4,7 +4,7 @@ use super::eight_bit::Photograph;
 use super::fraction::Place;
 use super::map::check_size;
 use super::source_row::{PIECE, SourceRows, Sources};
-use super::{RectifyError, Sample};
+use super::{Interpolated, RectifyError};
 use crate::camera::Camera;
 use crate::raster::Raster;
 
@@ -17,7 +17,7 @@ const BAND: usize = 64;
 ///
 /// # Errors
 /// Photographs of fewer than 2 x 2 pixels.
-pub fn rectify_image<T: Sample>(
+pub fn rectify_image<T: Interpolated>(
     photograph: &Raster<T>,
     camera: &Camera,
     output: &Camera,

@@ -1,6 +1,6 @@
 //! Which four samples make an output pixel, and in what mixture? A look-up table, computed once for images of one size.
 
-use super::Sample;
+use super::Interpolated;
 use super::eight_bit::Photograph;
 use super::fraction::{COARSE, Place};
 use super::source_row::{PIECE, SourceRows, Sources};
@@ -12,6 +12,7 @@ use std::sync::OnceLock;
 
 /// Why an image cannot be rectified.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RectifyError {
     /// Bilinear interpolation needs two samples in each direction; the table counts samples in 32 bits.
     #[error("images of {width} x {height} pixels cannot be interpolated: need 2 x 2 to 4294967294 pixels")]
@@ -137,7 +138,11 @@ impl RectifyMap {
     ///
     /// # Errors
     /// An image of another size.
-    pub fn apply<T: Sample>(&self, photograph: &Raster<T>, border: T) -> Result<Raster<T>, RectifyError> {
+    pub fn apply<T: Interpolated>(
+        &self,
+        photograph: &Raster<T>,
+        border: T,
+    ) -> Result<Raster<T>, RectifyError> {
         let (width, height) = (photograph.width(), photograph.height());
         if (width, height) != self.input_size {
             let (expected_width, expected_height) = self.input_size;
@@ -225,7 +230,7 @@ impl Entry {
         })
     }
 
-    fn mix<T: Sample>(&self, samples: &[T], width: usize) -> T {
+    fn mix<T: Interpolated>(&self, samples: &[T], width: usize) -> T {
         T::mix(samples, width, self.upper_left as usize, self.right, self.down)
     }
 }

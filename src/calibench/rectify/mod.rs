@@ -19,4 +19,4 @@ pub use direct::rectify_image;
 pub use map::{RectifyError, RectifyMap};
 pub use output::{OutputCameraError, OutputView, output_camera};
 pub use points::{rectify_points, source_pixel};
-pub use sample::Sample;
+pub use sample::Interpolated;

@@ -16,16 +16,17 @@ pub enum OutputView {
 
 /// Why there is no such camera.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum OutputCameraError {
     /// The lens model does not reach the image's border.
-    #[error("the border pixel ({u}, {v}) cannot be corrected: {source}; keep the same K instead")]
+    #[error("the border pixel ({u}, {v}) cannot be corrected: {cause}; keep the same K instead")]
     Border {
         /// The pixel, u.
         u: f64,
         /// The pixel, v.
         v: f64,
         /// Why not.
-        source: UndistortError,
+        cause: UndistortError,
     },
     /// Borders bent so far that no rectangle lies inside, or an image of fewer than 2 x 2 pixels.
     #[error("no part of a {width} x {height} image is valid everywhere after correction")]
@@ -102,10 +103,10 @@ fn corrected_extents(
 
 fn corrected(camera: &Camera, pixels: impl Iterator<Item = Vec2>) -> Result<Vec<Vec2>, OutputCameraError> {
     let ray = |pixel: Vec2| {
-        camera.normalised_ray(&pixel).map_err(|source| OutputCameraError::Border {
+        camera.normalised_ray(&pixel).map_err(|cause| OutputCameraError::Border {
             u: pixel.x,
             v: pixel.y,
-            source,
+            cause,
         })
     };
     pixels.map(ray).collect()

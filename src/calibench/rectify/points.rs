@@ -3,7 +3,7 @@
 use crate::camera::{Camera, UndistortError};
 use crate::geometry::Vec2;
 
-/// The pixels of a rectified image in which `pixels` of the photograph are shown: the chapter's point correction, for
+/// The pixels of a rectified image in which `pixels` of the photograph are shown: the correction of points, for
 /// `output` the same `K` without distortion. One answer a pixel; results are in pixels of `output`, not in target units.
 pub fn rectify_points(
     camera: &Camera,

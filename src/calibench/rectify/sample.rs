@@ -1,7 +1,7 @@
 //! Which number stands for a grey level while neighbours are mixed?
 
 /// A grey level that can be interpolated. Levels of 16 bits and intensities are mixed in `f32`, whose 24 bits hold them exactly.
-pub trait Sample: Copy {
+pub trait Interpolated: Copy {
     /// The level as a number.
     fn to_f32(self) -> f32;
     /// The nearest level.
@@ -13,7 +13,7 @@ pub trait Sample: Copy {
         None
     }
 
-    /// [`Sample::as_bytes`], to write.
+    /// [`Interpolated::as_bytes`], to write.
     fn as_bytes_mut(samples: &mut [Self]) -> Option<&mut [u8]> {
         let _ = samples;
         None
@@ -31,7 +31,7 @@ pub trait Sample: Copy {
     }
 }
 
-impl Sample for u8 {
+impl Interpolated for u8 {
     fn to_f32(self) -> f32 {
         f32::from(self)
     }
@@ -47,7 +47,7 @@ impl Sample for u8 {
     }
 }
 
-impl Sample for u16 {
+impl Interpolated for u16 {
     fn to_f32(self) -> f32 {
         f32::from(self)
     }
@@ -56,7 +56,7 @@ impl Sample for u16 {
     }
 }
 
-impl Sample for f32 {
+impl Interpolated for f32 {
     fn to_f32(self) -> f32 {
         self
     }

@@ -5,4 +5,4 @@ pub mod scene;
 pub mod stream;
 
 pub use scene::{Scene, SceneError, Truth};
-pub use stream::{Stream, StreamKey};
+pub use stream::{Stream, StreamKey, fnv1a};

@@ -71,6 +71,7 @@ pub struct Photograph {
 
 /// Why a board cannot be photographed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RenderError {
     /// Part of the board is not in front of the camera.
     #[error(
@@ -184,7 +185,7 @@ impl Photograph {
     }
 }
 
-/// A stand-in for the chapter's nine-point image, which is not available: 1571 x 1053 px, 3 x 3 dark dots, undistorted,
+/// A photograph of a nine-point board: 1571 x 1053 px, 3 x 3 dark dots, undistorted,
 /// column spacing 236.23 px, row spacing 236.19 px, centre (714.708, 565.993), which follows from the published matrix.
 /// The dots' diameter is not published; a quarter of the spacing is taken.
 pub fn nine_dot_stand_in() -> Photograph {

@@ -7,6 +7,7 @@ use crate::geometry::{Mat3, Pose, Vec2, Vec3, rotation};
 
 /// The truth of a synthetic experiment: camera, image size, target points and poses.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Truth {
     /// Intrinsic parameters.
     pub camera: Camera,
@@ -28,6 +29,7 @@ pub struct Scene {
 
 /// Why a scene cannot be photographed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SceneError {
     /// A target point is not in front of the camera.
     #[error(
@@ -50,34 +52,34 @@ pub enum SceneError {
 }
 
 impl Truth {
-    /// The chapter's virtual camera: f = 600, principal point (326, 243), k1 = -0.18, k2 = 0.05.
-    pub fn chapter_camera() -> Camera {
+    /// A virtual camera: f = 600, principal point (326, 243), k1 = -0.18, k2 = 0.05.
+    pub fn example_camera() -> Camera {
         use crate::camera::BrownConrady;
         Camera::pinhole(600.0, 600.0, 326.0, 243.0).with_distortion(BrownConrady::radial(-0.18, 0.05))
     }
 
-    /// The chapter's image size.
-    pub const CHAPTER_IMAGE: (usize, usize) = (640, 480);
+    /// The size of its image, px.
+    pub const EXAMPLE_IMAGE: (usize, usize) = (640, 480);
 
-    /// The chapter's target: 9 x 7 circles, 10 mm apart. The chapter gives no diameter; 3 mm is what its figure shows best.
-    pub fn chapter_board() -> Board {
+    /// A target: 9 x 7 circles of 3 mm, 10 mm apart.
+    pub fn example_board() -> Board {
         Board::circles(9, 7, 10.0, 3.0).expect("a 9 x 7 grid of 3 mm discs is a board")
     }
 
-    /// The chapter's four poses at 120 mm: fronto-parallel, +20 deg about X, -20 deg about Y, and (-15, 15, 10) deg.
-    pub fn chapter_poses() -> Vec<Pose> {
+    /// Four poses at 120 mm: fronto-parallel, +20 deg about X, -20 deg about Y, and (-15, 15, 10) deg.
+    pub fn example_poses() -> Vec<Pose> {
         [[0.0, 0.0, 0.0], [20.0, 0.0, 0.0], [0.0, -20.0, 0.0], [-15.0, 15.0, 10.0]]
             .map(|degrees| looking_at_centre(degrees, 120.0))
             .to_vec()
     }
 
-    /// The chapter's four-pose scene.
-    pub fn chapter() -> Truth {
+    /// The four poses of that target before that camera.
+    pub fn example() -> Truth {
         Truth {
-            camera: Truth::chapter_camera(),
-            image_size: Truth::CHAPTER_IMAGE,
-            points: Truth::chapter_board().points(),
-            cam_from_target: Truth::chapter_poses(),
+            camera: Truth::example_camera(),
+            image_size: Truth::EXAMPLE_IMAGE,
+            points: Truth::example_board().points(),
+            cam_from_target: Truth::example_poses(),
         }
     }
 }
@@ -119,9 +121,9 @@ impl Scene {
         Ok(Scene { truth, pixels })
     }
 
-    /// The chapter's four-pose scene.
-    pub fn chapter() -> Scene {
-        Scene::new(Truth::chapter()).expect("the chapter's target is in front of its camera")
+    /// Four photographs of a target, [`Truth::example`].
+    pub fn example() -> Scene {
+        Scene::new(Truth::example()).expect("the target is in front of its camera")
     }
 
     /// Noise-free pixels, view by view.
@@ -165,11 +167,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_chapters_target_fills_the_published_part_of_the_image() {
-        let scene = Scene::chapter();
+    fn the_examples_target_fills_the_published_part_of_the_image() {
+        let scene = Scene::example();
         assert_eq!(scene.observations(), 252);
         let camera = &scene.truth.camera;
-        // CHAPTER: r_max is about 0.44 in normalised coordinates.
+        // r_max is about 0.44 in normalised coordinates.
         let largest = scene
             .pixels()
             .iter()
@@ -181,7 +183,7 @@ mod tests {
 
     #[test]
     fn a_target_behind_the_camera_is_refused() {
-        let mut truth = Truth::chapter();
+        let mut truth = Truth::example();
         truth.cam_from_target[1].translation.z = -5.0;
         assert_eq!(Scene::new(truth), Err(SceneError::BehindCamera { view: 1, point: 0 }));
     }

@@ -25,7 +25,7 @@ pub struct Stream(ChaCha8Rng);
 impl Stream {
     /// Opens the stream of a key.
     pub fn open(key: StreamKey<'_>) -> Stream {
-        let words = [key.seed, fnv1a(key.scenario), key.trial, fnv1a(key.purpose)];
+        let words = [key.seed, fnv1a(key.scenario.bytes()), key.trial, fnv1a(key.purpose.bytes())];
         let mut bytes = [0u8; 32];
         for (chunk, word) in bytes.chunks_exact_mut(8).zip(words) {
             chunk.copy_from_slice(&word.to_le_bytes());
@@ -78,9 +78,10 @@ impl Stream {
 /// lies beyond it.
 const ZIGGURAT_TAIL: f64 = 3.654152885361;
 
-/// FNV-1a, 64 bits (Fowler, Noll & Vo 1991): a fixed, dependency-free name hash.
-fn fnv1a(name: &str) -> u64 {
-    name.bytes()
+/// FNV-1a, 64 bits (Fowler, Noll & Vo 1991): a fixed hash that needs no crate, for names and fingerprints.
+pub fn fnv1a(bytes: impl IntoIterator<Item = u8>) -> u64 {
+    bytes
+        .into_iter()
         .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 

@@ -72,7 +72,7 @@ impl Observed {
 
 pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, Failure> {
     observed.refuse_marks_outside()?;
-    let free = arguments.free.unwrap_or(FreeParameters::CHAPTER);
+    let free = arguments.free.unwrap_or(FreeParameters::STANDARD);
     let mut settings = Settings::new(free).with_loss(arguments.loss.unwrap_or(Loss::Squares));
     settings.image_size = observed.image_size;
     if arguments.intervals == Some(Intervals::Profile) {

@@ -119,8 +119,8 @@ mod tests {
 
     fn calibration() -> (Calibration, Vec<View>) {
         let key = StreamKey { seed: 1, scenario: "maps", trial: 0, purpose: "noise" };
-        let views = Scene::chapter().observe(0.1, &mut Stream::open(key));
-        (calibrate(&views, &Settings::chapter()).unwrap(), views)
+        let views = Scene::example().observe(0.1, &mut Stream::open(key));
+        (calibrate(&views, &Settings::standard()).unwrap(), views)
     }
 
     #[test]

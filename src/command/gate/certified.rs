@@ -3,7 +3,7 @@
 use super::super::{Exit, print, warn};
 use super::{Arguments, Stop, incomplete, process, usage};
 use calibench::io::write_atomically;
-use calibench_gate::certified::{DigitsTable, ReferenceProblem, measure, read};
+use calibench_gate::certified::{DigitsTable, ReferenceProblem, measure, read_with};
 use calibench_gate::solver::Polished;
 use calibench_gate::{Builtin, Solver};
 use calibench_harness::Build;
@@ -82,7 +82,7 @@ pub(super) fn print_table(path: &Path) -> Result<Exit, Stop> {
 /// All problems, or the one that was named.
 fn chosen(arguments: &Arguments) -> Result<Vec<ReferenceProblem>, Stop> {
     let project = Project::find().map_err(usage)?;
-    let mut problems = read(&project.root().join("reference")).map_err(usage)?;
+    let mut problems = read_with(|name| project.read_text(&format!("reference/{name}"))).map_err(usage)?;
     if let Some(name) = &arguments.problem {
         let names: Vec<String> = problems.iter().map(|p| p.problem.id.clone()).collect();
         problems.retain(|p| p.problem.id == *name);

@@ -107,20 +107,20 @@ pub struct Certified {
 #[derive(Debug, thiserror::Error)]
 pub enum ReferenceError {
     /// A file.
-    #[error("cannot read {path}: {source}", path = path.display())]
+    #[error("cannot read {path}: {cause}", path = path.display())]
     File {
         /// Which.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        cause: std::io::Error,
     },
     /// A file that is no reference problem.
-    #[error("{path} is no certified problem: {source}", path = path.display())]
+    #[error("{path} is no certified problem: {cause}", path = path.display())]
     Content {
         /// Which.
         path: PathBuf,
         /// What is wrong.
-        source: serde_json::Error,
+        cause: serde_json::Error,
     },
     /// A file that is not what was certified.
     #[error("{name} is not the file whose SHA-256 stands in SHA256SUMS ({stated}): it has {found}")]
@@ -139,18 +139,28 @@ pub enum ReferenceError {
 /// # Errors
 /// A file that is missing, was changed, or is no certified problem.
 pub fn read(folder: &Path) -> Result<Vec<ReferenceProblem>, ReferenceError> {
-    let sums = text(&folder.join("SHA256SUMS"))?;
+    read_with(|name| std::fs::read_to_string(folder.join(name)))
+}
+
+/// The same of files that `text_of` finds by their names.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_with(
+    text_of: impl Fn(&str) -> std::io::Result<String>,
+) -> Result<Vec<ReferenceProblem>, ReferenceError> {
+    let text = |name: &str| text_of(name).map_err(|cause| ReferenceError::File { path: name.into(), cause });
+    let sums = text("SHA256SUMS")?;
     let listed: Vec<(&str, &str)> = sums.lines().filter_map(|line| line.split_once("  ")).collect();
     let mut problems = Vec::new();
     for (stated, name) in listed {
-        let path = folder.join(name);
-        let content = text(&path)?;
+        let content = text(name)?;
         let found = sha256_hex(content.as_bytes());
         if found != stated {
             return Err(ReferenceError::Changed { name: name.into(), stated: stated.into(), found });
         }
-        if path.extension().is_some_and(|e| e == "json") {
-            let wrong = |source| ReferenceError::Content { path: path.clone(), source };
+        if name.ends_with(".json") {
+            let wrong = |cause| ReferenceError::Content { path: name.into(), cause };
             problems.push(ReferenceProblem {
                 problem: serde_json::from_str(&content).map_err(wrong)?,
                 reference: serde_json::from_str(&content).map_err(wrong)?,
@@ -159,8 +169,4 @@ pub fn read(folder: &Path) -> Result<Vec<ReferenceProblem>, ReferenceError> {
     }
     problems.sort_by(|a, b| (a.reference.level, &a.problem.id).cmp(&(b.reference.level, &b.problem.id)));
     Ok(problems)
-}
-
-fn text(path: &Path) -> Result<String, ReferenceError> {
-    std::fs::read_to_string(path).map_err(|source| ReferenceError::File { path: path.to_path_buf(), source })
 }

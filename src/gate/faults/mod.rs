@@ -12,6 +12,7 @@ use super::solver::{Builtin, Solver, answer, solve};
 use calibench::calibrate::Settings;
 use calibench::camera::{Camera, Parameter};
 use calibench::geometry::{Vec2, Vec3};
+use calibench::synth::fnv1a;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
@@ -161,9 +162,7 @@ fn fingerprint(problem: &Problem) -> u64 {
 }
 
 fn mixed(bytes: impl Iterator<Item = u8>) -> u64 {
-    let sum = bytes.fold(0xcbf2_9ce4_8422_2325, |hash: u64, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-    });
+    let sum = fnv1a(bytes);
     (sum ^ (sum >> 33)).wrapping_mul(0xff51_afd7_ed55_8ccd) >> 16
 }
 

@@ -97,20 +97,20 @@ pub struct Sizes {
 #[derive(Debug, thiserror::Error)]
 pub enum MeasuredError {
     /// A file.
-    #[error("cannot read {path}: {source}", path = path.display())]
+    #[error("cannot read {path}: {cause}", path = path.display())]
     File {
         /// Which.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        cause: std::io::Error,
     },
     /// A table.
-    #[error("{name}: {source}")]
+    #[error("{name}: {cause}")]
     Table {
         /// Which.
         name: &'static str,
         /// What is wrong.
-        source: csv::Error,
+        cause: csv::Error,
     },
 }
 
@@ -164,7 +164,7 @@ impl Measured {
     pub fn read(folder: &Path) -> Result<Measured, MeasuredError> {
         let text = |name: &str| {
             let path = folder.join(name);
-            std::fs::read_to_string(&path).map_err(|source| MeasuredError::File { path, source })
+            std::fs::read_to_string(&path).map_err(|cause| MeasuredError::File { path, cause })
         };
         let [faults, alarms, misled] = FILES.map(text);
         Measured::of_csv([&faults?, &alarms?, &misled?])
@@ -250,7 +250,7 @@ fn csv_of<Row: Serialize>(rows: &[Row]) -> String {
 
 fn rows_of<Row: DeserializeOwned>(name: &'static str, text: &str) -> Result<Vec<Row>, MeasuredError> {
     let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(text.as_bytes());
-    reader.deserialize().collect::<Result<_, _>>().map_err(|source| MeasuredError::Table { name, source })
+    reader.deserialize().collect::<Result<_, _>>().map_err(|cause| MeasuredError::Table { name, cause })
 }
 
 #[cfg(test)]

@@ -77,10 +77,10 @@ fn plain_sums(camera: &Camera, pairs: &PairBlocks, loss: Loss) -> ([[f64; 16]; 1
 
 #[test]
 fn the_sums_are_those_of_the_definition_for_every_model_and_loss() {
-    let chapter = FreeParameters::CHAPTER;
+    let standard = FreeParameters::STANDARD;
     let all = FreeParameters::of(&Parameter::ALL);
     let losses = [Loss::Squares, Loss::Huber { delta_px: 0.2 }, Loss::Cauchy { scale_px: 0.2 }];
-    for (camera, free) in [(radial_camera(), chapter), (full_camera(), all)] {
+    for (camera, free) in [(radial_camera(), standard), (full_camera(), all)] {
         for loss in losses {
             let pairs = pairs(&camera, 63);
             let mut sums = NO_SUMS;

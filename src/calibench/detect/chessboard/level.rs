@@ -5,7 +5,7 @@
 //! `(x + 1/2) 2^k - 1/2` of the photograph.
 
 use crate::geometry::Vec2;
-use crate::raster::{Raster, Sample};
+use crate::raster::{Level, Raster};
 use std::cell::OnceCell;
 
 /// Least side of a level, px: a board of 3 x 3 squares of 8 px, with its surroundings.
@@ -17,7 +17,7 @@ pub struct Pyramid<'a, T> {
     reduced: Vec<OnceCell<Raster<f32>>>,
 }
 
-impl<'a, T: Sample> Pyramid<'a, T> {
+impl<'a, T: Level> Pyramid<'a, T> {
     pub fn new(photo: &'a Raster<T>) -> Pyramid<'a, T> {
         let mut reduced = Vec::new();
         let mut side = photo.width().min(photo.height()) / 2;
@@ -68,7 +68,7 @@ pub fn scale(level: usize) -> f64 {
     (1u64 << level) as f64
 }
 
-fn half<T: Sample>(image: &Raster<T>) -> Raster<f32> {
+fn half<T: Level>(image: &Raster<T>) -> Raster<f32> {
     let (width, height) = (image.width() / 2, image.height() / 2);
     let mut samples = Vec::with_capacity(width * height);
     for y in 0..height {
@@ -94,7 +94,7 @@ pub struct Smoothed {
 const NOISE_LEFT: f64 = 70.0 / 256.0;
 
 impl Smoothed {
-    fn of<T: Sample>(image: &Raster<T>) -> Smoothed {
+    fn of<T: Level>(image: &Raster<T>) -> Smoothed {
         let (width, height) = (image.width(), image.height());
         let mut across: Vec<f32> = Vec::with_capacity(width * height);
         let mut row: Vec<f32> = Vec::with_capacity(width + 4);
@@ -186,7 +186,7 @@ const NOISE_SAMPLES: usize = 4000;
 
 /// Standard deviation of white noise: second differences along rows have a variance of `6 sigma^2`, and most of an image has no edge; the
 /// lower quartile of `|N|` is 0.3186 standard deviations.
-fn noise<T: Sample>(image: &Raster<T>) -> f64 {
+fn noise<T: Level>(image: &Raster<T>) -> f64 {
     let (width, height) = (image.width(), image.height());
     if width < 3 {
         return 0.0;

@@ -8,7 +8,7 @@ use super::smoothness::{expected, out_of_line};
 use crate::detect::edge::SHARPEST_EDGE_PX;
 use crate::detect::saddle::{Crossing, Window, fit_near_edges};
 use crate::geometry::Vec2;
-use crate::raster::{Raster, Sample};
+use crate::raster::{Level, Raster};
 
 /// Part of the distance to the next corner that a window reaches: beyond the middle, blur of the next edge comes in.
 const WINDOW_FRACTION: f64 = 0.42;
@@ -87,7 +87,7 @@ fn curvature(a: &Vec2, b: &Vec2, c: &Vec2) -> f64 {
 
 /// All corners of a board that was found in a level, fitted in the photograph; `None` where one has no fit or lies out of line.
 /// `starts_dark`: the square between the first row and column of corners is dark.
-pub fn refined<T: Sample>(
+pub fn refined<T: Level>(
     photo: &Raster<T>,
     pyramid: &Pyramid<'_, T>,
     level: usize,
@@ -127,7 +127,7 @@ pub fn refined<T: Sample>(
 const BLURRED_LEVELS: usize = 2;
 
 /// The fit of a corner in a reduced image, as a place of the photograph.
-fn fit_in_level<T: Sample>(
+fn fit_in_level<T: Level>(
     pyramid: &Pyramid<'_, T>,
     level: usize,
     is_dark: &dyn Fn(usize) -> bool,
@@ -153,7 +153,7 @@ struct Fitting<'a, T> {
     largest_px: f64,
 }
 
-impl<T: Sample> Fitting<'_, T> {
+impl<T: Level> Fitting<'_, T> {
     /// Every fit; each starts from the widths of the one before, whose edges have the same blur and direction.
     fn all(&self, places: &[Vec2], edges_px: &[[f64; 2]]) -> Vec<Option<Crossing>> {
         let mut before = None;
@@ -180,7 +180,7 @@ fn sides(around: &Around, largest_px: f64) -> [Vec2; 2] {
     })
 }
 
-fn fitted<T: Sample>(
+fn fitted<T: Level>(
     image: &Raster<T>,
     start: &Crossing,
     around: &Around,
@@ -192,7 +192,7 @@ fn fitted<T: Sample>(
 }
 
 /// Directions from the corners beside, levels from the pixels in the middle of the quadrants.
-fn start<T: Sample>(
+fn start<T: Level>(
     image: &Raster<T>,
     corner: Vec2,
     around: &Around,
