@@ -3,8 +3,9 @@
 use crate::board::View;
 use crate::geometry::Vec2;
 
-/// Two photographs differ by their noise, some 0.01 px at the least; pixels that agree to this many px are one measurement, written twice.
-const SAME_PX: f64 = 1e-6;
+/// Two photographs differ by their noise, some 0.01 px at the least; pixels that all agree to this many px are one measurement, written twice: to two
+/// decimals perhaps.
+const SAME_PX: f64 = 6e-3;
 /// Coordinates of a target that agree to this part of its size are those of one mark.
 const SAME_PART: f64 = 1e-9;
 

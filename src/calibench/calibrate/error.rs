@@ -10,8 +10,8 @@ use crate::geometry::HomographyError;
 pub enum CalibrationError {
     /// Each view gives two constraints on the linear parameters.
     #[error(
-        "{got} view(s){} cannot determine {linear} free linear parameters (fx fy cx cy skew): each view gives two constraints, \
-         so at least {need} are needed; add views of other tilt or hold parameters",
+        "{got} view(s){} cannot determine the {linear} that are free of fx, fy, cx, cy and skew: a view gives two constraints (and what a \
+         distortion tells of its centre leaves nothing to check it by), so at least {need} are needed; add views of other tilt or hold parameters",
         if *copies > 0 { format!(", {copies} copies of them not counted,") } else { String::new() }
     )]
     TooFewViews {
@@ -44,7 +44,7 @@ pub enum CalibrationError {
     },
     /// A parameter that is not free has no value.
     #[error(
-        "{parameter} is neither free nor given a value: hold it at one, or state the image size for cx and cy"
+        "{parameter} is neither free nor given a value: give it a value to be held at, or state the image size for cx and cy"
     )]
     HeldWithoutValue {
         /// Which.
@@ -93,7 +93,7 @@ pub enum CalibrationError {
     /// The data do not tell the free parameters apart.
     #[error(
         "the data cannot separate {}: {why}. Tilt the target by 20 degrees or more, about different axes, in some views, or \
-         hold one of them", inseparable.join(" and ")
+         give one of them a value to be held at", inseparable.join(" and ")
     )]
     NotIdentifiable {
         /// The parameters that trade off against each other, strongest first.

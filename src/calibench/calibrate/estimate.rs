@@ -9,7 +9,7 @@ use super::normal::Observations;
 use super::retraction::Retraction;
 use super::search::{self, Evidence, Judged};
 use super::start::Held;
-use super::target_frame::TargetFrame;
+use super::target_frame::TargetFrames;
 use super::{
     Calibration, CalibrationError, Loss, Settings, Termination, Warning, chunks, identifiability, kernel,
     polish, start, strays, warnings,
@@ -87,8 +87,8 @@ fn with_copies(mut calibration: Calibration, distinct: &Distinct) -> Calibration
 }
 
 fn estimate(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
-    let frame = TargetFrame::of(views);
-    let (observations, homographies) = homographies(views, &frame)?;
+    let frames = TargetFrames::of(views);
+    let (observations, homographies) = homographies(views, &frames)?;
     let pixel_frame = pixel_frame(&observations);
     let held = Held::of(settings, pixel_frame.0)?;
     let starts = start::starts(&homographies, settings, &held, pixel_frame)?;
@@ -103,7 +103,7 @@ fn estimate(views: &[View], settings: &Settings) -> Result<Calibration, Calibrat
     };
     let evidence =
         Evidence { homographies: &homographies, held: &held, pixel_frame, search: settings.search };
-    report(search::best_minimum(&problem, starts, &evidence)?, &problem, &frame, settings.profile_coverage)
+    report(search::best_minimum(&problem, starts, &evidence)?, &problem, &frames, settings.profile_coverage)
 }
 
 fn check_counts(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
@@ -141,10 +141,10 @@ fn is_distorting(settings: &Settings) -> Result<bool, CalibrationError> {
 /// The views in the target's frame, and the homography of each.
 fn homographies(
     views: &[View],
-    frame: &TargetFrame,
+    frames: &TargetFrames,
 ) -> Result<(Vec<Observations>, Vec<Homography>), CalibrationError> {
     let fits = chunks::map(views, |index, view| {
-        let observations = frame.observations(view);
+        let observations = frames.at(index).observations(view);
         Homography::fit_pairs(&observations, START_GAIN)
             .map(|fit| (observations, fit.homography))
             .map_err(|source| CalibrationError::View { view: index, source })
@@ -171,7 +171,7 @@ fn pixel_frame(observations: &[Observations]) -> (Vec2, f64) {
 fn report(
     judged: Judged,
     problem: &Problem<'_>,
-    frame: &TargetFrame,
+    frames: &TargetFrames,
     profile_coverage: Option<f64>,
 ) -> Result<Calibration, CalibrationError> {
     let observations = problem.observations;
@@ -207,11 +207,15 @@ fn report(
             why: "the normal equations are singular".into(),
         }
     })?;
-    let covariance = frame.covariance(unit, cam_from_target, variance);
+    let covariance = frames.covariance(unit, cam_from_target, variance);
     let mut calibration = Calibration {
         camera: *camera,
         free: system.free,
-        cam_from_target: cam_from_target.iter().map(|pose| frame.cam_from_target(pose)).collect(),
+        cam_from_target: cam_from_target
+            .iter()
+            .enumerate()
+            .map(|(view, pose)| frames.at(view).cam_from_target(pose))
+            .collect(),
         rmse_px: (square / points as f64).sqrt(),
         sigma_px,
         degrees_of_freedom,

@@ -150,7 +150,13 @@ pub(super) fn refuse_if_flat(
     let variance = variance(problem, noise_px);
     let rise = |far: &Minimum| (far.system.cost - walked.best.system.cost) / variance;
     let share = |far: &Far| rise(&far.minimum) / least_rise(far.parameter);
-    let flattest = walked.far.iter().min_by(|a, b| share(a).total_cmp(&share(b)));
+    // A better minimum met on the way may lie where the walk ended.
+    let is_elsewhere = |far: &&Far| {
+        let [here, there] =
+            [&walked.best, &far.minimum].map(|minimum| minimum.state.camera.get(far.parameter));
+        (here - there).abs() > ELSEWHERE * here.abs()
+    };
+    let flattest = walked.far.iter().filter(is_elsewhere).min_by(|a, b| share(a).total_cmp(&share(b)));
     match flattest {
         Some(far) if share(far) < 1.0 => Err(CalibrationError::NotIdentifiable {
             inseparable: moved(&walked.best.state, &far.minimum.state, far.parameter),
@@ -192,6 +198,8 @@ fn add(names: &mut Vec<String>, name: &str) {
     }
 }
 
+/// Two values that differ by less than this part of theirs are one.
+const ELSEWHERE: f64 = 1e-3;
 /// A parameter or pose that changed by less than this part between two states that fit alike did not move along.
 const MOVED: f64 = 0.1;
 

@@ -4,16 +4,16 @@ use super::estimate::Fit;
 use super::minimise::{Problem, State};
 use super::{CalibrationError, Loss, Warning};
 
-/// A squared residual above this many variances is worth a look: in 250 marks of noise one set in a hundred has one.
-const LARGE: f64 = 20.0;
+/// Noise makes one set in this many look as if it had a stray, before a robust fit has been asked: `exp(-7)`.
+const LOG_LOOK: f64 = 7.0;
 /// Of noise the mean square of a squared residual is twice the square of its mean; this many times are none.
 const HEAVY: f64 = 4.0;
-/// Of noise, one squared residual in 10^8 exceeds the median by this factor: `36 sigma^2` over `2 ln 2 sigma^2`.
-const STRAY: f64 = 26.0;
+/// And one in this many after it: `exp(-13)`.
+const LOG_STRAY: f64 = 13.0;
 /// More than this part of the marks are no strays: the model is wrong.
 const MOST: f64 = 0.3;
 /// A robust loss with a scale below this part of the median residual takes noise for strays.
-const NARROW: f64 = 0.1;
+const NARROW: f64 = 0.3;
 
 /// Gross errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -87,7 +87,8 @@ pub(super) fn strays(problem: &Problem<'_>, state: &State, fit: &Fit, variance: 
         fit = Fit::of(&state, problem.observations);
     }
     let median = median(&fit);
-    let marks = fit.squares().filter(|&square| square > STRAY * median).count();
+    let limit = largest_of_noise(problem, &fit)? * median;
+    let marks = fit.squares().filter(|&square| square > limit).count();
     if marks == 0 || marks as f64 > (MOST * fit.squares().count() as f64).max(1.0) {
         return None;
     }
@@ -99,16 +100,28 @@ pub(super) fn strays(problem: &Problem<'_>, state: &State, fit: &Fit, variance: 
     Some(Strays { marks, share, view, point, residual_px, median_px: median.sqrt() })
 }
 
+/// What hardly any set of noise exceeds, over the median squared residual. A squared residual exceeds `x sigma^2` with probability `exp(-x / 2)`,
+/// half of them `2 ln 2 sigma^2`, so that of `N` marks one exceeds `2 (ln N + L) sigma^2` with probability `exp(-L)` at most. A fit of few
+/// degrees of freedom follows some marks and leaves others: by how much more is bounded by the square of coordinates over degrees of freedom. `None`
+/// where these are fewer than the marks: a robust fit then passes through half of them.
+fn largest_of_noise(problem: &Problem<'_>, fit: &Fit) -> Option<f64> {
+    let marks = fit.squares().count();
+    let freedom = (2 * marks).checked_sub(problem.free.len() + 6 * problem.observations.len())?;
+    let followed = 2.0 * marks as f64 / freedom as f64;
+    let largest = 2.0 * (libm::log(marks as f64) + LOG_STRAY);
+    (freedom >= marks).then(|| largest * followed * followed / (2.0 * std::f64::consts::LN_2))
+}
+
 /// Whether some residuals are much larger than the rest: one alone stands out, and many make the tails heavy.
 fn is_suspicious(fit: &Fit, variance: f64) -> bool {
-    let (mut count, mut sum, mut sum_of_squares) = (0.0, 0.0, 0.0);
-    let mut stands_out = false;
+    let (mut count, mut sum, mut sum_of_squares, mut largest) = (0.0, 0.0, 0.0, 0.0_f64);
     for square in fit.squares() {
         count += 1.0;
         sum += square;
         sum_of_squares += square * square;
-        stands_out |= square > LARGE * variance;
+        largest = largest.max(square);
     }
+    let stands_out = largest > 2.0 * (libm::log(count) + LOG_LOOK) * variance;
     stands_out || sum_of_squares * count > HEAVY * sum * sum
 }
 
