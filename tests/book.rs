@@ -179,9 +179,9 @@ fn what_a_killed_build_left_is_gone_after_the_next_and_of_two_at_once_both_end_w
     let mut names: Vec<String> = entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
     names.sort();
     assert_eq!(names, [".book.lock", "book"]);
-    assert!(out.join("book/index.html").is_file() && !out.join("book/half.html").exists());
+    assert!(out.join("book/page.html").is_file() && !out.join("book/half.html").exists());
     // A build that fails leaves the book that is there: a file stands where a folder is to be made.
     std::fs::write(out.join(".book.new"), "in the way").unwrap();
     assert!(build(&project, &compiled, &out.join("book")).is_err());
-    assert!(out.join("book/index.html").is_file());
+    assert!(out.join("book/page.html").is_file());
 }
