@@ -1,6 +1,7 @@
 //! A camera from photographs of a circle grid.
 //!
 //! `cargo run --release --example from_photographs -- PHOTO...`; without photographs, some are rendered.
+#![allow(clippy::print_stdout, reason = "an example shows what it finds")]
 
 use calibench::board::View;
 use calibench::calibrate::{Settings, calibrate};

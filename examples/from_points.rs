@@ -1,6 +1,7 @@
 //! A camera from corners that were found elsewhere: a file with the columns `view,point,X,Y,u,v`.
 //!
 //! `cargo run --release --example from_points -- corners.csv`; without a file, one is made up.
+#![allow(clippy::print_stdout, reason = "an example shows what it finds")]
 
 use calibench::calibrate::{Settings, calibrate};
 use calibench::camera::Parameter;

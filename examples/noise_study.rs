@@ -1,6 +1,7 @@
 //! How does the error of the focal length grow with the noise? A study of one's own: draw, calibrate, compare with the Cramer-Rao bound.
 //!
 //! `cargo run --release --example noise_study`
+#![allow(clippy::print_stdout, reason = "an example shows what it finds")]
 
 use calibench::calibrate::{Settings, calibrate};
 use calibench::camera::{FreeParameters, Parameter};
@@ -29,7 +30,8 @@ pub fn run() -> Result<Vec<f64>, Box<dyn Error>> {
             // A stream of its own for every trial: one more draw elsewhere shifts nothing.
             let key = StreamKey { seed: 1, scenario: "noise study", trial, purpose: "noise" };
             let result = calibrate(&scene.observe(sigma_px, &mut Stream::open(key)), &Settings::standard())?;
-            squares += (result.camera.fx - scene.truth.camera.fx).powi(2);
+            let error = result.camera.fx - scene.truth.camera.fx;
+            squares += error * error;
         }
         let spread = (squares / TRIALS as f64).sqrt();
         println!("noise {sigma_px} px: fx spreads by {spread:.3} px, the bound is {bound:.3} px");

@@ -1,6 +1,7 @@
 //! Is a solver of one's own to be trusted? The gate asks it problems with known answers; here one that reports a focal length too large.
 //!
 //! `cargo run --release --example own_gate`
+#![allow(clippy::print_stdout, reason = "an example shows what it finds")]
 
 use calibench_gate::accept::Breakage;
 use calibench_gate::protocol::{Answer, Problem};

@@ -1,6 +1,7 @@
 //! Which loss is right when some marks are wrong? Three losses on the same views, one mark in twenty moved by ten pixels.
 //!
 //! `cargo run --release --example own_loss`
+#![allow(clippy::print_stdout, reason = "an example shows what it finds")]
 
 use calibench::board::View;
 use calibench::calibrate::{Loss, Settings, calibrate};
