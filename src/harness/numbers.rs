@@ -6,7 +6,7 @@ use super::published::Rule;
 use super::reconcile::Reconciliation;
 use super::record::{Number, Record};
 
-/// A group of numbers : [`Record::group`], [`Record::exact`].
+/// A group of numbers, begun by [`Record::group`] or [`Record::exact`].
 ///
 /// ```text
 /// record

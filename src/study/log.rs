@@ -107,7 +107,7 @@ impl Folder {
     /// The trials on the disk, from the first; their hash is compared before any is read.
     pub(super) fn trials(&self, engine: &Engine) -> Result<Replay, FolderError> {
         let manifest = self.manifest()?;
-        let (path, cause) = if manifest.complete && manifest.trials == TrialFile::Parquet {
+        let (path, source) = if manifest.complete && manifest.trials == TrialFile::Parquet {
             let path = self.file(TrialFile::Parquet.name());
             let expected = manifest.files.get(TrialFile::Parquet.name());
             let found = hexadecimal(&hash_of(&path, u64::MAX)?.0);
@@ -119,7 +119,7 @@ impl Folder {
             let checkpoint = self.checkpoint()?;
             (self.file(TrialFile::Csv.name()), self.lines(&checkpoint, engine)?.0)
         };
-        Ok(Replay::new(cause, path))
+        Ok(Replay::new(source, path))
     }
 
     /// The log as far as the checkpoint counts it, and the running hash of that.
@@ -168,10 +168,10 @@ impl Folder {
             return Ok(log);
         }
         let checkpoint = self.checkpoint()?;
-        let (cause, hash) = self.lines(&checkpoint, engine)?;
+        let (source, hash) = self.lines(&checkpoint, engine)?;
         self.files.cut(&log.file, checkpoint.bytes).map_err(located)?;
         (log.bytes, log.hash) = (checkpoint.bytes, hash);
-        let mut replay = Replay::new(cause, path);
+        let mut replay = Replay::new(source, path);
         while replay.batch(engine)? {}
         if engine.batches != checkpoint.batches {
             let what =

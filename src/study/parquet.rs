@@ -27,12 +27,12 @@ const GROUP: usize = 1 << 14;
 /// Columns before the quantities: cell, trial, outcome, iterations.
 const LEADING: usize = 4;
 
-/// Writes all trials of `cause` to `sink`.
+/// Writes all trials of `source` to `sink`.
 pub(super) fn write(
     sink: impl Write + Send,
     path: &Path,
     engine: &Engine,
-    cause: &mut dyn Source,
+    source: &mut dyn Source,
 ) -> Result<(), FolderError> {
     let failed = |error: ParquetError| unwritten(path, error);
     let columns = tables::columns(&engine.quantities);
@@ -41,7 +41,7 @@ pub(super) fn write(
     loop {
         let mut trials = Vec::with_capacity(GROUP);
         while trials.len() < GROUP
-            && let Some(trial) = cause.next()?
+            && let Some(trial) = source.next()?
         {
             trials.push(trial);
         }
