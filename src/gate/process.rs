@@ -10,12 +10,15 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// After this many breakages in a row a worker stops asking a program that never gave an answer: it does not work at all.
 const PATIENCE: usize = 3;
 /// The same for a program that has answered before: more than all bad input of a run, which may well break it every time.
 const LONG_PATIENCE: usize = 24;
+/// How long is waited before something is looked at again.
+const MOMENT: Duration = Duration::from_millis(5);
 /// Bytes of standard error that are quoted.
 const STDERR_TAIL: usize = 400;
 
@@ -74,7 +77,9 @@ struct Running {
     from_child: Receiver<Heard>,
     /// Its mark in the environment, see [`descendants`].
     mark: String,
+    /// The end of what it wrote to standard error.
     stderr: Arc<Mutex<Vec<u8>>>,
+    stderr_reader: JoinHandle<()>,
 }
 
 impl Process {
@@ -108,7 +113,7 @@ impl Process {
         }
         let Some(running) = worker.running.as_mut() else { return Err(crashed("not started".into())) };
         if running.to_child.send(problem.to_line()).is_err() {
-            return Err(running.obituary());
+            return Err(running.crash());
         }
         let deadline = Instant::now() + self.timeout;
         let mut wrong: Option<Breakage> = None;
@@ -123,7 +128,7 @@ impl Process {
                 Ok(Heard::Line(line)) => line,
                 Ok(Heard::TooLong) => return Err(Breakage::TooLong { limit: MOST_LINE_BYTES }),
                 Err(RecvTimeoutError::Disconnected) => {
-                    return Err(wrong.unwrap_or_else(|| running.obituary()));
+                    return Err(wrong.unwrap_or_else(|| running.crash()));
                 }
                 Err(RecvTimeoutError::Timeout) => {
                     return Err(wrong.unwrap_or(Breakage::Timeout { seconds: self.timeout.as_secs_f64() }));
@@ -224,7 +229,7 @@ impl Running {
         });
         let stderr = Arc::new(Mutex::new(Vec::new()));
         let kept = Arc::clone(&stderr);
-        std::thread::spawn(move || {
+        let stderr_reader = std::thread::spawn(move || {
             let mut chunk = [0u8; 4096];
             while let Ok(n) = errors.read(&mut chunk) {
                 if n == 0 {
@@ -236,21 +241,24 @@ impl Running {
                 kept.drain(..surplus);
             }
         });
-        Ok(Running { child, to_child, from_child, mark, stderr })
+        Ok(Running { child, to_child, from_child, mark, stderr, stderr_reader })
     }
 
-    /// How the program ended, and its last words.
-    fn obituary(&mut self) -> Breakage {
-        // Its output is closed; it is given a moment to end by itself.
+    /// How the program ended, and the end of what it wrote to standard error.
+    fn crash(&mut self) -> Breakage {
+        // Its output is closed; it is given a moment to end by itself, and the reader of its standard error to come to the end of that.
         let deadline = Instant::now() + Duration::from_millis(500);
         let status = loop {
             match self.child.try_wait() {
                 Ok(Some(status)) => break status.to_string(),
-                Ok(None) if Instant::now() < deadline => std::thread::sleep(Duration::from_millis(5)),
+                Ok(None) if Instant::now() < deadline => std::thread::sleep(MOMENT),
                 Ok(None) => break "its output was closed".to_string(),
                 Err(error) => break error.to_string(),
             }
         };
+        while !self.stderr_reader.is_finished() && Instant::now() < deadline {
+            std::thread::sleep(MOMENT);
+        }
         let kept = self.stderr.lock().unwrap_or_else(PoisonError::into_inner);
         let last = String::from_utf8_lossy(&kept).trim().replace('\n', " | ");
         Breakage::Crashed { how: status, stderr: last }

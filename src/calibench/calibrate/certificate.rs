@@ -93,7 +93,7 @@ pub(super) fn certify(problem: &Problem<'_>, state: &State, reduction: &Reductio
     let points: usize = problem.observations.iter().map(|pairs| pairs.len()).sum();
     // What rounding leaves of exact data proves nothing.
     let (gain, undetermined) = score(problem, state, reduction);
-    let floor = (cost - gain).max(problem.rounding_cost()).min(cost);
+    let floor = (cost - gain).max(problem.rounding_cost).min(cost);
     let freedom = (2 * views).saturating_sub(undetermined);
     let lens = problem.free.len() - undetermined;
     let floor_freedom = (2 * points).saturating_sub(8 * views + lens);

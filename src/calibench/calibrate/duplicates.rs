@@ -98,8 +98,8 @@ impl Thinned {
 }
 
 /// Bits of the table in which marks are looked up: few enough to clear for every view, and so many that of 63 different marks two share one in
-/// a view of eight.
-const TABLE_BITS: u32 = 14;
+/// a view of four.
+const TABLE_BITS: u32 = 13;
 
 /// Whether no mark is a copy of another: by a table of their keys' bits, and by sorted keys where two share a bit.
 fn are_different(view: &View) -> bool {

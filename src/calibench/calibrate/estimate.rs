@@ -4,7 +4,7 @@ use super::certificate::Certificate;
 use super::conditioning::Conditioning;
 use super::duplicates::Distinct;
 use super::intervals::Profile;
-use super::minimise::{Problem, State};
+use super::minimise::{Problem, State, rounding_cost};
 use super::normal::Observations;
 use super::retraction::Retraction;
 use super::search::{self, Evidence, Judged};
@@ -100,6 +100,7 @@ fn estimate(views: &[View], settings: &Settings) -> Result<Calibration, Calibrat
         hold_tilt: false,
         retraction: Retraction::Straight,
         focal_limits: (0.0, f64::INFINITY),
+        rounding_cost: rounding_cost(&observations),
     };
     let evidence =
         Evidence { homographies: &homographies, held: &held, pixel_frame, search: settings.search };
@@ -179,12 +180,12 @@ fn report(
     let State { camera, cam_from_target } = &minimum.state;
     let system = &minimum.system;
     let fit = Fit::of(&minimum.state, observations);
-    let points = fit.residuals.iter().map(Vec::len).sum::<usize>();
+    let points = fit.marks();
     let degrees_of_freedom = 2 * points - system.unknowns();
     let freedom = degrees_of_freedom.max(1) as f64;
     strays::refuse_narrow_loss(problem.loss, &fit)?;
     let strays = strays::strays(problem, &minimum.state, &fit, fit.square / freedom);
-    let Fit { residuals, square, largest_radius } = fit;
+    let Fit { residuals, square, largest_radius, .. } = fit;
     let sigma_px = (square / freedom).sqrt();
     let conditioning = reduction.as_ref().and_then(|reduction| Conditioning::of(system, reduction));
     if !problem.free.is_empty() {
@@ -246,7 +247,11 @@ fn judged_termination(termination: Termination, certificate: Option<&Certificate
 pub(super) struct Fit {
     pub residuals: Vec<Vec<Vec2>>,
     /// Sum of squared residuals.
-    square: f64,
+    pub square: f64,
+    /// Sum of their squares.
+    fourth: f64,
+    /// The largest of them.
+    pub largest_square: f64,
     /// Largest distance of an ideal point from the axis, in normalised coordinates.
     largest_radius: f64,
 }
@@ -261,9 +266,24 @@ impl Fit {
         let views = chunks::map(observations, |index, pairs| {
             kernel::view_residuals(&state.camera, &state.cam_from_target[index], pairs)
         });
-        let square = views.iter().map(|view| view.square).sum();
-        let largest_radius = views.iter().map(|view| view.largest_radius_sq).fold(0.0, f64::max).sqrt();
-        Fit { residuals: views.into_iter().map(|view| view.residuals).collect(), square, largest_radius }
+        let largest = |of: fn(&kernel::ViewResiduals) -> f64| views.iter().map(of).fold(0.0, f64::max);
+        Fit {
+            square: views.iter().map(|view| view.square).sum(),
+            fourth: views.iter().map(|view| view.fourth).sum(),
+            largest_square: largest(|view| view.largest_square),
+            largest_radius: largest(|view| view.largest_radius_sq).sqrt(),
+            residuals: views.into_iter().map(|view| view.residuals).collect(),
+        }
+    }
+
+    /// Number of marks.
+    pub fn marks(&self) -> usize {
+        self.residuals.iter().map(Vec::len).sum()
+    }
+
+    /// `N sum s^2 / (sum s)^2` of the squared residuals `s`: 2 for noise, larger where tails are heavy.
+    pub fn tails(&self) -> f64 {
+        self.fourth * self.marks() as f64 / (self.square * self.square)
     }
 }
 

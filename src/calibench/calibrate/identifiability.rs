@@ -123,7 +123,7 @@ fn refuse_if_fits(
 
 /// Variance of a pixel coordinate; exact data leave rounding as noise.
 pub(super) fn variance(problem: &Problem<'_>, noise_px: f64) -> f64 {
-    (noise_px * noise_px).max(problem.rounding_cost())
+    (noise_px * noise_px).max(problem.rounding_cost)
 }
 
 /// Refuses normal equations that are singular.

@@ -461,6 +461,10 @@ pub(super) struct ViewResiduals {
     pub residuals: Vec<crate::geometry::Vec2>,
     /// Sum of squares.
     pub square: f64,
+    /// Sum of the squares' squares.
+    pub fourth: f64,
+    /// Largest square.
+    pub largest_square: f64,
     /// Largest squared distance of an ideal point from the axis, in normalised coordinates.
     pub largest_radius_sq: f64,
 }
@@ -482,7 +486,8 @@ impl Kernel for Residuals<'_> {
         let View { camera, cam_from_target, pairs, .. } = self.0;
         let m = Model::<L>::new(camera, cam_from_target);
         let mut residuals = Vec::with_capacity(pairs.blocks.len() * LANES);
-        let (mut square, mut largest) = (L::zero(), L::zero());
+        let (mut square, mut fourth, mut largest_square, mut largest) =
+            (L::zero(), L::zero(), L::zero(), L::zero());
         for (index, block) in pairs.blocks.iter().enumerate() {
             let [x, y, depth] = ideal_point(&m, L::load(&block.x), L::load(&block.y));
             let s = x * x + y * y;
@@ -500,15 +505,18 @@ impl Kernel for Residuals<'_> {
                 sum = sum * L::load(&mask);
             }
             square = square + sum;
+            fourth = fourth + sum * sum;
+            largest_square = sum.max(largest_square);
             let (ru, rv) = (ru.store(), rv.store());
             for i in 0..LANES {
                 residuals.push(Vec2::new(ru[i], rv[i]));
             }
         }
         residuals.truncate(pairs.len());
-        let largest_radius_sq = largest.store().into_iter().fold(0.0, f64::max);
-        let [square, ..] = L::sums([square; 4]);
-        ViewResiduals { residuals, square, largest_radius_sq }
+        let greatest = |lanes: L| lanes.store().into_iter().fold(0.0, f64::max);
+        let [square, fourth, ..] = L::sums([square, fourth, square, fourth]);
+        let (largest_square, largest_radius_sq) = (greatest(largest_square), greatest(largest));
+        ViewResiduals { residuals, square, fourth, largest_square, largest_radius_sq }
     }
 }
 

@@ -27,6 +27,8 @@ pub(super) struct Problem<'a> {
     pub retraction: Retraction,
     /// Focal lengths, px, outside of which a search has run away and ends.
     pub focal_limits: (f64, f64),
+    /// Below this a cost is rounding: [`rounding_cost`] of the observations.
+    pub rounding_cost: f64,
 }
 
 /// A minimum, or where the search ended.
@@ -60,6 +62,12 @@ fn eased(ratio: f64) -> f64 {
     (1.0 - x * x * x).max(1.0 / 3.0)
 }
 
+/// The cost that rounding alone makes.
+pub(super) fn rounding_cost(observations: &[Observations]) -> f64 {
+    let unit = |p: f64| (ROUNDINGS * f64::EPSILON * p) * (ROUNDINGS * f64::EPSILON * p);
+    observations.iter().flat_map(Observations::iter).map(|(_, pixel)| unit(pixel.x) + unit(pixel.y)).sum()
+}
+
 impl Problem<'_> {
     /// Normal equations at a state; an infinite cost where a point is not in front of the camera.
     pub fn linearise_into(&self, state: &State, system: &mut System) {
@@ -78,16 +86,6 @@ impl Problem<'_> {
         }
     }
 
-    /// Below this a cost is rounding.
-    pub fn rounding_cost(&self) -> f64 {
-        let unit = |p: f64| (ROUNDINGS * f64::EPSILON * p) * (ROUNDINGS * f64::EPSILON * p);
-        self.observations
-            .iter()
-            .flat_map(Observations::iter)
-            .map(|(_, pixel)| unit(pixel.x) + unit(pixel.y))
-            .sum()
-    }
-
     fn has_run_away(&self, camera: &Camera) -> bool {
         let (shortest, longest) = self.focal_limits;
         camera.fx.min(camera.fy) < shortest || camera.fx.max(camera.fy) > longest
@@ -95,7 +93,7 @@ impl Problem<'_> {
 
     /// Levenberg-Marquardt (Levenberg 1944; Marquardt 1963) with damping `lambda diag(J^T J)`.
     pub fn minimise(&self, start: State) -> Minimum {
-        let rounding_cost = self.rounding_cost();
+        let rounding_cost = self.rounding_cost;
         let views = self.observations.len();
         let mut state = start;
         let mut system = System::new(self.free, views);

@@ -75,7 +75,7 @@ impl Judged {
         let cost = self.minimum.system.cost;
         let points = problem.observations.iter().map(|o| o.len()).sum();
         // What rounding leaves of exact data proves nothing.
-        let rounding = problem.rounding_cost();
+        let rounding = problem.rounding_cost;
         if let Some(certificate) = self.certificate.as_mut() {
             if !certificate.holds()
                 && let Some(beside) = beside(problem, &self.minimum)

@@ -62,8 +62,7 @@ pub(super) fn or_blamed<T>(
 ) -> Result<T, CalibrationError> {
     let Err(CalibrationError::NotIdentifiable { .. }) = outcome else { return outcome };
     let fit = Fit::of(state, problem.observations);
-    let mean = fit.squares().sum::<f64>() / fit.squares().count() as f64;
-    match strays(problem, state, &fit, mean) {
+    match strays(problem, state, &fit, fit.square / fit.marks() as f64) {
         Some(found) => Err(found.into()),
         None => outcome,
     }
@@ -89,14 +88,14 @@ pub(super) fn strays(problem: &Problem<'_>, state: &State, fit: &Fit, variance: 
     let median = median(&fit);
     let limit = largest_of_noise(problem, &fit)? * median;
     let marks = fit.squares().filter(|&square| square > limit).count();
-    if marks == 0 || marks as f64 > (MOST * fit.squares().count() as f64).max(1.0) {
+    if marks == 0 || marks as f64 > (MOST * fit.marks() as f64).max(1.0) {
         return None;
     }
     let numbered = fit.residuals.iter().enumerate().flat_map(|(view, list)| {
         list.iter().enumerate().map(move |(point, residual)| (view, point, residual.norm()))
     });
     let (view, point, residual_px) = numbered.max_by(|a, b| a.2.total_cmp(&b.2))?;
-    let share = marks as f64 / fit.squares().count() as f64;
+    let share = marks as f64 / fit.marks() as f64;
     Some(Strays { marks, share, view, point, residual_px, median_px: median.sqrt() })
 }
 
@@ -105,7 +104,7 @@ pub(super) fn strays(problem: &Problem<'_>, state: &State, fit: &Fit, variance: 
 /// degrees of freedom follows some marks and leaves others: by how much more is bounded by the square of coordinates over degrees of freedom. `None`
 /// where these are fewer than the marks: a robust fit then passes through half of them.
 fn largest_of_noise(problem: &Problem<'_>, fit: &Fit) -> Option<f64> {
-    let marks = fit.squares().count();
+    let marks = fit.marks();
     let freedom = (2 * marks).checked_sub(problem.free.len() + 6 * problem.observations.len())?;
     let followed = 2.0 * marks as f64 / freedom as f64;
     let largest = 2.0 * (libm::log(marks as f64) + LOG_STRAY);
@@ -114,15 +113,8 @@ fn largest_of_noise(problem: &Problem<'_>, fit: &Fit) -> Option<f64> {
 
 /// Whether some residuals are much larger than the rest: one alone stands out, and many make the tails heavy.
 fn is_suspicious(fit: &Fit, variance: f64) -> bool {
-    let (mut count, mut sum, mut sum_of_squares, mut largest) = (0.0, 0.0, 0.0, 0.0_f64);
-    for square in fit.squares() {
-        count += 1.0;
-        sum += square;
-        sum_of_squares += square * square;
-        largest = largest.max(square);
-    }
-    let stands_out = largest > 2.0 * (libm::log(count) + LOG_LOOK) * variance;
-    stands_out || sum_of_squares * count > HEAVY * sum * sum
+    let noise = 2.0 * (libm::log(fit.marks() as f64) + LOG_LOOK) * variance;
+    fit.largest_square > noise || fit.tails() > HEAVY
 }
 
 /// The median squared residual.

@@ -16,16 +16,13 @@ const CHANCE: f64 = 4.75;
 /// Weaker correlations, which large sets of real photographs show all the time, widen no standard deviation by more than a fifth.
 const MATERIAL: f64 = 0.2;
 
-/// The warning, where neighbours' residuals agree.
-pub(super) fn structure(residuals: &[Vec<Vec2>]) -> Option<Warning> {
-    let (mut pairs, mut marks, mut square, mut products) = (0.0, 0.0, 0.0, 0.0);
+/// The warning, where neighbours' residuals agree; `variance` is `s^2`.
+pub(super) fn structure(residuals: &[Vec<Vec2>], variance: f64) -> Option<Warning> {
+    let (mut pairs, mut products) = (0.0, 0.0);
     for view in residuals {
-        square += view.iter().map(|r| r.norm_squared()).sum::<f64>();
-        products += view.windows(2).map(|pair| pair[0].dot(&pair[1])).sum::<f64>();
+        products += view.windows(2).map(|pair| pair[0].x * pair[1].x + pair[0].y * pair[1].y).sum::<f64>();
         pairs += view.len().saturating_sub(1) as f64;
-        marks += view.len() as f64;
     }
-    let variance = square / (2.0 * marks);
     let z = products / (variance * (2.0 * pairs).sqrt());
     let correlation = products / pairs / (2.0 * variance);
     (z > CHANCE && correlation > MATERIAL).then_some(Warning::Structured { correlation })

@@ -12,36 +12,46 @@ pub(super) struct TargetFrame {
     scale: f64,
 }
 
-impl TargetFrame {
-    pub fn of(views: &[View]) -> TargetFrame {
-        let points = || views.iter().flat_map(|view| view.points().iter());
-        // Moments about one of the points: its distance from the centroid is of the points' own size.
-        let Some(&origin) = points().next() else { return TargetFrame { centre: Vec2::zeros(), scale: 1.0 } };
-        let (mut count, mut sum, mut square) = (0.0, Vec2::zeros(), 0.0);
-        for view in views {
-            let (mut x, mut y, mut squares) = (0.0, 0.0, 0.0);
-            for point in view.points() {
-                let (dx, dy) = (point.x - origin.x, point.y - origin.y);
-                (x, y, squares) = (x + dx, y + dy, squares + (dx * dx + dy * dy));
-            }
-            count += view.len() as f64;
-            sum += Vec2::new(x, y);
-            square += squares;
+/// Sums over some points `p`, relative to an origin among them: their distances from the centroid are then of the points' own size.
+#[derive(Clone, Copy)]
+struct Moments {
+    count: f64,
+    /// `sum (p - origin)`.
+    sum: Vec2,
+    /// `sum |p - origin|^2`.
+    square: f64,
+}
+
+impl Moments {
+    fn of(points: &[Vec2], origin: Vec2) -> Moments {
+        let (mut x, mut y, mut square) = (0.0, 0.0, 0.0);
+        for point in points {
+            let (dx, dy) = (point.x - origin.x, point.y - origin.y);
+            (x, y, square) = (x + dx, y + dy, square + (dx * dx + dy * dy));
         }
-        let offset = sum / count;
-        let centre = origin + offset;
-        let mean_square = square / count - offset.norm_squared();
-        // Coincident points have no size; their homography refuses them.
-        let scale = if mean_square > 0.0 { mean_square.sqrt() } else { 1.0 };
-        TargetFrame { centre, scale }
+        Moments { count: points.len() as f64, sum: Vec2::new(x, y), square }
     }
 
-    /// Whether a view's points are of the frame's size: not a small patch of it.
-    fn is_of_size(&self, view: &View) -> bool {
-        let outside = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
-        let grown = |(low, high): (Vec2, Vec2), p: &Vec2| (low.inf(p), high.sup(p));
-        let (low, high) = view.points().iter().fold(outside, grown);
-        (high - low).max() > PATCH * self.scale
+    fn plus(self, other: &Moments) -> Moments {
+        Moments {
+            count: self.count + other.count,
+            sum: self.sum + other.sum,
+            square: self.square + other.square,
+        }
+    }
+
+    /// Mean squared distance from the centroid.
+    fn mean_square(&self) -> f64 {
+        self.square / self.count - (self.sum / self.count).norm_squared()
+    }
+}
+
+impl TargetFrame {
+    fn of(moments: &Moments, origin: Vec2) -> TargetFrame {
+        let mean_square = moments.mean_square();
+        // Coincident points have no size; their homography refuses them.
+        let scale = if mean_square > 0.0 { mean_square.sqrt() } else { 1.0 };
+        TargetFrame { centre: origin + moments.sum / moments.count, scale }
     }
 
     pub fn observations(&self, view: &View) -> Observations {
@@ -61,8 +71,8 @@ impl TargetFrame {
     }
 }
 
-/// A view narrower than this part of the size of all points sees a patch of a large target.
-const PATCH: f64 = 0.3;
+/// A view whose points' root mean square distance from their centroid is below this part of that of all points sees a patch of a large target.
+const PATCH: f64 = 0.1;
 
 /// The frames of all views: one and the same, or each its own where views see patches of a large target, of which the whole would make rounding.
 pub(super) enum TargetFrames {
@@ -72,11 +82,21 @@ pub(super) enum TargetFrames {
 
 impl TargetFrames {
     pub fn of(views: &[View]) -> TargetFrames {
-        let common = TargetFrame::of(views);
-        if views.iter().all(|view| common.is_of_size(view)) {
-            return TargetFrames::Common(common);
+        let Some(&origin) = views.iter().flat_map(|view| view.points()).next() else {
+            return TargetFrames::Own(Vec::new());
+        };
+        let each: Vec<Moments> = views.iter().map(|view| Moments::of(view.points(), origin)).collect();
+        let nothing = Moments { count: 0.0, sum: Vec2::zeros(), square: 0.0 };
+        let all = each.iter().fold(nothing, Moments::plus);
+        let smallest = PATCH * PATCH * all.mean_square();
+        if each.iter().all(|view| view.mean_square() > smallest) {
+            return TargetFrames::Common(TargetFrame::of(&all, origin));
         }
-        TargetFrames::Own(views.iter().map(|view| TargetFrame::of(std::slice::from_ref(view))).collect())
+        let own = |view: &View| {
+            let origin = view.points()[0];
+            TargetFrame::of(&Moments::of(view.points(), origin), origin)
+        };
+        TargetFrames::Own(views.iter().map(own).collect())
     }
 
     /// That of a view.

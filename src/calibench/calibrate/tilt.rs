@@ -4,7 +4,7 @@
 //! `g w^2 / f` px at the edge of a target of half-width `w` px and slope `g` (Schweighofer & Pinz 2006; Collins & Bartoli 2014). A search
 //! that starts in the wrong one stays there.
 
-use super::minimise::{Problem, State};
+use super::minimise::{Problem, State, rounding_cost};
 use super::normal::Observations;
 use crate::camera::FreeParameters;
 use crate::geometry::{Mat3, Pose, Vec3};
@@ -68,6 +68,7 @@ pub(super) fn resected(problem: &Problem<'_>, state: &State, view: usize, start:
         free: FreeParameters::NONE,
         observations: &problem.observations[view..=view],
         max_iterations: RESECTION_ITERATIONS,
+        rounding_cost: rounding_cost(&problem.observations[view..=view]),
         ..*problem
     };
     let minimum = alone.minimise(State { camera: state.camera, cam_from_target: vec![start] });

@@ -31,7 +31,10 @@ pub(super) fn of(
     {
         warnings.push(Warning::NotCertified);
     }
-    warnings.extend(structure::structure(&calibration.residuals));
+    warnings.extend(structure::structure(
+        &calibration.residuals,
+        0.5 * calibration.rmse_px * calibration.rmse_px,
+    ));
     warnings.extend(twin_pose(&twins));
     warnings.extend(from_behind(calibration));
     warnings.extend(correlated(&calibration.covariance, calibration.free));
