@@ -92,8 +92,9 @@ impl TargetFrames {
         if each.iter().all(|view| view.mean_square() > smallest) {
             return TargetFrames::Common(TargetFrame::of(&all, origin));
         }
+        // A view without points has no frame either; its homography refuses it.
         let own = |view: &View| {
-            let origin = view.points()[0];
+            let origin = view.points().first().copied().unwrap_or(origin);
             TargetFrame::of(&Moments::of(view.points(), origin), origin)
         };
         TargetFrames::Own(views.iter().map(own).collect())
@@ -136,5 +137,38 @@ impl TargetFrames {
         }
         covariance.intrinsics *= variance;
         covariance
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn view(points: impl Iterator<Item = (f64, f64)>) -> View {
+        let points: Vec<Vec2> = points.map(|(x, y)| Vec2::new(x, y)).collect();
+        View::new(points.clone(), points).unwrap()
+    }
+
+    fn grid(size: f64, at: f64) -> View {
+        view((0..9).map(|i| (at + size * f64::from(i % 3), at + size * f64::from(i / 3))))
+    }
+
+    #[test]
+    fn views_of_a_patch_have_frames_of_their_own() {
+        let is_common = |views: &[View]| matches!(TargetFrames::of(views), TargetFrames::Common(_));
+        assert!(is_common(&[grid(1.0, 0.0), grid(0.2, 0.0)]));
+        assert!(!is_common(&[grid(1.0, 0.0), grid(0.01, 0.0)]));
+        let frames = TargetFrames::of(&[grid(1.0, 0.0), grid(0.01, 0.5)]);
+        assert!((frames.at(1).centre - Vec2::repeat(0.51)).norm() < 1e-12);
+        assert!((frames.at(1).scale - 0.01 * (4.0_f64 / 3.0).sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_view_without_points_is_left_to_its_homography() {
+        let nothing = || view(std::iter::empty());
+        assert!(
+            matches!(TargetFrames::of(&[nothing(), grid(1.0, 0.0)]), TargetFrames::Own(frames) if frames.len() == 2)
+        );
+        assert!(matches!(TargetFrames::of(&[nothing()]), TargetFrames::Own(_)));
     }
 }
