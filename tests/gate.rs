@@ -6,7 +6,7 @@ use calibench_gate::faults::{Faulty, planted};
 use calibench_gate::plan::Purpose;
 use calibench_gate::power::Measured;
 use calibench_gate::protocol::{Problem, schemas};
-use calibench_gate::{Builtin, Plan, Process, Property, Report, Solver, Terms, run};
+use calibench_gate::{Builtin, Plan, Process, Property, Report, Solver, Terms, Verdict, run};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -286,4 +286,51 @@ fn the_schemas_know_every_field_that_is_sent() {
     let given = Builtin.ask(&problems(1)[0]).expect("an answer");
     let given = serde_json::to_value(given).expect("JSON");
     assert!(given.as_object().expect("an object").keys().all(|key| fields(answer).contains(key)));
+}
+
+fn judged(fault: &str, samples: usize) -> Report {
+    let fault = planted().into_iter().find(|f| f.id == fault).expect("the fault");
+    let plan = Plan::new(1, samples).expect("a plan");
+    Report::new(&plan, "", &run(&plan, &Faulty::new(fault), &|_| ()), &Terms::default(), 0.0)
+}
+
+fn verdicts(report: &Report, property: Property) -> Vec<Verdict> {
+    report.checks.iter().filter(|c| c.property == property).map(|c| c.verdict).collect()
+}
+
+#[test]
+fn warnings_count_for_nothing_where_good_data_bring_them_too() {
+    let report = judged("warns-of-everything", 16);
+    assert!(verdicts(&report, Property::Specificity).contains(&Verdict::Failed), "{}", report.details());
+    assert!(verdicts(&report, Property::Degenerate).contains(&Verdict::Grave), "{}", report.details());
+}
+
+#[test]
+fn a_solver_that_never_answers_holds_nothing_but_the_protocol() {
+    let report = judged("refuses-everything", 16);
+    let held: Vec<Property> =
+        report.checks.iter().filter(|c| c.verdict == Verdict::Held).map(|c| c.property).collect();
+    assert!(held.iter().all(|p| *p == Property::Protocol), "{held:?}");
+    assert!(verdicts(&report, Property::Convergence).iter().all(|v| *v == Verdict::Failed));
+}
+
+#[test]
+fn a_matrix_that_is_no_covariance_and_lost_correlations_are_findings_of_a_quick_run() {
+    for fault in ["covariance-of-one-triangle", "covariance-not-definite", "covariance-in-another-order"] {
+        let report = judged(fault, 1);
+        assert!(verdicts(&report, Property::CovarianceForm).contains(&Verdict::Failed), "{fault}");
+    }
+    let report = judged("correlations-dropped", 1);
+    assert!(verdicts(&report, Property::Covariance).contains(&Verdict::Failed), "{}", report.details());
+    assert!(!verdicts(&report, Property::CovarianceForm).contains(&Verdict::Failed), "{}", report.details());
+}
+
+#[test]
+fn a_change_of_what_is_stated_is_a_change() {
+    let doubled = gate(&["--samples", "64", "--against", "builtin", "--planted", "covariance-doubled"]);
+    let text = String::from_utf8_lossy(&doubled.stdout).into_owned();
+    assert!(
+        text.lines().any(|l| l.starts_with("four-pose") && l.contains(" 2.000 ") && l.contains("MOVED")),
+        "{text}"
+    );
 }

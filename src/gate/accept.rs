@@ -1,5 +1,6 @@
 //! Can the answer be read as an estimate? Counts, names and numbers are checked before anything is judged.
 
+use super::covariance_form::{self, CovarianceFault};
 use super::protocol::{Answer, AnswerPose, Problem, Status};
 use calibench::camera::{Camera, FreeParameters, Parameter};
 use calibench::geometry::Pose;
@@ -17,6 +18,8 @@ pub struct Estimate {
     pub standard_deviations: Option<Vec<f64>>,
     /// Covariance of the free parameters, in order.
     pub covariance: Option<DMatrix<f64>>,
+    /// What is wrong with its form.
+    pub covariance_fault: Option<CovarianceFault>,
     /// Reprojection error as the solver states it, px.
     pub rmse_px: Option<f64>,
     /// What the solver warns of.
@@ -168,11 +171,10 @@ fn estimate(problem: &Problem, answer: Answer) -> Result<Estimate, Breakage> {
     let free = free_of(problem);
     let (camera, held_changed) = camera(problem, &answer, free)?;
     let covariance = covariance(&answer, free)?;
-    let standard_deviations = match (&answer.standard_deviations, &covariance) {
-        (Some(named), _) => Some(deviations(named, free)?),
-        (None, Some(matrix)) => Some(matrix.diagonal().iter().map(|v| v.sqrt()).collect()),
-        (None, None) => None,
-    };
+    let stated = answer.standard_deviations.as_ref().map(|named| deviations(named, free)).transpose()?;
+    let covariance_fault = covariance.as_ref().and_then(|c| covariance_form::fault(c, stated.as_deref()));
+    let of_diagonal = |c: &DMatrix<f64>| c.diagonal().iter().map(|v| v.sqrt()).collect();
+    let standard_deviations = stated.or_else(|| covariance.as_ref().map(of_diagonal));
     let rmse_px = answer.rmse.map(|x| positive("rmse", x)).transpose()?;
     let cam_from_target = answer.poses.map(|poses| self::poses(&poses, problem.views.len())).transpose()?;
     Ok(Estimate {
@@ -180,6 +182,7 @@ fn estimate(problem: &Problem, answer: Answer) -> Result<Estimate, Breakage> {
         cam_from_target,
         standard_deviations,
         covariance,
+        covariance_fault,
         rmse_px,
         warnings: answer.warnings,
         held_changed,

@@ -12,6 +12,7 @@
 pub mod accept;
 pub mod bad_input;
 pub mod certified;
+pub mod covariance_form;
 mod descendants;
 pub mod faults;
 pub mod files;
@@ -19,6 +20,7 @@ pub mod judge;
 pub mod paired;
 pub mod plan;
 pub mod power;
+pub mod principal;
 pub mod process;
 pub mod protocol;
 pub mod recorder;

@@ -31,10 +31,12 @@ pub struct Comparison {
     pub bits: usize,
     /// Largest difference of a parameter, in standard deviations of the bound.
     pub largest: f64,
-    /// Parameter whose mean moved most certainly, its mean difference in standard deviations, and the p-value.
+    /// Parameter whose mean moved most certainly by an amount that matters, its mean difference in standard deviations, and the p-value.
     pub shift: Option<(String, f64, f64)>,
-    /// Parameter whose spread changed most certainly, the ratio of variances new / reference, and the p-value.
+    /// Parameter whose spread changed most certainly by an amount that matters, the ratio of variances new / reference, and the p-value.
     pub spread: Option<(String, f64, f64)>,
+    /// The same of the stated uncertainty: a parameter or an uncorrelated combination of some, the ratio of its stated variances.
+    pub stated: Option<(String, f64, f64)>,
     /// Median time new / reference.
     pub time: f64,
 }
@@ -82,14 +84,37 @@ pub fn compare(
         solver: solver.to_string(),
         reference: reference.to_string(),
         false_alarm_rate,
-        tests: 2 * parameters,
+        tests: 4 * parameters,
         comparisons,
         verdicts: differing.map(|(n, o)| (n.property, n.scenario, o.verdict, n.verdict)).collect(),
     }
 }
 
-/// A paired test: what is told, and its p-value.
+/// A paired test: what is told, and its normal score. Scores rank what is beyond doubt, where all p-values are 0.
 type Test = fn(&[(f64, f64)]) -> Option<(f64, f64)>;
+
+/// What was tested, what is told of it, and its p-value: of those results whose values matter the most certain, or of all where none matters.
+fn most_certain(
+    results: impl Iterator<Item = (String, f64, f64)>,
+    matters: fn(f64) -> bool,
+) -> Option<(String, f64, f64)> {
+    let rank = |(_, value, z): &(String, f64, f64)| (matters(*value), z.abs(), value.abs());
+    let best = results.max_by(|a, b| {
+        let ((a, az, av), (b, bz, bv)) = (rank(a), rank(b));
+        a.cmp(&b).then(az.total_cmp(&bz)).then(av.total_cmp(&bv))
+    })?;
+    Some((best.0, best.1, two_sided(best.2)))
+}
+
+/// A shift that matters.
+fn is_relevant(shift: f64) -> bool {
+    shift.abs() > RELEVANT
+}
+
+/// A ratio that matters.
+fn is_other(ratio: f64) -> bool {
+    is_relevant(ratio - 1.0)
+}
 
 fn of_scenario(scenario: &Scenario, replies: Vec<(&Seen, &Seen)>) -> Comparison {
     let estimate = |seen: &Seen| matches!(seen, Seen::Estimate(_));
@@ -106,12 +131,12 @@ fn of_scenario(scenario: &Scenario, replies: Vec<(&Seen, &Seen)>) -> Comparison 
         both.iter().map(|(n, o)| (n.errors[i] / sd[i], o.errors[i] / sd[i])).collect()
     };
     let names: Vec<Parameter> = scenario.free.iter().collect();
-    let most_certain = |test: Test| {
+    let estimates = |test: Test, matters: fn(f64) -> bool| {
         let each = names.iter().enumerate().filter_map(|(i, name)| {
-            let (value, p) = test(&standardised(i))?;
-            Some((name.name().to_string(), value, p))
+            let (value, z) = test(&standardised(i))?;
+            Some((name.name().to_string(), value, z))
         });
-        each.min_by(|a, b| a.2.total_cmp(&b.2))
+        most_certain(each, matters)
     };
     let lawful = scenario.demand == Demand::Law;
     Comparison {
@@ -121,10 +146,31 @@ fn of_scenario(scenario: &Scenario, replies: Vec<(&Seen, &Seen)>) -> Comparison 
         gained: replies.iter().filter(|(n, o)| estimate(n) && !estimate(o)).count(),
         bits: both.iter().filter(|(n, o)| n.bits != o.bits).count(),
         largest: (0..names.len()).flat_map(standardised).map(|(n, o)| (n - o).abs()).fold(0.0, f64::max),
-        shift: most_certain(shift).filter(|_| lawful),
-        spread: most_certain(spread).filter(|_| lawful),
+        shift: estimates(shift, is_relevant).filter(|_| lawful),
+        spread: estimates(spread, is_other).filter(|_| lawful),
+        stated: most_certain(stated(scenario, &both), is_other).filter(|_| lawful),
         time: median(both.iter().map(|(n, _)| n.seconds)) / median(both.iter().map(|(_, o)| o.seconds)),
     }
+}
+
+/// Ratios of stated variances, parameter by parameter and along the uncorrelated combinations, each with its score: the mean logarithm of the
+/// ratio is compared with its spread from problem to problem.
+fn stated<'a>(
+    scenario: &'a Scenario,
+    both: &'a [(&Trial, &Trial)],
+) -> impl Iterator<Item = (String, f64, f64)> + 'a {
+    let variance = |trial: &Trial, i: usize| Some(trial.standard_deviations.as_ref()?.get(i)?.powi(2));
+    let along = |trial: &Trial, i: usize| trial.principal_variances.as_ref()?.get(i).copied();
+    let compared = move |name: String, of: &dyn Fn(&Trial) -> Option<f64>| {
+        let logarithms = both.iter().filter_map(|(n, o)| Some((libm::log(of(n)?), libm::log(of(o)?))));
+        let (mean, z) = shift(&logarithms.collect::<Vec<_>>())?;
+        Some((name, libm::exp(mean), z))
+    };
+    let parameters = scenario.free.iter().enumerate();
+    let singly = parameters.filter_map(move |(i, p)| compared(p.name().to_string(), &|t| variance(t, i)));
+    let combined = (0..scenario.free.len())
+        .filter_map(move |i| compared(scenario.principal.name(i).to_string(), &|t| along(t, i)));
+    singly.chain(combined)
 }
 
 fn median(values: impl Iterator<Item = f64>) -> f64 {
@@ -137,7 +183,7 @@ fn two_sided(z: f64) -> f64 {
     (2.0 * normal_cdf(-z.abs())).min(1.0)
 }
 
-/// Mean difference, and how likely chance makes it (paired z-test).
+/// Mean difference and its score (paired z-test).
 fn shift(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
     let n = pairs.len() as f64;
     let mean = pairs.iter().map(|(a, b)| a - b).sum::<f64>() / n;
@@ -147,10 +193,10 @@ fn shift(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
         return None;
     }
     let error = (square / (n - 1.0) / n).sqrt();
-    Some((mean, if error > 0.0 { two_sided(mean / error) } else { 0.0 }))
+    Some((mean, mean / error))
 }
 
-/// Ratio of variances, and how likely chance makes it: sum and difference of two variables of equal variance are uncorrelated
+/// Ratio of variances and the score of their equality: sum and difference of two variables of equal variance are uncorrelated
 /// (Pitman 1939; Morgan 1939), their correlation tested by Fisher's transformation (1921).
 fn spread(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
     let n = pairs.len() as f64;
@@ -171,7 +217,7 @@ fn spread(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
     }
     let correlation = ((aa - bb) / (sums * differences).sqrt()).clamp(-1.0, 1.0);
     let z = libm::atanh(correlation) * (n - 3.0).sqrt();
-    Some((aa / bb, two_sided(z)))
+    Some((aa / bb, z))
 }
 
 /// Whether a verdict is worse than the one before; what is no longer stated is.
@@ -190,10 +236,10 @@ impl Paired {
 
     /// Whether a scenario's estimates moved by an amount that matters and that chance does not explain.
     pub fn moved(&self, c: &Comparison) -> bool {
-        let shifted = c.shift.as_ref().is_some_and(|(_, d, p)| d.abs() > RELEVANT && self.certain(*p));
-        let spread =
-            c.spread.as_ref().is_some_and(|(_, r, p)| (r - 1.0).abs() > RELEVANT && self.certain(*p));
-        shifted || spread || c.lost > 0
+        let moved = |test: &Option<(String, f64, f64)>, matters: fn(f64) -> bool| {
+            test.as_ref().is_some_and(|(_, value, p)| matters(*value) && self.certain(*p))
+        };
+        moved(&c.shift, is_relevant) || moved(&c.spread, is_other) || moved(&c.stated, is_other) || c.lost > 0
     }
 
     /// Whether nothing that matters changed: what is no longer stated counts as changed.
@@ -205,7 +251,7 @@ impl Paired {
     /// One line a scenario, then what follows.
     pub fn to_text(&self) -> String {
         let mut text = format!(
-            "gate: {} against {}, same problems\n\n{:<18} {:>6} {:>6} {:>10}  {:<24} {:<24} {:>6}\n",
+            "gate: {} against {}, same problems\n\n{:<18} {:>6} {:>6} {:>10}  {:<24} {:<24} {:<24} {:>6}\n",
             self.solver,
             self.reference,
             "scenario",
@@ -214,6 +260,7 @@ impl Paired {
             "largest/sd",
             "mean shift/sd",
             "variance ratio",
+            "stated variance ratio",
             "time"
         );
         let told = |test: &Option<(String, f64, f64)>| match test {
@@ -222,13 +269,14 @@ impl Paired {
         };
         for c in &self.comparisons {
             text.push_str(&format!(
-                "{:<18} {:>6} {:>6} {:>10}  {:<24} {:<24} {:>6}{}\n",
+                "{:<18} {:>6} {:>6} {:>10}  {:<24} {:<24} {:<24} {:>6}{}\n",
                 c.scenario,
                 c.pairs,
                 c.bits,
                 significant(c.largest, 2),
                 told(&c.shift),
                 told(&c.spread),
+                told(&c.stated),
                 significant(c.time, 2),
                 if self.moved(c) { "  MOVED" } else { "" }
             ));
@@ -280,18 +328,29 @@ mod tests {
     #[test]
     fn a_shift_far_below_the_noise_is_seen_and_chance_is_not() {
         // Difference 0.01 + 0.02 y: its mean is 10 standard errors from zero.
-        let (mean, p) = shift(&pairs(|x, y| x + 0.01 + 0.02 * y)).unwrap();
-        assert!((mean - 0.01).abs() < 0.005 && p < 1e-9, "{mean} {p}");
-        let (_, p) = shift(&pairs(|x, y| x + 0.02 * y)).unwrap();
-        assert!(p > 1e-4, "{p}");
+        let (mean, z) = shift(&pairs(|x, y| x + 0.01 + 0.02 * y)).unwrap();
+        assert!((mean - 0.01).abs() < 0.005 && two_sided(z) < 1e-9, "{mean} {z}");
+        let (_, z) = shift(&pairs(|x, y| x + 0.02 * y)).unwrap();
+        assert!(two_sided(z) > 1e-4, "{z}");
         assert_eq!(shift(&pairs(|x, _| x)), None);
     }
 
     #[test]
+    fn of_results_beyond_doubt_the_one_that_matters_is_told() {
+        let results = |list: &[(&str, f64, f64)]| {
+            let list: Vec<_> = list.iter().map(|(name, value, z)| (name.to_string(), *value, *z)).collect();
+            most_certain(list.into_iter(), is_relevant).unwrap().0
+        };
+        assert_eq!(results(&[("fx", 1e-5, 90.0), ("k1", 0.2, 60.0)]), "k1");
+        assert_eq!(results(&[("fx", 0.1, 50.0), ("k1", 0.2, 60.0)]), "k1");
+        assert_eq!(results(&[("fx", 1e-5, 90.0), ("k1", 1e-4, 60.0)]), "fx");
+    }
+
+    #[test]
     fn two_per_cent_more_spread_are_seen_on_common_noise() {
-        let (ratio, p) = spread(&pairs(|x, y| 1.01 * x + 0.01 * y)).unwrap();
-        assert!((ratio - 1.02).abs() < 0.01 && p < 1e-9, "{ratio} {p}");
-        let (_, p) = spread(&pairs(|x, y| (x + 0.1 * y) / 1.01f64.sqrt())).unwrap();
-        assert!(p > 1e-4, "{p}");
+        let (ratio, z) = spread(&pairs(|x, y| 1.01 * x + 0.01 * y)).unwrap();
+        assert!((ratio - 1.02).abs() < 0.01 && two_sided(z) < 1e-9, "{ratio} {z}");
+        let (_, z) = spread(&pairs(|x, y| (x + 0.1 * y) / 1.01f64.sqrt())).unwrap();
+        assert!(two_sided(z) > 1e-4, "{z}");
     }
 }

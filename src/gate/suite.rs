@@ -1,5 +1,6 @@
 //! On which scenes is a solver judged? Families of cameras and poses with known truth, as data.
 
+use super::principal::Principal;
 use calibench::board::{Board, BoardError, Pattern};
 use calibench::calibrate::Covariance;
 use calibench::camera::{BrownConrady, Camera, FreeParameters, Parameter};
@@ -41,6 +42,8 @@ pub struct Scenario {
     pub most: usize,
     /// Cramer-Rao bound at `sigma_px`.
     pub bound: Covariance,
+    /// Its uncorrelated combinations of parameters.
+    pub principal: Principal,
 }
 
 /// A scene of the suite that cannot be built: a mistake in the suite.
@@ -241,6 +244,7 @@ fn build(draft: Draft, sigma_px: f64) -> Result<Scenario, SuiteError> {
         outliers: 0.0,
         textbook_misled: 0.0,
         most: usize::MAX,
+        principal: Principal::of(&bound.intrinsics, bound.free),
         bound,
     })
 }

@@ -1,6 +1,7 @@
 //! What is kept of an answer? Its distance from the truth in the units of theory, so that a million answers fit in memory.
 
 use super::accept::{Breakage, Estimate, Outcome};
+use super::covariance_form::CovarianceFault;
 use super::plan::{Case, Plan, Purpose};
 use super::protocol::Problem;
 use super::solver::{self, Reply};
@@ -38,6 +39,10 @@ pub struct Trial {
     pub nees: f64,
     /// Reported standard deviations.
     pub standard_deviations: Option<Vec<f64>>,
+    /// What is wrong with the form of the reported covariance.
+    pub covariance_fault: Option<CovarianceFault>,
+    /// Variances of the reported covariance along the bound's principal directions, over the bound's ([`super::principal`]).
+    pub principal_variances: Option<Vec<f64>>,
     /// `e^T P^-1 e` under the reported covariance.
     pub own_nees: Option<f64>,
     /// Reported RMSE, px.
@@ -92,6 +97,11 @@ fn measure(scenario: &Scenario, case: &Case, problem: &Problem, estimate: &Estim
     Trial {
         nees: scenario.bound.normalised_error_squared(&errors).unwrap_or(f64::INFINITY),
         own_nees: own_nees(estimate, &errors),
+        principal_variances: estimate
+            .covariance
+            .as_ref()
+            .filter(|_| plain)
+            .map(|c| scenario.principal.variances(c)),
         square: poses.map(|poses| square(&estimate.camera, poses, problem)),
         refitted_square: (case.purpose == Purpose::Sample && case.trial < REFITTED)
             .then(|| refitted_square(&estimate.camera, problem))
@@ -118,6 +128,8 @@ fn unmeasured(estimate: &Estimate, seconds: f64) -> Trial {
         errors: Vec::new(),
         nees: f64::NAN,
         standard_deviations: estimate.standard_deviations.clone(),
+        covariance_fault: estimate.covariance_fault,
+        principal_variances: None,
         own_nees: None,
         rmse_px: estimate.rmse_px,
         square: None,

@@ -12,7 +12,7 @@ use super::start::Held;
 use super::target_frame::TargetFrames;
 use super::{
     Calibration, CalibrationError, Loss, Settings, Termination, Warning, chunks, identifiability, kernel,
-    polish, start, strays, warnings,
+    polish, start, strays, structure, warnings,
 };
 use crate::board::View;
 use crate::camera::Parameter;
@@ -184,7 +184,7 @@ fn report(
     let degrees_of_freedom = 2 * points - system.unknowns();
     let freedom = degrees_of_freedom.max(1) as f64;
     strays::refuse_narrow_loss(problem.loss, &fit)?;
-    let strays = strays::strays(problem, &minimum.state, &fit, fit.square / freedom);
+    let of_residuals = warnings_of_residuals(problem, &minimum.state, &fit, freedom);
     let Fit { residuals, square, largest_radius, .. } = fit;
     let sigma_px = (square / freedom).sqrt();
     let conditioning = reduction.as_ref().and_then(|reduction| Conditioning::of(system, reduction));
@@ -230,9 +230,24 @@ fn report(
         warnings: Vec::new(),
         residuals,
     };
-    let strays = strays.map(Warning::from);
-    calibration.warnings = warnings::of(&calibration, largest_radius, strays, &skewed, rival, twins);
+    calibration.warnings = warnings::of(&calibration, largest_radius, of_residuals, &skewed, rival, twins);
     Ok(calibration)
+}
+
+/// Gross errors, and residuals that agree with their neighbours'. What rounding leaves of exact data tells of neither.
+fn warnings_of_residuals(
+    problem: &Problem<'_>,
+    state: &State,
+    fit: &Fit,
+    freedom: f64,
+) -> impl Iterator<Item = Warning> + use<> {
+    let (strays, structure) = if fit.square > problem.rounding_cost {
+        let strays = strays::strays(problem, state, fit, fit.square / freedom);
+        (strays, structure::structure(&fit.residuals, 0.5 * fit.square / fit.marks() as f64))
+    } else {
+        (None, None)
+    };
+    strays.map(Warning::from).into_iter().chain(structure)
 }
 
 /// A minimum counts as one only where the certificate holds.

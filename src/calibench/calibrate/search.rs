@@ -115,7 +115,7 @@ impl Judged {
         let apart = |met: &Met| {
             let differences = problem.free.iter().enumerate().map(|(i, parameter)| {
                 let difference = (met.camera.get(parameter) - camera.get(parameter)).abs();
-                (parameter, difference / (covariance[(i, i)].sqrt() * noise_px))
+                (parameter, difference / (covariance[(i, i)] * variance).sqrt())
             });
             differences.max_by(|a, b| a.1.total_cmp(&b.1))
         };

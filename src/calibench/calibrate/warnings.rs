@@ -4,23 +4,23 @@ use super::intervals::Skewed;
 use super::intervals::student_quantile;
 use super::report::{STRONG_CORRELATION, UNCERTAIN_FOCAL};
 use super::search::{Rival, Twin};
-use super::{Calibration, Certificate, Covariance, Termination, Warning, structure};
+use super::{Calibration, Certificate, Covariance, Termination, Warning};
 use crate::camera::{Camera, FreeParameters, Parameter};
 use crate::geometry::Pose;
 
-/// The warnings of a calibration: `strays` is that of its outliers, `skewed` are the parameters whose cost is no parabola, `rival`
+/// The warnings of a calibration: `of_residuals` are those of its outliers and of what residuals have in common, `skewed` are the parameters whose cost is no parabola, `rival`
 /// is another camera.
 pub(super) fn of(
     calibration: &Calibration,
     largest_radius: f64,
-    strays: Option<Warning>,
+    of_residuals: impl Iterator<Item = Warning>,
     skewed: &[Skewed],
     rival: Option<Rival>,
     twins: Vec<Twin>,
 ) -> Vec<Warning> {
     let mut warnings = Vec::new();
     warnings.extend(ending(calibration));
-    warnings.extend(strays);
+    warnings.extend(of_residuals);
     if calibration.degrees_of_freedom == 0 {
         warnings.push(Warning::NoDegreesOfFreedom);
     } else {
@@ -31,10 +31,6 @@ pub(super) fn of(
     {
         warnings.push(Warning::NotCertified);
     }
-    warnings.extend(structure::structure(
-        &calibration.residuals,
-        0.5 * calibration.rmse_px * calibration.rmse_px,
-    ));
     warnings.extend(twin_pose(&twins));
     warnings.extend(from_behind(calibration));
     warnings.extend(correlated(&calibration.covariance, calibration.free));

@@ -1,7 +1,16 @@
 //! Faults of the program around a good solver: wrong, missing or impossible answers now and then.
 
 use super::{Planted, chosen, correct, fingerprint, gross, spoilt};
-use crate::protocol::{Answer, Status};
+use crate::protocol::{Answer, Problem, Status};
+
+/// A camera that nothing tells, known to a thousandth of a pixel.
+fn confident_nonsense(problem: &Problem) -> Answer {
+    let mut answer = Answer::without_estimate(&problem.id, Status::Ok, String::new());
+    answer.message = None;
+    answer.parameters = problem.free.iter().map(|name| (name.clone(), 92_779.0)).collect();
+    answer.standard_deviations = Some(problem.free.iter().map(|name| (name.clone(), 1e-3)).collect());
+    answer
+}
 
 pub(super) const FAULTS: &[Planted] = &[
     gross("nan-now-and-then", "one answer in fifty has cy = NaN", |p, _| {
@@ -24,4 +33,19 @@ pub(super) const FAULTS: &[Planted] = &[
     gross("refuses-good-data", "one good problem in twenty is refused", |p, _| {
         if chosen(p, 20) { Answer::without_estimate(&p.id, Status::Refused, "bad luck") } else { correct(p) }
     }),
+    gross("refuses-everything", "every problem is refused", |p, _| {
+        Answer::without_estimate(&p.id, Status::Refused, "no luck")
+    }),
+    gross(
+        "warns-of-everything",
+        "a warning with every answer, and one with a tiny deviation where data are refused",
+        |p, _| {
+            let mut given = correct(p);
+            if given.status != Status::Ok {
+                given = confident_nonsense(p);
+            }
+            given.warnings.push("use with care".into());
+            given
+        },
+    ),
 ];

@@ -15,6 +15,22 @@ pub(super) const FAULTS: &[Planted] = &[
     gross("covariance-per-2n", "residual variance divided by 2N, not by degrees of freedom", |p, _| {
         spoilt(p, |a| scale_covariance(a, freedom(p) / (2.0 * p.points() as f64)))
     }),
+    gross("correlations-dropped", "only the variances stated, as if nothing hung together", |p, _| {
+        spoilt(p, |a| change_entries(a, |i, j, x| if i == j { x } else { 0.0 }))
+    }),
+    gross("covariance-of-one-triangle", "only the upper triangle of the covariance filled in", |p, _| {
+        spoilt(p, |a| change_entries(a, |i, j, x| if i <= j { x } else { 0.0 }))
+    }),
+    gross(
+        "covariance-not-definite",
+        "correlations two per cent too large, beyond 1 for fx and fy",
+        |p, _| spoilt(p, |a| change_entries(a, |i, j, x| if i == j { x } else { 1.02 * x })),
+    ),
+    gross(
+        "covariance-in-another-order",
+        "rows and columns of the covariance in another order than its names, beside standard deviations by name",
+        |p, _| spoilt(p, covariance_in_another_order),
+    ),
     gross(
         "covariance-of-the-median",
         "noise taken from the median residual: outliers do not widen it",
@@ -32,6 +48,23 @@ pub(super) const FAULTS: &[Planted] = &[
 
 fn scale_covariance(answer: &mut Answer, factor: f64) {
     answer.covariance.iter_mut().flat_map(|c| c.matrix.iter_mut().flatten()).for_each(|x| *x *= factor);
+}
+
+fn change_entries(answer: &mut Answer, how: impl Fn(usize, usize, f64) -> f64) {
+    let rows = answer.covariance.iter_mut().flat_map(|c| c.matrix.iter_mut()).enumerate();
+    for (i, row) in rows {
+        row.iter_mut().enumerate().for_each(|(j, x)| *x = how(i, j, *x));
+    }
+}
+
+/// The matrix in the opposite order, the names as they were.
+fn covariance_in_another_order(answer: &mut Answer) {
+    let Some(stated) = &mut answer.covariance else { return };
+    let deviations =
+        stated.parameters.iter().enumerate().map(|(i, name)| (name.clone(), stated.matrix[i][i].sqrt()));
+    answer.standard_deviations = Some(deviations.collect());
+    stated.matrix.reverse();
+    stated.matrix.iter_mut().for_each(|row| row.reverse());
 }
 
 /// `s^2 (J_a^T J_a)^-1` with the columns of the intrinsics only.

@@ -1,6 +1,7 @@
 //! What does the solver do where no answer is right? Refuse, flag, admit - or answer wrongly with confidence.
 
 use super::checks::{Basis, Check, Property};
+use super::habits::Habits;
 use super::{Answers, chance, estimate};
 use crate::bad_input::{BadCase, Fault};
 use crate::plan::{Plan, Purpose};
@@ -40,22 +41,22 @@ impl Conduct {
 }
 
 /// One check a bad problem.
-pub(super) fn check(plan: &Plan, seen: &[Option<Seen>]) -> Vec<Check> {
+pub(super) fn check(plan: &Plan, seen: &[Option<Seen>], habits: Habits) -> Vec<Check> {
     let of_case = |(case, seen): (&crate::plan::Case, &Option<Seen>)| match case.purpose {
-        Purpose::Bad(index) => Some(judge(&plan.bad[index], seen.as_ref()?)),
+        Purpose::Bad(index) => Some(judge(&plan.bad[index], seen.as_ref()?, habits)),
         _ => None,
     };
     plan.cases.iter().zip(seen).filter_map(of_case).collect()
 }
 
-fn judge(case: &BadCase, seen: &Seen) -> Check {
+fn judge(case: &BadCase, seen: &Seen, habits: Habits) -> Check {
     let right = |trial: &Trial| {
         let focal = case.truth.fx;
         case.fault == Fault::Degenerate && trial.errors.iter().take(2).all(|e| e.abs() <= RIGHT * focal)
     };
     let conduct = match (case.fault, seen) {
-        (Fault::Malformed, Seen::Estimate(trial)) if trial.warnings == 0 => Conduct::Wrong,
-        _ => conduct(seen, right),
+        (Fault::Malformed, Seen::Estimate(trial)) if !is_flagged(trial, habits) => Conduct::Wrong,
+        _ => conduct(seen, habits, right),
     };
     let evidence = match (conduct, seen) {
         (Conduct::Refused, Seen::Refused { reason, .. }) => format!("refused: {reason}"),
@@ -70,8 +71,13 @@ fn judge(case: &BadCase, seen: &Seen) -> Check {
         Fault::Degenerate => Property::Degenerate,
         Fault::Malformed => Property::BadInput,
     };
-    let held = !matches!(conduct, Conduct::Broken | Conduct::Wrong);
-    let check = Check::new(property, case.id, Basis::Certain(held), 1, evidence);
+    let basis = match conduct {
+        Conduct::Broken | Conduct::Wrong => Basis::Certain(false),
+        // A solver that refuses everything has not looked at the data.
+        Conduct::Refused if !habits.answers => Basis::Told,
+        _ => Basis::Certain(true),
+    };
+    let check = Check::new(property, case.id, basis, 1, evidence);
     if conduct == Conduct::Wrong { check.gravely() } else { check }
 }
 
@@ -83,15 +89,20 @@ fn wrong(trial: &Trial, case: &BadCase) -> String {
     format!("fx {} ({stated}) where {} is true", significant(trial.camera.fx, 5), case.truth.fx)
 }
 
-fn conduct(seen: &Seen, right: impl Fn(&Trial) -> bool) -> Conduct {
+fn conduct(seen: &Seen, habits: Habits, right: impl Fn(&Trial) -> bool) -> Conduct {
     match seen {
         Seen::Broken(_) => Conduct::Broken,
         Seen::Refused { .. } => Conduct::Refused,
-        Seen::Estimate(trial) if trial.warnings > 0 => Conduct::Flagged,
+        Seen::Estimate(trial) if is_flagged(trial, habits) => Conduct::Flagged,
         Seen::Estimate(trial) if admits(trial) => Conduct::Admitted,
         Seen::Estimate(trial) if right(trial) => Conduct::Right,
         Seen::Estimate(_) => Conduct::Wrong,
     }
+}
+
+/// Whether a warning tells this answer from good ones.
+fn is_flagged(trial: &Trial, habits: Habits) -> bool {
+    trial.warnings > 0 && habits.warns_rarely
 }
 
 /// Whether the stated standard deviations cover the errors.
@@ -101,19 +112,21 @@ fn admits(trial: &Trial) -> bool {
 }
 
 /// How a sample of a doubtful scenario was met.
-fn conduct_in_doubt(seen: &Seen) -> Conduct {
-    conduct(seen, |trial| chance::above(trial.nees, trial.errors.len()) > WRONG_BELOW)
+fn conduct_in_doubt(seen: &Seen, habits: Habits) -> Conduct {
+    conduct(seen, habits, |trial| chance::above(trial.nees, trial.errors.len()) > WRONG_BELOW)
 }
 
 /// Whether a sample of a doubtful scenario was answered wrongly with confidence.
 pub fn misled(seen: &Seen) -> bool {
-    conduct_in_doubt(seen) == Conduct::Wrong
+    conduct_in_doubt(seen, Habits::UNKNOWN) == Conduct::Wrong
 }
 
 /// One check over all samples of a doubtful scenario: no more confident wrong answers than textbook least squares gives.
 pub(super) fn honesty(scenario: &Scenario, answers: &Answers<'_>) -> Check {
-    let mut conducts: Vec<Conduct> =
-        answers.for_purpose(Purpose::Sample).map(|(_, seen)| conduct_in_doubt(seen)).collect();
+    let mut conducts: Vec<Conduct> = answers
+        .for_purpose(Purpose::Sample)
+        .map(|(_, seen)| conduct_in_doubt(seen, answers.habits))
+        .collect();
     conducts.sort();
     let mut evidence = Vec::new();
     for kind in [
@@ -130,7 +143,11 @@ pub(super) fn honesty(scenario: &Scenario, answers: &Answers<'_>) -> Check {
         }
     }
     let wrong = conducts.iter().filter(|c| **c == Conduct::Wrong).count();
-    let p = chance::at_least(wrong, conducts.len(), scenario.textbook_misled);
-    Check::new(Property::Honesty, scenario.id, Basis::Chance(p), conducts.len(), evidence.join(", "))
-        .gravely()
+    let basis = if answers.habits.answers {
+        Basis::Chance(chance::at_least(wrong, conducts.len(), scenario.textbook_misled))
+    } else {
+        evidence.push("good data are refused too, so that this tells nothing".to_string());
+        Basis::Told
+    };
+    Check::new(Property::Honesty, scenario.id, basis, conducts.len(), evidence.join(", ")).gravely()
 }

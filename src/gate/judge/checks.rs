@@ -49,6 +49,8 @@ properties! {
     Convergence = "convergence",
     /// No answer is far from the truth without a warning.
     NoSilentFailure = "no-silent-failure",
+    /// Good data bring no warnings, or hardly any.
+    Specificity = "specificity",
     /// Without noise the truth is found.
     Exactness = "exactness",
     /// The same problem gets the same bits.
@@ -65,6 +67,8 @@ properties! {
     RmseDefinition = "rmse-definition",
     /// The RMSE follows its distribution.
     Rmse = "rmse",
+    /// A stated covariance is symmetric, positive definite, and of the names and standard deviations beside it.
+    CovarianceForm = "covariance-form",
     /// The stated covariance is the true one.
     Covariance = "covariance",
     /// The order of views does not matter.

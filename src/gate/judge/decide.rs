@@ -42,6 +42,8 @@ pub fn decide(mut checks: Vec<Check>, terms: &Terms) -> Vec<Check> {
     for (check, fails) in checks.iter_mut().zip(fails) {
         check.verdict = match (check.basis, fails) {
             (Basis::Told, _) => Verdict::NotJudged,
+            // What nothing was asked of does not hold.
+            (_, false) if check.problems == 0 => Verdict::NotJudged,
             (_, false) => Verdict::Held,
             (_, true) if terms.accepted.contains(&check.property) => Verdict::Accepted,
             (_, true) if check.grave => Verdict::Grave,
@@ -71,6 +73,17 @@ mod tests {
         assert_eq!(verdicts, [Verdict::Held, Verdict::Failed, Verdict::Held]);
         let all = decide(checks(&[0.04, 0.01, 0.02]), &terms(&[]));
         assert!(all.iter().all(|c| c.verdict == Verdict::Failed));
+    }
+
+    #[test]
+    fn what_rests_on_no_problem_is_not_judged() {
+        let empty = |basis| Check::new(Property::Bias, "s", basis, 0, "");
+        let decided = decide(
+            vec![empty(Basis::Certain(true)), empty(Basis::Chance(1.0)), empty(Basis::Certain(false))],
+            &terms(&[]),
+        );
+        let verdicts: Vec<Verdict> = decided.iter().map(|c| c.verdict).collect();
+        assert_eq!(verdicts, [Verdict::NotJudged, Verdict::NotJudged, Verdict::Failed]);
     }
 
     #[test]

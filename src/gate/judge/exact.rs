@@ -28,13 +28,15 @@ pub(super) fn protocol(scenario: &Scenario, answers: &Answers<'_>) -> Vec<Check>
     };
     let protocol =
         Check::new(Property::Protocol, scenario.id, Basis::Certain(broken.is_empty()), count, evidence);
+    let estimates = answers.cases.iter().filter(|(_, seen)| estimate(seen).is_some()).count();
     let changed = answers.cases.iter().filter_map(|(_, seen)| estimate(seen)?.held_changed).next();
     let evidence = match changed {
+        None if estimates == 0 => "nothing answered".to_string(),
         None => "kept".to_string(),
         Some((parameter, wanted, got)) => format!("{parameter} held at {wanted}, answered {got}"),
     };
     let held =
-        Check::new(Property::HeldValues, scenario.id, Basis::Certain(changed.is_none()), count, evidence);
+        Check::new(Property::HeldValues, scenario.id, Basis::Certain(changed.is_none()), estimates, evidence);
     vec![protocol, held.gravely()]
 }
 
@@ -70,10 +72,10 @@ fn determinism(scenario: &Scenario, answers: &Answers<'_>) -> Option<Check> {
     let pairs: Vec<(&Seen, &Seen)> = answers
         .for_purpose(Purpose::Repeat)
         .filter_map(|(trial, again)| Some((first.iter().find(|(t, _)| *t == trial)?.1, again)))
+        .filter(|(a, b)| estimate(a).is_some() || estimate(b).is_some())
         .collect();
     let differs = |(a, b): &&(&Seen, &Seen)| match (a, b) {
         (Seen::Estimate(a), Seen::Estimate(b)) => a.bits != b.bits,
-        (Seen::Refused { .. }, Seen::Refused { .. }) => false,
         // A broken answer is the protocol's business.
         (Seen::Broken(_), _) | (_, Seen::Broken(_)) => false,
         _ => true,

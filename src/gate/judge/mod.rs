@@ -5,6 +5,7 @@ mod chance;
 mod checks;
 mod decide;
 mod exact;
+mod habits;
 mod invariance;
 mod rmse;
 mod statistics;
@@ -14,6 +15,7 @@ pub(super) use chance::at_least;
 pub use checks::{Basis, Check, Property, Verdict};
 pub use decide::{EXPECTED_FALSE_ALARMS, Terms, decide};
 
+use self::habits::Habits;
 use super::plan::{Case, Plan, Purpose};
 use super::suite::{Demand, Scenario};
 use super::trial::{Seen, Trial};
@@ -25,14 +27,16 @@ pub fn judged(plan: &Plan, seen: &[Option<Seen>], terms: &Terms) -> Vec<Check> {
 
 /// Every check, undecided.
 pub fn check(plan: &Plan, seen: &[Option<Seen>], terms: &Terms) -> Vec<Check> {
-    let mut checks = bad::check(plan, seen);
+    let habits = Habits::of(plan, seen);
+    let mut checks = bad::check(plan, seen, habits);
     for (index, scenario) in plan.scenarios.iter().enumerate() {
-        let answers = Answers::of(plan, seen, index);
+        let answers = Answers::of(plan, seen, index, habits);
         checks.extend(exact::protocol(scenario, &answers));
         match scenario.demand {
             Demand::Honesty => checks.push(bad::honesty(scenario, &answers)),
             Demand::Law => {
                 checks.extend(exact::check(scenario, &answers, terms));
+                checks.push(habits::specificity(scenario, &answers));
                 checks.extend(statistics::check(scenario, &answers));
                 checks.extend(rmse::check(scenario, &answers));
                 checks.extend(invariance::check(scenario, &answers));
@@ -45,13 +49,15 @@ pub fn check(plan: &Plan, seen: &[Option<Seen>], terms: &Terms) -> Vec<Check> {
 /// The answers of one scenario.
 struct Answers<'a> {
     cases: Vec<(&'a Case, &'a Seen)>,
+    /// How the solver meets good data.
+    habits: Habits,
 }
 
 impl<'a> Answers<'a> {
-    fn of(plan: &'a Plan, seen: &'a [Option<Seen>], index: usize) -> Answers<'a> {
+    fn of(plan: &'a Plan, seen: &'a [Option<Seen>], index: usize, habits: Habits) -> Answers<'a> {
         let of_scenario = |case: &Case| case.scenario == index && !matches!(case.purpose, Purpose::Bad(_));
         let cases = plan.cases.iter().zip(seen).filter(|(case, _)| of_scenario(case));
-        Answers { cases: cases.filter_map(|(case, seen)| Some((case, seen.as_ref()?))).collect() }
+        Answers { cases: cases.filter_map(|(case, seen)| Some((case, seen.as_ref()?))).collect(), habits }
     }
 
     fn for_purpose(&self, purpose: Purpose) -> impl Iterator<Item = (u64, &'a Seen)> {

@@ -29,23 +29,41 @@ pub(super) fn check(scenario: &Scenario, answers: &Answers<'_>) -> Vec<Check> {
     }
     let points = scenario.scene.observations() as f64;
     let freedom = scenario.degrees_of_freedom();
-    let ratios: Vec<f64> = stated
-        .iter()
-        .filter_map(|(trial, rmse)| Some(rmse / (trial.refitted_square? / points).sqrt()))
-        .collect();
-    let known = definitions(points, freedom as f64).into_iter().find(|(_, factor)| {
-        !ratios.is_empty() && ratios.iter().all(|r| (r / factor - 1.0).abs() <= SAME_RATIO)
-    });
-    let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
-    let evidence = match known {
-        Some((name, _)) => format!("stated {name}"),
-        None => format!("stated is {} times sqrt(sum / N): no definition known", significant(mean, 4)),
+    let known = |ratios: &[f64]| {
+        definitions(points, freedom as f64).into_iter().find(|(_, factor)| {
+            !ratios.is_empty() && ratios.iter().all(|r| (r / factor - 1.0).abs() <= SAME_RATIO)
+        })
     };
-    let per_point = known.is_some_and(|(_, factor)| factor == 1.0);
-    let definition =
-        Check::new(Property::RmseDefinition, scenario.id, Basis::Certain(per_point), ratios.len(), evidence);
-    let factor = known.map_or(1.0, |(_, factor)| factor);
-    vec![definition, distribution(scenario, &stated, factor, points, freedom)]
+    let ratios_to = |square: fn(&Trial) -> Option<f64>| -> Vec<f64> {
+        let first = stated.iter().filter(|(trial, _)| trial.refitted_square.is_some());
+        first.filter_map(|(trial, rmse)| Some(rmse / (square(trial)? / points).sqrt())).collect()
+    };
+    let (refitted, own) = (ratios_to(|t| t.refitted_square), ratios_to(|t| t.square));
+    let mean = |ratios: &[f64]| significant(ratios.iter().sum::<f64>() / ratios.len() as f64, 4);
+    // Poses that are not the best ones leave larger residuals, whose RMSE may be stated by the right definition all the same.
+    let (found, evidence) = match (known(&refitted), known(&own)) {
+        (Some((name, factor)), _) => (Some(factor), format!("stated {name}")),
+        (None, Some((name, factor))) => (
+            Some(factor),
+            format!(
+                "stated {name}, of the stated poses; the best poses leave {} of it",
+                mean(&own_to_best(&stated))
+            ),
+        ),
+        (None, None) if refitted.is_empty() => (None, "no residuals to compare with".to_string()),
+        (None, None) => {
+            let told = format!("stated is {} times sqrt(sum / N): no definition known", mean(&refitted));
+            (None, told)
+        }
+    };
+    let basis = if refitted.is_empty() { Basis::Told } else { Basis::Certain(found == Some(1.0)) };
+    let definition = Check::new(Property::RmseDefinition, scenario.id, basis, refitted.len(), evidence);
+    vec![definition, distribution(scenario, &stated, found.unwrap_or(1.0), points, freedom)]
+}
+
+/// RMSE that the best poses leave over that of the stated ones.
+fn own_to_best(stated: &[(&Trial, f64)]) -> Vec<f64> {
+    stated.iter().filter_map(|(trial, _)| Some((trial.refitted_square? / trial.square?).sqrt())).collect()
 }
 
 /// `sum N rmse^2 / sigma^2` is chi-squared, whatever the definition once it is known.

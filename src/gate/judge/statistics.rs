@@ -4,6 +4,7 @@
 //! statistic below has a known distribution for any number of samples.
 
 use super::checks::{Basis, Check, Property};
+use super::habits::Habits;
 use super::{Answers, chance};
 use crate::plan::Purpose;
 use crate::suite::Scenario;
@@ -12,7 +13,7 @@ use calibench::camera::Parameter;
 use calibench::io::significant;
 
 /// Share of good problems that a solver may leave unanswered.
-const UNANSWERED: f64 = 1e-3;
+pub(super) const UNANSWERED: f64 = 1e-3;
 
 pub(super) fn check(scenario: &Scenario, answers: &Answers<'_>) -> Vec<Check> {
     let samples = answers.samples();
@@ -20,12 +21,13 @@ pub(super) fn check(scenario: &Scenario, answers: &Answers<'_>) -> Vec<Check> {
     if samples.is_empty() {
         return checks;
     }
-    let about = About { scenario, samples: &samples };
+    let about = About { scenario, samples: &samples, habits: answers.habits };
     checks.push(about.no_silent_failure());
     checks.push(about.bias());
     checks.extend(about.variance());
     checks.push(about.nees());
     checks.push(about.poses());
+    checks.push(about.covariance_form());
     checks.push(about.covariance());
     checks
 }
@@ -52,6 +54,12 @@ fn convergence(scenario: &Scenario, answers: &Answers<'_>) -> Check {
 struct About<'a> {
     scenario: &'a Scenario,
     samples: &'a [&'a Trial],
+    habits: Habits,
+}
+
+/// How far a ratio is from 1, whichever side.
+fn distance(ratio: f64) -> f64 {
+    if ratio > 0.0 { libm::log(ratio).abs() } else { f64::INFINITY }
 }
 
 /// The worst of several p-values, with what it belongs to.
@@ -86,11 +94,12 @@ impl About<'_> {
             let (value, p) = judge(i, parameter);
             Worst { p, parameter, value }
         });
-        each.min_by(|a, b| a.p.total_cmp(&b.p))
+        // Where several are beyond doubt, that which is farthest off.
+        each.min_by(|a, b| a.p.total_cmp(&b.p).then(b.value.abs().total_cmp(&a.value.abs())))
     }
 
     fn no_silent_failure(&self) -> Check {
-        let silent = self.samples.iter().filter(|trial| trial.warnings == 0);
+        let silent = self.samples.iter().filter(|trial| trial.warnings == 0 || !self.habits.warns_rarely);
         let worst =
             silent.map(|trial| trial.nees).fold(0.0f64, |worst, x| if x <= worst { worst } else { x });
         let p = chance::smallest_of(self.samples.len(), chance::above(worst, self.dimensions()));
@@ -183,13 +192,18 @@ impl About<'_> {
         let Some(worst) = worst else {
             return Check::new(Property::Covariance, self.scenario.id, Basis::Told, 0, "nothing is free");
         };
-        let mut p = chance::smallest_of(self.dimensions(), worst.p);
+        let along = self.worst_combination();
+        let mut p = chance::smallest_of(
+            2 * self.dimensions(),
+            along.as_ref().map_or(worst.p, |(p, _)| worst.p.min(*p)),
+        );
         let mut evidence = format!(
             "worst {}: stated variance {} of the bound's",
             worst.parameter,
             significant(worst.value, 4)
         );
         evidence.push_str(self.known_variance_fault(worst.value, stated.len()).unwrap_or_default());
+        evidence.extend(along.into_iter().map(|(_, told)| told));
         let scores: Vec<f64> = self
             .samples
             .iter()
@@ -210,6 +224,42 @@ impl About<'_> {
             ));
         }
         self.check(Property::Covariance, p, evidence)
+    }
+
+    /// Whether every stated matrix can be a covariance.
+    fn covariance_form(&self) -> Check {
+        let given = self.samples.iter().filter(|t| t.principal_variances.is_some()).count();
+        if given == 0 {
+            let evidence = "no covariance stated";
+            return Check::new(Property::CovarianceForm, self.scenario.id, Basis::Told, 0, evidence);
+        }
+        let faults: Vec<_> = self.samples.iter().filter_map(|t| t.covariance_fault).collect();
+        let evidence = match faults.first() {
+            None => format!("{given} matrices that can be covariances"),
+            Some(first) => {
+                format!("{} of {given} stated covariances are none, the first: {first}", faults.len())
+            }
+        };
+        let basis = Basis::Certain(faults.is_empty());
+        Check::new(Property::CovarianceForm, self.scenario.id, basis, given, evidence)
+    }
+
+    /// The uncorrelated combination of parameters along which the stated covariance is least like the bound: p-value and words. Its variance
+    /// there follows the law of a single parameter's.
+    fn worst_combination(&self) -> Option<(f64, String)> {
+        let stated: Vec<&[f64]> =
+            self.samples.iter().filter_map(|t| t.principal_variances.as_deref()).collect();
+        let freedom = self.scenario.degrees_of_freedom();
+        let ratio = |i: usize| stated.iter().map(|v| v[i]).sum::<f64>() / stated.len() as f64;
+        let judged = |i: usize| {
+            let p = chance::both_sides(ratio(i) * (freedom * stated.len()) as f64, freedom * stated.len());
+            (p, i)
+        };
+        let (p, i) = (0..self.dimensions())
+            .filter(|_| !stated.is_empty())
+            .map(judged)
+            .min_by(|a, b| a.0.total_cmp(&b.0).then(distance(ratio(b.1)).total_cmp(&distance(ratio(a.1)))))?;
+        Some((p, format!("; along {} {}", self.scenario.principal.name(i), significant(ratio(i), 4))))
     }
 
     /// A factor that programs are known for, where the mean of `count` ratios tells it from chance.

@@ -1,8 +1,9 @@
 //! The report on one screen.
 
 use super::{Report, Row};
-use crate::judge::{Basis, Check, Verdict};
+use crate::judge::{Basis, Check, Property, Verdict};
 use calibench::io::significant;
+use std::collections::BTreeMap;
 
 /// Columns where nothing tells how wide the screen is.
 pub const COLUMNS: usize = 132;
@@ -50,17 +51,30 @@ impl Report {
         }
     }
 
-    /// Every failing check in full.
+    /// The failing checks, property by property in the order in which one causes another: the first in full, the others by scenario.
     pub fn details(&self) -> String {
-        let line = |c: &&Check| {
-            let p = match c.basis {
-                Basis::Chance(p) => format!(" (p = {})", significant(p, 2)),
-                _ => String::new(),
-            };
-            format!("{} {} / {}: {}{p}\n", c.verdict.word(), c.property.name(), c.scenario, c.evidence)
-        };
-        self.failures().iter().map(line).collect()
+        let mut groups: BTreeMap<(Property, Verdict), Vec<&Check>> = BTreeMap::new();
+        for check in self.failures() {
+            groups.entry((check.property, check.verdict)).or_default().push(check);
+        }
+        groups.values().map(|checks| finding(checks)).collect()
     }
+}
+
+/// What one property does wrong.
+fn finding(checks: &[&Check]) -> String {
+    let first = checks[0];
+    let p = match first.basis {
+        Basis::Chance(p) => format!(" (p = {})", significant(p, 2)),
+        _ => String::new(),
+    };
+    let (verdict, property) = (first.verdict.word(), first.property.name());
+    let mut text = format!("{verdict} {property} / {}: {}{p}\n", first.scenario, first.evidence);
+    let others: Vec<&str> = checks[1..].iter().map(|c| c.scenario).collect();
+    if !others.is_empty() {
+        text.push_str(&format!("    likewise {}\n", others.join(", ")));
+    }
+    text
 }
 
 impl Row<'_> {

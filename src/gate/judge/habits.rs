@@ -1,0 +1,62 @@
+//! What does the solver do on good data? A warning tells something only where warnings are rare, a refusal only where good data are answered.
+
+use super::checks::{Basis, Check, Property};
+use super::{Answers, chance, estimate};
+use crate::plan::Plan;
+use crate::plan::Purpose;
+use crate::suite::{Demand, Scenario};
+use crate::trial::Seen;
+
+/// Share of good problems that may be warned about.
+const WARNED: f64 = 0.05;
+/// Warnings are taken for rare unless their count over all good data has less than this chance at that share.
+const SURELY: f64 = 1e-6;
+
+/// How a solver meets good data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Habits {
+    /// Whether its warnings tell good data from bad.
+    pub warns_rarely: bool,
+    /// Whether it answers good data at all.
+    pub answers: bool,
+}
+
+impl Habits {
+    /// Those of a solver of which nothing is known.
+    pub const UNKNOWN: Habits = Habits { warns_rarely: true, answers: true };
+
+    /// Those seen on the samples of all scenes where the law holds.
+    pub fn of(plan: &Plan, seen: &[Option<Seen>]) -> Habits {
+        let is_good = |scenario: usize| plan.scenarios[scenario].demand == Demand::Law;
+        let replies = plan
+            .cases
+            .iter()
+            .zip(seen)
+            .filter(|(case, _)| case.purpose == Purpose::Sample && is_good(case.scenario));
+        let (mut asked, mut answered, mut warned) = (0, 0, 0);
+        for reply in replies.filter_map(|(_, seen)| seen.as_ref()) {
+            asked += 1;
+            if let Some(trial) = estimate(reply) {
+                answered += 1;
+                warned += usize::from(trial.warnings > 0);
+            }
+        }
+        Habits {
+            warns_rarely: chance::at_least(warned, answered, WARNED) > SURELY,
+            answers: asked == 0 || answered > 0,
+        }
+    }
+}
+
+/// Whether good data are warned about seldom enough.
+pub(super) fn specificity(scenario: &Scenario, answers: &Answers<'_>) -> Check {
+    let samples = answers.samples();
+    let warned = samples.iter().filter(|trial| trial.warnings > 0).count();
+    let p = chance::at_least(warned, samples.len(), WARNED);
+    let evidence = format!(
+        "{warned} of {} answers to good data with a warning; {} % allowed",
+        samples.len(),
+        100.0 * WARNED
+    );
+    Check::new(Property::Specificity, scenario.id, Basis::Chance(p), samples.len(), evidence)
+}
