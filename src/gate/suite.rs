@@ -182,6 +182,46 @@ fn lawful() -> Vec<Draft> {
             free: FreeParameters::of(&[Fx, Fy, K1]),
             ..chapter_draft("held", "principal point and k2 held at known values")
         },
+        Draft {
+            camera: Camera {
+                skew: 1.5,
+                ..base.with_distortion(BrownConrady { k3: -0.03, ..lens(-0.18, 0.05, 0.0, 0.0) })
+            },
+            free: FreeParameters::STANDARD.with(Parameter::Skew).with(Parameter::K3),
+            poses: ring(8, 30.0, 12.0, 126.0),
+            ..chapter_draft("skew-and-k3", "skewed axes and a third radial coefficient, both free")
+        },
+        Draft {
+            poses: ring(8, 52.0, 8.0, 150.0)
+                .into_iter()
+                .enumerate()
+                .map(|(i, [x, y, _, across, down, distance])| [x, y, 45.0 * i as f64, across, down, distance])
+                .collect(),
+            ..chapter_draft("steep", "targets tilted by 52 degrees and rolled all the way round")
+        },
+        Draft {
+            camera: base.with_distortion(lens(0.12, 0.04, 0.0, 0.0)),
+            poses: ring(6, 25.0, 10.0, 136.0),
+            ..chapter_draft("pincushion", "magnification that grows towards the corners")
+        },
+        Draft {
+            camera: Camera::pinhole(5000.0, 5000.0, 654.0, 470.0)
+                .with_distortion(BrownConrady::radial(-0.3, 0.0)),
+            image_size: (1280, 960),
+            poses: ring(12, 45.0, 8.0, 700.0),
+            free: FreeParameters::of(&[Fx, Fy, Cx, Cy, K1]),
+            ..chapter_draft("telephoto", "a focal length of four image widths")
+        },
+        Draft {
+            poses: vec![[25.0, 12.0, 0.0, 3.0, 0.0, 115.0], [-18.0, 24.0, 8.0, 0.0, -3.0, 120.0]],
+            ..chapter_draft("two-views", "as few views as determine the camera")
+        },
+        Draft { board: (28, 20, 3.0), ..chapter_draft("many-marks", "560 points a view") },
+        Draft {
+            board: (5, 4, 20.0),
+            poses: ring(32, 30.0, 14.0, 140.0),
+            ..chapter_draft("thirty-two-views", "more views than most programs are tried on")
+        },
     ]
 }
 

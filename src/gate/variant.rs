@@ -72,18 +72,29 @@ impl Variant {
                 let (du, dv) = (SHIFT_PX.0 as f64, SHIFT_PX.1 as f64);
                 Camera { cx: camera.cx - du, cy: camera.cy - dv, ..*camera }
             }
-            Variant::SwappedAxes => {
-                let lens = &camera.distortion;
-                Camera {
-                    fx: camera.fy,
-                    fy: camera.fx,
-                    cx: camera.cy,
-                    cy: camera.cx,
-                    skew: camera.skew,
-                    distortion: BrownConrady { p1: lens.p2, p2: lens.p1, ..*lens },
-                }
-            }
+            Variant::SwappedAxes => with_axes_swapped(camera),
         }
+    }
+}
+
+/// The camera that sees `(v, u)` where this one sees `(u, v)`: with the rows of its matrix exchanged, made triangular again by a rotation about the
+/// optical axis, `[[0, fy'], [fx', s']] = [[fx, s], [0, fy]] Q`. Radial distortion does not know of `Q`; the vector `(p2, p1)` of the tangential terms
+/// turns with it. Without skew parameters are exchanged, no more.
+fn with_axes_swapped(camera: &Camera) -> Camera {
+    let fy = libm::hypot(camera.fx, camera.skew);
+    let (sine, cosine) = (camera.skew / fy, camera.fx / fy);
+    let lens = &camera.distortion;
+    Camera {
+        fx: camera.fy * cosine,
+        fy,
+        cx: camera.cy,
+        cy: camera.cx,
+        skew: camera.fy * sine,
+        distortion: BrownConrady {
+            p1: cosine * lens.p2 + sine * lens.p1,
+            p2: cosine * lens.p1 - sine * lens.p2,
+            ..*lens
+        },
     }
 }
 
@@ -116,4 +127,27 @@ fn swap(problem: &mut Problem) {
     }
     problem.free.iter_mut().for_each(|name| *name = partner(name));
     problem.held = problem.held.iter().map(|(name, value)| (partner(name), *value)).collect();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use calibench::geometry::Vec3;
+
+    #[test]
+    fn a_skewed_camera_with_its_axes_swapped_sees_the_same_points() {
+        let lens = BrownConrady { k1: -0.2, k2: 0.05, p1: 0.003, p2: -0.002, k3: 0.01 };
+        let camera =
+            Camera { skew: 40.0, ..Camera::pinhole(600.0, 450.0, 320.0, 250.0).with_distortion(lens) };
+        let swapped = with_axes_swapped(&camera);
+        // Points before the other camera are mirrored, and turned by Q.
+        let (sine, cosine) = (camera.skew / swapped.fy, camera.fx / swapped.fy);
+        for (x, y) in [(0.3, 0.1), (-0.2, 0.25), (0.05, -0.3)] {
+            let seen = camera.project(&Vec3::new(x, y, 1.0)).unwrap();
+            let turned = Vec3::new(cosine * y - sine * x, cosine * x + sine * y, 1.0);
+            let other = swapped.project(&turned).unwrap();
+            assert!((seen.yx() - other).norm() < 1e-10, "{seen} {other}");
+        }
+        assert!((with_axes_swapped(&swapped).skew - camera.skew).abs() < 1e-10);
+    }
 }
