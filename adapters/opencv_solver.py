@@ -18,11 +18,15 @@ ORDER = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"]
 CRITERIA = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, np.finfo(float).eps)
 
 
+class Unsupported(ValueError):
+    """OpenCV is not made for this problem."""
+
+
 def flags_and_guess(problem, views):
     """The flags that hold what must be held, and a starting matrix where values are not OpenCV's defaults."""
     free, held = set(problem["free"]), problem["held"]
     if "skew" in free or held.get("skew", 0.0) != 0.0:
-        raise ValueError("OpenCV's camera has no skew")
+        raise Unsupported("OpenCV's camera has no skew")
     flags = 0
     for name, flag in [("k1", cv2.CALIB_FIX_K1), ("k2", cv2.CALIB_FIX_K2), ("k3", cv2.CALIB_FIX_K3)]:
         if name not in free:
@@ -32,11 +36,11 @@ def flags_and_guess(problem, views):
         if held.get("p1", 0.0) == held.get("p2", 0.0) == 0.0:
             flags = flags & ~cv2.CALIB_FIX_TANGENT_DIST | cv2.CALIB_ZERO_TANGENT_DIST
     elif "p1" not in free or "p2" not in free:
-        raise ValueError("OpenCV holds p1 and p2 only together")
+        raise Unsupported("OpenCV holds p1 and p2 only together")
     if ("fx" in free) != ("fy" in free):
-        raise ValueError("OpenCV holds fx and fy only together")
+        raise Unsupported("OpenCV holds fx and fy only together")
     if ("cx" in free) != ("cy" in free):
-        raise ValueError("OpenCV holds cx and cy only together")
+        raise Unsupported("OpenCV holds cx and cy only together")
     if "fx" not in free:
         flags |= cv2.CALIB_FIX_FOCAL_LENGTH
     if "cx" not in free:
@@ -81,7 +85,8 @@ def answer(problem):
     try:
         return {"id": problem["id"]} | solve(problem)
     except (cv2.error, ValueError) as error:
-        return {"id": problem["id"], "status": "refused", "message": str(error).strip().split("\n")[0]}
+        status = "unsupported" if isinstance(error, Unsupported) else "refused"
+        return {"id": problem["id"], "status": status, "message": str(error).strip().split("\n")[0]}
 
 
 def main():

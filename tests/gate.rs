@@ -5,7 +5,7 @@ use calibench_gate::accept::{Breakage, Outcome};
 use calibench_gate::faults::{Faulty, planted};
 use calibench_gate::plan::Purpose;
 use calibench_gate::power::Measured;
-use calibench_gate::protocol::{Problem, schemas};
+use calibench_gate::protocol::{Answer, Problem, Status, schemas};
 use calibench_gate::{Builtin, Plan, Process, Property, Report, Solver, Terms, Verdict, run};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -333,4 +333,26 @@ fn a_change_of_what_is_stated_is_a_change() {
         text.lines().any(|l| l.starts_with("four-pose") && l.contains(" 2.000 ") && l.contains("MOVED")),
         "{text}"
     );
+}
+
+#[test]
+fn what_is_not_supported_is_named_and_not_judged_but_not_everything_can_be() {
+    struct Without(&'static str);
+    impl Solver for Without {
+        fn name(&self) -> String {
+            "a solver".into()
+        }
+        fn ask(&self, problem: &Problem) -> Result<Answer, Breakage> {
+            let unknown = problem.free.iter().any(|name| name == self.0);
+            let unsupported = || Answer::without_estimate(&problem.id, Status::Unsupported, "not known here");
+            if unknown { Ok(unsupported()) } else { Builtin.ask(problem) }
+        }
+    }
+    let plan = Plan::new(1, 16).expect("a plan");
+    let report = |name| Report::new(&plan, "", &run(&plan, &Without(name), &|_| ()), &Terms::default(), 0.0);
+    let skewless = report("skew");
+    assert!(skewless.held(), "{}", skewless.details());
+    assert!(skewless.conclusion().contains("not supported: skew-and-k3"), "{}", skewless.conclusion());
+    // fx is free in all good scenes.
+    assert!(!report("fx").held());
 }

@@ -160,7 +160,7 @@ fn judge(family: &Family, drawn: &Drawn, outcome: &Outcome) -> Option<Line> {
         .and_then(|bound| bound.standard_deviation(Parameter::Fx))
         .map_or(f64::INFINITY, |sd| sd / truth.camera.fx);
     let (ending, excess, fx) = match outcome {
-        Outcome::Refused(_) => (Ending::Refused, 0.0, 0.0),
+        Outcome::Refused(_) | Outcome::Unsupported(_) => (Ending::Refused, 0.0, 0.0),
         Outcome::Broken(_) => (Ending::Broken, 0.0, 0.0),
         Outcome::Estimate(estimate) => {
             let cost =

@@ -35,6 +35,8 @@ pub enum Outcome {
     Estimate(Box<Estimate>),
     /// The solver gave no estimate and said so.
     Refused(String),
+    /// The solver is not made for problems of this kind, and said so.
+    Unsupported(String),
     /// No answer, or one that breaks the protocol.
     Broken(Breakage),
 }
@@ -159,6 +161,9 @@ pub fn accept(problem: &Problem, answer: Answer) -> Outcome {
     match answer.status {
         Status::Ok => {
             estimate(problem, answer).map_or_else(Outcome::Broken, |e| Outcome::Estimate(Box::new(e)))
+        }
+        Status::Unsupported => {
+            Outcome::Unsupported(answer.message.unwrap_or_else(|| "no reason given".into()))
         }
         Status::Refused => Outcome::Refused(answer.message.unwrap_or_else(|| "refused".into())),
         Status::NotConverged => {

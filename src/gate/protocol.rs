@@ -45,6 +45,8 @@ pub enum Status {
     Refused,
     /// The search did not end in a minimum.
     NotConverged,
+    /// The program does not know a parameter that is free or held, or cannot hold it: no problem of that kind is judged.
+    Unsupported,
 }
 
 /// The answer to a problem: a line on the solver's standard output.

@@ -24,6 +24,8 @@ pub enum Seen {
         /// Time it took, s.
         seconds: f64,
     },
+    /// The solver is not made for problems of this kind.
+    Unsupported(String),
     /// The protocol was broken.
     Broken(Breakage),
 }
@@ -75,6 +77,7 @@ pub fn reduce(plan: &Plan, case: &Case, problem: &Problem, reply: Reply) -> Seen
     match outcome {
         Outcome::Broken(breakage) => Seen::Broken(breakage),
         Outcome::Refused(reason) => Seen::Refused { reason, seconds },
+        Outcome::Unsupported(reason) => Seen::Unsupported(reason),
         Outcome::Estimate(estimate) => {
             let scenario = &plan.scenarios[case.scenario];
             Seen::Estimate(Box::new(match case.purpose {

@@ -64,6 +64,7 @@ pub fn measure(problems: &[ReferenceProblem], solver: &dyn Solver) -> Vec<Result
             None => Ok(Digits::of(&estimate, &problem.reference.certified)),
         },
         Outcome::Refused(why) => Err(format!("refused: {why}")),
+        Outcome::Unsupported(why) => Err(format!("not supported: {why}")),
         Outcome::Broken(why) => Err(format!("no answer: {why}")),
     };
     solver.ask_all(&asked).into_iter().zip(problems).map(of_reply).collect()

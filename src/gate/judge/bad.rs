@@ -92,7 +92,7 @@ fn wrong(trial: &Trial, case: &BadCase) -> String {
 fn conduct(seen: &Seen, habits: Habits, right: impl Fn(&Trial) -> bool) -> Conduct {
     match seen {
         Seen::Broken(_) => Conduct::Broken,
-        Seen::Refused { .. } => Conduct::Refused,
+        Seen::Refused { .. } | Seen::Unsupported(_) => Conduct::Refused,
         Seen::Estimate(trial) if is_flagged(trial, habits) => Conduct::Flagged,
         Seen::Estimate(trial) if admits(trial) => Conduct::Admitted,
         Seen::Estimate(trial) if right(trial) => Conduct::Right,

@@ -92,7 +92,7 @@ fn time(scenario: &Scenario, answers: &Answers<'_>, limit_s: Option<f64>) -> Opt
         .filter_map(|(_, seen)| match seen {
             Seen::Estimate(trial) => Some(1e3 * trial.seconds),
             Seen::Refused { seconds, .. } => Some(1e3 * seconds),
-            Seen::Broken(_) => None,
+            Seen::Unsupported(_) | Seen::Broken(_) => None,
         })
         .collect();
     milliseconds.sort_by(f64::total_cmp);

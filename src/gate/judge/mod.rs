@@ -31,6 +31,11 @@ pub fn check(plan: &Plan, seen: &[Option<Seen>], terms: &Terms) -> Vec<Check> {
     let mut checks = bad::check(plan, seen, habits);
     for (index, scenario) in plan.scenarios.iter().enumerate() {
         let answers = Answers::of(plan, seen, index, habits);
+        if let Some(reason) = answers.unsupported().filter(|_| habits.answers) {
+            let evidence = format!("not supported: {reason}");
+            checks.push(Check::new(Property::Convergence, scenario.id, Basis::Told, 0, evidence));
+            continue;
+        }
         checks.extend(exact::protocol(scenario, &answers));
         match scenario.demand {
             Demand::Honesty => checks.push(bad::honesty(scenario, &answers)),
@@ -65,6 +70,15 @@ impl<'a> Answers<'a> {
             .iter()
             .filter(move |(case, _)| case.purpose == purpose)
             .map(|&(case, seen)| (case.trial, seen))
+    }
+
+    /// Why the solver says that it is not made for this scene, if it says so of every problem: of some only is no reason.
+    fn unsupported(&self) -> Option<&'a str> {
+        let reasons = self.cases.iter().map(|(_, seen)| match seen {
+            Seen::Unsupported(reason) => Some(reason.as_str()),
+            _ => None,
+        });
+        reasons.collect::<Option<Vec<&str>>>()?.first().copied()
     }
 
     /// The estimates of samples, in order.

@@ -37,7 +37,7 @@ fn convergence(scenario: &Scenario, answers: &Answers<'_>) -> Check {
     let (mut asked, mut refused) = (0, 0);
     for (_, seen) in answers.for_purpose(Purpose::Sample) {
         asked += 1;
-        if let Seen::Refused { reason, .. } = seen {
+        if let Seen::Refused { reason, .. } | Seen::Unsupported(reason) = seen {
             refused += 1;
             first.get_or_insert(reason);
         }

@@ -47,8 +47,19 @@ impl Report {
                 let fail = if failures.len() == 1 { "check fails" } else { "checks fail" };
                 format!("NOT TRUSTED: {} {fail}, {grave} gravely; {rate}", failures.len())
             }
-            _ => format!("TRUSTED: every check that could be judged holds{accepted}; {rate}"),
+            _ => format!(
+                "TRUSTED: every check that could be judged holds{accepted}{}; {rate}",
+                self.unsupported()
+            ),
         }
+    }
+
+    /// The scenes for which the solver is not made.
+    fn unsupported(&self) -> String {
+        let is_unsupported =
+            |c: &&Check| c.property == Property::Convergence && c.verdict == Verdict::NotJudged;
+        let scenes: Vec<&str> = self.checks.iter().filter(is_unsupported).map(|c| c.scenario).collect();
+        if scenes.is_empty() { String::new() } else { format!(", but not supported: {}", scenes.join(", ")) }
     }
 
     /// The failing checks, property by property in the order in which one causes another: the first in full, the others by scenario.
