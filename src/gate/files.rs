@@ -114,7 +114,7 @@ fn truth_lines(plan: &Plan) -> String {
                 serde_json::json!({"rotation": rows, "translation": pose.translation.as_slice()})
             })
             .collect();
-        serde_json::json!({"id": plan.id(case), "parameters": parameters, "poses": poses}).to_string()
+        serde_json::json!({"id": plan.id(case), "case": plan.name(case), "parameters": parameters, "poses": poses}).to_string()
     });
     joined(lines.collect())
 }

@@ -7,7 +7,7 @@ use super::variant::Variant;
 use calibench::board::View;
 use calibench::camera::Parameter;
 use calibench::geometry::Vec2;
-use calibench::synth::{SceneError, Stream, StreamKey};
+use calibench::synth::{SceneError, Stream, StreamKey, fnv1a};
 
 /// What a problem is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,7 +97,7 @@ impl Plan {
     pub fn problem(&self, case: &Case) -> Problem {
         let scenario = &self.scenarios[case.scenario];
         match case.purpose {
-            Purpose::Bad(index) => self.bad[index].problem.clone(),
+            Purpose::Bad(index) => Problem { id: self.id(case), ..self.bad[index].problem.clone() },
             Purpose::Exact => problem_of(scenario, &scenario.scene.exact(), self.id(case)),
             Purpose::Sample | Purpose::Repeat => {
                 problem_of(scenario, &self.observe(scenario, case.trial), self.id(case))
@@ -109,8 +109,16 @@ impl Plan {
         }
     }
 
-    /// The id of a case's problem.
+    /// The id of a case's problem: a number that tells a solver nothing of what it is asked for.
     pub fn id(&self, case: &Case) -> String {
+        let name = self.name(case);
+        let hash = fnv1a(self.seed.to_le_bytes().into_iter().chain(name.bytes()));
+        // The last letters of a name move the low bits of its hash only: neighbours would be told by their common beginning.
+        format!("{:016x}", (hash ^ (hash >> 32)).wrapping_mul(0x9e37_79b9_7f4a_7c15))
+    }
+
+    /// What a case is, for people: scenario, purpose and trial.
+    pub fn name(&self, case: &Case) -> String {
         let scenario = self.scenarios[case.scenario].id;
         match case.purpose {
             Purpose::Bad(index) => self.bad[index].id.to_string(),
@@ -179,5 +187,23 @@ fn problem_of(scenario: &Scenario, views: &[View], id: String) -> Problem {
             .collect(),
         free: scenario.free.iter().map(|p| p.name().to_string()).collect(),
         held: held.map(|p| (p.name().to_string(), truth.camera.get(p))).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn ids_are_different_and_tell_nothing() {
+        let plan = Plan::new(1, 40).unwrap();
+        let ids: BTreeSet<String> = plan.cases.iter().map(|case| plan.id(case)).collect();
+        assert_eq!(ids.len(), plan.cases.len());
+        assert!(ids.iter().all(|id| id.len() == 16 && id.bytes().all(|b| b.is_ascii_hexdigit())));
+        // Samples 10 and 11 of a scene share no beginning, but by chance.
+        let of = |trial| plan.id(&Case { scenario: 0, purpose: Purpose::Sample, trial });
+        assert_ne!(of(10)[..6], of(11)[..6]);
+        assert_ne!(Plan::new(2, 40).unwrap().id(&plan.cases[0]), plan.id(&plan.cases[0]));
     }
 }
