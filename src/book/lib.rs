@@ -23,6 +23,7 @@
 //! | `ref eq:projection` | `equation (1.1)`, `Figure 2.1`, `Table 3.2` |
 //! | `contradiction two-views` | a statement of the chapter that does not hold, declared where the text says so |
 //! | `all-contradictions` | all of them, with links to where they are declared |
+//! | `item-counts`, `all-items` | every item of the chapter and what became of it |
 //! | `published-counts` | how many published values hold, by kind of verdict |
 //! | `all-published`, `all-references` | the appendix, the list of references |
 //!
@@ -37,6 +38,7 @@ mod finding;
 mod format;
 mod golden_file;
 mod html;
+mod items;
 mod labels;
 mod layout;
 mod links;
@@ -56,6 +58,7 @@ pub use compile::{Compiled, compile};
 pub use contradictions::Contradiction;
 pub use evidence::{Evidence, ExperimentEvidence};
 pub use finding::Finding;
+pub use items::Item;
 pub use page::CompiledPage;
 pub use render::{BookError, build, index_of};
 pub use sources::{Page, Sources};

@@ -7,9 +7,9 @@ use super::finding::Finding;
 use super::golden_file::{GoldenFigure, GoldenFile, GoldenNumber};
 use super::labels::Labels;
 use super::scan::{Kind, scan};
-use super::sources::{CONTRADICTIONS, REFERENCES, Sources};
+use super::sources::{CONTRADICTIONS, ITEMS, REFERENCES, Sources};
 use super::text::{attribute, escape, inline, sentence};
-use super::{appendix, contradictions, format, listing, references};
+use super::{appendix, contradictions, format, items, listing, references};
 use calibench::io::hash::sha256_hex;
 use calibench_harness::published::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -63,6 +63,8 @@ impl<'a> Resolver<'a> {
             ["ref", label] => self.refer(label, begins_sentence),
             ["contradiction", id] => self.contradiction(id),
             ["all-contradictions"] => self.contradictions(),
+            ["item-counts"] => Ok(items::counts(&self.sources.items)),
+            ["all-items"] => self.items(),
             ["published-counts"] => Ok(appendix::published_counts(self.sources)),
             ["all-published"] => Ok(appendix::published_table(self.sources)),
             ["all-records"] => Ok(appendix::record_list(self.sources)),
@@ -245,6 +247,39 @@ impl<'a> Resolver<'a> {
         Ok(contradictions::table(&rows))
     }
 
+    fn items(&mut self) -> Resolved {
+        let mut rows = String::new();
+        for item in &self.sources.items {
+            let shown: Result<Vec<String>, String> = item.places.iter().map(|p| self.place(p)).collect();
+            let shown = shown.map_err(|e| format!("line {} of {ITEMS}: {e}", item.line))?;
+            rows.push_str(&items::row(item, &shown.join(", ")));
+        }
+        Ok(items::table(&rows))
+    }
+
+    /// A link to what shows an item of the chapter.
+    fn place(&mut self, place: &str) -> Resolved {
+        let (kind, name) = place.split_once(' ').ok_or_else(|| format!("`{place}` is no place"))?;
+        match kind {
+            "claim" => self.claim(name),
+            "published" => self.published(name),
+            "figure" => self.refer(&format!("fig:{name}"), true),
+            "cite" => self.cite(name, false),
+            "contradiction" => {
+                let page =
+                    self.declared.get(name).ok_or_else(|| format!("`{name}` is not declared above"))?;
+                Ok(format!("<a href=\"{page}#contradiction-{name}\">Against the chapter</a>"))
+            }
+            "page" => {
+                let file = name.split('#').next().unwrap_or(name);
+                let page = self.sources.pages.iter().find(|page| page.path == file);
+                let page = page.ok_or_else(|| format!("there is no page `{file}`"))?;
+                Ok(format!("<a href=\"{name}\">{}</a>", inline(&page.title)))
+            }
+            _ => Err(format!("`{kind}` is no kind of place")),
+        }
+    }
+
     /// Plain text with placeholders, resolved.
     fn within(&mut self, text: &str) -> Resolved {
         let pieces = scan(text);
@@ -266,18 +301,23 @@ impl<'a> Resolver<'a> {
                 shown.push(self.cite(key, false)?);
                 continue;
             }
-            let (experiment, claim) = split(evidence)?;
-            let (found, golden) = self.golden(experiment)?;
-            if !golden.claims.iter().any(|c| c == claim) {
-                return Err(format!("experiment `{experiment}` has no claim `{claim}`"));
-            }
-            if found.record.as_ref().is_some_and(|r| r.claims.iter().any(|c| c.id == claim && !c.held)) {
-                return Err(format!("claim `{evidence}`, which shows `{}`, fails", entry.id));
-            }
-            let page = appendix::page_of(experiment);
-            shown.push(format!("<a href=\"{page}#claim-{claim}\"><code>{}</code></a>", inline(evidence)));
+            shown.push(self.claim(evidence).map_err(|e| format!("{e}, and is to show `{}`", entry.id))?);
         }
         Ok(shown.join(", "))
+    }
+
+    /// A link to a claim, `<experiment>.<claim>`, which must be there and hold.
+    fn claim(&self, id: &str) -> Resolved {
+        let (experiment, claim) = split(id)?;
+        let (found, golden) = self.golden(experiment)?;
+        if !golden.claims.iter().any(|c| c == claim) {
+            return Err(format!("experiment `{experiment}` has no claim `{claim}`"));
+        }
+        if found.record.as_ref().is_some_and(|r| r.claims.iter().any(|c| c.id == claim && !c.held)) {
+            return Err(format!("claim `{id}` fails"));
+        }
+        let page = appendix::page_of(experiment);
+        Ok(format!("<a href=\"{page}#claim-{claim}\"><code>{}</code></a>", inline(id)))
     }
 
     /// Names that nothing uses: references, labels, contradictions that no page declares, figures that are drawn for nobody.

@@ -3,6 +3,7 @@
 use super::contradictions::{self, Contradiction};
 use super::evidence::Evidence;
 use super::finding::Finding;
+use super::items::{self, Item};
 use super::references::{self, Reference};
 use super::summary;
 use calibench_harness::project::Project;
@@ -16,6 +17,9 @@ pub(super) const REFERENCES: &str = "book/references.toml";
 
 /// Where the chapter is contradicted, relative to the project.
 pub(super) const CONTRADICTIONS: &str = "book/contradictions.toml";
+
+/// Every item of the chapter, relative to the project.
+pub(super) const ITEMS: &str = "book/items.toml";
 
 /// A page as it is written.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -39,6 +43,8 @@ pub struct Sources {
     pub references: Vec<Reference>,
     /// Where the chapter is contradicted.
     pub contradictions: Vec<Contradiction>,
+    /// Every item of the chapter, and what became of it.
+    pub items: Vec<Item>,
     /// The chapter's published values.
     pub published: Vec<Entry>,
     /// What the experiments say.
@@ -65,11 +71,12 @@ impl Sources {
         }
         let references = read(project, REFERENCES, references::parse)?;
         let contradictions = read(project, CONTRADICTIONS, contradictions::parse)?;
+        let items = read(project, ITEMS, items::parse)?;
         let published =
             published::chapter().map_err(|e| Finding::new("golden/published.toml", 1, e.to_string()))?;
         let published = published.to_vec();
         let project = project.clone();
-        Ok(Sources { pages, references, contradictions, published, evidence, project })
+        Ok(Sources { pages, references, contradictions, items, published, evidence, project })
     }
 }
 
