@@ -105,7 +105,7 @@ impl MonteCarlo<'_> {
 fn refusal(error: &CalibrationError) -> String {
     match error {
         CalibrationError::NotIdentifiable { inseparable, .. } => {
-            let mut names = inseparable.clone();
+            let mut names: Vec<&str> = inseparable.iter().map(|unknown| unknown.name()).collect();
             names.sort();
             format!("refused: cannot separate {}", names.join(", "))
         }

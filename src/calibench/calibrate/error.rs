@@ -1,6 +1,6 @@
 //! Why can no camera be estimated from these data?
 
-use super::ClosedFormError;
+use super::{ClosedFormError, Unknown, unknown};
 use crate::camera::Parameter;
 use crate::geometry::HomographyError;
 
@@ -93,11 +93,12 @@ pub enum CalibrationError {
     /// The data do not tell the free parameters apart.
     #[error(
         "the data cannot separate {}: {why}. Tilt the target by 20 degrees or more, about different axes, in some views, or \
-         give one of them a value to be held at", inseparable.join(" and ")
+         give one of them a value to be held at",
+        unknown::joined(inseparable)
     )]
     NotIdentifiable {
-        /// The parameters that trade off against each other, strongest first.
-        inseparable: Vec<String>,
+        /// What trades off against each other, strongest first.
+        inseparable: Vec<Unknown>,
         /// What in the data makes it so.
         why: String,
     },

@@ -11,8 +11,8 @@ use super::search::{self, Evidence, Judged};
 use super::start::Held;
 use super::target_frame::TargetFrames;
 use super::{
-    Calibration, CalibrationError, Loss, Settings, Termination, Warning, chunks, identifiability, kernel,
-    polish, start, strays, structure, warnings,
+    Calibration, CalibrationError, Loss, Settings, Termination, Unknown, Warning, chunks, identifiability,
+    kernel, polish, start, strays, structure, warnings,
 };
 use crate::board::View;
 use crate::camera::Parameter;
@@ -204,7 +204,7 @@ fn report(
         .unwrap_or_default();
     let unit = reduction.and_then(|reduction| reduction.covariance()).ok_or_else(|| {
         CalibrationError::NotIdentifiable {
-            inseparable: vec!["camera".into(), "poses".into()],
+            inseparable: vec![Unknown::Camera, Unknown::Poses],
             why: "the normal equations are singular".into(),
         }
     })?;

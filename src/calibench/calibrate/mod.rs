@@ -35,6 +35,7 @@ mod system;
 mod target_frame;
 mod termination;
 mod tilt;
+mod unknown;
 mod walk;
 mod warnings;
 
@@ -51,3 +52,4 @@ pub use report::{Calibration, Warning};
 pub use settings::Settings;
 pub use system::System;
 pub use termination::Termination;
+pub use unknown::Unknown;

@@ -199,7 +199,7 @@ impl CalibrationFields {
             weakest_direction: calibration
                 .conditioning
                 .iter()
-                .flat_map(|c| c.weakest.iter().map(|m| (m.name.clone(), m.weight)))
+                .flat_map(|c| c.weakest.iter().map(|m| (m.unknown.to_string(), m.weight)))
                 .collect(),
             weakest_information: calibration.conditioning.as_ref().map(|c| c.smallest_eigenvalue),
             warnings: calibration.warnings.iter().map(ToString::to_string).collect(),

@@ -39,7 +39,7 @@ pub(super) fn parameter_rows(told: &Told) -> Vec<[String; 4]> {
 pub(super) fn weakest(told: &Told) -> Option<String> {
     let conditioning = told.fit.calibration.conditioning.as_ref()?;
     let members: Vec<String> =
-        conditioning.weakest.iter().map(|m| format!("{} {:+.2}", m.name, m.weight)).collect();
+        conditioning.weakest.iter().map(|m| format!("{} {:+.2}", m.unknown, m.weight)).collect();
     Some(members.join(", "))
 }
 
