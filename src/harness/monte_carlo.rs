@@ -116,6 +116,7 @@ fn refusal(error: &CalibrationError) -> String {
         CalibrationError::Strays { .. } => "refused: gross errors".to_string(),
         CalibrationError::HeldWithoutValue { .. }
         | CalibrationError::BadHeldValue { .. }
+        | CalibrationError::BadRatio { .. }
         | CalibrationError::NarrowLoss { .. }
         | CalibrationError::BadLoss => "refused: impossible settings".to_string(),
         _ => "refused: another reason".to_string(),

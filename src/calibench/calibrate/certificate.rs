@@ -118,6 +118,7 @@ fn score(problem: &Problem<'_>, state: &State, reduction: &Reduction) -> (f64, u
     let shares = chunks::map(problem.observations, |view, pairs| {
         let strain =
             kernel::view_strain(&state.camera, &state.cam_from_target[view], pairs, problem.loss, radial);
+        let strain = problem.fy_per_fx.map_or(strain, |ratio| strain.with_tie(ratio));
         Share::of(&strain, &reduction.eliminated[view], &parameters)
     });
     for share in &shares {

@@ -6,6 +6,7 @@ use crate::geometry::HomographyError;
 
 /// A calibration that is refused. Every variant carries the numbers and says what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum CalibrationError {
     /// Each view gives two constraints on the linear parameters.
@@ -57,6 +58,12 @@ pub enum CalibrationError {
         parameter: Parameter,
         /// The value.
         value: f64,
+    },
+    /// Focal lengths cannot be tied in this ratio.
+    #[error("fy cannot be {ratio} times fx: a ratio is a positive number")]
+    BadRatio {
+        /// fy over fx.
+        ratio: f64,
     },
     /// The loss has no positive scale.
     #[error("a robust loss needs a positive scale in px")]

@@ -94,6 +94,7 @@ fn estimate(views: &[View], settings: &Settings) -> Result<Calibration, Calibrat
     let starts = start::starts(&homographies, settings, &held, pixel_frame)?;
     let problem = Problem {
         free: settings.free(),
+        fy_per_fx: held.fy_per_fx,
         observations: &observations,
         loss: settings.loss,
         max_iterations: settings.max_iterations,
@@ -208,7 +209,8 @@ fn report(
             why: "the normal equations are singular".into(),
         }
     })?;
-    let covariance = frames.covariance(unit, cam_from_target, variance);
+    let mut covariance = frames.covariance(unit, cam_from_target, variance);
+    covariance.fy_per_fx = problem.fy_per_fx;
     let mut calibration = Calibration {
         camera: *camera,
         free: system.free,

@@ -60,6 +60,7 @@ pub(super) fn polish(views: &[View], loss: Loss, mut calibration: Calibration) -
 /// Camera and poses.
 struct State {
     free: FreeParameters,
+    fy_per_fx: Option<Number>,
     parameters: [Number; Parameter::COUNT],
     poses: Vec<PoseNumbers>,
 }
@@ -74,6 +75,7 @@ impl State {
     fn of(calibration: &Calibration) -> State {
         State {
             free: calibration.free,
+            fy_per_fx: calibration.covariance.fy_per_fx.map(Number::from),
             parameters: calibration.camera.parameters().map(Number::from),
             poses: calibration.cam_from_target.iter().map(PoseNumbers::of).collect(),
         }
@@ -83,6 +85,9 @@ impl State {
     fn take(&mut self, step: &Step) {
         for (parameter, &d) in self.free.iter().zip(&step.intrinsics) {
             self.parameters[parameter as usize] += d;
+        }
+        if let Some(ratio) = self.fy_per_fx {
+            self.parameters[Parameter::Fy as usize] = ratio * self.parameters[Parameter::Fx as usize];
         }
         for (pose, d) in self.poses.iter_mut().zip(&step.poses) {
             pose.take(d);
@@ -225,7 +230,9 @@ impl Equations {
         let root_mean = |count: usize| (square / Number::from(count.max(1) as f64)).sqrt().to_f64();
         let variance = square / Number::from(before.degrees_of_freedom.max(1) as f64);
         let covariance = match loss {
-            Loss::Squares => self.covariance(state.free, variance),
+            Loss::Squares => {
+                Covariance { fy_per_fx: before.covariance.fy_per_fx, ..self.covariance(state.free, variance) }
+            }
             Loss::Huber { .. } | Loss::Cauchy { .. } => before.covariance.clone(),
         };
         Some(Calibration {
@@ -253,6 +260,7 @@ impl Equations {
         }
         let mut result = Covariance {
             free,
+            fy_per_fx: None,
             intrinsics: DMatrix::from_fn(n, n, |i, j| (variance * intrinsics[i][j]).to_f64()),
             poses: Vec::with_capacity(self.views.len()),
             cross: Vec::with_capacity(self.views.len()),
@@ -300,6 +308,9 @@ fn view_square(state: &State, index: usize, view: &View, loss: Loss) -> Option<S
             for (column, parameter) in row[POSE..].iter_mut().zip(state.free.iter()) {
                 let place = parameter as usize;
                 *column = linear.get(place).copied().unwrap_or_else(|| shared[POSE + place - linear.len()]);
+                if let Some(ratio) = state.fy_per_fx.filter(|_| parameter == Parameter::Fx) {
+                    *column += ratio * linear[Parameter::Fy as usize];
+                }
             }
             row[size - 1] = residual;
             for i in 0..size {

@@ -7,11 +7,12 @@ use std::fmt;
 
 /// The result of a calibration.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Calibration {
     /// The estimate; parameters that were not free have the values they were held at.
     pub camera: Camera,
-    /// What was estimated.
+    /// What was estimated. An fy that is tied to fx (`covariance.fy_per_fx`) follows and is not counted.
     pub free: FreeParameters,
     /// One pose a view.
     pub cam_from_target: Vec<Pose>,
@@ -326,4 +327,74 @@ impl Calibration {
 fn rms<'a>(residuals: impl ExactSizeIterator<Item = &'a Vec2>) -> f64 {
     let count = residuals.len() as f64;
     (residuals.map(|r| r.norm_squared()).sum::<f64>() / count).sqrt()
+}
+
+#[cfg(all(test, feature = "serde", feature = "io"))]
+mod tests {
+    use crate::board::View;
+    use crate::calibrate::{Calibration, CalibrationError, Conditioning, Loss, Settings, calibrate};
+    use crate::camera::{BrownConrady, Camera, Parameter};
+    use crate::geometry::{Pose, Vec2, Vec3, rotation};
+    use serde::{Serialize, de::DeserializeOwned};
+
+    fn views(turns: &[[f64; 3]]) -> Vec<View> {
+        let camera =
+            Camera::pinhole(600.0, 590.0, 320.0, 240.0).with_distortion(BrownConrady::radial(-0.2, 0.1));
+        let points: Vec<Vec2> =
+            (0..35).map(|i| Vec2::new(f64::from(i % 7) - 3.0, f64::from(i / 7) - 2.0) * 12.0).collect();
+        let view = |(number, turn): (usize, &[f64; 3])| {
+            let pose = Pose {
+                rotation: rotation::from_xyz_rad(turn[0], turn[1], turn[2]),
+                translation: Vec3::new(2.0, -3.0, 120.0 + 9.0 * number as f64),
+            };
+            // A wave for noise: residuals, and so a covariance, that are not 0.
+            let error = |i: usize| 0.1 * Vec2::new(libm::sin(7.0 * i as f64), libm::cos(5.0 * i as f64));
+            let image = |(i, p): (usize, &Vec2)| {
+                camera.project(&pose.apply(&Vec3::new(p.x, p.y, 0.0))).map(|pixel| pixel + error(i))
+            };
+            let pixels = points.iter().enumerate().map(image).collect::<Option<Vec<Vec2>>>().unwrap();
+            View::new(points.clone(), pixels).unwrap()
+        };
+        turns.iter().enumerate().map(view).collect()
+    }
+
+    /// What a value is after the way through JSON.
+    fn there_and_back<T: Serialize + DeserializeOwned>(value: &T) -> T {
+        serde_json::from_str(&serde_json::to_string(value).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn serde_keeps_a_calibration_and_what_it_was_asked_to_the_bit() {
+        let settings = Settings::standard()
+            .with_image_size((640, 480))
+            .with_loss(Loss::Huber { delta_px: 0.5 })
+            .hold(Parameter::K2, 0.1)
+            .with_profile_intervals(0.95);
+        assert_eq!(there_and_back(&settings), settings);
+        let views = views(&[[0.3, 0.0, 0.1], [0.0, -0.3, 0.0], [-0.2, 0.25, 0.4]]);
+        let calibration: Calibration = calibrate(&views, &settings).unwrap();
+        assert_eq!(there_and_back(&calibration), calibration);
+        let conditioning: Conditioning = calibration.conditioning.unwrap();
+        assert_eq!(there_and_back(&conditioning), conditioning);
+    }
+
+    #[test]
+    fn serde_keeps_a_refusal_with_its_reason() {
+        let facing = views(&[[0.0; 3], [0.0, 0.0, 0.3], [0.0, 0.0, -0.2]]);
+        let refusals = [
+            calibrate(&facing, &Settings::standard()).map(|r| r.camera).unwrap_err(),
+            calibrate(&facing[..1], &Settings::standard()).map(|r| r.camera).unwrap_err(),
+        ];
+        assert!(matches!(refusals[0], CalibrationError::NotIdentifiable { .. }), "{}", refusals[0]);
+        for refusal in refusals {
+            assert_eq!(there_and_back(&refusal), refusal);
+        }
+    }
+
+    #[test]
+    fn serde_refuses_a_covariance_whose_blocks_do_not_fit() {
+        let text = r#"{"free": "fx,fy", "intrinsics": [[1.0]], "poses": [], "cross": []}"#;
+        let error = serde_json::from_str::<crate::calibrate::Covariance>(text).unwrap_err();
+        assert!(error.to_string().contains("other sizes"), "{error}");
+    }
 }

@@ -36,6 +36,8 @@ pub(super) fn of(
     warnings.extend(correlated(&calibration.covariance, calibration.free));
     warnings.extend([Parameter::Fx, Parameter::Fy].into_iter().filter_map(|parameter| {
         let relative = calibration.standard_deviation(parameter)? / calibration.camera.get(parameter);
+        // An fy that is tied to fx is known as well, and said once.
+        calibration.free.position(parameter)?;
         (relative > UNCERTAIN_FOCAL).then_some(Warning::FocalLengthUncertain { parameter, relative })
     }));
     warnings.extend(folding(&calibration.camera, largest_radius));
