@@ -117,6 +117,7 @@ fn refusal(error: &CalibrationError) -> String {
         CalibrationError::HeldWithoutValue { .. }
         | CalibrationError::BadHeldValue { .. }
         | CalibrationError::BadRatio { .. }
+        | CalibrationError::BadPrior { .. }
         | CalibrationError::NarrowLoss { .. }
         | CalibrationError::BadLoss => "refused: impossible settings".to_string(),
         _ => "refused: another reason".to_string(),

@@ -65,6 +65,18 @@ pub enum CalibrationError {
         /// fy over fx.
         ratio: f64,
     },
+    /// A prior that no camera has, or that says nothing.
+    #[error(
+        "{parameter} = {mean} +- {standard_deviation} is no prior: a standard deviation is positive, and a focal length too"
+    )]
+    BadPrior {
+        /// Which.
+        parameter: Parameter,
+        /// Its value.
+        mean: f64,
+        /// Its standard deviation.
+        standard_deviation: f64,
+    },
     /// The loss has no positive scale.
     #[error("a robust loss needs a positive scale in px")]
     BadLoss,

@@ -14,6 +14,7 @@ use super::chance::chi_squared_quantile;
 use super::conditioning::{Conditioning, WeakComponent};
 use super::minimise::{Minimum, Problem, State};
 use super::normal::Observations;
+use super::prior::Priors;
 use super::system::System;
 use super::walk::{Far, Walked};
 use super::{CalibrationError, Unknown};
@@ -112,13 +113,45 @@ fn refuse_if_fits(
     }
     let mut exact = System::new(problem.free, problem.observations.len());
     problem.linearise_into(&held.state, &mut exact);
-    refuse_if_singular(exact.conditioning().as_ref(), || {
-        format!(
-            "{what} within noise (holding it so raises the cost by {ratio:.1} variances, and up to {bound:.0} could be \
-             chance on {degrees_of_freedom} degrees of freedom)"
-        )
-    })?;
+    let why = format!(
+        "{what} within noise (holding it so raises the cost by {ratio:.1} variances, and up to {bound:.0} could be \
+         chance on {degrees_of_freedom} degrees of freedom)"
+    );
+    refuse_if_singular(exact.conditioning().as_ref(), || why.clone())?;
+    if !problem.priors.list.is_empty() {
+        refuse_if_priors_give_way(problem, minimum, &held.state, &exact, &why)?;
+    }
     Ok(None)
+}
+
+/// A parameter that parallel planes leave to the priors must be known by them: where the estimate is said to be known better than this part of
+/// what they say, the difference comes from the tilts that noise made.
+const GIVEN_WAY: f64 = 0.9;
+
+/// Refuses planes that may be parallel, and then leave something to the priors, if the priors are so wide that the noise's tilts decide: `exact`
+/// are the equations at the state `parallel`.
+fn refuse_if_priors_give_way(
+    problem: &Problem<'_>,
+    minimum: &Minimum,
+    parallel: &State,
+    exact: &System,
+    why: &str,
+) -> Result<(), CalibrationError> {
+    let pixels = Problem { priors: Priors::NONE, ..*problem };
+    let mut alone = System::new(problem.free, problem.observations.len());
+    pixels.linearise_into(parallel, &mut alone);
+    let alone = alone.conditioning();
+    let covariance = |system: &System| system.reduction().and_then(|r| r.intrinsics_covariance());
+    let (Some(claimed), Some(known)) = (covariance(&minimum.system), covariance(exact)) else {
+        return Ok(());
+    };
+    let gives_way = |row: usize| claimed[(row, row)] < GIVEN_WAY * GIVEN_WAY * known[(row, row)];
+    if alone.as_ref().is_some_and(|c| !c.is_singular()) || !(0..problem.free.len()).any(gives_way) {
+        return Ok(());
+    }
+    let inseparable = alone.map_or_else(|| vec![Unknown::Camera, Unknown::Poses], |c| names(&c.weakest));
+    let why = format!("{why}, and what is known beforehand is too little to decide: state it more narrowly");
+    Err(CalibrationError::NotIdentifiable { inseparable, why })
 }
 
 /// Variance of a pixel coordinate; exact data leave rounding as noise.

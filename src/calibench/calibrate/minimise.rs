@@ -3,6 +3,7 @@
 use super::Loss;
 use super::Termination;
 use super::normal::{self, Observations};
+use super::prior::Priors;
 use super::retraction::Retraction;
 use super::system::{Step, System};
 use crate::camera::{Camera, FreeParameters};
@@ -20,6 +21,8 @@ pub(super) struct Problem<'a> {
     pub free: FreeParameters,
     /// fy over fx, where fy follows fx.
     pub fy_per_fx: Option<f64>,
+    /// What is known beforehand.
+    pub priors: Priors<'a>,
     pub observations: &'a [Observations],
     pub loss: Loss,
     pub max_iterations: usize,
@@ -80,6 +83,7 @@ impl Problem<'_> {
             system.cost = f64::INFINITY;
             return;
         }
+        self.priors.add_to(camera, system);
         if self.hold_tilt {
             for (view, pose) in system.views.iter_mut().zip(&state.cam_from_target) {
                 view.hold_tilt(&pose.rotation.column(2).into_owned());

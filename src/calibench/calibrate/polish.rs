@@ -7,6 +7,7 @@
 #![allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
 
 use super::kernel::{self, Model, Rows};
+use super::prior::Priors;
 use super::{Calibration, Covariance, Loss, Warning};
 use crate::board::View;
 use crate::camera::{Camera, FreeParameters, Parameter};
@@ -32,11 +33,12 @@ type Square = [[Number; COLUMNS]; COLUMNS];
 /// last digits. One that did not converge is left as it is; one whose steps do not shrink too, with a warning.
 ///
 /// Under a robust loss the covariance stays that of the unpolished minimum, which differs from this one by some 1e-7 of itself.
-pub(super) fn polish(views: &[View], loss: Loss, mut calibration: Calibration) -> Calibration {
+/// `variance` is that of a pixel coordinate, px^2, which weighs the priors.
+pub(super) fn polish(views: &[View], loss: Loss, variance: f64, mut calibration: Calibration) -> Calibration {
     if !calibration.termination.is_minimum() {
         return calibration;
     }
-    let mut state = State::of(&calibration);
+    let mut state = State::of(&calibration, variance);
     let mut last = f64::INFINITY;
     for _ in 0..MOST_STEPS {
         let Some((step, length_px)) = Equations::of(&state, views, loss).and_then(|e| e.step()) else {
@@ -61,6 +63,10 @@ pub(super) fn polish(views: &[View], loss: Loss, mut calibration: Calibration) -
 struct State {
     free: FreeParameters,
     fy_per_fx: Option<Number>,
+    /// The variance that weighs the priors, px^2.
+    variance: f64,
+    /// Parameter, mean and weight.
+    priors: Vec<(Parameter, f64, f64)>,
     parameters: [Number; Parameter::COUNT],
     poses: Vec<PoseNumbers>,
 }
@@ -72,8 +78,11 @@ struct PoseNumbers {
 }
 
 impl State {
-    fn of(calibration: &Calibration) -> State {
+    fn of(calibration: &Calibration, variance: f64) -> State {
+        let priors = Priors { list: &calibration.priors, variance };
         State {
+            variance,
+            priors: priors.weighted().map(|(prior, weight)| (prior.parameter, prior.mean, weight)).collect(),
             free: calibration.free,
             fy_per_fx: calibration.covariance.fy_per_fx.map(Number::from),
             parameters: calibration.camera.parameters().map(Number::from),
@@ -185,6 +194,12 @@ impl Equations {
             }
             factored.push(square);
         }
+        for &(parameter, mean, weight) in &state.priors {
+            let row = state.free.position(parameter)?;
+            let weight = Number::from(weight);
+            reduced[row][row] += weight;
+            reduced[n][row] += weight * (state.parameters[parameter as usize] - Number::from(mean));
+        }
         factor(&mut reduced, n, n + 1)?;
         Some(Equations { n, views: factored, reduced })
     }
@@ -227,8 +242,18 @@ impl Equations {
             }
             residuals.push(of_view);
         }
-        let root_mean = |count: usize| (square / Number::from(count.max(1) as f64)).sqrt().to_f64();
-        let variance = square / Number::from(before.degrees_of_freedom.max(1) as f64);
+        let root_mean = |count: f64| (square / Number::from(count.max(1.0))).sqrt().to_f64();
+        // Priors settle a part of an unknown: the degrees of freedom are then no whole number, and stay those of the unpolished minimum.
+        let squares =
+            |residuals: &[Vec<Vec2>]| residuals.iter().flatten().map(|r| r.norm_squared()).sum::<f64>();
+        let freedom = match state.priors.is_empty() {
+            true => before.degrees_of_freedom as f64,
+            false => squares(&before.residuals) / (before.sigma_px * before.sigma_px),
+        };
+        let variance = match state.priors.is_empty() {
+            true => square / Number::from(freedom.max(1.0)),
+            false => Number::from(state.variance),
+        };
         let covariance = match loss {
             Loss::Squares => {
                 Covariance { fy_per_fx: before.covariance.fy_per_fx, ..self.covariance(state.free, variance) }
@@ -238,8 +263,8 @@ impl Equations {
         Some(Calibration {
             camera: Camera::from_parameters(state.parameters.map(Number::to_f64)),
             cam_from_target: state.poses.iter().map(PoseNumbers::to_pose).collect(),
-            rmse_px: root_mean(residuals.iter().map(Vec::len).sum()),
-            sigma_px: root_mean(before.degrees_of_freedom),
+            rmse_px: root_mean(residuals.iter().map(Vec::len).sum::<usize>() as f64),
+            sigma_px: root_mean(freedom),
             residuals,
             covariance,
             ..before.clone()

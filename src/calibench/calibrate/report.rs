@@ -1,6 +1,6 @@
 //! What does a calibration say? The estimate, how sure it is, how it fits, and what to be careful about.
 
-use super::{Certificate, Conditioning, Covariance, ProfileInterval, Termination};
+use super::{Certificate, Conditioning, Covariance, Prior, ProfileInterval, Termination};
 use crate::camera::{Camera, FreeParameters, Parameter};
 use crate::geometry::{Pose, Vec2};
 use std::fmt;
@@ -14,6 +14,8 @@ pub struct Calibration {
     pub camera: Camera,
     /// What was estimated. An fy that is tied to fx (`covariance.fy_per_fx`) follows and is not counted.
     pub free: FreeParameters,
+    /// What was known of them beforehand; it counts in the estimate and in the covariance.
+    pub priors: Vec<Prior>,
     /// One pose a view.
     pub cam_from_target: Vec<Pose>,
     /// Predicted - observed, px, view by view, point by point.
@@ -21,9 +23,9 @@ pub struct Calibration {
     /// `sqrt(sum |r|^2 / N)` over all N points, px: as in OpenCV.
     pub rmse_px: f64,
     /// Estimated standard deviation of one pixel coordinate: `sqrt(sum |r|^2 / (2 N - p))`, px. Under a robust loss see
-    /// [`Calibration::covariance`].
+    /// [`Calibration::covariance`]. With priors `p` counts the unknowns less what the priors settle of them, see [`Prior`].
     pub sigma_px: f64,
-    /// Degrees of freedom `2 N - p`.
+    /// Degrees of freedom `2 N - p`; with priors rounded down.
     pub degrees_of_freedom: usize,
     /// First-order covariance of intrinsics and poses. Under a robust loss it is scaled by Huber's correction
     /// `[sum psi^2 / (2N - p)] / [mean psi']^2` (Huber & Ronchetti 2009, section 7.6), psi' being [`Loss::slope`](crate::calibrate::Loss::slope).
@@ -176,6 +178,19 @@ pub enum Warning {
         /// Largest radius of an observed point.
         largest_observed: f64,
     },
+    /// The pixels and what was known beforehand do not go together: one of the two is wrong.
+    Contradicted {
+        /// Of which parameter.
+        parameter: Parameter,
+        /// The value known beforehand.
+        mean: f64,
+        /// Its standard deviation.
+        standard_deviation: f64,
+        /// The estimate, between the two.
+        estimate: f64,
+        /// By how many standard deviations of their difference they disagree.
+        deviations: f64,
+    },
     /// No residual degrees of freedom: the fit is exact whatever the noise, and no standard deviation can be told.
     NoDegreesOfFreedom,
     /// The last digits were asked for, and the steps towards them did not shrink: the estimate is the refinement's.
@@ -281,6 +296,11 @@ impl fmt::Display for Warning {
                 f,
                 "the lens model folds back at normalised radius {monotone_radius:.3}, and points were seen out to \
                  {largest_observed:.3}: it must not be used beyond them"
+            ),
+            Warning::Contradicted { parameter, mean, standard_deviation, estimate, deviations } => write!(
+                f,
+                "the marks contradict what is known of {parameter} beforehand, {mean} +- {standard_deviation}: with both it is {estimate:.6}, and \
+                 they disagree by {deviations:.1} standard deviations; one of the two is wrong"
             ),
             Warning::NoDegreesOfFreedom => f.write_str(
                 "as many unknowns as measurements: the fit is exact and says nothing about its accuracy",

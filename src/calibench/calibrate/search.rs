@@ -221,7 +221,8 @@ fn trades_off(free: FreeParameters, covariance: &DMatrix<f64>) -> bool {
 /// the noise.
 pub(super) fn noise_of(problem: &Problem<'_>, minimum: &Minimum) -> f64 {
     let coordinates = 2 * problem.observations.iter().map(|o| o.len()).sum::<usize>();
-    let freedom = coordinates.saturating_sub(minimum.system.unknowns()).max(1);
+    let measurements = coordinates + problem.priors.list.len();
+    let freedom = measurements.saturating_sub(minimum.system.unknowns()).max(1);
     (minimum.system.cost / freedom as f64).sqrt()
 }
 
@@ -485,7 +486,7 @@ const FEW: usize = 100;
 const BENT: [f64; 3] = [0.0, -0.2, 0.2];
 
 /// The relaxed model of these data, its least minimum first and then that of an ordinary camera: square pixels, and its centre in the middle.
-fn relax(problem: &Problem<'_>, evidence: &Evidence<'_>, is_certified: bool) -> Vec<Relaxed> {
+pub(super) fn relax(problem: &Problem<'_>, evidence: &Evidence<'_>, is_certified: bool) -> Vec<Relaxed> {
     use Parameter::{Cx, Cy, Fx, Fy, Skew};
     let held = evidence.held;
     let sought = relaxed::parameters(problem, |p| held.value(p).is_some_and(|value| value != 0.0));
@@ -571,8 +572,12 @@ fn relaxed_starts(
     let unit = evidence.pixel_frame.1 / gauge;
     let ratio = libm::log(SCAN.1 / SCAN.0) / (SCAN_STEPS - 1) as f64;
     let focal = |i: usize| unit * SCAN.0 * libm::exp(ratio * i as f64);
+    let with_priors = |mut hypothesis: Hypothesis| {
+        hypothesis.cost += problem.priors.cost(&state_of(relaxed, evidence.held, &hypothesis).camera);
+        hypothesis
+    };
     let scan: Vec<Option<Hypothesis>> =
-        (0..SCAN_STEPS).map(|i| hypothesis(relaxed, evidence, &centred(focal(i)))).collect();
+        (0..SCAN_STEPS).map(|i| hypothesis(relaxed, evidence, &centred(focal(i))).map(with_priors)).collect();
     hypotheses.extend(lowest(scan));
     hypotheses.iter().map(|hypothesis| state_of(relaxed, evidence.held, hypothesis)).collect()
 }

@@ -1,6 +1,6 @@
 //! What may the estimator change, and from where does it start?
 
-use super::{CalibrationError, Loss};
+use super::{CalibrationError, Loss, Prior};
 use crate::camera::{Camera, FreeParameters, Parameter};
 
 /// What becomes of one parameter.
@@ -16,6 +16,13 @@ pub enum Role {
     Held(f64),
     /// Estimated.
     Free,
+    /// Estimated, and known beforehand: see [`super::Prior`].
+    Known {
+        /// Its value.
+        mean: f64,
+        /// How well it is known.
+        standard_deviation: f64,
+    },
 }
 
 /// What to estimate and how: a builder.
@@ -96,6 +103,12 @@ impl Settings {
         self
     }
 
+    /// Estimates `parameter`, which is known beforehand to be `mean` with this standard deviation: one more measurement, with its share in the
+    /// covariance. See [`super::Prior`].
+    pub fn with_prior(self, parameter: Parameter, mean: f64, standard_deviation: f64) -> Settings {
+        self.with_role(parameter, Role::Known { mean, standard_deviation })
+    }
+
     /// Gives `parameter` a role, whatever it had before.
     pub fn with_role(mut self, parameter: Parameter, role: Role) -> Settings {
         self.roles[parameter as usize] = role;
@@ -160,8 +173,17 @@ impl Settings {
 
     /// The parameters to estimate; an fy that is tied to fx is none of its own.
     pub fn free(&self) -> FreeParameters {
-        let is_free = |p: &Parameter| self.role(*p) == Role::Free && !self.is_tied(*p);
+        let is_estimated = |p: &Parameter| matches!(self.role(*p), Role::Free | Role::Known { .. });
+        let is_free = |p: &Parameter| is_estimated(p) && !self.is_tied(*p);
         Parameter::ALL.into_iter().filter(is_free).fold(FreeParameters::NONE, FreeParameters::with)
+    }
+
+    /// What is known beforehand.
+    pub fn priors(&self) -> impl Iterator<Item = Prior> {
+        Parameter::ALL.into_iter().filter_map(|parameter| match self.role(parameter) {
+            Role::Known { mean, standard_deviation } => Some(Prior { parameter, mean, standard_deviation }),
+            _ => None,
+        })
     }
 
     fn is_tied(&self, parameter: Parameter) -> bool {
@@ -184,7 +206,7 @@ impl Settings {
             return Ok(self.held(Parameter::Fx)?.zip(self.fy_per_fx).map(|(fx, ratio)| ratio * fx));
         }
         let value = match self.role(parameter) {
-            Role::Free => return Ok(None),
+            Role::Free | Role::Known { .. } => return Ok(None),
             Role::Held(value) => Some(value),
             Role::Default => self.default_of(parameter),
         };

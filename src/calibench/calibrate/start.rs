@@ -3,7 +3,7 @@
 use super::closed_form::{self, ClosedFormError};
 use super::minimise::State;
 use super::tie::met_halfway;
-use super::{CalibrationError, Settings};
+use super::{CalibrationError, Prior, Settings};
 use crate::camera::{Camera, Parameter};
 use crate::geometry::{Homography, Mat3, Pose, Vec2};
 
@@ -22,6 +22,7 @@ pub(super) fn starts(
     let centred = |focal: f64| Camera::pinhole(focal, aspect * focal, held.centre.x, held.centre.y);
     let cameras = [
         settings.start,
+        held.focal_known.map(centred),
         closed.as_ref().ok().copied().filter(|camera| is_plausible(camera, pixel_frame)),
         focal_from_centre(homographies, held.centre, aspect).map(centred),
         Some(centred(2.0 * half_width)),
@@ -95,12 +96,17 @@ pub(super) fn focal_from_centre(homographies: &[Homography], centre: Vec2, aspec
     (w > 0.0 && w.is_finite()).then(|| 1.0 / w.sqrt())
 }
 
+/// A focal length known to this part of it is a better start than any that is estimated without distortion.
+const GOOD_START: f64 = 0.1;
+
 /// The values that are not estimated.
 pub(super) struct Held {
     values: [Option<f64>; Parameter::COUNT],
     /// fy over fx, where the two are estimated together.
     pub fy_per_fx: Option<f64>,
-    /// The principal point that is held, or else the image's centre, or that of the pixels seen.
+    /// fx, if it is known beforehand well enough to start from.
+    focal_known: Option<f64>,
+    /// The principal point that is held or known beforehand, or else the image's centre, or that of the pixels seen.
     pub centre: Vec2,
 }
 
@@ -113,11 +119,17 @@ impl Held {
         let image_centre = settings
             .image_size
             .map_or(pixel_centre, |(w, h)| Vec2::new(0.5 * (w as f64 - 1.0), 0.5 * (h as f64 - 1.0)));
+        let known = |p| settings.priors().find(|prior| prior.parameter == p).map(|prior| prior.mean);
         let centre = Vec2::new(
-            values[Parameter::Cx as usize].unwrap_or(image_centre.x),
-            values[Parameter::Cy as usize].unwrap_or(image_centre.y),
+            values[Parameter::Cx as usize].or(known(Parameter::Cx)).unwrap_or(image_centre.x),
+            values[Parameter::Cy as usize].or(known(Parameter::Cy)).unwrap_or(image_centre.y),
         );
-        Ok(Held { values, fy_per_fx: settings.tie()?, centre })
+        let is_good_start = |prior: &Prior| {
+            matches!(prior.parameter, Parameter::Fx | Parameter::Fy)
+                && prior.standard_deviation < GOOD_START * prior.mean
+        };
+        let focal_known = settings.priors().find(is_good_start).map(|prior| prior.mean);
+        Ok(Held { values, fy_per_fx: settings.tie()?, focal_known, centre })
     }
 
     /// The value a parameter is held at.
