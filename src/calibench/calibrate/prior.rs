@@ -11,17 +11,39 @@
 //! ```text
 //! sigma^2 = sum |r|^2 / (2 N - p + sum (posterior sd / sd)^2)
 //! ```
-//! without bias in a linear model: with a wide prior as if the parameter were free, with a narrow one as if it were held (MacKay 1992,
-//! section 4). The right-hand side depends on `sigma` through the weights, and is repeated until `sigma` changes by less than 1e-6 of itself.
+//! without bias in a linear model: with a wide prior as if the parameter were free, with a narrow one as if it were held (MacKay 1992 counts the
+//! parameters that data determine alike). The right-hand side depends on `sigma` through the weights, and is repeated until `sigma` changes by
+//! less than 1e-6 of itself; a polished minimum keeps the weights.
 
 use super::estimate::Fit;
-use super::minimise::{Minimum, Problem};
+use super::minimise::{Minimum, Problem, State};
 use super::search::{self, Evidence, Judged};
 use super::system::System;
 use super::{CalibrationError, relaxed};
 use crate::camera::{Camera, Parameter};
 
 /// A parameter that is estimated, and known beforehand: `mean +- standard_deviation`, normally distributed.
+///
+/// With the noise `sigma` of a pixel coordinate it counts as a residual of `sigma (p - mean) / standard_deviation` px, so that the covariance of
+/// all unknowns is `sigma^2 (J^T J + W)^-1`, `W = diag(sigma^2 / standard_deviation^2)`. The noise is estimated with the rest, from the pixels'
+/// residuals alone: `sum |r|^2 / (2 N - p + sum s^2)`, where `s` is the standard deviation of the estimate over that of the prior. It is repeated
+/// until `sigma` changes by less than 1e-6 of itself.
+///
+/// ```
+/// use calibench::calibrate::{Settings, calibrate};
+/// use calibench::camera::Parameter;
+/// use calibench::synth::{Scene, Stream, StreamKey};
+///
+/// let mut stream = Stream::open(StreamKey { seed: 1, scenario: "example", trial: 0, purpose: "noise" });
+/// let views = Scene::example().observe(0.1, &mut stream);
+/// // Square pixels, and a lens whose k1 an earlier calibration told.
+/// let settings = Settings::standard().tie_focal_lengths(1.0).with_prior(Parameter::K1, -0.18, 0.002);
+/// let result = calibrate(&views, &settings)?;
+/// assert_eq!(result.camera.fx, result.camera.fy);
+/// assert_eq!(result.standard_deviation(Parameter::Fx), result.standard_deviation(Parameter::Fy));
+/// assert!(result.standard_deviation(Parameter::K1) < Some(0.002));
+/// # Ok::<(), calibench::calibrate::CalibrationError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Prior {
@@ -93,13 +115,13 @@ const LEAST_PX: f64 = 1e-4;
 const SETTLED: f64 = 1e-6;
 /// Refinements until it is; each gains two digits or more on ordinary data.
 const MOST_REFITS: usize = 60;
-/// Searches, each with the weights that the minimum before it led to: one, and a second where that found a lower minimum.
+/// Searches, each with the weights that the minimum before it led to: two, and a third where the second found a lower minimum.
 const MOST_SEARCHES: usize = 4;
 
 /// The best minimum under priors, and the variance of a pixel coordinate that weighed them.
 pub(super) fn best_minimum(
     problem: &Problem<'_>,
-    mut starts: Vec<super::minimise::State>,
+    mut starts: Vec<State>,
     evidence: &Evidence<'_>,
 ) -> Result<(Judged, f64), CalibrationError> {
     let with = |variance: f64| Problem { priors: Priors { variance, ..problem.priors }, ..*problem };

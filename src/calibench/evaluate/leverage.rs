@@ -9,7 +9,8 @@ use nalgebra::{DVector, SMatrix};
 /// The leverage of u and of v of every point, view by view: the diagonal of the hat matrix `J (J^T J)^-1 J^T`.
 ///
 /// To first order the residuals are `(I - H)` times the noise, so a coordinate with leverage `h` has a residual of variance
-/// `sigma^2 (1 - h)`, and the leverages sum to the number of unknowns (Hoaglin & Welsch 1978). `J` is taken at the estimate.
+/// `sigma^2 (1 - h)`, and the leverages sum to the number of unknowns (Hoaglin & Welsch 1978), less what priors settle of
+/// them. `J` is taken at the estimate.
 ///
 /// `None` if `views` are not those of the calibration, or if it has no residual degrees of freedom. Under a robust loss
 /// the matrix is another; then the result is only indicative.
