@@ -372,3 +372,31 @@ fn the_search_finds_minima_as_low_as_from_the_truth_under_ties_and_priors() {
     }
     assert!(answered > 2 * refused, "{answered} answered, {refused} refused");
 }
+
+/// A certificate misses with the probability it states: a twentieth of the draws have a probability below a twentieth, with ties, with priors on the
+/// lens, which homographies share, and on the focal length, of which they know nothing.
+#[test]
+fn certificates_miss_as_often_as_they_say_under_ties_and_priors() {
+    const RATE: f64 = 0.05;
+    let scene = Scene::example();
+    let truth = scene.truth.camera;
+    for (tie, known) in
+        [(true, None), (false, Some((Parameter::Fx, 1.0))), (true, Some((Parameter::K1, 0.005)))]
+    {
+        let missed = (0..TRIALS).filter(|&trial| {
+            let mut settings = Settings::standard();
+            if tie {
+                settings = settings.tie_focal_lengths(truth.fy / truth.fx);
+            }
+            if let Some((parameter, sd)) = known {
+                let mean = truth.get(parameter) + sd * noise("certified priors", trial).normal();
+                settings = settings.with_prior(parameter, mean, sd);
+            }
+            let views = scene.observe(0.1, &mut noise("certificates", trial));
+            calibrate(&views, &settings).unwrap().certificate.unwrap().p_value < RATE
+        });
+        let (missed, trials) = (missed.count() as f64, TRIALS as f64);
+        let z = (missed - RATE * trials) / (RATE * (1.0 - RATE) * trials).sqrt();
+        assert!(z.abs() < FAR, "{known:?}, tied {tie}: {missed} of {trials}");
+    }
+}

@@ -113,13 +113,15 @@ fn refuse_if_fits(
     }
     let mut exact = System::new(problem.free, problem.observations.len());
     problem.linearise_into(&held.state, &mut exact);
-    let why = format!(
-        "{what} within noise (holding it so raises the cost by {ratio:.1} variances, and up to {bound:.0} could be \
-         chance on {degrees_of_freedom} degrees of freedom)"
-    );
-    refuse_if_singular(exact.conditioning().as_ref(), || why.clone())?;
+    let why = || {
+        format!(
+            "{what} within noise (holding it so raises the cost by {ratio:.1} variances, and up to {bound:.0} could be \
+             chance on {degrees_of_freedom} degrees of freedom)"
+        )
+    };
+    refuse_if_singular(exact.conditioning().as_ref(), why)?;
     if !problem.priors.list.is_empty() {
-        refuse_if_priors_give_way(problem, minimum, &held.state, &exact, &why)?;
+        refuse_if_priors_give_way(problem, minimum, &held.state, &exact, why)?;
     }
     Ok(None)
 }
@@ -135,7 +137,7 @@ fn refuse_if_priors_give_way(
     minimum: &Minimum,
     parallel: &State,
     exact: &System,
-    why: &str,
+    why: impl FnOnce() -> String,
 ) -> Result<(), CalibrationError> {
     let pixels = Problem { priors: Priors::NONE, ..*problem };
     let mut alone = System::new(problem.free, problem.observations.len());
@@ -150,7 +152,8 @@ fn refuse_if_priors_give_way(
         return Ok(());
     }
     let inseparable = alone.map_or_else(|| vec![Unknown::Camera, Unknown::Poses], |c| names(&c.weakest));
-    let why = format!("{why}, and what is known beforehand is too little to decide: state it more narrowly");
+    let why =
+        format!("{}, and what is known beforehand is too little to decide: state it more narrowly", why());
     Err(CalibrationError::NotIdentifiable { inseparable, why })
 }
 

@@ -573,7 +573,9 @@ fn relaxed_starts(
     let ratio = libm::log(SCAN.1 / SCAN.0) / (SCAN_STEPS - 1) as f64;
     let focal = |i: usize| unit * SCAN.0 * libm::exp(ratio * i as f64);
     let with_priors = |mut hypothesis: Hypothesis| {
-        hypothesis.cost += problem.priors.cost(&state_of(relaxed, evidence.held, &hypothesis).camera);
+        if !problem.priors.list.is_empty() {
+            hypothesis.cost += problem.priors.cost(&state_of(relaxed, evidence.held, &hypothesis).camera);
+        }
         hypothesis
     };
     let scan: Vec<Option<Hypothesis>> =
