@@ -2,6 +2,7 @@
 //!
 //! `cargo test --test all golden::` runs those of `tests/golden.rs`.
 
+mod beforehand;
 mod book;
 mod certified;
 mod chapter_scene;

@@ -1,6 +1,6 @@
 //! Does the solver recover the chapter's camera, and does it refuse what cannot be recovered?
 
-use calibench::calibrate::{CalibrationError, Settings, Termination, Warning, calibrate};
+use calibench::calibrate::{CalibrationError, Settings, Termination, Unknown, Warning, calibrate};
 use calibench::camera::{FreeParameters, Parameter};
 use calibench::geometry::{Pose, Vec3};
 use calibench::synth::{Scene, Stream, StreamKey, Truth, scene::looking_at_centre};
@@ -50,8 +50,8 @@ fn facing_views_alone_are_refused_for_focal_length_and_distance() {
                 .map(|r| r.camera)
                 .unwrap_err();
             let CalibrationError::NotIdentifiable { inseparable, .. } = &error else { panic!("{error}") };
-            assert!(inseparable.iter().any(|n| n == "focal length"), "{error}");
-            assert!(inseparable.iter().any(|n| n == "distance"), "{error}");
+            assert!(inseparable.contains(&Unknown::FocalLength), "{error}");
+            assert!(inseparable.contains(&Unknown::Distance), "{error}");
         }
         // Without noise, views from one distance are copies of each other, and count as one.
         let error = calibrate(&scene.exact(), &Settings::standard()).map(|r| r.camera).unwrap_err();

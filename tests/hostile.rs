@@ -213,8 +213,9 @@ fn options_that_contradict_each_other_or_the_input_are_refused() {
     fs::write(folder.join("c.csv"), corner_file()).expect("written");
     fs::write(folder.join("p.csv"), PAIRS).expect("written");
     let calibrate = |rest: &[&'static str]| [&["calibrate"], rest].concat();
-    let fine: [&[&str]; 3] = [
+    let fine: [&[&str]; 4] = [
         &["c.csv", "--fix", "k2=0.05"],
+        &["c.csv", "--tie", "fy=fx", "--prior", "k1=-0.18+-0.01"],
         &["c.csv", "--free", "fx,fy", "--fix", "k1=0", "--image-size", "640x480"],
         &["p.csv"],
     ];
@@ -222,13 +223,21 @@ fn options_that_contradict_each_other_or_the_input_are_refused() {
         let output = limited(&folder, &calibrate(rest));
         assert_eq!(output.status.code(), Some(0), "{rest:?}: {}", text(&output.stderr));
     }
-    let wrong: [(&[&str], &str); 9] = [
+    let wrong: [(&[&str], &str); 17] = [
         (&["c.csv", "--free", "fx,fy", "--fix", "fx=600"], "fx is in --free and in --fix"),
         (&["c.csv", "--fix", "fx=600", "--fix", "fx=700"], "--fix gives fx more than once"),
         (&["c.csv", "--mode", "tilted"], "--mode is for point pairs"),
         (&["--board", "dots:3x3:1", "a.png", "--mode", "planar"], "--mode is for point pairs"),
         (&["p.csv", "--free", "fx"], "--free is for a camera"),
         (&["p.csv", "--fix", "fx=600"], "--fix is for a camera"),
+        (&["p.csv", "--tie", "fy=fx"], "--tie is for a camera"),
+        (&["p.csv", "--prior", "k1=0+-1"], "--prior is for a camera"),
+        (&["c.csv", "--fix", "k1=0", "--prior", "k1=0+-1"], "k1 is in --prior and in --fix"),
+        (&["c.csv", "--prior", "k1=0+-1", "--prior", "k1=0+-2"], "--prior gives k1 more than once"),
+        (&["c.csv", "--prior", "fy=600+-1", "--tie", "fy=fx"], "fy is in --prior and in --tie"),
+        (&["c.csv", "--free", "fx,fy", "--tie", "fy=fx"], "fy is in --free and in --tie"),
+        (&["c.csv", "--fix", "fy=600", "--tie", "fy=fx"], "fy is in --fix and in --tie"),
+        (&["c.csv", "--prior", "k1=0+-0"], "is no prior"),
         (&["p.csv", "--image-size", "640x480"], "--image-size is for a camera"),
         (&["p.csv", "--loss", "huber:1"], "--loss is for a camera"),
         (&["p.csv", "--reject-views", "3"], "--reject-views is for a camera"),

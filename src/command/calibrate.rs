@@ -2,7 +2,7 @@
 
 use super::report::table;
 use super::{Exit, print, warn};
-use calibench::calibrate::Loss;
+use calibench::calibrate::{Loss, Prior};
 use calibench::camera::{FreeParameters, Parameter};
 use calibench::io::input::{MOST_SIDE_PX, MOST_TABLE_BYTES, read_named};
 use calibench::io::memory::{DEFAULT_MEMORY, parse_bytes};
@@ -42,12 +42,18 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "BOARD")]
     board: Option<BoardSpec>,
     /// Parameters to estimate, of fx fy cx cy skew k1 k2 p1 p2 k3; the others are held, distortion and skew at 0
-    /// [default: fx,fy,cx,cy,k1,k2, without those of --fix]
+    /// [default: fx,fy,cx,cy,k1,k2 and those of --prior, without those of --fix and --tie]
     #[arg(long, value_name = "LIST")]
     free: Option<FreeParameters>,
     /// Holds a parameter at a value, such as k3=0; may be repeated
     #[arg(long, value_name = "NAME=VALUE", value_parser = parse_held)]
     fix: Vec<(Parameter, f64)>,
+    /// Ties the focal lengths: fy=fx for square pixels, fy/fx=1.02 for others
+    #[arg(long, value_name = "fy=fx", value_parser = parse_tie)]
+    tie: Option<f64>,
+    /// What is known of a parameter beforehand, value and standard deviation, such as k1=-0.2+-0.01: one more measurement; may be repeated
+    #[arg(long, value_name = "NAME=VALUE+-SD", value_parser = parse_prior)]
+    prior: Vec<Prior>,
     /// Image size, such as 640x480: where a held principal point lies by default, and the frame of the plots
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     image_size: Option<(usize, usize)>,
@@ -127,6 +133,26 @@ fn parse_held(text: &str) -> Result<(Parameter, f64), String> {
         name.trim().parse().map_err(|e: calibench::camera::UnknownParameter| e.to_string())?;
     let value = value.trim().parse::<f64>().map_err(|_| format!("`{value}` is not a number"))?;
     Ok((parameter, value))
+}
+
+/// `fy=fx` or `fy/fx=RATIO`: no sign in it means anything to a shell.
+fn parse_tie(text: &str) -> Result<f64, String> {
+    let wanted = || "expected fy=fx, or a positive ratio such as fy/fx=1.02".to_string();
+    let (what, value) = text.split_once('=').ok_or_else(wanted)?;
+    match (what.trim(), value.trim()) {
+        ("fy", "fx") => Ok(1.0),
+        ("fy/fx", ratio) => ratio.parse().ok().filter(|r: &f64| *r > 0.0 && r.is_finite()).ok_or_else(wanted),
+        _ => Err(wanted()),
+    }
+}
+
+fn parse_prior(text: &str) -> Result<Prior, String> {
+    let wanted = || "expected NAME=VALUE+-SD, such as k1=-0.2+-0.01".to_string();
+    let (name, value) = text.split_once('=').ok_or_else(wanted)?;
+    let parameter = name.trim().parse().map_err(|e: calibench::camera::UnknownParameter| e.to_string())?;
+    let (mean, deviation) = value.split_once("+-").ok_or_else(wanted)?;
+    let number = |text: &str| text.trim().parse::<f64>().map_err(|_| format!("`{text}` is not a number"));
+    Ok(Prior { parameter, mean: number(mean)?, standard_deviation: number(deviation)? })
 }
 
 fn parse_size(text: &str) -> Result<(usize, usize), String> {
@@ -217,4 +243,22 @@ fn from_table(arguments: &Arguments, file: &Path) -> Result<Exit, Failure> {
         ..Observed::default()
     };
     camera::run(arguments, observed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn priors_and_ties_are_read_with_their_signs() {
+        let prior = parse_prior("k1=-0.2+-1e-2").unwrap();
+        assert_eq!((prior.parameter, prior.mean, prior.standard_deviation), (Parameter::K1, -0.2, 0.01));
+        for broken in ["k1=-0.2", "k1", "k9=0+-1", "k1=a+-1", "k1=1+-"] {
+            assert!(parse_prior(broken).is_err(), "{broken}");
+        }
+        assert_eq!((parse_tie("fy=fx"), parse_tie("fy/fx=1.02")), (Ok(1.0), Ok(1.02)));
+        for broken in ["fx=fy", "fy", "fy/fx=0", "fy/fx=nan", "fy/fx=inf", "k1=k2"] {
+            assert!(parse_tie(broken).is_err(), "{broken}");
+        }
+    }
 }

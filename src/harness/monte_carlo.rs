@@ -105,7 +105,7 @@ impl MonteCarlo<'_> {
 fn refusal(error: &CalibrationError) -> String {
     match error {
         CalibrationError::NotIdentifiable { inseparable, .. } => {
-            let mut names = inseparable.clone();
+            let mut names: Vec<&str> = inseparable.iter().map(|unknown| unknown.name()).collect();
             names.sort();
             format!("refused: cannot separate {}", names.join(", "))
         }
@@ -116,6 +116,8 @@ fn refusal(error: &CalibrationError) -> String {
         CalibrationError::Strays { .. } => "refused: gross errors".to_string(),
         CalibrationError::HeldWithoutValue { .. }
         | CalibrationError::BadHeldValue { .. }
+        | CalibrationError::BadRatio { .. }
+        | CalibrationError::BadPrior { .. }
         | CalibrationError::NarrowLoss { .. }
         | CalibrationError::BadLoss => "refused: impossible settings".to_string(),
         _ => "refused: another reason".to_string(),

@@ -14,6 +14,11 @@
 //! ```
 //! for `V` views, `N` points and `n` free parameters, `m` combinations of which free homographies leave undetermined (the focal length; without
 //! distortion the principal point too). To first order the statistic follows Fisher's distribution.
+//!
+//! **Priors.** The floor is what the pixels alone reach: no prior enters it, not one on a coefficient of the lens, which the relaxed model shares,
+//! nor one on the focal length, which it does not know. A prior is one more measurement that the calibration must meet and the relaxed model need
+//! not, so that the excess counts the priors' share of the cost and `d1` grows by their number. A prior that the pixels contradict is a part of the
+//! model that does not hold, and is not certified.
 #![allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
 
 use super::blocks::N;
@@ -22,7 +27,8 @@ use super::chunks;
 use super::elimination::Eliminated;
 use super::kernel::{self, Strain};
 use super::minimise::{Problem, State};
-use super::system::Reduction;
+use super::prior::Priors;
+use super::system::{Reduction, System};
 use crate::camera::Parameter;
 
 /// A right minimum of a model that holds misses its certificate with this probability at most: rare among the calibrations of a lifetime,
@@ -92,18 +98,38 @@ pub(super) fn certify(problem: &Problem<'_>, state: &State, reduction: &Reductio
     let views = problem.observations.len();
     let points: usize = problem.observations.iter().map(|pairs| pairs.len()).sum();
     // What rounding leaves of exact data proves nothing.
-    let (gain, undetermined) = score(problem, state, reduction);
-    let floor = (cost - gain).max(problem.rounding_cost).min(cost);
-    let freedom = (2 * views).saturating_sub(undetermined);
+    let (gain, undetermined) = if problem.priors.list.is_empty() {
+        score(problem, state, reduction, [0.0; N])
+    } else {
+        score_of_pixels(problem, state)
+    };
+    let floor = (cost - problem.priors.cost(&state.camera) - gain).max(problem.rounding_cost).min(cost);
+    let freedom = (2 * views + problem.priors.list.len()).saturating_sub(undetermined);
     let lens = problem.free.len() - undetermined;
     let floor_freedom = (2 * points).saturating_sub(8 * views + lens);
     Certificate::of(cost, floor, points, freedom, floor_freedom)
 }
 
+/// The score of the pixels alone, at a minimum under priors: there the priors hold the balance to the pixels' gradient.
+fn score_of_pixels(problem: &Problem<'_>, state: &State) -> (f64, usize) {
+    let pixels = Problem { priors: Priors::NONE, ..*problem };
+    let mut system = System::new(problem.free, problem.observations.len());
+    pixels.linearise_into(state, &mut system);
+    let Some(reduction) = system.reduction() else { return (0.0, 0) };
+    let mut right = [0.0; N];
+    for (prior, weight) in problem.priors.weighted() {
+        if let Some(row) = problem.free.position(prior.parameter) {
+            right[row] = weight * (state.camera.get(prior.parameter) - prior.mean);
+        }
+    }
+    score(&pixels, state, &reduction, right)
+}
+
 /// `T`: with the strains of a view eliminated after its pose, `S_i = E_i^T E_i - ...`, `U_i` their coupling with the intrinsics and `g_i` their
 /// gradient, `T = sum g_i^T S_i^-1 g_i + w^T (S - sum U_i^T S_i^-1 U_i)^+ w` with `w = sum U_i^T S_i^-1 g_i`. The inverse is a pseudo-inverse:
-/// free homographies know no focal length. Returns `T` and how many combinations of the intrinsics they leave undetermined.
-fn score(problem: &Problem<'_>, state: &State, reduction: &Reduction) -> (f64, usize) {
+/// free homographies know no focal length. Where the gradient of the intrinsics does not vanish, `right` is it with the other sign and `w` starts
+/// there. Returns `T` and how many combinations of the intrinsics they leave undetermined.
+fn score(problem: &Problem<'_>, state: &State, reduction: &Reduction, mut right: [f64; N]) -> (f64, usize) {
     let radial = kernel::is_radial(&state.camera, problem.free);
     let parameters: Vec<usize> = problem.free.iter().map(|p| p as usize).collect();
     let n = parameters.len();
@@ -114,10 +140,11 @@ fn score(problem: &Problem<'_>, state: &State, reduction: &Reduction) -> (f64, u
         }
     }
     let scale: [f64; N] = std::array::from_fn(|i| if i < n { matrix[i][i] } else { 0.0 });
-    let (mut gain, mut right) = (0.0, [0.0; N]);
+    let mut gain = 0.0;
     let shares = chunks::map(problem.observations, |view, pairs| {
         let strain =
             kernel::view_strain(&state.camera, &state.cam_from_target[view], pairs, problem.loss, radial);
+        let strain = problem.fy_per_fx.map_or(strain, |ratio| strain.with_tie(ratio));
         Share::of(&strain, &reduction.eliminated[view], &parameters)
     });
     for share in &shares {

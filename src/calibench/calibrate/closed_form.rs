@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, SVector};
 
 /// Why the closed form has no answer.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum ClosedFormError {
     /// Two constraints a view against five unknowns, four without skew.

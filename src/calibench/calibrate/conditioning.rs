@@ -1,5 +1,6 @@
 //! Which combination of parameters do the data say least about?
 
+use super::Unknown;
 use super::blocks::N;
 use super::elimination::Eliminated;
 use super::system::{Reduction, System};
@@ -21,11 +22,11 @@ pub struct Conditioning {
 }
 
 /// One member of the weakest combination.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WeakComponent {
-    /// `fx`, ..., `k3`, or the pose component that moves with it: `tilt`, `roll`, `lateral position`, `distance`.
-    pub name: String,
+    /// An intrinsic parameter, or the pose component that moves with it: tilt, roll, lateral position, distance.
+    pub unknown: Unknown,
     /// Share of the combination in scaled units, signed for intrinsics, in size for poses (root mean square over views).
     pub weight: f64,
 }
@@ -87,12 +88,12 @@ fn named(
         .free
         .iter()
         .zip(direction.iter())
-        .map(|(parameter, &weight)| WeakComponent { name: parameter.name().to_string(), weight })
+        .map(|(parameter, &weight)| WeakComponent { unknown: Unknown::Intrinsic(parameter), weight })
         .collect();
     let response = pose_response(system, eliminated, &step);
-    for (name, weight) in ["tilt", "roll", "lateral position", "distance"].into_iter().zip(response) {
-        members.push(WeakComponent { name: name.to_string(), weight });
-    }
+    let of_pose = [Unknown::Tilt, Unknown::Roll, Unknown::LateralPosition, Unknown::Distance];
+    members
+        .extend(of_pose.into_iter().zip(response).map(|(unknown, weight)| WeakComponent { unknown, weight }));
     members.sort_by(|a, b| b.weight.abs().total_cmp(&a.weight.abs()));
     let largest = members.first().map_or(0.0, |m| m.weight.abs());
     members.retain(|m| m.weight.abs() >= NAMED_SHARE * largest);

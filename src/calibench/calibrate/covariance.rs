@@ -1,6 +1,7 @@
 //! How well are the unknowns known? Covariance blocks and what follows from them.
 
 use crate::camera::{FreeParameters, Parameter};
+use crate::geometry::Vec2;
 use nalgebra::{DMatrix, MatrixXx6, SMatrix};
 
 /// Covariance of the free intrinsics and of every pose.
@@ -8,9 +9,13 @@ use nalgebra::{DMatrix, MatrixXx6, SMatrix};
 /// To first order the estimate is Gaussian with covariance `sigma^2 (J^T J)^-1`; poses are marginal over the intrinsics and the
 /// other way round. Pose entries: rotation vector of `R <- exp(delta) R` in rad, then translation in the target's unit.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(into = "data::Rows", try_from = "data::Rows"))]
 pub struct Covariance {
     /// Which parameters the rows of `intrinsics` are, in order.
     pub free: FreeParameters,
+    /// fy over fx, if the two are tied: fy then has no row, the standard deviation of fx times this ratio, and the correlations of fx.
+    pub fy_per_fx: Option<f64>,
     /// n x n.
     pub intrinsics: DMatrix<f64>,
     /// 6 x 6 a view.
@@ -30,15 +35,34 @@ impl Covariance {
 
     /// Standard deviation of an intrinsic parameter; `None` if it was not estimated.
     pub fn standard_deviation(&self, parameter: Parameter) -> Option<f64> {
-        let i = self.free.position(parameter)?;
-        Some(self.intrinsics[(i, i)].sqrt())
+        let (i, factor) = self.row(parameter)?;
+        Some(factor * self.intrinsics[(i, i)].sqrt())
     }
 
-    /// Correlation coefficient of two intrinsic parameters; `None` if one was not estimated.
+    /// Correlation coefficient of two intrinsic parameters, 1 of fx and an fy that is tied to it; `None` if one was not estimated.
     pub fn correlation(&self, a: Parameter, b: Parameter) -> Option<f64> {
-        let (i, j) = (self.free.position(a)?, self.free.position(b)?);
+        let ((i, _), (j, _)) = (self.row(a)?, self.row(b)?);
         let m = &self.intrinsics;
         Some(m[(i, j)] / (m[(i, i)] * m[(j, j)]).sqrt())
+    }
+
+    /// The columns of the estimated parameters, from those of all ten in the Jacobian of a pixel: to that of fx an fy that is tied to it adds its
+    /// share.
+    pub fn columns(&self, of_all: &SMatrix<f64, 2, { Parameter::COUNT }>) -> Vec<Vec2> {
+        let column = |parameter: Parameter| of_all.column(parameter as usize).into_owned();
+        let with_tie = |parameter: Parameter| match self.fy_per_fx {
+            Some(ratio) if parameter == Parameter::Fx => column(parameter) + ratio * column(Parameter::Fy),
+            _ => column(parameter),
+        };
+        self.free.iter().map(with_tie).collect()
+    }
+
+    /// The row of a parameter, and how many times that of the row it is.
+    fn row(&self, parameter: Parameter) -> Option<(usize, f64)> {
+        match self.fy_per_fx {
+            Some(ratio) if parameter == Parameter::Fy => Some((self.free.position(Parameter::Fx)?, ratio)),
+            _ => Some((self.free.position(parameter)?, 1.0)),
+        }
     }
 
     /// `e^T P^-1 e` for an error of the free intrinsics: chi-squared with as many degrees of freedom if the covariance is
@@ -50,5 +74,64 @@ impl Covariance {
         }
         let e = nalgebra::DVector::from_row_slice(error);
         Some(e.dot(&self.intrinsics.clone().cholesky()?.solve(&e)))
+    }
+}
+
+/// A covariance as data: every matrix by its rows.
+#[cfg(feature = "serde")]
+mod data {
+    use super::{Covariance, DMatrix, FreeParameters, MatrixXx6, SMatrix};
+
+    #[derive(serde::Serialize, serde::Deserialize)]
+    pub(super) struct Rows {
+        free: FreeParameters,
+        fy_per_fx: Option<f64>,
+        intrinsics: Vec<Vec<f64>>,
+        poses: Vec<[[f64; 6]; 6]>,
+        cross: Vec<Vec<[f64; 6]>>,
+    }
+
+    impl From<Covariance> for Rows {
+        fn from(covariance: Covariance) -> Rows {
+            let Covariance { free, fy_per_fx, intrinsics, poses, cross } = covariance;
+            let row_of_six = |row: &dyn Fn(usize) -> f64| std::array::from_fn(row);
+            Rows {
+                free,
+                fy_per_fx,
+                intrinsics: intrinsics.row_iter().map(|row| row.iter().copied().collect()).collect(),
+                poses: poses.iter().map(|m| std::array::from_fn(|i| row_of_six(&|j| m[(i, j)]))).collect(),
+                cross: cross
+                    .iter()
+                    .map(|m| m.row_iter().map(|row| row_of_six(&|j| row[j])).collect())
+                    .collect(),
+            }
+        }
+    }
+
+    impl TryFrom<Rows> for Covariance {
+        type Error = String;
+
+        fn try_from(rows: Rows) -> Result<Covariance, String> {
+            let n = rows.free.len();
+            let fits = |len: usize| len == n;
+            let is_whole = fits(rows.intrinsics.len())
+                && rows.intrinsics.iter().all(|row| fits(row.len()))
+                && rows.cross.iter().all(|block| fits(block.len()))
+                && rows.cross.len() == rows.poses.len();
+            if !is_whole {
+                return Err(format!(
+                    "a covariance of {n} parameters and {} poses has blocks of other sizes",
+                    rows.poses.len()
+                ));
+            }
+            let from_rows = |block: &[[f64; 6]]| MatrixXx6::from_fn(n, |i, j| block[i][j]);
+            Ok(Covariance {
+                free: rows.free,
+                fy_per_fx: rows.fy_per_fx,
+                intrinsics: DMatrix::from_fn(n, n, |i, j| rows.intrinsics[i][j]),
+                poses: rows.poses.iter().map(|m| SMatrix::from_fn(|i, j| m[i][j])).collect(),
+                cross: rows.cross.iter().map(|block| from_rows(block)).collect(),
+            })
+        }
     }
 }

@@ -1,11 +1,12 @@
 //! Why can no camera be estimated from these data?
 
-use super::ClosedFormError;
+use super::{ClosedFormError, Unknown, unknown};
 use crate::camera::Parameter;
 use crate::geometry::HomographyError;
 
 /// A calibration that is refused. Every variant carries the numbers and says what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum CalibrationError {
     /// Each view gives two constraints on the linear parameters.
@@ -58,6 +59,24 @@ pub enum CalibrationError {
         /// The value.
         value: f64,
     },
+    /// Focal lengths cannot be tied in this ratio.
+    #[error("fy cannot be {ratio} times fx: a ratio is a positive number")]
+    BadRatio {
+        /// fy over fx.
+        ratio: f64,
+    },
+    /// A prior that no camera has, or that says nothing.
+    #[error(
+        "{parameter} = {mean} +- {standard_deviation} is no prior: a standard deviation is positive, and a focal length too"
+    )]
+    BadPrior {
+        /// Which.
+        parameter: Parameter,
+        /// Its value.
+        mean: f64,
+        /// Its standard deviation.
+        standard_deviation: f64,
+    },
     /// The loss has no positive scale.
     #[error("a robust loss needs a positive scale in px")]
     BadLoss,
@@ -93,11 +112,12 @@ pub enum CalibrationError {
     /// The data do not tell the free parameters apart.
     #[error(
         "the data cannot separate {}: {why}. Tilt the target by 20 degrees or more, about different axes, in some views, or \
-         give one of them a value to be held at", inseparable.join(" and ")
+         give one of them a value to be held at",
+        unknown::joined(inseparable)
     )]
     NotIdentifiable {
-        /// The parameters that trade off against each other, strongest first.
-        inseparable: Vec<String>,
+        /// What trades off against each other, strongest first.
+        inseparable: Vec<Unknown>,
         /// What in the data makes it so.
         why: String,
     },

@@ -6,13 +6,15 @@ use super::duplicates::Distinct;
 use super::intervals::Profile;
 use super::minimise::{Problem, State, rounding_cost};
 use super::normal::Observations;
+use super::prior::{self, Priors};
 use super::retraction::Retraction;
 use super::search::{self, Evidence, Judged};
 use super::start::Held;
+use super::system::System;
 use super::target_frame::TargetFrames;
 use super::{
-    Calibration, CalibrationError, Loss, Settings, Termination, Warning, chunks, identifiability, kernel,
-    polish, start, strays, structure, warnings,
+    Calibration, CalibrationError, Loss, Prior, Settings, Termination, Unknown, Warning, chunks,
+    identifiability, kernel, polish, start, strays, structure, warnings,
 };
 use crate::board::View;
 use crate::camera::Parameter;
@@ -53,8 +55,12 @@ pub fn calibrate(views: &[View], settings: &Settings) -> Result<Calibration, Cal
 
 fn calibrate_different(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
     check_counts(views, settings)?;
-    let calibration = chunks::in_pool(views.len(), || estimate(views, settings))?;
-    Ok(if settings.polish { polish::polish(views, settings.loss, calibration) } else { calibration })
+    let (calibration, variance) = chunks::in_pool(views.len(), || estimate(views, settings))?;
+    Ok(if settings.polish {
+        polish::polish(views, settings.loss, variance, calibration)
+    } else {
+        calibration
+    })
 }
 
 /// The result for all that was given: a copy has the pose and the residuals of what it is a copy of, and counts in no statistic.
@@ -86,14 +92,18 @@ fn with_copies(mut calibration: Calibration, distinct: &Distinct) -> Calibration
     calibration
 }
 
-fn estimate(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
+/// The calibration, and the variance of a pixel coordinate that weighed the priors.
+fn estimate(views: &[View], settings: &Settings) -> Result<(Calibration, f64), CalibrationError> {
     let frames = TargetFrames::of(views);
     let (observations, homographies) = homographies(views, &frames)?;
     let pixel_frame = pixel_frame(&observations);
     let held = Held::of(settings, pixel_frame.0)?;
+    let priors: Vec<Prior> = settings.priors().collect();
     let starts = start::starts(&homographies, settings, &held, pixel_frame)?;
     let problem = Problem {
         free: settings.free(),
+        fy_per_fx: held.fy_per_fx,
+        priors: Priors { list: &priors, variance: 0.0 },
         observations: &observations,
         loss: settings.loss,
         max_iterations: settings.max_iterations,
@@ -104,7 +114,13 @@ fn estimate(views: &[View], settings: &Settings) -> Result<Calibration, Calibrat
     };
     let evidence =
         Evidence { homographies: &homographies, held: &held, pixel_frame, search: settings.search };
-    report(search::best_minimum(&problem, starts, &evidence)?, &problem, &frames, settings.profile_coverage)
+    let (judged, variance) = if priors.is_empty() {
+        (search::best_minimum(&problem, starts, &evidence)?, 0.0)
+    } else {
+        prior::best_minimum(&problem, starts, &evidence)?
+    };
+    let problem = Problem { priors: Priors { variance, ..problem.priors }, ..problem };
+    Ok((report(judged, &problem, &frames, settings.profile_coverage)?, variance))
 }
 
 fn check_counts(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
@@ -113,18 +129,34 @@ fn check_counts(views: &[View], settings: &Settings) -> Result<(), CalibrationEr
         return Err(CalibrationError::BadLoss);
     }
     let free = settings.free();
-    let linear = [Fx, Fy, Cx, Cy, Skew].into_iter().filter(|&p| free.contains(p)).count();
+    check_priors(settings)?;
+    let is_known = |p| settings.priors().any(|prior| prior.parameter == p);
+    let linear = [Fx, Fy, Cx, Cy, Skew].into_iter().filter(|&p| free.contains(p) && !is_known(p)).count();
     let most = if is_distorting(settings)? { 2 } else { usize::MAX };
     let need = linear.div_ceil(2).clamp(1, most);
     if views.len() < need {
         return Err(CalibrationError::TooFewViews { need, got: views.len(), linear, copies: 0 });
     }
     let coordinates = 2 * views.iter().map(View::len).sum::<usize>();
-    let unknowns = free.len() + 6 * views.len();
+    let unknowns = free.len() - settings.priors().count() + 6 * views.len();
     if coordinates < unknowns {
         return Err(CalibrationError::TooFewPoints { coordinates, unknowns });
     }
     Ok(())
+}
+
+fn check_priors(settings: &Settings) -> Result<(), CalibrationError> {
+    let is_possible = |prior: &Prior| {
+        let is_focal = matches!(prior.parameter, Parameter::Fx | Parameter::Fy);
+        let (mean, sd) = (prior.mean, prior.standard_deviation);
+        mean.is_finite() && sd > 0.0 && sd.is_finite() && (mean > 0.0 || !is_focal)
+    };
+    match settings.priors().find(|prior| !is_possible(prior)) {
+        Some(Prior { parameter, mean, standard_deviation }) => {
+            Err(CalibrationError::BadPrior { parameter, mean, standard_deviation })
+        }
+        None => Ok(()),
+    }
 }
 
 /// Whether the lens may distort: homographies give two constraints a view, and a distortion tells its centre and the aspect ratio besides, so
@@ -181,10 +213,17 @@ fn report(
     let system = &minimum.system;
     let fit = Fit::of(&minimum.state, observations);
     let points = fit.marks();
-    let degrees_of_freedom = 2 * points - system.unknowns();
-    let freedom = degrees_of_freedom.max(1) as f64;
+    let settled = problem.priors.settled(&minimum);
+    let freedom = fit.freedom(system, settled);
+    let degrees_of_freedom =
+        ((2 * points) as f64 + settled - system.unknowns() as f64 + WHOLE).max(0.0) as usize;
     strays::refuse_narrow_loss(problem.loss, &fit)?;
     let of_residuals = warnings_of_residuals(problem, &minimum.state, &fit, freedom);
+    let variance = if problem.priors.list.is_empty() {
+        fit.variance(problem.loss, freedom)
+    } else {
+        problem.priors.variance
+    };
     let Fit { residuals, square, largest_radius, .. } = fit;
     let sigma_px = (square / freedom).sqrt();
     let conditioning = reduction.as_ref().and_then(|reduction| Conditioning::of(system, reduction));
@@ -193,7 +232,6 @@ fn report(
             "the normal equations are singular".into()
         })?;
     }
-    let variance = noise_variance(&residuals, square, problem.loss, freedom);
     let intervals = profile_coverage
         .zip(reduction.as_ref())
         .and_then(|(coverage, reduction)| {
@@ -204,14 +242,16 @@ fn report(
         .unwrap_or_default();
     let unit = reduction.and_then(|reduction| reduction.covariance()).ok_or_else(|| {
         CalibrationError::NotIdentifiable {
-            inseparable: vec!["camera".into(), "poses".into()],
+            inseparable: vec![Unknown::Camera, Unknown::Poses],
             why: "the normal equations are singular".into(),
         }
     })?;
-    let covariance = frames.covariance(unit, cam_from_target, variance);
+    let mut covariance = frames.covariance(unit, cam_from_target, variance);
+    covariance.fy_per_fx = problem.fy_per_fx;
     let mut calibration = Calibration {
         camera: *camera,
         free: system.free,
+        priors: problem.priors.list.to_vec(),
         cam_from_target: cam_from_target
             .iter()
             .enumerate()
@@ -258,6 +298,9 @@ fn judged_termination(termination: Termination, certificate: Option<&Certificate
     }
 }
 
+/// A sum of shares that is a whole number but for rounding counts as one.
+const WHOLE: f64 = 1e-6;
+
 /// How the minimum fits the observations.
 pub(super) struct Fit {
     pub residuals: Vec<Vec<Vec2>>,
@@ -275,6 +318,17 @@ impl Fit {
     /// The squared residuals, mark by mark.
     pub fn squares(&self) -> impl Iterator<Item = f64> {
         self.residuals.iter().flatten().map(|r| r.norm_squared())
+    }
+
+    /// Degrees of freedom that the residuals have, 1 at the least; `settled` unknowns are known from elsewhere.
+    pub fn freedom(&self, system: &System, settled: f64) -> f64 {
+        let coordinates = 2 * self.marks();
+        (coordinates as f64 + settled - system.unknowns() as f64).max(1.0)
+    }
+
+    /// Factor of the unit covariance: the residual variance, or Huber's correction for a robust loss.
+    pub fn variance(&self, loss: Loss, freedom: f64) -> f64 {
+        noise_variance(&self.residuals, self.square, loss, freedom)
     }
 
     pub fn of(state: &State, observations: &[Observations]) -> Fit {

@@ -10,13 +10,14 @@
 //! - Where tilts are no larger than noise makes them, all planes are held parallel: if the data fit as well, and the parameters could not be
 //!   identified were the planes parallel, the calibration is refused.
 
-use super::CalibrationError;
 use super::chance::chi_squared_quantile;
 use super::conditioning::{Conditioning, WeakComponent};
 use super::minimise::{Minimum, Problem, State};
 use super::normal::Observations;
+use super::prior::Priors;
 use super::system::System;
 use super::walk::{Far, Walked};
+use super::{CalibrationError, Unknown};
 use crate::camera::Parameter;
 use crate::geometry::{Pose, Vec2, Vec3, rotation};
 
@@ -112,13 +113,48 @@ fn refuse_if_fits(
     }
     let mut exact = System::new(problem.free, problem.observations.len());
     problem.linearise_into(&held.state, &mut exact);
-    refuse_if_singular(exact.conditioning().as_ref(), || {
+    let why = || {
         format!(
             "{what} within noise (holding it so raises the cost by {ratio:.1} variances, and up to {bound:.0} could be \
              chance on {degrees_of_freedom} degrees of freedom)"
         )
-    })?;
+    };
+    refuse_if_singular(exact.conditioning().as_ref(), why)?;
+    if !problem.priors.list.is_empty() {
+        refuse_if_priors_give_way(problem, minimum, &held.state, &exact, why)?;
+    }
     Ok(None)
+}
+
+/// A parameter that parallel planes leave to the priors must be known by them: where the estimate is said to be known better than this part of
+/// what they say, the difference comes from the tilts that noise made.
+const GIVEN_WAY: f64 = 0.9;
+
+/// Refuses planes that may be parallel, and then leave something to the priors, if the priors are so wide that the noise's tilts decide: `exact`
+/// are the equations at the state `parallel`.
+fn refuse_if_priors_give_way(
+    problem: &Problem<'_>,
+    minimum: &Minimum,
+    parallel: &State,
+    exact: &System,
+    why: impl FnOnce() -> String,
+) -> Result<(), CalibrationError> {
+    let pixels = Problem { priors: Priors::NONE, ..*problem };
+    let mut alone = System::new(problem.free, problem.observations.len());
+    pixels.linearise_into(parallel, &mut alone);
+    let alone = alone.conditioning();
+    let covariance = |system: &System| system.reduction().and_then(|r| r.intrinsics_covariance());
+    let (Some(claimed), Some(known)) = (covariance(&minimum.system), covariance(exact)) else {
+        return Ok(());
+    };
+    let gives_way = |row: usize| claimed[(row, row)] < GIVEN_WAY * GIVEN_WAY * known[(row, row)];
+    if alone.as_ref().is_some_and(|c| !c.is_singular()) || !(0..problem.free.len()).any(gives_way) {
+        return Ok(());
+    }
+    let inseparable = alone.map_or_else(|| vec![Unknown::Camera, Unknown::Poses], |c| names(&c.weakest));
+    let why =
+        format!("{}, and what is known beforehand is too little to decide: state it more narrowly", why());
+    Err(CalibrationError::NotIdentifiable { inseparable, why })
 }
 
 /// Variance of a pixel coordinate; exact data leave rounding as noise.
@@ -135,7 +171,7 @@ pub(super) fn refuse_if_singular(
         Some(c) if !c.is_singular() => Ok(()),
         Some(c) => Err(CalibrationError::NotIdentifiable { inseparable: names(&c.weakest), why: why() }),
         None => Err(CalibrationError::NotIdentifiable {
-            inseparable: vec!["camera".into(), "poses".into()],
+            inseparable: vec![Unknown::Camera, Unknown::Poses],
             why: why(),
         }),
     }
@@ -173,28 +209,18 @@ pub(super) fn refuse_if_flat(
     }
 }
 
-/// Names for people: fx and fy together are the focal length, and so on; the poses' share last.
-fn names(weakest: &[WeakComponent]) -> Vec<String> {
-    let mut names: Vec<String> = Vec::new();
+/// Groups for people: fx and fy together are the focal length, and so on; the poses' share last.
+fn names(weakest: &[WeakComponent]) -> Vec<Unknown> {
+    let mut names = Vec::new();
     for member in weakest {
-        add(&mut names, group(&member.name));
+        add(&mut names, member.unknown.group());
     }
     names
 }
 
-fn group(name: &str) -> &str {
-    match name {
-        "fx" | "fy" => "focal length",
-        "cx" | "cy" => "principal point",
-        "k1" | "k2" | "k3" => "radial distortion",
-        "p1" | "p2" => "tangential distortion",
-        other => other,
-    }
-}
-
-fn add(names: &mut Vec<String>, name: &str) {
-    if !names.iter().any(|n| n == name) {
-        names.push(name.to_string());
+fn add(names: &mut Vec<Unknown>, name: Unknown) {
+    if !names.contains(&name) {
+        names.push(name);
     }
 }
 
@@ -204,13 +230,13 @@ const ELSEWHERE: f64 = 1e-3;
 const MOVED: f64 = 0.1;
 
 /// What moved along when a parameter was moved far away, that parameter first.
-fn moved(near: &State, far: &State, parameter: Parameter) -> Vec<String> {
+fn moved(near: &State, far: &State, parameter: Parameter) -> Vec<Unknown> {
     let mut list = Vec::new();
-    add(&mut list, group(parameter.name()));
+    add(&mut list, Unknown::Intrinsic(parameter).group());
     let (a, b) = (&near.camera, &far.camera);
     let focal = 0.5 * (a.fx + a.fy);
     if (libm::log(a.fx / b.fx)).abs().max(libm::log(a.fy / b.fy).abs()) > MOVED {
-        add(&mut list, "focal length");
+        add(&mut list, Unknown::FocalLength);
     }
     let views = || near.cam_from_target.iter().zip(&far.cam_from_target);
     let count = near.cam_from_target.len().max(1) as f64;
@@ -218,16 +244,16 @@ fn moved(near: &State, far: &State, parameter: Parameter) -> Vec<String> {
         |of: &dyn Fn(&Pose, &Pose) -> f64| (views().map(|(a, b)| of(a, b)).sum::<f64>() / count).sqrt();
     let squared = |x: f64| x * x;
     if mean(&|a, b| squared(libm::log((a.translation.z / b.translation.z).abs()))) > MOVED {
-        add(&mut list, "distance");
+        add(&mut list, Unknown::Distance);
     }
     if (Vec2::new(a.cx, a.cy) - Vec2::new(b.cx, b.cy)).norm() > MOVED * focal {
-        add(&mut list, "principal point");
+        add(&mut list, Unknown::PrincipalPoint);
     }
     if mean(&|a, b| squared((a.translation - b.translation).xy().norm() / a.translation.z)) > MOVED {
-        add(&mut list, "lateral position");
+        add(&mut list, Unknown::LateralPosition);
     }
     if mean(&|a, b| (a.rotation.column(2) - b.rotation.column(2)).norm_squared()) > MOVED {
-        add(&mut list, "tilt");
+        add(&mut list, Unknown::Tilt);
     }
     list
 }

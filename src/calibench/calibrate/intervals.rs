@@ -12,6 +12,7 @@
 
 use super::minimise::{Minimum, Problem, State};
 use super::system::{Reduction, Step};
+use super::tie::tied;
 use crate::camera::Parameter;
 use nalgebra::SVector;
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -153,9 +154,11 @@ impl<'a> Profile<'a> {
             self.reduction.eliminated.iter().map(|factors| -factors.response(&intrinsics, n)).collect();
         let step = Step::along(intrinsics, poses);
         let mut state = self.minimum.state.clone();
-        self.problem.retraction.apply(&self.minimum.state, free, &step, &mut state);
+        let fy_per_fx = self.problem.fy_per_fx;
+        self.problem.retraction.apply(&self.minimum.state, free, fy_per_fx, &step, &mut state);
         // A curved path may end beside the value wanted.
-        state.camera = state.camera.with(parameter, self.minimum.state.camera.get(parameter) + offset);
+        let value = self.minimum.state.camera.get(parameter) + offset;
+        state.camera = tied(state.camera.with(parameter, value), fy_per_fx);
         state
     }
 }

@@ -3,6 +3,7 @@
 use super::Loss;
 use super::Termination;
 use super::normal::{self, Observations};
+use super::prior::Priors;
 use super::retraction::Retraction;
 use super::system::{Step, System};
 use crate::camera::{Camera, FreeParameters};
@@ -18,6 +19,10 @@ pub(super) struct State {
 /// What is minimised.
 pub(super) struct Problem<'a> {
     pub free: FreeParameters,
+    /// fy over fx, where fy follows fx.
+    pub fy_per_fx: Option<f64>,
+    /// What is known beforehand.
+    pub priors: Priors<'a>,
     pub observations: &'a [Observations],
     pub loss: Loss,
     pub max_iterations: usize,
@@ -72,10 +77,13 @@ impl Problem<'_> {
     /// Normal equations at a state; an infinite cost where a point is not in front of the camera.
     pub fn linearise_into(&self, state: &State, system: &mut System) {
         let State { camera, cam_from_target } = state;
-        if normal::fill(system, camera, cam_from_target, self.observations, self.loss).is_none() {
+        if normal::fill(system, camera, cam_from_target, self.observations, self.loss, self.fy_per_fx)
+            .is_none()
+        {
             system.cost = f64::INFINITY;
             return;
         }
+        self.priors.add_to(camera, system);
         if self.hold_tilt {
             for (view, pose) in system.views.iter_mut().zip(&state.cam_from_target) {
                 view.hold_tilt(&pose.rotation.column(2).into_owned());
@@ -115,7 +123,7 @@ impl Problem<'_> {
                 damping *= DAMPING_FACTOR;
                 continue;
             }
-            self.retraction.apply(&state, self.free, &step, &mut trial);
+            self.retraction.apply(&state, self.free, self.fy_per_fx, &step, &mut trial);
             let undamped = damping <= FIRST_DAMPING;
             if undamped && step.predicted_gain <= RELATIVE_GAIN * system.cost + rounding_cost {
                 std::mem::swap(&mut state, &mut trial);

@@ -39,10 +39,11 @@ pub(super) fn fill(
     cam_from_target: &[Pose],
     observations: &[Observations],
     loss: Loss,
+    fy_per_fx: Option<f64>,
 ) -> Option<()> {
     let free = system.free;
     let radial = kernel::is_radial(camera, free);
-    let columns = Columns::of(free);
+    let columns = Columns::of(free, fy_per_fx);
     // Every entry that is ever read is written below; the rest stays 0.
     system.views.resize_with(observations.len(), ViewBlock::zero);
     let mut total = Some(Share::zero());
@@ -77,15 +78,17 @@ pub(super) fn fill(
 struct Columns {
     parameters: [Parameter; Parameter::COUNT],
     n: usize,
+    /// fy over fx, if fx is free and fy tied to it.
+    fy_per_fx: Option<f64>,
 }
 
 impl Columns {
-    fn of(free: FreeParameters) -> Columns {
+    fn of(free: FreeParameters, fy_per_fx: Option<f64>) -> Columns {
         let mut parameters = Parameter::ALL;
         for (slot, parameter) in parameters.iter_mut().zip(free.iter()) {
             *slot = parameter;
         }
-        Columns { parameters, n: free.len() }
+        Columns { parameters, n: free.len(), fy_per_fx: fy_per_fx.filter(|_| free.contains(Parameter::Fx)) }
     }
 
     /// Hands the sums of a view to its block and adds the intrinsics' share (upper triangle).
@@ -101,6 +104,9 @@ impl Columns {
                 block.coupling[(i, j)] = kernel::coupling(sums, a, j);
             }
         }
+        if let Some(ratio) = self.fy_per_fx {
+            self.add_tied(ratio, sums, share, block);
+        }
         share.cost += kernel::cost(sums);
         for i in 0..6 {
             for (j, &sum) in sums[i].iter().enumerate().take(6).skip(i) {
@@ -108,6 +114,24 @@ impl Columns {
                 block.pose[(j, i)] = sum;
             }
             block.gradient[i] = kernel::pose_gradient(sums, i);
+        }
+    }
+}
+
+impl Columns {
+    /// Turns the column of fx, the first, into `d/dfx + a d/dfy`.
+    fn add_tied(&self, ratio: f64, sums: &Sums, share: &mut Share, block: &mut ViewBlock) {
+        let by_fy = |parameter: Parameter| {
+            let (row, column) = INTRINSICS_SLOTS[Parameter::Fy as usize][parameter as usize];
+            sums[usize::from(row)][usize::from(column)]
+        };
+        share.square[(0, 0)] += ratio * ratio * by_fy(Parameter::Fy) + 2.0 * ratio * by_fy(Parameter::Fx);
+        for (j, &other) in self.parameters.iter().enumerate().take(self.n).skip(1) {
+            share.square[(0, j)] += ratio * by_fy(other);
+        }
+        share.gradient[0] += ratio * kernel::gradient(sums, Parameter::Fy);
+        for j in 0..6 {
+            block.coupling[(0, j)] += ratio * kernel::coupling(sums, Parameter::Fy, j);
         }
     }
 }
@@ -136,6 +160,6 @@ pub fn information(
         Some(Observations::new(points.iter().copied().zip(pixels)))
     };
     let observations: Vec<Observations> = cam_from_target.iter().map(seen).collect::<Option<_>>()?;
-    fill(&mut system, camera, cam_from_target, &observations, Loss::Squares)?;
+    fill(&mut system, camera, cam_from_target, &observations, Loss::Squares, None)?;
     Some(system)
 }

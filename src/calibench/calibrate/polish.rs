@@ -7,6 +7,7 @@
 #![allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
 
 use super::kernel::{self, Model, Rows};
+use super::prior::Priors;
 use super::{Calibration, Covariance, Loss, Warning};
 use crate::board::View;
 use crate::camera::{Camera, FreeParameters, Parameter};
@@ -32,11 +33,12 @@ type Square = [[Number; COLUMNS]; COLUMNS];
 /// last digits. One that did not converge is left as it is; one whose steps do not shrink too, with a warning.
 ///
 /// Under a robust loss the covariance stays that of the unpolished minimum, which differs from this one by some 1e-7 of itself.
-pub(super) fn polish(views: &[View], loss: Loss, mut calibration: Calibration) -> Calibration {
+/// `variance` is that of a pixel coordinate, px^2, which weighs the priors.
+pub(super) fn polish(views: &[View], loss: Loss, variance: f64, mut calibration: Calibration) -> Calibration {
     if !calibration.termination.is_minimum() {
         return calibration;
     }
-    let mut state = State::of(&calibration);
+    let mut state = State::of(&calibration, variance);
     let mut last = f64::INFINITY;
     for _ in 0..MOST_STEPS {
         let Some((step, length_px)) = Equations::of(&state, views, loss).and_then(|e| e.step()) else {
@@ -60,6 +62,11 @@ pub(super) fn polish(views: &[View], loss: Loss, mut calibration: Calibration) -
 /// Camera and poses.
 struct State {
     free: FreeParameters,
+    fy_per_fx: Option<Number>,
+    /// The variance that weighs the priors, px^2.
+    variance: f64,
+    /// Parameter, mean and weight.
+    priors: Vec<(Parameter, f64, f64)>,
     parameters: [Number; Parameter::COUNT],
     poses: Vec<PoseNumbers>,
 }
@@ -71,9 +78,13 @@ struct PoseNumbers {
 }
 
 impl State {
-    fn of(calibration: &Calibration) -> State {
+    fn of(calibration: &Calibration, variance: f64) -> State {
+        let priors = Priors { list: &calibration.priors, variance };
         State {
+            variance,
+            priors: priors.weighted().map(|(prior, weight)| (prior.parameter, prior.mean, weight)).collect(),
             free: calibration.free,
+            fy_per_fx: calibration.covariance.fy_per_fx.map(Number::from),
             parameters: calibration.camera.parameters().map(Number::from),
             poses: calibration.cam_from_target.iter().map(PoseNumbers::of).collect(),
         }
@@ -83,6 +94,9 @@ impl State {
     fn take(&mut self, step: &Step) {
         for (parameter, &d) in self.free.iter().zip(&step.intrinsics) {
             self.parameters[parameter as usize] += d;
+        }
+        if let Some(ratio) = self.fy_per_fx {
+            self.parameters[Parameter::Fy as usize] = ratio * self.parameters[Parameter::Fx as usize];
         }
         for (pose, d) in self.poses.iter_mut().zip(&step.poses) {
             pose.take(d);
@@ -180,6 +194,12 @@ impl Equations {
             }
             factored.push(square);
         }
+        for &(parameter, mean, weight) in &state.priors {
+            let row = state.free.position(parameter)?;
+            let weight = Number::from(weight);
+            reduced[row][row] += weight;
+            reduced[n][row] += weight * (state.parameters[parameter as usize] - Number::from(mean));
+        }
         factor(&mut reduced, n, n + 1)?;
         Some(Equations { n, views: factored, reduced })
     }
@@ -222,17 +242,29 @@ impl Equations {
             }
             residuals.push(of_view);
         }
-        let root_mean = |count: usize| (square / Number::from(count.max(1) as f64)).sqrt().to_f64();
-        let variance = square / Number::from(before.degrees_of_freedom.max(1) as f64);
+        let root_mean = |count: f64| (square / Number::from(count.max(1.0))).sqrt().to_f64();
+        // Priors settle a part of an unknown: the degrees of freedom are then no whole number, and stay those of the unpolished minimum.
+        let squares =
+            |residuals: &[Vec<Vec2>]| residuals.iter().flatten().map(|r| r.norm_squared()).sum::<f64>();
+        let freedom = match state.priors.is_empty() {
+            true => before.degrees_of_freedom as f64,
+            false => squares(&before.residuals) / (before.sigma_px * before.sigma_px),
+        };
+        let variance = match state.priors.is_empty() {
+            true => square / Number::from(freedom.max(1.0)),
+            false => Number::from(state.variance),
+        };
         let covariance = match loss {
-            Loss::Squares => self.covariance(state.free, variance),
+            Loss::Squares => {
+                Covariance { fy_per_fx: before.covariance.fy_per_fx, ..self.covariance(state.free, variance) }
+            }
             Loss::Huber { .. } | Loss::Cauchy { .. } => before.covariance.clone(),
         };
         Some(Calibration {
             camera: Camera::from_parameters(state.parameters.map(Number::to_f64)),
             cam_from_target: state.poses.iter().map(PoseNumbers::to_pose).collect(),
-            rmse_px: root_mean(residuals.iter().map(Vec::len).sum()),
-            sigma_px: root_mean(before.degrees_of_freedom),
+            rmse_px: root_mean(residuals.iter().map(Vec::len).sum::<usize>() as f64),
+            sigma_px: root_mean(freedom),
             residuals,
             covariance,
             ..before.clone()
@@ -253,6 +285,7 @@ impl Equations {
         }
         let mut result = Covariance {
             free,
+            fy_per_fx: None,
             intrinsics: DMatrix::from_fn(n, n, |i, j| (variance * intrinsics[i][j]).to_f64()),
             poses: Vec::with_capacity(self.views.len()),
             cross: Vec::with_capacity(self.views.len()),
@@ -300,6 +333,9 @@ fn view_square(state: &State, index: usize, view: &View, loss: Loss) -> Option<S
             for (column, parameter) in row[POSE..].iter_mut().zip(state.free.iter()) {
                 let place = parameter as usize;
                 *column = linear.get(place).copied().unwrap_or_else(|| shared[POSE + place - linear.len()]);
+                if let Some(ratio) = state.fy_per_fx.filter(|_| parameter == Parameter::Fx) {
+                    *column += ratio * linear[Parameter::Fy as usize];
+                }
             }
             row[size - 1] = residual;
             for i in 0..size {

@@ -78,10 +78,11 @@ pub(super) fn relax(
     fit.relaxed(at, lens_parameters)
 }
 
-/// The parameters of the relaxed lens for a calibration whose `free` parameters are these; `is_distorting` tells which coefficients are held at
-/// a value other than 0.
-pub(super) fn parameters(free: FreeParameters, is_distorting: impl Fn(Parameter) -> bool) -> FreeParameters {
+/// The parameters of the relaxed lens for a calibration; `is_distorting` tells which coefficients are held at a value other than 0. The shape of
+/// the cells, fy over fx, is one of them unless it is known.
+pub(super) fn parameters(problem: &Problem<'_>, is_distorting: impl Fn(Parameter) -> bool) -> FreeParameters {
     use Parameter::{Cx, Cy, Fx, Fy, K1, K2, K3, P1, P2, Skew};
+    let free = problem.free;
     let focal_free = free.contains(Fx) || free.contains(Fy);
     let lens = [K1, K2, P1, P2, K3];
     // A coefficient held at a value is no number of the relaxed model's unless the focal length is held too.
@@ -92,7 +93,7 @@ pub(super) fn parameters(free: FreeParameters, is_distorting: impl Fn(Parameter)
     }
     let shape = [Cx, Cy, Skew].into_iter().filter(|&p| free.contains(p));
     let sought = shape.fold(sought, FreeParameters::with);
-    if focal_free { sought.with(Fy) } else { sought }
+    if focal_free && problem.fy_per_fx.is_none() { sought.with(Fy) } else { sought }
 }
 
 /// The minimum of the relaxed model next to a calibration.
@@ -103,7 +104,7 @@ pub(super) fn beside(problem: &Problem<'_>, camera: &Camera, cam_from_target: &[
         entries(&columns)
     };
     let state = State { lens: *camera, homographies: cam_from_target.iter().map(homography).collect() };
-    let free = parameters(problem.free, |p| camera.get(p) != 0.0);
+    let free = parameters(problem, |p| camera.get(p) != 0.0);
     let fit = Fit { observations: problem.observations, loss: problem.loss };
     fit.relaxed(fit.minimise(state, free, LAST_ITERATIONS)?, free)
 }

@@ -1,18 +1,21 @@
 //! What does a calibration say? The estimate, how sure it is, how it fits, and what to be careful about.
 
-use super::{Certificate, Conditioning, Covariance, ProfileInterval, Termination};
+use super::{Certificate, Conditioning, Covariance, Prior, ProfileInterval, Termination};
 use crate::camera::{Camera, FreeParameters, Parameter};
 use crate::geometry::{Pose, Vec2};
 use std::fmt;
 
 /// The result of a calibration.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Calibration {
     /// The estimate; parameters that were not free have the values they were held at.
     pub camera: Camera,
-    /// What was estimated.
+    /// What was estimated. An fy that is tied to fx (`covariance.fy_per_fx`) follows and is not counted.
     pub free: FreeParameters,
+    /// What was known of them beforehand; it counts in the estimate and in the covariance.
+    pub priors: Vec<Prior>,
     /// One pose a view.
     pub cam_from_target: Vec<Pose>,
     /// Predicted - observed, px, view by view, point by point.
@@ -20,9 +23,9 @@ pub struct Calibration {
     /// `sqrt(sum |r|^2 / N)` over all N points, px: as in OpenCV.
     pub rmse_px: f64,
     /// Estimated standard deviation of one pixel coordinate: `sqrt(sum |r|^2 / (2 N - p))`, px. Under a robust loss see
-    /// [`Calibration::covariance`].
+    /// [`Calibration::covariance`]. With priors `p` counts the unknowns less what the priors settle of them, see [`Prior`].
     pub sigma_px: f64,
-    /// Degrees of freedom `2 N - p`.
+    /// Degrees of freedom `2 N - p`; with priors rounded down.
     pub degrees_of_freedom: usize,
     /// First-order covariance of intrinsics and poses. Under a robust loss it is scaled by Huber's correction
     /// `[sum psi^2 / (2N - p)] / [mean psi']^2` (Huber & Ronchetti 2009, section 7.6), psi' being [`Loss::slope`](crate::calibrate::Loss::slope).
@@ -175,6 +178,19 @@ pub enum Warning {
         /// Largest radius of an observed point.
         largest_observed: f64,
     },
+    /// The pixels and what was known beforehand do not go together: one of the two is wrong.
+    Contradicted {
+        /// Of which parameter.
+        parameter: Parameter,
+        /// The value known beforehand.
+        mean: f64,
+        /// Its standard deviation.
+        standard_deviation: f64,
+        /// The estimate, between the two.
+        estimate: f64,
+        /// By how many standard deviations of their difference they disagree.
+        deviations: f64,
+    },
     /// No residual degrees of freedom: the fit is exact whatever the noise, and no standard deviation can be told.
     NoDegreesOfFreedom,
     /// The last digits were asked for, and the steps towards them did not shrink: the estimate is the refinement's.
@@ -281,6 +297,11 @@ impl fmt::Display for Warning {
                 "the lens model folds back at normalised radius {monotone_radius:.3}, and points were seen out to \
                  {largest_observed:.3}: it must not be used beyond them"
             ),
+            Warning::Contradicted { parameter, mean, standard_deviation, estimate, deviations } => write!(
+                f,
+                "the marks contradict what is known of {parameter} beforehand, {mean} +- {standard_deviation}: with both it is {estimate:.6}, and \
+                 they disagree by {deviations:.1} standard deviations; one of the two is wrong"
+            ),
             Warning::NoDegreesOfFreedom => f.write_str(
                 "as many unknowns as measurements: the fit is exact and says nothing about its accuracy",
             ),
@@ -326,4 +347,74 @@ impl Calibration {
 fn rms<'a>(residuals: impl ExactSizeIterator<Item = &'a Vec2>) -> f64 {
     let count = residuals.len() as f64;
     (residuals.map(|r| r.norm_squared()).sum::<f64>() / count).sqrt()
+}
+
+#[cfg(all(test, feature = "serde", feature = "io"))]
+mod tests {
+    use crate::board::View;
+    use crate::calibrate::{Calibration, CalibrationError, Conditioning, Loss, Settings, calibrate};
+    use crate::camera::{BrownConrady, Camera, Parameter};
+    use crate::geometry::{Pose, Vec2, Vec3, rotation};
+    use serde::{Serialize, de::DeserializeOwned};
+
+    fn views(turns: &[[f64; 3]]) -> Vec<View> {
+        let camera =
+            Camera::pinhole(600.0, 590.0, 320.0, 240.0).with_distortion(BrownConrady::radial(-0.2, 0.1));
+        let points: Vec<Vec2> =
+            (0..35).map(|i| Vec2::new(f64::from(i % 7) - 3.0, f64::from(i / 7) - 2.0) * 12.0).collect();
+        let view = |(number, turn): (usize, &[f64; 3])| {
+            let pose = Pose {
+                rotation: rotation::from_xyz_rad(turn[0], turn[1], turn[2]),
+                translation: Vec3::new(2.0, -3.0, 120.0 + 9.0 * number as f64),
+            };
+            // A wave for noise: residuals, and so a covariance, that are not 0.
+            let error = |i: usize| 0.1 * Vec2::new(libm::sin(7.0 * i as f64), libm::cos(5.0 * i as f64));
+            let image = |(i, p): (usize, &Vec2)| {
+                camera.project(&pose.apply(&Vec3::new(p.x, p.y, 0.0))).map(|pixel| pixel + error(i))
+            };
+            let pixels = points.iter().enumerate().map(image).collect::<Option<Vec<Vec2>>>().unwrap();
+            View::new(points.clone(), pixels).unwrap()
+        };
+        turns.iter().enumerate().map(view).collect()
+    }
+
+    /// What a value is after the way through JSON.
+    fn there_and_back<T: Serialize + DeserializeOwned>(value: &T) -> T {
+        serde_json::from_str(&serde_json::to_string(value).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn serde_keeps_a_calibration_and_what_it_was_asked_to_the_bit() {
+        let settings = Settings::standard()
+            .with_image_size((640, 480))
+            .with_loss(Loss::Huber { delta_px: 0.5 })
+            .hold(Parameter::K2, 0.1)
+            .with_profile_intervals(0.95);
+        assert_eq!(there_and_back(&settings), settings);
+        let views = views(&[[0.3, 0.0, 0.1], [0.0, -0.3, 0.0], [-0.2, 0.25, 0.4]]);
+        let calibration: Calibration = calibrate(&views, &settings).unwrap();
+        assert_eq!(there_and_back(&calibration), calibration);
+        let conditioning: Conditioning = calibration.conditioning.unwrap();
+        assert_eq!(there_and_back(&conditioning), conditioning);
+    }
+
+    #[test]
+    fn serde_keeps_a_refusal_with_its_reason() {
+        let facing = views(&[[0.0; 3], [0.0, 0.0, 0.3], [0.0, 0.0, -0.2]]);
+        let refusals = [
+            calibrate(&facing, &Settings::standard()).map(|r| r.camera).unwrap_err(),
+            calibrate(&facing[..1], &Settings::standard()).map(|r| r.camera).unwrap_err(),
+        ];
+        assert!(matches!(refusals[0], CalibrationError::NotIdentifiable { .. }), "{}", refusals[0]);
+        for refusal in refusals {
+            assert_eq!(there_and_back(&refusal), refusal);
+        }
+    }
+
+    #[test]
+    fn serde_refuses_a_covariance_whose_blocks_do_not_fit() {
+        let text = r#"{"free": "fx,fy", "intrinsics": [[1.0]], "poses": [], "cross": []}"#;
+        let error = serde_json::from_str::<crate::calibrate::Covariance>(text).unwrap_err();
+        assert!(error.to_string().contains("other sizes"), "{error}");
+    }
 }

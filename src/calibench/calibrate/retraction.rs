@@ -7,6 +7,7 @@
 
 use super::minimise::State;
 use super::system::Step;
+use super::tie::tied;
 use crate::camera::{BrownConrady, Camera, FreeParameters, Parameter};
 use crate::geometry::{Mat3, Pose, Vec3};
 use nalgebra::SVector;
@@ -21,20 +22,27 @@ pub(super) enum Retraction {
 }
 
 impl Retraction {
-    /// Moves `from` by `step` into `to`.
-    pub fn apply(self, from: &State, free: FreeParameters, step: &Step, to: &mut State) {
+    /// Moves `from` by `step` into `to`; `fy_per_fx` ties the focal lengths.
+    pub fn apply(
+        self,
+        from: &State,
+        free: FreeParameters,
+        fy_per_fx: Option<f64>,
+        step: &Step,
+        to: &mut State,
+    ) {
         let intrinsics = step.intrinsics.as_slice();
         let poses = to.cam_from_target.iter_mut().zip(&from.cam_from_target).zip(&step.poses);
         match self {
             Retraction::Straight => {
-                to.camera = from.camera.stepped(free, intrinsics);
+                to.camera = tied(from.camera.stepped(free, intrinsics), fy_per_fx);
                 for ((to, from), delta) in poses {
                     *to = from.perturbed(delta);
                 }
             }
             Retraction::Curved => {
-                to.camera = curved_camera(&from.camera, free, intrinsics);
-                let straight = from.camera.stepped(free, intrinsics);
+                to.camera = curved_camera(&from.camera, free, fy_per_fx, intrinsics);
+                let straight = tied(from.camera.stepped(free, intrinsics), fy_per_fx);
                 let rate = |old: f64, new: f64| ((new - old) / old).clamp(-LARGEST_LOG, LARGEST_LOG);
                 let rates = [rate(from.camera.fx, straight.fx), rate(from.camera.fy, straight.fy)];
                 for ((to, from), delta) in poses {
@@ -49,8 +57,8 @@ impl Retraction {
 const LARGEST_LOG: f64 = 3.0;
 
 /// `f exp(df / f)`, and coefficients straight in `k1 / f^2`, `k2 / f^4`, `k3 / f^6`, `p / f`. Held parameters stay.
-fn curved_camera(camera: &Camera, free: FreeParameters, step: &[f64]) -> Camera {
-    let straight = camera.stepped(free, step);
+fn curved_camera(camera: &Camera, free: FreeParameters, fy_per_fx: Option<f64>, step: &[f64]) -> Camera {
+    let straight = tied(camera.stepped(free, step), fy_per_fx);
     let grown = |old: f64, new: f64| old * libm::exp(((new - old) / old).clamp(-LARGEST_LOG, LARGEST_LOG));
     let (fx, fy) = (grown(camera.fx, straight.fx), grown(camera.fy, straight.fy));
     let rate = if free.contains(Parameter::Fx) {
@@ -76,7 +84,7 @@ fn curved_camera(camera: &Camera, free: FreeParameters, step: &[f64]) -> Camera 
         p2: along(Parameter::P2, 1, old.p2, new.p2),
         k3: along(Parameter::K3, 6, old.k3, new.k3),
     };
-    Camera { fx, fy, ..straight }.with_distortion(distortion)
+    tied(Camera { fx, fy, ..straight }.with_distortion(distortion), fy_per_fx)
 }
 
 /// `t_z exp(dt_z / t_z)`, and straight in `fx t_x / t_z`, `fy t_y / t_z`, `r_31 / t_z`, `r_32 / t_z`; the focal lengths change by the
@@ -117,7 +125,7 @@ fn with_axis(rotation: &Mat3, a: f64, b: f64) -> Mat3 {
 
 /// The state with the focal lengths that are free `s` times as long, and all that follows them: distances, tilts, coefficients. Its images
 /// agree to second order in the tilts.
-pub(super) fn scaled(state: &State, free: FreeParameters, s: f64) -> State {
+pub(super) fn scaled(state: &State, free: FreeParameters, fy_per_fx: Option<f64>, s: f64) -> State {
     let powers = [
         (Parameter::Fx, 1),
         (Parameter::Fy, 1),
@@ -138,7 +146,10 @@ pub(super) fn scaled(state: &State, free: FreeParameters, s: f64) -> State {
             translation: Vec3::new(t.x, t.y, s * t.z),
         }
     };
-    State { camera: moved, cam_from_target: state.cam_from_target.iter().map(pose).collect() }
+    State {
+        camera: tied(moved, fy_per_fx),
+        cam_from_target: state.cam_from_target.iter().map(pose).collect(),
+    }
 }
 
 /// The shortest rotation that takes unit vector `from` to unit vector `to`; none where they are opposite.
@@ -174,7 +185,7 @@ mod tests {
         let turn = SVector::<f64, 6>::from([0.2, -0.1, 0.3, 0.5, 0.4, 2.0]);
         let apart = |h: f64| {
             let step = unit.map(|x| h * x);
-            let (a, b) = (camera.stepped(free, &step), curved_camera(&camera, free, &step));
+            let (a, b) = (camera.stepped(free, &step), curved_camera(&camera, free, None, &step));
             let cameras: f64 = a
                 .parameters()
                 .iter()

@@ -15,6 +15,7 @@ use super::relaxed::{self, Relaxed};
 use super::retraction::Retraction;
 use super::start::{Held, focal_from_centre};
 use super::system::Reduction;
+use super::tie::{met_halfway, tied};
 use super::walk::Walked;
 use super::{CalibrationError, Termination, strays, tilt, walk};
 use crate::camera::{BrownConrady, Camera, FreeParameters, Parameter};
@@ -220,7 +221,8 @@ fn trades_off(free: FreeParameters, covariance: &DMatrix<f64>) -> bool {
 /// the noise.
 pub(super) fn noise_of(problem: &Problem<'_>, minimum: &Minimum) -> f64 {
     let coordinates = 2 * problem.observations.iter().map(|o| o.len()).sum::<usize>();
-    let freedom = coordinates.saturating_sub(minimum.system.unknowns()).max(1);
+    let measurements = coordinates + problem.priors.list.len();
+    let freedom = measurements.saturating_sub(minimum.system.unknowns()).max(1);
     (minimum.system.cost / freedom as f64).sqrt()
 }
 
@@ -333,7 +335,7 @@ fn from_relaxed(problem: &Problem<'_>, first: Judged, evidence: &Evidence<'_>) -
         let starts: Vec<State> =
             next.iter().flat_map(|relaxed| relaxed_starts(problem, relaxed, evidence, 1.0)).collect();
         found.try_all(problem, starts);
-        if found.is_far_above_floor() {
+        if found.is_far_above_floor() && problem.fy_per_fx.is_none() {
             let stretched =
                 |relaxed: &Relaxed| ASPECTS.map(|aspect| relaxed_starts(problem, relaxed, evidence, aspect));
             found.try_all(problem, next.iter().flat_map(stretched).flatten().collect());
@@ -484,10 +486,10 @@ const FEW: usize = 100;
 const BENT: [f64; 3] = [0.0, -0.2, 0.2];
 
 /// The relaxed model of these data, its least minimum first and then that of an ordinary camera: square pixels, and its centre in the middle.
-fn relax(problem: &Problem<'_>, evidence: &Evidence<'_>, is_certified: bool) -> Vec<Relaxed> {
+pub(super) fn relax(problem: &Problem<'_>, evidence: &Evidence<'_>, is_certified: bool) -> Vec<Relaxed> {
     use Parameter::{Cx, Cy, Fx, Fy, Skew};
     let held = evidence.held;
-    let sought = relaxed::parameters(problem.free, |p| held.value(p).is_some_and(|value| value != 0.0));
+    let sought = relaxed::parameters(problem, |p| held.value(p).is_some_and(|value| value != 0.0));
     let gauge = gauge_lens(problem, evidence);
     let middle = held.centre;
     let is_centred = !(sought.contains(Cx) && sought.contains(Cy));
@@ -534,7 +536,8 @@ fn gauge_lens(problem: &Problem<'_>, evidence: &Evidence<'_>) -> Camera {
     let start = held.camera(Camera::pinhole(gauge, gauge, held.centre.x, held.centre.y));
     if problem.free.contains(Fx) || problem.free.contains(Fy) {
         // The coefficients start at 0: their values belong to another focal length.
-        Camera { fx: gauge, fy: gauge, ..start }.with_distortion(BrownConrady::radial(0.0, 0.0))
+        let cells = tied(Camera { fx: gauge, fy: gauge, ..start }, problem.fy_per_fx);
+        cells.with_distortion(BrownConrady::radial(0.0, 0.0))
     } else {
         start
     }
@@ -563,14 +566,20 @@ fn relaxed_starts(
         cameras.push(camera);
     }
     let centred = |focal: f64| Camera::pinhole(focal, focal * aspect, 0.0, 0.0);
-    cameras.extend(focal_from_centre(&homographies, Vec2::zeros()).map(centred));
+    cameras.extend(focal_from_centre(&homographies, Vec2::zeros(), 1.0).map(centred));
     let known = cameras.iter().filter_map(|camera| hypothesis(relaxed, evidence, camera));
     let mut hypotheses: Vec<Hypothesis> = known.collect();
     let unit = evidence.pixel_frame.1 / gauge;
     let ratio = libm::log(SCAN.1 / SCAN.0) / (SCAN_STEPS - 1) as f64;
     let focal = |i: usize| unit * SCAN.0 * libm::exp(ratio * i as f64);
+    let with_priors = |mut hypothesis: Hypothesis| {
+        if !problem.priors.list.is_empty() {
+            hypothesis.cost += problem.priors.cost(&state_of(relaxed, evidence.held, &hypothesis).camera);
+        }
+        hypothesis
+    };
     let scan: Vec<Option<Hypothesis>> =
-        (0..SCAN_STEPS).map(|i| hypothesis(relaxed, evidence, &centred(focal(i)))).collect();
+        (0..SCAN_STEPS).map(|i| hypothesis(relaxed, evidence, &centred(focal(i))).map(with_priors)).collect();
     hypotheses.extend(lowest(scan));
     hypotheses.iter().map(|hypothesis| state_of(relaxed, evidence.held, hypothesis)).collect()
 }
@@ -591,7 +600,9 @@ fn hypothesis(relaxed: &Relaxed, evidence: &Evidence<'_>, camera: &Camera) -> Op
             value(Parameter::Cy, camera.cy, lens.fy, lens.cy),
         )
     };
-    condensed::hypothesis(relaxed, &in_gauge)
+    // In units of the gauge, whose focal lengths stand in the ratio themselves, tied ones are equal.
+    let tie = held.fy_per_fx.map(|ratio| ratio * lens.fx / lens.fy);
+    condensed::hypothesis(relaxed, &met_halfway(in_gauge, tie))
 }
 
 /// The lowest minima of a scan, the lowest first.

@@ -1,14 +1,49 @@
 //! What may the estimator change, and from where does it start?
 
-use super::{CalibrationError, Loss};
+use super::{CalibrationError, Loss, Prior};
 use crate::camera::{Camera, FreeParameters, Parameter};
 
-/// What to estimate and how.
+/// What becomes of one parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
+pub enum Role {
+    /// Held at its default: skew and distortion at 0, the principal point in the image's centre. A focal length has none.
+    #[default]
+    Default,
+    /// Held at a value.
+    Held(f64),
+    /// Estimated.
+    Free,
+    /// Estimated, and known beforehand: see [`super::Prior`].
+    Known {
+        /// Its value.
+        mean: f64,
+        /// How well it is known.
+        standard_deviation: f64,
+    },
+}
+
+/// What to estimate and how: a builder.
+///
+/// Every parameter has one [`Role`] and the last word on it wins, so that nothing can be held and estimated at once:
+///
+/// ```
+/// use calibench::calibrate::{Role, Settings};
+/// use calibench::camera::Parameter;
+///
+/// let settings = Settings::standard().hold(Parameter::Cx, 320.0).hold(Parameter::K2, 0.0).estimate(Parameter::Cx);
+/// assert_eq!(settings.role(Parameter::Cx), Role::Free);
+/// assert_eq!(settings.free().to_string(), "fx,fy,cx,cy,k1");
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Settings {
-    free: FreeParameters,
-    held: [Option<f64>; Parameter::COUNT],
+    #[cfg_attr(feature = "serde", serde(with = "by_name"))]
+    roles: [Role; Parameter::COUNT],
+    /// fy over fx where the two are tied; the role of fy is then of no account.
+    fy_per_fx: Option<f64>,
     /// Image width and height in px, if known: the principal point of a start that needs one is the image's centre.
     pub image_size: Option<(usize, usize)>,
     /// Loss of a residual.
@@ -32,9 +67,10 @@ const DEFAULT_MAX_ITERATIONS: usize = 200;
 impl Settings {
     /// Estimates the parameters of `free`. Skew and distortion that are not free are held at 0.
     pub fn new(free: FreeParameters) -> Settings {
+        let role = |parameter| if free.contains(parameter) { Role::Free } else { Role::Default };
         Settings {
-            free,
-            held: [None; Parameter::COUNT],
+            roles: Parameter::ALL.map(role),
+            fy_per_fx: None,
             image_size: None,
             loss: Loss::Squares,
             start: None,
@@ -51,9 +87,34 @@ impl Settings {
     }
 
     /// Holds `parameter` at `value`.
-    pub fn hold(mut self, parameter: Parameter, value: f64) -> Settings {
-        self.free = self.free.without(parameter);
-        self.held[parameter as usize] = Some(value);
+    pub fn hold(self, parameter: Parameter, value: f64) -> Settings {
+        self.with_role(parameter, Role::Held(value))
+    }
+
+    /// Estimates `parameter`: undoes what was said of it before.
+    pub fn estimate(self, parameter: Parameter) -> Settings {
+        self.with_role(parameter, Role::Free)
+    }
+
+    /// Ties the focal lengths: `fy = fy_per_fx fx`, 1 for square pixels. What becomes of fx is left as it is; a role given to fy unties them.
+    pub fn tie_focal_lengths(mut self, fy_per_fx: f64) -> Settings {
+        self.fy_per_fx = Some(fy_per_fx);
+        self.roles[Parameter::Fy as usize] = Role::Default;
+        self
+    }
+
+    /// Estimates `parameter`, which is known beforehand to be `mean` with this standard deviation: one more measurement, with its share in the
+    /// covariance. See [`super::Prior`].
+    pub fn with_prior(self, parameter: Parameter, mean: f64, standard_deviation: f64) -> Settings {
+        self.with_role(parameter, Role::Known { mean, standard_deviation })
+    }
+
+    /// Gives `parameter` a role, whatever it had before.
+    pub fn with_role(mut self, parameter: Parameter, role: Role) -> Settings {
+        self.roles[parameter as usize] = role;
+        if parameter == Parameter::Fy {
+            self.fy_per_fx = None;
+        }
         self
     }
 
@@ -66,6 +127,18 @@ impl Settings {
     /// Chooses the loss.
     pub fn with_loss(mut self, loss: Loss) -> Settings {
         self.loss = loss;
+        self
+    }
+
+    /// Starts from these intrinsics instead of the closed form; parameters that are held keep their values.
+    pub fn starting_at(mut self, camera: Camera) -> Settings {
+        self.start = Some(camera);
+        self
+    }
+
+    /// Gives up after so many iterations of the refinement.
+    pub fn with_max_iterations(mut self, max_iterations: usize) -> Settings {
+        self.max_iterations = max_iterations;
         self
     }
 
@@ -88,19 +161,55 @@ impl Settings {
         self
     }
 
-    /// The parameters to estimate.
-    pub fn free(&self) -> FreeParameters {
-        self.free
+    /// What becomes of `parameter`; of an fy that is tied to fx see [`Settings::fy_per_fx`].
+    pub fn role(&self, parameter: Parameter) -> Role {
+        self.roles[parameter as usize]
     }
 
-    /// The value a parameter is held at; `None` if it is free.
+    /// fy over fx, if they are tied.
+    pub fn fy_per_fx(&self) -> Option<f64> {
+        self.fy_per_fx
+    }
+
+    /// The parameters to estimate; an fy that is tied to fx is none of its own.
+    pub fn free(&self) -> FreeParameters {
+        let is_estimated = |p: &Parameter| matches!(self.role(*p), Role::Free | Role::Known { .. });
+        let is_free = |p: &Parameter| is_estimated(p) && !self.is_tied(*p);
+        Parameter::ALL.into_iter().filter(is_free).fold(FreeParameters::NONE, FreeParameters::with)
+    }
+
+    /// What is known beforehand.
+    pub fn priors(&self) -> impl Iterator<Item = Prior> {
+        Parameter::ALL.into_iter().filter_map(|parameter| match self.role(parameter) {
+            Role::Known { mean, standard_deviation } => Some(Prior { parameter, mean, standard_deviation }),
+            _ => None,
+        })
+    }
+
+    fn is_tied(&self, parameter: Parameter) -> bool {
+        parameter == Parameter::Fy && self.fy_per_fx.is_some()
+    }
+
+    /// fy over fx where the two are estimated together.
+    pub(super) fn tie(&self) -> Result<Option<f64>, CalibrationError> {
+        match self.fy_per_fx {
+            Some(ratio) if !(ratio > 0.0 && ratio.is_finite()) => Err(CalibrationError::BadRatio { ratio }),
+            ratio => Ok(ratio.filter(|_| self.free().contains(Parameter::Fx))),
+        }
+    }
+
+    /// The value a parameter is held at; `None` if it is free, or tied to one that is.
     ///
     /// A principal point that is neither free nor given is the image's centre: `(w - 1) / 2`.
     pub(super) fn held(&self, parameter: Parameter) -> Result<Option<f64>, CalibrationError> {
-        if self.free.contains(parameter) {
-            return Ok(None);
+        if self.is_tied(parameter) {
+            return Ok(self.held(Parameter::Fx)?.zip(self.fy_per_fx).map(|(fx, ratio)| ratio * fx));
         }
-        let value = self.held[parameter as usize].or_else(|| self.default_of(parameter));
+        let value = match self.role(parameter) {
+            Role::Free | Role::Known { .. } => return Ok(None),
+            Role::Held(value) => Some(value),
+            Role::Default => self.default_of(parameter),
+        };
         match value {
             Some(value) if value.is_finite() && !(is_focal(parameter) && value <= 0.0) => Ok(Some(value)),
             Some(value) => Err(CalibrationError::BadHeldValue { parameter, value }),
@@ -120,4 +229,22 @@ impl Settings {
 
 fn is_focal(parameter: Parameter) -> bool {
     matches!(parameter, Parameter::Fx | Parameter::Fy)
+}
+
+/// Roles as data: by the parameters' names, those at their default left out.
+#[cfg(feature = "serde")]
+mod by_name {
+    use super::{Parameter, Role};
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+    use std::collections::BTreeMap;
+
+    pub fn serialize<S: Serializer>(roles: &[Role; Parameter::COUNT], to: S) -> Result<S::Ok, S::Error> {
+        let told = Parameter::ALL.into_iter().zip(roles).filter(|(_, role)| **role != Role::Default);
+        told.collect::<BTreeMap<Parameter, &Role>>().serialize(to)
+    }
+
+    pub fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<[Role; Parameter::COUNT], D::Error> {
+        let told = BTreeMap::<Parameter, Role>::deserialize(from)?;
+        Ok(Parameter::ALL.map(|parameter| told.get(&parameter).copied().unwrap_or_default()))
+    }
 }

@@ -2,7 +2,8 @@
 
 use super::closed_form::{self, ClosedFormError};
 use super::minimise::State;
-use super::{CalibrationError, Settings};
+use super::tie::met_halfway;
+use super::{CalibrationError, Prior, Settings};
 use crate::camera::{Camera, Parameter};
 use crate::geometry::{Homography, Mat3, Pose, Vec2};
 
@@ -17,11 +18,13 @@ pub(super) fn starts(
 ) -> Result<Vec<State>, CalibrationError> {
     let half_width = pixel_frame.1;
     let closed = normalised_closed_form(homographies, settings, pixel_frame);
-    let centred = |focal: f64| Camera::pinhole(focal, focal, held.centre.x, held.centre.y);
+    let aspect = held.fy_per_fx.unwrap_or(1.0);
+    let centred = |focal: f64| Camera::pinhole(focal, aspect * focal, held.centre.x, held.centre.y);
     let cameras = [
         settings.start,
+        held.focal_known.map(centred),
         closed.as_ref().ok().copied().filter(|camera| is_plausible(camera, pixel_frame)),
-        focal_from_centre(homographies, held.centre).map(centred),
+        focal_from_centre(homographies, held.centre, aspect).map(centred),
         Some(centred(2.0 * half_width)),
         Some(centred(8.0 * half_width)),
     ];
@@ -73,9 +76,10 @@ fn is_plausible(camera: &Camera, (centre, half_width): (Vec2, f64)) -> bool {
 }
 
 /// One focal length from the two constraints of every view when the principal point is known (Zhang 2000, section 3.1 with
-/// `u0, v0` given): `h1^T B h2 = 0` and `h1^T B h1 = h2^T B h2` with `B = diag(w, w, 1)`, least squares in `w = 1/f^2`.
-pub(super) fn focal_from_centre(homographies: &[Homography], centre: Vec2) -> Option<f64> {
-    let shift = Mat3::new(1.0, 0.0, -centre.x, 0.0, 1.0, -centre.y, 0.0, 0.0, 1.0);
+/// `u0, v0` given): `h1^T B h2 = 0` and `h1^T B h1 = h2^T B h2` with `B = diag(w, w, 1)`, least squares in `w = 1/f^2`. With cells of `aspect`,
+/// fy over fx, rows are counted in units of it first, and the result is fx.
+pub(super) fn focal_from_centre(homographies: &[Homography], centre: Vec2, aspect: f64) -> Option<f64> {
+    let shift = Mat3::new(1.0, 0.0, -centre.x, 0.0, 1.0 / aspect, -centre.y / aspect, 0.0, 0.0, 1.0);
     let (mut square, mut product) = (0.0, 0.0);
     for h in homographies {
         let h = shift * h.0;
@@ -92,10 +96,17 @@ pub(super) fn focal_from_centre(homographies: &[Homography], centre: Vec2) -> Op
     (w > 0.0 && w.is_finite()).then(|| 1.0 / w.sqrt())
 }
 
+/// A focal length known to this part of it is a better start than any that is estimated without distortion.
+const GOOD_START: f64 = 0.1;
+
 /// The values that are not estimated.
 pub(super) struct Held {
     values: [Option<f64>; Parameter::COUNT],
-    /// The principal point that is held, or else the image's centre, or that of the pixels seen.
+    /// fy over fx, where the two are estimated together.
+    pub fy_per_fx: Option<f64>,
+    /// fx, if it is known beforehand well enough to start from.
+    focal_known: Option<f64>,
+    /// The principal point that is held or known beforehand, or else the image's centre, or that of the pixels seen.
     pub centre: Vec2,
 }
 
@@ -108,11 +119,17 @@ impl Held {
         let image_centre = settings
             .image_size
             .map_or(pixel_centre, |(w, h)| Vec2::new(0.5 * (w as f64 - 1.0), 0.5 * (h as f64 - 1.0)));
+        let known = |p| settings.priors().find(|prior| prior.parameter == p).map(|prior| prior.mean);
         let centre = Vec2::new(
-            values[Parameter::Cx as usize].unwrap_or(image_centre.x),
-            values[Parameter::Cy as usize].unwrap_or(image_centre.y),
+            values[Parameter::Cx as usize].or(known(Parameter::Cx)).unwrap_or(image_centre.x),
+            values[Parameter::Cy as usize].or(known(Parameter::Cy)).unwrap_or(image_centre.y),
         );
-        Ok(Held { values, centre })
+        let is_good_start = |prior: &Prior| {
+            matches!(prior.parameter, Parameter::Fx | Parameter::Fy)
+                && prior.standard_deviation < GOOD_START * prior.mean
+        };
+        let focal_known = settings.priors().find(is_good_start).map(|prior| prior.mean);
+        Ok(Held { values, fy_per_fx: settings.tie()?, focal_known, centre })
     }
 
     /// The value a parameter is held at.
@@ -120,13 +137,13 @@ impl Held {
         self.values[parameter as usize]
     }
 
-    /// The camera with its held values.
+    /// The camera with its held values, and its focal lengths tied if they are to be.
     pub fn camera(&self, camera: Camera) -> Camera {
         let mut parameters = camera.parameters();
         for (parameter, held) in parameters.iter_mut().zip(self.values) {
             *parameter = held.unwrap_or(*parameter);
         }
-        Camera::from_parameters(parameters)
+        met_halfway(Camera::from_parameters(parameters), self.fy_per_fx)
     }
 
     /// The camera with its held values, and the poses it implies.

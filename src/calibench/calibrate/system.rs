@@ -145,7 +145,7 @@ impl Reduction {
         let blocks: Vec<(PoseBlock, MatrixXx6<f64>)> =
             chunks::map(&self.eliminated, |_, factors| factors.covariance(&padded, n));
         let (poses, cross) = blocks.into_iter().unzip();
-        Some(Covariance { free: self.free, intrinsics, poses, cross })
+        Some(Covariance { free: self.free, fy_per_fx: None, intrinsics, poses, cross })
     }
 }
 

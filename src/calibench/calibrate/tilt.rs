@@ -6,6 +6,7 @@
 
 use super::minimise::{Problem, State, rounding_cost};
 use super::normal::Observations;
+use super::prior::Priors;
 use crate::camera::FreeParameters;
 use crate::geometry::{Mat3, Pose, Vec3};
 
@@ -66,6 +67,7 @@ const RESECTION_ITERATIONS: usize = 30;
 pub(super) fn resected(problem: &Problem<'_>, state: &State, view: usize, start: Pose) -> (Pose, f64) {
     let alone = Problem {
         free: FreeParameters::NONE,
+        priors: Priors::NONE,
         observations: &problem.observations[view..=view],
         max_iterations: RESECTION_ITERATIONS,
         rounding_cost: rounding_cost(&problem.observations[view..=view]),

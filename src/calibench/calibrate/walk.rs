@@ -96,7 +96,8 @@ fn walk(
     let origin = walked.best.system.cost;
     let mut state = walked.best.state.clone();
     for number in 1..=STEPS {
-        let step = with_better_tilts(&held, held.minimise(scaled(&state, problem.free, factor)));
+        let step =
+            with_better_tilts(&held, held.minimise(scaled(&state, problem.free, problem.fy_per_fx, factor)));
         walked.starts += 1;
         let least = better.as_ref().map_or(origin, |b| b.system.cost);
         if step.system.cost < least + PROMISING * noise_px * noise_px {

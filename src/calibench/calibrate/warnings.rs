@@ -4,7 +4,7 @@ use super::intervals::Skewed;
 use super::intervals::student_quantile;
 use super::report::{STRONG_CORRELATION, UNCERTAIN_FOCAL};
 use super::search::{Rival, Twin};
-use super::{Calibration, Certificate, Covariance, Termination, Warning};
+use super::{Calibration, Certificate, Covariance, Prior, Termination, Warning};
 use crate::camera::{Camera, FreeParameters, Parameter};
 use crate::geometry::Pose;
 
@@ -31,11 +31,14 @@ pub(super) fn of(
     {
         warnings.push(Warning::NotCertified);
     }
+    warnings.extend(calibration.priors.iter().filter_map(|prior| contradicted(calibration, prior)));
     warnings.extend(twin_pose(&twins));
     warnings.extend(from_behind(calibration));
     warnings.extend(correlated(&calibration.covariance, calibration.free));
     warnings.extend([Parameter::Fx, Parameter::Fy].into_iter().filter_map(|parameter| {
         let relative = calibration.standard_deviation(parameter)? / calibration.camera.get(parameter);
+        // An fy that is tied to fx is known as well, and said once.
+        calibration.free.position(parameter)?;
         (relative > UNCERTAIN_FOCAL).then_some(Warning::FocalLengthUncertain { parameter, relative })
     }));
     warnings.extend(folding(&calibration.camera, largest_radius));
@@ -51,6 +54,27 @@ pub(super) fn of(
         excess,
     }));
     warnings
+}
+
+/// A normal number exceeds this in size with a probability of one in a million.
+const CONTRADICTED: f64 = 4.89;
+/// Where the pixels make an estimate better than its prior by less than this part, they say nothing of it.
+const TOLD_BY_PIXELS: f64 = 1e-6;
+
+/// Before the photographs the estimate is spread about the prior's mean with the variance that they take away from it.
+fn contradicted(calibration: &Calibration, prior: &Prior) -> Option<Warning> {
+    let Prior { parameter, mean, standard_deviation } = *prior;
+    let share = calibration.standard_deviation(parameter)? / standard_deviation;
+    let taken = 1.0 - share * share;
+    let estimate = calibration.camera.get(parameter);
+    let deviations = (estimate - mean).abs() / (standard_deviation * taken.sqrt());
+    (taken > TOLD_BY_PIXELS && deviations > CONTRADICTED).then_some(Warning::Contradicted {
+        parameter,
+        mean,
+        standard_deviation,
+        estimate,
+        deviations,
+    })
 }
 
 /// Coverage of the interval that few degrees of freedom widen.

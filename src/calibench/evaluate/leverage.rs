@@ -2,14 +2,15 @@
 
 use crate::board::View;
 use crate::calibrate::Calibration;
-use crate::camera::{Parameter, project_with_jacobian};
+use crate::camera::project_with_jacobian;
 use crate::geometry::{Vec2, Vec3};
 use nalgebra::{DVector, SMatrix};
 
 /// The leverage of u and of v of every point, view by view: the diagonal of the hat matrix `J (J^T J)^-1 J^T`.
 ///
 /// To first order the residuals are `(I - H)` times the noise, so a coordinate with leverage `h` has a residual of variance
-/// `sigma^2 (1 - h)`, and the leverages sum to the number of unknowns (Hoaglin & Welsch 1978). `J` is taken at the estimate.
+/// `sigma^2 (1 - h)`, and the leverages sum to the number of unknowns (Hoaglin & Welsch 1978), less what priors settle of
+/// them. `J` is taken at the estimate.
 ///
 /// `None` if `views` are not those of the calibration, or if it has no residual degrees of freedom. Under a robust loss
 /// the matrix is another; then the result is only indicative.
@@ -19,16 +20,13 @@ pub fn leverages(calibration: &Calibration, views: &[View]) -> Option<Vec<Vec<Ve
     if views.len() != calibration.cam_from_target.len() || variance.is_nan() || variance <= 0.0 {
         return None;
     }
-    let free: Vec<Parameter> = calibration.free.iter().collect();
     let of_point = |view: usize, point: &Vec2| {
         let pose = &calibration.cam_from_target[view];
         let point = Vec3::new(point.x, point.y, 0.0);
         let jacobian = project_with_jacobian(&calibration.camera, pose, &point).ok()?;
+        let columns = covariance.columns(&jacobian.intrinsics);
         let of_row = |row: usize| {
-            let a = DVector::from_iterator(
-                free.len(),
-                free.iter().map(|&p| jacobian.intrinsics[(row, p as usize)]),
-            );
+            let a = DVector::from_iterator(columns.len(), columns.iter().map(|column| column[row]));
             let c: SMatrix<f64, 6, 1> = jacobian.pose.row(row).transpose();
             let intrinsics = a.dot(&(&covariance.intrinsics * &a));
             let cross = a.dot(&(&covariance.cross[view] * c));

@@ -3,6 +3,7 @@
 use super::homography_system::NormalEquations;
 use super::lanes::{Kernel, LANES, Lanes, PairBlock, PairBlocks, dispatch};
 use super::{Mat3, Vec2, Vec3};
+use std::fmt;
 
 /// A projective map of the plane: `s [u v 1]^T = H [X Y 1]^T`, defined up to scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,6 +23,7 @@ pub struct HomographyFit {
 
 /// Why no homography can be found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum HomographyError {
     /// Four pairs are the least.
@@ -37,8 +39,8 @@ pub enum HomographyError {
         "the {points} {side} points do not span a plane (flatness {flatness:.1e}): they are collinear or coincide"
     )]
     Collinear {
-        /// `target` or `image`.
-        side: &'static str,
+        /// Which points.
+        side: Side,
         /// Number of points.
         points: usize,
         /// `4 det / trace^2` of the scatter matrix: 1 for a round cloud, 0 for a line.
@@ -63,6 +65,26 @@ pub enum HomographyError {
         /// Number on the second.
         to: usize,
     },
+}
+
+/// The two sets of points that a homography relates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
+pub enum Side {
+    /// What is mapped.
+    Target,
+    /// Where it is mapped to.
+    Image,
+}
+
+impl fmt::Display for Side {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Side::Target => "target",
+            Side::Image => "image",
+        })
+    }
 }
 
 impl Homography {
@@ -151,10 +173,10 @@ impl Frame {
     /// The frames of target and image points.
     fn both(pairs: &PairBlocks) -> Result<[Frame; 2], HomographyError> {
         let [target, image] = dispatch(Moments { pairs });
-        Ok([Frame::of(target, pairs.len(), "target")?, Frame::of(image, pairs.len(), "image")?])
+        Ok([Frame::of(target, pairs.len(), Side::Target)?, Frame::of(image, pairs.len(), Side::Image)?])
     }
 
-    fn of(spread: Spread, points: usize, side: &'static str) -> Result<Frame, HomographyError> {
+    fn of(spread: Spread, points: usize, side: Side) -> Result<Frame, HomographyError> {
         let Spread { centroid, xx, yy, xy } = spread;
         let trace = xx + yy;
         let scale = (2.0 * points as f64 / trace).sqrt();
@@ -318,11 +340,11 @@ mod tests {
         let plane: Vec<Vec2> = (0..9).map(|i| Vec2::new(f64::from(i % 3), f64::from(i / 3))).collect();
         assert!(matches!(
             Homography::fit(&line, &plane),
-            Err(HomographyError::Collinear { side: "target", .. })
+            Err(HomographyError::Collinear { side: Side::Target, .. })
         ));
         assert!(matches!(
             Homography::fit(&plane, &line),
-            Err(HomographyError::Collinear { side: "image", .. })
+            Err(HomographyError::Collinear { side: Side::Image, .. })
         ));
         assert!(matches!(
             Homography::fit(&plane[..3], &plane[..3]),

@@ -13,7 +13,7 @@ pub mod scatter;
 pub mod similarity;
 
 pub use affine::{Affine, LinearFitError};
-pub use homography::{Homography, HomographyError, HomographyFit};
+pub use homography::{Homography, HomographyError, HomographyFit, Side};
 pub use line::{LineError, LineFit};
 pub use pose::Pose;
 pub use scatter::Scatter;

@@ -1,7 +1,7 @@
 //! How is a calibration kept and handed on? `result.json`: the camera by its parameters' names, with all that is known of it.
 
 use super::input::{InputError, MOST_TABLE_BYTES, read_regular_text};
-use crate::calibrate::{Calibration, Certificate, ProfileInterval, Termination};
+use crate::calibrate::{Calibration, Certificate, Prior, ProfileInterval, Termination};
 use crate::camera::{Camera, Parameter};
 use crate::geometry::{Vec2, rotation};
 use serde::{Deserialize, Serialize};
@@ -123,6 +123,24 @@ impl IntervalFields {
     }
 }
 
+/// A [`Prior`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PriorFields {
+    /// Of which parameter.
+    pub parameter: &'static str,
+    /// Its value.
+    pub mean: f64,
+    /// How well it is known.
+    pub standard_deviation: f64,
+}
+
+impl PriorFields {
+    fn of(prior: &Prior) -> PriorFields {
+        let Prior { parameter, mean, standard_deviation } = *prior;
+        PriorFields { parameter: parameter.name(), mean, standard_deviation }
+    }
+}
+
 /// The whole of a calibration.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CalibrationFields {
@@ -134,6 +152,13 @@ pub struct CalibrationFields {
     pub image_size: Option<(usize, usize)>,
     /// Names of the estimated parameters, in the order of the covariance.
     pub free: Vec<&'static str>,
+    /// fy over fx, if the two are tied: fy is then not in `free` and has no row in `covariance`, but has its standard deviation, that of fx times
+    /// this; the two are fully correlated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fy_per_fx: Option<f64>,
+    /// What was known of parameters beforehand; it counts in the estimate and in the covariance.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub priors: Vec<PriorFields>,
     /// Standard deviation of each estimated parameter.
     pub standard_deviations: BTreeMap<&'static str, f64>,
     /// Covariance of the estimated parameters.
@@ -182,7 +207,9 @@ impl CalibrationFields {
             camera: calibration.camera.into(),
             image_size,
             free: calibration.free.iter().map(Parameter::name).collect(),
-            standard_deviations: calibration.free.iter().filter_map(deviation).collect(),
+            fy_per_fx: calibration.covariance.fy_per_fx,
+            priors: calibration.priors.iter().map(PriorFields::of).collect(),
+            standard_deviations: Parameter::ALL.into_iter().filter_map(deviation).collect(),
             covariance: (0..n).map(|i| (0..n).map(|j| covariance[(i, j)]).collect()).collect(),
             rmse_px: calibration.rmse_px,
             sigma_px: calibration.sigma_px,
@@ -199,7 +226,7 @@ impl CalibrationFields {
             weakest_direction: calibration
                 .conditioning
                 .iter()
-                .flat_map(|c| c.weakest.iter().map(|m| (m.name.clone(), m.weight)))
+                .flat_map(|c| c.weakest.iter().map(|m| (m.unknown.to_string(), m.weight)))
                 .collect(),
             weakest_information: calibration.conditioning.as_ref().map(|c| c.smallest_eigenvalue),
             warnings: calibration.warnings.iter().map(ToString::to_string).collect(),

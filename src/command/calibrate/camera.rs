@@ -3,7 +3,7 @@
 use super::finished::{Told, parameter_rows, summary, weakest};
 use super::{Arguments, Exit, Failure, Format, Intervals, advice, maps, page, plots, print, table};
 use calibench::board::{Board, View};
-use calibench::calibrate::{Loss, ProfileInterval, Settings};
+use calibench::calibrate::{Loss, Prior, ProfileInterval, Settings};
 use calibench::camera::FreeParameters;
 use calibench::geometry::Vec2;
 use calibench::io::{CalibrationFields, LeftOut, significant, write_atomically};
@@ -80,6 +80,12 @@ pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, Fai
     }
     for &(parameter, value) in &arguments.fix {
         settings = settings.hold(parameter, value);
+    }
+    for &Prior { parameter, mean, standard_deviation } in &arguments.prior {
+        settings = settings.with_prior(parameter, mean, standard_deviation);
+    }
+    if let Some(ratio) = arguments.tie {
+        settings = settings.tie_focal_lengths(ratio);
     }
     let fitter =
         Fitter { settings: &settings, discs: observed.discs.as_ref(), reject_factor: arguments.reject_views };

@@ -22,6 +22,8 @@ pub(super) fn refuse(arguments: &Arguments, input: Input) -> Result<(), String> 
         Input::PointPairs => &[
             ("--free", arguments.free.is_some()),
             ("--fix", !arguments.fix.is_empty()),
+            ("--tie", arguments.tie.is_some()),
+            ("--prior", !arguments.prior.is_empty()),
             ("--image-size", arguments.image_size.is_some()),
             ("--loss", arguments.loss.is_some()),
             ("--intervals", arguments.intervals.is_some()),
@@ -39,16 +41,30 @@ pub(super) fn refuse(arguments: &Arguments, input: Input) -> Result<(), String> 
     }
 }
 
-/// A parameter has one value, or is estimated.
+/// A parameter has one value, or is estimated, or follows another.
 fn parameters(arguments: &Arguments) -> Result<(), String> {
     let fixed: Vec<Parameter> = arguments.fix.iter().map(|fix| fix.0).collect();
-    if let Some(twice) = fixed.iter().enumerate().find(|(i, p)| fixed[..*i].contains(p)) {
-        return Err(format!("--fix gives {} more than once: give it one value", twice.1));
+    let known: Vec<Parameter> = arguments.prior.iter().map(|prior| prior.parameter).collect();
+    for (option, list) in [("--fix", &fixed), ("--prior", &known)] {
+        if let Some((_, twice)) = list.iter().enumerate().find(|(i, p)| list[..*i].contains(p)) {
+            return Err(format!("{option} gives {twice} more than once: give it one value"));
+        }
     }
+    let in_both = |list: &[Parameter]| fixed.iter().copied().find(|p| list.contains(p));
     // The parameters that are free by default give way to --fix; those that were named do not.
-    let both = arguments.free.and_then(|free| fixed.iter().find(|p| free.contains(**p)));
-    match both {
-        Some(p) => Err(format!("{p} is in --free and in --fix: it is estimated or held, not both")),
-        None => Ok(()),
+    let named: Vec<Parameter> = arguments.free.into_iter().flat_map(|free| free.iter()).collect();
+    if let Some(p) = in_both(&named) {
+        return Err(format!("{p} is in --free and in --fix: it is estimated or held, not both"));
+    }
+    if let Some(p) = in_both(&known) {
+        return Err(format!("{p} is in --prior and in --fix: it is estimated or held, not both"));
+    }
+    let says_of_fy = [("--free", &named), ("--fix", &fixed), ("--prior", &known)];
+    let twice = says_of_fy.into_iter().find(|(_, list)| list.contains(&Parameter::Fy));
+    match (arguments.tie, twice) {
+        (Some(_), Some((option, _))) => {
+            Err(format!("fy is in {option} and in --tie: it follows fx or goes its own way, not both"))
+        }
+        _ => Ok(()),
     }
 }

@@ -1,6 +1,6 @@
 //! What is said of a finished calibration, in the terminal and on the page?
 
-use calibench::calibrate::Certificate;
+use calibench::calibrate::{Calibration, Certificate};
 use calibench::camera::Parameter;
 use calibench::io::{LeftOut, significant};
 use calibench::photos::Fit;
@@ -39,7 +39,7 @@ pub(super) fn parameter_rows(told: &Told) -> Vec<[String; 4]> {
 pub(super) fn weakest(told: &Told) -> Option<String> {
     let conditioning = told.fit.calibration.conditioning.as_ref()?;
     let members: Vec<String> =
-        conditioning.weakest.iter().map(|m| format!("{} {:+.2}", m.name, m.weight)).collect();
+        conditioning.weakest.iter().map(|m| format!("{} {:+.2}", m.unknown, m.weight)).collect();
     Some(members.join(", "))
 }
 
@@ -61,6 +61,7 @@ pub(super) fn summary(told: &Told) -> String {
     if let Some(sentence) = calibration.certificate.as_ref().and_then(certificate) {
         text.push_str(&sentence);
     }
+    text.push_str(&beforehand(calibration));
     if let Some(bias) = &told.fit.bias {
         // Writing to a string cannot fail.
         let _ = writeln!(
@@ -72,6 +73,17 @@ pub(super) fn summary(told: &Told) -> String {
         );
     }
     text
+}
+
+/// What was tied and what was known, a line each.
+fn beforehand(calibration: &Calibration) -> String {
+    let tie =
+        calibration.covariance.fy_per_fx.map(|ratio| format!("tied: fy = {} fx\n", significant(ratio, 10)));
+    let known = calibration.priors.iter().map(|prior| {
+        let (mean, sd) = (significant(prior.mean, 10), significant(prior.standard_deviation, 3));
+        format!("known beforehand: {} = {mean} +- {sd}\n", prior.parameter)
+    });
+    tie.into_iter().chain(known).collect()
 }
 
 /// The certificate in a sentence; none where nothing can be certified.

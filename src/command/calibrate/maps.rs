@@ -2,7 +2,7 @@
 
 use calibench::board::View;
 use calibench::calibrate::Calibration;
-use calibench::camera::{Camera, Parameter, project_with_jacobian};
+use calibench::camera::{Camera, project_with_jacobian};
 use calibench::geometry::{Pose, Vec2, Vec3};
 use calibench_harness::{Figure, HeatMap, Plot};
 use nalgebra::Matrix2;
@@ -67,11 +67,10 @@ pub(super) fn pixel_deviation(calibration: &Calibration, pixel: &Vec2) -> f64 {
         return f64::NAN;
     };
     let covariance = &calibration.covariance.intrinsics;
-    let free: Vec<Parameter> = calibration.free.iter().collect();
+    let columns = calibration.covariance.columns(&at.intrinsics);
     let mut spread = Matrix2::zeros();
-    for (i, &a) in free.iter().enumerate() {
-        for (j, &b) in free.iter().enumerate() {
-            let (a, b) = (at.intrinsics.column(a as usize), at.intrinsics.column(b as usize));
+    for (i, a) in columns.iter().enumerate() {
+        for (j, b) in columns.iter().enumerate() {
             spread += a * b.transpose() * covariance[(i, j)];
         }
     }

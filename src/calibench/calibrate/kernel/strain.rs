@@ -28,6 +28,16 @@ pub(in crate::calibrate) struct Strain {
     pub gradient: [f64; 2],
 }
 
+impl Strain {
+    /// With the column of fx turned into `d/dfx + a d/dfy`.
+    pub fn with_tie(mut self, fy_per_fx: f64) -> Strain {
+        for column in &mut self.intrinsics {
+            column[Parameter::Fx as usize] += fy_per_fx * column[Parameter::Fy as usize];
+        }
+        self
+    }
+}
+
 /// The sums of a view at the given camera and pose; points behind the camera make them meaningless.
 pub(in crate::calibrate) fn view_strain(
     camera: &Camera,

@@ -1,0 +1,181 @@
+//! What is known of a parameter before any photograph is taken? A value with its standard deviation: one more measurement.
+//!
+//! With the noise `sigma` of a pixel coordinate a prior is a residual of `sigma (p - mean) / sd` px, and the cost becomes
+//!
+//! ```text
+//! sum |r|^2 + sigma^2 sum ((p - mean) / sd)^2,   covariance = sigma^2 (J^T J + W)^-1,   W = diag(sigma^2 / sd^2)
+//! ```
+//! The noise is estimated with the rest. Of `p` unknowns a prior settles a part of its own, `(posterior sd / sd)^2`, which costs the pixels no
+//! degree of freedom, so that
+//!
+//! ```text
+//! sigma^2 = sum |r|^2 / (2 N - p + sum (posterior sd / sd)^2)
+//! ```
+//! without bias in a linear model: with a wide prior as if the parameter were free, with a narrow one as if it were held (MacKay 1992 counts the
+//! parameters that data determine alike). The right-hand side depends on `sigma` through the weights, and is repeated until `sigma` changes by
+//! less than 1e-6 of itself; a polished minimum keeps the weights.
+
+use super::estimate::Fit;
+use super::minimise::{Minimum, Problem, State};
+use super::search::{self, Evidence, Judged};
+use super::system::System;
+use super::{CalibrationError, relaxed};
+use crate::camera::{Camera, Parameter};
+
+/// A parameter that is estimated, and known beforehand: `mean +- standard_deviation`, normally distributed.
+///
+/// With the noise `sigma` of a pixel coordinate it counts as a residual of `sigma (p - mean) / standard_deviation` px, so that the covariance of
+/// all unknowns is `sigma^2 (J^T J + W)^-1`, `W = diag(sigma^2 / standard_deviation^2)`. The noise is estimated with the rest, from the pixels'
+/// residuals alone: `sum |r|^2 / (2 N - p + sum s^2)`, where `s` is the standard deviation of the estimate over that of the prior. It is repeated
+/// until `sigma` changes by less than 1e-6 of itself.
+///
+/// ```
+/// use calibench::calibrate::{Settings, calibrate};
+/// use calibench::camera::Parameter;
+/// use calibench::synth::{Scene, Stream, StreamKey};
+///
+/// let mut stream = Stream::open(StreamKey { seed: 1, scenario: "example", trial: 0, purpose: "noise" });
+/// let views = Scene::example().observe(0.1, &mut stream);
+/// // Square pixels, and a lens whose k1 an earlier calibration told.
+/// let settings = Settings::standard().tie_focal_lengths(1.0).with_prior(Parameter::K1, -0.18, 0.002);
+/// let result = calibrate(&views, &settings)?;
+/// assert_eq!(result.camera.fx, result.camera.fy);
+/// assert_eq!(result.standard_deviation(Parameter::Fx), result.standard_deviation(Parameter::Fy));
+/// assert!(result.standard_deviation(Parameter::K1) < Some(0.002));
+/// # Ok::<(), calibench::calibrate::CalibrationError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Prior {
+    /// Which.
+    pub parameter: Parameter,
+    /// Its value.
+    pub mean: f64,
+    /// How well it is known.
+    pub standard_deviation: f64,
+}
+
+/// Priors, and the variance of a pixel coordinate that weighs them, px^2.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Priors<'a> {
+    pub list: &'a [Prior],
+    pub variance: f64,
+}
+
+impl Priors<'_> {
+    /// Nothing is known beforehand.
+    pub const NONE: Priors<'static> = Priors { list: &[], variance: 0.0 };
+
+    /// Each with its weight, `sigma^2 / sd^2`.
+    pub fn weighted(&self) -> impl Iterator<Item = (&Prior, f64)> {
+        let weight = |prior: &Prior| self.variance / (prior.standard_deviation * prior.standard_deviation);
+        self.list.iter().map(move |prior| (prior, weight(prior)))
+    }
+
+    /// Their share of the cost, px^2. A parameter that is held for a while, as along a profile, pays for its place too.
+    pub fn cost(&self, camera: &Camera) -> f64 {
+        let squared = |x: f64| x * x;
+        self.weighted()
+            .map(|(prior, weight)| weight * squared(camera.get(prior.parameter) - prior.mean))
+            .sum()
+    }
+
+    /// Adds them to the normal equations at `camera`.
+    pub fn add_to(&self, camera: &Camera, system: &mut System) {
+        system.cost += self.cost(camera);
+        for (prior, weight) in self.weighted() {
+            if let Some(row) = system.free.position(prior.parameter) {
+                system.intrinsics[(row, row)] += weight;
+                system.gradient[row] += weight * (camera.get(prior.parameter) - prior.mean);
+            }
+        }
+    }
+
+    /// How many unknowns they settle, `sum (posterior sd / sd)^2`: all of theirs where nothing else is known of them, none where the pixels say far
+    /// more.
+    pub fn settled(&self, minimum: &Minimum) -> f64 {
+        if self.list.is_empty() {
+            return 0.0;
+        }
+        let free = minimum.system.free;
+        let covariance = minimum.system.reduction().and_then(|reduction| reduction.intrinsics_covariance());
+        let share = |(prior, weight): (&Prior, f64)| {
+            let row = free.position(prior.parameter)?;
+            Some(covariance.as_ref()?[(row, row)] * weight)
+        };
+        self.weighted().filter_map(share).sum()
+    }
+}
+
+/// Where homographies leave no degree of freedom to tell the noise, the first weights are for this, px: what good detectors reach.
+const USUAL_PX: f64 = 0.1;
+/// Nobody's marks are better than this, px: exact data would otherwise leave priors no weight at all.
+const LEAST_PX: f64 = 1e-4;
+/// The noise is settled when it changes by less than this part.
+const SETTLED: f64 = 1e-6;
+/// Refinements until it is; each gains two digits or more on ordinary data.
+const MOST_REFITS: usize = 60;
+/// Searches, each with the weights that the minimum before it led to: two, and a third where the second found a lower minimum.
+const MOST_SEARCHES: usize = 4;
+
+/// The best minimum under priors, and the variance of a pixel coordinate that weighed them.
+pub(super) fn best_minimum(
+    problem: &Problem<'_>,
+    mut starts: Vec<State>,
+    evidence: &Evidence<'_>,
+) -> Result<(Judged, f64), CalibrationError> {
+    let with = |variance: f64| Problem { priors: Priors { variance, ..problem.priors }, ..*problem };
+    let mut variance = first_variance(problem, evidence);
+    let mut searches = 0;
+    loop {
+        let judged = search::best_minimum(&with(variance), starts, evidence)?;
+        searches += 1;
+        let settled = settle(problem, &judged.minimum, variance);
+        if is_settled(settled, variance) || searches == MOST_SEARCHES {
+            return Ok((judged, variance));
+        }
+        (variance, starts) = (settled, vec![judged.minimum.state]);
+    }
+}
+
+/// The variance at which weights and residuals agree, next to a minimum.
+fn settle(problem: &Problem<'_>, minimum: &Minimum, variance: f64) -> f64 {
+    let with = |variance: f64| Problem { priors: Priors { variance, ..problem.priors }, ..*problem };
+    let mut next = variance_at(&with(variance), minimum);
+    let mut last = variance;
+    let mut state = minimum.state.clone();
+    for _ in 0..MOST_REFITS {
+        if is_settled(next, last) {
+            break;
+        }
+        let problem = with(next);
+        let refined = problem.minimise(state);
+        (last, next) = (next, variance_at(&problem, &refined));
+        state = refined.state;
+    }
+    next
+}
+
+fn is_settled(next: f64, last: f64) -> bool {
+    // A variance changes by twice the part that its root does.
+    (next - last).abs() <= 2.0 * SETTLED * last
+}
+
+/// Before any camera is known: what homographies behind a common lens leave over.
+fn first_variance(problem: &Problem<'_>, evidence: &Evidence<'_>) -> f64 {
+    let marks: usize = problem.observations.iter().map(|o| o.len()).sum();
+    let least = search::relax(problem, evidence, true).first().map_or(f64::NAN, |relaxed| relaxed.cost);
+    let lens =
+        relaxed::parameters(problem, |p| evidence.held.value(p).is_some_and(|value| value != 0.0)).len();
+    let freedom = (2 * marks).saturating_sub(8 * problem.observations.len() + lens);
+    let variance = least / freedom as f64;
+    let is_told = freedom > 0 && variance.is_finite();
+    if is_told { variance.max(LEAST_PX * LEAST_PX) } else { USUAL_PX * USUAL_PX }
+}
+
+/// The variance that the residuals of a minimum say, at the scale at which the covariance is stated.
+fn variance_at(problem: &Problem<'_>, minimum: &Minimum) -> f64 {
+    let fit = Fit::of(&minimum.state, problem.observations);
+    let freedom = fit.freedom(&minimum.system, problem.priors.settled(minimum));
+    fit.variance(problem.loss, freedom).max(LEAST_PX * LEAST_PX)
+}

@@ -1,0 +1,22 @@
+//! How does fy follow fx where the two are tied? At a fixed ratio: square pixels, or cells whose shape a data sheet states.
+//!
+//! Tied, fy is no unknown of its own. With `fy = a fx` the column of fx in every Jacobian becomes `d/dfx + a d/dfy`, every step ends with
+//! `fy = a fx`, and the relaxed model knows the shape of the cells.
+
+use crate::camera::Camera;
+
+/// The camera with `fy = a fx`, if they are tied.
+pub(super) fn tied(camera: Camera, fy_per_fx: Option<f64>) -> Camera {
+    match fy_per_fx {
+        Some(ratio) => Camera { fy: ratio * camera.fx, ..camera },
+        None => camera,
+    }
+}
+
+/// The camera with both focal lengths moved alike until they stand in the ratio: `fx <- sqrt(fx fy / a)`. For starts that know of no tie.
+pub(super) fn met_halfway(camera: Camera, fy_per_fx: Option<f64>) -> Camera {
+    match fy_per_fx {
+        Some(ratio) => tied(Camera { fx: (camera.fx * (camera.fy / ratio)).sqrt(), ..camera }, fy_per_fx),
+        None => camera,
+    }
+}

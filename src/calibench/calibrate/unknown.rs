@@ -1,0 +1,77 @@
+//! What can data fail to tell apart? The names of a calibration's unknowns, one by one and in groups.
+
+use crate::camera::Parameter;
+use std::fmt;
+
+/// An unknown of a calibration, or a group of them that a user thinks of as one. [`fmt::Display`] gives its name in words.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
+pub enum Unknown {
+    /// fx and fy.
+    FocalLength,
+    /// cx and cy.
+    PrincipalPoint,
+    /// k1, k2 and k3.
+    RadialDistortion,
+    /// p1 and p2.
+    TangentialDistortion,
+    /// Turns of the targets about the camera's x and y axes.
+    Tilt,
+    /// Turns of the targets about the optical axis.
+    Roll,
+    /// The targets' positions along x and y.
+    LateralPosition,
+    /// The targets' positions along the optical axis.
+    Distance,
+    /// All intrinsics.
+    Camera,
+    /// All poses.
+    Poses,
+    /// One intrinsic parameter.
+    #[cfg_attr(feature = "serde", serde(untagged))]
+    Intrinsic(Parameter),
+}
+
+impl Unknown {
+    /// The group that a parameter belongs to; an unknown without one is its own.
+    pub fn group(self) -> Unknown {
+        use Parameter::{Cx, Cy, Fx, Fy, K1, K2, K3, P1, P2};
+        match self {
+            Unknown::Intrinsic(Fx | Fy) => Unknown::FocalLength,
+            Unknown::Intrinsic(Cx | Cy) => Unknown::PrincipalPoint,
+            Unknown::Intrinsic(K1 | K2 | K3) => Unknown::RadialDistortion,
+            Unknown::Intrinsic(P1 | P2) => Unknown::TangentialDistortion,
+            other => other,
+        }
+    }
+
+    /// `fx`, ..., `k3`, `focal length`, `lateral position` and so on.
+    pub fn name(self) -> &'static str {
+        match self {
+            Unknown::Intrinsic(parameter) => parameter.name(),
+            Unknown::FocalLength => "focal length",
+            Unknown::PrincipalPoint => "principal point",
+            Unknown::RadialDistortion => "radial distortion",
+            Unknown::TangentialDistortion => "tangential distortion",
+            Unknown::Tilt => "tilt",
+            Unknown::Roll => "roll",
+            Unknown::LateralPosition => "lateral position",
+            Unknown::Distance => "distance",
+            Unknown::Camera => "camera",
+            Unknown::Poses => "poses",
+        }
+    }
+}
+
+impl fmt::Display for Unknown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// The names in a row: `focal length and distance`.
+pub(super) fn joined(unknowns: &[Unknown]) -> String {
+    unknowns.iter().map(|unknown| unknown.name()).collect::<Vec<_>>().join(" and ")
+}
