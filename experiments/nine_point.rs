@@ -16,6 +16,7 @@
 use calibench::detect::{GridError, circle_grid, sparse_dots};
 use calibench::geometry::{Affine, Mat3, Vec2};
 use calibench::io::image::parse_image;
+use calibench::io::input::{MOST_IMAGE_BYTES, read_regular};
 use calibench::io::overlay::Overlay;
 use calibench::planar::{PlaneCalibration, PlaneModel, calibrate_plane};
 use calibench::raster::Raster;

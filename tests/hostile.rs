@@ -289,6 +289,27 @@ fn a_pipe_blocks_nobody_and_headers_are_read_as_csv_has_them() {
 }
 
 #[test]
+fn a_pipe_in_the_place_of_a_table_or_of_a_record_blocks_nobody() {
+    let folder = folder("pipes-for-tables");
+    let pipe = |name: &str| {
+        let path = folder.join(name);
+        fs::create_dir_all(path.parent().expect("it lies in a folder")).expect("a folder is made");
+        assert!(Command::new("mkfifo").arg(path).status().expect("mkfifo").success());
+    };
+    for name in ["faults.csv", "golden/line-bending.snap", "reference/SHA256SUMS"] {
+        pipe(name);
+    }
+    refused(&folder, &["gate", "--power-table", "."], &["faults.csv", "not a regular file"]);
+    refused(&folder, &["gate", "--digits-table", "faults.csv"], &["faults.csv", "not a regular file"]);
+    refused(&folder, &["run", "nine-point", "--image", "faults.csv"], &["faults.csv", "not a regular file"]);
+    // A source tree whose files are pipes: there is no snapshot, and there are no certified problems.
+    fs::write(folder.join("golden/published.toml"), "").expect("written");
+    refused(&folder, &["gate", "--certified"], &["SHA256SUMS", "not a regular file"]);
+    let checked = within(PATIENCE_FOR_WORK, &folder, &["check", "line-bending"]);
+    assert!(checked.status.code().is_some_and(|code| code > 0), "{}", text(&checked.stdout));
+}
+
+#[test]
 fn a_pipe_in_a_run_folder_blocks_nobody() {
     let folder = folder("run-folder-pipes");
     fs::write(folder.join("spec.toml"), fixed_poses()).expect("written");

@@ -6,6 +6,7 @@ use calibench::io::files::{Disk, Files};
 use calibench::synth::{Stream, StreamKey};
 use calibench_study::{Engine, Folder, FolderError, Manifest, Outcome, RunError, Shard, TrialFile, finish};
 use std::fs;
+use std::io::Write;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
@@ -37,23 +38,39 @@ fn go_on(files: Arc<dyn Files>, path: &Path, manifest: &Manifest, told: &mut u64
     Ok(())
 }
 
-/// Trials that the checkpoint vouches for.
+/// Batches of the study above.
+const BATCHES: u64 = 6;
+
+/// Batches that the checkpoint vouches for. A complete run whose trials were put into another file has none: its manifest vouches for all.
 fn kept(path: &Path) -> u64 {
-    let text = fs::read_to_string(path.join("checkpoint.json")).unwrap_or_default();
-    let checkpoint: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
-    checkpoint["batches"].as_u64().unwrap_or(0)
+    let of = |name: &str| -> serde_json::Value {
+        serde_json::from_str(&fs::read_to_string(path.join(name)).unwrap_or_default()).unwrap_or_default()
+    };
+    let all = of("manifest.json")["complete"] == true;
+    of("checkpoint.json")["batches"].as_u64().unwrap_or(if all { BATCHES } else { 0 })
 }
 
 #[test]
 fn a_run_that_fails_at_any_operation_loses_its_last_batch_at_most_and_ends_in_the_same_bytes() {
-    let whole = scratch("faults-whole");
-    crate::study::run(&whole, &spec(), Shard::WHOLE, TrialFile::Csv);
+    fail_at_every_operation(TrialFile::Csv);
+}
+
+#[cfg(feature = "parquet")]
+#[test]
+fn so_does_one_whose_trials_become_a_parquet_file() {
+    fail_at_every_operation(TrialFile::Parquet);
+}
+
+fn fail_at_every_operation(trials: TrialFile) {
+    let whole = scratch(&format!("faults-whole-{trials}"));
+    crate::study::run(&whole, &spec(), Shard::WHOLE, trials);
     let engine = Engine::new(&spec(), Shard::WHOLE).unwrap();
-    let manifest = Manifest::new(&engine.spec, Shard::WHOLE, &calibench_experiments::build());
+    let manifest =
+        Manifest::new(&engine.spec, Shard::WHOLE, &calibench_experiments::build()).with_trials(trials);
     for fault in [Fault::Killed, Fault::Full] {
         let mut operation = 0;
         loop {
-            let path = scratch("faults");
+            let path = scratch(&format!("faults-{trials}"));
             let (failing, mut told) = (Failing::at(operation, fault), 0);
             let ended = go_on(failing.clone(), &path, &manifest, &mut told);
             if ended.is_ok() && !failing.has_failed() {
@@ -178,7 +195,89 @@ fn a_disk_that_became_read_only_ends_with_three_and_the_run_goes_on_later() {
     assert_eq!(first.status.code(), Some(3), "{said}");
     assert_eq!(said.matches("disk/run").count(), 1, "{said}");
     assert_eq!(second.status.code(), Some(0), "{}", String::from_utf8_lossy(&second.stderr));
-    assert_eq!(same, 6);
+    assert_eq!(same, BATCHES);
+    fs::remove_dir_all(folder).unwrap();
+}
+
+/// What time it is, and how much has passed, as a clock says that jumps by up to a year, forward or back, whenever it is asked.
+const JUMPING_CLOCK: &str = "
+#include <time.h>
+int clock_gettime(clockid_t clock, struct timespec *now) {
+    static __thread unsigned long long state = 1;
+    state = state * 6364136223846793005ull + 1442695040888963407ull;
+    now->tv_sec = 1000000000 + (state >> 39);
+    now->tv_nsec = (state >> 10) % 1000000000;
+    return 0;
+}
+";
+
+/// Makes the clock a library that takes the place of the system's; `false` where no C compiler is.
+#[cfg(target_os = "linux")]
+fn made_clock(library: &Path) -> bool {
+    let mut compiler = Command::new("cc");
+    compiler.args(["-x", "c", "-shared", "-fPIC", "-o"]).arg(library).arg("-").stdin(Stdio::piped());
+    let Ok(mut compiler) = compiler.spawn() else { return false };
+    compiler.stdin.take().unwrap().write_all(JUMPING_CLOCK.as_bytes()).unwrap();
+    assert!(compiler.wait().unwrap().success());
+    true
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_clock_that_jumps_while_a_study_runs_stops_and_goes_on_changes_no_byte() {
+    let folder = scratch("clock");
+    fs::create_dir_all(&folder).unwrap();
+    let library = folder.join("clock.so");
+    if !made_clock(&library) {
+        eprintln!("skipped: there is no C compiler");
+        return;
+    }
+    let long = crate::study::SPEC.replace(", redraw = true", "").replace("per_cell = 45", "per_cell = 2000");
+    fs::write(folder.join("spec.toml"), long).unwrap();
+    let whole = command(&["study", "run", "spec.toml", "--out", "whole"], &folder).output().unwrap();
+    assert!(whole.status.success());
+    let jumping = |arguments: &[&str]| {
+        let mut command = command(arguments, &folder);
+        command.env("LD_PRELOAD", &library).stdout(Stdio::piped()).spawn().unwrap()
+    };
+    let mut stopped = 0;
+    for arguments in [&["study", "run", "spec.toml", "--out", "jumped"][..]]
+        .into_iter()
+        .chain([&["study", "resume", "jumped"][..]; 4])
+    {
+        let child = jumping(arguments);
+        std::thread::sleep(Duration::from_millis(60));
+        let interrupted = Command::new("kill").args(["-INT", &child.id().to_string()]).output().unwrap();
+        let output = child.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        // Before its handler stands, an interrupt ends it at once.
+        assert!(matches!(output.status.code(), None | Some(0 | 3)), "{said}");
+        assert!(!said.contains("panicked"), "{said}");
+        stopped += usize::from(interrupted.status.success() && !output.status.success());
+        if !folder.join("jumped/manifest.json").exists() {
+            break;
+        }
+    }
+    let again = folder.join("jumped/manifest.json").exists();
+    let last: &[&str] = if again {
+        &["study", "resume", "jumped"]
+    } else {
+        &["study", "run", "spec.toml", "--out", "jumped"]
+    };
+    let output = jumping(last).wait_with_output().unwrap();
+    let said =
+        [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+    assert!(output.status.success(), "{said}");
+    assert!(!said.contains("NaN") && !said.contains("inf"), "{said}");
+    assert!(stopped > 0, "it was never stopped");
+    assert_same(&folder.join("whole"), &folder.join("jumped"));
+    // The clock did jump: a measurement by it takes no time, or more than anybody has.
+    let output = jumping(&["study", "measure", "spec.toml", "--trials", "2"]).wait_with_output().unwrap();
+    let said =
+        [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+    assert!(matches!(output.status.code(), Some(0 | 2)), "{said}");
+    let seconds = said.split(" cells: ").nth(1).and_then(|rest| rest.split(' ').next()?.parse::<f64>().ok());
+    assert!(said.contains("took no time") || seconds.is_some_and(|seconds| seconds > 1e4), "{said}");
     fs::remove_dir_all(folder).unwrap();
 }
 

@@ -145,3 +145,43 @@ fn a_file_that_was_changed_is_refused() {
     drop(folder);
     fs::remove_dir_all(path).unwrap();
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_ends_with_three_and_the_run_goes_on_to_the_same_file() {
+    use crate::writers::{mount, on_disk};
+    use std::process::Command;
+
+    let folder = scratch("pq-full");
+    let disk = folder.join("disk");
+    fs::create_dir_all(&disk).unwrap();
+    fs::write(folder.join("spec.toml"), SPEC).unwrap();
+    let command = |arguments: &[&str]| {
+        Command::new(env!("CARGO_BIN_EXE_calibench")).args(arguments).current_dir(&folder).output().unwrap()
+    };
+    let run = |out: &str| command(&["study", "run", "spec.toml", "--trials", "parquet", "--out", out]);
+    assert_eq!(run("whole").status.code(), Some(0));
+    let (mut refused, mut held) = (0, 0);
+    for kib in (12..=252).step_by(24) {
+        let there = on_disk(&disk, &format!("size={kib}k"), || {
+            let first = run("disk/run");
+            let said = String::from_utf8_lossy(&first.stderr);
+            assert!(matches!(first.status.code(), Some(0 | 3)), "{kib} kB: {said}");
+            assert!(said.matches("disk/run").count() <= 1, "{kib} kB: {said}");
+            refused += usize::from(first.status.code() == Some(3));
+            held += usize::from(first.status.code() == Some(0));
+            assert!(mount(&disk, "remount,size=16m"));
+            let again = match disk.join("run/manifest.json").exists() {
+                true => command(&["study", "resume", "disk/run"]),
+                false => run("disk/run"),
+            };
+            assert_eq!(again.status.code(), Some(0), "{kib} kB: {}", String::from_utf8_lossy(&again.stderr));
+            assert_same(&folder.join("whole"), &disk.join("run"));
+        });
+        if !there {
+            return;
+        }
+    }
+    assert!(refused > 3 && held > 0, "{refused} refused, {held} held");
+    fs::remove_dir_all(folder).unwrap();
+}

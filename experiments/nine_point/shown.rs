@@ -24,8 +24,8 @@ impl Shown {
             let image = photograph.image.to_u8().to_f32();
             return Ok(Shown { image, centres_true: Some(photograph.centres_true) });
         };
-        let bytes =
-            std::fs::read(path).map_err(|cause| ExperimentError::File { path: path.clone(), cause })?;
+        let bytes = read_regular(path, MOST_IMAGE_BYTES)
+            .map_err(|error| ExperimentError::Input(error.to_string()))?;
         let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         let image = parse_image(&bytes, &name).map_err(|error| ExperimentError::Input(error.to_string()))?;
         record.input(name, &bytes);

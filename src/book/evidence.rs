@@ -2,12 +2,13 @@
 
 use super::golden_file::GoldenFile;
 use calibench::io::hash::sha256_hex;
+use calibench::io::input::MOST_TABLE_BYTES;
+use calibench::io::read_regular_text;
 use calibench_harness::project::Project;
 use calibench_harness::{Build, Experiment, Record, record_json};
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
-use std::fs;
 
 /// The evidence of all experiments, by name.
 #[derive(Debug, Clone, Default)]
@@ -126,10 +127,10 @@ impl ExperimentEvidence {
     /// Reads out/<id>/, and says whether it is the locked run's.
     fn read_last_run(&mut self, project: &Project, id: &str) -> bool {
         let folder = project.out().join(id);
-        let text = fs::read_to_string(folder.join("record.json")).unwrap_or_default();
+        let text = read_regular_text(&folder.join("record.json"), MOST_TABLE_BYTES).unwrap_or_default();
         let Ok(record) = serde_json::from_str::<RecordFile>(&text) else { return false };
         for item in &record.tables {
-            let Ok(csv) = fs::read_to_string(folder.join(&item.file)) else { return false };
+            let Ok(csv) = read_regular_text(&folder.join(&item.file), MOST_TABLE_BYTES) else { return false };
             self.tables.insert(item.file.trim_end_matches(".csv").to_string(), csv);
         }
         let fresh = self.golden.as_ref().is_some_and(|golden| self.is_locked_run(golden, &record));

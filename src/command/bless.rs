@@ -45,7 +45,7 @@ fn bless(experiment: &Experiment, project: &Project, build: &Build) -> Exit {
         }
     };
     let path = project.snapshot(id);
-    let before = std::fs::read_to_string(&path).unwrap_or_default();
+    let before = project.snapshot_text(id).unwrap_or_default();
     let after = golden::file_text(record);
     let comparison = golden::compare(golden::contents(&before), golden::contents(&after));
     let written = emit(record, &project.out(), &project.figures(id), build)

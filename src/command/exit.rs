@@ -24,7 +24,7 @@ impl Exit {
     /// The user's input is the user's to mend; anything else left the run incomplete.
     pub fn of_failure(error: &ExperimentError) -> Exit {
         match error {
-            ExperimentError::Input(_) | ExperimentError::File { .. } => Exit::Usage,
+            ExperimentError::Input(_) => Exit::Usage,
             _ => Exit::Incomplete,
         }
     }

@@ -4,6 +4,7 @@ use super::provenance::Build;
 use super::published::not_judged;
 use super::reconcile::{Expectation, Reconciliation};
 use super::record::Record;
+use calibench::io::input::{MOST_TABLE_BYTES, read_regular};
 use calibench::io::write_atomically;
 use serde_json::{Value, json};
 use std::io;
@@ -22,7 +23,7 @@ pub fn emit(record: &Record, out: &Path, figures: &Path, build: &Build) -> io::R
     for figure in record.figures() {
         let path = figures.join(figure.file_name());
         // A figure that is what it was keeps its time: the program carries the committed ones, and is not built anew for them.
-        if !std::fs::read(&path).is_ok_and(|old| old == figure.bytes) {
+        if !read_regular(&path, MOST_TABLE_BYTES).is_ok_and(|old| old == figure.bytes) {
             write_atomically(&path, &figure.bytes)?;
         }
     }

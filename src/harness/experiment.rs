@@ -40,14 +40,6 @@ pub enum ExperimentError {
     /// The record contradicts itself.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// A file cannot be read or written.
-    #[error("{path}: {cause}", path = path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        cause: std::io::Error,
-    },
     /// The user's input cannot be used.
     #[error("{0}")]
     Input(String),

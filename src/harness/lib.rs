@@ -36,6 +36,7 @@ mod record;
 pub mod resources;
 mod simulated;
 pub mod stats;
+pub mod stopwatch;
 mod table;
 pub mod verdict;
 

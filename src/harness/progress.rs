@@ -1,10 +1,11 @@
 //! How far is it? A line on standard error for work that takes over a second, nothing otherwise.
 
+use super::stopwatch::{Clock, Stopwatch, rate};
 use calibench::io::{shown, significant};
 use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Work that is done within this time is not shown.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -17,6 +18,7 @@ const COLUMNS: usize = 79;
 #[derive(Debug, Clone)]
 pub struct ProgressDisplay {
     screen: Option<Arc<Screen>>,
+    clock: Clock,
 }
 
 /// One piece of work. Dropping it ends its line.
@@ -35,7 +37,7 @@ struct Screen {
 #[derive(Debug, Default)]
 struct State {
     running: Vec<Arc<Work>>,
-    drawn: Option<Instant>,
+    drawn: Option<Stopwatch>,
 }
 
 #[derive(Debug)]
@@ -45,19 +47,25 @@ struct Work {
     done: AtomicUsize,
     /// Steps that were done before, which say nothing of the rate.
     before: AtomicUsize,
-    started: Instant,
+    watch: Stopwatch,
     note: Mutex<String>,
 }
 
 impl ProgressDisplay {
     /// Draws nothing.
     pub fn hidden() -> ProgressDisplay {
-        ProgressDisplay { screen: None }
+        ProgressDisplay { screen: None, clock: Clock::System }
     }
 
     /// Draws on standard error.
     pub fn stderr() -> ProgressDisplay {
-        ProgressDisplay { screen: std::io::stderr().is_terminal().then(Arc::default) }
+        let screen = std::io::stderr().is_terminal().then(Arc::default);
+        ProgressDisplay { screen, clock: Clock::System }
+    }
+
+    /// The same by another clock.
+    pub fn with_clock(self, clock: Clock) -> ProgressDisplay {
+        ProgressDisplay { clock, ..self }
     }
 
     /// Announces `total` steps of work.
@@ -67,7 +75,7 @@ impl ProgressDisplay {
             total: AtomicUsize::new(total),
             done: AtomicUsize::new(0),
             before: AtomicUsize::new(0),
-            started: Instant::now(),
+            watch: Stopwatch::on(&self.clock),
             note: Mutex::default(),
         });
         if let Some(screen) = &self.screen {
@@ -87,7 +95,7 @@ impl Progress {
     pub fn advance(&self, steps: usize) {
         self.work.done.fetch_add(steps, Relaxed);
         if let Some(screen) = &self.screen
-            && self.work.started.elapsed() >= PATIENCE
+            && self.work.watch.elapsed() >= PATIENCE
         {
             screen.draw();
         }
@@ -130,12 +138,12 @@ impl Screen {
     /// Draws the line, unless another thread does or it was drawn just now.
     fn draw(&self) {
         let Ok(mut state) = self.state.try_lock() else { return };
-        if state.drawn.is_some_and(|at| at.elapsed() < PAUSE) {
+        if state.drawn.as_ref().is_some_and(|watch| watch.elapsed() < PAUSE) {
             return;
         }
         let Some(oldest) = state.running.first() else { return };
-        put(&oldest.line(oldest.started.elapsed(), state.running.len() - 1));
-        state.drawn = Some(Instant::now());
+        put(&oldest.line(oldest.watch.elapsed(), state.running.len() - 1));
+        state.drawn = Some(oldest.watch.again());
     }
 }
 
@@ -143,12 +151,17 @@ impl Work {
     /// Counts, rate, time left and note, after `took`, with so many other pieces under way. The note comes last: a narrow line cuts it.
     fn line(&self, took: Duration, others: usize) -> String {
         let (done, total) = (self.done.load(Relaxed), self.total.load(Relaxed));
-        let rate = done.saturating_sub(self.before.load(Relaxed)) as f64 / took.as_secs_f64();
-        let left = total.saturating_sub(done) as f64 / rate;
-        let left = if left.is_finite() { format!(", {left:.0} s left") } else { String::new() };
+        let pace = rate(done.saturating_sub(self.before.load(Relaxed)) as u64, took).map_or_else(
+            String::new,
+            |rate| {
+                let left = total.saturating_sub(done) as f64 / rate;
+                let left = if left.is_finite() { format!(", {left:.0} s left") } else { String::new() };
+                format!(" {}/s{left}", significant(rate, 3))
+            },
+        );
         let others = if others > 0 { format!(" (and {others} more)") } else { String::new() };
         let note = self.note.lock().unwrap_or_else(PoisonError::into_inner);
-        let line = format!("{}{others} {done}/{total} {}/s{left} {note}", self.label, significant(rate, 3));
+        let line = format!("{}{others} {done}/{total}{pace} {note}", self.label);
         line.trim_end().chars().take(COLUMNS).collect()
     }
 }
@@ -164,6 +177,7 @@ fn put(line: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::atomic::AtomicU64;
 
     #[test]
     fn the_rate_is_that_of_the_steps_done_now_and_a_long_note_is_cut() {
@@ -175,5 +189,28 @@ mod tests {
         assert_eq!(line, format!("study 60/100 {}/s, 20 s left worst: cell 3", significant(2.0, 3)));
         progress.note(&"x".repeat(200));
         assert_eq!(progress.work.line(Duration::from_secs(10), 2).chars().count(), COLUMNS);
+    }
+
+    #[test]
+    fn a_clock_that_jumps_changes_the_rate_that_is_shown_and_nothing_else() {
+        let milliseconds = Arc::new(AtomicU64::new(1_000_000));
+        let clock = Clock::Set(milliseconds.clone());
+        // Drawn, as on a terminal.
+        let display = ProgressDisplay { screen: Some(Arc::default()), clock };
+        let progress = display.start("study", 100);
+        for (now, shown) in [
+            (1_000_000, "study 1/100"),
+            (0, "study 2/100"),
+            (1_003_000, &format!("study 3/100 {}/s, 97 s left", significant(1.0, 3))),
+            (999_000, "study 4/100"),
+            (1_005_000, &format!("study 5/100 {}/s, 95 s left", significant(1.0, 3))),
+        ] {
+            milliseconds.store(now, Relaxed);
+            progress.step();
+            assert_eq!(progress.work.line(progress.work.watch.elapsed(), 0), shown, "at {now}");
+        }
+        milliseconds.store(u64::MAX, Relaxed);
+        progress.step();
+        assert!(progress.work.line(progress.work.watch.elapsed(), 0).starts_with("study 6/100 "));
     }
 }

@@ -1,6 +1,7 @@
 //! Where do golden/, figures/ and out/ stand? In the nearest folder above that has golden/published.toml; elsewhere golden values and the
 //! book's text come from the program itself, and what is written goes to the current folder.
 
+use calibench::io::input::{MOST_TABLE_BYTES, read_regular};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -84,7 +85,7 @@ impl Project {
     pub fn read(&self, path: &str) -> io::Result<Vec<u8>> {
         match self.carried.iter().find(|(name, _)| *name == path) {
             Some((_, bytes)) => Ok(bytes.to_vec()),
-            None => std::fs::read(self.root.join(path)),
+            None => Ok(read_regular(&self.root.join(path), MOST_TABLE_BYTES)?),
         }
     }
 

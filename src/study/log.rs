@@ -8,11 +8,12 @@ use super::run_error::RunError;
 use super::tables;
 use super::trial::Trial;
 use super::trial_file::TrialFile;
+use calibench::io::files::Files;
 use calibench::io::hash::hexadecimal;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fs::{File, OpenOptions};
-use std::io::{self, Read};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// What is known to be on the disk.
@@ -71,10 +72,11 @@ impl Folder {
                 let mut lines = self.lines(&self.checkpoint()?, engine)?.0;
                 let located = |cause| Located { path: path.clone(), cause };
                 let unfinished = self.file(".trials.parquet");
-                let file = File::create(&unfinished).map_err(located)?;
-                super::parquet::write(&file, &path, engine, lines.as_mut())?;
+                let mut written =
+                    Written { files: self.files.as_ref(), file: File::create(&unfinished).map_err(located)? };
+                super::parquet::write(&mut written, &path, engine, lines.as_mut())?;
                 self.files
-                    .sync(&file)
+                    .sync(&written.file)
                     .and_then(|()| self.files.rename(&unfinished, &path))
                     .map_err(located)?;
             }
@@ -202,6 +204,22 @@ impl Folder {
         let checkpoint = Checkpoint { run, batches, bytes: log.bytes, sha256 };
         let text = serde_json::to_string(&checkpoint).expect("a checkpoint holds nothing that JSON cannot");
         self.write("checkpoint.json", text.as_bytes())
+    }
+}
+
+/// A file that is written through the folder's operations.
+struct Written<'a> {
+    files: &'a dyn Files,
+    file: File,
+}
+
+impl Write for Written<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.files.write(&mut self.file, bytes).map(|()| bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
     }
 }
 

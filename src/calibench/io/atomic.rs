@@ -23,22 +23,74 @@ pub fn write_atomically(path: &Path, contents: &[u8]) -> io::Result<()> {
 /// # Errors
 /// As there.
 pub fn write_atomically_to(files: &dyn Files, path: &Path, contents: &[u8]) -> io::Result<()> {
-    let with_path = |e: io::Error| io::Error::new(e.kind(), format!("cannot write {}: {e}", path.display()));
-    let folder = folder_of(path);
-    files.make_folder(folder).map_err(with_path)?;
-    // What cannot be removed is in nobody's way.
-    let _ = remove_leftovers_of(files, folder, path.file_name());
-    let (mut file, temporary) = open_beside(path).map_err(with_path)?;
-    let written = files
-        .write(&mut file, contents)
-        // On the disk before the rename: else a power cut may leave the new name with no contents.
-        .and_then(|()| files.sync(&file))
-        .and_then(|()| files.rename(&temporary, path));
-    if written.is_err() {
-        // The first error is the one to report.
-        let _ = files.remove(&temporary);
+    Beside::write(files, path, contents)?.place()
+}
+
+/// Writes files that belong together. All are on the disk before the first of them is put in its place, so a disk that is full changes none. A
+/// process that is killed in the moment in which they are put there, one after the other, leaves the last ones old: where the last is new, all
+/// are.
+///
+/// # Errors
+/// As [`write_atomically`].
+pub fn write_together(contents: &[(PathBuf, Vec<u8>)]) -> io::Result<()> {
+    write_together_to(&Disk, contents)
+}
+
+/// As [`write_together`], through the given operations.
+///
+/// # Errors
+/// As there.
+pub fn write_together_to(files: &dyn Files, contents: &[(PathBuf, Vec<u8>)]) -> io::Result<()> {
+    let beside: Vec<Beside<'_>> =
+        contents.iter().map(|(path, bytes)| Beside::write(files, path, bytes)).collect::<io::Result<_>>()?;
+    beside.into_iter().try_for_each(Beside::place)
+}
+
+/// A file that is on the disk, beside its place. It is removed unless it is put there.
+struct Beside<'a> {
+    files: &'a dyn Files,
+    path: &'a Path,
+    temporary: PathBuf,
+    /// Open, and so locked, until the file has its name.
+    file: File,
+    placed: bool,
+}
+
+impl<'a> Beside<'a> {
+    fn write(files: &'a dyn Files, path: &'a Path, contents: &[u8]) -> io::Result<Beside<'a>> {
+        let folder = folder_of(path);
+        files.make_folder(folder).map_err(with_path(path))?;
+        // What cannot be removed is in nobody's way.
+        let _ = remove_leftovers_of(files, folder, path.file_name());
+        let (file, temporary) = open_beside(path).map_err(with_path(path))?;
+        let mut beside = Beside { files, path, temporary, file, placed: false };
+        files
+            .write(&mut beside.file, contents)
+            // On the disk before the rename: else a power cut may leave the new name with no contents.
+            .and_then(|()| files.sync(&beside.file))
+            .map_err(with_path(path))?;
+        Ok(beside)
     }
-    written.map_err(with_path)
+
+    fn place(mut self) -> io::Result<()> {
+        self.files.rename(&self.temporary, self.path).map_err(with_path(self.path))?;
+        self.placed = true;
+        Ok(())
+    }
+}
+
+impl Drop for Beside<'_> {
+    fn drop(&mut self) {
+        if !self.placed {
+            // The error that led here is the one to report.
+            let _ = self.files.remove(&self.temporary);
+        }
+    }
+}
+
+/// The error with the file that could not be written.
+fn with_path(path: &Path) -> impl Fn(io::Error) -> io::Error {
+    move |error| io::Error::new(error.kind(), format!("cannot write {}: {error}", path.display()))
 }
 
 /// The folder in which a file stands.

@@ -57,6 +57,16 @@ pub enum InputError {
     },
 }
 
+/// What the system said of a file that it does not give; else the sentence.
+impl From<InputError> for io::Error {
+    fn from(error: InputError) -> io::Error {
+        match error {
+            InputError::Open { cause, .. } => cause,
+            refused => io::Error::new(io::ErrorKind::InvalidInput, refused),
+        }
+    }
+}
+
 /// Refuses what is there and is no regular file: opening a pipe blocks until somebody opens its other end, for writing too.
 ///
 /// # Errors

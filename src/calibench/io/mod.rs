@@ -20,7 +20,7 @@ pub mod result;
 pub mod shown;
 pub mod table;
 
-pub use atomic::write_atomically;
+pub use atomic::{write_atomically, write_together};
 #[cfg(feature = "photo")]
 pub use channels::{Channels, read_channels};
 pub use corners::{CornerFile, parse_corners, read_corners};

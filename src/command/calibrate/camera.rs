@@ -6,12 +6,12 @@ use calibench::board::{Board, View};
 use calibench::calibrate::{Loss, Prior, ProfileInterval, Settings};
 use calibench::camera::FreeParameters;
 use calibench::geometry::Vec2;
-use calibench::io::{CalibrationFields, LeftOut, significant, write_atomically};
+use calibench::io::{CalibrationFields, LeftOut, significant, write_together};
 use calibench::photos::{Fit, Fitter};
 use calibench_harness::Figure;
 use std::collections::BTreeMap;
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Views and where they come from.
 #[derive(Debug, Default)]
@@ -128,13 +128,15 @@ fn bias_note(fit: &Fit) -> Option<String> {
     ))
 }
 
+/// All files or none, `result.json` last: where it is new, all that belongs to it is.
 fn write_files(folder: &Path, fields: &CalibrationFields, told: &Told) -> std::io::Result<()> {
-    write_atomically(&folder.join("result.json"), fields.to_json().as_bytes())?;
     let figures = figures(told);
-    for figure in &figures {
-        write_atomically(&folder.join(figure.file_name()), &figure.bytes)?;
-    }
-    write_atomically(&folder.join("report.html"), page::html(told, &figures).as_bytes())
+    let page = page::html(told, &figures).into_bytes();
+    let mut files: Vec<(PathBuf, Vec<u8>)> =
+        figures.into_iter().map(|figure| (folder.join(figure.file_name()), figure.bytes)).collect();
+    files.push((folder.join("report.html"), page));
+    files.push((folder.join("result.json"), fields.to_json().into_bytes()));
+    write_together(&files)
 }
 
 fn figures(told: &Told) -> Vec<Figure> {

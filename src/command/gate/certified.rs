@@ -2,7 +2,8 @@
 
 use super::super::{Exit, print, warn};
 use super::{Arguments, Stop, incomplete, process, usage};
-use calibench::io::write_atomically;
+use calibench::io::input::MOST_SPEC_BYTES;
+use calibench::io::{read_regular_text, write_atomically};
 use calibench_gate::certified::{DigitsTable, ReferenceProblem, measure, read_with};
 use calibench_gate::solver::Polished;
 use calibench_gate::{Builtin, Solver};
@@ -73,8 +74,7 @@ pub(super) fn write_table(arguments: &Arguments, path: &Path, build: &Build) -> 
 
 /// Prints a table that was written before.
 pub(super) fn print_table(path: &Path) -> Result<Exit, Stop> {
-    let text =
-        std::fs::read_to_string(path).map_err(|e| usage(format!("cannot read {}: {e}", path.display())))?;
+    let text = read_regular_text(path, MOST_SPEC_BYTES).map_err(usage)?;
     print(&DigitsTable::of_csv(&text).map_err(usage)?.to_markdown());
     Ok(Exit::Held)
 }

@@ -3,9 +3,9 @@
 use super::{Failure, read};
 use crate::{Exit, print};
 use calibench_harness::resources::{peak_memory_mib, processor_seconds};
+use calibench_harness::stopwatch::{Stopwatch, rate};
 use calibench_study::{RunError, Spec, in_memory};
 use std::path::PathBuf;
-use std::time::Instant;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Arguments {
@@ -24,10 +24,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
     let threads = rayon::current_num_threads();
     for trials in [arguments.trials.max(2), arguments.trials.max(2).saturating_mul(4)] {
         spec.trials.per_cell = trials;
-        let (started, processor) = (Instant::now(), processor_seconds());
+        let (watch, processor) = (Stopwatch::start(), processor_seconds());
         let engine = in_memory(spec.clone(), &text, |_| {}).map_err(RunError::from)?;
-        let seconds = started.elapsed().as_secs_f64();
-        let rate = engine.trials() as f64 / seconds;
+        let took = watch.elapsed();
+        let rate = rate(engine.trials(), took).ok_or_else(|| {
+            Failure::usage(format!(
+                "{} trials took no time by this clock: measure more, --trials",
+                engine.trials()
+            ))
+        })?;
+        let seconds = took.as_secs_f64();
         let memory = peak_memory_mib().map_or_else(|| "unknown".to_string(), |m| format!("{m:.1} MiB"));
         let spent = processor.and_then(|before| Some(processor_seconds()? - before)).filter(|s| *s > 0.0);
         // Where others share the machine, processor time tells what a core can do.

@@ -4,6 +4,7 @@ use super::{Failure, read};
 use crate::{Exit, print, warn};
 use calibench::io::significant;
 use calibench_harness::project::Project;
+use calibench_harness::stopwatch::{Stopwatch, rate};
 use calibench_harness::{Build, ProgressDisplay};
 use calibench_study::{
     Engine, Folder, FolderError, Interruption, Manifest, Outcome, RunError, Shard, Summary, TrialFile, Worst,
@@ -12,7 +13,6 @@ use calibench_study::{
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Arguments {
@@ -105,7 +105,7 @@ fn interruption() -> Arc<Interruption> {
 fn drive(folder: &Folder, mut engine: Engine) -> Result<Exit, Failure> {
     let stop = interruption();
     let progress = ProgressDisplay::stderr().start(&engine.spec.name, engine.most_trials() as usize);
-    let (started, mut told) = (Instant::now(), None);
+    let (watch, mut told) = (Stopwatch::start(), None);
     let outcome = folder.run(&mut engine, &stop, |pace| {
         if told.is_none() {
             progress.already(pace.before as usize);
@@ -116,7 +116,7 @@ fn drive(folder: &Folder, mut engine: Engine) -> Result<Exit, Failure> {
         told = Some(pace.trials);
     })?;
     drop(progress);
-    let seconds = started.elapsed().as_secs_f64();
+    let took = watch.elapsed();
     if outcome == Outcome::Interrupted {
         let path = folder.path().display();
         warn(&format!(
@@ -128,9 +128,9 @@ fn drive(folder: &Folder, mut engine: Engine) -> Result<Exit, Failure> {
     let summary = finish(folder, &engine)?;
     tell(folder, &engine, &summary);
     if let Some(trials) = told {
-        let rate = trials as f64 / seconds;
-        let cores = rayon::current_num_threads();
-        print(&format!("{trials} trials in {seconds:.1} s: {rate:.0} a second on {cores} thread(s)\n"));
+        let rate = rate(trials, took).map_or_else(String::new, |rate| format!(": {rate:.0} a second"));
+        let (seconds, cores) = (took.as_secs_f64(), rayon::current_num_threads());
+        print(&format!("{trials} trials in {seconds:.1} s{rate} on {cores} thread(s)\n"));
     }
     Ok(Exit::Held)
 }

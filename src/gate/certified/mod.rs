@@ -10,7 +10,8 @@ pub use digits::{DIGITS_OF_DOUBLES, Digits, log_relative_error, measure};
 pub use table::{DigitsTable, Row, TableError};
 
 use super::protocol::{AnswerPose, Problem};
-use calibench::io::sha256_hex;
+use calibench::io::input::MOST_SPEC_BYTES;
+use calibench::io::{read_regular_text, sha256_hex};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -139,7 +140,7 @@ pub enum ReferenceError {
 /// # Errors
 /// A file that is missing, was changed, or is no certified problem.
 pub fn read(folder: &Path) -> Result<Vec<ReferenceProblem>, ReferenceError> {
-    read_with(|name| std::fs::read_to_string(folder.join(name)))
+    read_with(|name| Ok(read_regular_text(&folder.join(name), MOST_SPEC_BYTES)?))
 }
 
 /// The same of files that `text_of` finds by their names.

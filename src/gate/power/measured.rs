@@ -5,9 +5,11 @@ use crate::faults::{Class, planted};
 use crate::judge::{EXPECTED_FALSE_ALARMS, at_least};
 use crate::plan::PlanError;
 use crate::{Builtin, textbook};
+use calibench::io::input::MOST_SPEC_BYTES;
+use calibench::io::{InputError, read_regular_text};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// A planted fault.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -96,14 +98,9 @@ pub struct Sizes {
 /// Tables that cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum MeasuredError {
-    /// A file.
-    #[error("cannot read {path}: {cause}", path = path.display())]
-    File {
-        /// Which.
-        path: PathBuf,
-        /// What the system said.
-        cause: std::io::Error,
-    },
+    /// A file that cannot be read.
+    #[error(transparent)]
+    File(#[from] InputError),
     /// A table.
     #[error("{name}: {cause}")]
     Table {
@@ -162,10 +159,7 @@ impl Measured {
     /// # Errors
     /// A file that is missing or no such table.
     pub fn read(folder: &Path) -> Result<Measured, MeasuredError> {
-        let text = |name: &str| {
-            let path = folder.join(name);
-            std::fs::read_to_string(&path).map_err(|cause| MeasuredError::File { path, cause })
-        };
+        let text = |name: &str| read_regular_text(&folder.join(name), MOST_SPEC_BYTES);
         let [faults, alarms, misled] = FILES.map(text);
         Measured::of_csv([&faults?, &alarms?, &misled?])
     }
