@@ -3,6 +3,7 @@
 //! `cargo test --test all golden::` runs those of `tests/golden.rs`.
 
 mod book;
+mod camera_files;
 mod certified;
 mod chapter_scene;
 mod command;
