@@ -1,6 +1,9 @@
 //! Which readers meet untrusted bytes? Each as a function of bytes that must end, and must not panic, whatever they are.
 
 use calibench::camera::FreeParameters;
+use calibench::io::formats::{
+    FORMATS, VnlBoard, Wishes, detect, parse_target, parse_vnl, read_camera_file, write_camera_file,
+};
 use calibench::io::image::{parse_extent, parse_image};
 use calibench::io::result::parse_camera;
 use calibench::io::{memory, parse_corners, parse_point_pairs, table};
@@ -14,10 +17,11 @@ use calibench_study::{Checkpoint, Manifest, Shard, Spec};
 pub type Reader = (&'static str, fn(&[u8]));
 
 /// The readers by name; the seeds of each stand in `fuzz/seeds/<name>/`.
-pub const READERS: [Reader; 11] = [
+pub const READERS: [Reader; 12] = [
     ("corners", corners),
     ("pairs", pairs),
     ("camera", camera),
+    ("formats", formats),
     ("study", study),
     ("manifest", manifest),
     ("checkpoint", checkpoint),
@@ -42,6 +46,21 @@ pub fn pairs(bytes: &[u8]) {
 /// Results and cameras.
 pub fn camera(bytes: &[u8]) {
     let _ = parse_camera("camera", &String::from_utf8_lossy(bytes));
+}
+
+/// Cameras, corners and boards in the files of other programs: the same bytes as every format, and what is read written as every one.
+pub fn formats(bytes: &[u8]) {
+    let text = String::from_utf8_lossy(bytes);
+    let wishes = Wishes { fit: true, ..Wishes::default() };
+    let _ = detect("formats", &text);
+    for format in &FORMATS {
+        let Ok(camera) = read_camera_file(format, "formats", &text, None, &wishes) else { continue };
+        for format in &FORMATS {
+            let _ = write_camera_file(format, &camera, &wishes);
+        }
+    }
+    let _ = parse_target("formats", &text);
+    let _ = parse_vnl("formats", &text, &VnlBoard { columns: 3, rows: 2, spacing: 1.0 });
 }
 
 /// Most points that a study of these tests places: above, it would take long, and be right to.

@@ -4,6 +4,7 @@
 
 mod beforehand;
 mod book;
+mod camera_files;
 mod certified;
 mod chapter_scene;
 mod command;

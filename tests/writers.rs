@@ -23,7 +23,7 @@ struct Verb {
     arguments: &'static [&'static str],
 }
 
-const VERBS: [Verb; 9] = [
+const VERBS: [Verb; 11] = [
     Verb {
         name: "camera",
         arguments: &["calibrate", "../corners.csv", "--image-size", "640x480", "--out", "out"],
@@ -33,6 +33,11 @@ const VERBS: [Verb; 9] = [
     Verb {
         name: "undistort",
         arguments: &["undistort", "--camera", "../camera.json", "--mask", "--out", "out", "../photo.png"],
+    },
+    Verb { name: "convert", arguments: &["convert", "../camera.json", "out/camera.xml"] },
+    Verb {
+        name: "diff",
+        arguments: &["diff", "../camera.json", "../other.json", "--image-size", "640x480", "--out", "out"],
     },
     Verb {
         name: "gate",
@@ -70,6 +75,8 @@ fn with_input(name: &str) -> PathBuf {
     }
     let camera = r#"{"camera": {"fx": 600, "fy": 600, "cx": 326, "cy": 243, "k1": -0.18}}"#;
     let pairs = "point,px,py,X,Y\n0,0,0,0,0\n1,100,0,1,0\n2,0,100,0,1\n3,100,101,1,1\n";
+    let other = r#"{"camera": {"fx": 601, "fy": 600, "cx": 325, "cy": 243, "k1": -0.17}}"#;
+    fs::write(folder.join("other.json"), other).expect("written");
     for (name, text) in [("corners.csv", corners.as_str()), ("camera.json", camera), ("pairs.csv", pairs)] {
         fs::write(folder.join(name), text).expect("written");
     }

@@ -26,6 +26,7 @@ mod plane;
 mod plots;
 
 pub(super) use plane::plane_text;
+pub(super) use plots::round_down;
 
 /// What the exit codes mean here.
 const EXIT_CODES: &str = "Exit codes: 0 a minimum whose RMSE lies at most a quarter above that of free homographies (warnings say what to be careful about), 2 \
@@ -155,7 +156,7 @@ fn parse_prior(text: &str) -> Result<Prior, String> {
     Ok(Prior { parameter, mean: number(mean)?, standard_deviation: number(deviation)? })
 }
 
-fn parse_size(text: &str) -> Result<(usize, usize), String> {
+pub(super) fn parse_size(text: &str) -> Result<(usize, usize), String> {
     let wanted = || "expected WIDTHxHEIGHT in pixels, such as 640x480".to_string();
     let (width, height) = text.split_once('x').ok_or_else(wanted)?;
     match (width.trim().parse::<usize>(), height.trim().parse::<usize>()) {

@@ -4,6 +4,8 @@ mod bless;
 mod book;
 mod calibrate;
 mod check;
+mod convert;
+mod diff;
 mod exit;
 mod gate;
 mod list;
@@ -56,6 +58,10 @@ enum Verb {
     Ninepoint(ninepoint::Arguments),
     /// Removes a calibrated lens's distortion from photographs
     Undistort(undistort::Arguments),
+    /// Converts cameras, corners and boards between the files of OpenCV, ROS, Kalibr, mrcal, COLMAP, MATLAB, HALCON and this program
+    Convert(Box<convert::Arguments>),
+    /// Compares two cameras over the frame, and tests whether both may be one
+    Diff(diff::Arguments),
     /// Monte Carlo studies from a file: resumable, sharded, with intervals
     Study(study::Arguments),
     /// Judges a solver, this library's or any program, on problems with known answers
@@ -87,6 +93,8 @@ pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCo
         Some(Verb::Calibrate(arguments)) => calibrate::run(&arguments),
         Some(Verb::Ninepoint(arguments)) => ninepoint::run(&arguments),
         Some(Verb::Undistort(arguments)) => undistort::run(&arguments),
+        Some(Verb::Convert(arguments)) => convert::run(&arguments),
+        Some(Verb::Diff(arguments)) => diff::run(&arguments),
         Some(Verb::Study(arguments)) => study::run(&arguments, build),
         Some(Verb::Gate(arguments)) => gate::run(&arguments, build),
     };

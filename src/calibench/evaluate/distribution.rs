@@ -55,6 +55,12 @@ pub fn fisher_cdf(f: f64, numerator_freedom: usize, denominator_freedom: usize) 
         .map_or(f64::NAN, |d| stable(d.cdf(f.max(0.0))))
 }
 
+/// `P(F > f)` of the same ratio: what is small keeps its digits.
+pub fn fisher_tail(f: f64, numerator_freedom: usize, denominator_freedom: usize) -> f64 {
+    FisherSnedecor::new(numerator_freedom as f64, denominator_freedom as f64)
+        .map_or(f64::NAN, |d| stable(d.sf(f.max(0.0))))
+}
+
 /// The standard normal equivalent of a chi-squared value: the cube root of chi-squared over its degrees of freedom is nearly normal
 /// (Wilson & Hilferty 1931).
 pub fn wilson_hilferty(chi_squared: f64, degrees_of_freedom: f64) -> f64 {

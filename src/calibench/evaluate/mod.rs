@@ -1,6 +1,7 @@
 //! How far is the estimate from the truth, and how far should it be? The only place where both are known.
 
 pub mod bound;
+pub mod difference;
 pub mod distribution;
 pub mod errors;
 pub mod interval;
@@ -9,6 +10,9 @@ pub mod rmse;
 pub mod sample;
 
 pub use bound::{BoundError, cramer_rao};
+pub use difference::{
+    Calibrated, DifferenceError, FrameDifference, OneCamera, TakenOut, frame_difference, one_camera,
+};
 pub use errors::{Errors, errors_of};
 pub use interval::Interval;
 pub use leverage::leverages;

@@ -7,6 +7,7 @@ pub mod corners;
 pub mod data;
 pub mod digits;
 pub mod files;
+pub mod formats;
 pub mod hash;
 #[cfg(feature = "photo")]
 pub mod image;

@@ -38,7 +38,7 @@ fn residuals(calibration: &Calibration, views: &[View], image_size: Option<(usiz
 }
 
 /// The largest of 1, 2, 5 times a power of ten that is not larger.
-fn round_down(x: f64) -> f64 {
+pub(crate) fn round_down(x: f64) -> f64 {
     let power = libm::exp10(libm::floor(libm::log10(x)));
     [5.0, 2.0, 1.0].map(|m| m * power).into_iter().find(|&m| m <= x).unwrap_or(power)
 }

@@ -1,0 +1,205 @@
+//! This library's own JSON: `result.json` of a calibration, or no more than a camera.
+//!
+//! The centre of the first pixel is (0, 0); parameters stand under their names. `camera.schema.json` is its schema.
+
+use super::super::result::{CameraFields, parse_camera};
+use super::camera_file::{CameraFile, Estimated};
+use super::error::FormatError;
+use super::node::Source;
+use super::{Format, Found, Room, Size, Written};
+use crate::camera::{FreeParameters, Parameter};
+use crate::geometry::{Pose, Vec3, rotation};
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// The JSON schema of what is written and read.
+pub const SCHEMA: &str = include_str!("camera.schema.json");
+
+pub(super) const FORMAT: Format = Format {
+    name: "calibench",
+    of: "calibench",
+    endings: &["json"],
+    first_pixel: 0.0,
+    coefficients: "k1 k2 p1 p2 k3, by name",
+    room: Room { skew: true, covariance: true, pose: true, name: true, size: Size::Kept },
+    looks_like: |text| {
+        text.trim_start().starts_with('{') && text.contains("\"camera\"") && text.contains("\"fx\"")
+    },
+    read: |source, _| read(source),
+    write: |camera, _| Ok(write(camera)),
+};
+
+/// What stands in a file beside the camera and the image's size.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Fields {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    written_by: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    name: Option<String>,
+    camera: CameraFields,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    image_size: Option<(usize, usize)>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    free: Vec<String>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    covariance: Vec<Vec<f64>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    degrees_of_freedom: Option<usize>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    cam_from_reference: Option<PoseFields>,
+    /// Only whether there are any.
+    #[serde(default, skip_serializing)]
+    views: Option<serde::de::IgnoredAny>,
+}
+
+/// A pose as numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PoseFields {
+    rotation_vector_rad: [f64; 3],
+    translation: [f64; 3],
+}
+
+fn read(source: &Source) -> Result<Vec<Found>, FormatError> {
+    let (camera, image_size) = parse_camera(source.file, source.text)?;
+    let syntax = |error: serde_json::Error| FormatError::Syntax {
+        file: source.file.into(),
+        line: error.line(),
+        column: error.column(),
+        message: error.to_string(),
+    };
+    let fields: Fields = serde_json::from_str(source.text).map_err(syntax)?;
+    let views = fields.views.is_some();
+    let pose = fields.cam_from_reference.map(|pose| Pose {
+        rotation: rotation::exp(&Vec3::from(pose.rotation_vector_rad)),
+        translation: Vec3::from(pose.translation),
+    });
+    let note = "the views with their residuals, and what was found about the calibration, are not kept";
+    Ok(vec![
+        CameraFile {
+            image_size,
+            estimated: estimated(source, &fields)?,
+            cam_from_reference: pose,
+            notes: views.then(|| note.to_string()).into_iter().collect(),
+            name: fields.name,
+            ..CameraFile::of(camera)
+        }
+        .into(),
+    ])
+}
+
+fn estimated(source: &Source, fields: &Fields) -> Result<Option<Estimated>, FormatError> {
+    if fields.covariance.is_empty() {
+        return Ok(None);
+    }
+    let at = |key: &str| source.text.find(&format!("\"{key}\"")).unwrap_or(0);
+    let wrong = |key: &str, message: String| Err(source.value(at(key), key, message));
+    let mut free = FreeParameters::NONE;
+    for name in &fields.free {
+        match name.parse::<Parameter>() {
+            Ok(parameter) if free.is_empty() || free.iter().last() < Some(parameter) => {
+                free = free.with(parameter)
+            }
+            Ok(parameter) => return wrong("free", format!("{parameter} is out of order")),
+            Err(error) => return wrong("free", error.to_string()),
+        }
+    }
+    let n = free.len();
+    let square = fields.covariance.len() == n && fields.covariance.iter().all(|row| row.len() == n);
+    if !square {
+        return wrong("covariance", format!("{n} rows of {n} numbers are expected, as many as are free"));
+    }
+    let covariance = DMatrix::from_fn(n, n, |i, j| fields.covariance[i][j]);
+    if covariance.iter().any(|value| !value.is_finite()) {
+        return wrong("covariance", "a number is not finite".into());
+    }
+    Ok(Some(Estimated { free, covariance, degrees_of_freedom: fields.degrees_of_freedom }))
+}
+
+fn write(camera: &CameraFile) -> Written {
+    let estimated = camera.estimated.as_ref();
+    let rows = |e: &Estimated| e.covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
+    let fields = Fields {
+        written_by: Some(format!("calibench {}", env!("CARGO_PKG_VERSION"))),
+        name: camera.name.clone(),
+        camera: camera.camera.into(),
+        image_size: camera.image_size,
+        free: estimated.map_or(Vec::new(), |e| e.free.iter().map(|p| p.name().to_string()).collect()),
+        covariance: estimated.map_or(Vec::new(), rows),
+        degrees_of_freedom: estimated.and_then(|e| e.degrees_of_freedom),
+        cam_from_reference: camera.cam_from_reference.map(|pose| PoseFields {
+            rotation_vector_rad: rotation::log(&pose.rotation).into(),
+            translation: pose.translation.into(),
+        }),
+        views: None,
+    };
+    // Plain fields and string keys: nothing in them can fail to serialise.
+    let text = serde_json::to_string_pretty(&fields).expect("a camera serialises") + "\n";
+    text.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Camera;
+    use serde_json::Value;
+
+    /// A file in which every field stands.
+    fn whole() -> CameraFile {
+        CameraFile {
+            name: Some("left".into()),
+            image_size: Some((640, 480)),
+            estimated: Some(Estimated {
+                free: FreeParameters::of(&[Parameter::Fx, Parameter::Cx]),
+                covariance: DMatrix::from_row_slice(2, 2, &[1.0, 0.1, 0.1, 2.0]),
+                degrees_of_freedom: Some(100),
+            }),
+            cam_from_reference: Some(Pose {
+                rotation: rotation::exp(&Vec3::new(0.1, 0.2, 0.3)),
+                translation: Vec3::new(1.0, 2.0, 3.0),
+            }),
+            ..CameraFile::of(Camera::pinhole(600.0, 601.0, 320.0, 240.0))
+        }
+    }
+
+    #[test]
+    fn everything_survives_the_way_through_a_file() {
+        let text = write(&whole()).text;
+        let back = read(&Source { file: "f", text: &text }).unwrap().remove(0).camera.unwrap();
+        assert_eq!(
+            (back.camera, back.image_size, &back.estimated),
+            (whole().camera, whole().image_size, &whole().estimated)
+        );
+        let (a, b) = (back.cam_from_reference.unwrap(), whole().cam_from_reference.unwrap());
+        assert!((a.rotation - b.rotation).norm() < 1e-15 && a.translation == b.translation);
+    }
+
+    #[test]
+    fn the_schema_names_every_field_that_is_written_and_no_other() {
+        let schema: Value = serde_json::from_str(SCHEMA).unwrap();
+        let written: Value = serde_json::from_str(&write(&whole()).text).unwrap();
+        let names = |value: &Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
+        let of_schema = |path: &str| names(schema.pointer(path).unwrap());
+        assert_eq!(of_schema("/properties"), names(&written));
+        assert_eq!(of_schema("/properties/camera/properties"), names(&written["camera"]));
+        assert_eq!(
+            of_schema("/properties/cam_from_reference/properties"),
+            names(&written["cam_from_reference"])
+        );
+    }
+
+    #[test]
+    fn a_covariance_that_does_not_fit_its_parameters_is_refused_with_its_line() {
+        let camera = r#"{"camera": {"fx": 1, "fy": 1, "cx": 0, "cy": 0},"#;
+        let cases = [
+            ("\"free\": [\"fx\"],\n\"covariance\": [[1, 2]]}", "f:2:1: covariance: 1 rows of 1 numbers"),
+            ("\"free\": [\"cx\", \"fx\"], \"covariance\": [[1]]}", "free: fx is out of order"),
+            ("\"free\": [\"f\"], \"covariance\": [[1]]}", "unknown camera parameter `f`"),
+        ];
+        for (rest, expected) in cases {
+            let text = format!("{camera}{rest}");
+            let error = read(&Source { file: "f", text: &text }).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+}

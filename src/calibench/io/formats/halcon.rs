@@ -1,0 +1,241 @@
+//! HALCON: the text of `write_cam_par`, up to HALCON 12, that describes itself: `Name:short: value;`, its type and bounds, its meaning.
+//!
+//! With `(u, v)` in metres on the image plane and the focal length `Focus`, `u = Focus X / Z`, column `= u~ / Sx + Cx`, row `= v~ / Sy + Cy`;
+//! the centre of the first pixel is (0, 0). The lens takes the seen point `(u~, v~)` to the ideal one, the other way round than here:
+//!
+//! ```text
+//! division:    u = u~ / (1 + Kappa r^2)
+//! polynomial:  u = u~ (1 + K1 r^2 + K2 r^4 + K3 r^6) + P1 (r^2 + 2 u~^2) + 2 P2 u~ v~      r^2 = u~^2 + v~^2
+//!              v = v~ (1 + K1 r^2 + K2 r^4 + K3 r^6) + 2 P1 u~ v~ + P2 (r^2 + 2 v~^2)
+//! ```
+//! So only a lens without distortion has an equal here; any other is refused, or on request fitted over the frame, with the largest error
+//! said. (MVTec HALCON operator reference, `read_cam_par`, "Calibration", "2D Transformations".)
+
+use super::camera_file::CameraFile;
+use super::decimal::decimal;
+use super::error::FormatError;
+use super::node::{MOST_NAMES, Source, side};
+use super::{Format, Found, Room, Size, Wishes, Written, fitted};
+use crate::camera::{BrownConrady, Camera};
+use crate::geometry::Vec2;
+
+pub(super) const FORMAT: Format = Format {
+    name: "halcon",
+    of: "HALCON",
+    endings: &["dat", "cal"],
+    first_pixel: 0.0,
+    coefficients: "K1 K2 K3 P1 P2 of its own lens",
+    room: Room { skew: false, covariance: false, pose: false, name: false, size: Size::Needed },
+    looks_like: |text| text.contains("ParGroup:"),
+    read,
+    write,
+};
+
+const FIT: &str = "it takes what is seen to what is ideal, so no lens here is its equal; --fit finds the nearest one and says its largest error";
+
+/// A lens of HALCON's: from the seen point to the ideal one, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Lens {
+    Division(f64),
+    Polynomial([f64; 5]),
+}
+
+impl Lens {
+    fn is_ideal(&self) -> bool {
+        matches!(self, Lens::Division(0.0) | Lens::Polynomial([0.0, 0.0, 0.0, 0.0, 0.0]))
+    }
+
+    fn ideal_from_seen(&self, seen: &Vec2) -> Vec2 {
+        match *self {
+            Lens::Division(kappa) => seen / (1.0 + kappa * seen.norm_squared()),
+            // Its P1 stands where p2 does here, and the other way round.
+            Lens::Polynomial([k1, k2, k3, p1, p2]) => {
+                BrownConrady { k1, k2, p1: p2, p2: p1, k3 }.distort(seen)
+            }
+        }
+    }
+}
+
+/// The parameters of a file: name, place of the value, value.
+struct Entries<'a> {
+    source: &'a Source<'a>,
+    entries: Vec<(&'a str, usize, &'a str)>,
+}
+
+impl<'a> Entries<'a> {
+    /// Statements end with a semicolon; those of types, bounds and meanings say nothing about the camera.
+    fn of(source: &'a Source<'a>) -> Result<Entries<'a>, FormatError> {
+        let text = source.text;
+        let mut entries: Vec<(&str, usize, &str)> = Vec::new();
+        let place = |part: &str| part.as_ptr() as usize - text.as_ptr() as usize;
+        for line in text.lines().filter(|line| !line.trim_start().starts_with('#')) {
+            for statement in line.split(';').map(str::trim) {
+                let parts: Vec<&str> = statement.split(':').map(str::trim).collect();
+                let [name, _, value] = parts[..] else { continue };
+                if statement.starts_with('"') || matches!(name, "DOUBLE" | "INT" | "STRING") {
+                    continue;
+                }
+                if entries.len() == MOST_NAMES {
+                    return Err(source.syntax(place(name), format!("more than {MOST_NAMES} names")));
+                }
+                if entries.iter().any(|(known, ..)| *known == name) {
+                    return Err(source.syntax(place(name), format!("`{name}` stands here a second time")));
+                }
+                entries.push((name, place(value), value));
+            }
+        }
+        Ok(Entries { source, entries })
+    }
+
+    fn get(&self, name: &str) -> Option<(usize, &'a str)> {
+        self.entries.iter().find(|(known, ..)| *known == name).map(|(_, offset, value)| (*offset, *value))
+    }
+
+    fn number(&self, name: &str) -> Result<f64, FormatError> {
+        let Some((offset, value)) = self.get(name) else {
+            return Err(FormatError::Missing { file: self.source.file.into(), line: 1, what: name.into() });
+        };
+        self.source.number(offset, name, value)
+    }
+
+    fn side(&self, name: &str) -> Result<usize, FormatError> {
+        let number = self.number(name)?;
+        let (offset, value) = self.get(name).unwrap_or_default();
+        side(number).ok_or_else(|| self.source.value(offset, name, format!("{value} is no number of pixels")))
+    }
+}
+
+/// What belongs to cameras of another kind.
+const OTHER_KINDS: [(&str, &str); 5] = [
+    ("Magnification", "a telecentric lens"),
+    ("Tilt", "a tilt lens"),
+    ("Vx", "a line scan camera"),
+    ("Vy", "a line scan camera"),
+    ("Vz", "a line scan camera"),
+];
+
+fn read(source: &Source, wishes: &Wishes) -> Result<Vec<Found>, FormatError> {
+    let entries = Entries::of(source)?;
+    let other = OTHER_KINDS.iter().find(|(name, _)| entries.get(name).is_some());
+    if let Some((_, kind)) = other {
+        return Err(source.lens(*kind, "no camera here is one"));
+    }
+    let focus = entries.number("Focus")?;
+    if focus <= 0.0 {
+        // Older versions wrote a telecentric lens as one of focal length 0.
+        return Err(source.lens(
+            format!("a lens of focal length {focus} (0 is a telecentric one)"),
+            "no camera here is one",
+        ));
+    }
+    let (sx, sy) = (entries.number("Sx")?, entries.number("Sy")?);
+    let ideal = Camera::pinhole(focus / sx, focus / sy, entries.number("Cx")?, entries.number("Cy")?);
+    let size = (entries.side("ImageWidth")?, entries.side("ImageHeight")?);
+    let lens = lens_of(&entries)?;
+    let mut file = CameraFile { image_size: Some(size), ..CameraFile::of(ideal) };
+    file.notes.push(format!("a pixel measures {sx} x {sy} m, which is not kept"));
+    if lens.is_ideal() {
+        return Ok(vec![file.into()]);
+    }
+    let kind =
+        if matches!(lens, Lens::Division(_)) { "HALCON's division lens" } else { "HALCON's polynomial lens" };
+    if !wishes.fit {
+        return Err(source.lens(kind, FIT));
+    }
+    // Seen and ideal points over the frame, in units of the focal length.
+    let seen = |pixel: &Vec2| Vec2::new((pixel.x - ideal.cx) * sx, (pixel.y - ideal.cy) * sy);
+    let pixels: Vec<Vec2> = fitted::frame(size).collect();
+    let rays: Vec<Vec2> = pixels.iter().map(|pixel| lens.ideal_from_seen(&seen(pixel)) / focus).collect();
+    let pairs: Vec<(Vec2, Vec2)> =
+        rays.iter().zip(&pixels).map(|(ray, pixel)| (*ray, seen(pixel) / focus)).collect();
+    let fitted = fitted::polynomial(&pairs)
+        .ok_or_else(|| source.lens(kind, "no lens here comes near it over the frame"))?;
+    file.camera = ideal.with_distortion(fitted);
+    let error = fitted::largest_error_px(&file.camera, &rays.into_iter().zip(pixels).collect::<Vec<_>>());
+    file.notes.push(format!("{kind} is fitted over the frame: the largest error is {error:.2e} px"));
+    Ok(vec![file.into()])
+}
+
+fn lens_of(entries: &Entries) -> Result<Lens, FormatError> {
+    let names = ["Poly1", "Poly2", "Poly3", "Poly4", "Poly5"];
+    if entries.get("Poly1").is_none() {
+        return Ok(Lens::Division(entries.number("Kappa")?));
+    }
+    let mut coefficients = [0.0; 5];
+    for (coefficient, name) in coefficients.iter_mut().zip(names) {
+        *coefficient = entries.number(name)?;
+    }
+    Ok(Lens::Polynomial(coefficients))
+}
+
+fn write(file: &CameraFile, wishes: &Wishes) -> Result<Written, FormatError> {
+    let camera = &file.camera;
+    let (width, height) = file.image_size.unwrap_or_default();
+    let (focus, sy) = (camera.fy * wishes.pixel_height_m, wishes.pixel_height_m);
+    let sx = focus / camera.fx;
+    let mut converted = vec![format!(
+        "focal lengths are in metres there: a pixel is taken to be {} m high, which changes no ray",
+        wishes.pixel_height_m
+    )];
+    let lens = if camera.distortion.is_ideal() {
+        vec![("Kappa", "kappa", 0.0, "Radial distortion coefficient [1/(meter*meter)]")]
+    } else {
+        let (coefficients, error) = polynomial_of(camera, (width, height), wishes)?;
+        converted.push(format!("the lens is fitted over the frame: the largest error is {error:.2e} px"));
+        let f2 = focus * focus;
+        let metres = [f2, f2 * f2, f2 * f2 * f2, focus, focus];
+        let c = |i: usize| coefficients[i] / metres[i];
+        vec![
+            ("Poly1", "poly1", c(0), "Radial distortion coefficient K1 [1/m^2]"),
+            ("Poly2", "poly2", c(1), "Radial distortion coefficient K2 [1/m^4]"),
+            ("Poly3", "poly3", c(2), "Radial distortion coefficient K3 [1/m^6]"),
+            ("Poly4", "poly4", c(3), "Decentering distortion coefficient P1 [1/m]"),
+            ("Poly5", "poly5", c(4), "Decentering distortion coefficient P2 [1/m]"),
+        ]
+    };
+    let mut text = "# INTERNAL CAMERA PARAMETERS\n\nParGroup: Camera: Parameter;\n    \"Internal camera parameters\";\n\n".to_string();
+    let mut add = |name: &str, short: &str, value: String, bounds: &str, meaning: &str| {
+        text += &format!("{name}:{short}: {value};\n    {bounds};\n    \"{meaning}\";\n\n");
+    };
+    add("Focus", "foc", decimal(focus), "DOUBLE:0.0:", "Focal length of the lens [meter]");
+    for (name, short, value, meaning) in lens {
+        add(name, short, decimal(value), "DOUBLE::", meaning);
+    }
+    add("Sx", "sx", decimal(sx), "DOUBLE:0.0:", "Width of a cell on the sensor [meter]");
+    add("Sy", "sy", decimal(sy), "DOUBLE:0.0:", "Height of a cell on the sensor [meter]");
+    add("Cx", "cx", decimal(camera.cx), "DOUBLE::", "X-coordinate of the image center [pixel]");
+    add("Cy", "cy", decimal(camera.cy), "DOUBLE::", "Y-coordinate of the image center [pixel]");
+    add("ImageWidth", "imgw", width.to_string(), "INT:1:", "Width of the images [pixel]");
+    add("ImageHeight", "imgh", height.to_string(), "INT:1:", "Height of the images [pixel]");
+    Ok(Written { text, converted, lost: Vec::new() })
+}
+
+/// K1, K2, K3, P1, P2 in units of the focal length, and the largest error, px.
+fn polynomial_of(
+    camera: &Camera,
+    size: (usize, usize),
+    wishes: &Wishes,
+) -> Result<([f64; 5], f64), FormatError> {
+    let refuse = |help: String| {
+        Err(FormatError::CannotHold { format: "HALCON", what: "this lens exactly".into(), help })
+    };
+    if !wishes.fit {
+        return refuse(FIT.into());
+    }
+    let mut pairs = Vec::new();
+    for pixel in fitted::frame(size) {
+        let seen = camera.normalised_from_pixel(&pixel);
+        match camera.normalised_ray(&pixel) {
+            Ok(ray) => pairs.push((seen, ray)),
+            Err(error) => return refuse(format!("it does not reach the whole frame: {error}")),
+        }
+    }
+    let Some(fit) = fitted::polynomial(&pairs) else {
+        return refuse("no lens there comes near it over the frame".into());
+    };
+    let by_halcon: Vec<(Vec2, Vec2)> = fitted::frame(size)
+        .map(|pixel| (fit.distort(&camera.normalised_from_pixel(&pixel)), pixel))
+        .collect();
+    let BrownConrady { k1, k2, p1, p2, k3 } = fit;
+    Ok(([k1, k2, k3, p2, p1], fitted::largest_error_px(camera, &by_halcon)))
+}

@@ -1,0 +1,277 @@
+//! Which files of other programs are read and written? Cameras in ten formats, corners and boards in those of mrcal and Kalibr.
+//!
+//! A format is a file here: how its text becomes a [`CameraFile`] and back. What all of them share is done in one place, [`read_camera_file`]
+//! and [`write_camera_file`]: the origin of the pixels is moved, and what a format cannot hold is refused, if this would be another camera
+//! without it, or else named.
+
+mod calibench;
+mod camera_file;
+mod colmap;
+mod decimal;
+mod error;
+mod fitted;
+mod flow;
+mod halcon;
+mod kalibr;
+mod lens;
+mod matlab;
+mod mrcal;
+mod node;
+mod opencv;
+mod ros;
+#[cfg(test)]
+mod tests;
+mod vnl;
+mod xml;
+mod yaml;
+
+pub use calibench::SCHEMA;
+pub use camera_file::{CameraFile, Estimated};
+pub use error::FormatError;
+pub use kalibr::{ChessTarget, parse_target, target_text};
+pub use vnl::{VnlBoard, corner_text, looks_like_vnl, parse_vnl, vnl_text};
+
+use crate::camera::Camera;
+use crate::geometry::Vec2;
+use node::Source;
+
+/// Bytes of a file of a camera: mrcal keeps whole calibrations beside one.
+pub const MOST_BYTES: u64 = 1 << 28;
+
+/// What a format has room for, beyond focal lengths, principal point and lens.
+#[derive(Debug, Clone, Copy)]
+struct Room {
+    skew: bool,
+    covariance: bool,
+    pose: bool,
+    name: bool,
+    size: Size,
+}
+
+/// Whether a format has the image's size.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Size {
+    Needed,
+    Kept,
+}
+
+/// A format: its names, its conventions, its reader and its writer.
+#[derive(Debug)]
+pub struct Format {
+    /// The name on the command line.
+    pub name: &'static str,
+    /// The program or library whose format it is.
+    pub of: &'static str,
+    /// Endings of its files.
+    pub endings: &'static [&'static str],
+    /// Both coordinates of the centre of the first pixel.
+    pub first_pixel: f64,
+    /// The lens's coefficients in the order of its files.
+    pub coefficients: &'static str,
+    room: Room,
+    looks_like: fn(&str) -> bool,
+    read: fn(&Source, &Wishes) -> Result<Vec<Found>, FormatError>,
+    write: fn(&CameraFile, &Wishes) -> Result<Written, FormatError>,
+}
+
+/// A camera of a file that may hold several: one that cannot be read here does not keep the others from it.
+#[derive(Debug)]
+struct Found {
+    name: Option<String>,
+    camera: Result<CameraFile, FormatError>,
+}
+
+impl From<CameraFile> for Found {
+    fn from(camera: CameraFile) -> Found {
+        Found { name: camera.name.clone(), camera: Ok(camera) }
+    }
+}
+
+/// What the user wants where the files leave a choice.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wishes {
+    /// Fits the nearest lens where a lens has no equal in the other format.
+    pub fit: bool,
+    /// Height of a pixel, m: HALCON states focal lengths in metres.
+    pub pixel_height_m: f64,
+    /// Both coordinates of the first pixel's centre in the file that is read, where its program did not keep to the format's.
+    pub first_pixel: Option<f64>,
+}
+
+impl Default for Wishes {
+    fn default() -> Wishes {
+        Wishes { fit: false, pixel_height_m: 1e-6, first_pixel: None }
+    }
+}
+
+/// A file's text, and what is to be said about it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Written {
+    /// The text.
+    pub text: String,
+    /// What was converted.
+    pub converted: Vec<String>,
+    /// What the file does not keep.
+    pub lost: Vec<String>,
+}
+
+impl From<String> for Written {
+    fn from(text: String) -> Written {
+        Written { text, ..Written::default() }
+    }
+}
+
+/// Formats of cameras. Those with the clearest marks come first: the first that a text looks like is taken.
+pub static FORMATS: [Format; 10] = [
+    calibench::FORMAT,
+    opencv::JSON,
+    opencv::XML,
+    mrcal::FORMAT,
+    matlab::FORMAT,
+    halcon::FORMAT,
+    ros::FORMAT,
+    kalibr::FORMAT,
+    opencv::YAML,
+    colmap::FORMAT,
+];
+
+/// The format of a name.
+pub fn format_of_name(name: &str) -> Option<&'static Format> {
+    FORMATS.iter().find(|format| format.name == name)
+}
+
+/// The names of all formats.
+pub fn format_names() -> Vec<&'static str> {
+    FORMATS.iter().map(|format| format.name).collect()
+}
+
+/// The formats whose files end like this one.
+fn formats_of_ending(file: &str) -> Vec<&'static Format> {
+    let ending = file.rsplit_once('.').map_or("", |(_, ending)| ending).to_lowercase();
+    FORMATS.iter().filter(|format| format.endings.contains(&ending.as_str())).collect()
+}
+
+/// The format of a text: by what stands in it, then by the name of its file.
+///
+/// # Errors
+/// [`FormatError::Unknown`].
+pub fn detect(file: &str, text: &str) -> Result<&'static Format, FormatError> {
+    let by_contents = FORMATS.iter().find(|format| (format.looks_like)(text));
+    if let Some(format) = by_contents {
+        return Ok(format);
+    }
+    only_one(file, "--from", formats_of_ending(file))
+}
+
+/// The format in which a file of this name is to be written.
+///
+/// # Errors
+/// [`FormatError::Unknown`] where an ending is of no format or of several.
+pub fn format_to_write(file: &str) -> Result<&'static Format, FormatError> {
+    only_one(file, "--to", formats_of_ending(file))
+}
+
+fn only_one(
+    file: &str,
+    option: &'static str,
+    formats: Vec<&'static Format>,
+) -> Result<&'static Format, FormatError> {
+    match formats[..] {
+        [format] => Ok(format),
+        [] => Err(FormatError::Unknown { file: file.into(), option, names: format_names() }),
+        _ => Err(FormatError::Unknown {
+            file: file.into(),
+            option,
+            names: formats.iter().map(|format| format.name).collect(),
+        }),
+    }
+}
+
+/// Reads the camera of a text in a format; of several, the one with this name. `file` names it in errors.
+///
+/// # Errors
+/// See [`FormatError`].
+pub fn read_camera_file(
+    format: &Format,
+    file: &str,
+    text: &str,
+    camera: Option<&str>,
+    wishes: &Wishes,
+) -> Result<CameraFile, FormatError> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let cameras = (format.read)(&Source { file, text }, wishes)?;
+    let first_pixel = wishes.first_pixel.unwrap_or(format.first_pixel);
+    let read = chosen(file, cameras, camera)?.with_origin_moved(-first_pixel);
+    match read.camera.is_valid() {
+        true => Ok(read),
+        false => Err(FormatError::NoCamera { file: file.into() }),
+    }
+}
+
+/// The camera of a name, or the only one.
+fn chosen(file: &str, mut cameras: Vec<Found>, wanted: Option<&str>) -> Result<CameraFile, FormatError> {
+    let names = || cameras.iter().map(|found| found.name.clone().unwrap_or_default()).collect::<Vec<_>>();
+    let file = file.to_string();
+    let place = match wanted {
+        Some(wanted) => match names().iter().position(|name| name == wanted) {
+            Some(place) => place,
+            None => return Err(FormatError::NoSuchCamera { file, name: wanted.to_string(), names: names() }),
+        },
+        None if cameras.len() > 1 => return Err(FormatError::Several { file, names: names() }),
+        None if cameras.is_empty() => return Err(FormatError::NoCamera { file }),
+        None => 0,
+    };
+    cameras.swap_remove(place).camera
+}
+
+/// Writes a camera in a format.
+///
+/// # Errors
+/// [`FormatError::CannotHold`] where the format's file would be another camera, or would lack what every such file has.
+pub fn write_camera_file(
+    format: &Format,
+    camera: &CameraFile,
+    wishes: &Wishes,
+) -> Result<Written, FormatError> {
+    let refuse = |what: &str, help: &str| {
+        Err(FormatError::CannotHold { format: format.of, what: what.into(), help: help.into() })
+    };
+    if !camera.camera.is_valid() {
+        return refuse("this camera", "fx and fy must be positive, and every parameter finite");
+    }
+    if camera.camera.skew != 0.0 && !format.room.skew {
+        return refuse("skew", "calibrate without it (--fix skew=0), or write calibench or matlab");
+    }
+    if camera.image_size.is_none() && format.room.size == Size::Needed {
+        return refuse("a camera without its image's size", "give --image-size WxH");
+    }
+    let mut written = (format.write)(&camera.clone().with_origin_moved(format.first_pixel), wishes)?;
+    let room = format.room;
+    let losses = [
+        (camera.estimated.is_some() && !room.covariance, "the covariance"),
+        (camera.cam_from_reference.is_some() && !room.pose, "the camera's pose"),
+        (camera.name.is_some() && !room.name, "the camera's name"),
+    ];
+    let lost = losses.into_iter().filter(|(lost, _)| *lost);
+    written.lost.extend(lost.map(|(_, what)| format!("{what}: {} has no place for it", format.of)));
+    Ok(written)
+}
+
+/// Largest distance between the pixels of a written file's camera and those of the camera it was written from, px, for rays through the
+/// whole frame; `None` where the image's size is not known.
+///
+/// # Errors
+/// What keeps the written file from being read: a fault of this library.
+pub fn read_back_px(
+    format: &Format,
+    written: &Written,
+    camera: &CameraFile,
+) -> Result<Option<f64>, FormatError> {
+    let wishes = Wishes { fit: true, ..Wishes::default() };
+    let back = read_camera_file(format, "what was written", &written.text, None, &wishes)?;
+    let Some(size) = camera.image_size else { return Ok(None) };
+    let rays = fitted::frame(size).filter_map(|pixel| camera.camera.normalised_ray(&pixel).ok());
+    let pixel = |camera: &Camera, ray: &Vec2| camera.pixel_from_normalised(&camera.distortion.distort(ray));
+    let distances = rays.map(|ray| (pixel(&back.camera, &ray) - pixel(&camera.camera, &ray)).norm());
+    Ok(Some(distances.fold(0.0, f64::max)))
+}

@@ -1,0 +1,284 @@
+//! `calibench diff A B`: how two cameras differ over the frame, and whether both may be one.
+
+use super::calibrate::{Format as Shown, parse_size, round_down};
+use super::{Exit, print, warn};
+use calibench::evaluate::{
+    Calibrated, FrameDifference, OneCamera, TakenOut, difference::frame_nodes, frame_difference, one_camera,
+};
+use calibench::io::formats::{CameraFile, FormatError, MOST_BYTES, Wishes, detect, read_camera_file};
+use calibench::io::{read_regular_text, significant, write_atomically};
+use calibench_harness::{Figure, HeatMap, Look, Plot};
+use clap::Args;
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// What the exit codes mean here.
+const EXIT_CODES: &str = "Exit codes: 0 nothing speaks against one camera, or there are no covariances to ask, 1 they are two, at the rate of \
+     false alarms, 2 wrong usage or input, 3 incomplete";
+
+#[derive(Debug, Args)]
+#[command(after_help = EXIT_CODES)]
+pub(super) struct Arguments {
+    /// A camera in any format that `calibench convert` reads; result.json of `calibench calibrate` brings its covariance along
+    a: PathBuf,
+    /// The other camera
+    b: PathBuf,
+    /// Size of the frame, where neither file says it
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    image_size: Option<(usize, usize)>,
+    /// Distance of what is looked at, in mm: the best translation is taken out too [default: the best rotation alone, for any distance]
+    #[arg(long, value_name = "MM", value_parser = parse_distance)]
+    at: Option<f64>,
+    /// Rate of false alarms of the test
+    #[arg(long, value_name = "RATE", value_parser = parse_rate, default_value_t = 0.01)]
+    rate: f64,
+    /// Folder for difference.json and two plots
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Text for people or JSON for programs
+    #[arg(long, value_enum, default_value_t = Shown::Text)]
+    format: Shown,
+}
+
+fn parse_distance(text: &str) -> Result<f64, String> {
+    let distance = text.strip_suffix("mm").unwrap_or(text).parse().ok();
+    distance
+        .filter(|d: &f64| d.is_finite() && *d > 0.0)
+        .ok_or_else(|| "expected a distance in mm, above 0".into())
+}
+
+fn parse_rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate| 0.0 < *rate && *rate < 1.0);
+    rate.ok_or_else(|| "expected a rate between 0 and 1, such as 0.01".into())
+}
+
+pub(super) fn run(arguments: &Arguments) -> Exit {
+    let compared = match compared(arguments) {
+        Ok(compared) => compared,
+        Err(message) => {
+            warn(&message);
+            return Exit::Usage;
+        }
+    };
+    let json = format!("{:#}\n", compared.json(arguments));
+    if let Some(folder) = &arguments.out
+        && let Err(error) = write_files(folder, &json, &compared)
+    {
+        warn(&error.to_string());
+        return Exit::Incomplete;
+    }
+    match arguments.format {
+        Shown::Text => print(&compared.text(arguments)),
+        Shown::Json => print(&json),
+    }
+    match &compared.test {
+        Ok(test) if test.p_value < arguments.rate => Exit::Deviates,
+        _ => Exit::Held,
+    }
+}
+
+/// What was found.
+struct Compared {
+    size: (usize, usize),
+    difference: FrameDifference,
+    /// The test, or why there is none.
+    test: Result<OneCamera, String>,
+}
+
+fn compared(arguments: &Arguments) -> Result<Compared, String> {
+    let (a, b) = (read(&arguments.a)?, read(&arguments.b)?);
+    let size = frame(arguments, &a, &b)?;
+    let taken_out =
+        arguments.at.map_or(TakenOut::Rotation, |distance| TakenOut::RotationAndTranslation { distance });
+    let difference =
+        frame_difference(&a.camera, &b.camera, size, taken_out).map_err(|error| error.to_string())?;
+    let test = match (calibrated(&a), calibrated(&b)) {
+        (Some(a), Some(b)) => one_camera(&a, &b, size, taken_out).map_err(|error| error.to_string()),
+        (None, _) => Err(format!("{} has no covariance", arguments.a.display())),
+        (_, None) => Err(format!("{} has no covariance", arguments.b.display())),
+    };
+    Ok(Compared { size, difference, test })
+}
+
+fn read(path: &Path) -> Result<CameraFile, String> {
+    let file = path.display().to_string();
+    let text = read_regular_text(path, MOST_BYTES).map_err(|error| error.to_string())?;
+    let format = detect(&file, &text).map_err(|error| error.to_string())?;
+    read_camera_file(format, &file, &text, None, &Wishes::default()).map_err(|error| match error {
+        FormatError::Several { names, .. } => format!(
+            "{file}: {} cameras: take one of {} out first, with calibench convert --camera NAME",
+            names.len(),
+            names.join(", ")
+        ),
+        error => error.to_string(),
+    })
+}
+
+/// The frame of both.
+fn frame(arguments: &Arguments, a: &CameraFile, b: &CameraFile) -> Result<(usize, usize), String> {
+    let mut sizes = [a.image_size, b.image_size, arguments.image_size].into_iter().flatten();
+    let Some(size) = sizes.next() else { return Err("the frame is not known: give --image-size WxH".into()) };
+    match sizes.find(|other| *other != size) {
+        None => Ok(size),
+        Some(other) => Err(format!(
+            "{} x {} px and {} x {} px: bring both to one size first, with calibench convert --resize",
+            size.0, size.1, other.0, other.1
+        )),
+    }
+}
+
+fn calibrated(file: &CameraFile) -> Option<Calibrated<'_>> {
+    let estimated = file.estimated.as_ref()?;
+    Some(Calibrated {
+        camera: &file.camera,
+        free: estimated.free,
+        covariance: &estimated.covariance,
+        degrees_of_freedom: estimated.degrees_of_freedom,
+    })
+}
+
+impl Compared {
+    fn text(&self, arguments: &Arguments) -> String {
+        let FrameDifference { rms_px, b_from_a, .. } = &self.difference;
+        let (width, height) = self.size;
+        let mut text = format!(
+            "{} against {} over {width} x {height} px\ntaken out: a rotation by {} degrees",
+            arguments.b.display(),
+            arguments.a.display(),
+            significant(self.difference.rotation_rad().to_degrees(), 3)
+        );
+        // Writing to a string cannot fail, here and below.
+        if let Some(distance) = arguments.at {
+            let [x, y, z] = [0, 1, 2].map(|i| significant(b_from_a.translation[i], 3));
+            let _ = write!(text, " and a translation by ({x}, {y}, {z}) mm at {distance} mm");
+        }
+        let _ =
+            writeln!(text, "\ndifference left: {} px RMS{}", significant(*rms_px, 3), self.largest_text());
+        match &self.test {
+            Ok(test) => text += &test_text(test, arguments.rate),
+            Err(why) => {
+                let _ = writeln!(text, "not tested whether both are one camera: {why}");
+            }
+        }
+        text
+    }
+
+    fn largest_text(&self) -> String {
+        let Some(largest) = self.difference.largest() else { return String::new() };
+        let (size, pixel) = (significant(largest.difference.norm(), 3), largest.pixel);
+        format!(", at most {size} px, at ({:.0}, {:.0})", pixel.x, pixel.y)
+    }
+
+    fn json(&self, arguments: &Arguments) -> Value {
+        let difference = &self.difference;
+        let rotation = calibench::geometry::rotation::log(&difference.b_from_a.rotation);
+        let translation = difference.b_from_a.translation;
+        let largest = difference.largest();
+        let test = self.test.as_ref().map(|test| {
+            json!({
+                "chi_squared": test.chi_squared,
+                "degrees_of_freedom": test.degrees_of_freedom,
+                "imitated": test.imitated,
+                "noise_freedom": test.noise_freedom,
+                "p_value": test.p_value,
+                "rate": arguments.rate,
+                "one_camera": test.p_value >= arguments.rate,
+            })
+        });
+        json!({
+            "written_by": format!("calibench {}", env!("CARGO_PKG_VERSION")),
+            "a": arguments.a.display().to_string(),
+            "b": arguments.b.display().to_string(),
+            "image_size": [self.size.0, self.size.1],
+            "at_mm": arguments.at,
+            "rotation_vector_rad": [rotation.x, rotation.y, rotation.z],
+            "translation_mm": arguments.at.map(|_| [translation.x, translation.y, translation.z]),
+            "rms_px": difference.rms_px,
+            "max_px": largest.map(|node| node.difference.norm()),
+            "max_at_px": largest.map(|node| [node.pixel.x, node.pixel.y]),
+            "nodes": difference.nodes.iter().map(|node| [
+                node.pixel.x, node.pixel.y, node.difference.x, node.difference.y,
+            ]).collect::<Vec<_>>(),
+            "test": test.as_ref().ok(),
+            "not_tested": self.test.as_ref().err(),
+        })
+    }
+}
+
+fn test_text(test: &OneCamera, rate: f64) -> String {
+    let says = match test.p_value < rate {
+        true => "they are two cameras",
+        false => "nothing speaks against one camera",
+    };
+    let mut text = format!(
+        "chi-squared {} on {} degrees of freedom, by chance with probability {}: {says} (false alarms at {rate})\n",
+        significant(test.chi_squared, 4),
+        test.degrees_of_freedom,
+        significant(test.p_value, 2),
+    );
+    if test.imitated > 0 {
+        let _ = writeln!(
+            text,
+            "{} combinations of parameters are left out: what was taken out imitates them",
+            test.imitated
+        );
+    }
+    text
+}
+
+fn write_files(folder: &Path, json: &str, compared: &Compared) -> std::io::Result<()> {
+    write_atomically(&folder.join("difference.json"), json.as_bytes())?;
+    for figure in [Some(arrows(compared)), sizes(compared)].into_iter().flatten() {
+        write_atomically(&folder.join(figure.file_name()), &figure.bytes)?;
+    }
+    Ok(())
+}
+
+/// Where pixels move.
+fn arrows(compared: &Compared) -> Figure {
+    let nodes = &compared.difference.nodes;
+    let (width, height) = compared.size;
+    let longest = compared.difference.largest().map_or(0.0, |node| node.difference.norm());
+    // The longest arrow takes a twentieth of the frame.
+    let factor = round_down(width.max(height) as f64 / 20.0 / longest.max(f64::MIN_POSITIVE));
+    let factor = if factor.is_finite() { factor } else { 1.0 };
+    let arrows: Vec<(f64, f64, f64, f64)> = nodes
+        .iter()
+        .map(|n| (n.pixel.x, n.pixel.y, factor * n.difference.x, factor * n.difference.y))
+        .collect();
+    let (right, bottom) = (width as f64 - 0.5, height as f64 - 0.5);
+    let border = [(-0.5, -0.5), (right, -0.5), (right, bottom), (-0.5, bottom), (-0.5, -0.5)];
+    let title = format!("Difference of projection, B \u{2212} A, {factor} times enlarged");
+    let plot = Plot::new(title, "u (px)", "v (px)").equal_aspect().y_down();
+    let plot = plot.line_as("", &border, Look::ink()).arrows("", &arrows);
+    let caption = "Where camera B shows what camera A shows at the arrow's foot, px, after the best motion between them.";
+    Figure::plot("difference", &plot, caption)
+}
+
+/// Cells of the map along the frame's longer side: more have no room for their numbers.
+const LONG_SIDE_CELLS: usize = 10;
+
+/// How far pixels move.
+fn sizes(compared: &Compared) -> Option<Figure> {
+    let (all, columns) = frame_nodes(compared.size);
+    let rows = all.len() / columns;
+    let step = columns.max(rows).div_ceil(LONG_SIDE_CELLS).max(1);
+    // Every so many nodes one, in the middle of its cell.
+    let places = |count: usize| (step / 2..count).step_by(step).collect::<Vec<_>>();
+    let (columns_shown, rows_shown) = (places(columns), places(rows));
+    let size = |i: usize, j: usize| {
+        let pixel = all[j * columns + i];
+        let node = compared.difference.nodes.iter().find(|node| node.pixel == pixel);
+        node.map_or(f64::NAN, |node| node.difference.norm())
+    };
+    let upwards = rows_shown.iter().rev().flat_map(|&j| columns_shown.iter().map(move |&i| (i, j)));
+    let values: Vec<f64> = upwards.map(|(i, j)| size(i, j)).collect();
+    let label = |x: f64| format!("{x:.0}");
+    let x = columns_shown.iter().map(|&i| label(all[i].x)).collect();
+    let y = rows_shown.iter().rev().map(|&j| label(all[j * columns].y)).collect();
+    let heat = HeatMap::new("difference (px)", x, y, values).ok()?.digits(2);
+    let plot = Plot::heat_map("How far are the pixels apart?", "u (px)", "v (px)", heat);
+    let caption = "Distance between the pixels of both cameras, px, after the best motion between them; cells are named by their middle.";
+    Some(Figure::plot("difference-size", &plot, caption))
+}
