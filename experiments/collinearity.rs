@@ -24,7 +24,7 @@ use calibench::synth::scene::looking_at_centre;
 use calibench::synth::{Scene, Stream, StreamKey, Truth};
 use calibench_harness::figure::density;
 use calibench_harness::published::{self, Entry};
-use calibench_harness::stats::{Interval, normal_two_sided};
+use calibench_harness::stats::{self, Interval, normal_two_sided};
 use calibench_harness::{
     Band, Cell, Context, Experiment, ExperimentError, Figure, HeatMap, Look, Plot, Predicted, Record, Table,
 };

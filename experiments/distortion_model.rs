@@ -67,7 +67,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     claim_full_model(&mut record, &nodes);
     record.table(bias_table(&nodes, &theory, unit));
     record.figure(bias_figure(&nodes, &theory, unit));
-    record.figure(rmse_figure(&nodes, &theory));
+    record.figure(rmse_figure(&nodes, &theory, unit));
     Ok(record)
 }
 
@@ -502,6 +502,15 @@ fn bias_table(nodes: &[Node], theory: &Theory, unit: Vector2<f64>) -> Table {
         .into()
 }
 
+/// Where a curve first rises through one, straight between its nodes on logarithmic axes; NaN where it does not.
+fn reaches_one(curve: &[(f64, f64)]) -> f64 {
+    let rise = curve.windows(2).find(|pair| pair[0].1 < 1.0 && pair[1].1 >= 1.0);
+    rise.map_or(f64::NAN, |pair| {
+        let ((x0, y0), (x1, y1)) = (pair[0], pair[1]);
+        x0 * libm::pow(x1 / x0, libm::log(1.0 / y0) / libm::log(y1 / y0))
+    })
+}
+
 fn bias_figure(nodes: &[Node], theory: &Theory, unit: Vector2<f64>) -> Figure {
     use Parameter::*;
     let shown = &nodes[1..];
@@ -523,30 +532,40 @@ fn bias_figure(nodes: &[Node], theory: &Theory, unit: Vector2<f64>) -> Figure {
     .hline("one standard deviation", 1.0)
     .log_x()
     .log_y();
-    let caption = "Bias of the chapter's model on exact pixels of a decentred lens, in standard deviations \
-                   for noise of 0.1 px; nothing is drawn at random. Notice where each parameter reaches one \
-                   standard deviation.";
+    let caption = format!(
+        "Bias of the chapter's model on exact pixels of a decentred lens, in standard deviations for noise \
+         of {SIGMA_PX} px; nothing is drawn at random. Notice where a bias reaches one standard deviation: \
+         cx at a ratio of {:.3}, cy at {:.3}, k1 at {:.2}, fx at {:.2}.",
+        reaches_one(&curve(Cx)),
+        reaches_one(&curve(Cy)),
+        reaches_one(&curve(K1)),
+        reaches_one(&curve(Fx))
+    );
     Figure::plot("bias", &plot, caption)
 }
 
-fn rmse_figure(nodes: &[Node], theory: &Theory) -> Figure {
+fn rmse_figure(nodes: &[Node], theory: &Theory, unit: Vector2<f64>) -> Figure {
     let exact: Vec<(f64, f64)> = nodes.iter().map(|n| (n.ratio, n.rmse_px)).collect();
     let noisy: Vec<(f64, f64)> = nodes.iter().map(|n| (n.ratio, theory.with_noise_px(n.rmse_px))).collect();
     let noise = theory.noise();
+    let notices = theory.rmse_notices(unit);
     let plot = Plot::new(
         "Does the reprojection error tell?",
         "tangential over radial displacement (RMS)",
         "RMSE (px)",
     )
     .line("without noise", &exact)
-    .line("expected with noise of 0.1 px", &noisy)
+    .line(format!("expected with noise of {SIGMA_PX} px"), &noisy)
     .hline("noise alone: 99.5 % lie below", noise.interval_px(0.01).high);
     let caption = format!(
         "RMSE per point of the model without tangential terms, without noise and as expected with noise of \
-         0.1 px; nothing is drawn at random. The second begins at {:.4} px, what noise alone leaves after \
-         the fit of {} parameters. Notice where it passes what noise alone explains.",
+         {SIGMA_PX} px; nothing is drawn at random. The second begins at {:.4} px, what noise alone leaves \
+         after the fit of {} parameters. Notice that it passes what noise alone explains at a ratio of \
+         {:.3}, where the bias of cx is {:.0} standard deviations.",
         noise.root_mean_square_px(),
-        noise.parameters
+        noise.parameters,
+        notices,
+        theory.bias(unit * notices)[2].abs() / theory.small_sd(Parameter::Cx)
     );
     Figure::plot("rmse", &plot, caption)
 }

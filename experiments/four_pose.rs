@@ -59,6 +59,8 @@ const RATE: f64 = 1e-4;
 const COVERAGE: f64 = 0.95;
 /// Residuals are drawn this many times longer than they are.
 const ARROW_SCALE: f64 = 150.0;
+/// Draws that show how much the residuals of neighbours correlate by chance.
+const PATTERN_TRIALS: usize = 200;
 /// Dots of the clouds: enough to show a shape.
 const CLOUD: usize = 600;
 
@@ -80,7 +82,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     weak::claim_facing_views(&mut record, context)?;
 
     record.figure(figures::views(&draw));
-    record.figure(figures::residuals(&draw));
+    record.figure(figures::residuals(&draw)?);
     record.figure(figures::residual_distribution(&draw));
     record.figure(figures::ellipse(&draw, &book, &outcome));
     record.figure(figures::rmse(&draw, &book, &outcome));

@@ -225,8 +225,10 @@ fn report_sweep(record: &mut Record, sweep: &[Step]) {
     let caption = format!(
         "What a reader who exchanges fy and cx sees in fy's place, in standard deviations of fy, for truths \
          whose focal length approaches cx; noise {SIGMA_PX} px, one calibration a point, seed {}. Notice \
-         the blind zone between the limits.",
-        record.seed()
+         the blind zone between the limits: an exchange stays hidden where the two differ by less than \
+         {:.1} px.",
+        record.seed(),
+        limit * middle.sd_px
     );
     record.figure(Figure::plot("blind-zone", &plot, caption));
     // cx is estimated with a standard deviation of its own: z has mean -difference / sd(fy) and deviation

@@ -207,6 +207,18 @@ impl Map {
         self.nodes.iter().filter(|n| n.is_identifiable()).collect()
     }
 
+    fn without_tilt(&self) -> impl Iterator<Item = &Node> {
+        self.nodes.iter().filter(|n| n.tilt_deg == 0)
+    }
+
+    fn trials_without_tilt(&self) -> usize {
+        self.without_tilt().map(|n| n.outcome.trials).sum()
+    }
+
+    fn converged_without_tilt(&self) -> usize {
+        self.without_tilt().map(|n| n.outcome.converged()).sum()
+    }
+
     /// Largest over smallest value among the identifiable nodes.
     fn range(&self, value: impl Fn(&Node) -> f64) -> f64 {
         let values = || self.identifiable().into_iter().map(&value);
@@ -326,9 +338,9 @@ fn node_table(map: &Map) -> Rows<&Node> {
 
 /// Without tilt there is no bound, and every trial is refused for the right reason.
 fn claim_no_tilt(record: &mut Record, map: &Map) {
-    let flat: Vec<&Node> = map.nodes.iter().filter(|n| n.tilt_deg == 0).collect();
+    let flat: Vec<&Node> = map.without_tilt().collect();
     let refused: usize = flat.iter().map(|n| n.outcome.refused_naming(&["focal length", "distance"])).sum();
-    let trials: usize = flat.iter().map(|n| n.outcome.trials).sum();
+    let trials = map.trials_without_tilt();
     record.exact("").count(
         "no-tilt-refused",
         refused,

@@ -9,6 +9,7 @@
 use calibench::camera::{BrownConrady, Camera};
 use calibench::geometry::{LineFit, Vec2};
 use calibench::synth::Truth;
+use calibench_harness::stats::{largest, smallest};
 use calibench_harness::{
     Band, Context, Dash, Experiment, ExperimentError, Figure, Look, Marker, Plot, Record, Table,
 };
@@ -64,9 +65,10 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     record.table(deviation_table(&ideal, &bent, &opposite));
     record.table(sweep_table("height", "line height v", ("v", "px"), &heights));
     record.table(sweep_table("k1", "k1", ("k1", ""), &strengths));
-    record.figure(grid_figure(&barrel, &pincushion));
+    record.figure(grid_figure(&barrel, &pincushion, &bent, &opposite)?);
     let printed = (record.printed("max-deviation")?, record.printed("rms-deviation")?);
-    record.figure(deviation_figure(&ideal, &bent, &opposite, printed.0));
+    let k1 = (barrel.distortion.k1, pincushion.distortion.k1);
+    record.figure(deviation_figure(&ideal, (&bent, &opposite), k1, printed.0));
     record.figure(height_figure(&heights, &barrel, printed));
     record.figure(k1_figure(&strengths, &barrel));
     Ok(record)
@@ -327,7 +329,30 @@ fn grid_lines(see: impl Fn(&Vec2) -> Vec2) -> Vec<Vec<(f64, f64)>> {
     rows.chain(columns).collect()
 }
 
-fn grid_figure(barrel: &Camera, pincushion: &Camera) -> Figure {
+/// `barrel, k1 = -0.18`, with a typographer's minus.
+fn named(lens: &str, k1: f64) -> String {
+    format!("{lens}, k1 = {k1:+}").replace('-', "\u{2212}")
+}
+
+/// The row and the column of points through the principal point, as a lens shows them.
+fn central_lines(camera: &Camera, see: impl Fn(&Vec2) -> Vec2) -> [Vec<Vec2>; 2] {
+    let across = (0..=62).map(|k| see(&Vec2::new(10.0 + 10.0 * f64::from(k), camera.cy)));
+    let down = (0..=46).map(|k| see(&Vec2::new(camera.cx, 10.0 + 10.0 * f64::from(k))));
+    [across.collect(), down.collect()]
+}
+
+/// Largest distance of the central lines from their regression lines under a lens, px.
+fn central_deviation(camera: &Camera) -> Result<f64, ExperimentError> {
+    let [across, down] = central_lines(camera, |p| camera.distort_pixel(p));
+    Ok(fit(&across)?.max_deviation().max(fit(&down)?.max_deviation()))
+}
+
+fn grid_figure(
+    barrel: &Camera,
+    pincushion: &Camera,
+    bent: &Bent,
+    opposite: &Bent,
+) -> Result<Figure, ExperimentError> {
     let panel = |title: &str, see: &dyn Fn(&Vec2) -> Vec2| {
         let (width, height) = Truth::EXAMPLE_IMAGE;
         let (right, bottom) = (width as f64 - 0.5, height as f64 - 0.5);
@@ -338,12 +363,8 @@ fn grid_figure(barrel: &Camera, pincushion: &Camera) -> Figure {
             Look::ink().dash(Dash::Dotted),
         );
         let lines = grid_lines(see);
-        let seen = |u: f64, v: f64| {
-            let pixel = see(&Vec2::new(u, v));
-            (pixel.x, pixel.y)
-        };
-        let across: Vec<_> = (0..=62).map(|k| seen(10.0 + 10.0 * f64::from(k), barrel.cy)).collect();
-        let down: Vec<_> = (0..=46).map(|k| seen(barrel.cx, 10.0 + 10.0 * f64::from(k))).collect();
+        let [across, down] =
+            central_lines(barrel, see).map(|line| line.iter().map(|p| (p.x, p.y)).collect::<Vec<_>>());
         let central = Look::series(2).dash(Dash::Dashed).width(1.2);
         let plot = plot.line_as("through the principal point", &across, central).line_as("", &down, central);
         let plain = Look::series(0).width(0.9);
@@ -352,17 +373,32 @@ fn grid_figure(barrel: &Camera, pincushion: &Camera) -> Figure {
     };
     let panels = [
         panel("ideal", &|p| *p),
-        panel("barrel, k1 = \u{2212}0.18", &|p| barrel.distort_pixel(p)),
-        panel("pincushion, k1 = +0.18", &|p| pincushion.distort_pixel(p)),
+        panel(&named("barrel", barrel.distortion.k1), &|p| barrel.distort_pixel(p)),
+        panel(&named("pincushion", pincushion.distortion.k1), &|p| pincushion.distort_pixel(p)),
     ];
-    let caption = "A grid seen through an ideal lens, the chapter's lens (k1 = -0.18, k2 = 0.05) and its \
-                   opposite (k1 = +0.18, k2 = 0.05), in pixels. Nothing is drawn at random. Notice that the \
-                   two dashed lines, through the principal point (326, 243), stay straight while the top \
-                   line bows.";
-    Figure::panels("grids", &panels, 3, caption)
+    let lens = |camera: &Camera| format!("k1 = {:+}, k2 = {}", camera.distortion.k1, camera.distortion.k2);
+    let caption = format!(
+        "A grid seen through an ideal lens, the chapter's lens ({}) and its opposite ({}), in pixels. \
+         Nothing is drawn at random. Notice that the two dashed lines, through the principal point ({}, \
+         {}), leave their regression lines by {:.3} px at most, the top line by {:.3} px under the one lens \
+         and {:.3} px under the other.",
+        lens(barrel),
+        lens(pincushion),
+        barrel.cx,
+        barrel.cy,
+        central_deviation(barrel)?.max(central_deviation(pincushion)?),
+        bent.distorted.max_deviation(),
+        opposite.distorted.max_deviation()
+    );
+    Ok(Figure::panels("grids", &panels, 3, caption))
 }
 
-fn deviation_figure(ideal: &[Vec2], bent: &Bent, opposite: &Bent, printed_max_px: f64) -> Figure {
+fn deviation_figure(
+    ideal: &[Vec2],
+    (bent, opposite): (&Bent, &Bent),
+    k1: (f64, f64),
+    printed_max_px: f64,
+) -> Figure {
     let along = |fit: &LineFit| -> Vec<(f64, f64)> {
         ideal.iter().zip(&fit.deviations).map(|(p, d)| (p.x, *d)).collect()
     };
@@ -372,8 +408,8 @@ fn deviation_figure(ideal: &[Vec2], bent: &Bent, opposite: &Bent, printed_max_px
         "deviation (px), down positive",
     )
     .y_down()
-    .line("barrel, k1 = \u{2212}0.18", &along(&bent.distorted))
-    .line("pincushion, k1 = +0.18", &along(&opposite.distorted))
+    .line(named("barrel", k1.0), &along(&bent.distorted))
+    .line(named("pincushion", k1.1), &along(&opposite.distorted))
     .line("barrel, corrected", &along(&bent.corrected))
     .hline(format!("\u{b1}{printed_max_px} px, as published"), printed_max_px)
     .hline("", -printed_max_px);
@@ -416,9 +452,20 @@ fn height_figure(heights: &[Node], camera: &Camera, (max_px, rms_px): (f64, f64)
                 &[(LINE_V_PX, max_px), (LINE_V_PX, rms_px)],
                 Look::ink(),
             );
-    let caption = "Largest and RMS deviation of a horizontal line (u = 20 ... 620 px) under the chapter's \
-                   lens against its height, in pixels; nothing is drawn at random. Notice the zero at the \
-                   principal point's row, and the nearly linear growth away from it.";
+    let away = || heights.iter().filter(|n| n.at != camera.cy);
+    let a_tenth = || away().map(|n| 10.0 * n.max_px / (n.at - camera.cy).abs());
+    let at_centre = heights.iter().filter(|n| n.at == camera.cy).map(|n| n.max_px);
+    let caption = format!(
+        "Largest and RMS deviation of a horizontal line (u = {} ... {} px) under the chapter's lens against \
+         its height, in pixels; nothing is drawn at random. Notice that a line at the principal point's row \
+         leaves its regression line by {:.3} px, and any other by {:.2} to {:.2} px for every 10 px between \
+         it and that row.",
+        10 * LINE_U_PX.start(),
+        10 * LINE_U_PX.end(),
+        largest(at_centre),
+        smallest(a_tenth()),
+        largest(a_tenth())
+    );
     Figure::plot("height", &plot, caption)
 }
 
@@ -446,13 +493,17 @@ fn k1_figure(strengths: &[Node], camera: &Camera) -> Figure {
         .band_as("bound of the second-order remainder", &remainder, Look::series(4))
         .y_range(0.0, 14.0)
         .vline("chapter's k1", camera.distortion.k1);
-    let gap = strengths.iter().map(|n| (n.max_px - n.first_order.max_px).abs()).fold(0.0, f64::max);
-    let bound = strengths.iter().map(|n| n.first_order.bound_px).fold(0.0, f64::max);
+    let gap = largest(strengths.iter().map(|n| (n.max_px - n.first_order.max_px).abs()));
+    let bound = largest(strengths.iter().map(|n| n.first_order.bound_px));
+    let a_tenth = || strengths.iter().filter(|n| n.at != 0.0).map(|n| 0.1 * n.max_px / n.at.abs());
     let caption = format!(
-        "Deviation of the top line (v = 60 px) against k1 alone, in pixels; nothing is drawn at random. \
-         Notice that the line bends in proportion to k1, alike for both signs. First-order theory misses it \
-         by {gap:.2} px at most; the bound, which adds up all second-order terms as if they had one sign, \
-         allows {bound:.1} px there and says little more than that the theory is one of small k1."
+        "Deviation of the top line (v = {LINE_V_PX} px) against k1 alone, in pixels; nothing is drawn at \
+         random. Notice that every tenth of k1, of either sign, bends the line by {:.2} to {:.2} px. \
+         First-order theory misses it by {gap:.2} px at most; the bound, which adds up all second-order \
+         terms as if they had one sign, allows {bound:.1} px there and says little more than that the \
+         theory is one of small k1.",
+        smallest(a_tenth()),
+        largest(a_tenth())
     );
     Figure::plot("k1", &plot, caption)
 }

@@ -18,7 +18,7 @@ use calibench::geometry::{Pose, Vec2, Vec3};
 use calibench::photos::Fitter;
 use calibench::synth::render::{Imaging, Photograph, SensorNoise, photograph};
 use calibench::synth::{Stream, StreamKey, Truth};
-use calibench_harness::stats::{Interval, each_of};
+use calibench_harness::stats::{self, Interval, each_of};
 use calibench_harness::{
     Band, Context, Experiment, ExperimentError, Figure, Look, Plot, Record, Rows, Table,
 };
@@ -105,13 +105,18 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     record.table(bias_table(&exact, &unit));
     record.figure(noise_figure(&outcomes, context.seed));
     record.figure(bias_figure(&exact, &unit));
-    record.note(
-        "0.1 px is not what a sensor makes of dots like these: noise of 1 % of full scale gives less than a \
-         twentieth of it. What print, flatness and uneven sharpness add is not rendered here.",
-    );
+    record.note(format!(
+        "{CHAPTER_NOISE_PX} px is not what a sensor makes of dots like these: noise of {} % of full scale \
+         gives {:.1} % of it. What print, flatness and uneven sharpness add is not rendered here.",
+        100.0 * BASE.noise,
+        100.0 * rms_coordinate(&base(&outcomes)?.errors) / CHAPTER_NOISE_PX
+    ));
     let photo = &album.photos(&BASE)[3];
-    let caption = "The chapter's target in its compound pose, dots of 3 mm, blur 0.5 px, without noise: \
-                   what the detector sees.";
+    let caption = format!(
+        "The chapter's target in its compound pose, dots of {} mm, blur {} px, without noise: what the \
+         detector sees.",
+        BASE.diameter_mm, BASE.blur_px
+    );
     record.figure(Figure::photo("photograph", &photo.image.to_u8(), caption));
     Ok(record)
 }
@@ -460,11 +465,24 @@ fn noise_figure(outcomes: &[Outcome], seed: u64) -> Figure {
             |n| Node { diameter_mm: BASE.diameter_mm, ..*n },
         ),
     ];
+    let loss = |o: &Outcome| rms_coordinate(&o.errors) / o.bound_px;
+    let worst_loss = |chosen: &dyn Fn(&Node) -> bool| {
+        stats::largest(outcomes.iter().filter(|o| chosen(&o.node)).map(loss))
+    };
+    let largest_px = stats::largest(outcomes.iter().map(|o| rms_coordinate(&o.errors)));
     let caption = format!(
-        "Extraction noise of a coordinate, px, over the 252 dots of the chapter's four poses, each node one \
-         photograph a pose, seed {seed}; the sweeps cross at blur 0.5 px, noise 1 % of full scale, dots of \
-         3 mm. Notice where the detector leaves the bound, and that the scale ends at a quarter of the \
-         chapter's 0.1 px."
+        "Extraction noise of a coordinate, px, over the {} dots of the chapter's four poses, each node one \
+         photograph a pose, seed {seed}; the sweeps cross at blur {} px, noise {} % of full scale, dots of \
+         {} mm. Notice that the detector's noise is at most {:.2} times its bound up to {SHARP_PX} px of \
+         blur and {:.2} times beyond, and that the largest, {largest_px:.3} px, is {:.0} % of the chapter's \
+         {CHAPTER_NOISE_PX} px.",
+        outcomes[0].errors.len(),
+        BASE.blur_px,
+        100.0 * BASE.noise,
+        BASE.diameter_mm,
+        worst_loss(&|node| node.blur_px <= SHARP_PX),
+        worst_loss(&|node| node.blur_px > SHARP_PX),
+        100.0 * largest_px / CHAPTER_NOISE_PX
     );
     Figure::panels("noise", &panels, 3, caption)
 }
@@ -489,9 +507,20 @@ fn bias_figure(exact: &[Exact], unit: &[f64]) -> Figure {
         )
         .points("predicted", &curve(&|e| largest_deviation(&differences(&e.predicted.camera, &truth), unit)))
         .line("corrected", &curve(&|e| largest_deviation(&differences(&e.corrected.camera, &truth), unit)));
-    let caption = "Left: RMS distance of detected centres from the true ones, px. Right: error of the worst \
-                   of the six parameters in standard deviations under the chapter's noise of 0.1 px. Four \
-                   poses, blur 0.5 px, nothing drawn at random. Notice what of the bias reaches the camera, \
-                   and what correction leaves of it.";
+    let worst = |camera: &Camera| largest_deviation(&differences(camera, &truth), unit);
+    let last = &exact[exact.len() - 1];
+    let caption = format!(
+        "Left: RMS distance of detected centres from the true ones, px. Right: error of the worst of the \
+         six parameters in standard deviations under the chapter's noise of {CHAPTER_NOISE_PX} px. Four \
+         poses, blur {} px, nothing drawn at random. Notice that with dots of {} mm centres {:.3} px off \
+         move the camera by {:.2} standard deviations, and that correction leaves {:.4} px and {:.3} \
+         standard deviations.",
+        BASE.blur_px,
+        last.diameter_mm,
+        rms(&last.displacements),
+        worst(&last.uncorrected.camera),
+        rms(&last.remainder()),
+        worst(&last.corrected.camera)
+    );
     Figure::panels("bias", &[pixels, cameras], 2, caption)
 }

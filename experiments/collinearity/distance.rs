@@ -90,7 +90,12 @@ pub fn report_distances(record: &mut Record, draws: &[Draw], book: &Book) -> Res
     let caption = format!(
         "Largest deviation of the target's top row in pixels, and corrected pixels minus target \
          millimetres, against the target's distance, without noise; the band is three standard deviations \
-         of {TRIALS} draws at 120 mm. Notice where each curve meets its published number."
+         of {TRIALS} draws at {DISTANCE_MM} mm. Notice that of all whole distances {:.0} to {:.0} mm print \
+         427, and that at {DISTANCE_MM} mm the top row is {:.2} standard deviations from its published \
+         number.",
+        stats::smallest(whole.iter().copied()),
+        stats::largest(whole.iter().copied()),
+        sigmas(DISTANCE_MM)
     );
     record.figure(Figure::panels("distance", &panels, 2, caption));
     Ok(())

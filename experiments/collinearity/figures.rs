@@ -25,7 +25,9 @@ pub fn row_figure(ours: &Found, exact: &Found, book: &Book, seed: u64) -> Figure
     let caption = format!(
         "Signed distance of the nine points of the target's top row from their regression line, in pixels, \
          before and after correction by the single-plane calibration (seed {seed}, sigma {SIGMA_PX} px, \
-         centre free). Notice the two scales."
+         centre free). Notice the two scales: our draw reaches {:.3} px before and {:.3} px after.",
+        ours.row_before.max_deviation(),
+        ours.row_after.max_deviation()
     );
     Figure::panels("top-row", &panels, 2, caption)
 }
@@ -90,8 +92,10 @@ pub fn residual_figure(view: &View, found: &Found, seed: u64) -> Figure {
     let caption = format!(
         "Residuals of the {} points of our draw (seed {seed}, sigma {SIGMA_PX} px, centre free): of the \
          calibration in pixels, and of the affine fit of corrected points in millimetres. Look for a \
-         pattern: noise has none.",
-        view.len()
+         pattern: noise has none. Their RMS is {:.3} px and {:.4} mm.",
+        view.len(),
+        rms(&found.plane.residuals_px),
+        rms(&found.affine_residuals)
     );
     Figure::panels("residuals", &panels, 2, caption)
 }

@@ -405,8 +405,9 @@ fn error_figure(r: &Results, seed: u64, bands: &[[f64; 4]]) -> Figure {
         .x_range(0.0, days(QUARTER as f64));
     let caption = format!(
         "Length error at the middle shift of every day, neither the coldest nor the hottest, for {SHOWN} \
-         simulated stations, with median and central 95 % of {WATCHED}, in mm; seed {seed}. Notice where \
-         the case study's {TOLERANCE_MM} mm lies."
+         simulated stations, with median and central 95 % of {WATCHED}, in mm; seed {seed}. Notice that \
+         the median station is {:.3} mm off on the last day, where the case study allows {TOLERANCE_MM} mm.",
+        median[median.len() - 1].1
     );
     Figure::plot("error", &plot, caption)
 }

@@ -153,16 +153,23 @@ pub(crate) fn report(record: &mut Record, examined: &Examined) {
     let direct: Vec<(f64, f64)> = sweep.iter().map(|c| (c.distance_mm, c.direct)).collect();
     let ratio: Vec<(f64, f64)> =
         sweep.iter().map(|c| (c.distance_mm, 100.0 * (c.spacing_ratio - 1.0).abs())).collect();
+    let one_to_one = Truth::example_camera().fx;
+    let off = |c: &Checks| (c.distance_mm - one_to_one).abs();
+    let nearest = sweep.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(chapter);
     let plot =
         Plot::new("Pixels taken for millimetres", "distance of the target (mm)", "what the check shows")
             .line("difference to the target (\u{201c}mm\u{201d})", &direct)
             .line("error of the spacing (%)", &ratio)
-            .vline("one pixel a millimetre", Truth::example_camera().fx);
+            .vline("one pixel a millimetre", one_to_one);
     let caption = format!(
         "RMS difference of corrected pixels and target millimetres, and error of the spacing of neighbours, \
-         against the distance of a facing target; nothing is drawn at random. Notice what each check shows \
-         at {} mm, where a pixel is a millimetre.",
-        Truth::example_camera().fx
+         against the distance of a facing target; nothing is drawn at random. Notice that at \
+         {} mm, where a pixel is {:.0} mm on the target, the difference is {:.0} and the spacing {:.1} % \
+         off.",
+        nearest.distance_mm,
+        nearest.distance_mm / one_to_one,
+        nearest.direct,
+        100.0 * (nearest.spacing_ratio - 1.0).abs()
     );
     record.figure(Figure::plot("units", &plot, caption));
 }

@@ -54,6 +54,17 @@ pub fn slope(x: &[f64], y: &[f64]) -> f64 {
     xy / x.iter().map(|x| (x - mean_x) * (x - mean_x)).sum::<f64>()
 }
 
+/// Correlation of two quantities whose means are known to be zero; NaN of nothing.
+pub fn correlation_about_zero(pairs: impl IntoIterator<Item = (f64, f64)>) -> f64 {
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for (x, y) in pairs {
+        xx += x * x;
+        xy += x * y;
+        yy += y * y;
+    }
+    xy / (xx * yy).sqrt()
+}
+
 /// Share of the items that fulfil a condition; NaN of nothing.
 pub fn share<T>(items: &[T], condition: impl Fn(&T) -> bool) -> f64 {
     items.iter().filter(|item| condition(item)).count() as f64 / items.len() as f64
@@ -83,6 +94,9 @@ mod tests {
         assert_eq!(mean(&[1.0, 2.0, 6.0]), 3.0);
         assert_eq!(root_mean_square([3.0, -4.0]), 12.5f64.sqrt());
         assert_eq!(slope(&[0.0, 1.0, 2.0], &[1.0, 3.0, 5.0]), 2.0);
+        // 1 - 2 + 2 over the root of 9 x 6, by hand.
+        let pairs = [(1.0, 1.0), (-2.0, 1.0), (2.0, 1.0), (0.0, 3f64.sqrt())];
+        assert!((correlation_about_zero(pairs) - 1.0 / 54f64.sqrt()).abs() < 1e-15);
         assert!(mean(&[]).is_nan() && slope(&[1.0, 1.0], &[0.0, 1.0]).is_nan());
     }
 
