@@ -1,6 +1,9 @@
 //! From which sources is this program built? Asked once, of git and Cargo.lock, while it is built: a program that is older than the
 //! sources beside it still names its own. What does the command carry with it? And are there data for the tests that need some?
 
+#[path = "src/calibench/io/data.rs"]
+mod data;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -28,7 +31,7 @@ fn main() {
     let (commit, changed) = tree.as_ref().and_then(Tree::state).unwrap_or_default();
     // Elsewhere than in its own tree Cargo may have chosen other versions than those of the lock file that came along.
     let crates = if tree.is_some() { versions(&root.join("Cargo.lock")) } else { String::new() };
-    look_for_data(&root);
+    look_for_data();
     carry(&root);
     println!("cargo::rustc-env=CALIBENCH_COMMIT={commit}");
     println!("cargo::rustc-env=CALIBENCH_CHANGED={changed}");
@@ -84,13 +87,11 @@ fn quoted_code(page: &str) -> Vec<&str> {
 }
 
 /// Tests that need the measurements of others are ignored, and counted so, where these are absent or CALIBENCH_DATA is `none`.
-fn look_for_data(root: &Path) {
+fn look_for_data() {
     println!("cargo::rustc-check-cfg=cfg(calibench_data)");
-    println!("cargo::rerun-if-env-changed=CALIBENCH_DATA");
-    let named = std::env::var_os("CALIBENCH_DATA");
-    let folder = named.as_ref().map_or_else(|| root.join("../shared/data"), PathBuf::from);
+    println!("cargo::rerun-if-env-changed={}", data::VARIABLE);
     // A folder that is named and missing is a mistake: the tests run, and say so.
-    if folder.is_dir() || named.is_some_and(|name| name != "none") {
+    if data::data_folder() != Ok(None) {
         println!("cargo::rustc-cfg=calibench_data");
     }
 }

@@ -2,6 +2,7 @@
 
 use super::homography_system::NormalEquations;
 use super::lanes::{Kernel, LANES, Lanes, PairBlock, PairBlocks, dispatch};
+use super::scatter::SMALLEST_FLATNESS;
 use super::{Mat3, Vec2, Vec3};
 use std::fmt;
 
@@ -108,6 +109,18 @@ impl Homography {
     ///
     /// # Errors
     /// Fewer than four pairs, or points that do not span a plane on either side.
+    ///
+    /// ```
+    /// use calibench::geometry::{Homography, Vec2};
+    ///
+    /// let square = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(x, y)| Vec2::new(x, y));
+    /// let seen = [(100.0, 80.0), (300.0, 90.0), (280.0, 260.0), (120.0, 250.0)].map(|(u, v)| Vec2::new(u, v));
+    /// let fit = Homography::fit(&square, &seen)?;
+    /// // Four pairs are met exactly.
+    /// let corner = fit.homography.apply(&square[2]).expect("in front of the camera");
+    /// assert!((corner - seen[2]).norm() < 1e-9);
+    /// # Ok::<(), calibench::geometry::HomographyError>(())
+    /// ```
     pub fn fit(from: &[Vec2], to: &[Vec2]) -> Result<HomographyFit, HomographyError> {
         if from.len() != to.len() {
             return Err(HomographyError::Lengths { from: from.len(), to: to.len() });
@@ -157,8 +170,6 @@ const MAX_ITERATIONS: usize = 30;
 const RELATIVE_GAIN: f64 = 1e-12;
 /// Residuals of normalised coordinates, of size 1, below this many roundings are rounding.
 const ROUNDINGS: f64 = 2.0;
-/// A line seen with rounding errors has 1e-16; points that leave their line by a millionth of its length still pass.
-const SMALLEST_FLATNESS: f64 = 1e-12;
 /// Smallest pivot, relative to its diagonal, of a well-posed normalised system: a 9 x 7 grid has 1e-2, rounding gives 1e-16.
 const SMALLEST_PIVOT: f64 = 1e-11;
 

@@ -3,6 +3,10 @@
 use super::Vec2;
 use nalgebra::Matrix2;
 
+/// Flatness from which points span a plane. A line seen with rounding errors has 1e-16; points that leave their line by a
+/// millionth of its length have 1e-12 and still pass.
+pub(super) const SMALLEST_FLATNESS: f64 = 1e-13;
+
 /// Centre and extent of a cloud of points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scatter {
@@ -35,10 +39,9 @@ impl Scatter {
         }
     }
 
-    /// Whether the points span a plane. A line seen with rounding errors has a flatness of 1e-16; points that leave their
-    /// line by a millionth of its length have 1e-12 and still pass.
+    /// Whether the points span a plane.
     pub fn spans_a_plane(&self) -> bool {
-        self.flatness > 1e-13
+        self.flatness > SMALLEST_FLATNESS
     }
 }
 

@@ -1,17 +1,30 @@
-//! Where are the measurements of others? A folder beside the project, or wherever the user says.
+//! Where are the measurements of others? A folder beside the project, or wherever the user says. The build script asks the same
+//! lines, so they need the standard library alone.
 
+use std::fmt;
 use std::path::PathBuf;
 
 /// The environment variable that names the folder.
 pub const VARIABLE: &str = "CALIBENCH_DATA";
 
 /// The user named a folder that is not there.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{VARIABLE} names {path}, which is not a folder: correct it, or unset it to use ../shared/data")]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MissingDataFolder {
     /// The folder named.
     pub path: String,
 }
+
+impl fmt::Display for MissingDataFolder {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let path = &self.path;
+        write!(
+            f,
+            "{VARIABLE} names {path}, which is not a folder: correct it, or unset it to use ../shared/data"
+        )
+    }
+}
+
+impl std::error::Error for MissingDataFolder {}
 
 /// The folder of real data: `CALIBENCH_DATA` if set, else `../shared/data` seen from the package (from the working directory
 /// outside of Cargo). `None` if the variable is `none`, or unset and the default is absent: a reason to skip, not to fail.
