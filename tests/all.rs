@@ -14,6 +14,7 @@ mod detect_chessboard;
 mod detect_circles;
 mod detect_corners;
 mod detect_photos;
+mod errors;
 mod examples;
 mod failing_disk;
 mod fuzz_seeds;

@@ -15,7 +15,7 @@ fn read(path: &str) -> String {
 }
 
 /// Files below a folder with one of these extensions, in order.
-fn files(folder: &str, extensions: &[&str]) -> Vec<PathBuf> {
+pub(crate) fn files(folder: &str, extensions: &[&str]) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut folders = vec![root().join(folder)];
     while let Some(folder) = folders.pop() {

@@ -34,7 +34,7 @@ pub enum FilesError {
     #[error(transparent)]
     Write(#[from] io::Error),
     /// It cannot be read.
-    #[error("cannot read {0}")]
+    #[error(transparent)]
     Read(#[from] InputError),
     /// The manifest is none.
     #[error("{path} is no manifest of an export: {cause}", path = path.display())]

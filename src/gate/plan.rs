@@ -63,7 +63,7 @@ pub enum PlanError {
         samples: usize,
     },
     /// Bad input that cannot be photographed.
-    #[error("bad input: {0}")]
+    #[error(transparent)]
     Bad(#[from] SceneError),
 }
 

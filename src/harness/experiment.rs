@@ -2,6 +2,7 @@
 
 use super::progress::{Progress, ProgressDisplay};
 use super::record::{Record, RecordError};
+use calibench::io::message;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
@@ -9,7 +10,8 @@ use std::path::PathBuf;
 /// An experiment: one file in experiments/.
 #[derive(Debug, Clone, Copy)]
 pub struct Experiment {
-    /// Name in kebab-case, such as `four-pose`: of the binary, the folder in out/ and figures/, and the snapshot.
+    /// Name in kebab-case, such as `four-pose`: of the binary, the folder in out/ and figures/, and the
+    /// snapshot.
     pub id: &'static str,
     /// A headline.
     pub title: &'static str,
@@ -47,7 +49,7 @@ pub enum ExperimentError {
     #[error("the experiment panicked, which is a defect: {0}")]
     Panicked(String),
     /// A step failed that should not.
-    #[error("{step}: {cause}")]
+    #[error("{step}: {}", message(&**cause))]
     Step {
         /// What was being done.
         step: &'static str,
@@ -98,19 +100,21 @@ impl Context {
         Record::new(self.experiment, self.seed)
     }
 
-    /// Announces `total` steps of work; call [`Progress::step`] after each, from any thread. Work that is done within a
-    /// second is not shown.
+    /// Announces `total` steps of work; call [`Progress::step`] after each, from any thread. Work that is
+    /// done within a second is not shown.
     pub fn progress(&self, what: &str, total: usize) -> Progress {
         self.display.start(&format!("{}: {what}", self.experiment), total)
     }
 }
 
 impl Experiment {
-    /// Runs the experiment and checks its record. A panic becomes an error, so that the other experiments finish.
+    /// Runs the experiment and checks its record. A panic becomes an error, so that the other experiments
+    /// finish.
     pub fn execute(&self, context: &Context) -> Result<Record, ExperimentError> {
         // A panic leaves nothing behind that is used again: the context is read only, the record is lost.
         let outcome = catch_unwind(AssertUnwindSafe(|| (self.run)(context)));
-        let record = outcome.unwrap_or_else(|payload| Err(ExperimentError::Panicked(message(&*payload))))?;
+        let record =
+            outcome.unwrap_or_else(|payload| Err(ExperimentError::Panicked(panic_message(&*payload))))?;
         record.validate()?;
         Ok(record)
     }
@@ -122,7 +126,7 @@ impl Experiment {
 }
 
 /// What a panic said.
-fn message(payload: &(dyn Any + Send)) -> String {
+fn panic_message(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().map(|text| text.to_string());
     text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no message".to_string())
 }

@@ -36,7 +36,7 @@ pub enum CalibrationError {
         unknowns: usize,
     },
     /// A view has no homography.
-    #[error("view {view}: {source}")]
+    #[error("view {view} has no homography")]
     View {
         /// Index of the view.
         view: usize,
@@ -122,7 +122,9 @@ pub enum CalibrationError {
         why: String,
     },
     /// No start put every point in front of the camera.
-    #[error("no starting values: {source}, and no focal length put the target in front of the camera")]
+    #[error(
+        "no starting values: no focal length puts the target in front of the camera, and the closed form fails"
+    )]
     NoStart {
         /// Why the closed form failed.
         source: ClosedFormError,

@@ -13,6 +13,7 @@ pub mod hash;
 pub mod image;
 pub mod input;
 pub mod memory;
+pub mod message;
 #[cfg(feature = "photo")]
 pub mod overlay;
 pub mod pairs;
@@ -32,6 +33,7 @@ pub use hash::sha256_hex;
 pub use image::{Extent, Grey, ImageError, image_extent, read_image, write_png, write_png_16};
 pub use input::{InputError, MOST_SIDE_PX, read_regular, read_regular_text};
 pub use memory::Memory;
+pub use message::message;
 #[cfg(feature = "photo")]
 pub use overlay::{Colour, Overlay};
 pub use pairs::{PointPairs, parse_point_pairs, read_point_pairs};

@@ -1,4 +1,5 @@
-//! What would make the next calibration better? Gaps in the data, with the numbers that show them and what to do.
+//! What would make the next calibration better? Gaps in the data, with the numbers that show them and what to
+//! do.
 
 use super::maps::{Cells, corner_radius_px, pixel_deviation};
 use calibench::calibrate::Calibration;
@@ -7,15 +8,15 @@ use calibench::geometry::{Vec2, Vec3};
 use calibench::io::significant;
 use calibench::photos::Fit;
 
-/// Points that end before this part of the corner radius leave half of the image's area without any, and the highest radial
-/// term less than a fifth of its effect in the corner (0.7^5 = 0.17).
+/// Points that end before this part of the corner radius leave half of the image's area without any, and the
+/// highest radial term less than a fifth of its effect in the corner (0.7^5 = 0.17).
 const RADIUS_COVERED: f64 = 0.7;
 
 /// Part of the frame's cells that may be empty before it is worth a word.
 const EMPTY_CELLS: f64 = 0.4;
 
-/// Boards turned by less than this against each other hardly tell focal length from distance: its standard deviation falls
-/// with the sine of the angle (Zhang 2000, section 5, finds 45 degrees best).
+/// Boards turned by less than this against each other hardly tell focal length from distance: its standard
+/// deviation falls with the sine of the angle (Zhang 2000, section 5, finds 45 degrees best).
 const LEAST_TILT_DEGREES: f64 = 15.0;
 
 /// A view this many times worse than the median deserves a look.
@@ -99,11 +100,12 @@ fn tilt(calibration: &Calibration) -> Option<String> {
     })
 }
 
-/// Directions in which the outermost normals are looked for: the widest angle is missed by a part in a thousand at most.
+/// Directions in which the outermost normals are looked for: the widest angle is missed by a part in a
+/// thousand at most.
 const DIRECTIONS: usize = 32;
 
-/// The normals that lie farthest out in each direction across the optical axis: among them are two with the widest angle, and finding them
-/// takes time that grows with their number, not with its square.
+/// The normals that lie farthest out in each direction across the optical axis: among them are two with the
+/// widest angle, and finding them takes time that grows with their number, not with its square.
 fn outermost(normals: &[Vec3]) -> Vec<Vec3> {
     let farthest = |k: usize| {
         let (sin, cos) = libm::sincos(std::f64::consts::TAU * k as f64 / DIRECTIONS as f64);

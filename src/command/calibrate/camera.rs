@@ -1,12 +1,12 @@
-//! A camera from views, wherever they come from: the fit, what it is told as, and the files it leaves.
+//! A camera from views, wherever they come from: the fit, how it is printed, and the files it leaves.
 
-use super::finished::{Told, parameter_rows, summary, weakest};
+use super::finished::{Finished, parameter_rows, summary, weakest};
 use super::{Arguments, Exit, Failure, Format, Intervals, advice, maps, page, plots, print, table};
 use calibench::board::{Board, View};
 use calibench::calibrate::{Loss, Prior, ProfileInterval, Settings};
 use calibench::camera::FreeParameters;
 use calibench::geometry::Vec2;
-use calibench::io::{CalibrationFields, LeftOut, significant, write_together};
+use calibench::io::{CalibrationFields, LeftOut, message, significant, write_together};
 use calibench::photos::{Fit, Fitter};
 use calibench_harness::Figure;
 use std::collections::BTreeMap;
@@ -35,8 +35,9 @@ pub(super) struct Observed {
 /// Coverage of the intervals: what a certificate of measurement states.
 const COVERAGE: f64 = 0.95;
 
-/// A mark may lie this part of the image's longer side beyond the centres of the outermost pixels, one pixel at least: its border is half a
-/// pixel away, files that count pixels from 1 add half a pixel, and what noise adds to marks at the border is no other image's size.
+/// A mark may lie this part of the image's longer side beyond the centres of the outermost pixels, one pixel
+/// at least: its border is half a pixel away, files that count pixels from 1 add half a pixel, and what noise
+/// adds to marks at the border is no other image's size.
 const BEYOND: f64 = 0.02;
 
 /// Whether a mark lies in an image, or as little outside as noise puts it.
@@ -47,7 +48,8 @@ fn within(pixel: &Vec2, (width, height): (usize, usize)) -> bool {
 }
 
 impl Observed {
-    /// Marks outside of the image are those of another camera or another size, most often of one whose sides were swapped.
+    /// Marks outside of the image are those of another camera or another size, most often of one whose sides
+    /// were swapped.
     fn refuse_marks_outside(&self) -> Result<(), String> {
         let Some(size) = self.image_size else { return Ok(()) };
         let marks =
@@ -89,22 +91,23 @@ pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, Fai
     }
     let fitter =
         Fitter { settings: &settings, discs: observed.discs.as_ref(), reject_factor: arguments.reject_views };
-    let fit = fitter.fit(&observed.views).map_err(|error| format!("{}: {error}", observed.source))?;
-    let told = told(observed, fit);
-    let mut fields = CalibrationFields::of(&told.fit.calibration, &told.names, told.image_size);
-    fields.left_out = told.left_out.clone();
-    fields.warnings.extend(told.notes.iter().chain(&told.advice).cloned());
+    let fit =
+        fitter.fit(&observed.views).map_err(|error| format!("{}: {}", observed.source, message(&error)))?;
+    let finished = finish(observed, fit);
+    let mut fields = CalibrationFields::of(&finished.fit.calibration, &finished.names, finished.image_size);
+    fields.left_out = finished.left_out.clone();
+    fields.warnings.extend(finished.notes.iter().chain(&finished.advice).cloned());
     if let Some(folder) = &arguments.out {
-        write_files(folder, &fields, &told).map_err(Failure::unwritten)?;
+        write_files(folder, &fields, &finished).map_err(Failure::unwritten)?;
     }
     match arguments.format {
         Format::Json => print(&fields.to_json()),
-        Format::Text => print(&text(&told)),
+        Format::Text => print(&text(&finished)),
     }
-    Ok(if told.fit.calibration.is_usable() { Exit::Held } else { Exit::Incomplete })
+    Ok(if finished.fit.calibration.is_usable() { Exit::Held } else { Exit::Incomplete })
 }
 
-fn told(observed: Observed, fit: Fit) -> Told {
+fn finish(observed: Observed, fit: Fit) -> Finished {
     let mut left_out = observed.left_out;
     left_out.extend(fit.rejected.iter().map(|rejected| LeftOut {
         name: observed.names[rejected.view].clone(),
@@ -115,7 +118,7 @@ fn told(observed: Observed, fit: Fit) -> Told {
     notes.extend(bias_note(&fit));
     let advice = advice::of(&fit, &names, observed.image_size);
     let (image_size, overlays, source) = (observed.image_size, observed.overlays, observed.source);
-    Told { source, fit, names, image_size, left_out, overlays, notes, advice }
+    Finished { source, fit, names, image_size, left_out, overlays, notes, advice }
 }
 
 /// A correction that did not settle is no correction to trust.
@@ -129,9 +132,9 @@ fn bias_note(fit: &Fit) -> Option<String> {
 }
 
 /// All files or none, `result.json` last: where it is new, all that belongs to it is.
-fn write_files(folder: &Path, fields: &CalibrationFields, told: &Told) -> std::io::Result<()> {
-    let figures = figures(told);
-    let page = page::html(told, &figures).into_bytes();
+fn write_files(folder: &Path, fields: &CalibrationFields, finished: &Finished) -> std::io::Result<()> {
+    let figures = figures(finished);
+    let page = page::html(finished, &figures).into_bytes();
     let mut files: Vec<(PathBuf, Vec<u8>)> =
         figures.into_iter().map(|figure| (folder.join(figure.file_name()), figure.bytes)).collect();
     files.push((folder.join("report.html"), page));
@@ -139,11 +142,14 @@ fn write_files(folder: &Path, fields: &CalibrationFields, told: &Told) -> std::i
     write_together(&files)
 }
 
-fn figures(told: &Told) -> Vec<Figure> {
-    let calibration = &told.fit.calibration;
-    let mut figures = plots::figures(calibration, &told.fit.views, told.image_size);
+fn figures(finished: &Finished) -> Vec<Figure> {
+    let calibration = &finished.fit.calibration;
+    let mut figures = plots::figures(calibration, &finished.fit.views, finished.image_size);
     figures.extend(
-        told.image_size.into_iter().flat_map(|size| maps::figures(calibration, &told.fit.views, size)),
+        finished
+            .image_size
+            .into_iter()
+            .flat_map(|size| maps::figures(calibration, &finished.fit.views, size)),
     );
     figures
 }
@@ -166,31 +172,31 @@ fn interval_table(intervals: &[ProfileInterval]) -> String {
     format!("{}\n\n", rows.trim_fmt())
 }
 
-fn text(told: &Told) -> String {
-    let calibration = &told.fit.calibration;
+fn text(finished: &Finished) -> String {
+    let calibration = &finished.fit.calibration;
     let mut parameters = table(&["parameter", "value", "standard deviation", "unit"]);
-    parameter_rows(told).into_iter().for_each(|row| {
+    parameter_rows(finished).into_iter().for_each(|row| {
         parameters.add_row(row);
     });
     let intervals = interval_table(&calibration.intervals);
     let mut views = table(&["view", "points", "RMSE (px)", "distance"]);
-    for (i, name) in told.names.iter().enumerate() {
+    for (i, name) in finished.names.iter().enumerate() {
         let rmse = calibration.view_rmse_px(i).unwrap_or(f64::NAN);
         let distance = calibration.cam_from_target[i].translation.z;
         let points = calibration.residuals[i].len().to_string();
         views.add_row([name.clone(), points, significant(rmse, 4), significant(distance, 5)]);
     }
     let mut text =
-        format!("{}\n\n{intervals}{}\n\n{}", parameters.trim_fmt(), views.trim_fmt(), summary(told));
+        format!("{}\n\n{intervals}{}\n\n{}", parameters.trim_fmt(), views.trim_fmt(), summary(finished));
     // Writing to a string cannot fail, here and below.
-    if let Some(weakest) = weakest(told) {
+    if let Some(weakest) = weakest(finished) {
         let _ = writeln!(text, "weakest direction: {weakest}");
     }
-    for LeftOut { name, reason } in &told.left_out {
+    for LeftOut { name, reason } in &finished.left_out {
         let _ = writeln!(text, "left out: {name}: {reason}");
     }
     let warnings = calibration.warnings.iter().map(ToString::to_string);
-    for warning in warnings.chain(told.notes.iter().chain(&told.advice).cloned()) {
+    for warning in warnings.chain(finished.notes.iter().chain(&finished.advice).cloned()) {
         let _ = writeln!(text, "warning: {warning}");
     }
     text

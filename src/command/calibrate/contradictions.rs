@@ -1,4 +1,5 @@
-//! Do the options say one thing? What they say twice, or say to a kind of input that has no use for it, is refused and not decided.
+//! Do the options say one thing? What they say twice, or say to a kind of input that has no use for it, is
+//! refused and not decided.
 
 use super::Arguments;
 use calibench::camera::Parameter;

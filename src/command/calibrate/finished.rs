@@ -7,8 +7,8 @@ use calibench::photos::Fit;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// A finished calibration with all that is told of it.
-pub(super) struct Told {
+/// A finished calibration with all that is said of it.
+pub(super) struct Finished {
     pub(super) source: String,
     pub(super) fit: Fit,
     /// Names of the views that were fitted.
@@ -21,8 +21,8 @@ pub(super) struct Told {
 }
 
 /// Parameters worth a line: name, value, standard deviation or `held`, unit.
-pub(super) fn parameter_rows(told: &Told) -> Vec<[String; 4]> {
-    let calibration = &told.fit.calibration;
+pub(super) fn parameter_rows(finished: &Finished) -> Vec<[String; 4]> {
+    let calibration = &finished.fit.calibration;
     let row = |parameter: Parameter| {
         let deviation = match calibration.standard_deviation(parameter) {
             Some(sd) => significant(sd, 3),
@@ -36,16 +36,16 @@ pub(super) fn parameter_rows(told: &Told) -> Vec<[String; 4]> {
 }
 
 /// The weakest direction in words; `None` if nothing but poses was free.
-pub(super) fn weakest(told: &Told) -> Option<String> {
-    let conditioning = told.fit.calibration.conditioning.as_ref()?;
+pub(super) fn weakest(finished: &Finished) -> Option<String> {
+    let conditioning = finished.fit.calibration.conditioning.as_ref()?;
     let members: Vec<String> =
         conditioning.weakest.iter().map(|m| format!("{} {:+.2}", m.unknown, m.weight)).collect();
     Some(members.join(", "))
 }
 
 /// The fit in a sentence.
-pub(super) fn summary(told: &Told) -> String {
-    let calibration = &told.fit.calibration;
+pub(super) fn summary(finished: &Finished) -> String {
+    let calibration = &finished.fit.calibration;
     let axes = calibration.rms_per_axis_px();
     let mut text = format!(
         "RMSE {} px over {} points (u {}, v {}); noise of a coordinate {} px on {} degrees of freedom\n{} after {} steps\n",
@@ -62,7 +62,7 @@ pub(super) fn summary(told: &Told) -> String {
         text.push_str(&sentence);
     }
     text.push_str(&beforehand(calibration));
-    if let Some(bias) = &told.fit.bias {
+    if let Some(bias) = &finished.fit.bias {
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,

@@ -54,12 +54,13 @@ impl Cells {
     }
 }
 
-/// Standard deviation of the pixel that a ray falls on, px, in its worst direction: the ray is held fixed in the camera's
-/// frame, and with `J = d pixel / d intrinsics` along it and the intrinsics' covariance `P` this is the root of the larger
-/// eigenvalue of `J P J^T`.
+/// Standard deviation of the pixel that a ray falls on, px, in its worst direction: the ray is held fixed in
+/// the camera's frame, and with `J = d pixel / d intrinsics` along it and the intrinsics' covariance `P` this
+/// is the root of the larger eigenvalue of `J P J^T`.
 ///
-/// Part of it could be made up by turning the camera, so a pose that is estimated with the same camera predicts pixels better
-/// than this; directions measured by the camera alone are known no better. NaN beyond the lens model's monotone radius.
+/// Part of it could be made up by turning the camera, so a pose that is estimated with the same camera
+/// predicts pixels better than this; directions measured by the camera alone are known no better. NaN beyond
+/// the lens model's monotone radius.
 pub(super) fn pixel_deviation(calibration: &Calibration, pixel: &Vec2) -> f64 {
     let Ok(ray) = calibration.camera.normalised_ray(pixel) else { return f64::NAN };
     let point = Vec3::new(ray.x, ray.y, 1.0);

@@ -1,6 +1,6 @@
 //! The report as a page: one HTML file that needs nothing else, light or dark as the reader's system is.
 
-use super::finished::{Told, parameter_rows, summary, weakest};
+use super::finished::{Finished, parameter_rows, summary, weakest};
 use calibench::io::significant;
 use calibench_harness::Figure;
 use std::fmt::Write;
@@ -20,23 +20,25 @@ figure{margin:0}figure svg{max-width:100%;height:auto}figcaption{color:var(--sof
 a{color:inherit}";
 
 /// The page.
-pub(super) fn html(told: &Told, figures: &[Figure]) -> String {
-    let title = format!("Calibration from {}", told.source);
+pub(super) fn html(finished: &Finished, figures: &[Figure]) -> String {
+    let title = format!("Calibration from {}", finished.source);
     let mut page = format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
          content=\"width=device-width,initial-scale=1\">\n<title>{0}</title>\n<style>\n{STYLE}\n</style>\n</head>\n<body>\n\
          <h1>{0}</h1>\n",
         escaped(&title)
     );
-    for line in summary(told).lines() {
+    for line in summary(finished).lines() {
         paragraph(&mut page, "", line);
     }
-    warnings(&mut page, told);
+    warnings(&mut page, finished);
     page.push_str("<h2>Parameters</h2>\n");
-    let rows: Vec<Vec<String>> =
-        parameter_rows(told).into_iter().map(|row| row.iter().map(|cell| escaped(cell)).collect()).collect();
+    let rows: Vec<Vec<String>> = parameter_rows(finished)
+        .into_iter()
+        .map(|row| row.iter().map(|cell| escaped(cell)).collect())
+        .collect();
     table(&mut page, &["parameter", "value", "standard deviation", "unit"], &rows);
-    if let Some(weakest) = weakest(told) {
+    if let Some(weakest) = weakest(finished) {
         let line = format!("Weakest direction, the combination that the data say least about: {weakest}.");
         paragraph(&mut page, "", &line);
     }
@@ -44,9 +46,9 @@ pub(super) fn html(told: &Told, figures: &[Figure]) -> String {
     table(
         &mut page,
         &["view", "points", "RMSE (px)", "largest (px)", "distance", "tilt (deg)"],
-        &views(told),
+        &views(finished),
     );
-    left_out(&mut page, told);
+    left_out(&mut page, finished);
     page.push_str("<h2>Figures</h2>\n<div class=\"figures\">\n");
     figures.iter().for_each(|figure| inlined(&mut page, figure));
     let version = env!("CARGO_PKG_VERSION");
@@ -55,24 +57,25 @@ pub(super) fn html(told: &Told, figures: &[Figure]) -> String {
     page
 }
 
-fn warnings(page: &mut String, told: &Told) {
-    let own = told.fit.calibration.warnings.iter().map(ToString::to_string);
-    for warning in own.chain(told.notes.iter().chain(&told.advice).cloned()) {
+fn warnings(page: &mut String, finished: &Finished) {
+    let own = finished.fit.calibration.warnings.iter().map(ToString::to_string);
+    for warning in own.chain(finished.notes.iter().chain(&finished.advice).cloned()) {
         paragraph(page, " class=\"warn\"", &warning);
     }
 }
 
-fn views(told: &Told) -> Vec<Vec<String>> {
-    let calibration = &told.fit.calibration;
+fn views(finished: &Finished) -> Vec<Vec<String>> {
+    let calibration = &finished.fit.calibration;
     let row = |(i, name): (usize, &String)| {
         let residuals = &calibration.residuals[i];
         let largest = residuals.iter().map(|r| r.norm()).fold(0.0, f64::max);
         let pose = &calibration.cam_from_target[i];
-        // Angle between the board's normal and the optical axis, whichever side of the board is called its front.
+        // Angle between the board's normal and the optical axis, whichever side of the board is called its
+        // front.
         let normal = pose.rotation.column(2);
         let tilt = libm::atan2(libm::hypot(normal.x, normal.y), normal.z.abs()).to_degrees();
         vec![
-            linked(told, name),
+            linked(finished, name),
             residuals.len().to_string(),
             significant(calibration.view_rmse_px(i).unwrap_or(f64::NAN), 4),
             significant(largest, 3),
@@ -80,11 +83,11 @@ fn views(told: &Told) -> Vec<Vec<String>> {
             format!("{tilt:.1}"),
         ]
     };
-    told.names.iter().enumerate().map(row).collect()
+    finished.names.iter().enumerate().map(row).collect()
 }
 
-fn left_out(page: &mut String, told: &Told) {
-    if told.left_out.is_empty() {
+fn left_out(page: &mut String, finished: &Finished) {
+    if finished.left_out.is_empty() {
         return;
     }
     page.push_str("<h2>Left out</h2>\n");
@@ -94,15 +97,15 @@ fn left_out(page: &mut String, told: &Told) {
         "In the picture of a photograph without the board, a red cross stands on each disc that was seen.",
     );
     page.push_str("<ul>\n");
-    for left in &told.left_out {
-        let _ = writeln!(page, "<li>{}: {}</li>", linked(told, &left.name), escaped(&left.reason));
+    for left in &finished.left_out {
+        let _ = writeln!(page, "<li>{}: {}</li>", linked(finished, &left.name), escaped(&left.reason));
     }
     page.push_str("</ul>\n");
 }
 
 /// A view's name, which leads to its picture if there is one.
-fn linked(told: &Told, name: &str) -> String {
-    match told.overlays.get(name) {
+fn linked(finished: &Finished, name: &str) -> String {
+    match finished.overlays.get(name) {
         Some(overlay) => format!("<a href=\"{}\">{}</a>", escaped(overlay), escaped(name)),
         None => escaped(name),
     }

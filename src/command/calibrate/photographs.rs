@@ -1,4 +1,5 @@
-//! Photographs of a board: each is read, its marks found and drawn in; one that fails is named and the rest goes on.
+//! Photographs of a board: each is read, its marks found and drawn in; one that fails is named and the rest
+//! goes on.
 
 use super::camera::{self, Observed};
 use super::{Arguments, Exit, Failure, warn};
@@ -66,8 +67,8 @@ pub(super) fn run(arguments: &Arguments, board: &BoardSpec, photos: &[PathBuf]) 
     camera::run(arguments, observed)
 }
 
-/// What `work` gives for each photograph, in their order. Threads of its own: one of a pool that waits for memory may be given the work of
-/// another by whoever it waits for, and then both wait.
+/// What `work` gives for each photograph, in their order. Threads of its own: one of a pool that waits for
+/// memory may be given the work of another by whoever it waits for, and then both wait.
 fn each<T: Send>(photos: &[PathBuf], work: impl Fn(usize, &Path) -> T + Sync) -> Vec<T> {
     let next = AtomicUsize::new(0);
     let results: Vec<Mutex<Option<T>>> = photos.iter().map(|_| Mutex::new(None)).collect();
@@ -105,7 +106,8 @@ fn plain(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect()
 }
 
-/// The board's marks in their order; where it was not found, a red cross on each disc that might be one of them.
+/// The board's marks in their order; where it was not found, a red cross on each disc that might be one of
+/// them.
 fn draw(photo: &Grey, marks: &Result<Vec<Vec2>, NotFound>, columns: usize) -> Overlay {
     let scale = if photo.width() < ENLARGED_BELOW_PX { 2 } else { 1 };
     let mut overlay = Overlay::new(&photo.to_u8(), scale);
@@ -158,7 +160,8 @@ fn observed(
 
 type Size = (usize, usize);
 
-/// The size that most photographs with the board have, and who has it. A photograph that does not show the board may be anything.
+/// The size that most photographs with the board have, and who has it. A photograph that does not show the
+/// board may be anything.
 ///
 /// # Errors
 /// Two sizes that equally many have: nothing says which camera is meant.

@@ -1,4 +1,5 @@
-//! What does a calibration look like? Residuals over the frame, view by view, and the lens with its uncertainty.
+//! What does a calibration look like? Residuals over the frame, view by view, and the lens with its
+//! uncertainty.
 
 use calibench::board::View;
 use calibench::calibrate::Calibration;

@@ -75,7 +75,9 @@ pub(super) fn write_table(arguments: &Arguments, path: &Path, build: &Build) -> 
 /// Prints a table that was written before.
 pub(super) fn print_table(path: &Path) -> Result<Exit, Stop> {
     let text = read_regular_text(path, MOST_SPEC_BYTES).map_err(usage)?;
-    print(&DigitsTable::of_csv(&text).map_err(usage)?.to_markdown());
+    let table = DigitsTable::of_csv(&text)
+        .map_err(|e| usage(format!("{} is no table of digits: {e}", path.display())))?;
+    print(&table.to_markdown());
     Ok(Exit::Held)
 }
 

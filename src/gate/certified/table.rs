@@ -35,7 +35,7 @@ pub struct Row {
 
 /// A table that cannot be read.
 #[derive(Debug, thiserror::Error)]
-#[error("no table of digits: {0}")]
+#[error(transparent)]
 pub struct TableError(#[from] csv::Error);
 
 /// Rows of several solvers.
