@@ -1,4 +1,5 @@
-//! In which order are trials done, and when is a cell finished? Batches of fixed size, one cell after the other, round by round.
+//! In which order are trials done, and when is a cell finished? Batches of fixed size, one cell after the
+//! other, round by round.
 
 use super::accumulate::Tally;
 use super::cells::Cell;
@@ -38,8 +39,8 @@ pub struct Pace {
     pub trials: u64,
     /// Trials done before it was resumed.
     pub before: u64,
-    /// Trials that the part will have at its end, as far as can be told: a cell that stops at a precision is taken to approach it by
-    /// the root of its trials.
+    /// Trials that the part will have at its end, as far as can be told: a cell that stops at a precision is
+    /// taken to approach it by the root of its trials.
     pub expected: u64,
     /// The cell that is known worst.
     pub worst: Option<Worst>,
@@ -148,8 +149,8 @@ impl Engine {
         Some(0.5 * (sd.high - sd.low) / sd.value)
     }
 
-    /// The cell whose trials say least, by the wanted quantity or else the first estimated parameter. Cells that are precise enough or
-    /// not begun are not asked.
+    /// The cell whose trials say least, by the wanted quantity or else the first estimated parameter. Cells
+    /// that are precise enough or not begun are not asked.
     fn worst(&self) -> Option<Worst> {
         let wanted = self.spec.trials.precision.as_ref().map(|p| p.quantity.as_str());
         let quantity =
@@ -214,7 +215,7 @@ impl Engine {
         &mut self,
         stop: &Interruption,
         mut keep: impl FnMut(&[Trial]) -> Result<(), E>,
-        mut tell: impl FnMut(&Pace),
+        mut report: impl FnMut(&Pace),
     ) -> Result<Outcome, E> {
         let before = self.trials();
         while let Some(unit) = self.next() {
@@ -225,15 +226,39 @@ impl Engine {
             keep(&trials)?;
             self.absorb(unit, &trials);
             let expected = self.expected_trials();
-            tell(&Pace { trials: self.trials() - before, before, expected, worst: self.worst() });
+            report(&Pace { trials: self.trials() - before, before, expected, worst: self.worst() });
         }
         Ok(Outcome::Complete)
     }
 }
 
 /// Runs a whole study without files: for experiments, plans and measurements.
-pub fn in_memory(spec: Spec, text: &str, tell: impl FnMut(&Pace)) -> Result<Engine, SpecError> {
-    in_memory_seeing(spec, text, |_| {}, tell)
+///
+/// ```
+/// use calibench_study::{Spec, in_memory, summarise};
+///
+/// let text = r#"
+/// name = "views"
+/// question = "How well do four views tell the focal length?"
+/// seed = 1
+/// scene.image = [640, 480]
+/// scene.camera = { fx = 600.0, fy = 600.0, cx = 326.0, cy = 243.0, k1 = -0.18, k2 = 0.05 }
+/// scene.target = { columns = 9, rows = 7, spacing_mm = 10.0 }
+/// scene.poses = { kind = "spread", views = 4, tilt_deg = 20.0, distance_mm = 120.0 }
+/// scene.noise_px = 0.1
+/// trials = { per_cell = 50, batch = 50 }
+/// "#;
+/// let summary = summarise(&in_memory(Spec::parse(text)?, text, |_| {})?);
+/// let fx = summary.cells[0].of("fx").and_then(|fx| fx.sd).expect("fx is free, and trials converge");
+/// // The interval of the standard deviation holds some 0.7 px.
+/// assert!(fx.low < fx.value && fx.value < fx.high && (0.4..1.2).contains(&fx.value));
+/// # Ok::<(), calibench_study::SpecError>(())
+/// ```
+///
+/// # Errors
+/// A study that cannot be run as written.
+pub fn in_memory(spec: Spec, text: &str, report: impl FnMut(&Pace)) -> Result<Engine, SpecError> {
+    in_memory_seeing(spec, text, |_| {}, report)
 }
 
 /// As [`in_memory`], showing every trial, in order.
@@ -241,13 +266,13 @@ pub fn in_memory_seeing(
     spec: Spec,
     text: &str,
     mut see: impl FnMut(&Trial),
-    tell: impl FnMut(&Pace),
+    report: impl FnMut(&Pace),
 ) -> Result<Engine, SpecError> {
     let mut engine = Engine::of(spec, text, Shard::WHOLE)?;
     let keep = |trials: &[Trial]| {
         trials.iter().for_each(&mut see);
         Ok::<(), Infallible>(())
     };
-    let Ok(_) = engine.drive(&AtomicBool::new(false), keep, tell);
+    let Ok(_) = engine.drive(&AtomicBool::new(false), keep, report);
     Ok(engine)
 }

@@ -16,6 +16,17 @@ pub enum Pattern {
 }
 
 /// A planar board: `columns x rows` marks on a square grid.
+///
+/// ```
+/// use calibench::board::Board;
+///
+/// let board = Board::chessboard(9, 6, 25.0)?;
+/// assert_eq!(board.points().len(), 54);
+/// // Neighbours in a row are one square apart.
+/// assert_eq!((board.points()[1] - board.points()[0]).norm(), 25.0);
+/// assert!(Board::chessboard(1, 6, 25.0).is_err());
+/// # Ok::<(), calibench::board::BoardError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Board {
     columns: usize,

@@ -3,6 +3,18 @@
 use crate::geometry::Vec2;
 
 /// The correspondences of one photograph: `points[i]` of the target's plane Z = 0 was seen at `pixels[i]`.
+///
+/// ```
+/// use calibench::board::View;
+/// use calibench::geometry::Vec2;
+///
+/// let points = vec![Vec2::new(0.0, 0.0), Vec2::new(10.0, 0.0)];
+/// let view = View::new(points.clone(), vec![Vec2::new(320.5, 240.0), Vec2::new(371.2, 239.4)])?;
+/// assert_eq!(view.len(), 2);
+/// // Every point needs its pixel.
+/// assert!(View::new(points, vec![]).is_err());
+/// # Ok::<(), calibench::board::ViewError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
     points: Vec<Vec2>,

@@ -35,6 +35,20 @@ const START_GAIN: f64 = 1e-3;
 /// # Errors
 /// Data that cannot determine the free parameters are refused; see [`CalibrationError`]. A refinement that does not converge is
 /// no error: the result says so in [`Calibration::termination`] and in a warning.
+///
+/// ```
+/// use calibench::calibrate::{CalibrationError, Settings, calibrate};
+/// use calibench::synth::Scene;
+///
+/// let scene = Scene::example();
+/// let result = calibrate(&scene.exact(), &Settings::standard())?;
+/// // Without noise the camera is found up to rounding.
+/// assert!((result.camera.fx - scene.truth.camera.fx).abs() < 1e-4 && result.rmse_px < 1e-6);
+/// // One view does not determine fx, fy, cx and cy.
+/// let refused = calibrate(&scene.exact()[..1], &Settings::standard());
+/// assert!(matches!(refused, Err(CalibrationError::TooFewViews { need: 2, got: 1, .. })));
+/// # Ok::<(), CalibrationError>(())
+/// ```
 pub fn calibrate(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
     let Some(distinct) = Distinct::of(views) else { return calibrate_different(views, settings) };
     match calibrate_different(&distinct.views(views), settings) {

@@ -10,6 +10,20 @@ use super::{BrownConrady, FreeParameters, Parameter, UndistortError};
 use crate::geometry::{Mat3, Vec2, Vec3};
 
 /// Intrinsic parameters of a camera.
+///
+/// ```
+/// use calibench::camera::{BrownConrady, Camera};
+/// use calibench::geometry::{Vec2, Vec3};
+///
+/// let camera = Camera::pinhole(600.0, 600.0, 320.0, 240.0).with_distortion(BrownConrady::radial(-0.18, 0.05));
+/// // A point on the optical axis is seen at the principal point.
+/// assert_eq!(camera.project(&Vec3::new(0.0, 0.0, 5.0)), Some(Vec2::new(320.0, 240.0)));
+/// // The inverse of the lens is exact: corrected and distorted again, a pixel is where it was.
+/// let pixel = Vec2::new(100.0, 50.0);
+/// let ideal = camera.correct_pixel(&pixel)?;
+/// assert!((camera.distort_pixel(&ideal) - pixel).norm() < 1e-9);
+/// # Ok::<(), calibench::camera::UndistortError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Camera {

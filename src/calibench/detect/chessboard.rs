@@ -143,6 +143,20 @@ const FIRST_LEVEL_PIXELS: usize = 1_200_000;
 ///
 /// # Errors
 /// See [`ChessboardError`]; a board is returned complete and ordered, or not at all.
+///
+/// ```
+/// use calibench::board::Board;
+/// use calibench::detect::chessboard;
+/// use calibench::synth::Truth;
+/// use calibench::synth::render::{Imaging, photograph};
+///
+/// let (camera, pose) = (Truth::example_camera(), Truth::example_poses()[1]);
+/// let photo =
+///     photograph(&camera, Truth::EXAMPLE_IMAGE, &Board::chessboard(8, 6, 8.0)?, &pose, &Imaging::default())?;
+/// let found = chessboard(&photo.image, 8, 6)?;
+/// assert_eq!(found.corners_px().len(), 48);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn chessboard<T: Level>(
     image: &Raster<T>,
     columns: usize,

@@ -44,6 +44,21 @@ const DENSE_SIDE: usize = 4;
 ///
 /// # Errors
 /// See [`GridError`]; a grid is returned complete and ordered, or not at all.
+///
+/// ```
+/// use calibench::detect::circle_grid;
+/// use calibench::synth::Truth;
+/// use calibench::synth::render::{Imaging, photograph};
+///
+/// let (camera, board) = (Truth::example_camera(), Truth::example_board());
+/// let pose = Truth::example_poses()[0];
+/// let photo = photograph(&camera, Truth::EXAMPLE_IMAGE, &board, &pose, &Imaging::default())?;
+/// let grid = circle_grid(&photo.image, 9, 7)?;
+/// assert_eq!(grid.centres_px().len(), 63);
+/// // The target faces the camera, so its discs are seen as discs and their centres are where the lens puts them.
+/// assert!((grid.centres_px()[31] - photo.centres_true[31]).norm() < 0.01);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn circle_grid<T: Level>(image: &Raster<T>, columns: usize, rows: usize) -> Result<DotGrid, GridError> {
     circle_grid_of(&blobs(image, &BlobOptions::default()), columns, rows)
 }

@@ -75,6 +75,16 @@ impl Affine {
     ///
     /// # Errors
     /// Fewer than three pairs, or `from` on one line.
+    ///
+    /// ```
+    /// use calibench::geometry::{Affine, Vec2};
+    ///
+    /// let from = [Vec2::new(0.0, 0.0), Vec2::new(1.0, 0.0), Vec2::new(0.0, 1.0)];
+    /// let to = [Vec2::new(5.0, 5.0), Vec2::new(7.0, 5.0), Vec2::new(5.0, 8.0)];
+    /// let map = Affine::fit(&from, &to)?;
+    /// assert!((map.apply(&Vec2::new(1.0, 1.0)) - Vec2::new(7.0, 8.0)).norm() < 1e-12);
+    /// # Ok::<(), calibench::geometry::LinearFitError>(())
+    /// ```
     pub fn fit(from: &[Vec2], to: &[Vec2]) -> Result<Affine, LinearFitError> {
         let (from_centroid, to_centroid) = checked_centroids(from, to, 3)?;
         let pairs = || from.iter().zip(to).map(|(f, t)| (f - from_centroid, t - to_centroid));

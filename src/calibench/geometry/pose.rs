@@ -4,6 +4,16 @@ use super::{Mat3, Vec3, rotation};
 
 /// A rigid motion `x_a = R x_b + t`. A variable of this type names both frames, target first to be applied last:
 /// `cam_from_target` takes target coordinates to camera coordinates.
+///
+/// ```
+/// use calibench::geometry::{Mat3, Pose, Vec3};
+///
+/// let cam_from_target = Pose { rotation: Mat3::identity(), translation: Vec3::new(0.0, 0.0, 120.0) };
+/// let target_from_cam = cam_from_target.inverse();
+/// let point = Vec3::new(10.0, 20.0, 0.0);
+/// assert_eq!(cam_from_target.apply(&point), Vec3::new(10.0, 20.0, 120.0));
+/// assert_eq!(target_from_cam.compose(&cam_from_target).apply(&point), point);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pose {

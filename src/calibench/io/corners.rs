@@ -30,6 +30,18 @@ pub fn read_corners(path: &Path) -> Result<CornerFile, TableError> {
 ///
 /// # Errors
 /// See [`TableError`].
+///
+/// ```
+/// use calibench::io::parse_corners;
+///
+/// let text = "view,point,X,Y,u,v\nleft,0,0,0,320.5,240\nleft,1,10,0,371.2,239.4\n";
+/// let corners = parse_corners("corners.csv", text.as_bytes())?;
+/// assert_eq!((corners.view_names[0].as_str(), corners.views[0].len()), ("left", 2));
+/// // What is wrong is named with its line and column.
+/// let broken = parse_corners("corners.csv", text.replace("371.2", "?").as_bytes()).unwrap_err();
+/// assert!(broken.to_string().starts_with("corners.csv:3: column 'u'"));
+/// # Ok::<(), calibench::io::TableError>(())
+/// ```
 pub fn parse_corners(file: &str, input: impl Read) -> Result<CornerFile, TableError> {
     let rows = read_table(file, input, ["view", "point"], ["X", "Y", "u", "v"])?;
     refuse_repeated_points(file, &rows)?;

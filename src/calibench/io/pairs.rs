@@ -30,6 +30,15 @@ pub fn read_point_pairs(path: &Path) -> Result<PointPairs, TableError> {
 ///
 /// # Errors
 /// See [`TableError`].
+///
+/// ```
+/// use calibench::io::parse_point_pairs;
+///
+/// let pairs = parse_point_pairs("pairs.csv", "point,px,py,X,Y\na,100,50,0,0\nb,140,50,10,0\n".as_bytes())?;
+/// assert_eq!(pairs.names, ["a", "b"]);
+/// assert_eq!(pairs.world[1].x, 10.0);
+/// # Ok::<(), calibench::io::TableError>(())
+/// ```
 pub fn parse_point_pairs(file: &str, input: impl Read) -> Result<PointPairs, TableError> {
     let mut pairs = PointPairs::default();
     let mut first_line = BTreeMap::new();

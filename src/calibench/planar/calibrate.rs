@@ -62,6 +62,19 @@ pub struct PlaneCalibration {
 /// # Errors
 /// Fewer than four pairs, coordinates that are not finite, a point given twice, points on one line, and sets that leave the
 /// family's map open.
+///
+/// ```
+/// use calibench::geometry::Vec2;
+/// use calibench::planar::{PlaneModel, calibrate_plane};
+///
+/// // Nine marks 10 mm apart, seen at 4 px a millimetre.
+/// let world: Vec<Vec2> = (0..9).map(|i| Vec2::new(f64::from(i % 3), f64::from(i / 3)) * 10.0).collect();
+/// let pixels: Vec<Vec2> = world.iter().map(|p| Vec2::new(100.0 + 4.0 * p.x, 50.0 + 4.0 * p.y)).collect();
+/// let plane = calibrate_plane(PlaneModel::Affine, &pixels, &world)?;
+/// assert!((plane.scale_x - 0.25).abs() < 1e-12);
+/// assert_eq!(plane.degrees_of_freedom, 12);
+/// # Ok::<(), calibench::planar::PlaneError>(())
+/// ```
 pub fn calibrate_plane(
     model: PlaneModel,
     pixels: &[Vec2],

@@ -43,6 +43,20 @@ pub enum RectifyError {
 /// An output pixel has data when its source lies within the centres of the photograph's outermost samples, so that no sample is
 /// invented. Pixel (0, 0) is the centre of the top-left sample on both sides. Levels of 16 bits and intensities are mixed in `f32`, 8-bit
 /// levels in whole numbers, within 0.02 of a level before they are rounded.
+///
+/// ```
+/// use calibench::camera::{BrownConrady, Camera};
+/// use calibench::raster::Raster;
+/// use calibench::rectify::RectifyMap;
+///
+/// let ideal = Camera::pinhole(60.0, 60.0, 31.5, 23.5);
+/// let lens = ideal.with_distortion(BrownConrady::radial(-0.1, 0.0));
+/// let map = RectifyMap::between(&lens, (64, 48), &ideal, (64, 48))?;
+/// // A sheet of one grey stays that grey wherever the photograph has data.
+/// let grey = Raster::from_fn(64, 48, |_, _| 90u8);
+/// assert_eq!(map.apply(&grey, 0)?.get(31, 23), 90);
+/// # Ok::<(), calibench::rectify::RectifyError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct RectifyMap {
     input_size: (usize, usize),

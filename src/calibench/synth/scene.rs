@@ -20,6 +20,18 @@ pub struct Truth {
 }
 
 /// A scene: noise-free pixels of every view of a truth.
+///
+/// ```
+/// use calibench::synth::{Scene, Stream, StreamKey};
+///
+/// let scene = Scene::example();
+/// assert_eq!(scene.observations(), 4 * 63);
+/// let key = StreamKey { seed: 1, scenario: "example", trial: 0, purpose: "noise" };
+/// let noisy = scene.observe(0.1, &mut Stream::open(key));
+/// // The same key gives the same noise, to the last bit.
+/// assert_eq!(noisy, scene.observe(0.1, &mut Stream::open(key)));
+/// assert_ne!(noisy, scene.exact());
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
     /// What produced the pixels.

@@ -19,6 +19,15 @@ pub struct StreamKey<'a> {
 
 /// A stream of random numbers: ChaCha8 (Bernstein 2008), 256-bit key `seed | scenario | trial | purpose`, 64 bits each, the
 /// two names by their FNV-1a hash.
+///
+/// ```
+/// use calibench::synth::{Stream, StreamKey};
+///
+/// let key = StreamKey { seed: 1, scenario: "example", trial: 0, purpose: "noise" };
+/// let (mut first, mut other) = (Stream::open(key), Stream::open(StreamKey { trial: 1, ..key }));
+/// assert_eq!(first.normal(), Stream::open(key).normal());
+/// assert_ne!(first.normal(), other.normal());
+/// ```
 #[derive(Debug, Clone)]
 pub struct Stream(ChaCha8Rng);
 
