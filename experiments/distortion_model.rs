@@ -502,7 +502,8 @@ fn bias_table(nodes: &[Node], theory: &Theory, unit: Vector2<f64>) -> Table {
         .into()
 }
 
-/// Where a curve first rises through one, straight between its nodes on logarithmic axes; NaN where it does not.
+/// Where a curve first rises through one, straight between its nodes on logarithmic axes; NaN where it does
+/// not.
 fn reaches_one(curve: &[(f64, f64)]) -> f64 {
     let rise = curve.windows(2).find(|pair| pair[0].1 < 1.0 && pair[1].1 >= 1.0);
     rise.map_or(f64::NAN, |pair| {

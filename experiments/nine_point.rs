@@ -114,8 +114,8 @@ fn unit_grid() -> Vec<Vec2> {
 
 fn claim_refusal(record: &mut Record, image: &Raster<f32>) {
     let answer = circle_grid(image, 3, 3);
-    let said = answer.as_ref().map_or_else(ToString::to_string, |_| "accepted".to_string());
-    record.note(format!("The detector for dense grids says of nine dots: {said}"));
+    let text = answer.as_ref().map_or_else(ToString::to_string, |_| "accepted".to_string());
+    record.note(format!("The detector for dense grids says of nine dots: {text}"));
     record
         .claim_that(
             "dense-grid-refuses",
@@ -124,7 +124,7 @@ fn claim_refusal(record: &mut Record, image: &Raster<f32>) {
         )
         .every(
             "cases",
-            [(said, matches!(answer, Err(GridError::TooFewForGrid { columns: 3, rows: 3, found: 9, .. })))],
+            [(text, matches!(answer, Err(GridError::TooFewForGrid { columns: 3, rows: 3, found: 9, .. })))],
         )
         .because(
             "three marks in a row leave one step to confirm another: too few to tell a grid from chance",

@@ -101,8 +101,8 @@ fn neighbours_agree(points: &[Vec2], calibration: &Calibration) -> f64 {
     }))
 }
 
-/// The same of other draws of the noise: the fit takes up what neighbours have in common, so zero is not to be
-/// expected.
+/// The same of other draws of the noise: the fit takes up what neighbours have in common, so zero is not to
+/// be expected.
 fn neighbours_in_other_draws(draw: &Draw) -> Result<Sample, ExperimentError> {
     let mut sample = Sample::about(&[0.0]);
     for trial in 0..PATTERN_TRIALS as u64 {

@@ -134,7 +134,8 @@ fn numbers_table(id: &str, evidence: &ExperimentEvidence, golden: &GoldenFile) -
     )
 }
 
-/// The claims of a record, each with its reason and false-alarm rate. With `places`, every row can be linked to.
+/// The claims of a record, each with its reason and false-alarm rate. With `places`, every row can be linked
+/// to.
 pub(super) fn claims_table(claims: &[RecordClaim], places: bool) -> String {
     let mut rows = String::new();
     for claim in claims {
@@ -184,7 +185,8 @@ pub(super) fn published_counts(sources: &Sources) -> String {
     all.to_string()
 }
 
-/// Every number that the chapter prints: ours, what both are held against, what the verdict is worth, and the verdict.
+/// Every number that the chapter prints: ours, what both are held against, what the verdict is worth, and the
+/// verdict.
 pub(super) fn published_table(sources: &Sources) -> String {
     let mut rows = String::new();
     for entry in &sources.published {

@@ -69,11 +69,11 @@ pub fn compile(sources: &Sources) -> Compiled {
 
 /// Whether what follows `before` is the first of a sentence.
 fn begins_sentence(before: &str) -> bool {
-    let said = before.trim_end();
-    let between = &before[said.len()..];
-    said.is_empty()
+    let text_before = before.trim_end();
+    let between = &before[text_before.len()..];
+    text_before.is_empty()
         || between.matches('\n').count() > 1
-        || !between.is_empty() && said.ends_with(['.', '?', '!'])
+        || !between.is_empty() && text_before.ends_with(['.', '?', '!'])
 }
 
 fn translate(

@@ -1,4 +1,5 @@
-//! Which numbers of the text are no results? Constants of the chapter's scene, taken from the code that builds it.
+//! Which numbers of the text are no results? Constants of the chapter's scene, taken from the code that
+//! builds it.
 
 use calibench::synth::Truth;
 

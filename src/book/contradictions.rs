@@ -1,4 +1,5 @@
-//! Where is the chapter contradicted? book/contradictions.toml, declared where the text says so and listed on one page.
+//! Where is the chapter contradicted? book/contradictions.toml, declared where the text says so and listed on
+//! one page.
 
 use super::appendix::section;
 use super::text::inline;

@@ -1,4 +1,5 @@
-//! What do the experiments say? For each: the golden snapshot, and the record with its tables from this run or the last.
+//! What do the experiments say? For each: the golden snapshot, and the record with its tables from this run
+//! or the last.
 
 use super::golden_file::GoldenFile;
 use calibench::io::hash::sha256_hex;
@@ -95,8 +96,8 @@ impl Evidence {
         evidence
     }
 
-    /// The evidence of the last run, from out/; an experiment whose files are missing, or are not those of the locked
-    /// run, is named in the second part.
+    /// The evidence of the last run, from out/; an experiment whose files are missing, or are not those of
+    /// the locked run, is named in the second part.
     pub fn of_last_run(project: &Project, experiments: &[Experiment]) -> (Evidence, Vec<String>) {
         let mut evidence = Evidence::named(project, experiments);
         let mut stale = Vec::new();

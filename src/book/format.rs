@@ -1,6 +1,7 @@
 //! How does a number look in the text? By a format of the placeholder: `.4`, `s3`, `e1`, `%1`.
 
-/// Formats a value; `None` for a format that is not known. A minus is typographic, a power of ten is written as one.
+/// Formats a value; `None` for a format that is not known. A minus is typographic, a power of ten is written
+/// as one.
 pub(super) fn format(value: f64, how: &str) -> Option<String> {
     let (kind, digits) = (how.get(..1)?, how.get(1..)?.parse::<usize>().ok()?);
     let plain = match kind {

@@ -1,4 +1,5 @@
-//! How does markdown become HTML? By CommonMark with tables and named headings; links to pages of the book become links to HTML.
+//! How does markdown become HTML? By CommonMark with tables and named headings; links to pages of the book
+//! become links to HTML.
 
 use pulldown_cmark::{CowStr, Event, Options, Parser, Tag, TagEnd};
 use std::collections::BTreeSet;

@@ -1,4 +1,5 @@
-//! What is equation (3.2)? Names of equations, figures, tables and places, numbered by chapter in the order of the text.
+//! What is equation (3.2)? Names of equations, figures, tables and places, numbered by chapter in the order
+//! of the text.
 
 use super::finding::Finding;
 use super::scan::{Kind, Piece};

@@ -1,4 +1,5 @@
-//! What stands around the text of a page? The contents beside it, the neighbours below it; no script, and nothing from outside.
+//! What stands around the text of a page? The contents beside it, the neighbours below it; no script, and
+//! nothing from outside.
 
 use super::html::attributes;
 use super::page::CompiledPage;
@@ -7,7 +8,8 @@ use super::text::escape;
 /// Title of the book.
 const TITLE: &str = "Camera calibration, checked against truth";
 
-/// A page as a browser opens it: its text, the contents of the whole book, and links to the pages before and after it.
+/// A page as a browser opens it: its text, the contents of the whole book, and links to the pages before and
+/// after it.
 pub(super) fn page(pages: &[&CompiledPage], at: usize, text: &str) -> String {
     let contents: String =
         pages.iter().enumerate().map(|(i, page)| line_of_contents(page, i == at)).collect();
@@ -44,7 +46,8 @@ pub(super) fn print(pages: &[&CompiledPage], texts: &[String]) -> String {
     document(TITLE, &format!("<div class=\"content\"><main>\n{sections}</main></div>\n"))
 }
 
-/// The text of a page with its names and links as they are when all pages are one: `#place` of page `stem` is `#stem--place`.
+/// The text of a page with its names and links as they are when all pages are one: `#place` of page `stem` is
+/// `#stem--place`.
 fn within_one_page(text: &str, stem: &str) -> String {
     let named = attributes(text, "id", |name| format!("{stem}--{name}"));
     attributes(&named, "href", |target| {

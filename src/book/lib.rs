@@ -1,5 +1,6 @@
-//! How does the book get its numbers? Its sources hold placeholders; every one is resolved from golden/, figures/, the
-//! records of the last run and the code, and what cannot be resolved is a finding with file and line.
+//! How does the book get its numbers? Its sources hold placeholders; every one is resolved from golden/,
+//! figures/, the records of the last run and the code, and what cannot be resolved is a finding with file and
+//! line.
 //!
 //! ```text
 //! book/text/*.md --scan--> pieces --label--> names of equations, figures, tables, places
@@ -71,8 +72,8 @@ pub fn pieces_of(text: &str) -> usize {
 use calibench_harness::project::Project;
 use calibench_harness::{Experiment, Record};
 
-/// Everything in the book's sources that does not resolve: unknown and unused names, stale figures, dead links, and results
-/// typed in by hand. Writes nothing; `records` are those of the present run.
+/// Everything in the book's sources that does not resolve: unknown and unused names, stale figures, dead
+/// links, and results typed in by hand. Writes nothing; `records` are those of the present run.
 pub fn check(project: &Project, experiments: &[Experiment], records: &[&Record]) -> Vec<Finding> {
     let evidence = Evidence::of_records(project, experiments, records);
     match Sources::load(project, evidence) {

@@ -1,7 +1,8 @@
-//! Which code does a section show? An item of a source file by its name, so that the text cannot drift from it.
+//! Which code does a section show? An item of a source file by its name, so that the text cannot drift from
+//! it.
 
-/// The item `name` of a file: function, structure, constant, trait or implementation, with its documentation; first line
-/// from 1. `Type::name` looks inside `impl Type`.
+/// The item `name` of a file: function, structure, constant, trait or implementation, with its documentation;
+/// first line from 1. `Type::name` looks inside `impl Type`.
 pub(super) fn item(source: &str, name: &str) -> Option<(usize, String)> {
     let lines: Vec<&str> = source.lines().collect();
     let (from, to, name) = match name.split_once("::") {
@@ -34,8 +35,9 @@ fn defines(line: &str, keyword: &str, name: &str) -> bool {
     rest.strip_prefix(name).is_some_and(|after| !after.starts_with(|c: char| c.is_alphanumeric() || c == '_'))
 }
 
-/// The last line of the item that begins at `start`: where its brackets are closed and a `}` or `;` ends the line. Code
-/// that rustfmt has seen closes an item at its own indentation; a raw string ends where it is closed.
+/// The last line of the item that begins at `start`: where its brackets are closed and a `}` or `;` ends the
+/// line. Code that rustfmt has seen closes an item at its own indentation; a raw string ends where it is
+/// closed.
 fn end_of(lines: &[&str], start: usize) -> usize {
     let margin = lines[start].len() - lines[start].trim_start().len();
     if lines[start].trim_end().ends_with([';', '}']) {

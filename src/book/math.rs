@@ -6,7 +6,8 @@ use math_core::{LatexToMathML, MathCoreConfig, MathDisplay};
 /// The converter with the book's macros.
 pub(super) struct Mathematics(LatexToMathML);
 
-/// Names of the literature: vectors and matrices upright and bold are avoided, so that `K`, `R`, `t` look as in the code.
+/// Names of the literature: vectors and matrices upright and bold are avoided, so that `K`, `R`, `t` look as
+/// in the code.
 const MACROS: [(&str, &str); 3] =
     [("T", r"\mathsf{T}"), ("norm", r"\lVert #1 \rVert"), ("unit", r"\,\mathrm{#1}")];
 

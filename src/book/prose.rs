@@ -1,4 +1,5 @@
-//! Was a result typed in by hand? Numbers of a result have a decimal point or a unit; in prose they must be placeholders.
+//! Was a result typed in by hand? Numbers of a result have a decimal point or a unit; in prose they must be
+//! placeholders.
 
 /// Units that make a number a quantity.
 const UNITS: [&str; 20] = [
@@ -24,8 +25,8 @@ const UNITS: [&str; 20] = [
     "weeks",
 ];
 
-/// Quantities in a piece of prose: `4.678`, `20 px`, `33%`. A number behind a section sign is a place, not a quantity, and
-/// one inside a word (`f32`, `k1`, `x86-64`) is part of a name.
+/// Quantities in a piece of prose: `4.678`, `20 px`, `33%`. A number behind a section sign is a place, not a
+/// quantity, and one inside a word (`f32`, `k1`, `x86-64`) is part of a name.
 pub(super) fn quantities(prose: &str) -> Vec<(usize, &str)> {
     let bytes = prose.as_bytes();
     let mut found = Vec::new();

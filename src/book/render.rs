@@ -1,4 +1,5 @@
-//! How does the compiled book become a folder that a browser opens? Every page as HTML, and all on one; what they show stands beside them.
+//! How does the compiled book become a folder that a browser opens? Every page as HTML, and all on one; what
+//! they show stands beside them.
 
 use super::compile::Compiled;
 use super::page::CompiledPage;

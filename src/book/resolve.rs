@@ -320,7 +320,8 @@ impl<'a> Resolver<'a> {
         Ok(format!("<a href=\"{page}#claim-{claim}\"><code>{}</code></a>", inline(id)))
     }
 
-    /// Names that nothing uses: references, labels, contradictions that no page declares, figures that are drawn for nobody.
+    /// Names that nothing uses: references, labels, contradictions that no page declares, figures that are
+    /// drawn for nobody.
     pub(super) fn unused(&self) -> Vec<Finding> {
         let mut findings = self.labels.unused();
         let uncited = self.sources.references.iter().filter(|r| !self.cited.contains(&r.key));

@@ -1,4 +1,5 @@
-//! What is the book made from? Pages in the order of book/text/SUMMARY.md, references, evidence, and the folder of the code.
+//! What is the book made from? Pages in the order of book/text/SUMMARY.md, references, evidence, and the
+//! folder of the code.
 
 use super::contradictions::{self, Contradiction};
 use super::evidence::Evidence;

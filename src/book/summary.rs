@@ -1,4 +1,5 @@
-//! Which pages are there, in which order? A line each in SUMMARY.md; those of its list are chapters and have numbers.
+//! Which pages are there, in which order? A line each in SUMMARY.md; those of its list are chapters and have
+//! numbers.
 
 /// A line of the summary.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -5,7 +5,8 @@ pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// Hides from the markdown reader what it would take for its own signs; for HTML that stands inside a paragraph or a cell.
+/// Hides from the markdown reader what it would take for its own signs; for HTML that stands inside a
+/// paragraph or a cell.
 pub(super) fn shield(html: &str) -> String {
     let mut shielded = String::with_capacity(html.len());
     for c in html.chars() {

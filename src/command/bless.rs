@@ -1,4 +1,5 @@
-//! `calibench bless ID`: the present result becomes the golden snapshot. Claims are not touched: one that fails stays failed.
+//! `calibench bless ID`: the present result becomes the golden snapshot. Claims are not touched: one that
+//! fails stays failed.
 
 use super::{Exit, find, print, warn};
 use calibench::io::write_atomically;

@@ -73,12 +73,12 @@ fn write(project: &Project, evidence: Evidence) -> Exit {
         return Exit::Incomplete;
     }
     print(&format!("book: {}\n", calibench_book::index_of(&folder).display()));
-    print(&told(&compiled.findings));
+    print(&findings_text(&compiled.findings));
     if compiled.findings.is_empty() { Exit::Held } else { Exit::Deviates }
 }
 
 /// One line a finding.
-pub(super) fn told(findings: &[Finding]) -> String {
+pub(super) fn findings_text(findings: &[Finding]) -> String {
     findings.iter().map(|finding| format!("book: {finding}\n")).collect()
 }
 

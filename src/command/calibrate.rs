@@ -1,4 +1,5 @@
-//! `calibench calibrate`: a camera from a corner file or from photographs, or a plane map from a file of point pairs.
+//! `calibench calibrate`: a camera from a corner file or from photographs, or a plane map from a file of
+//! point pairs.
 
 use super::report::table;
 use super::{Exit, print, warn};
@@ -35,15 +36,16 @@ const EXIT_CODES: &str = "Exit codes: 0 a minimum whose RMSE lies at most a quar
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_CODES)]
 pub(super) struct Arguments {
-    /// Corner file with the columns view,point,X,Y,u,v, or point pairs with point,px,py,X,Y, or - for one of them on standard input;
-    /// with --board, photographs
+    /// Corner file with the columns view,point,X,Y,u,v, or point pairs with point,px,py,X,Y, or - for one of
+    /// them on standard input; with --board, photographs
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// The board in the photographs: chess:9x6:25mm (inner corners), circles:9x7:10mm:3mm (spacing, diameter) or dots:3x3:1
+    /// The board in the photographs: chess:9x6:25mm (inner corners), circles:9x7:10mm:3mm (spacing, diameter)
+    /// or dots:3x3:1
     #[arg(long, value_name = "BOARD")]
     board: Option<BoardSpec>,
-    /// Parameters to estimate, of fx fy cx cy skew k1 k2 p1 p2 k3; the others are held, distortion and skew at 0
-    /// [default: fx,fy,cx,cy,k1,k2 and those of --prior, without those of --fix and --tie]
+    /// Parameters to estimate, of fx fy cx cy skew k1 k2 p1 p2 k3; the others are held, distortion and skew
+    /// at 0 [default: fx,fy,cx,cy,k1,k2 and those of --prior, without those of --fix and --tie]
     #[arg(long, value_name = "LIST")]
     free: Option<FreeParameters>,
     /// Holds a parameter at a value, such as k3=0; may be repeated
@@ -52,7 +54,8 @@ pub(super) struct Arguments {
     /// Ties the focal lengths: fy=fx for square pixels, fy/fx=1.02 for others
     #[arg(long, value_name = "fy=fx", value_parser = parse_tie)]
     tie: Option<f64>,
-    /// What is known of a parameter beforehand, value and standard deviation, such as k1=-0.2+-0.01: one more measurement; may be repeated
+    /// What is known of a parameter beforehand, value and standard deviation, such as k1=-0.2+-0.01: one more
+    /// measurement; may be repeated
     #[arg(long, value_name = "NAME=VALUE+-SD", value_parser = parse_prior)]
     prior: Vec<Prior>,
     /// Image size, such as 640x480: where a held principal point lies by default, and the frame of the plots
@@ -64,14 +67,15 @@ pub(super) struct Arguments {
     /// Leaves out views whose RMSE exceeds FACTOR times the median, worst first, such as 3
     #[arg(long, value_name = "FACTOR", value_parser = parse_factor)]
     reject_views: Option<f64>,
-    /// Intervals of 95 % beside the standard deviations: by the profile of the cost, which holds where the data are weak [default:
-    /// linear]
+    /// Intervals of 95 % beside the standard deviations: by the profile of the cost, which holds where the
+    /// data are weak [default: linear]
     #[arg(long, value_enum)]
     intervals: Option<Intervals>,
     /// Map of a plane from point pairs [default: planar]
     #[arg(long, value_enum)]
     mode: Option<Mode>,
-    /// Memory that photographs may take together, such as 500MB or 2GiB; large ones then come one at a time [default: 2GiB]
+    /// Memory that photographs may take together, such as 500MB or 2GiB; large ones then come one at a time
+    /// [default: 2GiB]
     #[arg(long, value_name = "BYTES", value_parser = parse_bytes, default_value_t = DEFAULT_MEMORY, hide_default_value = true)]
     memory: u64,
     /// Folder for result.json, the page report.html, plots, and the photographs with their marks drawn in

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::fs;
 
-/// How the outcome is told.
+/// How the outcome is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Format {
     /// A table for people
@@ -26,7 +26,7 @@ enum Format {
 pub(super) struct Arguments {
     /// Names of experiments; without any, everything is checked, the book with it
     ids: Vec<String>,
-    /// How the outcome is told
+    /// How the outcome is printed
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
     /// Fails also where a number moved by a bit within its band
@@ -68,10 +68,10 @@ pub(super) fn run(experiments: &[Experiment], arguments: &Arguments) -> Exit {
     } else {
         Vec::new()
     };
-    tell(&runs, &verdicts, &findings, arguments.format)
+    print_outcome(&runs, &verdicts, &findings, arguments.format)
 }
 
-fn tell(runs: &[Run], verdicts: &[Option<Verdict>], findings: &[Finding], format: Format) -> Exit {
+fn print_outcome(runs: &[Run], verdicts: &[Option<Verdict>], findings: &[Finding], format: Format) -> Exit {
     let failed = |run: &Run| run.result.as_ref().err().map(|e| format!("FAILED {}: {e}", run.experiment.id));
     let failures: Vec<String> = runs.iter().filter_map(failed).collect();
     let judged: Vec<Verdict> = verdicts.iter().flatten().cloned().collect();
@@ -81,7 +81,7 @@ fn tell(runs: &[Run], verdicts: &[Option<Verdict>], findings: &[Finding], format
         Format::Text => {
             print(&reconciliation_table(runs, verdicts));
             print(&details(&judged));
-            print(&super::book::told(findings));
+            print(&super::book::findings_text(findings));
         }
         Format::Json => {
             let experiments: Vec<Value> = judged.iter().map(to_json).collect();

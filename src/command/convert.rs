@@ -43,7 +43,8 @@ pub(super) struct Arguments {
     /// Writes the camera of the same images scaled to this size, edge to edge
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     resize: Option<(usize, usize)>,
-    /// Both coordinates of the centre of the first pixel in IN, such as 0 or 0.5 [default: what its format says]
+    /// Both coordinates of the centre of the first pixel in IN, such as 0 or 0.5 [default: what its format
+    /// says]
     #[arg(long, value_name = "PX", value_parser = parse_finite, allow_negative_numbers = true)]
     first_pixel: Option<f64>,
     /// Fits the nearest lens where there is no equal one (HALCON's), and says the largest error

@@ -83,15 +83,15 @@ pub(super) struct Arguments {
     /// Judges this library's solver with a planted fault; `list` names them
     #[arg(long, value_name = "FAULT", conflicts_with_all = ["solver", "judge"])]
     planted: Option<String>,
-    /// Measures the gate itself: every planted fault, false alarms over 200 clean seeds, how often textbook least squares is
-    /// misled; writes three tables to a folder
+    /// Measures the gate itself: every planted fault, false alarms over 200 clean seeds, how often textbook
+    /// least squares is misled; writes three tables to a folder
     #[arg(long, value_name = "DIR", conflicts_with_all = ["solver", "judge", "export", "record", "planted"])]
     power: Option<PathBuf>,
     /// Prints the tables in a folder written by --power as Markdown
     #[arg(long, value_name = "DIR")]
     power_table: Option<PathBuf>,
-    /// Counts the digits that the solver shares with the certified values of reference/ [default solver here: this library's,
-    /// polished to the last digits]
+    /// Counts the digits that the solver shares with the certified values of reference/ [default solver here:
+    /// this library's, polished to the last digits]
     #[arg(long, conflicts_with_all = ["export", "judge", "power", "planted", "record", "against"])]
     certified: bool,
     /// The only certified problem to put
@@ -100,7 +100,8 @@ pub(super) struct Arguments {
     /// Digits that every certified problem must reach
     #[arg(long, value_name = "N", requires = "certified", default_value_t = 0.0)]
     least_digits: f64,
-    /// Counts the digits of this library's solver and of the programs in adapters/, and writes the table as CSV
+    /// Counts the digits of this library's solver and of the programs in adapters/, and writes the table as
+    /// CSV
     #[arg(long, value_name = "FILE", requires = "certified", conflicts_with = "solver")]
     digits: Option<PathBuf>,
     /// Prints a table written by --digits as Markdown
@@ -281,10 +282,10 @@ fn judge(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build)
 
 /// Characters in a line: what the shell says, else what most terminals have; a file gets the whole.
 fn columns() -> usize {
-    let said = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
+    let asked = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
     let most =
         if std::io::stdout().is_terminal() { TERMINAL_COLUMNS } else { calibench_gate::report::COLUMNS };
-    said.unwrap_or(most)
+    asked.unwrap_or(most)
 }
 
 /// Characters in a line of a terminal that does not say.

@@ -25,8 +25,8 @@ use calibench_harness::{Build, Experiment};
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
-/// A test bench for camera calibration: every number is reconciled with truth, with theory, with the published values, and
-/// with the last run.
+/// A test bench for camera calibration: every number is reconciled with truth, with theory, with the
+/// published values, and with the last run.
 ///
 /// Without a verb, every experiment runs: out/ receives its tables and record, figures/ its figures, out/book
 /// the book, and one table says what holds.
@@ -46,7 +46,8 @@ enum Verb {
     List(list::Arguments),
     /// Runs one experiment
     Run(run::Arguments),
-    /// Runs everything and compares, writing nothing: golden values, claims, published values, committed figures, the book
+    /// Runs everything and compares, writing nothing: golden values, claims, published values, committed
+    /// figures, the book
     Check(check::Arguments),
     /// Accepts the present result of an experiment as its golden snapshot, and its figures with it
     Bless(bless::Arguments),
@@ -58,7 +59,8 @@ enum Verb {
     Ninepoint(ninepoint::Arguments),
     /// Removes a calibrated lens's distortion from photographs
     Undistort(undistort::Arguments),
-    /// Converts cameras, corners and boards between the files of OpenCV, ROS, Kalibr, mrcal, COLMAP, MATLAB, HALCON and this program
+    /// Converts cameras, corners and boards between the files of OpenCV, ROS, Kalibr, mrcal, COLMAP, MATLAB,
+    /// HALCON and this program
     Convert(Box<convert::Arguments>),
     /// Compares two cameras over the frame, and tests whether both may be one
     Diff(diff::Arguments),
@@ -68,8 +70,8 @@ enum Verb {
     Gate(Box<gate::Arguments>),
 }
 
-/// The `calibench` command over a table of experiments; `build` is what stands as their origin in what they write, `carried` what is read
-/// outside the source tree.
+/// The `calibench` command over a table of experiments; `build` is what stands as their origin in what they
+/// write, `carried` what is read outside the source tree.
 pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCode {
     calibench_harness::project::carry(carried);
     let arguments = match Arguments::try_parse() {
@@ -107,7 +109,8 @@ pub fn main_for(experiment: &Experiment, build: &Build) -> ExitCode {
     terminal::ended(run::main_for(experiment, build)).into()
 }
 
-/// Ctrl-C ends the program with a code of its own. Files are renamed into place whole, so what is finished stays.
+/// Ctrl-C ends the program with a code of its own. Files are renamed into place whole, so what is finished
+/// stays.
 fn end_well_on_interrupt() {
     let handler = || {
         warn("interrupted: what was finished and written is kept, the rest is missing");
@@ -118,7 +121,8 @@ fn end_well_on_interrupt() {
     let _ = ctrlc::set_handler(handler);
 }
 
-/// Threads, and programs that are judged at the same time. More would only wait for each other, and each takes memory of its own.
+/// Threads, and programs that are judged at the same time. More would only wait for each other, and each
+/// takes memory of its own.
 pub const MOST_THREADS: usize = 1024;
 
 /// Sets the size of the thread pool.

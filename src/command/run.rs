@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 /// What a run can be told.
 #[derive(Debug, Args)]
 struct Options {
-    /// Seed of the random streams; golden values hold for the default seed only [default: the experiment's own]
+    /// Seed of the random streams; golden values hold for the default seed only [default: the experiment's
+    /// own]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Folder for tables, record and figures [default: out/, with the figures of the locked run in figures/]

@@ -20,9 +20,11 @@ pub(super) enum Verb {
     Resume(run::ResumeArguments),
     /// Joins the shards of a study into what an undivided run gives, bit for bit
     Merge(run::MergeArguments),
-    /// Compares two runs trial by trial: effect with interval, and a verdict only where the interval clears "no difference"
+    /// Compares two runs trial by trial: effect with interval, and a verdict only where the interval clears
+    /// "no difference"
     Compare(compare::Arguments),
-    /// Says how many views of which tilt and coverage reach a wanted standard deviation, and confirms it by trials
+    /// Says how many views of which tilt and coverage reach a wanted standard deviation, and confirms it by
+    /// trials
     Plan(plan::Arguments),
     /// Measures trials per second and core, and peak memory
     Measure(measure::Arguments),

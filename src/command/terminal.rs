@@ -1,14 +1,17 @@
-//! How are results told? On standard output, messages on standard error; a reader that has gone away is no error, a disk that is full is.
+//! How are results told? On standard output, messages on standard error; a reader that has gone away is no
+//! error, a disk that is full is.
 
 use super::Exit;
 use calibench::io::shown;
 use std::io::{self, Write};
 use std::sync::OnceLock;
 
-/// Why standard output could not be written, once it could not. Verbs go on, since their files count for themselves; [`ended`] tells.
+/// Why standard output could not be written, once it could not. Verbs go on, since their files count for
+/// themselves; [`ended`] tells.
 static LOST: OnceLock<String> = OnceLock::new();
 
-/// Writes to standard output. Whoever closed the pipe has read enough; any other failure makes the run incomplete, see `ended`.
+/// Writes to standard output. Whoever closed the pipe has read enough; any other failure makes the run
+/// incomplete, see `ended`.
 pub fn print(text: &str) {
     let mut out = io::stdout().lock();
     note(out.write_all(shown(text).as_bytes()).and_then(|()| out.flush()));

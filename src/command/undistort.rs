@@ -13,10 +13,12 @@ use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// result.json of `calibench calibrate`, or any JSON with {"camera": {"fx": ..., "fy": ..., "cx": ..., "cy": ...}}
+    /// result.json of `calibench calibrate`, or any JSON with {"camera": {"fx": ..., "fy": ..., "cx": ...,
+    /// "cy": ...}}
     #[arg(long, value_name = "RESULT.json")]
     camera: PathBuf,
-    /// Photographs: PNG, JPEG, BMP, PGM or TIFF, grey or colour, with or without alpha, 8 or 16 bit; all is kept
+    /// Photographs: PNG, JPEG, BMP, PGM or TIFF, grey or colour, with or without alpha, 8 or 16 bit; all is
+    /// kept
     #[arg(required = true, value_name = "PHOTOS")]
     photos: Vec<PathBuf>,
     /// Folder for the corrected photographs, as PNG of the same name, and camera-<W>x<H>.json
@@ -25,7 +27,8 @@ pub(super) struct Arguments {
     /// What the output shows
     #[arg(long, value_enum, default_value_t = View::Same)]
     view: View,
-    /// Grey level, black 0 to white 1, of output pixels without data; where the photograph has alpha, they are transparent too
+    /// Grey level, black 0 to white 1, of output pixels without data; where the photograph has alpha, they
+    /// are transparent too
     #[arg(long, value_name = "LEVEL", default_value_t = 0.0, value_parser = parse_level)]
     border: f32,
     /// Memory that a photograph may take, such as 500MB or 2GiB [default: 2GiB]
@@ -110,7 +113,8 @@ fn distinct_outputs(arguments: &Arguments) -> Result<(), String> {
     Ok(())
 }
 
-/// Whether the name is `mask-<W>x<H>.png`, in letters of either size, since some file systems do not tell them apart.
+/// Whether the name is `mask-<W>x<H>.png`, in letters of either size, since some file systems do not tell
+/// them apart.
 fn is_mask_name(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
     let size = name.strip_prefix("mask-").and_then(|rest| rest.strip_suffix(".png"));
@@ -209,7 +213,8 @@ impl Work<'_> {
     }
 }
 
-/// Every channel corrected. Pixels without data get the level `border` in colours and `clear` in alpha, the second or fourth channel.
+/// Every channel corrected. Pixels without data get the level `border` in colours and `clear` in alpha, the
+/// second or fourth channel.
 fn all<T: Interpolated>(
     map: &RectifyMap,
     channels: &[Raster<T>],

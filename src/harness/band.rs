@@ -1,6 +1,7 @@
 //! How far may a locked number move before it counts as changed? Exactly nowhere, or within a stated band.
 
-/// The tolerance of a golden number, with its reason. It is stored in the snapshot, so loosening one shows in review.
+/// The tolerance of a golden number, with its reason. It is stored in the snapshot, so loosening one shows in
+/// review.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Band {
     /// Not a bit may change.

@@ -1,4 +1,5 @@
-//! Which code do committed measurements depend on? Its lines are put into the program, so that it can tell whether they are stale.
+//! Which code do committed measurements depend on? Its lines are put into the program, so that it can tell
+//! whether they are stale.
 
 #[path = "fingerprint/code.rs"]
 mod code;

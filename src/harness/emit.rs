@@ -1,4 +1,5 @@
-//! How does a record reach the disk? CSV, JSON and figures, each written beside its place and renamed into it.
+//! How does a record reach the disk? CSV, JSON and figures, each written beside its place and renamed into
+//! it.
 
 use super::provenance::Build;
 use super::published::not_judged;
@@ -10,8 +11,8 @@ use serde_json::{Value, json};
 use std::io;
 use std::path::Path;
 
-/// Writes `<out>/<experiment>/*.csv` and `record.json`, and the figures to the folder `figures`. An interrupted run leaves
-/// whole files only.
+/// Writes `<out>/<experiment>/*.csv` and `record.json`, and the figures to the folder `figures`. An
+/// interrupted run leaves whole files only.
 ///
 /// # Errors
 /// What the file system says, with the path.
@@ -22,7 +23,8 @@ pub fn emit(record: &Record, out: &Path, figures: &Path, build: &Build) -> io::R
     }
     for figure in record.figures() {
         let path = figures.join(figure.file_name());
-        // A figure that is what it was keeps its time: the program carries the committed ones, and is not built anew for them.
+        // A figure that is what it was keeps its time: the program carries the committed ones, and is not
+        // built anew for them.
         if !read_regular(&path, MOST_TABLE_BYTES).is_ok_and(|old| old == figure.bytes) {
             write_atomically(&path, &figure.bytes)?;
         }

@@ -1,5 +1,6 @@
-//! Were committed measurements made by the code that runs now? A measurement that takes minutes is not repeated by every check: it carries
-//! the fingerprint of the code it depends on, and is stale as soon as a line of that code changes.
+//! Were committed measurements made by the code that runs now? A measurement that takes minutes is not
+//! repeated by every check: it carries the fingerprint of the code it depends on, and is stale as soon as a
+//! line of that code changes.
 
 #[cfg(test)]
 mod code;
@@ -9,8 +10,9 @@ use calibench::io::sha256_hex;
 /// Digits that are kept: 64 bits.
 const DIGITS: usize = 16;
 
-/// The code that a measurement depends on: SHA-256 of its lines without comments, blank lines and tests, and of the versions of the numeric
-/// crates; the first 16 hexadecimal digits. None where the program was built outside the source tree: there nothing can have changed.
+/// The code that a measurement depends on: SHA-256 of its lines without comments, blank lines and tests, and
+/// of the versions of the numeric crates; the first 16 hexadecimal digits. None where the program was built
+/// outside the source tree: there nothing can have changed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fingerprint(Option<String>);
 
@@ -40,7 +42,8 @@ impl Fingerprint {
         format!("# {command}; fingerprint {}", self.0.as_deref().unwrap_or("unknown"))
     }
 
-    /// A case for a claim: whether `table`, committed as `name`, was written with this fingerprint, and what to do if not.
+    /// A case for a claim: whether `table`, committed as `name`, was written with this fingerprint, and what
+    /// to do if not.
     pub fn case(&self, name: &str, table: &str, command: &str) -> (String, bool) {
         let written = written(table).unwrap_or("none");
         let Some(present) = &self.0 else { return (format!("{name}: {written}"), true) };

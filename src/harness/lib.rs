@@ -10,9 +10,10 @@
 //! ```
 //!
 //! # Adding an experiment
-//! 1. `experiments/<name>.rs`: `pub const EXPERIMENT: Experiment`, and a `run(&Context) -> Result<Record, ExperimentError>` that
-//!    reports numbers, claims, tables and figures.
-//! 2. Three registrations: `mod` and table entry in `experiments/lib.rs`, and its own binary in `experiments/bin`.
+//! 1. `experiments/<name>.rs`: `pub const EXPERIMENT: Experiment`, and a `run(&Context) -> Result<Record,
+//!    ExperimentError>` that reports numbers, claims, tables and figures.
+//! 2. Three registrations: `mod` and table entry in `experiments/lib.rs`, and its own binary in
+//!    `experiments/bin`.
 //! 3. `calibench run <id>`, read and look; then `calibench bless <id>` and commit golden/ and figures/.
 //!
 //! The layout test names whatever was forgotten.

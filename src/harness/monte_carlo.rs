@@ -1,7 +1,7 @@
 //! What do many draws of one scene give? Trials in parallel, gathered in their own order.
 //!
-//! Every trial opens its own random stream, and results are gathered in the order of the trials and summed in that order:
-//! no bit depends on the number of threads.
+//! Every trial opens its own random stream, and results are gathered in the order of the trials and summed in
+//! that order: no bit depends on the number of threads.
 
 use super::Progress;
 use calibench::calibrate::{Calibration, CalibrationError, Covariance, Settings, Termination, calibrate};
@@ -38,8 +38,8 @@ pub struct Estimate {
     pub errors: Vec<f64>,
     /// Reprojection error per point, px.
     pub rmse_px: f64,
-    /// Squared Mahalanobis distance of the errors under the estimate's own covariance: the normalised estimation error
-    /// squared (Bar-Shalom, Li & Kirubarajan 2001). NaN if that covariance is singular.
+    /// Squared Mahalanobis distance of the errors under the estimate's own covariance: the normalised
+    /// estimation error squared (Bar-Shalom, Li & Kirubarajan 2001). NaN if that covariance is singular.
     pub normalised_error_squared: f64,
 }
 
@@ -52,8 +52,8 @@ pub struct Outcome {
     pub trials: usize,
     /// Converged estimates, in the order of the trials.
     pub estimates: Vec<Estimate>,
-    /// How many trials ended how. Every trial is counted once: as [`CONVERGED`], by another way the refinement ended, or by
-    /// the reason for which the data were refused.
+    /// How many trials ended how. Every trial is counted once: as [`CONVERGED`], by another way the
+    /// refinement ended, or by the reason for which the data were refused.
     pub endings: BTreeMap<String, usize>,
 }
 

@@ -119,15 +119,9 @@ mod tests {
     use crate::published::PublishedError;
     use crate::record::RecordError;
 
-    fn with_claim() -> Record {
-        let mut record = Record::new("line-bending", 0);
-        record.claim_that("c", "zero is small").at_most(0.0, 1.0).because("definition");
-        record
-    }
-
     #[test]
     fn unit_and_band_hold_until_others_are_said() {
-        let mut record = with_claim();
+        let mut record = Record::with_claim();
         record.exact("px").number("a", 1.0, "").unit("").count("b", 2, "");
         record
             .group("mm", Band::relative(0.1, "test"))
@@ -150,23 +144,23 @@ mod tests {
 
     #[test]
     fn only_a_published_number_is_reconciled_and_only_by_its_rule() {
-        let mut record = with_claim();
+        let mut record = Record::with_claim();
         record.exact("px").number("max-deviation", 4.677_75, "").rounds_to_printed();
         assert_eq!(record.validate(), Ok(()));
         assert!(record.reconciliations()[0].held());
 
-        let mut record = with_claim();
+        let mut record = Record::with_claim();
         record.exact("px").number("other", 1.0, "").rounds_to_printed();
         assert!(matches!(record.validate(), Err(RecordError::Published(PublishedError::Unknown(_)))));
 
-        let mut record = with_claim();
+        let mut record = Record::with_claim();
         record.exact("px").number("max-deviation", 4.677_75, "").near_printed(1.0, "nothing");
         assert!(matches!(record.validate(), Err(RecordError::Rule { expected: Some(Rule::Exact), .. })));
 
-        let mut record = with_claim();
+        let mut record = Record::with_claim();
         record.exact("px").rounds_to_printed();
         assert!(matches!(record.validate(), Err(RecordError::NoSuchNumber(_))));
-        let mut record = with_claim();
+        let mut record = Record::with_claim();
         record.reconcile("max-deviation").rounds_to_printed();
         assert_eq!(record.validate(), Err(RecordError::NoSuchNumber("max-deviation".into())));
     }

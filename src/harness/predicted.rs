@@ -19,8 +19,8 @@ pub enum Predicted {
         /// Degrees of freedom, > 0.
         dof: f64,
     },
-    /// `scale sqrt(chi2 with dof degrees of freedom)`, such as an RMSE: per point over N points with noise sigma,
-    /// `scale = sigma / sqrt(N)` and `dof = 2 N - p`.
+    /// `scale sqrt(chi2 with dof degrees of freedom)`, such as an RMSE: per point over N points with noise
+    /// sigma, `scale = sigma / sqrt(N)` and `dof = 2 N - p`.
     Chi {
         /// Factor on the root.
         scale: f64,
@@ -41,9 +41,9 @@ pub enum Predicted {
 }
 
 impl Predicted {
-    /// The central interval that a correct draw misses with probability `false_alarm_rate`, half on each side. A simulated
-    /// interval has a rate of its own, see [`Predicted::effective_rate`]. Parameters outside their domain give NaN ends,
-    /// in which nothing lies.
+    /// The central interval that a correct draw misses with probability `false_alarm_rate`, half on each
+    /// side. A simulated interval has a rate of its own, see [`Predicted::effective_rate`]. Parameters
+    /// outside their domain give NaN ends, in which nothing lies.
     pub fn interval(&self, false_alarm_rate: f64) -> (f64, f64) {
         if let Predicted::Simulated { low, high, .. } = self {
             return (*low, *high);

@@ -148,7 +148,8 @@ impl Screen {
 }
 
 impl Work {
-    /// Counts, rate, time left and note, after `took`, with so many other pieces under way. The note comes last: a narrow line cuts it.
+    /// Counts, rate, time left and note, after `took`, with so many other pieces under way. The note comes
+    /// last: a narrow line cuts it.
     fn line(&self, took: Duration, others: usize) -> String {
         let (done, total) = (self.done.load(Relaxed), self.total.load(Relaxed));
         let pace = rate(done.saturating_sub(self.before.load(Relaxed)) as u64, took).map_or_else(
@@ -166,7 +167,8 @@ impl Work {
     }
 }
 
-/// Puts a line in the place of the last one. Spaces clear what was longer: no terminal needs to know an escape sequence.
+/// Puts a line in the place of the last one. Spaces clear what was longer: no terminal needs to know an
+/// escape sequence.
 fn put(line: &str) {
     let mut stderr = std::io::stderr().lock();
     // A failure would be that of the terminal, and there is nobody left to tell.

@@ -1,5 +1,6 @@
-//! Where do golden/, figures/ and out/ stand? In the nearest folder above that has golden/published.toml; elsewhere golden values and the
-//! book's text come from the program itself, and what is written goes to the current folder.
+//! Where do golden/, figures/ and out/ stand? In the nearest folder above that has golden/published.toml;
+//! elsewhere golden values and the book's text come from the program itself, and what is written goes to the
+//! current folder.
 
 use calibench::io::input::{MOST_TABLE_BYTES, read_regular};
 use std::io;
@@ -12,7 +13,8 @@ pub type Files = &'static [(&'static str, &'static [u8])];
 /// What the program carries with it.
 static CARRIED: OnceLock<Files> = OnceLock::new();
 
-/// Says what the program carries with it for the time when it runs outside the source tree. The first call counts.
+/// Says what the program carries with it for the time when it runs outside the source tree. The first call
+/// counts.
 pub fn carry(files: Files) {
     CARRIED.get_or_init(|| files);
 }
@@ -37,7 +39,8 @@ pub struct NotInProject {
 }
 
 impl Project {
-    /// The source tree around the current folder; without one, the current folder with what the program carries.
+    /// The source tree around the current folder; without one, the current folder with what the program
+    /// carries.
     ///
     /// # Errors
     /// There is no source tree, and the program carries nothing.

@@ -10,12 +10,14 @@ use std::collections::BTreeMap;
 pub struct Build {
     /// The commit; `None` if it was built outside of a repository of its own.
     pub commit: Option<Commit>,
-    /// Versions of the crates whose arithmetic stands in the path of a number; none if they are not known for certain.
+    /// Versions of the crates whose arithmetic stands in the path of a number; none if they are not known for
+    /// certain.
     pub crates: BTreeMap<String, String>,
 }
 
 impl Build {
-    /// What a build script found: hash or nothing, `true` or `false`, and `name version` of crates, separated by commas.
+    /// What a build script found: hash or nothing, `true` or `false`, and `name version` of crates, separated
+    /// by commas.
     pub fn read(hash: &str, changed: &str, crates: &str) -> Build {
         let commit = (!hash.is_empty()).then(|| Commit { hash: hash.to_string(), dirty: changed == "true" });
         let named = crates.split(',').filter_map(|text| text.split_once(' '));

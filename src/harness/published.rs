@@ -9,7 +9,8 @@ use std::sync::OnceLock;
 pub enum Rule {
     /// Ours must round to the printed digits.
     Exact,
-    /// One draw from a distribution: the book's value and ours must both lie inside the predicted distribution.
+    /// One draw from a distribution: the book's value and ours must both lie inside the predicted
+    /// distribution.
     Sampled,
     /// Ours must come within a tolerance whose origin the record states.
     Within,
@@ -26,7 +27,8 @@ impl Rule {
     }
 }
 
-/// What the verdict on a published number is worth: could it have come out otherwise, and on whose data does it rest?
+/// What the verdict on a published number is worth: could it have come out otherwise, and on whose data does
+/// it rest?
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
@@ -76,8 +78,8 @@ pub struct Entry {
     pub rule: Option<Rule>,
     /// What the verdict is worth.
     pub kind: Kind,
-    /// Why it is of that kind: from what it is derived, what stands in, what was chosen by it, or what is missing. Empty only
-    /// for an independent number.
+    /// Why it is of that kind: from what it is derived, what stands in, what was chosen by it, or what is
+    /// missing. Empty only for an independent number.
     #[serde(default)]
     pub because: String,
     /// What the number is.
@@ -195,7 +197,8 @@ pub fn entry(experiment: &str, number: &str) -> Result<&'static Entry, Published
     chapter()?.iter().find(|entry| entry.id == id).ok_or(PublishedError::Unknown(id))
 }
 
-/// The values of an experiment that nothing judges. None where `published.toml` is broken, which every reconciliation tells.
+/// The values of an experiment that nothing judges. None where `published.toml` is broken, which every
+/// reconciliation tells.
 pub fn not_judged(experiment: &str) -> impl Iterator<Item = &'static Entry> {
     let entries = chapter().unwrap_or_default().iter();
     entries.filter(move |e| e.kind == Kind::CannotBeJudged && e.experiment() == experiment)

@@ -58,7 +58,8 @@ impl Reconciliation {
         }
     }
 
-    /// The book's value is known to half a unit of its last digit: it is inside if any value that rounds to it is.
+    /// The book's value is known to half a unit of its last digit: it is inside if any value that rounds to
+    /// it is.
     pub(super) fn sampled(
         entry: &Entry,
         ours: f64,

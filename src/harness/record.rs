@@ -265,23 +265,27 @@ impl Record {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn with_claim() -> Record {
+impl Record {
+    /// A record that lacks nothing: what tests begin with.
+    pub(super) fn with_claim() -> Record {
         let mut record = Record::new("line-bending", 0);
         record.claim_that("c", "zero is small").at_most(0.0, 1.0).because("definition");
         record
     }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
 
     #[test]
     fn a_record_needs_a_claim_and_names_of_its_own() {
         assert_eq!(Record::new("e", 0).validate(), Err(RecordError::NoClaim("e".into())));
-        let mut record = with_claim();
+        let mut record = Record::with_claim();
         assert_eq!(record.validate(), Ok(()));
         record.exact("px").number("n", 1.0, "").number("n", 2.0, "");
         assert!(matches!(record.validate(), Err(RecordError::Duplicate { what: "numbers", .. })));
-        let mut record = with_claim();
+        let mut record = Record::with_claim();
         record.exact("").number("Not | a name", 1.0, "");
         assert!(matches!(record.validate(), Err(RecordError::Name(_))));
     }

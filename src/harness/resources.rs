@@ -8,7 +8,8 @@ pub fn peak_memory_mib() -> Option<f64> {
     Some(kib / 1024.0)
 }
 
-/// Processor time of all threads so far, s: user and system time, in hundredths of a second whatever the kernel's clock.
+/// Processor time of all threads so far, s: user and system time, in hundredths of a second whatever the
+/// kernel's clock.
 pub fn processor_seconds() -> Option<f64> {
     let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
     // The name, in parentheses, may hold spaces; after it, user time is field 12 and system time field 13.

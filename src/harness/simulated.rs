@@ -1,13 +1,14 @@
-//! How far may a draw lie from those of a simulation? An interval that assumes nothing but that all come alike.
+//! How far may a draw lie from those of a simulation? An interval that assumes nothing but that all come
+//! alike.
 
 use super::Predicted;
 
 impl Predicted {
     /// The interval from the `beyond`-th smallest to the `beyond`-th largest of `draws`.
     ///
-    /// One more independent draw is equally likely to take each of the `n + 1` places among the `n` draws, whatever their
-    /// distribution, so it lies outside with probability exactly `2 beyond / (n + 1)` (Wilks 1941). Fewer than
-    /// `2 beyond` draws, or a draw that is NaN, give NaN ends, in which nothing lies.
+    /// One more independent draw is equally likely to take each of the `n + 1` places among the `n` draws,
+    /// whatever their distribution, so it lies outside with probability exactly `2 beyond / (n + 1)` (Wilks
+    /// 1941). Fewer than `2 beyond` draws, or a draw that is NaN, give NaN ends, in which nothing lies.
     pub fn from_draws(draws: &[f64], beyond: usize, what: &str) -> Predicted {
         let n = draws.len();
         let false_alarm_rate = 2.0 * beyond as f64 / (n + 1) as f64;
@@ -31,7 +32,8 @@ mod tests {
 
     #[test]
     fn the_interval_is_left_as_often_as_stated() {
-        // Each of 4000 rounds draws 19 numbers and one more, which leaves the range of the 19 with probability 2/20.
+        // Each of 4000 rounds draws 19 numbers and one more, which leaves the range of the 19 with
+        // probability 2/20.
         let key = StreamKey { seed: 1, scenario: "from-draws", trial: 0, purpose: "noise" };
         let mut stream = Stream::open(key);
         let rounds = 4000;

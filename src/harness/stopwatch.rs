@@ -1,5 +1,5 @@
-//! How long did it take? By the system's clock, or by one that a test sets. A clock may stand still, run ahead and go back: what is told of time
-//! is wrong then, and nothing that is written depends on it.
+//! How long did it take? By the system's clock, or by one that a test sets. A clock may stand still, run
+//! ahead and go back: what is told of time is wrong then, and nothing that is written depends on it.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, LazyLock};

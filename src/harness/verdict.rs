@@ -1,4 +1,5 @@
-//! Did the experiment hold? Golden, claims and published values of one run, judged in one place for tests and command.
+//! Did the experiment hold? Golden, claims and published values of one run, judged in one place for tests and
+//! command.
 
 use super::experiment::{Context, Experiment, ExperimentError};
 use super::golden;
@@ -42,7 +43,8 @@ impl ByKind {
     }
 }
 
-/// Kinds that occur, such as `independent 7 of 7, derived 11 of 11, input 8 of 8`; empty where nothing is printed.
+/// Kinds that occur, such as `independent 7 of 7, derived 11 of 11, input 8 of 8`; empty where nothing is
+/// printed.
 impl fmt::Display for ByKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut before = "";
@@ -109,7 +111,8 @@ pub fn run(experiment: &Experiment, context: &Context) -> Run {
 }
 
 impl Verdict {
-    /// Judges a record. `snapshot` is the text of its golden file; a run with another seed or input is not compared.
+    /// Judges a record. `snapshot` is the text of its golden file; a run with another seed or input is not
+    /// compared.
     pub fn of(record: &Record, snapshot: Option<&str>, locked: bool) -> Verdict {
         let mut verdict = Verdict {
             experiment: record.experiment().to_string(),

@@ -48,7 +48,8 @@ impl Spec {
     /// The cells of the grid, the last factor varying fastest. `text` is the file, for errors that say where.
     ///
     /// # Errors
-    /// A level that does not fit the study, poses that cannot be, a precision of something that is not measured.
+    /// A level that does not fit the study, poses that cannot be, a precision of something that is not
+    /// measured.
     pub fn cells(&self, text: &str) -> Result<Vec<Cell>, SpecError> {
         let designs = designs(self, text)?;
         let mut cells = designs
@@ -144,7 +145,8 @@ impl Cell {
         }
     }
 
-    /// The Cramer-Rao covariance of the cell's scene; `None` where it is singular, and where each trial has poses of its own.
+    /// The Cramer-Rao covariance of the cell's scene; `None` where it is singular, and where each trial has
+    /// poses of its own.
     pub fn bound(&self) -> Option<Covariance> {
         cramer_rao(&self.scene.as_ref()?.truth, self.free, self.noise_px()).ok()
     }

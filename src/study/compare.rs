@@ -117,7 +117,8 @@ impl Pairs {
         }
     }
 
-    /// `rms_b / rms_a`: its logarithm is nearly normal with variance `var(b^2 / mean b^2 - a^2 / mean a^2) / (4 n)`, pair by pair.
+    /// `rms_b / rms_a`: its logarithm is nearly normal with variance `var(b^2 / mean b^2 - a^2 / mean a^2) /
+    /// (4 n)`, pair by pair.
     fn ratio(&self, false_alarm: f64) -> Option<Estimated> {
         let n = self.count as f64;
         let (a, b) = (self.a / n, self.b / n);
@@ -132,8 +133,8 @@ impl Pairs {
     }
 }
 
-/// Compares the runs in two folders. The intervals are widened so that all together raise a false alarm as rarely as one of the first
-/// run's own intervals (Bonferroni).
+/// Compares the runs in two folders. The intervals are widened so that all together raise a false alarm as
+/// rarely as one of the first run's own intervals (Bonferroni).
 pub fn compare(first: &Path, second: &Path) -> Result<Comparison, CompareError> {
     // Each is locked while it is read: the second would seem to be in use by another run.
     if let (Ok(a), Ok(b)) = (first.canonicalize(), second.canonicalize())
@@ -176,8 +177,9 @@ pub fn compare(first: &Path, second: &Path) -> Result<Comparison, CompareError> 
     Ok(conclude(&names, &shared, &pairs, &only, 1.0 - a.engine.spec.confidence))
 }
 
-/// Compares the levels of a factor within the run in a folder: each cell with that of the factor's first level and the same levels
-/// of the others, trial by trial. The first of a pair is the cell of the first level.
+/// Compares the levels of a factor within the run in a folder: each cell with that of the factor's first
+/// level and the same levels of the others, trial by trial. The first of a pair is the cell of the first
+/// level.
 pub fn compare_levels(path: &Path, factor: &str) -> Result<Comparison, CompareError> {
     let mut run = Reading::open(path)?;
     let spec = &run.engine.spec;
@@ -244,8 +246,8 @@ fn conclude(
     only: &[(u64, u64)],
     false_alarm: f64,
 ) -> Comparison {
-    let told = pairs.iter().filter(|p| p.count >= 4).count();
-    let each = each_of(told, false_alarm);
+    let judged = pairs.iter().filter(|p| p.count >= 4).count();
+    let each = each_of(judged, false_alarm);
     let mut effects = Vec::new();
     for (cell, sums) in pairs.chunks(shared.len().max(1)).enumerate() {
         for ((quantity, _, _), sum) in shared.iter().zip(sums) {

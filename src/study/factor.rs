@@ -1,4 +1,5 @@
-//! What varies, and how does a level change the study? A level takes the place of one field or of several together.
+//! What varies, and how does a level change the study? A level takes the place of one field or of several
+//! together.
 
 use super::spec_error::{SpecError, place};
 use serde::{Deserialize, Serialize};
@@ -13,7 +14,8 @@ pub struct Factor {
     /// Unit of the levels, empty for a pure number or a word.
     #[serde(default)]
     pub unit: String,
-    /// Path of the fields that a level sets, such as `["scene.poses.views"]`. With several, each level is a list of as many values.
+    /// Path of the fields that a level sets, such as `["scene.poses.views"]`. With several, each level is a
+    /// list of as many values.
     pub set: Vec<String>,
     /// The levels.
     pub levels: Vec<Spanned<Value>>,
@@ -87,8 +89,8 @@ impl Factor {
     }
 }
 
-/// Replaces or adds the value at a dotted path. Its parents must be there: a misspelt table is an error, and a misspelt field is found
-/// when the tree is read.
+/// Replaces or adds the value at a dotted path. Its parents must be there: a misspelt table is an error, and
+/// a misspelt field is found when the tree is read.
 fn put(tree: &mut Table, path: &str, value: &Value) -> Result<(), String> {
     let (parents, field) =
         path.rsplit_once('.').ok_or_else(|| format!("`{path}`: name a field of scene or estimator"))?;

@@ -1,4 +1,5 @@
-//! How does a reader see a study? Spread against its bound over the factors, and how trials ended where some failed.
+//! How does a reader see a study? Spread against its bound over the factors, and how trials ended where some
+//! failed.
 
 use super::engine::Engine;
 use super::moments::Estimated;

@@ -1,4 +1,5 @@
-//! Is this the code that began the study? Version, numeric crates, and the bits of the trials of a fixed study.
+//! Is this the code that began the study? Version, numeric crates, and the bits of the trials of a fixed
+//! study.
 
 use super::engine::Engine;
 use super::shard::Shard;
@@ -31,7 +32,8 @@ impl Fingerprint {
     }
 }
 
-/// Touches what a trial can meet: drawn poses, gross errors, a length, every parameter and every loss. The seed is arbitrary.
+/// Touches what a trial can meet: drawn poses, gross errors, a length, every parameter and every loss. The
+/// seed is arbitrary.
 const STUDY: &str = r#"
 name = "fingerprint"
 question = "Is this the code that began the study?"

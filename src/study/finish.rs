@@ -1,4 +1,5 @@
-//! What is written once every trial is done? Tables, figures, report, and the manifest that names them all by their hashes.
+//! What is written once every trial is done? Tables, figures, report, and the manifest that names them all by
+//! their hashes.
 
 use super::engine::Engine;
 use super::folder::{Folder, FolderError};

@@ -1,4 +1,5 @@
-//! Whose folder is this? One run's: begun once, used by one process at a time, continued only by the same study and code.
+//! Whose folder is this? One run's: begun once, used by one process at a time, continued only by the same
+//! study and code.
 
 use super::manifest::{Difference, Manifest};
 use super::shard::{Shard, ShardError};
@@ -13,7 +14,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The folder of one run: `spec.toml`, `manifest.json`, `trials.csv` and `checkpoint.json`, and the results once it is complete.
+/// The folder of one run: `spec.toml`, `manifest.json`, `trials.csv` and `checkpoint.json`, and the results
+/// once it is complete.
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
@@ -115,8 +117,8 @@ const TRIES: usize = 20;
 /// Pause between them: a second in all.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// Locks a file. A program that this one is starting at this moment holds all of its open files, and the locks of those that were just closed,
-/// until it has begun.
+/// Locks a file. A program that this one is starting at this moment holds all of its open files, and the
+/// locks of those that were just closed, until it has begun.
 fn patiently(file: &File) -> Result<(), fs::TryLockError> {
     for _ in 1..TRIES {
         match file.try_lock() {

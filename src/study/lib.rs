@@ -1,12 +1,13 @@
-//! What would ten thousand calibrations say? Monte Carlo studies described by data, resumable, sharded, with intervals.
+//! What would ten thousand calibrations say? Monte Carlo studies described by data, resumable, sharded, with
+//! intervals.
 //!
 //! ```text
 //! Spec (TOML) --cells--> grid of designs --Engine--> trials.csv (in order, the one source of truth)
 //!   --fold--> Tally a cell --summarise--> summary with intervals beside the Cramer-Rao bound --> figures, report
 //! ```
-//! Every number is a function of `trials.csv`: a resumed run replays it, a merge interleaves those of the shards, and both
-//! end with the same bytes as an undivided run. A trial draws from streams of its own, so neither the number of threads nor
-//! the split can move a bit of it.
+//! Every number is a function of `trials.csv`: a resumed run replays it, a merge interleaves those of the
+//! shards, and both end with the same bytes as an undivided run. A trial draws from streams of its own, so
+//! neither the number of threads nor the split can move a bit of it.
 
 mod accumulate;
 mod cells;

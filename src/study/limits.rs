@@ -1,22 +1,26 @@
-//! How large may a study be? Counted from its file before any work, so that what cannot end is refused and not begun.
+//! How large may a study be? Counted from its file before any work, so that what cannot end is refused and
+//! not begun.
 
 use super::spec_error::SpecError;
 
 /// Cells of a grid. Each keeps its scene and its sums; figures compare every cell with every other.
 pub const MOST_CELLS: u64 = 10_000;
-/// Trials of a study. At the rate of one core, some 20 000 a second, this is 1600 years: what is counted beyond is a slip.
+/// Trials of a study. At the rate of one core, some 20 000 a second, this is 1600 years: what is counted
+/// beyond is a slip.
 pub const MOST_TRIALS: u64 = 1_000_000_000_000_000;
 /// Trials of a batch, which are in memory together: some 500 bytes each, as numbers and as lines.
 pub const MOST_BATCH: u64 = 1_000_000;
 /// Points that one trial shows, views times marks: some 130 bytes each in every thread.
 pub const MOST_POINTS: u64 = 1_000_000;
-/// Points of the scenes that are placed before the first trial, over all cells; where every trial draws poses of its own, those of the
-/// draws that the prediction takes its mean over. Placing one takes about a microsecond.
+/// Points of the scenes that are placed before the first trial, over all cells; where every trial draws poses
+/// of its own, those of the draws that the prediction takes its mean over. Placing one takes about a
+/// microsecond.
 pub const MOST_PLACED: u64 = 100_000_000;
 /// Pixels along a side of an image.
 pub const MOST_SIDE: usize = calibench::io::MOST_SIDE_PX;
 
-/// Refuses a grid with too many cells, or cells with too many trials. `levels` are the numbers of levels of the factors.
+/// Refuses a grid with too many cells, or cells with too many trials. `levels` are the numbers of levels of
+/// the factors.
 pub(super) fn check_trials(
     levels: impl Iterator<Item = usize>,
     per_cell: u64,
@@ -36,8 +40,8 @@ pub(super) struct Points {
 }
 
 impl Points {
-    /// Refuses a cell whose trials show too many points, or one that brings all cells above what may be placed. `draws` is the number of
-    /// scenes drawn for it before the first trial.
+    /// Refuses a cell whose trials show too many points, or one that brings all cells above what may be
+    /// placed. `draws` is the number of scenes drawn for it before the first trial.
     pub(super) fn add(&mut self, marks: usize, views: usize, draws: u64) -> Result<(), SpecError> {
         let points = marks as u128 * views as u128;
         let advice = "give it fewer views or marks";

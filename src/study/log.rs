@@ -1,4 +1,5 @@
-//! How does a run survive an interruption? Trials are appended, made durable, and only then counted in a checkpoint.
+//! How does a run survive an interruption? Trials are appended, made durable, and only then counted in a
+//! checkpoint.
 
 use super::engine::{Engine, Interruption, Outcome, Pace};
 use super::folder::{Folder, FolderError, Located};
@@ -20,7 +21,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {
-    /// [`Manifest::identity`] of the run whose trials it counts; empty in files of versions that did not write it.
+    /// [`Manifest::identity`] of the run whose trials it counts; empty in files of versions that did not
+    /// write it.
     #[serde(default)]
     run: String,
     batches: u64,
@@ -44,7 +46,7 @@ impl Folder {
         &self,
         engine: &mut Engine,
         stop: &Interruption,
-        tell: impl FnMut(&Pace),
+        report: impl FnMut(&Pace),
     ) -> Result<Outcome, RunError> {
         if !self.has_log()? {
             let mut replay = self.trials(engine)?;
@@ -58,7 +60,7 @@ impl Folder {
             self.append(&mut log, tables::rows(trials).as_bytes(), batches)?;
             Ok(())
         };
-        engine.drive(stop, keep, tell)
+        engine.drive(stop, keep, report)
     }
 
     /// Puts the trials of a complete run into the file that its manifest names; SHA-256 of that.
@@ -100,7 +102,8 @@ impl Folder {
         Ok(())
     }
 
-    /// Whether the run's trials stand in its log; of a complete run whose trials were put elsewhere the log is gone.
+    /// Whether the run's trials stand in its log; of a complete run whose trials were put elsewhere the log
+    /// is gone.
     fn has_log(&self) -> Result<bool, FolderError> {
         let manifest = self.manifest()?;
         Ok(!manifest.complete || manifest.trials == TrialFile::Csv)
@@ -145,7 +148,8 @@ impl Folder {
         Ok((Box::new(lines), hash))
     }
 
-    /// The checkpoint, which must be of the run that the manifest describes: trials of another study, part or code are not taken over.
+    /// The checkpoint, which must be of the run that the manifest describes: trials of another study, part or
+    /// code are not taken over.
     pub(super) fn checkpoint(&self) -> Result<Checkpoint, FolderError> {
         let checkpoint: Checkpoint = serde_json::from_str(&self.read("checkpoint.json")?)
             .map_err(|e| self.damaged("checkpoint.json", e.to_string()))?;

@@ -82,7 +82,8 @@ impl Manifest {
         Manifest { trials, ..self }
     }
 
-    /// Whatever would make trials of `now` unfit to stand beside those of `self`. Commits may differ as long as the code behaves alike.
+    /// Whatever would make trials of `now` unfit to stand beside those of `self`. Commits may differ as long
+    /// as the code behaves alike.
     pub fn differences(&self, now: &Manifest) -> Vec<Difference> {
         let mut found = Vec::new();
         differ("spec", &self.spec, &now.spec, &mut found);

@@ -1,4 +1,5 @@
-//! How do parts become the whole? Their batches are interleaved in the order in which an undivided run does them.
+//! How do parts become the whole? Their batches are interleaved in the order in which an undivided run does
+//! them.
 
 use super::engine::Engine;
 use super::folder::{Folder, FolderError};
@@ -70,8 +71,9 @@ struct Part {
     shard: Shard,
 }
 
-/// Joins the runs in `parts` into a new folder `out`, which then holds what an undivided run would, byte for byte. Its trials stand in
-/// the kind of file of the first part, or in that asked for: the one part of an undivided run is put into another file so.
+/// Joins the runs in `parts` into a new folder `out`, which then holds what an undivided run would, byte for
+/// byte. Its trials stand in the kind of file of the first part, or in that asked for: the one part of an
+/// undivided run is put into another file so.
 pub fn merge(
     parts: &[PathBuf],
     out: &Path,
@@ -88,7 +90,8 @@ pub fn merge(
     let mut whole = Engine::new(&text, Shard::WHOLE).map_err(RunError::from)?;
     let build = Build { commit: commit(&parts), ..build.clone() };
     let manifest = Manifest::new(&whole.spec, Shard::WHOLE, &build).with_trials(trials);
-    // Bounds and statistics of the whole come from this code, its trials from that of the parts: the manifest names one.
+    // Bounds and statistics of the whole come from this code, its trials from that of the parts: the manifest
+    // names one.
     first.folder.check(&manifest)?;
     let shards: Vec<Shard> = parts.iter().map(|part| part.shard).collect();
     let mut readings = parts

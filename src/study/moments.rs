@@ -1,8 +1,10 @@
-//! What do many values say, in one pass and little memory? Power sums, and intervals that do not assume a normal distribution.
+//! What do many values say, in one pass and little memory? Power sums, and intervals that do not assume a
+//! normal distribution.
 
 use calibench::evaluate::distribution::normal_two_sided;
 
-/// Sums of powers about 0; meant for errors, whose mean is small against their spread, or for values of one order of size.
+/// Sums of powers about 0; meant for errors, whose mean is small against their spread, or for values of one
+/// order of size.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Moments {
     count: u64,
@@ -81,8 +83,9 @@ impl Moments {
         })
     }
 
-    /// The standard deviation with its interval: `ln s^2` is nearly normal with variance `(kappa - (n - 3)/(n - 1)) / n`, kappa the
-    /// kurtosis; for normal values `2 / (n - 1)` (Bonett 2006, without his small-sample constants).
+    /// The standard deviation with its interval: `ln s^2` is nearly normal with variance
+    /// `(kappa - (n - 3)/(n - 1)) / n`, kappa the kurtosis; for normal values `2 / (n - 1)` (Bonett 2006,
+    /// without his small-sample constants).
     pub fn sd_interval(&self, false_alarm: f64) -> Option<Estimated> {
         let (n, variance) = (self.count as f64, self.variance());
         if self.count < 4 || variance == 0.0 {
@@ -127,7 +130,8 @@ mod tests {
 
     #[test]
     fn intervals_cover_as_often_as_they_say() {
-        // Uniform values: sd 1/sqrt(12), mean 0, kurtosis 1.8, for which an interval that assumes normal values would be too wide.
+        // Uniform values: sd 1/sqrt(12), mean 0, kurtosis 1.8, for which an interval that assumes normal
+        // values would be too wide.
         let (repeats, draws, truth) = (2000, 300, (1.0f64 / 12.0).sqrt());
         let mut covered = [0usize; 3];
         for trial in 0..repeats {
@@ -139,8 +143,8 @@ mod tests {
             covered[1] += usize::from(moments.sd_interval(0.05).unwrap().contains(truth));
             covered[2] += usize::from(moments.rms_interval(0.05).unwrap().contains(truth));
         }
-        // Binomial sd sqrt(0.05 * 0.95 / 2000) = 0.0049; the approximations lose up to half a percent at 300 draws. Five sd and that:
-        // a false alarm in 1e6.
+        // Binomial sd sqrt(0.05 * 0.95 / 2000) = 0.0049; the approximations lose up to half a percent at 300
+        // draws. Five sd and that: a false alarm in 1e6.
         for count in covered {
             let share = count as f64 / repeats as f64;
             assert!((share - 0.95).abs() < 0.03, "{covered:?}");

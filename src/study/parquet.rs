@@ -1,7 +1,8 @@
-//! How do trials stand in a Parquet file? The columns of `trials.csv` with their types; a value that is not there is null.
+//! How do trials stand in a Parquet file? The columns of `trials.csv` with their types; a value that is not
+//! there is null.
 //!
-//! Nothing is compressed: errors are noise, which no codec shortens, and the other columns are counters and words, which the
-//! encodings of the format pack already.
+//! Nothing is compressed: errors are noise, which no codec shortens, and the other columns are counters and
+//! words, which the encodings of the format pack already.
 
 use super::engine::Engine;
 use super::folder::{FolderError, Located};
@@ -69,7 +70,8 @@ fn schema(columns: &[String]) -> ParquetResult<TypePtr> {
     Ok(Arc::new(Type::group_type_builder("trial").with_fields(fields).build()?))
 }
 
-/// Counters by their differences, outcomes by a dictionary; a dictionary of errors would hold nearly all of them.
+/// Counters by their differences, outcomes by a dictionary; a dictionary of errors would hold nearly all of
+/// them.
 fn properties() -> WriterProperties {
     let mut properties = WriterProperties::builder()
         .set_dictionary_enabled(false)

@@ -1,4 +1,5 @@
-//! What does a program without the feature `parquet` say of Parquet files? That it cannot read or write them, and what helps.
+//! What does a program without the feature `parquet` say of Parquet files? That it cannot read or write them,
+//! and what helps.
 
 use super::engine::Engine;
 use super::folder::FolderError;

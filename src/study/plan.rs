@@ -1,4 +1,5 @@
-//! How many views, how far tilted, how widely placed, for a wanted accuracy? Predicted from the bound, confirmed by trials.
+//! How many views, how far tilted, how widely placed, for a wanted accuracy? Predicted from the bound,
+//! confirmed by trials.
 
 use super::engine::{Pace, in_memory};
 use super::moments::Estimated;
@@ -38,7 +39,8 @@ pub struct Design {
     pub coverage: f64,
     /// Fewest views that suffice, and the predicted standard deviation with them.
     pub enough: Option<(usize, f64)>,
-    /// Where no number suffices: the predicted standard deviation with the most views, if there is one, or why there is none.
+    /// Where no number suffices: the predicted standard deviation with the most views, if there is one, or
+    /// why there is none.
     pub best: Result<Option<f64>, String>,
 }
 
@@ -76,7 +78,8 @@ pub enum PlanError {
 
 /// For every tilt and coverage the fewest views whose Cramer-Rao bound meets the goal.
 ///
-/// The views of a longer series contain those of a shorter one, so the bound falls with every view and halving finds the fewest.
+/// The views of a longer series contain those of a shorter one, so the bound falls with every view and
+/// halving finds the fewest.
 pub fn search(spec: &Spec, goal: &Goal, search: &Search) -> Result<Vec<Design>, PlanError> {
     if !(goal.sd > 0.0 && goal.sd.is_finite()) {
         return Err(PlanError::Wanted(goal.sd));
@@ -154,12 +157,12 @@ pub fn confirm(
     design: &Design,
     distance_mm: f64,
     trials: u64,
-    tell: impl FnMut(&Pace),
+    report: impl FnMut(&Pace),
 ) -> Result<Option<Confirmation>, PlanError> {
     let Some((views, _)) = design.enough else { return Ok(None) };
     let mut spec = with_poses(spec, views, design.tilt_deg, design.coverage, distance_mm);
     spec.trials = Trials { per_cell: trials, ..spec.trials };
-    let engine = in_memory(spec, "", tell)?;
+    let engine = in_memory(spec, "", report)?;
     let summary = summarise(&engine);
     let cell = &summary.cells[0];
     let statistic = cell.of(&goal.quantity);

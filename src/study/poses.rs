@@ -1,4 +1,5 @@
-//! Where is the target held? Generators of poses, from a list to random draws, all with the target inside the image.
+//! Where is the target held? Generators of poses, from a list to random draws, all with the target inside the
+//! image.
 
 use calibench::camera::Camera;
 use calibench::geometry::{Mat3, Pose, Vec2, Vec3, rotation};
@@ -13,14 +14,15 @@ use std::f64::consts::TAU;
 pub enum Poses {
     /// The chapter's four poses. (Braces, so that a field too many is an error.)
     Chapter {},
-    /// Views tilted alike about directions that follow the golden angle. The first views of a longer series are those of a shorter one.
+    /// Views tilted alike about directions that follow the golden angle. The first views of a longer series
+    /// are those of a shorter one.
     Spread {
         /// Number of views.
         views: usize,
         /// Angle between the target's normal and the optical axis.
         tilt_deg: f64,
-        /// How far the target's centre moves from the optical axis towards the place where the target touches the image's
-        /// border: 0 stays, 1 touches.
+        /// How far the target's centre moves from the optical axis towards the place where the target touches
+        /// the image's border: 0 stays, 1 touches.
         #[serde(default)]
         coverage: f64,
         /// Depth of the target's centre.
@@ -35,8 +37,9 @@ pub enum Poses {
     },
 }
 
-/// Views drawn at random: direction of the tilt uniform, its size uniform in `[tilt_min_deg, tilt_deg]`, roll uniform within
-/// `+-roll_deg`, direction and size of the shift uniform, distance uniform within `distance_mm (1 +- distance_spread)`.
+/// Views drawn at random: direction of the tilt uniform, its size uniform in `[tilt_min_deg, tilt_deg]`, roll
+/// uniform within `+-roll_deg`, direction and size of the shift uniform, distance uniform within `distance_mm
+/// (1 +- distance_spread)`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RandomPoses {
@@ -96,7 +99,8 @@ pub enum PosesError {
     },
 }
 
-/// The angle that divides the circle in the golden section: any number of multiples is spread evenly (Vogel 1979).
+/// The angle that divides the circle in the golden section: any number of multiples is spread evenly (Vogel
+/// 1979).
 const GOLDEN_TURN: f64 = 0.381_966_011_250_105_15;
 /// Fraction of sqrt(2), unrelated to the golden section, so that shift and tilt do not go together.
 const SILVER_TURN: f64 = 0.414_213_562_373_095_03;
@@ -167,7 +171,8 @@ impl Poses {
 }
 
 impl RandomPoses {
-    /// A fixed number of draws a view, whatever the ranges: cells that differ in a range meet the same directions.
+    /// A fixed number of draws a view, whatever the ranges: cells that differ in a range meet the same
+    /// directions.
     fn draw(&self, sight: &Sight<'_>, stream: &mut Stream) -> Pose {
         let [direction, size, roll, shift_direction, shift, depth] =
             std::array::from_fn(|_| stream.uniform());
@@ -185,8 +190,8 @@ impl PoseSpec {
     }
 }
 
-/// View `k` of a series: tilt and shift turn by unrelated steps; the shift's size follows van der Corput's sequence (1935), its root
-/// spreading the centres evenly over the area.
+/// View `k` of a series: tilt and shift turn by unrelated steps; the shift's size follows van der Corput's
+/// sequence (1935), its root spreading the centres evenly over the area.
 fn spread(k: usize, tilt_deg: f64, coverage: f64, distance: f64, sight: &Sight<'_>) -> Pose {
     let turns = k as f64;
     let rotation = tilted(TAU * GOLDEN_TURN * turns, tilt_deg.to_radians(), 0.0);

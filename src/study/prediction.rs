@@ -1,4 +1,5 @@
-//! What does theory expect of a cell before anything is drawn? The Cramer-Rao bound and the distributions that follow from it.
+//! What does theory expect of a cell before anything is drawn? The Cramer-Rao bound and the distributions
+//! that follow from it.
 
 use super::quantity::Quantity;
 use super::spec::Length;
@@ -8,7 +9,8 @@ use calibench::evaluate::{RmseDistribution, cramer_rao};
 use calibench::geometry::Vec2;
 use calibench::synth::Truth;
 
-/// Mean and standard deviation that theory expects, to first order in the noise and for Gaussian noise without gross errors.
+/// Mean and standard deviation that theory expects, to first order in the noise and for Gaussian noise
+/// without gross errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Expected {
     /// Mean; 0 for an error.
@@ -53,7 +55,8 @@ impl Prediction {
         Prediction(quantities.iter().map(one).collect())
     }
 
-    /// The mean over several sets of poses: means of means and of variances. A quantity that one set cannot predict has none.
+    /// The mean over several sets of poses: means of means and of variances. A quantity that one set cannot
+    /// predict has none.
     pub(super) fn mean_of(sets: &[Prediction]) -> Prediction {
         let count = sets.len() as f64;
         let quantities = sets.first().map_or(0, |s| s.0.len());
@@ -74,8 +77,8 @@ fn error(sd: f64) -> Option<Expected> {
     sd.is_finite().then_some(Expected { mean: 0.0, sd })
 }
 
-/// With sigma estimated from `d` degrees of freedom, `e^T P^-1 e / n` follows Fisher's F with `(n, d)`: mean `d / (d - 2)`, variance
-/// `2 d^2 (n + d - 2) / (n (d - 2)^2 (d - 4))`.
+/// With sigma estimated from `d` degrees of freedom, `e^T P^-1 e / n` follows Fisher's F with `(n, d)`: mean
+/// `d / (d - 2)`, variance `2 d^2 (n + d - 2) / (n (d - 2)^2 (d - 4))`.
 fn nees(n: f64, d: f64) -> Option<Expected> {
     if n == 0.0 || d <= 4.0 {
         return None;

@@ -65,7 +65,8 @@ impl Length {
         Some([see(centre - half)?, see(centre + half)?])
     }
 
-    /// Measured - true length, mm, of the segment seen at `pixels`; `None` where the camera's lens model has no ray.
+    /// Measured - true length, mm, of the segment seen at `pixels`; `None` where the camera's lens model has
+    /// no ray.
     pub(super) fn error_mm(&self, camera: &Camera, pixels: &[Vec2; 2]) -> Option<f64> {
         let [a, b] = [camera.normalised_ray(&pixels[0]).ok()?, camera.normalised_ray(&pixels[1]).ok()?];
         Some((b - a).norm() * self.centre_mm[2] - self.length_mm)

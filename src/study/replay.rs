@@ -1,4 +1,5 @@
-//! How are the trials of a run read back? Batch by batch, in the order in which the engine does them, from either kind of file.
+//! How are the trials of a run read back? Batch by batch, in the order in which the engine does them, from
+//! either kind of file.
 
 use super::engine::Engine;
 use super::folder::{FolderError, Located};

@@ -9,7 +9,8 @@ use calibench::io::significant;
 use calibench_harness::Figure;
 use std::fmt::Write;
 
-/// Wide tables and figures scroll within the page, which never does: figures keep a size at which they can be read.
+/// Wide tables and figures scroll within the page, which never does: figures keep a size at which they can be
+/// read.
 const STYLE: &str = "body{font:15px/1.5 sans-serif;max-width:1280px;margin:2em auto;padding:0 1em;color:#1a1a1a}\
 h1{font-size:1.6em;margin-bottom:.2em}h2{font-size:1.2em;margin-top:2em}\
 table{border-collapse:collapse;margin:.5em 0;font-variant-numeric:tabular-nums;font-size:13px}\
@@ -76,7 +77,7 @@ fn endings(summary: &Summary) -> String {
     let mut rows = String::new();
     for cell in &summary.cells {
         for (outcome, count, share) in &cell.outcomes {
-            row(&mut rows, &[escape(&cell.name), escape(outcome), count.to_string(), told(Some(*share))]);
+            row(&mut rows, &[escape(&cell.name), escape(outcome), count.to_string(), shown(Some(*share))]);
         }
     }
     table(&["cell", "outcome", "trials", "share"], &rows)
@@ -104,9 +105,9 @@ fn quantity_table(summary: &Summary, name: &str) -> String {
             false => format!("{}<br><small>\u{b1} {}</small>", significant(p.mean, 4), significant(p.sd, 4)),
         });
         let mut entries =
-            vec![escape(&cell.name), s.count.to_string(), told(s.mean), told(s.sd), told(s.rms)];
-        entries.extend(s.quantiles.iter().map(|(_, q)| told(*q)));
-        entries.extend([predicted, told(s.ratio)]);
+            vec![escape(&cell.name), s.count.to_string(), shown(s.mean), shown(s.sd), shown(s.rms)];
+        entries.extend(s.quantiles.iter().map(|(_, q)| shown(*q)));
+        entries.extend([predicted, shown(s.ratio)]);
         row(&mut rows, &entries);
     }
     let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
@@ -117,15 +118,15 @@ fn provenance(manifest: &Manifest, spec_text: &str) -> String {
     let mut text = String::from("<h2>How this was made</h2>\n<div class=\"wide\"><table>\n");
     let commit = manifest.commit.clone().unwrap_or_else(|| "unknown".to_string());
     let dirty = if manifest.dirty == Some(true) { " (with changes)" } else { "" };
-    let mut tell = |what: &str, is: &str| {
+    let mut line = |what: &str, is: &str| {
         row(&mut text, &[escape(what), format!("<span class=\"hash\">{}</span>", escape(is))]);
     };
-    tell("commit", &format!("{commit}{dirty}"));
-    tell("calibench", &manifest.code.calibench);
-    tell("solver behaviour", &manifest.code.behaviour);
-    manifest.code.crates.iter().for_each(|(name, version)| tell(name, version));
-    tell("specification", &manifest.spec_sha256);
-    manifest.files.iter().for_each(|(name, hash)| tell(name, hash));
+    line("commit", &format!("{commit}{dirty}"));
+    line("calibench", &manifest.code.calibench);
+    line("solver behaviour", &manifest.code.behaviour);
+    manifest.code.crates.iter().for_each(|(name, version)| line(name, version));
+    line("specification", &manifest.spec_sha256);
+    manifest.files.iter().for_each(|(name, hash)| line(name, hash));
     text.push_str("</table></div>\n<p>Command: <code>calibench study run spec.toml</code> with</p>\n");
     text + &format!("<pre>{}</pre>\n", escape(spec_text))
 }
@@ -150,7 +151,7 @@ fn dash() -> String {
 }
 
 /// The value, and its interval in a line of its own.
-fn told(estimated: Option<Estimated>) -> String {
+fn shown(estimated: Option<Estimated>) -> String {
     estimated.map_or_else(dash, |e| {
         let [value, low, high] = [e.value, e.low, e.high].map(|x| significant(x, 4));
         format!("{value}<br><small>[{low}, {high}]</small>")

@@ -24,7 +24,8 @@ impl Shard {
     /// Parts of a study. More folders than this are a slip.
     pub const MOST: u64 = 1_000_000;
 
-    /// The first of the deals that belongs to this part, from deal `deal` on; deals count batches, cell by cell within a round.
+    /// The first of the deals that belongs to this part, from deal `deal` on; deals count batches, cell by
+    /// cell within a round.
     pub(super) fn first_from(&self, deal: u64) -> u64 {
         deal + (self.index + self.count - deal % self.count) % self.count
     }
@@ -36,8 +37,8 @@ impl Shard {
 
     /// Whether batch `batch` of `cell` belongs to this part.
     ///
-    /// Batches are dealt out in turn, so that parts take about as long as each other. Where cells end at a precision, whole cells are
-    /// dealt out: the stop rule of a cell must see all of its trials.
+    /// Batches are dealt out in turn, so that parts take about as long as each other. Where cells end at a
+    /// precision, whole cells are dealt out: the stop rule of a cell must see all of its trials.
     pub(super) fn holds(&self, cell: usize, batch: u64, cells: usize, whole_cells: bool) -> bool {
         let deal = if whole_cells { cell as u64 } else { batch * cells as u64 + cell as u64 };
         deal % self.count == self.index

@@ -1,9 +1,11 @@
-//! Which value do a given share of many values stay below? Quantiles from counts, with bounded memory and a bounded error.
+//! Which value do a given share of many values stay below? Quantiles from counts, with bounded memory and a
+//! bounded error.
 
 use std::collections::BTreeMap;
 
-/// Counts of values in buckets of geometric width (Masson, Rim & Lee 2019, "DDSketch"). A quantile is known to a relative error of
-/// [`Sketch::RELATIVE_ERROR`]; counts are integers, so neither order nor grouping of the values matters.
+/// Counts of values in buckets of geometric width (Masson, Rim & Lee 2019, "DDSketch"). A quantile is known
+/// to a relative error of [`Sketch::RELATIVE_ERROR`]; counts are integers, so neither order nor grouping of
+/// the values matters.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Sketch {
     /// Bucket, negative values below positive ones.
@@ -85,7 +87,8 @@ mod tests {
         values.iter().rev().for_each(|v| sketch.add(*v));
         for (i, value) in values.iter().enumerate() {
             let found = sketch.of_rank(i as u64 + 1).unwrap();
-            // The logarithm may put a value at the edge of its bucket into the next: rounding on top of the error.
+            // The logarithm may put a value at the edge of its bucket into the next: rounding on top of the
+            // error.
             assert!(
                 (found - value).abs() <= 1.000_001 * Sketch::RELATIVE_ERROR * value.abs(),
                 "{value} {found}"

@@ -1,4 +1,5 @@
-//! What is a study? A scene, an estimator, factors to vary, and how many trials: a TOML file, every field named here.
+//! What is a study? A scene, an estimator, factors to vary, and how many trials: a TOML file, every field
+//! named here.
 
 use super::factor::Factor;
 use super::limits;
@@ -23,8 +24,8 @@ pub struct Spec {
     pub question: String,
     /// Seed of every stream.
     pub seed: u64,
-    /// Whether trial `t` meets the same noise in every cell: comparisons between cells are then paired, and cells are not
-    /// independent of each other.
+    /// Whether trial `t` meets the same noise in every cell: comparisons between cells are then paired, and
+    /// cells are not independent of each other.
     #[serde(default = "yes")]
     pub common_random_numbers: bool,
     /// Confidence of every interval.
@@ -79,8 +80,8 @@ pub struct TargetSpec {
     pub spacing_mm: f64,
 }
 
-/// A length parallel to the image plane at a known distance: its ends are seen at their true pixels, and the calibrated
-/// camera measures it on the plane `Z = centre_mm[2]`.
+/// A length parallel to the image plane at a known distance: its ends are seen at their true pixels, and the
+/// calibrated camera measures it on the plane `Z = centre_mm[2]`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Length {
@@ -100,7 +101,8 @@ pub struct Estimator {
     /// Free parameters.
     #[serde(default = "chapter_model", with = "names::free")]
     pub free: FreeParameters,
-    /// Values at which others are held; skew and distortion are held at 0 otherwise, the principal point at the image's centre.
+    /// Values at which others are held; skew and distortion are held at 0 otherwise, the principal point at
+    /// the image's centre.
     #[serde(default, with = "names::held", skip_serializing_if = "BTreeMap::is_empty")]
     pub hold: BTreeMap<Parameter, f64>,
     /// Loss of a residual.
@@ -124,8 +126,8 @@ pub enum LossChoice {
 pub struct Trials {
     /// Trials a cell; the most there may be where a precision is wanted.
     pub per_cell: u64,
-    /// Trials between two checkpoints. The stop rule is judged at the end of a batch only, so its outcome does not depend on
-    /// timing.
+    /// Trials between two checkpoints. The stop rule is judged at the end of a batch only, so its outcome
+    /// does not depend on timing.
     #[serde(default = "five_hundred")]
     pub batch: u64,
     /// Stop a cell early once this is known well enough.
@@ -135,8 +137,9 @@ pub struct Trials {
 
 /// A cell ends when the interval of the standard deviation of `quantity` is narrow enough.
 ///
-/// Looking repeatedly and stopping at the first success makes the interval cover slightly less often than it says; two
-/// batches at least, and a fixed batch size, keep the loss below a percent for batches of some hundred trials.
+/// Looking repeatedly and stopping at the first success makes the interval cover slightly less often than it
+/// says; two batches at least, and a fixed batch size, keep the loss below a percent for batches of some
+/// hundred trials.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Precision {

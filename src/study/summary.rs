@@ -123,8 +123,8 @@ fn statistic(
     }
 }
 
-/// A quantile, and the values at the ranks between which the true one lies: their number below it is binomial (normal approximation).
-/// `None` where a rank would lie outside the sample.
+/// A quantile, and the values at the ranks between which the true one lies: their number below it is binomial
+/// (normal approximation). `None` where a rank would lie outside the sample.
 fn quantile(sketch: &Sketch, origin: f64, share: f64, false_alarm: f64) -> Option<Estimated> {
     let n = sketch.total() as f64;
     let middle = n * share;

@@ -1,4 +1,5 @@
-//! What happens in one trial? Noise is drawn, a camera is calibrated without seeing the truth, and both are compared.
+//! What happens in one trial? Noise is drawn, a camera is calibrated without seeing the truth, and both are
+//! compared.
 
 use super::cells::Cell;
 use super::quantity::Quantity;
@@ -67,8 +68,9 @@ fn failed(cell: &Cell, quantities: &[Quantity], trial: u64, outcome: String) -> 
     Trial { cell: cell.index, trial, outcome, iterations: 0, values: vec![None; quantities.len()] }
 }
 
-/// Gaussian noise from one stream and gross errors from another, both drawn point by point whatever their size: cells that differ
-/// in noise, outliers or model meet the same draws, and a longer series of views begins with those of a shorter one.
+/// Gaussian noise from one stream and gross errors from another, both drawn point by point whatever their
+/// size: cells that differ in noise, outliers or model meet the same draws, and a longer series of views
+/// begins with those of a shorter one.
 fn observe(cell: &Cell, scene: &Scene, trial: u64) -> Vec<View> {
     let design = &cell.design.scene;
     let exact = scene.observe(design.noise_px, &mut cell.stream(trial, "noise"));

@@ -1,7 +1,8 @@
-//! In which file do the trials of a complete run stand? As CSV, the log of the run itself, or as Parquet, written from the log at the end.
+//! In which file do the trials of a complete run stand? As CSV, the log of the run itself, or as Parquet,
+//! written from the log at the end.
 //!
-//! A run writes CSV whatever is chosen: lines can be appended, and a torn one cut off, while a Parquet file is readable only once its
-//! footer stands at the end.
+//! A run writes CSV whatever is chosen: lines can be appended, and a torn one cut off, while a Parquet file
+//! is readable only once its footer stands at the end.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;

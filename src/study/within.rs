@@ -1,4 +1,5 @@
-//! How does an experiment use a study? Seeded by the experiment, told in its record, with its progress, and without files.
+//! How does an experiment use a study? Seeded by the experiment, told in its record, with its progress, and
+//! without files.
 
 use super::engine::{Engine, in_memory_seeing};
 use super::spec::Spec;

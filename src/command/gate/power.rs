@@ -16,7 +16,8 @@ const CLEAN_SEEDS: usize = 200;
 /// Seed of the first, unless --seed is more than 1: no other run of the project draws these.
 const FIRST_CLEAN_SEED: u64 = 20_001;
 
-/// Measures and writes the tables; a fault that is missed, or a correct solver that is failed for certain, deviates.
+/// Measures and writes the tables; a fault that is missed, or a correct solver that is failed for certain,
+/// deviates.
 pub(super) fn measure(
     arguments: &Arguments,
     folder: &Path,

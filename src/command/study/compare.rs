@@ -1,4 +1,5 @@
-//! `calibench study compare A B`: which run is closer to the truth? And `compare A --factor NAME`: which level?
+//! `calibench study compare A B`: which run is closer to the truth? And `compare A --factor NAME`: which
+//! level?
 
 use super::Failure;
 use crate::{Exit, print};
@@ -36,11 +37,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
             (compare_levels(&arguments.first, factor)?, ["first level", "this"])
         }
     };
-    print(&told(&comparison, names));
+    print(&comparison_text(&comparison, names));
     Ok(Exit::Held)
 }
 
-fn told(comparison: &Comparison, [first, second]: [&str; 2]) -> String {
+fn comparison_text(comparison: &Comparison, [first, second]: [&str; 2]) -> String {
     let mut table = Table::new();
     table.load_style(presets::NOTHING);
     let heads = [format!("RMS {first}"), format!("RMS {second}"), format!("{second} / {first}")];

@@ -67,7 +67,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
         distance_mm: arguments.distance,
     };
     let designs = search(&spec, &arguments.want, &range)?;
-    print(&told(&designs, arguments));
+    print(&designs_text(&designs, arguments));
     let Some(chosen) = choose(&designs) else {
         print("No design suffices: allow more views or tilt, reduce the noise, or hold parameters.\n");
         return Ok(Exit::Deviates);
@@ -87,7 +87,7 @@ fn length(arguments: &Arguments) -> Result<Option<Length>, Failure> {
     }
 }
 
-fn told(designs: &[Design], arguments: &Arguments) -> String {
+fn designs_text(designs: &[Design], arguments: &Arguments) -> String {
     let mut table = Table::new();
     table.load_style(presets::NOTHING);
     table.set_header(["tilt (deg)", "coverage", "views", "predicted sd"]);
@@ -105,10 +105,10 @@ fn told(designs: &[Design], arguments: &Arguments) -> String {
 
 fn judge(spec: &Spec, chosen: &Design, arguments: &Arguments) -> Result<Exit, Failure> {
     let progress = ProgressDisplay::stderr().start("confirming", arguments.confirm as usize);
-    let mut told = 0;
+    let mut shown = 0;
     let confirmed = confirm(spec, &arguments.want, chosen, arguments.distance, arguments.confirm, |pace| {
-        progress.advance((pace.trials - told) as usize);
-        told = pace.trials;
+        progress.advance((pace.trials - shown) as usize);
+        shown = pace.trials;
     })?;
     drop(progress);
     let views = chosen.enough.map_or(0, |e| e.0);

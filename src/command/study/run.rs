@@ -72,7 +72,7 @@ pub(super) fn resume(arguments: &ResumeArguments, build: &Build) -> Result<Exit,
 pub(super) fn merge_parts(arguments: &MergeArguments, build: &Build) -> Result<Exit, Failure> {
     let (folder, engine) = merge(&arguments.parts, &arguments.out, arguments.trials, build)?;
     let summary = finish(&folder, &engine)?;
-    tell(&folder, &engine, &summary);
+    print_summary(&folder, &engine, &summary);
     Ok(Exit::Held)
 }
 
@@ -86,7 +86,8 @@ fn default_folder(engine: &Engine) -> PathBuf {
     out.join("studies").join(format!("{}{part}", engine.spec.name))
 }
 
-/// Set by Ctrl-C and by a request to terminate; a second one ends the process at once, which loses a batch and no more.
+/// Set by Ctrl-C and by a request to terminate; a second one ends the process at once, which loses a batch
+/// and no more.
 fn interruption() -> Arc<Interruption> {
     let stop = Arc::new(AtomicBool::new(false));
     let seen = stop.clone();
@@ -105,15 +106,15 @@ fn interruption() -> Arc<Interruption> {
 fn drive(folder: &Folder, mut engine: Engine) -> Result<Exit, Failure> {
     let stop = interruption();
     let progress = ProgressDisplay::stderr().start(&engine.spec.name, engine.most_trials() as usize);
-    let (watch, mut told) = (Stopwatch::start(), None);
+    let (watch, mut shown) = (Stopwatch::start(), None);
     let outcome = folder.run(&mut engine, &stop, |pace| {
-        if told.is_none() {
+        if shown.is_none() {
             progress.already(pace.before as usize);
         }
         progress.expect(pace.expected as usize);
         progress.note(&pace.worst.as_ref().map_or_else(String::new, worst));
-        progress.advance((pace.trials - told.unwrap_or(0)) as usize);
-        told = Some(pace.trials);
+        progress.advance((pace.trials - shown.unwrap_or(0)) as usize);
+        shown = Some(pace.trials);
     })?;
     drop(progress);
     let took = watch.elapsed();
@@ -126,8 +127,8 @@ fn drive(folder: &Folder, mut engine: Engine) -> Result<Exit, Failure> {
         return Ok(Exit::Incomplete);
     }
     let summary = finish(folder, &engine)?;
-    tell(folder, &engine, &summary);
-    if let Some(trials) = told {
+    print_summary(folder, &engine, &summary);
+    if let Some(trials) = shown {
         let rate = rate(trials, took).map_or_else(String::new, |rate| format!(": {rate:.0} a second"));
         let (seconds, cores) = (took.as_secs_f64(), rayon::current_num_threads());
         print(&format!("{trials} trials in {seconds:.1} s{rate} on {cores} thread(s)\n"));
@@ -147,7 +148,7 @@ fn worst(worst: &Worst) -> String {
 }
 
 /// A few lines for the terminal; everything stands in the report.
-fn tell(folder: &Folder, engine: &Engine, summary: &Summary) {
+fn print_summary(folder: &Folder, engine: &Engine, summary: &Summary) {
     for cell in &summary.cells {
         let failed: Vec<String> =
             cell.outcomes.iter().filter(|o| o.0 != "converged").map(|o| format!("{} {}", o.1, o.0)).collect();

@@ -41,7 +41,8 @@ impl Axis {
         Axis { label: label.into(), scale: Scale::Linear, fixed: None, reversed: false }
     }
 
-    /// The span that shows all `values` with a margin, or the fixed range. Values that cannot be shown do not count.
+    /// The span that shows all `values` with a margin, or the fixed range. Values that cannot be shown do not
+    /// count.
     pub(super) fn span(&self, values: impl Iterator<Item = f64>) -> Span {
         let span = |low, high| Span { scale: self.scale, low, high, reversed: self.reversed };
         if let Some((low, high)) = self.fixed {

@@ -1,8 +1,8 @@
 //! How are many values shown? Counted in bins of equal width, as a density.
 
-/// Bars `(left, right, height)` of `bins` bins between `low` and `high`, for [`super::Plot::histogram`]. The height is the
-/// share of all values over the bin's width, so that a predicted density lies on the bars; values outside are in no bar
-/// but count as values.
+/// Bars `(left, right, height)` of `bins` bins between `low` and `high`, for [`super::Plot::histogram`]. The
+/// height is the share of all values over the bin's width, so that a predicted density lies on the bars;
+/// values outside are in no bar but count as values.
 pub fn density(values: &[f64], (low, high): (f64, f64), bins: usize) -> Vec<(f64, f64, f64)> {
     let width = (high - low) / bins as f64;
     let mut counts = vec![0usize; bins];

@@ -1,7 +1,7 @@
 //! How does a stroke become SVG? plotters' backend, on a canvas ten times finer than the figure.
 //!
-//! plotters draws on whole pixels, which kinks smooth curves. Everything is drawn ten times larger, and the view box
-//! scales it back.
+//! plotters draws on whole pixels, which kinks smooth curves. Everything is drawn ten times larger, and the
+//! view box scales it back.
 
 use super::colour::Rgb;
 use plotters::backend::{DrawingBackend, SVGBackend};
@@ -15,7 +15,8 @@ const FINE: f64 = 10.0;
 /// plotters divides a font's size by this on its way to SVG; undone here, so that sizes are CSS pixels.
 const FONT_SCALE: f64 = 1.24;
 
-/// Families a viewer tries in turn; the first is the one whose measures are embedded here, and Verdana shares its widths.
+/// Families a viewer tries in turn; the first is the one whose measures are embedded here, and Verdana shares
+/// its widths.
 const FAMILY: &str = "DejaVu Sans, Verdana, Geneva, sans-serif";
 
 /// A point of the figure, px, y down.

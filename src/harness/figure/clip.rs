@@ -64,7 +64,8 @@ impl Frame {
     }
 }
 
-/// Cuts a line into the strokes of a dash pattern (stroke, gap, stroke, gap, ... px); an empty pattern leaves it whole.
+/// Cuts a line into the strokes of a dash pattern (stroke, gap, stroke, gap, ... px); an empty pattern leaves
+/// it whole.
 pub(super) fn dashes(line: &[Point], pattern: &[f64]) -> Vec<Vec<Point>> {
     if pattern.is_empty() || line.len() < 2 {
         return vec![line.to_vec()];

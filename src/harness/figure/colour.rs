@@ -3,8 +3,8 @@
 /// An opaque colour, red, green and blue.
 pub type Rgb = (u8, u8, u8);
 
-/// Okabe & Ito (2008), chosen to stay apart for readers with any of the common colour deficiencies. Their yellow is left
-/// out: it does not show as a line on white.
+/// Okabe & Ito (2008), chosen to stay apart for readers with any of the common colour deficiencies. Their
+/// yellow is left out: it does not show as a line on white.
 const SERIES: [Rgb; 7] =
     [(0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (86, 180, 233), (230, 159, 0), (0, 0, 0)];
 
@@ -123,7 +123,8 @@ impl Look {
     }
 }
 
-/// Viridis (Smith & van der Walt 2015) at nine even steps; its lightness grows evenly, so it survives greyscale.
+/// Viridis (Smith & van der Walt 2015) at nine even steps; its lightness grows evenly, so it survives
+/// greyscale.
 const VIRIDIS: [Rgb; 9] = [
     (68, 1, 84),
     (71, 44, 122),

@@ -186,8 +186,8 @@ impl Plot {
         self.with(Layer::Arrows { label: label.into(), arrows: arrows.to_vec(), look })
     }
 
-    /// The curve `(x - centre)' covariance^-1 (x - centre) = scale^2`. With `scale^2 = -2 ln(1 - p)` it holds a normal
-    /// draw with probability `p`: 2.4477 for 95 %. A matrix that is no covariance draws nothing.
+    /// The curve `(x - centre)' covariance^-1 (x - centre) = scale^2`. With `scale^2 = -2 ln(1 - p)` it holds
+    /// a normal draw with probability `p`: 2.4477 for 95 %. A matrix that is no covariance draws nothing.
     pub fn ellipse(
         mut self,
         label: impl Into<String>,

@@ -1,5 +1,5 @@
-//! Which lines of a source text are code? All but comments, blank lines and the tests below them. The build script compiles this file as
-//! well: it uses nothing but the standard library.
+//! Which lines of a source text are code? All but comments, blank lines and the tests below them. The build
+//! script compiles this file as well: it uses nothing but the standard library.
 
 use std::fs;
 use std::io;
@@ -15,8 +15,8 @@ pub fn lines(source: &str) -> String {
         .fold(String::new(), |text, line| text + line + "\n")
 }
 
-/// The code lines of these files of `root`, and of every `.rs` file but `tests.rs` in these folders and below, in the order of their paths,
-/// each file under its path.
+/// The code lines of these files of `root`, and of every `.rs` file but `tests.rs` in these folders and
+/// below, in the order of their paths, each file under its path.
 ///
 /// # Errors
 /// A folder or file that cannot be read.

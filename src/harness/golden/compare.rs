@@ -93,8 +93,8 @@ fn compare_number(comparison: &mut Comparison, name: &str, golden: &[&str], ours
     }
 }
 
-/// With the same bits in every number, the data behind a file may not have changed; when numbers moved inside their bands,
-/// the files must have moved with them.
+/// With the same bits in every number, the data behind a file may not have changed; when numbers moved inside
+/// their bands, the files must have moved with them.
 fn compare_file(
     comparison: &mut Comparison,
     (kind, name): (&str, &str),

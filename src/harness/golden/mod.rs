@@ -1,4 +1,5 @@
-//! Is the result unchanged? A snapshot in plain text for each experiment, compared number by number within stored bands.
+//! Is the result unchanged? A snapshot in plain text for each experiment, compared number by number within
+//! stored bands.
 
 mod compare;
 mod snapshot;

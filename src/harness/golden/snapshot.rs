@@ -1,7 +1,7 @@
 //! What is locked of a record? One line for each number, claim, published value, table and figure.
 //!
-//! Fields are separated by ` | `. Numbers stand with as many digits as bring the same bits back. Left out, because they do
-//! not belong to the result: time, host, paths, crate versions, and descriptions.
+//! Fields are separated by ` | `. Numbers stand with as many digits as bring the same bits back. Left out,
+//! because they do not belong to the result: time, host, paths, crate versions, and descriptions.
 
 use crate::{Claim, Expectation, Number, Reconciliation, Record};
 use calibench::io::hash::sha256_hex;
@@ -53,7 +53,8 @@ fn number_line(number: &Number) -> String {
     line(&["number", id, &format!("{value:?}"), unit_text(unit), &band.width(), band.reason()])
 }
 
-/// The interval stands with six digits: enough to see a change of claim, and the comparison forgives the last ones.
+/// The interval stands with six digits: enough to see a change of claim, and the comparison forgives the last
+/// ones.
 fn claim_line(claim: &Claim) -> String {
     let rate =
         claim.false_alarm_rate.map_or("nothing drawn".to_string(), |r| format!("false-alarm rate {r:?}"));
