@@ -59,7 +59,8 @@ fn tied_focal_lengths_are_the_free_ones_projected_by_their_covariance() {
         let pc = p * &c;
         let moved = &x - &pc * (c.dot(&x) / c.dot(&pc));
         let left: DMatrix<f64> = p - &pc * pc.transpose() / c.dot(&pc);
-        let unit = (tied.sigma_px / free.sigma_px).powi(2);
+        let noise = tied.sigma_px / free.sigma_px;
+        let unit = noise * noise;
         for (i, parameter) in free.free.iter().enumerate() {
             let sd = tied.standard_deviation(parameter).unwrap();
             let off = (tied.camera.get(parameter) - moved[i]).abs() / sd;

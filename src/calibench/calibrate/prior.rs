@@ -126,10 +126,12 @@ pub(super) fn best_minimum(
 ) -> Result<(Judged, f64), CalibrationError> {
     let with = |variance: f64| Problem { priors: Priors { variance, ..problem.priors }, ..*problem };
     let mut variance = first_variance(problem, evidence);
-    let mut searches = 0;
+    let (mut searches, mut iterations) = (0, 0);
     loop {
-        let judged = search::best_minimum(&with(variance), starts, evidence)?;
+        let mut judged = search::best_minimum(&with(variance), starts, evidence)?;
         searches += 1;
+        iterations += judged.minimum.iterations;
+        judged.minimum.iterations = iterations;
         let settled = settle(problem, &judged.minimum, variance);
         if is_settled(settled, variance) || searches == MOST_SEARCHES {
             return Ok((judged, variance));

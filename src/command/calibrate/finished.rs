@@ -77,12 +77,11 @@ pub(super) fn summary(finished: &Finished) -> String {
 
 /// What was tied and what was known, a line each.
 fn beforehand(calibration: &Calibration) -> String {
-    let tie =
-        calibration.covariance.fy_per_fx.map(|ratio| format!("tied: fy = {} fx\n", significant(ratio, 10)));
-    let known = calibration.priors.iter().map(|prior| {
-        let (mean, sd) = (significant(prior.mean, 10), significant(prior.standard_deviation, 3));
-        format!("known beforehand: {} = {mean} +- {sd}\n", prior.parameter)
-    });
+    let tie = calibration.covariance.fy_per_fx.map(|ratio| format!("tied: fy = {ratio} fx\n"));
+    let known = calibration
+        .priors
+        .iter()
+        .map(|p| format!("known beforehand: {} = {} +- {}\n", p.parameter, p.mean, p.standard_deviation));
     tie.into_iter().chain(known).collect()
 }
 
