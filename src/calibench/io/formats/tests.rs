@@ -213,6 +213,7 @@ fn several_cameras_need_a_name_and_an_ending_that_fits_several_formats_is_none()
         read(file, text, Some("9"), &Wishes::default()).unwrap_err().to_string().contains("no camera `9`")
     );
     assert_eq!(format_to_write("a.cameramodel").unwrap().name, "mrcal");
+    assert_eq!(format_to_write("a.JSON").unwrap().name, "calibench");
     assert!(
         format_to_write("a.yaml").unwrap_err().to_string().contains("--to, one of ros, kalibr, opencv-yaml")
     );
