@@ -26,7 +26,7 @@ pub(super) const FORMAT: Format = Format {
 /// Most cameras in a file: each is kept until one is chosen.
 const MOST_CAMERAS: usize = 1_000_000;
 
-fn lines<'a>(text: &'a str) -> impl Iterator<Item = (usize, &'a str)> {
+fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let mut offset = 0;
     let with_offset = text.split_inclusive('\n').map(move |line| {
         let start = offset;

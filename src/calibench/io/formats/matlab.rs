@@ -15,7 +15,8 @@ use crate::camera::{BrownConrady, Camera};
 pub(super) const FORMAT: Format = Format {
     name: "matlab",
     of: "MATLAB",
-    endings: &["json"],
+    // `.json` is this library's own: this one must be named.
+    endings: &[],
     first_pixel: 1.0,
     coefficients: "k1 k2 k3, then p1 p2",
     room: Room { skew: true, covariance: false, pose: false, name: false, size: Size::Kept },

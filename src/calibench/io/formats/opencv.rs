@@ -41,7 +41,8 @@ pub(super) const XML: Format = Format {
 pub(super) const JSON: Format = Format {
     name: "opencv-json",
     of: "OpenCV",
-    endings: &["json"],
+    // `.json` is this library's own: this one must be named.
+    endings: &[],
     first_pixel: 0.0,
     coefficients: "k1 k2 p1 p2 k3",
     room: ROOM,

@@ -12,7 +12,7 @@ const CAMERA: Camera = Camera {
     cy: 236.7320508075689,
     skew: 0.0,
     distortion: BrownConrady {
-        k1: -0.2236067977499790,
+        k1: -0.223606797749979,
         k2: 0.0648074069840786,
         p1: 0.0013038404810405,
         p2: -0.0009486832980505,
@@ -213,6 +213,7 @@ fn several_cameras_need_a_name_and_an_ending_that_fits_several_formats_is_none()
         read(file, text, Some("9"), &Wishes::default()).unwrap_err().to_string().contains("no camera `9`")
     );
     assert_eq!(format_to_write("a.cameramodel").unwrap().name, "mrcal");
+    assert_eq!(format_to_write("a.JSON").unwrap().name, "calibench");
     assert!(
         format_to_write("a.yaml").unwrap_err().to_string().contains("--to, one of ros, kalibr, opencv-yaml")
     );
