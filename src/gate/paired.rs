@@ -159,7 +159,10 @@ fn stated<'a>(
     scenario: &'a Scenario,
     both: &'a [(&Trial, &Trial)],
 ) -> impl Iterator<Item = (String, f64, f64)> + 'a {
-    let variance = |trial: &Trial, i: usize| Some(trial.standard_deviations.as_ref()?.get(i)?.powi(2));
+    let variance = |trial: &Trial, i: usize| {
+        let sd = trial.standard_deviations.as_ref()?.get(i)?;
+        Some(sd * sd)
+    };
     let along = |trial: &Trial, i: usize| trial.principal_variances.as_ref()?.get(i).copied();
     let compared = move |name: String, of: &dyn Fn(&Trial) -> Option<f64>| {
         let logarithms = both.iter().filter_map(|(n, o)| Some((libm::log(of(n)?), libm::log(of(o)?))));

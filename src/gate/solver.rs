@@ -6,6 +6,7 @@ use calibench::board::{View, ViewError};
 use calibench::calibrate::{Calibration, Settings, Termination, Warning, calibrate};
 use calibench::camera::Parameter;
 use calibench::geometry::{Pose, Vec2};
+use calibench::io::message;
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -104,8 +105,8 @@ pub(super) fn solve(
     problem: &Problem,
     adjust: impl FnOnce(Settings) -> Settings,
 ) -> Result<Calibration, String> {
-    let views = views(problem).map_err(|e| e.to_string())?;
-    calibrate(&views, &adjust(settings(problem))).map_err(|e| e.to_string())
+    let views = views(problem).map_err(|e| message(&e))?;
+    calibrate(&views, &adjust(settings(problem))).map_err(|e| message(&e))
 }
 
 /// The problem's correspondences as views.
