@@ -491,3 +491,70 @@ fn a_full_disk_is_not_wrong_usage_and_its_file_is_named_once() {
         assert_eq!(said.matches("disk/").count(), 1, "the path stands once: {said}");
     }
 }
+
+#[test]
+fn a_device_or_pipe_in_the_place_of_a_report_is_left_as_it_is() {
+    let folder = folder("no-file");
+    assert!(Command::new("mkfifo").arg(folder.join("pipe")).status().expect("mkfifo runs").success());
+    for place in ["/dev/null", "/dev/full", "pipe"] {
+        let output = within(PATIENCE, &folder, &["gate", "--samples", "1", "--json", place]);
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(3), "{place}: {said}");
+        assert!(said.contains("no file: name another"), "{place}: {said}");
+        assert!(!folder.join(place).metadata().expect("it is there").is_file(), "{place}");
+    }
+}
+
+#[test]
+fn a_run_never_writes_through_a_link() {
+    let folder = folder("links");
+    fs::write(folder.join("study.toml"), fixed_poses()).expect("written");
+    let run = limited(&folder, &["study", "run", "study.toml", "--out", "run"]);
+    assert_eq!(run.status.code(), Some(0), "{}", text(&run.stderr));
+    fs::write(folder.join("mine"), "do not touch").expect("written");
+    for name in ["trials.csv", "checkpoint.json"] {
+        fs::remove_file(folder.join("run").join(name)).expect("removed");
+    }
+    std::os::unix::fs::symlink("../mine", folder.join("run/trials.csv")).expect("linked");
+    refused(&folder, &["study", "resume", "run"], &["trials.csv is a link"]);
+    assert_eq!(fs::read(folder.join("mine")).expect("read"), b"do not touch");
+}
+
+#[test]
+fn noise_beyond_numbers_is_refused_before_the_first_trial() {
+    let folder = folder("noise");
+    let study = fixed_poses().replace("levels = [0.1, 0.3]", "levels = [0.1, 1e308]");
+    assert!(study.contains("1e308"));
+    fs::write(folder.join("study.toml"), study).expect("written");
+    refused(&folder, &["study", "run", "study.toml", "--out", "run"], &["noise_px", "below 1e6"]);
+    assert!(!folder.join("run").exists());
+}
+
+#[test]
+fn a_camera_is_not_overwritten_by_that_of_the_output() {
+    let folder = folder("own-camera");
+    fs::write(
+        folder.join("camera-8x8.json"),
+        r#"{"camera": {"fx": 9, "fy": 9, "cx": 4, "cy": 4, "k1": -0.1}}"#,
+    )
+    .expect("written");
+    let arguments = ["undistort", "--camera", "camera-8x8.json", "--out", ".", "photo.png"];
+    refused(&folder, &arguments, &["camera-8x8.json", "choose another folder"]);
+}
+
+#[test]
+fn options_of_the_gate_that_would_be_ignored_are_refused() {
+    let folder = folder("ignored-options");
+    for arguments in [
+        &["gate", "--certified", "--json", "report.json"][..],
+        &["gate", "--certified", "--samples", "3"],
+        &["gate", "--samples", "2", "--size", "thorough"],
+        &["gate", "--timeout", "nan"],
+        &["gate", "--jobs", "0"],
+        &["gate", "--certified", "--least-digits", "nan"],
+        &["gate", "--schema", "a", "--export", "b"],
+        &["gate", "--export", "b", "--json", "report.json"],
+    ] {
+        refused(&folder, arguments, &[]);
+    }
+}

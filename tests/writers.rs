@@ -99,6 +99,7 @@ fn fill(disk: &Path, whole: &Tree) {
         ("text/lines.md", "# Lines\n\n{{figure line-bending.grids}}\n"),
         ("references.toml", "reference = []\n"),
         ("contradictions.toml", "contradiction = []\n"),
+        ("items.toml", "item = []\n"),
     ] {
         fs::write(disk.join("book").join(name), text).expect("written");
     }

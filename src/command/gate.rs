@@ -45,7 +45,7 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, default_value_t = Size::Quick)]
     size: Size,
     /// Samples a scenario, in place of --size
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", conflicts_with = "size")]
     samples: Option<usize>,
     /// Seed of the noise
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -72,7 +72,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "REF", conflicts_with_all = ["export", "judge", "power"])]
     against: Option<String>,
     /// Writes the problems to a folder, truth kept apart, for programs that cannot be driven by a pipe
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["solver", "json", "junit", "html", "accept"])]
     export: Option<PathBuf>,
     /// Judges as ever, and writes the problems and the solver's answers to a folder
     #[arg(long, value_name = "DIR", conflicts_with_all = ["export", "against"])]
@@ -88,11 +88,14 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DIR", conflicts_with_all = ["solver", "judge", "export", "record", "planted"])]
     power: Option<PathBuf>,
     /// Prints the tables in a folder written by --power as Markdown
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", exclusive = true)]
     power_table: Option<PathBuf>,
     /// Counts the digits that the solver shares with the certified values of reference/ [default solver here:
     /// this library's, polished to the last digits]
-    #[arg(long, conflicts_with_all = ["export", "judge", "power", "planted", "record", "against"])]
+    #[arg(long, conflicts_with_all = [
+        "export", "judge", "power", "planted", "record", "against", "json", "junit", "html", "seed", "samples", "size", "accept", "median_time",
+        "false_alarms",
+    ])]
     certified: bool,
     /// The only certified problem to put
     #[arg(long, value_name = "NAME", requires = "certified")]
@@ -105,10 +108,10 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE", requires = "certified", conflicts_with = "solver")]
     digits: Option<PathBuf>,
     /// Prints a table written by --digits as Markdown
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", exclusive = true)]
     digits_table: Option<PathBuf>,
     /// Writes the JSON schemas of the protocol to a folder
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", exclusive = true)]
     schema: Option<PathBuf>,
 }
 
@@ -169,6 +172,12 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
     }
     if samples == 0 || !(arguments.false_alarms > 0.0 && arguments.false_alarms < 1.0) {
         return Err(usage("--samples must be at least 1 and --false-alarms between 0 and 1"));
+    }
+    if !(arguments.timeout > 0.0 && arguments.timeout.is_finite()) || arguments.jobs == 0 {
+        return Err(usage("--timeout must be a positive number of seconds and --jobs at least 1"));
+    }
+    if !arguments.least_digits.is_finite() {
+        return Err(usage("--least-digits must be a number"));
     }
     if arguments.median_time.is_some_and(|s| !(s > 0.0 && s.is_finite())) {
         return Err(usage("--median-time must be a positive number of seconds"));

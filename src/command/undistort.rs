@@ -92,6 +92,18 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
 /// Two photographs must not be written to one file, nor one over itself.
 fn distinct_outputs(arguments: &Arguments) -> Result<(), String> {
     let mut outputs = BTreeSet::new();
+    let is_output = |path: &Path| {
+        path.file_name().is_some_and(|n| n.to_string_lossy().to_lowercase().starts_with("camera-"))
+    };
+    let folder = |path: &Path| path.parent().map(Path::to_path_buf).unwrap_or_default();
+    let same = |a: &Path, b: &Path| matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b);
+    let of_camera = folder(&arguments.camera.canonicalize().unwrap_or_default());
+    if is_output(&arguments.camera) && same(&of_camera, &arguments.out) {
+        let camera = arguments.camera.display();
+        return Err(format!(
+            "{camera} could be overwritten by the camera of the output: choose another folder"
+        ));
+    }
     for photo in &arguments.photos {
         let output = output_path(&arguments.out, photo);
         if let (Ok(from), Ok(to)) = (photo.canonicalize(), output.canonicalize())

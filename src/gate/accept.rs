@@ -2,6 +2,7 @@
 
 use super::covariance_form::{self, CovarianceFault};
 use super::protocol::{Answer, AnswerPose, Problem, Status};
+use super::quoted::quoted;
 use calibench::camera::{Camera, FreeParameters, Parameter};
 use calibench::geometry::Pose;
 use nalgebra::DMatrix;
@@ -143,7 +144,8 @@ pub fn read_line(line: &str) -> Result<Answer, Breakage> {
                 return Breakage::BadNumber { what: "a number of the answer".into(), value: f64::NAN };
             }
         }
-        Breakage::Garbage { reason: error.to_string(), line: line.chars().take(LINE_HEAD).collect() }
+        let head: String = line.chars().take(LINE_HEAD).collect();
+        Breakage::Garbage { reason: quoted(&error.to_string()), line: quoted(&head) }
     })
 }
 
@@ -156,19 +158,20 @@ pub fn id_in(line: &str) -> Option<&str> {
 /// Reads an answer as the outcome of a problem.
 pub fn accept(problem: &Problem, answer: Answer) -> Outcome {
     if answer.id != problem.id {
-        return Outcome::Broken(Breakage::WrongId { got: answer.id });
+        return Outcome::Broken(Breakage::WrongId { got: quoted(&answer.id) });
     }
     match answer.status {
         Status::Ok => {
             estimate(problem, answer).map_or_else(Outcome::Broken, |e| Outcome::Estimate(Box::new(e)))
         }
         Status::Unsupported => {
-            Outcome::Unsupported(answer.message.unwrap_or_else(|| "no reason given".into()))
+            Outcome::Unsupported(quoted(answer.message.as_deref().unwrap_or("no reason given")))
         }
-        Status::Refused => Outcome::Refused(answer.message.unwrap_or_else(|| "refused".into())),
-        Status::NotConverged => {
-            Outcome::Refused(format!("not converged: {}", answer.message.unwrap_or_default()))
-        }
+        Status::Refused => Outcome::Refused(quoted(answer.message.as_deref().unwrap_or("refused"))),
+        Status::NotConverged => Outcome::Refused(format!(
+            "not converged: {}",
+            quoted(answer.message.as_deref().unwrap_or_default())
+        )),
     }
 }
 

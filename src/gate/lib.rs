@@ -23,6 +23,7 @@ pub mod power;
 pub mod principal;
 pub mod process;
 pub mod protocol;
+pub mod quoted;
 pub mod recorder;
 pub mod report;
 pub mod run;

@@ -3,6 +3,7 @@
 use super::accept::{Breakage, id_in, read_line};
 use super::descendants;
 use super::protocol::{Answer, Problem};
+use super::quoted::quoted;
 use super::solver::{Given, Solver};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -136,7 +137,7 @@ impl Process {
             };
             match read_line(&line) {
                 Ok(answer) if answer.id == problem.id => return wrong.map_or(Ok(answer), Err),
-                Ok(answer) => wrong = wrong.or(Some(Breakage::WrongId { got: answer.id })),
+                Ok(answer) => wrong = wrong.or(Some(Breakage::WrongId { got: quoted(&answer.id) })),
                 Err(breakage) => {
                     wrong = wrong.or(Some(breakage));
                     if id_in(&line) == Some(&problem.id) {
@@ -260,7 +261,7 @@ impl Running {
             std::thread::sleep(MOMENT);
         }
         let kept = self.stderr.lock().unwrap_or_else(PoisonError::into_inner);
-        let last = String::from_utf8_lossy(&kept).trim().replace('\n', " | ");
+        let last = quoted(&String::from_utf8_lossy(&kept).trim().replace('\n', " | "));
         Breakage::Crashed { how: status, stderr: last }
     }
 }

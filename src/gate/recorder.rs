@@ -61,5 +61,5 @@ pub(super) fn broken(line: &str) -> Option<(String, Breakage)> {
         broken: String,
     }
     let read: Broken = serde_json::from_str(line).ok()?;
-    Some((read.id, Breakage::Recorded(read.broken)))
+    Some((read.id, Breakage::Recorded(super::quoted::quoted(&read.broken))))
 }

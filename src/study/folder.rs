@@ -77,6 +77,9 @@ pub enum FolderError {
     /// There is none.
     #[error("{path} holds no run: `calibench study run` begins one", path = .0.display())]
     Missing(PathBuf),
+    /// What stands in the folder is written elsewhere: a run changes its own files only.
+    #[error("{path} is a link: a run writes to its own folder only; remove the link, or begin in another folder", path = .0.display())]
+    Link(PathBuf),
     /// Another process is at it.
     #[error("{path} is in use by another run: wait for it, or choose another folder", path = .0.display())]
     InUse(PathBuf),
@@ -129,6 +132,18 @@ fn patiently(file: &File) -> Result<(), fs::TryLockError> {
     file.try_lock()
 }
 
+/// Refuses a folder with links in it, which might lead to anybody's files.
+fn refuse_links(path: &Path) -> Result<(), FolderError> {
+    let located = |cause| Located { path: path.to_path_buf(), cause };
+    for entry in fs::read_dir(path).map_err(located)? {
+        let entry = entry.map_err(located)?;
+        if entry.file_type().map_err(located)?.is_symlink() {
+            return Err(FolderError::Link(entry.path()));
+        }
+    }
+    Ok(())
+}
+
 impl Folder {
     /// Begins a run.
     pub fn create(path: &Path, spec_text: &str, manifest: &Manifest) -> Result<Folder, FolderError> {
@@ -176,6 +191,7 @@ impl Folder {
         for opened in OF_A_RUN.map(|name| path.join(name)).iter().chain([&name]) {
             regular_or_absent(opened)?;
         }
+        refuse_links(path)?;
         let located = |cause| Located { path: name.clone(), cause };
         let file = OpenOptions::new().create(true).append(true).open(&name).map_err(located)?;
         match patiently(&file) {

@@ -43,6 +43,9 @@ pub struct Spec {
     pub factor: Vec<Factor>,
 }
 
+/// No image is as wide as such noise, px; far above it pixels are no finite numbers.
+const MOST_NOISE_PX: f64 = 1e6;
+
 /// Truth: camera, target, poses, noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -229,7 +232,7 @@ impl SceneSpec {
         let side = self.image.0.max(self.image.1);
         check("scene.image", side as f64, "at most 1048576 px a side", side <= limits::MOST_SIDE)?;
         let noise = self.noise_px;
-        check("scene.noise_px", noise, "a positive number", noise > 0.0 && noise.is_finite())?;
+        check("scene.noise_px", noise, "a positive number below 1e6", noise > 0.0 && noise < MOST_NOISE_PX)?;
         let share = self.outlier_share;
         check("scene.outlier_share", share, "from 0 to below 1", (0.0..1.0).contains(&share))?;
         let spread = self.outlier_px;

@@ -59,6 +59,7 @@ struct Beside<'a> {
 impl<'a> Beside<'a> {
     fn write(files: &'a dyn Files, path: &'a Path, contents: &[u8]) -> io::Result<Beside<'a>> {
         let folder = folder_of(path);
+        refuse_what_is_no_file(path).map_err(with_path(path))?;
         files.make_folder(folder).map_err(with_path(path))?;
         // What cannot be removed is in nobody's way.
         let _ = remove_leftovers_of(files, folder, path.file_name());
@@ -85,6 +86,18 @@ impl Drop for Beside<'_> {
             // The error that led here is the one to report.
             let _ = self.files.remove(&self.temporary);
         }
+    }
+}
+
+/// A device, a pipe or a folder would be gone for good if a file took its place; a link to a file is replaced, and its target left alone.
+fn refuse_what_is_no_file(path: &Path) -> io::Result<()> {
+    match fs::metadata(path) {
+        Ok(there) if !there.is_file() => Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "a device, pipe or folder is there, and no file: name another",
+        )),
+        // Nothing is there, or a link that leads nowhere.
+        _ => Ok(()),
     }
 }
 
@@ -199,6 +212,21 @@ mod tests {
         write_atomically(&path, b"new").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"new");
         assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn no_file_takes_the_place_of_what_is_none_and_a_links_target_is_left_alone() {
+        let folder = folder("no-file");
+        fs::create_dir_all(folder.join("folder")).unwrap();
+        let refused = write_atomically(&folder.join("folder"), b"new").unwrap_err();
+        assert!(refused.to_string().contains("no file: name another"), "{refused}");
+        assert!(write_atomically(Path::new("/dev/null"), b"new").is_err());
+        fs::write(folder.join("target"), b"old").unwrap();
+        std::os::unix::fs::symlink("target", folder.join("link")).unwrap();
+        write_atomically(&folder.join("link"), b"new").unwrap();
+        assert_eq!(fs::read(folder.join("target")).unwrap(), b"old");
         fs::remove_dir_all(folder).unwrap();
     }
 

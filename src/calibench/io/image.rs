@@ -4,6 +4,7 @@
 //! `(299 R + 587 G + 114 B) / 1000` rounded, the weights of the field's other tools; an alpha channel is ignored.
 
 use super::input::{InputError, MOST_IMAGE_BYTES, open_regular};
+use super::jpeg_end;
 use crate::raster::Raster;
 pub(super) use image::DynamicImage as Decoded;
 use image::{DynamicImage, ImageDecoder, ImageReader};
@@ -150,9 +151,28 @@ pub fn parse_image(bytes: &[u8], name: &str) -> Result<Grey, ImageError> {
     Ok(grey(decoded(Cursor::new(bytes), name)?))
 }
 
-pub(super) fn decoded(source: impl std::io::BufRead + Seek, name: &str) -> Result<Decoded, ImageError> {
+pub(super) fn decoded(mut source: impl std::io::BufRead + Seek, name: &str) -> Result<Decoded, ImageError> {
+    refuse_cut_jpeg(&mut source, name)?;
     let decoder = decoder(source, name)?;
     DynamicImage::from_decoder(decoder).map_err(|error| of_decoder(error, name))
+}
+
+/// Refuses a JPEG that was cut off.
+fn refuse_cut_jpeg(source: &mut (impl std::io::BufRead + Seek), name: &str) -> Result<(), ImageError> {
+    let io = |cause| ImageError::Io { path: name.to_string(), cause };
+    if !source.fill_buf().map_err(io)?.starts_with(&[0xff, 0xd8]) {
+        return Ok(());
+    }
+    let mut bytes = Vec::new();
+    source.read_to_end(&mut bytes).map_err(io)?;
+    source.rewind().map_err(io)?;
+    if jpeg_end::has_end(&bytes) {
+        return Ok(());
+    }
+    Err(ImageError::Broken {
+        path: name.to_string(),
+        reason: "the JPEG was cut off: its end is missing".into(),
+    })
 }
 
 /// The size of an image, known before it is decoded.
@@ -385,6 +405,20 @@ mod tests {
             let error = parse_image(&whole[..length], "cut.png").unwrap_err();
             assert!(matches!(error, ImageError::Broken { .. }), "{length}: {error}");
         }
+    }
+
+    #[test]
+    fn a_jpeg_that_was_cut_off_is_refused_wherever() {
+        let image = image::RgbImage::from_fn(200, 100, |x, y| {
+            image::Rgb([(x + y) as u8, (3 * x) as u8, (5 * y) as u8])
+        });
+        let whole = file_of(image.into(), image::ImageFormat::Jpeg);
+        assert!(parse_image(&[&whole[..], b"whatever follows"].concat(), "whole.jpg").is_ok());
+        for part in [10, 50, 90, 99] {
+            let error = parse_image(&whole[..whole.len() * part / 100], "cut.jpg").unwrap_err();
+            assert!(matches!(error, ImageError::Broken { .. }), "{part} %: {error}");
+        }
+        assert!(parse_image(&whole[..whole.len() - 2], "cut.jpg").is_err());
     }
 
     #[test]

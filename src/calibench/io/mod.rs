@@ -12,6 +12,8 @@ pub mod hash;
 #[cfg(feature = "photo")]
 pub mod image;
 pub mod input;
+#[cfg(feature = "photo")]
+mod jpeg_end;
 pub mod memory;
 pub mod message;
 #[cfg(feature = "photo")]
