@@ -53,7 +53,7 @@ fn with_causes() -> Vec<(Box<dyn Error>, String)> {
         (CalibrationError::NoStart { source: closed_form.clone() }.into(), closed_form.to_string()),
         (SinglePlaneError::from(POINTS).into(), POINTS.to_string()),
         (TableError::from(input()).into(), input().to_string()),
-        (DetectError::from(grid.clone()).into(), grid.to_string()),
+        (DetectError::from(grid).into(), grid.to_string()),
         (SuiteError::from(board.clone()).into(), board.to_string()),
         (SuiteError::Scene { id: "four", cause: scene() }.into(), scene().to_string()),
         (PlanError::from(scene()).into(), scene().to_string()),
