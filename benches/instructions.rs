@@ -1,6 +1,8 @@
-//! How many instructions does a kernel take? Repeats one row's work, for `valgrind` to count: `instructions ROW TIMES`.
+//! How many instructions does a kernel take? Repeats one row's work, for `valgrind` to count: `instructions
+//! ROW TIMES`.
 //!
-//! `.ci/instructions` runs it with two counts; the difference is that of the repetitions, without making the input.
+//! `.ci/instructions` runs it with two counts; the difference is that of the repetitions, without making the
+//! input.
 
 mod common;
 mod works;

@@ -1,4 +1,5 @@
-//! Every row of the speed tables on the clock: `cargo bench --package calibench-benches --bench rows -- calibrate`.
+//! Every row of the speed tables on the clock: `cargo bench --package calibench-benches --bench rows --
+//! calibrate`.
 #![allow(missing_docs)]
 
 mod common;

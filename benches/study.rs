@@ -1,5 +1,6 @@
-//! A trial of a study: four views of 63 points drawn, calibrated with covariance, and recorded; on one core, in memory and in a folder with
-//! its checkpoints. Then the memory that ten thousand trials take beyond what the first thousand took.
+//! A trial of a study: four views of 63 points drawn, calibrated with covariance, and recorded; on one core,
+//! in memory and in a folder with its checkpoints. Then the memory that ten thousand trials take beyond what
+//! the first thousand took.
 #![allow(missing_docs)]
 
 use calibench_harness::Build;

@@ -1,4 +1,5 @@
-//! What is measured? Every row of the speed tables as a piece of work that can be repeated and whose answer can be looked at.
+//! What is measured? Every row of the speed tables as a piece of work that can be repeated and whose answer
+//! can be looked at.
 #![allow(dead_code, reason = "every program of this folder takes what it needs")]
 
 use crate::common;
@@ -127,7 +128,8 @@ pub fn rows() -> Vec<String> {
     calibrations.chain(images).chain(rest.into_iter().chain(study).map(str::to_string)).collect()
 }
 
-/// Trials of the study of four poses, in one batch as `study run` does them but for the files: a repetition is a trial.
+/// Trials of the study of four poses, in one batch as `study run` does them but for the files: a repetition
+/// is a trial.
 struct Study;
 
 impl Work for Study {
@@ -176,12 +178,14 @@ pub fn cameras((width, _): (usize, usize)) -> (Camera, Camera) {
     (pinhole.with_distortion(BrownConrady::radial(c.distortion.k1, c.distortion.k2)), pinhole)
 }
 
-/// A tilted circle grid in front of the chapter's camera, with noise of four grey levels: edges, flats and texture.
+/// A tilted circle grid in front of the chapter's camera, with noise of four grey levels: edges, flats and
+/// texture.
 pub fn frame(size: (usize, usize)) -> Raster<u8> {
     board_image(size, &Truth::example_board(), [-15.0, 15.0, 10.0]).0
 }
 
-/// The chapter's grid as its camera sees it in the fourth view, 640 x 480, and where its discs' centres truly are.
+/// The chapter's grid as its camera sees it in the fourth view, 640 x 480, and where its discs' centres truly
+/// are.
 pub fn grid() -> (Raster<u8>, Vec<Vec2>) {
     board_image((640, 480), &Truth::example_board(), [-15.0, 15.0, 10.0])
 }

@@ -22,7 +22,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// What a camera with a focal length of 600 px sees of the board in four poses, through a slightly blurred lens.
+/// What a camera with a focal length of 600 px sees of the board in four poses, through a slightly blurred
+/// lens.
 pub fn rendered() -> Result<Vec<Raster<f32>>, Box<dyn Error>> {
     let Truth { camera, image_size, cam_from_target, .. } = Truth::example();
     let imaging = Imaging { blur_px: 0.7, ..Imaging::default() };

@@ -1,4 +1,5 @@
-//! How does the error of the focal length grow with the noise? A study of one's own: draw, calibrate, compare with the Cramer-Rao bound.
+//! How does the error of the focal length grow with the noise? A study of one's own: draw, calibrate, compare
+//! with the Cramer-Rao bound.
 //!
 //! `cargo run --release --example noise_study`
 #![allow(clippy::print_stdout, reason = "an example shows what it finds")]

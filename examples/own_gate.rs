@@ -1,4 +1,5 @@
-//! Is a solver of one's own to be trusted? The gate asks it problems with known answers; here one that reports a focal length too large.
+//! Is a solver of one's own to be trusted? The gate asks it problems with known answers; here one that
+//! reports a focal length too large.
 //!
 //! `cargo run --release --example own_gate`
 #![allow(clippy::print_stdout, reason = "an example shows what it finds")]

@@ -1,4 +1,5 @@
-//! Which loss is right when some marks are wrong? Three losses on the same views, one mark in twenty moved by ten pixels.
+//! Which loss is right when some marks are wrong? Three losses on the same views, one mark in twenty moved by
+//! ten pixels.
 //!
 //! `cargo run --release --example own_loss`
 #![allow(clippy::print_stdout, reason = "an example shows what it finds")]

@@ -1,4 +1,5 @@
-//! Every test that crosses rooms, in one program: a program of its own for each file would be linked twenty times over.
+//! Every test that crosses rooms, in one program: a program of its own for each file would be linked twenty
+//! times over.
 //!
 //! `cargo test --test all golden::` runs those of `tests/golden.rs`.
 

@@ -1,4 +1,5 @@
-//! Does what is known beforehand count as it should? Tied focal lengths and priors against fits without them, limits, and statistics.
+//! Does what is known beforehand count as it should? Tied focal lengths and priors against fits without them,
+//! limits, and statistics.
 
 use calibench::board::View;
 use calibench::calibrate::{
@@ -36,8 +37,9 @@ fn deviations_apart(a: &Calibration, b: &Calibration) -> f64 {
     Parameter::ALL.into_iter().filter_map(ratio).fold(0.0, f64::max)
 }
 
-/// In a linear model the tied fit is the free one moved to `c . x = 0` by its covariance: `x - P c (c . x) / (c^T P c)`, and its covariance is
-/// `P - P c c^T P / (c^T P c)` (Gauss's theory of least squares under a condition).
+/// In a linear model the tied fit is the free one moved to `c . x = 0` by its covariance: `x - P c (c . x) /
+/// (c^T P c)`, and its covariance is `P - P c c^T P / (c^T P c)` (Gauss's theory of least squares under a
+/// condition).
 #[test]
 fn tied_focal_lengths_are_the_free_ones_projected_by_their_covariance() {
     // Small noise: what is second order in it vanishes.
@@ -88,7 +90,8 @@ fn exact_data_of_square_pixels_give_the_same_camera_tied_and_free() {
     }
 }
 
-/// Tied, one focal length is left, and two views of a pinhole camera with its centre held tell more than it needs.
+/// Tied, one focal length is left, and two views of a pinhole camera with its centre held tell more than it
+/// needs.
 #[test]
 fn a_tie_leaves_one_unknown_less_to_determine() {
     let camera = Camera::pinhole(1200.0, 1200.0, 639.5, 479.5);
@@ -150,7 +153,8 @@ fn a_narrow_prior_holds_and_a_wide_one_says_nothing() {
                 let settings = standard().with_loss(loss).with_prior(parameter, value, times * sd);
                 calibrate(&views, &settings).unwrap()
             };
-            // What a prior changes goes with the square of its standard deviation over that of the pixels, or of its inverse.
+            // What a prior changes goes with the square of its standard deviation over that of the pixels, or
+            // of its inverse.
             let narrow = with(1e-5);
             assert!(apart(&narrow, &held) < 1e-5, "{parameter}: {:e}", apart(&narrow, &held));
             assert!(deviations_apart(&narrow, &held) < 1e-5, "{parameter}");
@@ -215,8 +219,8 @@ fn a_prior_that_the_marks_contradict_is_named() {
     assert_eq!(right.termination, Termination::Converged);
 }
 
-/// The mean over trials of the normalised error squared, and how many standard deviations it lies from its expectation: chi-squared with `n`
-/// degrees of freedom a trial has variance `2 n`.
+/// The mean over trials of the normalised error squared, and how many standard deviations it lies from its
+/// expectation: chi-squared with `n` degrees of freedom a trial has variance `2 n`.
 fn consistency(trials: u64, calibrated: impl Fn(u64) -> Calibration) -> (f64, f64) {
     let truth = Truth::example().camera;
     let (mut sum, mut freedom) = (0.0, 0.0);
@@ -228,8 +232,8 @@ fn consistency(trials: u64, calibrated: impl Fn(u64) -> Calibration) -> (f64, f6
     (sum / freedom, (sum - freedom) / (2.0 * freedom).sqrt())
 }
 
-/// A covariance 15 % too large or too small is seen: 400 trials of five or six parameters know their mean to 3 %. Four standard deviations happen by
-/// chance once in 16 000 such tests.
+/// A covariance 15 % too large or too small is seen: 400 trials of five or six parameters know their mean to
+/// 3 %. Four standard deviations happen by chance once in 16 000 such tests.
 const TRIALS: u64 = 400;
 const FAR: f64 = 4.0;
 
@@ -244,7 +248,8 @@ fn the_covariance_of_tied_fits_holds_in_draws() {
     assert!(z.abs() < FAR, "{mean}, {z} standard deviations");
 }
 
-/// The priors are drawn about the truth as they say they are. Each knows its parameter about as well as the pixels do.
+/// The priors are drawn about the truth as they say they are. Each knows its parameter about as well as the
+/// pixels do.
 #[test]
 fn the_covariance_of_fits_with_priors_holds_in_draws() {
     let scene = Scene::example();
@@ -263,7 +268,8 @@ fn the_covariance_of_fits_with_priors_holds_in_draws() {
     assert!(z.abs() < FAR, "{mean}, {z} standard deviations");
 }
 
-/// Few marks: there the degrees of freedom that a prior leaves show. The variance of a pixel coordinate is estimated without bias.
+/// Few marks: there the degrees of freedom that a prior leaves show. The variance of a pixel coordinate is
+/// estimated without bias.
 #[test]
 fn the_noise_is_estimated_without_bias_under_priors() {
     let few = |view: View| {
@@ -332,7 +338,8 @@ fn polishing_keeps_ties_and_priors() {
     assert_eq!(polished.priors, plain.priors);
 }
 
-/// Weak scenes, of which a search may take the wrong minimum: its cost is never above that of a search that starts at the truth.
+/// Weak scenes, of which a search may take the wrong minimum: its cost is never above that of a search that
+/// starts at the truth.
 #[test]
 fn the_search_finds_minima_as_low_as_from_the_truth_under_ties_and_priors() {
     let cost = |result: &Calibration| {
@@ -374,8 +381,9 @@ fn the_search_finds_minima_as_low_as_from_the_truth_under_ties_and_priors() {
     assert!(answered > 2 * refused, "{answered} answered, {refused} refused");
 }
 
-/// A certificate misses with the probability it states: a twentieth of the draws have a probability below a twentieth, with ties, with priors on the
-/// lens, which homographies share, and on the focal length, of which they know nothing.
+/// A certificate misses with the probability it states: a twentieth of the draws have a probability below a
+/// twentieth, with ties, with priors on the lens, which homographies share, and on the focal length, of which
+/// they know nothing.
 #[test]
 fn certificates_miss_as_often_as_they_say_under_ties_and_priors() {
     const RATE: f64 = 0.05;

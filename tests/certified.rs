@@ -1,4 +1,5 @@
-//! Are the certified problems what was certified, and does the polished solver reach their digits from every start?
+//! Are the certified problems what was certified, and does the polished solver reach their digits from every
+//! start?
 
 use calibench::board::View;
 use calibench::calibrate::{Calibration, Settings, calibrate};
@@ -106,8 +107,8 @@ fn certified_numbers_agree_with_each_other_and_with_the_data() {
                 square += (predicted - pixel).norm_squared();
             }
         }
-        // At a minimum an error of the parameters counts squared, and that of a residual, some 1e-10 px where the target's origin lies
-        // 300 m away, once over the residual.
+        // At a minimum an error of the parameters counts squared, and that of a residual, some 1e-10 px where
+        // the target's origin lies 300 m away, once over the residual.
         assert!(log_relative_error(square, certified.sum_of_squares) > 9.0, "{id}: {square}");
     }
 }
@@ -156,7 +157,8 @@ fn polishing_moves_the_estimate_by_less_than_a_millionth_of_its_standard_deviati
         for parameter in plain.free.iter() {
             let moved = (plain.camera.get(parameter) - polished.camera.get(parameter)).abs();
             let deviation = plain.standard_deviation(parameter).expect("it is free");
-            // The refinement promises 1e-7 times the root of the degrees of freedom, of which there are up to 4000.
+            // The refinement promises 1e-7 times the root of the degrees of freedom, of which there are up to
+            // 4000.
             assert!(
                 moved <= 1e-5 * deviation,
                 "{}: {parameter} by {:e}",

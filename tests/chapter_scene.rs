@@ -20,7 +20,8 @@ fn exact_data_give_the_exact_camera() {
     assert_eq!(result.termination, Termination::Converged);
     for parameter in FreeParameters::STANDARD.iter() {
         let error = result.camera.get(parameter) - scene.truth.camera.get(parameter);
-        // Rounding of pixels near 600 is 1e-13; the bound turns 0.1 px into at most 0.7 px of focal length, so 1e-11 is safe.
+        // Rounding of pixels near 600 is 1e-13; the bound turns 0.1 px into at most 0.7 px of focal length,
+        // so 1e-11 is safe.
         assert!(error.abs() < 1e-10, "{parameter}: {error:e}");
     }
     assert!(result.rmse_px < 1e-11, "{:e}", result.rmse_px);
@@ -32,8 +33,9 @@ fn exact_data_give_the_exact_camera() {
 #[test]
 fn the_predicted_standard_deviations_are_those_of_the_chapter() {
     let result = calibrate(&Scene::example().observe(0.1, &mut noise(0)), &Settings::standard()).unwrap();
-    // CHAPTER 5.3, Cramer-Rao standard deviations at the truth, to their printed digits; sigma is estimated here with 474
-    // degrees of freedom (standard error 3.2 %, five of them 16 %) and the point of linearisation differs a little.
+    // CHAPTER 5.3, Cramer-Rao standard deviations at the truth, to their printed digits; sigma is estimated
+    // here with 474 degrees of freedom (standard error 3.2 %, five of them 16 %) and the point of
+    // linearisation differs a little.
     let expected = [0.681, 0.684, 0.392, 0.376, 0.0035, 0.0157];
     for (parameter, sd) in FreeParameters::STANDARD.iter().zip(expected) {
         let ours = result.standard_deviation(parameter).unwrap();
@@ -106,7 +108,8 @@ fn views_of_one_tilt_are_refused_though_each_is_tilted() {
     }
 }
 
-/// A distorting lens marks its centre and its aspect ratio in every view; one tilt is then enough for the rest.
+/// A distorting lens marks its centre and its aspect ratio in every view; one tilt is then enough for the
+/// rest.
 #[test]
 fn distortion_makes_views_of_one_tilt_identifiable() {
     let views = scene_of(one_tilt()).observe(0.1, &mut noise(0));
@@ -169,7 +172,8 @@ fn neither_the_unit_nor_the_origin_of_the_target_matters() {
         for parameter in FreeParameters::STANDARD.iter() {
             let sd = base.standard_deviation(parameter).unwrap();
             let change = (result.camera.get(parameter) - base.camera.get(parameter)) / sd;
-            // Offsets of 4e5 over a target of 2000 cost 2 to 3 digits of 16; convergence leaves 1e-6 of a standard deviation.
+            // Offsets of 4e5 over a target of 2000 cost 2 to 3 digits of 16; convergence leaves 1e-6 of a
+            // standard deviation.
             assert!(change.abs() < 1e-5, "{parameter}: {change:e} standard deviations");
             let sd_change = result.standard_deviation(parameter).unwrap() / sd - 1.0;
             assert!(sd_change.abs() < 1e-6, "{parameter}: {sd_change:e}");
@@ -202,7 +206,8 @@ fn gross_errors_under_a_robust_loss_are_no_reason_to_refuse_tilted_views() {
             .collect();
         for loss in [Loss::Cauchy { scale_px: 0.3 }, Loss::Huber { delta_px: 0.3 }] {
             let result = calibrate(&views, &Settings::standard().with_loss(loss));
-            // 0.7 px is the bound without gross errors; ten times that is far from what they do to plain least squares.
+            // 0.7 px is the bound without gross errors; ten times that is far from what they do to plain
+            // least squares.
             let fx = result.unwrap_or_else(|error| panic!("trial {trial}, {loss:?}: {error}")).camera.fx;
             assert!((fx - 600.0).abs() < 7.0, "trial {trial}, {loss:?}: fx {fx}");
         }

@@ -1,4 +1,5 @@
-//! Does the command end as it says it does? Exit codes, files and streams of `calibench` and of an experiment's own binary.
+//! Does the command end as it says it does? Exit codes, files and streams of `calibench` and of an
+//! experiment's own binary.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -157,7 +158,8 @@ fn a_number_that_moved_ends_with_one_and_is_named() {
     assert!(tree.join("figures/line-bending/grids.svg").is_file(), "the locked run draws the tree's figures");
 }
 
-/// A program's origin is that of its build, wherever it runs: neither the commit of the folder around it nor none.
+/// A program's origin is that of its build, wherever it runs: neither the commit of the folder around it nor
+/// none.
 #[test]
 fn a_record_names_the_build_and_not_the_repository_around_it() {
     let folder = folder("another-repository");

@@ -1,10 +1,11 @@
-//! Does a user of the library get what it computes with, and nothing else? Its dependency graph, and that of the command.
+//! Does a user of the library get what it computes with, and nothing else? Its dependency graph, and that of
+//! the command.
 
 use std::collections::BTreeSet;
 use std::process::Command;
 
-/// What `cargo tree` prints of the crates that are compiled with the given arguments. It may ask for no feature that the tests were not
-/// built with: nobody has downloaded those crates.
+/// What `cargo tree` prints of the crates that are compiled with the given arguments. It may ask for no
+/// feature that the tests were not built with: nobody has downloaded those crates.
 fn tree(format: &str, arguments: &[&str]) -> String {
     let output = Command::new(env!("CARGO"))
         .args([

@@ -1,4 +1,5 @@
-//! Chessboards on exact renders: found under every condition that a person sees them in, in their own order, and no other board.
+//! Chessboards on exact renders: found under every condition that a person sees them in, in their own order,
+//! and no other board.
 
 #[path = "../benches/chess/cases.rs"]
 mod cases;

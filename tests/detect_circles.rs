@@ -1,4 +1,5 @@
-//! Circle grids and sparse dots on rendered images: order, refusals, and the accuracy of centres against theory.
+//! Circle grids and sparse dots on rendered images: order, refusals, and the accuracy of centres against
+//! theory.
 
 use calibench::board::Board;
 use calibench::camera::{BrownConrady, Camera};
@@ -60,8 +61,9 @@ fn without_correction_the_bias_of_tilted_discs_remains() {
     assert!(predicted > 0.04 && (seen - predicted).abs() < 0.003, "{seen} {predicted}");
 }
 
-/// The Cramer-Rao bound of a disc's centre, levels and shape known: `sigma^2 (sum g g^T)^-1` over the pixels around it, with
-/// `g` the image's derivative by a shift, from renders shifted by `+-h`. RMS over the discs of the distance, px.
+/// The Cramer-Rao bound of a disc's centre, levels and shape known: `sigma^2 (sum g g^T)^-1` over the pixels
+/// around it, with `g` the image's derivative by a shift, from renders shifted by `+-h`. RMS over the discs
+/// of the distance, px.
 fn bound_px(pose: &Pose, imaging: &Imaging, sigma: f64) -> f64 {
     let h = 0.02;
     let board = Truth::example_board();
@@ -109,9 +111,10 @@ fn noise_moves_centres_hardly_more_than_the_bound() {
             })
             .sum();
         let ratio = (square / trials as f64).sqrt() / bound_px(&pose, &imaging, sigma);
-        // 20 x 63 centres, two coordinates each: the ratio's own standard error is 1/sqrt(4 x 1260) = 0.014, so an efficient
-        // estimator lies above 0.93 with a chance of 1 - 3e-7. What the estimator may lose is a claim: a quarter. The bound
-        // knows levels, shading and shape, the estimator does not: measured 1.04 to 1.11.
+        // 20 x 63 centres, two coordinates each: the ratio's own standard error is 1/sqrt(4 x 1260) = 0.014,
+        // so an efficient estimator lies above 0.93 with a chance of 1 - 3e-7. What the estimator may lose is
+        // a claim: a quarter. The bound knows levels, shading and shape, the estimator does not: measured
+        // 1.04 to 1.11.
         eprintln!("tilt {tilt}, blur {blur_px}: {ratio:.3} of the bound");
         assert!((0.93..1.25).contains(&ratio), "tilt {tilt}, blur {blur_px}: {ratio}");
     }
@@ -127,7 +130,8 @@ fn light_that_falls_off_moves_centres_little() {
     assert!(rms < 0.01, "{rms}");
 }
 
-/// Whether a grid holds the true centres in the true order or, by the documented convention, in the reverse one.
+/// Whether a grid holds the true centres in the true order or, by the documented convention, in the reverse
+/// one.
 fn assert_ordered(grid: &DotGrid, centres_true: &[Vec2], what: &str) {
     let seen = grid.centres_px();
     let last = seen.len() - 1;

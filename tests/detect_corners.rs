@@ -25,7 +25,8 @@ fn refined_corners_are_near_the_truth() {
             .sum();
         let rms = (square / 54.0).sqrt();
         eprintln!("tilt {tilt:?}: {rms:.5} px");
-        // Measured 0.001 to 0.004 px; most where edges run along pixel rows and the lens is only nearly Gaussian.
+        // Measured 0.001 to 0.004 px; most where edges run along pixel rows and the lens is only nearly
+        // Gaussian.
         assert!(rms < 0.01, "tilt {tilt:?}: {rms}");
     }
 }

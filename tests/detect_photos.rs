@@ -14,8 +14,8 @@ fn photo(path: PathBuf) -> Raster<u8> {
     image
 }
 
-/// Largest distance of marks from the homography that fits them best, px: lens distortion stays below a few pixels, while
-/// one exchanged pair of marks would leave a spacing, tens of pixels.
+/// Largest distance of marks from the homography that fits them best, px: lens distortion stays below a few
+/// pixels, while one exchanged pair of marks would leave a spacing, tens of pixels.
 fn worst_misfit_px(board: &Board, centres: &[Vec2]) -> f64 {
     let fit = Homography::fit(&board.points(), centres).unwrap();
     let predicted = board.points().into_iter().map(|p| fit.homography.apply(&p).unwrap());
@@ -61,8 +61,8 @@ mod chessboards {
             let reversed = (corners[0] - pixels[0]).norm() > (corners[0] - pixels[53]).norm();
             let theirs = |i: usize| if reversed { pixels[53 - i] } else { pixels[i] };
             let square: f64 = (0..54).map(|i| (corners[i] - theirs(i)).norm_squared()).sum();
-            // Two extractors: cornerSubPix alone errs by up to 0.06 px RMS on sharp renders, photographs are noisier. One
-            // exchanged pair of corners would leave several pixels.
+            // Two extractors: cornerSubPix alone errs by up to 0.06 px RMS on sharp renders, photographs are
+            // noisier. One exchanged pair of corners would leave several pixels.
             assert!((square / 54.0).sqrt() < 0.25, "left{number:02}: {}", (square / 54.0).sqrt());
         }
     }
@@ -91,8 +91,8 @@ mod chessboards {
             let (a, b) =
                 (ours.standard_deviation(parameter).unwrap(), theirs.standard_deviation(parameter).unwrap());
             let z = (ours.camera.get(parameter) - theirs.camera.get(parameter)) / (a * a + b * b).sqrt();
-            // The photographs are the same, so the two errors are correlated and z is smaller than for independent data, of
-            // which one of nine would exceed 3 in one case of 41.
+            // The photographs are the same, so the two errors are correlated and z is smaller than for
+            // independent data, of which one of nine would exceed 3 in one case of 41.
             assert!(z.abs() < 3.0, "{parameter}: {z:.2} combined standard deviations");
         }
     }
@@ -109,8 +109,9 @@ mod chessboards {
         let number = |key: &str, i: usize| set[key].as_array().unwrap()[i].as_float().unwrap();
         for (i, parameter) in ours.free.iter().enumerate() {
             let difference = ours.camera.get(parameter) - number("published", i);
-            // The published corners are another detector's. Where the tolerance stated with them is narrower than what the noise of ours
-            // allows (k1: 0.002 against a standard deviation of 0.0019), two standard deviations take its place.
+            // The published corners are another detector's. Where the tolerance stated with them is narrower
+            // than what the noise of ours allows (k1: 0.002 against a standard deviation of 0.0019), two
+            // standard deviations take its place.
             let allowed = number("tolerance", i).max(2.0 * ours.standard_deviation(parameter).unwrap());
             assert!(difference.abs() <= allowed, "{parameter} differs by {difference}");
         }
@@ -125,8 +126,8 @@ mod chessboards {
             let image = photo(folder.join(format!("bumblebee_left/left{number:02}.jpg")));
             let found = chessboard(&image, 4, 6).unwrap_or_else(|e| panic!("left{number:02}: {e}"));
             assert!(worst_misfit_px(&board, found.corners_px()) < 4.0, "left{number:02}");
-            // The size that is there is named where the board ends clearly; in some photographs places beside it continue the lattice, and
-            // the error counts corners instead. Never is it a board.
+            // The size that is there is named where the board ends clearly; in some photographs places beside
+            // it continue the lattice, and the error counts corners instead. Never is it a board.
             assert!(chessboard(&image, 5, 6).is_err(), "left{number:02}");
             assert!(chessboard(&image, 4, 5).is_err());
         }

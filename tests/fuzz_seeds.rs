@@ -1,4 +1,5 @@
-//! Do the readers that meet untrusted bytes end without a panic? On every seed of the fuzz targets, cut off and damaged at every place.
+//! Do the readers that meet untrusted bytes end without a panic? On every seed of the fuzz targets, cut off
+//! and damaged at every place.
 
 #[path = "../fuzz/readers.rs"]
 mod readers;

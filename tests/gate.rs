@@ -1,4 +1,5 @@
-//! Does the gate treat any program as a black box, and end as it says? Programs that work, hang, crash and babble.
+//! Does the gate treat any program as a black box, and end as it says? Programs that work, hang, crash and
+//! babble.
 #![cfg(unix)]
 
 use calibench_gate::accept::{Breakage, Outcome};
@@ -94,7 +95,8 @@ fn a_program_that_crashes_is_quoted() {
 
 #[test]
 fn a_program_that_breaks_on_bad_input_is_asked_again() {
-    // Answers the first problem of every start, then ends: no two answers in a row, and yet it is never given up.
+    // Answers the first problem of every start, then ends: no two answers in a row, and yet it is never given
+    // up.
     let once =
         r#"read line; printf '%s\n' "$line" | sed 's/^{"id":"\([^"]*\)".*/{"id":"\1","status":"refused"}/'"#;
     let process = Process::new(once, Duration::from_secs(20), 1);

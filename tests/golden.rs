@@ -80,8 +80,9 @@ fn claims_and_published_values_hold_for_another_seed_too() {
     }
 }
 
-/// The golden snapshots were blessed with the threads of some machine, and every other run compares with the same bits: `.ci/run` those of
-/// one and of two threads in release, `.ci/reproducible` those of other processors.
+/// The golden snapshots were blessed with the threads of some machine, and every other run compares with the
+/// same bits: `.ci/run` those of one and of two threads in release, `.ci/reproducible` those of other
+/// processors.
 #[test]
 fn five_threads_give_the_bits_of_the_golden_snapshots() {
     let committed = |id: &str| {

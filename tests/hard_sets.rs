@@ -1,4 +1,5 @@
-//! The sets that a stranger's scenes once got a wrong answer with: `reference/hard-sets`, each with what is right.
+//! The sets that a stranger's scenes once got a wrong answer with: `reference/hard-sets`, each with what is
+//! right.
 
 use calibench::board::View;
 use calibench::calibrate::{Calibration, CalibrationError, Settings, Termination, Warning, calibrate};
@@ -23,7 +24,8 @@ fn calibrated(
 
 const CHAPTER: &str = "fx,fy,cx,cy,k1,k2";
 
-/// The reference's cost and focal length: a search that starts at the truth, written by somebody else in another language.
+/// The reference's cost and focal length: a search that starts at the truth, written by somebody else in
+/// another language.
 #[test]
 fn the_minimum_is_the_one_next_to_the_truth() {
     let rows = [

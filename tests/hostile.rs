@@ -1,4 +1,5 @@
-//! What does the command do with input that nobody means well? It says what is wrong, in time and in little memory, and loses nothing.
+//! What does the command do with input that nobody means well? It says what is wrong, in time and in little
+//! memory, and loses nothing.
 #![cfg(target_os = "linux")]
 
 use std::fs;

@@ -1,5 +1,6 @@
-//! Was anything forgotten? Every experiment has its file, its three registrations, its snapshot and its figures. Between the rooms the
-//! compiler keeps the walls, which are crates; inside the library each folder imports only from those below it.
+//! Was anything forgotten? Every experiment has its file, its three registrations, its snapshot and its
+//! figures. Between the rooms the compiler keeps the walls, which are crates; inside the library each folder
+//! imports only from those below it.
 
 use calibench_harness::Experiment;
 use std::collections::BTreeSet;
@@ -89,8 +90,8 @@ fn every_file_of_tests_is_run() {
     }
 }
 
-/// The library's folders from the ground up. Those of one inner list do not know each other: `calibrate` never sees the truth that
-/// `synth` makes.
+/// The library's folders from the ground up. Those of one inner list do not know each other: `calibrate`
+/// never sees the truth that `synth` makes.
 const LAYERS: [&[&str]; 6] = [
     &["geometry"],
     &["camera", "board", "raster"],

@@ -85,8 +85,9 @@ fn photographs_give_the_camera_and_bad_files_are_named_and_left_out() {
     let result = result(&folder);
     assert_eq!(result["left_out"].as_array().map(Vec::len), Some(bad.len()));
     assert_eq!(result["views"].as_array().map(Vec::len), Some(4));
-    // The detector leaves 0.0014 px RMS at most on sharp renders (its tests), over 252 points an error vector of 0.022 px;
-    // by Cauchy-Schwarz it moves fx by 6.81 px a pixel of unit noise at most: 0.15 px, and k1 by 0.035 x 0.022 = 8e-4.
+    // The detector leaves 0.0014 px RMS at most on sharp renders (its tests), over 252 points an error vector
+    // of 0.022 px; by Cauchy-Schwarz it moves fx by 6.81 px a pixel of unit noise at most: 0.15 px, and k1 by
+    // 0.035 x 0.022 = 8e-4.
     let camera = |name: &str| result["camera"][name].as_f64().unwrap();
     assert!((camera("fx") - 600.0).abs() < 0.15 && (camera("cx") - 326.0).abs() < 0.15, "{result:#}");
     assert!((camera("k1") + 0.18).abs() < 8e-4, "{result:#}");
@@ -136,8 +137,8 @@ fn a_mis_detected_view_is_rejected_on_request() {
         write_png(&folder.join(format!("more{i}.png")), &rendered(&Truth::example_board(), &pose).to_u8())
             .unwrap();
     }
-    // A grid that the detector takes for the board, though it is not: its rows are a tenth farther apart, which a camera of
-    // longer fy shows.
+    // A grid that the detector takes for the board, though it is not: its rows are a tenth farther apart,
+    // which a camera of longer fy shows.
     let stretching = Camera { fy: 660.0, ..Truth::example_camera() };
     let pose = looking_at_centre([25.0, 0.0, 0.0], 140.0);
     let stretched =
@@ -176,9 +177,9 @@ fn colour_and_bright_discs_on_dark_ground_are_read_too() {
     let output = calibrate(&folder, &arguments);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let result: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
-    // A quarter of the contrast of the grey photographs, rounded to whole levels: an edge pixel is off by half a level of about
-    // 100, over some 60 edge pixels of a disc 15 px wide, so a centre by about 0.003 px: ten times the error of sharp
-    // renders above at most.
+    // A quarter of the contrast of the grey photographs, rounded to whole levels: an edge pixel is off by
+    // half a level of about 100, over some 60 edge pixels of a disc 15 px wide, so a centre by about 0.003
+    // px: ten times the error of sharp renders above at most.
     assert!((result["camera"]["fx"].as_f64().unwrap() - 600.0).abs() < 1.5, "{result:#}");
 }
 

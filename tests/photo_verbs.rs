@@ -1,4 +1,5 @@
-//! Do the verbs on photographs do what they say? `calibench ninepoint` and `calibench undistort`, from file to file.
+//! Do the verbs on photographs do what they say? `calibench ninepoint` and `calibench undistort`, from file
+//! to file.
 
 use calibench::geometry::Vec2;
 use calibench::io::{Channels, Grey, read_channels, read_image, write_png, write_png_16};
@@ -41,8 +42,8 @@ fn nine_dots_are_calibrated_from_file_to_json_and_overlay() {
         assert_eq!(printed, written);
         assert_eq!(printed["mode"], mode);
         assert_eq!(printed["points"].as_array().map(Vec::len), Some(9));
-        // Centres are found within 0.005 px (8-bit rounding), so is a column's spacing of 236.23 px; a similarity takes the
-        // mean of both spacings, 0.02 px away.
+        // Centres are found within 0.005 px (8-bit rounding), so is a column's spacing of 236.23 px; a
+        // similarity takes the mean of both spacings, 0.02 px away.
         let spacing = 1.0 / printed["scale_x"].as_f64().unwrap();
         assert!((spacing - 236.23).abs() < 0.025, "{mode}: {spacing}");
     }

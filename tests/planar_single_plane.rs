@@ -1,4 +1,5 @@
-//! Does the single-plane calibration recover a lens from one view, with the residuals and the spread that theory predicts?
+//! Does the single-plane calibration recover a lens from one view, with the residuals and the spread that
+//! theory predicts?
 
 use calibench::board::View;
 use calibench::calibrate::Termination;
@@ -42,8 +43,8 @@ fn a_noiseless_view_gives_the_lens_back_from_any_pose() {
             let fit = calibrate_single_plane(&view, &options).unwrap();
             assert_eq!(fit.termination, Termination::Converged);
             assert!(fit.rms_px < 1e-11, "{:e}", fit.rms_px);
-            // Predicted spread at sigma = 640 eps, the rounding of a pixel: sd(k2) 0.03 * 1.4e-12, sd(c) 3 * 1.4e-12 px;
-            // 100 of them.
+            // Predicted spread at sigma = 640 eps, the rounding of a pixel: sd(k2) 0.03 * 1.4e-12, sd(c) 3 *
+            // 1.4e-12 px; 100 of them.
             let [k1, k2, cu, cv] = lens_errors(&fit);
             assert!(k1.abs() < 1e-10 && k2.abs() < 1e-10, "{k1:e} {k2:e}");
             assert!(cu.abs() < 1e-8 && cv.abs() < 1e-8, "{cu:e} {cv:e}");
@@ -82,7 +83,8 @@ fn the_focal_length_is_a_gauge() {
 
 struct Sample {
     rms_mean: f64,
-    /// Mean over the trials of `e^T C^-1 e` for (k1, k2) or (k1, k2, cu, cv), `C` the covariance each fit reports.
+    /// Mean over the trials of `e^T C^-1 e` for (k1, k2) or (k1, k2, cu, cv), `C` the covariance each fit
+    /// reports.
     mean_square: f64,
 }
 
@@ -122,11 +124,13 @@ fn check(centre_free: bool, parameters: usize) {
     assert!((predicted / exact - 1.0).abs() < 1.0 / (4.0 * (2 * POINTS - parameters) as f64) * 1.1);
     let interval = Z * sd / (TRIALS as f64).sqrt();
     assert!((sample.rms_mean - exact).abs() < interval, "{} for {exact} +- {interval}", sample.rms_mean);
-    // The chapter's sheet gives 0.1355 +- 0.008 for both; that is the held centre's mean, two parameters fewer.
+    // The chapter's sheet gives 0.1355 +- 0.008 for both; that is the held centre's mean, two parameters
+    // fewer.
     let spread = if centre_free { 0.008 } else { interval + 0.00005 };
     assert!((sample.rms_mean - 0.1355).abs() < spread, "{}", sample.rms_mean);
-    // e^T C^-1 e follows chi-square with d degrees: mean d, variance 2 d. The linearisation moves the mean by a few percent of
-    // that at most: the curvature enters with sd(centre) / focal, about 1e-2, squared against terms of order one.
+    // e^T C^-1 e follows chi-square with d degrees: mean d, variance 2 d. The linearisation moves the mean by
+    // a few percent of that at most: the curvature enters with sd(centre) / focal, about 1e-2, squared
+    // against terms of order one.
     let d = if centre_free { 4.0 } else { 2.0 };
     let interval = Z * (2.0 * d / TRIALS as f64).sqrt() + 0.02 * d;
     assert!((sample.mean_square - d).abs() < interval, "{} for {d} +- {interval}", sample.mean_square);
@@ -144,7 +148,8 @@ fn residuals_and_spread_follow_theory_with_the_centre_free() {
 
 #[test]
 fn a_centre_held_at_the_image_centre_adds_the_expected_model_error() {
-    // Without noise what remains is the model's error b; with noise the squares add: E[RMS^2] = sigma^2 (2N - p) / N + b^2.
+    // Without noise what remains is the model's error b; with noise the squares add: E[RMS^2] = sigma^2 (2N -
+    // p) / N + b^2.
     let exact = scene(0).exact().remove(0);
     let fit = calibrate_single_plane(&exact, &options(IMAGE_CENTRE, false)).unwrap();
     let noise = mean_rms(2 * POINTS - 10);
@@ -164,8 +169,8 @@ fn a_centre_held_at_the_image_centre_adds_the_expected_model_error() {
 
 #[test]
 fn the_covariance_of_all_parameters_predicts_the_observed_pixels() {
-    // A pixel's spread from the full covariance at h33 = 1 agrees with what moving the data does: the mean over the points of
-    // trace(J C J^T) is sigma^2 p / N, the hat matrix's trace.
+    // A pixel's spread from the full covariance at h33 = 1 agrees with what moving the data does: the mean
+    // over the points of trace(J C J^T) is sigma^2 p / N, the hat matrix's trace.
     let view = noisy(&scene(3), 1);
     let fit = calibrate_single_plane(&view, &options(IMAGE_CENTRE, true)).unwrap();
     let spread = fit.spread.as_ref().unwrap();
@@ -199,8 +204,8 @@ fn the_covariance_of_all_parameters_predicts_the_observed_pixels() {
         }
     }
     let expected = 12.0 * spread.sigma_px * spread.sigma_px;
-    // Differences at 1e-4 of a standard deviation: 1e-4 * 0.03 px above rounding 1e-13 leaves 1e-7; cancellation between
-    // correlated entries costs three digits.
+    // Differences at 1e-4 of a standard deviation: 1e-4 * 0.03 px above rounding 1e-13 leaves 1e-7;
+    // cancellation between correlated entries costs three digits.
     assert!((trace / expected - 1.0).abs() < 1e-3, "{trace} for {expected}");
 }
 
@@ -219,7 +224,8 @@ fn views_that_fix_no_lens_are_refused() {
         SinglePlaneError::TooFewPoints { parameters: 10, need: 5, got: 4 }
     );
     assert!(matches!(refused(&part(&[0, 1, 2, 3, 4, 5, 6]), held), SinglePlaneError::Homography(_)));
-    // Eight points on one circle about the centre see one radius: k1 and k2 cannot be told apart, nor from the scale.
+    // Eight points on one circle about the centre see one radius: k1 and k2 cannot be told apart, nor from
+    // the scale.
     let ring: Vec<Vec2> = (0..12)
         .map(|i| 30.0 * Vec2::new(libm::cos(f64::from(i) * 0.5), libm::sin(f64::from(i) * 0.5)))
         .collect();
@@ -247,6 +253,7 @@ fn without_distortion_a_free_centre_is_refused_and_a_held_one_is_not() {
             }
         })
         .count();
-    // One in a thousand by the threshold, 1.5 with sigma estimated on 116 degrees of freedom: five or more of 200 at 2e-5.
+    // One in a thousand by the threshold, 1.5 with sigma estimated on 116 degrees of freedom: five or more of
+    // 200 at 2e-5.
     assert!(released < 5, "{released} of 200");
 }

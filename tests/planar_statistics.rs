@@ -28,7 +28,8 @@ fn truth(model: PlaneModel) -> Homography {
     Homography(Mat3::new(a, b, -3.08, b, a2, 2.33, h31, h32, 1.0))
 }
 
-/// Matrix entries that are free in the family and independent of each other, by their place in a row-by-row count.
+/// Matrix entries that are free in the family and independent of each other, by their place in a row-by-row
+/// count.
 fn free_entries(model: PlaneModel) -> &'static [usize] {
     match model {
         PlaneModel::Similarity => &[0, 1, 2, 5],
@@ -75,8 +76,8 @@ fn check(model: PlaneModel) {
         let error = fit.map.world_from_pixel(&corner).unwrap() - corner_true;
         chi_corner += error.dot(&covariance.cholesky().unwrap().solve(&error));
     }
-    // Each is chi-square with d degrees of freedom: mean d, variance 2 d. The families are linear, or nearly so at a noise of
-    // 1e-4 over marks 1 unit apart: the second order is 1e-4 of the first.
+    // Each is chi-square with d degrees of freedom: mean d, variance 2 d. The families are linear, or nearly
+    // so at a noise of 1e-4 over marks 1 unit apart: the second order is 1e-4 of the first.
     let parameters = model.parameters() as f64;
     for (sum, d) in [(chi_residual, 18.0 - parameters), (chi_entries, parameters), (chi_corner, 2.0)] {
         let mean = sum / TRIALS as f64;

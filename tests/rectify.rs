@@ -9,8 +9,8 @@ use calibench::synth::{Scene, Truth};
 
 const SIZE: (usize, usize) = Truth::EXAMPLE_IMAGE;
 
-/// A photograph of a grey edge that is straight for an ideal lens: intensity rises by 1/8 a pixel across the line
-/// `v = 60 + 0.05 u`, from black to white.
+/// A photograph of a grey edge that is straight for an ideal lens: intensity rises by 1/8 a pixel across the
+/// line `v = 60 + 0.05 u`, from black to white.
 fn photograph_of_an_edge(camera: &Camera) -> Raster<f32> {
     let across = |ideal: Vec2| (ideal.y - 60.0 - 0.05 * ideal.x) / 1.0025f64.sqrt();
     Raster::from_fn(SIZE.0, SIZE.1, |x, y| {
@@ -46,8 +46,9 @@ fn a_bent_edge_is_straight_in_the_rectified_image() {
 
     let straight = edge_of(&map.apply(&photograph, 0.0).unwrap(), &map.mask());
     assert!(straight.len() > 600, "{}", straight.len());
-    // Bilinear sampling of a ramp whose level lines have the curvature k errs by k / 8 px in either direction, twice (photograph
-    // and crossing); the lens bends this line by at most 12 px over 640, k = 8 * 12 / 640^2 = 2.3e-4 a px. f32 adds 1e-6.
+    // Bilinear sampling of a ramp whose level lines have the curvature k errs by k / 8 px in either
+    // direction, twice (photograph and crossing); the lens bends this line by at most 12 px over 640, k = 8 *
+    // 12 / 640^2 = 2.3e-4 a px. f32 adds 1e-6.
     assert!(off(&straight) < 2.0 * 2.0 * 2.3e-4 / 8.0, "{:e}", off(&straight));
 }
 
@@ -82,6 +83,7 @@ fn a_lens_calibrated_from_one_exact_view_rectifies_as_the_true_one() {
     assert_eq!(differing, 0);
     let photograph = photograph_of_an_edge(&truth).to_u16();
     let (a, b) = (by_truth.apply(&photograph, 0).unwrap(), by_fit.apply(&photograph, 0).unwrap());
-    // The lenses agree to 1e-8 px, f32 weights to 6e-8: far below a level of 65536 over an edge of 8 px, but for a rounding.
+    // The lenses agree to 1e-8 px, f32 weights to 6e-8: far below a level of 65536 over an edge of 8 px, but
+    // for a rounding.
     assert!(a.samples().iter().zip(b.samples()).all(|(a, b)| a.abs_diff(*b) <= 1));
 }

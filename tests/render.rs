@@ -28,7 +28,8 @@ fn supersampled(level: &dyn Fn(&Vec2) -> f64, pixel: (usize, usize), n: usize) -
     sum / (n * n) as f64
 }
 
-/// Largest difference between a rendered image and supersampling, over a scatter of pixels with partial coverage.
+/// Largest difference between a rendered image and supersampling, over a scatter of pixels with partial
+/// coverage.
 fn largest_difference(board: &Board, ink: &dyn Fn(&Vec2) -> bool) -> (f64, usize) {
     let camera = Truth::example_camera().with_distortion(BrownConrady {
         k1: -0.18,
@@ -53,8 +54,8 @@ fn largest_difference(board: &Board, ink: &dyn Fn(&Vec2) -> bool) -> (f64, usize
     (largest, tested)
 }
 
-// An edge pixel of n x n samples is wrong by about sqrt(n) / n^2 samples (3e-3 at n = 48), five times that in the worst of
-// hundreds, times the contrast 0.75.
+// An edge pixel of n x n samples is wrong by about sqrt(n) / n^2 samples (3e-3 at n = 48), five times that in
+// the worst of hundreds, times the contrast 0.75.
 const SUPERSAMPLING_PX: f64 = 5.0 * 3e-3 * 0.75;
 
 #[test]

@@ -1,4 +1,5 @@
-//! Is a minimum the right one, and is what is said of it true? Data on which a search can go wrong, and data that mislead.
+//! Is a minimum the right one, and is what is said of it true? Data on which a search can go wrong, and data
+//! that mislead.
 
 use calibench::board::View;
 use calibench::calibrate::{Calibration, CalibrationError, Settings, Termination, Warning, calibrate};
@@ -36,7 +37,8 @@ fn three_facing_views_and_one_tilted_give_the_camera() {
     }
 }
 
-/// A target in a corner of a large image, far from its centre, image size not given: the closed form is exact, and must be believed.
+/// A target in a corner of a large image, far from its centre, image size not given: the closed form is
+/// exact, and must be believed.
 #[test]
 fn exact_data_far_from_the_image_centre_give_the_exact_camera() {
     let turns = [[20.0, 0.0, 0.0], [0.0, 20.0, 5.0], [-20.0, 10.0, 0.0], [5.0, -20.0, 10.0]];
@@ -52,7 +54,8 @@ fn exact_data_far_from_the_image_centre_give_the_exact_camera() {
     let result = calibrate(&scene.exact(), &Settings::new("fx,fy,cx,cy".parse().unwrap())).unwrap();
     assert_eq!(result.termination, Termination::Converged);
     for parameter in result.free.iter() {
-        // Rounding of pixels near 4000 is 1e-12; these poses turn a pixel into some hundred pixels of focal length.
+        // Rounding of pixels near 4000 is 1e-12; these poses turn a pixel into some hundred pixels of focal
+        // length.
         let error = result.camera.get(parameter) - scene.truth.camera.get(parameter);
         assert!(error.abs() < 1e-7, "{parameter}: {error:e}");
     }

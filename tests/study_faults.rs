@@ -1,4 +1,5 @@
-//! What does a study lose when everything that can fail does? At every write, by kill -9 at any moment, on a full disk, with a rival.
+//! What does a study lose when everything that can fail does? At every write, by kill -9 at any moment, on a
+//! full disk, with a rival.
 
 use crate::failing_disk::{Failing, Fault};
 use crate::study::{assert_same, scratch};
@@ -41,7 +42,8 @@ fn go_on(files: Arc<dyn Files>, path: &Path, manifest: &Manifest, told: &mut u64
 /// Batches of the study above.
 const BATCHES: u64 = 6;
 
-/// Batches that the checkpoint vouches for. A complete run whose trials were put into another file has none: its manifest vouches for all.
+/// Batches that the checkpoint vouches for. A complete run whose trials were put into another file has none:
+/// its manifest vouches for all.
 fn kept(path: &Path) -> u64 {
     let of = |name: &str| -> serde_json::Value {
         serde_json::from_str(&fs::read_to_string(path.join(name)).unwrap_or_default()).unwrap_or_default()
@@ -199,7 +201,8 @@ fn a_disk_that_became_read_only_ends_with_three_and_the_run_goes_on_later() {
     fs::remove_dir_all(folder).unwrap();
 }
 
-/// What time it is, and how much has passed, as a clock says that jumps by up to a year, forward or back, whenever it is asked.
+/// What time it is, and how much has passed, as a clock says that jumps by up to a year, forward or back,
+/// whenever it is asked.
 const JUMPING_CLOCK: &str = "
 #include <time.h>
 int clock_gettime(clockid_t clock, struct timespec *now) {

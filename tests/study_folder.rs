@@ -1,4 +1,5 @@
-//! Do threads, parts and interruptions leave every byte of a study where it was, and is a changed study refused?
+//! Do threads, parts and interruptions leave every byte of a study where it was, and is a changed study
+//! refused?
 
 use crate::study::{SPEC, assert_same, resume, scratch};
 use calibench_experiments::build;
@@ -243,7 +244,8 @@ fn of_two_paired_runs_the_quieter_is_found_better_and_a_copy_is_not() {
     assert!(same.effects.iter().all(|e| e.verdict == Verdict::NotTold && e.ratio.value == 1.0));
     let quieter = compare(&paths[0], &paths[2]).unwrap();
     for e in &quieter.effects {
-        // To first order half the noise halves every error, trial by trial; what is left is of second order, a few percent at 0.3 px.
+        // To first order half the noise halves every error, trial by trial; what is left is of second order,
+        // a few percent at 0.3 px.
         assert!(e.verdict == Verdict::SecondBetter && (e.ratio.value - 0.5).abs() < 0.05, "{e:?}");
     }
     let error = compare(&paths[0], &paths[3]).unwrap_err();
@@ -261,7 +263,8 @@ fn levels_of_a_factor_are_paired_within_a_run() {
     let noise = compare_levels(&path, "noise").unwrap();
     assert_eq!(noise.effects.len(), 14, "the louder of two noises, with two losses, seven errors each");
     for e in &noise.effects {
-        // To first order three times the noise is three times the error; the second order is a few percent at 0.3 px.
+        // To first order three times the noise is three times the error; the second order is a few percent at
+        // 0.3 px.
         assert!(e.verdict == Verdict::FirstBetter && (e.ratio.value - 3.0).abs() < 0.3, "{e:?}");
     }
     let losses = compare_levels(&path, "loss").unwrap();

@@ -38,7 +38,8 @@ fn the_chapters_views_attain_the_bound_and_the_predicted_rmse() {
     for s in &cell.statistics {
         let (name, predicted) = (s.quantity.name(), s.predicted.unwrap());
         let (mean, ratio) = (s.mean.unwrap(), s.ratio.unwrap());
-        // First-order theory leaves a bias of the order of the noise over the focal length times the sd: 2 % of it covers k2's.
+        // First-order theory leaves a bias of the order of the noise over the focal length times the sd: 2 %
+        // of it covers k2's.
         let slack = 0.02 * predicted.sd;
         assert!(
             mean.low - slack <= predicted.mean && predicted.mean <= mean.high + slack,
@@ -78,8 +79,8 @@ fn facing_views_are_counted_as_refused_and_predict_nothing() {
 
 #[test]
 fn common_random_numbers_pair_cells_exactly() {
-    // Half the noise from the same draws gives, to first order, half the error: the ratio of the spreads is 2 to far better than
-    // independent draws could tell.
+    // Half the noise from the same draws gives, to first order, half the error: the ratio of the spreads is 2
+    // to far better than independent draws could tell.
     let factor = "[[factor]]\nname = \"noise\"\nset = [\"scene.noise_px\"]\nlevels = [0.01, 0.02]";
     let text = spec("{ kind = \"chapter\" }", &format!("trials = {{ per_cell = 40, batch = 40 }}\n{factor}"));
     let sd = |text: &str| {
@@ -106,7 +107,8 @@ fn a_robust_loss_withstands_gross_errors() {
     );
     let summary = summarise(&in_memory(Spec::parse(&text).unwrap(), &text, |_| {}).unwrap());
     let sd = |cell: usize| summary.cells[cell].of("fx").unwrap().sd.unwrap();
-    // Noise variance 0.01 px^2 against 5 % of 25/3: least squares loses a factor of 6.5; the robust loss stays within 2.
+    // Noise variance 0.01 px^2 against 5 % of 25/3: least squares loses a factor of 6.5; the robust loss
+    // stays within 2.
     assert!(sd(0).low > 3.0 * sd(1).high, "{:?} {:?}", sd(0), sd(1));
 }
 

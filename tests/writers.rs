@@ -1,4 +1,5 @@
-//! What does each verb that writes leave where the disk is full or read-only, or where it is killed? Files as they were, or whole ones.
+//! What does each verb that writes leave where the disk is full or read-only, or where it is killed? Files as
+//! they were, or whole ones.
 #![cfg(target_os = "linux")]
 
 use crate::failing_disk::{Failing, Fault};
@@ -86,7 +87,8 @@ fn with_input(name: &str) -> PathBuf {
     folder
 }
 
-/// What makes a folder a source tree, with a golden number that has moved and a book of one page, and `old` in place of every file of `whole`.
+/// What makes a folder a source tree, with a golden number that has moved and a book of one page, and `old`
+/// in place of every file of `whole`.
 fn fill(disk: &Path, whole: &Tree) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     for name in ["style/book.css", "style/CalibenchMath.woff2", "style/CalibenchMath-LICENSE.txt"] {
@@ -377,7 +379,8 @@ fn a_full_disk_ends_with_three_and_leaves_old_files_or_whole_ones() {
     fs::remove_dir_all(folder).expect("removed");
 }
 
-/// Every line names one of the files, and once; pages of a book that is not yet in its place by where they are.
+/// Every line names one of the files, and once; pages of a book that is not yet in its place by where they
+/// are.
 fn assert_named_once(verb: &Verb, said: &str, whole: &Tree) {
     let names: Vec<&str> = whole.keys().map(String::as_str).chain(["out/book"]).collect();
     for line in said.replace("out/.book.new/", "out/book/").lines() {

@@ -1,7 +1,8 @@
-//! How well are chessboards found? Exact renders with known corners, by condition: recall, wrong boards, error of the corners.
+//! How well are chessboards found? Exact renders with known corners, by condition: recall, wrong boards,
+//! error of the corners.
 //!
-//! `cargo run --release --no-default-features --example chess -- [--trials N] [--write FOLDER] [--cases PART] [--wrong-sizes N]`;
-//! `benches/chess/opencv.py FOLDER` then measures OpenCV's finders on the same images.
+//! `cargo run --release --no-default-features --example chess -- [--trials N] [--write FOLDER] [--cases PART]
+//! [--wrong-sizes N]`; `benches/chess/opencv.py FOLDER` then measures OpenCV's finders on the same images.
 #![allow(clippy::print_stdout, reason = "a program whose output is its result")]
 
 mod cases;
@@ -20,7 +21,8 @@ use std::time::SystemTime;
 /// Corners along a row, rows.
 pub const BOARD: (usize, usize) = (9, 6);
 
-/// A corner farther than this from its place, px, belongs to another place: the board is wrong. Twice the widest blur; squares are larger.
+/// A corner farther than this from its place, px, belongs to another place: the board is wrong. Twice the
+/// widest blur; squares are larger.
 const WRONG_PX: f64 = 6.0;
 
 struct Arguments {
@@ -167,7 +169,8 @@ fn pgm(image: &Raster<u8>) -> Vec<u8> {
     bytes
 }
 
-/// This thread's time on a processor where the system tells it, so that other work on the machine does not count; else the clock's.
+/// This thread's time on a processor where the system tells it, so that other work on the machine does not
+/// count; else the clock's.
 fn seconds() -> f64 {
     let told = fs::read_to_string("/proc/thread-self/schedstat").ok();
     let nanoseconds = told.and_then(|text| text.split(' ').next()?.parse::<f64>().ok());

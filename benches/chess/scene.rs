@@ -1,4 +1,5 @@
-//! How does a photograph of a case arise? A random pose that keeps the whole board in the image, rendered, moved, made noisy, rounded.
+//! How does a photograph of a case arise? A random pose that keeps the whole board in the image, rendered,
+//! moved, made noisy, rounded.
 
 use super::BOARD;
 use super::cases::Case;
@@ -54,7 +55,8 @@ fn camera(case: &Case) -> Camera {
         .with_distortion(BrownConrady::radial(case.lens[0], case.lens[1]))
 }
 
-/// A random tilt about a random axis, as near as the image allows or up to `far` times farther; `None` where it sees the board's edge.
+/// A random tilt about a random axis, as near as the image allows or up to `far` times farther; `None` where
+/// it sees the board's edge.
 fn pose(case: &Case, camera: &Camera, random: &mut Stream) -> Option<Pose> {
     let tilt = random.uniform_in(case.tilt.0, case.tilt.1).to_radians();
     let axis = random.uniform_in(0.0, std::f64::consts::TAU);

@@ -1,7 +1,9 @@
-//! This library's side of the comparison with its peers: exports the problems, and answers to requests line by line.
+//! This library's side of the comparison with its peers: exports the problems, and answers to requests line
+//! by line.
 //!
-//! `peers export FOLDER` writes the problems as raw numbers. `peers serve` reads `time ROW SECONDS`, works for about that long and
-//! answers with the seconds one repetition took, or `answer ROW FILE`, and writes the row's numbers there.
+//! `peers export FOLDER` writes the problems as raw numbers. `peers serve` reads `time ROW SECONDS`, works
+//! for about that long and answers with the seconds one repetition took, or `answer ROW FILE`, and writes the
+//! row's numbers there.
 
 #[path = "../common.rs"]
 mod common;
@@ -53,7 +55,8 @@ fn serve() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Seconds of one repetition: the median over about `budget` seconds of work, timed in groups long enough for the clock.
+/// Seconds of one repetition: the median over about `budget` seconds of work, timed in groups long enough for
+/// the clock.
 fn seconds(work: &mut dyn works::Work, budget: f64) -> f64 {
     const GROUP_SECONDS: f64 = 20e-6;
     let timed = |work: &mut dyn works::Work, times: usize| {

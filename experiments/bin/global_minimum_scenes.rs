@@ -1,4 +1,5 @@
-//! Every scene of the experiment `global-minimum`, or those of a family: what is committed in golden/global-minimum/.
+//! Every scene of the experiment `global-minimum`, or those of a family: what is committed in
+//! golden/global-minimum/.
 
 use calibench_experiments::global_minimum::campaign;
 use std::process::ExitCode;

@@ -1,7 +1,7 @@
 //! Which scenes do people have? The distributions of the random scenes, as data with a sentence each.
 //!
-//! A family is a list of cameras, layouts, and models; scene `i` takes the camera `i mod cameras`, then the layout, then the model, so that any
-//! run of neighbouring indices is balanced. Everything else is drawn.
+//! A family is a list of cameras, layouts, and models; scene `i` takes the camera `i mod cameras`, then the
+//! layout, then the model, so that any run of neighbouring indices is balanced. Everything else is drawn.
 
 use calibench::camera::{FreeParameters, Parameter::*};
 
@@ -61,11 +61,13 @@ pub struct Lens {
     pub tangential: Draw,
     /// Share of lenses with tangential terms among those whose model does not estimate them.
     pub tangential_share: f64,
-    /// Whether the lens must be one-to-one out to the farthest corner of the image, and that corner within [`WIDEST`].
+    /// Whether the lens must be one-to-one out to the farthest corner of the image, and that corner within
+    /// [`WIDEST`].
     pub whole_field: bool,
 }
 
-/// Largest undistorted radius of an image corner: half a field of 120 degrees. Beyond, nobody uses this lens model.
+/// Largest undistorted radius of an image corner: half a field of 120 degrees. Beyond, nobody uses this lens
+/// model.
 pub const WIDEST: f64 = 1.75;
 
 /// Where a principal point lies.
@@ -190,7 +192,8 @@ const MODELS: &[Model] = &[
     model("skew-k1-k2", FreeParameters::of(&[Fx, Fy, Cx, Cy, Skew, K1, K2])),
 ];
 
-/// Cameras from a wide web camera to a telephoto of many pixels; most principal points near the middle, some far off.
+/// Cameras from a wide web camera to a telephoto of many pixels; most principal points near the middle, some
+/// far off.
 const ANY_CAMERA: Lens = Lens {
     focal_px: LogUniform(250.0, 5000.0),
     focal_ratio: Uniform(0.97, 1.03),

@@ -1,4 +1,5 @@
-//! How are judged scenes shown to people? A line of CSV each with every number, and a line of counts a family.
+//! How are judged scenes shown to people? A line of CSV each with every number, and a line of counts a
+//! family.
 
 use super::committed::DETERMINED;
 use super::families::Family;

@@ -1,8 +1,10 @@
-//! Where does a search that starts at the truth end? An independent Levenberg-Marquardt minimisation, the reference of every scene.
+//! Where does a search that starts at the truth end? An independent Levenberg-Marquardt minimisation, the
+//! reference of every scene.
 //!
-//! It minimises the same cost as the solver, the sum of squared pixel distances, and shares no search code with it: normal equations summed
-//! point by point from `camera::project_with_jacobian`, poses eliminated view by view (Schur complement), damping in proportion to the
-//! diagonal (Marquardt 1963). Its unknown poses are those of the target's middle, so that a far origin costs no digits.
+//! It minimises the same cost as the solver, the sum of squared pixel distances, and shares no search code
+//! with it: normal equations summed point by point from `camera::project_with_jacobian`, poses eliminated
+//! view by view (Schur complement), damping in proportion to the diagonal (Marquardt 1963). Its unknown poses
+//! are those of the target's middle, so that a far origin costs no digits.
 
 use calibench::board::View;
 use calibench::camera::{Camera, FreeParameters, Parameter, project_with_jacobian};

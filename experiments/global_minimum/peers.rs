@@ -1,4 +1,5 @@
-//! How do other calibrators end on the same scenes? Asked through the gate's protocol, judged by the same reference.
+//! How do other calibrators end on the same scenes? Asked through the gate's protocol, judged by the same
+//! reference.
 
 use super::SEED;
 use super::campaign::FOLDER;
@@ -19,11 +20,13 @@ use rayon::prelude::*;
 use std::path::Path;
 use std::time::Duration;
 
-/// Scenes of the first family that other programs are asked; they are slower. Of the others: the first half hundred.
+/// Scenes of the first family that other programs are asked; they are slower. Of the others: the first half
+/// hundred.
 const SCENES: u64 = 2000;
 const NAMED_SCENES: u64 = 50;
-/// A cost is the reference's if it exceeds it by less than this many noise variances: a hundredth is a tenth of a standard deviation of one
-/// parameter. Wider than for this library's solver, for programs that read points in single precision.
+/// A cost is the reference's if it exceeds it by less than this many noise variances: a hundredth is a tenth
+/// of a standard deviation of one parameter. Wider than for this library's solver, for programs that read
+/// points in single precision.
 const SAME_COST_VARIANCES: f64 = 0.01;
 /// Problems that are asked at once.
 const CHUNK: u64 = 100;
@@ -102,8 +105,8 @@ impl Line {
 /// The command that asks OpenCV.
 pub const COMMAND: &str = "cargo run --release --bin global-minimum-scenes -- --peer opencv --solver 'python3 adapters/opencv_solver.py'";
 
-/// Asks a program about the first scenes of every family and writes `<name>.csv` beside the committed scenes. Scenes whose skew is
-/// unknown are left out: few programs know it.
+/// Asks a program about the first scenes of every family and writes `<name>.csv` beside the committed scenes.
+/// Scenes whose skew is unknown are left out: few programs know it.
 pub fn measure(command: &str, name: &str, jobs: usize) -> Result<(), String> {
     let process = Process::new(command, TIMEOUT, jobs);
     let mut lines = String::new();

@@ -1,4 +1,5 @@
-//! Which scene has the number `i`? Truth, noise and settings, drawn from a family by seed and index alone, in any order.
+//! Which scene has the number `i`? Truth, noise and settings, drawn from a family by seed and index alone, in
+//! any order.
 
 use super::families::{Centre, Draw, Family, Layout, Lens, Model, Places, Second, Target, Tilts, WIDEST};
 use calibench::board::View;
@@ -114,8 +115,8 @@ fn turn<T>(list: &'static [T], index: u64) -> &'static T {
     &list[(index % list.len() as u64) as usize]
 }
 
-/// Whether views and points are as many as the solver asks for: two constraints a view on the linear parameters, and as many pixel
-/// coordinates as unknowns.
+/// Whether views and points are as many as the solver asks for: two constraints a view on the linear
+/// parameters, and as many pixel coordinates as unknowns.
 fn is_enough(free: FreeParameters, views: usize, points: usize) -> bool {
     let linear = free.iter().filter(|&p| p <= Parameter::Skew).count();
     2 * views >= linear && 2 * views * points >= free.len() + 6 * views
@@ -130,7 +131,8 @@ impl Draw {
         }
     }
 
-    /// A whole number; each end of the range is as likely as its share of the range, half a step beyond included.
+    /// A whole number; each end of the range is as likely as its share of the range, half a step beyond
+    /// included.
     fn count(&self, stream: &mut Stream) -> usize {
         let value = match *self {
             Draw::Is(value) => value,
@@ -281,7 +283,8 @@ impl Bench<'_> {
         (0.5 * (first + last), last - first)
     }
 
-    /// Distance at which a facing target has this part of the image's width, or less if it would be taller than the image.
+    /// Distance at which a facing target has this part of the image's width, or less if it would be taller
+    /// than the image.
     fn distance_of(&self, coverage: f64) -> f64 {
         let (_, size) = self.extent();
         let wide = self.camera.fx * size.x / (coverage * self.image_size.0 as f64);

@@ -29,7 +29,8 @@ pub struct BadCase {
     pub truth: Camera,
 }
 
-/// Noise of the degenerate sets, px. Without noise their normal equations are singular and nearly every solver notices.
+/// Noise of the degenerate sets, px. Without noise their normal equations are singular and nearly every
+/// solver notices.
 const SIGMA_PX: f64 = 0.1;
 
 /// The cases, drawn from `seed`.

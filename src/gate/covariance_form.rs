@@ -1,8 +1,10 @@
-//! Can a stated covariance be one? Symmetric, positive definite, and of the standard deviations and names that stand beside it.
+//! Can a stated covariance be one? Symmetric, positive definite, and of the standard deviations and names
+//! that stand beside it.
 
 use nalgebra::DMatrix;
 
-/// Entries and their mirror images, and standard deviations stated twice, differ by less than this part in single precision and rounded text.
+/// Entries and their mirror images, and standard deviations stated twice, differ by less than this part in
+/// single precision and rounded text.
 const ROUNDED: f64 = 1e-3;
 
 /// Why a matrix is no covariance of the parameters it names.

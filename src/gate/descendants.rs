@@ -1,16 +1,19 @@
-//! What did a program start, and how is all of it ended? By its process group, and on Linux wherever its processes have moved to.
+//! What did a program start, and how is all of it ended? By its process group, and on Linux wherever its
+//! processes have moved to.
 //!
-//! A process that calls `setsid` leaves the group, one whose parent ends leaves the tree. Both keep the environment they were started
-//! with: a mark in it finds them (`/proc/PID/environ`). The command also becomes the parent of orphans (`PR_SET_CHILD_SUBREAPER`), so
-//! that at its end even those that cleared their environment are found below it.
+//! A process that calls `setsid` leaves the group, one whose parent ends leaves the tree. Both keep the
+//! environment they were started with: a mark in it finds them (`/proc/PID/environ`). The command also
+//! becomes the parent of orphans (`PR_SET_CHILD_SUBREAPER`), so that at its end even those that cleared their
+//! environment are found below it.
 //!
-//! Limits: other systems end the process group only; and where the gate itself is killed, a program that does not end when its standard
-//! input does goes on.
+//! Limits: other systems end the process group only; and where the gate itself is killed, a program that does
+//! not end when its standard input does goes on.
 
 /// The name of the mark. Its value is of one program and one start.
 pub(super) const MARK: &str = "CALIBENCH_GATE_SOLVER";
 
-/// Times that processes are looked for again after some were ended: between a look and an end they may start others.
+/// Times that processes are looked for again after some were ended: between a look and an end they may start
+/// others.
 #[cfg(target_os = "linux")]
 const LOOKS: usize = 50;
 
@@ -23,7 +26,8 @@ pub(super) fn end(group: u32, value: &str) {
     let _ = value;
 }
 
-/// Makes this process the parent of orphans below it. Only for a program that starts no others than those it judges.
+/// Makes this process the parent of orphans below it. Only for a program that starts no others than those it
+/// judges.
 pub(super) fn adopt_orphans() {
     // Where the system refuses, the marks remain.
     #[cfg(target_os = "linux")]

@@ -1,4 +1,5 @@
-//! How is a program judged that cannot be driven by a pipe? Problems as files, truth kept apart, answers as files.
+//! How is a program judged that cannot be driven by a pipe? Problems as files, truth kept apart, answers as
+//! files.
 
 use super::accept::{Breakage, id_in, read_line};
 use super::plan::{Plan, PlanError, Purpose};
@@ -78,7 +79,8 @@ pub fn export(plan: &Plan, folder: &Path) -> Result<(), FilesError> {
     Ok(())
 }
 
-/// Writes the answers that were kept of a run to `answers.jsonl`; a question that broke the protocol has a line that says how.
+/// Writes the answers that were kept of a run to `answers.jsonl`; a question that broke the protocol has a
+/// line that says how.
 ///
 /// # Errors
 /// A file that cannot be written.

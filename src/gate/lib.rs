@@ -7,7 +7,8 @@
 //!   -> Check (one a property and scenario) --decide (Holm, one overall false-alarm rate)--> Report
 //! ```
 //!
-//! The gate's own power is measured by planted faults ([`faults`], [`power`]), its false alarms by clean runs.
+//! The gate's own power is measured by planted faults ([`faults`], [`power`]), its false alarms by clean
+//! runs.
 
 pub mod accept;
 pub mod bad_input;
@@ -43,5 +44,6 @@ pub use solver::{Builtin, Solver};
 
 /// Samples a scenario in a quick run: under 30 s for this library's solver, and enough for every gross fault.
 pub const QUICK: usize = 128;
-/// Samples a scenario in a thorough run: enough for a bias of a tenth of a standard deviation and a variance 5 % too large.
+/// Samples a scenario in a thorough run: enough for a bias of a tenth of a standard deviation and a variance
+/// 5 % too large.
 pub const THOROUGH: usize = 8192;

@@ -1,6 +1,7 @@
 //! What did a change of the solver change? Two solvers on the same problems, compared answer by answer.
 //!
-//! The noise is common to both, so it cancels in the difference: a shift far too small for two separate verdicts shows.
+//! The noise is common to both, so it cancels in the difference: a shift far too small for two separate
+//! verdicts shows.
 
 use super::judge::{Check, Property, Verdict};
 use super::plan::{Plan, Purpose};
@@ -13,7 +14,8 @@ use calibench::io::significant;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// A mean difference or an excess of spread below this part of a standard deviation is no change that matters, however certain.
+/// A mean difference or an excess of spread below this part of a standard deviation is no change that
+/// matters, however certain.
 const RELEVANT: f64 = 1e-3;
 
 /// One scenario, compared.
@@ -31,11 +33,14 @@ pub struct Comparison {
     pub bits: usize,
     /// Largest difference of a parameter, in standard deviations of the bound.
     pub largest: f64,
-    /// Parameter whose mean moved most certainly by an amount that matters, its mean difference in standard deviations, and the p-value.
+    /// Parameter whose mean moved most certainly by an amount that matters, its mean difference in standard
+    /// deviations, and the p-value.
     pub shift: Option<(String, f64, f64)>,
-    /// Parameter whose spread changed most certainly by an amount that matters, the ratio of variances new / reference, and the p-value.
+    /// Parameter whose spread changed most certainly by an amount that matters, the ratio of variances new /
+    /// reference, and the p-value.
     pub spread: Option<(String, f64, f64)>,
-    /// The same of the stated uncertainty: a parameter or an uncorrelated combination of some, the ratio of its stated variances.
+    /// The same of the stated uncertainty: a parameter or an uncorrelated combination of some, the ratio of
+    /// its stated variances.
     pub stated: Option<(String, f64, f64)>,
     /// Median time new / reference.
     pub time: f64,
@@ -90,10 +95,12 @@ pub fn compare(
     }
 }
 
-/// A paired test: what is told, and its normal score. Scores rank what is beyond doubt, where all p-values are 0.
+/// A paired test: what is told, and its normal score. Scores rank what is beyond doubt, where all p-values
+/// are 0.
 type Test = fn(&[(f64, f64)]) -> Option<(f64, f64)>;
 
-/// What was tested, what is told of it, and its p-value: of those results whose values matter the most certain, or of all where none matters.
+/// What was tested, what is told of it, and its p-value: of those results whose values matter the most
+/// certain, or of all where none matters.
 fn most_certain(
     results: impl Iterator<Item = (String, f64, f64)>,
     matters: fn(f64) -> bool,
@@ -153,8 +160,8 @@ fn of_scenario(scenario: &Scenario, replies: Vec<(&Seen, &Seen)>) -> Comparison 
     }
 }
 
-/// Ratios of stated variances, parameter by parameter and along the uncorrelated combinations, each with its score: the mean logarithm of the
-/// ratio is compared with its spread from problem to problem.
+/// Ratios of stated variances, parameter by parameter and along the uncorrelated combinations, each with its
+/// score: the mean logarithm of the ratio is compared with its spread from problem to problem.
 fn stated<'a>(
     scenario: &'a Scenario,
     both: &'a [(&Trial, &Trial)],
@@ -199,8 +206,8 @@ fn shift(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
     Some((mean, mean / error))
 }
 
-/// Ratio of variances and the score of their equality: sum and difference of two variables of equal variance are uncorrelated
-/// (Pitman 1939; Morgan 1939), their correlation tested by Fisher's transformation (1921).
+/// Ratio of variances and the score of their equality: sum and difference of two variables of equal variance
+/// are uncorrelated (Pitman 1939; Morgan 1939), their correlation tested by Fisher's transformation (1921).
 fn spread(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
     let n = pairs.len() as f64;
     if pairs.len() < 30 {

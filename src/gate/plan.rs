@@ -1,4 +1,5 @@
-//! Which problems make a run? The list of cases, each a function of suite, seed and size, and of nothing else.
+//! Which problems make a run? The list of cases, each a function of suite, seed and size, and of nothing
+//! else.
 
 use super::bad_input::{BadCase, bad_cases};
 use super::protocol::{Problem, ProblemView};
@@ -113,7 +114,8 @@ impl Plan {
     pub fn id(&self, case: &Case) -> String {
         let name = self.name(case);
         let hash = fnv1a(self.seed.to_le_bytes().into_iter().chain(name.bytes()));
-        // The last letters of a name move the low bits of its hash only: neighbours would be told by their common beginning.
+        // The last letters of a name move the low bits of its hash only: neighbours would be told by their
+        // common beginning.
         format!("{:016x}", (hash ^ (hash >> 32)).wrapping_mul(0x9e37_79b9_7f4a_7c15))
     }
 

@@ -1,8 +1,10 @@
-//! Along which combinations of parameters is a covariance looked at? Along those that the bound knows best and worst.
+//! Along which combinations of parameters is a covariance looked at? Along those that the bound knows best
+//! and worst.
 //!
-//! Variances of single parameters say nothing of their correlations. With `D` the standard deviations of the bound `P` and
-//! `D^-1 P D^-1 = V L V^T`, the combinations `w_i^T x`, `w_i = D^-1 v_i / sqrt(l_i)`, are uncorrelated and of variance 1 under the bound: a stated
-//! covariance `S` is as large as the bound along every one if `w_i^T S w_i = 1`. A correlation of 0.996 that is left out makes that 250.
+//! Variances of single parameters say nothing of their correlations. With `D` the standard deviations of the
+//! bound `P` and `D^-1 P D^-1 = V L V^T`, the combinations `w_i^T x`, `w_i = D^-1 v_i / sqrt(l_i)`, are
+//! uncorrelated and of variance 1 under the bound: a stated covariance `S` is as large as the bound along
+//! every one if `w_i^T S w_i = 1`. A correlation of 0.996 that is left out makes that 250.
 
 use calibench::camera::{FreeParameters, Parameter};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -92,7 +94,8 @@ mod tests {
         let largest = (0..2)
             .max_by(|&i, &j| principal.variances(&lost)[i].total_cmp(&principal.variances(&lost)[j]))
             .unwrap();
-        // The correlation is 5.97 / 6; along the difference of the standardised parameters the bound is 1 less that.
+        // The correlation is 5.97 / 6; along the difference of the standardised parameters the bound is 1
+        // less that.
         assert!((principal.variances(&lost)[largest] * (1.0 - 5.97 / 6.0) - 1.0).abs() < 1e-9);
         assert_eq!(principal.name(largest), "fx - fy");
     }

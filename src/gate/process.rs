@@ -14,9 +14,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// After this many breakages in a row a worker stops asking a program that never gave an answer: it does not work at all.
+/// After this many breakages in a row a worker stops asking a program that never gave an answer: it does not
+/// work at all.
 const PATIENCE: usize = 3;
-/// The same for a program that has answered before: more than all bad input of a run, which may well break it every time.
+/// The same for a program that has answered before: more than all bad input of a run, which may well break it
+/// every time.
 const LONG_PATIENCE: usize = 24;
 /// How long is waited before something is looked at again.
 const MOMENT: Duration = Duration::from_millis(5);
@@ -25,22 +27,25 @@ const STDERR_TAIL: usize = 400;
 
 /// Bytes of a line. The answer to the largest problem, poses of all views and a full covariance, takes 20 kB.
 pub const MOST_LINE_BYTES: usize = 1 << 20;
-/// Lines that are read ahead: with the longest lines 16 MB a program. A program that writes on waits for its pipe.
+/// Lines that are read ahead: with the longest lines 16 MB a program. A program that writes on waits for its
+/// pipe.
 const LINES_AHEAD: usize = 16;
-/// Lines that are no answer before a problem is given up: a program that talks much is told from one that never ends.
+/// Lines that are no answer before a problem is given up: a program that talks much is told from one that
+/// never ends.
 const MOST_WRONG_LINES: usize = 1000;
 
-/// Programs that run, by process group, each with its mark: to be ended when the gate is interrupted, since a group of its own hears no
-/// Ctrl-C.
+/// Programs that run, by process group, each with its mark: to be ended when the gate is interrupted, since a
+/// group of its own hears no Ctrl-C.
 static RUNNING: Mutex<BTreeMap<u32, String>> = Mutex::new(BTreeMap::new());
 
-/// Makes this process the parent of whatever a program leaves behind, so that [`end_all`] finds it. Only for a process that starts no
-/// other programs: they would be ended too.
+/// Makes this process the parent of whatever a program leaves behind, so that [`end_all`] finds it. Only for
+/// a process that starts no other programs: they would be ended too.
 pub fn adopt_orphans() {
     descendants::adopt_orphans();
 }
 
-/// Ends every program that any gate of this process started, with what they started, and whatever else runs below this process.
+/// Ends every program that any gate of this process started, with what they started, and whatever else runs
+/// below this process.
 pub fn end_all() {
     let running = std::mem::take(&mut *RUNNING.lock().unwrap_or_else(PoisonError::into_inner));
     running.iter().for_each(|(group, mark)| descendants::end(*group, mark));
@@ -105,8 +110,8 @@ impl Process {
         result
     }
 
-    /// Sends the problem and reads until its answer, the deadline or the end of the program. A line that is no answer, or the
-    /// answer to another problem, is what is reported.
+    /// Sends the problem and reads until its answer, the deadline or the end of the program. A line that is
+    /// no answer, or the answer to another problem, is what is reported.
     fn converse(&self, worker: &mut Worker, problem: &Problem) -> Result<Answer, Breakage> {
         let crashed = |how: String| Breakage::Crashed { how, stderr: String::new() };
         if worker.running.is_none() {
@@ -247,7 +252,8 @@ impl Running {
 
     /// How the program ended, and the end of what it wrote to standard error.
     fn crash(&mut self) -> Breakage {
-        // Its output is closed; it is given a moment to end by itself, and the reader of its standard error to come to the end of that.
+        // Its output is closed; it is given a moment to end by itself, and the reader of its standard error
+        // to come to the end of that.
         let deadline = Instant::now() + Duration::from_millis(500);
         let status = loop {
             match self.child.try_wait() {

@@ -5,8 +5,8 @@ use calibench::io::shown;
 /// Characters that are kept.
 const MOST: usize = 400;
 
-/// The beginning of a solver's text, on one line, with control characters as their numbers: for the terminal, for reports, and for a memory that
-/// holds what a hundred thousand answers say.
+/// The beginning of a solver's text, on one line, with control characters as their numbers: for the terminal,
+/// for reports, and for a memory that holds what a hundred thousand answers say.
 pub fn quoted(text: &str) -> String {
     let head: String =
         text.chars().take(MOST).map(|c| if matches!(c, '\n' | '\r' | '\t') { ' ' } else { c }).collect();

@@ -1,4 +1,5 @@
-//! What did a solver answer, word for word? It is asked as ever, and its answers are kept, those that broke the protocol too.
+//! What did a solver answer, word for word? It is asked as ever, and its answers are kept, those that broke
+//! the protocol too.
 
 use super::accept::Breakage;
 use super::protocol::{Answer, Problem};

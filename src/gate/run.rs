@@ -9,7 +9,8 @@ use rayon::prelude::*;
 /// Problems that are held in memory at a time: about 20 kB each.
 const BATCH: usize = 1024;
 
-/// Asks the solver every case of the plan. `progress` hears how many more are done. `None` stands for a case that was left out.
+/// Asks the solver every case of the plan. `progress` hears how many more are done. `None` stands for a case
+/// that was left out.
 pub fn run(plan: &Plan, solver: &dyn Solver, progress: &(dyn Fn(usize) + Sync)) -> Vec<Option<Seen>> {
     let mut seen = vec![None; plan.cases.len()];
     ask_where(plan, solver, &mut seen, |_| true, progress);

@@ -1,4 +1,5 @@
-//! Who answers? Anything that takes a problem and gives an answer: this library's solver, a wrapper of it, a process.
+//! Who answers? Anything that takes a problem and gives an answer: this library's solver, a wrapper of it, a
+//! process.
 
 use super::accept::{Breakage, Outcome, accept, free_of};
 use super::protocol::{Answer, AnswerCovariance, AnswerPose, Problem, Status};
@@ -125,8 +126,8 @@ pub(super) fn settings(problem: &Problem) -> Settings {
         .fold(settings, |settings, (parameter, value)| settings.hold(parameter, value))
 }
 
-/// A calibration in the words of the protocol. Only warnings that question the estimate flag it: a correlation between two
-/// coefficients stands in the covariance already.
+/// A calibration in the words of the protocol. Only warnings that question the estimate flag it: a
+/// correlation between two coefficients stands in the covariance already.
 pub(super) fn answer(id: &str, calibration: &Calibration) -> Answer {
     let covariance = &calibration.covariance;
     let names = || calibration.free.iter().map(|p| p.name().to_string());

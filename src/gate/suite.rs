@@ -35,8 +35,8 @@ pub struct Scenario {
     pub sigma_px: f64,
     /// Share of points that are displaced by [`OUTLIER_PX`].
     pub outliers: f64,
-    /// Share of samples to which textbook least squares gives a confidently wrong answer: measured for the doubtful scenes,
-    /// none where the law holds ([`super::textbook`]).
+    /// Share of samples to which textbook least squares gives a confidently wrong answer: measured for the
+    /// doubtful scenes, none where the law holds ([`super::textbook`]).
     pub textbook_misled: f64,
     /// Most samples for which the second-order terms that the law neglects stay below its resolution.
     pub most: usize,
@@ -70,8 +70,9 @@ pub enum SuiteError {
     Board(#[from] BoardError),
 }
 
-/// Noise of the scenes that test the law. The bias of a least-squares estimate is of second order in the noise, so at a
-/// tenth of ordinary corner noise it is a tenth as large against the standard deviation: too small to be seen.
+/// Noise of the scenes that test the law. The bias of a least-squares estimate is of second order in the
+/// noise, so at a tenth of ordinary corner noise it is a tenth as large against the standard deviation: too
+/// small to be seen.
 pub const LAW_SIGMA_PX: f64 = 0.01;
 /// Ordinary corner noise, the chapter's.
 pub const ORDINARY_SIGMA_PX: f64 = 0.1;
@@ -98,8 +99,9 @@ fn four(distance: f64) -> Vec<[f64; 6]> {
         .to_vec()
 }
 
-/// `count` poses round the optical axis: the target leans outwards by `tilt` degrees in turn to every side, and its centre
-/// lies `aside` from the axis. The angle grows by the golden angle, so that any number of poses covers all sides.
+/// `count` poses round the optical axis: the target leans outwards by `tilt` degrees in turn to every side,
+/// and its centre lies `aside` from the axis. The angle grows by the golden angle, so that any number of
+/// poses covers all sides.
 fn ring(count: usize, tilt: f64, aside: f64, distance: f64) -> Vec<[f64; 6]> {
     const GOLDEN_ANGLE_RAD: f64 = 2.399_963_229_728_653;
     (0..count)
@@ -232,8 +234,8 @@ fn lawful() -> Vec<Draft> {
 pub fn suite() -> Result<Vec<Scenario>, SuiteError> {
     let mut scenarios: Vec<Scenario> =
         lawful().into_iter().map(|draft| build(draft, LAW_SIGMA_PX)).collect::<Result<_, _>>()?;
-    // Second-order bias grows with the square of the noise. 500 samples would show one of 0.02 standard deviations as
-    // 0.02 sqrt(500) = 0.45 standard errors, a tenth of what is called a deviation.
+    // Second-order bias grows with the square of the noise. 500 samples would show one of 0.02 standard
+    // deviations as 0.02 sqrt(500) = 0.45 standard errors, a tenth of what is called a deviation.
     let ordinary = chapter_draft("ordinary-noise", "the chapter's scene with its noise of 0.1 px");
     scenarios.push(Scenario { most: 500, ..build(ordinary, ORDINARY_SIGMA_PX)? });
     let near = Draft {
@@ -327,8 +329,8 @@ mod tests {
         assert_eq!(suite.iter().filter_map(outside).collect::<Vec<_>>(), []);
     }
 
-    /// The law is linear: a standard deviation must be a small part of what it is compared with, the scale on which the
-    /// projection bends (the focal length itself, and 1 for the distortion coefficients).
+    /// The law is linear: a standard deviation must be a small part of what it is compared with, the scale on
+    /// which the projection bends (the focal length itself, and 1 for the distortion coefficients).
     #[test]
     fn the_noise_of_the_law_is_small_against_the_curvature() {
         for s in suite().unwrap().iter().filter(|s| s.demand == Demand::Law) {

@@ -1,9 +1,11 @@
-//! How often do poor data mislead least squares itself? The measure of honesty on scenes where the linear law fails.
+//! How often do poor data mislead least squares itself? The measure of honesty on scenes where the linear law
+//! fails.
 //!
-//! The textbook answer is the minimum of the squared residuals with the covariance `s^2 (J^T J)^-1`, and no warning. Where poses
-//! are nearly parallel, or a few points are wrong, even that covariance is exceeded now and then by more than chance on a normal
-//! distribution allows. How often is measured here, on noise that no run of the gate draws, and stands in the suite; a solver is
-//! dishonest where it is misled more often than that.
+//! The textbook answer is the minimum of the squared residuals with the covariance `s^2 (J^T J)^-1`, and no
+//! warning. Where poses are nearly parallel, or a few points are wrong, even that covariance is exceeded now
+//! and then by more than chance on a normal distribution allows. How often is measured here, on noise that no
+//! run of the gate draws, and stands in the suite; a solver is dishonest where it is misled more often than
+//! that.
 
 use super::accept::Breakage;
 use super::judge::misled;
@@ -47,8 +49,8 @@ pub struct Misled {
 }
 
 impl Misled {
-    /// Whether the suite's rate for the scene agrees with the count: both are counts, so their difference is normal with the sum
-    /// of their variances. Five standard deviations: a false alarm in a million.
+    /// Whether the suite's rate for the scene agrees with the count: both are counts, so their difference is
+    /// normal with the sum of their variances. Five standard deviations: a false alarm in a million.
     pub fn agrees(&self) -> bool {
         let (rate, draws) = (self.scenario.textbook_misled, self.draws as f64);
         let variance = rate * (1.0 - rate) * (1.0 / draws + 1.0 / DRAWS as f64);

@@ -1,4 +1,5 @@
-//! What is kept of an answer? Its distance from the truth in the units of theory, so that a million answers fit in memory.
+//! What is kept of an answer? Its distance from the truth in the units of theory, so that a million answers
+//! fit in memory.
 
 use super::accept::{Breakage, Estimate, Outcome};
 use super::covariance_form::CovarianceFault;
@@ -43,7 +44,8 @@ pub struct Trial {
     pub standard_deviations: Option<Vec<f64>>,
     /// What is wrong with the form of the reported covariance.
     pub covariance_fault: Option<CovarianceFault>,
-    /// Variances of the reported covariance along the bound's principal directions, over the bound's ([`super::principal`]).
+    /// Variances of the reported covariance along the bound's principal directions, over the bound's
+    /// ([`super::principal`]).
     pub principal_variances: Option<Vec<f64>>,
     /// `e^T P^-1 e` under the reported covariance.
     pub own_nees: Option<f64>,
@@ -53,8 +55,8 @@ pub struct Trial {
     pub square: Option<f64>,
     /// The same with poses refitted to the reported camera; for the first trials only.
     pub refitted_square: Option<f64>,
-    /// `e^T P^-1 e` of every reported pose under the bound: chi-squared with six degrees of freedom. Infinite where the matrix
-    /// is no rotation.
+    /// `e^T P^-1 e` of every reported pose under the bound: chi-squared with six degrees of freedom. Infinite
+    /// where the matrix is no rotation.
     pub pose_nees: Option<Vec<f64>>,
     /// Number of warnings.
     pub warnings: usize,
@@ -68,7 +70,8 @@ pub struct Trial {
 
 /// Trials whose poses are refitted, to learn how the solver defines its RMSE.
 pub const REFITTED: u64 = 8;
-/// A rotation matrix whose `R^T R` differs by more than this from the identity is none: single precision leaves 1e-7.
+/// A rotation matrix whose `R^T R` differs by more than this from the identity is none: single precision
+/// leaves 1e-7.
 const NOT_A_ROTATION: f64 = 1e-5;
 
 /// Reduces the reply to a case.

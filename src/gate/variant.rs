@@ -1,4 +1,5 @@
-//! Which changes of a problem must not change its answer? Invariances, with the change of the camera that undoes them.
+//! Which changes of a problem must not change its answer? Invariances, with the change of the camera that
+//! undoes them.
 
 use super::protocol::Problem;
 use calibench::camera::{BrownConrady, Camera};
@@ -77,9 +78,10 @@ impl Variant {
     }
 }
 
-/// The camera that sees `(v, u)` where this one sees `(u, v)`: with the rows of its matrix exchanged, made triangular again by a rotation about the
-/// optical axis, `[[0, fy'], [fx', s']] = [[fx, s], [0, fy]] Q`. Radial distortion does not know of `Q`; the vector `(p2, p1)` of the tangential terms
-/// turns with it. Without skew parameters are exchanged, no more.
+/// The camera that sees `(v, u)` where this one sees `(u, v)`: with the rows of its matrix exchanged, made
+/// triangular again by a rotation about the optical axis, `[[0, fy'], [fx', s']] = [[fx, s], [0, fy]] Q`.
+/// Radial distortion does not know of `Q`; the vector `(p2, p1)` of the tangential terms turns with it.
+/// Without skew parameters are exchanged, no more.
 fn with_axes_swapped(camera: &Camera) -> Camera {
     let fy = libm::hypot(camera.fx, camera.skew);
     let (sine, cosine) = (camera.skew / fy, camera.fx / fy);

@@ -70,7 +70,8 @@ pub enum BoardError {
 }
 
 impl Board {
-    /// Most marks of a board: a thousand by a thousand, far above what a photograph can show apart. Their places take 16 MB.
+    /// Most marks of a board: a thousand by a thousand, far above what a photograph can show apart. Their
+    /// places take 16 MB.
     pub const MOST_MARKS: usize = 1_000_000;
 
     /// A board of `columns x rows` marks, `spacing` apart.

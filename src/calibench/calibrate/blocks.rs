@@ -28,8 +28,9 @@ impl ViewBlock {
         ViewBlock { coupling: SMatrix::zeros(), pose: SMatrix::zeros(), gradient: SVector::zeros() }
     }
 
-    /// Lets the target turn only about `normal` (unit vector, camera frame), so that its plane keeps its tilt: with
-    /// `P = diag(n n^T, I)` the block becomes `P C P + (I - P) c` and `B P`, `P g`, whose step stays in the range of `P`.
+    /// Lets the target turn only about `normal` (unit vector, camera frame), so that its plane keeps its
+    /// tilt: with `P = diag(n n^T, I)` the block becomes `P C P + (I - P) c` and `B P`, `P g`, whose step
+    /// stays in the range of `P`.
     pub(super) fn hold_tilt(&mut self, normal: &nalgebra::Vector3<f64>) {
         let mut keep = PoseBlock::identity();
         keep.fixed_view_mut::<3, 3>(0, 0).copy_from(&(normal * normal.transpose()));

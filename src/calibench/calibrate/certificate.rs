@@ -1,24 +1,28 @@
 //! Is a minimum the right one? Its cost is held against the floor of a model in which nothing is ambiguous.
 //!
-//! Give every view a homography of its own instead of a pose, behind the same lens: the *relaxed model*. It holds every camera and every pose,
-//! and it knows no focal length, no distance and no choice between two tilts, so that its own minimum is easily found. If a minimum of the
-//! calibration is the right one and the model holds, its cost exceeds the relaxed one by chance only: by `sigma^2` times a chi-squared variable
+//! Give every view a homography of its own instead of a pose, behind the same lens: the *relaxed model*. It
+//! holds every camera and every pose, and it knows no focal length, no distance and no choice between two
+//! tilts, so that its own minimum is easily found. If a minimum of the calibration is the right one and the
+//! model holds, its cost exceeds the relaxed one by chance only: by `sigma^2` times a chi-squared variable
 //! with at most two degrees of freedom a view (a homography has eight parameters, a pose six).
 //!
-//! At a minimum of the calibration the relaxed model's gradient is left in the two strains of each plane alone
-//! ([`super::kernel::Strain`]). A Gauss-Newton step of the whole relaxed model tells how far the cost would fall (Rao's score test): with the
-//! columns `E` of the strains, poses and intrinsics eliminated from them,
+//! At a minimum of the calibration the relaxed model's gradient is left in the two strains of each plane
+//! alone ([`super::kernel::Strain`]). A Gauss-Newton step of the whole relaxed model tells how far the cost
+//! would fall (Rao's score test): with the columns `E` of the strains, poses and intrinsics eliminated from
+//! them,
 //!
 //! ```text
 //! T = g^T (E^T E)^-1 g,   floor F = cost - T,   statistic (T / d1) / (F / d2),   d1 = 2 V - m,   d2 = 2 N - 8 V - (n - m)
 //! ```
-//! for `V` views, `N` points and `n` free parameters, `m` combinations of which free homographies leave undetermined (the focal length; without
-//! distortion the principal point too). To first order the statistic follows Fisher's distribution.
+//! for `V` views, `N` points and `n` free parameters, `m` combinations of which free homographies leave
+//! undetermined (the focal length; without distortion the principal point too). To first order the statistic
+//! follows Fisher's distribution.
 //!
-//! **Priors.** The floor is what the pixels alone reach: no prior enters it, not one on a coefficient of the lens, which the relaxed model shares,
-//! nor one on the focal length, which it does not know. A prior is one more measurement that the calibration must meet and the relaxed model need
-//! not, so that the excess counts the priors' share of the cost and `d1` grows by their number. A prior that the pixels contradict is a part of the
-//! model that does not hold, and is not certified.
+//! **Priors.** The floor is what the pixels alone reach: no prior enters it, not one on a coefficient of the
+//! lens, which the relaxed model shares, nor one on the focal length, which it does not know. A prior is one
+//! more measurement that the calibration must meet and the relaxed model need not, so that the excess counts
+//! the priors' share of the cost and `d1` grows by their number. A prior that the pixels contradict is a part
+//! of the model that does not hold, and is not certified.
 #![allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
 
 use super::blocks::N;
@@ -31,8 +35,8 @@ use super::prior::Priors;
 use super::system::{Reduction, System};
 use crate::camera::Parameter;
 
-/// A right minimum of a model that holds misses its certificate with this probability at most: rare among the calibrations of a lifetime,
-/// while wrong minima of consequence lie tens of orders below.
+/// A right minimum of a model that holds misses its certificate with this probability at most: rare among the
+/// calibrations of a lifetime, while wrong minima of consequence lie tens of orders below.
 pub(super) const FALSE_ALARM: f64 = 1e-6;
 
 /// How the cost of a minimum compares with the least that any camera and any poses could reach.
@@ -44,17 +48,19 @@ pub struct Certificate {
     pub floor_rmse_px: f64,
     /// By how much the cost exceeds that floor, in variances of a pixel coordinate.
     pub excess: f64,
-    /// Degrees of freedom of the excess: two a view less those of the intrinsics that homographies do not determine; at 0 nothing can be
-    /// certified.
+    /// Degrees of freedom of the excess: two a view less those of the intrinsics that homographies do not
+    /// determine; at 0 nothing can be certified.
     pub freedom: usize,
     /// Degrees of freedom of the floor; 0 where the homographies leave none, and nothing can be certified.
     pub floor_freedom: usize,
-    /// Probability that chance makes such an excess where the minimum is the right one and the lens model holds.
+    /// Probability that chance makes such an excess where the minimum is the right one and the lens model
+    /// holds.
     pub p_value: f64,
 }
 
 impl Certificate {
-    /// Whether there is anything to be certified by: more measurements than homographies need, and more views than the camera needs.
+    /// Whether there is anything to be certified by: more measurements than homographies need, and more views
+    /// than the camera needs.
     pub fn is_possible(&self) -> bool {
         self.freedom > 0 && self.floor_freedom > 0
     }
@@ -93,7 +99,8 @@ impl Certificate {
     }
 }
 
-/// The certificate of a minimum: its pose blocks and reduced equations stand in `reduction`, and its cost is `cost`.
+/// The certificate of a minimum: its pose blocks and reduced equations stand in `reduction`, and its cost is
+/// `cost`.
 pub(super) fn certify(problem: &Problem<'_>, state: &State, reduction: &Reduction, cost: f64) -> Certificate {
     let views = problem.observations.len();
     let points: usize = problem.observations.iter().map(|pairs| pairs.len()).sum();
@@ -110,7 +117,8 @@ pub(super) fn certify(problem: &Problem<'_>, state: &State, reduction: &Reductio
     Certificate::of(cost, floor, points, freedom, floor_freedom)
 }
 
-/// The score of the pixels alone, at a minimum under priors: there the priors hold the balance to the pixels' gradient.
+/// The score of the pixels alone, at a minimum under priors: there the priors hold the balance to the pixels'
+/// gradient.
 fn score_of_pixels(problem: &Problem<'_>, state: &State) -> (f64, usize) {
     let pixels = Problem { priors: Priors::NONE, ..*problem };
     let mut system = System::new(problem.free, problem.observations.len());
@@ -125,10 +133,11 @@ fn score_of_pixels(problem: &Problem<'_>, state: &State) -> (f64, usize) {
     score(&pixels, state, &reduction, right)
 }
 
-/// `T`: with the strains of a view eliminated after its pose, `S_i = E_i^T E_i - ...`, `U_i` their coupling with the intrinsics and `g_i` their
-/// gradient, `T = sum g_i^T S_i^-1 g_i + w^T (S - sum U_i^T S_i^-1 U_i)^+ w` with `w = sum U_i^T S_i^-1 g_i`. The inverse is a pseudo-inverse:
-/// free homographies know no focal length. Where the gradient of the intrinsics does not vanish, `right` is it with the other sign and `w` starts
-/// there. Returns `T` and how many combinations of the intrinsics they leave undetermined.
+/// `T`: with the strains of a view eliminated after its pose, `S_i = E_i^T E_i - ...`, `U_i` their coupling
+/// with the intrinsics and `g_i` their gradient, `T = sum g_i^T S_i^-1 g_i + w^T (S - sum U_i^T S_i^-1 U_i)^+
+/// w` with `w = sum U_i^T S_i^-1 g_i`. The inverse is a pseudo-inverse: free homographies know no focal
+/// length. Where the gradient of the intrinsics does not vanish, `right` is it with the other sign and `w`
+/// starts there. Returns `T` and how many combinations of the intrinsics they leave undetermined.
 fn score(problem: &Problem<'_>, state: &State, reduction: &Reduction, mut right: [f64; N]) -> (f64, usize) {
     let radial = kernel::is_radial(&state.camera, problem.free);
     let parameters: Vec<usize> = problem.free.iter().map(|p| p as usize).collect();
@@ -162,7 +171,8 @@ fn score(problem: &Problem<'_>, state: &State, reduction: &Reduction, mut right:
     (gain + through_lens, undetermined)
 }
 
-/// What the strains of a view say: two orthonormal combinations of them, each with its coupling to the intrinsics and its gradient.
+/// What the strains of a view say: two orthonormal combinations of them, each with its coupling to the
+/// intrinsics and its gradient.
 struct Share {
     columns: [[f64; N]; 2],
     gradient: [f64; 2],
@@ -184,7 +194,8 @@ impl Share {
         let mut columns = [coupling(&strain.intrinsics[0], &a), coupling(&strain.intrinsics[1], &b)];
         let mut gradient = strain.gradient;
         let (aa, ab) = (strain.square[0] - dot(&a, &a), strain.square[1] - dot(&a, &b));
-        // Without perspective and with few points a strain may be no more than rounding: it then says nothing.
+        // Without perspective and with few points a strain may be no more than rounding: it then says
+        // nothing.
         let first = inverse_root(aa, strain.square[0]);
         columns[0] = columns[0].map(|x| x * first);
         gradient[0] *= first;
@@ -206,11 +217,13 @@ fn inverse_root(left: f64, whole: f64) -> f64 {
 
 /// Of which less than this part is left after an elimination is known by rounding only.
 const SMALLEST_SHARE: f64 = 1e-11;
-/// Likewise for the intrinsics, of which free homographies leave some undetermined: several eliminations' rounding.
+/// Likewise for the intrinsics, of which free homographies leave some undetermined: several eliminations'
+/// rounding.
 const SMALLEST_PIVOT: f64 = 1e-9;
 
-/// `r^T M^+ r` for a positive semi-definite `M` (upper triangle) and `r` in its range, by elimination with the largest pivot first; what is left
-/// of a parameter is compared with `scale`, its size at first. Returns also the rank that `M` lacks.
+/// `r^T M^+ r` for a positive semi-definite `M` (upper triangle) and `r` in its range, by elimination with
+/// the largest pivot first; what is left of a parameter is compared with `scale`, its size at first. Returns
+/// also the rank that `M` lacks.
 fn quadratic_form(
     matrix: &mut [[f64; N]; N],
     right: &mut [f64; N],

@@ -6,8 +6,9 @@ use statrs::function::beta::checked_beta_reg;
 /// Digits kept: the last ones of the beta function are the platform's.
 const DIGITS: f64 = 1e9;
 
-/// `P(F > f)` of the ratio of two independent chi-squared variables, each over its degrees of freedom (Fisher 1924): the regularised
-/// incomplete beta function `I_x(d2 / 2, d1 / 2)` at `x = d2 / (d2 + d1 f)`. To nine digits; 0 below 1e-300.
+/// `P(F > f)` of the ratio of two independent chi-squared variables, each over its degrees of freedom (Fisher
+/// 1924): the regularised incomplete beta function `I_x(d2 / 2, d1 / 2)` at `x = d2 / (d2 + d1 f)`. To nine
+/// digits; 0 below 1e-300.
 pub(super) fn fisher_tail(f: f64, numerator_freedom: usize, denominator_freedom: usize) -> f64 {
     let (d1, d2) = (numerator_freedom as f64, denominator_freedom as f64);
     if f.is_nan() || f <= 0.0 {

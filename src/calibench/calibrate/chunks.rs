@@ -1,13 +1,16 @@
-//! How do several threads give the bits of one? Views are worked on in chunks of fixed size, and chunks are combined in order.
+//! How do several threads give the bits of one? Views are worked on in chunks of fixed size, and chunks are
+//! combined in order.
 
-/// Views in a chunk: enough work to be worth handing over (some 50 us), few enough for a hundred views to be shared out.
+/// Views in a chunk: enough work to be worth handing over (some 50 us), few enough for a hundred views to be
+/// shared out.
 pub(super) const CHUNK: usize = 16;
 /// With fewer items the threads' meeting costs more than they save.
 #[cfg(feature = "parallel")]
 const WORTH_SHARING: usize = 4 * CHUNK;
 
-/// Does `work` over `items` items on a thread of the pool where it is worth sharing: there one [`fold`] after another finds the other
-/// threads awake, while each that is called from outside the pool puts its caller to sleep and wakes it up again.
+/// Does `work` over `items` items on a thread of the pool where it is worth sharing: there one [`fold`] after
+/// another finds the other threads awake, while each that is called from outside the pool puts its caller to
+/// sleep and wakes it up again.
 pub(super) fn in_pool<R: Send>(items: usize, work: impl FnOnce() -> R + Send) -> R {
     #[cfg(feature = "parallel")]
     if items >= WORTH_SHARING && rayon::current_num_threads() > 1 {
@@ -18,7 +21,8 @@ pub(super) fn in_pool<R: Send>(items: usize, work: impl FnOnce() -> R + Send) ->
     work()
 }
 
-/// Applies `work` to the chunks of `items`, with the chunk's number, and hands the results to `combine` in order.
+/// Applies `work` to the chunks of `items`, with the chunk's number, and hands the results to `combine` in
+/// order.
 pub(super) fn fold<T: Send, R: Send>(
     items: &mut [T],
     work: impl Fn(usize, &mut [T]) -> R + Sync,

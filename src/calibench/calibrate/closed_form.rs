@@ -1,4 +1,5 @@
-//! Which camera do the homographies alone imply? Zhang's closed form (Zhang 2000, sections 2.3, 3.1, appendix B).
+//! Which camera do the homographies alone imply? Zhang's closed form (Zhang 2000, sections 2.3, 3.1, appendix
+//! B).
 
 use crate::camera::Camera;
 use crate::geometry::{Homography, Mat3, Pose, Vec3};
@@ -26,12 +27,13 @@ pub enum ClosedFormError {
 
 /// The camera whose absolute conic best meets the constraints of the homographies, without distortion.
 ///
-/// Each `H = [h1 h2 h3]` gives `h1^T B h2 = 0` and `h1^T B h1 = h2^T B h2` for `B ~ K^-T K^-1` (Zhang 2000, eqs. 3, 4). With
-/// `b = (B11, B12, B22, B13, B23, B33)` they read `V b = 0` (eqs. 8, 9); `b` is the singular vector of the smallest
-/// singular value. Without skew the column of `B12` is left out, which is Zhang's extra equation met exactly.
+/// Each `H = [h1 h2 h3]` gives `h1^T B h2 = 0` and `h1^T B h1 = h2^T B h2` for `B ~ K^-T K^-1` (Zhang 2000,
+/// eqs. 3, 4). With `b = (B11, B12, B22, B13, B23, B33)` they read `V b = 0` (eqs. 8, 9); `b` is the singular
+/// vector of the smallest singular value. Without skew the column of `B12` is left out, which is Zhang's
+/// extra equation met exactly.
 ///
-/// The result depends on the scaling of the homographies and of the pixels; Zhang's published values are those for
-/// `h33 = 1` and raw pixels.
+/// The result depends on the scaling of the homographies and of the pixels; Zhang's published values are
+/// those for `h33 = 1` and raw pixels.
 ///
 /// # Errors
 /// Fewer than 3 views with skew or 2 without; a `B` that is not definite.
@@ -94,9 +96,9 @@ fn camera_from_conic([b11, b12, b22, b13, b23, b33]: [f64; 6]) -> Result<Camera,
     Ok(Camera { skew: gamma, ..Camera::pinhole(alpha, beta, u0, v0) })
 }
 
-/// The pose of a target with the given homography, for a camera without distortion (Zhang 2000, section 3.1): the columns of
-/// `K^-1 H` are `r1`, `r2`, `t` up to scale; the nearest rotation is taken. `None` if the target would lie at or behind the
-/// camera, or is not finite.
+/// The pose of a target with the given homography, for a camera without distortion (Zhang 2000, section 3.1):
+/// the columns of `K^-1 H` are `r1`, `r2`, `t` up to scale; the nearest rotation is taken. `None` if the
+/// target would lie at or behind the camera, or is not finite.
 pub fn pose_from_homography(camera: &Camera, homography: &Homography) -> Option<Pose> {
     let columns = camera.k().try_inverse()? * homography.0;
     let (a, b, c) = (columns.column(0), columns.column(1), columns.column(2));
@@ -111,8 +113,9 @@ pub fn pose_from_homography(camera: &Camera, homography: &Homography) -> Option<
 
 /// The rotation nearest to `[r1, r2, r1 x r2]`, not finite if `r1` and `r2` are parallel.
 ///
-/// The third column stands on the first two, so the polar factor falls apart: with `G = [r1 r2]^T [r1 r2]` the first two columns are
-/// `[r1 r2] G^(-1/2)`, and a 2 x 2 root is `G^(1/2) = (G + d I) / sqrt(trace G + 2 d)`, `d = sqrt(det G)` (Higham 2008, section 6.1).
+/// The third column stands on the first two, so the polar factor falls apart: with `G = [r1 r2]^T [r1 r2]`
+/// the first two columns are `[r1 r2] G^(-1/2)`, and a 2 x 2 root is `G^(1/2) = (G + d I) / sqrt(trace G + 2
+/// d)`, `d = sqrt(det G)` (Higham 2008, section 6.1).
 fn nearest_rotation(r1: &Vec3, r2: &Vec3) -> Mat3 {
     let (g11, g12, g22) = (r1.norm_squared(), r1.dot(r2), r2.norm_squared());
     // |r1 x r2| is the root of the determinant without cancellation.

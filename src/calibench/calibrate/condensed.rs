@@ -1,8 +1,8 @@
 //! Which focal lengths and tilts agree with the homographies? The relaxed model in place of the points.
 //!
-//! At the relaxed minimum a view says of its homography `h` what all of its points say: `(h - h0)^T C (h - h0)`. A pose and a focal length predict
-//! `h`, so that a hypothesis costs a few small products instead of a pass over the points, and tens of focal lengths with both tilts of every
-//! plane can be tried.
+//! At the relaxed minimum a view says of its homography `h` what all of its points say: `(h - h0)^T C (h -
+//! h0)`. A pose and a focal length predict `h`, so that a hypothesis costs a few small products instead of a
+//! pass over the points, and tens of focal lengths with both tilts of every plane can be tried.
 
 use super::closed_form::pose_from_homography;
 use super::relaxed::{Entries, EntriesBlock, Relaxed, matrix};
@@ -23,8 +23,8 @@ pub(super) struct Hypothesis {
 /// Steps of a pose: each start is next to its answer or not worth following.
 const STEPS: usize = 6;
 
-/// The best pose of every view for a pinhole camera in units of the gauge, the better tilt for each. `None` where a view has no pose in front
-/// of the camera.
+/// The best pose of every view for a pinhole camera in units of the gauge, the better tilt for each. `None`
+/// where a view has no pose in front of the camera.
 pub(super) fn hypothesis(relaxed: &Relaxed, camera: &Camera) -> Option<Hypothesis> {
     let mut poses = Vec::with_capacity(relaxed.homographies.len());
     let mut total = 0.0;

@@ -11,9 +11,9 @@ use nalgebra::{DMatrix, DVector, SVector};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Conditioning {
-    /// Smallest eigenvalue of the intrinsics' information after the poses are eliminated, scaled to unit diagonal before
-    /// the elimination: the part of the information about the weakest combination that is left when the poses and the
-    /// other intrinsics are unknown too. 1 is perfect, 0 is not identifiable.
+    /// Smallest eigenvalue of the intrinsics' information after the poses are eliminated, scaled to unit
+    /// diagonal before the elimination: the part of the information about the weakest combination that is
+    /// left when the poses and the other intrinsics are unknown too. 1 is perfect, 0 is not identifiable.
     pub smallest_eigenvalue: f64,
     /// Largest over smallest eigenvalue of the same matrix.
     pub condition_number: f64,
@@ -25,14 +25,16 @@ pub struct Conditioning {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WeakComponent {
-    /// An intrinsic parameter, or the pose component that moves with it: tilt, roll, lateral position, distance.
+    /// An intrinsic parameter, or the pose component that moves with it: tilt, roll, lateral position,
+    /// distance.
     pub unknown: Unknown,
-    /// Share of the combination in scaled units, signed for intrinsics, in size for poses (root mean square over views).
+    /// Share of the combination in scaled units, signed for intrinsics, in size for poses (root mean square
+    /// over views).
     pub weight: f64,
 }
 
-/// Smallest eigenvalue of the scaled information below which it is rounding: the elimination subtracts numbers of size 1, so its
-/// error is some hundred roundings.
+/// Smallest eigenvalue of the scaled information below which it is rounding: the elimination subtracts
+/// numbers of size 1, so its error is some hundred roundings.
 const SINGULAR: f64 = 1e-12;
 /// Members of the weakest combination below this share of the largest one are not worth a name.
 const NAMED_SHARE: f64 = 0.2;
@@ -100,8 +102,9 @@ fn named(
     members
 }
 
-/// How far the poses follow an intrinsics step, `-C^-1 B^T d`, in units in which each component alone has unit information:
-/// root mean square over the views of tilt (x, y), roll (z), lateral position (x, y), distance (z).
+/// How far the poses follow an intrinsics step, `-C^-1 B^T d`, in units in which each component alone has
+/// unit information: root mean square over the views of tilt (x, y), roll (z), lateral position (x, y),
+/// distance (z).
 fn pose_response(system: &System, eliminated: &[Eliminated], step: &SVector<f64, N>) -> [f64; 4] {
     let mut squares = [0.0; 4];
     let total: f64 = system.views.len() as f64;
@@ -112,6 +115,7 @@ fn pose_response(system: &System, eliminated: &[Eliminated], step: &SVector<f64,
             squares[group] += moved[i] * moved[i] * view.pose[(i, i)] / total;
         }
     }
-    // A view holds 1/total of the intrinsics' information, so its pose is measured on a scale smaller by that root.
+    // A view holds 1/total of the intrinsics' information, so its pose is measured on a scale smaller by that
+    // root.
     squares.map(|s| (s / total).sqrt())
 }

@@ -6,15 +6,17 @@ use nalgebra::{DMatrix, MatrixXx6, SMatrix};
 
 /// Covariance of the free intrinsics and of every pose.
 ///
-/// To first order the estimate is Gaussian with covariance `sigma^2 (J^T J)^-1`; poses are marginal over the intrinsics and the
-/// other way round. Pose entries: rotation vector of `R <- exp(delta) R` in rad, then translation in the target's unit.
+/// To first order the estimate is Gaussian with covariance `sigma^2 (J^T J)^-1`; poses are marginal over the
+/// intrinsics and the other way round. Pose entries: rotation vector of `R <- exp(delta) R` in rad, then
+/// translation in the target's unit.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(into = "data::Rows", try_from = "data::Rows"))]
 pub struct Covariance {
     /// Which parameters the rows of `intrinsics` are, in order.
     pub free: FreeParameters,
-    /// fy over fx, if the two are tied: fy then has no row, the standard deviation of fx times this ratio, and the correlations of fx.
+    /// fy over fx, if the two are tied: fy then has no row, the standard deviation of fx times this ratio,
+    /// and the correlations of fx.
     pub fy_per_fx: Option<f64>,
     /// n x n.
     pub intrinsics: DMatrix<f64>,
@@ -39,15 +41,16 @@ impl Covariance {
         Some(factor * self.intrinsics[(i, i)].sqrt())
     }
 
-    /// Correlation coefficient of two intrinsic parameters, 1 of fx and an fy that is tied to it; `None` if one was not estimated.
+    /// Correlation coefficient of two intrinsic parameters, 1 of fx and an fy that is tied to it; `None` if
+    /// one was not estimated.
     pub fn correlation(&self, a: Parameter, b: Parameter) -> Option<f64> {
         let ((i, _), (j, _)) = (self.row(a)?, self.row(b)?);
         let m = &self.intrinsics;
         Some(m[(i, j)] / (m[(i, i)] * m[(j, j)]).sqrt())
     }
 
-    /// The columns of the estimated parameters, from those of all ten in the Jacobian of a pixel: to that of fx an fy that is tied to it adds its
-    /// share.
+    /// The columns of the estimated parameters, from those of all ten in the Jacobian of a pixel: to that of
+    /// fx an fy that is tied to it adds its share.
     pub fn columns(&self, of_all: &SMatrix<f64, 2, { Parameter::COUNT }>) -> Vec<Vec2> {
         let column = |parameter: Parameter| of_all.column(parameter as usize).into_owned();
         let with_tie = |parameter: Parameter| match self.fy_per_fx {
@@ -65,9 +68,9 @@ impl Covariance {
         }
     }
 
-    /// `e^T P^-1 e` for an error of the free intrinsics: chi-squared with as many degrees of freedom if the covariance is
-    /// right (the normalised estimation error squared; Bar-Shalom, Li & Kirubarajan 2001). `None` if `P` is singular or the
-    /// error has another length.
+    /// `e^T P^-1 e` for an error of the free intrinsics: chi-squared with as many degrees of freedom if the
+    /// covariance is right (the normalised estimation error squared; Bar-Shalom, Li & Kirubarajan 2001).
+    /// `None` if `P` is singular or the error has another length.
     pub fn normalised_error_squared(&self, error: &[f64]) -> Option<f64> {
         if error.len() != self.free.len() {
             return None;

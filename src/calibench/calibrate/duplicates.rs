@@ -1,10 +1,11 @@
-//! Which views and marks were given more than once? A copy says nothing new, and counted again it would shrink every standard deviation.
+//! Which views and marks were given more than once? A copy says nothing new, and counted again it would
+//! shrink every standard deviation.
 
 use crate::board::View;
 use crate::geometry::Vec2;
 
-/// Two photographs differ by their noise, some 0.01 px at the least; pixels that all agree to this many px are one measurement, written twice: to two
-/// decimals perhaps.
+/// Two photographs differ by their noise, some 0.01 px at the least; pixels that all agree to this many px
+/// are one measurement, written twice: to two decimals perhaps.
 const SAME_PX: f64 = 6e-3;
 /// Coordinates of a target that agree to this part of its size are those of one mark.
 const SAME_PART: f64 = 1e-9;
@@ -15,7 +16,8 @@ pub(super) struct Distinct {
     pub kept: Vec<usize>,
     /// For each given view its place among those kept.
     pub place: Vec<usize>,
-    /// For each given view the kept view's mark that each of its marks is: `None` where they are the same, in the same order.
+    /// For each given view the kept view's mark that each of its marks is: `None` where they are the same, in
+    /// the same order.
     marks: Vec<Option<Vec<usize>>>,
     /// The kept views whose marks were not all different, without the copies.
     thinned: Vec<(usize, View)>,
@@ -97,11 +99,12 @@ impl Thinned {
     }
 }
 
-/// Bits of the table in which marks are looked up: few enough to clear for every view, and so many that of 63 different marks two share one in
-/// a view of four.
+/// Bits of the table in which marks are looked up: few enough to clear for every view, and so many that of 63
+/// different marks two share one in a view of four.
 const TABLE_BITS: u32 = 13;
 
-/// Whether no mark is a copy of another: by a table of their keys' bits, and by sorted keys where two share a bit.
+/// Whether no mark is a copy of another: by a table of their keys' bits, and by sorted keys where two share a
+/// bit.
 fn are_different(view: &View) -> bool {
     let mut table = [0_u64; 1 << (TABLE_BITS - 6)];
     let is_new = |pair| {
@@ -139,7 +142,8 @@ fn marks_in(views: &[View], thin: &[Option<Thinned>], view: usize, first: usize)
     Some(marks)
 }
 
-/// For each view the first that is the same but for rounding and the order of its marks: itself unless it is a copy.
+/// For each view the first that is the same but for rounding and the order of its marks: itself unless it is
+/// a copy.
 fn first_of_each(views: &[View]) -> Vec<usize> {
     let mut first: Vec<usize> = (0..views.len()).collect();
     // Only views whose leftmost pixels agree are compared whole: time grows as that of sorting.

@@ -75,8 +75,8 @@ impl Reduced {
     }
 }
 
-/// Cholesky factor of a lower triangle in its place, with the inverse of the diagonal in place of the diagonal. `None` if not positive
-/// definite.
+/// Cholesky factor of a lower triangle in its place, with the inverse of the diagonal in place of the
+/// diagonal. `None` if not positive definite.
 #[inline(always)]
 fn factor_in_place<const K: usize>(lower: &mut [[f64; K]; K], n: usize) -> Option<()> {
     for j in 0..n {
@@ -100,8 +100,8 @@ fn factor_in_place<const K: usize>(lower: &mut [[f64; K]; K], n: usize) -> Optio
     Some(())
 }
 
-/// Eliminates the poses of `views`; returns `sum W^T [W z]`, of which the upper triangle is filled. `None` where a block is not
-/// positive definite.
+/// Eliminates the poses of `views`; returns `sum W^T [W z]`, of which the upper triangle is filled. `None`
+/// where a block is not positive definite.
 pub(super) fn eliminate(
     views: &[ViewBlock],
     eliminated: &mut [Eliminated],
@@ -249,7 +249,8 @@ impl Eliminated {
         b
     }
 
-    /// Covariance of the pose, `C^-1 + Y P Y^T` with `Y = C^-1 B^T` and `P` that of the intrinsics, and theirs with it, `-P Y^T`.
+    /// Covariance of the pose, `C^-1 + Y P Y^T` with `Y = C^-1 B^T` and `P` that of the intrinsics, and
+    /// theirs with it, `-P Y^T`.
     pub fn covariance(&self, intrinsics: &Intrinsics, n: usize) -> (PoseBlock, MatrixXx6<f64>) {
         let (pose, minus_cross) = if n < 2 * LANES {
             dispatch(PoseCovariance::<2> { view: self, intrinsics })

@@ -20,21 +20,21 @@ use crate::board::View;
 use crate::camera::Parameter;
 use crate::geometry::{Homography, Vec2};
 
-/// Homographies of the start are refined until a step promises less than this part of their cost: distortion, which they leave out, is
-/// far larger than what is left to gain.
+/// Homographies of the start are refined until a step promises less than this part of their cost: distortion,
+/// which they leave out, is far larger than what is left to gain.
 const START_GAIN: f64 = 1e-3;
 
 /// Estimates the free parameters of `settings` and the pose of every view.
 ///
 /// 1. A homography for each view, of least squared pixel distance.
 /// 2. Intrinsics in closed form, poses from them (Zhang 2000, section 3.1).
-/// 3. All unknowns refined together: the sum of squared pixel distances is least (Zhang 2000, section 3.2, with the full
-///    Brown-Conrady model), which is the maximum-likelihood estimate under Gaussian noise.
+/// 3. All unknowns refined together: the sum of squared pixel distances is least (Zhang 2000, section 3.2,
+///    with the full Brown-Conrady model), which is the maximum-likelihood estimate under Gaussian noise.
 /// 4. Covariance, conditioning, warnings.
 ///
 /// # Errors
-/// Data that cannot determine the free parameters are refused; see [`CalibrationError`]. A refinement that does not converge is
-/// no error: the result says so in [`Calibration::termination`] and in a warning.
+/// Data that cannot determine the free parameters are refused; see [`CalibrationError`]. A refinement that
+/// does not converge is no error: the result says so in [`Calibration::termination`] and in a warning.
 ///
 /// ```
 /// use calibench::calibrate::{CalibrationError, Settings, calibrate};
@@ -77,7 +77,8 @@ fn calibrate_different(views: &[View], settings: &Settings) -> Result<Calibratio
     })
 }
 
-/// The result for all that was given: a copy has the pose and the residuals of what it is a copy of, and counts in no statistic.
+/// The result for all that was given: a copy has the pose and the residuals of what it is a copy of, and
+/// counts in no statistic.
 fn with_copies(mut calibration: Calibration, distinct: &Distinct) -> Calibration {
     fn at<T: Clone>(list: &[T], place: &[usize]) -> Vec<T> {
         place.iter().map(|&i| list[i].clone()).collect()
@@ -173,8 +174,8 @@ fn check_priors(settings: &Settings) -> Result<(), CalibrationError> {
     }
 }
 
-/// Whether the lens may distort: homographies give two constraints a view, and a distortion tells its centre and the aspect ratio besides, so
-/// that two views may tell all; the rank of the equations has the last word.
+/// Whether the lens may distort: homographies give two constraints a view, and a distortion tells its centre
+/// and the aspect ratio besides, so that two views may tell all; the rank of the equations has the last word.
 fn is_distorting(settings: &Settings) -> Result<bool, CalibrationError> {
     use Parameter::*;
     for parameter in [K1, K2, P1, P2, K3] {
@@ -288,7 +289,8 @@ fn report(
     Ok(calibration)
 }
 
-/// Gross errors, and residuals that agree with their neighbours'. What rounding leaves of exact data tells of neither.
+/// Gross errors, and residuals that agree with their neighbours'. What rounding leaves of exact data tells of
+/// neither.
 fn warnings_of_residuals(
     problem: &Problem<'_>,
     state: &State,
@@ -334,7 +336,8 @@ impl Fit {
         self.residuals.iter().flatten().map(|r| r.norm_squared())
     }
 
-    /// Degrees of freedom that the residuals have, 1 at the least; `settled` unknowns are known from elsewhere.
+    /// Degrees of freedom that the residuals have, 1 at the least; `settled` unknowns are known from
+    /// elsewhere.
     pub fn freedom(&self, system: &System, settled: f64) -> f64 {
         let coordinates = 2 * self.marks();
         (coordinates as f64 + settled - system.unknowns() as f64).max(1.0)

@@ -1,14 +1,16 @@
-//! Do the data determine the parameters, or does only their noise? Refuses calibrations whose answer would be an accident.
+//! Do the data determine the parameters, or does only their noise? Refuses calibrations whose answer would be
+//! an accident.
 //!
-//! Views of parallel planes say no more about the linear parameters than one view does (Zhang 2000, section 4), and views
-//! parallel to the image plane leave focal length and distance inseparable. With noise no two planes are exactly parallel,
-//! and a solver finds some camera, with small and meaningless standard deviations: linearised where the noise put it, the
-//! model looks well determined. The covariance cannot see this; the cost can, and it is asked twice.
+//! Views of parallel planes say no more about the linear parameters than one view does (Zhang 2000, section
+//! 4), and views parallel to the image plane leave focal length and distance inseparable. With noise no two
+//! planes are exactly parallel, and a solver finds some camera, with small and meaningless standard
+//! deviations: linearised where the noise put it, the model looks well determined. The covariance cannot see
+//! this; the cost can, and it is asked twice.
 //!
-//! - A parameter is moved far away and the rest refitted ([`super::walk`]): if the data do not object, the calibration is refused, and what moved
-//!   along is named.
-//! - Where tilts are no larger than noise makes them, all planes are held parallel: if the data fit as well, and the parameters could not be
-//!   identified were the planes parallel, the calibration is refused.
+//! - A parameter is moved far away and the rest refitted ([`super::walk`]): if the data do not object, the
+//!   calibration is refused, and what moved along is named.
+//! - Where tilts are no larger than noise makes them, all planes are held parallel: if the data fit as well,
+//!   and the parameters could not be identified were the planes parallel, the calibration is refused.
 
 use super::chance::chi_squared_quantile;
 use super::conditioning::{Conditioning, WeakComponent};
@@ -23,17 +25,19 @@ use crate::geometry::{Pose, Vec2, Vec3, rotation};
 
 /// With this probability at most data that determine nothing pass.
 const FALSE_ACCEPTANCE: f64 = 1e-6;
-/// Planes whose difference of tilt moves the edge of the target's image by more than this many standard deviations of a pixel are not
-/// parallel by accident, and need no test.
+/// Planes whose difference of tilt moves the edge of the target's image by more than this many standard
+/// deviations of a pixel are not parallel by accident, and need no test.
 const EVIDENT_TILT: f64 = 50.0;
 
 /// A cost lower by more variances than this is no rounding.
 const LOWER: f64 = 1e-3;
 /// Iterations of the fit with parallel planes: it starts next to its answer.
 const PARALLEL_ITERATIONS: usize = 50;
-/// The cost rises by the square of so many standard deviations when a focal length that the data determine is moved far away: three. A factor of three in focal length that costs less is no knowledge of it.
+/// The cost rises by the square of so many standard deviations when a focal length that the data determine is
+/// moved far away: three. A factor of three in focal length that costs less is no knowledge of it.
 const FOCAL_RISE: f64 = 9.0;
-/// Likewise for the principal point: two. It may be known poorly while the focal length is known well; then a warning is enough.
+/// Likewise for the principal point: two. It may be known poorly while the focal length is known well; then a
+/// warning is enough.
 const CENTRE_RISE: f64 = 4.0;
 
 /// The least rise, in variances, that a parameter far away must cause.
@@ -46,12 +50,14 @@ fn largest_chance_chi_squared(degrees_of_freedom: usize) -> f64 {
     chi_squared_quantile(1.0 - FALSE_ACCEPTANCE, degrees_of_freedom)
 }
 
-/// Whether the tilts of a state are so different, and so different from none, that no test is needed; for noise `noise_px` on a coordinate.
+/// Whether the tilts of a state are so different, and so different from none, that no test is needed; for
+/// noise `noise_px` on a coordinate.
 pub(super) fn tilts_are_evident(problem: &Problem<'_>, state: &State, noise_px: f64) -> bool {
     doubtful_slopes(problem, state, noise_px).is_empty()
 }
 
-/// The common slopes that all planes might have: none, and the mean. Empty where the planes are evidently not parallel.
+/// The common slopes that all planes might have: none, and the mean. Empty where the planes are evidently not
+/// parallel.
 fn doubtful_slopes(problem: &Problem<'_>, state: &State, noise_px: f64) -> Vec<(Vec2, &'static str)> {
     let slopes: Vec<Slope> =
         state.cam_from_target.iter().zip(problem.observations).filter_map(|(p, o)| Slope::of(p, o)).collect();
@@ -70,8 +76,8 @@ fn doubtful_slopes(problem: &Problem<'_>, state: &State, noise_px: f64) -> Vec<(
     candidates
 }
 
-/// Refuses if planes that are parallel explain the data and do not determine the parameters. A state of lower cost, if one is met, is
-/// returned: what was given is then no minimum, and nothing is refused.
+/// Refuses if planes that are parallel explain the data and do not determine the parameters. A state of lower
+/// cost, if one is met, is returned: what was given is then no minimum, and nothing is refused.
 pub(super) fn refuse_if_parallel(
     problem: &Problem<'_>,
     minimum: &Minimum,
@@ -90,8 +96,9 @@ pub(super) fn refuse_if_parallel(
 
 /// Refuses if planes of the given common slope explain the data and do not determine the parameters.
 ///
-/// Twice the log-likelihood ratio against free tilts is at most that against free homographies, which under parallel
-/// planes is chi-squared with at most four degrees of freedom a view (two of perspective, two of foreshortening).
+/// Twice the log-likelihood ratio against free tilts is at most that against free homographies, which under
+/// parallel planes is chi-squared with at most four degrees of freedom a view (two of perspective, two of
+/// foreshortening).
 fn refuse_if_fits(
     problem: &Problem<'_>,
     minimum: &Minimum,
@@ -126,12 +133,12 @@ fn refuse_if_fits(
     Ok(None)
 }
 
-/// A parameter that parallel planes leave to the priors must be known by them: where the estimate is said to be known better than this part of
-/// what they say, the difference comes from the tilts that noise made.
+/// A parameter that parallel planes leave to the priors must be known by them: where the estimate is said to
+/// be known better than this part of what they say, the difference comes from the tilts that noise made.
 const GIVEN_WAY: f64 = 0.9;
 
-/// Refuses planes that may be parallel, and then leave something to the priors, if the priors are so wide that the noise's tilts decide: `exact`
-/// are the equations at the state `parallel`.
+/// Refuses planes that may be parallel, and then leave something to the priors, if the priors are so wide
+/// that the noise's tilts decide: `exact` are the equations at the state `parallel`.
 fn refuse_if_priors_give_way(
     problem: &Problem<'_>,
     minimum: &Minimum,
@@ -226,7 +233,8 @@ fn add(names: &mut Vec<Unknown>, name: Unknown) {
 
 /// Two values that differ by less than this part of theirs are one.
 const ELSEWHERE: f64 = 1e-3;
-/// A parameter or pose that changed by less than this part between two states that fit alike did not move along.
+/// A parameter or pose that changed by less than this part between two states that fit alike did not move
+/// along.
 const MOVED: f64 = 0.1;
 
 /// What moved along when a parameter was moved far away, that parameter first.
@@ -260,8 +268,8 @@ fn moved(near: &State, far: &State, parameter: Parameter) -> Vec<Unknown> {
 
 /// The tilt of a target plane: `(n_x, n_y) / n_z` of its normal in the camera's frame.
 ///
-/// Inverse depth is linear over the image, `1/Z ~ 1 + slope . (x, y)`, so a slope `g` moves the edge of the target's image,
-/// `w` px from its centre, by about `g w^2 / f` px against a plane that faces the camera.
+/// Inverse depth is linear over the image, `1/Z ~ 1 + slope . (x, y)`, so a slope `g` moves the edge of the
+/// target's image, `w` px from its centre, by about `g w^2 / f` px against a plane that faces the camera.
 struct Slope {
     value: Vec2,
     half_width_px: f64,

@@ -1,14 +1,16 @@
-//! Between which values does a parameter lie? The profile of the cost, where the covariance alone would mislead.
+//! Between which values does a parameter lie? The profile of the cost, where the covariance alone would
+//! mislead.
 //!
-//! A covariance takes the cost for a parabola. Where the data are weak it is none: a long focal length is bounded below and hardly above. The
-//! profile holds one parameter, refits all others, and asks how much the cost has risen: with the signed root
+//! A covariance takes the cost for a parabola. Where the data are weak it is none: a long focal length is
+//! bounded below and hardly above. The profile holds one parameter, refits all others, and asks how much the
+//! cost has risen: with the signed root
 //!
 //! ```text
 //! tau(v) = sign(v - estimate) sqrt((cost(v) - least cost) / sigma^2)
 //! ```
-//! the interval of coverage `1 - alpha` is `|tau| <= t`, `t` the quantile of Student's distribution (Bates & Watts 1988, section 6.1). Linear
-//! theory has `tau = (v - estimate) / standard deviation`; JCGM 101 (2008), section 8.1, asks for such a comparison before a standard
-//! uncertainty is stated.
+//! the interval of coverage `1 - alpha` is `|tau| <= t`, `t` the quantile of Student's distribution (Bates &
+//! Watts 1988, section 6.1). Linear theory has `tau = (v - estimate) / standard deviation`; JCGM 101 (2008),
+//! section 8.1, asks for such a comparison before a standard uncertainty is stated.
 
 use super::minimise::{Minimum, Problem, State};
 use super::system::{Reduction, Step};
@@ -114,7 +116,8 @@ impl<'a> Profile<'a> {
         self.covariance[(row, row)].sqrt() * self.noise_px
     }
 
-    /// Where `|tau| = t`, starting from the linear end: secants through the estimate, which the profile makes nearly straight.
+    /// Where `|tau| = t`, starting from the linear end: secants through the estimate, which the profile makes
+    /// nearly straight.
     fn end(&self, parameter: Parameter, linear: f64, t: f64) -> Option<f64> {
         let mut offset = linear;
         for _ in 0..REFITS {
@@ -166,7 +169,8 @@ impl<'a> Profile<'a> {
 /// A rise below minus this many variances is a better minimum and no rounding.
 const LOWER: f64 = 1e-3;
 
-/// Half the width of the interval of Student's distribution that holds `coverage`; to nine digits, the same on every machine.
+/// Half the width of the interval of Student's distribution that holds `coverage`; to nine digits, the same
+/// on every machine.
 pub(super) fn student_quantile(coverage: f64, degrees_of_freedom: usize) -> f64 {
     let t = StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1) as f64)
         .map_or(f64::NAN, |distribution| distribution.inverse_cdf(0.5 + 0.5 * coverage));

@@ -1,8 +1,9 @@
 //! What are the sums over the points of a view? The inner loop of the calibration, four points at a time.
 //!
-//! Of a point's Jacobian the row of u depends on (fx, cx, skew) and the row of v on (fy, cy), while pose and lens move both.
-//! With `q = (pose, k1, k2, p1, p2, k3)` only the products that are not 0 are summed: `q_u q_u^T + q_v q_v^T`, `q_u` and `q_v`
-//! times their own linear parameters, and a handful of scalars. Which of them a problem needs is looked up afterwards.
+//! Of a point's Jacobian the row of u depends on (fx, cx, skew) and the row of v on (fy, cy), while pose and
+//! lens move both. With `q = (pose, k1, k2, p1, p2, k3)` only the products that are not 0 are summed: `q_u
+//! q_u^T + q_v q_v^T`, `q_u` and `q_v` times their own linear parameters, and a handful of scalars. Which of
+//! them a problem needs is looked up afterwards.
 #![allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
 
 mod strain;
@@ -21,8 +22,9 @@ const SHARED_RADIAL: usize = 8;
 
 /// Sums over the points of a view, found by [`intrinsics_slot`] and its kin.
 ///
-/// Rows 0 to 11: upper triangle of the shared columns' squares. Rows 12 to 16: shared columns times fx, cx, skew (row u) and fy,
-/// cy (row v). Row 17: shared columns times the residual. Row 18: the scalars of [`scalars`].
+/// Rows 0 to 11: upper triangle of the shared columns' squares. Rows 12 to 16: shared columns times fx, cx,
+/// skew (row u) and fy, cy (row v). Row 17: shared columns times the residual. Row 18: the scalars of
+/// [`scalars`].
 pub(super) type Sums = [[f64; SHARED]; 19];
 
 /// Sums of nothing.
@@ -176,7 +178,8 @@ impl<L: Arithmetic> Model<L> {
         }
     }
 
-    /// From numbers of more digits than a [`Camera`] has: the parameters in their order, the first two columns of `R`, and `t`.
+    /// From numbers of more digits than a [`Camera`] has: the parameters in their order, the first two
+    /// columns of `R`, and `t`.
     pub fn of_numbers(parameters: &[L; Parameter::COUNT], r: [[L; 2]; 3], t: [L; 3]) -> Model<L> {
         let [fx, fy, cx, cy, skew, k1, k2, p1, p2, k3] = *parameters;
         Model { fx, fy, cx, cy, skew, k1, k2, p1, p2, k3, r, t }
@@ -193,8 +196,8 @@ pub(super) struct Rows<L> {
     pub v: [L; SHARED],
 }
 
-/// [`crate::camera::project_with_jacobian`], written out for points with Z = 0. With `RADIAL` skew, p1, p2 and k3 are taken to be 0
-/// and have no columns.
+/// [`crate::camera::project_with_jacobian`], written out for points with Z = 0. With `RADIAL` skew, p1, p2
+/// and k3 are taken to be 0 and have no columns.
 #[inline(always)]
 pub(super) fn rows<L: Arithmetic, const RADIAL: bool>(m: &Model<L>, px: L, py: L) -> Rows<L> {
     let (one, two, three) = (L::splat(1.0), L::splat(2.0), L::splat(3.0));
@@ -276,7 +279,8 @@ fn by_point<L: Arithmetic>([dx, dy]: [L; 2], [x, y]: [L; 2], inverse_depth: L) -
     [a, b, -(a * x + b * y)]
 }
 
-/// The row of the rotation from that of the point: `d X_c / d delta = -[q]x`, so a row p becomes `-(p^T [q]x) = (q x p)^T`.
+/// The row of the rotation from that of the point: `d X_c / d delta = -[q]x`, so a row p becomes `-(p^T [q]x)
+/// = (q x p)^T`.
 #[inline(always)]
 fn by_rotation<L: Arithmetic>([qx, qy, qz]: [L; 3], p: [L; 3]) -> [L; 3] {
     [qy * p[2] - qz * p[1], qz * p[0] - qx * p[2], qx * p[1] - qy * p[0]]
@@ -438,7 +442,8 @@ impl<L: Lanes, const Q: usize> Accumulators<L, Q> {
     }
 }
 
-/// The product with the column of the principal point. A mask of 0 and 1 is its own square: only other weights need it.
+/// The product with the column of the principal point. A mask of 0 and 1 is its own square: only other
+/// weights need it.
 #[inline(always)]
 fn times_one<L: Arithmetic, const ROBUST: bool>(value: L, one: L) -> L {
     if ROBUST { value * one } else { value }
@@ -496,7 +501,8 @@ impl Kernel for Residuals<'_> {
             let mut ru = m.fx * xd + m.skew * yd + m.cx - L::load(&block.u);
             let mut rv = m.fy * yd + m.cy - L::load(&block.v);
             if !depth.all_positive() {
-                // Not in front of the camera: no prediction. The search never ends there unless it started there.
+                // Not in front of the camera: no prediction. The search never ends there unless it started
+                // there.
                 let unseen = hidden(depth.store(), pairs.len() - index * LANES);
                 (ru, rv) = (behind(ru, unseen), behind(rv, unseen));
             }

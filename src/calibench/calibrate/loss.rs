@@ -1,4 +1,5 @@
-//! How much does a residual count? Least squares, or losses under which a mis-detected point cannot carry the fit away.
+//! How much does a residual count? Least squares, or losses under which a mis-detected point cannot carry the
+//! fit away.
 
 /// The loss `rho(s)` of a point with squared residual `s = |r|^2` in px^2; the cost is its sum over points.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -40,7 +41,8 @@ impl Loss {
         }
     }
 
-    /// `rho'(s) + s rho''(s)`: the slope of the influence `rho'(|r|^2) r`, the mean of its slopes along and across the residual.
+    /// `rho'(s) + s rho''(s)`: the slope of the influence `rho'(|r|^2) r`, the mean of its slopes along and
+    /// across the residual.
     pub fn slope(&self, s: f64) -> f64 {
         let weight = self.at(s).1;
         match *self {

@@ -45,8 +45,8 @@ pub(super) struct Minimum {
     pub iterations: usize,
 }
 
-/// A step that gains less than this part of the cost moves no parameter by more than `1e-7 sqrt(degrees of freedom)` of
-/// its standard deviation.
+/// A step that gains less than this part of the cost moves no parameter by more than `1e-7 sqrt(degrees of
+/// freedom)` of its standard deviation.
 const RELATIVE_GAIN: f64 = 1e-14;
 /// Residuals of pixels near `p` cannot be known better than this many roundings of `p`.
 const ROUNDINGS: f64 = 8.0;
@@ -57,11 +57,13 @@ const DAMPING_FACTOR: f64 = 10.0;
 /// With this damping a step is a short way down the gradient; if that fails, nothing helps.
 const LARGEST_DAMPING: f64 = 1e10;
 
-/// What a search on a curved path multiplies its damping by after a failure, and again by this after each further one.
+/// What a search on a curved path multiplies its damping by after a failure, and again by this after each
+/// further one.
 const FIRST_GROWTH: f64 = 2.0;
 
-/// Factor of the damping after a step that gained `ratio` of what it promised: a third at best, 1 where half was kept (Nielsen 1999). A
-/// fixed factor goes to and fro between steps that are too long and steps that are short.
+/// Factor of the damping after a step that gained `ratio` of what it promised: a third at best, 1 where half
+/// was kept (Nielsen 1999). A fixed factor goes to and fro between steps that are too long and steps that are
+/// short.
 fn eased(ratio: f64) -> f64 {
     let x = 2.0 * ratio - 1.0;
     (1.0 - x * x * x).max(1.0 / 3.0)

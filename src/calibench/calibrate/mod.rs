@@ -1,4 +1,5 @@
-//! Which camera explains the pixels? Zhang's method: homographies, closed form, maximum-likelihood refinement, covariance.
+//! Which camera explains the pixels? Zhang's method: homographies, closed form, maximum-likelihood
+//! refinement, covariance.
 //!
 //! [`calibrate`] is the whole way; the steps stand in files of their own. Truth never enters here.
 

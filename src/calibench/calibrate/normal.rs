@@ -1,8 +1,8 @@
 //! What does one view say about the unknowns? The normal equations of a view, summed over its points.
 //!
-//! Unknowns of a view: the `n` free intrinsics, then its six pose parameters. With the Jacobian `J = [J_a J_c]` of a point's
-//! residual (predicted - observed) and the weight `w` of the loss, a view contributes
-//! `A += w J_a^T J_a`, `B = sum w J_a^T J_c`, `C = sum w J_c^T J_c` and the gradients `J^T w r`.
+//! Unknowns of a view: the `n` free intrinsics, then its six pose parameters. With the Jacobian `J = [J_a
+//! J_c]` of a point's residual (predicted - observed) and the weight `w` of the loss, a view contributes `A
+//! += w J_a^T J_a`, `B = sum w J_a^T J_c`, `C = sum w J_c^T J_c` and the gradients `J^T w r`.
 
 use super::Loss;
 use super::blocks::{Intrinsics, N, ViewBlock};
@@ -30,9 +30,11 @@ impl Share {
     }
 }
 
-/// Fills the system with the normal equations of all views. `None` where a point is not in front of the camera.
+/// Fills the system with the normal equations of all views. `None` where a point is not in front of the
+/// camera.
 ///
-/// Views are summed in chunks of fixed size, and the chunks in order: the result is the same whoever computes them.
+/// Views are summed in chunks of fixed size, and the chunks in order: the result is the same whoever computes
+/// them.
 pub(super) fn fill(
     system: &mut System,
     camera: &Camera,
@@ -143,10 +145,11 @@ fn predict(camera: &Camera, cam_from_target: &Pose, point: &Vec2) -> Option<Vec2
     camera.project(&(q + cam_from_target.translation))
 }
 
-/// The Fisher information of a scene: normal equations at given parameters, for unit noise, with every point of `points`
-/// seen in every view. `None` if a point is not in front of the camera.
+/// The Fisher information of a scene: normal equations at given parameters, for unit noise, with every point
+/// of `points` seen in every view. `None` if a point is not in front of the camera.
 ///
-/// Divided by `sigma^2` it is the inverse of the Cramer-Rao bound; its [`System::covariance`] times `sigma^2` is the bound.
+/// Divided by `sigma^2` it is the inverse of the Cramer-Rao bound; its [`System::covariance`] times `sigma^2`
+/// is the bound.
 ///
 /// ```
 /// use calibench::calibrate::information;

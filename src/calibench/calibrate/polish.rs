@@ -1,9 +1,11 @@
-//! What are the minimum's last digits? Gauss-Newton steps from a converged calibration, in numbers of 31 digits.
+//! What are the minimum's last digits? Gauss-Newton steps from a converged calibration, in numbers of 31
+//! digits.
 //!
-//! The refinement ends where a step would gain less than 1e-14 of the cost: some 1e-7 of a standard deviation, which no measurement
-//! notices. To compare solvers digit by digit, or with certified values, the rest of the way is gone here: residuals, normal
-//! equations and their solution in double-double arithmetic, until a step moves no residual by more than 1e-20 px. It costs
-//! some twenty refinements, and is done only when it is asked for.
+//! The refinement ends where a step would gain less than 1e-14 of the cost: some 1e-7 of a standard
+//! deviation, which no measurement notices. To compare solvers digit by digit, or with certified values, the
+//! rest of the way is gone here: residuals, normal equations and their solution in double-double arithmetic,
+//! until a step moves no residual by more than 1e-20 px. It costs some twenty refinements, and is done only
+//! when it is asked for.
 #![allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
 
 use super::kernel::{self, Model, Rows};
@@ -16,10 +18,11 @@ use crate::geometry::lanes::Arithmetic;
 use crate::geometry::{Pose, Vec2};
 use nalgebra::{DMatrix, MatrixXx6, SMatrix};
 
-/// Root of the squared length of a step, measured by the residuals that it changes: seven orders below what rounding of a pixel in
-/// doubles does, and as many above the rounding of 31 digits.
+/// Root of the squared length of a step, measured by the residuals that it changes: seven orders below what
+/// rounding of a pixel in doubles does, and as many above the rounding of 31 digits.
 const SETTLED_PX: f64 = 1e-20;
-/// Steps shrink by a factor of ten to ten thousand each on every data set seen; a search of so many does not shrink.
+/// Steps shrink by a factor of ten to ten thousand each on every data set seen; a search of so many does not
+/// shrink.
 const MOST_STEPS: usize = 100;
 /// Pose columns.
 const POSE: usize = 6;
@@ -29,11 +32,12 @@ const COLUMNS: usize = POSE + Parameter::COUNT + 1;
 /// Symmetric, of which the lower triangle is used.
 type Square = [[Number; COLUMNS]; COLUMNS];
 
-/// The calibration at the exact minimum near to it: parameters, poses, residuals and, under least squares, the covariance have their
-/// last digits. One that did not converge is left as it is; one whose steps do not shrink too, with a warning.
+/// The calibration at the exact minimum near to it: parameters, poses, residuals and, under least squares,
+/// the covariance have their last digits. One that did not converge is left as it is; one whose steps do not
+/// shrink too, with a warning.
 ///
-/// Under a robust loss the covariance stays that of the unpolished minimum, which differs from this one by some 1e-7 of itself.
-/// `variance` is that of a pixel coordinate, px^2, which weighs the priors.
+/// Under a robust loss the covariance stays that of the unpolished minimum, which differs from this one by
+/// some 1e-7 of itself. `variance` is that of a pixel coordinate, px^2, which weighs the priors.
 pub(super) fn polish(views: &[View], loss: Loss, variance: f64, mut calibration: Calibration) -> Calibration {
     if !calibration.termination.is_minimum() {
         return calibration;
@@ -127,8 +131,8 @@ impl PoseNumbers {
         }
     }
 
-    /// `R <- exp(delta) R`, `t <- t + step`: each column turned by the series of the exponential. Steps are below 1e-3, so that its
-    /// twelfth term is below 1e-44.
+    /// `R <- exp(delta) R`, `t <- t + step`: each column turned by the series of the exponential. Steps are
+    /// below 1e-3, so that its twelfth term is below 1e-44.
     fn take(&mut self, step: &[Number; POSE]) {
         let turn = [step[0], step[1], step[2]];
         for column in &mut self.columns {
@@ -168,11 +172,13 @@ struct Step {
     poses: Vec<[Number; POSE]>,
 }
 
-/// Normal equations with the poses eliminated. The residual is one more column, so that gradients are eliminated with the rest.
+/// Normal equations with the poses eliminated. The residual is one more column, so that gradients are
+/// eliminated with the rest.
 struct Equations {
     /// Free intrinsics.
     n: usize,
-    /// A view's factored columns: the first six are those of its Cholesky factor, rows in the order pose, intrinsics, residual.
+    /// A view's factored columns: the first six are those of its Cholesky factor, rows in the order pose,
+    /// intrinsics, residual.
     views: Vec<Square>,
     /// The Cholesky factor of the Schur complement, with a row for the residual.
     reduced: Square,
@@ -243,7 +249,8 @@ impl Equations {
             residuals.push(of_view);
         }
         let root_mean = |count: f64| (square / Number::from(count.max(1.0))).sqrt().to_f64();
-        // Priors settle a part of an unknown: the degrees of freedom are then no whole number, and stay those of the unpolished minimum.
+        // Priors settle a part of an unknown: the degrees of freedom are then no whole number, and stay those
+        // of the unpolished minimum.
         let squares =
             |residuals: &[Vec<Vec2>]| residuals.iter().flatten().map(|r| r.norm_squared()).sum::<f64>();
         let freedom = match state.priors.is_empty() {
@@ -271,8 +278,9 @@ impl Equations {
         })
     }
 
-    /// The inverse of the normal matrix times `variance`, in blocks: with `L L^T` the reduced matrix, `P = L^-T L^-1` for the
-    /// intrinsics, `-P Y^T` with a pose and `C^-1 + Y P Y^T` for it, where `C = L_c L_c^T` and `Y = L_c^-T W`.
+    /// The inverse of the normal matrix times `variance`, in blocks: with `L L^T` the reduced matrix, `P =
+    /// L^-T L^-1` for the intrinsics, `-P Y^T` with a pose and `C^-1 + Y P Y^T` for it, where `C = L_c L_c^T`
+    /// and `Y = L_c^-T W`.
     fn covariance(&self, free: FreeParameters, variance: Number) -> Covariance {
         let n = self.n;
         let inverse = inverse_of_lower(&self.reduced, n);
@@ -311,8 +319,8 @@ impl Equations {
     }
 }
 
-/// `sum w c c^T` over the rows of a view, `c` being pose columns, free intrinsics and residual. `None` where a point is not in front
-/// of the camera.
+/// `sum w c c^T` over the rows of a view, `c` being pose columns, free intrinsics and residual. `None` where
+/// a point is not in front of the camera.
 fn view_square(state: &State, index: usize, view: &View, loss: Loss) -> Option<Square> {
     let size = POSE + state.free.len() + 1;
     let model = state.model(index);
@@ -358,8 +366,8 @@ fn residual(at: &Rows<Number>, pixel: &Vec2) -> [Number; 2] {
     [at.pixel[0] - Number::splat(pixel.x), at.pixel[1] - Number::splat(pixel.y)]
 }
 
-/// The first `pivots` columns of the Cholesky factor of a matrix of `size` rows, in its place; the rest becomes the Schur
-/// complement. `None` if a pivot is not positive.
+/// The first `pivots` columns of the Cholesky factor of a matrix of `size` rows, in its place; the rest
+/// becomes the Schur complement. `None` if a pivot is not positive.
 #[allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
 fn factor(square: &mut Square, pivots: usize, size: usize) -> Option<()> {
     for k in 0..pivots {

@@ -1,19 +1,22 @@
-//! What is known of a parameter before any photograph is taken? A value with its standard deviation: one more measurement.
+//! What is known of a parameter before any photograph is taken? A value with its standard deviation: one more
+//! measurement.
 //!
-//! With the noise `sigma` of a pixel coordinate a prior is a residual of `sigma (p - mean) / sd` px, and the cost becomes
+//! With the noise `sigma` of a pixel coordinate a prior is a residual of `sigma (p - mean) / sd` px, and the
+//! cost becomes
 //!
 //! ```text
 //! sum |r|^2 + sigma^2 sum ((p - mean) / sd)^2,   covariance = sigma^2 (J^T J + W)^-1,   W = diag(sigma^2 / sd^2)
 //! ```
-//! The noise is estimated with the rest. Of `p` unknowns a prior settles a part of its own, `(posterior sd / sd)^2`, which costs the pixels no
-//! degree of freedom, so that
+//! The noise is estimated with the rest. Of `p` unknowns a prior settles a part of its own, `(posterior sd /
+//! sd)^2`, which costs the pixels no degree of freedom, so that
 //!
 //! ```text
 //! sigma^2 = sum |r|^2 / (2 N - p + sum (posterior sd / sd)^2)
 //! ```
-//! without bias in a linear model: with a wide prior as if the parameter were free, with a narrow one as if it were held (MacKay 1992 counts the
-//! parameters that data determine alike). The right-hand side depends on `sigma` through the weights, and is repeated until `sigma` changes by
-//! less than 1e-6 of itself; a polished minimum keeps the weights.
+//! without bias in a linear model: with a wide prior as if the parameter were free, with a narrow one as if
+//! it were held (MacKay 1992 counts the parameters that data determine alike). The right-hand side depends on
+//! `sigma` through the weights, and is repeated until `sigma` changes by less than 1e-6 of itself; a polished
+//! minimum keeps the weights.
 
 use super::estimate::Fit;
 use super::minimise::{Minimum, Problem, State};
@@ -24,10 +27,11 @@ use crate::camera::{Camera, Parameter};
 
 /// A parameter that is estimated, and known beforehand: `mean +- standard_deviation`, normally distributed.
 ///
-/// With the noise `sigma` of a pixel coordinate it counts as a residual of `sigma (p - mean) / standard_deviation` px, so that the covariance of
-/// all unknowns is `sigma^2 (J^T J + W)^-1`, `W = diag(sigma^2 / standard_deviation^2)`. The noise is estimated with the rest, from the pixels'
-/// residuals alone: `sum |r|^2 / (2 N - p + sum s^2)`, where `s` is the standard deviation of the estimate over that of the prior. It is repeated
-/// until `sigma` changes by less than 1e-6 of itself.
+/// With the noise `sigma` of a pixel coordinate it counts as a residual of `sigma (p - mean) /
+/// standard_deviation` px, so that the covariance of all unknowns is `sigma^2 (J^T J + W)^-1`, `W =
+/// diag(sigma^2 / standard_deviation^2)`. The noise is estimated with the rest, from the pixels' residuals
+/// alone: `sum |r|^2 / (2 N - p + sum s^2)`, where `s` is the standard deviation of the estimate over that of
+/// the prior. It is repeated until `sigma` changes by less than 1e-6 of itself.
 ///
 /// ```
 /// use calibench::calibrate::{Settings, calibrate};
@@ -72,7 +76,8 @@ impl Priors<'_> {
         self.list.iter().map(move |prior| (prior, weight(prior)))
     }
 
-    /// Their share of the cost, px^2. A parameter that is held for a while, as along a profile, pays for its place too.
+    /// Their share of the cost, px^2. A parameter that is held for a while, as along a profile, pays for its
+    /// place too.
     pub fn cost(&self, camera: &Camera) -> f64 {
         let squared = |x: f64| x * x;
         self.weighted()
@@ -91,8 +96,8 @@ impl Priors<'_> {
         }
     }
 
-    /// How many unknowns they settle, `sum (posterior sd / sd)^2`: all of theirs where nothing else is known of them, none where the pixels say far
-    /// more.
+    /// How many unknowns they settle, `sum (posterior sd / sd)^2`: all of theirs where nothing else is known
+    /// of them, none where the pixels say far more.
     pub fn settled(&self, minimum: &Minimum) -> f64 {
         if self.list.is_empty() {
             return 0.0;
@@ -107,7 +112,8 @@ impl Priors<'_> {
     }
 }
 
-/// Where homographies leave no degree of freedom to tell the noise, the first weights are for this, px: what good detectors reach.
+/// Where homographies leave no degree of freedom to tell the noise, the first weights are for this, px: what
+/// good detectors reach.
 const USUAL_PX: f64 = 0.1;
 /// Nobody's marks are better than this, px: exact data would otherwise leave priors no weight at all.
 const LEAST_PX: f64 = 1e-4;
@@ -115,7 +121,8 @@ const LEAST_PX: f64 = 1e-4;
 const SETTLED: f64 = 1e-6;
 /// Refinements until it is; each gains two digits or more on ordinary data.
 const MOST_REFITS: usize = 60;
-/// Searches, each with the weights that the minimum before it led to: two, and a third where the second found a lower minimum.
+/// Searches, each with the weights that the minimum before it led to: two, and a third where the second found
+/// a lower minimum.
 const MOST_SEARCHES: usize = 4;
 
 /// The best minimum under priors, and the variance of a pixel coordinate that weighed them.

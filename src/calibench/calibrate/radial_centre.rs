@@ -1,8 +1,9 @@
 //! About which pixel does a lens distort? The centre from the points of planes, whatever the distortion is.
 //!
-//! A radial distortion moves a pixel along the line through the distortion's centre `e`, so the observed pixel `m`, the ideal pixel `H X`
-//! and `e` lie on one line: `m^T [e]x H X = 0`. The matrix `F = [e]x H` of a view is found linearly from eight points or more, and `e` is the left
-//! null vector that all views share (Hartley & Kang 2007). No model of the distortion is needed, and no starting value.
+//! A radial distortion moves a pixel along the line through the distortion's centre `e`, so the observed
+//! pixel `m`, the ideal pixel `H X` and `e` lie on one line: `m^T [e]x H X = 0`. The matrix `F = [e]x H` of a
+//! view is found linearly from eight points or more, and `e` is the left null vector that all views share
+//! (Hartley & Kang 2007). No model of the distortion is needed, and no starting value.
 
 use super::normal::Observations;
 use crate::geometry::{Mat3, Vec2, Vec3};
@@ -11,7 +12,8 @@ use nalgebra::SMatrix;
 /// Fewest points of a view that determine `F`.
 const FEWEST: usize = 8;
 
-/// The common centre, px; `None` where no view has enough points or the centre lies at infinity. Without distortion it means nothing.
+/// The common centre, px; `None` where no view has enough points or the centre lies at infinity. Without
+/// distortion it means nothing.
 pub(super) fn radial_centre(views: &[Observations], (origin, half_width): (Vec2, f64)) -> Option<Vec2> {
     let mut sum = Mat3::zeros();
     for view in views.iter().filter(|view| view.len() >= FEWEST) {
@@ -27,8 +29,8 @@ pub(super) fn radial_centre(views: &[Observations], (origin, half_width): (Vec2,
 /// A centre farther from the pixels seen than this many of their half-widths is no lens's.
 const FARTHEST: f64 = 3.0;
 
-/// `F` of a view, of unit norm, pixels reduced to size 1: the eigenvector of least eigenvalue of the sum over points of the squares of
-/// `m (x) X`.
+/// `F` of a view, of unit norm, pixels reduced to size 1: the eigenvector of least eigenvalue of the sum over
+/// points of the squares of `m (x) X`.
 fn radial_matrix(view: &Observations, origin: Vec2, half_width: f64) -> Option<Mat3> {
     let mut normal = SMatrix::<f64, 9, 9>::zeros();
     for (point, pixel) in view.iter() {

@@ -1,12 +1,14 @@
-//! What do the points say before anybody asks for a camera? One lens for all views, and a free homography for each.
+//! What do the points say before anybody asks for a camera? One lens for all views, and a free homography for
+//! each.
 //!
 //! ```text
 //! i = H_v X                      ideal point, in units of a gauge focal length f0
 //! m = K0 distort(i)              K0 = [[f0, skew, cu], [0, a f0, cv], [0, 0, 1]]
 //! ```
-//! Every camera with every set of poses is one of these, so the least cost here is a floor of the calibration's; and nothing here is ambiguous:
-//! no focal length, no distance, no tilt. With a free homography the focal length is a gauge: `k1` is known as `k1 / f^2`, `k2` as
-//! `k2 / f^4`, and so on. What the data do not fix (a centre without distortion) the damping leaves where it starts.
+//! Every camera with every set of poses is one of these, so the least cost here is a floor of the
+//! calibration's; and nothing here is ambiguous: no focal length, no distance, no tilt. With a free
+//! homography the focal length is a gauge: `k1` is known as `k1 / f^2`, `k2` as `k2 / f^4`, and so on. What
+//! the data do not fix (a centre without distortion) the damping leaves where it starts.
 #![allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
 
 use super::Loss;
@@ -38,15 +40,18 @@ pub(super) struct Relaxed {
 const ITERATIONS: usize = 60;
 /// Steps of the last one: few marks leave narrow valleys.
 const LAST_ITERATIONS: usize = 300;
-/// A stage ends when a step gains less than this part of the cost: a hundredth of a variance in ten thousand points.
+/// A stage ends when a step gains less than this part of the cost: a hundredth of a variance in ten thousand
+/// points.
 const RELATIVE_GAIN: f64 = 1e-7;
 const FIRST_DAMPING: f64 = 1e-3;
 const SMALLEST_DAMPING: f64 = 1e-9;
 const LARGEST_DAMPING: f64 = 1e8;
 
-/// Fits the relaxed model from `start`, in stages: radial distortion about the given centre, then the centre, then all that is free.
+/// Fits the relaxed model from `start`, in stages: radial distortion about the given centre, then the centre,
+/// then all that is free.
 ///
-/// `homographies` are those of the views without distortion, pixels from target points. `None` if no view can be linearised.
+/// `homographies` are those of the views without distortion, pixels from target points. `None` if no view can
+/// be linearised.
 pub(super) fn relax(
     problem: &Problem<'_>,
     homographies: &[Homography],
@@ -78,8 +83,8 @@ pub(super) fn relax(
     fit.relaxed(at, lens_parameters)
 }
 
-/// The parameters of the relaxed lens for a calibration; `is_distorting` tells which coefficients are held at a value other than 0. The shape of
-/// the cells, fy over fx, is one of them unless it is known.
+/// The parameters of the relaxed lens for a calibration; `is_distorting` tells which coefficients are held at
+/// a value other than 0. The shape of the cells, fy over fx, is one of them unless it is known.
 pub(super) fn parameters(problem: &Problem<'_>, is_distorting: impl Fn(Parameter) -> bool) -> FreeParameters {
     use Parameter::{Cx, Cy, Fx, Fy, K1, K2, K3, P1, P2, Skew};
     let free = problem.free;
@@ -109,7 +114,8 @@ pub(super) fn beside(problem: &Problem<'_>, camera: &Camera, cam_from_target: &[
     fit.relaxed(fit.minimise(state, free, LAST_ITERATIONS)?, free)
 }
 
-/// A homography under which every point lies in front of the camera: where noise has bent one of few points beyond that, its affine part.
+/// A homography under which every point lies in front of the camera: where noise has bent one of few points
+/// beyond that, its affine part.
 fn in_front(mut h: Entries, pairs: &Observations) -> Entries {
     let is_in_front = |p: Vec2| h[6] * p.x + h[7] * p.y + 1.0 > SMALLEST_DENOMINATOR;
     if !pairs.iter().all(|(p, _)| is_in_front(p)) {
@@ -220,7 +226,8 @@ impl Fit<'_> {
         sum
     }
 
-    /// The equations of one view; adds the lens's share to `sum`. A point on or behind the horizon makes the cost infinite.
+    /// The equations of one view; adds the lens's share to `sum`. A point on or behind the horizon makes the
+    /// cost infinite.
     fn add_view(
         &self,
         lens: &Camera,
@@ -315,7 +322,8 @@ struct Step {
 }
 
 impl Equations {
-    /// Levenberg-Marquardt's step and the gain it promises; `None` where the damped matrix is not positive definite.
+    /// Levenberg-Marquardt's step and the gain it promises; `None` where the damped matrix is not positive
+    /// definite.
     fn solve(&self, damping: f64, n: usize) -> Option<(Step, f64)> {
         let mut schur = DMatrix::from_fn(n, n, |i, j| self.lens[(i.min(j), i.max(j))]);
         for i in 0..n {

@@ -22,22 +22,25 @@ pub struct Calibration {
     pub residuals: Vec<Vec<Vec2>>,
     /// `sqrt(sum |r|^2 / N)` over all N points, px: as in OpenCV.
     pub rmse_px: f64,
-    /// Estimated standard deviation of one pixel coordinate: `sqrt(sum |r|^2 / (2 N - p))`, px. Under a robust loss see
-    /// [`Calibration::covariance`]. With priors `p` counts the unknowns less what the priors settle of them, see [`Prior`].
+    /// Estimated standard deviation of one pixel coordinate: `sqrt(sum |r|^2 / (2 N - p))`, px. Under a
+    /// robust loss see [`Calibration::covariance`]. With priors `p` counts the unknowns less what the priors
+    /// settle of them, see [`Prior`].
     pub sigma_px: f64,
     /// Degrees of freedom `2 N - p`; with priors rounded down.
     pub degrees_of_freedom: usize,
     /// First-order covariance of intrinsics and poses. Under a robust loss it is scaled by Huber's correction
-    /// `[sum psi^2 / (2N - p)] / [mean psi']^2` (Huber & Ronchetti 2009, section 7.6), psi' being [`Loss::slope`](crate::calibrate::Loss::slope).
+    /// `[sum psi^2 / (2N - p)] / [mean psi']^2` (Huber & Ronchetti 2009, section 7.6), psi' being
+    /// [`Loss::slope`](crate::calibrate::Loss::slope).
     pub covariance: Covariance,
     /// Weakest direction of the estimate; `None` if nothing but poses was free.
     pub conditioning: Option<Conditioning>,
     /// How the refinement ended.
     pub termination: Termination,
-    /// How the cost compares with its floor; `None` where a pose is undetermined. Under a robust loss it compares weighted residuals, and its
-    /// probability is rough.
+    /// How the cost compares with its floor; `None` where a pose is undetermined. Under a robust loss it
+    /// compares weighted residuals, and its probability is rough.
     pub certificate: Option<Certificate>,
-    /// Intervals by the profile of the cost, one a free parameter; empty unless [`super::Settings::with_profile_intervals`] asked for them.
+    /// Intervals by the profile of the cost, one a free parameter; empty unless
+    /// [`super::Settings::with_profile_intervals`] asked for them.
     pub intervals: Vec<ProfileInterval>,
     /// Starts that were refined: 1 where the first left no doubt.
     pub starts: usize,
@@ -191,13 +194,16 @@ pub enum Warning {
         /// By how many standard deviations of their difference they disagree.
         deviations: f64,
     },
-    /// No residual degrees of freedom: the fit is exact whatever the noise, and no standard deviation can be told.
+    /// No residual degrees of freedom: the fit is exact whatever the noise, and no standard deviation can be
+    /// told.
     NoDegreesOfFreedom,
-    /// The last digits were asked for, and the steps towards them did not shrink: the estimate is the refinement's.
+    /// The last digits were asked for, and the steps towards them did not shrink: the estimate is the
+    /// refinement's.
     NotPolished,
 }
 
-/// Beyond this two parameters share 96 % of their variance; k1 and k2 of an ordinary set of views stay below it.
+/// Beyond this two parameters share 96 % of their variance; k1 and k2 of an ordinary set of views stay below
+/// it.
 pub(super) const STRONG_CORRELATION: f64 = 0.98;
 /// A focal length worse than this makes the linearisation behind the covariance doubtful.
 pub(super) const UNCERTAIN_FOCAL: f64 = 0.05;
@@ -205,7 +211,8 @@ pub(super) const UNCERTAIN_FOCAL: f64 = 0.05;
 /// A larger part of the marks than this goes astray by itself seldom.
 const MANY: f64 = 0.1;
 
-/// Real boards leave the RMSE up to a seventh above its floor, wrong minima of consequence lie more than a third above.
+/// Real boards leave the RMSE up to a seventh above its floor, wrong minima of consequence lie more than a
+/// third above.
 const GROSS: f64 = 1.25;
 
 impl fmt::Display for Warning {
@@ -314,8 +321,8 @@ impl fmt::Display for Warning {
 }
 
 impl Calibration {
-    /// Whether the estimate is a minimum whose RMSE lies no more than a quarter above its floor: beyond that it is another minimum than the
-    /// right one, or a model that has little to do with the data.
+    /// Whether the estimate is a minimum whose RMSE lies no more than a quarter above its floor: beyond that
+    /// it is another minimum than the right one, or a model that has little to do with the data.
     pub fn is_usable(&self) -> bool {
         let is_gross = |c: &Certificate| !c.holds() && self.rmse_px > GROSS * c.floor_rmse_px;
         self.termination.is_minimum() && !self.certificate.as_ref().is_some_and(is_gross)
@@ -336,7 +343,8 @@ impl Calibration {
         self.residuals.get(view).map(|r| rms(r.iter()))
     }
 
-    /// Root mean square of u and of v residuals apart, px: the definition of programs that report one number an axis.
+    /// Root mean square of u and of v residuals apart, px: the definition of programs that report one number
+    /// an axis.
     pub fn rms_per_axis_px(&self) -> Vec2 {
         let sums = self.residuals.iter().flatten().fold(Vec2::zeros(), |s, r| s + r.component_mul(r));
         (sums / self.points() as f64).map(f64::sqrt)

@@ -1,9 +1,10 @@
 //! How does a step become a new state? Straight, or along the curve on which the images stay what they are.
 //!
-//! Where the data say little about the focal length, camera and poses move together on a long curve: `f` and the distance grow alike, the tilt
-//! with them, `k1` with their square. A straight step leaves the curve at once, and the search creeps. The relaxed model tells what the
-//! points fix: `f / t_z`, `t_x / t_z`, `r_31 / t_z`, `k1 / f^2`. A step is therefore taken straight in those, which is the same to first
-//! order, so that only the path to a minimum changes and never the minimum.
+//! Where the data say little about the focal length, camera and poses move together on a long curve: `f` and
+//! the distance grow alike, the tilt with them, `k1` with their square. A straight step leaves the curve at
+//! once, and the search creeps. The relaxed model tells what the points fix: `f / t_z`, `t_x / t_z`, `r_31 /
+//! t_z`, `k1 / f^2`. A step is therefore taken straight in those, which is the same to first order, so that
+//! only the path to a minimum changes and never the minimum.
 
 use super::minimise::State;
 use super::system::Step;
@@ -56,7 +57,8 @@ impl Retraction {
 /// A change of logarithm beyond this is no small step any more: a factor of 20.
 const LARGEST_LOG: f64 = 3.0;
 
-/// `f exp(df / f)`, and coefficients straight in `k1 / f^2`, `k2 / f^4`, `k3 / f^6`, `p / f`. Held parameters stay.
+/// `f exp(df / f)`, and coefficients straight in `k1 / f^2`, `k2 / f^4`, `k3 / f^6`, `p / f`. Held parameters
+/// stay.
 fn curved_camera(camera: &Camera, free: FreeParameters, fy_per_fx: Option<f64>, step: &[f64]) -> Camera {
     let straight = tied(camera.stepped(free, step), fy_per_fx);
     let grown = |old: f64, new: f64| old * libm::exp(((new - old) / old).clamp(-LARGEST_LOG, LARGEST_LOG));
@@ -87,8 +89,8 @@ fn curved_camera(camera: &Camera, free: FreeParameters, fy_per_fx: Option<f64>, 
     tied(Camera { fx, fy, ..straight }.with_distortion(distortion), fy_per_fx)
 }
 
-/// `t_z exp(dt_z / t_z)`, and straight in `fx t_x / t_z`, `fy t_y / t_z`, `r_31 / t_z`, `r_32 / t_z`; the focal lengths change by the
-/// logarithms `focal`.
+/// `t_z exp(dt_z / t_z)`, and straight in `fx t_x / t_z`, `fy t_y / t_z`, `r_31 / t_z`, `r_32 / t_z`; the
+/// focal lengths change by the logarithms `focal`.
 fn curved_pose(pose: &Pose, delta: &SVector<f64, 6>, focal: [f64; 2]) -> Pose {
     let straight = pose.perturbed(delta);
     let t = &pose.translation;
@@ -98,7 +100,8 @@ fn curved_pose(pose: &Pose, delta: &SVector<f64, 6>, focal: [f64; 2]) -> Pose {
     }
     let s = libm::exp(rate);
     let z = t.z * s;
-    // f x = f t_x / t_z changes by f (dx + x df / f) with dx = (dt_x - t_x dt_z / t_z) / t_z; over the new f, times the new t_z.
+    // f x = f t_x / t_z changes by f (dx + x df / f) with dx = (dt_x - t_x dt_z / t_z) / t_z; over the new f,
+    // times the new t_z.
     let across =
         |own: f64, step: f64, focal: f64| (own * (1.0 + focal - rate) + step) / t.z * libm::exp(-focal) * z;
     let translation = Vec3::new(across(t.x, delta[3], focal[0]), across(t.y, delta[4], focal[1]), z);
@@ -111,8 +114,8 @@ fn curved_pose(pose: &Pose, delta: &SVector<f64, 6>, focal: [f64; 2]) -> Pose {
     Pose { rotation: with_axis(&straight.rotation, row(0), row(1)), translation }
 }
 
-/// The rotation turned, the shortest way, so that the optical axis has the components `a`, `b` along the target's axes; unchanged where
-/// there is no such direction.
+/// The rotation turned, the shortest way, so that the optical axis has the components `a`, `b` along the
+/// target's axes; unchanged where there is no such direction.
 fn with_axis(rotation: &Mat3, a: f64, b: f64) -> Mat3 {
     let in_plane = a * a + b * b;
     if in_plane >= 1.0 {
@@ -123,8 +126,8 @@ fn with_axis(rotation: &Mat3, a: f64, b: f64) -> Mat3 {
     rotation * between(&wanted, &reached)
 }
 
-/// The state with the focal lengths that are free `s` times as long, and all that follows them: distances, tilts, coefficients. Its images
-/// agree to second order in the tilts.
+/// The state with the focal lengths that are free `s` times as long, and all that follows them: distances,
+/// tilts, coefficients. Its images agree to second order in the tilts.
 pub(super) fn scaled(state: &State, free: FreeParameters, fy_per_fx: Option<f64>, s: f64) -> State {
     let powers = [
         (Parameter::Fx, 1),

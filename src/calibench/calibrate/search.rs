@@ -1,8 +1,9 @@
 //! Which minimum is the right one? One start where the data leave no doubt, and a search where they do.
 //!
-//! Good data need one start, and the certificate says that it was enough. Otherwise the relaxed model ([`super::relaxed`]) gives the lens and the
-//! homographies without it; focal lengths are tried against both tilts of every plane ([`super::condensed`]); the best are refined, and tilts
-//! that perspective hardly tells are tried the other way round. The least cost wins.
+//! Good data need one start, and the certificate says that it was enough. Otherwise the relaxed model
+//! ([`super::relaxed`]) gives the lens and the homographies without it; focal lengths are tried against both
+//! tilts of every plane ([`super::condensed`]); the best are refined, and tilts that perspective hardly tells
+//! are tried the other way round. The least cost wins.
 
 use super::certificate::{self, Certificate};
 use super::closed_form;
@@ -49,16 +50,20 @@ pub(super) struct Evidence<'a> {
     pub search: bool,
 }
 
-/// A certificate whose probability is below this is no reason to refuse a minimum, but one to look for a better.
+/// A certificate whose probability is below this is no reason to refuse a minimum, but one to look for a
+/// better.
 const CLEAR: f64 = 1e-4;
-/// With fewer degrees of freedom a certificate tells too little to rely on it alone: two views can be explained by another camera entirely.
+/// With fewer degrees of freedom a certificate tells too little to rely on it alone: two views can be
+/// explained by another camera entirely.
 const TELLING: usize = 4;
 /// Good data take five to ten iterations; a search that took more came from far away.
 const SHORT_WAY: usize = 25;
 
-/// A focal length or principal point known worse than this part of the focal length may hide another minimum that is nearly as good.
+/// A focal length or principal point known worse than this part of the focal length may hide another minimum
+/// that is nearly as good.
 const WELL_KNOWN: f64 = 0.03;
-/// The same where the lens is free to be crooked (tangential terms, skew) or has a third radial term: such a lens explains more.
+/// The same where the lens is free to be crooked (tangential terms, skew) or has a third radial term: such a
+/// lens explains more.
 const WELL_KNOWN_FLEXIBLE: f64 = 0.01;
 
 impl Judged {
@@ -70,8 +75,8 @@ impl Judged {
         Judged { minimum, reduction, certificate, starts, skewed: Vec::new(), rival: None, twins: Vec::new() }
     }
 
-    /// With the floor fitted where a step towards it does not certify the minimum: the step is straight, the relaxed model is not. A lower
-    /// cost of the relaxed model that was met elsewhere is a floor too.
+    /// With the floor fitted where a step towards it does not certify the minimum: the step is straight, the
+    /// relaxed model is not. A lower cost of the relaxed model that was met elsewhere is a floor too.
     fn certified(mut self, problem: &Problem<'_>, lowest_relaxed: f64) -> Judged {
         let cost = self.minimum.system.cost;
         let points = problem.observations.iter().map(|o| o.len()).sum();
@@ -146,8 +151,9 @@ impl Judged {
         self
     }
 
-    /// Whether the minimum is clear, and the planes are not parallel. Parallel planes that determine nothing are refused at once, before a
-    /// search that could find nothing, where the noise is known: at a cost that its floor certifies.
+    /// Whether the minimum is clear, and the planes are not parallel. Parallel planes that determine nothing
+    /// are refused at once, before a search that could find nothing, where the noise is known: at a cost that
+    /// its floor certifies.
     fn is_settled(&self, problem: &Problem<'_>) -> Result<bool, CalibrationError> {
         if !self.certificate.as_ref().is_some_and(|c| c.is_possible() && c.holds()) {
             return Ok(false);
@@ -161,7 +167,8 @@ impl Judged {
         noise_of(problem, &self.minimum)
     }
 
-    /// Whether focal lengths and principal point are known so well that no other minimum can be nearly as good.
+    /// Whether focal lengths and principal point are known so well that no other minimum can be nearly as
+    /// good.
     fn is_well_known(&self, problem: &Problem<'_>) -> bool {
         let Some(covariance) = self.reduction.as_ref().and_then(Reduction::intrinsics_covariance) else {
             return false;
@@ -205,7 +212,8 @@ impl Judged {
     }
 }
 
-/// Beyond this correlation a crooked lens can take the place of the principal point: there may be two of them.
+/// Beyond this correlation a crooked lens can take the place of the principal point: there may be two of
+/// them.
 const TRADES_OFF: f64 = 0.98;
 
 /// Whether the principal point is hardly told from the tangential terms.
@@ -217,8 +225,8 @@ fn trades_off(free: FreeParameters, covariance: &DMatrix<f64>) -> bool {
     centre.iter().any(|&i| tangential.iter().any(|&j| correlation(i, j).abs() > TRADES_OFF))
 }
 
-/// Standard deviation of a pixel coordinate, from the cost under the loss in use: gross errors, which a robust loss discounts, say nothing of
-/// the noise.
+/// Standard deviation of a pixel coordinate, from the cost under the loss in use: gross errors, which a
+/// robust loss discounts, say nothing of the noise.
 pub(super) fn noise_of(problem: &Problem<'_>, minimum: &Minimum) -> f64 {
     let coordinates = 2 * problem.observations.iter().map(|o| o.len()).sum::<usize>();
     let measurements = coordinates + problem.priors.list.len();
@@ -226,7 +234,8 @@ pub(super) fn noise_of(problem: &Problem<'_>, minimum: &Minimum) -> f64 {
     (minimum.system.cost / freedom as f64).sqrt()
 }
 
-/// The best minimum that is found; `starts` are tried in order until one converges, and the search goes on if that is in doubt.
+/// The best minimum that is found; `starts` are tried in order until one converges, and the search goes on if
+/// that is in doubt.
 ///
 /// # Errors
 /// Where the data do not determine focal length or principal point.
@@ -315,7 +324,8 @@ const ROUNDS: usize = 4;
 /// A relaxed model is better if its cost is lower by more than this part.
 const LOWER: f64 = 1e-4;
 
-/// Refines from the relaxed model's starts; where the relaxed model next to the best of them is lower than the one known, again from that.
+/// Refines from the relaxed model's starts; where the relaxed model next to the best of them is lower than
+/// the one known, again from that.
 fn from_relaxed(problem: &Problem<'_>, first: Judged, evidence: &Evidence<'_>) -> Found {
     let is_certified = first.is_certified();
     let best = if first.minimum.termination == Termination::IterationLimit {
@@ -350,8 +360,9 @@ fn beside(problem: &Problem<'_>, minimum: &Minimum) -> Option<Relaxed> {
     relaxed::beside(problem, &minimum.state.camera, &minimum.state.cam_from_target)
 }
 
-/// Refuses what the data do not determine, where the noise is known: at a cost that its floor certifies. Gross errors would pass for noise
-/// under which nothing is determined, and the advice would be wrong. A state of lower cost is returned if one is met.
+/// Refuses what the data do not determine, where the noise is known: at a cost that its floor certifies.
+/// Gross errors would pass for noise under which nothing is determined, and the advice would be wrong. A
+/// state of lower cost is returned if one is met.
 fn refuse_undetermined(
     problem: &Problem<'_>,
     walked: &Walked,
@@ -444,7 +455,8 @@ fn with_profiles(problem: &Problem<'_>, mut judged: Judged) -> Judged {
 
 /// A search in doubt may take this many times the iterations.
 const PATIENCE: usize = 10;
-/// A focal length shorter than this many half-widths of the pixels seen is no lens's: a search that comes there has run away.
+/// A focal length shorter than this many half-widths of the pixels seen is no lens's: a search that comes
+/// there has run away.
 const SHORTEST: f64 = 0.02;
 /// Likewise a longer one.
 const LONGEST: f64 = 1e4;
@@ -479,13 +491,15 @@ pub(super) fn is_better(new: &Minimum, old: &Minimum) -> bool {
     converged(new) && !converged(old) && new.system.cost <= old.system.cost * (1.0 + EQUAL)
 }
 
-/// Where the relaxed model leaves fewer degrees of freedom it has minima of its own, and is fitted from more starts unless the first minimum is
-/// certified: with few marks these cost little.
+/// Where the relaxed model leaves fewer degrees of freedom it has minima of its own, and is fitted from more
+/// starts unless the first minimum is certified: with few marks these cost little.
 const FEW: usize = 100;
-/// Radial distortions to start from where marks are few, at the gauge focal length: none, a barrel and a pincushion.
+/// Radial distortions to start from where marks are few, at the gauge focal length: none, a barrel and a
+/// pincushion.
 const BENT: [f64; 3] = [0.0, -0.2, 0.2];
 
-/// The relaxed model of these data, its least minimum first and then that of an ordinary camera: square pixels, and its centre in the middle.
+/// The relaxed model of these data, its least minimum first and then that of an ordinary camera: square
+/// pixels, and its centre in the middle.
 pub(super) fn relax(problem: &Problem<'_>, evidence: &Evidence<'_>, is_certified: bool) -> Vec<Relaxed> {
     use Parameter::{Cx, Cy, Fx, Fy, Skew};
     let held = evidence.held;
@@ -527,7 +541,8 @@ fn spread_over((middle, half_width): (Vec2, f64)) -> impl Iterator<Item = Vec2> 
     pairs.map(move |offset| middle + offset * half_width)
 }
 
-/// The lens that the relaxed model starts from. Its gauge is the focal length that is held, or else a wide lens's.
+/// The lens that the relaxed model starts from. Its gauge is the focal length that is held, or else a wide
+/// lens's.
 fn gauge_lens(problem: &Problem<'_>, evidence: &Evidence<'_>) -> Camera {
     use Parameter::{Fx, Fy};
     let held = evidence.held;
@@ -543,14 +558,16 @@ fn gauge_lens(problem: &Problem<'_>, evidence: &Evidence<'_>) -> Camera {
     }
 }
 
-/// Focal lengths that are tried, in units of the half-width of the pixels seen: from a fisheye to a long lens.
+/// Focal lengths that are tried, in units of the half-width of the pixels seen: from a fisheye to a long
+/// lens.
 const SCAN: (f64, f64) = (0.3, 300.0);
 /// Steps of the scan: 14 % each, less than the width of a minimum.
 const SCAN_STEPS: usize = 52;
 /// Minima of the scan that are refined.
 const REFINED: usize = 3;
 
-/// States to refine from, the most promising first; `aspect` is that of the cameras tried, relative to the relaxed lens's.
+/// States to refine from, the most promising first; `aspect` is that of the cameras tried, relative to the
+/// relaxed lens's.
 fn relaxed_starts(
     problem: &Problem<'_>,
     relaxed: &Relaxed,
@@ -618,7 +635,8 @@ fn lowest(scan: Vec<Option<Hypothesis>>) -> Vec<Hypothesis> {
     minima.into_iter().filter_map(|i| scan[i].clone()).collect()
 }
 
-/// The camera and poses of a hypothesis: with `s = f / f0` the coefficients are `k1 s^2`, `k2 s^4`, `k3 s^6`, `p1 s`, `p2 s`.
+/// The camera and poses of a hypothesis: with `s = f / f0` the coefficients are `k1 s^2`, `k2 s^4`, `k3 s^6`,
+/// `p1 s`, `p2 s`.
 fn state_of(relaxed: &Relaxed, held: &Held, hypothesis: &Hypothesis) -> State {
     let (lens, k) = (&relaxed.lens, &hypothesis.camera);
     let s = k.fx;

@@ -9,7 +9,8 @@ use crate::camera::{Camera, FreeParameters, Parameter};
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Role {
-    /// Held at its default: skew and distortion at 0, the principal point in the image's centre. A focal length has none.
+    /// Held at its default: skew and distortion at 0, the principal point in the image's centre. A focal
+    /// length has none.
     #[default]
     Default,
     /// Held at a value.
@@ -27,7 +28,8 @@ pub enum Role {
 
 /// What to estimate and how: a builder.
 ///
-/// Every parameter has one [`Role`] and the last word on it wins, so that nothing can be held and estimated at once:
+/// Every parameter has one [`Role`] and the last word on it wins, so that nothing can be held and estimated
+/// at once:
 ///
 /// ```
 /// use calibench::calibrate::{Role, Settings};
@@ -44,7 +46,8 @@ pub struct Settings {
     roles: [Role; Parameter::COUNT],
     /// fy over fx where the two are tied; the role of fy is then of no account.
     fy_per_fx: Option<f64>,
-    /// Image width and height in px, if known: the principal point of a start that needs one is the image's centre.
+    /// Image width and height in px, if known: the principal point of a start that needs one is the image's
+    /// centre.
     pub image_size: Option<(usize, usize)>,
     /// Loss of a residual.
     pub loss: Loss,
@@ -54,8 +57,8 @@ pub struct Settings {
     pub max_iterations: usize,
     /// Whether the minimum is followed to its last digits.
     pub polish: bool,
-    /// Whether the search goes on from other starts where the first minimum is in doubt. Without, the answer is whatever the first start leads
-    /// to: for studies of searches.
+    /// Whether the search goes on from other starts where the first minimum is in doubt. Without, the answer
+    /// is whatever the first start leads to: for studies of searches.
     pub search: bool,
     /// Coverage of intervals by the profile of the cost, if they are wanted: see [`super::ProfileInterval`].
     pub profile_coverage: Option<f64>,
@@ -96,15 +99,16 @@ impl Settings {
         self.with_role(parameter, Role::Free)
     }
 
-    /// Ties the focal lengths: `fy = fy_per_fx fx`, 1 for square pixels. What becomes of fx is left as it is; a role given to fy unties them.
+    /// Ties the focal lengths: `fy = fy_per_fx fx`, 1 for square pixels. What becomes of fx is left as it is;
+    /// a role given to fy unties them.
     pub fn tie_focal_lengths(mut self, fy_per_fx: f64) -> Settings {
         self.fy_per_fx = Some(fy_per_fx);
         self.roles[Parameter::Fy as usize] = Role::Default;
         self
     }
 
-    /// Estimates `parameter`, which is known beforehand to be `mean` with this standard deviation: one more measurement, with its share in the
-    /// covariance. See [`super::Prior`].
+    /// Estimates `parameter`, which is known beforehand to be `mean` with this standard deviation: one more
+    /// measurement, with its share in the covariance. See [`super::Prior`].
     pub fn with_prior(self, parameter: Parameter, mean: f64, standard_deviation: f64) -> Settings {
         self.with_role(parameter, Role::Known { mean, standard_deviation })
     }
@@ -142,8 +146,9 @@ impl Settings {
         self
     }
 
-    /// Follows the minimum to its last digits, in double-double arithmetic: for comparisons digit by digit. No measurement notices the
-    /// difference, some 1e-7 of a standard deviation, and it takes some twenty times as long.
+    /// Follows the minimum to its last digits, in double-double arithmetic: for comparisons digit by digit.
+    /// No measurement notices the difference, some 1e-7 of a standard deviation, and it takes some twenty
+    /// times as long.
     pub fn polished(mut self) -> Settings {
         self.polish = true;
         self
@@ -155,7 +160,8 @@ impl Settings {
         self
     }
 
-    /// Asks for intervals by the profile of the cost, each to contain its true value with probability `coverage`.
+    /// Asks for intervals by the profile of the cost, each to contain its true value with probability
+    /// `coverage`.
     pub fn with_profile_intervals(mut self, coverage: f64) -> Settings {
         self.profile_coverage = Some(coverage);
         self

@@ -4,10 +4,10 @@
 //! i = H X                                         ideal pixel of target point X
 //! m = c + f distort((i - c) / f)                  observed pixel; distort: x (1 + k1 r^2 + k2 r^4)
 //! ```
-//! One plane cannot tell the focal length, so `f` is a gauge: any value fits as well, with `k1` proportional to `f^2` and `k2` to
-//! `f^4`. With the camera's true focal length the coefficients are the camera's own. A free distortion centre `c` is fixed by
-//! the data only as far as there is distortion. (Tsai 1987 is the classical single-view calibration; this is its planar core,
-//! without a pose.)
+//! One plane cannot tell the focal length, so `f` is a gauge: any value fits as well, with `k1` proportional
+//! to `f^2` and `k2` to `f^4`. With the camera's true focal length the coefficients are the camera's own. A
+//! free distortion centre `c` is fixed by the data only as far as there is distortion. (Tsai 1987 is the
+//! classical single-view calibration; this is its planar core, without a pose.)
 
 mod model;
 mod refine;
@@ -83,7 +83,8 @@ pub enum SinglePlaneError {
     },
 }
 
-/// Distortion counts as seen when `k^T C^-1 k` exceeds the 99.9 % quantile of chi-square on 2 degrees of freedom, `-2 ln 0.001`.
+/// Distortion counts as seen when `k^T C^-1 k` exceeds the 99.9 % quantile of chi-square on 2 degrees of
+/// freedom, `-2 ln 0.001`.
 const SEEN_DISTORTION: f64 = 13.815510557964274;
 
 /// Uncertainty to first order, from the residuals.
@@ -93,8 +94,8 @@ pub struct SinglePlaneSpread {
     pub sigma_px: f64,
     /// Covariance of `k1, k2, cu, cv`; zero where the centre was held.
     pub lens: Matrix4<f64>,
-    /// Covariance of the homography's first eight entries, row by row, at the scale `h33 = 1`, and then `k1, k2, cu, cv`.
-    /// `None` if the target's origin lies on the horizon, where that scale does not exist.
+    /// Covariance of the homography's first eight entries, row by row, at the scale `h33 = 1`, and then `k1,
+    /// k2, cu, cv`. `None` if the target's origin lies on the horizon, where that scale does not exist.
     pub all: Option<DMatrix<f64>>,
 }
 
@@ -124,8 +125,8 @@ pub struct SinglePlane {
 }
 
 impl SinglePlane {
-    /// The lens as a camera: `focal_px` for both focal lengths, the centre as principal point. It is the camera up to the gauge:
-    /// right for correcting and distorting pixels, not for distances.
+    /// The lens as a camera: `focal_px` for both focal lengths, the centre as principal point. It is the
+    /// camera up to the gauge: right for correcting and distorting pixels, not for distances.
     pub fn lens_camera(&self) -> Camera {
         lens_camera(self.focal_px, &self.centre_px, self.distortion)
     }
@@ -148,19 +149,21 @@ impl SinglePlane {
     }
 }
 
-/// The RMS per point to expect from `points` points under noise of `sigma_px` a coordinate, and its standard deviation, px.
+/// The RMS per point to expect from `points` points under noise of `sigma_px` a coordinate, and its standard
+/// deviation, px.
 ///
-/// `sum |r|^2 / sigma^2` follows chi-square with `n = 2 N - p` degrees of freedom to first order, so
-/// `E[RMS] = sigma sqrt(n / N)` and `sd(RMS) = sigma / sqrt(2 N)`, each short of the exact moment of the chi distribution by
-/// less than `1 / (4 n)` relative.
+/// `sum |r|^2 / sigma^2` follows chi-square with `n = 2 N - p` degrees of freedom to first order, so `E[RMS]
+/// = sigma sqrt(n / N)` and `sd(RMS) = sigma / sqrt(2 N)`, each short of the exact moment of the chi
+/// distribution by less than `1 / (4 n)` relative.
 pub fn predicted_rms_px(sigma_px: f64, points: usize, parameters: usize) -> (f64, f64) {
     let degrees = (2 * points).saturating_sub(parameters) as f64;
     (sigma_px * (degrees / points as f64).sqrt(), sigma_px / (2.0 * points as f64).sqrt())
 }
 
-/// Calibrates the lens from one view of a plane: minimises the squared distances between predicted and observed pixels over the
-/// homography, `k1`, `k2` and, if asked, the centre, by Levenberg-Marquardt from a fitted homography without distortion. A free
-/// centre is released once `k1` and `k2` have settled: without distortion it has no effect to follow.
+/// Calibrates the lens from one view of a plane: minimises the squared distances between predicted and
+/// observed pixels over the homography, `k1`, `k2` and, if asked, the centre, by Levenberg-Marquardt from a
+/// fitted homography without distortion. A free centre is released once `k1` and `k2` have settled: without
+/// distortion it has no effect to follow.
 ///
 /// # Errors
 /// Too few points, no homography, or parameters that the points do not fix.

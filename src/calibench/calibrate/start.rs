@@ -7,9 +7,10 @@ use super::{CalibrationError, Prior, Settings};
 use crate::camera::{Camera, Parameter};
 use crate::geometry::{Homography, Mat3, Pose, Vec2};
 
-/// The intrinsics and poses to refine from, the most promising first: the caller's own, the closed form, one focal length
-/// from the principal point, guesses of a wide and of a long lens. `homographies` take the target frame of the refinement to
-/// pixels; `pixel_frame` is the centre and the half-width of the pixels seen.
+/// The intrinsics and poses to refine from, the most promising first: the caller's own, the closed form, one
+/// focal length from the principal point, guesses of a wide and of a long lens. `homographies` take the
+/// target frame of the refinement to pixels; `pixel_frame` is the centre and the half-width of the pixels
+/// seen.
 pub(super) fn starts(
     homographies: &[Homography],
     settings: &Settings,
@@ -38,7 +39,8 @@ pub(super) fn starts(
     Ok(states)
 }
 
-/// The closed form in pixels scaled to unit size, where its equations are well conditioned for any image size.
+/// The closed form in pixels scaled to unit size, where its equations are well conditioned for any image
+/// size.
 fn normalised_closed_form(
     homographies: &[Homography],
     settings: &Settings,
@@ -75,9 +77,10 @@ fn is_plausible(camera: &Camera, (centre, half_width): (Vec2, f64)) -> bool {
         && (Vec2::new(camera.cx, camera.cy) - centre).norm() < 5.0 * half_width
 }
 
-/// One focal length from the two constraints of every view when the principal point is known (Zhang 2000, section 3.1 with
-/// `u0, v0` given): `h1^T B h2 = 0` and `h1^T B h1 = h2^T B h2` with `B = diag(w, w, 1)`, least squares in `w = 1/f^2`. With cells of `aspect`,
-/// fy over fx, rows are counted in units of it first, and the result is fx.
+/// One focal length from the two constraints of every view when the principal point is known (Zhang 2000,
+/// section 3.1 with `u0, v0` given): `h1^T B h2 = 0` and `h1^T B h1 = h2^T B h2` with `B = diag(w, w, 1)`,
+/// least squares in `w = 1/f^2`. With cells of `aspect`, fy over fx, rows are counted in units of it first,
+/// and the result is fx.
 pub(super) fn focal_from_centre(homographies: &[Homography], centre: Vec2, aspect: f64) -> Option<f64> {
     let shift = Mat3::new(1.0, 0.0, -centre.x, 0.0, 1.0 / aspect, -centre.y / aspect, 0.0, 0.0, 1.0);
     let (mut square, mut product) = (0.0, 0.0);
@@ -106,7 +109,8 @@ pub(super) struct Held {
     pub fy_per_fx: Option<f64>,
     /// fx, if it is known beforehand well enough to start from.
     focal_known: Option<f64>,
-    /// The principal point that is held or known beforehand, or else the image's centre, or that of the pixels seen.
+    /// The principal point that is held or known beforehand, or else the image's centre, or that of the
+    /// pixels seen.
     pub centre: Vec2,
 }
 

@@ -39,7 +39,8 @@ impl From<Strays> for CalibrationError {
     }
 }
 
-/// Refuses a robust loss that is narrower than the noise: its weights, and so the covariance, would mean nothing.
+/// Refuses a robust loss that is narrower than the noise: its weights, and so the covariance, would mean
+/// nothing.
 pub(super) fn refuse_narrow_loss(loss: Loss, fit: &Fit) -> Result<(), CalibrationError> {
     let scale_px = match loss {
         Loss::Squares => return Ok(()),
@@ -68,8 +69,8 @@ pub(super) fn or_blamed<T>(
     }
 }
 
-/// The strays of a least-squares fit with residuals of variance `variance`, if there are a few: the fit is repeated with Cauchy's loss at the
-/// scale of the median, which strays do not move.
+/// The strays of a least-squares fit with residuals of variance `variance`, if there are a few: the fit is
+/// repeated with Cauchy's loss at the scale of the median, which strays do not move.
 pub(super) fn strays(problem: &Problem<'_>, state: &State, fit: &Fit, variance: f64) -> Option<Strays> {
     if problem.loss != Loss::Squares || !is_suspicious(fit, variance) {
         return None;
@@ -99,10 +100,11 @@ pub(super) fn strays(problem: &Problem<'_>, state: &State, fit: &Fit, variance: 
     Some(Strays { marks, share, view, point, residual_px, median_px: median.sqrt() })
 }
 
-/// What hardly any set of noise exceeds, over the median squared residual. A squared residual exceeds `x sigma^2` with probability `exp(-x / 2)`,
-/// half of them `2 ln 2 sigma^2`, so that of `N` marks one exceeds `2 (ln N + L) sigma^2` with probability `exp(-L)` at most. A fit of few
-/// degrees of freedom follows some marks and leaves others: by how much more is bounded by the square of coordinates over degrees of freedom. `None`
-/// where these are fewer than the marks: a robust fit then passes through half of them.
+/// What hardly any set of noise exceeds, over the median squared residual. A squared residual exceeds `x
+/// sigma^2` with probability `exp(-x / 2)`, half of them `2 ln 2 sigma^2`, so that of `N` marks one exceeds
+/// `2 (ln N + L) sigma^2` with probability `exp(-L)` at most. A fit of few degrees of freedom follows some
+/// marks and leaves others: by how much more is bounded by the square of coordinates over degrees of freedom.
+/// `None` where these are fewer than the marks: a robust fit then passes through half of them.
 fn largest_of_noise(problem: &Problem<'_>, fit: &Fit) -> Option<f64> {
     let marks = fit.marks();
     let freedom = (2 * marks).checked_sub(problem.free.len() + 6 * problem.observations.len())?;

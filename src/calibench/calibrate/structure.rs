@@ -1,19 +1,21 @@
 //! Do neighbouring marks err alike? Noise does not; a lens or a board that the model leaves out does.
 //!
-//! Marks are given row by row, so that one and the next are mostly neighbours. Of independent noise the sum over such pairs
+//! Marks are given row by row, so that one and the next are mostly neighbours. Of independent noise the sum
+//! over such pairs
 //!
 //! ```text
 //! z = sum r_i . r_(i+1) / (s^2 sqrt(2 n)),   s^2 = sum |r_i|^2 / (2 N)
 //! ```
-//! for `n` pairs and `N` marks has mean 0 and variance 1 (Moran 1950, for neighbours on a line); what a fit takes out of the residuals lowers it a little. Marks in
-//! another order make the test blind, not wrong.
+//! for `n` pairs and `N` marks has mean 0 and variance 1 (Moran 1950, for neighbours on a line); what a fit
+//! takes out of the residuals lowers it a little. Marks in another order make the test blind, not wrong.
 
 use super::Warning;
 use crate::geometry::Vec2;
 
 /// A normal number exceeds this with a probability of one in a million.
 const CHANCE: f64 = 4.75;
-/// Weaker correlations, which large sets of real photographs show all the time, widen no standard deviation by more than a fifth.
+/// Weaker correlations, which large sets of real photographs show all the time, widen no standard deviation
+/// by more than a fifth.
 const MATERIAL: f64 = 0.2;
 
 /// The warning, where neighbours' residuals agree; `variance` is `s^2`.

@@ -1,8 +1,9 @@
-//! How are thousands of poses solved for without a matrix of thousands of rows? Schur elimination of the pose blocks.
+//! How are thousands of poses solved for without a matrix of thousands of rows? Schur elimination of the pose
+//! blocks.
 //!
-//! The normal equations of a calibration are an arrow: intrinsics `A` (n x n), one pose block `C_i` (6 x 6) a view, and
-//! couplings `B_i` (n x 6). Poses do not couple with each other, so with `C_i = L_i L_i^T`, `W_i = L_i^-1 B_i^T`,
-//! `z_i = L_i^-1 g_i`
+//! The normal equations of a calibration are an arrow: intrinsics `A` (n x n), one pose block `C_i` (6 x 6) a
+//! view, and couplings `B_i` (n x 6). Poses do not couple with each other, so with `C_i = L_i L_i^T`, `W_i =
+//! L_i^-1 B_i^T`, `z_i = L_i^-1 g_i`
 //!
 //! ```text
 //! S = A - sum W_i^T W_i,   S d_a = -(g_a - sum W_i^T z_i),   L_i^T d_i = -(z_i + W_i d_a)
@@ -67,7 +68,8 @@ impl System {
         }
     }
 
-    /// Factors the damped pose blocks; returns `S` and the right-hand side. `None` where a block is not positive definite.
+    /// Factors the damped pose blocks; returns `S` and the right-hand side. `None` where a block is not
+    /// positive definite.
     pub(super) fn eliminate(&self, damping: f64, eliminated: &mut Vec<Eliminated>) -> Option<Reduced> {
         let n = self.free.len();
         eliminated.resize_with(self.views.len(), Eliminated::default);
@@ -197,7 +199,8 @@ mod tests {
         let inverse = dense(&system).try_inverse().unwrap();
         let covariance = system.covariance().unwrap();
         let n = system.free.len();
-        // Both lose digits with the condition number of the scaled matrix (about 1e6): compare at 1e-8 of the scale.
+        // Both lose digits with the condition number of the scaled matrix (about 1e6): compare at 1e-8 of the
+        // scale.
         let close = |a: f64, b: f64, i: usize, j: usize| {
             (a - b).abs() <= 1e-8 * (inverse[(i, i)] * inverse[(j, j)]).sqrt()
         };

@@ -1,18 +1,20 @@
-//! In which frame is a target refined? Centred on its points and of unit size, whatever its own unit and origin.
+//! In which frame is a target refined? Centred on its points and of unit size, whatever its own unit and
+//! origin.
 
 use super::Covariance;
 use super::normal::Observations;
 use crate::board::View;
 use crate::geometry::{Mat3, Pose, Vec2, Vec3, rotation};
 
-/// The frame in which targets are refined: centred on the points, scaled to unit size, so that neither the unit nor a far
-/// origin of the target costs digits.
+/// The frame in which targets are refined: centred on the points, scaled to unit size, so that neither the
+/// unit nor a far origin of the target costs digits.
 pub(super) struct TargetFrame {
     centre: Vec2,
     scale: f64,
 }
 
-/// Sums over some points `p`, relative to an origin among them: their distances from the centroid are then of the points' own size.
+/// Sums over some points `p`, relative to an origin among them: their distances from the centroid are then of
+/// the points' own size.
 #[derive(Clone, Copy)]
 struct Moments {
     count: f64,
@@ -71,10 +73,12 @@ impl TargetFrame {
     }
 }
 
-/// A view whose points' root mean square distance from their centroid is below this part of that of all points sees a patch of a large target.
+/// A view whose points' root mean square distance from their centroid is below this part of that of all
+/// points sees a patch of a large target.
 const PATCH: f64 = 0.1;
 
-/// The frames of all views: one and the same, or each its own where views see patches of a large target, of which the whole would make rounding.
+/// The frames of all views: one and the same, or each its own where views see patches of a large target, of
+/// which the whole would make rounding.
 pub(super) enum TargetFrames {
     Common(TargetFrame),
     Own(Vec<TargetFrame>),
@@ -118,7 +122,8 @@ impl TargetFrames {
             let (rr, rt): (Mat3, Mat3) =
                 (block.fixed_view::<3, 3>(0, 0).into(), block.fixed_view::<3, 3>(0, 3).into());
             let tt: Mat3 = block.fixed_view::<3, 3>(3, 3).into();
-            // With the change [[I, 0], [K, s I]]: the lower rows K P_rr + s P_tr and K P_rt + s P_tt, then the columns alike.
+            // With the change [[I, 0], [K, s I]]: the lower rows K P_rr + s P_tr and K P_rt + s P_tt, then
+            // the columns alike.
             let lower = turned(&rr, &rt);
             let corner = lower * lever.transpose() + scale * (lever * rt + scale * tt);
             let symmetric = 0.5 * (corner + corner.transpose());

@@ -5,15 +5,17 @@
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Termination {
-    /// A further step would lower the cost by less than 1e-14 of it, or by less than its rounding: the estimate is a minimum to
-    /// about a millionth of its standard deviation, or to rounding. And it is certified: see [`super::Certificate`].
+    /// A further step would lower the cost by less than 1e-14 of it, or by less than its rounding: the
+    /// estimate is a minimum to about a millionth of its standard deviation, or to rounding. And it is
+    /// certified: see [`super::Certificate`].
     Converged,
-    /// A minimum that no other start bettered, but free homographies explain the pixels better than chance allows: the lens model does not
-    /// fit, or a better minimum was not found.
+    /// A minimum that no other start bettered, but free homographies explain the pixels better than chance
+    /// allows: the lens model does not fit, or a better minimum was not found.
     AboveFloor,
     /// The iterations ran out.
     IterationLimit,
-    /// No step lowers the cost although the gradient is not zero: the surface is too flat or too rough for the arithmetic.
+    /// No step lowers the cost although the gradient is not zero: the surface is too flat or too rough for
+    /// the arithmetic.
     Stalled,
 }
 

@@ -1,7 +1,8 @@
-//! How does fy follow fx where the two are tied? At a fixed ratio: square pixels, or cells whose shape a data sheet states.
+//! How does fy follow fx where the two are tied? At a fixed ratio: square pixels, or cells whose shape a data
+//! sheet states.
 //!
-//! Tied, fy is no unknown of its own. With `fy = a fx` the column of fx in every Jacobian becomes `d/dfx + a d/dfy`, every step ends with
-//! `fy = a fx`, and the relaxed model knows the shape of the cells.
+//! Tied, fy is no unknown of its own. With `fy = a fx` the column of fx in every Jacobian becomes `d/dfx + a
+//! d/dfy`, every step ends with `fy = a fx`, and the relaxed model knows the shape of the cells.
 
 use crate::camera::Camera;
 
@@ -13,7 +14,8 @@ pub(super) fn tied(camera: Camera, fy_per_fx: Option<f64>) -> Camera {
     }
 }
 
-/// The camera with both focal lengths moved alike until they stand in the ratio: `fx <- sqrt(fx fy / a)`. For starts that know of no tie.
+/// The camera with both focal lengths moved alike until they stand in the ratio: `fx <- sqrt(fx fy / a)`. For
+/// starts that know of no tie.
 pub(super) fn met_halfway(camera: Camera, fy_per_fx: Option<f64>) -> Camera {
     match fy_per_fx {
         Some(ratio) => tied(Camera { fx: (camera.fx * (camera.fy / ratio)).sqrt(), ..camera }, fy_per_fx),

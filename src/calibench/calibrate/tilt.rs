@@ -1,8 +1,8 @@
 //! Which of its two tilts does a plane have? The other pose that explains an image of a plane nearly as well.
 //!
-//! Seen from far away a plane and its mirror image with respect to the line of sight look the same; only perspective tells them apart, by
-//! `g w^2 / f` px at the edge of a target of half-width `w` px and slope `g` (Schweighofer & Pinz 2006; Collins & Bartoli 2014). A search
-//! that starts in the wrong one stays there.
+//! Seen from far away a plane and its mirror image with respect to the line of sight look the same; only
+//! perspective tells them apart, by `g w^2 / f` px at the edge of a target of half-width `w` px and slope `g`
+//! (Schweighofer & Pinz 2006; Collins & Bartoli 2014). A search that starts in the wrong one stays there.
 
 use super::minimise::{Problem, State, rounding_cost};
 use super::normal::Observations;
@@ -10,8 +10,9 @@ use super::prior::Priors;
 use crate::camera::FreeParameters;
 use crate::geometry::{Mat3, Pose, Vec3};
 
-/// The pose whose plane is mirrored about the line of sight to the target's origin: `R' = Q^T D Q R D` with `D = diag(1, 1, -1)` and `Q` the
-/// rotation that takes the line of sight to the optical axis. Its image agrees to first order in size over distance.
+/// The pose whose plane is mirrored about the line of sight to the target's origin: `R' = Q^T D Q R D` with
+/// `D = diag(1, 1, -1)` and `Q` the rotation that takes the line of sight to the optical axis. Its image
+/// agrees to first order in size over distance.
 pub(super) fn mirrored(pose: &Pose) -> Pose {
     let sight = pose.translation.normalize();
     let about = to_axis(&sight);
@@ -33,17 +34,20 @@ pub(super) fn angle_between(a: &Pose, b: &Pose) -> f64 {
     libm::atan2(a.cross(&b).norm(), a.dot(&b))
 }
 
-/// If turning a plane to its other tilt raises the cost by more variances than this, the other tilt cannot explain the view.
+/// If turning a plane to its other tilt raises the cost by more variances than this, the other tilt cannot
+/// explain the view.
 const TELLING: f64 = 400.0;
-/// If the shortening of a plane by its tilt is worth fewer variances than this, it might as well have none, and both tilts are one.
+/// If the shortening of a plane by its tilt is worth fewer variances than this, it might as well have none,
+/// and both tilts are one.
 const TILTED: f64 = 4.0;
-/// Mean square of the perspective of a unit tilt over a square of half-width 1, less what a pose can follow: `x^2` less its best line has
-/// 4/45, and as much of `x y` is left.
+/// Mean square of the perspective of a unit tilt over a square of half-width 1, less what a pose can follow:
+/// `x^2` less its best line has 4/45, and as much of `x y` is left.
 const CURVED: f64 = 0.16;
 /// Mean square of a unit shortening over the same square, less a change of distance: half of 1/3.
 const SHORTENED: f64 = 0.17;
 
-/// Whether the mirrored pose might explain a view of noise `noise_px` as well: its tilt shows, and perspective hardly tells its sign.
+/// Whether the mirrored pose might explain a view of noise `noise_px` as well: its tilt shows, and
+/// perspective hardly tells its sign.
 pub(super) fn is_doubtful(pose: &Pose, observations: &Observations, focal: f64, noise_px: f64) -> bool {
     let normal = pose.rotation.column(2).into_owned();
     let sight = pose.translation.normalize();

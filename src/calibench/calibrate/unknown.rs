@@ -3,7 +3,8 @@
 use crate::camera::Parameter;
 use std::fmt;
 
-/// An unknown of a calibration, or a group of them that a user thinks of as one. [`fmt::Display`] gives its name in words.
+/// An unknown of a calibration, or a group of them that a user thinks of as one. [`fmt::Display`] gives its
+/// name in words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]

@@ -1,8 +1,10 @@
-//! Is there a better minimum at another focal length? The profile of the cost: a focal length is held, the rest refitted.
+//! Is there a better minimum at another focal length? The profile of the cost: a focal length is held, the
+//! rest refitted.
 //!
-//! With small tilts every plane has two poses that do, and each choice of them has a minimum of its own, at its own focal length. Walking along
-//! the focal length with the better tilt of every plane at each step meets them one after another. The same walk tells how far the
-//! focal length could be off: where the cost does not rise, the data do not determine it.
+//! With small tilts every plane has two poses that do, and each choice of them has a minimum of its own, at
+//! its own focal length. Walking along the focal length with the better tilt of every plane at each step
+//! meets them one after another. The same walk tells how far the focal length could be off: where the cost
+//! does not rise, the data do not determine it.
 
 use super::identifiability::{least_rise, variance};
 use super::minimise::{Minimum, Problem};
@@ -21,7 +23,8 @@ const FAR_CENTRE: f64 = 0.5;
 const KNOWN_CENTRE: f64 = 0.01;
 /// The walk turns where the cost has risen by this many variances: what is farther off is far worse.
 const RISEN: f64 = 100.0;
-/// From steps of the walk whose cost exceeds the least by fewer variances than this, the search goes on with the focal length free.
+/// From steps of the walk whose cost exceeds the least by fewer variances than this, the search goes on with
+/// the focal length free.
 const PROMISING: f64 = 12.0;
 /// Walks, each from a better minimum than the one before.
 const WALKS: usize = 4;
@@ -43,8 +46,8 @@ pub(super) struct Far {
     pub minimum: Minimum,
 }
 
-/// Walks from a minimum, and again from any better one it meets, for noise of `noise_px`; `centre_sd` are the standard deviations of the
-/// principal point.
+/// Walks from a minimum, and again from any better one it meets, for noise of `noise_px`; `centre_sd` are the
+/// standard deviations of the principal point.
 pub(super) fn far_away(
     problem: &Problem<'_>,
     minimum: Minimum,
@@ -80,7 +83,8 @@ pub(super) fn far_away(
     walked
 }
 
-/// Walks along the focal length until the cost has risen by `limit` or the focal length has changed by a factor of 3.
+/// Walks along the focal length until the cost has risen by `limit` or the focal length has changed by a
+/// factor of 3.
 fn walk(
     problem: &Problem<'_>,
     factor: f64,
@@ -142,7 +146,8 @@ fn step_aside(problem: &Problem<'_>, parameter: Parameter, limit: f64, walked: &
 /// Rounds of turning tilts and refining together.
 const TILT_ROUNDS: usize = 4;
 
-/// Turns planes whose other tilt explains their view better, the camera held, and refines; until none is left.
+/// Turns planes whose other tilt explains their view better, the camera held, and refines; until none is
+/// left.
 pub(super) fn with_better_tilts(problem: &Problem<'_>, minimum: Minimum) -> Minimum {
     let mut best = minimum;
     for _ in 0..TILT_ROUNDS {

@@ -8,8 +8,8 @@ use super::{Calibration, Certificate, Covariance, Prior, Termination, Warning};
 use crate::camera::{Camera, FreeParameters, Parameter};
 use crate::geometry::Pose;
 
-/// The warnings of a calibration: `of_residuals` are those of its outliers and of what residuals have in common, `skewed` are the parameters whose cost is no parabola, `rival`
-/// is another camera.
+/// The warnings of a calibration: `of_residuals` are those of its outliers and of what residuals have in
+/// common, `skewed` are the parameters whose cost is no parabola, `rival` is another camera.
 pub(super) fn of(
     calibration: &Calibration,
     largest_radius: f64,
@@ -61,7 +61,8 @@ const CONTRADICTED: f64 = 4.89;
 /// Where the pixels make an estimate better than its prior by less than this part, they say nothing of it.
 const TOLD_BY_PIXELS: f64 = 1e-6;
 
-/// Before the photographs the estimate is spread about the prior's mean with the variance that they take away from it.
+/// Before the photographs the estimate is spread about the prior's mean with the variance that they take away
+/// from it.
 fn contradicted(calibration: &Calibration, prior: &Prior) -> Option<Warning> {
     let Prior { parameter, mean, standard_deviation } = *prior;
     let share = calibration.standard_deviation(parameter)? / standard_deviation;
@@ -100,7 +101,8 @@ fn twin_pose(twins: &[Twin]) -> Option<Warning> {
     Some(Warning::TwinPose { view, views: twins.len(), degrees, excess })
 }
 
-/// Views whose target faces the camera with the other side than most targets do: a mirrored order of marks looks like this.
+/// Views whose target faces the camera with the other side than most targets do: a mirrored order of marks
+/// looks like this.
 fn from_behind(calibration: &Calibration) -> Option<Warning> {
     let faces_away = |pose: &Pose| pose.rotation.column(2).dot(&pose.translation) > 0.0;
     let away: Vec<bool> = calibration.cam_from_target.iter().map(faces_away).collect();

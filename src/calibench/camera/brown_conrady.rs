@@ -1,7 +1,7 @@
 //! How does a lens bend straight lines, and how is that undone exactly?
 //!
-//! In normalised coordinates `(x, y)` on the plane Z = 1, `s = r^2 = x^2 + y^2` (Brown 1971; the order and signs of the
-//! coefficients are OpenCV's):
+//! In normalised coordinates `(x, y)` on the plane Z = 1, `s = r^2 = x^2 + y^2` (Brown 1971; the order and
+//! signs of the coefficients are OpenCV's):
 //!
 //! ```text
 //! g   = 1 + k1 s + k2 s^2 + k3 s^3
@@ -58,8 +58,8 @@ pub enum UndistortError {
     },
 }
 
-/// Steps of [`BrownConrady::radial_ratio`]. The start errs by about `e = 12 (k1 s)^3`; the steps leave some `3 k1 s e^2`, its square, rounding.
-/// For `|k1 s| < 0.1`, most of what lenses do, that is 1e-2, 1e-5, 1e-11.
+/// Steps of [`BrownConrady::radial_ratio`]. The start errs by about `e = 12 (k1 s)^3`; the steps leave some
+/// `3 k1 s e^2`, its square, rounding. For `|k1 s| < 0.1`, most of what lenses do, that is 1e-2, 1e-5, 1e-11.
 const NEWTON_STEPS: usize = 3;
 /// A last step shorter than this leaves an error of its square, times a number of size 1: rounding.
 const SETTLED: f64 = 1e-9;
@@ -82,8 +82,8 @@ pub(super) struct RadialRatio<A> {
 }
 
 impl<A: Arithmetic> RadialRatio<A> {
-    /// Two numbers that are greater than 0 if the ratio is the root inside `disc`: it has settled, and its point lies inside, where the
-    /// root is the only one.
+    /// Two numbers that are greater than 0 if the ratio is the root inside `disc`: it has settled, and its
+    /// point lies inside, where the root is the only one.
     #[inline(always)]
     pub fn margins(&self, disc: &MonotoneDisc) -> [A; 2] {
         [
@@ -146,8 +146,8 @@ impl BrownConrady {
         )
     }
 
-    /// The undistorted radius up to which the radial map `r g(r^2)` grows, infinite if it always does: the square root of
-    /// the smallest positive root of `1 + 3 k1 s + 5 k2 s^2 + 7 k3 s^3`.
+    /// The undistorted radius up to which the radial map `r g(r^2)` grows, infinite if it always does: the
+    /// square root of the smallest positive root of `1 + 3 k1 s + 5 k2 s^2 + 7 k3 s^3`.
     pub fn monotone_radius(&self) -> f64 {
         smallest_positive_root([1.0, 3.0 * self.k1, 5.0 * self.k2, 7.0 * self.k3])
             .map_or(f64::INFINITY, f64::sqrt)
@@ -163,9 +163,9 @@ impl BrownConrady {
 
     /// The ideal point whose distorted image is `distorted`, to machine precision.
     ///
-    /// The radial part is inverted first: by a few steps of Newton's method from a series, or, where those do not settle, by
-    /// Newton's method kept inside a bracket (the map is monotone there, so it cannot fail). Newton's method in the plane then takes
-    /// in the tangential part.
+    /// The radial part is inverted first: by a few steps of Newton's method from a series, or, where those do
+    /// not settle, by Newton's method kept inside a bracket (the map is monotone there, so it cannot fail).
+    /// Newton's method in the plane then takes in the tangential part.
     ///
     /// # Errors
     /// Outside the image of the monotone disc there is no unique answer, and it is refused.
@@ -210,8 +210,9 @@ impl BrownConrady {
         self.p1 == 0.0 && self.p2 == 0.0
     }
 
-    /// Ideal over distorted radius, `q`, for a squared distorted radius `s`: the root of `q g(q^2 s) = 1`, by a fixed number of Newton steps
-    /// from the series `1 - k1 s + (3 k1^2 - k2) s^2`. The same operations for one point and for several at once.
+    /// Ideal over distorted radius, `q`, for a squared distorted radius `s`: the root of `q g(q^2 s) = 1`, by
+    /// a fixed number of Newton steps from the series `1 - k1 s + (3 k1^2 - k2) s^2`. The same operations for
+    /// one point and for several at once.
     #[inline(always)]
     pub(super) fn radial_ratio<A: Arithmetic>(&self, s: A) -> RadialRatio<A> {
         let one = A::splat(1.0);
@@ -226,7 +227,8 @@ impl BrownConrady {
         for k in 0..NEWTON_STEPS {
             let square = ratio * ratio;
             if k > 0 {
-                // The inverse follows the slope by a Newton step of its own: division is the slowest operation.
+                // The inverse follows the slope by a Newton step of its own: division is the slowest
+                // operation.
                 let slope = one + square * (a3 + square * (b5 + square * c7));
                 inverse_slope = inverse_slope * (one + (one - slope * inverse_slope));
             }
@@ -274,8 +276,8 @@ impl BrownConrady {
         Some(r)
     }
 
-    /// Newton's method for `distort(ideal) = distorted`, with steps halved until they reduce the residual without leaving
-    /// the region where the map keeps its orientation.
+    /// Newton's method for `distort(ideal) = distorted`, with steps halved until they reduce the residual
+    /// without leaving the region where the map keeps its orientation.
     fn newton_in_plane(&self, distorted: &Vec2, start: Vec2) -> Option<Vec2> {
         // A solution leaves only rounding; a point with no preimage leaves a distance.
         let rounding = 2.0 * f64::EPSILON * (1.0 + distorted.norm());

@@ -5,8 +5,8 @@ use crate::geometry::Vec2;
 use crate::geometry::lanes::{Kernel, LANES, Lanes, dispatch};
 
 impl Camera {
-    /// [`Camera::correct_pixel`] of every pixel, in order and with the same bits; some ten times faster for lenses without tangential
-    /// part. The result is in pixels.
+    /// [`Camera::correct_pixel`] of every pixel, in order and with the same bits; some ten times faster for
+    /// lenses without tangential part. The result is in pixels.
     ///
     /// # Errors
     /// The error of the first pixel outside the monotone radius of the lens model.

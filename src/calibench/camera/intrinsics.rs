@@ -119,8 +119,8 @@ impl Camera {
         self.pixel_from_normalised(&self.distortion.distort(&self.normalised_from_pixel(ideal)))
     }
 
-    /// Where an ideal lens with the same `K` would have shown what is seen at `pixel`: the correction of a point.
-    /// The result is in pixels, not in target units.
+    /// Where an ideal lens with the same `K` would have shown what is seen at `pixel`: the correction of a
+    /// point. The result is in pixels, not in target units.
     ///
     /// # Errors
     /// Outside the monotone radius of the lens model.

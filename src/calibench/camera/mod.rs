@@ -1,4 +1,5 @@
-//! How does a point in front of the camera become a pixel? Pinhole, Brown-Conrady distortion, their derivatives and inverse.
+//! How does a point in front of the camera become a pixel? Pinhole, Brown-Conrady distortion, their
+//! derivatives and inverse.
 
 mod brown_conrady;
 mod correction;

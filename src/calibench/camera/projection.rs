@@ -25,9 +25,9 @@ pub struct BehindCamera {
 
 /// Projects a target point and differentiates the pixel.
 ///
-/// With `X_c = R X + t`, `(x, y) = (X_c, Y_c) / Z_c` and `D` the distortion's Jacobian:
-/// `d pixel / d X_c = [[fx, skew], [0, fy]] D [[1, 0, -x], [0, 1, -y]] / Z_c`, and `d X_c / d delta = -[R X]x`,
-/// `d X_c / d t = I`.
+/// With `X_c = R X + t`, `(x, y) = (X_c, Y_c) / Z_c` and `D` the distortion's Jacobian: `d pixel / d X_c =
+/// [[fx, skew], [0, fy]] D [[1, 0, -x], [0, 1, -y]] / Z_c`, and `d X_c / d delta = -[R X]x`, `d X_c / d t =
+/// I`.
 pub fn project_with_jacobian(
     camera: &Camera,
     cam_from_target: &Pose,

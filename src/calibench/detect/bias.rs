@@ -1,8 +1,9 @@
 //! How far is the centre of an imaged disc from the image of the disc's centre?
 //!
-//! Perspective maps a disc to an ellipse whose centre is not the image of the disc's centre, and distortion bends it
-//! further; a detector sees the centroid of the imaged area (Heikkila & Silven 1997 for the perspective part). With the
-//! outline `p(theta)` of the disc through the full camera model, Green's theorem gives
+//! Perspective maps a disc to an ellipse whose centre is not the image of the disc's centre, and distortion
+//! bends it further; a detector sees the centroid of the imaged area (Heikkila & Silven 1997 for the
+//! perspective part). With the outline `p(theta)` of the disc through the full camera model, Green's theorem
+//! gives
 //!
 //! ```text
 //! A = 1/2 oint (u dv - v du),     centroid = (1 / 2A) (oint u^2 dv, -oint v^2 du)
@@ -14,11 +15,12 @@ use crate::camera::{BehindCamera, Camera};
 use crate::geometry::{Pose, Vec2, Vec3};
 use nalgebra::{Matrix2, Matrix2x3, Matrix3x2};
 
-/// Points of the trapezoidal rule. The integrand's harmonics fall at least as fast as (radius / distance)^n, below 1e-16
-/// from the 32nd on for any disc smaller than a third of its distance.
+/// Points of the trapezoidal rule. The integrand's harmonics fall at least as fast as (radius / distance)^n,
+/// below 1e-16 from the 32nd on for any disc smaller than a third of its distance.
 const OUTLINE_POINTS: usize = 64;
 
-/// Area centroid of the imaged disc minus the projection of its centre, px. Subtract it from a detected centre.
+/// Area centroid of the imaged disc minus the projection of its centre, px. Subtract it from a detected
+/// centre.
 ///
 /// # Errors
 /// A disc that is not wholly in front of the camera.
@@ -44,7 +46,8 @@ pub fn disc_bias(
     Ok(moment / twice_area)
 }
 
-/// The bias of every mark of a board, in the order of [`Board::points`]; zero for corners, which have no extent.
+/// The bias of every mark of a board, in the order of [`Board::points`]; zero for corners, which have no
+/// extent.
 ///
 /// # Errors
 /// A mark that is not wholly in front of the camera.
@@ -102,8 +105,8 @@ mod tests {
 
     #[test]
     fn a_tilted_disc_has_the_bias_of_its_ellipse() {
-        // A disc at the origin tilted by t about X: v / f = y cos t / (Z + y sin t) for y = -r ... r, so the ellipse's
-        // vertical extent is centred on the mean of its ends.
+        // A disc at the origin tilted by t about X: v / f = y cos t / (Z + y sin t) for y = -r ... r, so the
+        // ellipse's vertical extent is centred on the mean of its ends.
         let (f, z, r) = (600.0, 120.0, 1.5);
         let camera = Camera::pinhole(f, f, 0.0, 0.0);
         for degrees in [20.0f64, 45.0] {
@@ -121,7 +124,8 @@ mod tests {
         let camera = Camera::pinhole(600.0, 600.0, 326.0, 243.0).with_distortion(lens);
         let centre = Vec2::new(40.0, -30.0);
         let bias = disc_bias(&camera, &tilted(40.0), &centre, 3.0).unwrap();
-        // The polygon of 20 000 outline points as an independent centroid: its error falls as 1 / n^2, 1e-8 here.
+        // The polygon of 20 000 outline points as an independent centroid: its error falls as 1 / n^2, 1e-8
+        // here.
         let pose = tilted(40.0);
         let pixel = |p: Vec2| pixel_and_slope(&camera, &pose, &p).unwrap().0;
         let origin = pixel(centre);

@@ -1,12 +1,13 @@
 //! Where exactly is the centre of an imaged disc? The ellipse whose edge explains the pixels best.
 //!
-//! 1. Levels: a plane is fitted to the ground around the disc and one to the inside, so that smooth shading cancels; the
-//!    pixels near the edge become coverage `c = (ground - level) / (ground - inside)`.
-//! 2. Moments of the coverage give the ellipse and a grey-weighted centroid. Pixels clear of the edge count as 1 or 0, so
-//!    only the noise of a narrow ring enters.
-//! 3. One Gauss-Newton step on the centre against the model `c = S(d)`, `d` the distance to the ellipse. It weighs each pixel
-//!    by the slope of the edge, which the centroid does not, and so attains the Cramer-Rao bound of the centre: by symmetry
-//!    the centre's derivatives are orthogonal to those of axes, levels and edge width, whose errors then do not matter.
+//! 1. Levels: a plane is fitted to the ground around the disc and one to the inside, so that smooth shading
+//!    cancels; the pixels near the edge become coverage `c = (ground - level) / (ground - inside)`.
+//! 2. Moments of the coverage give the ellipse and a grey-weighted centroid. Pixels clear of the edge count
+//!    as 1 or 0, so only the noise of a narrow ring enters.
+//! 3. One Gauss-Newton step on the centre against the model `c = S(d)`, `d` the distance to the ellipse. It
+//!    weighs each pixel by the slope of the edge, which the centroid does not, and so attains the Cramer-Rao
+//!    bound of the centre: by symmetry the centre's derivatives are orthogonal to those of axes, levels and
+//!    edge width, whose errors then do not matter.
 
 use super::blob::{Blob, semi_axes};
 use super::edge::{Edge, SHARPEST_EDGE_PX, SPREAD_PER_WIDTH};
@@ -52,7 +53,8 @@ impl Ellipse {
         ((rho_sq - rho_sq.sqrt()) * inverse_norm, half_gradient * inverse_norm)
     }
 
-    /// Circumference, by Ramanujan's first approximation (relative error below 1e-4 for axis ratios above 1/4).
+    /// Circumference, by Ramanujan's first approximation (relative error below 1e-4 for axis ratios above
+    /// 1/4).
     fn circumference_px(&self) -> f64 {
         let (a, b) = (self.long_px, self.short_px);
         std::f64::consts::PI * (3.0 * (a + b) - ((3.0 * a + b) * (a + 3.0 * b)).sqrt())
@@ -88,7 +90,8 @@ fn for_each_between<T: Level>(
     }
 }
 
-/// Moments of the coverage: a better ellipse, and the edge's half-width. Pixels within `ring_px` of the edge are looked at.
+/// Moments of the coverage: a better ellipse, and the edge's half-width. Pixels within `ring_px` of the edge
+/// are looked at.
 fn moments<T: Level>(
     image: &Raster<T>,
     ellipse: &Ellipse,
@@ -120,7 +123,8 @@ fn moments<T: Level>(
     let (xx, xy, yy) =
         (xx / area - mean.x * mean.x, xy / area - mean.x * mean.y, yy / area - mean.y * mean.y);
     let edge_px = spread / ellipse.circumference_px() / SPREAD_PER_WIDTH;
-    // The pixel's square and the edge's softness both widen the moments of coverage by the edge's variance h^2 / 5.
+    // The pixel's square and the edge's softness both widen the moments of coverage by the edge's variance
+    // h^2 / 5.
     let soft = edge_px.max(SHARPEST_EDGE_PX);
     let soft = soft * soft / 5.0;
     let covariance = Matrix2::new(xx - soft, xy, xy, yy - soft);
@@ -173,8 +177,8 @@ pub(super) fn refine<T: Level>(image: &Raster<T>, centre: Vec2, covariance: Matr
     (is_finite && moved.norm() < 0.5 * ellipse.short_px).then_some(blob)
 }
 
-/// How far around the mark its ground is looked at: a few pixels, more for larger marks, but less than half of the gap to
-/// a neighbour that is as far away as the mark is wide.
+/// How far around the mark its ground is looked at: a few pixels, more for larger marks, but less than half
+/// of the gap to a neighbour that is as far away as the mark is wide.
 fn outer_px(ellipse: &Ellipse, clear_px: f64) -> f64 {
     clear_px + (0.5 * ellipse.short_px).clamp(1.0, 8.0)
 }

@@ -1,13 +1,15 @@
-//! Where do the squares of a chessboard meet? Corners found in a pyramid of images, ordered by the squares' colours, fitted to the pixels.
+//! Where do the squares of a chessboard meet? Corners found in a pyramid of images, ordered by the squares'
+//! colours, fitted to the pixels.
 //!
 //! 1. A level of the pyramid is searched for places where two edges cross ([`candidates`]).
-//! 2. Lattices grow from corner to corner along the squares' edges ([`growth`]); where one is missing, it is looked for ([`probe`]).
-//! 3. A lattice with exactly one full rectangle of the asked size, and no board beyond it, is the board ([`board`]). A larger rectangle is
-//!    another board.
+//! 2. Lattices grow from corner to corner along the squares' edges ([`growth`]); where one is missing, it is
+//!    looked for ([`probe`]).
+//! 3. A lattice with exactly one full rectangle of the asked size, and no board beyond it, is the board
+//!    ([`board`]). A larger rectangle is another board.
 //! 4. Its corners are fitted in the photograph ([`refine`]).
 //!
-//! The level of about a megapixel comes first, then finer ones (small squares), then coarser ones (noise and blur). A board is returned
-//! complete and in order, or not at all.
+//! The level of about a megapixel comes first, then finer ones (small squares), then coarser ones (noise and
+//! blur). A board is returned complete and in order, or not at all.
 
 mod board;
 mod candidates;
@@ -37,10 +39,11 @@ pub struct Chessboard {
 /// How far the image tells which corner is the board's first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Orientation {
-    /// The first corner is the physical one in every view: before it lies the dark square at the board's origin. So it is where one of
-    /// columns and rows is odd and the other even.
+    /// The first corner is the physical one in every view: before it lies the dark square at the board's
+    /// origin. So it is where one of columns and rows is odd and the other even.
     Fixed,
-    /// Half a turn looks the same: the first corner is the one of two that lies nearer to the image's top left.
+    /// Half a turn looks the same: the first corner is the one of two that lies nearer to the image's top
+    /// left.
     HalfTurn,
     /// Every quarter turn looks the same (as many rows as columns, an even number): the first of four.
     QuarterTurn,
@@ -136,7 +139,8 @@ pub enum ChessboardError {
     },
 }
 
-/// Pixels of the level that is searched first, at most: boards of ten squares a side have squares of 40 px or more there.
+/// Pixels of the level that is searched first, at most: boards of ten squares a side have squares of 40 px or
+/// more there.
 const FIRST_LEVEL_PIXELS: usize = 1_200_000;
 
 /// Finds a chessboard of `columns x rows` inner corners, all visible.

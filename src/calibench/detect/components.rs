@@ -1,8 +1,9 @@
-//! Which dark (or bright) pixels hang together? Connected components of runs, with their moments, in one pass.
+//! Which dark (or bright) pixels hang together? Connected components of runs, with their moments, in one
+//! pass.
 //!
-//! Each row is cut into runs of marked pixels; runs that touch a run of the row above (sharing a column) join its
-//! component through a union-find forest. Only runs are touched after the tiles of one side are skipped, so the time grows
-//! with the outline, not with the area. (Run-based labelling: He, Chao & Suzuki 2008.)
+//! Each row is cut into runs of marked pixels; runs that touch a run of the row above (sharing a column) join
+//! its component through a union-find forest. Only runs are touched after the tiles of one side are skipped,
+//! so the time grows with the outline, not with the area. (Run-based labelling: He, Chao & Suzuki 2008.)
 
 use super::threshold::{Side, TILE_PX, Thresholds};
 use crate::raster::{Level, Raster};
@@ -99,7 +100,8 @@ struct Stretch<T> {
     level: Option<T>,
 }
 
-/// The stretches of a row of tiles, left to right: one for every mixed tile, one for neighbouring tiles of the mark's side.
+/// The stretches of a row of tiles, left to right: one for every mixed tile, one for neighbouring tiles of
+/// the mark's side.
 fn find_stretches<T: Level>(
     tiles: impl Iterator<Item = (T, Side)>,
     width: usize,

@@ -1,10 +1,11 @@
 //! Where exactly do four squares meet? The point that every edge around it points at.
 //!
-//! At a pixel `p` on an edge through the corner `q` the gradient `g` is perpendicular to `p - q`; inside a square it is
-//! zero. So `q` minimises `sum w (g . (p - q))^2`, a linear problem, solved again around each new `q` until it rests
-//! (Foerstner & Gulch 1987; the window and weights are those of OpenCV's `cornerSubPix`). Differences between pixels put an
-//! error of some hundredths of a pixel into it that depends on the corner's place on the pixel grid, so it is only the start
-//! of a fit to the pixels themselves (`saddle`), and what remains where that does not converge.
+//! At a pixel `p` on an edge through the corner `q` the gradient `g` is perpendicular to `p - q`; inside a
+//! square it is zero. So `q` minimises `sum w (g . (p - q))^2`, a linear problem, solved again around each
+//! new `q` until it rests (Foerstner & Gulch 1987; the window and weights are those of OpenCV's
+//! `cornerSubPix`). Differences between pixels put an error of some hundredths of a pixel into it that
+//! depends on the corner's place on the pixel grid, so it is only the start of a fit to the pixels themselves
+//! (`saddle`), and what remains where that does not converge.
 
 use super::saddle;
 use crate::geometry::Vec2;
@@ -47,13 +48,15 @@ pub enum RefineError {
     },
 }
 
-/// The iteration contracts by a factor of three or more a step; 40 steps are past rest from anywhere in the window.
+/// The iteration contracts by a factor of three or more a step; 40 steps are past rest from anywhere in the
+/// window.
 const MAX_STEPS: usize = 40;
 
 /// Steps below this leave the corner where it is to the accuracy of any image.
 const REST_PX: f64 = 1e-5;
 
-/// Least ratio of the eigenvalues of the gradients' scatter: edges that cross at less than 10 degrees have 0.008.
+/// Least ratio of the eigenvalues of the gradients' scatter: edges that cross at less than 10 degrees have
+/// 0.008.
 const LEAST_FLATNESS: f64 = 0.01;
 
 /// Refines the place of a chessboard corner, looking at `2 half_px + 1` pixels a side.

@@ -15,7 +15,8 @@ pub struct BlobOptions {
     pub polarity: Polarity,
     /// Least area, px. Below 12 px (diameter 4 px) neither shape nor centre can be trusted.
     pub least_area_px: f64,
-    /// Least ratio of the axes. A disc tilted by 45 deg at the edge of a wide view shows 0.5; 0.25 leaves room.
+    /// Least ratio of the axes. A disc tilted by 45 deg at the edge of a wide view shows 0.5; 0.25 leaves
+    /// room.
     pub least_axis_ratio: f64,
 }
 
@@ -25,14 +26,16 @@ impl Default for BlobOptions {
     }
 }
 
-/// The area of a component may differ from that of its moments' ellipse by this fraction, plus the raggedness of small
-/// components, about one pixel in ten along the outline.
+/// The area of a component may differ from that of its moments' ellipse by this fraction, plus the raggedness
+/// of small components, about one pixel in ten along the outline.
 const AREA_TOLERANCE: f64 = 0.1;
 
-/// Largest misfit of an ellipse: discs show 0.02 to 0.08 depending on size and sharpness; squares show 0.25 and more.
+/// Largest misfit of an ellipse: discs show 0.02 to 0.08 depending on size and sharpness; squares show 0.25
+/// and more.
 const LARGEST_MISFIT: f64 = 0.2;
 
-/// The discs of an image, top to bottom by their highest pixel. Marks that touch the image's border are left out.
+/// The discs of an image, top to bottom by their highest pixel. Marks that touch the image's border are left
+/// out.
 pub fn blobs<T: Level>(image: &Raster<T>, options: &BlobOptions) -> Vec<Blob> {
     let Some(thresholds) = Thresholds::of(image) else { return Vec::new() };
     components(image, &thresholds, options.polarity)

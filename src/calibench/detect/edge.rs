@@ -1,9 +1,10 @@
 //! How does coverage fall across the edge of a mark? The edge of a square pixel's view, sharp or soft.
 //!
-//! A pixel crossed by a straight edge of normal `n` sees the edge through boxes of widths `|nx|` and `|ny|`; a soft lens
-//! adds a spread of its own. Below a blur of about three quarters of a pixel the orientation matters (a sharp edge along a row is
-//! a ramp of exactly one pixel, a diagonal one a parabola-ramp of 1.41), and treating it as isotropic would move centres by
-//! some thousandths of a pixel with their phase on the grid. Softer edges are isotropic to that accuracy.
+//! A pixel crossed by a straight edge of normal `n` sees the edge through boxes of widths `|nx|` and `|ny|`;
+//! a soft lens adds a spread of its own. Below a blur of about three quarters of a pixel the orientation
+//! matters (a sharp edge along a row is a ramp of exactly one pixel, a diagonal one a parabola-ramp of 1.41),
+//! and treating it as isotropic would move centres by some thousandths of a pixel with their phase on the
+//! grid. Softer edges are isotropic to that accuracy.
 
 use crate::geometry::Vec2;
 use crate::geometry::lanes::Lanes;
@@ -17,7 +18,8 @@ pub const SPREAD_PER_WIDTH: f64 = 9.0 / 35.0;
 /// The narrowest box: a narrower one changes no coverage by more than 1e-3 and divides by almost nothing.
 const LEAST_BOX_PX: f64 = 0.02;
 
-/// Lens boxes up to which the pixel's orientation shows, px: two of 1.8 px have the variance of a Gaussian of 0.73 px.
+/// Lens boxes up to which the pixel's orientation shows, px: two of 1.8 px have the variance of a Gaussian of
+/// 0.73 px.
 const WIDEST_LENS_PX: f64 = 1.8;
 
 /// A model of the edge: coverage as a function of the distance from the edge.
@@ -28,7 +30,8 @@ pub enum Edge {
         /// Width of each of the boxes that stand for the lens, px.
         lens_px: f64,
     },
-    /// The integral of Epanechnikov's parabola: `S(t) = 1/2 - 3/4 t + 1/4 t^3`, `t = d / h` in -1 ... 1, variance `h^2 / 5`.
+    /// The integral of Epanechnikov's parabola: `S(t) = 1/2 - 3/4 t + 1/4 t^3`, `t = d / h` in -1 ... 1,
+    /// variance `h^2 / 5`.
     Soft {
         /// `h`, px.
         half_width_px: f64,
@@ -135,9 +138,10 @@ impl LaneEdge {
     }
 }
 
-/// A step seen through four boxes: `1 - F(d)` and the density `f(d)` of the sum of uniform numbers of widths a, b, c and c.
-/// With `x_+ = max(x, 0)`, `F = sum of s (d + (+-a +-b +-c +-c) / 2)_+^4 / (24 a b c^2)` over the sixteen sign choices, `s` their
-/// product; the two lens boxes together give offsets `-c, 0, c` of weight `1, -2, 1`.
+/// A step seen through four boxes: `1 - F(d)` and the density `f(d)` of the sum of uniform numbers of widths
+/// a, b, c and c. With `x_+ = max(x, 0)`, `F = sum of s (d + (+-a +-b +-c +-c) / 2)_+^4 / (24 a b c^2)` over
+/// the sixteen sign choices, `s` their product; the two lens boxes together give offsets `-c, 0, c` of weight
+/// `1, -2, 1`.
 fn four_boxes(d: f64, a: f64, b: f64, c: f64) -> (f64, f64) {
     let (mut cubes, mut fourths) = (0.0, 0.0);
     for (pixel, sign) in [(a + b, 1.0), (a - b, -1.0), (b - a, -1.0), (-a - b, 1.0)] {

@@ -1,8 +1,9 @@
 //! Which marks are neighbours on the board? A lattice grown mark by mark from a seed.
 //!
-//! Every mark predicts its four neighbours from the steps around it; the mark nearest to a prediction, if near enough and of
-//! similar size, takes the place. Steps are updated as the lattice grows, so it follows perspective and distortion. The seed's
-//! two steps may be a row and a diagonal: any two independent steps span the same lattice, and the caller straightens it.
+//! Every mark predicts its four neighbours from the steps around it; the mark nearest to a prediction, if
+//! near enough and of similar size, takes the place. Steps are updated as the lattice grows, so it follows
+//! perspective and distortion. The seed's two steps may be a row and a diagonal: any two independent steps
+//! span the same lattice, and the caller straightens it.
 
 use super::Blob;
 use super::neighbours::Neighbours;
@@ -15,8 +16,9 @@ pub type Place = (i32, i32);
 /// Marks by their places.
 pub type Lattice = BTreeMap<Place, usize>;
 
-/// How far from its prediction a neighbour may lie, as a fraction of the step. Half would be the next mark's territory;
-/// a strong lens and 45 deg of tilt change the step by less than a quarter from one mark to the next.
+/// How far from its prediction a neighbour may lie, as a fraction of the step. Half would be the next mark's
+/// territory; a strong lens and 45 deg of tilt change the step by less than a quarter from one mark to the
+/// next.
 const SEARCH_FRACTION: f64 = 0.3;
 
 /// Largest ratio of areas of neighbouring marks: 45 deg of tilt at close range changes it by 1.5.
@@ -107,7 +109,8 @@ impl Marks<'_> {
         lattice
     }
 
-    /// The steps around a place: between the marks on either side where they are known, else the inherited ones.
+    /// The steps around a place: between the marks on either side where they are known, else the inherited
+    /// ones.
     fn steps_at(&self, lattice: &Lattice, place: Place, inherited: [Vec2; 2]) -> [Vec2; 2] {
         let here = self.centres[lattice[&place]];
         let at =

@@ -1,4 +1,5 @@
-//! How bright are ground and mark here? A plane through each, clear of the edge, so that smooth shading cancels.
+//! How bright are ground and mark here? A plane through each, clear of the edge, so that smooth shading
+//! cancels.
 
 use super::region::{Region, around};
 use crate::geometry::Vec2;
@@ -76,8 +77,8 @@ pub struct Levels {
 }
 
 impl Levels {
-    /// Fits the ground between `clear` and `outer` and the mark within `inner`, places counted from `centre`; `None` where either has no
-    /// pixel.
+    /// Fits the ground between `clear` and `outer` and the mark within `inner`, places counted from `centre`;
+    /// `None` where either has no pixel.
     pub fn fit<T: Level>(
         image: &Raster<T>,
         centre: &Vec2,
@@ -111,8 +112,8 @@ impl Levels {
     fn of(ground: &PlaneFit, mark: &PlaneFit) -> Option<Levels> {
         let (own, middle) = (mark.solve()?, Vec2::new(mark.x, mark.y) / mark.n);
         let ground = ground.solve()?;
-        // Light falls on mark and ground alike, and the ground, being wider, shows its slope with less noise. Not so for
-        // bright marks: their ground shows no light.
+        // Light falls on mark and ground alike, and the ground, being wider, shows its slope with less noise.
+        // Not so for bright marks: their ground shows no light.
         let (mark_level, ground_level) = (own.at(&middle), ground.at(&middle));
         let mark = if 0.0 <= mark_level && mark_level < ground_level {
             Plane(ground.0 * (mark_level / ground_level))

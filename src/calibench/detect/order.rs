@@ -1,10 +1,12 @@
-//! Which mark of a lattice is which mark of the board? A complete rectangle in a stated order, or a reason why not.
+//! Which mark of a lattice is which mark of the board? A complete rectangle in a stated order, or a reason
+//! why not.
 //!
-//! **Order.** Row by row, as [`Board::points`](crate::board::Board::points): along a row first. A symmetric grid looks the
-//! same after half a turn (a square one after a quarter), so the image cannot tell which corner is the board's first. The
-//! convention here: of all orders that see the board from its front (X to Y turns the way u turns to v) and have the asked
-//! number of columns and rows, the one whose first mark has the least `u + v`, the corner nearest to the image's top left.
-//! A calibration is indifferent to the choice: it only turns the board's frame by half a turn about its normal.
+//! **Order.** Row by row, as [`Board::points`](crate::board::Board::points): along a row first. A symmetric
+//! grid looks the same after half a turn (a square one after a quarter), so the image cannot tell which
+//! corner is the board's first. The convention here: of all orders that see the board from its front (X to Y
+//! turns the way u turns to v) and have the asked number of columns and rows, the one whose first mark has
+//! the least `u + v`, the corner nearest to the image's top left. A calibration is indifferent to the choice:
+//! it only turns the board's frame by half a turn about its normal.
 
 use super::lattice::{Lattice, Place};
 use crate::geometry::Vec2;
@@ -13,7 +15,8 @@ use crate::geometry::Vec2;
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GridError {
-    /// Grids with fewer marks than this on a side, or fewer in the image, cannot be told from chance by their regularity.
+    /// Grids with fewer marks than this on a side, or fewer in the image, cannot be told from chance by their
+    /// regularity.
     #[error(
         "a dense grid needs at least {need} x {need} marks, asked for {columns} x {rows}, found {found}: use the detector \
          for sparse dots"
@@ -94,12 +97,13 @@ pub enum GridError {
     },
 }
 
-/// Largest distance of a mark from the middle of its neighbours in a row or column, in steps: 45 deg of tilt at close
-/// range gives 0.1, a lens that bends a line by a tenth of its length less; a mark skipped or taken from a neighbouring
-/// lattice 0.5.
+/// Largest distance of a mark from the middle of its neighbours in a row or column, in steps: 45 deg of tilt
+/// at close range gives 0.1, a lens that bends a line by a tenth of its length less; a mark skipped or taken
+/// from a neighbouring lattice 0.5.
 const LARGEST_DEVIATION: f64 = 0.3;
 
-/// The marks of a lattice in the order of a `columns x rows` board. `centres[mark]` is a mark's place in the image.
+/// The marks of a lattice in the order of a `columns x rows` board. `centres[mark]` is a mark's place in the
+/// image.
 ///
 /// # Errors
 /// See [`GridError`].
@@ -155,8 +159,9 @@ fn rectangle(lattice: &Lattice, seen: usize, columns: usize, rows: usize) -> Res
     })
 }
 
-/// The one full rectangle of the asked size in a lattice with a few stray marks beside it (texture that happens to lie where
-/// the next mark would). A larger board has at least a whole row more, which is more strays than the caller lets pass.
+/// The one full rectangle of the asked size in a lattice with a few stray marks beside it (texture that
+/// happens to lie where the next mark would). A larger board has at least a whole row more, which is more
+/// strays than the caller lets pass.
 fn only_rectangle(lattice: &Lattice, columns: usize, rows: usize) -> Option<Rectangle> {
     let mut only = None;
     for [a, b, c, d] in STRAIGHTENINGS {

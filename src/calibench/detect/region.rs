@@ -17,11 +17,12 @@ pub struct Region {
 }
 
 impl Region {
-    /// The ellipse with this covariance of area, every point of its outline moved outwards by at least `by_px` (inwards for a
-    /// negative one); `None` where nothing is left.
+    /// The ellipse with this covariance of area, every point of its outline moved outwards by at least
+    /// `by_px` (inwards for a negative one); `None` where nothing is left.
     ///
-    /// Semi-axes `a`, `b` become `a + c`, `b + c`. That is the covariance times `1 + 2 c / (a + b)` plus `(c^2 + 2 c a b / (a + b)) / 4`
-    /// on the diagonal, and moves the outline by no less than `2 sqrt(a b) / (a + b)` of `c`, which `c` therefore exceeds `by_px` by.
+    /// Semi-axes `a`, `b` become `a + c`, `b + c`. That is the covariance times `1 + 2 c / (a + b)` plus
+    /// `(c^2 + 2 c a b / (a + b)) / 4` on the diagonal, and moves the outline by no less than `2 sqrt(a b) /
+    /// (a + b)` of `c`, which `c` therefore exceeds `by_px` by.
     pub fn new(centre: Vec2, covariance: &Matrix2<f64>, by_px: f64) -> Option<Region> {
         let (b, a) = semi_axes(covariance);
         let c = by_px * (a + b) / (2.0 * (a * b).sqrt());
@@ -113,7 +114,8 @@ mod tests {
             let c = by * (a + b) / (2.0 * (a * b).sqrt());
             for i in 0..200 {
                 let (s, k) = libm::sincos(f64::from(i) * 0.0314);
-                // A point of the first outline moves to the same parameter of the second: along the first's normal by this much.
+                // A point of the first outline moves to the same parameter of the second: along the first's
+                // normal by this much.
                 let normal = Vec2::new(b * k, a * s).normalize();
                 let moved = normal.dot(&Vec2::new(c * k, c * s));
                 prop_assert!(moved.abs() >= by.abs() * (1.0 - 1e-12));

@@ -1,14 +1,16 @@
 //! Which crossing of two edges explains the pixels around a chessboard corner best?
 //!
-//! Model: `I(p) = m + g . (p - q) + a f1(d1) f2(d2)`, with `d = n . (p - q) - k (t . (p - q))^2 / 2` the distance from an edge of direction
-//! `t`, normal `n` and curvature `k`, and `f = 1 - 2 S` running from -1 to 1 across it, `S` the edge as a square pixel sees it
-//! ([`Edge`]). Gauss-Newton on the corner `q`, the two directions and widths, `m`, `a` and the slope `g` of uneven light. Both widths
-//! are free, for a moving camera blurs one edge more than the other. The curvatures are given: the neighbouring corners show them
-//! far better than a window's pixels. A pixel on neither edge adds nothing to `q`, so pixels farther away are left out, and unlike
-//! gradients between pixels the model has no error of its own that depends on where the corner lies on the pixel grid.
+//! Model: `I(p) = m + g . (p - q) + a f1(d1) f2(d2)`, with `d = n . (p - q) - k (t . (p - q))^2 / 2` the
+//! distance from an edge of direction `t`, normal `n` and curvature `k`, and `f = 1 - 2 S` running from -1 to
+//! 1 across it, `S` the edge as a square pixel sees it ([`Edge`]). Gauss-Newton on the corner `q`, the two
+//! directions and widths, `m`, `a` and the slope `g` of uneven light. Both widths are free, for a moving
+//! camera blurs one edge more than the other. The curvatures are given: the neighbouring corners show them
+//! far better than a window's pixels. A pixel on neither edge adds nothing to `q`, so pixels farther away are
+//! left out, and unlike gradients between pixels the model has no error of its own that depends on where the
+//! corner lies on the pixel grid.
 //!
-//! Blur of any symmetric shape leaves the image of two crossing lines symmetric under half a turn about `q`, and so is the model:
-//! a wrong shape of the edge costs precision, but does not move the corner.
+//! Blur of any symmetric shape leaves the image of two crossing lines symmetric under half a turn about `q`,
+//! and so is the model: a wrong shape of the edge costs precision, but does not move the corner.
 
 use super::edge::{Edge, LaneEdge, SHARPEST_EDGE_PX};
 use crate::geometry::Vec2;
@@ -22,15 +24,16 @@ const PARAMETERS: usize = 10;
 /// Gauss-Newton steps; from half a pixel away five suffice.
 const MAX_STEPS: usize = 16;
 
-/// Steps in which the edges' widths are estimated too. Then they are held: sharp and soft edges have different models, and an edge
-/// between the two would swing from one to the other for ever.
+/// Steps in which the edges' widths are estimated too. Then they are held: sharp and soft edges have
+/// different models, and an edge between the two would swing from one to the other for ever.
 const WIDTH_STEPS: usize = 5;
 
-/// Steps below this are at rest: a tenth of the accuracy of a good image, and the next would be ten times smaller.
+/// Steps below this are at rest: a tenth of the accuracy of a good image, and the next would be ten times
+/// smaller.
 const REST_PX: f64 = 5e-4;
 
-/// Largest last step where the corner never rests: an edge along a row of a sharp image steps to and fro between models, by as much as
-/// this is no harm.
+/// Largest last step where the corner never rests: an edge along a row of a sharp image steps to and fro
+/// between models, by as much as this is no harm.
 const LAST_PX: f64 = 0.01;
 
 /// Pixels on either side of an edge's reach that show the level of the squares.
@@ -46,7 +49,8 @@ const MAX_BANDS: usize = 4;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Crossing {
     pub corner: Vec2,
-    /// Directions of the edges; of a positive amplitude it is dark from the first to the second, turning as from u to v.
+    /// Directions of the edges; of a positive amplitude it is dark from the first to the second, turning as
+    /// from u to v.
     pub angles_rad: [f64; 2],
     /// Half-widths of the edges, px ([`Edge::new`]).
     pub edges_px: [f64; 2],
@@ -67,15 +71,17 @@ pub(super) enum Window {
 /// A pixel: its offset from the window's centre, and its level.
 type Pixel = (Vec2, f64);
 
-/// Refines a corner within a disc of radius `half_px`; `None` where no crossing fits or it leaves the start by a pixel.
+/// Refines a corner within a disc of radius `half_px`; `None` where no crossing fits or it leaves the start
+/// by a pixel.
 pub(super) fn refine<T: Level>(image: &Raster<T>, start: Vec2, half_px: usize) -> Option<Vec2> {
     let pixels = pixels_in(image, start, &Window::Disc(half_px))?;
     let crossing = initial(&pixels, start)?;
     Some(fit(&pixels, crossing, [0.0; 2], half_px as f64, 1.0)?.corner)
 }
 
-/// Fits a crossing to the pixels of a window near its edges, which bend by the curvatures; `None` where none fits or it leaves the
-/// start by more than `most_px`. Where the edges prove wider than was thought, more pixels are taken.
+/// Fits a crossing to the pixels of a window near its edges, which bend by the curvatures; `None` where none
+/// fits or it leaves the start by more than `most_px`. Where the edges prove wider than was thought, more
+/// pixels are taken.
 pub(super) fn fit_near_edges<T: Level>(
     image: &Raster<T>,
     start: &Crossing,
@@ -193,7 +199,8 @@ fn initial(pixels: &[Pixel], corner: Vec2) -> Option<Crossing> {
     let angles_rad = [axis_rad - half_opening_rad, axis_rad + half_opening_rad];
     let levels = || pixels.iter().map(|(_, level)| *level);
     let (low, high) = (levels().fold(f64::INFINITY, f64::min), levels().fold(f64::NEG_INFINITY, f64::max));
-    // Along the axis of greatest curvature the image is bright: there the two normals point to different sides.
+    // Along the axis of greatest curvature the image is bright: there the two normals point to different
+    // sides.
     Some(Crossing {
         corner,
         angles_rad,
@@ -343,7 +350,8 @@ fn step(
         sums[i * (i + 1) / 2 + j]
     });
     let gradient = SVector::<f64, PARAMETERS>::from_fn(|i, _| sums[SUMS - PARAMETERS + i]);
-    // A perfectly sharp image leaves the widths undetermined below the pixel's own: hold them lightly where they are.
+    // A perfectly sharp image leaves the widths undetermined below the pixel's own: hold them lightly where
+    // they are.
     let hold = 1e-6 * crossing.amplitude * crossing.amplitude * (LANES * blocks.len()) as f64;
     normal[(4, 4)] += hold;
     normal[(5, 5)] += hold;

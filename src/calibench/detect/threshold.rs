@@ -1,18 +1,20 @@
-//! Which level separates marks from their ground here? A threshold for every tile, half-way between the extremes around it.
+//! Which level separates marks from their ground here? A threshold for every tile, half-way between the
+//! extremes around it.
 //!
-//! Tiles whose neighbourhood shows no contrast (inside a large mark, on empty paper) inherit the threshold of the nearest
-//! tiles that have one, through a pyramid of averages. So the threshold follows uneven light, and marks may be larger
-//! than tiles. One pass over the pixels (extremes), the rest over tiles. (Local extremes on tiles as in AprilTag 2,
-//! Wang & Olson 2016; the inheritance is ours.)
+//! Tiles whose neighbourhood shows no contrast (inside a large mark, on empty paper) inherit the threshold of
+//! the nearest tiles that have one, through a pyramid of averages. So the threshold follows uneven light, and
+//! marks may be larger than tiles. One pass over the pixels (extremes), the rest over tiles. (Local extremes
+//! on tiles as in AprilTag 2, Wang & Olson 2016; the inheritance is ours.)
 
 use crate::raster::{Level, Raster};
 
-/// Side of a tile, px. A neighbourhood of 3 x 3 tiles, 48 px, sees mark and ground of every mark up to about that size at
-/// its edge; larger tiles follow shading less well, smaller ones see more noise and less contrast.
+/// Side of a tile, px. A neighbourhood of 3 x 3 tiles, 48 px, sees mark and ground of every mark up to about
+/// that size at its edge; larger tiles follow shading less well, smaller ones see more noise and less
+/// contrast.
 pub const TILE_PX: usize = 16;
 
-/// Least contrast of a neighbourhood, as a fraction of the range of the whole image, that can be a mark's edge. Noise of
-/// 2 % of the range spans 14 % in a neighbourhood of 2304 samples.
+/// Least contrast of a neighbourhood, as a fraction of the range of the whole image, that can be a mark's
+/// edge. Noise of 2 % of the range spans 14 % in a neighbourhood of 2304 samples.
 const LEAST_CONTRAST: f64 = 0.15;
 
 /// What a tile shows against its threshold.
@@ -120,7 +122,8 @@ impl<T: Level> Extremes<T> {
     }
 }
 
-/// The one of a tile's samples that wins against all others, in halves: each is one operation on short vectors.
+/// The one of a tile's samples that wins against all others, in halves: each is one operation on short
+/// vectors.
 fn pick_one<T: Level>(tile: &[T], pick: impl Fn(T, T) -> T) -> T {
     let Some(samples) = tile.first_chunk::<TILE_PX>() else {
         return tile[1..].iter().fold(tile[0], |best, &x| pick(x, best));
@@ -186,7 +189,8 @@ mod tests {
 
     #[test]
     fn the_threshold_follows_the_light() {
-        // Stripes of 20 % and 80 % reflectance, 8 px wide, under light that falls to a fifth across the image.
+        // Stripes of 20 % and 80 % reflectance, 8 px wide, under light that falls to a fifth across the
+        // image.
         let light = |x: usize| 1.0 - 0.8 * x as f32 / 639.0;
         let image = Raster::from_fn(640, 64, |x, _| light(x) * if x / 8 % 2 == 0 { 0.2 } else { 0.8 });
         let thresholds = Thresholds::of(&image).unwrap();

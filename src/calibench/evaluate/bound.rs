@@ -21,8 +21,9 @@ pub enum BoundError {
     BehindCamera,
 }
 
-/// The Cramer-Rao bound `sigma^2 (J^T J)^-1` of intrinsics and poses for Gaussian noise of standard deviation `sigma_px` on each
-/// pixel coordinate, `J` taken at the truth (Rao 1945; Cramer 1946). The maximum-likelihood estimate attains it to first order.
+/// The Cramer-Rao bound `sigma^2 (J^T J)^-1` of intrinsics and poses for Gaussian noise of standard deviation
+/// `sigma_px` on each pixel coordinate, `J` taken at the truth (Rao 1945; Cramer 1946). The
+/// maximum-likelihood estimate attains it to first order.
 ///
 /// # Errors
 /// A scene whose information matrix is singular, or with points behind the camera.
@@ -30,7 +31,8 @@ pub fn cramer_rao(truth: &Truth, free: FreeParameters, sigma_px: f64) -> Result<
     let information = information(&truth.camera, free, &truth.cam_from_target, &truth.points)
         .ok_or(BoundError::BehindCamera)?;
     let singular = || BoundError::Singular { free: free.to_string(), views: truth.cam_from_target.len() };
-    // Rounding can leave a singular matrix with a Cholesky factor: its inverse would be large and meaningless.
+    // Rounding can leave a singular matrix with a Cholesky factor: its inverse would be large and
+    // meaningless.
     if information.conditioning().is_some_and(|c| c.is_singular()) {
         return Err(singular());
     }

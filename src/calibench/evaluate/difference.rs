@@ -1,8 +1,10 @@
-//! How do two cameras differ, and may both be one? Their projections compared over the frame, and a test by both covariances.
+//! How do two cameras differ, and may both be one? Their projections compared over the frame, and a test by
+//! both covariances.
 //!
-//! Rays of camera A are turned by the rotation that makes B's pixels meet A's best, in least squares over the frame: a calibration cannot
-//! tell where its camera looks, so a rotation that all poses share is no difference of the lenses (the implied transformation of mrcal;
-//! Kogan 2021). Where the points lie at one distance, a translation may be taken out as well.
+//! Rays of camera A are turned by the rotation that makes B's pixels meet A's best, in least squares over the
+//! frame: a calibration cannot tell where its camera looks, so a rotation that all poses share is no
+//! difference of the lenses (the implied transformation of mrcal; Kogan 2021). Where the points lie at one
+//! distance, a translation may be taken out as well.
 
 use super::distribution::{ChiSquare, fisher_tail};
 use crate::camera::{Camera, FreeParameters, Parameter, project_with_jacobian};
@@ -116,7 +118,8 @@ pub fn frame_nodes((width, height): (usize, usize)) -> (Vec<Vec2>, usize) {
     ((0..rows).flat_map(row).collect(), columns)
 }
 
-/// The points that camera A sees at the nodes, at the distance; those left out at which one of the lenses folds back.
+/// The points that camera A sees at the nodes, at the distance; those left out at which one of the lenses
+/// folds back.
 fn points_seen(a: &Camera, b: &Camera, size: (usize, usize), distance: f64) -> Vec<(Vec2, Vec3)> {
     let limit = b.distortion.monotone_radius();
     let point = |pixel: &Vec2| {
@@ -225,19 +228,22 @@ pub struct OneCamera {
     pub p_value: f64,
 }
 
-/// A combination of parameters whose difference, the motion taken out, is less than this part of that of the combination seen best is one
-/// that the motion imitates: what the linear model leaves out is larger than a ten-thousandth.
+/// A combination of parameters whose difference, the motion taken out, is less than this part of that of the
+/// combination seen best is one that the motion imitates: what the linear model leaves out is larger than a
+/// ten-thousandth.
 const IMITATED: f64 = 1e-4;
 
 /// Tests whether two independent calibrations are of one camera.
 ///
-/// With `delta` the difference of the parameters, `P = P_A + P_B` its covariance if the camera is one, `J` the derivatives of the frame's
-/// pixels by the parameters and `W` those by the motion, the difference that is left is `d = M J delta`, `M = 1 - W (W^T W)^-1 W^T`. Its
-/// covariance `M J P J^T M` has the rank `r` of `M J`, and `d^T (M J P J^T M)^+ d` is chi-squared with `r` degrees of freedom: with `P = L L^T`
-/// and the eigenvectors `v` of `L^T J^T M J L` that belong to eigenvalues above zero, it is the sum of `(v^T L^-1 delta)^2`. A rotation turns
-/// a principal point into something like it and never quite, so it takes no degree of freedom, unless the lens is so long that what is left
-/// is nothing; a translation at one distance imitates more. The noise that scales both covariances is estimated: over `r` the sum follows
-/// Fisher's distribution, with the degrees of freedom of Satterthwaite (1946).
+/// With `delta` the difference of the parameters, `P = P_A + P_B` its covariance if the camera is one, `J`
+/// the derivatives of the frame's pixels by the parameters and `W` those by the motion, the difference that
+/// is left is `d = M J delta`, `M = 1 - W (W^T W)^-1 W^T`. Its covariance `M J P J^T M` has the rank `r` of
+/// `M J`, and `d^T (M J P J^T M)^+ d` is chi-squared with `r` degrees of freedom: with `P = L L^T` and the
+/// eigenvectors `v` of `L^T J^T M J L` that belong to eigenvalues above zero, it is the sum of `(v^T L^-1
+/// delta)^2`. A rotation turns a principal point into something like it and never quite, so it takes no
+/// degree of freedom, unless the lens is so long that what is left is nothing; a translation at one distance
+/// imitates more. The noise that scales both covariances is estimated: over `r` the sum follows Fisher's
+/// distribution, with the degrees of freedom of Satterthwaite (1946).
 ///
 /// # Errors
 /// See [`DifferenceError`].
@@ -321,13 +327,15 @@ fn left_by_motion(
     let w =
         DMatrix::from_fn(rows, taken_out.unknowns(), |i, k| derivatives[i / 2].pose[(i % 2, k)] * scale(k));
     let motion = (w.transpose() * &w).cholesky().ok_or(DifferenceError::NotPositive)?;
-    // Twice: what rounding leaves of the motion after the first time is of the size of what a long lens leaves of a principal point.
+    // Twice: what rounding leaves of the motion after the first time is of the size of what a long lens
+    // leaves of a principal point.
     let once = &j - &w * motion.solve(&(w.transpose() * &j));
     let left = &once - &w * motion.solve(&(w.transpose() * &once));
     Ok(left.transpose() * &left)
 }
 
-/// Degrees of freedom of a sum of two variances in proportion `share` to `1 - share` (Satterthwaite 1946), rounded down.
+/// Degrees of freedom of a sum of two variances in proportion `share` to `1 - share` (Satterthwaite 1946),
+/// rounded down.
 fn satterthwaite(share: f64, of_a: usize, of_b: usize) -> usize {
     let part = |share: f64, freedom: usize| share * share / freedom.max(1) as f64;
     let freedom = 1.0 / (part(share, of_a) + part(1.0 - share, of_b));
@@ -381,8 +389,8 @@ mod tests {
         let tests: Vec<OneCamera> = (0..DRAWS).map(|trial| tested(camera, trial)).collect();
         assert!(tests.iter().all(|test| test.degrees_of_freedom == 6 && test.imitated == 0));
         let below = |limit: f64| tests.iter().filter(|test| test.p_value < limit).count() as u64;
-        // Binomial counts, of which each interval holds all but a thousandth: of 400, 4 are expected at 1 %, 40 at 10 %, 200 at 50 %; 3, 31 and
-        // 196 were counted when this was written.
+        // Binomial counts, of which each interval holds all but a thousandth: of 400, 4 are expected at 1 %,
+        // 40 at 10 %, 200 at 50 %; 3, 31 and 196 were counted when this was written.
         assert!(below(RATE) <= 11, "{} of {DRAWS} below {RATE}", below(RATE));
         assert!((22..=61).contains(&below(0.1)), "{} of {DRAWS} below 0.1", below(0.1));
         assert!((167..=233).contains(&below(0.5)), "{} of {DRAWS} below 0.5", below(0.5));
@@ -405,7 +413,8 @@ mod tests {
         let tests: Vec<(OneCamera, f64)> = tests.collect();
         let mean = |of: fn(&(OneCamera, f64)) -> f64| tests.iter().map(of).sum::<f64>() / DRAWS as f64;
         let (found, noncentrality) = (mean(|t| t.0.chi_squared), mean(|t| t.1));
-        // Noncentral chi-squared: mean r + lambda, variance 2 (r + 2 lambda); 3.3 standard deviations of the mean leave a thousandth.
+        // Noncentral chi-squared: mean r + lambda, variance 2 (r + 2 lambda); 3.3 standard deviations of the
+        // mean leave a thousandth.
         let spread = (2.0 * (6.0 + 2.0 * noncentrality) / DRAWS as f64).sqrt();
         assert!((found - 6.0 - noncentrality).abs() < 3.3 * spread, "{found} against 6 + {noncentrality}");
         let seen = tests.iter().filter(|(test, _)| test.p_value < 0.01).count();
@@ -418,7 +427,8 @@ mod tests {
         let camera = Truth::example_camera();
         let same = frame_difference(&camera, &camera, SIZE, TakenOut::Rotation).unwrap();
         assert!(same.rms_px < 1e-12 && same.rotation_rad() < 1e-15);
-        // A principal point 3 px off: most of it is a rotation by 3 / 600 rad, and what is left is what perspective makes of it.
+        // A principal point 3 px off: most of it is a rotation by 3 / 600 rad, and what is left is what
+        // perspective makes of it.
         let moved = camera.with(Parameter::Cx, camera.cx + 3.0);
         let left = frame_difference(&camera, &moved, SIZE, TakenOut::Rotation).unwrap();
         assert!((left.rotation_rad() - 3.0 / 600.0).abs() < 1e-3 && left.rms_px < 0.6, "{left:?}");
@@ -442,7 +452,8 @@ mod tests {
 
     #[test]
     fn a_long_lens_leaves_no_trace_of_its_principal_point() {
-        // A field of a third of a degree: what a rotation leaves of a principal point is a hundred-thousandth of it.
+        // A field of a third of a degree: what a rotation leaves of a principal point is a hundred-thousandth
+        // of it.
         let camera = Camera::pinhole(1e5, 1e5, 320.0, 240.0);
         let free: FreeParameters = "fx,fy,cx,cy".parse().unwrap();
         // A focal length known to a hundredth, a principal point to a pixel.

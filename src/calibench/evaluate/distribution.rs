@@ -1,7 +1,9 @@
-//! How likely is a value by chance? The normal and chi-squared distributions, the same digits on every machine.
+//! How likely is a value by chance? The normal and chi-squared distributions, the same digits on every
+//! machine.
 //!
-//! The distributions are those of `statrs`, whose logarithms and exponentials may be the platform's; their last digits
-//! differ between machines. Every result is therefore rounded to ten significant digits, far more than a probability needs.
+//! The distributions are those of `statrs`, whose logarithms and exponentials may be the platform's; their
+//! last digits differ between machines. Every result is therefore rounded to ten significant digits, far more
+//! than a probability needs.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal};
 
@@ -41,15 +43,16 @@ pub fn normal_quantile(p: f64) -> f64 {
     stable(standard_normal().inverse_cdf(p))
 }
 
-/// The half-width `z` of a two-sided interval that a standard normal variable leaves with probability `false_alarm`.
+/// The half-width `z` of a two-sided interval that a standard normal variable leaves with probability
+/// `false_alarm`.
 pub fn normal_two_sided(false_alarm: f64) -> f64 {
     // By symmetry; the lower tail keeps its digits where 1 - p would not.
     -normal_quantile(0.5 * false_alarm)
 }
 
-/// `P(F <= f)` of the ratio of two independent chi-squared variables, each over its degrees of freedom: a squared
-/// Mahalanobis distance over its dimension follows it if the covariance was scaled by an estimated variance (Fisher 1924).
-/// NaN if a number of degrees of freedom is 0.
+/// `P(F <= f)` of the ratio of two independent chi-squared variables, each over its degrees of freedom: a
+/// squared Mahalanobis distance over its dimension follows it if the covariance was scaled by an estimated
+/// variance (Fisher 1924). NaN if a number of degrees of freedom is 0.
 pub fn fisher_cdf(f: f64, numerator_freedom: usize, denominator_freedom: usize) -> f64 {
     FisherSnedecor::new(numerator_freedom as f64, denominator_freedom as f64)
         .map_or(f64::NAN, |d| stable(d.cdf(f.max(0.0))))
@@ -61,8 +64,8 @@ pub fn fisher_tail(f: f64, numerator_freedom: usize, denominator_freedom: usize)
         .map_or(f64::NAN, |d| stable(d.sf(f.max(0.0))))
 }
 
-/// The standard normal equivalent of a chi-squared value: the cube root of chi-squared over its degrees of freedom is nearly normal
-/// (Wilson & Hilferty 1931).
+/// The standard normal equivalent of a chi-squared value: the cube root of chi-squared over its degrees of
+/// freedom is nearly normal (Wilson & Hilferty 1931).
 pub fn wilson_hilferty(chi_squared: f64, degrees_of_freedom: f64) -> f64 {
     let spread = 2.0 / (9.0 * degrees_of_freedom);
     (libm::cbrt(chi_squared / degrees_of_freedom) - (1.0 - spread)) / spread.sqrt()
@@ -102,7 +105,8 @@ impl ChiSquare {
 
     /// The `x` with `P(X <= x) = p`, 0 < p < 1, to ten digits.
     ///
-    /// Bisection of the distribution function between bounds from the normal approximation (Wilson & Hilferty 1931).
+    /// Bisection of the distribution function between bounds from the normal approximation (Wilson & Hilferty
+    /// 1931).
     pub fn quantile(self, p: f64) -> f64 {
         let d = self.degrees_of_freedom;
         let c = 2.0 / (9.0 * d);
@@ -148,7 +152,8 @@ mod tests {
         assert!((ChiSquare::new(6).survival(9.0) - 0.173_578_1).abs() < 1e-6);
         assert!((ChiSquare::new(1).quantile(0.99) - 6.634_897).abs() < 1e-5);
         assert!((ChiSquare::new(474).quantile(0.5) - 473.333).abs() < 1e-2);
-        // Table 26.9: F of 6 and 30 degrees of freedom exceeds 2.42 with probability 5 %, to its three digits.
+        // Table 26.9: F of 6 and 30 degrees of freedom exceeds 2.42 with probability 5 %, to its three
+        // digits.
         assert!((fisher_cdf(2.4205, 6, 30) - 0.95).abs() < 1e-4);
         assert!(fisher_cdf(1.0, 0, 5).is_nan());
     }

@@ -57,7 +57,8 @@ impl Interval {
         Interval { low: (centre - half).max(0.0), high: (centre + half).min(1.0) }
     }
 
-    /// The true correlation behind a sample correlation of `trials` pairs (Fisher 1921): `atanh r +- z / sqrt(n - 3)`.
+    /// The true correlation behind a sample correlation of `trials` pairs (Fisher 1921): `atanh r +- z /
+    /// sqrt(n - 3)`.
     pub fn of_correlation(sample: f64, trials: usize, false_alarm: f64) -> Interval {
         let half = normal_two_sided(false_alarm) / (trials.max(4) as f64 - 3.0).sqrt();
         let centre = libm::atanh(sample);
@@ -65,7 +66,8 @@ impl Interval {
     }
 }
 
-/// The false-alarm rate of each of `count` claims that keeps the chance of any false alarm below `overall` (Bonferroni).
+/// The false-alarm rate of each of `count` claims that keeps the chance of any false alarm below `overall`
+/// (Bonferroni).
 pub fn each_of(count: usize, overall: f64) -> f64 {
     overall / count.max(1) as f64
 }

@@ -1,4 +1,5 @@
-//! How much of its own noise does a point pull into the fit? Leverages, which say how large each residual should be.
+//! How much of its own noise does a point pull into the fit? Leverages, which say how large each residual
+//! should be.
 
 use crate::board::View;
 use crate::calibrate::Calibration;
@@ -6,14 +7,15 @@ use crate::camera::project_with_jacobian;
 use crate::geometry::{Vec2, Vec3};
 use nalgebra::{DVector, SMatrix};
 
-/// The leverage of u and of v of every point, view by view: the diagonal of the hat matrix `J (J^T J)^-1 J^T`.
+/// The leverage of u and of v of every point, view by view: the diagonal of the hat matrix `J (J^T J)^-1
+/// J^T`.
 ///
-/// To first order the residuals are `(I - H)` times the noise, so a coordinate with leverage `h` has a residual of variance
-/// `sigma^2 (1 - h)`, and the leverages sum to the number of unknowns (Hoaglin & Welsch 1978), less what priors settle of
-/// them. `J` is taken at the estimate.
+/// To first order the residuals are `(I - H)` times the noise, so a coordinate with leverage `h` has a
+/// residual of variance `sigma^2 (1 - h)`, and the leverages sum to the number of unknowns (Hoaglin & Welsch
+/// 1978), less what priors settle of them. `J` is taken at the estimate.
 ///
-/// `None` if `views` are not those of the calibration, or if it has no residual degrees of freedom. Under a robust loss
-/// the matrix is another; then the result is only indicative.
+/// `None` if `views` are not those of the calibration, or if it has no residual degrees of freedom. Under a
+/// robust loss the matrix is another; then the result is only indicative.
 pub fn leverages(calibration: &Calibration, views: &[View]) -> Option<Vec<Vec<Vec2>>> {
     let covariance = &calibration.covariance;
     let variance = calibration.sigma_px * calibration.sigma_px;

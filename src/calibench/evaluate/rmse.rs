@@ -1,13 +1,15 @@
-//! How large should the reprojection error be? Its distribution when the model is right and the noise is Gaussian.
+//! How large should the reprojection error be? Its distribution when the model is right and the noise is
+//! Gaussian.
 
 use super::Interval;
 use super::distribution::ChiSquare;
 
 /// The predicted distribution of the RMSE per point of a least-squares fit.
 ///
-/// The sum of squares over `2 N` coordinates with `p` parameters fitted is `sigma^2` times a chi-squared variable with
-/// `d = 2 N - p` degrees of freedom (to first order in the noise), so `RMSE = sigma sqrt(X / N)`. The noise floor is
-/// `sqrt(2) sigma`; parameters absorb noise, so the expectation lies below it by the factor `sqrt(d / 2N)`.
+/// The sum of squares over `2 N` coordinates with `p` parameters fitted is `sigma^2` times a chi-squared
+/// variable with `d = 2 N - p` degrees of freedom (to first order in the noise), so `RMSE = sigma sqrt(X /
+/// N)`. The noise floor is `sqrt(2) sigma`; parameters absorb noise, so the expectation lies below it by the
+/// factor `sqrt(d / 2N)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RmseDistribution {
     /// Standard deviation of a pixel coordinate, px.
@@ -38,7 +40,8 @@ impl RmseDistribution {
         self.scale() * ChiSquare::new(self.degrees_of_freedom()).mean_of_root()
     }
 
-    /// `sqrt(E[RMSE^2]) = sigma sqrt(d / N)`, px: the value usually quoted, above the mean by half a variance over it.
+    /// `sqrt(E[RMSE^2]) = sigma sqrt(d / N)`, px: the value usually quoted, above the mean by half a variance
+    /// over it.
     pub fn root_mean_square_px(&self) -> f64 {
         self.scale() * (self.degrees_of_freedom() as f64).sqrt()
     }
@@ -78,7 +81,8 @@ mod tests {
 
     #[test]
     fn the_examples_prediction_is_met() {
-        // Printed for this scene: E[RMSE] = 0.1371 +- 0.0045 for 252 points and 30 parameters; noise floor 0.1414.
+        // Printed for this scene: E[RMSE] = 0.1371 +- 0.0045 for 252 points and 30 parameters; noise floor
+        // 0.1414.
         let predicted = RmseDistribution { sigma_px: 0.1, points: 252, parameters: 30 };
         assert!((predicted.mean_px() - 0.1371).abs() < 5e-5);
         assert!((predicted.standard_deviation_px() - 0.0045).abs() < 5e-5);

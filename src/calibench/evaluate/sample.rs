@@ -1,6 +1,8 @@
-//! What do many trials say together? Mean, spread and correlation in one pass, independent of how the trials were split.
+//! What do many trials say together? Mean, spread and correlation in one pass, independent of how the trials
+//! were split.
 
-/// Sums of a multivariate sample about a fixed origin: trials can be added in any grouping as long as the order is kept.
+/// Sums of a multivariate sample about a fixed origin: trials can be added in any grouping as long as the
+/// order is kept.
 ///
 /// The origin should lie near the values (the truth does), so that nothing cancels.
 #[derive(Debug, Clone, PartialEq)]

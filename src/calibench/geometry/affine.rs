@@ -70,8 +70,8 @@ impl Affine {
 
     /// The map `from -> to` that minimises the squared distances in `to`.
     ///
-    /// Both sides are reduced to their centroids; the two columns of the remaining design matrix are orthogonalised
-    /// (Gram-Schmidt, twice, as a QR decomposition), so the condition number is not squared.
+    /// Both sides are reduced to their centroids; the two columns of the remaining design matrix are
+    /// orthogonalised (Gram-Schmidt, twice, as a QR decomposition), so the condition number is not squared.
     ///
     /// # Errors
     /// Fewer than three pairs, or `from` on one line.

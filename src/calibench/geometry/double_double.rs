@@ -1,8 +1,10 @@
-//! What if sixteen digits are not enough? Numbers of some 31 digits: a sum of two doubles that do not overlap.
+//! What if sixteen digits are not enough? Numbers of some 31 digits: a sum of two doubles that do not
+//! overlap.
 //!
-//! Sums and products as Dekker (1971), "A floating-point technique for extending the available precision"; sum of two such numbers,
-//! quotient and root as Hida, Li & Bailey (2001), "Algorithms for quad-double precision floating point arithmetic", whose relative
-//! errors are a few times 2^-104. Only IEEE operations of doubles, none fused: the same bits on every machine.
+//! Sums and products as Dekker (1971), "A floating-point technique for extending the available precision";
+//! sum of two such numbers, quotient and root as Hida, Li & Bailey (2001), "Algorithms for quad-double
+//! precision floating point arithmetic", whose relative errors are a few times 2^-104. Only IEEE operations
+//! of doubles, none fused: the same bits on every machine.
 //!
 //! Domain: magnitudes from 1e-140 to 1e140, within which no partial product over- or underflows.
 

@@ -100,12 +100,13 @@ impl Homography {
         self.0.try_inverse().map(Homography)
     }
 
-    /// The homography `from -> to` that minimises the squared distances in `to`: the maximum-likelihood estimate under
-    /// Gaussian noise on `to` alone.
+    /// The homography `from -> to` that minimises the squared distances in `to`: the maximum-likelihood
+    /// estimate under Gaussian noise on `to` alone.
     ///
     /// Start: the direct linear transform in coordinates normalised to centroid 0 and mean square radius 2
-    /// (Hartley 1997), with `h33 = 1` there, which holds for any view that has the centroid of the points in front of the
-    /// camera. Then Gauss-Newton on the geometric error (Zhang 2000, appendix A), halving steps that do not improve.
+    /// (Hartley 1997), with `h33 = 1` there, which holds for any view that has the centroid of the points in
+    /// front of the camera. Then Gauss-Newton on the geometric error (Zhang 2000, appendix A), halving steps
+    /// that do not improve.
     ///
     /// # Errors
     /// Fewer than four pairs, or points that do not span a plane on either side.
@@ -128,8 +129,8 @@ impl Homography {
         Homography::fit_pairs(&PairBlocks::new(from.iter().copied().zip(to.iter().copied())), RELATIVE_GAIN)
     }
 
-    /// [`Homography::fit`] for pairs that are already in blocks, ended when the next step promises to lower the cost by less than
-    /// `relative_gain` of it.
+    /// [`Homography::fit`] for pairs that are already in blocks, ended when the next step promises to lower
+    /// the cost by less than `relative_gain` of it.
     pub(crate) fn fit_pairs(
         pairs: &PairBlocks,
         relative_gain: f64,
@@ -165,12 +166,14 @@ impl Homography {
 
 /// Gauss-Newton halves the error at the very least; 30 steps are far past convergence for any usable data.
 const MAX_ITERATIONS: usize = 30;
-/// Convergence is quadratic-like near the optimum: when the next step would gain less than this part of the cost, the estimate is within
-/// `1e-6 sqrt(degrees of freedom)` of a standard deviation of the minimum, and the step before gained about as much more.
+/// Convergence is quadratic-like near the optimum: when the next step would gain less than this part of the
+/// cost, the estimate is within `1e-6 sqrt(degrees of freedom)` of a standard deviation of the minimum, and
+/// the step before gained about as much more.
 const RELATIVE_GAIN: f64 = 1e-12;
 /// Residuals of normalised coordinates, of size 1, below this many roundings are rounding.
 const ROUNDINGS: f64 = 2.0;
-/// Smallest pivot, relative to its diagonal, of a well-posed normalised system: a 9 x 7 grid has 1e-2, rounding gives 1e-16.
+/// Smallest pivot, relative to its diagonal, of a well-posed normalised system: a 9 x 7 grid has 1e-2,
+/// rounding gives 1e-16.
 const SMALLEST_PIVOT: f64 = 1e-11;
 
 /// A normalising similarity: `scale (p - centroid)`.

@@ -1,8 +1,8 @@
 //! What are the normal equations of a homography? Sums over its points, and their solution.
 //!
-//! Unknowns `h0 .. h7` of `[[h0, h1, h2], [h3, h4, h5], [h6, h7, 1]]`. The rows of a point for u and v are `w [a, 0, -u b]` and
-//! `w [0, a, -v b]` with `a = (x, y, 1)`, `b = (x, y)`, so that with `M = sum w^2 a a^T`, `P = -sum w^2 u a b^T`, `Q = -sum w^2 v a b^T`,
-//! `T = sum w^2 (u^2 + v^2) b b^T`
+//! Unknowns `h0 .. h7` of `[[h0, h1, h2], [h3, h4, h5], [h6, h7, 1]]`. The rows of a point for u and v are `w
+//! [a, 0, -u b]` and `w [0, a, -v b]` with `a = (x, y, 1)`, `b = (x, y)`, so that with `M = sum w^2 a a^T`,
+//! `P = -sum w^2 u a b^T`, `Q = -sum w^2 v a b^T`, `T = sum w^2 (u^2 + v^2) b b^T`
 //!
 //! ```text
 //! J^T J = [[M, 0, P], [0, M, Q], [P^T, Q^T, T]]
@@ -19,7 +19,8 @@ pub(super) struct NormalEquations {
     pub cost: f64,
 }
 
-/// Sums kept: six of `M`, five each of `P` and `Q`, three of `T`, eight of the gradient, the cost; in whole lanes.
+/// Sums kept: six of `M`, five each of `P` and `Q`, three of `T`, eight of the gradient, the cost; in whole
+/// lanes.
 const SUMS: usize = 28;
 /// First of `M`: xx, xy, x, yy, y, 1.
 const M: usize = 0;
@@ -54,7 +55,8 @@ impl NormalEquations {
         dispatch(Sum { pairs, h: Some(h) })
     }
 
-    /// The step and the fall of the cost it promises, `-g^T step`; `None` where the matrix is not positive definite.
+    /// The step and the fall of the cost it promises, `-g^T step`; `None` where the matrix is not positive
+    /// definite.
     pub fn solve(&self) -> Option<([f64; 8], f64)> {
         if !self.cost.is_finite() {
             return None;
@@ -63,8 +65,8 @@ impl NormalEquations {
         Some(self.solve_with(&f))
     }
 
-    /// The solution of linear equations, or the smallest squared pivot of the factor relative to its diagonal entry where that is below
-    /// `smallest_pivot`; 0 if there is no factor.
+    /// The solution of linear equations, or the smallest squared pivot of the factor relative to its diagonal
+    /// entry where that is below `smallest_pivot`; 0 if there is no factor.
     pub fn solve_if_regular(&self, smallest_pivot: f64) -> Result<[f64; 8], f64> {
         let factor = self.factor().ok_or(0.0)?;
         let diagonal = [self.sums[M], self.sums[M + 3], self.sums[M + 5], self.sums[T], self.sums[T + 2]];

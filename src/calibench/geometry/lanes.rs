@@ -1,8 +1,10 @@
-//! How are four points worked on at once with the same bits on every machine? Four lanes, no fused operation, one order.
+//! How are four points worked on at once with the same bits on every machine? Four lanes, no fused operation,
+//! one order.
 //!
-//! A kernel is written once over [`Lanes`] and runs on whatever registers the machine has. Lane `i` of every operation is the
-//! IEEE operation of scalar code, and lanes are summed as `(l0 + l1) + (l2 + l3)`, so the width of a register never shows in a
-//! result. Multiplication and addition are never fused: a fused product is rounded once less, and not every machine has it.
+//! A kernel is written once over [`Lanes`] and runs on whatever registers the machine has. Lane `i` of every
+//! operation is the IEEE operation of scalar code, and lanes are summed as `(l0 + l1) + (l2 + l3)`, so the
+//! width of a register never shows in a result. Multiplication and addition are never fused: a fused product
+//! is rounded once less, and not every machine has it.
 
 use super::Vec2;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -35,15 +37,15 @@ pub(crate) trait Lanes: Arithmetic {
     }
 }
 
-/// A computation over [`Lanes`], run by [`dispatch`]. Implementations mark `run` and all that it calls `#[inline(always)]`, so that
-/// it is compiled for the registers chosen.
+/// A computation over [`Lanes`], run by [`dispatch`]. Implementations mark `run` and all that it calls
+/// `#[inline(always)]`, so that it is compiled for the registers chosen.
 pub(crate) trait Kernel {
     type Output;
     fn run<L: Lanes>(self) -> Self::Output;
 }
 
-/// Runs a kernel with the widest registers that the machine has, or in plain code if built with `--cfg calibench_portable`: that is for
-/// measuring what other machines run.
+/// Runs a kernel with the widest registers that the machine has, or in plain code if built with `--cfg
+/// calibench_portable`: that is for measuring what other machines run.
 #[inline]
 pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(all(target_arch = "x86_64", not(calibench_portable)))]
@@ -134,8 +136,8 @@ impl Lanes for Portable {
     }
 }
 
-/// AVX2. The type is named in this module only, and made only inside [`wide::run`], which runs only where AVX2 is: that is what makes
-/// every `unsafe` block below sound.
+/// AVX2. The type is named in this module only, and made only inside [`wide::run`], which runs only where
+/// AVX2 is: that is what makes every `unsafe` block below sound.
 #[cfg(all(target_arch = "x86_64", not(calibench_portable)))]
 mod wide {
     use super::{Add, Arithmetic, Div, Kernel, LANES, Lanes, Mul, Neg, Sub};
@@ -241,8 +243,8 @@ pub(crate) struct PairBlock {
     pub v: [f64; LANES],
 }
 
-/// Pairs `(x, y)`, `(u, v)` of points in blocks of four. The last block is filled up with copies of the last pair, which
-/// [`PairBlocks::mask`] takes out of sums.
+/// Pairs `(x, y)`, `(u, v)` of points in blocks of four. The last block is filled up with copies of the last
+/// pair, which [`PairBlocks::mask`] takes out of sums.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PairBlocks {
     pub blocks: Vec<PairBlock>,
@@ -285,7 +287,8 @@ impl PairBlocks {
         (0..self.len).map(move |k| pair(&self.blocks[k / LANES], k % LANES))
     }
 
-    /// Least and greatest u and v: the corners of the box around the second points. Empty is infinite and inside out.
+    /// Least and greatest u and v: the corners of the box around the second points. Empty is infinite and
+    /// inside out.
     pub fn to_box(&self) -> (Vec2, Vec2) {
         dispatch(Bounds { pairs: self })
     }

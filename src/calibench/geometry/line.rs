@@ -2,14 +2,16 @@
 
 use super::Vec2;
 
-/// A line fitted by orthogonal regression (total least squares, Pearson 1901), with the distances of its points.
+/// A line fitted by orthogonal regression (total least squares, Pearson 1901), with the distances of its
+/// points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LineFit {
     /// A point of the line: the points' mean.
     pub point: Vec2,
     /// Unit vector along the line, `x >= 0`.
     pub direction: Vec2,
-    /// Signed perpendicular distance of every point, in the points' unit; positive on the side of `(-d_y, d_x)`.
+    /// Signed perpendicular distance of every point, in the points' unit; positive on the side of `(-d_y,
+    /// d_x)`.
     pub deviations: Vec<f64>,
 }
 
@@ -44,8 +46,8 @@ pub enum LineError {
 impl LineFit {
     /// Fits a line through at least two points that are not all the same.
     ///
-    /// With the centred second moments `S`, the direction has the angle `atan2(2 S_xy, S_xx - S_yy) / 2`: the axis of
-    /// the larger eigenvalue of `S`.
+    /// With the centred second moments `S`, the direction has the angle `atan2(2 S_xy, S_xx - S_yy) / 2`: the
+    /// axis of the larger eigenvalue of `S`.
     pub fn new(points: &[Vec2]) -> Result<LineFit, LineError> {
         if points.len() < 2 {
             return Err(LineError::TooFewPoints { got: points.len() });

@@ -2,8 +2,8 @@
 
 use super::{Mat3, Vec3, rotation};
 
-/// A rigid motion `x_a = R x_b + t`. A variable of this type names both frames, target first to be applied last:
-/// `cam_from_target` takes target coordinates to camera coordinates.
+/// A rigid motion `x_a = R x_b + t`. A variable of this type names both frames, target first to be applied
+/// last: `cam_from_target` takes target coordinates to camera coordinates.
 ///
 /// ```
 /// use calibench::geometry::{Mat3, Pose, Vec3};
@@ -45,7 +45,8 @@ impl Pose {
         Pose { rotation: self.rotation * b_from_c.rotation, translation: self.apply(&b_from_c.translation) }
     }
 
-    /// The pose moved by a small step `(rotation vector in rad, translation)`: `R <- exp(delta) R`, `t <- t + step`.
+    /// The pose moved by a small step `(rotation vector in rad, translation)`: `R <- exp(delta) R`, `t <- t +
+    /// step`.
     pub fn perturbed(&self, step: &nalgebra::Vector6<f64>) -> Pose {
         let delta = Vec3::new(step[0], step[1], step[2]);
         Pose {

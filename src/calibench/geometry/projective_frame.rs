@@ -13,10 +13,12 @@ pub fn entry(index: usize) -> Mat3 {
     unit
 }
 
-/// The covariance of the entries of `M = left L right`, scaled to `m33 = 1`, from that of `L`, scaled to `l33 = 1`.
+/// The covariance of the entries of `M = left L right`, scaled to `m33 = 1`, from that of `L`, scaled to `l33
+/// = 1`.
 ///
-/// First order: `dM = (left dL right - M (left dL right)_33) / (left L right)_33`. Parameters beyond the eighth stay as they are.
-/// `None` if `m33` is zero: then the origin maps to infinity and no such scale exists.
+/// First order: `dM = (left dL right - M (left dL right)_33) / (left L right)_33`. Parameters beyond the
+/// eighth stay as they are. `None` if `m33` is zero: then the origin maps to infinity and no such scale
+/// exists.
 pub fn change_frames<const N: usize>(
     left: &Mat3,
     local: &Mat3,

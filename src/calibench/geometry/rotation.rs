@@ -2,8 +2,8 @@
 
 use super::{Mat3, Vec3};
 
-/// Below this angle the Taylor series of `sin(a)/a` and `(1 - cos(a))/a^2` to second order is exact to rounding:
-/// its first neglected term is `a^4 / 120 < 1e-18`.
+/// Below this angle the Taylor series of `sin(a)/a` and `(1 - cos(a))/a^2` to second order is exact to
+/// rounding: its first neglected term is `a^4 / 120 < 1e-18`.
 const SMALL_ANGLE_RAD: f64 = 1e-4;
 
 /// The cross-product matrix: `skew(a) b = a x b`.
@@ -30,8 +30,8 @@ pub fn exp(w: &Vec3) -> Mat3 {
 
 /// The rotation vector `w` with `exp(w) = R`, in radians, `|w| <= pi`.
 ///
-/// The quaternion of largest component is formed first (Shepperd 1978), so that the result keeps full precision for
-/// every angle, half turns included.
+/// The quaternion of largest component is formed first (Shepperd 1978), so that the result keeps full
+/// precision for every angle, half turns included.
 pub fn log(r: &Mat3) -> Vec3 {
     let (real, imaginary) = quaternion(r);
     let norm = imaginary.norm();
@@ -76,8 +76,9 @@ pub fn from_xyz_rad(x: f64, y: f64, z: f64) -> Mat3 {
     about(Vec3::z(), z) * about(Vec3::y(), y) * about(Vec3::x(), x)
 }
 
-/// The rotation nearest to `m` in the Frobenius norm: `U diag(1, 1, det(U V^T)) V^T` of its singular value decomposition
-/// (Zhang 2000, appendix C; Umeyama 1991 for the sign). `None` where the decomposition does not exist (non-finite input).
+/// The rotation nearest to `m` in the Frobenius norm: `U diag(1, 1, det(U V^T)) V^T` of its singular value
+/// decomposition (Zhang 2000, appendix C; Umeyama 1991 for the sign). `None` where the decomposition does not
+/// exist (non-finite input).
 pub fn nearest(m: &Mat3) -> Option<Mat3> {
     if !m.iter().all(|x| x.is_finite()) {
         return None;

@@ -3,8 +3,8 @@
 use super::Vec2;
 use nalgebra::Matrix2;
 
-/// Flatness from which points span a plane. A line seen with rounding errors has 1e-16; points that leave their line by a
-/// millionth of its length have 1e-12 and still pass.
+/// Flatness from which points span a plane. A line seen with rounding errors has 1e-16; points that leave
+/// their line by a millionth of its length have 1e-12 and still pass.
 pub(super) const SMALLEST_FLATNESS: f64 = 1e-13;
 
 /// Centre and extent of a cloud of points.
@@ -21,8 +21,8 @@ pub struct Scatter {
 impl Scatter {
     /// The scatter of a list of points; all NaN for an empty list.
     ///
-    /// The mean is corrected by the mean of the offsets from it, so that it is the nearest number even where coordinates
-    /// are large against their differences.
+    /// The mean is corrected by the mean of the offsets from it, so that it is the nearest number even where
+    /// coordinates are large against their differences.
     pub fn of(points: &[Vec2]) -> Scatter {
         let count = points.len() as f64;
         let near = points.iter().sum::<Vec2>() / count;

@@ -13,7 +13,8 @@ pub enum Handedness {
     Mirrored,
 }
 
-/// A similarity `y = A x + t` with `a = scale cos(angle)`, `b = scale sin(angle)`: four parameters, shapes stay the same.
+/// A similarity `y = A x + t` with `a = scale cos(angle)`, `b = scale sin(angle)`: four parameters, shapes
+/// stay the same.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Similarity {
     /// `scale cos(angle)`.
@@ -46,15 +47,17 @@ impl Similarity {
         libm::hypot(self.a, self.b)
     }
 
-    /// The map `from -> to` that minimises the squared distances in `to`, turned or mirrored, whichever fits better.
+    /// The map `from -> to` that minimises the squared distances in `to`, turned or mirrored, whichever fits
+    /// better.
     ///
-    /// With offsets `p`, `w` from the centroids and `S = sum w p^T`, a proper map has `a = (S11 + S22) / sum |p|^2`,
-    /// `b = (S21 - S12) / sum |p|^2`; a mirrored one `a = (S11 - S22) / ...`, `b = (S12 + S21) / ...`. The proper one leaves
-    /// less than the mirrored one by `4 det S / sum |p|^2`, so the sign of `det S` decides (Umeyama 1991 with scale, in the
-    /// plane and without the restriction to rotations).
+    /// With offsets `p`, `w` from the centroids and `S = sum w p^T`, a proper map has `a = (S11 + S22) / sum
+    /// |p|^2`, `b = (S21 - S12) / sum |p|^2`; a mirrored one `a = (S11 - S22) / ...`, `b = (S12 + S21) /
+    /// ...`. The proper one leaves less than the mirrored one by `4 det S / sum |p|^2`, so the sign of `det
+    /// S` decides (Umeyama 1991 with scale, in the plane and without the restriction to rotations).
     ///
     /// # Errors
-    /// Fewer than three pairs, or `from` on one line: that leaves the handedness open. So does `det S = 0`, which is refused too.
+    /// Fewer than three pairs, or `from` on one line: that leaves the handedness open. So does `det S = 0`,
+    /// which is refused too.
     pub fn fit(from: &[Vec2], to: &[Vec2]) -> Result<Similarity, LinearFitError> {
         let (from_centroid, to_centroid) = checked_centroids(from, to, 3)?;
         let mut cross = Matrix2::zeros();
@@ -80,7 +83,8 @@ impl Similarity {
     }
 }
 
-/// Rounding leaves 1e-16 of a determinant that is zero; a set that is a plane by a millionth of its length has 1e-6.
+/// Rounding leaves 1e-16 of a determinant that is zero; a set that is a plane by a millionth of its length
+/// has 1e-6.
 const SMALLEST_DETERMINANT: f64 = 1e-12;
 
 #[cfg(test)]

@@ -9,8 +9,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Writes a file whole or not at all: a reader, or a run after a crash, finds the old contents or the new.
 ///
-/// The temporary file lies in the same folder, so that the rename stays on one file system. It is removed if writing fails; what a write
-/// of the same file that was killed has left is removed first. Folders on the way are created.
+/// The temporary file lies in the same folder, so that the rename stays on one file system. It is removed if
+/// writing fails; what a write of the same file that was killed has left is removed first. Folders on the way
+/// are created.
 ///
 /// # Errors
 /// Whatever the file system says, with the path.
@@ -26,9 +27,9 @@ pub fn write_atomically_to(files: &dyn Files, path: &Path, contents: &[u8]) -> i
     Beside::write(files, path, contents)?.place()
 }
 
-/// Writes files that belong together. All are on the disk before the first of them is put in its place, so a disk that is full changes none. A
-/// process that is killed in the moment in which they are put there, one after the other, leaves the last ones old: where the last is new, all
-/// are.
+/// Writes files that belong together. All are on the disk before the first of them is put in its place, so a
+/// disk that is full changes none. A process that is killed in the moment in which they are put there, one
+/// after the other, leaves the last ones old: where the last is new, all are.
 ///
 /// # Errors
 /// As [`write_atomically`].
@@ -89,7 +90,8 @@ impl Drop for Beside<'_> {
     }
 }
 
-/// A device, a pipe or a folder would be gone for good if a file took its place; a link to a file is replaced, and its target left alone.
+/// A device, a pipe or a folder would be gone for good if a file took its place; a link to a file is
+/// replaced, and its target left alone.
 fn refuse_what_is_no_file(path: &Path) -> io::Result<()> {
     match fs::metadata(path) {
         Ok(there) if !there.is_file() => Err(io::Error::new(
@@ -111,7 +113,8 @@ fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// A new temporary file beside `path`. It is locked as long as it is open: one that nobody locks was left by a process that was killed.
+/// A new temporary file beside `path`. It is locked as long as it is open: one that nobody locks was left by
+/// a process that was killed.
 fn open_beside(path: &Path) -> io::Result<(File, PathBuf)> {
     loop {
         let temporary = temporary_beside(path)?;
@@ -120,7 +123,8 @@ fn open_beside(path: &Path) -> io::Result<(File, PathBuf)> {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
             Err(error) => return Err(error),
             Ok(file) => {
-                // Where the file system knows no locks, nobody can tell what was left, and nothing is removed.
+                // Where the file system knows no locks, nobody can tell what was left, and nothing is
+                // removed.
                 let _ = file.lock();
                 // Another process may have removed it before it was locked.
                 if temporary.exists() {

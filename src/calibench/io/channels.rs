@@ -4,7 +4,8 @@ use super::image::{self, Decoded, ImageError, opened};
 use crate::raster::{Level, Raster};
 use std::path::Path;
 
-/// A photograph by its channels: grey, grey and alpha, red green blue, or red green blue and alpha. All have the same size.
+/// A photograph by its channels: grey, grey and alpha, red green blue, or red green blue and alpha. All have
+/// the same size.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Channels {
     /// 8 bits a sample.

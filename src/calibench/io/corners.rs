@@ -12,8 +12,8 @@ use std::path::Path;
 pub struct CornerFile {
     /// Name of each view, as it stands in the file.
     pub view_names: Vec<String>,
-    /// Correspondences of each view, in the file's order. Target coordinates in the target's unit, pixels with (0, 0) at the
-    /// centre of the top-left pixel.
+    /// Correspondences of each view, in the file's order. Target coordinates in the target's unit, pixels
+    /// with (0, 0) at the centre of the top-left pixel.
     pub views: Vec<View>,
 }
 

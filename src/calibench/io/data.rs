@@ -1,5 +1,5 @@
-//! Where are the measurements of others? A folder beside the project, or wherever the user says. The build script asks the same
-//! lines, so they need the standard library alone.
+//! Where are the measurements of others? A folder beside the project, or wherever the user says. The build
+//! script asks the same lines, so they need the standard library alone.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -26,8 +26,9 @@ impl fmt::Display for MissingDataFolder {
 
 impl std::error::Error for MissingDataFolder {}
 
-/// The folder of real data: `CALIBENCH_DATA` if set, else `../shared/data` seen from the package (from the working directory
-/// outside of Cargo). `None` if the variable is `none`, or unset and the default is absent: a reason to skip, not to fail.
+/// The folder of real data: `CALIBENCH_DATA` if set, else `../shared/data` seen from the package (from the
+/// working directory outside of Cargo). `None` if the variable is `none`, or unset and the default is absent:
+/// a reason to skip, not to fail.
 ///
 /// # Errors
 /// The variable is set, but not to a folder.

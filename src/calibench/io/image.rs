@@ -1,7 +1,7 @@
 //! How does a photograph become a raster? PNG, JPEG, BMP, PGM/PPM and TIFF; grey or colour, 8 or 16 bit.
 //!
-//! The format is told by the content, not by the name. Colour becomes grey by Rec. 601 luma,
-//! `(299 R + 587 G + 114 B) / 1000` rounded, the weights of the field's other tools; an alpha channel is ignored.
+//! The format is told by the content, not by the name. Colour becomes grey by Rec. 601 luma, `(299 R + 587 G
+//! + 114 B) / 1000` rounded, the weights of the field's other tools; an alpha channel is ignored.
 
 use super::input::{InputError, MOST_IMAGE_BYTES, open_regular};
 use super::jpeg_end;
@@ -77,7 +77,8 @@ pub enum ImageError {
     },
 }
 
-/// Largest number of pixels: 200 megapixels, above the largest sensors and below what exhausts a small machine.
+/// Largest number of pixels: 200 megapixels, above the largest sensors and below what exhausts a small
+/// machine.
 pub const LIMIT_PX: u64 = 200_000_000;
 
 impl Grey {
@@ -185,14 +186,15 @@ pub struct Extent {
 }
 
 impl Extent {
-    /// Memory that reading the photograph as grey, finding its marks and drawing them in takes at most: the samples, the grey levels, and
-    /// for each pixel eight bytes of detection or four of the overlay and its file.
+    /// Memory that reading the photograph as grey, finding its marks and drawing them in takes at most: the
+    /// samples, the grey levels, and for each pixel eight bytes of detection or four of the overlay and its
+    /// file.
     pub fn memory_to_detect(&self) -> u64 {
         self.bytes.saturating_mul(2).saturating_add(self.pixels.saturating_mul(12))
     }
 
-    /// Memory that correcting the photograph takes: its samples as they were decoded, by channels, corrected, and as they are written, and
-    /// for each pixel the look-up table and its making.
+    /// Memory that correcting the photograph takes: its samples as they were decoded, by channels, corrected,
+    /// and as they are written, and for each pixel the look-up table and its making.
     pub fn memory_to_correct(&self) -> u64 {
         self.bytes.saturating_mul(4).saturating_add(self.pixels.saturating_mul(32))
     }

@@ -10,7 +10,8 @@ pub const MOST_SIDE_PX: usize = 1 << 20;
 pub const MOST_TABLE_BYTES: u64 = 1 << 30;
 /// Bytes of a study's file, a manifest or a checkpoint.
 pub const MOST_SPEC_BYTES: u64 = 1 << 24;
-/// Bytes of an image file: what a photograph of the largest size takes without compression, at 16 bits a sample and four samples.
+/// Bytes of an image file: what a photograph of the largest size takes without compression, at 16 bits a
+/// sample and four samples.
 pub const MOST_IMAGE_BYTES: u64 = 1_600_000_000;
 
 /// Why a file is not read.
@@ -67,7 +68,8 @@ impl From<InputError> for io::Error {
     }
 }
 
-/// Refuses what is there and is no regular file: opening a pipe blocks until somebody opens its other end, for writing too.
+/// Refuses what is there and is no regular file: opening a pipe blocks until somebody opens its other end,
+/// for writing too.
 ///
 /// # Errors
 /// [`InputError::NotRegular`].
@@ -83,7 +85,8 @@ fn regular(path: &Path, seen: &Metadata) -> Result<(), InputError> {
     Err(InputError::NotRegular { path: path.display().to_string(), kind, hint: "" })
 }
 
-/// Opens a regular file of at most `most` bytes, and tells its length. It is looked at before it is opened, since opening a pipe blocks.
+/// Opens a regular file of at most `most` bytes, and tells its length. It is looked at before it is opened,
+/// since opening a pipe blocks.
 ///
 /// # Errors
 /// See [`InputError`].

@@ -1,9 +1,12 @@
-//! Does a JPEG come to its end? Decoders paint what is missing of one that was cut off in grey, and say nothing.
+//! Does a JPEG come to its end? Decoders paint what is missing of one that was cut off in grey, and say
+//! nothing.
 //!
-//! A file is a row of segments, each `FF`, a kind, and mostly a length; after a scan's header (`FF DA`) its data follow, in which a byte `FF` is
-//! always followed by `00` or the number of a restart. It ends with `FF D9` (ITU-T T.81, 1992, annex B).
+//! A file is a row of segments, each `FF`, a kind, and mostly a length; after a scan's header (`FF DA`) its
+//! data follow, in which a byte `FF` is always followed by `00` or the number of a restart. It ends with `FF
+//! D9` (ITU-T T.81, 1992, annex B).
 
-/// Whether the segments lead to the mark of the end. What follows it is nobody's business; bytes that are no segment are left to the decoder.
+/// Whether the segments lead to the mark of the end. What follows it is nobody's business; bytes that are no
+/// segment are left to the decoder.
 pub(super) fn has_end(bytes: &[u8]) -> bool {
     let mut at = 2;
     loop {

@@ -1,10 +1,12 @@
-//! How much memory may photographs take together? It is asked for before a photograph is decoded, and given back when it is done with.
+//! How much memory may photographs take together? It is asked for before a photograph is decoded, and given
+//! back when it is done with.
 
 use super::input::InputError;
 use std::path::Path;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-/// What photographs may take if nothing else is said: one of 100 megapixels in colour at a time, or several small ones.
+/// What photographs may take if nothing else is said: one of 100 megapixels in colour at a time, or several
+/// small ones.
 pub const DEFAULT_MEMORY: u64 = 2 << 30;
 
 /// Bytes that several threads share.
@@ -28,8 +30,8 @@ impl Memory {
         Memory { most, free: Mutex::new(most), given_back: Condvar::new() }
     }
 
-    /// Takes what a file needs, and waits for it while others have it: photographs that fill the memory come one at a time. Whoever
-    /// holds a part must not wait for another.
+    /// Takes what a file needs, and waits for it while others have it: photographs that fill the memory come
+    /// one at a time. Whoever holds a part must not wait for another.
     ///
     /// # Errors
     /// More is needed than there is in all.

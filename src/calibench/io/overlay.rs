@@ -1,4 +1,5 @@
-//! Did the detector find what a person sees? The photograph, enlarged, with the marks and their order drawn in.
+//! Did the detector find what a person sees? The photograph, enlarged, with the marks and their order drawn
+//! in.
 
 use super::image::{ImageError, encoded, write};
 use crate::geometry::Vec2;
@@ -8,8 +9,8 @@ use std::path::Path;
 /// Red, green, blue.
 pub type Colour = [u8; 3];
 
-/// A colour picture over a grey image, each pixel shown as `scale x scale`. Drawing takes image pixels, so sub-pixel places
-/// are seen.
+/// A colour picture over a grey image, each pixel shown as `scale x scale`. Drawing takes image pixels, so
+/// sub-pixel places are seen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Overlay {
     width: usize,
@@ -72,8 +73,8 @@ impl Overlay {
         }
     }
 
-    /// Draws a detected grid: a cross on every mark, a line along each row in the row's colour, a circle around the first
-    /// mark. `marks` are in rows of `columns`.
+    /// Draws a detected grid: a cross on every mark, a line along each row in the row's colour, a circle
+    /// around the first mark. `marks` are in rows of `columns`.
     pub fn grid(&mut self, marks: &[Vec2], columns: usize) {
         let colour = |mark: usize| ROW_COLOURS[mark / columns.max(1) % ROW_COLOURS.len()];
         for (row, marks) in marks.chunks(columns.max(1)).enumerate() {

@@ -1,4 +1,5 @@
-//! How is a calibration kept and handed on? `result.json`: the camera by its parameters' names, with all that is known of it.
+//! How is a calibration kept and handed on? `result.json`: the camera by its parameters' names, with all that
+//! is known of it.
 
 use super::input::{InputError, MOST_TABLE_BYTES, read_regular_text};
 use crate::calibrate::{Calibration, Certificate, Prior, ProfileInterval, Termination};
@@ -8,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The ten intrinsic parameters by name; those left out of a file are 0, and any other name is refused: without it this would be another
-/// camera.
+/// The ten intrinsic parameters by name; those left out of a file are 0, and any other name is refused:
+/// without it this would be another camera.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(missing_docs, reason = "the names are those of `Parameter`")]
@@ -152,8 +153,8 @@ pub struct CalibrationFields {
     pub image_size: Option<(usize, usize)>,
     /// Names of the estimated parameters, in the order of the covariance.
     pub free: Vec<&'static str>,
-    /// fy over fx, if the two are tied: fy is then not in `free` and has no row in `covariance`, but has its standard deviation, that of fx times
-    /// this; the two are fully correlated.
+    /// fy over fx, if the two are tied: fy is then not in `free` and has no row in `covariance`, but has its
+    /// standard deviation, that of fx times this; the two are fully correlated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fy_per_fx: Option<f64>,
     /// What was known of parameters beforehand; it counts in the estimate and in the covariance.

@@ -2,8 +2,9 @@
 
 use std::borrow::Cow;
 
-/// Text as it is shown: what would command a terminal, or reorder what is read, stands as its number. Names of files, fields of a study and
-/// whatever a solver says come from elsewhere. The form is that of JSON, so that JSON stays JSON.
+/// Text as it is shown: what would command a terminal, or reorder what is read, stands as its number. Names
+/// of files, fields of a study and whatever a solver says come from elsewhere. The form is that of JSON, so
+/// that JSON stays JSON.
 pub fn shown(text: &str) -> Cow<'_, str> {
     let commands = |c: char| {
         (c.is_control() && c != '\n' && c != '\t')

@@ -149,8 +149,8 @@ pub(super) struct Row<const NAMES: usize, const NUMBERS: usize> {
     pub numbers: [f64; NUMBERS],
 }
 
-/// Reads the named columns, in whatever order they stand; further columns are ignored. A byte order mark, line ends of either
-/// kind, blank lines and blanks around fields are harmless.
+/// Reads the named columns, in whatever order they stand; further columns are ignored. A byte order mark,
+/// line ends of either kind, blank lines and blanks around fields are harmless.
 pub(super) fn read_table<const NAMES: usize, const NUMBERS: usize>(
     file: &str,
     input: impl Read,
@@ -215,8 +215,8 @@ fn read_all(file: &str, mut input: impl Read) -> Result<Vec<u8>, TableError> {
     Ok(bytes)
 }
 
-/// Counts lines up to a record's first byte. The csv reader's own count stops before the blank lines, and before the line
-/// feed of a carriage return, that it skips to reach the record.
+/// Counts lines up to a record's first byte. The csv reader's own count stops before the blank lines, and
+/// before the line feed of a carriage return, that it skips to reach the record.
 struct LineCounter<'a> {
     bytes: &'a [u8],
     counted_to: usize,
@@ -224,7 +224,8 @@ struct LineCounter<'a> {
 }
 
 impl LineCounter<'_> {
-    /// The line of a record that starts at `position` or after the line ends that follow it; 0 without a position.
+    /// The line of a record that starts at `position` or after the line ends that follow it; 0 without a
+    /// position.
     fn line_of(&mut self, position: Option<&csv::Position>) -> u64 {
         let Some(position) = position else { return 0 };
         let start = position.byte() as usize;
@@ -291,7 +292,8 @@ pub(super) fn open(path: &std::path::Path) -> Result<(String, Vec<u8>), TableErr
     Ok((path.display().to_string(), read_regular(path, MOST_TABLE_BYTES)?))
 }
 
-/// The names of the columns; none where the first line cannot be read, of which the reader of the table says why.
+/// The names of the columns; none where the first line cannot be read, of which the reader of the table says
+/// why.
 pub fn columns(bytes: &[u8]) -> Vec<String> {
     let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(bytes);

@@ -1,4 +1,5 @@
-//! What does the user say of a board, and where are its marks in a photograph? `chess:9x6:25mm`, `circles:9x7:10mm:3mm`.
+//! What does the user say of a board, and where are its marks in a photograph? `chess:9x6:25mm`,
+//! `circles:9x7:10mm:3mm`.
 
 use super::discs::{NotFound, ordered_discs};
 use crate::board::{Board, BoardError, Pattern};

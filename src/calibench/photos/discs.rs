@@ -16,7 +16,8 @@ pub struct NotFound {
     pub candidates_px: Vec<Vec2>,
 }
 
-/// The discs of a photograph in the order that `order` gives them. Dark ones are tried first, then bright ones.
+/// The discs of a photograph in the order that `order` gives them. Dark ones are tried first, then bright
+/// ones.
 ///
 /// # Errors
 /// Neither makes the board: the reason of whichever kind has more discs.

@@ -1,24 +1,26 @@
-//! Which camera do the marks of photographs give? Calibration with the bias of discs taken off, and stray views left out.
+//! Which camera do the marks of photographs give? Calibration with the bias of discs taken off, and stray
+//! views left out.
 //!
-//! The centre of an imaged disc is not the image of the disc's centre, and by how much depends on the camera and the pose
-//! that are sought. So they are found in turn: calibrate, predict every disc's bias from the estimate, subtract it from
-//! what was detected, calibrate again (Heikkila 2000). The bias is a second-order effect of the disc's size and hardly
-//! changes with the estimate, so each round leaves a small part of the error of the last.
+//! The centre of an imaged disc is not the image of the disc's centre, and by how much depends on the camera
+//! and the pose that are sought. So they are found in turn: calibrate, predict every disc's bias from the
+//! estimate, subtract it from what was detected, calibrate again (Heikkila 2000). The bias is a second-order
+//! effect of the disc's size and hardly changes with the estimate, so each round leaves a small part of the
+//! error of the last.
 
 use crate::board::{Board, Pattern, View};
 use crate::calibrate::{Calibration, CalibrationError, Settings, calibrate};
 use crate::detect::disc_biases;
 use crate::geometry::Vec2;
 
-/// Rounds end when no disc's bias changes by more than this, px: a tenth of what the best detection on noise-free images
-/// leaves.
+/// Rounds end when no disc's bias changes by more than this, px: a tenth of what the best detection on
+/// noise-free images leaves.
 const SETTLED_PX: f64 = 1e-4;
 
 /// Rounds before giving up; two or three suffice wherever the estimate is near the truth.
 const MOST_ROUNDS: usize = 20;
 
-/// A view that fits this well is no stray, whatever the median: no detector does better on a photograph, and on computed
-/// points only rounding is left to compare.
+/// A view that fits this well is no stray, whatever the median: no detector does better on a photograph, and
+/// on computed points only rounding is left to compare.
 const LEAST_STRAY_PX: f64 = 0.01;
 
 /// How views are fitted.
@@ -77,8 +79,9 @@ pub struct Fit {
 }
 
 impl Fitter<'_> {
-    /// Calibrates, without the views whose marks do not span a plane. With a factor of rejection, the view that stands out most is dropped and all others fitted again until
-    /// none stands out, so that a view that spoils the fit does not take others with it. At least half of the views stay.
+    /// Calibrates, without the views whose marks do not span a plane. With a factor of rejection, the view
+    /// that stands out most is dropped and all others fitted again until none stands out, so that a view that
+    /// spoils the fit does not take others with it. At least half of the views stay.
     ///
     /// # Errors
     /// See [`CalibrationError`]; views in it are counted among those given.
@@ -115,7 +118,8 @@ impl Fitter<'_> {
         }
     }
 
-    /// The view without which the others have the least RMSE; `None` if they determine nothing without any one.
+    /// The view without which the others have the least RMSE; `None` if they determine nothing without any
+    /// one.
     fn best_without_one(&self, views: &[View]) -> Option<usize> {
         let without = |place: usize| {
             let others: Vec<View> =
@@ -159,7 +163,8 @@ impl Fitter<'_> {
         let mut last: Option<Vec<Vec<Vec2>>> = None;
         let mut rounds = 0;
         loop {
-            // An estimate that puts a disc behind the camera predicts no bias: it is left uncorrected, and the RMSE tells.
+            // An estimate that puts a disc behind the camera predicts no bias: it is left uncorrected, and
+            // the RMSE tells.
             let Some(biases) = biases(&calibration, board) else { return Ok((calibration, corrected, None)) };
             let change = last.as_ref().map_or(f64::INFINITY, |last| largest_change(last, &biases));
             if change < SETTLED_PX || rounds == MOST_ROUNDS {
@@ -227,8 +232,8 @@ mod tests {
         let fit = fitter.fit(&biased_views()).unwrap();
         let bias = fit.bias.unwrap();
         assert!(bias.settled() && bias.rounds <= 4, "{bias:?}");
-        // The last round changed no pixel by more than 1e-4 px, and the next would change it by far less: the residuals
-        // are below it.
+        // The last round changed no pixel by more than 1e-4 px, and the next would change it by far less: the
+        // residuals are below it.
         assert!(fit.calibration.rmse_px < SETTLED_PX, "{}", fit.calibration.rmse_px);
         let uncorrected = Fitter { discs: None, ..fitter }.fit(&biased_views()).unwrap();
         assert!(

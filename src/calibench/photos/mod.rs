@@ -1,4 +1,5 @@
-//! From photographs of a board to a camera: what the board is, where its marks are, which views count, and the fit.
+//! From photographs of a board to a camera: what the board is, where its marks are, which views count, and
+//! the fit.
 //!
 //! ```text
 //! BoardSpec --detect(photograph)--> marks --fit--> calibrate, subtract the discs' bias, leave out stray views

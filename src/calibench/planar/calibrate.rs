@@ -8,7 +8,8 @@ use nalgebra::DMatrix;
 /// The family of maps to fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PlaneModel {
-    /// Six parameters: the camera looks straight at the plane, pixels may be oblong or skewed (mode 0, planar).
+    /// Six parameters: the camera looks straight at the plane, pixels may be oblong or skewed (mode 0,
+    /// planar).
     Affine,
     /// Eight parameters: the camera is tilted (mode 1, tilted).
     Projective,
@@ -36,8 +37,8 @@ pub struct PlaneCalibration {
     pub map: PlaneMap,
     /// Whether the map mirrors at the centroid of the pixels, as it does where v points down and Y up.
     pub handedness: Handedness,
-    /// World units per pixel along u: `|d(X, Y) / du|` at the centroid of the pixels. For an affine map and a similarity, the
-    /// norm of the matrix's first column, the same everywhere.
+    /// World units per pixel along u: `|d(X, Y) / du|` at the centroid of the pixels. For an affine map and a
+    /// similarity, the norm of the matrix's first column, the same everywhere.
     pub scale_x: f64,
     /// World units per pixel along v.
     pub scale_y: f64,
@@ -53,15 +54,15 @@ pub struct PlaneCalibration {
     pub spread: Option<PlaneSpread>,
 }
 
-/// Calibrates a plane from pixels and the world points they show: the map of the family that minimises the squared distances
-/// in the world.
+/// Calibrates a plane from pixels and the world points they show: the map of the family that minimises the
+/// squared distances in the world.
 ///
-/// Affine map and similarity are exact linear solutions; the projective map is the maximum-likelihood homography. World
-/// coordinates may be large against the patch: everything is computed from offsets.
+/// Affine map and similarity are exact linear solutions; the projective map is the maximum-likelihood
+/// homography. World coordinates may be large against the patch: everything is computed from offsets.
 ///
 /// # Errors
-/// Fewer than four pairs, coordinates that are not finite, a point given twice, points on one line, and sets that leave the
-/// family's map open.
+/// Fewer than four pairs, coordinates that are not finite, a point given twice, points on one line, and sets
+/// that leave the family's map open.
 ///
 /// ```
 /// use calibench::geometry::Vec2;
@@ -124,7 +125,8 @@ fn residuals(map: &PlaneMap, pairs: &Pairs) -> Result<Vec<Vec2>, PlaneError> {
     pairs.pixels.iter().zip(&pairs.world).enumerate().map(residual).collect()
 }
 
-/// How the first eight entries of the map, row by row, move with each parameter: 8 x p. All families are linear in theirs.
+/// How the first eight entries of the map, row by row, move with each parameter: 8 x p. All families are
+/// linear in theirs.
 fn entries_by_parameter(model: PlaneModel, handedness: Handedness) -> DMatrix<f64> {
     let mut basis = DMatrix::zeros(8, model.parameters());
     if model != PlaneModel::Similarity {
@@ -184,7 +186,8 @@ mod tests {
             let near_fit = calibrate_plane(model, &patch, &nine_marks()).unwrap();
             let far_fit = calibrate_plane(model, &patch, &far).unwrap();
             for (near, far) in near_fit.residuals.iter().zip(&far_fit.residuals) {
-                // Offsets up to 1.4 rounded to 2e-16 under residuals of 1e-5: 1e-10 relative is five times that.
+                // Offsets up to 1.4 rounded to 2e-16 under residuals of 1e-5: 1e-10 relative is five times
+                // that.
                 assert!((near - far).norm() <= 1e-10 * near_fit.rms_point, "{model:?}: {near} {far}");
             }
             let (near, far) = (near_fit.spread.unwrap(), far_fit.spread.unwrap());

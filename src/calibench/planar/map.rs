@@ -3,9 +3,11 @@
 use crate::geometry::{Mat3, Vec2, Vec3};
 use nalgebra::{Matrix2, SMatrix};
 
-/// A plane map, kept as a homography between offsets from two origins: `s [w - w0, 1]^T = L [p - p0, 1]^T`, `l33 = 1`.
+/// A plane map, kept as a homography between offsets from two origins: `s [w - w0, 1]^T = L [p - p0, 1]^T`,
+/// `l33 = 1`.
 ///
-/// Its 3 x 3 matrix between absolute coordinates loses digits where world coordinates are large; this form does not.
+/// Its 3 x 3 matrix between absolute coordinates loses digits where world coordinates are large; this form
+/// does not.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PlaneMap {
@@ -19,13 +21,15 @@ impl PlaneMap {
     /// The map of a local homography scaled to `l33 = 1`; `None` if singular.
     pub(super) fn new(pixel_origin: Vec2, world_origin: Vec2, local: Mat3) -> Option<PlaneMap> {
         let inverse = local.try_inverse()?;
-        // The pixel origin maps to the front, so its image must come back from the front: fixes the sign of the inverse.
+        // The pixel origin maps to the front, so its image must come back from the front: fixes the sign of
+        // the inverse.
         let back = (inverse * Vec3::new(local[(0, 2)], local[(1, 2)], 1.0)).z;
         let local_inverse = if back < 0.0 { -inverse } else { inverse };
         Some(PlaneMap { pixel_origin, world_origin, local, local_inverse })
     }
 
-    /// The 3 x 3 matrix `M` of `s [X Y 1]^T = M [u v 1]^T`, scaled to `m33 = 1` unless pixel (0, 0) lies on the horizon.
+    /// The 3 x 3 matrix `M` of `s [X Y 1]^T = M [u v 1]^T`, scaled to `m33 = 1` unless pixel (0, 0) lies on
+    /// the horizon.
     pub fn matrix(&self) -> Mat3 {
         let product = translation(&self.world_origin) * self.local * translation(&-self.pixel_origin);
         if product[(2, 2)] != 0.0 { product / product[(2, 2)] } else { product }

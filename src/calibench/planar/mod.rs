@@ -1,5 +1,5 @@
-//! Where on the plane is what a pixel shows? Nine-point calibration: an affine, projective or similarity map from pixels to
-//! world coordinates, from four point pairs or more.
+//! Where on the plane is what a pixel shows? Nine-point calibration: an affine, projective or similarity map
+//! from pixels to world coordinates, from four point pairs or more.
 //!
 //! ```text
 //! s [X Y 1]^T = M [u v 1]^T

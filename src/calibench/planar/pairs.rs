@@ -6,7 +6,8 @@ use crate::geometry::{HomographyError, LinearFitError, Scatter, Vec2};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlaneError {
-    /// Four pairs are the least for every model, so that the affine and similarity maps leave something to check.
+    /// Four pairs are the least for every model, so that the affine and similarity maps leave something to
+    /// check.
     #[error("a plane calibration needs at least {need} point pairs, got {got}")]
     TooFewPairs {
         /// Least number.
@@ -93,8 +94,8 @@ impl From<LinearFitError> for PlaneError {
 
 /// Pairs as offsets from an origin on each side.
 ///
-/// A coordinate minus an origin of similar size is exact in floating point (Sterbenz 1974), so nothing is lost where world
-/// coordinates are large, as on a machine's axes, against the patch they measure.
+/// A coordinate minus an origin of similar size is exact in floating point (Sterbenz 1974), so nothing is
+/// lost where world coordinates are large, as on a machine's axes, against the patch they measure.
 pub(super) struct Pairs {
     pub pixel_origin: Vec2,
     pub world_origin: Vec2,

@@ -6,7 +6,8 @@ pub use sample::Level;
 
 /// A grey image, row by row. Level `(x, y)` is centred on pixel coordinate `(x, y)`.
 ///
-/// `Raster<f32>` holds linear intensity with black 0 and white 1; `Raster<u8>` and `Raster<u16>` hold grey levels.
+/// `Raster<f32>` holds linear intensity with black 0 and white 1; `Raster<u8>` and `Raster<u16>` hold grey
+/// levels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Raster<T> {
     width: usize,
@@ -48,7 +49,8 @@ impl<T: Copy> Raster<T> {
         Raster { width, height, samples }
     }
 
-    /// An image made a few rows at a time: `fill(y, rows)` changes at most `at_once` rows, from row `y` on, that are at `level` before.
+    /// An image made a few rows at a time: `fill(y, rows)` changes at most `at_once` rows, from row `y` on,
+    /// that are at `level` before.
     pub fn from_bands(
         width: usize,
         height: usize,

@@ -8,11 +8,12 @@ pub trait Level: Copy + PartialOrd {
     /// The level as a number of single precision, exactly.
     fn to_f32(self) -> f32;
 
-    /// The least sample that is not below a level: `x < at_least(level)` holds for the samples with `x < level`.
+    /// The least sample that is not below a level: `x < at_least(level)` holds for the samples with `x <
+    /// level`.
     fn at_least(level: f64) -> Self;
 
-    /// The sum of a run's levels, and the sum of levels times their places 0, 1, 2 ...: exact for whole levels, in `f64` and a
-    /// fixed order for intensities.
+    /// The sum of a run's levels, and the sum of levels times their places 0, 1, 2 ...: exact for whole
+    /// levels, in `f64` and a fixed order for intensities.
     fn sums(run: &[Self]) -> (f64, f64);
 }
 

@@ -1,4 +1,5 @@
-//! How is a single photograph rectified without a table? Sources are computed and sampled while they are near.
+//! How is a single photograph rectified without a table? Sources are computed and sampled while they are
+//! near.
 
 use super::eight_bit::Photograph;
 use super::fraction::Place;
@@ -11,9 +12,10 @@ use crate::raster::Raster;
 /// Rows of the output whose pieces are made one below the other: they look at nearly the same samples.
 const BAND: usize = 64;
 
-/// Turns a photograph of `camera` into an image of `output`, usually a camera without distortion; pixels without data get the level
-/// `border`. The same image as [`RectifyMap::between`](super::RectifyMap::between) and [`RectifyMap::apply`](super::RectifyMap::apply) make, at a
-/// fraction of their time together; a table is for several photographs.
+/// Turns a photograph of `camera` into an image of `output`, usually a camera without distortion; pixels
+/// without data get the level `border`. The same image as [`RectifyMap::between`](super::RectifyMap::between)
+/// and [`RectifyMap::apply`](super::RectifyMap::apply) make, at a fraction of their time together; a table is
+/// for several photographs.
 ///
 /// # Errors
 /// Photographs of fewer than 2 x 2 pixels.

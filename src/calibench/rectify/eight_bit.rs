@@ -1,4 +1,5 @@
-//! Rectification of 8-bit levels with the widest registers that the machine has, and the same bits without them.
+//! Rectification of 8-bit levels with the widest registers that the machine has, and the same bits without
+//! them.
 
 use super::fraction::{Place, coarse};
 use super::source_row::Sources;
@@ -45,7 +46,8 @@ impl<'a> Photograph<'a> {
         }
     }
 
-    /// Levels of a part of an output row from their windows; `single` gives the levels of a block without window, by number.
+    /// Levels of a part of an output row from their windows; `single` gives the levels of a block without
+    /// window, by number.
     pub fn mix_windows(&self, windows: &[Window], levels: &mut [u8], single: impl FnMut(usize, &mut [u8])) {
         #[cfg(all(target_arch = "x86_64", not(calibench_portable)))]
         if std::is_x86_feature_detected!("avx2") {
@@ -123,8 +125,8 @@ impl Registers for Portable {
     }
 }
 
-/// AVX2. [`wide::Wide`] is named in this module only, in functions compiled for AVX2, which run only where AVX2 is: that is what makes every
-/// `unsafe` block below sound that is not about a pointer.
+/// AVX2. [`wide::Wide`] is named in this module only, in functions compiled for AVX2, which run only where
+/// AVX2 is: that is what makes every `unsafe` block below sound that is not about a pointer.
 #[cfg(all(target_arch = "x86_64", not(calibench_portable)))]
 mod wide {
     use super::super::fraction::{COARSE, COARSE_BITS, ROUNDING};
@@ -189,7 +191,8 @@ mod wide {
         let whole = |of: __m256i| _mm256_srai_epi32::<{ COARSE_BITS as i32 }>(of);
         let x = _mm256_sub_epi32(whole(u), _mm256_set1_epi32(column));
         let y = _mm256_sub_epi32(whole(v), _mm256_set1_epi32(row));
-        // Bits that a place in the window does not have: none in columns 0 to 14, where column + 1 has none either, and rows 0 and 1.
+        // Bits that a place in the window does not have: none in columns 0 to 14, where column + 1 has none
+        // either, and rows 0 and 1.
         let next = _mm256_add_epi32(x, _mm256_set1_epi32(1));
         let bits = _mm256_or_si256(_mm256_or_si256(x, next), _mm256_slli_epi32::<3>(y));
         if _mm256_testz_si256(bits, _mm256_set1_epi32(!(COLUMNS as i32 - 1))) == 0 {
@@ -239,8 +242,8 @@ mod wide {
                 _mm_loadu_si128(part.add(2 * width).cast()),
             )
         };
-        // Every place twice: for the left sample, and one more for the right one. A set highest bit makes zero of a shuffled byte, so that each
-        // comes from one of two rows.
+        // Every place twice: for the left sample, and one more for the right one. A set highest bit makes
+        // zero of a shuffled byte, so that each comes from one of two rows.
         let twice = _mm_unpacklo_epi8(window.places, window.places);
         let first = _mm_add_epi8(twice, _mm_set1_epi16(0x0100));
         let second = _mm_xor_si128(first, _mm_set1_epi8(LOWER as i8));
@@ -304,7 +307,8 @@ mod tests {
         (0..SIZE.0 * SIZE.1).map(|i| ((i * 7919 + i * i % 251 * 31) % 256) as u8).collect()
     }
 
-    /// Sources that a lens may give: along a row, drifting down and stretched, some outside, some at the very edge.
+    /// Sources that a lens may give: along a row, drifting down and stretched, some outside, some at the very
+    /// edge.
     fn row(stretch: f64, slope: f64, start: Vec2) -> Sources {
         let mut sources = Sources::new();
         for i in 0..PIECE {

@@ -1,12 +1,14 @@
-//! Between which samples does a position lie, and how far? Whole samples and fixed-point fractions, the same for a table and without one.
+//! Between which samples does a position lie, and how far? Whole samples and fixed-point fractions, the same
+//! for a table and without one.
 //!
-//! Fractions are cut to 24 bits, which `f32` holds exactly. 8-bit levels are mixed with these rounded to 14 bits: that moves a level by at
-//! most 255 / 2^15 in each direction.
+//! Fractions are cut to 24 bits, which `f32` holds exactly. 8-bit levels are mixed with these rounded to 14
+//! bits: that moves a level by at most 255 / 2^15 in each direction.
 
 use crate::geometry::Vec2;
 
-/// A source this close to a sample's centre is on it: maps that agree but for rounding (1e-12 px) take samples unchanged, and
-/// a source on the image's edge is inside. It moves nothing visibly: fractions are coarser.
+/// A source this close to a sample's centre is on it: maps that agree but for rounding (1e-12 px) take
+/// samples unchanged, and a source on the image's edge is inside. It moves nothing visibly: fractions are
+/// coarser.
 pub const ON_A_SAMPLE_PX: f64 = 1e-9;
 
 /// One, in fine fractions.
@@ -36,8 +38,8 @@ impl Place {
     }
 }
 
-/// The lower of two neighbouring samples about a position, and the weight of the upper one; the last pair serves the last sample
-/// too.
+/// The lower of two neighbouring samples about a position, and the weight of the upper one; the last pair
+/// serves the last sample too.
 fn split(position: f64, count: usize) -> Option<(u32, f32)> {
     // Exact but for the rounding of `rounding`, which both kinds of fraction share.
     let nudged = (rounding(position * f64::from(COARSE)) - 0.5) / f64::from(COARSE);
@@ -63,8 +65,8 @@ fn rounding(fractions: f64) -> f64 {
     fractions + ROUNDING
 }
 
-/// A position in coarse fractions of a pixel as a whole number of them, as [`Place::of`] and [`coarse`] find it; negative for a
-/// negative one, NaN, or one beyond 2^17 px.
+/// A position in coarse fractions of a pixel as a whole number of them, as [`Place::of`] and [`coarse`] find
+/// it; negative for a negative one, NaN, or one beyond 2^17 px.
 #[inline(always)]
 pub fn whole_position(fractions: f64) -> i32 {
     let rounded = rounding(fractions);

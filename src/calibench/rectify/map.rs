@@ -1,4 +1,5 @@
-//! Which four samples make an output pixel, and in what mixture? A look-up table, computed once for images of one size.
+//! Which four samples make an output pixel, and in what mixture? A look-up table, computed once for images of
+//! one size.
 
 use super::Interpolated;
 use super::eight_bit::Photograph;
@@ -40,9 +41,10 @@ pub enum RectifyError {
 
 /// A look-up table from output pixels to samples of the photograph.
 ///
-/// An output pixel has data when its source lies within the centres of the photograph's outermost samples, so that no sample is
-/// invented. Pixel (0, 0) is the centre of the top-left sample on both sides. Levels of 16 bits and intensities are mixed in `f32`, 8-bit
-/// levels in whole numbers, within 0.02 of a level before they are rounded.
+/// An output pixel has data when its source lies within the centres of the photograph's outermost samples, so
+/// that no sample is invented. Pixel (0, 0) is the centre of the top-left sample on both sides. Levels of 16
+/// bits and intensities are mixed in `f32`, 8-bit levels in whole numbers, within 0.02 of a level before they
+/// are rounded.
 ///
 /// ```
 /// use calibench::camera::{BrownConrady, Camera};
@@ -93,8 +95,8 @@ pub(super) fn check_size((width, height): (usize, usize)) -> Result<(), RectifyE
 }
 
 impl RectifyMap {
-    /// The table of any inverse map: `source` gives the photograph's pixel that an output pixel shows, or `None`. Sizes are
-    /// width and height, px.
+    /// The table of any inverse map: `source` gives the photograph's pixel that an output pixel shows, or
+    /// `None`. Sizes are width and height, px.
     ///
     /// # Errors
     /// Photographs of fewer than 2 x 2 pixels.
@@ -209,8 +211,8 @@ impl RectifyMap {
         Raster::from_fn(self.output_size.0, self.output_size.1, |x, y| self.row(y)[x].upper_left != NO_DATA)
     }
 
-    /// The photograph's pixel that an output pixel is sampled at, to the precision of the weights; `None` without data. Panics
-    /// outside the output.
+    /// The photograph's pixel that an output pixel is sampled at, to the precision of the weights; `None`
+    /// without data. Panics outside the output.
     pub fn source(&self, x: usize, y: usize) -> Option<Vec2> {
         self.row(y)[x].source(self.input_size.0)
     }

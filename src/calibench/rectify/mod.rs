@@ -1,9 +1,11 @@
-//! What would an ideal lens have shown? Rectification: every pixel of the output asks where in the photograph it was seen.
+//! What would an ideal lens have shown? Rectification: every pixel of the output asks where in the photograph
+//! it was seen.
 //!
 //! ```text
 //! output pixel -> ray of the output camera -> distort -> photograph's pixel -> bilinear sample
 //! ```
-//! The inverse mapping needs only the forward distortion, leaves no holes, and its look-up table serves every image of a size.
+//! The inverse mapping needs only the forward distortion, leaves no holes, and its look-up table serves every
+//! image of a size.
 
 mod direct;
 mod eight_bit;

@@ -1,4 +1,5 @@
-//! Which camera should the rectified image come from? The same, one that loses nothing, or one that shows nothing empty.
+//! Which camera should the rectified image come from? The same, one that loses nothing, or one that shows
+//! nothing empty.
 
 use crate::camera::{BrownConrady, Camera, UndistortError};
 use crate::geometry::Vec2;
@@ -40,9 +41,9 @@ pub enum OutputCameraError {
 
 /// The camera without distortion of a rectified image of the same size as the photograph.
 ///
-/// The photograph's border (the centres of its outermost samples) is corrected pixel by pixel. `AllPixels` fits the box around it
-/// into the image, `OnlyValid` fits the image into the box inside of it, both with one magnification for u and v, so that
-/// pixels keep their shape.
+/// The photograph's border (the centres of its outermost samples) is corrected pixel by pixel. `AllPixels`
+/// fits the box around it into the image, `OnlyValid` fits the image into the box inside of it, both with one
+/// magnification for u and v, so that pixels keep their shape.
 ///
 /// # Errors
 /// A border that the lens model does not reach, or no valid rectangle; never for `SameK`.
@@ -74,7 +75,8 @@ pub fn output_camera(
     Ok(Camera::pinhole(fx, fy, cx, cy))
 }
 
-/// Left, right, top and bottom of the box around (`outward`) or inside of the corrected border, normalised coordinates.
+/// Left, right, top and bottom of the box around (`outward`) or inside of the corrected border, normalised
+/// coordinates.
 fn corrected_extents(
     camera: &Camera,
     size: (usize, usize),
@@ -87,7 +89,8 @@ fn corrected_extents(
     let sides =
         [along(column(0.0)?, 0), along(column(last_u)?, 0), along(row(0.0)?, 1), along(row(last_v)?, 1)];
     if outward {
-        // A bent side may reach beyond its corners along its own direction too: the box is over all four sides.
+        // A bent side may reach beyond its corners along its own direction too: the box is over all four
+        // sides.
         let rows = [along(row(0.0)?, 0), along(row(last_v)?, 0)];
         let columns = [along(column(0.0)?, 1), along(column(last_u)?, 1)];
         Ok([
@@ -120,8 +123,8 @@ fn least(values: &[f64]) -> f64 {
     values.iter().copied().fold(f64::INFINITY, f64::min) - between_samples(values)
 }
 
-/// How far a smooth curve may rise above its samples: an eighth of its second difference, doubled for the change of curvature
-/// from sample to sample.
+/// How far a smooth curve may rise above its samples: an eighth of its second difference, doubled for the
+/// change of curvature from sample to sample.
 fn between_samples(values: &[f64]) -> f64 {
     0.25 * values.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).fold(0.0, f64::max)
 }
@@ -157,7 +160,8 @@ mod tests {
                 prop_assert!(inside >= -1e-12, "{inside}");
                 nearest = nearest.min(inside);
             }
-            // Tight: the box touches the image but for the allowance between samples, 0.25 * curvature of a few 1e-3 px.
+            // Tight: the box touches the image but for the allowance between samples, 0.25 * curvature of a
+            // few 1e-3 px.
             prop_assert!(nearest < 0.02, "{nearest}");
         }
     }

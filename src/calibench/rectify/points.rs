@@ -3,8 +3,9 @@
 use crate::camera::{Camera, UndistortError};
 use crate::geometry::Vec2;
 
-/// The pixels of a rectified image in which `pixels` of the photograph are shown: the correction of points, for
-/// `output` the same `K` without distortion. One answer a pixel; results are in pixels of `output`, not in target units.
+/// The pixels of a rectified image in which `pixels` of the photograph are shown: the correction of points,
+/// for `output` the same `K` without distortion. One answer a pixel; results are in pixels of `output`, not
+/// in target units.
 pub fn rectify_points(
     camera: &Camera,
     output: &Camera,
@@ -18,13 +19,14 @@ pub fn rectify_points(
         .collect()
 }
 
-/// The pixel of the photograph that shows what `pixel` of an output image shows; `None` where the lens model, of either camera,
-/// has folded back: what it predicts there is seen elsewhere already.
+/// The pixel of the photograph that shows what `pixel` of an output image shows; `None` where the lens model,
+/// of either camera, has folded back: what it predicts there is seen elsewhere already.
 pub fn source_pixel(camera: &Camera, output: &Camera, pixel: &Vec2) -> Option<Vec2> {
     source_within(camera, output, camera.distortion.monotone_radius(), pixel)
 }
 
-/// [`source_pixel`] with the monotone radius of the photograph's lens given: finding it costs more than the rest.
+/// [`source_pixel`] with the monotone radius of the photograph's lens given: finding it costs more than the
+/// rest.
 pub(super) fn source_within(camera: &Camera, output: &Camera, radius: f64, pixel: &Vec2) -> Option<Vec2> {
     let seen = output.normalised_from_pixel(pixel);
     let ray = if output.distortion.is_ideal() { seen } else { output.distortion.undistort(&seen).ok()? };

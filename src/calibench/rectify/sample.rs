@@ -1,6 +1,7 @@
 //! Which number stands for a grey level while neighbours are mixed?
 
-/// A grey level that can be interpolated. Levels of 16 bits and intensities are mixed in `f32`, whose 24 bits hold them exactly.
+/// A grey level that can be interpolated. Levels of 16 bits and intensities are mixed in `f32`, whose 24 bits
+/// hold them exactly.
 pub trait Interpolated: Copy {
     /// The level as a number.
     fn to_f32(self) -> f32;
@@ -19,8 +20,8 @@ pub trait Interpolated: Copy {
         None
     }
 
-    /// The bilinear mixture of four samples, the upper left at index `at` of rows `width` long. Exact where a weight is 0 or 1,
-    /// unlike `left + w (right - left)`. Panics outside the samples.
+    /// The bilinear mixture of four samples, the upper left at index `at` of rows `width` long. Exact where a
+    /// weight is 0 or 1, unlike `left + w (right - left)`. Panics outside the samples.
     fn mix(samples: &[Self], width: usize, at: usize, right: f32, down: f32) -> Self {
         let between = |index: usize| {
             let (left, other) = (samples[index].to_f32(), samples[index + 1].to_f32());

@@ -1,4 +1,5 @@
-//! Where in the photograph was a whole row of the output seen? Four pixels at a time, with the bits of one at a time.
+//! Where in the photograph was a whole row of the output seen? Four pixels at a time, with the bits of one at
+//! a time.
 
 use super::fraction::COARSE;
 use super::points::source_within;
@@ -9,7 +10,8 @@ use crate::geometry::lanes::{Kernel, LANES, Lanes, dispatch};
 /// Pixels of a row that are worked on while they are near.
 pub const PIECE: usize = 256;
 
-/// Sources of pixels of a row, in coarse fractions of a pixel (a power of two, so no bit is lost); NaN without data.
+/// Sources of pixels of a row, in coarse fractions of a pixel (a power of two, so no bit is lost); NaN
+/// without data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sources {
     pub u: [f64; PIECE],
@@ -51,8 +53,8 @@ impl<'a> SourceRows<'a> {
         SourceRows { camera, output, radius: camera.distortion.monotone_radius(), x, x_row: None }
     }
 
-    /// The sources of `count` pixels, at most [`PIECE`], from `first` on, a multiple of [`LANES`], in row `y`. The rest of the piece
-    /// is left as it is.
+    /// The sources of `count` pixels, at most [`PIECE`], from `first` on, a multiple of [`LANES`], in row
+    /// `y`. The rest of the piece is left as it is.
     pub fn fill(&mut self, y: usize, first: usize, count: usize, sources: &mut Sources) {
         if !self.output.distortion.is_ideal() {
             for place in 0..count {
@@ -93,11 +95,13 @@ impl Kernel for Distort<'_, '_> {
 }
 
 impl Distort<'_, '_> {
-    /// Whether the lens has but k1 and k2, the axes are not skew, and the whole piece lies within the monotone radius.
+    /// Whether the lens has but k1 and k2, the axes are not skew, and the whole piece lies within the
+    /// monotone radius.
     fn is_plain(&self) -> bool {
         let camera = self.rows.camera;
         let lens = &camera.distortion;
-        // Farthest from the middle is an end: columns are in order, and so are the roundings of their squares.
+        // Farthest from the middle is an end: columns are in order, and so are the roundings of their
+        // squares.
         let last = (self.first + self.count).next_multiple_of(LANES) - 1;
         let farthest = self.rows.x[self.first].abs().max(self.rows.x[last].abs());
         let y = self.rows.output.normalised_from_pixel(&Vec2::new(0.0, self.y as f64)).y;
@@ -105,8 +109,9 @@ impl Distort<'_, '_> {
         is_unfolded && [lens.p1, lens.p2, lens.k3, camera.skew].iter().all(|&x| x == 0.0)
     }
 
-    /// The operations of `BrownConrady::distort`, `BrownConrady::jacobian` and `Camera::pixel_from_normalised`, in their order. Products with zero are
-    /// left out if `PLAIN`: they add nothing.
+    /// The operations of `BrownConrady::distort`, `BrownConrady::jacobian` and
+    /// `Camera::pixel_from_normalised`, in their order. Products with zero are left out if `PLAIN`: they add
+    /// nothing.
     #[inline(always)]
     #[allow(clippy::needless_range_loop, reason = "three slices of one length")]
     fn distort<L: Lanes, const PLAIN: bool>(self) {

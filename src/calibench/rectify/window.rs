@@ -1,8 +1,10 @@
-//! How are eight neighbouring pixels of 8 bits mixed at once? From a window of three rows of sixteen samples, in whole numbers.
+//! How are eight neighbouring pixels of 8 bits mixed at once? From a window of three rows of sixteen samples,
+//! in whole numbers.
 //!
-//! A lens moves neighbours nearly alike: the sources of eight output pixels in a row lie, as a rule, within fifteen columns and two
-//! rows. Such a window is loaded as three registers and its samples are shuffled into place. Whatever the registers, the
-//! arithmetic is that of [`mix`], so the bits are the same; pixels that lie otherwise are mixed one by one.
+//! A lens moves neighbours nearly alike: the sources of eight output pixels in a row lie, as a rule, within
+//! fifteen columns and two rows. Such a window is loaded as three registers and its samples are shuffled into
+//! place. Whatever the registers, the arithmetic is that of [`mix`], so the bits are the same; pixels that
+//! lie otherwise are mixed one by one.
 
 use super::fraction::{COARSE, COARSE_BITS, whole_position};
 
@@ -36,15 +38,16 @@ impl Window {
     pub const NONE: Window =
         Window { first: u32::MAX, places: [0; PIXELS], right: [0; PIXELS], down: [0; PIXELS] };
 
-    /// The window of eight sources, given in coarse fractions of a pixel; `None` where they do not lie in one, or not all inside the image of this width and
-    /// these limits.
+    /// The window of eight sources, given in coarse fractions of a pixel; `None` where they do not lie in
+    /// one, or not all inside the image of this width and these limits.
     pub fn of(u: &[f64; PIXELS], v: &[f64; PIXELS], width: usize, limits: &Limits) -> Option<Window> {
         let (u, v) = (u.map(whole_position), v.map(whole_position));
         let (column, row) = limits.corner(u[0], [v[0], v[PIXELS - 1]])?;
         let mut window = Window { first: (row as usize * width + column as usize) as u32, ..Window::NONE };
         for i in 0..PIXELS {
             let (x, y) = ((u[i] >> COARSE_BITS) - column, (v[i] >> COARSE_BITS) - row);
-            // A pixel on the very first column or row may be outside by less than a fraction: not to be decided here.
+            // A pixel on the very first column or row may be outside by less than a fraction: not to be
+            // decided here.
             let is_inside =
                 u[i] > 0 && v[i] > 0 && (0..COLUMNS as i32 - 1).contains(&x) && (y == 0 || y == 1);
             if !is_inside {
@@ -81,10 +84,10 @@ impl Limits {
         Limits { column: last(width, COLUMNS), row: last(height, ROWS) }
     }
 
-    /// Column and row of a window's upper left sample, from the sources of its first and last pixel in coarse fractions: so far left
-    /// and up that it lies in the image. The first pixel is taken for the leftmost: a mirrored image has no windows. `None` if they are not
-    /// to be had, or in the first column or row: a pixel there may be outside by less than a fraction, which is not to be decided
-    /// here.
+    /// Column and row of a window's upper left sample, from the sources of its first and last pixel in coarse
+    /// fractions: so far left and up that it lies in the image. The first pixel is taken for the leftmost: a
+    /// mirrored image has no windows. `None` if they are not to be had, or in the first column or row: a
+    /// pixel there may be outside by less than a fraction, which is not to be decided here.
     #[inline(always)]
     pub fn corner(&self, u: i32, v: [i32; 2]) -> Option<(i32, i32)> {
         let column = (u >> COARSE_BITS).min(self.column);
@@ -94,14 +97,15 @@ impl Limits {
     }
 }
 
-/// Bits of a level between its two mixings: it then fits 15 bits. Cut to these it is too small by 2^-8 in the mean, and by no more off that.
+/// Bits of a level between its two mixings: it then fits 15 bits. Cut to these it is too small by 2^-8 in the
+/// mean, and by no more off that.
 pub const MIDDLE_BITS: u32 = 7;
 
 /// What rounds a mixture to the nearest level: a half, and the mean of what was cut off.
 pub const TO_NEAREST: u32 = (1 << (COARSE_BITS + MIDDLE_BITS - 1)) + (1 << (COARSE_BITS - 1));
 
-/// The mixture of four samples, the upper left at index `at`, in whole numbers: within half a level, and 0.02 for weights of 14 bits, of the exact
-/// one. Weights are at most [`COARSE`].
+/// The mixture of four samples, the upper left at index `at`, in whole numbers: within half a level, and 0.02
+/// for weights of 14 bits, of the exact one. Weights are at most [`COARSE`].
 #[inline(always)]
 pub fn mix(samples: &[u8], width: usize, at: usize, right: u16, down: u16) -> u8 {
     let between = |index: usize| {

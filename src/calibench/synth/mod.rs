@@ -1,4 +1,5 @@
-//! What would a camera of known truth see? The virtual camera, its scenes, and the one place where noise enters.
+//! What would a camera of known truth see? The virtual camera, its scenes, and the one place where noise
+//! enters.
 
 pub mod render;
 pub mod scene;

@@ -1,11 +1,12 @@
 //! What image does the virtual camera take of a board? Exact area sampling of the projected marks.
 //!
-//! A pixel is the mean of the continuous image over its unit square (fill factor 1), not a point sample. Marks are plane
-//! regions of one level with piecewise smooth outlines, so the mean needs only the outlines: each is projected through
-//! the full camera model and the area it covers in every pixel is summed along it (Green's theorem). With blur, the
-//! continuous image is convolved with a Gaussian before the pixel's square is averaged, again along the outline and in
-//! closed form across it. Nothing is supersampled. The error of a noise-free sample is below 1e-6 of the contrast
-//! without blur and below 1e-7 with it, before rounding to `f32` (3e-8).
+//! A pixel is the mean of the continuous image over its unit square (fill factor 1), not a point sample.
+//! Marks are plane regions of one level with piecewise smooth outlines, so the mean needs only the outlines:
+//! each is projected through the full camera model and the area it covers in every pixel is summed along it
+//! (Green's theorem). With blur, the continuous image is convolved with a Gaussian before the pixel's square
+//! is averaged, again along the outline and in closed form across it. Nothing is supersampled. The error of a
+//! noise-free sample is below 1e-6 of the contrast without blur and below 1e-7 with it, before rounding to
+//! `f32` (3e-8).
 
 mod blur;
 mod coverage;
@@ -37,8 +38,8 @@ pub struct Appearance {
 pub struct Surround {
     /// Level of everything that is not board.
     pub level: f64,
-    /// Width of the paper around the outermost marks (circles: their centres; chessboard: the outer squares' edges), in
-    /// the board's unit.
+    /// Width of the paper around the outermost marks (circles: their centres; chessboard: the outer squares'
+    /// edges), in the board's unit.
     pub margin: f64,
 }
 
@@ -133,13 +134,15 @@ impl Projector<'_> {
     }
 }
 
-/// Photographs a board: the noise-free image of `image_size` (width, height) px and the true pixels of its marks.
+/// Photographs a board: the noise-free image of `image_size` (width, height) px and the true pixels of its
+/// marks.
 ///
-/// Chessboards have `(columns + 1) x (rows + 1)` squares; the square towards the board's origin corner (least X, least Y) is
-/// dark.
+/// Chessboards have `(columns + 1) x (rows + 1)` squares; the square towards the board's origin corner (least
+/// X, least Y) is dark.
 ///
 /// # Errors
-/// Any outline that reaches behind the camera or beyond the monotone radius of the lens, and settings out of domain.
+/// Any outline that reaches behind the camera or beyond the monotone radius of the lens, and settings out of
+/// domain.
 pub fn photograph(
     camera: &Camera,
     image_size: (usize, usize),
@@ -185,9 +188,9 @@ impl Photograph {
     }
 }
 
-/// A photograph of a nine-point board: 1571 x 1053 px, 3 x 3 dark dots, undistorted,
-/// column spacing 236.23 px, row spacing 236.19 px, centre (714.708, 565.993), which follows from the published matrix.
-/// The dots' diameter is not published; a quarter of the spacing is taken.
+/// A photograph of a nine-point board: 1571 x 1053 px, 3 x 3 dark dots, undistorted, column spacing 236.23
+/// px, row spacing 236.19 px, centre (714.708, 565.993), which follows from the published matrix. The dots'
+/// diameter is not published; a quarter of the spacing is taken.
 pub fn nine_dot_stand_in() -> Photograph {
     let board = Board::circles(3, 3, 1.0, 0.25).expect("a quarter of the spacing is a disc");
     let camera = Camera::pinhole(236.23, 236.19, 714.708, 565.993);

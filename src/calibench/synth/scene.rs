@@ -96,7 +96,8 @@ impl Truth {
     }
 }
 
-/// The pose of a target whose centre lies on the optical axis at `distance`, turned by `Rz Ry Rx` of the given degrees.
+/// The pose of a target whose centre lies on the optical axis at `distance`, turned by `Rz Ry Rx` of the
+/// given degrees.
 pub fn looking_at_centre(xyz_degrees: [f64; 3], distance: f64) -> Pose {
     let [x, y, z] = xyz_degrees.map(f64::to_radians);
     let rotation: Mat3 = rotation::from_xyz_rad(x, y, z);
@@ -153,8 +154,8 @@ impl Scene {
         self.observe_with(|pixel| *pixel)
     }
 
-    /// The views with Gaussian noise of standard deviation `sigma_px` on each of u and v, drawn view by view, point by
-    /// point, u before v.
+    /// The views with Gaussian noise of standard deviation `sigma_px` on each of u and v, drawn view by view,
+    /// point by point, u before v.
     pub fn observe(&self, sigma_px: f64, stream: &mut Stream) -> Vec<View> {
         self.observe_with(|pixel| {
             let du = stream.normal();

@@ -1,4 +1,5 @@
-//! Where do random numbers come from? Streams keyed by what they are for, so that one more draw shifts nothing else.
+//! Where do random numbers come from? Streams keyed by what they are for, so that one more draw shifts
+//! nothing else.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -17,8 +18,8 @@ pub struct StreamKey<'a> {
     pub purpose: &'a str,
 }
 
-/// A stream of random numbers: ChaCha8 (Bernstein 2008), 256-bit key `seed | scenario | trial | purpose`, 64 bits each, the
-/// two names by their FNV-1a hash.
+/// A stream of random numbers: ChaCha8 (Bernstein 2008), 256-bit key `seed | scenario | trial | purpose`, 64
+/// bits each, the two names by their FNV-1a hash.
 ///
 /// ```
 /// use calibench::synth::{Stream, StreamKey};
@@ -59,9 +60,9 @@ impl Stream {
 
     /// A standard normal number.
     ///
-    /// rand_distr's ziggurat is exact arithmetic inside `|x| < R`; beyond, it calls the platform's logarithm, whose last bit
-    /// differs between machines. A draw that falls there (1 in 3700) is replaced by one from the same tail, by Marsaglia's
-    /// method (1964) with `libm`.
+    /// rand_distr's ziggurat is exact arithmetic inside `|x| < R`; beyond, it calls the platform's logarithm,
+    /// whose last bit differs between machines. A draw that falls there (1 in 3700) is replaced by one from
+    /// the same tail, by Marsaglia's method (1964) with `libm`.
     pub fn normal(&mut self) -> f64 {
         let x: f64 = self.0.sample(StandardNormal);
         if x.abs() < ZIGGURAT_TAIL { x } else { self.normal_tail().copysign(x) }
@@ -83,8 +84,8 @@ impl Stream {
     }
 }
 
-/// Where the tail of the ziggurat with 256 layers starts (Marsaglia & Tsang 2000), rounded down: every draw from the tail
-/// lies beyond it.
+/// Where the tail of the ziggurat with 256 layers starts (Marsaglia & Tsang 2000), rounded down: every draw
+/// from the tail lies beyond it.
 const ZIGGURAT_TAIL: f64 = 3.654152885361;
 
 /// FNV-1a, 64 bits (Fowler, Noll & Vo 1991): a fixed hash that needs no crate, for names and fingerprints.
@@ -147,8 +148,8 @@ mod tests {
             tail += usize::from(x.abs() > 3.8);
         }
         let n = f64::from(n);
-        // Bands of 5 standard errors: mean 1/sqrt(n), variance sqrt(2/n), fourth moment sqrt(96/n); the chance that a right
-        // generator misses one of the four is below 3e-6, and the seed is fixed.
+        // Bands of 5 standard errors: mean 1/sqrt(n), variance sqrt(2/n), fourth moment sqrt(96/n); the
+        // chance that a right generator misses one of the four is below 3e-6, and the seed is fixed.
         assert!((sum / n).abs() < 5.0 / n.sqrt());
         assert!((square / n - 1.0).abs() < 5.0 * (2.0 / n).sqrt());
         assert!((fourth / n - 3.0).abs() < 5.0 * (96.0 / n).sqrt());

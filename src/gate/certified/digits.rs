@@ -1,4 +1,5 @@
-//! How many digits of an answer are right? The logarithm of its relative error, as McCullough (1998) measures statistical programs.
+//! How many digits of an answer are right? The logarithm of its relative error, as McCullough (1998) measures
+//! statistical programs.
 
 use super::{Certified, ReferenceProblem};
 use crate::accept::{Estimate, Outcome};
@@ -8,7 +9,8 @@ use calibench::camera::Parameter;
 /// More than a double can say of a number: where the digits stop counting.
 pub const DIGITS_OF_DOUBLES: f64 = 15.0;
 
-/// `-log10(|x - c| / |c|)`, or `-log10 |x|` where `c = 0`, between 0 and [`DIGITS_OF_DOUBLES`] (McCullough 1998, section 3.1).
+/// `-log10(|x - c| / |c|)`, or `-log10 |x|` where `c = 0`, between 0 and [`DIGITS_OF_DOUBLES`] (McCullough
+/// 1998, section 3.1).
 pub fn log_relative_error(x: f64, certified: f64) -> f64 {
     let error = (x - certified).abs() / if certified == 0.0 { 1.0 } else { certified.abs() };
     if error.is_nan() { 0.0 } else { (-libm::log10(error)).clamp(0.0, DIGITS_OF_DOUBLES) }

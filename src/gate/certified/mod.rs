@@ -1,7 +1,9 @@
-//! What is the right answer, to twenty digits? The problems of `reference/`, each with data, start values and certified results.
+//! What is the right answer, to twenty digits? The problems of `reference/`, each with data, start values and
+//! certified results.
 //!
-//! The values were certified by an independent program in numbers of 40 and of 60 digits; `reference/README.md` says how. A file is a
-//! [`Problem`] with more fields, so that whoever reads problems reads it too.
+//! The values were certified by an independent program in numbers of 40 and of 60 digits;
+//! `reference/README.md` says how. A file is a [`Problem`] with more fields, so that whoever reads problems
+//! reads it too.
 
 mod digits;
 mod table;

@@ -1,4 +1,5 @@
-//! How do solvers compare on the certified problems? A table of digits, written once by a command and quoted by README and book.
+//! How do solvers compare on the certified problems? A table of digits, written once by a command and quoted
+//! by README and book.
 
 use super::{Digits, Level, ReferenceProblem};
 use calibench::camera::Parameter;

@@ -1,4 +1,5 @@
-//! Faults of the estimate itself: the wrong model, the wrong loss, a search that ends too early, data that should be refused.
+//! Faults of the estimate itself: the wrong model, the wrong loss, a search that ends too early, data that
+//! should be refused.
 
 use super::{Planted, correct, gross, subtle, with_settings};
 use crate::protocol::{Answer, AnswerCovariance, Problem, Status};

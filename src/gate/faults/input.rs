@@ -31,7 +31,8 @@ pub(super) const FAULTS: &[Planted] = &[
     }),
     gross("first-view-twice", "the first view counts twice", |p, _| {
         let mut changed = p.clone();
-        // A hundredth of a pixel aside, as noise would put it: what is the same but for rounding the solver under the fault counts once.
+        // A hundredth of a pixel aside, as noise would put it: what is the same but for rounding the solver
+        // under the fault counts once.
         changed.views.extend(p.views.first().cloned().map(|mut view| {
             view.pixels.iter_mut().flatten().for_each(|x| *x += 0.01);
             view

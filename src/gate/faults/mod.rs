@@ -1,4 +1,5 @@
-//! Would the gate notice? Faults of the kinds that calibrators have, planted in this library's correct solver.
+//! Would the gate notice? Faults of the kinds that calibrators have, planted in this library's correct
+//! solver.
 
 mod estimation;
 mod input;
@@ -51,7 +52,8 @@ pub fn planted() -> Vec<Planted> {
 #[derive(Debug)]
 pub struct Faulty {
     fault: Planted,
-    /// How often each problem was asked, by its fingerprint: a count of all calls would depend on the order of threads.
+    /// How often each problem was asked, by its fingerprint: a count of all calls would depend on the order
+    /// of threads.
     asked: Mutex<BTreeMap<u64, u64>>,
 }
 
@@ -105,8 +107,9 @@ fn spoilt(problem: &Problem, spoil: impl FnOnce(&mut Answer)) -> Answer {
     answer
 }
 
-/// The answer of a run with other settings, stated as good however it ended. Where parameters were held that should have
-/// been estimated, the standard deviations are those of the correct answer: the fault itself is to be noticed, not a gap.
+/// The answer of a run with other settings, stated as good however it ended. Where parameters were held that
+/// should have been estimated, the standard deviations are those of the correct answer: the fault itself is
+/// to be noticed, not a gap.
 fn with_settings(problem: &Problem, adjust: impl FnOnce(Settings) -> Settings) -> Answer {
     let right = correct(problem);
     if right.status != Status::Ok {
@@ -136,7 +139,8 @@ fn camera_of(answer: &Answer) -> Camera {
     Camera::from_parameters(Parameter::ALL.map(|p| answer.parameters.get(p.name()).copied().unwrap_or(0.0)))
 }
 
-/// Target point and residual (predicted - observed, px) of every point that the answer puts before the camera.
+/// Target point and residual (predicted - observed, px) of every point that the answer puts before the
+/// camera.
 fn residuals(problem: &Problem, answer: &Answer) -> Vec<(Vec2, Vec2)> {
     let camera = camera_of(answer);
     let mut residuals = Vec::with_capacity(problem.points());
@@ -150,7 +154,8 @@ fn residuals(problem: &Problem, answer: &Answer) -> Vec<(Vec2, Vec2)> {
     residuals
 }
 
-/// Whether this problem is among one in `rate`, chosen by its pixels: the same in every run, and when it is asked again.
+/// Whether this problem is among one in `rate`, chosen by its pixels: the same in every run, and when it is
+/// asked again.
 fn chosen(problem: &Problem, rate: u64) -> bool {
     fingerprint(problem).is_multiple_of(rate)
 }

@@ -1,4 +1,5 @@
-//! Faults of what is said about the uncertainty, and estimates that spread or lie a little beside what the data allow.
+//! Faults of what is said about the uncertainty, and estimates that spread or lie a little beside what the
+//! data allow.
 
 use super::{Planted, camera_of, freedom, gross, residuals, spoilt, subtle};
 use crate::accept::free_of;
@@ -107,8 +108,8 @@ fn covariance_of_the_median(problem: &Problem, answer: &mut Answer) {
     }
 }
 
-/// Moves fx by `deviations` standard deviations, and every other parameter by what its covariance with fx makes of that: the
-/// least conspicuous way to be wrong by that much.
+/// Moves fx by `deviations` standard deviations, and every other parameter by what its covariance with fx
+/// makes of that: the least conspicuous way to be wrong by that much.
 fn biased_together(answer: &mut Answer, deviations: f64) {
     let Some(stated) = &answer.covariance else { return };
     let Some(fx) = stated.parameters.iter().position(|name| name == "fx") else { return };
@@ -120,10 +121,11 @@ fn biased_together(answer: &mut Answer, deviations: f64) {
     (answer.poses, answer.rmse) = (None, None);
 }
 
-/// Adds noise with `share` of the stated covariance `D C D` (C the correlations): a step `sqrt(share) D C^1/2 z`. The `z` are
-/// contrasts of the residuals, which to first order say nothing of the estimate's error. Neither they nor the symmetric root
-/// depend on the order of views or points, on the target's unit or on the image's origin, and exchanged axes exchange them: no
-/// check of invariance sees the noise, nothing but the spread betrays it.
+/// Adds noise with `share` of the stated covariance `D C D` (C the correlations): a step `sqrt(share) D C^1/2
+/// z`. The `z` are contrasts of the residuals, which to first order say nothing of the estimate's error.
+/// Neither they nor the symmetric root depend on the order of views or points, on the target's unit or on the
+/// image's origin, and exchanged axes exchange them: no check of invariance sees the noise, nothing but the
+/// spread betrays it.
 fn add_noise(problem: &Problem, answer: &mut Answer, share: f64) {
     let residuals = residuals(problem, answer);
     (answer.poses, answer.rmse) = (None, None);
@@ -145,9 +147,9 @@ fn add_noise(problem: &Problem, answer: &mut Answer, share: f64) {
     }
 }
 
-/// A standard normal number for a parameter: the residuals weighted by waves over the target that are too short for any
-/// parameter of camera or pose to follow, divided by their size. Parameters of the one axis are those of the other with the
-/// axes exchanged; NaN where all residuals are zero.
+/// A standard normal number for a parameter: the residuals weighted by waves over the target that are too
+/// short for any parameter of camera or pose to follow, divided by their size. Parameters of the one axis are
+/// those of the other with the axes exchanged; NaN where all residuals are zero.
 fn contrast(residuals: &[(Vec2, Vec2)], name: &str) -> f64 {
     // A wave number a parameter, any that differ, in radians over the target's root mean square radius.
     let (wave, along_u, along_v) = match name {

@@ -121,7 +121,8 @@ pub fn misled(seen: &Seen) -> bool {
     conduct_in_doubt(seen, Habits::UNKNOWN) == Conduct::Wrong
 }
 
-/// One check over all samples of a doubtful scenario: no more confident wrong answers than textbook least squares gives.
+/// One check over all samples of a doubtful scenario: no more confident wrong answers than textbook least
+/// squares gives.
 pub(super) fn honesty(scenario: &Scenario, answers: &Answers<'_>) -> Check {
     let mut conducts: Vec<Conduct> = answers
         .for_purpose(Purpose::Sample)

@@ -3,8 +3,8 @@
 use calibench::evaluate::distribution::{ChiSquare, normal_cdf, wilson_hilferty};
 use statrs::distribution::{Binomial, ContinuousCDF, DiscreteCDF, FisherSnedecor, Normal};
 
-/// Above this many degrees of freedom the cube root of a chi-squared variable is normal to 1e-5 in probability, and the series
-/// of the incomplete gamma function would take thousands of terms.
+/// Above this many degrees of freedom the cube root of a chi-squared variable is normal to 1e-5 in
+/// probability, and the series of the incomplete gamma function would take thousands of terms.
 const WILSON_HILFERTY: usize = 20_000;
 
 /// Chance that a normal variable is at least `|z|` from zero.

@@ -22,9 +22,9 @@ impl Default for Terms {
     }
 }
 
-/// Decides every check. Statistical ones by Holm's step-down procedure (1979): with `m` p-values in ascending order, the i-th
-/// is rejected while it is at most `overall / (m - i + 1)`; the chance of any false rejection is at most `overall`,
-/// however the checks depend on each other.
+/// Decides every check. Statistical ones by Holm's step-down procedure (1979): with `m` p-values in ascending
+/// order, the i-th is rejected while it is at most `overall / (m - i + 1)`; the chance of any false rejection
+/// is at most `overall`, however the checks depend on each other.
 pub fn decide(mut checks: Vec<Check>, terms: &Terms) -> Vec<Check> {
     let overall = terms.false_alarm_rate;
     let p_value = |check: &Check| match check.basis {

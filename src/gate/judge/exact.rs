@@ -7,8 +7,8 @@ use crate::suite::Scenario;
 use crate::trial::Seen;
 use calibench::io::significant;
 
-/// An error of exact data that noise of this size on every coordinate would cause: double precision leaves below 1e-10 px,
-/// single precision about 1e-5 px.
+/// An error of exact data that noise of this size on every coordinate would cause: double precision leaves
+/// below 1e-10 px, single precision about 1e-5 px.
 const EXACT_PX: f64 = 1e-6;
 
 /// Whether every problem had a well-formed answer.

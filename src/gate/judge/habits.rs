@@ -1,4 +1,5 @@
-//! What does the solver do on good data? A warning tells something only where warnings are rare, a refusal only where good data are answered.
+//! What does the solver do on good data? A warning tells something only where warnings are rare, a refusal
+//! only where good data are answered.
 
 use super::checks::{Basis, Check, Property};
 use super::{Answers, chance, estimate};

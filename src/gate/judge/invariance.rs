@@ -9,8 +9,8 @@ use crate::trial::Seen;
 use crate::variant::Variant;
 use calibench::io::significant;
 
-/// A difference that noise of this size would cause is a hundredth of ordinary corner noise: it cannot matter to a user, and
-/// is far above what single precision (1e-5 px) or a loose stopping rule leaves.
+/// A difference that noise of this size would cause is a hundredth of ordinary corner noise: it cannot matter
+/// to a user, and is far above what single precision (1e-5 px) or a loose stopping rule leaves.
 const SAME_PX: f64 = 1e-3;
 
 pub(super) fn check(scenario: &Scenario, answers: &Answers<'_>) -> Vec<Check> {
@@ -46,7 +46,8 @@ fn compare(scenario: &Scenario, answers: &Answers<'_>, variant: Variant) -> Opti
             _ => one_sided += 1,
         }
     }
-    // A problem left unanswered now and then is a matter of convergence; one left unanswered for what was changed happens every time.
+    // A problem left unanswered now and then is a matter of convergence; one left unanswered for what was
+    // changed happens every time.
     let basis = if worst_px.is_some_and(|px| px > SAME_PX) {
         Basis::Certain(false)
     } else {

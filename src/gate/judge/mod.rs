@@ -72,7 +72,8 @@ impl<'a> Answers<'a> {
             .map(|&(case, seen)| (case.trial, seen))
     }
 
-    /// Why the solver says that it is not made for this scene, if it says so of every problem: of some only is no reason.
+    /// Why the solver says that it is not made for this scene, if it says so of every problem: of some only
+    /// is no reason.
     fn unsupported(&self) -> Option<&'a str> {
         let reasons = self.cases.iter().map(|(_, seen)| match seen {
             Seen::Unsupported(reason) => Some(reason.as_str()),

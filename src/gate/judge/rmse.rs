@@ -6,7 +6,8 @@ use crate::suite::Scenario;
 use crate::trial::Trial;
 use calibench::io::significant;
 
-/// Two definitions differ by more than this part on every scene of the suite; rounding and stopping rules by far less.
+/// Two definitions differ by more than this part on every scene of the suite; rounding and stopping rules by
+/// far less.
 const SAME_RATIO: f64 = 2e-3;
 
 /// The ways in which programs divide a sum of squared residuals over `N` points with `d` degrees of freedom.
@@ -40,7 +41,8 @@ pub(super) fn check(scenario: &Scenario, answers: &Answers<'_>) -> Vec<Check> {
     };
     let (refitted, own) = (ratios_to(|t| t.refitted_square), ratios_to(|t| t.square));
     let mean = |ratios: &[f64]| significant(ratios.iter().sum::<f64>() / ratios.len() as f64, 4);
-    // Poses that are not the best ones leave larger residuals, whose RMSE may be stated by the right definition all the same.
+    // Poses that are not the best ones leave larger residuals, whose RMSE may be stated by the right
+    // definition all the same.
     let (found, evidence) = match (known(&refitted), known(&own)) {
         (Some((name, factor)), _) => (Some(factor), format!("stated {name}")),
         (None, Some((name, factor))) => (

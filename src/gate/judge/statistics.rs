@@ -1,7 +1,8 @@
-//! Do many errors together look as theory says? Bias, variance, joint size, poses and stated covariance against the bound.
+//! Do many errors together look as theory says? Bias, variance, joint size, poses and stated covariance
+//! against the bound.
 //!
-//! To first order the error of a maximum-likelihood estimate is normal with the Cramer-Rao bound `P` as its covariance, so every
-//! statistic below has a known distribution for any number of samples.
+//! To first order the error of a maximum-likelihood estimate is normal with the Cramer-Rao bound `P` as its
+//! covariance, so every statistic below has a known distribution for any number of samples.
 
 use super::checks::{Basis, Check, Property};
 use super::habits::Habits;
@@ -110,8 +111,8 @@ impl About<'_> {
         self.check(Property::NoSilentFailure, p, evidence).gravely()
     }
 
-    /// Each parameter's mean is normal, and all means together are chi-squared: a small error of one parameter that others
-    /// should have followed shows in the second only.
+    /// Each parameter's mean is normal, and all means together are chi-squared: a small error of one
+    /// parameter that others should have followed shows in the second only.
     fn bias(&self) -> Check {
         let mean = |i: usize| self.samples.iter().map(|t| t.errors[i]).sum::<f64>() / self.n();
         let means: Vec<f64> = (0..self.dimensions()).map(mean).collect();
@@ -152,7 +153,8 @@ impl About<'_> {
         self.check(Property::Nees, p, evidence)
     }
 
-    /// Residuals of all stated poses, and the error of each sample's first pose: other poses of the sample depend on it.
+    /// Residuals of all stated poses, and the error of each sample's first pose: other poses of the sample
+    /// depend on it.
     fn poses(&self) -> Check {
         let stated: Vec<(f64, f64)> =
             self.samples.iter().filter_map(|t| Some((t.square?, *t.pose_nees.as_ref()?.first()?))).collect();
@@ -173,8 +175,8 @@ impl About<'_> {
         self.check(Property::Poses, chance::smallest_of(2, p), evidence)
     }
 
-    /// A stated variance is the bound's times an estimate of the noise, `chi-squared / d`; and errors in units of the stated
-    /// covariance follow an F distribution, whose normal scores have a mean of zero.
+    /// A stated variance is the bound's times an estimate of the noise, `chi-squared / d`; and errors in
+    /// units of the stated covariance follow an F distribution, whose normal scores have a mean of zero.
     fn covariance(&self) -> Check {
         let stated: Vec<&[f64]> =
             self.samples.iter().filter_map(|t| t.standard_deviations.as_deref()).collect();
@@ -244,8 +246,8 @@ impl About<'_> {
         Check::new(Property::CovarianceForm, self.scenario.id, basis, given, evidence)
     }
 
-    /// The uncorrelated combination of parameters along which the stated covariance is least like the bound: p-value and words. Its variance
-    /// there follows the law of a single parameter's.
+    /// The uncorrelated combination of parameters along which the stated covariance is least like the bound:
+    /// p-value and words. Its variance there follows the law of a single parameter's.
     fn worst_combination(&self) -> Option<(f64, String)> {
         let stated: Vec<&[f64]> =
             self.samples.iter().filter_map(|t| t.principal_variances.as_deref()).collect();

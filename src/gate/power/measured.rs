@@ -1,4 +1,5 @@
-//! What was measured of the gate? Its power, its false alarms and its measure of honesty, as three tables that are committed.
+//! What was measured of the gate? Its power, its false alarms and its measure of honesty, as three tables
+//! that are committed.
 
 use super::{Alarms, catch, catch_solver, false_alarms};
 use crate::faults::{Class, planted};
@@ -46,7 +47,8 @@ pub struct AlarmRow {
 }
 
 impl AlarmRow {
-    /// The largest number of alarms that chance exceeds with probability at most `tail`, if the stated rate is the true one.
+    /// The largest number of alarms that chance exceeds with probability at most `tail`, if the stated rate
+    /// is the true one.
     pub fn most(&self, tail: f64) -> usize {
         (0..self.seeds).find(|&n| at_least(n + 1, self.seeds, self.stated_rate) <= tail).unwrap_or(self.seeds)
     }
@@ -113,13 +115,13 @@ pub enum MeasuredError {
 
 /// Names of the three tables.
 const FILES: [&str; 3] = ["faults.csv", "false-alarms.csv", "textbook.csv"];
-/// Stated rates at which false alarms are counted. At the gate's own, 200 runs show nothing but gross excess; the others show
-/// that the p-values are right where there is something to count.
+/// Stated rates at which false alarms are counted. At the gate's own, 200 runs show nothing but gross excess;
+/// the others show that the p-values are right where there is something to count.
 const RATES: [f64; 4] = [0.2, 0.05, 0.01, EXPECTED_FALSE_ALARMS];
 
 impl Measured {
-    /// Measures all three. The correct solver itself stands first among the faults' runs, under the name `none`: it must not be
-    /// caught. `progress` hears the name of every step.
+    /// Measures all three. The correct solver itself stands first among the faults' runs, under the name
+    /// `none`: it must not be caught. `progress` hears the name of every step.
     ///
     /// # Errors
     /// A plan that cannot be made.

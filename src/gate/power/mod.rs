@@ -26,8 +26,9 @@ pub struct Catch {
     pub verdict: Verdict,
 }
 
-/// Asks a faulty solver for 1, 2, 4, ... samples a scenario until a check fails at the gate's own false-alarm rate, up to `most`;
-/// then looks for the problem, in the order in which they were asked, with which it began to fail.
+/// Asks a faulty solver for 1, 2, 4, ... samples a scenario until a check fails at the gate's own false-alarm
+/// rate, up to `most`; then looks for the problem, in the order in which they were asked, with which it began
+/// to fail.
 ///
 /// # Errors
 /// A plan that cannot be made.
@@ -79,7 +80,8 @@ fn failures(checks: Vec<Check>) -> Vec<Check> {
     failed
 }
 
-/// Indices of the cases in the order in which they were asked: by doubled rounds, each in the order of the plan.
+/// Indices of the cases in the order in which they were asked: by doubled rounds, each in the order of the
+/// plan.
 fn order_of_asking(plan: &Plan, samples: usize) -> Vec<usize> {
     let round = |i: &usize| plan.cases[*i].trial.checked_ilog2().map_or(0, |power| power + 1);
     let mut order: Vec<usize> =
@@ -120,7 +122,8 @@ fn first_failing(
 pub struct Alarms {
     /// Seeds tried.
     pub seeds: usize,
-    /// Smallest p-value of each run, times the number of its checks (Bonferroni; Holm rejects something exactly where this does).
+    /// Smallest p-value of each run, times the number of its checks (Bonferroni; Holm rejects something
+    /// exactly where this does).
     pub smallest: Vec<f64>,
     /// Failures that no chance explains, one line each.
     pub certain: Vec<String>,

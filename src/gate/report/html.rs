@@ -16,7 +16,8 @@ anywhere}td:first-child{white-space:nowrap}details{margin:.4rem 0}summary{cursor
 .not,small{color:#a5a5a5}.accepted{color:#f0b040}.sum{background:#1d2a20}.sum.bad{background:#2d1c1e}}";
 
 impl Report {
-    /// Self-contained HTML: the conclusion, a row a property, every check behind it, and what the scenarios are.
+    /// Self-contained HTML: the conclusion, a row a property, every check behind it, and what the scenarios
+    /// are.
     pub fn to_html(&self) -> String {
         let mut page = format!(
             "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><meta name=\"viewport\" \

@@ -62,7 +62,8 @@ impl Report {
         if scenes.is_empty() { String::new() } else { format!(", but not supported: {}", scenes.join(", ")) }
     }
 
-    /// The failing checks, property by property in the order in which one causes another: the first in full, the others by scenario.
+    /// The failing checks, property by property in the order in which one causes another: the first in full,
+    /// the others by scenario.
     pub fn details(&self) -> String {
         let mut groups: BTreeMap<(Property, Verdict), Vec<&Check>> = BTreeMap::new();
         for check in self.failures() {

@@ -1,13 +1,14 @@
-//! By how much would the pixels of a view like to deform its plane? The two directions in which a homography leaves the poses.
+//! By how much would the pixels of a view like to deform its plane? The two directions in which a homography
+//! leaves the poses.
 //!
-//! A pose moves target points by `M = [r1 r2 t]`, six numbers; a homography has eight. The two that no pose has stretch the plane
-//! within itself, `M + R S` with `S = [[a, b], [b, -a], [0, 0]]`:
+//! A pose moves target points by `M = [r1 r2 t]`, six numbers; a homography has eight. The two that no pose
+//! has stretch the plane within itself, `M + R S` with `S = [[a, b], [b, -a], [0, 0]]`:
 //!
 //! ```text
 //! d X_c / d a = r1 x - r2 y,   d X_c / d b = r2 x + r1 y
 //! ```
-//! (the trace of `S` is a change of distance). At a minimum of a calibration the gradient vanishes for all of its unknowns; where it does
-//! not vanish for these, free homographies would explain the pixels better.
+//! (the trace of `S` is a change of distance). At a minimum of a calibration the gradient vanishes for all of
+//! its unknowns; where it does not vanish for these, free homographies would explain the pixels better.
 
 use super::{Model, Rows, SHARED, View, lane_losses, rows};
 use crate::calibrate::Loss;
@@ -54,7 +55,8 @@ pub(in crate::calibrate) fn view_strain(
     }
 }
 
-/// Three squares, two of the gradient, one of nothing; then for each column the twelve shared ones, and five linear ones.
+/// Three squares, two of the gradient, one of nothing; then for each column the twelve shared ones, and five
+/// linear ones.
 const SUMS: usize = 40;
 /// First of column `a`: shared, then fx, fy, cx, cy, skew.
 const A: usize = 6;

@@ -54,7 +54,8 @@ fn pairs(camera: &Camera, count: usize) -> PairBlocks {
     }))
 }
 
-/// The sums as they are defined: `sum w J^T J`, `sum w J^T r` and the cost over ten intrinsics and six pose parameters.
+/// The sums as they are defined: `sum w J^T J`, `sum w J^T r` and the cost over ten intrinsics and six pose
+/// parameters.
 fn plain_sums(camera: &Camera, pairs: &PairBlocks, loss: Loss) -> ([[f64; 16]; 16], [f64; 16], f64) {
     let (mut square, mut gradient, mut cost) = ([[0.0; 16]; 16], [0.0; 16], 0.0);
     for (point, pixel) in pairs.iter() {
@@ -86,7 +87,8 @@ fn the_sums_are_those_of_the_definition_for_every_model_and_loss() {
             let mut sums = NO_SUMS;
             view_sums(&camera, &pose(), &pairs, loss, is_radial(&camera, free), &mut sums).unwrap();
             let (square, slope, expected_cost) = plain_sums(&camera, &pairs, loss);
-            // A sum of 126 products errs by at most 126 roundings of the sum of sizes, here by Cauchy-Schwarz.
+            // A sum of 126 products errs by at most 126 roundings of the sum of sizes, here by
+            // Cauchy-Schwarz.
             let close = |own: f64, i: usize, j: usize| {
                 let scale = (square[i][i] * square[j][j]).sqrt();
                 assert!((own - square[i][j]).abs() <= 126.0 * f64::EPSILON * scale, "{loss:?} ({i}, {j})");

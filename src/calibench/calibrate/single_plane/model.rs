@@ -1,16 +1,19 @@
-//! Where does the model put a target point, and how does that move with the parameters? All in units of the gauge length.
+//! Where does the model put a target point, and how does that move with the parameters? All in units of the
+//! gauge length.
 
 use crate::board::View;
 use crate::camera::BrownConrady;
 use crate::geometry::{Homography, Mat3, Scatter, Vec2, Vec3};
 use nalgebra::{Matrix2, SMatrix, SVector};
 
-/// `h11 ... h32` of the local homography (`h33 = 1`), `k1`, `k2`, and the centre's shift in units of the gauge length.
+/// `h11 ... h32` of the local homography (`h33 = 1`), `k1`, `k2`, and the centre's shift in units of the
+/// gauge length.
 pub(super) const PARAMETERS: usize = 12;
 pub(super) type ParameterVector = SVector<f64, PARAMETERS>;
 pub(super) type PointJacobian = SMatrix<f64, 2, PARAMETERS>;
 
-/// Target points reduced to centroid 0 and RMS radius 1, pixels to offsets from the given centre in units of the gauge length.
+/// Target points reduced to centroid 0 and RMS radius 1, pixels to offsets from the given centre in units of
+/// the gauge length.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Frames {
     target_centroid: Vec2,
@@ -94,7 +97,8 @@ pub(super) fn predict(frames: &Frames, at: &ParameterVector, point: &Vec2) -> Ve
 
 /// The predicted offset and its derivatives; `None` behind the horizon.
 ///
-/// With `x = i - c` and `D` the distortion's Jacobian at `x`: `dm/di = D`, `dm/dc = I - D`, `dm/dk1 = x r^2`, `dm/dk2 = x r^4`.
+/// With `x = i - c` and `D` the distortion's Jacobian at `x`: `dm/di = D`, `dm/dc = I - D`, `dm/dk1 = x r^2`,
+/// `dm/dk2 = x r^4`.
 pub(super) fn predict_with_jacobian(
     frames: &Frames,
     at: &ParameterVector,

@@ -1,4 +1,5 @@
-//! Which parameters put the predicted pixels nearest to the observed ones? Levenberg-Marquardt on twelve parameters.
+//! Which parameters put the predicted pixels nearest to the observed ones? Levenberg-Marquardt on twelve
+//! parameters.
 
 use super::super::Termination;
 use super::SinglePlaneError;
@@ -28,8 +29,8 @@ struct Normal {
     cost: f64,
 }
 
-/// Minimises over the first `active` parameters, by Levenberg-Marquardt with Marquardt's scaling (Marquardt 1963) and
-/// Nielsen's damping rule (Nielsen 1999).
+/// Minimises over the first `active` parameters, by Levenberg-Marquardt with Marquardt's scaling (Marquardt
+/// 1963) and Nielsen's damping rule (Nielsen 1999).
 pub(super) fn refine(
     frames: &Frames,
     view: &View,
@@ -44,7 +45,8 @@ pub(super) fn refine(
         if let Some(newton) = solve(&normal, 0.0) {
             let promised = -normal.gradient.dot(&newton);
             if promised <= rounding(view, normal.cost) {
-                // Too short for the cost to judge, but the gradient, small itself, is known better: the last digits.
+                // Too short for the cost to judge, but the gradient, small itself, is known better: the last
+                // digits.
                 at += newton;
                 normal = normal_equations(frames, view, &at, active);
                 break Termination::Converged;
@@ -84,8 +86,8 @@ pub(super) fn refine(
     Ok(Outcome { parameters: at, unit_covariance, termination, iterations })
 }
 
-/// The sum of squares `|r|^2` is not known better than `2 |r| |d| + |d|^2`, where `d` is the rounding of the residuals: a few
-/// roundings of numbers of order one in each coordinate.
+/// The sum of squares `|r|^2` is not known better than `2 |r| |d| + |d|^2`, where `d` is the rounding of the
+/// residuals: a few roundings of numbers of order one in each coordinate.
 fn rounding(view: &View, cost: f64) -> f64 {
     let coordinate = 4.0 * f64::EPSILON;
     let all = (2.0 * view.len() as f64).sqrt() * coordinate;
@@ -107,7 +109,8 @@ fn normal_equations(frames: &Frames, view: &View, at: &ParameterVector, active: 
 const VECTORS: usize = PARAMETERS / LANES;
 const _: () = assert!(PARAMETERS.is_multiple_of(LANES));
 
-/// `sum J^T J`, `sum J^T r` and `sum |r|^2`, point by point: an entry is the same sum in the same order on any registers.
+/// `sum J^T J`, `sum J^T r` and `sum |r|^2`, point by point: an entry is the same sum in the same order on
+/// any registers.
 struct Sum<'a> {
     frames: &'a Frames,
     view: &'a View,

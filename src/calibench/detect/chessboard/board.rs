@@ -1,4 +1,5 @@
-//! Is the asked board in a lattice, and which corner is its first? A complete rectangle, ordered by the colours of its squares.
+//! Is the asked board in a lattice, and which corner is its first? A complete rectangle, ordered by the
+//! colours of its squares.
 
 use super::Orientation;
 use super::growth::axes_at;
@@ -32,7 +33,8 @@ pub enum Found {
     Incomplete,
 }
 
-/// Corners beside a rectangle that may be chance, as part of the side: texture that looks like one more corner.
+/// Corners beside a rectangle that may be chance, as part of the side: texture that looks like one more
+/// corner.
 const MOST_STRAYS: f64 = 0.34;
 
 impl Rectangle {
@@ -104,11 +106,13 @@ fn largest(lattice: &Lattice) -> Option<Rectangle> {
     best
 }
 
-/// The rectangle's marks in the board's order, how far the image fixes it, and whether the square before the first mark is dark.
+/// The rectangle's marks in the board's order, how far the image fixes it, and whether the square before the
+/// first mark is dark.
 ///
-/// Orders that see the board from its front and have the asked columns and rows: one, of a rectangle, or two of a square, and as
-/// many from the other end. Where some have a dark square at the board's origin, before the first mark, and others a bright one, the
-/// dark ones are the board. Among what remains the first mark is the one nearest to the image's top left.
+/// Orders that see the board from its front and have the asked columns and rows: one, of a rectangle, or two
+/// of a square, and as many from the other end. Where some have a dark square at the board's origin, before
+/// the first mark, and others a bright one, the dark ones are the board. Among what remains the first mark is
+/// the one nearest to the image's top left.
 pub fn ordered(
     lattice: &Lattice,
     rectangle: &Rectangle,
@@ -207,7 +211,8 @@ mod tests {
 
     #[test]
     fn the_colour_of_the_corner_square_fixes_odd_by_even_boards() {
-        // The square between +i and +j of place (0, 0) is dark, so that (0, 0) starts the board; one place on, it does not.
+        // The square between +i and +j of place (0, 0) is dark, so that (0, 0) starts the board; one place
+        // on, it does not.
         let (lattice_96, places) = (lattice(9, 6), places_px(9, 6));
         let board = Rectangle { low: (0, 0), width: 9, height: 6 };
         let (marks, orientation, _) = ordered(&lattice_96, &board, &places, (9, 6));
@@ -229,8 +234,9 @@ mod tests {
         assert_eq!(both(8, 6, (8, 6)), (0, 1, Orientation::HalfTurn));
         assert_eq!(both(7, 7, (7, 7)), (0, 1, Orientation::HalfTurn));
         assert_eq!(both(6, 6, (6, 6)).2, Orientation::QuarterTurn);
-        // Counted across, seen from the front: the dark squares in the corners lie on the left, and a row of six runs along them, with the
-        // nine rows to its right hand; so the first corner is the lower one, and the next lies above it.
+        // Counted across, seen from the front: the dark squares in the corners lie on the left, and a row of
+        // six runs along them, with the nine rows to its right hand; so the first corner is the lower one,
+        // and the next lies above it.
         assert_eq!(both(9, 6, (6, 9)), (45, 36, Orientation::Fixed));
     }
 }

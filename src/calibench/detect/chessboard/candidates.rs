@@ -1,14 +1,17 @@
-//! Where might four squares meet? Places around which a level is bright, dark, bright, dark, with the directions of both edges.
+//! Where might four squares meet? Places around which a level is bright, dark, bright, dark, with the
+//! directions of both edges.
 //!
-//! Eight samples `f_k` on a circle of 3 px around every pixel of the smoothed level, as the ChESS detector (Bennett & Lasenby
-//! 2014) takes sixteen. Its second harmonic is large where two edges cross, at any angle between edges and rows:
-//! `R = C^2 + S^2 - E - M` with `C = f_0 - f_2 + f_4 - f_6`, `S = f_1 - f_3 + f_5 - f_7`. `E`, the squared differences of opposite
-//! samples, removes straight edges and the places where a board ends; `M`, 8 times the squared difference of circle and centre,
-//! removes lines and spots. Noise enters `C^2 + S^2` and `E` alike, so `R` has no bias from it.
+//! Eight samples `f_k` on a circle of 3 px around every pixel of the smoothed level, as the ChESS detector
+//! (Bennett & Lasenby 2014) takes sixteen. Its second harmonic is large where two edges cross, at any angle
+//! between edges and rows: `R = C^2 + S^2 - E - M` with `C = f_0 - f_2 + f_4 - f_6`, `S = f_1 - f_3 + f_5 -
+//! f_7`. `E`, the squared differences of opposite samples, removes straight edges and the places where a
+//! board ends; `M`, 8 times the squared difference of circle and centre, removes lines and spots. Noise
+//! enters `C^2 + S^2` and `E` alike, so `R` has no bias from it.
 //!
-//! At a maximum of `R` a quadric fitted to 5 x 5 samples gives the saddle point, and a circle of 32 samples the edges: opposite
-//! samples are averaged (a crossing looks the same after half a turn), and their mean must pass half-way between bright and dark
-//! exactly twice in half a turn. Nothing here depends on the contrast, only on its ratio to the noise.
+//! At a maximum of `R` a quadric fitted to 5 x 5 samples gives the saddle point, and a circle of 32 samples
+//! the edges: opposite samples are averaged (a crossing looks the same after half a turn), and their mean
+//! must pass half-way between bright and dark exactly twice in half a turn. Nothing here depends on the
+//! contrast, only on its ratio to the noise.
 
 use super::level::Smoothed;
 use crate::geometry::Vec2;
@@ -28,13 +31,16 @@ pub struct Candidate {
 /// Radius of the circle of eight, px; the four between the axes lie at 2.83 px.
 const CIRCLE_PX: usize = 3;
 
-/// Least `sqrt(R)` in standard deviations of the noise of `C`: pure noise exceeds it at one pixel in 500 at most.
+/// Least `sqrt(R)` in standard deviations of the noise of `C`: pure noise exceeds it at one pixel in 500 at
+/// most.
 const LEAST_IN_NOISE: f64 = 3.5;
 
-/// Least `sqrt(R)` as a fraction of the level's range, for images without noise: a contrast of 1/200 gives twice this.
+/// Least `sqrt(R)` as a fraction of the level's range, for images without noise: a contrast of 1/200 gives
+/// twice this.
 const LEAST_IN_RANGE: f64 = 0.005;
 
-/// Least `sqrt(R)` of a corner that stands out, as a fraction of the level's range: a contrast of a tenth has 0.15.
+/// Least `sqrt(R)` of a corner that stands out, as a fraction of the level's range: a contrast of a tenth has
+/// 0.15.
 const STRONG_IN_RANGE: f64 = 0.15;
 
 /// How much a corner must stand out to be a candidate.

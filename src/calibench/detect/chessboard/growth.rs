@@ -1,11 +1,13 @@
-//! Which corners are neighbours on the board? A lattice grown along the edges of its squares (after Geiger et al. 2012).
+//! Which corners are neighbours on the board? A lattice grown along the edges of its squares (after Geiger et
+//! al. 2012).
 //!
-//! From one corner to the next runs an edge that both have: dark on the same side all the way, and the corners' dark quadrants
-//! turn into each other's bright ones. A lattice starts where an edge leaves a corner in two directions and ends in such
-//! neighbours. Then every empty place beside it is predicted from the steps around it, in perspective along a line and parallel
-//! to the line beside it, so that it follows tilt, lens and bent paper, and takes the corner that is there, if its edges fit. A
-//! predicted place without a candidate is searched ([`probe`](super::probe)), which needs less contrast than finding a corner
-//! without knowing where.
+//! From one corner to the next runs an edge that both have: dark on the same side all the way, and the
+//! corners' dark quadrants turn into each other's bright ones. A lattice starts where an edge leaves a corner
+//! in two directions and ends in such neighbours. Then every empty place beside it is predicted from the
+//! steps around it, in perspective along a line and parallel to the line beside it, so that it follows tilt,
+//! lens and bent paper, and takes the corner that is there, if its edges fit. A predicted place without a
+//! candidate is searched ([`probe`](super::probe)), which needs less contrast than finding a corner without
+//! knowing where.
 
 use super::candidates::Candidate;
 use super::level::Smoothed;
@@ -19,8 +21,8 @@ use std::collections::BTreeMap;
 
 /// What was found in a level.
 pub struct Grown {
-    /// The largest lattice first. Its i runs along the first corner's first edge; turning from i to j as from u to v, it is dark
-    /// at places of even `i + j`.
+    /// The largest lattice first. Its i runs along the first corner's first edge; turning from i to j as from
+    /// u to v, it is dark at places of even `i + j`.
     pub lattices: Vec<Lattice>,
     /// The corners that the lattices count, px of the level.
     pub corners: Vec<Candidate>,
@@ -29,16 +31,19 @@ pub struct Grown {
 /// How far from its prediction a corner may lie, in steps. Half would be the next corner's territory.
 const SEARCH: f64 = 0.3;
 
-/// Least cosine between an edge's direction and the way to the neighbour: 25 degrees for directions measured on a circle of 3.5 px.
+/// Least cosine between an edge's direction and the way to the neighbour: 25 degrees for directions measured
+/// on a circle of 3.5 px.
 const LEAST_COSINE: f64 = 0.9;
 
-/// Nearest candidates among which a corner looks for its first neighbours: noise and texture may stand between.
+/// Nearest candidates among which a corner looks for its first neighbours: noise and texture may stand
+/// between.
 const NEAREST: usize = 20;
 
 /// A larger lattice is no board but a tiled wall, which need not be followed to its end.
 const MOST: usize = 4000;
 
-/// Least part of the board from which on empty places are searched: texture makes smaller lattices, not worth the time.
+/// Least part of the board from which on empty places are searched: texture makes smaller lattices, not worth
+/// the time.
 const LEAST_PART_TO_PROBE: f64 = 0.2;
 
 /// How often an empty place is searched: once more when the lattice around it has grown.
@@ -203,7 +208,8 @@ impl Growth<'_> {
             }
         }
         if count == 0.0 {
-            // The first corners: one neighbour along each edge, so the square's fourth corner has no line to follow.
+            // The first corners: one neighbour along each edge, so the square's fourth corner has no line to
+            // follow.
             let (di, dj) = DIRECTIONS.into_iter().find(|(di, dj)| self.at((i - di, j - dj)).is_some())?;
             let step = steps * Vec2::new(f64::from(di), f64::from(dj));
             return Some((self.at((i - di, j - dj))? + step, steps));
@@ -212,7 +218,8 @@ impl Growth<'_> {
         (at.amax().is_finite() && steps.determinant() > 0.0).then_some((at, steps))
     }
 
-    /// The step in a direction near a place: that between the nearest pair of corners which has the direction.
+    /// The step in a direction near a place: that between the nearest pair of corners which has the
+    /// direction.
     fn step(&self, (i, j): Place, (di, dj): Place) -> Option<Vec2> {
         for reach in 0..3i32 {
             let (mut sum, mut count) = (Vec2::zeros(), 0.0);
@@ -298,8 +305,8 @@ impl Growth<'_> {
     }
 }
 
-/// The step after a step. Equal steps on a line seen in perspective are `1 / ((1 + t c) (1 + (t + 1) c))` apart, so that with `u` the
-/// ratio of the last two the next is `(u + 1) / (3 u - 1)` times the last.
+/// The step after a step. Equal steps on a line seen in perspective are `1 / ((1 + t c) (1 + (t + 1) c))`
+/// apart, so that with `u` the ratio of the last two the next is `(u + 1) / (3 u - 1)` times the last.
 fn next_step(last: Vec2, before: Option<Vec2>) -> Vec2 {
     let Some(before) = before else { return last };
     let ratio = (before.norm() / last.norm()).clamp(0.7, 1.5);
@@ -313,8 +320,8 @@ const LEAST_EDGE: f64 = 0.3;
 /// Distance from an edge at which its two sides are compared, px of the level.
 const SIDE_PX: f64 = 2.0;
 
-/// Whether the way from one corner to the other has a dark side and a bright one that differ by `least`; `dark_after`: the dark side is
-/// where the way turns to as u turns to v.
+/// Whether the way from one corner to the other has a dark side and a bright one that differ by `least`;
+/// `dark_after`: the dark side is where the way turns to as u turns to v.
 fn is_edge(level: &Smoothed, from: &Vec2, to: &Vec2, dark_after: bool, least: f64) -> bool {
     let way = to - from;
     let length = way.norm();

@@ -1,8 +1,9 @@
-//! How does the board look at half the size, a quarter ...? A pyramid of images, and each smoothed for the search.
+//! How does the board look at half the size, a quarter ...? A pyramid of images, and each smoothed for the
+//! search.
 //!
-//! A pixel of a level is the mean of 2 x 2 pixels of the level below, which is what a sensor of larger pixels would see: a
-//! level is an image in its own right, with half the blur and half the noise. Pixel `(x, y)` of level `k` is centred on
-//! `(x + 1/2) 2^k - 1/2` of the photograph.
+//! A pixel of a level is the mean of 2 x 2 pixels of the level below, which is what a sensor of larger pixels
+//! would see: a level is an image in its own right, with half the blur and half the noise. Pixel `(x, y)` of
+//! level `k` is centred on `(x + 1/2) 2^k - 1/2` of the photograph.
 
 use crate::geometry::Vec2;
 use crate::raster::{Level, Raster};
@@ -184,15 +185,16 @@ fn greater(a: f32, b: f32) -> f32 {
 /// Samples that the noise is estimated from, about.
 const NOISE_SAMPLES: usize = 4000;
 
-/// Standard deviation of white noise: second differences along rows have a variance of `6 sigma^2`, and most of an image has no edge; the
-/// lower quartile of `|N|` is 0.3186 standard deviations.
+/// Standard deviation of white noise: second differences along rows have a variance of `6 sigma^2`, and most
+/// of an image has no edge; the lower quartile of `|N|` is 0.3186 standard deviations.
 fn noise<T: Level>(image: &Raster<T>) -> f64 {
     let (width, height) = (image.width(), image.height());
     if width < 3 {
         return 0.0;
     }
     let step = (width * height).div_ceil(NOISE_SAMPLES).max(1);
-    // Rows and columns in the same proportion; an odd stride along a row, so that no regular pattern is met in step.
+    // Rows and columns in the same proportion; an odd stride along a row, so that no regular pattern is met
+    // in step.
     let stride = (step as f64).sqrt() as usize | 1;
     let mut differences: Vec<f64> = Vec::with_capacity(2 * NOISE_SAMPLES);
     for y in (0..height).step_by(stride) {

@@ -1,4 +1,5 @@
-//! Which mark stands at this place of a growing lattice? A table of places, for a lattice is asked many times a mark.
+//! Which mark stands at this place of a growing lattice? A table of places, for a lattice is asked many times
+//! a mark.
 
 use crate::detect::lattice::{Lattice, Place};
 

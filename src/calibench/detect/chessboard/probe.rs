@@ -1,8 +1,10 @@
-//! Is there a corner where the lattice predicts one? The place at which the four quadrants differ most, if they differ as squares.
+//! Is there a corner where the lattice predicts one? The place at which the four quadrants differ most, if
+//! they differ as squares.
 //!
-//! The lattice tells the directions and lengths of the squares' sides, so each quadrant's level is a mean of four samples around
-//! the middle of its nearer half. Where a board ends, three quadrants have one level and the fourth another: then the darkest of the
-//! bright ones is no brighter than the brightest of the dark ones, and there is no corner.
+//! The lattice tells the directions and lengths of the squares' sides, so each quadrant's level is a mean of
+//! four samples around the middle of its nearer half. Where a board ends, three quadrants have one level and
+//! the fourth another: then the darkest of the bright ones is no brighter than the brightest of the dark
+//! ones, and there is no corner.
 
 use super::candidates::{Candidate, saddle_offset};
 use super::level::Smoothed;
@@ -15,7 +17,8 @@ const SAMPLES: [f64; 2] = [0.16, 0.34];
 /// Offsets that are tried along each step, in steps.
 const OFFSETS: [f64; 5] = [-0.2, -0.1, 0.0, 0.1, 0.2];
 
-/// Least difference between the darkest bright quadrant and the brightest dark one, as part of the mean difference.
+/// Least difference between the darkest bright quadrant and the brightest dark one, as part of the mean
+/// difference.
 const LEAST_SEPARATION: f64 = 0.5;
 
 /// Least difference in standard deviations of a quadrant's mean.

@@ -1,7 +1,8 @@
 //! Where exactly are the board's corners? Each fitted in a window that has the shape of its squares.
 //!
-//! Directions, window and curvature of the edges come from the corners beside. A corner found in a reduced image is fitted there
-//! first, where it is sharp and its place is near enough, then in the photograph itself.
+//! Directions, window and curvature of the edges come from the corners beside. A corner found in a reduced
+//! image is fitted there first, where it is sharp and its place is near enough, then in the photograph
+//! itself.
 
 use super::level::{Pyramid, level_from_photo, photo_from_level, scale};
 use super::smoothness::{expected, out_of_line};
@@ -10,10 +11,12 @@ use crate::detect::saddle::{Crossing, Window, fit_near_edges};
 use crate::geometry::Vec2;
 use crate::raster::{Level, Raster};
 
-/// Part of the distance to the next corner that a window reaches: beyond the middle, blur of the next edge comes in.
+/// Part of the distance to the next corner that a window reaches: beyond the middle, blur of the next edge
+/// comes in.
 const WINDOW_FRACTION: f64 = 0.42;
 
-/// Largest reach of a window, px: longer edges bring little that the curvature's own error does not take back.
+/// Largest reach of a window, px: longer edges bring little that the curvature's own error does not take
+/// back.
 const LARGEST_REACH_PX: f64 = 14.0;
 
 /// Largest reach in a reduced image, where the fit is only a start, px.
@@ -69,7 +72,8 @@ impl Corners<'_> {
     }
 }
 
-/// The step at the end of a line and its curvature: the direction is the chord's, turned by half the angle of the arc.
+/// The step at the end of a line and its curvature: the direction is the chord's, turned by half the angle of
+/// the arc.
 fn end_of_line(here: Vec2, next: Vec2, after: Option<Vec2>) -> (Vec2, f64) {
     let step = next - here;
     let Some(after) = after else { return (step, 0.0) };
@@ -79,14 +83,15 @@ fn end_of_line(here: Vec2, next: Vec2, after: Option<Vec2>) -> (Vec2, f64) {
     (step + Vec2::new(-step.y, step.x) * turn, bent)
 }
 
-/// The curvature of the arc through three places, positive where it turns as from u to v (Menger: `4 area / product of sides`).
+/// The curvature of the arc through three places, positive where it turns as from u to v (Menger: `4 area /
+/// product of sides`).
 fn curvature(a: &Vec2, b: &Vec2, c: &Vec2) -> f64 {
     let (ab, bc, ac) = (b - a, c - b, c - a);
     2.0 * ab.perp(&bc) / (ab.norm() * bc.norm() * ac.norm())
 }
 
-/// All corners of a board that was found in a level, fitted in the photograph; `None` where one has no fit or lies out of line.
-/// `starts_dark`: the square between the first row and column of corners is dark.
+/// All corners of a board that was found in a level, fitted in the photograph; `None` where one has no fit or
+/// lies out of line. `starts_dark`: the square between the first row and column of corners is dark.
 pub fn refined<T: Level>(
     photo: &Raster<T>,
     pyramid: &Pyramid<'_, T>,
@@ -123,7 +128,8 @@ pub fn refined<T: Level>(
     good.into_iter().collect()
 }
 
-/// Levels in which a corner is fitted that has no fit in the photograph: motion of twelve pixels is one of three there.
+/// Levels in which a corner is fitted that has no fit in the photograph: motion of twelve pixels is one of
+/// three there.
 const BLURRED_LEVELS: usize = 2;
 
 /// The fit of a corner in a reduced image, as a place of the photograph.
@@ -142,7 +148,8 @@ fn fit_in_level<T: Level>(
     Some(photo_from_level(&fit.corner, level))
 }
 
-/// Part of an edge's width in a reduced image that the photograph's is thought to have: pixels four times as large add to it.
+/// Part of an edge's width in a reduced image that the photograph's is thought to have: pixels four times as
+/// large add to it.
 const START_WIDTH: f64 = 0.8;
 
 /// The fits of a board's corners in one image.
@@ -154,7 +161,8 @@ struct Fitting<'a, T> {
 }
 
 impl<T: Level> Fitting<'_, T> {
-    /// Every fit; each starts from the widths of the one before, whose edges have the same blur and direction.
+    /// Every fit; each starts from the widths of the one before, whose edges have the same blur and
+    /// direction.
     fn all(&self, places: &[Vec2], edges_px: &[[f64; 2]]) -> Vec<Option<Crossing>> {
         let mut before = None;
         let mut fit = |index: usize| {

@@ -1,12 +1,15 @@
-//! Does a corner lie where the corners beside it put it? Rows and columns are smooth: perspective and lens change a step little by little.
+//! Does a corner lie where the corners beside it put it? Rows and columns are smooth: perspective and lens
+//! change a step little by little.
 //!
-//! A corner is compared with the polynomial through its neighbours on a line, of the highest degree that they allow. One that was fitted to
-//! another edge stands out along its row and along its column; a crease in the paper only along one of them, and stays.
+//! A corner is compared with the polynomial through its neighbours on a line, of the highest degree that they
+//! allow. One that was fitted to another edge stands out along its row and along its column; a crease in the
+//! paper only along one of them, and stays.
 
 use crate::geometry::Vec2;
 
-/// A polynomial's value at place 0 from its values at other places, and how far a corner may lie from it, in steps. The distances are twice
-/// what a board tilted by 70 degrees at close range shows, where a step is three quarters of the one before.
+/// A polynomial's value at place 0 from its values at other places, and how far a corner may lie from it, in
+/// steps. The distances are twice what a board tilted by 70 degrees at close range shows, where a step is
+/// three quarters of the one before.
 struct Rule {
     weights: &'static [(isize, f64)],
     tolerance: f64,
@@ -26,7 +29,8 @@ const RULES: [Rule; 7] = [
 /// Least tolerance, px: noise.
 const LEAST_TOLERANCE_PX: f64 = 1.0;
 
-/// Where the corners beside put a corner along a row (`axis` 0) or a column (1), and how far from it it may lie, px.
+/// Where the corners beside put a corner along a row (`axis` 0) or a column (1), and how far from it it may
+/// lie, px.
 fn expected_along(good: &[Option<Vec2>], columns: usize, index: usize, axis: usize) -> Option<(Vec2, f64)> {
     let rows = good.len() / columns;
     let (column, row) = ((index % columns) as isize, (index / columns) as isize);
@@ -54,7 +58,8 @@ fn expected_along(good: &[Option<Vec2>], columns: usize, index: usize, axis: usi
     })
 }
 
-/// Where the corners beside put a corner, by the surer of its row and its column, and how far from it it may lie, px.
+/// Where the corners beside put a corner, by the surer of its row and its column, and how far from it it may
+/// lie, px.
 pub fn expected(good: &[Option<Vec2>], columns: usize, index: usize) -> Option<(Vec2, f64)> {
     let along = [0, 1].map(|axis| expected_along(good, columns, index, axis));
     along.into_iter().flatten().min_by(|a, b| a.1.total_cmp(&b.1))
@@ -68,8 +73,8 @@ fn deviation(good: &[Option<Vec2>], columns: usize, index: usize) -> f64 {
     along.into_iter().flatten().reduce(f64::min).unwrap_or(0.0)
 }
 
-/// The corners that are missing, and those out of line, which are taken out: the worst first, for one shifts what is expected of its
-/// neighbours.
+/// The corners that are missing, and those out of line, which are taken out: the worst first, for one shifts
+/// what is expected of its neighbours.
 pub fn out_of_line(good: &mut [Option<Vec2>], columns: usize) -> Vec<usize> {
     loop {
         let worst = (0..good.len())

@@ -1,6 +1,7 @@
 //! This library's own JSON: `result.json` of a calibration, or no more than a camera.
 //!
-//! The centre of the first pixel is (0, 0); parameters stand under their names. `camera.schema.json` is its schema.
+//! The centre of the first pixel is (0, 0); parameters stand under their names. `camera.schema.json` is its
+//! schema.
 
 use super::super::result::{CameraFields, parse_camera};
 use super::camera_file::{CameraFile, Estimated};

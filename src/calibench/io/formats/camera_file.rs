@@ -54,9 +54,9 @@ impl CameraFile {
 
     /// The camera of the same image scaled to another size, edge to edge.
     ///
-    /// The image's edge lies at -1/2, so `u' = s (u + 1/2) - 1/2`, with `s` the ratio of the widths, and the same for v with the heights.
-    /// Focal lengths and skew take the factor of their axis; the lens, which acts on normalised coordinates, stays. `None` where the
-    /// size of the image is not known.
+    /// The image's edge lies at -1/2, so `u' = s (u + 1/2) - 1/2`, with `s` the ratio of the widths, and the
+    /// same for v with the heights. Focal lengths and skew take the factor of their axis; the lens, which
+    /// acts on normalised coordinates, stays. `None` where the size of the image is not known.
     pub fn resized(mut self, to: (usize, usize)) -> Option<CameraFile> {
         let from = self.image_size?;
         let (su, sv) = (to.0 as f64 / from.0 as f64, to.1 as f64 / from.1 as f64);

@@ -1,8 +1,8 @@
 //! COLMAP: `cameras.txt`, a line a camera: `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`.
 //!
-//! The upper left corner of the image is (0, 0) and the centre of its first pixel (0.5, 0.5). The coefficients of `OPENCV` and
-//! `FULL_OPENCV` are OpenCV's; `SIMPLE_RADIAL` and `RADIAL` have one focal length and k1, or k1 and k2. (COLMAP documentation, "Output
-//! Format"; `src/colmap/sensor/models.h`.)
+//! The upper left corner of the image is (0, 0) and the centre of its first pixel (0.5, 0.5). The
+//! coefficients of `OPENCV` and `FULL_OPENCV` are OpenCV's; `SIMPLE_RADIAL` and `RADIAL` have one focal
+//! length and k1, or k1 and k2. (COLMAP documentation, "Output Format"; `src/colmap/sensor/models.h`.)
 
 use super::camera_file::CameraFile;
 use super::decimal::decimals;

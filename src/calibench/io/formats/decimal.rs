@@ -1,9 +1,10 @@
-//! How is a number written so that every reader gets the same bits? By its shortest digits, with a point and a signed exponent.
+//! How is a number written so that every reader gets the same bits? By its shortest digits, with a point and
+//! a signed exponent.
 
 use std::fmt::Write;
 
-/// The shortest decimal that reads back as the same number. YAML 1.1, which PyYAML reads, takes `1e-9` for a word: a number has a point, and
-/// its exponent a sign.
+/// The shortest decimal that reads back as the same number. YAML 1.1, which PyYAML reads, takes `1e-9` for a
+/// word: a number has a point, and its exponent a sign.
 pub(super) fn decimal(number: f64) -> String {
     let text = format!("{number:?}");
     let Some((digits, exponent)) = text.split_once('e') else { return text };

@@ -1,10 +1,12 @@
-//! How near does one lens come to another of a different kind? A linear fit over the frame, and its largest error.
+//! How near does one lens come to another of a different kind? A linear fit over the frame, and its largest
+//! error.
 
 use crate::camera::{BrownConrady, Camera};
 use crate::geometry::Vec2;
 use nalgebra::{SMatrix, SVector};
 
-/// Nodes along each side of the frame, border included: a lens's polynomial of seventh order has no detail between them.
+/// Nodes along each side of the frame, border included: a lens's polynomial of seventh order has no detail
+/// between them.
 const NODES: usize = 33;
 
 /// Pixels spread over a frame, out to its edges.
@@ -13,8 +15,8 @@ pub(super) fn frame((width, height): (usize, usize)) -> impl Iterator<Item = Vec
     (0..NODES).flat_map(move |j| (0..NODES).map(move |i| Vec2::new(along(i, width), along(j, height))))
 }
 
-/// The polynomial of Brown and Conrady that takes the first point of each pair nearest to the second, in least squares; it is linear in its
-/// coefficients. `None` where the pairs do not determine it.
+/// The polynomial of Brown and Conrady that takes the first point of each pair nearest to the second, in
+/// least squares; it is linear in its coefficients. `None` where the pairs do not determine it.
 pub(super) fn polynomial(pairs: &[(Vec2, Vec2)]) -> Option<BrownConrady> {
     let mut normal = SMatrix::<f64, 5, 5>::zeros();
     let mut right = SVector::<f64, 5>::zeros();

@@ -1,4 +1,5 @@
-//! How are values in brackets read? Lists and maps of JSON, of YAML's flow style and of Python's literals, over as many lines as they take.
+//! How are values in brackets read? Lists and maps of JSON, of YAML's flow style and of Python's literals,
+//! over as many lines as they take.
 
 use super::error::FormatError;
 use super::node::{Budget, MOST_NAMES, Node, Source, Value, shortened};

@@ -1,15 +1,18 @@
-//! HALCON: the text of `write_cam_par`, up to HALCON 12, that describes itself: `Name:short: value;`, its type and bounds, its meaning.
+//! HALCON: the text of `write_cam_par`, up to HALCON 12, that describes itself: `Name:short: value;`, its
+//! type and bounds, its meaning.
 //!
-//! With `(u, v)` in metres on the image plane and the focal length `Focus`, `u = Focus X / Z`, column `= u~ / Sx + Cx`, row `= v~ / Sy + Cy`;
-//! the centre of the first pixel is (0, 0). The lens takes the seen point `(u~, v~)` to the ideal one, the other way round than here:
+//! With `(u, v)` in metres on the image plane and the focal length `Focus`, `u = Focus X / Z`, column `= u~ /
+//! Sx + Cx`, row `= v~ / Sy + Cy`; the centre of the first pixel is (0, 0). The lens takes the seen point
+//! `(u~, v~)` to the ideal one, the other way round than here:
 //!
 //! ```text
 //! division:    u = u~ / (1 + Kappa r^2)
 //! polynomial:  u = u~ (1 + K1 r^2 + K2 r^4 + K3 r^6) + P1 (r^2 + 2 u~^2) + 2 P2 u~ v~      r^2 = u~^2 + v~^2
 //!              v = v~ (1 + K1 r^2 + K2 r^4 + K3 r^6) + 2 P1 u~ v~ + P2 (r^2 + 2 v~^2)
 //! ```
-//! So only a lens without distortion has an equal here; any other is refused, or on request fitted over the frame, with the largest error
-//! said. (MVTec HALCON operator reference, `read_cam_par`, "Calibration", "2D Transformations".)
+//! So only a lens without distortion has an equal here; any other is refused, or on request fitted over the
+//! frame, with the largest error said. (MVTec HALCON operator reference, `read_cam_par`, "Calibration", "2D
+//! Transformations".)
 
 use super::camera_file::CameraFile;
 use super::decimal::decimal;

@@ -1,8 +1,9 @@
 //! Kalibr: `camchain.yaml` with a camera or several, and the YAML of a target.
 //!
-//! `intrinsics` of the model `pinhole` are `[fu, fv, pu, pv]`, `distortion_coeffs` of `radtan` `[k1, k2, r1, r2]`, which are OpenCV's first
-//! four; the centre of the first pixel is (0, 0), since marks come from OpenCV's detectors. `T_cn_cnm1` takes coordinates of the camera before
-//! to those of this one. (Kalibr wiki, "yaml formats", "Supported models", "Calibration targets".)
+//! `intrinsics` of the model `pinhole` are `[fu, fv, pu, pv]`, `distortion_coeffs` of `radtan` `[k1, k2, r1,
+//! r2]`, which are OpenCV's first four; the centre of the first pixel is (0, 0), since marks come from
+//! OpenCV's detectors. `T_cn_cnm1` takes coordinates of the camera before to those of this one. (Kalibr wiki,
+//! "yaml formats", "Supported models", "Calibration targets".)
 
 use super::camera_file::CameraFile;
 use super::decimal::{decimal, decimals};

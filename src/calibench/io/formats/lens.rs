@@ -1,7 +1,8 @@
 //! In which order do the coefficients of a lens stand? OpenCV's, which ROS, Kalibr, mrcal and COLMAP share.
 //!
-//! `k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tau_x tau_y]]]]`, in the equations of [`BrownConrady`]: OpenCV documentation, "Camera
-//! Calibration and 3D Reconstruction"; mrcal documentation, "Lens models", `LENSMODEL_OPENCV`.
+//! `k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tau_x tau_y]]]]`, in the equations of [`BrownConrady`]: OpenCV
+//! documentation, "Camera Calibration and 3D Reconstruction"; mrcal documentation, "Lens models",
+//! `LENSMODEL_OPENCV`.
 
 use super::error::FormatError;
 use super::node::Source;

@@ -1,9 +1,10 @@
 //! MATLAB: `jsonencode(toStruct(params))` of a `cameraParameters` or `cameraIntrinsics` object.
 //!
-//! MATLAB counts pixels from 1: the centre of the first pixel is (1, 1), and a principal point is 1 px more than in OpenCV (MathWorks,
-//! `cameraIntrinsicsToOpenCV`). `ImageSize` is rows, columns. `K` is `[[fx, s, cx], [0, fy, cy], [0, 0, 1]]`; its older form
-//! `IntrinsicMatrix` is the transpose. `RadialDistortion` is `[k1 k2]` or `[k1 k2 k3]`, `TangentialDistortion` `[p1 p2]`, in the equations of
-//! OpenCV. (MathWorks, `cameraParameters`, `cameraIntrinsics`.) Skew is in pixels, as here.
+//! MATLAB counts pixels from 1: the centre of the first pixel is (1, 1), and a principal point is 1 px more
+//! than in OpenCV (MathWorks, `cameraIntrinsicsToOpenCV`). `ImageSize` is rows, columns. `K` is `[[fx, s,
+//! cx], [0, fy, cy], [0, 0, 1]]`; its older form `IntrinsicMatrix` is the transpose. `RadialDistortion` is
+//! `[k1 k2]` or `[k1 k2 k3]`, `TangentialDistortion` `[p1 p2]`, in the equations of OpenCV. (MathWorks,
+//! `cameraParameters`, `cameraIntrinsics`.) Skew is in pixels, as here.
 
 use super::camera_file::CameraFile;
 use super::decimal::decimals;

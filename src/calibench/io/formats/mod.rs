@@ -1,8 +1,9 @@
-//! Which files of other programs are read and written? Cameras in ten formats, corners and boards in those of mrcal and Kalibr.
+//! Which files of other programs are read and written? Cameras in ten formats, corners and boards in those of
+//! mrcal and Kalibr.
 //!
-//! A format is a file here: how its text becomes a [`CameraFile`] and back. What all of them share is done in one place, [`read_camera_file`]
-//! and [`write_camera_file`]: the origin of the pixels is moved, and what a format cannot hold is refused, if this would be another camera
-//! without it, or else named.
+//! A format is a file here: how its text becomes a [`CameraFile`] and back. What all of them share is done in
+//! one place, [`read_camera_file`] and [`write_camera_file`]: the origin of the pixels is moved, and what a
+//! format cannot hold is refused, if this would be another camera without it, or else named.
 
 mod calibench;
 mod camera_file;
@@ -94,7 +95,8 @@ pub struct Wishes {
     pub fit: bool,
     /// Height of a pixel, m: HALCON states focal lengths in metres.
     pub pixel_height_m: f64,
-    /// Both coordinates of the first pixel's centre in the file that is read, where its program did not keep to the format's.
+    /// Both coordinates of the first pixel's centre in the file that is read, where its program did not keep
+    /// to the format's.
     pub first_pixel: Option<f64>,
 }
 
@@ -227,7 +229,8 @@ fn chosen(file: &str, mut cameras: Vec<Found>, wanted: Option<&str>) -> Result<C
 /// Writes a camera in a format.
 ///
 /// # Errors
-/// [`FormatError::CannotHold`] where the format's file would be another camera, or would lack what every such file has.
+/// [`FormatError::CannotHold`] where the format's file would be another camera, or would lack what every such
+/// file has.
 pub fn write_camera_file(
     format: &Format,
     camera: &CameraFile,
@@ -257,8 +260,8 @@ pub fn write_camera_file(
     Ok(written)
 }
 
-/// Largest distance between the pixels of a written file's camera and those of the camera it was written from, px, for rays through the
-/// whole frame; `None` where the image's size is not known.
+/// Largest distance between the pixels of a written file's camera and those of the camera it was written
+/// from, px, for rays through the whole frame; `None` where the image's size is not known.
 ///
 /// # Errors
 /// What keeps the written file from being read: a fault of this library.

@@ -1,8 +1,9 @@
-//! mrcal: `.cameramodel`, a literal of Python with the lens's name, its numbers, the camera's place and the image's size.
+//! mrcal: `.cameramodel`, a literal of Python with the lens's name, its numbers, the camera's place and the
+//! image's size.
 //!
-//! `intrinsics` are `fx, fy, cx, cy` and the lens in OpenCV's order; the centre of the first pixel is (0, 0); `extrinsics` is a rotation
-//! vector (rad) and a translation that take reference to camera coordinates, `rt_cam_ref`. (mrcal documentation, "Camera model
-//! representation", "Lens models", "Conventions".)
+//! `intrinsics` are `fx, fy, cx, cy` and the lens in OpenCV's order; the centre of the first pixel is (0, 0);
+//! `extrinsics` is a rotation vector (rad) and a translation that take reference to camera coordinates,
+//! `rt_cam_ref`. (mrcal documentation, "Camera model representation", "Lens models", "Conventions".)
 
 use super::camera_file::CameraFile;
 use super::decimal::decimals;

@@ -1,4 +1,5 @@
-//! What do the formats have in common? A tree of named values, each with its place in the text, so that every complaint says where.
+//! What do the formats have in common? A tree of named values, each with its place in the text, so that every
+//! complaint says where.
 
 use super::error::FormatError;
 use crate::geometry::Mat3;

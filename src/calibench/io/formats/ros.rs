@@ -1,8 +1,10 @@
-//! ROS: the YAML of `camera_calibration_parsers`, and what `rostopic echo` prints of a `sensor_msgs/CameraInfo`.
+//! ROS: the YAML of `camera_calibration_parsers`, and what `rostopic echo` prints of a
+//! `sensor_msgs/CameraInfo`.
 //!
-//! `K = [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]`; `D` is in OpenCV's order, five numbers for `plumb_bob`, eight for `rational_polynomial`; the
-//! centre of the first pixel is (0, 0), as in OpenCV, by which `image_geometry` projects. Files are written for a single camera: `R` is the
-//! identity and `P` is `K`. (sensor_msgs/CameraInfo documentation; REP 104.)
+//! `K = [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]`; `D` is in OpenCV's order, five numbers for `plumb_bob`, eight
+//! for `rational_polynomial`; the centre of the first pixel is (0, 0), as in OpenCV, by which
+//! `image_geometry` projects. Files are written for a single camera: `R` is the identity and `P` is `K`.
+//! (sensor_msgs/CameraInfo documentation; REP 104.)
 
 use super::camera_file::CameraFile;
 use super::decimal::decimals;

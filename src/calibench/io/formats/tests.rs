@@ -1,4 +1,5 @@
-//! Do the readers see the camera that other programs wrote, and does it survive every way between two formats?
+//! Do the readers see the camera that other programs wrote, and does it survive every way between two
+//! formats?
 
 use super::*;
 use crate::camera::BrownConrady;

@@ -1,7 +1,8 @@
 //! mrcal's corners: `corners.vnl`, a line an observed corner: `filename x y level`.
 //!
-//! Corners of an image stand row by row, x fastest, every one of the board's; one that was not found has `-` or a negative level. The centre
-//! of the first pixel is (0, 0). The board is not in the file. (mrcal documentation, "Formulation", `mrcal.observations_from_vnl`; vnlog.)
+//! Corners of an image stand row by row, x fastest, every one of the board's; one that was not found has `-`
+//! or a negative level. The centre of the first pixel is (0, 0). The board is not in the file. (mrcal
+//! documentation, "Formulation", `mrcal.observations_from_vnl`; vnlog.)
 
 use super::super::corners::CornerFile;
 use super::super::table::MOST_ROWS;
@@ -125,7 +126,8 @@ impl Image {
     }
 }
 
-/// A corner may lie this part of the spacing beside its place on the grid: decimals of a file, not another board.
+/// A corner may lie this part of the spacing beside its place on the grid: decimals of a file, not another
+/// board.
 const OFF_GRID: f64 = 1e-6;
 
 /// Writes corners that are those of a board, `-` where one was not found.

@@ -1,4 +1,5 @@
-//! How is the XML of OpenCV's FileStorage read? Elements with elements or words inside; what the elements are is known by their names.
+//! How is the XML of OpenCV's FileStorage read? Elements with elements or words inside; what the elements are
+//! is known by their names.
 
 use super::error::FormatError;
 use super::flow::refuse_second;

@@ -1,7 +1,8 @@
 //! How is the YAML of camera files read? Maps and lists by their indent, and values in brackets.
 //!
-//! The part of YAML that OpenCV's FileStorage, ROS, Kalibr and PyYAML write. OpenCV's header `%YAML:1.0` and `key:value` within braces are
-//! no YAML to most readers; anchors, aliases, blocks of text (`|`, `>`) and words over several lines are refused.
+//! The part of YAML that OpenCV's FileStorage, ROS, Kalibr and PyYAML write. OpenCV's header `%YAML:1.0` and
+//! `key:value` within braces are no YAML to most readers; anchors, aliases, blocks of text (`|`, `>`) and
+//! words over several lines are refused.
 
 use super::error::FormatError;
 use super::flow::{self, refuse_second};

@@ -1,7 +1,9 @@
-//! What does a blurred pixel see of a region? The region's area weighted by a Gaussian convolved with the pixel's square.
+//! What does a blurred pixel see of a region? The region's area weighted by a Gaussian convolved with the
+//! pixel's square.
 //!
-//! The weight is separable, `k(x - i) k(y - j)` with `k = Gauss(sigma) * box(1)`. By Green's theorem its integral over a
-//! region is the contour integral `oint P(x - i) k(y - j) dy` with `P` the antiderivative of `k`:
+//! The weight is separable, `k(x - i) k(y - j)` with `k = Gauss(sigma) * box(1)`. By Green's theorem its
+//! integral over a region is the contour integral `oint P(x - i) k(y - j) dy` with `P` the antiderivative of
+//! `k`:
 //!
 //! ```text
 //! k(x) = Phi((x + 1/2) / sigma) - Phi((x - 1/2) / sigma)
@@ -33,8 +35,8 @@ impl Kernel {
         Kernel { sigma_px, reach_px: REACH * sigma_px + 0.5 }
     }
 
-    /// Arcs short enough for the quadrature: over a chord of sigma/2 three Gauss points integrate the Gaussian to 1e-8, and
-    /// slivers of 1e-5 px^2 leave the arc within 1e-8 px of its parabola.
+    /// Arcs short enough for the quadrature: over a chord of sigma/2 three Gauss points integrate the
+    /// Gaussian to 1e-8, and slivers of 1e-5 px^2 leave the arc within 1e-8 px of its parabola.
     pub fn steps(&self) -> Steps {
         Steps { sliver: 1e-5, chord_px: 0.5 * self.sigma_px }
     }
@@ -50,8 +52,8 @@ impl Kernel {
         }
     }
 
-    /// Adds a step `dy` at a point: pixel `(i, j)` gains `(1 - P(x - i)) k(y - j) dy`, which is zero far left of the point
-    /// and constant far right of it, so only the differences between columns are stored.
+    /// Adds a step `dy` at a point: pixel `(i, j)` gains `(1 - P(x - i)) k(y - j) dy`, which is zero far left
+    /// of the point and constant far right of it, so only the differences between columns are stored.
     fn add_node(&self, coverage: &mut Coverage, at: Vec2, dy: f64) {
         let first_row = libm::ceil(at.y - self.reach_px).max(0.0);
         let last_row = libm::floor(at.y + self.reach_px).min(coverage.height() as f64 - 1.0);

@@ -1,8 +1,8 @@
 //! How much of each pixel does a region cover? Signed areas summed along its outline.
 //!
-//! A step `dy` of the outline covers everything to its right; steps up and down cancel outside the region. Each step
-//! enters as a difference along its row, so that one running sum at the end gives every pixel's coverage. (The scheme of
-//! area-coverage font rasterisers, here with curved edges.)
+//! A step `dy` of the outline covers everything to its right; steps up and down cancel outside the region.
+//! Each step enters as a difference along its row, so that one running sum at the end gives every pixel's
+//! coverage. (The scheme of area-coverage font rasterisers, here with curved edges.)
 
 use super::outline::Arc;
 use crate::geometry::Vec2;
@@ -31,8 +31,8 @@ impl Coverage {
         self.height
     }
 
-    /// Changes the coverage of pixel `(column, row)` and all to its right by `area`. Left of the image counts as its first
-    /// column; right of it nothing changes.
+    /// Changes the coverage of pixel `(column, row)` and all to its right by `area`. Left of the image counts
+    /// as its first column; right of it nothing changes.
     pub fn step(&mut self, column: i64, row: usize, area: f64) {
         let column = column.max(0) as usize;
         if column < self.width {
@@ -50,7 +50,8 @@ impl Coverage {
         }
     }
 
-    /// Credits a sliver to the pixel at its place. A step covers what is right of it, `-oint x dy`, hence the sign.
+    /// Credits a sliver to the pixel at its place. A step covers what is right of it, `-oint x dy`, hence the
+    /// sign.
     fn add_sliver(&mut self, at: Vec2, sliver: f64) {
         let (column, row) = (libm::floor(at.x + 0.5), libm::floor(at.y + 0.5));
         if row >= 0.0 && row < self.height as f64 && column >= 0.0 && column < self.width as f64 {
@@ -80,7 +81,8 @@ impl Coverage {
         }
     }
 
-    /// Adds a step of height `dy` that runs between two abscissae within one row, cut at the borders of columns.
+    /// Adds a step of height `dy` that runs between two abscissae within one row, cut at the borders of
+    /// columns.
     fn add_in_row(&mut self, row: usize, x0: f64, x1: f64, dy: f64) {
         let (left, right) = (x0.min(x1), x0.max(x1));
         let (low, high) = (left.clamp(0.0, self.width as f64), right.clamp(0.0, self.width as f64));
@@ -103,7 +105,8 @@ impl Coverage {
         }
     }
 
-    /// Adds a step of height `dy` inside one pixel, at mean abscissa `x`: of the pixel, the part right of it is covered.
+    /// Adds a step of height `dy` inside one pixel, at mean abscissa `x`: of the pixel, the part right of it
+    /// is covered.
     fn add_in_cell(&mut self, row: usize, column: i64, x: f64, dy: f64) {
         let left_part = x - column as f64;
         self.step(column, row, dy * (1.0 - left_part));
@@ -148,8 +151,8 @@ mod tests {
         coverage
     }
 
-    /// Area of the disc of radius `r` about the origin left of `x` and below `y` (both signed), from the circle's
-    /// antiderivative: an independent closed form.
+    /// Area of the disc of radius `r` about the origin left of `x` and below `y` (both signed), from the
+    /// circle's antiderivative: an independent closed form.
     fn quadrant_area(x: f64, y: f64, r: f64) -> f64 {
         let segment = |t: f64| {
             let t = t.clamp(-r, r);

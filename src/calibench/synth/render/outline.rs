@@ -1,4 +1,5 @@
-//! Where does the edge of a mark run in the image? Smooth pieces of outline, cut into arcs that are nearly straight.
+//! Where does the edge of a mark run in the image? Smooth pieces of outline, cut into arcs that are nearly
+//! straight.
 
 use crate::geometry::Vec2;
 
@@ -33,7 +34,8 @@ impl Piece {
         }
     }
 
-    /// Parts into which the piece is cut before its curvature is looked at, so that no turn hides between samples.
+    /// Parts into which the piece is cut before its curvature is looked at, so that no turn hides between
+    /// samples.
     pub fn start_parts(&self) -> usize {
         match self {
             Piece::Circle { .. } => 16,
@@ -76,8 +78,8 @@ pub struct Arc {
 }
 
 impl Arc {
-    /// Signed area between the arc and its chord, `2/3 (middle - from) x (to - from)`, exact for a parabola (Archimedes):
-    /// what the chord lacks of `1/2 oint (x dy - y dx)`.
+    /// Signed area between the arc and its chord, `2/3 (middle - from) x (to - from)`, exact for a parabola
+    /// (Archimedes): what the chord lacks of `1/2 oint (x dy - y dx)`.
     pub fn sliver(&self) -> f64 {
         let (a, b) = (self.middle - self.from, self.to - self.from);
         (a.x * b.y - a.y * b.x) * (2.0 / 3.0)
@@ -94,9 +96,9 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// An arc enters the sharp image as two chords plus the two slivers between chord and arc, each an eighth of the arc's
-    /// own. A sliver that straddles pixels is credited to one of them; 8e-7 / 8 = 1e-7 bounds that error, and an outline
-    /// passes a pixel's border only a few times.
+    /// An arc enters the sharp image as two chords plus the two slivers between chord and arc, each an eighth
+    /// of the arc's own. A sliver that straddles pixels is credited to one of them; 8e-7 / 8 = 1e-7 bounds
+    /// that error, and an outline passes a pixel's border only a few times.
     pub const SHARP: Steps = Steps { sliver: 8e-7, chord_px: f64::INFINITY };
 }
 

@@ -3,11 +3,11 @@
 use crate::raster::Raster;
 use crate::synth::Stream;
 
-/// A smooth gain over the image: `1 + slope_x x + slope_y y + falloff (x^2 + y^2)`, with `x, y` running from -1 to 1 over
-/// the longer side of the image and 0 at its centre.
+/// A smooth gain over the image: `1 + slope_x x + slope_y y + falloff (x^2 + y^2)`, with `x, y` running from
+/// -1 to 1 over the longer side of the image and 0 at its centre.
 ///
-/// The gain is a property of the pixel, taken at its centre: over one pixel it changes by about `2 slope / width`, which an
-/// illumination across the board would do too.
+/// The gain is a property of the pixel, taken at its centre: over one pixel it changes by about `2 slope /
+/// width`, which an illumination across the board would do too.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Shading {
     /// Change of the gain from the centre to the right edge.
@@ -33,9 +33,11 @@ impl Shading {
     }
 }
 
-/// The linear sensor model of EMVA 1288: a sample of intensity `L` has variance `L / full_well + (read / full_well)^2`.
+/// The linear sensor model of EMVA 1288: a sample of intensity `L` has variance `L / full_well + (read /
+/// full_well)^2`.
 ///
-/// Photon noise is drawn from the normal distribution of equal variance; at 100 electrons its skewness is 0.1.
+/// Photon noise is drawn from the normal distribution of equal variance; at 100 electrons its skewness is
+/// 0.1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensorNoise {
     /// Electrons at intensity 1; infinite for no photon noise. Positive.
