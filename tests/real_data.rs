@@ -3,9 +3,11 @@
 //! Expected values: `published.toml` of the data folder. Ignored where the folder is absent.
 
 use crate::data;
-use calibench::calibrate::{Calibration, Settings, calibrate, closed_form};
-use calibench::camera::FreeParameters;
-use calibench::geometry::Homography;
+use calibench::calibrate::{
+    Board, Calibration, LensCalibration, Settings, calibrate, calibrate_lens, closed_form,
+};
+use calibench::camera::{Camera, FreeParameters, Lens, Model, Parameter};
+use calibench::geometry::{Homography, Vec3};
 use calibench::io::{CornerFile, read_corners};
 use std::path::PathBuf;
 
@@ -127,4 +129,53 @@ fn the_matlab_toolboxs_camera_is_found() {
     let rms = published.numbers("calib1", "rms_axis_px");
     assert_relative(unbiased.x, rms[0], 1e-6, "rms u");
     assert_relative(unbiased.y, rms[1], 1e-6, "rms v");
+}
+
+/// mrcal's names in the order of OpenCV: fx fy cx cy, then the rational model's coefficients.
+fn rational(numbers: &[f64]) -> Camera<Lens> {
+    let lens = Lens::new(Model::Rational, &numbers[4..]).unwrap();
+    Camera::with_lens(numbers[0], numbers[1], numbers[2], numbers[3], lens)
+}
+
+/// The largest distance, px, of where two cameras see the marks of a calibration, each mark at its own ray of the
+/// other camera: k1 with k4, k2 with k5 and k3 with k6 nearly trade off, pixels do not.
+fn apart(found: &LensCalibration, other: &Camera<Lens>, corners: &CornerFile) -> f64 {
+    let mut largest = 0.0_f64;
+    for (view, pose) in corners.views.iter().zip(&found.cam_from_target) {
+        for point in view.points() {
+            let seen = pose.apply(&Vec3::new(point.x, point.y, 0.0));
+            largest = largest.max((found.camera.pixel(&seen).unwrap() - other.pixel(&seen).unwrap()).norm());
+        }
+    }
+    largest
+}
+
+#[test]
+#[cfg_attr(not(calibench_data), ignore = "needs the measurements of others: CONTRIBUTING.md, real data")]
+fn mrcals_ultra_wide_camera_and_its_bowed_board_are_found() {
+    let published = Published::load();
+    let corners = published.corners("overpass/points.csv");
+    let of_model = Settings::of_model(Model::Rational).with_image_size((6016, 4016));
+    let bowed = Board::Bowed { standard_deviation: f64::INFINITY };
+    for (board, camera, rms) in [
+        (Board::Flat, "flat_board", "flat_board_rms_point_weighted_px"),
+        (bowed, "bowed_board", "bowed_board_rms_point_weighted_px"),
+    ] {
+        let found = calibrate_lens(&corners.views, &of_model.clone().with_board(board)).unwrap();
+        let theirs = rational(&published.numbers("overpass", camera));
+        assert_relative(found.rmse_px, published.number("overpass", rms), 1e-7, rms);
+        for parameter in [Parameter::Fx, Parameter::Fy] {
+            let (ours, theirs) = (found.camera.value(parameter).unwrap(), theirs.value(parameter).unwrap());
+            assert_relative(ours, theirs, 1e-6, parameter.name());
+        }
+        let apart = apart(&found, &theirs, &corners);
+        assert!(apart < 0.002, "{camera}: {apart} px");
+        if let Some(shape) = found.board {
+            let bow = published.numbers("overpass", "bow_m");
+            for (k, ours) in [shape.bow_x, shape.bow_y].into_iter().enumerate() {
+                let z = (ours - bow[k]) / shape.standard_deviations[k];
+                assert!(z.abs() < 0.1, "bow {k}: {z} standard deviations");
+            }
+        }
+    }
 }

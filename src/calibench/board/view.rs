@@ -19,6 +19,7 @@ use crate::geometry::Vec2;
 pub struct View {
     points: Vec<Vec2>,
     pixels: Vec<Vec2>,
+    weights: Option<Vec<f64>>,
 }
 
 /// Why correspondences cannot be used.
@@ -47,6 +48,22 @@ pub enum ViewError {
         /// Pixel v.
         v: f64,
     },
+    /// Marks and weights do not pair up.
+    #[error("{marks} marks but {weights} weights: every mark needs its weight")]
+    Weights {
+        /// Number of marks.
+        marks: usize,
+        /// Number of weights.
+        weights: usize,
+    },
+    /// A weight that says nothing.
+    #[error("point {index} has weight {weight}: a weight is positive; leave the mark out instead")]
+    BadWeight {
+        /// Position in the list.
+        index: usize,
+        /// The weight.
+        weight: f64,
+    },
 }
 
 impl View {
@@ -60,7 +77,28 @@ impl View {
                 return Err(ViewError::NotFinite { index, x: point.x, y: point.y, u: pixel.x, v: pixel.y });
             }
         }
-        Ok(View { points, pixels })
+        Ok(View { points, pixels, weights: None })
+    }
+
+    /// Gives every mark a weight by which its residual is multiplied: 1 over its standard deviation, in units of
+    /// that of a mark of weight 1.
+    ///
+    /// # Errors
+    /// Not a weight a mark, or one that is not positive and finite.
+    pub fn with_weights(mut self, weights: Vec<f64>) -> Result<View, ViewError> {
+        if weights.len() != self.len() {
+            return Err(ViewError::Weights { marks: self.len(), weights: weights.len() });
+        }
+        if let Some(index) = weights.iter().position(|w| !(*w > 0.0 && w.is_finite())) {
+            return Err(ViewError::BadWeight { index, weight: weights[index] });
+        }
+        self.weights = Some(weights);
+        Ok(self)
+    }
+
+    /// The marks' weights; `None` if all are 1.
+    pub fn weights(&self) -> Option<&[f64]> {
+        self.weights.as_deref()
     }
 
     /// Target points, in the target's unit.

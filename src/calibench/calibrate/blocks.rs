@@ -4,27 +4,28 @@ use crate::camera::Parameter;
 use crate::geometry::lanes::LANES;
 use nalgebra::{SMatrix, SVector};
 
-/// Room for every intrinsic parameter and the gradient, in whole lanes; rows beyond the free ones stay 0.
+/// Room for every intrinsic parameter of a camera with Brown-Conrady's lens and the gradient, in whole lanes; rows
+/// beyond the free ones stay 0. The blocks of other lenses are `W` wide.
 pub(super) const N: usize = (Parameter::COUNT + 1).next_multiple_of(LANES);
 
-pub(super) type Intrinsics = SMatrix<f64, N, N>;
+pub(super) type Intrinsics<const W: usize = N> = SMatrix<f64, W, W>;
 pub(super) type PoseBlock = SMatrix<f64, 6, 6>;
-pub(super) type Coupling = SMatrix<f64, N, 6>;
+pub(super) type Coupling<const W: usize = N> = SMatrix<f64, W, 6>;
 
 /// What one view contributes.
 #[derive(Debug, Clone)]
-pub(super) struct ViewBlock {
+pub(super) struct ViewBlock<const W: usize = N> {
     /// `B`, intrinsics x pose.
-    pub coupling: Coupling,
+    pub coupling: Coupling<W>,
     /// `C`.
     pub pose: PoseBlock,
     /// Gradient of the pose.
     pub gradient: SVector<f64, 6>,
 }
 
-impl ViewBlock {
+impl<const W: usize> ViewBlock<W> {
     /// A view that says nothing.
-    pub(super) fn zero() -> ViewBlock {
+    pub(super) fn zero() -> ViewBlock<W> {
         ViewBlock { coupling: SMatrix::zeros(), pose: SMatrix::zeros(), gradient: SVector::zeros() }
     }
 

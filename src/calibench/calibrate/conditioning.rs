@@ -1,7 +1,6 @@
 //! Which combination of parameters do the data say least about?
 
 use super::Unknown;
-use super::blocks::N;
 use super::elimination::Eliminated;
 use super::system::{Reduction, System};
 use nalgebra::{DMatrix, DVector, SVector};
@@ -39,7 +38,7 @@ const SINGULAR: f64 = 1e-12;
 /// Members of the weakest combination below this share of the largest one are not worth a name.
 const NAMED_SHARE: f64 = 0.2;
 
-impl System {
+impl<const W: usize> System<W> {
     /// How well these equations separate the intrinsics; `None` if nothing is free or a pose is undetermined.
     pub fn conditioning(&self) -> Option<Conditioning> {
         Conditioning::of(self, &self.reduction()?)
@@ -53,8 +52,8 @@ impl Conditioning {
     }
 
     /// Analyses normal equations and their reduction; `None` if nothing is free.
-    pub(super) fn of(system: &System, reduction: &Reduction) -> Option<Conditioning> {
-        let n = system.free.len();
+    pub(super) fn of<const W: usize>(system: &System<W>, reduction: &Reduction<W>) -> Option<Conditioning> {
+        let n = system.shared;
         if n == 0 {
             return None;
         }
@@ -76,13 +75,13 @@ impl Conditioning {
     }
 }
 
-fn named(
-    system: &System,
-    eliminated: &[Eliminated],
+fn named<const W: usize>(
+    system: &System<W>,
+    eliminated: &[Eliminated<W>],
     direction: &DVector<f64>,
     scale: &DVector<f64>,
 ) -> Vec<WeakComponent> {
-    let mut step = SVector::<f64, N>::zeros();
+    let mut step = SVector::<f64, W>::zeros();
     for (i, d) in direction.iter().enumerate() {
         step[i] = d * scale[i];
     }
@@ -105,11 +104,15 @@ fn named(
 /// How far the poses follow an intrinsics step, `-C^-1 B^T d`, in units in which each component alone has
 /// unit information: root mean square over the views of tilt (x, y), roll (z), lateral position (x, y),
 /// distance (z).
-fn pose_response(system: &System, eliminated: &[Eliminated], step: &SVector<f64, N>) -> [f64; 4] {
+fn pose_response<const W: usize>(
+    system: &System<W>,
+    eliminated: &[Eliminated<W>],
+    step: &SVector<f64, W>,
+) -> [f64; 4] {
     let mut squares = [0.0; 4];
     let total: f64 = system.views.len() as f64;
     for (view, factors) in system.views.iter().zip(eliminated) {
-        let moved = factors.response(step, system.free.len());
+        let moved = factors.response(step, system.shared);
         for i in 0..6 {
             let group = [0, 0, 1, 2, 2, 3][i];
             squares[group] += moved[i] * moved[i] * view.pose[(i, i)] / total;

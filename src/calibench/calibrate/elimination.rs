@@ -5,29 +5,26 @@ use super::blocks::{Coupling, Intrinsics, N, PoseBlock, ViewBlock};
 use crate::geometry::lanes::{Kernel, LANES, Lanes, dispatch};
 use nalgebra::{DMatrix, MatrixXx6, SVector};
 
-/// Vectors of lanes in a row.
-const VECTORS: usize = N / LANES;
-
 /// A view's Cholesky factor and whitened coupling.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Eliminated {
+#[derive(Debug, Clone)]
+pub(super) struct Eliminated<const W: usize = N> {
     /// `L`, lower triangle, with the inverse of its diagonal in place of the diagonal.
     factor: [[f64; 6]; 6],
     /// `W = L^-1 B^T`, and `z = L^-1 g` in column n.
-    whitened: [[f64; N]; 6],
+    whitened: [[f64; W]; 6],
 }
 
 /// `S` (upper triangle) with the right-hand side `g_a - sum W_i^T z_i` in column n.
 #[derive(Debug, Clone)]
-pub(super) struct Reduced {
-    rows: [[f64; N]; N],
-    right: [f64; N],
+pub(super) struct Reduced<const W: usize = N> {
+    rows: [[f64; W]; W],
+    right: [f64; W],
 }
 
-impl Reduced {
+impl<const W: usize> Reduced<W> {
     /// The intrinsics' own part.
-    pub fn of(intrinsics: &Intrinsics, gradient: &SVector<f64, N>, damping: f64) -> Reduced {
-        let mut rows = [[0.0; N]; N];
+    pub fn of(intrinsics: &Intrinsics<W>, gradient: &SVector<f64, W>, damping: f64) -> Reduced<W> {
+        let mut rows = [[0.0; W]; W];
         for (i, row) in rows.iter_mut().enumerate() {
             for (j, entry) in row.iter_mut().enumerate().skip(i) {
                 *entry = intrinsics[(i, j)];
@@ -38,7 +35,7 @@ impl Reduced {
     }
 
     /// Less the share of some views.
-    pub fn less(mut self, share: &[[f64; N]; N], n: usize) -> Reduced {
+    pub fn less(mut self, share: &[[f64; W]; W], n: usize) -> Reduced<W> {
         for (i, row) in share.iter().enumerate().take(n) {
             for (entry, part) in self.rows[i].iter_mut().zip(row).take(n).skip(i) {
                 *entry -= part;
@@ -54,15 +51,15 @@ impl Reduced {
     }
 
     /// `-S^-1 right`, 0 beyond `n`; `None` if `S` is not positive definite.
-    pub fn solve(&self, n: usize) -> Option<SVector<f64, N>> {
-        let mut lower = [[0.0; N]; N];
+    pub fn solve(&self, n: usize) -> Option<SVector<f64, W>> {
+        let mut lower = [[0.0; W]; W];
         for (i, row) in lower.iter_mut().enumerate().take(n) {
             for (j, entry) in row.iter_mut().enumerate().take(i + 1) {
                 *entry = self.rows[j][i];
             }
         }
         factor_in_place(&mut lower, n)?;
-        let mut x = [0.0; N];
+        let mut x = [0.0; W];
         for i in 0..n {
             let known: f64 = (0..i).map(|k| lower[i][k] * x[k]).sum();
             x[i] = (-self.right[i] - known) * lower[i][i];
@@ -102,33 +99,47 @@ fn factor_in_place<const K: usize>(lower: &mut [[f64; K]; K], n: usize) -> Optio
 
 /// Eliminates the poses of `views`; returns `sum W^T [W z]`, of which the upper triangle is filled. `None`
 /// where a block is not positive definite.
-pub(super) fn eliminate(
-    views: &[ViewBlock],
-    eliminated: &mut [Eliminated],
+pub(super) fn eliminate<const W: usize>(
+    views: &[ViewBlock<W>],
+    eliminated: &mut [Eliminated<W>],
     damping: f64,
     n: usize,
-) -> Option<[[f64; N]; N]> {
-    if n < 2 * LANES {
-        dispatch(Eliminate::<2> { views, eliminated, damping, n })
-    } else {
-        dispatch(Eliminate::<VECTORS> { views, eliminated, damping, n })
+) -> Option<[[f64; W]; W]> {
+    match vectors::<W>(n) {
+        2 => dispatch(Eliminate::<W, 2> { views, eliminated, damping, n }),
+        3 => dispatch(Eliminate::<W, 3> { views, eliminated, damping, n }),
+        4 => dispatch(Eliminate::<W, 4> { views, eliminated, damping, n }),
+        _ => dispatch(Eliminate::<W, 6> { views, eliminated, damping, n }),
+    }
+}
+
+/// Vectors of lanes that `n` numbers and one more fill: 2, 3, 4 or 6, and no more than a row has.
+#[inline(always)]
+fn vectors<const W: usize>(n: usize) -> usize {
+    debug_assert!(n < W);
+    match n / LANES {
+        0 | 1 => 2,
+        2 => 3,
+        _ if W <= 3 * LANES => 3,
+        3 => 4,
+        _ => 6,
     }
 }
 
 /// Works on the first `V` vectors of every row; `n < 4 V`.
-struct Eliminate<'a, const V: usize> {
-    views: &'a [ViewBlock],
-    eliminated: &'a mut [Eliminated],
+struct Eliminate<'a, const W: usize, const V: usize> {
+    views: &'a [ViewBlock<W>],
+    eliminated: &'a mut [Eliminated<W>],
     damping: f64,
     n: usize,
 }
 
-impl<const V: usize> Kernel for Eliminate<'_, V> {
-    type Output = Option<[[f64; N]; N]>;
+impl<const W: usize, const V: usize> Kernel for Eliminate<'_, W, V> {
+    type Output = Option<[[f64; W]; W]>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Option<[[f64; N]; N]> {
-        let mut squares = [[L::zero(); V]; N];
+    fn run<L: Lanes>(self) -> Option<[[f64; W]; W]> {
+        let mut squares = [[L::zero(); V]; W];
         for (view, out) in self.views.iter().zip(self.eliminated) {
             let mut lower = [[0.0; 6]; 6];
             for (i, row) in lower.iter_mut().enumerate() {
@@ -140,7 +151,7 @@ impl<const V: usize> Kernel for Eliminate<'_, V> {
             factor_in_place(&mut lower, 6)?;
             let mut w = [[L::zero(); V]; 6];
             for i in 0..6 {
-                w[i] = row_of::<L, V>(&view.coupling, view.gradient[i], i, self.n);
+                w[i] = row_of::<L, W, V>(&view.coupling, view.gradient[i], i, self.n);
                 for k in 0..i {
                     let factor = L::splat(lower[i][k]);
                     for v in 0..V {
@@ -163,7 +174,7 @@ impl<const V: usize> Kernel for Eliminate<'_, V> {
                 }
             }
         }
-        let mut sums = [[0.0; N]; N];
+        let mut sums = [[0.0; W]; W];
         for (row, target) in squares.iter().zip(&mut sums) {
             for (v, &lanes) in row.iter().enumerate() {
                 store(target, v, lanes);
@@ -175,28 +186,39 @@ impl<const V: usize> Kernel for Eliminate<'_, V> {
 
 /// Column `i` of the coupling as a row, with the gradient in column `n`.
 #[inline(always)]
-fn row_of<L: Lanes, const V: usize>(coupling: &Coupling, gradient: f64, i: usize, n: usize) -> [L; V] {
-    let mut row = [0.0; N];
-    row.copy_from_slice(&coupling.as_slice()[i * N..(i + 1) * N]);
+fn row_of<L: Lanes, const W: usize, const V: usize>(
+    coupling: &Coupling<W>,
+    gradient: f64,
+    i: usize,
+    n: usize,
+) -> [L; V] {
+    let mut row = [0.0; W];
+    row.copy_from_slice(&coupling.as_slice()[i * W..(i + 1) * W]);
     row[n] = gradient;
     std::array::from_fn(|v| load(&row, v))
 }
 
 /// Vector `v` of a row.
 #[inline(always)]
-fn load<L: Lanes>(row: &[f64; N], v: usize) -> L {
+fn load<L: Lanes, const W: usize>(row: &[f64; W], v: usize) -> L {
     let at = v * LANES;
     L::load(&[row[at], row[at + 1], row[at + 2], row[at + 3]])
 }
 
 #[inline(always)]
-fn store<L: Lanes>(row: &mut [f64; N], v: usize, lanes: L) {
+fn store<L: Lanes, const W: usize>(row: &mut [f64; W], v: usize, lanes: L) {
     row[v * LANES..(v + 1) * LANES].copy_from_slice(&lanes.store());
 }
 
-impl Eliminated {
+impl<const W: usize> Default for Eliminated<W> {
+    fn default() -> Eliminated<W> {
+        Eliminated { factor: [[0.0; 6]; 6], whitened: [[0.0; W]; 6] }
+    }
+}
+
+impl<const W: usize> Eliminated<W> {
     /// `-L^-T (z + W d_a)`.
-    pub fn pose_step(&self, intrinsics: &SVector<f64, N>, n: usize) -> SVector<f64, 6> {
+    pub fn pose_step(&self, intrinsics: &SVector<f64, W>, n: usize) -> SVector<f64, 6> {
         let mut rest = [0.0; 6];
         for (r, row) in rest.iter_mut().zip(&self.whitened) {
             *r = -row[n];
@@ -208,7 +230,7 @@ impl Eliminated {
     }
 
     /// `C^-1 B^T a = L^-T W a`: how far the pose follows an intrinsics step, with the opposite sign.
-    pub fn response(&self, intrinsics: &SVector<f64, N>, n: usize) -> SVector<f64, 6> {
+    pub fn response(&self, intrinsics: &SVector<f64, W>, n: usize) -> SVector<f64, 6> {
         let along = self
             .whitened
             .map(|row| row.iter().zip(intrinsics.iter()).take(n).map(|(w, d)| w * d).sum::<f64>());
@@ -216,8 +238,8 @@ impl Eliminated {
     }
 
     /// `W^T y` for a whitened vector, `n` entries: the intrinsics' share of it.
-    pub fn coupled(&self, y: &[f64; 6], n: usize) -> [f64; N] {
-        let mut sum = [0.0; N];
+    pub fn coupled(&self, y: &[f64; 6], n: usize) -> [f64; W] {
+        let mut sum = [0.0; W];
         for (row, y) in self.whitened.iter().zip(y) {
             for (sum, w) in sum.iter_mut().zip(row).take(n) {
                 *sum += w * y;
@@ -251,25 +273,26 @@ impl Eliminated {
 
     /// Covariance of the pose, `C^-1 + Y P Y^T` with `Y = C^-1 B^T` and `P` that of the intrinsics, and
     /// theirs with it, `-P Y^T`.
-    pub fn covariance(&self, intrinsics: &Intrinsics, n: usize) -> (PoseBlock, MatrixXx6<f64>) {
-        let (pose, minus_cross) = if n < 2 * LANES {
-            dispatch(PoseCovariance::<2> { view: self, intrinsics })
-        } else {
-            dispatch(PoseCovariance::<VECTORS> { view: self, intrinsics })
+    pub fn covariance(&self, intrinsics: &Intrinsics<W>, n: usize) -> (PoseBlock, MatrixXx6<f64>) {
+        let (pose, minus_cross) = match vectors::<W>(n) {
+            2 => dispatch(PoseCovariance::<W, 2> { view: self, intrinsics }),
+            3 => dispatch(PoseCovariance::<W, 3> { view: self, intrinsics }),
+            4 => dispatch(PoseCovariance::<W, 4> { view: self, intrinsics }),
+            _ => dispatch(PoseCovariance::<W, 6> { view: self, intrinsics }),
         };
         let pose = PoseBlock::from_fn(|i, j| 0.5 * (pose[i][j] + pose[j][i]));
         (pose, MatrixXx6::from_fn(n, |i, j| -minus_cross[j][i]))
     }
 }
 
-struct PoseCovariance<'a, const V: usize> {
-    view: &'a Eliminated,
-    intrinsics: &'a Intrinsics,
+struct PoseCovariance<'a, const W: usize, const V: usize> {
+    view: &'a Eliminated<W>,
+    intrinsics: &'a Intrinsics<W>,
 }
 
-impl<const V: usize> Kernel for PoseCovariance<'_, V> {
+impl<const W: usize, const V: usize> Kernel for PoseCovariance<'_, W, V> {
     /// Pose block, and `Y P` row by row; entries beyond those asked for mean nothing.
-    type Output = ([[f64; 2 * LANES]; 6], [[f64; N]; 6]);
+    type Output = ([[f64; 2 * LANES]; 6], [[f64; W]; 6]);
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
@@ -278,7 +301,7 @@ impl<const V: usize> Kernel for PoseCovariance<'_, V> {
         let mut y: [[L; V]; 6] =
             std::array::from_fn(|i| std::array::from_fn(|v| load(&self.view.whitened[i], v)));
         solve_rows_transposed(factor, &mut y);
-        let mut y_rows = [[0.0; N]; 6];
+        let mut y_rows = [[0.0; W]; 6];
         for (row, target) in y.iter().zip(&mut y_rows) {
             for (v, &lanes) in row.iter().enumerate() {
                 store(target, v, lanes);
@@ -289,7 +312,7 @@ impl<const V: usize> Kernel for PoseCovariance<'_, V> {
         let columns = self.intrinsics.as_slice();
         for k in 0..V * LANES {
             let at: [L; V] = std::array::from_fn(|v| {
-                let first = k * N + v * LANES;
+                let first = k * W + v * LANES;
                 L::load(&[columns[first], columns[first + 1], columns[first + 2], columns[first + 3]])
             });
             for i in 0..6 {
@@ -299,7 +322,7 @@ impl<const V: usize> Kernel for PoseCovariance<'_, V> {
                 }
             }
         }
-        let mut minus_cross = [[0.0; N]; 6];
+        let mut minus_cross = [[0.0; W]; 6];
         for (row, target) in product.iter().zip(&mut minus_cross) {
             for (v, &lanes) in row.iter().enumerate() {
                 store(target, v, lanes);

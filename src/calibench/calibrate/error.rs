@@ -1,8 +1,12 @@
 //! Why can no camera be estimated from these data?
 
 use super::{ClosedFormError, Unknown, unknown};
-use crate::camera::Parameter;
+use crate::camera::{Model, Parameter};
 use crate::geometry::HomographyError;
+
+fn coefficients(model: Model) -> String {
+    model.coefficients().iter().map(|p| p.name()).collect::<Vec<_>>().join(" ")
+}
 
 /// A calibration that is refused. Every variant carries the numbers and says what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -58,6 +62,26 @@ pub enum CalibrationError {
         parameter: Parameter,
         /// The value.
         value: f64,
+    },
+    /// A parameter that the lens model does not have.
+    #[error("the {model} model has no {parameter}: its coefficients are {}", coefficients(*model))]
+    NotOfModel {
+        /// Which.
+        parameter: Parameter,
+        /// The model.
+        model: Model,
+    },
+    /// What only one estimator knows was asked of the other.
+    #[error("{what} is known to `calibrate_lens` only: call that")]
+    OfAnyLens {
+        /// Another lens model, marks of unequal weight, a board that is not flat.
+        what: &'static str,
+    },
+    /// A standard deviation that no board has.
+    #[error("a board's bow cannot be known to {standard_deviation}: a standard deviation is positive")]
+    BadBoard {
+        /// The standard deviation.
+        standard_deviation: f64,
     },
     /// Focal lengths cannot be tied in this ratio.
     #[error("fy cannot be {ratio} times fx: a ratio is a positive number")]
@@ -120,6 +144,15 @@ pub enum CalibrationError {
         inseparable: Vec<Unknown>,
         /// What in the data makes it so.
         why: String,
+    },
+    /// No start lets the lens see every mark.
+    #[error(
+        "no starting values: no {model} lens was found that sees every mark; a lens beyond 90 degrees from the axis needs a fisheye model \
+         (kannala-brandt, double-sphere)"
+    )]
+    NoImage {
+        /// The model.
+        model: Model,
     },
     /// No start put every point in front of the camera.
     #[error(

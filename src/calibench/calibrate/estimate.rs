@@ -13,11 +13,11 @@ use super::start::Held;
 use super::system::System;
 use super::target_frame::TargetFrames;
 use super::{
-    Calibration, CalibrationError, Loss, Prior, Settings, Termination, Unknown, Warning, chunks,
+    Board, Calibration, CalibrationError, Loss, Prior, Role, Settings, Termination, Unknown, Warning, chunks,
     identifiability, kernel, polish, start, strays, structure, warnings,
 };
 use crate::board::View;
-use crate::camera::Parameter;
+use crate::camera::{Model, Parameter};
 use crate::geometry::{Homography, Vec2};
 
 /// Homographies of the start are refined until a step promises less than this part of their cost: distortion,
@@ -140,11 +140,10 @@ fn estimate(views: &[View], settings: &Settings) -> Result<(Calibration, f64), C
 
 fn check_counts(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
     use Parameter::*;
-    if !settings.loss.is_valid() {
-        return Err(CalibrationError::BadLoss);
-    }
+    check_loss_and_priors(settings)?;
+    refuse_other_lenses(views, settings)?;
+    check_model(settings)?;
     let free = settings.free();
-    check_priors(settings)?;
     let is_known = |p| settings.priors().any(|prior| prior.parameter == p);
     let linear = [Fx, Fy, Cx, Cy, Skew].into_iter().filter(|&p| free.contains(p) && !is_known(p)).count();
     let most = if is_distorting(settings)? { 2 } else { usize::MAX };
@@ -160,7 +159,36 @@ fn check_counts(views: &[View], settings: &Settings) -> Result<(), CalibrationEr
     Ok(())
 }
 
-fn check_priors(settings: &Settings) -> Result<(), CalibrationError> {
+/// What [`super::calibrate_lens`] is for.
+fn refuse_other_lenses(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
+    let what = if settings.model() != Model::BrownConrady {
+        "a lens model other than brown-conrady"
+    } else if views.iter().any(|view| view.weights().is_some()) {
+        "the weight of a mark"
+    } else if settings.board != Board::Flat {
+        "a board that is not flat"
+    } else {
+        return Ok(());
+    };
+    Err(CalibrationError::OfAnyLens { what })
+}
+
+/// Refuses a role for a parameter that the model does not have.
+pub(super) fn check_model(settings: &Settings) -> Result<(), CalibrationError> {
+    let model = settings.model();
+    let is_foreign = |p: &Parameter| !model.parameters().any(|own| own == *p);
+    let mut told = Parameter::OF_ALL_MODELS.into_iter().filter(|&p| settings.role(p) != Role::Default);
+    match told.find(is_foreign) {
+        Some(parameter) => Err(CalibrationError::NotOfModel { parameter, model }),
+        None => Ok(()),
+    }
+}
+
+/// A loss with a scale, priors that a camera may have.
+pub(super) fn check_loss_and_priors(settings: &Settings) -> Result<(), CalibrationError> {
+    if !settings.loss.is_valid() {
+        return Err(CalibrationError::BadLoss);
+    }
     let is_possible = |prior: &Prior| {
         let is_focal = matches!(prior.parameter, Parameter::Fx | Parameter::Fy);
         let (mean, sd) = (prior.mean, prior.standard_deviation);
@@ -283,6 +311,7 @@ fn report(
         starts,
         iterations: minimum.iterations,
         warnings: Vec::new(),
+        board: None,
         residuals,
     };
     calibration.warnings = warnings::of(&calibration, largest_radius, of_residuals, &skewed, rival, twins);
@@ -377,7 +406,7 @@ impl Fit {
 ///
 /// The weighted normal matrix is `sum w J^T J`; with `mean w` it stands for `mean w J^T J`, so the sandwich
 /// `sum w^2 r^2 / (mean psi')^2 (J^T J)^-1` is `sum w^2 r^2 mean w / (mean psi')^2` times its inverse.
-fn noise_variance(residuals: &[Vec<Vec2>], square: f64, loss: Loss, freedom: f64) -> f64 {
+pub(super) fn noise_variance(residuals: &[Vec<Vec2>], square: f64, loss: Loss, freedom: f64) -> f64 {
     if loss == Loss::Squares {
         return square / freedom;
     }

@@ -2,6 +2,7 @@
 
 use super::Loss;
 use super::Termination;
+use super::blocks::N;
 use super::normal::{self, Observations};
 use super::prior::Priors;
 use super::retraction::Retraction;
@@ -37,10 +38,10 @@ pub(super) struct Problem<'a> {
 }
 
 /// A minimum, or where the search ended.
-pub(super) struct Minimum {
-    pub state: State,
+pub(super) struct Minimum<S = State, const W: usize = N> {
+    pub state: S,
     /// Normal equations one last negligible step before `state`.
-    pub system: System,
+    pub system: System<W>,
     pub termination: Termination,
     pub iterations: usize,
 }
@@ -76,6 +77,11 @@ pub(super) fn rounding_cost(observations: &[Observations]) -> f64 {
 }
 
 impl Problem<'_> {
+    /// The minimum that a start leads to.
+    pub fn minimise(&self, start: State) -> Minimum {
+        descend(self, start)
+    }
+
     /// Normal equations at a state; an infinite cost where a point is not in front of the camera.
     pub fn linearise_into(&self, state: &State, system: &mut System) {
         let State { camera, cam_from_target } = state;
@@ -95,68 +101,128 @@ impl Problem<'_> {
             system.cost = f64::INFINITY;
         }
     }
+}
 
-    fn has_run_away(&self, camera: &Camera) -> bool {
-        let (shortest, longest) = self.focal_limits;
-        camera.fx.min(camera.fy) < shortest || camera.fx.max(camera.fy) > longest
+impl Descent<N> for Problem<'_> {
+    type State = State;
+
+    fn system(&self) -> System {
+        System::new(self.free, self.observations.len())
     }
 
-    /// Levenberg-Marquardt (Levenberg 1944; Marquardt 1963) with damping `lambda diag(J^T J)`.
-    pub fn minimise(&self, start: State) -> Minimum {
-        let rounding_cost = self.rounding_cost;
-        let views = self.observations.len();
-        let mut state = start;
-        let mut system = System::new(self.free, views);
-        let mut trial_system = System::new(self.free, views);
-        let mut step = Step::default();
-        let mut trial = state.clone();
-        let mut damping = FIRST_DAMPING;
-        let mut growth = FIRST_GROWTH;
-        let mut iterations = 0;
-        self.linearise_into(&state, &mut system);
-        let termination = loop {
-            if iterations == self.max_iterations {
-                break Termination::IterationLimit;
-            }
-            if damping > LARGEST_DAMPING || !system.cost.is_finite() {
+    fn linearise_into(&self, state: &State, system: &mut System) {
+        Problem::linearise_into(self, state, system);
+    }
+
+    fn step(&self, from: &State, step: &Step, to: &mut State) {
+        self.retraction.apply(from, self.free, self.fy_per_fx, step, to);
+    }
+
+    fn is_curved(&self) -> bool {
+        self.retraction == Retraction::Curved
+    }
+
+    fn has_run_away(&self, state: &State) -> bool {
+        let (shortest, longest) = self.focal_limits;
+        state.camera.fx.min(state.camera.fy) < shortest || state.camera.fx.max(state.camera.fy) > longest
+    }
+
+    fn max_iterations(&self) -> usize {
+        self.max_iterations
+    }
+
+    fn rounding_cost(&self) -> f64 {
+        self.rounding_cost
+    }
+}
+
+/// What is to be made least: sums of squares whose normal equations are an arrow `W` wide.
+pub(super) trait Descent<const W: usize> {
+    /// The unknowns.
+    type State: Clone;
+
+    /// An empty system of the right size.
+    fn system(&self) -> System<W>;
+
+    /// Normal equations at a state; an infinite cost where the model has no image of a point.
+    fn linearise_into(&self, state: &Self::State, system: &mut System<W>);
+
+    /// Moves `from` by a step.
+    fn step(&self, from: &Self::State, step: &Step<W>, to: &mut Self::State);
+
+    /// Whether steps follow a curve.
+    fn is_curved(&self) -> bool {
+        false
+    }
+
+    /// Whether the search has left all that is possible.
+    fn has_run_away(&self, _: &Self::State) -> bool {
+        false
+    }
+
+    fn max_iterations(&self) -> usize;
+
+    /// Below this a cost is rounding.
+    fn rounding_cost(&self) -> f64;
+}
+
+/// Levenberg-Marquardt (Levenberg 1944; Marquardt 1963) with damping `lambda diag(J^T J)`.
+pub(super) fn descend<D: Descent<W>, const W: usize>(problem: &D, start: D::State) -> Minimum<D::State, W> {
+    let rounding_cost = problem.rounding_cost();
+    let max_iterations = problem.max_iterations();
+    let mut state = start;
+    let mut system = problem.system();
+    let mut trial_system = problem.system();
+    let mut step = Step::default();
+    let mut trial = state.clone();
+    let mut damping = FIRST_DAMPING;
+    let mut growth = FIRST_GROWTH;
+    let mut iterations = 0;
+    problem.linearise_into(&state, &mut system);
+    let termination = loop {
+        if iterations == max_iterations {
+            break Termination::IterationLimit;
+        }
+        if damping > LARGEST_DAMPING || !system.cost.is_finite() {
+            break Termination::Stalled;
+        }
+        if system.solve_into(damping, &mut step).is_none() {
+            damping *= DAMPING_FACTOR;
+            continue;
+        }
+        problem.step(&state, &step, &mut trial);
+        let undamped = damping <= FIRST_DAMPING;
+        if undamped && step.predicted_gain <= RELATIVE_GAIN * system.cost + rounding_cost {
+            std::mem::swap(&mut state, &mut trial);
+            break Termination::Converged;
+        }
+        iterations += 1;
+        problem.linearise_into(&trial, &mut trial_system);
+        if trial_system.cost < system.cost {
+            let gained = system.cost - trial_system.cost;
+            std::mem::swap(&mut state, &mut trial);
+            std::mem::swap(&mut system, &mut trial_system);
+            let lowered = if problem.is_curved() {
+                damping * eased(gained / step.predicted_gain)
+            } else {
+                damping / DAMPING_FACTOR
+            };
+            damping = lowered.max(FIRST_DAMPING / 1e6);
+            growth = FIRST_GROWTH;
+            if problem.has_run_away(&state) {
                 break Termination::Stalled;
             }
-            if system.solve_into(damping, &mut step).is_none() {
-                damping *= DAMPING_FACTOR;
-                continue;
-            }
-            self.retraction.apply(&state, self.free, self.fy_per_fx, &step, &mut trial);
-            let undamped = damping <= FIRST_DAMPING;
-            if undamped && step.predicted_gain <= RELATIVE_GAIN * system.cost + rounding_cost {
-                std::mem::swap(&mut state, &mut trial);
-                break Termination::Converged;
-            }
-            iterations += 1;
-            self.linearise_into(&trial, &mut trial_system);
-            if trial_system.cost < system.cost {
-                let gained = system.cost - trial_system.cost;
-                std::mem::swap(&mut state, &mut trial);
-                std::mem::swap(&mut system, &mut trial_system);
-                damping = match self.retraction {
-                    Retraction::Straight => damping / DAMPING_FACTOR,
-                    Retraction::Curved => damping * eased(gained / step.predicted_gain),
-                }
-                .max(FIRST_DAMPING / 1e6);
-                growth = FIRST_GROWTH;
-                if self.has_run_away(&state.camera) {
-                    break Termination::Stalled;
-                }
-            } else if step.predicted_gain <= ROUNDINGS * f64::EPSILON * system.cost + rounding_cost {
-                // The promised gain is below what the sum of squares can show.
-                break Termination::Converged;
+        } else if step.predicted_gain <= ROUNDINGS * f64::EPSILON * system.cost + rounding_cost {
+            // The promised gain is below what the sum of squares can show.
+            break Termination::Converged;
+        } else {
+            damping = if problem.is_curved() {
+                damping.max(FIRST_DAMPING / 1e6) * growth
             } else {
-                damping = match self.retraction {
-                    Retraction::Straight => damping.max(FIRST_DAMPING) * DAMPING_FACTOR,
-                    Retraction::Curved => damping.max(FIRST_DAMPING / 1e6) * growth,
-                };
-                growth *= FIRST_GROWTH;
-            }
-        };
-        Minimum { state, system, termination, iterations }
-    }
+                damping.max(FIRST_DAMPING) * DAMPING_FACTOR
+            };
+            growth *= FIRST_GROWTH;
+        }
+    };
+    Minimum { state, system, termination, iterations }
 }

@@ -3,6 +3,7 @@
 //!
 //! [`calibrate`] is the whole way; the steps stand in files of their own. Truth never enters here.
 
+mod any_lens;
 mod blocks;
 mod certificate;
 mod chance;
@@ -42,6 +43,7 @@ mod unknown;
 mod walk;
 mod warnings;
 
+pub use any_lens::{BoardShape, LensCalibration, calibrate_lens};
 pub use certificate::Certificate;
 pub use closed_form::{ClosedFormError, closed_form, pose_from_homography};
 pub use conditioning::{Conditioning, WeakComponent};
@@ -53,7 +55,7 @@ pub use loss::Loss;
 pub use normal::information;
 pub use prior::Prior;
 pub use report::{Calibration, Warning};
-pub use settings::{Role, Settings};
+pub use settings::{Board, Role, Settings};
 pub use system::System;
 pub use termination::Termination;
 pub use unknown::Unknown;

@@ -1,7 +1,7 @@
 //! What does a calibration say? The estimate, how sure it is, how it fits, and what to be careful about.
 
-use super::{Certificate, Conditioning, Covariance, Prior, ProfileInterval, Termination};
-use crate::camera::{Camera, FreeParameters, Parameter};
+use super::{BoardShape, Certificate, Conditioning, Covariance, Prior, ProfileInterval, Termination};
+use crate::camera::{BrownConrady, Camera, FreeParameters, Parameter};
 use crate::geometry::{Pose, Vec2};
 use std::fmt;
 
@@ -9,9 +9,9 @@ use std::fmt;
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
-pub struct Calibration {
+pub struct Calibration<L = BrownConrady> {
     /// The estimate; parameters that were not free have the values they were held at.
-    pub camera: Camera,
+    pub camera: Camera<L>,
     /// What was estimated. An fy that is tied to fx (`covariance.fy_per_fx`) follows and is not counted.
     pub free: FreeParameters,
     /// What was known of them beforehand; it counts in the estimate and in the covariance.
@@ -48,6 +48,8 @@ pub struct Calibration {
     pub iterations: usize,
     /// What to be careful about.
     pub warnings: Vec<Warning>,
+    /// The shape of the board, where it was estimated.
+    pub board: Option<BoardShape>,
 }
 
 /// Something a user should know before trusting the numbers.
@@ -181,6 +183,13 @@ pub enum Warning {
         /// Largest radius of an observed point.
         largest_observed: f64,
     },
+    /// The lens model folds back within the view.
+    FoldsInsideView {
+        /// Angle from the axis, degrees, beyond which the model is not one-to-one.
+        monotone_angle: f64,
+        /// Largest angle of an observed point, degrees.
+        largest_observed: f64,
+    },
     /// The pixels and what was known beforehand do not go together: one of the two is wrong.
     Contradicted {
         /// Of which parameter.
@@ -299,6 +308,11 @@ impl fmt::Display for Warning {
                 "{parameter} is known to {:.0} % only: tilt the target more, about different axes",
                 100.0 * relative
             ),
+            Warning::FoldsInsideView { monotone_angle, largest_observed } => write!(
+                f,
+                "the lens model folds back {monotone_angle:.1} degrees from the axis, and points were seen out to {largest_observed:.1} \
+                 degrees: do not use it near or beyond that angle; free fewer coefficients or take another model"
+            ),
             Warning::FoldsInsideImage { monotone_radius, largest_observed } => write!(
                 f,
                 "the lens model folds back at normalised radius {monotone_radius:.3}, and points were seen out to \
@@ -320,7 +334,7 @@ impl fmt::Display for Warning {
     }
 }
 
-impl Calibration {
+impl<L> Calibration<L> {
     /// Whether the estimate is a minimum whose RMSE lies no more than a quarter above its floor: beyond that
     /// it is another minimum than the right one, or a model that has little to do with the data.
     pub fn is_usable(&self) -> bool {

@@ -1,7 +1,7 @@
 //! What may the estimator change, and from where does it start?
 
 use super::{CalibrationError, Loss, Prior};
-use crate::camera::{Camera, FreeParameters, Parameter};
+use crate::camera::{Camera, FreeParameters, Lens, Model, Parameter};
 
 /// What becomes of one parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -26,6 +26,51 @@ pub enum Role {
     },
 }
 
+/// What is estimated of a board that is not flat.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bend {
+    /// Two bows, or with a twist three numbers.
+    pub deformations: usize,
+    /// Standard deviation of each beforehand, in the target's unit; infinite where nothing is known.
+    pub standard_deviation: f64,
+}
+
+impl Board {
+    /// What is to be estimated of it.
+    pub(super) fn bend(self) -> Option<Bend> {
+        match self {
+            Board::Flat => None,
+            Board::Bowed { standard_deviation } => Some(Bend { deformations: 2, standard_deviation }),
+            Board::Bent { standard_deviation } => Some(Bend { deformations: 3, standard_deviation }),
+        }
+    }
+}
+
+/// How flat the board is taken to be.
+///
+/// A board that is not flat has its marks at the height `a (1 - x^2) + b (1 - y^2) + c x y` over its plane, `x` and
+/// `y` from -1 to 1 over all marks: a bow along x, a bow along y, and a twist. The same board is seen in all views.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
+pub enum Board {
+    /// Exactly.
+    #[default]
+    Flat,
+    /// Two bows are estimated, each known beforehand to be 0 with this standard deviation; infinite where nothing
+    /// is known.
+    Bowed {
+        /// Of each, in the target's unit.
+        standard_deviation: f64,
+    },
+    /// Two bows and a twist likewise.
+    Bent {
+        /// Of each, in the target's unit.
+        standard_deviation: f64,
+    },
+}
+
 /// What to estimate and how: a builder.
 ///
 /// Every parameter has one [`Role`] and the last word on it wins, so that nothing can be held and estimated
@@ -43,7 +88,11 @@ pub enum Role {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Settings {
     #[cfg_attr(feature = "serde", serde(with = "by_name"))]
-    roles: [Role; Parameter::COUNT],
+    roles: [Role; Parameter::OF_ALL_MODELS.len()],
+    /// The lens model: the parameters that it has.
+    model: Model,
+    /// How flat the board is.
+    pub board: Board,
     /// fy over fx where the two are tied; the role of fy is then of no account.
     fy_per_fx: Option<f64>,
     /// Image width and height in px, if known: the principal point of a start that needs one is the image's
@@ -72,7 +121,9 @@ impl Settings {
     pub fn new(free: FreeParameters) -> Settings {
         let role = |parameter| if free.contains(parameter) { Role::Free } else { Role::Default };
         Settings {
-            roles: Parameter::ALL.map(role),
+            roles: Parameter::OF_ALL_MODELS.map(role),
+            model: Model::BrownConrady,
+            board: Board::Flat,
             fy_per_fx: None,
             image_size: None,
             loss: Loss::Squares,
@@ -82,6 +133,34 @@ impl Settings {
             search: true,
             profile_coverage: None,
         }
+    }
+
+    /// What [`Model::standard_free`] says of a lens model, for [`super::calibrate_lens`].
+    ///
+    /// ```
+    /// use calibench::calibrate::Settings;
+    /// use calibench::camera::Model;
+    ///
+    /// let settings = Settings::of_model(Model::KannalaBrandt);
+    /// assert_eq!(settings.free().to_string(), "fx,fy,cx,cy,k1,k2,k3,k4");
+    /// ```
+    pub fn of_model(model: Model) -> Settings {
+        Settings::new(model.standard_free()).with_model(model)
+    }
+
+    /// Chooses the lens model; roles stay as they are.
+    pub fn with_model(self, model: Model) -> Settings {
+        Settings { model, ..self }
+    }
+
+    /// Says how flat the board is.
+    pub fn with_board(self, board: Board) -> Settings {
+        Settings { board, ..self }
+    }
+
+    /// The lens model.
+    pub fn model(&self) -> Model {
+        self.model
     }
 
     /// fx, fy, cx, cy, k1, k2 free: what most lenses need and most data determine.
@@ -181,12 +260,12 @@ impl Settings {
     pub fn free(&self) -> FreeParameters {
         let is_estimated = |p: &Parameter| matches!(self.role(*p), Role::Free | Role::Known { .. });
         let is_free = |p: &Parameter| is_estimated(p) && !self.is_tied(*p);
-        Parameter::ALL.into_iter().filter(is_free).fold(FreeParameters::NONE, FreeParameters::with)
+        Parameter::OF_ALL_MODELS.into_iter().filter(is_free).fold(FreeParameters::NONE, FreeParameters::with)
     }
 
     /// What is known beforehand.
     pub fn priors(&self) -> impl Iterator<Item = Prior> {
-        Parameter::ALL.into_iter().filter_map(|parameter| match self.role(parameter) {
+        Parameter::OF_ALL_MODELS.into_iter().filter_map(|parameter| match self.role(parameter) {
             Role::Known { mean, standard_deviation } => Some(Prior { parameter, mean, standard_deviation }),
             _ => None,
         })
@@ -228,7 +307,7 @@ impl Settings {
             Parameter::Fx | Parameter::Fy => None,
             Parameter::Cx => self.image_size.map(|(width, _)| 0.5 * (width as f64 - 1.0)),
             Parameter::Cy => self.image_size.map(|(_, height)| 0.5 * (height as f64 - 1.0)),
-            _ => Some(0.0),
+            _ => Some(Lens::ideal(self.model).get(parameter).unwrap_or(0.0)),
         }
     }
 }
@@ -244,13 +323,19 @@ mod by_name {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
     use std::collections::BTreeMap;
 
-    pub fn serialize<S: Serializer>(roles: &[Role; Parameter::COUNT], to: S) -> Result<S::Ok, S::Error> {
-        let told = Parameter::ALL.into_iter().zip(roles).filter(|(_, role)| **role != Role::Default);
+    pub fn serialize<S: Serializer>(
+        roles: &[Role; Parameter::OF_ALL_MODELS.len()],
+        to: S,
+    ) -> Result<S::Ok, S::Error> {
+        let told =
+            Parameter::OF_ALL_MODELS.into_iter().zip(roles).filter(|(_, role)| **role != Role::Default);
         told.collect::<BTreeMap<Parameter, &Role>>().serialize(to)
     }
 
-    pub fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<[Role; Parameter::COUNT], D::Error> {
+    pub fn deserialize<'a, D: Deserializer<'a>>(
+        from: D,
+    ) -> Result<[Role; Parameter::OF_ALL_MODELS.len()], D::Error> {
         let told = BTreeMap::<Parameter, Role>::deserialize(from)?;
-        Ok(Parameter::ALL.map(|parameter| told.get(&parameter).copied().unwrap_or_default()))
+        Ok(Parameter::OF_ALL_MODELS.map(|parameter| told.get(&parameter).copied().unwrap_or_default()))
     }
 }

@@ -19,48 +19,58 @@ use nalgebra::{DMatrix, MatrixXx6, SMatrix, SVector};
 
 /// Normal equations `J^T w J` and gradient `J^T w r` of all views.
 #[derive(Debug, Clone)]
-pub struct System {
+pub struct System<const W: usize = N> {
     pub(super) free: FreeParameters,
-    pub(super) intrinsics: Intrinsics,
-    pub(super) gradient: SVector<f64, N>,
-    pub(super) views: Vec<ViewBlock>,
+    /// How many unknowns all views share: the free intrinsics, and a board's shape.
+    pub(super) shared: usize,
+    pub(super) intrinsics: Intrinsics<W>,
+    pub(super) gradient: SVector<f64, W>,
+    pub(super) views: Vec<ViewBlock<W>>,
     pub(super) cost: f64,
 }
 
 /// Normal equations without the poses: what uncertainty and conditioning are both read from.
-pub(super) struct Reduction {
+pub(super) struct Reduction<const W: usize = N> {
     free: FreeParameters,
+    shared: usize,
     /// The views' factors.
-    pub eliminated: Vec<Eliminated>,
+    pub eliminated: Vec<Eliminated<W>>,
     /// `S`, the intrinsics' information when the poses are unknown too.
     pub schur: DMatrix<f64>,
 }
 
 /// A step of all unknowns.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Step {
+#[derive(Debug, Clone)]
+pub(super) struct Step<const W: usize = N> {
     /// One entry per free intrinsic parameter.
-    pub intrinsics: SVector<f64, N>,
+    pub intrinsics: SVector<f64, W>,
     /// Rotation vector and translation of each view.
     pub poses: Vec<SVector<f64, 6>>,
     /// Predicted fall of the cost, `-(2 g^T d + d^T H d)`, without the damping.
     pub predicted_gain: f64,
     /// The views' factors, kept between the two passes over them.
-    eliminated: Vec<Eliminated>,
+    eliminated: Vec<Eliminated<W>>,
 }
 
-impl Step {
+impl<const W: usize> Default for Step<W> {
+    fn default() -> Step<W> {
+        Step { intrinsics: SVector::zeros(), poses: Vec::new(), predicted_gain: 0.0, eliminated: Vec::new() }
+    }
+}
+
+impl<const W: usize> Step<W> {
     /// A step that was not solved for.
-    pub fn along(intrinsics: SVector<f64, N>, poses: Vec<SVector<f64, 6>>) -> Step {
+    pub fn along(intrinsics: SVector<f64, W>, poses: Vec<SVector<f64, 6>>) -> Step<W> {
         Step { intrinsics, poses, ..Step::default() }
     }
 }
 
-impl System {
+impl<const W: usize> System<W> {
     /// An empty system with room for `views` views.
-    pub(super) fn new(free: FreeParameters, views: usize) -> System {
+    pub(super) fn new(free: FreeParameters, views: usize) -> System<W> {
         System {
             free,
+            shared: free.len(),
             intrinsics: Intrinsics::zeros(),
             gradient: SVector::zeros(),
             views: Vec::with_capacity(views),
@@ -68,13 +78,19 @@ impl System {
         }
     }
 
+    /// With `others` unknowns that all views share besides the intrinsics.
+    pub(super) fn sharing(mut self, others: usize) -> System<W> {
+        self.shared = self.free.len() + others;
+        self
+    }
+
     /// Factors the damped pose blocks; returns `S` and the right-hand side. `None` where a block is not
     /// positive definite.
-    pub(super) fn eliminate(&self, damping: f64, eliminated: &mut Vec<Eliminated>) -> Option<Reduced> {
-        let n = self.free.len();
+    pub(super) fn eliminate(&self, damping: f64, eliminated: &mut Vec<Eliminated<W>>) -> Option<Reduced<W>> {
+        let n = self.shared;
         eliminated.resize_with(self.views.len(), Eliminated::default);
         let mut reduced = Some(Reduced::of(&self.intrinsics, &self.gradient, damping));
-        let chunk = |index: usize, chunk: &mut [Eliminated]| {
+        let chunk = |index: usize, chunk: &mut [Eliminated<W>]| {
             let views = &self.views[index * CHUNK..][..chunk.len()];
             elimination::eliminate(views, chunk, damping, n)
         };
@@ -88,8 +104,8 @@ impl System {
     }
 
     /// Solves for the step of `H + damping diag(H)`. `None` where the damped matrix is not positive definite.
-    pub(super) fn solve_into(&self, damping: f64, step: &mut Step) -> Option<()> {
-        let n = self.free.len();
+    pub(super) fn solve_into(&self, damping: f64, step: &mut Step<W>) -> Option<()> {
+        let n = self.shared;
         let reduced = self.eliminate(damping, &mut step.eliminated)?;
         step.intrinsics = reduced.solve(n)?;
         let a = step.intrinsics;
@@ -113,10 +129,10 @@ impl System {
     }
 
     /// The undamped equations with the poses eliminated; `None` where a pose is undetermined.
-    pub(super) fn reduction(&self) -> Option<Reduction> {
+    pub(super) fn reduction(&self) -> Option<Reduction<W>> {
         let mut eliminated = Vec::new();
-        let schur = self.eliminate(0.0, &mut eliminated)?.matrix(self.free.len());
-        Some(Reduction { free: self.free, eliminated, schur })
+        let schur = self.eliminate(0.0, &mut eliminated)?.matrix(self.shared);
+        Some(Reduction { free: self.free, shared: self.shared, eliminated, schur })
     }
 
     /// The inverse of the normal matrix, block by block, for unit noise; `None` if it is singular.
@@ -126,14 +142,14 @@ impl System {
 
     /// Number of unknowns.
     pub fn unknowns(&self) -> usize {
-        self.free.len() + 6 * self.views.len()
+        self.shared + 6 * self.views.len()
     }
 }
 
-impl Reduction {
+impl<const W: usize> Reduction<W> {
     /// The intrinsics' covariance for unit noise; `None` if it is singular.
     pub fn intrinsics_covariance(&self) -> Option<DMatrix<f64>> {
-        if self.free.is_empty() {
+        if self.shared == 0 {
             return Some(DMatrix::zeros(0, 0));
         }
         Some(self.schur.clone().cholesky()?.inverse())
@@ -141,7 +157,7 @@ impl Reduction {
 
     /// See [`System::covariance`].
     pub fn covariance(&self) -> Option<Covariance> {
-        let n = self.free.len();
+        let n = self.shared;
         let intrinsics = self.intrinsics_covariance()?;
         let padded = SMatrix::from_fn(|i, j| if i < n && j < n { intrinsics[(i, j)] } else { 0.0 });
         let blocks: Vec<(PoseBlock, MatrixXx6<f64>)> =

@@ -60,6 +60,24 @@ impl TargetFrame {
         Observations::new(view.pairs().map(|(p, pixel)| ((p - self.centre) / self.scale, *pixel)))
     }
 
+    /// A point of the target in this frame.
+    pub fn of_point(&self, point: &Vec2) -> Vec2 {
+        (point - self.centre) / self.scale
+    }
+
+    /// The target's unit in this frame's.
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+
+    /// `t' = (t + R c) / s`: the inverse of [`TargetFrame::cam_from_target`].
+    pub fn of_pose(&self, pose: &Pose) -> Pose {
+        Pose {
+            rotation: pose.rotation,
+            translation: (pose.translation + self.rotated_centre(pose)) / self.scale,
+        }
+    }
+
     /// `t = s t' - R c` for a pose of the centred, scaled target.
     pub fn cam_from_target(&self, pose: &Pose) -> Pose {
         Pose {

@@ -4,7 +4,7 @@ use super::intervals::Skewed;
 use super::intervals::student_quantile;
 use super::report::{STRONG_CORRELATION, UNCERTAIN_FOCAL};
 use super::search::{Rival, Twin};
-use super::{Calibration, Certificate, Covariance, Prior, Termination, Warning};
+use super::{Calibration, Certificate, Covariance, LensCalibration, Prior, Termination, Warning};
 use crate::camera::{Camera, FreeParameters, Parameter};
 use crate::geometry::Pose;
 
@@ -31,16 +31,12 @@ pub(super) fn of(
     {
         warnings.push(Warning::NotCertified);
     }
-    warnings.extend(calibration.priors.iter().filter_map(|prior| contradicted(calibration, prior)));
+    let value = |parameter| calibration.camera.get(parameter);
+    warnings.extend(calibration.priors.iter().filter_map(|prior| contradicted(calibration, prior, value)));
     warnings.extend(twin_pose(&twins));
-    warnings.extend(from_behind(calibration));
+    warnings.extend(from_behind(&calibration.cam_from_target));
     warnings.extend(correlated(&calibration.covariance, calibration.free));
-    warnings.extend([Parameter::Fx, Parameter::Fy].into_iter().filter_map(|parameter| {
-        let relative = calibration.standard_deviation(parameter)? / calibration.camera.get(parameter);
-        // An fy that is tied to fx is known as well, and said once.
-        calibration.free.position(parameter)?;
-        (relative > UNCERTAIN_FOCAL).then_some(Warning::FocalLengthUncertain { parameter, relative })
-    }));
+    warnings.extend(focal_length_uncertain(calibration, value));
     warnings.extend(folding(&calibration.camera, largest_radius));
     warnings.extend(skewed.iter().map(|s| Warning::NotLinear {
         parameter: s.parameter,
@@ -56,6 +52,47 @@ pub(super) fn of(
     warnings
 }
 
+/// The warnings of a calibration with a lens of any model: `neighbours` is what residuals have in common.
+pub(super) fn of_lens(
+    calibration: &LensCalibration,
+    largest_angle: f64,
+    neighbours: Option<Warning>,
+) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    if calibration.termination != Termination::Converged {
+        let LensCalibration { termination, iterations, .. } = *calibration;
+        warnings.push(Warning::NotConverged { termination, iterations });
+    }
+    warnings.extend(neighbours);
+    warnings.extend(few_degrees_of_freedom(calibration.degrees_of_freedom));
+    let value = |parameter| calibration.camera.value(parameter).unwrap_or(0.0);
+    warnings.extend(calibration.priors.iter().filter_map(|prior| contradicted(calibration, prior, value)));
+    warnings.extend(from_behind(&calibration.cam_from_target));
+    warnings.extend(correlated(&calibration.covariance, calibration.free));
+    warnings.extend(focal_length_uncertain(calibration, value));
+    let limit = calibration.camera.distortion.monotone_angle();
+    if limit < largest_angle {
+        warnings.push(Warning::FoldsInsideView {
+            monotone_angle: limit.to_degrees(),
+            largest_observed: largest_angle.to_degrees(),
+        });
+    }
+    warnings
+}
+
+/// Focal lengths that are known roughly.
+fn focal_length_uncertain<L>(
+    calibration: &Calibration<L>,
+    value: impl Fn(Parameter) -> f64,
+) -> impl Iterator<Item = Warning> {
+    [Parameter::Fx, Parameter::Fy].into_iter().filter_map(move |parameter| {
+        let relative = calibration.covariance.standard_deviation(parameter)? / value(parameter);
+        // An fy that is tied to fx is known as well, and said once.
+        calibration.free.position(parameter)?;
+        (relative > UNCERTAIN_FOCAL).then_some(Warning::FocalLengthUncertain { parameter, relative })
+    })
+}
+
 /// A normal number exceeds this in size with a probability of one in a million.
 const CONTRADICTED: f64 = 4.89;
 /// Where the pixels make an estimate better than its prior by less than this part, they say nothing of it.
@@ -63,11 +100,15 @@ const TOLD_BY_PIXELS: f64 = 1e-6;
 
 /// Before the photographs the estimate is spread about the prior's mean with the variance that they take away
 /// from it.
-fn contradicted(calibration: &Calibration, prior: &Prior) -> Option<Warning> {
+fn contradicted<L>(
+    calibration: &Calibration<L>,
+    prior: &Prior,
+    value: impl Fn(Parameter) -> f64,
+) -> Option<Warning> {
     let Prior { parameter, mean, standard_deviation } = *prior;
-    let share = calibration.standard_deviation(parameter)? / standard_deviation;
+    let share = calibration.covariance.standard_deviation(parameter)? / standard_deviation;
     let taken = 1.0 - share * share;
-    let estimate = calibration.camera.get(parameter);
+    let estimate = value(parameter);
     let deviations = (estimate - mean).abs() / (standard_deviation * taken.sqrt());
     (taken > TOLD_BY_PIXELS && deviations > CONTRADICTED).then_some(Warning::Contradicted {
         parameter,
@@ -103,9 +144,9 @@ fn twin_pose(twins: &[Twin]) -> Option<Warning> {
 
 /// Views whose target faces the camera with the other side than most targets do: a mirrored order of marks
 /// looks like this.
-fn from_behind(calibration: &Calibration) -> Option<Warning> {
+fn from_behind(cam_from_target: &[Pose]) -> Option<Warning> {
     let faces_away = |pose: &Pose| pose.rotation.column(2).dot(&pose.translation) > 0.0;
-    let away: Vec<bool> = calibration.cam_from_target.iter().map(faces_away).collect();
+    let away: Vec<bool> = cam_from_target.iter().map(faces_away).collect();
     let count = away.iter().filter(|&&away| away).count();
     let odd = 2 * count <= away.len();
     let mut views = (0..away.len()).filter(|&view| away[view] == odd);

@@ -26,7 +26,7 @@ use crate::geometry::{Mat3, Vec2, Vec3};
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Camera {
+pub struct Camera<L = BrownConrady> {
     /// Focal length along u, px.
     pub fx: f64,
     /// Focal length along v, px.
@@ -38,10 +38,10 @@ pub struct Camera {
     /// Skew, px: `u` gains `skew * y_d` (Zhang's gamma).
     pub skew: f64,
     /// The lens.
-    pub distortion: BrownConrady,
+    pub distortion: L,
 }
 
-impl Camera {
+impl Camera<BrownConrady> {
     /// A camera without skew or distortion.
     pub fn pinhole(fx: f64, fy: f64, cx: f64, cy: f64) -> Camera {
         Camera { fx, fy, cx, cy, skew: 0.0, distortion: BrownConrady::default() }

@@ -1,4 +1,4 @@
-//! Which of the camera's numbers are estimated? The ten intrinsic parameters and subsets of them.
+//! Which of the camera's numbers are estimated? The intrinsic parameters of all lens models and subsets of them.
 
 use std::fmt;
 use std::str::FromStr;
@@ -29,26 +29,71 @@ pub enum Parameter {
     P2,
     /// Radial distortion of seventh order.
     K3,
+    /// Radial: the first of the rational model's denominator, the fourth of a fisheye's polynomial.
+    K4,
+    /// Radial, the second of the rational model's denominator.
+    K5,
+    /// Radial, the third of the rational model's denominator.
+    K6,
+    /// Thin prism along x, second order.
+    S1,
+    /// Thin prism along x, fourth order.
+    S2,
+    /// Thin prism along y, second order.
+    S3,
+    /// Thin prism along y, fourth order.
+    S4,
+    /// Tilt of the sensor about x, rad.
+    #[cfg_attr(feature = "serde", serde(rename = "tau_x"))]
+    TauX,
+    /// Tilt of the sensor about y, rad.
+    #[cfg_attr(feature = "serde", serde(rename = "tau_y"))]
+    TauY,
+    /// Distance of the spheres' centres in the double-sphere model.
+    Xi,
+    /// Place of the pinhole behind the second sphere, 0 to 1.
+    Alpha,
 }
 
 impl Parameter {
-    /// Number of intrinsic parameters.
+    /// Number of parameters of a camera with Brown-Conrady's lens.
     pub const COUNT: usize = 10;
 
-    /// All parameters, in order.
+    /// The parameters of a camera with Brown-Conrady's lens, in order.
     pub const ALL: [Parameter; Parameter::COUNT] = {
         use Parameter::*;
         [Fx, Fy, Cx, Cy, Skew, K1, K2, P1, P2, K3]
     };
 
-    /// The name used in files and on the command line: `fx fy cx cy skew k1 k2 p1 p2 k3`.
+    /// The linear parameters, which every camera has.
+    pub const LINEAR: [Parameter; 5] = {
+        use Parameter::*;
+        [Fx, Fy, Cx, Cy, Skew]
+    };
+
+    /// The parameters of all lens models, in order.
+    pub const OF_ALL_MODELS: [Parameter; 21] = {
+        use Parameter::*;
+        [Fx, Fy, Cx, Cy, Skew, K1, K2, P1, P2, K3, K4, K5, K6, S1, S2, S3, S4, TauX, TauY, Xi, Alpha]
+    };
+
+    /// The name used in files and on the command line: `fx fy cx cy skew`, then the coefficients `k1 k2 p1 p2
+    /// k3`, `k4 k5 k6`, `s1 s2 s3 s4`, `tau_x tau_y`, `xi alpha`.
     pub fn name(self) -> &'static str {
-        ["fx", "fy", "cx", "cy", "skew", "k1", "k2", "p1", "p2", "k3"][self as usize]
+        const NAMES: [&str; 21] = [
+            "fx", "fy", "cx", "cy", "skew", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3",
+            "s4", "tau_x", "tau_y", "xi", "alpha",
+        ];
+        NAMES[self as usize]
     }
 
     /// The unit, empty for a pure number.
     pub fn unit(self) -> &'static str {
-        if self <= Parameter::Skew { "px" } else { "" }
+        match self {
+            linear if linear <= Parameter::Skew => "px",
+            Parameter::TauX | Parameter::TauY => "rad",
+            _ => "",
+        }
     }
 }
 
@@ -60,14 +105,17 @@ impl fmt::Display for Parameter {
 
 /// A name that is not a parameter's.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("unknown camera parameter `{0}`: the parameters are fx fy cx cy skew k1 k2 p1 p2 k3")]
+#[error(
+    "unknown camera parameter `{0}`: the parameters are fx fy cx cy skew k1 k2 p1 p2 k3, and with other lens models k4 \
+     k5 k6 s1 s2 s3 s4 tau_x tau_y xi alpha"
+)]
 pub struct UnknownParameter(pub String);
 
 impl FromStr for Parameter {
     type Err = UnknownParameter;
 
     fn from_str(name: &str) -> Result<Parameter, UnknownParameter> {
-        Parameter::ALL
+        Parameter::OF_ALL_MODELS
             .into_iter()
             .find(|p| p.name() == name)
             .ok_or_else(|| UnknownParameter(name.to_string()))
@@ -78,7 +126,7 @@ impl FromStr for Parameter {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(into = "String", try_from = "String"))]
-pub struct FreeParameters(u16);
+pub struct FreeParameters(u32);
 
 impl FreeParameters {
     /// Nothing is free: only poses are estimated.
@@ -95,7 +143,7 @@ impl FreeParameters {
         let mut bits = 0;
         let mut i = 0;
         while i < parameters.len() {
-            bits |= 1 << parameters[i] as u16;
+            bits |= 1 << parameters[i] as u32;
             i += 1;
         }
         FreeParameters(bits)
@@ -103,17 +151,17 @@ impl FreeParameters {
 
     /// Whether `parameter` is free.
     pub fn contains(self, parameter: Parameter) -> bool {
-        self.0 & (1 << parameter as u16) != 0
+        self.0 & (1 << parameter as u32) != 0
     }
 
     /// This set and `parameter`.
     pub fn with(self, parameter: Parameter) -> FreeParameters {
-        FreeParameters(self.0 | 1 << parameter as u16)
+        FreeParameters(self.0 | 1 << parameter as u32)
     }
 
     /// This set without `parameter`.
     pub fn without(self, parameter: Parameter) -> FreeParameters {
-        FreeParameters(self.0 & !(1 << parameter as u16))
+        FreeParameters(self.0 & !(1 << parameter as u32))
     }
 
     /// Number of free parameters.
@@ -128,12 +176,18 @@ impl FreeParameters {
 
     /// The free parameters, in order.
     pub fn iter(self) -> impl Iterator<Item = Parameter> {
-        Parameter::ALL.into_iter().filter(move |&p| self.contains(p))
+        let mut left = self.0;
+        std::iter::from_fn(move || {
+            let next = *Parameter::OF_ALL_MODELS.get(left.trailing_zeros() as usize)?;
+            left &= left - 1;
+            Some(next)
+        })
     }
 
     /// The row of `parameter` in a vector of the free parameters.
     pub fn position(self, parameter: Parameter) -> Option<usize> {
-        self.iter().position(|p| p == parameter)
+        let before = self.0 & ((1 << parameter as u32) - 1);
+        self.contains(parameter).then_some(before.count_ones() as usize)
     }
 }
 
@@ -187,7 +241,8 @@ mod tests {
 
     #[test]
     fn every_parameter_has_its_own_name_and_place() {
-        for (place, parameter) in Parameter::ALL.into_iter().enumerate() {
+        assert!(Parameter::OF_ALL_MODELS.starts_with(&Parameter::ALL));
+        for (place, parameter) in Parameter::OF_ALL_MODELS.into_iter().enumerate() {
             assert_eq!(parameter as usize, place);
             assert_eq!(parameter.name().parse(), Ok(parameter));
         }

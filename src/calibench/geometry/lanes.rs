@@ -20,13 +20,24 @@ pub(crate) trait Arithmetic:
     fn splat(value: f64) -> Self;
 }
 
+/// Arithmetic with the functions that lenses are made of; those that no register has come from libm, the same on
+/// every machine.
+pub(crate) trait Real: Arithmetic {
+    fn sqrt(self) -> Self;
+    fn sin(self) -> Self;
+    fn cos(self) -> Self;
+    /// The angle of the point `(x, self)`.
+    fn atan2(self, x: Self) -> Self;
+    /// The smaller; the second where one is not a number.
+    fn min(self, other: Self) -> Self;
+}
+
 /// Four numbers that are computed with at once.
-pub(crate) trait Lanes: Arithmetic {
+pub(crate) trait Lanes: Real {
     fn load(values: &[f64; LANES]) -> Self;
     fn store(self) -> [f64; LANES];
     /// Lane by lane the larger; the second where one is not a number.
     fn max(self, other: Self) -> Self;
-    fn sqrt(self) -> Self;
     /// Whether every lane is greater than 0; NaN is not.
     fn all_positive(self) -> bool;
     /// The sums of the lanes of four vectors, each as `(l0 + l1) + (l2 + l3)`.
@@ -69,6 +80,59 @@ impl Arithmetic for f64 {
     }
 }
 
+impl Real for f64 {
+    #[inline(always)]
+    fn sqrt(self) -> f64 {
+        f64::sqrt(self)
+    }
+
+    #[inline(always)]
+    fn sin(self) -> f64 {
+        libm::sin(self)
+    }
+
+    #[inline(always)]
+    fn cos(self) -> f64 {
+        libm::cos(self)
+    }
+
+    #[inline(always)]
+    fn atan2(self, x: f64) -> f64 {
+        libm::atan2(self, x)
+    }
+
+    #[inline(always)]
+    fn min(self, other: f64) -> f64 {
+        if self < other { self } else { other }
+    }
+}
+
+/// The functions that lanes take from libm, number by number.
+macro_rules! functions_lane_by_lane {
+    () => {
+        #[inline(always)]
+        fn sin(self) -> Self {
+            Self::load(&self.store().map(libm::sin))
+        }
+
+        #[inline(always)]
+        fn cos(self) -> Self {
+            Self::load(&self.store().map(libm::cos))
+        }
+
+        #[inline(always)]
+        fn atan2(self, x: Self) -> Self {
+            let (y, x) = (self.store(), x.store());
+            Self::load(&std::array::from_fn(|i| libm::atan2(y[i], x[i])))
+        }
+
+        #[inline(always)]
+        fn min(self, other: Self) -> Self {
+            -(-self).max(-other)
+        }
+    };
+}
+
 /// Lanes for any machine; the compiler pairs them up where it can.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Portable([f64; LANES]);
@@ -103,6 +167,15 @@ impl Arithmetic for Portable {
     }
 }
 
+impl Real for Portable {
+    #[inline(always)]
+    fn sqrt(self) -> Portable {
+        Portable(self.0.map(f64::sqrt))
+    }
+
+    functions_lane_by_lane!();
+}
+
 impl Lanes for Portable {
     #[inline(always)]
     fn load(values: &[f64; LANES]) -> Portable {
@@ -121,11 +194,6 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn sqrt(self) -> Portable {
-        Portable(self.0.map(f64::sqrt))
-    }
-
-    #[inline(always)]
     fn all_positive(self) -> bool {
         self.0.iter().all(|&a| a > 0.0)
     }
@@ -140,7 +208,7 @@ impl Lanes for Portable {
 /// AVX2 is: that is what makes every `unsafe` block below sound.
 #[cfg(all(target_arch = "x86_64", not(calibench_portable)))]
 mod wide {
-    use super::{Add, Arithmetic, Div, Kernel, LANES, Lanes, Mul, Neg, Sub};
+    use super::{Add, Arithmetic, Div, Kernel, LANES, Lanes, Mul, Neg, Real, Sub};
     use std::arch::x86_64::*;
 
     #[derive(Clone, Copy)]
@@ -183,6 +251,16 @@ mod wide {
         }
     }
 
+    impl Real for Wide {
+        #[inline(always)]
+        fn sqrt(self) -> Wide {
+            // SAFETY: see the module.
+            Wide(unsafe { _mm256_sqrt_pd(self.0) })
+        }
+
+        functions_lane_by_lane!();
+    }
+
     impl Lanes for Wide {
         #[inline(always)]
         fn load(values: &[f64; LANES]) -> Wide {
@@ -202,12 +280,6 @@ mod wide {
         fn max(self, other: Wide) -> Wide {
             // SAFETY: see the module.
             Wide(unsafe { _mm256_max_pd(self.0, other.0) })
-        }
-
-        #[inline(always)]
-        fn sqrt(self) -> Wide {
-            // SAFETY: see the module.
-            Wide(unsafe { _mm256_sqrt_pd(self.0) })
         }
 
         #[inline(always)]

@@ -1,7 +1,8 @@
-//! What was seen where? Corner files: `view,point,X,Y,u,v`, one line an observed point.
+//! What was seen where? Corner files: `view,point,X,Y,u,v`, one line an observed point, and if it is known how well
+//! each was seen, `weight` or `sigma_px`.
 
-use super::table::{Row, TableError, open, read_table};
-use crate::board::View;
+use super::table::{Row, TableError, columns, open, read_table};
+use crate::board::{View, ViewError};
 use crate::geometry::Vec2;
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -28,8 +29,11 @@ pub fn read_corners(path: &Path) -> Result<CornerFile, TableError> {
 
 /// Reads corners from any source; `file` names it in errors. Lines of one view need not stand together.
 ///
+/// A column `weight` has the factor of each mark's residual, a column `sigma_px` the standard deviation of its
+/// coordinates: 1 over the weight ([`View::with_weights`]).
+///
 /// # Errors
-/// See [`TableError`].
+/// See [`TableError`]; both columns at once.
 ///
 /// ```
 /// use calibench::io::parse_corners;
@@ -42,22 +46,71 @@ pub fn read_corners(path: &Path) -> Result<CornerFile, TableError> {
 /// assert!(broken.to_string().starts_with("corners.csv:3: column 'u'"));
 /// # Ok::<(), calibench::io::TableError>(())
 /// ```
-pub fn parse_corners(file: &str, input: impl Read) -> Result<CornerFile, TableError> {
-    let rows = read_table(file, input, ["view", "point"], ["X", "Y", "u", "v"])?;
+pub fn parse_corners(file: &str, mut input: impl Read) -> Result<CornerFile, TableError> {
+    let unreadable = |message: String| TableError::Unreadable { file: file.into(), line: 0, message };
+    let mut bytes = Vec::new();
+    input.read_to_end(&mut bytes).map_err(|e| unreadable(e.to_string()))?;
+    let header = columns(&bytes);
+    let has = |name: &str| header.iter().any(|column| column == name);
+    match (has("weight"), has("sigma_px")) {
+        (true, true) => {
+            Err(unreadable("columns 'weight' and 'sigma_px' say the same twice: keep one of them".into()))
+        }
+        (true, false) => weighted(file, &bytes, "weight", |weight| weight),
+        (false, true) => weighted(file, &bytes, "sigma_px", |sigma| 1.0 / sigma),
+        (false, false) => {
+            let rows = read_table(file, bytes.as_slice(), ["view", "point"], ["X", "Y", "u", "v"])?;
+            grouped(file, rows, |_| None)
+        }
+    }
+}
+
+fn weighted(
+    file: &str,
+    bytes: &[u8],
+    column: &'static str,
+    weight: impl Fn(f64) -> f64,
+) -> Result<CornerFile, TableError> {
+    let rows = read_table(file, bytes, ["view", "point"], ["X", "Y", "u", "v", column])?;
+    grouped(file, rows, |numbers| Some(weight(numbers[4])))
+}
+
+/// One view's marks while they are collected.
+#[derive(Default)]
+struct Marks {
+    points: Vec<Vec2>,
+    pixels: Vec<Vec2>,
+    weights: Vec<f64>,
+}
+
+impl Marks {
+    fn view(self) -> Result<View, ViewError> {
+        let view = View::new(self.points, self.pixels)?;
+        if self.weights.is_empty() { Ok(view) } else { view.with_weights(self.weights) }
+    }
+}
+
+fn grouped<const N: usize>(
+    file: &str,
+    rows: Vec<Row<2, N>>,
+    weight: impl Fn(&[f64; N]) -> Option<f64>,
+) -> Result<CornerFile, TableError> {
     refuse_repeated_points(file, &rows)?;
     let mut index_of = BTreeMap::new();
-    let mut grouped: Vec<(String, Vec<Vec2>, Vec<Vec2>)> = Vec::new();
-    for Row { names: [view, _], numbers: [x, y, u, v], .. } in rows {
+    let mut views: Vec<(String, Marks)> = Vec::new();
+    for Row { names: [view, _], numbers, .. } in rows {
         let index = *index_of.entry(view.clone()).or_insert_with(|| {
-            grouped.push((view, Vec::new(), Vec::new()));
-            grouped.len() - 1
+            views.push((view, Marks::default()));
+            views.len() - 1
         });
-        grouped[index].1.push(Vec2::new(x, y));
-        grouped[index].2.push(Vec2::new(u, v));
+        let marks = &mut views[index].1;
+        marks.points.push(Vec2::new(numbers[0], numbers[1]));
+        marks.pixels.push(Vec2::new(numbers[2], numbers[3]));
+        marks.weights.extend(weight(&numbers));
     }
     let mut corners = CornerFile { view_names: Vec::new(), views: Vec::new() };
-    for (name, points, pixels) in grouped {
-        let view = View::new(points, pixels).map_err(|cause| TableError::View {
+    for (name, marks) in views {
+        let view = marks.view().map_err(|cause| TableError::View {
             file: file.into(),
             view: name.clone(),
             cause,
@@ -68,7 +121,7 @@ pub fn parse_corners(file: &str, input: impl Read) -> Result<CornerFile, TableEr
     Ok(corners)
 }
 
-fn refuse_repeated_points(file: &str, rows: &[Row<2, 4>]) -> Result<(), TableError> {
+fn refuse_repeated_points<const N: usize>(file: &str, rows: &[Row<2, N>]) -> Result<(), TableError> {
     let mut first_line = BTreeMap::new();
     for row in rows {
         if let Some(first) = first_line.insert(&row.names, row.line) {
@@ -103,6 +156,23 @@ mod tests {
         assert_eq!(corners.view_names, ["7", "3"]);
         assert_eq!(corners.views[0].pixels(), [Vec2::new(1.0, 2.0), Vec2::new(5.0, 6.0)]);
         assert_eq!(corners.views[1].points(), [Vec2::zeros()]);
+    }
+
+    #[test]
+    fn marks_may_have_weights_or_standard_deviations() {
+        let weighted = parse("view,point,X,Y,u,v,weight\n0,0,0,0,1,2,0.5\n0,1,1,0,3,4,2\n").unwrap();
+        assert_eq!(weighted.views[0].weights(), Some([0.5, 2.0].as_slice()));
+        let spread = parse("sigma_px,view,point,X,Y,u,v\n2,0,0,0,0,1,2\n0.5,0,1,1,0,3,4\n").unwrap();
+        assert_eq!(spread, weighted);
+        assert_eq!(parse("view,point,X,Y,u,v\n0,0,0,0,1,2\n").unwrap().views[0].weights(), None);
+        let nothing = complaint("view,point,X,Y,u,v,weight\n7,0,0,0,1,2,0\n");
+        assert_eq!(
+            nothing,
+            "c.csv: view '7': point 0 has weight 0: a weight is positive; leave the mark out instead"
+        );
+        assert!(
+            complaint("view,point,X,Y,u,v,weight,sigma_px\n0,0,0,0,1,2,1,1\n").contains("keep one of them")
+        );
     }
 
     #[test]

@@ -1,0 +1,153 @@
+//! From marks to a camera with a lens of any model and its uncertainty.
+
+use super::super::estimate::{check_loss_and_priors, check_model};
+use super::super::minimise::{Minimum, descend};
+use super::super::settings::Bend;
+use super::super::target_frame::TargetFrames;
+use super::super::{Board, CalibrationError, Prior, Settings, Termination, calibrate, chunks};
+use super::marks::Marks;
+use super::problem::{Problem, State, rounding_cost};
+use super::report::{self, LensCalibration};
+use super::{WIDTH, shape, start};
+use crate::board::View;
+use crate::camera::{Model, Parameter};
+use crate::geometry::HomographyError;
+
+/// Where nothing else tells the noise of a coordinate, priors are first weighed with this one, px.
+const USUAL_PX: f64 = 0.1;
+/// Nobody's marks are better than this, px: exact data would otherwise leave priors no weight at all.
+const LEAST_PX: f64 = 1e-4;
+/// The noise that weighs priors is settled when its variance changes by less than this part.
+const SETTLED: f64 = 2e-6;
+/// Refinements until it is.
+const MOST_REFITS: usize = 60;
+/// Marks that a pose needs.
+const LEAST_MARKS: usize = 4;
+
+/// [`calibrate`] with a lens of any model ([`Settings::of_model`]), marks of unequal weight
+/// ([`View::with_weights`]) and a board that need not be flat ([`Board`]).
+///
+/// The cost is `sum w^2 |r|^2` under the loss, with the priors' share; see [`Prior`]. The covariance is that of
+/// [`calibrate`], the noise that of a coordinate of weight 1. A camera with Brown-Conrady's lens, marks of
+/// weight 1 and a flat board is handed to [`calibrate`], with all that it checks. For all else the better of
+/// two starts is refined, one by the rays of a fisheye, one by a pinhole; nothing certifies that minimum, and
+/// views given twice count twice.
+///
+/// # Errors
+/// As [`calibrate`]; a parameter that the model does not have; a model that cannot see every mark.
+///
+/// ```
+/// use calibench::board::View;
+/// use calibench::calibrate::{Settings, calibrate_lens};
+/// use calibench::camera::{Camera, Lens, Model};
+/// use calibench::geometry::{Pose, Vec2, Vec3};
+/// use calibench::synth::Truth;
+///
+/// // The example's board and poses, seen through a fisheye.
+/// let lens = Lens::new(Model::KannalaBrandt, &[-0.03, 0.004, 0.0, 0.0])?;
+/// let camera = Camera::with_lens(600.0, 600.0, 320.0, 240.0, lens);
+/// let truth = Truth::example();
+/// let seen = |pose: &Pose| {
+///     let pixel = |p: &Vec2| camera.pixel(&pose.apply(&Vec3::new(p.x, p.y, 0.0)));
+///     View::new(truth.points.clone(), truth.points.iter().filter_map(pixel).collect())
+/// };
+/// let views: Vec<View> = truth.cam_from_target.iter().map(seen).collect::<Result<_, _>>()?;
+/// let found = calibrate_lens(&views, &Settings::of_model(Model::KannalaBrandt))?;
+/// assert!((found.camera.fx - 600.0).abs() < 1e-3 && found.rmse_px < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn calibrate_lens(views: &[View], settings: &Settings) -> Result<LensCalibration, CalibrationError> {
+    let is_plain = views.iter().all(|view| view.weights().is_none()) && settings.board == Board::Flat;
+    if settings.model() == Model::BrownConrady && is_plain {
+        return calibrate(views, settings).map(LensCalibration::from);
+    }
+    check(views, settings)?;
+    chunks::in_pool(views.len(), || estimate(views, settings))
+}
+
+fn check(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
+    use Parameter::{Cx, Cy, Fx, Fy, Skew};
+    check_loss_and_priors(settings)?;
+    check_model(settings)?;
+    if let Some(Bend { standard_deviation, .. }) = settings.board.bend()
+        && (standard_deviation.is_nan() || standard_deviation <= 0.0)
+    {
+        return Err(CalibrationError::BadBoard { standard_deviation });
+    }
+    let free = settings.free();
+    let is_known = |p| settings.priors().any(|prior| prior.parameter == p);
+    let linear = [Fx, Fy, Cx, Cy, Skew].into_iter().filter(|&p| free.contains(p) && !is_known(p)).count();
+    // A distortion tells its centre and the aspect ratio besides.
+    let need = linear.div_ceil(2).clamp(1, 2);
+    if views.len() < need {
+        return Err(CalibrationError::TooFewViews { need, got: views.len(), linear, copies: 0 });
+    }
+    let coordinates = 2 * views.iter().map(View::len).sum::<usize>();
+    let unknowns = free.len() - settings.priors().count() + 6 * views.len();
+    if coordinates < unknowns {
+        return Err(CalibrationError::TooFewPoints { coordinates, unknowns });
+    }
+    // What is neither free nor given a value is refused here.
+    settings.model().parameters().try_for_each(|parameter| settings.held(parameter).map(drop))?;
+    match views.iter().position(|view| view.len() < LEAST_MARKS) {
+        Some(view) => {
+            let source = HomographyError::TooFewPoints { need: LEAST_MARKS, got: views[view].len() };
+            Err(CalibrationError::View { view, source })
+        }
+        None => Ok(()),
+    }
+}
+
+fn estimate(views: &[View], settings: &Settings) -> Result<LensCalibration, CalibrationError> {
+    let frames = TargetFrames::of(views);
+    let region = shape::region(views);
+    let of_view = |(index, view)| Marks::of(view, frames.at(index), &region);
+    let marks: Vec<Marks> = views.iter().enumerate().map(of_view).collect();
+    let priors: Vec<Prior> = settings.priors().collect();
+    let flat = Problem {
+        views: &marks,
+        free: settings.free(),
+        fy_per_fx: settings.tie()?,
+        priors: &priors,
+        variance: USUAL_PX * USUAL_PX,
+        bend: None,
+        loss: settings.loss,
+        max_iterations: settings.max_iterations,
+        rounding_cost: rounding_cost(&marks),
+    };
+    let starts = start::starts(&flat, views, settings);
+    let count = starts.len();
+    let best = starts
+        .into_iter()
+        .map(|state| descend(&flat, state))
+        .filter(|minimum| minimum.system.cost.is_finite())
+        .min_by(|a, b| a.system.cost.total_cmp(&b.system.cost))
+        .ok_or(CalibrationError::NoImage { model: settings.model() })?;
+    let state = start::with_better_tilts(&flat, best.state);
+    let bent = Problem { bend: settings.board.bend(), ..flat };
+    let (problem, minimum) = settled(bent, state, best.iterations);
+    report::report(minimum, &problem, &frames, region, count)
+}
+
+/// The minimum at which the noise that weighs what is known beforehand is the noise that the residuals show.
+fn settled(
+    mut problem: Problem<'_>,
+    state: State,
+    iterations: usize,
+) -> (Problem<'_>, Minimum<State, WIDTH>) {
+    let is_told = !problem.priors.is_empty() || problem.bend.is_some();
+    let mut minimum = descend(&problem, state);
+    let mut iterations = iterations + minimum.iterations;
+    for _ in 0..MOST_REFITS {
+        let variance = report::variance(&problem, &minimum).max(LEAST_PX * LEAST_PX);
+        let is_settled = (variance - problem.variance).abs() <= SETTLED * variance;
+        if !is_told || is_settled || minimum.termination != Termination::Converged {
+            break;
+        }
+        problem.variance = variance;
+        minimum = descend(&problem, minimum.state);
+        iterations += minimum.iterations;
+    }
+    minimum.iterations = iterations;
+    (problem, minimum)
+}

@@ -1,0 +1,248 @@
+//! What are the sums over the marks of a view, for a lens of any model? Four marks at a time.
+//!
+//! Columns of a mark's Jacobian: six of the pose, then the unknowns that all views share, then the residual. All
+//! products of two columns are summed; the sums are the blocks of the normal equations.
+#![allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
+
+use super::super::Loss;
+use super::super::blocks::{Intrinsics, ViewBlock};
+use super::WIDTH;
+use super::marks::{Block, Marks};
+use crate::camera::{Camera, FreeParameters, Lens, LensModel, LensVisitor, Parameter, visit};
+use crate::geometry::Pose;
+use crate::geometry::lanes::{Kernel, LANES, Lanes, dispatch};
+use nalgebra::SVector;
+
+/// Pose, shared unknowns, residual, in whole lanes.
+const COLUMNS: usize = 32;
+/// Derivatives that a mark has by all that views may share: five linear parameters, a lens's coefficients, three
+/// deformations.
+const LINEAR: usize = 5;
+const DEFORMATIONS: usize = 3;
+const MOST: usize = LINEAR + 14 + DEFORMATIONS;
+
+/// Which of a mark's derivatives are columns, and in which order.
+#[derive(Debug, Clone)]
+pub(super) struct Columns {
+    places: Vec<usize>,
+    /// fy over fx, if fx is free and fy tied to it.
+    fy_per_fx: Option<f64>,
+}
+
+impl Columns {
+    /// The free parameters in order, then so many deformations of the board.
+    pub fn of(lens: &Lens, free: FreeParameters, fy_per_fx: Option<f64>, deformations: usize) -> Columns {
+        let coefficients = lens.model().coefficients();
+        let place = |parameter: Parameter| match coefficients.iter().position(|&p| p == parameter) {
+            Some(k) => LINEAR + k,
+            None => parameter as usize,
+        };
+        let behind = LINEAR + coefficients.len();
+        let places = free.iter().map(place).chain(behind..behind + deformations).collect();
+        Columns { places, fy_per_fx: fy_per_fx.filter(|_| free.contains(Parameter::Fx)) }
+    }
+}
+
+/// The shared unknowns' part of some views.
+pub(super) struct Share {
+    pub square: Intrinsics<WIDTH>,
+    pub gradient: SVector<f64, WIDTH>,
+    pub cost: f64,
+}
+
+impl Share {
+    pub fn zero() -> Share {
+        Share { square: Intrinsics::zeros(), gradient: SVector::zeros(), cost: 0.0 }
+    }
+}
+
+/// A view and what is asked of it.
+pub(super) struct View<'a> {
+    pub camera: &'a Camera<Lens>,
+    pub cam_from_target: &'a Pose,
+    pub shape: &'a [f64; 3],
+    pub marks: &'a Marks,
+    pub loss: Loss,
+    pub columns: &'a Columns,
+}
+
+/// Adds the sums of a view. `None` where the lens has no image of a mark.
+pub(super) fn add_view(view: &View<'_>, share: &mut Share, block: &mut ViewBlock<WIDTH>) -> Option<()> {
+    visit(&view.camera.distortion, OfModel { view, share, block })
+}
+
+struct OfModel<'a, 'b> {
+    view: &'a View<'b>,
+    share: &'a mut Share,
+    block: &'a mut ViewBlock<WIDTH>,
+}
+
+impl LensVisitor for OfModel<'_, '_> {
+    type Output = Option<()>;
+
+    fn run<M: LensModel<P>, const P: usize>(self, coefficients: [f64; P]) -> Option<()> {
+        let OfModel { view, share, block } = self;
+        let sums = dispatch(Sums::<M, P> { view, coefficients, model: std::marker::PhantomData })?;
+        spread(&sums, view.columns.places.len(), share, block);
+        Some(())
+    }
+}
+
+/// Hands the sums to the blocks.
+fn spread(
+    (squares, cost): &([[f64; COLUMNS]; COLUMNS], f64),
+    shared: usize,
+    share: &mut Share,
+    block: &mut ViewBlock<WIDTH>,
+) {
+    let residual = 6 + shared;
+    for i in 0..6 {
+        for j in i..6 {
+            block.pose[(i, j)] = squares[i][j];
+            block.pose[(j, i)] = squares[i][j];
+        }
+        for k in 0..shared {
+            block.coupling[(k, i)] = squares[i][6 + k];
+        }
+        block.gradient[i] = squares[i][residual];
+    }
+    for k in 0..shared {
+        for l in k..shared {
+            share.square[(k, l)] += squares[6 + k][6 + l];
+        }
+        share.gradient[k] += squares[6 + k][residual];
+    }
+    share.cost += cost;
+}
+
+struct Sums<'a, 'b, M, const P: usize> {
+    view: &'a View<'b>,
+    coefficients: [f64; P],
+    model: std::marker::PhantomData<M>,
+}
+
+/// The rows of four marks' Jacobian, and their residual.
+struct Rows<L> {
+    columns: [[L; COLUMNS]; 2],
+    residual: [L; 2],
+    inside: L,
+}
+
+impl<M: LensModel<P>, const P: usize> Kernel for Sums<'_, '_, M, P> {
+    /// Products of columns, upper triangle, and the cost.
+    type Output = Option<([[f64; COLUMNS]; COLUMNS], f64)>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Self::Output {
+        let View { marks, loss, columns, .. } = *self.view;
+        let constants = M::constants(self.coefficients.map(L::splat));
+        let count = 6 + columns.places.len() + 1;
+        let mut squares = [[L::zero(); COLUMNS]; COLUMNS];
+        let mut cost = L::zero();
+        for block in &marks.blocks {
+            let mut rows = rows::<L, M, P>(self.view, &constants, block);
+            if !rows.inside.all_positive() {
+                return None;
+            }
+            let mut root = L::load(&block.weight);
+            let [ru, rv] = rows.residual;
+            let square = (ru * ru + rv * rv) * root * root;
+            if loss == Loss::Squares {
+                cost = cost + square;
+            } else {
+                let at = square.store().map(|s| loss.at(s));
+                cost = cost + L::load(&at.map(|(rho, _)| rho));
+                root = root * L::load(&at.map(|(_, weight)| weight)).sqrt();
+            }
+            for row in &mut rows.columns {
+                for column in &mut row[..count] {
+                    *column = *column * root;
+                }
+            }
+            let [u, v] = &rows.columns;
+            for i in 0..count {
+                let (ui, vi) = (u[i], v[i]);
+                for j in i..count {
+                    squares[i][j] = squares[i][j] + (ui * u[j] + vi * v[j]);
+                }
+            }
+        }
+        let mut sums = [[0.0; COLUMNS]; COLUMNS];
+        for i in 0..count {
+            let mut j = i / LANES * LANES;
+            while j < count {
+                let four = L::sums([squares[i][j], squares[i][j + 1], squares[i][j + 2], squares[i][j + 3]]);
+                sums[i][j..j + LANES].copy_from_slice(&four);
+                j += LANES;
+            }
+        }
+        let [cost, ..] = L::sums([cost; 4]);
+        Some((sums, cost))
+    }
+}
+
+/// The Jacobian of four marks: `d X_c / d delta = -[q]x` with `q = R X`, `d X_c / d t = I`, `d X_c / d height = r3`.
+#[inline(always)]
+fn rows<L: Lanes, M: LensModel<P>, const P: usize>(
+    view: &View<'_>,
+    constants: &M::Constants<L>,
+    block: &Block,
+) -> Rows<L> {
+    let (camera, r, t) = (view.camera, &view.cam_from_target.rotation, &view.cam_from_target.translation);
+    let heights = block.height.map(|h| L::load(&h));
+    let mut z = L::zero();
+    for k in 0..DEFORMATIONS {
+        z = z + L::splat(view.shape[k]) * heights[k];
+    }
+    let (x, y) = (L::load(&block.x), L::load(&block.y));
+    let mut q = [L::zero(); 3];
+    let mut point = [L::zero(); 3];
+    for i in 0..3 {
+        q[i] = L::splat(r[(i, 0)]) * x + L::splat(r[(i, 1)]) * y + L::splat(r[(i, 2)]) * z;
+        point[i] = q[i] + L::splat(t[i]);
+    }
+    let at = M::project(constants, point);
+    let [fx, fy, skew] = [camera.fx, camera.fy, camera.skew].map(L::splat);
+    let [xd, yd] = at.at;
+    let residual = [
+        fx * xd + skew * yd + L::splat(camera.cx) - L::load(&block.u),
+        fy * yd + L::splat(camera.cy) - L::load(&block.v),
+    ];
+    let (zero, one) = (L::zero(), L::splat(1.0));
+    // All derivatives of u and of v by what views share.
+    let mut all = [[zero; MOST]; 2];
+    (all[0][Parameter::Fx as usize], all[0][Parameter::Cx as usize]) = (xd, one);
+    all[0][Parameter::Skew as usize] = yd;
+    (all[1][Parameter::Fy as usize], all[1][Parameter::Cy as usize]) = (yd, one);
+    for k in 0..P {
+        let [dx, dy] = at.by_lens[k];
+        all[0][LINEAR + k] = fx * dx + skew * dy;
+        all[1][LINEAR + k] = fy * dy;
+    }
+    let mut by_point = [[zero; 3]; 2];
+    for i in 0..3 {
+        let (dx, dy) = (at.by_point[0][i], at.by_point[1][i]);
+        by_point[0][i] = fx * dx + skew * dy;
+        by_point[1][i] = fy * dy;
+    }
+    let mut columns = [[zero; COLUMNS]; 2];
+    for row in 0..2 {
+        let p = by_point[row];
+        columns[row][0] = q[1] * p[2] - q[2] * p[1];
+        columns[row][1] = q[2] * p[0] - q[0] * p[2];
+        columns[row][2] = q[0] * p[1] - q[1] * p[0];
+        (columns[row][3], columns[row][4], columns[row][5]) = (p[0], p[1], p[2]);
+        let along = p[0] * L::splat(r[(0, 2)]) + p[1] * L::splat(r[(1, 2)]) + p[2] * L::splat(r[(2, 2)]);
+        for k in 0..DEFORMATIONS {
+            all[row][LINEAR + P + k] = along * heights[k];
+        }
+        for (k, &place) in view.columns.places.iter().enumerate() {
+            columns[row][6 + k] = all[row][place];
+        }
+        if let (Some(ratio), Some(&place)) = (view.columns.fy_per_fx, view.columns.places.first()) {
+            columns[row][6] = all[row][place] + L::splat(ratio) * all[row][Parameter::Fy as usize];
+        }
+        columns[row][6 + view.columns.places.len()] = residual[row];
+    }
+    Rows { columns, residual, inside: at.inside }
+}

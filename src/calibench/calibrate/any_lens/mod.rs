@@ -1,0 +1,25 @@
+//! Which camera explains the pixels, with a lens of any model, marks of unequal weight, a board that is not flat?
+//!
+//! The estimator of [`super::calibrate`] knows one lens, and much about it: every start, the floor of its cost, its
+//! other minima. This one knows any lens ([`Model`]): the same least squares, normal equations and covariance, with
+//! starts that need no pinhole. Nothing certifies its minimum, and every result says so.
+//!
+//! [`Model`]: crate::camera::Model
+
+mod estimate;
+mod kernel;
+mod marks;
+mod problem;
+mod radial;
+mod report;
+mod shape;
+mod start;
+#[cfg(test)]
+mod tests;
+
+pub use estimate::calibrate_lens;
+pub use report::LensCalibration;
+pub use shape::BoardShape;
+
+/// Room for the free parameters of any lens, the board's shape and the gradient, in whole lanes.
+const WIDTH: usize = 24;

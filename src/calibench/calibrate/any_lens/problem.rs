@@ -1,0 +1,184 @@
+//! What is minimised with a lens of any model? The sum of squared, weighted pixel distances, and what is known
+//! beforehand.
+
+use super::super::Loss;
+use super::super::blocks::ViewBlock;
+use super::super::chunks::{self, CHUNK};
+use super::super::minimise::Descent;
+use super::super::prior::Prior;
+use super::super::settings::Bend;
+use super::super::system::{Step, System};
+use super::WIDTH;
+use super::kernel::{self, Columns, Share};
+use super::marks::Marks;
+use crate::camera::{Camera, FreeParameters, Lens};
+use crate::geometry::{Pose, Vec2};
+
+/// The unknowns.
+#[derive(Debug, Clone)]
+pub(super) struct State {
+    pub camera: Camera<Lens>,
+    pub cam_from_target: Vec<Pose>,
+    /// Of the board, in its own unit.
+    pub shape: [f64; 3],
+}
+
+impl State {
+    /// The pixel of a mark; `None` where the lens has none.
+    pub fn pixel(&self, view: usize, mark: &super::marks::Mark) -> Option<Vec2> {
+        self.camera.pixel(&self.cam_from_target[view].apply(&mark.on_board(&self.shape)))
+    }
+}
+
+/// What is minimised.
+#[derive(Clone, Copy)]
+pub(super) struct Problem<'a> {
+    pub views: &'a [Marks],
+    pub free: FreeParameters,
+    pub fy_per_fx: Option<f64>,
+    /// What is known beforehand, and the variance of a coordinate of weight 1 that weighs it, px^2.
+    pub priors: &'a [Prior],
+    pub variance: f64,
+    /// What is unknown of the board.
+    pub bend: Option<Bend>,
+    pub loss: Loss,
+    pub max_iterations: usize,
+    pub rounding_cost: f64,
+}
+
+/// Residuals of pixels near `p` cannot be known better than this many roundings of `p`.
+const ROUNDINGS: f64 = 8.0;
+
+/// The cost that rounding alone makes.
+pub(super) fn rounding_cost(views: &[Marks]) -> f64 {
+    let unit = |p: f64| (ROUNDINGS * f64::EPSILON * p) * (ROUNDINGS * f64::EPSILON * p);
+    let marks = views.iter().flat_map(|view| &view.list);
+    marks.map(|mark| (unit(mark.pixel.x) + unit(mark.pixel.y)) * mark.weight * mark.weight).sum()
+}
+
+impl Problem<'_> {
+    /// Unknowns that are not parameters of the camera.
+    pub fn deformations(&self) -> usize {
+        self.bend.map_or(0, |bend| bend.deformations)
+    }
+
+    /// Weights of the priors: parameters first, then the board's deformations.
+    fn add_priors(&self, state: &State, system: &mut System<WIDTH>) {
+        let mut add = |row: usize, off: f64, sd: f64| {
+            let weight = self.variance / (sd * sd);
+            system.cost += weight * off * off;
+            system.intrinsics[(row, row)] += weight;
+            system.gradient[row] += weight * off;
+        };
+        for prior in self.priors {
+            if let (Some(row), Some(value)) =
+                (self.free.position(prior.parameter), state.camera.value(prior.parameter))
+            {
+                add(row, value - prior.mean, prior.standard_deviation);
+            }
+        }
+        if let Some(bend) = self.known_bend() {
+            for (k, value) in state.shape.iter().enumerate().take(bend.deformations) {
+                add(self.free.len() + k, *value, bend.standard_deviation);
+            }
+        }
+    }
+
+    /// How many unknowns are settled by what is known beforehand: `sum (posterior sd / prior sd)^2`.
+    pub fn settled(&self, system: &System<WIDTH>) -> f64 {
+        let bend = self.known_bend();
+        if self.priors.is_empty() && bend.is_none() {
+            return 0.0;
+        }
+        let Some(covariance) = system.reduction().and_then(|r| r.intrinsics_covariance()) else { return 0.0 };
+        let share = |row: usize, sd: f64| covariance[(row, row)] * self.variance / (sd * sd);
+        let of_priors = self
+            .priors
+            .iter()
+            .filter_map(|prior| Some(share(self.free.position(prior.parameter)?, prior.standard_deviation)));
+        let rows = self.free.len()..self.free.len() + bend.map_or(0, |bend| bend.deformations);
+        let of_board = rows.filter_map(|row| Some(share(row, bend?.standard_deviation)));
+        of_priors.chain(of_board).sum()
+    }
+
+    /// The board's shape where something is known of it beforehand.
+    fn known_bend(&self) -> Option<Bend> {
+        self.bend.filter(|bend| bend.standard_deviation.is_finite())
+    }
+
+    fn fill(&self, state: &State, system: &mut System<WIDTH>) -> Option<()> {
+        let columns = Columns::of(&state.camera.distortion, self.free, self.fy_per_fx, self.deformations());
+        system.views.resize_with(self.views.len(), ViewBlock::zero);
+        let mut total = Some(Share::zero());
+        let chunk = |index: usize, blocks: &mut [ViewBlock<WIDTH>]| {
+            let mut share = Share::zero();
+            for (k, block) in blocks.iter_mut().enumerate() {
+                let at = index * CHUNK + k;
+                let view = kernel::View {
+                    camera: &state.camera,
+                    cam_from_target: &state.cam_from_target[at],
+                    shape: &state.shape,
+                    marks: &self.views[at],
+                    loss: self.loss,
+                    columns: &columns,
+                };
+                kernel::add_view(&view, &mut share, block)?;
+            }
+            Some(share)
+        };
+        chunks::fold(&mut system.views, chunk, |share| {
+            total = match (total.take(), share) {
+                (Some(mut sum), Some(part)) => {
+                    sum.square += part.square;
+                    sum.gradient += part.gradient;
+                    sum.cost += part.cost;
+                    Some(sum)
+                }
+                _ => None,
+            };
+        });
+        let mut total = total?;
+        total.square.fill_lower_triangle_with_upper_triangle();
+        (system.intrinsics, system.gradient, system.cost) = (total.square, total.gradient, total.cost);
+        Some(())
+    }
+}
+
+impl Descent<WIDTH> for Problem<'_> {
+    type State = State;
+
+    fn system(&self) -> System<WIDTH> {
+        System::new(self.free, self.views.len()).sharing(self.deformations())
+    }
+
+    fn linearise_into(&self, state: &State, system: &mut System<WIDTH>) {
+        let filled = self.fill(state, system);
+        if filled.is_none() || !(state.camera.fx > 0.0 && state.camera.fy > 0.0) || system.cost.is_nan() {
+            system.cost = f64::INFINITY;
+            return;
+        }
+        self.add_priors(state, system);
+    }
+
+    fn step(&self, from: &State, step: &Step<WIDTH>, to: &mut State) {
+        let shared = step.intrinsics.as_slice();
+        to.camera = from.camera.moved(self.free, shared);
+        if let Some(ratio) = self.fy_per_fx {
+            to.camera.fy = ratio * to.camera.fx;
+        }
+        for k in 0..self.deformations() {
+            to.shape[k] = from.shape[k] + shared[self.free.len() + k];
+        }
+        for ((to, from), delta) in to.cam_from_target.iter_mut().zip(&from.cam_from_target).zip(&step.poses) {
+            *to = from.perturbed(delta);
+        }
+    }
+
+    fn max_iterations(&self) -> usize {
+        self.max_iterations
+    }
+
+    fn rounding_cost(&self) -> f64 {
+        self.rounding_cost
+    }
+}

@@ -1,0 +1,109 @@
+//! Which coefficients bend angles from the axis to given radii? A start for one model from another's picture.
+
+use crate::camera::{FreeParameters, Lens, Model, Parameter};
+use crate::geometry::Vec3;
+use nalgebra::{DMatrix, DVector};
+
+/// A pinhole has no image of what lies beyond this angle, rad.
+const BESIDE: f64 = 1.55;
+/// Combinations of coefficients that are known worse than the best by this factor are left alone.
+const UNTOLD: f64 = 1e-6;
+/// Steps of each coefficient of the double sphere.
+const STEPS: usize = 12;
+
+/// The lens with those coefficients that are free fitted to pairs of angle (rad) and distorted radius; the others
+/// stay as they are. With it the factor of the focal length: the radii are those of a lens that leaves the axis
+/// with slope 1, and a double sphere does so with `1 / (1 + xi)`. Of these there are two, as a rule each a minimum of
+/// its own: one with a negative and one with a positive `xi`. None where a pinhole would have to see beside itself.
+pub(super) fn fitted(lens: Lens, free: FreeParameters, radii: &[[f64; 2]]) -> Vec<(Lens, f64)> {
+    if !lens.model().sees_behind() && radii.iter().any(|[angle, _]| *angle > BESIDE) {
+        return Vec::new();
+    }
+    match lens.model() {
+        Model::DoubleSphere if free.contains(Parameter::Xi) => [[-0.6, -0.05], [0.0, 0.9]]
+            .into_iter()
+            .filter_map(|[from, to]| best_sphere(lens, free, &steps(from, to), radii))
+            .collect(),
+        Model::DoubleSphere => {
+            let xi = lens.get(Parameter::Xi).unwrap_or(0.0);
+            best_sphere(lens, free, &[xi], radii).into_iter().collect()
+        }
+        _ => least_squares(lens, free, radii).map(|lens| (lens, 1.0)).into_iter().collect(),
+    }
+}
+
+/// A model's equation multiplied out, linear in its radial coefficients: their factors and the right-hand side.
+fn equation(model: Model, &[angle, radius]: &[f64; 2]) -> (Vec<(Parameter, f64)>, f64) {
+    use Parameter::{K1, K2, K3, K4, K5, K6};
+    let r = libm::tan(angle);
+    let (s, g) = (r * r, radius / r);
+    match model {
+        Model::KannalaBrandt => {
+            let t = angle * angle;
+            (vec![(K1, t), (K2, t * t), (K3, t * t * t), (K4, t * t * t * t)], radius / angle - 1.0)
+        }
+        Model::Division => (vec![(K1, radius * radius)], g - 1.0),
+        _ => {
+            let above = [(K1, s), (K2, s * s), (K3, s * s * s)];
+            let below = [(K4, -g * s), (K5, -g * s * s), (K6, -g * s * s * s)];
+            (above.into_iter().chain(below).collect(), g - 1.0)
+        }
+    }
+}
+
+fn least_squares(lens: Lens, free: FreeParameters, radii: &[[f64; 2]]) -> Option<Lens> {
+    let rows: Vec<_> = radii
+        .iter()
+        .filter(|[angle, radius]| *angle > 1e-3 && *radius > 0.0)
+        .map(|sample| equation(lens.model(), sample))
+        .collect();
+    let Some((first, _)) = rows.first() else { return Some(lens) };
+    let is_unknown = |p: &Parameter| free.contains(*p) && lens.get(*p).is_some();
+    let unknown: Vec<Parameter> = first.iter().map(|(p, _)| *p).filter(is_unknown).collect();
+    if unknown.is_empty() {
+        return Some(lens);
+    }
+    let mut a = DMatrix::zeros(rows.len(), unknown.len());
+    let mut b = DVector::zeros(rows.len());
+    for (i, (terms, wanted)) in rows.iter().enumerate() {
+        b[i] = *wanted;
+        for &(parameter, factor) in terms {
+            match unknown.iter().position(|&p| p == parameter) {
+                Some(column) => a[(i, column)] = factor,
+                None => b[i] -= factor * lens.get(parameter).unwrap_or(0.0),
+            }
+        }
+    }
+    let decomposed = a.svd(true, true);
+    let solved = decomposed.solve(&b, UNTOLD * decomposed.singular_values.max()).ok()?;
+    unknown.iter().zip(solved.iter()).try_fold(lens, |lens, (&p, &value)| lens.with(p, value))
+}
+
+/// Numbers evenly between two.
+fn steps(from: f64, to: f64) -> Vec<f64> {
+    (0..=STEPS).map(|k| from + (to - from) * k as f64 / STEPS as f64).collect()
+}
+
+/// The double sphere, of a grid, whose radii are closest.
+fn best_sphere(lens: Lens, free: FreeParameters, xis: &[f64], radii: &[[f64; 2]]) -> Option<(Lens, f64)> {
+    let held = || vec![lens.get(Parameter::Alpha).unwrap_or(0.5)];
+    let alphas = if free.contains(Parameter::Alpha) { steps(0.1, 0.9) } else { held() };
+    let squared_error = |lens: &Lens, xi: f64, [angle, radius]: &[f64; 2]| {
+        let at = lens.project(&Vec3::new(libm::sin(*angle), 0.0, libm::cos(*angle)))?;
+        let off = (1.0 + xi) * at.x - radius;
+        Some(off * off)
+    };
+    let mut best: Option<(f64, Lens, f64)> = None;
+    for &xi in xis {
+        for &alpha in &alphas {
+            let candidate = lens.with(Parameter::Xi, xi)?.with(Parameter::Alpha, alpha)?;
+            let error: Option<f64> = radii.iter().map(|sample| squared_error(&candidate, xi, sample)).sum();
+            if let Some(error) = error
+                && best.is_none_or(|(least, ..)| error < least)
+            {
+                best = Some((error, candidate, 1.0 + xi));
+            }
+        }
+    }
+    best.map(|(_, lens, factor)| (lens, factor))
+}

@@ -1,0 +1,157 @@
+//! What does a calibration with a lens of any model say? The minimum as a [`Calibration`].
+
+use super::super::conditioning::Conditioning;
+use super::super::estimate::noise_variance;
+use super::super::minimise::Minimum;
+use super::super::target_frame::TargetFrames;
+use super::super::{Calibration, CalibrationError, Unknown, identifiability, structure, warnings};
+use super::problem::{Problem, State};
+use super::{BoardShape, WIDTH};
+use crate::camera::Lens;
+use crate::geometry::Vec2;
+
+/// A calibration with a lens of any model.
+pub type LensCalibration = Calibration<Lens>;
+
+impl From<Calibration> for LensCalibration {
+    fn from(plain: Calibration) -> LensCalibration {
+        LensCalibration {
+            camera: plain.camera.into(),
+            free: plain.free,
+            priors: plain.priors,
+            cam_from_target: plain.cam_from_target,
+            residuals: plain.residuals,
+            rmse_px: plain.rmse_px,
+            sigma_px: plain.sigma_px,
+            degrees_of_freedom: plain.degrees_of_freedom,
+            covariance: plain.covariance,
+            conditioning: plain.conditioning,
+            termination: plain.termination,
+            certificate: plain.certificate,
+            intervals: plain.intervals,
+            starts: plain.starts,
+            iterations: plain.iterations,
+            warnings: plain.warnings,
+            board: plain.board,
+        }
+    }
+}
+
+/// Residuals of a state.
+struct Residuals {
+    /// Predicted - observed, px.
+    plain: Vec<Vec<Vec2>>,
+    /// Times the marks' weights.
+    weighted: Vec<Vec<Vec2>>,
+    /// Sum of the weighted squares.
+    square: f64,
+    marks: usize,
+    /// Largest angle from the axis, rad.
+    largest_angle: f64,
+}
+
+impl Residuals {
+    fn of(problem: &Problem<'_>, state: &State) -> Residuals {
+        let mut all =
+            Residuals { plain: Vec::new(), weighted: Vec::new(), square: 0.0, marks: 0, largest_angle: 0.0 };
+        for (view, marks) in problem.views.iter().enumerate() {
+            let residual = |mark| match state.pixel(view, mark) {
+                Some(pixel) => pixel - mark.pixel,
+                None => Vec2::repeat(f64::INFINITY),
+            };
+            let plain: Vec<Vec2> = marks.list.iter().map(residual).collect();
+            let weighted: Vec<Vec2> =
+                plain.iter().zip(&marks.list).map(|(r, mark)| r * mark.weight).collect();
+            all.square += weighted.iter().map(Vec2::norm_squared).sum::<f64>();
+            all.marks += marks.len();
+            for mark in &marks.list {
+                let point = state.cam_from_target[view].apply(&mark.on_board(&state.shape));
+                all.largest_angle = all.largest_angle.max(libm::atan2(point.xy().norm(), point.z));
+            }
+            all.plain.push(plain);
+            all.weighted.push(weighted);
+        }
+        all
+    }
+
+    /// Degrees of freedom, 1 at the least; `settled` unknowns are known from elsewhere.
+    fn freedom(&self, minimum: &Minimum<State, WIDTH>, settled: f64) -> f64 {
+        (2.0 * self.marks as f64 + settled - minimum.system.unknowns() as f64).max(1.0)
+    }
+}
+
+/// The variance of a coordinate of weight 1 that the residuals of a minimum show, at the scale at which the
+/// covariance is stated.
+pub(super) fn variance(problem: &Problem<'_>, minimum: &Minimum<State, WIDTH>) -> f64 {
+    let residuals = Residuals::of(problem, &minimum.state);
+    let freedom = residuals.freedom(minimum, problem.settled(&minimum.system));
+    noise_variance(&residuals.weighted, residuals.square, problem.loss, freedom)
+}
+
+/// The result at a minimum.
+///
+/// # Errors
+/// Normal equations that are singular.
+pub(super) fn report(
+    minimum: Minimum<State, WIDTH>,
+    problem: &Problem<'_>,
+    frames: &TargetFrames,
+    region: [Vec2; 2],
+    starts: usize,
+) -> Result<LensCalibration, CalibrationError> {
+    let Minimum { state, system, termination, iterations } = &minimum;
+    let residuals = Residuals::of(problem, state);
+    let settled = problem.settled(system);
+    let freedom = residuals.freedom(&minimum, settled);
+    let variance = noise_variance(&residuals.weighted, residuals.square, problem.loss, freedom);
+    let singular = || CalibrationError::NotIdentifiable {
+        inseparable: vec![Unknown::Camera, Unknown::Poses],
+        why: "the normal equations are singular".into(),
+    };
+    let reduction = system.reduction().ok_or_else(singular)?;
+    let conditioning = Conditioning::of(system, &reduction);
+    if !problem.free.is_empty() {
+        let why = || "the normal equations are singular".into();
+        identifiability::refuse_if_singular(conditioning.as_ref(), why)?;
+    }
+    let unit = reduction.covariance().ok_or_else(singular)?;
+    let mut covariance = frames.covariance(unit, &state.cam_from_target, variance);
+    covariance.fy_per_fx = problem.fy_per_fx;
+    // The board's shape stands behind the camera's parameters.
+    let n = problem.free.len();
+    let board = problem.bend.map(|bend| {
+        let sd = |k: usize| match k < bend.deformations {
+            true => covariance.intrinsics[(n + k, n + k)].sqrt(),
+            false => 0.0,
+        };
+        let [bow_x, bow_y, twist] = state.shape;
+        BoardShape { bow_x, bow_y, twist, standard_deviations: [sd(0), sd(1), sd(2)], region }
+    });
+    covariance.intrinsics = covariance.intrinsics.view((0, 0), (n, n)).into_owned();
+    covariance.cross = covariance.cross.iter().map(|cross| cross.rows(0, n).into_owned()).collect();
+    let neighbours = (residuals.square > problem.rounding_cost)
+        .then(|| structure::structure(&residuals.weighted, 0.5 * residuals.square / residuals.marks as f64))
+        .flatten();
+    let poses = state.cam_from_target.iter().enumerate();
+    let mut calibration = LensCalibration {
+        camera: state.camera,
+        free: problem.free,
+        priors: problem.priors.to_vec(),
+        cam_from_target: poses.map(|(view, pose)| frames.at(view).cam_from_target(pose)).collect(),
+        rmse_px: (residuals.square / residuals.marks as f64).sqrt(),
+        sigma_px: (residuals.square / freedom).sqrt(),
+        degrees_of_freedom: freedom as usize,
+        covariance,
+        conditioning,
+        termination: *termination,
+        certificate: None,
+        intervals: Vec::new(),
+        starts,
+        iterations: *iterations,
+        warnings: Vec::new(),
+        board,
+        residuals: residuals.plain,
+    };
+    calibration.warnings = warnings::of_lens(&calibration, residuals.largest_angle, neighbours);
+    Ok(calibration)
+}

@@ -1,0 +1,46 @@
+//! How is a board bent? Two bows and a twist.
+
+use crate::board::View;
+use crate::geometry::Vec2;
+
+/// The shape of a board that is not flat: the mark at `(X, Y)` lies `bow_x (1 - x^2) + bow_y (1 - y^2) + twist x y`
+/// towards +Z of the target, with `x` and `y` from -1 to 1 over the box around all marks (the bows as in mrcal's
+/// `calobject_warp`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct BoardShape {
+    /// Height of the middle over the edges in x, in the target's unit.
+    pub bow_x: f64,
+    /// Height of the middle over the edges in y, in the target's unit.
+    pub bow_y: f64,
+    /// Height of the corners where `x y = 1`, in the target's unit.
+    pub twist: f64,
+    /// Standard deviations of the three; 0 where none was estimated.
+    pub standard_deviations: [f64; 3],
+    /// The box around all marks: least and greatest X and Y.
+    pub region: [Vec2; 2],
+}
+
+impl BoardShape {
+    /// The height of a mark over the board's plane, in the target's unit.
+    pub fn height(&self, mark: &Vec2) -> f64 {
+        let [a, b, c] = basis(&self.region, mark);
+        self.bow_x * a + self.bow_y * b + self.twist * c
+    }
+}
+
+/// The box around the marks of all views.
+pub(super) fn region(views: &[View]) -> [Vec2; 2] {
+    let outside = [Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY)];
+    let points = views.iter().flat_map(View::points);
+    points.fold(outside, |[low, high], p| [low.inf(p), high.sup(p)])
+}
+
+/// `1 - x^2`, `1 - y^2`, `x y` of a mark.
+pub(super) fn basis([low, high]: &[Vec2; 2], mark: &Vec2) -> [f64; 3] {
+    let across = |low: f64, high: f64, at: f64| {
+        if high > low { (2.0 * at - low - high) / (high - low) } else { 0.0 }
+    };
+    let (x, y) = (across(low.x, high.x, mark.x), across(low.y, high.y, mark.y));
+    [1.0 - x * x, 1.0 - y * y, x * y]
+}

@@ -1,0 +1,229 @@
+//! From where does the search for a camera with any lens start?
+//!
+//! A homography of pixels needs a pinhole, and beyond some 100 degrees there is none. A ray needs none: with an
+//! equidistant fisheye of some focal length every pixel has a ray `b`, and `b x (H X) = 0` gives the homography
+//! from the board to rays, whatever the angle. The focal length is searched on a grid; the best few are refined
+//! with a polynomial of the angle (Kannala & Brandt 2006), which follows any lens, and the wanted model is
+//! fitted to the rays that this one sees.
+
+use super::super::minimise::descend;
+use super::super::target_frame::TargetFrames;
+use super::super::tilt::mirrored;
+use super::super::{Settings, calibrate};
+use super::marks::{Mark, Marks};
+use super::problem::{Problem, State};
+use super::radial;
+use crate::board::View;
+use crate::camera::{Camera, FreeParameters, Lens, Model, Parameter};
+use crate::geometry::{Mat3, Pose, Vec2, Vec3};
+use nalgebra::{SMatrix, SVector};
+
+/// Angles from the axis, rad, at which the farthest pixel may be seen: 3 to 103 degrees, each 1.3 times the last.
+const NARROWEST: f64 = 0.05;
+const ANGLES: usize = 14;
+const ANGLE_FACTOR: f64 = 1.3;
+/// So many of them are refined.
+const REFINED: usize = 3;
+/// Views that choose the focal length; all of them follow.
+const CHOOSERS: usize = 40;
+/// Steps of the poses alone, of a first lens, of a better one.
+const POSE_STEPS: usize = 6;
+const FIRST_STEPS: usize = 15;
+const LENS_STEPS: usize = 40;
+
+/// States from which the problem is worth minimising: from the angle polynomial, and from the pinhole's solver
+/// where that finds a camera.
+pub(super) fn starts(problem: &Problem<'_>, views: &[View], settings: &Settings) -> Vec<State> {
+    let from_rays = by_rays(problem, settings);
+    let from_pinhole = by_pinhole(problem, views, settings);
+    let both = from_rays.into_iter().chain(from_pinhole);
+    both.flat_map(|state| with_model(problem, &state, settings)).collect()
+}
+
+/// The state that the pinhole's solver finds with k1 and k2, however it fits.
+fn by_pinhole(problem: &Problem<'_>, views: &[View], settings: &Settings) -> Option<State> {
+    let mut plain = Settings::standard();
+    (plain.image_size, plain.loss, plain.search) = (settings.image_size, settings.loss, false);
+    let unweighted = |v: &View| View::new(v.points().to_vec(), v.pixels().to_vec()).ok();
+    let unweighted: Vec<View> = views.iter().map(unweighted).collect::<Option<_>>()?;
+    let found = calibrate(&unweighted, &plain).ok()?;
+    let frames = TargetFrames::of(views);
+    let poses = found.cam_from_target.iter().enumerate();
+    let state = State {
+        camera: found.camera.into(),
+        cam_from_target: poses.map(|(view, pose)| frames.at(view).of_pose(pose)).collect(),
+        shape: [0.0; 3],
+    };
+    is_seen(problem.views, &state).then_some(state)
+}
+
+/// The best state with an angle polynomial of two terms.
+fn by_rays(problem: &Problem<'_>, settings: &Settings) -> Option<State> {
+    let (centre, reach) = frame(problem.views, settings);
+    let chosen: Vec<Marks> =
+        chosen_views(problem.views).into_iter().map(|view| problem.views[view].clone()).collect();
+    let few = Problem { views: &chosen, ..fisheye(problem) };
+    let poses_alone = Problem { free: FreeParameters::NONE, max_iterations: POSE_STEPS, ..few };
+    let mut tried = Vec::with_capacity(ANGLES);
+    let mut angle = NARROWEST;
+    for _ in 0..ANGLES {
+        let lens = Lens::ideal(Model::KannalaBrandt);
+        let camera = Camera::with_lens(reach / angle, reach / angle, centre.x, centre.y, lens);
+        if let Some(state) = with_poses(&chosen, camera) {
+            tried.push(descend(&poses_alone, state));
+        }
+        angle *= ANGLE_FACTOR;
+    }
+    tried.sort_by(|a, b| a.system.cost.total_cmp(&b.system.cost));
+    use Parameter::{Cx, Cy, Fx, K1, K2};
+    let first = Problem { free: FreeParameters::of(&[Fx, K1]), max_iterations: FIRST_STEPS, ..few };
+    let lens = FreeParameters::of(&[Fx, Cx, Cy, K1, K2]);
+    let better = Problem { free: lens, max_iterations: LENS_STEPS, ..few };
+    let refined = tried.into_iter().take(REFINED).map(|m| descend(&better, descend(&first, m.state).state));
+    let best = refined
+        .filter(|m| m.system.cost.is_finite())
+        .min_by(|a, b| a.system.cost.total_cmp(&b.system.cost))?;
+    let whole = Problem { free: lens, max_iterations: LENS_STEPS, ..fisheye(problem) };
+    let state = with_better_tilts(&whole, with_poses(problem.views, best.state.camera)?);
+    Some(descend(&whole, state).state)
+}
+
+/// The problem with an angle polynomial, square pixels, and nothing known beforehand.
+fn fisheye<'a>(problem: &Problem<'a>) -> Problem<'a> {
+    Problem { fy_per_fx: Some(1.0), priors: &[], bend: None, ..*problem }
+}
+
+/// Where the axis may meet the image, and the distance of the farthest pixel from there.
+fn frame(views: &[Marks], settings: &Settings) -> (Vec2, f64) {
+    let pixels = || views.iter().flat_map(|view| &view.list).map(|mark| mark.pixel);
+    let outside = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
+    let (low, high) = pixels().fold(outside, |(low, high), p| (low.inf(&p), high.sup(&p)));
+    let middle = match settings.image_size {
+        Some((width, height)) => Vec2::new(0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0)),
+        None => 0.5 * (low + high),
+    };
+    let held = |parameter, otherwise: f64| match settings.held(parameter) {
+        Ok(Some(value)) => value,
+        _ => otherwise,
+    };
+    let centre = Vec2::new(held(Parameter::Cx, middle.x), held(Parameter::Cy, middle.y));
+    (centre, pixels().map(|p| (p - centre).norm()).fold(1.0, f64::max))
+}
+
+/// Views evenly taken from all.
+fn chosen_views(views: &[Marks]) -> Vec<usize> {
+    let count = views.len().min(CHOOSERS);
+    (0..count).map(|k| k * views.len() / count).collect()
+}
+
+/// The camera with a pose for every view; `None` where one has none.
+fn with_poses(views: &[Marks], camera: Camera<Lens>) -> Option<State> {
+    let cam_from_target = views.iter().map(|view| pose_from_rays(view, &camera)).collect::<Option<_>>()?;
+    Some(State { camera, cam_from_target, shape: [0.0; 3] })
+}
+
+/// The pose of a flat board from the rays of its marks; `None` with fewer than four.
+fn pose_from_rays(view: &Marks, camera: &Camera<Lens>) -> Option<Pose> {
+    let mut normal = SMatrix::<f64, 9, 9>::zeros();
+    let mut rays = Vec::with_capacity(view.len());
+    for mark in &view.list {
+        let Ok(ray) = camera.ray(&mark.pixel) else { continue };
+        // Two directions across the ray: H X has no part along them.
+        let other = if ray.x.abs() < 0.6 { Vec3::x() } else { Vec3::y() };
+        let first = ray.cross(&other).normalize();
+        let point = [mark.point.x, mark.point.y, 1.0];
+        for across in [first, ray.cross(&first)] {
+            let row = SVector::<f64, 9>::from_fn(|i, _| point[i % 3] * across[i / 3]);
+            normal += row * row.transpose();
+        }
+        rays.push((Vec3::from(point), ray));
+    }
+    if rays.len() < 4 {
+        return None;
+    }
+    let eigen = normal.symmetric_eigen();
+    let least = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+    let h = Mat3::from_fn(|i, j| least[3 * i + j]);
+    let in_front: f64 = rays.iter().map(|(point, ray)| (h * point).dot(ray)).sum();
+    let (a, b): (Vec3, Vec3) = (h.column(0).into(), h.column(1).into());
+    let scale = in_front.signum() * 2.0 / (a.norm() + b.norm());
+    let (a, b) = (scale * a, scale * b);
+    let svd = Mat3::from_columns(&[a, b, a.cross(&b)]).svd(true, true);
+    let pose = Pose { rotation: svd.u? * svd.v_t?, translation: scale * h.column(2) };
+    pose.is_finite().then_some(pose)
+}
+
+/// Turns the targets to their other tilt where that costs less: seen from afar the two look alike.
+pub(super) fn with_better_tilts(problem: &Problem<'_>, mut state: State) -> State {
+    for (view, marks) in problem.views.iter().enumerate() {
+        let alone = Problem {
+            views: std::slice::from_ref(marks),
+            free: FreeParameters::NONE,
+            priors: &[],
+            bend: None,
+            max_iterations: LENS_STEPS,
+            ..*problem
+        };
+        let at = |pose: Pose| State { cam_from_target: vec![pose], ..state };
+        let as_it_is = descend(&alone, at(state.cam_from_target[view]));
+        let turned = descend(&alone, at(mirrored(&as_it_is.state.cam_from_target[0])));
+        let better = if turned.system.cost < as_it_is.system.cost { turned } else { as_it_is };
+        if better.system.cost.is_finite() {
+            state.cam_from_target[view] = better.state.cam_from_target[0];
+        }
+    }
+    state
+}
+
+/// Whether the lens has an image of every mark.
+fn is_seen(views: &[Marks], state: &State) -> bool {
+    let mut marks =
+        views.iter().enumerate().flat_map(|(view, marks)| marks.list.iter().map(move |mark| (view, mark)));
+    marks.all(|(view, mark)| state.pixel(view, mark).is_some())
+}
+
+/// The state with lenses of the wanted model that see the marks where this one does; what is held or known
+/// beforehand has its value.
+fn with_model(problem: &Problem<'_>, state: &State, settings: &Settings) -> Vec<State> {
+    let Some(told) = with_values(problem, &state.camera, settings) else { return Vec::new() };
+    let lenses = radial::fitted(told.distortion, problem.free, &radii(problem.views, state));
+    let with_lens = |(lens, factor): (Lens, f64)| {
+        let mut camera = Camera { distortion: lens, ..told };
+        if problem.free.contains(Parameter::Fx) {
+            (camera.fx, camera.fy) = (factor * camera.fx, factor * camera.fy);
+        }
+        if let Some(ratio) = problem.fy_per_fx {
+            camera.fy = ratio * camera.fx;
+        }
+        State { camera, ..state.clone() }
+    };
+    lenses.into_iter().map(with_lens).filter(|state| is_seen(problem.views, state)).collect()
+}
+
+/// The camera with an ideal lens of the wanted model, and the values that are held or known beforehand.
+fn with_values(problem: &Problem<'_>, camera: &Camera<Lens>, settings: &Settings) -> Option<Camera<Lens>> {
+    let mut camera = Camera { distortion: Lens::ideal(settings.model()), skew: 0.0, ..*camera };
+    for parameter in settings.model().parameters() {
+        if let Ok(Some(value)) = settings.held(parameter) {
+            camera = camera.with_value(parameter, value)?;
+        }
+    }
+    for prior in problem.priors {
+        camera = camera.with_value(prior.parameter, prior.mean)?;
+    }
+    Some(camera)
+}
+
+/// Angles from the axis and distorted radii, of some marks.
+fn radii(views: &[Marks], state: &State) -> Vec<[f64; 2]> {
+    const ENOUGH: usize = 500;
+    let every = views.iter().map(Marks::len).sum::<usize>().div_ceil(ENOUGH).max(1);
+    let marks =
+        views.iter().enumerate().flat_map(|(view, marks)| marks.list.iter().map(move |mark| (view, mark)));
+    let polar = |(view, mark): (usize, &Mark)| {
+        let point = state.cam_from_target[view].apply(&mark.on_board(&state.shape));
+        let image = state.camera.distortion.project(&point)?;
+        Some([libm::atan2(point.xy().norm(), point.z), image.norm()])
+    };
+    marks.step_by(every).filter_map(polar).collect()
+}
