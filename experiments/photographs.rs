@@ -10,7 +10,7 @@
 //! boards that are not plane. What they add is not measured here.
 
 use calibench::board::{Board, View};
-use calibench::calibrate::{Calibration, Settings};
+use calibench::calibrate::Settings;
 use calibench::camera::{Camera, FreeParameters};
 use calibench::detect::{circle_grid, disc_biases};
 use calibench::evaluate::cramer_rao;
@@ -82,10 +82,10 @@ struct Exact {
     biases: Vec<Vec2>,
     /// Detected minus true centre, px, all views.
     displacements: Vec<Vec2>,
-    uncorrected: Calibration,
-    corrected: Calibration,
+    uncorrected: Camera,
+    corrected: Camera,
     /// The camera from exact pixels with the predicted bias added: what the bias alone does.
-    predicted: Calibration,
+    predicted: Camera,
 }
 
 fn run(context: &Context) -> Result<Record, ExperimentError> {
@@ -245,9 +245,11 @@ fn noise_free(diameter_mm: f64, album: &Album) -> Result<Exact, ExperimentError>
         predicted_views.push(view(biased)?);
     }
     let settings = Settings::standard();
-    let fit = |views: &[View], discs: Option<&Board>| {
+    let fit = |views: &[View], discs: Option<&Board>| -> Result<Camera, ExperimentError> {
         let fitter = Fitter { settings: &settings, discs, reject_factor: None };
-        fitter.fit(views).map(|fit| fit.calibration).map_err(ExperimentError::at("calibration"))
+        let camera = fitter.fit(views).map(|fit| fit.calibration.camera);
+        let camera = camera.map_err(ExperimentError::at("calibration"))?;
+        Ok(camera.brown_conrady().expect("the settings ask for a Brown-Conrady lens"))
     };
     Ok(Exact {
         diameter_mm,
@@ -343,7 +345,7 @@ fn report_bias(record: &mut Record, exact: &[Exact], unit: &[f64]) -> Result<(),
         .number("remainder-rms", remainder, "RMS distance from the true centres once corrected");
     let truth = Truth::example_camera();
     let (before, after) =
-        (differences(&chapter.uncorrected.camera, &truth), differences(&chapter.corrected.camera, &truth));
+        (differences(&chapter.uncorrected, &truth), differences(&chapter.corrected, &truth));
     for (i, p) in FreeParameters::STANDARD.iter().enumerate() {
         let what = format!("error of {p} from uncorrected centres, 3 mm dots");
         record.group(p.unit(), band()).number(format!("{p}-uncorrected"), before[i], what);
@@ -408,10 +410,10 @@ fn claim_bias(record: &mut Record, exact: &[Exact], unit: &[f64]) {
         (format!("dots of {} mm: {moved:?}", e.diameter_mm), within(&moved, &e.reach(unit)))
     };
     let statement = "with correction the camera is true up to what the detector leaves";
-    let cases = exact.iter().map(|e| case(e, differences(&e.corrected.camera, &truth)));
+    let cases = exact.iter().map(|e| case(e, differences(&e.corrected, &truth)));
     record.claim_that("corrected-camera-is-true", statement).every("dot sizes", cases).because(reason);
     let statement = "without correction the camera is wrong as the bias of the discs alone makes it";
-    let cases = exact.iter().map(|e| case(e, differences(&e.uncorrected.camera, &e.predicted.camera)));
+    let cases = exact.iter().map(|e| case(e, differences(&e.uncorrected, &e.predicted)));
     record.claim_that("uncorrected-camera-is-biased", statement).every("dot sizes", cases).because(reason);
 }
 
@@ -438,8 +440,8 @@ fn bias_table<'a>(exact: &'a [Exact], unit: &[f64]) -> Rows<&'a Exact> {
         .column("bias_rms", "px", |e| rms(&e.displacements))
         .column("bias_largest", "px", |e| largest(&e.displacements))
         .column("remainder_rms", "px", |e| rms(&e.remainder()))
-        .column("uncorrected_error", deviations, |e| error(&e.uncorrected.camera))
-        .column("corrected_error", deviations, |e| error(&e.corrected.camera))
+        .column("uncorrected_error", deviations, |e| error(&e.uncorrected))
+        .column("corrected_error", deviations, |e| error(&e.corrected))
 }
 
 fn noise_figure(outcomes: &[Outcome], seed: u64) -> Figure {
@@ -501,12 +503,9 @@ fn bias_figure(exact: &[Exact], unit: &[f64]) -> Figure {
     let cameras = Plot::new("camera", "diameter (mm)", "worst error (sd at 0.1 px)")
         .size(480.0, 360.0)
         .log_y()
-        .line(
-            "uncorrected",
-            &curve(&|e| largest_deviation(&differences(&e.uncorrected.camera, &truth), unit)),
-        )
-        .points("predicted", &curve(&|e| largest_deviation(&differences(&e.predicted.camera, &truth), unit)))
-        .line("corrected", &curve(&|e| largest_deviation(&differences(&e.corrected.camera, &truth), unit)));
+        .line("uncorrected", &curve(&|e| largest_deviation(&differences(&e.uncorrected, &truth), unit)))
+        .points("predicted", &curve(&|e| largest_deviation(&differences(&e.predicted, &truth), unit)))
+        .line("corrected", &curve(&|e| largest_deviation(&differences(&e.corrected, &truth), unit)));
     let worst = |camera: &Camera| largest_deviation(&differences(camera, &truth), unit);
     let last = &exact[exact.len() - 1];
     let caption = format!(
@@ -518,9 +517,9 @@ fn bias_figure(exact: &[Exact], unit: &[f64]) -> Figure {
         BASE.blur_px,
         last.diameter_mm,
         rms(&last.displacements),
-        worst(&last.uncorrected.camera),
+        worst(&last.uncorrected),
         rms(&last.remainder()),
-        worst(&last.corrected.camera)
+        worst(&last.corrected)
     );
     Figure::panels("bias", &[pixels, cameras], 2, caption)
 }

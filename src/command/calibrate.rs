@@ -3,8 +3,8 @@
 
 use super::report::table;
 use super::{Exit, print, warn};
-use calibench::calibrate::{Loss, Prior};
-use calibench::camera::{FreeParameters, Parameter};
+use calibench::calibrate::{Board, Loss, Prior};
+use calibench::camera::{FreeParameters, Model, Parameter, UnknownModel};
 use calibench::io::input::{MOST_SIDE_PX, MOST_TABLE_BYTES, read_named};
 use calibench::io::memory::{DEFAULT_MEMORY, parse_bytes};
 use calibench::io::parse_corners;
@@ -21,6 +21,7 @@ mod camera;
 mod contradictions;
 mod finished;
 mod maps;
+mod models;
 mod page;
 mod photographs;
 mod plane;
@@ -36,7 +37,7 @@ const EXIT_CODES: &str = "Exit codes: 0 a minimum whose RMSE lies at most a quar
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_CODES)]
 pub(super) struct Arguments {
-    /// Corner file with the columns view,point,X,Y,u,v, or point pairs with point,px,py,X,Y, or - for one of
+    /// Corner file with the columns view,point,X,Y,u,v (and weight or sigma_px, if marks differ), or point pairs with point,px,py,X,Y, or - for one of
     /// them on standard input; with --board, photographs
     #[arg(required = true)]
     files: Vec<PathBuf>,
@@ -44,8 +45,17 @@ pub(super) struct Arguments {
     /// or dots:3x3:1
     #[arg(long, value_name = "BOARD")]
     board: Option<BoardSpec>,
-    /// Parameters to estimate, of fx fy cx cy skew k1 k2 p1 p2 k3; the others are held, distortion and skew
-    /// at 0 [default: fx,fy,cx,cy,k1,k2 and those of --prior, without those of --fix and --tie]
+    /// Lens model: brown-conrady, rational, thin-prism, tilted, kannala-brandt, division or double-sphere; auto
+    /// compares eight by how they predict views that were left out [default: brown-conrady]
+    #[arg(long, value_name = "MODEL")]
+    model: Option<ModelChoice>,
+    /// Estimates how the board is bent, each number known beforehand to be 0 with a standard deviation in the
+    /// target's unit, or free: bow:SD (two bows), bow:free, bent:SD (with a twist), bent:free
+    #[arg(long = "board-shape", value_name = "SHAPE", value_parser = parse_shape)]
+    bow: Option<Board>,
+    /// Parameters to estimate, of fx fy cx cy skew k1 k2 p1 p2 k3 and those of other lens models; the others
+    /// are held, distortion and skew at 0 [default: fx,fy,cx,cy,k1,k2, with other lens models all of their
+    /// coefficients, and those of --prior, without those of --fix and --tie]
     #[arg(long, value_name = "LIST")]
     free: Option<FreeParameters>,
     /// Holds a parameter at a value, such as k3=0; may be repeated
@@ -100,6 +110,26 @@ pub(super) enum Intervals {
     Profile,
 }
 
+/// A lens model, or the best.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ModelChoice {
+    Auto,
+    Of(Model),
+}
+
+impl std::str::FromStr for ModelChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<ModelChoice, String> {
+        match text {
+            "auto" => Ok(ModelChoice::Auto),
+            name => {
+                name.parse().map(ModelChoice::Of).map_err(|error: UnknownModel| format!("{error}, or auto"))
+            }
+        }
+    }
+}
+
 /// The three maps of a plane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Mode {
@@ -138,6 +168,21 @@ fn parse_held(text: &str) -> Result<(Parameter, f64), String> {
         name.trim().parse().map_err(|e: calibench::camera::UnknownParameter| e.to_string())?;
     let value = value.trim().parse::<f64>().map_err(|_| format!("`{value}` is not a number"))?;
     Ok((parameter, value))
+}
+
+/// `bow:SD` or `bent:SD`, the standard deviation being a positive number or `free`.
+fn parse_shape(text: &str) -> Result<Board, String> {
+    let wanted = || "expected bow:SD or bent:SD, such as bow:0.5 or bent:free".to_string();
+    let (shape, known) = text.split_once(':').ok_or_else(wanted)?;
+    let standard_deviation = match known {
+        "free" => f64::INFINITY,
+        number => number.parse().ok().filter(|sd: &f64| *sd > 0.0 && sd.is_finite()).ok_or_else(wanted)?,
+    };
+    match shape {
+        "bow" => Ok(Board::Bowed { standard_deviation }),
+        "bent" => Ok(Board::Bent { standard_deviation }),
+        _ => Err(wanted()),
+    }
 }
 
 /// `fy=fx` or `fy/fx=RATIO`: no sign in it means anything to a shell.

@@ -1,12 +1,12 @@
 //! `calibench undistort --camera RESULT.json PHOTOS...`: what an ideal lens would have shown.
 
 use super::{Exit, print, warn};
-use calibench::camera::Camera;
+use calibench::camera::{Camera, Lens};
 use calibench::io::memory::{DEFAULT_MEMORY, parse_bytes};
-use calibench::io::result::{CameraFields, read_camera};
+use calibench::io::result::{LensFields, read_lens_camera};
 use calibench::io::{Channels, Memory, image_extent, read_channels, write_atomically, write_png};
 use calibench::raster::Raster;
-use calibench::rectify::{Interpolated, OutputView, RectifyError, RectifyMap, output_camera};
+use calibench::rectify::{Interpolated, OutputView, Projection, RectifyError, RectifyMap, output_camera};
 use clap::{Args, ValueEnum};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -24,9 +24,12 @@ pub(super) struct Arguments {
     /// Folder for the corrected photographs, as PNG of the same name, and camera-<W>x<H>.json
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// What the output shows
+    /// What the output shows; all and valid are for brown-conrady lenses and a pinhole
     #[arg(long, value_enum, default_value_t = View::Same)]
     view: View,
+    /// How the output shows it
+    #[arg(long, value_enum, default_value_t = To::Pinhole)]
+    projection: To,
     /// Grey level, black 0 to white 1, of output pixels without data; where the photograph has alpha, they
     /// are transparent too
     #[arg(long, value_name = "LEVEL", default_value_t = 0.0, value_parser = parse_level)]
@@ -49,6 +52,26 @@ enum View {
     Valid,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum To {
+    /// Straight lines are straight; less than 180 degrees are seen
+    Pinhole,
+    /// A fisheye: distance from the principal point is angle times focal length
+    Equidistant,
+    /// Longitude along u, latitude along v
+    Equirectangular,
+}
+
+impl From<To> for Projection {
+    fn from(to: To) -> Projection {
+        match to {
+            To::Pinhole => Projection::Pinhole,
+            To::Equidistant => Projection::Equidistant,
+            To::Equirectangular => Projection::Equirectangular,
+        }
+    }
+}
+
 impl From<View> for OutputView {
     fn from(view: View) -> OutputView {
         match view {
@@ -66,7 +89,7 @@ fn parse_level(text: &str) -> Result<f32, String> {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Exit {
-    let (camera, image_size) = match read_camera(&arguments.camera) {
+    let (camera, image_size) = match read_lens_camera(&arguments.camera) {
         Ok(read) => read,
         Err(error) => {
             warn(&error.to_string());
@@ -145,7 +168,7 @@ type Size = (usize, usize);
 
 struct Work<'a> {
     arguments: &'a Arguments,
-    camera: Camera,
+    camera: Camera<Lens>,
     image_size: Option<Size>,
     /// One look-up table for all photographs of a size.
     maps: BTreeMap<Size, RectifyMap>,
@@ -196,21 +219,42 @@ impl Work<'_> {
             return Ok(());
         }
         let wrong = |error: &dyn std::fmt::Display| (Exit::Usage, error.to_string());
-        let output =
-            output_camera(&self.camera, size, self.arguments.view.into()).map_err(|error| wrong(&error))?;
-        let map = RectifyMap::between(&self.camera, size, &output, size).map_err(|error| wrong(&error))?;
-        self.describe(size, &output, &map).map_err(|message| (Exit::Incomplete, message))?;
+        let (output, map) = match (self.camera.brown_conrady(), self.arguments.projection) {
+            (Some(camera), To::Pinhole) => {
+                let view = self.arguments.view.into();
+                let output = output_camera(&camera, size, view).map_err(|error| wrong(&error))?;
+                let map = RectifyMap::between(&camera, size, &output, size).map_err(|error| wrong(&error))?;
+                (Some(output.into()), map)
+            }
+            (_, projection) if self.arguments.view == View::Same => {
+                let projection = Projection::from(projection);
+                let map = RectifyMap::through_lens(&self.camera, size, projection);
+                (projection.camera(&self.camera), map.map_err(|error| wrong(&error))?)
+            }
+            _ => {
+                let message = "--view all and --view valid are for brown-conrady lenses and a pinhole: leave --view out";
+                return Err((Exit::Usage, message.to_string()));
+            }
+        };
+        self.describe(size, output, &map).map_err(|message| (Exit::Incomplete, message))?;
         self.maps.insert(size, map);
         Ok(())
     }
 
-    fn describe(&self, size: Size, output: &Camera, map: &RectifyMap) -> Result<(), String> {
+    fn describe(&self, size: Size, output: Option<Camera<Lens>>, map: &RectifyMap) -> Result<(), String> {
         let (width, height) = size;
         let mask = map.mask();
         let empty = mask.samples().iter().filter(|&&has_data| !has_data).count();
+        let camera = match output {
+            Some(camera) => serde_json::json!(LensFields(camera)),
+            None => {
+                let Camera { fx, fy, cx, cy, .. } = self.camera;
+                serde_json::json!({"projection": "equirectangular", "fx": fx, "fy": fy, "cx": cx, "cy": cy})
+            }
+        };
         let result = serde_json::json!({
             "written_by": format!("calibench {}", env!("CARGO_PKG_VERSION")),
-            "camera": CameraFields::from(*output),
+            "camera": camera,
             "image_size": [width, height],
             "pixels_without_data": empty,
         });

@@ -2,7 +2,7 @@
 
 use crate::camera::{FreeParameters, Parameter};
 use crate::geometry::Vec2;
-use nalgebra::{DMatrix, MatrixXx6, SMatrix};
+use nalgebra::{DMatrix, Matrix2, MatrixXx6, SMatrix};
 
 /// Covariance of the free intrinsics and of every pose.
 ///
@@ -58,6 +58,28 @@ impl Covariance {
             _ => column(parameter),
         };
         self.free.iter().map(with_tie).collect()
+    }
+
+    /// How an output is spread, px, in its worst direction, whose derivatives by a camera's parameters are given:
+    /// with `J` those of the estimated ones and `P` their covariance the root of the larger eigenvalue of `J P
+    /// J^T`. To that of fx an fy that is tied to it adds its share.
+    pub fn largest_spread(&self, by_parameters: &[(Parameter, Vec2)]) -> f64 {
+        let slope = |parameter: Parameter| {
+            by_parameters.iter().find(|(p, _)| *p == parameter).map_or(Vec2::zeros(), |(_, slope)| *slope)
+        };
+        let with_tie = |parameter: Parameter| match self.fy_per_fx {
+            Some(ratio) if parameter == Parameter::Fx => slope(parameter) + ratio * slope(Parameter::Fy),
+            _ => slope(parameter),
+        };
+        let columns: Vec<Vec2> = self.free.iter().map(with_tie).collect();
+        let mut spread = Matrix2::zeros();
+        for (i, a) in columns.iter().enumerate() {
+            for (j, b) in columns.iter().enumerate() {
+                spread += a * b.transpose() * self.intrinsics[(i, j)];
+            }
+        }
+        let (mean, half) = (0.5 * spread.trace(), 0.5 * (spread[(0, 0)] - spread[(1, 1)]));
+        (mean + libm::hypot(half, spread[(0, 1)])).max(0.0).sqrt()
     }
 
     /// The row of a parameter, and how many times that of the row it is.

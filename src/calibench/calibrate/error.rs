@@ -77,6 +77,12 @@ pub enum CalibrationError {
         /// Another lens model, marks of unequal weight, a board that is not flat.
         what: &'static str,
     },
+    /// What only the estimator for brown-conrady lenses, flat boards and marks of one weight knows.
+    #[error("{what} is known for brown-conrady lenses, flat boards and marks without weights only")]
+    OfBrownConrady {
+        /// Profile intervals, last digits, a start.
+        what: &'static str,
+    },
     /// A standard deviation that no board has.
     #[error("a board's bow cannot be known to {standard_deviation}: a standard deviation is positive")]
     BadBoard {

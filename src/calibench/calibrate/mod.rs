@@ -7,6 +7,7 @@ mod any_lens;
 mod blocks;
 mod certificate;
 mod chance;
+mod choice;
 mod chunks;
 mod closed_form;
 mod condensed;
@@ -43,8 +44,9 @@ mod unknown;
 mod walk;
 mod warnings;
 
-pub use any_lens::{BoardShape, LensCalibration, calibrate_lens};
+pub use any_lens::{BoardShape, LensCalibration, Located, calibrate_lens, locate};
 pub use certificate::Certificate;
+pub use choice::{Candidate, Compared, Freedom, compare_models, explaining_freedoms};
 pub use closed_form::{ClosedFormError, closed_form, pose_from_homography};
 pub use conditioning::{Conditioning, WeakComponent};
 pub use covariance::Covariance;

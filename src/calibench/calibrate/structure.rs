@@ -18,14 +18,35 @@ const CHANCE: f64 = 4.75;
 /// by more than a fifth.
 const MATERIAL: f64 = 0.2;
 
-/// The warning, where neighbours' residuals agree; `variance` is `s^2`.
-pub(super) fn structure(residuals: &[Vec<Vec2>], variance: f64) -> Option<Warning> {
+/// What neighbours' residuals have in common.
+pub(super) struct Neighbours {
+    /// Correlation coefficient of a mark's residual with the next one's.
+    pub correlation: f64,
+    /// The sum in its standard deviations.
+    z: f64,
+}
+
+/// Of residuals of one size; a set without neighbours has none.
+pub(super) fn neighbours(residuals: &[Vec<Vec2>]) -> Neighbours {
+    let marks: usize = residuals.iter().map(Vec::len).sum();
+    let square: f64 = residuals.iter().flatten().map(Vec2::norm_squared).sum();
+    with_variance(residuals, 0.5 * square / marks as f64)
+}
+
+fn with_variance(residuals: &[Vec<Vec2>], variance: f64) -> Neighbours {
     let (mut pairs, mut products) = (0.0, 0.0);
     for view in residuals {
         products += view.windows(2).map(|pair| pair[0].x * pair[1].x + pair[0].y * pair[1].y).sum::<f64>();
         pairs += view.len().saturating_sub(1) as f64;
     }
-    let z = products / (variance * (2.0 * pairs).sqrt());
-    let correlation = products / pairs / (2.0 * variance);
+    Neighbours {
+        correlation: products / pairs / (2.0 * variance),
+        z: products / (variance * (2.0 * pairs).sqrt()),
+    }
+}
+
+/// The warning, where neighbours' residuals agree; `variance` is `s^2`.
+pub(super) fn structure(residuals: &[Vec<Vec2>], variance: f64) -> Option<Warning> {
+    let Neighbours { correlation, z } = with_variance(residuals, variance);
     (z > CHANCE && correlation > MATERIAL).then_some(Warning::Structured { correlation })
 }

@@ -14,7 +14,7 @@ pub enum Unknown {
     FocalLength,
     /// cx and cy.
     PrincipalPoint,
-    /// k1, k2 and k3.
+    /// k1, k2 and k3, with other lens models up to k6.
     RadialDistortion,
     /// p1 and p2.
     TangentialDistortion,
@@ -38,11 +38,11 @@ pub enum Unknown {
 impl Unknown {
     /// The group that a parameter belongs to; an unknown without one is its own.
     pub fn group(self) -> Unknown {
-        use Parameter::{Cx, Cy, Fx, Fy, K1, K2, K3, P1, P2};
+        use Parameter::{Cx, Cy, Fx, Fy, K1, K2, K3, K4, K5, K6, P1, P2};
         match self {
             Unknown::Intrinsic(Fx | Fy) => Unknown::FocalLength,
             Unknown::Intrinsic(Cx | Cy) => Unknown::PrincipalPoint,
-            Unknown::Intrinsic(K1 | K2 | K3) => Unknown::RadialDistortion,
+            Unknown::Intrinsic(K1 | K2 | K3 | K4 | K5 | K6) => Unknown::RadialDistortion,
             Unknown::Intrinsic(P1 | P2) => Unknown::TangentialDistortion,
             other => other,
         }

@@ -1,7 +1,21 @@
 //! What is a camera with a lens of any model? The five linear parameters behind it.
 
-use super::{BrownConrady, Camera, FreeParameters, Lens, Parameter, UndistortError};
+use super::{
+    BrownConrady, Camera, FreeParameters, Lens, LensModel, LensVisitor, Parameter, UndistortError, visit,
+};
 use crate::geometry::{Vec2, Vec3};
+use nalgebra::{Matrix2, Matrix2x3};
+
+/// A pixel and its derivatives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PixelDerivatives {
+    /// The pixel.
+    pub pixel: Vec2,
+    /// By the point in camera coordinates.
+    pub by_point: Matrix2x3<f64>,
+    /// By the camera's parameters, in the order of [`Model::parameters`](super::Model::parameters).
+    pub by_parameters: Vec<(Parameter, Vec2)>,
+}
 
 impl Camera<Lens> {
     /// A camera without skew.
@@ -20,6 +34,35 @@ impl Camera<Lens> {
     /// Outside the image of the cone in which the lens is one-to-one.
     pub fn ray(&self, pixel: &Vec2) -> Result<Vec3, UndistortError> {
         self.distortion.ray(&self.before_sensor(pixel))
+    }
+
+    /// The pixel of a point in camera coordinates and its derivatives; `None` where the lens has no image of it.
+    pub fn pixel_with_derivatives(&self, point_cam: &Vec3) -> Option<PixelDerivatives> {
+        let linear = Matrix2::new(self.fx, self.skew, 0.0, self.fy);
+        let Slopes { at, by_point, by_lens } = visit(&self.distortion, SlopesAt(*point_cam))?;
+        let by_linear = [
+            Vec2::new(at.x, 0.0),
+            Vec2::new(0.0, at.y),
+            Vec2::new(1.0, 0.0),
+            Vec2::new(0.0, 1.0),
+            Vec2::new(at.y, 0.0),
+        ];
+        let by_lens = by_lens.into_iter().map(|slope| linear * slope);
+        Some(PixelDerivatives {
+            pixel: self.on_sensor(&at),
+            by_point: linear * by_point,
+            by_parameters: self
+                .distortion
+                .model()
+                .parameters()
+                .zip(by_linear.into_iter().chain(by_lens))
+                .collect(),
+        })
+    }
+
+    /// Whether every parameter is finite and both focal lengths are positive.
+    pub fn is_possible(&self) -> bool {
+        self.values().all(|(_, value)| value.is_finite()) && self.fx > 0.0 && self.fy > 0.0
     }
 
     /// One parameter's value; `None` if the model does not have it.
@@ -69,6 +112,39 @@ impl Camera<Lens> {
     fn before_sensor(&self, pixel: &Vec2) -> Vec2 {
         let y = (pixel.y - self.cy) / self.fy;
         Vec2::new((pixel.x - self.cx - self.skew * y) / self.fx, y)
+    }
+}
+
+/// What a lens does to a point, with derivatives.
+struct Slopes {
+    at: Vec2,
+    by_point: Matrix2x3<f64>,
+    by_lens: Vec<Vec2>,
+}
+
+struct SlopesAt(Vec3);
+
+impl LensVisitor for SlopesAt {
+    type Output = Option<Slopes>;
+
+    fn run<M: LensModel<P>, const P: usize>(self, coefficients: [f64; P]) -> Option<Slopes> {
+        let p = M::project(&M::constants(coefficients), self.0.into());
+        let [[a, b, c], [d, e, f]] = p.by_point;
+        (p.inside > 0.0).then(|| Slopes {
+            at: p.at.into(),
+            by_point: Matrix2x3::new(a, b, c, d, e, f),
+            by_lens: p.by_lens.into_iter().map(Vec2::from).collect(),
+        })
+    }
+}
+
+impl Camera<Lens> {
+    /// The same camera as one whose lens model is known to be Brown-Conrady's; `None` if it is another.
+    pub fn brown_conrady(&self) -> Option<Camera> {
+        let Camera { fx, fy, cx, cy, skew, distortion } = *self;
+        let [k1, k2, p1, p2, k3] = distortion.coefficients().try_into().ok()?;
+        let is_so = distortion.model() == super::Model::BrownConrady;
+        is_so.then_some(Camera { fx, fy, cx, cy, skew, distortion: BrownConrady { k1, k2, p1, p2, k3 } })
     }
 }
 

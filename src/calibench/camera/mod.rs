@@ -8,6 +8,7 @@ mod lens;
 mod parameter;
 mod projection;
 
+pub use any_lens::PixelDerivatives;
 pub use brown_conrady::{BrownConrady, UndistortError};
 pub use intrinsics::Camera;
 pub use lens::{Lens, Model, UnknownModel, WrongCoefficients};

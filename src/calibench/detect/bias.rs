@@ -11,7 +11,7 @@
 //! The integrands are periodic and analytic, so the trapezoidal rule converges geometrically.
 
 use crate::board::{Board, Pattern};
-use crate::camera::{BehindCamera, Camera};
+use crate::camera::{BehindCamera, Camera, Lens};
 use crate::geometry::{Pose, Vec2, Vec3};
 use nalgebra::{Matrix2, Matrix2x3, Matrix3x2};
 
@@ -25,7 +25,7 @@ const OUTLINE_POINTS: usize = 64;
 /// # Errors
 /// A disc that is not wholly in front of the camera.
 pub fn disc_bias(
-    camera: &Camera,
+    camera: &impl Imaging,
     cam_from_target: &Pose,
     centre: &Vec2,
     diameter: f64,
@@ -52,7 +52,7 @@ pub fn disc_bias(
 /// # Errors
 /// A mark that is not wholly in front of the camera.
 pub fn disc_biases(
-    camera: &Camera,
+    camera: &impl Imaging,
     cam_from_target: &Pose,
     board: &Board,
 ) -> Result<Vec<Vec2>, BehindCamera> {
@@ -67,20 +67,39 @@ pub fn disc_biases(
 
 /// The pixel of a board point and its derivative by the point.
 fn pixel_and_slope(
-    camera: &Camera,
+    camera: &impl Imaging,
     cam_from_target: &Pose,
     point: &Vec2,
 ) -> Result<(Vec2, Matrix2<f64>), BehindCamera> {
     let point_cam = cam_from_target.apply(&Vec3::new(point.x, point.y, 0.0));
-    if point_cam.z.is_nan() || point_cam.z <= 0.0 {
-        return Err(BehindCamera { depth: point_cam.z });
-    }
-    let ideal = point_cam.xy() / point_cam.z;
-    let by_point_cam = Matrix2x3::new(1.0, 0.0, -ideal.x, 0.0, 1.0, -ideal.y) / point_cam.z;
     let in_plane: Matrix3x2<f64> = cam_from_target.rotation.fixed_columns::<2>(0).into_owned();
-    let linear = Matrix2::new(camera.fx, camera.skew, 0.0, camera.fy);
-    let slope = linear * camera.distortion.jacobian(&ideal) * by_point_cam * in_plane;
-    Ok((camera.pixel_from_normalised(&camera.distortion.distort(&ideal)), slope))
+    let (pixel, slope) = camera.image(&point_cam).ok_or(BehindCamera { depth: point_cam.z })?;
+    Ok((pixel, slope * in_plane))
+}
+
+/// A camera of either kind.
+pub trait Imaging {
+    /// The pixel of a point in camera coordinates, and its derivative by the point; `None` where there is none.
+    fn image(&self, point_cam: &Vec3) -> Option<(Vec2, Matrix2x3<f64>)>;
+}
+
+impl Imaging for Camera {
+    fn image(&self, point_cam: &Vec3) -> Option<(Vec2, Matrix2x3<f64>)> {
+        if point_cam.z.is_nan() || point_cam.z <= 0.0 {
+            return None;
+        }
+        let ideal = point_cam.xy() / point_cam.z;
+        let by_point_cam = Matrix2x3::new(1.0, 0.0, -ideal.x, 0.0, 1.0, -ideal.y) / point_cam.z;
+        let linear = Matrix2::new(self.fx, self.skew, 0.0, self.fy);
+        let slope = linear * self.distortion.jacobian(&ideal) * by_point_cam;
+        Some((self.pixel_from_normalised(&self.distortion.distort(&ideal)), slope))
+    }
+}
+
+impl Imaging for Camera<Lens> {
+    fn image(&self, point_cam: &Vec3) -> Option<(Vec2, Matrix2x3<f64>)> {
+        self.pixel_with_derivatives(point_cam).map(|at| (at.pixel, at.by_point))
+    }
 }
 
 #[cfg(test)]

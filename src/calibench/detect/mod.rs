@@ -17,7 +17,7 @@ mod region;
 mod saddle;
 mod threshold;
 
-pub use bias::{disc_bias, disc_biases};
+pub use bias::{Imaging, disc_bias, disc_biases};
 pub use blob::Blob;
 pub use chessboard::{Chessboard, ChessboardError, Orientation, chessboard};
 pub use components::Polarity;

@@ -40,6 +40,6 @@ pub use message::message;
 pub use overlay::{Colour, Overlay};
 pub use pairs::{PointPairs, parse_point_pairs, read_point_pairs};
 pub use provenance::Commit;
-pub use result::{CalibrationFields, LeftOut, ResultError, read_camera};
+pub use result::{CalibrationFields, LeftOut, ResultError, read_camera, read_lens_camera};
 pub use shown::shown;
 pub use table::TableError;

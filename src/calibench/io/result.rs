@@ -2,8 +2,10 @@
 //! is known of it.
 
 use super::input::{InputError, MOST_TABLE_BYTES, read_regular_text};
-use crate::calibrate::{Calibration, Certificate, Prior, ProfileInterval, Termination};
-use crate::camera::{Camera, Parameter};
+use crate::calibrate::{
+    BoardShape, Certificate, Compared, LensCalibration, Prior, ProfileInterval, Termination,
+};
+use crate::camera::{Camera, Lens, Model, Parameter};
 use crate::geometry::{Vec2, rotation};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -43,6 +45,48 @@ impl From<Camera> for CameraFields {
 impl From<CameraFields> for Camera {
     fn from(f: CameraFields) -> Camera {
         Camera::from_parameters([f.fx, f.fy, f.cx, f.cy, f.skew, f.k1, f.k2, f.p1, f.p2, f.k3])
+    }
+}
+
+/// A camera with a lens of any model, by its parameters' names; `model` says which, and a camera without one has
+/// Brown-Conrady's lens.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LensFields(pub Camera<Lens>);
+
+impl Serialize for LensFields {
+    fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        use serde::ser::SerializeMap;
+        let mut map = to.serialize_map(None)?;
+        let model = self.0.distortion.model();
+        if model != Model::BrownConrady {
+            map.serialize_entry("model", model.name())?;
+        }
+        for (parameter, value) in self.0.values() {
+            map.serialize_entry(parameter.name(), &value)?;
+        }
+        map.end()
+    }
+}
+
+/// A [`BoardShape`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BoardFields {
+    /// Bow along x, bow along y and twist, in the target's unit.
+    pub bow_x: f64,
+    /// See `bow_x`.
+    pub bow_y: f64,
+    /// See `bow_x`.
+    pub twist: f64,
+    /// Their standard deviations.
+    pub standard_deviations: [f64; 3],
+    /// Least and greatest X and Y of all marks, over which they are defined.
+    pub region: [[f64; 2]; 2],
+}
+
+impl BoardFields {
+    fn of(shape: BoardShape) -> BoardFields {
+        let BoardShape { bow_x, bow_y, twist, standard_deviations, region } = shape;
+        BoardFields { bow_x, bow_y, twist, standard_deviations, region: region.map(Into::into) }
     }
 }
 
@@ -142,15 +186,49 @@ impl PriorFields {
     }
 }
 
+/// A lens model in a comparison ([`Compared`]).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ModelFields {
+    /// Its name.
+    pub model: &'static str,
+    /// Coefficients that were estimated.
+    pub coefficients: String,
+    /// RMSE of the fit, px.
+    pub rmse_px: f64,
+    /// Error of a coordinate on views that were left out, px.
+    pub hold_out_px: Option<f64>,
+    /// Schwarz's criterion.
+    pub bic: f64,
+    /// Correlation of a mark's residual with the next one's.
+    pub correlation: f64,
+}
+
+impl ModelFields {
+    /// Of one that was compared.
+    pub fn of(compared: &Compared) -> ModelFields {
+        ModelFields {
+            model: compared.candidate.model.name(),
+            coefficients: compared.candidate.coefficients.to_string(),
+            rmse_px: compared.calibration.rmse_px,
+            hold_out_px: compared.hold_out_px,
+            bic: compared.bic,
+            correlation: compared.correlation,
+        }
+    }
+}
+
 /// The whole of a calibration.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CalibrationFields {
     /// The program that wrote it.
     pub written_by: String,
     /// The estimate.
-    pub camera: CameraFields,
+    pub camera: LensFields,
     /// Width and height, px, if known.
     pub image_size: Option<(usize, usize)>,
+    /// The shape of the board, where it was estimated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub board: Option<BoardFields>,
     /// Names of the estimated parameters, in the order of the covariance.
     pub free: Vec<&'static str>,
     /// fy over fx, if the two are tied: fy is then not in `free` and has no row in `covariance`, but has its
@@ -185,6 +263,9 @@ pub struct CalibrationFields {
     pub weakest_direction: Vec<(String, f64)>,
     /// Part of that combination's information that remains when all else is unknown.
     pub weakest_information: Option<f64>,
+    /// Lens models that were compared, the chosen one first; the caller adds them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub models: Vec<ModelFields>,
     /// What to be careful about.
     pub warnings: Vec<String>,
     /// Views that were given but not used; the caller adds them.
@@ -196,7 +277,7 @@ pub struct CalibrationFields {
 impl CalibrationFields {
     /// The result of a calibration of views with these names.
     pub fn of(
-        calibration: &Calibration,
+        calibration: &LensCalibration,
         names: &[String],
         image_size: Option<(usize, usize)>,
     ) -> CalibrationFields {
@@ -205,12 +286,13 @@ impl CalibrationFields {
         let deviation = |p: Parameter| Some((p.name(), calibration.standard_deviation(p)?));
         CalibrationFields {
             written_by: format!("calibench {}", env!("CARGO_PKG_VERSION")),
-            camera: calibration.camera.into(),
+            camera: LensFields(calibration.camera),
             image_size,
+            board: calibration.board.map(BoardFields::of),
             free: calibration.free.iter().map(Parameter::name).collect(),
             fy_per_fx: calibration.covariance.fy_per_fx,
             priors: calibration.priors.iter().map(PriorFields::of).collect(),
-            standard_deviations: Parameter::ALL.into_iter().filter_map(deviation).collect(),
+            standard_deviations: Parameter::OF_ALL_MODELS.into_iter().filter_map(deviation).collect(),
             covariance: (0..n).map(|i| (0..n).map(|j| covariance[(i, j)]).collect()).collect(),
             rmse_px: calibration.rmse_px,
             sigma_px: calibration.sigma_px,
@@ -231,6 +313,7 @@ impl CalibrationFields {
                 .collect(),
             weakest_information: calibration.conditioning.as_ref().map(|c| c.smallest_eigenvalue),
             warnings: calibration.warnings.iter().map(ToString::to_string).collect(),
+            models: Vec::new(),
             left_out: Vec::new(),
             views: (0..calibration.cam_from_target.len())
                 .map(|i| view_fields(calibration, names, i))
@@ -245,7 +328,7 @@ impl CalibrationFields {
     }
 }
 
-fn view_fields(calibration: &Calibration, names: &[String], i: usize) -> ViewFields {
+fn view_fields(calibration: &LensCalibration, names: &[String], i: usize) -> ViewFields {
     let pose = &calibration.cam_from_target[i];
     let residuals: &[Vec2] = &calibration.residuals[i];
     ViewFields {
@@ -263,6 +346,16 @@ fn view_fields(calibration: &Calibration, names: &[String], i: usize) -> ViewFie
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 struct CameraOnly {
     camera: CameraFields,
+    #[serde(default)]
+    image_size: Option<(usize, usize)>,
+    #[serde(default)]
+    termination: Option<String>,
+}
+
+/// The same with parameters of any model.
+#[derive(Debug, Deserialize)]
+struct NamedOnly {
+    camera: BTreeMap<String, serde_json::Value>,
     #[serde(default)]
     image_size: Option<(usize, usize)>,
     #[serde(default)]
@@ -294,6 +387,22 @@ pub enum ResultError {
         /// How it ended.
         termination: String,
     },
+    /// The camera has a lens of another model than can be used here.
+    #[error("{file}: a camera with a {model} lens cannot be used here: this needs brown-conrady")]
+    OtherModel {
+        /// The file.
+        file: String,
+        /// The model.
+        model: Model,
+    },
+    /// No such lens.
+    #[error("{file}: {message}")]
+    Lens {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        message: String,
+    },
     /// No camera has these numbers.
     #[error("{file}: fx and fy must be positive, and every parameter finite")]
     NoCamera {
@@ -308,15 +417,72 @@ pub fn read_camera(path: &Path) -> Result<(Camera, Option<(usize, usize)>), Resu
     parse_camera(&file, &read_regular_text(path, MOST_TABLE_BYTES)?)
 }
 
-/// As [`read_camera`], from text; `file` names it in errors.
-pub fn parse_camera(file: &str, text: &str) -> Result<(Camera, Option<(usize, usize)>), ResultError> {
-    let fields: CameraOnly =
-        serde_json::from_str(text).map_err(|cause| ResultError::Format { file: file.into(), cause })?;
+/// As [`read_camera`], of any lens model.
+pub fn read_lens_camera(path: &Path) -> Result<(Camera<Lens>, Option<(usize, usize)>), ResultError> {
+    let file = path.display().to_string();
+    parse_lens_camera(&file, &read_regular_text(path, MOST_TABLE_BYTES)?)
+}
+
+/// As [`read_lens_camera`], from text; `file` names it in errors.
+pub fn parse_lens_camera(
+    file: &str,
+    text: &str,
+) -> Result<(Camera<Lens>, Option<(usize, usize)>), ResultError> {
+    let Some(model) = stated_model(file, text)? else {
+        return parse_camera(file, text).map(|(camera, size)| (camera.into(), size));
+    };
+    let format = |cause| ResultError::Format { file: file.into(), cause };
+    let fields: NamedOnly = serde_json::from_str(text).map_err(format)?;
+    refuse_unfinished(file, fields.termination)?;
+    let lens = |message: String| ResultError::Lens { file: file.into(), message };
+    let mut camera = Camera::with_lens(f64::NAN, f64::NAN, f64::NAN, f64::NAN, Lens::ideal(model));
+    for (name, value) in fields.camera {
+        if name == "model" {
+            continue;
+        }
+        let parameter: Parameter =
+            name.parse().map_err(|error: crate::camera::UnknownParameter| lens(error.to_string()))?;
+        let number = value.as_f64().ok_or_else(|| lens(format!("{name} is not a number")))?;
+        camera = camera
+            .with_value(parameter, number)
+            .ok_or_else(|| lens(format!("the {model} model has no {name}")))?;
+    }
+    match camera.is_possible() {
+        true => Ok((camera, fields.image_size)),
+        false => Err(ResultError::NoCamera { file: file.into() }),
+    }
+}
+
+/// The model that a camera states; `None` if it states none, or text that other readers complain of.
+fn stated_model(file: &str, text: &str) -> Result<Option<Model>, ResultError> {
+    let value: Option<serde_json::Value> = serde_json::from_str(text).ok();
+    let stated = value.as_ref().and_then(|value| value.get("camera")?.get("model")?.as_str());
+    let unknown = |error: crate::camera::UnknownModel| ResultError::Lens {
+        file: file.into(),
+        message: error.to_string(),
+    };
+    stated.map(|name| name.parse().map_err(unknown)).transpose()
+}
+
+fn refuse_unfinished(file: &str, termination: Option<String>) -> Result<(), ResultError> {
     let is_minimum =
         |how: &str| [Termination::Converged, Termination::AboveFloor].iter().any(|t| how == t.name());
-    if let Some(termination) = fields.termination.filter(|how| !is_minimum(how)) {
-        return Err(ResultError::NotConverged { file: file.into(), termination });
+    match termination.filter(|how| !is_minimum(how)) {
+        Some(termination) => Err(ResultError::NotConverged { file: file.into(), termination }),
+        None => Ok(()),
     }
+}
+
+/// As [`read_camera`], from text; `file` names it in errors.
+pub fn parse_camera(file: &str, text: &str) -> Result<(Camera, Option<(usize, usize)>), ResultError> {
+    if let Some(model) = stated_model(file, text)? {
+        let (camera, size) = parse_lens_camera(file, text)?;
+        let plain = camera.brown_conrady().ok_or(ResultError::OtherModel { file: file.into(), model })?;
+        return Ok((plain, size));
+    }
+    let fields: CameraOnly =
+        serde_json::from_str(text).map_err(|cause| ResultError::Format { file: file.into(), cause })?;
+    refuse_unfinished(file, fields.termination)?;
     let camera = Camera::from(fields.camera);
     if camera.is_valid() {
         Ok((camera, fields.image_size))

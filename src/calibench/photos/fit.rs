@@ -8,7 +8,7 @@
 //! error of the last.
 
 use crate::board::{Board, Pattern, View};
-use crate::calibrate::{Calibration, CalibrationError, Settings, calibrate};
+use crate::calibrate::{CalibrationError, LensCalibration, Settings, calibrate_lens};
 use crate::detect::disc_biases;
 use crate::geometry::Vec2;
 
@@ -67,7 +67,7 @@ pub struct Rejected {
 #[derive(Debug, Clone)]
 pub struct Fit {
     /// Of the kept views, in order.
-    pub calibration: Calibration,
+    pub calibration: LensCalibration,
     /// What was fitted: the kept views, bias of discs taken off.
     pub views: Vec<View>,
     /// Indices of the kept views among those given.
@@ -131,7 +131,7 @@ impl Fitter<'_> {
     }
 
     /// The worst view, if its RMSE exceeds the factor times the median of all.
-    fn stray(&self, calibration: &Calibration) -> Option<(usize, String)> {
+    fn stray(&self, calibration: &LensCalibration) -> Option<(usize, String)> {
         let factor = self.reject_factor?;
         let rmse: Vec<f64> =
             (0..calibration.residuals.len()).filter_map(|i| calibration.view_rmse_px(i)).collect();
@@ -155,8 +155,8 @@ impl Fitter<'_> {
     fn fit_all(
         &self,
         views: &[View],
-    ) -> Result<(Calibration, Vec<View>, Option<BiasCorrection>), CalibrationError> {
-        let mut calibration = calibrate(views, self.settings)?;
+    ) -> Result<(LensCalibration, Vec<View>, Option<BiasCorrection>), CalibrationError> {
+        let mut calibration = calibrate_lens(views, self.settings)?;
         let mut corrected = views.to_vec();
         let discs = self.discs.filter(|board| matches!(board.pattern(), Pattern::Circles { .. }));
         let Some(board) = discs else { return Ok((calibration, corrected, None)) };
@@ -177,19 +177,19 @@ impl Fitter<'_> {
                 return Ok((calibration, corrected, Some(bias)));
             }
             corrected = views.iter().zip(&biases).map(|(view, biases)| without_bias(view, biases)).collect();
-            calibration = calibrate(&corrected, self.settings)?;
+            calibration = calibrate_lens(&corrected, self.settings)?;
             last = Some(biases);
             rounds += 1;
         }
     }
 }
 
-fn biases(calibration: &Calibration, board: &Board) -> Option<Vec<Vec<Vec2>>> {
-    calibration
-        .cam_from_target
-        .iter()
-        .map(|pose| disc_biases(&calibration.camera, pose, board).ok())
-        .collect()
+fn biases(calibration: &LensCalibration, board: &Board) -> Option<Vec<Vec<Vec2>>> {
+    let poses = calibration.cam_from_target.iter();
+    match calibration.camera.brown_conrady() {
+        Some(camera) => poses.map(|pose| disc_biases(&camera, pose, board).ok()).collect(),
+        None => poses.map(|pose| disc_biases(&calibration.camera, pose, board).ok()).collect(),
+    }
 }
 
 fn largest_change(last: &[Vec<Vec2>], now: &[Vec<Vec2>]) -> f64 {
@@ -203,7 +203,12 @@ fn rms(biases: &[Vec<Vec2>]) -> f64 {
 
 fn without_bias(view: &View, biases: &[Vec2]) -> View {
     let pixels = view.pixels().iter().zip(biases).map(|(pixel, bias)| pixel - bias).collect();
-    View::new(view.points().to_vec(), pixels).unwrap_or_else(|_| view.clone())
+    let moved = View::new(view.points().to_vec(), pixels);
+    let weighted = moved.and_then(|moved| match view.weights() {
+        Some(weights) => moved.with_weights(weights.to_vec()),
+        None => Ok(moved),
+    });
+    weighted.unwrap_or_else(|_| view.clone())
 }
 
 #[cfg(test)]

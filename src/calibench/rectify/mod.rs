@@ -7,6 +7,7 @@
 //! The inverse mapping needs only the forward distortion, leaves no holes, and its look-up table serves every
 //! image of a size.
 
+mod any_lens;
 mod direct;
 mod eight_bit;
 mod fraction;
@@ -17,6 +18,7 @@ mod sample;
 mod source_row;
 mod window;
 
+pub use any_lens::Projection;
 pub use direct::rectify_image;
 pub use map::{RectifyError, RectifyMap};
 pub use output::{OutputCameraError, OutputView, output_camera};

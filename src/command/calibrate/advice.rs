@@ -2,7 +2,7 @@
 //! do.
 
 use super::maps::{Cells, corner_radius_px, pixel_deviation};
-use calibench::calibrate::Calibration;
+use calibench::calibrate::LensCalibration;
 use calibench::camera::Parameter;
 use calibench::geometry::{Vec2, Vec3};
 use calibench::io::significant;
@@ -36,8 +36,9 @@ pub(super) fn of(fit: &Fit, names: &[String], image_size: Option<(usize, usize)>
 }
 
 /// The highest radial term that was estimated.
-fn highest_radial(calibration: &Calibration) -> Option<Parameter> {
-    [Parameter::K3, Parameter::K2, Parameter::K1].into_iter().find(|&k| calibration.free.contains(k))
+fn highest_radial(calibration: &LensCalibration) -> Option<Parameter> {
+    use Parameter::{K1, K2, K3, K4, K5, K6};
+    [K6, K5, K4, K3, K2, K1].into_iter().find(|&k| calibration.free.contains(k))
 }
 
 fn radius(fit: &Fit, size: (usize, usize)) -> Option<String> {
@@ -70,7 +71,7 @@ fn empty_cells(fit: &Fit, size: (usize, usize)) -> Option<String> {
     })
 }
 
-fn corner_deviation(calibration: &Calibration, size: (usize, usize)) -> Option<String> {
+fn corner_deviation(calibration: &LensCalibration, size: (usize, usize)) -> Option<String> {
     let (right, bottom) = (size.0 as f64 - 1.0, size.1 as f64 - 1.0);
     let worst = [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)]
         .map(|(u, v)| pixel_deviation(calibration, &Vec2::new(u, v)))
@@ -84,7 +85,7 @@ fn corner_deviation(calibration: &Calibration, size: (usize, usize)) -> Option<S
     })
 }
 
-fn tilt(calibration: &Calibration) -> Option<String> {
+fn tilt(calibration: &LensCalibration) -> Option<String> {
     let normals: Vec<Vec3> =
         calibration.cam_from_target.iter().map(|pose| pose.rotation.column(2).into_owned()).collect();
     let extreme = outermost(&normals);
@@ -115,7 +116,7 @@ fn outermost(normals: &[Vec3]) -> Vec<Vec3> {
     (0..DIRECTIONS).filter_map(farthest).collect()
 }
 
-fn standing_out(calibration: &Calibration, names: &[String]) -> Option<String> {
+fn standing_out(calibration: &LensCalibration, names: &[String]) -> Option<String> {
     let rmse: Vec<f64> = (0..names.len()).filter_map(|i| calibration.view_rmse_px(i)).collect();
     let mut sorted = rmse.clone();
     sorted.sort_by(f64::total_cmp);

@@ -1,10 +1,13 @@
 //! A camera from views, wherever they come from: the fit, how it is printed, and the files it leaves.
 
 use super::finished::{Finished, parameter_rows, summary, weakest};
-use super::{Arguments, Exit, Failure, Format, Intervals, advice, maps, page, plots, print, table};
+use super::models::{self, Comparison};
+use super::{
+    Arguments, Exit, Failure, Format, Intervals, ModelChoice, advice, maps, page, plots, print, table,
+};
 use calibench::board::{Board, View};
 use calibench::calibrate::{Loss, Prior, ProfileInterval, Settings};
-use calibench::camera::FreeParameters;
+use calibench::camera::Model;
 use calibench::geometry::Vec2;
 use calibench::io::{CalibrationFields, LeftOut, message, significant, write_together};
 use calibench::photos::{Fit, Fitter};
@@ -74,8 +77,14 @@ impl Observed {
 
 pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, Failure> {
     observed.refuse_marks_outside()?;
-    let free = arguments.free.unwrap_or(FreeParameters::STANDARD);
-    let mut settings = Settings::new(free).with_loss(arguments.loss.unwrap_or(Loss::Squares));
+    let model = match arguments.model {
+        Some(ModelChoice::Of(model)) => model,
+        Some(ModelChoice::Auto) | None => Model::default(),
+    };
+    let free = arguments.free.unwrap_or(model.standard_free());
+    let mut settings =
+        Settings::new(free).with_model(model).with_loss(arguments.loss.unwrap_or(Loss::Squares));
+    settings.board = arguments.bow.unwrap_or_default();
     settings.image_size = observed.image_size;
     if arguments.intervals == Some(Intervals::Profile) {
         settings = settings.with_profile_intervals(COVERAGE);
@@ -89,13 +98,20 @@ pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, Fai
     if let Some(ratio) = arguments.tie {
         settings = settings.tie_focal_lengths(ratio);
     }
+    let comparison = match arguments.model {
+        Some(ModelChoice::Auto) => Some(models::compare(&observed, &mut settings)?),
+        _ => None,
+    };
     let fitter =
         Fitter { settings: &settings, discs: observed.discs.as_ref(), reject_factor: arguments.reject_views };
     let fit =
         fitter.fit(&observed.views).map_err(|error| format!("{}: {}", observed.source, message(&error)))?;
-    let finished = finish(observed, fit);
+    let mut finished = finish(observed, fit);
+    finished.advice.extend(models::freedoms(&finished.fit, &settings));
+    finished.comparison = comparison;
     let mut fields = CalibrationFields::of(&finished.fit.calibration, &finished.names, finished.image_size);
     fields.left_out = finished.left_out.clone();
+    fields.models = finished.comparison.iter().flat_map(|c| c.fields()).collect();
     fields.warnings.extend(finished.notes.iter().chain(&finished.advice).cloned());
     if let Some(folder) = &arguments.out {
         write_files(folder, &fields, &finished).map_err(Failure::unwritten)?;
@@ -118,7 +134,7 @@ fn finish(observed: Observed, fit: Fit) -> Finished {
     notes.extend(bias_note(&fit));
     let advice = advice::of(&fit, &names, observed.image_size);
     let (image_size, overlays, source) = (observed.image_size, observed.overlays, observed.source);
-    Finished { source, fit, names, image_size, left_out, overlays, notes, advice }
+    Finished { source, fit, names, image_size, left_out, overlays, notes, advice, comparison: None }
 }
 
 /// A correction that did not settle is no correction to trust.
@@ -178,6 +194,7 @@ fn text(finished: &Finished) -> String {
     parameter_rows(finished).into_iter().for_each(|row| {
         parameters.add_row(row);
     });
+    let comparison = finished.comparison.as_ref().map(Comparison::text).unwrap_or_default();
     let intervals = interval_table(&calibration.intervals);
     let mut views = table(&["view", "points", "RMSE (px)", "distance"]);
     for (i, name) in finished.names.iter().enumerate() {
@@ -186,8 +203,12 @@ fn text(finished: &Finished) -> String {
         let points = calibration.residuals[i].len().to_string();
         views.add_row([name.clone(), points, significant(rmse, 4), significant(distance, 5)]);
     }
-    let mut text =
-        format!("{}\n\n{intervals}{}\n\n{}", parameters.trim_fmt(), views.trim_fmt(), summary(finished));
+    let mut text = format!(
+        "{comparison}{}\n\n{intervals}{}\n\n{}",
+        parameters.trim_fmt(),
+        views.trim_fmt(),
+        summary(finished)
+    );
     // Writing to a string cannot fail, here and below.
     if let Some(weakest) = weakest(finished) {
         let _ = writeln!(text, "weakest direction: {weakest}");

@@ -1,7 +1,7 @@
 //! Do the options say one thing? What they say twice, or say to a kind of input that has no use for it, is
 //! refused and not decided.
 
-use super::Arguments;
+use super::{Arguments, ModelChoice};
 use calibench::camera::Parameter;
 
 /// What a file or the files hold.
@@ -21,6 +21,8 @@ pub(super) fn refuse(arguments: &Arguments, input: Input) -> Result<(), String> 
     let without_use: &[(&str, bool)] = match input {
         Input::Photographs | Input::Corners => &[("--mode", arguments.mode.is_some())],
         Input::PointPairs => &[
+            ("--model", arguments.model.is_some()),
+            ("--board-shape", arguments.bow.is_some()),
             ("--free", arguments.free.is_some()),
             ("--fix", !arguments.fix.is_empty()),
             ("--tie", arguments.tie.is_some()),
@@ -49,6 +51,20 @@ fn parameters(arguments: &Arguments) -> Result<(), String> {
     for (option, list) in [("--fix", &fixed), ("--prior", &known)] {
         if let Some((_, twice)) = list.iter().enumerate().find(|(i, p)| list[..*i].contains(p)) {
             return Err(format!("{option} gives {twice} more than once: give it one value"));
+        }
+    }
+    if arguments.model == Some(ModelChoice::Auto) {
+        let named = arguments.free.into_iter().flat_map(|free| free.iter());
+        let mut told = named.chain(fixed.iter().copied()).chain(known.iter().copied());
+        if let Some(p) = told.find(|p| !Parameter::LINEAR.contains(p)) {
+            return Err(format!(
+                "--model auto chooses what is estimated of a lens, and {p} is told already: leave it out"
+            ));
+        }
+        if arguments.bow.is_some() {
+            return Err(
+                "--model auto compares lenses before a flat board: leave --board-shape out".to_string()
+            );
         }
     }
     let in_both = |list: &[Parameter]| fixed.iter().copied().find(|p| list.contains(p));

@@ -1,6 +1,7 @@
 //! What is said of a finished calibration, in the terminal and on the page?
 
-use calibench::calibrate::{Calibration, Certificate};
+use super::models::Comparison;
+use calibench::calibrate::{BoardShape, Certificate, LensCalibration};
 use calibench::camera::Parameter;
 use calibench::io::{LeftOut, significant};
 use calibench::photos::Fit;
@@ -18,21 +19,23 @@ pub(super) struct Finished {
     pub(super) overlays: BTreeMap<String, String>,
     pub(super) notes: Vec<String>,
     pub(super) advice: Vec<String>,
+    /// Of lens models, if one was to be chosen.
+    pub(super) comparison: Option<Comparison>,
 }
 
 /// Parameters worth a line: name, value, standard deviation or `held`, unit.
 pub(super) fn parameter_rows(finished: &Finished) -> Vec<[String; 4]> {
     let calibration = &finished.fit.calibration;
-    let row = |parameter: Parameter| {
+    let row = |(parameter, value): (Parameter, f64)| {
         let deviation = match calibration.standard_deviation(parameter) {
             Some(sd) => significant(sd, 3),
-            None if calibration.camera.get(parameter) == 0.0 => return None,
+            None if value == 0.0 => return None,
             None => "held".to_string(),
         };
-        let value = significant(calibration.camera.get(parameter), 10);
+        let value = significant(value, 10);
         Some([parameter.name().to_string(), value, deviation, parameter.unit().to_string()])
     };
-    Parameter::ALL.into_iter().filter_map(row).collect()
+    calibration.camera.values().filter_map(row).collect()
 }
 
 /// The weakest direction in words; `None` if nothing but poses was free.
@@ -61,6 +64,7 @@ pub(super) fn summary(finished: &Finished) -> String {
     if let Some(sentence) = calibration.certificate.as_ref().and_then(certificate) {
         text.push_str(&sentence);
     }
+    text.push_str(&model(calibration));
     text.push_str(&beforehand(calibration));
     if let Some(bias) = &finished.fit.bias {
         // Writing to a string cannot fail.
@@ -75,8 +79,25 @@ pub(super) fn summary(finished: &Finished) -> String {
     text
 }
 
+/// The lens model, if it is not the usual one, and the board's shape; what is not certified is said to be so.
+fn model(calibration: &LensCalibration) -> String {
+    let model = calibration.camera.distortion.model();
+    let mut text = String::new();
+    if calibration.certificate.is_none() {
+        let _ =
+            writeln!(text, "lens model {model}, the best of {} starts, not certified", calibration.starts);
+    }
+    if let Some(BoardShape { bow_x, bow_y, twist, standard_deviations: sd, .. }) = calibration.board {
+        let known = |value: f64, sd: f64| format!("{} \u{b1} {}", significant(value, 4), significant(sd, 2));
+        let twist = if sd[2] > 0.0 { format!(", twist {}", known(twist, sd[2])) } else { String::new() };
+        let (x, y) = (known(bow_x, sd[0]), known(bow_y, sd[1]));
+        let _ = writeln!(text, "board: bow along x {x}, along y {y}{twist}, in the target's unit");
+    }
+    text
+}
+
 /// What was tied and what was known, a line each.
-fn beforehand(calibration: &Calibration) -> String {
+fn beforehand(calibration: &LensCalibration) -> String {
     let tie = calibration.covariance.fy_per_fx.map(|ratio| format!("tied: fy = {ratio} fx\n"));
     let known = calibration
         .priors

@@ -1,11 +1,10 @@
 //! Where in the frame does the calibration rest on points, and how well does it know where a pixel looks?
 
 use calibench::board::View;
-use calibench::calibrate::Calibration;
-use calibench::camera::{Camera, project_with_jacobian};
-use calibench::geometry::{Pose, Vec2, Vec3};
+use calibench::calibrate::LensCalibration;
+use calibench::camera::{Camera, Lens};
+use calibench::geometry::Vec2;
 use calibench_harness::{Figure, HeatMap, Plot};
-use nalgebra::Matrix2;
 
 /// Cells along the frame's longer side; the shorter has as many as keep them about square.
 const LONG_SIDE_CELLS: usize = 10;
@@ -61,26 +60,14 @@ impl Cells {
 /// Part of it could be made up by turning the camera, so a pose that is estimated with the same camera
 /// predicts pixels better than this; directions measured by the camera alone are known no better. NaN beyond
 /// the lens model's monotone radius.
-pub(super) fn pixel_deviation(calibration: &Calibration, pixel: &Vec2) -> f64 {
-    let Ok(ray) = calibration.camera.normalised_ray(pixel) else { return f64::NAN };
-    let point = Vec3::new(ray.x, ray.y, 1.0);
-    let Ok(at) = project_with_jacobian(&calibration.camera, &Pose::identity(), &point) else {
-        return f64::NAN;
-    };
-    let covariance = &calibration.covariance.intrinsics;
-    let columns = calibration.covariance.columns(&at.intrinsics);
-    let mut spread = Matrix2::zeros();
-    for (i, a) in columns.iter().enumerate() {
-        for (j, b) in columns.iter().enumerate() {
-            spread += a * b.transpose() * covariance[(i, j)];
-        }
-    }
-    let (mean, half) = (0.5 * spread.trace(), 0.5 * (spread[(0, 0)] - spread[(1, 1)]));
-    (mean + libm::hypot(half, spread[(0, 1)])).sqrt()
+pub(super) fn pixel_deviation(calibration: &LensCalibration, pixel: &Vec2) -> f64 {
+    let seen = calibration.camera.ray(pixel).ok();
+    let at = seen.and_then(|ray| calibration.camera.pixel_with_derivatives(&ray));
+    at.map_or(f64::NAN, |at| calibration.covariance.largest_spread(&at.by_parameters))
 }
 
 /// Largest distance of a corner of the frame from the principal point, px.
-pub(super) fn corner_radius_px(camera: &Camera, size: (usize, usize)) -> f64 {
+pub(super) fn corner_radius_px(camera: &Camera<Lens>, size: (usize, usize)) -> f64 {
     let (right, bottom) = (size.0 as f64 - 0.5, size.1 as f64 - 0.5);
     [(-0.5, -0.5), (right, -0.5), (-0.5, bottom), (right, bottom)]
         .map(|(u, v)| libm::hypot(u - camera.cx, v - camera.cy))
@@ -89,7 +76,7 @@ pub(super) fn corner_radius_px(camera: &Camera, size: (usize, usize)) -> f64 {
 }
 
 /// The maps of a calibration.
-pub(super) fn figures(calibration: &Calibration, views: &[View], size: (usize, usize)) -> Vec<Figure> {
+pub(super) fn figures(calibration: &LensCalibration, views: &[View], size: (usize, usize)) -> Vec<Figure> {
     let cells = Cells::of(size);
     let counts: Vec<f64> = cells.counts(views).into_iter().map(|count| count as f64).collect();
     let coverage = cells.plot("Points in each part of the frame", "points", &counts, 1).map(|plot| {

@@ -2,14 +2,14 @@
 //! uncertainty.
 
 use calibench::board::View;
-use calibench::calibrate::Calibration;
-use calibench::camera::Parameter;
-use calibench::geometry::Vec2;
+use calibench::calibrate::LensCalibration;
+use calibench::camera::{Camera, Parameter};
+use calibench::geometry::{Vec2, Vec3};
 use calibench_harness::{Figure, Look, Plot};
 
 /// The figures of a calibration.
 pub(super) fn figures(
-    calibration: &Calibration,
+    calibration: &LensCalibration,
     views: &[View],
     image_size: Option<(usize, usize)>,
 ) -> Vec<Figure> {
@@ -17,7 +17,7 @@ pub(super) fn figures(
 }
 
 /// Residuals as arrows where they were seen.
-fn residuals(calibration: &Calibration, views: &[View], image_size: Option<(usize, usize)>) -> Figure {
+fn residuals(calibration: &LensCalibration, views: &[View], image_size: Option<(usize, usize)>) -> Figure {
     let pixels = || views.iter().flat_map(|v| v.pixels());
     let residuals = || calibration.residuals.iter().flatten();
     let extent = pixels().fold(0.0f64, |m, p| m.max(p.x).max(p.y));
@@ -45,7 +45,7 @@ pub(crate) fn round_down(x: f64) -> f64 {
 }
 
 /// RMSE of each view against that of all.
-fn view_errors(calibration: &Calibration) -> Figure {
+fn view_errors(calibration: &LensCalibration) -> Figure {
     let points: Vec<(f64, f64)> = (0..calibration.residuals.len())
         .filter_map(|i| Some((i as f64 + 1.0, calibration.view_rmse_px(i)?)))
         .collect();
@@ -62,43 +62,61 @@ fn view_errors(calibration: &Calibration) -> Figure {
     )
 }
 
-/// Radial displacement by the lens with its standard deviation, out to the farthest point seen.
-fn lens(calibration: &Calibration, views: &[View]) -> Figure {
+/// The radius at which the lens shows an angle, against that of a pinhole or, where it sees far to the side, of an
+/// equidistant lens; with its standard deviation, out to the farthest point seen.
+fn lens(calibration: &LensCalibration, views: &[View]) -> Figure {
     let camera = &calibration.camera;
-    let farthest = views
-        .iter()
-        .flat_map(|v| v.pixels())
-        .filter_map(|p| camera.normalised_ray(p).ok())
-        .map(|ray| ray.norm())
-        .fold(0.0, f64::max);
+    let pixels = views.iter().flat_map(|v| v.pixels());
+    let angles = pixels.filter_map(|p| camera.ray(p).ok()).map(|ray| libm::atan2(ray.xy().norm(), ray.z));
+    let farthest = angles.fold(0.0, f64::max);
+    let is_wide = camera.distortion.model().sees_behind();
+    let (reference, name) = if is_wide { (farthest, "equidistant") } else { (libm::tan(farthest), "ideal") };
     let focal = 0.5 * (camera.fx + camera.fy);
-    let nodes = || (0..=100).map(|i| farthest * f64::from(i) / 100.0);
-    let shift = |r: f64| focal * (camera.distortion.distort(&Vec2::new(r, 0.0)).x - r);
-    let curve: Vec<(f64, f64)> = nodes().map(|r| (focal * r, shift(r))).collect();
-    let band: Vec<(f64, f64, f64)> = nodes()
-        .map(|r| {
-            let sd = 2.0 * focal * radial_deviation(calibration, r);
-            (focal * r, shift(r) - sd, shift(r) + sd)
-        })
-        .collect();
-    let plot =
-        Plot::new("Displacement by the lens", "distance from the principal point (px)", "outward (px)")
-            .band("\u{b1}2 standard deviations (k1, k2, k3)", &band)
-            .line("radial displacement", &curve)
-            .hline("", 0.0);
-    let caption = "Radial displacement out to the farthest point seen, px, tangential terms left out. Beyond that radius the \
-                   model is extrapolated.";
+    let at = |i: u32| {
+        let r = reference * f64::from(i) / 100.0;
+        let angle = if is_wide { r } else { libm::atan(r) };
+        let seen = camera.distortion.project(&Vec3::new(libm::sin(angle), 0.0, libm::cos(angle)))?;
+        Some((focal * r, focal * (seen.x - r), 2.0 * focal * radial_deviation(calibration, angle)))
+    };
+    let nodes: Vec<(f64, f64, f64)> = (0..=100).filter_map(at).collect();
+    let curve: Vec<(f64, f64)> = nodes.iter().map(|&(r, shift, _)| (r, shift)).collect();
+    let band: Vec<(f64, f64, f64)> =
+        nodes.iter().map(|&(r, shift, sd)| (r, shift - sd, shift + sd)).collect();
+    let radial = radial_names(calibration).join(", ");
+    let x = match is_wide {
+        true => "angle from the axis \u{d7} focal length (px)",
+        false => "distance from the principal point (px)",
+    };
+    let plot = Plot::new("Displacement by the lens", x, "outward (px)")
+        .band(format!("\u{b1}2 standard deviations ({radial})"), &band)
+        .line("radial displacement", &curve)
+        .hline("", 0.0);
+    let caption = format!(
+        "Radial displacement against an {name} lens out to the farthest point seen, px, tangential terms left out. Beyond that \
+         radius the model is extrapolated."
+    );
     Figure::plot("lens", &plot, caption)
 }
 
-/// Standard deviation of `r (k1 r^2 + k2 r^4 + k3 r^6)` from the coefficients' covariance.
-fn radial_deviation(calibration: &Calibration, r: f64) -> f64 {
-    let s = r * r;
-    let slopes = [(Parameter::K1, r * s), (Parameter::K2, r * s * s), (Parameter::K3, r * s * s * s)];
-    let free: Vec<(usize, f64)> =
-        slopes.into_iter().filter_map(|(p, slope)| Some((calibration.free.position(p)?, slope))).collect();
-    let covariance = &calibration.covariance.intrinsics;
-    let variance: f64 =
-        free.iter().flat_map(|&(i, a)| free.iter().map(move |&(j, b)| a * b * covariance[(i, j)])).sum();
-    variance.max(0.0).sqrt()
+/// Coefficients that bend an image radially.
+fn is_radial(parameter: Parameter) -> bool {
+    use Parameter::{Alpha, K1, K2, K3, K4, K5, K6, Xi};
+    matches!(parameter, K1 | K2 | K3 | K4 | K5 | K6 | Xi | Alpha)
+}
+
+/// The names of the radial coefficients of the model.
+fn radial_names(calibration: &LensCalibration) -> Vec<&'static str> {
+    let coefficients = calibration.camera.distortion.model().coefficients();
+    coefficients.iter().filter(|p| is_radial(**p)).map(|p| p.name()).collect()
+}
+
+/// Standard deviation of the distorted radius at an angle from the axis, from the radial coefficients'
+/// covariance.
+fn radial_deviation(calibration: &LensCalibration, angle: f64) -> f64 {
+    let plain = Camera { cx: 0.0, cy: 0.0, fx: 1.0, fy: 1.0, skew: 0.0, ..calibration.camera };
+    let point = Vec3::new(libm::sin(angle), 0.0, libm::cos(angle));
+    let Some(at) = plain.pixel_with_derivatives(&point) else { return f64::NAN };
+    let radial: Vec<(Parameter, Vec2)> =
+        at.by_parameters.into_iter().filter(|(p, _)| is_radial(*p)).collect();
+    calibration.covariance.largest_spread(&radial)
 }

@@ -69,6 +69,14 @@ fn check(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
     use Parameter::{Cx, Cy, Fx, Fy, Skew};
     check_loss_and_priors(settings)?;
     check_model(settings)?;
+    let only_plain = [
+        (settings.profile_coverage.is_some(), "an interval by the profile of the cost"),
+        (settings.polish, "the last digits of a minimum"),
+        (settings.start.is_some(), "a start for the intrinsics"),
+    ];
+    if let Some((_, what)) = only_plain.into_iter().find(|(asked, _)| *asked) {
+        return Err(CalibrationError::OfBrownConrady { what });
+    }
     if let Some(Bend { standard_deviation, .. }) = settings.board.bend()
         && (standard_deviation.is_nan() || standard_deviation <= 0.0)
     {

@@ -8,6 +8,7 @@
 
 mod estimate;
 mod kernel;
+mod locate;
 mod marks;
 mod problem;
 mod radial;
@@ -18,6 +19,7 @@ mod start;
 mod tests;
 
 pub use estimate::calibrate_lens;
+pub use locate::{Located, locate};
 pub use report::LensCalibration;
 pub use shape::BoardShape;
 

@@ -7,33 +7,48 @@ use super::super::target_frame::TargetFrames;
 use super::super::{Calibration, CalibrationError, Unknown, identifiability, structure, warnings};
 use super::problem::{Problem, State};
 use super::{BoardShape, WIDTH};
-use crate::camera::Lens;
+use crate::camera::{Camera, Lens};
 use crate::geometry::Vec2;
 
 /// A calibration with a lens of any model.
 pub type LensCalibration = Calibration<Lens>;
 
+impl<L> Calibration<L> {
+    /// The same with the camera written another way.
+    fn with_camera<M>(self, camera: Camera<M>) -> Calibration<M> {
+        Calibration {
+            camera,
+            free: self.free,
+            priors: self.priors,
+            cam_from_target: self.cam_from_target,
+            residuals: self.residuals,
+            rmse_px: self.rmse_px,
+            sigma_px: self.sigma_px,
+            degrees_of_freedom: self.degrees_of_freedom,
+            covariance: self.covariance,
+            conditioning: self.conditioning,
+            termination: self.termination,
+            certificate: self.certificate,
+            intervals: self.intervals,
+            starts: self.starts,
+            iterations: self.iterations,
+            warnings: self.warnings,
+            board: self.board,
+        }
+    }
+}
+
 impl From<Calibration> for LensCalibration {
     fn from(plain: Calibration) -> LensCalibration {
-        LensCalibration {
-            camera: plain.camera.into(),
-            free: plain.free,
-            priors: plain.priors,
-            cam_from_target: plain.cam_from_target,
-            residuals: plain.residuals,
-            rmse_px: plain.rmse_px,
-            sigma_px: plain.sigma_px,
-            degrees_of_freedom: plain.degrees_of_freedom,
-            covariance: plain.covariance,
-            conditioning: plain.conditioning,
-            termination: plain.termination,
-            certificate: plain.certificate,
-            intervals: plain.intervals,
-            starts: plain.starts,
-            iterations: plain.iterations,
-            warnings: plain.warnings,
-            board: plain.board,
-        }
+        let camera = plain.camera.into();
+        plain.with_camera(camera)
+    }
+}
+
+impl LensCalibration {
+    /// The same with a camera whose lens model is known to be Brown-Conrady's; `None` if it is another.
+    pub fn brown_conrady(&self) -> Option<Calibration> {
+        self.camera.brown_conrady().map(|camera| self.clone().with_camera(camera))
     }
 }
 

@@ -117,7 +117,7 @@ fn chosen_views(views: &[Marks]) -> Vec<usize> {
 }
 
 /// The camera with a pose for every view; `None` where one has none.
-fn with_poses(views: &[Marks], camera: Camera<Lens>) -> Option<State> {
+pub(super) fn with_poses(views: &[Marks], camera: Camera<Lens>) -> Option<State> {
     let cam_from_target = views.iter().map(|view| pose_from_rays(view, &camera)).collect::<Option<_>>()?;
     Some(State { camera, cam_from_target, shape: [0.0; 3] })
 }

@@ -1,0 +1,67 @@
+//! Where was the board in one view, for a camera that is known?
+
+use super::super::minimise::descend;
+use super::super::target_frame::TargetFrames;
+use super::super::{Loss, Settings};
+use super::marks::Marks;
+use super::problem::{Problem, State, rounding_cost};
+use super::{shape, start};
+use crate::board::View;
+use crate::camera::{Camera, FreeParameters, Lens};
+use crate::geometry::{Pose, Vec2};
+
+/// A view's pose, and what it leaves over.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Located {
+    /// The pose of least squared, weighted pixel distance.
+    pub cam_from_target: Pose,
+    /// Predicted - observed, px.
+    pub residuals: Vec<Vec2>,
+    /// Sum of the weighted squares, px^2, of `2 N - 6` degrees of freedom.
+    pub square: f64,
+}
+
+/// The pose of a flat board in a view of a camera that is known: from the rays of its marks, refined, the better of
+/// its two tilts. `None` with fewer than four marks, or where the camera cannot see them.
+///
+/// ```
+/// use calibench::calibrate::locate;
+/// use calibench::synth::Scene;
+///
+/// let scene = Scene::example();
+/// let found = locate(&scene.truth.camera.into(), &scene.exact()[0]).expect("63 marks tell the pose");
+/// let truth = &scene.truth.cam_from_target[0];
+/// assert!((found.cam_from_target.translation - truth.translation).norm() < 1e-6);
+/// ```
+pub fn locate(camera: &Camera<Lens>, view: &View) -> Option<Located> {
+    let views = std::slice::from_ref(view);
+    let frames = TargetFrames::of(views);
+    let marks = [Marks::of(view, frames.at(0), &shape::region(views))];
+    let problem = Problem {
+        views: &marks,
+        free: FreeParameters::NONE,
+        fy_per_fx: None,
+        priors: &[],
+        variance: 0.0,
+        bend: None,
+        loss: Loss::Squares,
+        max_iterations: Settings::standard().max_iterations,
+        rounding_cost: rounding_cost(&marks),
+    };
+    let state = start::with_poses(&marks, *camera)?;
+    let state = start::with_better_tilts(&problem, descend(&problem, state).state);
+    residuals(&marks[0], &state).map(|(residuals, square)| Located {
+        cam_from_target: frames.at(0).cam_from_target(&state.cam_from_target[0]),
+        residuals,
+        square,
+    })
+}
+
+fn residuals(marks: &Marks, state: &State) -> Option<(Vec<Vec2>, f64)> {
+    let residual = |mark| state.pixel(0, mark).map(|pixel| pixel - mark.pixel);
+    let residuals: Vec<Vec2> = marks.list.iter().map(residual).collect::<Option<_>>()?;
+    let weighted = residuals.iter().zip(&marks.list).map(|(r, mark)| (r * mark.weight).norm_squared());
+    let square = weighted.sum();
+    Some((residuals, square))
+}

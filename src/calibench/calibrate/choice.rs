@@ -1,0 +1,234 @@
+//! Which lens model do the marks ask for? Models compared by what they predict of views that they have not seen.
+//!
+//! The residuals of the fit always fall with more coefficients. Two measures do not: the error on views that were
+//! left out, and Schwarz's criterion (1978), which charges every unknown `ln n`:
+//!
+//! ```text
+//! hold-out = sqrt(sum |r|^2 / sum (2 N - 6)) over views that the camera was not fitted to
+//! BIC = n ln(sum |r|^2 / n) + p ln n,   n = 2 N coordinates, p unknowns
+//! ```
+
+use super::structure::neighbours;
+use super::{Board, CalibrationError, LensCalibration, Role, Settings, calibrate_lens, locate};
+use crate::board::View;
+use crate::camera::{FreeParameters, Model, Parameter};
+
+/// A lens model with the coefficients that are estimated, and what is taken of the board.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Candidate {
+    /// The model.
+    pub model: Model,
+    /// Its coefficients that are free; the others are 0.
+    pub coefficients: FreeParameters,
+    /// The board.
+    pub board: Board,
+}
+
+impl Candidate {
+    /// The models worth comparing where nothing is known of the lens: Brown-Conrady's from two coefficients to
+    /// five, the rational model, two fisheyes and the division model, with a flat board.
+    pub fn usual() -> Vec<Candidate> {
+        use Parameter::{K1, K2, K3, P1, P2};
+        let plain: [&[Parameter]; 4] = [&[K1, K2], &[K1, K2, K3], &[K1, K2, P1, P2], &[K1, K2, P1, P2, K3]];
+        let brown = plain.map(|list| (Model::BrownConrady, FreeParameters::of(list)));
+        let others = [Model::Rational, Model::KannalaBrandt, Model::DoubleSphere, Model::Division]
+            .map(|model| (model, FreeParameters::of(model.coefficients())));
+        let flat = |(model, coefficients)| Candidate { model, coefficients, board: Board::Flat };
+        brown.into_iter().chain(others).map(flat).collect()
+    }
+
+    /// The settings with this model: what they say of fx, fy, cx, cy and skew stays.
+    pub fn settings(&self, settings: &Settings) -> Settings {
+        let mut own = settings.clone().with_model(self.model).with_board(self.board);
+        for parameter in Parameter::OF_ALL_MODELS.into_iter().filter(|p| !Parameter::LINEAR.contains(p)) {
+            let role = if self.coefficients.contains(parameter) { Role::Free } else { Role::Default };
+            own = own.with_role(parameter, role);
+        }
+        own
+    }
+}
+
+/// How a candidate does.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Compared {
+    /// Which.
+    pub candidate: Candidate,
+    /// The fit to all views.
+    pub calibration: LensCalibration,
+    /// Schwarz's criterion: the least is best, 10 more is very strong evidence against (Kass & Raftery 1995).
+    pub bic: f64,
+    /// Error of a coordinate on views that were left out, px; `None` where too few views are left to calibrate
+    /// from.
+    pub hold_out_px: Option<f64>,
+    /// Squared error of each fold, for the comparison of two candidates.
+    folds: Vec<f64>,
+    /// Correlation of a mark's residual with the next one's: 0 for noise.
+    pub correlation: f64,
+}
+
+impl Compared {
+    /// In how many of the folds this one predicts the views that were left out better than the other, of how
+    /// many.
+    pub fn wins_against(&self, other: &Compared) -> (usize, usize) {
+        let better = self.folds.iter().zip(&other.folds).filter(|(own, others)| own < others).count();
+        (better, self.folds.len().min(other.folds.len()))
+    }
+
+    /// The error on views that were left out; infinite where there is none.
+    fn predicted(&self) -> f64 {
+        self.hold_out_px.unwrap_or(f64::INFINITY)
+    }
+}
+
+/// Parts into which the views are divided; each is left out once.
+const FOLDS: usize = 5;
+
+/// Predictions that differ by less than this part are equally good: five coefficients follow noise by about as
+/// much where two would do.
+const ALIKE: f64 = 0.005;
+
+/// Fits every candidate. The first of the result is the choice: of those that predict views that were left out (in
+/// five parts of the views in turn) as well as the best does, within half a percent, the one with the least of
+/// Schwarz's criterion. The others follow by their predictions. Candidates that the views do not determine come
+/// with their reason.
+pub fn compare_models(
+    views: &[View],
+    settings: &Settings,
+    candidates: &[Candidate],
+) -> (Vec<Compared>, Vec<(Candidate, CalibrationError)>) {
+    let (mut compared, mut refused) = (Vec::new(), Vec::new());
+    for &candidate in candidates {
+        match calibrate_lens(views, &candidate.settings(settings)) {
+            Ok(calibration) => compared.push(judged(views, settings, candidate, calibration)),
+            Err(error) => refused.push((candidate, error)),
+        }
+    }
+    compared.sort_by(|a, b| a.predicted().total_cmp(&b.predicted()).then(a.bic.total_cmp(&b.bic)));
+    let best = compared.first().map_or(f64::INFINITY, Compared::predicted);
+    let is_alike = |c: &Compared| c.predicted() <= (1.0 + ALIKE) * best;
+    let alike = compared.iter().enumerate().filter(|(_, c)| is_alike(c));
+    if let Some((chosen, _)) = alike.min_by(|(_, a), (_, b)| a.bic.total_cmp(&b.bic)) {
+        compared[..=chosen].rotate_right(1);
+    }
+    (compared, refused)
+}
+
+fn judged(
+    views: &[View],
+    settings: &Settings,
+    candidate: Candidate,
+    calibration: LensCalibration,
+) -> Compared {
+    let coordinates = 2.0 * calibration.points() as f64;
+    let square = calibration.rmse_px * calibration.rmse_px * calibration.points() as f64;
+    let unknowns = (coordinates - calibration.degrees_of_freedom as f64).max(0.0);
+    let folds = hold_out(views, &candidate.settings(settings));
+    let error = |folds: &[(f64, f64)]| {
+        let (square, freedom) =
+            folds.iter().fold((0.0, 0.0), |(s, f), (square, freedom)| (s + square, f + freedom));
+        (square / freedom).sqrt()
+    };
+    Compared {
+        candidate,
+        bic: coordinates * libm::log(square / coordinates) + unknowns * libm::log(coordinates),
+        hold_out_px: folds.as_deref().map(error),
+        folds: folds.unwrap_or_default().into_iter().map(|(square, _)| square).collect(),
+        correlation: neighbours(&calibration.residuals).correlation,
+        calibration,
+    }
+}
+
+/// Of each fold the squared, weighted error on its views and its degrees of freedom; `None` where a fold cannot be
+/// calibrated without.
+fn hold_out(views: &[View], settings: &Settings) -> Option<Vec<(f64, f64)>> {
+    let folds = FOLDS.min(views.len());
+    (0..folds)
+        .map(|fold| {
+            let (out, kept): (Vec<_>, Vec<_>) =
+                views.iter().enumerate().partition(|(view, _)| view % folds == fold);
+            let kept: Vec<View> = kept.into_iter().map(|(_, view)| view.clone()).collect();
+            let camera = calibrate_lens(&kept, settings).ok()?.camera;
+            let of_view = |view: &View| Some((locate(&camera, view)?.square, 2.0 * view.len() as f64 - 6.0));
+            out.into_iter().try_fold((0.0, 0.0), |(square, freedom), (_, view)| {
+                of_view(view).map(|(s, f)| (square + s, freedom + f))
+            })
+        })
+        .collect()
+}
+
+/// A freedom that explains what a fit leaves over.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Freedom {
+    /// The model with it.
+    pub candidate: Candidate,
+    /// RMSE with it, px.
+    pub rmse_px: f64,
+    /// Correlation of neighbours' residuals with it.
+    pub correlation: f64,
+}
+
+/// A freedom that takes away less than this part of the RMSE explains nothing.
+const WORTH: f64 = 0.05;
+
+/// Where residuals of neighbouring marks agree: which one freedom more, of the lens or of the board, lowers the
+/// RMSE of `fit` by a twentieth or more, the best first.
+pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibration) -> Vec<Freedom> {
+    use Parameter::{K1, K2, K3, P1, P2};
+    let model = settings.model();
+    let is_coefficient = |p: &Parameter| !Parameter::LINEAR.contains(p);
+    let own = fit.free.iter().filter(is_coefficient).fold(FreeParameters::NONE, FreeParameters::with);
+    let with = |more: &[Parameter]| more.iter().fold(own, |set, &p| set.with(p));
+    let richer = [with(&[K3]), with(&[P1, P2]), with(&[K1, K2, K3, P1, P2])];
+    let of_brown = richer.into_iter().filter(|_| model == Model::BrownConrady).map(|set| (model, set));
+    let others = [Model::Rational, Model::KannalaBrandt]
+        .into_iter()
+        .filter(|&other| other != model)
+        .map(|other| (other, FreeParameters::of(other.coefficients())));
+    let free = f64::INFINITY;
+    let bowed = Candidate { model, coefficients: own, board: Board::Bowed { standard_deviation: free } };
+    let candidates = of_brown
+        .chain(others)
+        .map(|(model, coefficients)| Candidate { model, coefficients, board: settings.board })
+        .chain((settings.board == Board::Flat).then_some(bowed))
+        .filter(|candidate| candidate.coefficients != own || *candidate == bowed);
+    let mut found: Vec<Freedom> = candidates
+        .filter_map(|candidate| {
+            let calibration = calibrate_lens(views, &candidate.settings(settings)).ok()?;
+            let correlation = neighbours(&calibration.residuals).correlation;
+            let rmse_px = calibration.rmse_px;
+            let is_minimum = calibration.termination.is_minimum();
+            (is_minimum && rmse_px < (1.0 - WORTH) * fit.rmse_px).then_some(Freedom {
+                candidate,
+                rmse_px,
+                correlation,
+            })
+        })
+        .collect();
+    found.sort_by(|a, b| a.rmse_px.total_cmp(&b.rmse_px));
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synth::{Scene, Stream, StreamKey};
+
+    #[test]
+    fn the_model_that_made_the_marks_is_chosen() {
+        let mut stream = Stream::open(StreamKey { seed: 3, scenario: "choice", trial: 0, purpose: "noise" });
+        let views: Vec<View> = (0..3).flat_map(|_| Scene::example().observe(0.1, &mut stream)).collect();
+        let (compared, refused) = compare_models(&views, &Settings::standard(), &Candidate::usual());
+        assert!(compared.len() + refused.len() == 8);
+        let best = &compared[0];
+        // The example's lens has k1 and k2: what has fewer coefficients, or others, predicts worse.
+        assert_eq!(best.candidate.model, Model::BrownConrady);
+        let named = |model| compared.iter().find(|c| c.candidate.model == model);
+        let division = named(Model::Division).unwrap();
+        assert!(division.hold_out_px > best.hold_out_px && division.bic > best.bic + 10.0);
+        let (wins, folds) = best.wins_against(division);
+        assert!(wins == folds && folds == 5, "{wins} of {folds}");
+        assert!(best.correlation.abs() < 0.15, "{}", best.correlation);
+    }
+}
