@@ -24,6 +24,7 @@ mod golden;
 mod hard_sets;
 mod hostile;
 mod layout;
+mod lens_models;
 mod photo_command;
 mod photo_verbs;
 mod planar_single_plane;

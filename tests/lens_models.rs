@@ -1,0 +1,181 @@
+//! Lens models against other programs, and as the command's user meets them.
+
+use calibench::camera::{Camera, Lens, Model};
+use calibench::geometry::{Pose, Vec2, Vec3, rotation};
+use calibench::io::read_lens_camera;
+use calibench::raster::Raster;
+use calibench::synth::{Stream, StreamKey};
+use serde_json::Value;
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// The lens and linear parameters of `reference/lenses/make.py`.
+fn reference_camera(model: &str, coefficients: &str) -> Camera<Lens> {
+    let coefficients: Vec<f64> = coefficients.split(' ').map(|c| c.parse().unwrap()).collect();
+    let lens = Lens::new(model.parse().unwrap(), &coefficients).unwrap();
+    Camera::with_lens(812.5, 806.75, 641.25, 477.5, lens)
+}
+
+#[test]
+fn pixels_are_those_of_other_programs() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("reference/lenses/pixels.csv");
+    let mut seen = 0;
+    for line in fs::read_to_string(file).unwrap().lines().skip(1) {
+        let [model, coefficients, numbers @ ..] = &line.split(',').collect::<Vec<_>>()[..] else {
+            panic!("{line}")
+        };
+        let [x, y, z, u, v] = numbers.iter().map(|n| n.parse().unwrap()).collect::<Vec<f64>>()[..] else {
+            panic!("{line}")
+        };
+        let camera = reference_camera(model, coefficients);
+        let pixel = camera.pixel(&Vec3::new(x, y, z)).unwrap();
+        assert!((pixel - Vec2::new(u, v)).norm() < 1e-9, "{line}: {pixel}");
+        // And the ray of that pixel is the point's direction.
+        let ray = camera.ray(&pixel).unwrap();
+        assert!((ray - Vec3::new(x, y, z).normalize()).norm() < 1e-12, "{line}: {ray}");
+        seen += 1;
+    }
+    assert_eq!(seen, 40 * Model::ALL.len());
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_calibench"));
+    command.args(arguments).current_dir(folder).output().expect("the program starts")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// An empty folder of this test's own.
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).expect("a folder is made");
+    folder
+}
+
+/// A corner file of a fisheye with noise of 0.1 px: eight views of a 9 x 7 board, `column` besides if given.
+fn fisheye_corners(column: Option<(&str, &dyn Fn(usize) -> f64)>) -> (Camera<Lens>, String) {
+    let lens = Lens::new(Model::KannalaBrandt, &[-0.03, 0.005, -0.001, 0.0]).unwrap();
+    let camera = Camera::with_lens(310.0, 312.0, 322.0, 241.0, lens);
+    let mut stream =
+        Stream::open(StreamKey { seed: 9, scenario: "fisheye", trial: 0, purpose: "noise" });
+    let name = column.map(|(name, _)| format!(",{name}")).unwrap_or_default();
+    let mut file = format!("view,point,X,Y,u,v{name}\n");
+    for view in 0..8 {
+        let turn = f64::from(view);
+        let pose = Pose {
+            rotation: rotation::from_xyz_rad(0.5 * libm::sin(turn), 0.5 * libm::cos(turn), 0.3 * turn),
+            translation: Vec3::new(
+                35.0 * libm::cos(2.4 * turn) - 40.0,
+                30.0 * libm::sin(2.4 * turn) - 30.0,
+                60.0,
+            ),
+        };
+        for i in 0..63_usize {
+            let point = Vec2::new(10.0 * (i % 9) as f64, 10.0 * (i / 9) as f64);
+            let pixel = camera.pixel(&pose.apply(&Vec3::new(point.x, point.y, 0.0))).unwrap();
+            let [du, dv] = [stream.normal(), stream.normal()].map(|n| 0.1 * n);
+            let more = column.map(|(_, of)| format!(",{}", of(i))).unwrap_or_default();
+            writeln!(file, "{view},{i},{},{},{},{}{more}", point.x, point.y, pixel.x + du, pixel.y + dv).unwrap();
+        }
+    }
+    (camera, file)
+}
+
+#[test]
+fn a_fisheye_is_calibrated_told_as_one_and_undone() {
+    let folder = folder("fisheye");
+    let (truth, corners) = fisheye_corners(None);
+    fs::write(folder.join("corners.csv"), corners).unwrap();
+    let fixed = ["calibrate", "corners.csv", "--image-size", "640x480", "--format", "json"];
+    let with = |more: &[&str]| run(&folder, &[&fixed[..], more].concat());
+    let fisheye = with(&["--model", "kannala-brandt", "--out", "result"]);
+    assert_eq!(fisheye.status.code(), Some(0), "{}", text(&fisheye.stderr));
+    let said: Value = serde_json::from_slice(&fisheye.stdout).unwrap();
+    assert_eq!(said["camera"]["model"], "kannala-brandt");
+    let sigma = said["sigma_px"].as_f64().unwrap();
+    assert!((0.09..0.11).contains(&sigma), "{sigma}");
+    let (camera, size) = read_lens_camera(&folder.join("result/result.json")).unwrap();
+    assert_eq!(size, Some((640, 480)));
+    for (parameter, value) in camera.values() {
+        let Some(sd) = said["standard_deviations"][parameter.name()].as_f64() else { continue };
+        let z = (value - truth.value(parameter).unwrap()) / sd;
+        assert!(z.abs() < 4.0, "{parameter}: {z} standard deviations");
+    }
+    // The plain lens is told not to fit, and what would.
+    let plain = with(&[]);
+    let warnings = text(&plain.stdout);
+    assert!(warnings.contains("a kannala-brandt lens (--model kannala-brandt) lowers the RMSE"), "{warnings}");
+    let chosen: Value = serde_json::from_slice(&with(&["--model", "auto"]).stdout).unwrap();
+    assert_eq!(chosen["camera"]["model"], chosen["models"][0]["model"]);
+    assert_eq!(chosen["camera"]["model"], "kannala-brandt");
+    assert_eq!(chosen["models"].as_array().unwrap().len(), 8);
+    // A line of the world is straight after the correction.
+    let photo = Raster::from_fn(640, 480, |x, y| {
+        let seen = truth.ray(&Vec2::new(x as f64, y as f64)).unwrap();
+        // The plane X = 0.4 Z is an edge between dark and bright.
+        if seen.x > 0.4 * seen.z { 200u8 } else { 40 }
+    });
+    calibench::io::write_png(&folder.join("photo.png"), &photo).unwrap();
+    let undone = run(&folder, &["undistort", "--camera", "result/result.json", "--out", "out", "photo.png"]);
+    assert_eq!(undone.status.code(), Some(0), "{}", text(&undone.stderr));
+    let corrected = calibench::io::read_image(&folder.join("out/photo.png")).unwrap().to_u8();
+    let edge = camera.fx * 0.4 + camera.cx;
+    for row in [120, 180, 240, 300, 360] {
+        let first = (0..640).find(|&x| corrected.get(x, row) > 120).unwrap() as f64;
+        assert!((first - edge).abs() < 1.5, "row {row}: {first} against {edge}");
+    }
+    for (projection, said) in [("equidistant", "kannala-brandt"), ("equirectangular", "equirectangular")] {
+        let arguments =
+            ["undistort", "--camera", "result/result.json", "--out", projection, "--projection", projection, "photo.png"];
+        assert_eq!(run(&folder, &arguments).status.code(), Some(0));
+        let camera = fs::read_to_string(folder.join(projection).join("camera-640x480.json")).unwrap();
+        assert!(camera.contains(said), "{camera}");
+    }
+}
+
+#[test]
+fn marks_have_weights_or_standard_deviations() {
+    let folder = folder("weights");
+    let weighted = |name: &str, of: &dyn Fn(usize) -> f64| fisheye_corners(Some((name, of))).1;
+    fs::write(folder.join("weight.csv"), weighted("weight", &|i| if i % 2 == 0 { 0.5 } else { 2.0 })).unwrap();
+    fs::write(folder.join("sigma.csv"), weighted("sigma_px", &|i| if i % 2 == 0 { 2.0 } else { 0.5 })).unwrap();
+    fs::write(folder.join("none.csv"), weighted("weight", &|_| 0.0)).unwrap();
+    let camera = |file: &str| -> Value {
+        let output = run(&folder, &["calibrate", file, "--model", "kannala-brandt", "--format", "json"]);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()["camera"].clone()
+    };
+    assert_eq!(camera("weight.csv"), camera("sigma.csv"));
+    let refused = run(&folder, &["calibrate", "none.csv"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(text(&refused.stderr).contains("point 0 has weight 0"), "{}", text(&refused.stderr));
+}
+
+#[test]
+fn what_a_model_does_not_have_is_refused_by_name() {
+    let folder = folder("lens-refused");
+    fs::write(folder.join("c.csv"), fisheye_corners(None).1).unwrap();
+    let refusals = [
+        (&["--model", "division", "--free", "fx,k2"][..], "the division model has no k2"),
+        (&["--model", "fisheye"], "unknown lens model `fisheye`"),
+        (&["--model", "auto", "--fix", "k1=0"], "--model auto chooses what is estimated of a lens"),
+        (&["--model", "rational", "--intervals", "profile"], "an interval by the profile of the cost"),
+        (&["--board-shape", "bow:0"], "expected bow:SD or bent:SD"),
+    ];
+    for (more, wanted) in refusals {
+        let output = run(&folder, &[&["calibrate", "c.csv"], more].concat());
+        assert_eq!(output.status.code(), Some(2), "{more:?}");
+        assert!(text(&output.stderr).contains(wanted), "{more:?}: {}", text(&output.stderr));
+    }
+    // Another command that knows the plain lens only says so.
+    let done = run(&folder, &["calibrate", "c.csv", "--model", "kannala-brandt", "--out", "r"]);
+    assert_eq!(done.status.code(), Some(0));
+    let converted = run(&folder, &["convert", "r/result.json", "camera.yaml", "--to", "opencv-yaml"]);
+    assert_eq!(converted.status.code(), Some(2));
+    assert!(text(&converted.stderr).contains("kannala-brandt"), "{}", text(&converted.stderr));
+}
