@@ -101,13 +101,13 @@ pub(super) fn figures(calibration: &LensCalibration, views: &[View], size: (usiz
 #[cfg(test)]
 mod tests {
     use super::*;
-    use calibench::calibrate::{Settings, calibrate};
+    use calibench::calibrate::{Settings, calibrate_lens};
     use calibench::synth::{Scene, Stream, StreamKey};
 
-    fn calibration() -> (Calibration, Vec<View>) {
+    fn calibration() -> (LensCalibration, Vec<View>) {
         let key = StreamKey { seed: 1, scenario: "maps", trial: 0, purpose: "noise" };
         let views = Scene::example().observe(0.1, &mut Stream::open(key));
-        (calibrate(&views, &Settings::standard()).unwrap(), views)
+        (calibrate_lens(&views, &Settings::standard()).unwrap(), views)
     }
 
     #[test]
