@@ -5,6 +5,7 @@ use super::report::table;
 use super::{Exit, print, warn};
 use calibench::calibrate::{Loss, Prior};
 use calibench::camera::{FreeParameters, Parameter};
+use calibench::io::ShownPath;
 use calibench::io::input::{MOST_SIDE_PX, MOST_TABLE_BYTES, read_named};
 use calibench::io::memory::{DEFAULT_MEMORY, parse_bytes};
 use calibench::io::parse_corners;
@@ -231,7 +232,7 @@ impl Failure {
 /// Corners or point pairs, told apart by the names of their columns.
 fn from_table(arguments: &Arguments, file: &Path) -> Result<Exit, Failure> {
     let bytes = read_named(file, MOST_TABLE_BYTES).map_err(|error| error.to_string())?;
-    let name = if file.as_os_str() == "-" { "standard input".into() } else { file.display().to_string() };
+    let name = if file.as_os_str() == "-" { "standard input".into() } else { file.shown() };
     let columns = columns(&bytes);
     let has = |names: &[&str]| names.iter().all(|name| columns.iter().any(|column| column == name));
     if has(&["px"]) && !has(&["view", "u", "v"]) {

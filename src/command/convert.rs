@@ -2,6 +2,7 @@
 
 use super::calibrate::{Format as Shown, parse_size};
 use super::{Exit, print, warn};
+use calibench::io::ShownPath;
 use calibench::io::formats::{
     self, CameraFile, ChessTarget, Format, VnlBoard, Wishes, format_names, format_of_name, read_camera_file,
 };
@@ -114,7 +115,7 @@ struct Converted {
 
 impl Converted {
     fn report(&self, from: &Path, to: &Path) -> String {
-        let mut text = format!("{} ({}) -> {} ({})\n", from.display(), self.from, to.display(), self.to);
+        let mut text = format!("{} ({}) -> {} ({})\n", from.shown(), self.from, to.shown(), self.to);
         for (word, lines) in [("read", &self.noted), ("converted", &self.converted), ("lost", &self.lost)] {
             for line in lines {
                 // Writing to a string cannot fail.
@@ -150,7 +151,7 @@ fn converted(arguments: &Arguments, from: &Path, to: &Path) -> Result<Converted,
     if let Some(Ok(board)) = from.to_str().map(str::parse::<BoardSpec>) {
         return board_to_target(&board);
     }
-    let name = from.display().to_string();
+    let name = from.shown();
     regular_or_absent(to).map_err(said)?;
     if let (Ok(a), Ok(b)) = (from.canonicalize(), to.canonicalize())
         && a == b
@@ -182,7 +183,7 @@ fn camera(arguments: &Arguments, name: &str, text: &str, to: &Path) -> Result<Co
         first_pixel: arguments.first_pixel,
     };
     let from = arguments.from.map_or_else(|| formats::detect(name, text), Ok).map_err(said)?;
-    let out = to.display().to_string();
+    let out = to.shown();
     let to = arguments.to.map_or_else(|| formats::format_to_write(&out), Ok).map_err(said)?;
     let read = read_camera_file(from, name, text, arguments.camera.as_deref(), &wishes).map_err(said)?;
     let first_pixel = wishes.first_pixel.unwrap_or(from.first_pixel);

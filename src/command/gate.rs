@@ -5,6 +5,7 @@ mod compare;
 mod power;
 
 use super::{Exit, MOST_THREADS, print, warn};
+use calibench::io::ShownPath;
 use calibench::io::write_atomically;
 use calibench_gate::faults::{Faulty, planted};
 use calibench_gate::files::{self, FilesError};
@@ -204,7 +205,7 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
     if let Some(folder) = &arguments.export {
         let plan = Plan::new(arguments.seed, samples).map_err(incomplete)?;
         files::export(&plan, folder).map_err(of_files)?;
-        print(&format!("{} problems written to {}\n", plan.cases.len(), folder.display()));
+        print(&format!("{} problems written to {}\n", plan.cases.len(), folder.shown()));
         return Ok(Exit::Held);
     }
     if let Some(folder) = &arguments.judge {
@@ -218,7 +219,7 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
         let recorder = Recorder::new(solver.as_ref());
         let exit = judge(arguments, &plan, &recorder, build)?;
         files::file_answers(&plan, folder, &recorder).map_err(of_files)?;
-        print(&format!("{} problems and answers written to {}\n", plan.cases.len(), folder.display()));
+        print(&format!("{} problems and answers written to {}\n", plan.cases.len(), folder.shown()));
         return Ok(exit);
     }
     if let Some(reference) = &arguments.against {

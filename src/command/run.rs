@@ -2,6 +2,7 @@
 
 use super::report::{details, summary};
 use super::{Exit, find, print, terminal, warn};
+use calibench::io::ShownPath;
 use calibench_harness::project::Project;
 use calibench_harness::verdict::{self, Run, Verdict};
 use calibench_harness::{Build, Context, Experiment, ProgressDisplay, emit};
@@ -83,7 +84,7 @@ fn run_one(experiment: &Experiment, options: &Options, build: &Build) -> Exit {
     let verdict = Verdict::of(record, snapshot.as_deref(), run.locked && project.is_some());
     print(&summary(record));
     let written = out.join(experiment.id);
-    print(&format!("\nwritten: {} and {}\n", written.display(), figures.display()));
+    print(&format!("\nwritten: {} and {}\n", written.shown(), figures.shown()));
     print(&details(std::slice::from_ref(&verdict)));
     if verdict.held() { Exit::Held } else { Exit::Deviates }
 }

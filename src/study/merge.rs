@@ -10,6 +10,7 @@ use super::shard::Shard;
 use super::tables;
 use super::trial_file::TrialFile;
 use calibench::io::Commit;
+use calibench::io::ShownPath;
 use calibench_harness::Build;
 use std::path::{Path, PathBuf};
 
@@ -23,13 +24,13 @@ pub enum MergeError {
     #[error("no parts were given: name the folders of all shards")]
     Nothing,
     /// The same folder under one name or two.
-    #[error("{path} is named twice: name the folder of each shard once", path = .0.display())]
+    #[error("{path} is named twice: name the folder of each shard once", path = .0.shown())]
     NamedTwice(PathBuf),
     /// The whole would take the place of a part.
-    #[error("{path} is one of the parts: choose another folder for the whole", path = .0.display())]
+    #[error("{path} is one of the parts: choose another folder for the whole", path = .0.shown())]
     IntoPart(PathBuf),
     /// A part that has trials left.
-    #[error("{path} (shard {shard}) is not complete: `calibench study resume {path}` first", path = path.display())]
+    #[error("{path} (shard {shard}) is not complete: `calibench study resume {path}` first", path = path.shown())]
     Incomplete {
         /// Its folder.
         path: PathBuf,
@@ -47,7 +48,7 @@ pub enum MergeError {
         count: u64,
     },
     /// Parts of different studies or code.
-    #[error("{path} differs from the first part:\n{}", differences.iter().map(|d| format!("  {d}")).collect::<Vec<_>>().join("\n"), path = path.display())]
+    #[error("{path} differs from the first part:\n{}", differences.iter().map(|d| format!("  {d}")).collect::<Vec<_>>().join("\n"), path = path.shown())]
     Differs {
         /// The folder.
         path: PathBuf,

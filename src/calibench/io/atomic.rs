@@ -1,6 +1,7 @@
 //! How is a file replaced so that nobody ever sees half of it? Written beside its place, then renamed.
 
 use super::files::{Disk, Files};
+use super::shown::ShownPath;
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, DirEntry, File, OpenOptions};
 use std::io;
@@ -105,7 +106,7 @@ fn refuse_what_is_no_file(path: &Path) -> io::Result<()> {
 
 /// The error with the file that could not be written.
 fn with_path(path: &Path) -> impl Fn(io::Error) -> io::Error {
-    move |error| io::Error::new(error.kind(), format!("cannot write {}: {error}", path.display()))
+    move |error| io::Error::new(error.kind(), format!("cannot write {}: {error}", path.shown()))
 }
 
 /// The folder in which a file stands.
@@ -157,7 +158,7 @@ pub fn remove_leftovers(folder: &Path) -> io::Result<()> {
 /// The same for the writes of one file, or of any.
 fn remove_leftovers_of(files: &dyn Files, folder: &Path, name: Option<&OsStr>) -> io::Result<()> {
     let with_path = |path: &Path, e: io::Error| {
-        io::Error::new(e.kind(), format!("cannot remove what a killed run left, {}: {e}", path.display()))
+        io::Error::new(e.kind(), format!("cannot remove what a killed run left, {}: {e}", path.shown()))
     };
     let entries = match fs::read_dir(folder) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),

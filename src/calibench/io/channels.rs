@@ -1,6 +1,7 @@
 //! How does a photograph keep its colours? As one raster a channel, with the depth of its file.
 
 use super::image::{self, Decoded, ImageError, opened};
+use super::shown::ShownPath;
 use crate::raster::{Level, Raster};
 use std::path::Path;
 
@@ -21,7 +22,7 @@ pub enum Channels {
 /// # Errors
 /// See [`ImageError`].
 pub fn read_channels(path: &Path) -> Result<Channels, ImageError> {
-    let name = path.display().to_string();
+    let name = path.shown();
     let image = image::decoded(opened(path)?, &name)?;
     let (width, height) = (image.width() as usize, image.height() as usize);
     let u8s = |samples: &[u8], count| Channels::U8(parted(samples, count, width, height));

@@ -5,6 +5,7 @@
 
 use super::input::{InputError, MOST_IMAGE_BYTES, open_regular};
 use super::jpeg_end;
+use super::shown::ShownPath;
 use crate::raster::Raster;
 pub(super) use image::DynamicImage as Decoded;
 use image::{DynamicImage, ImageDecoder, ImageReader};
@@ -126,7 +127,7 @@ impl Grey {
 /// # Errors
 /// See [`ImageError`]; a damaged file is an error, never a panic, and a forged size allocates nothing.
 pub fn read_image(path: &Path) -> Result<Grey, ImageError> {
-    Ok(grey(decoded(opened(path)?, &path.display().to_string())?))
+    Ok(grey(decoded(opened(path)?, &path.shown())?))
 }
 
 /// The file of a photograph, which holds at least a byte.
@@ -136,7 +137,7 @@ pub(super) fn opened(path: &Path) -> Result<BufReader<File>, ImageError> {
         error => ImageError::Input(error),
     })?;
     if length == 0 {
-        return Err(ImageError::Empty { path: path.display().to_string() });
+        return Err(ImageError::Empty { path: path.shown() });
     }
     Ok(BufReader::new(file))
 }
@@ -205,7 +206,7 @@ impl Extent {
 /// # Errors
 /// See [`ImageError`].
 pub fn image_extent(path: &Path) -> Result<Extent, ImageError> {
-    let decoder = decoder(opened(path)?, &path.display().to_string())?;
+    let decoder = decoder(opened(path)?, &path.shown())?;
     let (width, height) = decoder.dimensions();
     Ok(Extent { pixels: u64::from(width) * u64::from(height), bytes: decoder.total_bytes() })
 }

@@ -1,6 +1,7 @@
 //! What stands in a table of numbers? CSV with named columns; every complaint carries file, line and column.
 
 use super::input::{InputError, MOST_TABLE_BYTES, read_regular};
+use super::shown::{ShownPath, on_one_line};
 use crate::board::ViewError;
 use std::io::Read;
 
@@ -253,7 +254,7 @@ fn find_columns<const N: usize>(
         *place = found.next().ok_or_else(|| TableError::MissingColumn {
             file: file.into(),
             column,
-            header: header.iter().collect::<Vec<_>>().join(","),
+            header: on_one_line(&header.iter().collect::<Vec<_>>().join(",")).into_owned(),
             expected: expected(),
         })?;
         if found.next().is_some() {
@@ -271,7 +272,7 @@ fn name(file: &str, line: u64, column: &'static str, field: usize, text: &str) -
 }
 
 fn number(file: &str, line: u64, column: &'static str, field: usize, text: &str) -> Result<f64, TableError> {
-    let (file, field, owned) = (file.to_string(), field + 1, text.to_string());
+    let (file, field, owned) = (file.to_string(), field + 1, on_one_line(text).into_owned());
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
         Ok(_) => Err(TableError::NotFinite { file, line, column, field, text: owned }),
@@ -289,7 +290,7 @@ fn unreadable(file: &str, lines: &mut LineCounter<'_>, error: &csv::Error) -> Ta
 
 /// Name and bytes of a file for one of the readers.
 pub(super) fn open(path: &std::path::Path) -> Result<(String, Vec<u8>), TableError> {
-    Ok((path.display().to_string(), read_regular(path, MOST_TABLE_BYTES)?))
+    Ok((path.shown(), read_regular(path, MOST_TABLE_BYTES)?))
 }
 
 /// The names of the columns; none where the first line cannot be read, of which the reader of the table says

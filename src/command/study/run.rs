@@ -2,6 +2,7 @@
 
 use super::{Failure, read};
 use crate::{Exit, print, warn};
+use calibench::io::ShownPath;
 use calibench::io::significant;
 use calibench_harness::project::Project;
 use calibench_harness::stopwatch::{Stopwatch, rate};
@@ -52,7 +53,7 @@ pub(super) fn run(arguments: &Arguments, build: &Build) -> Result<Exit, Failure>
     arguments.trials.check().map_err(FolderError::from)?;
     let text = read(&arguments.spec)?;
     let engine = Engine::new(&text, arguments.shard)
-        .map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.display())))?;
+        .map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.shown())))?;
     let out = arguments.out.clone().unwrap_or_else(|| default_folder(&engine));
     let manifest = Manifest::new(&engine.spec, arguments.shard, build);
     let manifest = manifest.with_trials(arguments.trials);
@@ -119,7 +120,7 @@ fn drive(folder: &Folder, mut engine: Engine) -> Result<Exit, Failure> {
     drop(progress);
     let took = watch.elapsed();
     if outcome == Outcome::Interrupted {
-        let path = folder.path().display();
+        let path = folder.path().shown();
         warn(&format!(
             "interrupted after {} trials; continue with: calibench study resume {path}",
             engine.trials()
@@ -183,5 +184,5 @@ fn print_summary(folder: &Folder, engine: &Engine, summary: &Summary) {
         }
     }
     let report: &Path = &folder.file("report.html");
-    print(&format!("{} trials; written: {}\n", engine.trials(), report.display()));
+    print(&format!("{} trials; written: {}\n", engine.trials(), report.shown()));
 }
