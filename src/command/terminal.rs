@@ -2,6 +2,7 @@
 //! error, a disk that is full is.
 
 use super::Exit;
+use super::startup::standard_output;
 use calibench::io::shown;
 use std::io::{self, Write};
 use std::sync::OnceLock;
@@ -14,7 +15,8 @@ static LOST: OnceLock<String> = OnceLock::new();
 /// incomplete, see `ended`.
 pub fn print(text: &str) {
     let mut out = io::stdout().lock();
-    note(out.write_all(shown(text).as_bytes()).and_then(|()| out.flush()));
+    let written = standard_output().and_then(|()| out.write_all(shown(text).as_bytes()));
+    note(written.and_then(|()| out.flush()));
 }
 
 /// Writes a line to standard error.
@@ -30,7 +32,7 @@ pub(super) fn usage(error: &clap::Error) -> Exit {
         let _ = error.print();
         return Exit::Usage;
     }
-    note(error.print());
+    note(standard_output().and_then(|()| error.print()));
     Exit::Held
 }
 
