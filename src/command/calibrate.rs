@@ -9,7 +9,7 @@ use calibench::io::ShownPath;
 use calibench::io::input::{MOST_SIDE_PX, MOST_TABLE_BYTES, read_named};
 use calibench::io::memory::{DEFAULT_MEMORY, parse_bytes};
 use calibench::io::parse_corners;
-use calibench::io::table::columns;
+use calibench::io::table::{columns, unended_line};
 use calibench::photos::BoardSpec;
 use calibench::planar::PlaneModel;
 use camera::Observed;
@@ -31,8 +31,13 @@ pub(super) use plane::plane_text;
 pub(super) use plots::round_down;
 
 /// What the exit codes mean here.
-const EXIT_CODES: &str = "Exit codes: 0 a minimum whose RMSE lies at most a quarter above that of free homographies (warnings say what to be careful about), 2 \
-     wrong usage or data that do not determine the camera, 3 no minimum, or one far above them: the result is printed and must not be used";
+const EXIT_CODES: &str = "\
+Exit codes:
+  0  calibrated: a minimum whose RMSE lies at most a quarter above that of free homographies; read the warnings
+  2  wrong usage, or data that do not determine the camera: there is no result
+  3  do not use the result, if one is printed: no minimum, or one far above free homographies, or files or
+     standard output that could not be written, or interrupted
+Code 1 is of other verbs.";
 
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_CODES)]
@@ -237,18 +242,29 @@ fn from_table(arguments: &Arguments, file: &Path) -> Result<Exit, Failure> {
     let has = |names: &[&str]| names.iter().all(|name| columns.iter().any(|column| column == name));
     if has(&["px"]) && !has(&["view", "u", "v"]) {
         contradictions::refuse(arguments, Input::PointPairs)?;
+        unended(&name, &bytes).iter().for_each(|said| warn(&format!("warning: {said}")));
         return plane::run(arguments, &name, &bytes);
     }
     contradictions::refuse(arguments, Input::Corners)?;
     let corners = parse_corners(&name, bytes.as_slice()).map_err(|error| error.to_string())?;
+    let notes = unended(&name, &bytes).into_iter().collect();
     let observed = Observed {
         source: name,
         names: corners.view_names,
         views: corners.views,
         image_size: arguments.image_size,
+        notes,
         ..Observed::default()
     };
     camera::run(arguments, observed)
+}
+
+/// What is to be said of a table whose last line has no end.
+pub(super) fn unended(name: &str, bytes: &[u8]) -> Option<String> {
+    let line = unended_line(bytes)?;
+    Some(format!(
+        "{name}:{line}: this last line has no end: if the file was cut off there, its last number is another's beginning"
+    ))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! `calibench convert IN OUT`: a camera, corners or a board from the file of one program to that of another.
 
-use super::calibrate::{Format as Shown, parse_size};
+use super::calibrate::{Format as Shown, parse_size, unended};
 use super::{Exit, print, warn};
 use calibench::io::ShownPath;
 use calibench::io::formats::{
@@ -146,6 +146,14 @@ impl Converted {
     }
 }
 
+impl Converted {
+    /// With a note where the last line of a table has no end.
+    fn with_end_of(mut self, name: &str, bytes: &[u8]) -> Converted {
+        self.noted.extend(unended(name, bytes));
+        self
+    }
+}
+
 /// The kind of IN decides what OUT can be.
 fn converted(arguments: &Arguments, from: &Path, to: &Path) -> Result<Converted, String> {
     if let Some(Ok(board)) = from.to_str().map(str::parse::<BoardSpec>) {
@@ -160,13 +168,16 @@ fn converted(arguments: &Arguments, from: &Path, to: &Path) -> Result<Converted,
     }
     let bytes = read_regular(from, formats::MOST_BYTES).map_err(said)?;
     if arguments.from.is_none() && has_columns(&bytes) {
-        return corners_to_vnl(arguments, &name, &bytes);
+        return corners_to_vnl(arguments, &name, &bytes)
+            .map(|converted| converted.with_end_of(&name, &bytes));
     }
     let text = std::str::from_utf8(&bytes).map_err(|error| {
         format!("{name}: byte {} is no UTF-8 text: no file of these formats", error.valid_up_to())
     })?;
     match arguments.from {
-        None if formats::looks_like_vnl(text) => vnl_to_corners(arguments, &name, text),
+        None if formats::looks_like_vnl(text) => {
+            vnl_to_corners(arguments, &name, text).map(|converted| converted.with_end_of(&name, &bytes))
+        }
         None if text.lines().any(|line| line.starts_with("target_type")) => target_to_board(&name, text),
         _ => camera(arguments, &name, text, to),
     }

@@ -48,10 +48,11 @@ pub fn write_together_to(files: &dyn Files, contents: &[(PathBuf, Vec<u8>)]) -> 
     beside.into_iter().try_for_each(Beside::place)
 }
 
-/// A file that is on the disk, beside its place. It is removed unless it is put there.
-struct Beside<'a> {
+/// A file that is written beside its place, at once or piece by piece. It is removed unless it is put there.
+#[derive(Debug)]
+pub struct Beside<'a> {
     files: &'a dyn Files,
-    path: &'a Path,
+    path: PathBuf,
     temporary: PathBuf,
     /// Open, and so locked, until the file has its name.
     file: File,
@@ -59,24 +60,42 @@ struct Beside<'a> {
 }
 
 impl<'a> Beside<'a> {
-    fn write(files: &'a dyn Files, path: &'a Path, contents: &[u8]) -> io::Result<Beside<'a>> {
+    /// A file without contents.
+    ///
+    /// # Errors
+    /// As [`write_atomically`]; of every function here.
+    pub fn begin(files: &'a dyn Files, path: &Path) -> io::Result<Beside<'a>> {
         let folder = folder_of(path);
         refuse_what_is_no_file(path).map_err(with_path(path))?;
         files.make_folder(folder).map_err(with_path(path))?;
         // What cannot be removed is in nobody's way.
         let _ = remove_leftovers_of(files, folder, path.file_name());
         let (file, temporary) = open_beside(path).map_err(with_path(path))?;
-        let mut beside = Beside { files, path, temporary, file, placed: false };
-        files
-            .write(&mut beside.file, contents)
-            // On the disk before the rename: else a power cut may leave the new name with no contents.
-            .and_then(|()| files.sync(&beside.file))
-            .map_err(with_path(path))?;
+        Ok(Beside { files, path: path.to_path_buf(), temporary, file, placed: false })
+    }
+
+    /// A file with all of its contents, on the disk.
+    pub fn write(files: &'a dyn Files, path: &Path, contents: &[u8]) -> io::Result<Beside<'a>> {
+        let mut beside = Beside::begin(files, path)?;
+        beside.append(contents)?;
+        beside.sync()?;
         Ok(beside)
     }
 
-    fn place(mut self) -> io::Result<()> {
-        self.files.rename(&self.temporary, self.path).map_err(with_path(self.path))?;
+    /// Adds to the contents.
+    pub fn append(&mut self, contents: &[u8]) -> io::Result<()> {
+        self.files.write(&mut self.file, contents).map_err(with_path(&self.path))
+    }
+
+    /// Waits until the contents are on the disk, as they must be before the rename: else a power cut may leave
+    /// the new name without them.
+    pub fn sync(&self) -> io::Result<()> {
+        self.files.sync(&self.file).map_err(with_path(&self.path))
+    }
+
+    /// Puts the file in its place.
+    pub fn place(mut self) -> io::Result<()> {
+        self.files.rename(&self.temporary, &self.path).map_err(with_path(&self.path))?;
         self.placed = true;
         Ok(())
     }

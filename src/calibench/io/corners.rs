@@ -1,6 +1,6 @@
 //! What was seen where? Corner files: `view,point,X,Y,u,v`, one line an observed point.
 
-use super::table::{Row, TableError, open, read_table};
+use super::table::{Column, Row, TableError, open, read_table};
 use crate::board::View;
 use crate::geometry::Vec2;
 use std::collections::BTreeMap;
@@ -16,6 +16,10 @@ pub struct CornerFile {
     /// with (0, 0) at the centre of the top-left pixel.
     pub views: Vec<View>,
 }
+
+/// The numbers of a line.
+const COLUMNS: [Column; 4] =
+    [Column::length("X"), Column::length("Y"), Column::pixels("u"), Column::pixels("v")];
 
 /// Reads a corner file.
 ///
@@ -43,7 +47,7 @@ pub fn read_corners(path: &Path) -> Result<CornerFile, TableError> {
 /// # Ok::<(), calibench::io::TableError>(())
 /// ```
 pub fn parse_corners(file: &str, input: impl Read) -> Result<CornerFile, TableError> {
-    let rows = read_table(file, input, ["view", "point"], ["X", "Y", "u", "v"])?;
+    let rows = read_table(file, input, ["view", "point"], COLUMNS)?;
     refuse_repeated_points(file, &rows)?;
     let mut index_of = BTreeMap::new();
     let mut grouped: Vec<(String, Vec<Vec2>, Vec<Vec2>)> = Vec::new();
@@ -142,6 +146,18 @@ mod tests {
             (
                 &format!("{header}0,0,1,2,1e999,4\n"),
                 "c.csv:2: column 'u' (field 5): '1e999' is not a finite number",
+            ),
+            (
+                &format!("{header}0,0,1,2,1e300,4\n"),
+                "c.csv:2: column 'u' (field 5): '1e300' is beyond 1.048576e6, the most there may be",
+            ),
+            (
+                &format!("{header}0,0,1,-1e31,3,4\n"),
+                "c.csv:2: column 'Y' (field 4): '-1e31' is beyond 1e30, the most there may be",
+            ),
+            (
+                &format!("{header}0,0,1,2,3,\"4\nall held\"\n"),
+                "c.csv:2: column 'v' (field 6): '4\\u000aall held' is not a number",
             ),
             (&format!("{header},0,1,2,3,4\n"), "c.csv:2: column 'view' (field 1) is empty"),
             (
