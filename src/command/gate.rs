@@ -6,6 +6,7 @@ mod power;
 
 use super::{Exit, MOST_THREADS, print, warn};
 use calibench::io::ShownPath;
+use calibench::io::shown::on_one_line;
 use calibench::io::write_atomically;
 use calibench_gate::faults::{Faulty, planted};
 use calibench_gate::files::{self, FilesError};
@@ -15,7 +16,7 @@ use calibench_gate::{
 };
 use calibench_harness::{Build, ProgressDisplay};
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Longest time for a problem.
@@ -147,14 +148,43 @@ fn incomplete(message: impl ToString) -> Stop {
 }
 
 fn of_files(error: FilesError) -> Stop {
-    match error {
-        FilesError::Plan(PlanError::TooManySamples { .. }) => usage(error),
-        FilesError::Write(_) | FilesError::Plan(_) => incomplete(error),
-        _ => usage(error),
+    let message = error.to_string();
+    let exit = match error {
+        FilesError::Plan(PlanError::TooManySamples { .. }) => Exit::Usage,
+        FilesError::Write(_) | FilesError::Plan(_) => Exit::Incomplete,
+        _ => Exit::Usage,
+    };
+    (exit, on_one_line(&message).into_owned())
+}
+
+/// Refuses two reports in one file, of which the last would be left.
+fn refuse_one_file_for_two(arguments: &Arguments) -> Result<(), Stop> {
+    let reports = [("--json", &arguments.json), ("--junit", &arguments.junit), ("--html", &arguments.html)];
+    let named: Vec<(&str, PathBuf)> =
+        reports.into_iter().filter_map(|(option, path)| Some((option, place_of(path.as_ref()?)))).collect();
+    for (i, (option, place)) in named.iter().enumerate() {
+        if let Some((other, _)) = named[..i].iter().find(|(_, other)| other == place) {
+            return Err(usage(format!(
+                "{other} and {option} name one file, {}: give each report a file of its own",
+                place.shown()
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Where a file that is written would stand, by whatever way it is named.
+fn place_of(path: &Path) -> PathBuf {
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let folder = absolute.parent().and_then(|folder| folder.canonicalize().ok());
+    match (folder, absolute.file_name()) {
+        (Some(folder), Some(name)) => folder.join(name),
+        _ => absolute,
     }
 }
 
 fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
+    refuse_one_file_for_two(arguments)?;
     if let Some(folder) = &arguments.schema {
         for (name, text) in protocol::schemas() {
             write_atomically(&folder.join(name), text.as_bytes()).map_err(incomplete)?;
