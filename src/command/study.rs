@@ -10,6 +10,7 @@ use calibench::io::input::{InputError, MOST_SPEC_BYTES};
 use calibench::io::read_regular_text;
 use calibench_harness::Build;
 use calibench_study::{FolderError, MergeError, RunError};
+use std::io::ErrorKind;
 use std::path::Path;
 
 #[derive(Debug, clap::Subcommand)]
@@ -64,9 +65,13 @@ impl Failure {
     }
 }
 
-/// What the user gave is the user's to mend; a disk that fails leaves the run incomplete.
+/// What the user gave is the user's to mend, also a folder from which a file was taken; a disk that fails leaves
+/// the run incomplete.
 fn exit_of_folder(error: &FolderError) -> Exit {
     match error {
+        FolderError::Input(InputError::Open { cause, .. }) if cause.kind() == ErrorKind::NotFound => {
+            Exit::Usage
+        }
         FolderError::File(_) | FolderError::Unwritten(_) | FolderError::Input(InputError::Open { .. }) => {
             Exit::Incomplete
         }

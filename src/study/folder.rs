@@ -158,6 +158,15 @@ impl Folder {
         spec_text: &str,
         manifest: &Manifest,
     ) -> Result<Folder, FolderError> {
+        let folder = Folder::claim(files, path)?;
+        folder.write("spec.toml", spec_text.as_bytes())?;
+        // The manifest last: a folder without one holds no run.
+        folder.write("manifest.json", manifest.to_text().as_bytes())?;
+        Ok(folder)
+    }
+
+    /// A folder for a run, with nothing of one in it yet.
+    pub(super) fn claim(files: Arc<dyn Files>, path: &Path) -> Result<Folder, FolderError> {
         let located = |cause| Located { path: path.to_path_buf(), cause };
         files.make_folder(path).map_err(located)?;
         let folder = Folder::lock(files, path)?;
@@ -167,9 +176,6 @@ impl Folder {
         if let Some(found) = OF_A_RUN.into_iter().find(|name| folder.file(name).exists()) {
             return Err(FolderError::Leftover { path: path.to_path_buf(), found });
         }
-        folder.write("spec.toml", spec_text.as_bytes())?;
-        // The manifest last: a folder without one holds no run.
-        folder.write("manifest.json", manifest.to_text().as_bytes())?;
         Ok(folder)
     }
 
