@@ -657,10 +657,24 @@ fn a_line_break_in_a_name_begins_no_line_of_a_message() {
         assert!(said.contains("a\\u000aall held"), "{arguments:?}: {said}");
         assert!(!said.lines().any(|line| line.starts_with("all held")), "{arguments:?}: {said}");
     }
-    // The field of a table may have one too.
+    // The fields of a table and of a study may have one too.
     let field = PAIRS.replacen("0,0,0,0,0", "0,\"1\nall held\",0,0,0", 1);
     fs::write(folder.join("p.csv"), field).expect("written");
     refused(&folder, &["calibrate", "p.csv"], &["'1\\u000aall held' is not a number"]);
+    let factor = "name = \"noise\"\nunit";
+    let study = |name: &str| fixed_poses().replace(factor, &format!("name = \"{name}\"\nunit"));
+    fs::write(folder.join("named.toml"), study("a\\nall held")).expect("written");
+    fs::write(folder.join("wrong.toml"), study("noise\"\n\"a\\nall held\" = \"")).expect("written");
+    refused(&folder, &["study", "run", "wrong.toml"], &["a\\u000aall held"]);
+    let views = corner_file().replace("\n0,", "\n\"a\nall held\",");
+    fs::write(folder.join("c.csv"), views).expect("written");
+    for arguments in [&["calibrate", "c.csv"][..], &["study", "run", "named.toml", "--out", "run"]] {
+        let output = limited(&folder, arguments);
+        let said = text(&output.stdout) + &text(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {said}");
+        assert!(said.contains("a\\u000aall held"), "{arguments:?}: {said}");
+        assert!(!said.lines().any(|line| line.trim().starts_with("all held")), "{arguments:?}: {said}");
+    }
 }
 
 #[test]

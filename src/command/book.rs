@@ -1,5 +1,6 @@
 //! `calibench book`: the book alone, from the last run; what the last run lacks is run.
 
+use super::terminal::warn_lines;
 use super::{Exit, print, warn};
 use calibench::io::ShownPath;
 use calibench_book::{Evidence, Finding, Sources};
@@ -64,7 +65,7 @@ fn write(project: &Project, evidence: Evidence) -> Exit {
     let compiled = match Sources::load(project, evidence) {
         Ok(sources) => calibench_book::compile(&sources),
         Err(finding) => {
-            warn(&finding.to_string());
+            warn_lines(&finding.to_string());
             return Exit::Incomplete;
         }
     };

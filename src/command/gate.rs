@@ -4,9 +4,9 @@ mod certified;
 mod compare;
 mod power;
 
+use super::terminal::warn_lines;
 use super::{Exit, MOST_THREADS, print, warn};
 use calibench::io::ShownPath;
-use calibench::io::shown::on_one_line;
 use calibench::io::write_atomically;
 use calibench_gate::faults::{Faulty, planted};
 use calibench_gate::files::{self, FilesError};
@@ -148,13 +148,11 @@ fn incomplete(message: impl ToString) -> Stop {
 }
 
 fn of_files(error: FilesError) -> Stop {
-    let message = error.to_string();
-    let exit = match error {
-        FilesError::Plan(PlanError::TooManySamples { .. }) => Exit::Usage,
-        FilesError::Write(_) | FilesError::Plan(_) => Exit::Incomplete,
-        _ => Exit::Usage,
-    };
-    (exit, on_one_line(&message).into_owned())
+    match error {
+        FilesError::Plan(PlanError::TooManySamples { .. }) => usage(error),
+        FilesError::Write(_) | FilesError::Plan(_) => incomplete(error),
+        _ => usage(error),
+    }
 }
 
 /// Refuses two reports in one file, of which the last would be left.
@@ -315,7 +313,7 @@ fn judge(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build)
     }
     print(&report.to_text(columns()));
     if !report.held() {
-        warn(&report.details());
+        warn_lines(&report.details());
     }
     Ok(if report.held() { Exit::Held } else { Exit::Deviates })
 }

@@ -3,7 +3,7 @@
 
 use super::Exit;
 use super::startup::standard_output;
-use calibench::io::shown;
+use calibench::io::shown::{on_one_line, shown};
 use std::io::{self, Write};
 use std::sync::OnceLock;
 
@@ -19,8 +19,13 @@ pub fn print(text: &str) {
     note(written.and_then(|()| out.flush()));
 }
 
-/// Writes a line to standard error.
+/// Writes a line to standard error. A line break in it came from a name or a field, and stands as its number.
 pub fn warn(text: &str) {
+    warn_lines(&on_one_line(text));
+}
+
+/// Writes a message of several lines to standard error.
+pub(super) fn warn_lines(text: &str) {
     // There is nobody left to tell of a failure.
     let _ = writeln!(io::stderr().lock(), "{}", shown(text));
 }

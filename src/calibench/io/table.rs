@@ -308,7 +308,7 @@ fn name(file: &str, line: u64, column: &'static str, field: usize, text: &str) -
     if text.is_empty() {
         return Err(TableError::NoName { file: file.into(), line, column, field: field + 1 });
     }
-    Ok(text.into())
+    Ok(on_one_line(text).into_owned())
 }
 
 fn number(file: &str, line: u64, column: Column, field: usize, text: &str) -> Result<f64, TableError> {
