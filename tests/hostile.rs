@@ -559,3 +559,265 @@ fn options_of_the_gate_that_would_be_ignored_are_refused() {
         refused(&folder, arguments, &[]);
     }
 }
+
+/// Runs the command by a line of the shell, in which `"$0"` is the program.
+fn by_shell(folder: &Path, line: &str) -> Output {
+    let mut shell = Command::new("sh");
+    shell.args(["-c", line, CALIBENCH]).current_dir(folder).stdin(Stdio::null());
+    shell.output().expect("the shell starts")
+}
+
+#[test]
+fn a_standard_output_that_was_closed_before_the_start_ends_with_three_and_a_sentence() {
+    let folder = folder("closed-output");
+    for arguments in ["list", "--help", "study --help", "gate --planted list"] {
+        let output = by_shell(&folder, &format!("exec \"$0\" {arguments} >&-"));
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(3), "{arguments}: {said}");
+        assert!(said.contains("standard output") && said.contains("closed"), "{arguments}: {said}");
+    }
+    // Nothing was to be printed, or nobody wants to read it.
+    for line in [
+        "exec \"$0\" gate --schema out >&-",
+        "exec \"$0\" list > /dev/null",
+        "exec \"$0\" list <&- > /dev/null 2>&-",
+    ] {
+        let output = by_shell(&folder, line);
+        assert_eq!(output.status.code(), Some(0), "{line}: {}", text(&output.stderr));
+    }
+    // A program in front of ours may well open it for both reading and writing.
+    let output = by_shell(&folder, "exec \"$0\" list 1<> /dev/null");
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+}
+
+#[test]
+fn a_file_larger_than_the_shell_allows_is_an_error_and_nothing_is_left_of_it() {
+    let folder = folder("file-limit");
+    fs::write(folder.join("c.csv"), corner_file()).expect("written");
+    fs::write(folder.join("spec.toml"), fixed_poses()).expect("written");
+    for line in ["calibrate c.csv --out out", "study run spec.toml --out run"] {
+        // Blocks of 512 bytes: too few for report and trials.
+        let output = by_shell(&folder, &format!("ulimit -f 4; exec \"$0\" {line}"));
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(3), "{line}: {:?} {said}", output.status);
+        assert!(said.contains("too large"), "{line}: {said}");
+    }
+    let left = |name: &str| {
+        let entries = fs::read_dir(folder.join(name)).expect("a folder").flatten();
+        entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect::<Vec<_>>()
+    };
+    assert!(left("out").is_empty(), "{:?}", left("out"));
+    assert!(!left("run").iter().any(|name| name.ends_with(".tmp")), "{:?}", left("run"));
+    let resumed = limited(&folder, &["study", "resume", "run"]);
+    assert_eq!(resumed.status.code(), Some(0), "{}", text(&resumed.stderr));
+}
+
+#[test]
+fn a_table_that_may_have_been_cut_inside_its_last_number_is_used_with_a_warning() {
+    let folder = folder("unended");
+    let corners = corner_file();
+    fs::write(folder.join("c.csv"), corners.trim_end()).expect("written");
+    fs::write(folder.join("whole.csv"), &corners).expect("written");
+    fs::write(folder.join("p.csv"), PAIRS.trim_end()).expect("written");
+    let line = format!("c.csv:{}: this last line has no end", corners.lines().count());
+    let said = |arguments: &[&str]| {
+        let output = limited(&folder, arguments);
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", text(&output.stderr));
+        text(&output.stdout) + &text(&output.stderr)
+    };
+    assert!(said(&["calibrate", "c.csv"]).contains(&line));
+    assert!(said(&["calibrate", "c.csv", "--format", "json"]).contains(&line));
+    assert!(said(&["calibrate", "p.csv"]).contains("p.csv:5: this last line has no end"));
+    let convert = ["convert", "c.csv", "c.vnl", "--board", "chess:9x7:10mm"];
+    assert!(said(&convert).contains(&line));
+    assert!(!said(&["calibrate", "whole.csv"]).contains("has no end"));
+}
+
+#[test]
+fn a_line_break_in_a_name_begins_no_line_of_a_message() {
+    let folder = folder("line-breaks");
+    let name = "a\nall held";
+    for arguments in [
+        &["calibrate", name][..],
+        &["calibrate", "--board", "dots:3x3:1", name],
+        &["ninepoint", name],
+        &["undistort", "--camera", name, "--out", "o", "b.png"],
+        &["convert", name, "b.yaml"],
+        &["diff", name, name],
+        &["study", "run", name],
+        &["study", "resume", name],
+        &["study", "merge", name, "--out", "w"],
+        &["gate", "--judge", name],
+        &["gate", "--power-table", name],
+        &["run", "nine-point", "--image", name],
+    ] {
+        let output = within(PATIENCE, &folder, arguments);
+        let said = text(&output.stdout) + &text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        assert!(said.contains("a\\u000aall held"), "{arguments:?}: {said}");
+        assert!(!said.lines().any(|line| line.starts_with("all held")), "{arguments:?}: {said}");
+    }
+    // The fields of a table and of a study may have one too.
+    let field = PAIRS.replacen("0,0,0,0,0", "0,\"1\nall held\",0,0,0", 1);
+    fs::write(folder.join("p.csv"), field).expect("written");
+    refused(&folder, &["calibrate", "p.csv"], &["'1\\u000aall held' is not a number"]);
+    let factor = "name = \"noise\"\nunit";
+    let study = |name: &str| fixed_poses().replace(factor, &format!("name = \"{name}\"\nunit"));
+    fs::write(folder.join("named.toml"), study("a\\nall held")).expect("written");
+    fs::write(folder.join("wrong.toml"), study("noise\"\n\"a\\nall held\" = \"")).expect("written");
+    refused(&folder, &["study", "run", "wrong.toml"], &["a\\u000aall held"]);
+    let views = corner_file().replace("\n0,", "\n\"a\nall held\",");
+    fs::write(folder.join("c.csv"), views).expect("written");
+    for arguments in [&["calibrate", "c.csv"][..], &["study", "run", "named.toml", "--out", "run"]] {
+        let output = limited(&folder, arguments);
+        let said = text(&output.stdout) + &text(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {said}");
+        assert!(said.contains("a\\u000aall held"), "{arguments:?}: {said}");
+        assert!(!said.lines().any(|line| line.trim().starts_with("all held")), "{arguments:?}: {said}");
+    }
+}
+
+#[test]
+fn pixels_and_lengths_beyond_all_sense_are_refused_and_drop_no_view() {
+    let folder = folder("far-away");
+    let corners = corner_file();
+    let last = corners.lines().last().expect("a line");
+    let fields: Vec<&str> = last.split(',').collect();
+    for (column, value) in [(2, "1e300"), (3, "-1e31"), (4, "1e300"), (5, "-1e7")] {
+        let mut fields = fields.clone();
+        fields[column] = value;
+        fs::write(folder.join("c.csv"), corners.replace(last, &fields.join(","))).expect("written");
+        refused(
+            &folder,
+            &["calibrate", "c.csv"],
+            &[&format!("c.csv:{}", corners.lines().count()), value, "beyond"],
+        );
+    }
+}
+
+#[test]
+fn a_study_with_a_field_that_would_be_lost_is_refused_by_the_name_of_the_field() {
+    let folder = folder("study-fields");
+    let again = "[[factor]]\nname = \"again\"\nset = [\"scene.noise_px\"]\nlevels = [0.2, 0.4]\n\n[[factor]]";
+    let around = "[[factor]]\nname = \"views\"\nset = [\"scene.poses.views\"]\nlevels = [3, 4]\n\n[[factor]]\nname = \"poses\"\nset = [\"scene.poses\"]\n\
+         levels = [{ kind = \"chapter\" }]\n\n[[factor]]";
+    let estimator = |fields: &str| format!("[estimator]\n{fields}\n\n[trials]");
+    let cases: [(&str, String, &[&str]); 10] = [
+        ("[[factor]]", again.to_string(), &["scene.noise_px", "`again`", "`noise`", "set each field once"]),
+        ("[[factor]]", around.to_string(), &["scene.poses.views", "`views`", "`poses`"]),
+        ("[trials]", estimator("free = [\"fx\", \"fx\"]"), &["`fx` stands twice"]),
+        ("[trials]", estimator("hold = { k2 = nan }"), &["`k2` is held at NaN"]),
+        ("[trials]", estimator("hold = { k2 = inf }"), &["`k2` is held at inf"]),
+        ("[trials]", estimator("loss = { kind = \"huber\", delta_px = nan }"), &["delta_px", "positive"]),
+        ("[640, 480]", "[640, 480, 3]".to_string(), &["3 values in a list that has 2"]),
+        ("[640, 480]", "[640]".to_string(), &["1 values in a list that has 2"]),
+        ("redraw = true", "roll_deg = nan".to_string(), &["roll_deg", "finite"]),
+        (
+            "noise_px = 0.1\n",
+            "noise_px = 0.1\nlength = { centre_mm = [nan, 0, 300], length_mm = 10 }\n".to_string(),
+            &["scene.length.centre_mm", "finite"],
+        ),
+    ];
+    for (from, to, words) in cases {
+        let spec = crate::study::SPEC.replacen(from, &to, 1);
+        assert_ne!(spec, crate::study::SPEC, "{from}");
+        fs::write(folder.join("spec.toml"), spec).expect("written");
+        refused(&folder, &["study", "run", "spec.toml", "--out", "out"], words);
+        assert!(!folder.join("out").exists(), "{to}: nothing is begun");
+    }
+}
+
+#[test]
+fn a_plan_for_what_is_no_number_and_a_run_without_its_study_are_wrong_usage() {
+    let folder = folder("no-number");
+    fs::write(folder.join("spec.toml"), fixed_poses()).expect("written");
+    let plan = ["study", "plan", "spec.toml", "--want"];
+    let with = |rest: &[&'static str]| [&plan[..], rest].concat();
+    refused(&folder, &with(&["fx=nan"]), &["NaN", "positive"]);
+    refused(&folder, &with(&["fx=1", "--tilt", "nan"]), &["tilt_deg is NaN"]);
+    refused(&folder, &with(&["fx=1", "--coverage", "0.5,nan"]), &["coverage is NaN"]);
+    refused(&folder, &with(&["fx=1", "--distance", "nan"]), &["distance_mm is NaN"]);
+    refused(&folder, &with(&["length=1", "--at", "0,0,300", "--length", "nan"]), &["length_mm is NaN"]);
+    refused(&folder, &with(&["length=1", "--at", "nan,0,300", "--length", "10"]), &["centre_mm is NaN"]);
+    assert_eq!(limited(&folder, &["study", "run", "spec.toml", "--out", "run"]).status.code(), Some(0));
+    fs::remove_file(folder.join("run/spec.toml")).expect("removed");
+    refused(&folder, &["study", "resume", "run"], &["run/spec.toml"]);
+    refused(&folder, &["study", "merge", "run", "--out", "whole"], &["run/spec.toml"]);
+}
+
+#[test]
+fn a_study_of_which_every_trial_is_refused_says_so_and_deviates() {
+    let folder = folder("all-refused");
+    // Views that face the camera determine no focal length.
+    let poses = "poses = { kind = \"spread\", views = 3, tilt_deg = 0, coverage = 0.5, distance_mm = 150.0 }";
+    let spec: Vec<&str> =
+        crate::study::SPEC.lines().map(|line| if line.starts_with("poses") { poses } else { line }).collect();
+    fs::write(folder.join("spec.toml"), spec.join("\n")).expect("written");
+    let run = limited(&folder, &["study", "run", "spec.toml", "--out", "run"]);
+    let said = text(&run.stderr);
+    assert_eq!(run.status.code(), Some(1), "{said}");
+    assert!(said.contains("NOTHING MEASURED: not one of the 90 trials of this study converged"), "{said}");
+    assert!(folder.join("run/report.html").exists());
+    // What one part holds is not all.
+    let part = limited(&folder, &["study", "run", "spec.toml", "--shard", "0/2", "--out", "part"]);
+    let said = text(&part.stderr);
+    assert_eq!(part.status.code(), Some(0), "{said}");
+    assert!(said.contains("NOTHING MEASURED"), "{said}");
+}
+
+#[test]
+fn two_reports_in_one_file_and_a_reference_that_is_not_there_are_refused() {
+    let folder = folder("gate-names");
+    fs::create_dir_all(folder.join("sub")).expect("a folder is made");
+    for (one, other) in [("r", "r"), ("r", "./r"), ("r", "sub/../r")] {
+        let arguments = ["gate", "--samples", "1", "--json", one, "--html", other];
+        refused(&folder, &arguments, &["--json and --html name one file", "/r"]);
+        assert!(!folder.join("r").exists());
+    }
+    for reference in ["recorded/run", "./recorded", "recorded-last-week", "sub/"] {
+        refused(
+            &folder,
+            &["gate", "--samples", "1", "--against", reference],
+            &[reference, "calibench gate --record"],
+        );
+    }
+    let against = limited(&folder, &["gate", "--samples", "1", "--against", "exit 1"]);
+    assert!(against.status.code().is_some_and(|code| code < 2), "{}", text(&against.stderr));
+}
+
+/// Processes whose command names `word`.
+fn named(word: &str) -> Vec<String> {
+    let ids = fs::read_dir("/proc").into_iter().flatten().flatten();
+    let ids = ids.filter_map(|entry| entry.file_name().into_string().ok());
+    ids.filter(|id| {
+        let command = fs::read(format!("/proc/{id}/cmdline")).unwrap_or_default();
+        text(&command).contains(word) && runs(id)
+    })
+    .collect()
+}
+
+#[test]
+fn a_solver_that_starts_itself_anew_all_the_time_ends_with_the_gate() {
+    let folder = folder("respawn");
+    let (script, stop) = (folder.join("calibench-respawns.sh"), folder.join("stop"));
+    // In a session of its own each time, and without its environment. The file ends it where this test fails.
+    let text_of = "[ -e stop ] && exit\necho $$ >> lives\nsleep 0.002\nenv -i PATH=\"$PATH\" setsid sh \"$0\" < /dev/null > /dev/null 2>&1 &\n";
+    fs::write(&script, text_of).expect("written");
+    let name = script.to_str().expect("a plain path");
+    for _ in 0..5 {
+        let solver = format!("sh {name}; while [ $(wc -l < lives) -lt 5 ]; do sleep 0.01; done; exit 1");
+        let gate = Command::new(CALIBENCH)
+            .args(["gate", "--samples", "1", "--timeout", "3", "--solver", &solver])
+            .current_dir(&folder)
+            .output()
+            .expect("the program starts");
+        std::thread::sleep(Duration::from_millis(100));
+        let left = named(name);
+        if !left.is_empty() {
+            fs::write(&stop, "").expect("written");
+        }
+        assert_eq!(gate.status.code(), Some(1), "{}", text(&gate.stderr));
+        assert!(left.is_empty(), "{left:?} still run");
+        fs::remove_file(folder.join("lives")).expect("it lived");
+    }
+}

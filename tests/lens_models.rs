@@ -61,8 +61,7 @@ fn folder(name: &str) -> PathBuf {
 fn fisheye_corners(column: Option<(&str, &dyn Fn(usize) -> f64)>) -> (Camera<Lens>, String) {
     let lens = Lens::new(Model::KannalaBrandt, &[-0.03, 0.005, -0.001, 0.0]).unwrap();
     let camera = Camera::with_lens(310.0, 312.0, 322.0, 241.0, lens);
-    let mut stream =
-        Stream::open(StreamKey { seed: 9, scenario: "fisheye", trial: 0, purpose: "noise" });
+    let mut stream = Stream::open(StreamKey { seed: 9, scenario: "fisheye", trial: 0, purpose: "noise" });
     let name = column.map(|(name, _)| format!(",{name}")).unwrap_or_default();
     let mut file = format!("view,point,X,Y,u,v{name}\n");
     for view in 0..8 {
@@ -80,7 +79,8 @@ fn fisheye_corners(column: Option<(&str, &dyn Fn(usize) -> f64)>) -> (Camera<Len
             let pixel = camera.pixel(&pose.apply(&Vec3::new(point.x, point.y, 0.0))).unwrap();
             let [du, dv] = [stream.normal(), stream.normal()].map(|n| 0.1 * n);
             let more = column.map(|(_, of)| format!(",{}", of(i))).unwrap_or_default();
-            writeln!(file, "{view},{i},{},{},{},{}{more}", point.x, point.y, pixel.x + du, pixel.y + dv).unwrap();
+            writeln!(file, "{view},{i},{},{},{},{}{more}", point.x, point.y, pixel.x + du, pixel.y + dv)
+                .unwrap();
         }
     }
     (camera, file)
@@ -109,7 +109,10 @@ fn a_fisheye_is_calibrated_told_as_one_and_undone() {
     // The plain lens is told not to fit, and what would.
     let plain = with(&[]);
     let warnings = text(&plain.stdout);
-    assert!(warnings.contains("a kannala-brandt lens (--model kannala-brandt) lowers the RMSE"), "{warnings}");
+    assert!(
+        warnings.contains("a kannala-brandt lens (--model kannala-brandt) lowers the RMSE"),
+        "{warnings}"
+    );
     let chosen: Value = serde_json::from_slice(&with(&["--model", "auto"]).stdout).unwrap();
     assert_eq!(chosen["camera"]["model"], chosen["models"][0]["model"]);
     assert_eq!(chosen["camera"]["model"], "kannala-brandt");
@@ -130,8 +133,16 @@ fn a_fisheye_is_calibrated_told_as_one_and_undone() {
         assert!((first - edge).abs() < 1.5, "row {row}: {first} against {edge}");
     }
     for (projection, said) in [("equidistant", "kannala-brandt"), ("equirectangular", "equirectangular")] {
-        let arguments =
-            ["undistort", "--camera", "result/result.json", "--out", projection, "--projection", projection, "photo.png"];
+        let arguments = [
+            "undistort",
+            "--camera",
+            "result/result.json",
+            "--out",
+            projection,
+            "--projection",
+            projection,
+            "photo.png",
+        ];
         assert_eq!(run(&folder, &arguments).status.code(), Some(0));
         let camera = fs::read_to_string(folder.join(projection).join("camera-640x480.json")).unwrap();
         assert!(camera.contains(said), "{camera}");
@@ -142,8 +153,10 @@ fn a_fisheye_is_calibrated_told_as_one_and_undone() {
 fn marks_have_weights_or_standard_deviations() {
     let folder = folder("weights");
     let weighted = |name: &str, of: &dyn Fn(usize) -> f64| fisheye_corners(Some((name, of))).1;
-    fs::write(folder.join("weight.csv"), weighted("weight", &|i| if i % 2 == 0 { 0.5 } else { 2.0 })).unwrap();
-    fs::write(folder.join("sigma.csv"), weighted("sigma_px", &|i| if i % 2 == 0 { 2.0 } else { 0.5 })).unwrap();
+    fs::write(folder.join("weight.csv"), weighted("weight", &|i| if i % 2 == 0 { 0.5 } else { 2.0 }))
+        .unwrap();
+    fs::write(folder.join("sigma.csv"), weighted("sigma_px", &|i| if i % 2 == 0 { 2.0 } else { 0.5 }))
+        .unwrap();
     fs::write(folder.join("none.csv"), weighted("weight", &|_| 0.0)).unwrap();
     let camera = |file: &str| -> Value {
         let output = run(&folder, &["calibrate", file, "--model", "kannala-brandt", "--format", "json"]);

@@ -5,7 +5,9 @@ use crate::failing_disk::{Failing, Fault};
 use crate::study::{assert_same, scratch};
 use calibench::io::files::{Disk, Files};
 use calibench::synth::{Stream, StreamKey};
-use calibench_study::{Engine, Folder, FolderError, Manifest, Outcome, RunError, Shard, TrialFile, finish};
+use calibench_study::{
+    Engine, Folder, FolderError, Manifest, Outcome, RunError, Shard, TrialFile, finish, merge_on,
+};
 use std::fs;
 use std::io::Write;
 use std::path::Path;
@@ -98,6 +100,51 @@ fn fail_at_every_operation(trials: TrialFile) {
         assert!(operation > 40, "{fault:?}: {operation} operations are too few to be all");
     }
     fs::remove_dir_all(whole).unwrap();
+}
+
+#[test]
+fn a_merge_that_fails_at_any_operation_leaves_no_run_or_a_whole_one() {
+    let [whole, one, two, merged] =
+        ["merge-whole", "merge-0", "merge-1", "merge-out"].map(|name| scratch(&format!("faults-{name}")));
+    crate::study::run(&whole, &spec(), Shard::WHOLE, TrialFile::Csv);
+    for (index, path) in [&one, &two].into_iter().enumerate() {
+        crate::study::run(path, &spec(), Shard { index: index as u64, count: 2 }, TrialFile::Csv);
+    }
+    let parts = [one.clone(), two.clone()];
+    let build = calibench_experiments::build();
+    for fault in [Fault::Killed, Fault::Full] {
+        let mut operation = 0;
+        loop {
+            let _ = fs::remove_dir_all(&merged);
+            let failing = Failing::at(operation, fault);
+            let ended = merge_on(failing.clone(), &parts, &merged, None, &build);
+            if !failing.has_failed() {
+                break;
+            }
+            // On a full disk what follows the last write may well succeed.
+            assert!(
+                ended.is_err() || fault == Fault::Full,
+                "operation {operation} failed and nobody said so"
+            );
+            drop(ended);
+            let there = |name: &str| merged.join(name).exists();
+            if there("trials.csv") {
+                let bytes = |of: &Path| fs::read(of.join("trials.csv")).unwrap();
+                assert!(bytes(&merged) == bytes(&whole), "{fault:?} at {operation}: a part of the trials");
+            }
+            assert!(!there("manifest.json") || there("checkpoint.json"), "{fault:?} at {operation}");
+            if fault == Fault::Full && !there("manifest.json") {
+                assert!(!there("trials.csv"), "at {operation}: trials are left on a full disk");
+                let (folder, engine) = merge_on(Arc::new(Disk), &parts, &merged, None, &build).unwrap();
+                finish(&folder, &engine).unwrap();
+                drop(folder);
+                assert_same(&whole, &merged);
+            }
+            operation += 1;
+        }
+        assert!(operation > 12, "{fault:?}: {operation} operations are too few to be all");
+    }
+    [whole, one, two, merged].into_iter().for_each(|path| fs::remove_dir_all(path).unwrap());
 }
 
 fn command(arguments: &[&str], folder: &Path) -> Command {

@@ -1,6 +1,8 @@
 //! `calibench book`: the book alone, from the last run; what the last run lacks is run.
 
+use super::terminal::warn_lines;
 use super::{Exit, print, warn};
+use calibench::io::ShownPath;
 use calibench_book::{Evidence, Finding, Sources};
 use calibench_harness::project::Project;
 use calibench_harness::{Build, Context, Experiment, ProgressDisplay, Record, emit, verdict};
@@ -63,7 +65,7 @@ fn write(project: &Project, evidence: Evidence) -> Exit {
     let compiled = match Sources::load(project, evidence) {
         Ok(sources) => calibench_book::compile(&sources),
         Err(finding) => {
-            warn(&finding.to_string());
+            warn_lines(&finding.to_string());
             return Exit::Incomplete;
         }
     };
@@ -72,7 +74,7 @@ fn write(project: &Project, evidence: Evidence) -> Exit {
         warn(&error.to_string());
         return Exit::Incomplete;
     }
-    print(&format!("book: {}\n", calibench_book::index_of(&folder).display()));
+    print(&format!("book: {}\n", calibench_book::index_of(&folder).shown()));
     print(&findings_text(&compiled.findings));
     if compiled.findings.is_empty() { Exit::Held } else { Exit::Deviates }
 }
@@ -92,6 +94,6 @@ fn open(page: &Path) {
         "xdg-open"
     };
     if let Err(error) = std::process::Command::new(opener).arg(page).spawn() {
-        warn(&format!("cannot open {} with {opener}: {error}", page.display()));
+        warn(&format!("cannot open {} with {opener}: {error}", page.shown()));
     }
 }

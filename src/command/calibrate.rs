@@ -5,10 +5,11 @@ use super::report::table;
 use super::{Exit, print, warn};
 use calibench::calibrate::{Board, Loss, Prior};
 use calibench::camera::{FreeParameters, Model, Parameter, UnknownModel};
+use calibench::io::ShownPath;
 use calibench::io::input::{MOST_SIDE_PX, MOST_TABLE_BYTES, read_named};
 use calibench::io::memory::{DEFAULT_MEMORY, parse_bytes};
 use calibench::io::parse_corners;
-use calibench::io::table::columns;
+use calibench::io::table::{columns, unended_line};
 use calibench::photos::BoardSpec;
 use calibench::planar::PlaneModel;
 use camera::Observed;
@@ -31,8 +32,13 @@ pub(super) use plane::plane_text;
 pub(super) use plots::round_down;
 
 /// What the exit codes mean here.
-const EXIT_CODES: &str = "Exit codes: 0 a minimum whose RMSE lies at most a quarter above that of free homographies (warnings say what to be careful about), 2 \
-     wrong usage or data that do not determine the camera, 3 no minimum, or one far above them: the result is printed and must not be used";
+const EXIT_CODES: &str = "\
+Exit codes:
+  0  calibrated: a minimum whose RMSE lies at most a quarter above that of free homographies; read the warnings
+  2  wrong usage, or data that do not determine the camera: there is no result
+  3  do not use the result, if one is printed: no minimum, or one far above free homographies, or files or
+     standard output that could not be written, or interrupted
+Code 1 is of other verbs.";
 
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_CODES)]
@@ -276,23 +282,34 @@ impl Failure {
 /// Corners or point pairs, told apart by the names of their columns.
 fn from_table(arguments: &Arguments, file: &Path) -> Result<Exit, Failure> {
     let bytes = read_named(file, MOST_TABLE_BYTES).map_err(|error| error.to_string())?;
-    let name = if file.as_os_str() == "-" { "standard input".into() } else { file.display().to_string() };
+    let name = if file.as_os_str() == "-" { "standard input".into() } else { file.shown() };
     let columns = columns(&bytes);
     let has = |names: &[&str]| names.iter().all(|name| columns.iter().any(|column| column == name));
     if has(&["px"]) && !has(&["view", "u", "v"]) {
         contradictions::refuse(arguments, Input::PointPairs)?;
+        unended(&name, &bytes).iter().for_each(|said| warn(&format!("warning: {said}")));
         return plane::run(arguments, &name, &bytes);
     }
     contradictions::refuse(arguments, Input::Corners)?;
     let corners = parse_corners(&name, bytes.as_slice()).map_err(|error| error.to_string())?;
+    let notes = unended(&name, &bytes).into_iter().collect();
     let observed = Observed {
         source: name,
         names: corners.view_names,
         views: corners.views,
         image_size: arguments.image_size,
+        notes,
         ..Observed::default()
     };
     camera::run(arguments, observed)
+}
+
+/// What is to be said of a table whose last line has no end.
+pub(super) fn unended(name: &str, bytes: &[u8]) -> Option<String> {
+    let line = unended_line(bytes)?;
+    Some(format!(
+        "{name}:{line}: this last line has no end: if the file was cut off there, its last number is another's beginning"
+    ))
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use super::report::{details, reconciliation_table};
 use super::reproduce::{exit_of, judge_all};
+use super::terminal::warn_lines;
 use super::{Exit, find, print, warn};
 use calibench_book::Finding;
 use calibench_harness::project::Project;
@@ -92,7 +93,7 @@ fn print_outcome(runs: &[Run], verdicts: &[Option<Verdict>], findings: &[Finding
             print(&format!("{report:#}\n"));
         }
     }
-    failures.iter().for_each(|failure| warn(failure));
+    failures.iter().for_each(|failure| warn_lines(failure));
     exit
 }
 

@@ -1,7 +1,8 @@
 //! `calibench convert IN OUT`: a camera, corners or a board from the file of one program to that of another.
 
-use super::calibrate::{Format as Shown, parse_size};
+use super::calibrate::{Format as Shown, parse_size, unended};
 use super::{Exit, print, warn};
+use calibench::io::ShownPath;
 use calibench::io::formats::{
     self, CameraFile, ChessTarget, Format, VnlBoard, Wishes, format_names, format_of_name, read_camera_file,
 };
@@ -114,7 +115,7 @@ struct Converted {
 
 impl Converted {
     fn report(&self, from: &Path, to: &Path) -> String {
-        let mut text = format!("{} ({}) -> {} ({})\n", from.display(), self.from, to.display(), self.to);
+        let mut text = format!("{} ({}) -> {} ({})\n", from.shown(), self.from, to.shown(), self.to);
         for (word, lines) in [("read", &self.noted), ("converted", &self.converted), ("lost", &self.lost)] {
             for line in lines {
                 // Writing to a string cannot fail.
@@ -145,12 +146,20 @@ impl Converted {
     }
 }
 
+impl Converted {
+    /// With a note where the last line of a table has no end.
+    fn with_end_of(mut self, name: &str, bytes: &[u8]) -> Converted {
+        self.noted.extend(unended(name, bytes));
+        self
+    }
+}
+
 /// The kind of IN decides what OUT can be.
 fn converted(arguments: &Arguments, from: &Path, to: &Path) -> Result<Converted, String> {
     if let Some(Ok(board)) = from.to_str().map(str::parse::<BoardSpec>) {
         return board_to_target(&board);
     }
-    let name = from.display().to_string();
+    let name = from.shown();
     regular_or_absent(to).map_err(said)?;
     if let (Ok(a), Ok(b)) = (from.canonicalize(), to.canonicalize())
         && a == b
@@ -159,13 +168,16 @@ fn converted(arguments: &Arguments, from: &Path, to: &Path) -> Result<Converted,
     }
     let bytes = read_regular(from, formats::MOST_BYTES).map_err(said)?;
     if arguments.from.is_none() && has_columns(&bytes) {
-        return corners_to_vnl(arguments, &name, &bytes);
+        return corners_to_vnl(arguments, &name, &bytes)
+            .map(|converted| converted.with_end_of(&name, &bytes));
     }
     let text = std::str::from_utf8(&bytes).map_err(|error| {
         format!("{name}: byte {} is no UTF-8 text: no file of these formats", error.valid_up_to())
     })?;
     match arguments.from {
-        None if formats::looks_like_vnl(text) => vnl_to_corners(arguments, &name, text),
+        None if formats::looks_like_vnl(text) => {
+            vnl_to_corners(arguments, &name, text).map(|converted| converted.with_end_of(&name, &bytes))
+        }
         None if text.lines().any(|line| line.starts_with("target_type")) => target_to_board(&name, text),
         _ => camera(arguments, &name, text, to),
     }
@@ -182,7 +194,7 @@ fn camera(arguments: &Arguments, name: &str, text: &str, to: &Path) -> Result<Co
         first_pixel: arguments.first_pixel,
     };
     let from = arguments.from.map_or_else(|| formats::detect(name, text), Ok).map_err(said)?;
-    let out = to.display().to_string();
+    let out = to.shown();
     let to = arguments.to.map_or_else(|| formats::format_to_write(&out), Ok).map_err(said)?;
     let read = read_camera_file(from, name, text, arguments.camera.as_deref(), &wishes).map_err(said)?;
     let first_pixel = wishes.first_pixel.unwrap_or(from.first_pixel);

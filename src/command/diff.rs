@@ -5,6 +5,7 @@ use super::{Exit, print, warn};
 use calibench::evaluate::{
     Calibrated, FrameDifference, OneCamera, TakenOut, difference::frame_nodes, frame_difference, one_camera,
 };
+use calibench::io::ShownPath;
 use calibench::io::formats::{CameraFile, FormatError, MOST_BYTES, Wishes, detect, read_camera_file};
 use calibench::io::{read_regular_text, significant, write_atomically};
 use calibench_harness::{Figure, HeatMap, Look, Plot};
@@ -97,14 +98,14 @@ fn compared(arguments: &Arguments) -> Result<Compared, String> {
         frame_difference(&a.camera, &b.camera, size, taken_out).map_err(|error| error.to_string())?;
     let test = match (calibrated(&a), calibrated(&b)) {
         (Some(a), Some(b)) => one_camera(&a, &b, size, taken_out).map_err(|error| error.to_string()),
-        (None, _) => Err(format!("{} has no covariance", arguments.a.display())),
-        (_, None) => Err(format!("{} has no covariance", arguments.b.display())),
+        (None, _) => Err(format!("{} has no covariance", arguments.a.shown())),
+        (_, None) => Err(format!("{} has no covariance", arguments.b.shown())),
     };
     Ok(Compared { size, difference, test })
 }
 
 fn read(path: &Path) -> Result<CameraFile, String> {
-    let file = path.display().to_string();
+    let file = path.shown();
     let text = read_regular_text(path, MOST_BYTES).map_err(|error| error.to_string())?;
     let format = detect(&file, &text).map_err(|error| error.to_string())?;
     read_camera_file(format, &file, &text, None, &Wishes::default()).map_err(|error| match error {
@@ -146,8 +147,8 @@ impl Compared {
         let (width, height) = self.size;
         let mut text = format!(
             "{} against {} over {width} x {height} px\ntaken out: a rotation by {} degrees",
-            arguments.b.display(),
-            arguments.a.display(),
+            arguments.b.shown(),
+            arguments.a.shown(),
             significant(self.difference.rotation_rad().to_degrees(), 3)
         );
         // Writing to a string cannot fail, here and below.

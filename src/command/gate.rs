@@ -4,7 +4,9 @@ mod certified;
 mod compare;
 mod power;
 
+use super::terminal::warn_lines;
 use super::{Exit, MOST_THREADS, print, warn};
+use calibench::io::ShownPath;
 use calibench::io::write_atomically;
 use calibench_gate::faults::{Faulty, planted};
 use calibench_gate::files::{self, FilesError};
@@ -14,7 +16,7 @@ use calibench_gate::{
 };
 use calibench_harness::{Build, ProgressDisplay};
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Longest time for a problem.
@@ -153,7 +155,34 @@ fn of_files(error: FilesError) -> Stop {
     }
 }
 
+/// Refuses two reports in one file, of which the last would be left.
+fn refuse_one_file_for_two(arguments: &Arguments) -> Result<(), Stop> {
+    let reports = [("--json", &arguments.json), ("--junit", &arguments.junit), ("--html", &arguments.html)];
+    let named: Vec<(&str, PathBuf)> =
+        reports.into_iter().filter_map(|(option, path)| Some((option, place_of(path.as_ref()?)))).collect();
+    for (i, (option, place)) in named.iter().enumerate() {
+        if let Some((other, _)) = named[..i].iter().find(|(_, other)| other == place) {
+            return Err(usage(format!(
+                "{other} and {option} name one file, {}: give each report a file of its own",
+                place.shown()
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Where a file that is written would stand, by whatever way it is named.
+fn place_of(path: &Path) -> PathBuf {
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let folder = absolute.parent().and_then(|folder| folder.canonicalize().ok());
+    match (folder, absolute.file_name()) {
+        (Some(folder), Some(name)) => folder.join(name),
+        _ => absolute,
+    }
+}
+
 fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
+    refuse_one_file_for_two(arguments)?;
     if let Some(folder) = &arguments.schema {
         for (name, text) in protocol::schemas() {
             write_atomically(&folder.join(name), text.as_bytes()).map_err(incomplete)?;
@@ -204,7 +233,7 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
     if let Some(folder) = &arguments.export {
         let plan = Plan::new(arguments.seed, samples).map_err(incomplete)?;
         files::export(&plan, folder).map_err(of_files)?;
-        print(&format!("{} problems written to {}\n", plan.cases.len(), folder.display()));
+        print(&format!("{} problems written to {}\n", plan.cases.len(), folder.shown()));
         return Ok(Exit::Held);
     }
     if let Some(folder) = &arguments.judge {
@@ -218,7 +247,7 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
         let recorder = Recorder::new(solver.as_ref());
         let exit = judge(arguments, &plan, &recorder, build)?;
         files::file_answers(&plan, folder, &recorder).map_err(of_files)?;
-        print(&format!("{} problems and answers written to {}\n", plan.cases.len(), folder.display()));
+        print(&format!("{} problems and answers written to {}\n", plan.cases.len(), folder.shown()));
         return Ok(exit);
     }
     if let Some(reference) = &arguments.against {
@@ -284,7 +313,7 @@ fn judge(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build)
     }
     print(&report.to_text(columns()));
     if !report.held() {
-        warn(&report.details());
+        warn_lines(&report.details());
     }
     Ok(if report.held() { Exit::Held } else { Exit::Deviates })
 }

@@ -13,6 +13,7 @@ mod ninepoint;
 mod report;
 mod reproduce;
 mod run;
+mod startup;
 mod study;
 mod terminal;
 mod undistort;
@@ -73,6 +74,7 @@ enum Verb {
 /// The `calibench` command over a table of experiments; `build` is what stands as their origin in what they
 /// write, `carried` what is read outside the source tree.
 pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCode {
+    startup::take_large_files_for_errors();
     calibench_harness::project::carry(carried);
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
@@ -105,6 +107,7 @@ pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCo
 
 /// The command of an experiment's own binary: one run, as `calibench run ID` does it.
 pub fn main_for(experiment: &Experiment, build: &Build) -> ExitCode {
+    startup::take_large_files_for_errors();
     end_well_on_interrupt();
     terminal::ended(run::main_for(experiment, build)).into()
 }

@@ -5,6 +5,7 @@ use super::{Exit, print, warn};
 use calibench::board::Board;
 use calibench::detect::{DotGrid, sparse_dots_of};
 use calibench::geometry::Vec2;
+use calibench::io::ShownPath;
 use calibench::io::memory::{DEFAULT_MEMORY, parse_bytes};
 use calibench::io::{Memory, Overlay, image_extent, read_image, write_atomically};
 use calibench::photos::ordered_discs;
@@ -58,7 +59,7 @@ fn ninepoint(arguments: &Arguments) -> Result<Exit, String> {
     let memory = Memory::new(arguments.memory);
     let _taken = memory.take(&arguments.image, needed).map_err(|error| error.to_string())?;
     let image = read_image(&arguments.image).map_err(|error| error.to_string())?;
-    let at_file = |error: &dyn std::fmt::Display| format!("{}: {error}", arguments.image.display());
+    let at_file = |error: &dyn std::fmt::Display| format!("{}: {error}", arguments.image.shown());
     let grid = ordered_discs(&image, |discs| sparse_dots_of(discs, arguments.columns, arguments.rows))
         .map_err(|error| at_file(&error))?;
     let (centres_px, world) = (grid.centres_px(), unit_grid(arguments.columns, arguments.rows));

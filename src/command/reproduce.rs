@@ -1,6 +1,7 @@
 //! `calibench` alone: everything is run, written, and reconciled in one table.
 
 use super::report::{details, reconciliation_table};
+use super::terminal::warn_lines;
 use super::{Exit, print, warn};
 use calibench_harness::project::Project;
 use calibench_harness::verdict::{self, Run, Verdict};
@@ -31,7 +32,7 @@ pub(super) fn run(experiments: &[Experiment], build: &Build) -> Exit {
     let failures = failures(&runs, written);
     let judged: Vec<Verdict> = verdicts.into_iter().flatten().collect();
     print(&details(&judged));
-    failures.iter().for_each(|failure| warn(failure));
+    failures.iter().for_each(|failure| warn_lines(failure));
     let records: Vec<&Record> = runs.iter().filter_map(|run| run.result.as_ref().ok()).collect();
     let book = super::book::build_of(&project, experiments, &records);
     exit_of(&judged, !failures.is_empty()).max(book)

@@ -1,7 +1,9 @@
 //! `calibench run ID`, and the own binary of every experiment: one run, its files, its verdict.
 
 use super::report::{details, summary};
-use super::{Exit, find, print, terminal, warn};
+use super::terminal::{self, warn_lines};
+use super::{Exit, find, print, warn};
+use calibench::io::ShownPath;
 use calibench_harness::project::Project;
 use calibench_harness::verdict::{self, Run, Verdict};
 use calibench_harness::{Build, Context, Experiment, ProgressDisplay, emit};
@@ -70,7 +72,7 @@ fn run_one(experiment: &Experiment, options: &Options, build: &Build) -> Exit {
     let record = match &run.result {
         Ok(record) => record,
         Err(error) => {
-            warn(&format!("{}: {error}", experiment.id));
+            warn_lines(&format!("{}: {error}", experiment.id));
             return Exit::of_failure(error);
         }
     };
@@ -83,7 +85,7 @@ fn run_one(experiment: &Experiment, options: &Options, build: &Build) -> Exit {
     let verdict = Verdict::of(record, snapshot.as_deref(), run.locked && project.is_some());
     print(&summary(record));
     let written = out.join(experiment.id);
-    print(&format!("\nwritten: {} and {}\n", written.display(), figures.display()));
+    print(&format!("\nwritten: {} and {}\n", written.shown(), figures.shown()));
     print(&details(std::slice::from_ref(&verdict)));
     if verdict.held() { Exit::Held } else { Exit::Deviates }
 }

@@ -5,11 +5,14 @@ mod measure;
 mod plan;
 mod run;
 
-use super::{Exit, warn};
+use super::Exit;
+use super::terminal::warn_lines;
 use calibench::io::input::{InputError, MOST_SPEC_BYTES};
 use calibench::io::read_regular_text;
+use calibench::io::shown::on_one_line;
 use calibench_harness::Build;
 use calibench_study::{FolderError, MergeError, RunError};
+use std::io::ErrorKind;
 use std::path::Path;
 
 #[derive(Debug, clap::Subcommand)]
@@ -46,7 +49,7 @@ pub(super) fn run(arguments: &Arguments, build: &Build) -> Exit {
         Verb::Measure(arguments) => measure::run(arguments),
     };
     ended.unwrap_or_else(|failure| {
-        warn(&failure.message);
+        warn_lines(&failure.message);
         failure.exit
     })
 }
@@ -55,18 +58,23 @@ pub(super) fn run(arguments: &Arguments, build: &Build) -> Exit {
 #[derive(Debug)]
 struct Failure {
     exit: Exit,
+    /// One line; several where it lists in what two runs differ.
     message: String,
 }
 
 impl Failure {
     fn usage(message: impl Into<String>) -> Failure {
-        Failure { exit: Exit::Usage, message: message.into() }
+        Failure { exit: Exit::Usage, message: on_one_line(&message.into()).into_owned() }
     }
 }
 
-/// What the user gave is the user's to mend; a disk that fails leaves the run incomplete.
+/// What the user gave is the user's to mend, also a folder from which a file was taken; a disk that fails leaves
+/// the run incomplete.
 fn exit_of_folder(error: &FolderError) -> Exit {
     match error {
+        FolderError::Input(InputError::Open { cause, .. }) if cause.kind() == ErrorKind::NotFound => {
+            Exit::Usage
+        }
         FolderError::File(_) | FolderError::Unwritten(_) | FolderError::Input(InputError::Open { .. }) => {
             Exit::Incomplete
         }
@@ -76,17 +84,21 @@ fn exit_of_folder(error: &FolderError) -> Exit {
 
 impl From<FolderError> for Failure {
     fn from(error: FolderError) -> Failure {
-        Failure { exit: exit_of_folder(&error), message: error.to_string() }
+        let message = error.to_string();
+        let message = match error {
+            FolderError::Differs { .. } => message,
+            _ => on_one_line(&message).into_owned(),
+        };
+        Failure { exit: exit_of_folder(&error), message }
     }
 }
 
 impl From<RunError> for Failure {
     fn from(error: RunError) -> Failure {
-        let exit = match &error {
-            RunError::Spec(_) => Exit::Usage,
-            RunError::Folder(error) => exit_of_folder(error),
-        };
-        Failure { exit, message: error.to_string() }
+        match error {
+            RunError::Spec(error) => Failure::usage(error.to_string()),
+            RunError::Folder(error) => error.into(),
+        }
     }
 }
 
@@ -95,6 +107,7 @@ impl From<MergeError> for Failure {
         match error {
             MergeError::Run(error) => error.into(),
             MergeError::Incomplete { .. } => Failure { exit: Exit::Incomplete, message: error.to_string() },
+            MergeError::Differs { .. } => Failure { exit: Exit::Usage, message: error.to_string() },
             other => Failure::usage(other.to_string()),
         }
     }

@@ -2,7 +2,8 @@
 //! error, a disk that is full is.
 
 use super::Exit;
-use calibench::io::shown;
+use super::startup::standard_output;
+use calibench::io::shown::{on_one_line, shown};
 use std::io::{self, Write};
 use std::sync::OnceLock;
 
@@ -14,11 +15,17 @@ static LOST: OnceLock<String> = OnceLock::new();
 /// incomplete, see `ended`.
 pub fn print(text: &str) {
     let mut out = io::stdout().lock();
-    note(out.write_all(shown(text).as_bytes()).and_then(|()| out.flush()));
+    let written = standard_output().and_then(|()| out.write_all(shown(text).as_bytes()));
+    note(written.and_then(|()| out.flush()));
 }
 
-/// Writes a line to standard error.
+/// Writes a line to standard error. A line break in it came from a name or a field, and stands as its number.
 pub fn warn(text: &str) {
+    warn_lines(&on_one_line(text));
+}
+
+/// Writes a message of several lines to standard error.
+pub(super) fn warn_lines(text: &str) {
     // There is nobody left to tell of a failure.
     let _ = writeln!(io::stderr().lock(), "{}", shown(text));
 }
@@ -30,7 +37,7 @@ pub(super) fn usage(error: &clap::Error) -> Exit {
         let _ = error.print();
         return Exit::Usage;
     }
-    note(error.print());
+    note(standard_output().and_then(|()| error.print()));
     Exit::Held
 }
 

@@ -2,6 +2,7 @@
 
 use super::{Exit, print, warn};
 use calibench::camera::{Camera, Lens};
+use calibench::io::ShownPath;
 use calibench::io::memory::{DEFAULT_MEMORY, parse_bytes};
 use calibench::io::result::{LensFields, read_lens_camera};
 use calibench::io::{Channels, Memory, image_extent, read_channels, write_atomically, write_png};
@@ -122,7 +123,7 @@ fn distinct_outputs(arguments: &Arguments) -> Result<(), String> {
     let same = |a: &Path, b: &Path| matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b);
     let of_camera = folder(&arguments.camera.canonicalize().unwrap_or_default());
     if is_output(&arguments.camera) && same(&of_camera, &arguments.out) {
-        let camera = arguments.camera.display();
+        let camera = arguments.camera.shown();
         return Err(format!(
             "{camera} could be overwritten by the camera of the output: choose another folder"
         ));
@@ -132,17 +133,17 @@ fn distinct_outputs(arguments: &Arguments) -> Result<(), String> {
         if let (Ok(from), Ok(to)) = (photo.canonicalize(), output.canonicalize())
             && from == to
         {
-            return Err(format!("{} would be overwritten: choose another folder", photo.display()));
+            return Err(format!("{} would be overwritten: choose another folder", photo.shown()));
         }
         if arguments.mask && is_mask_name(&output) {
             return Err(format!(
                 "{} would be written to {}, which is the name of a mask: rename it, or leave --mask out",
-                photo.display(),
-                output.display()
+                photo.shown(),
+                output.shown()
             ));
         }
         if !outputs.insert(output.clone()) {
-            return Err(format!("two photographs would be written to {}: rename one", output.display()));
+            return Err(format!("two photographs would be written to {}: rename one", output.shown()));
         }
     }
     Ok(())
@@ -188,10 +189,10 @@ impl Work<'_> {
             && expected != image.size()
         {
             let ((width, height), (w, h)) = (image.size(), expected);
-            let camera = self.arguments.camera.display();
+            let camera = self.arguments.camera.shown();
             return Err(wrong(format!(
                 "{}: {width} x {height} px, but {camera} is of {w} x {h} px images",
-                photo.display()
+                photo.shown()
             )));
         }
         self.prepare(image.size())?;
@@ -209,7 +210,7 @@ impl Work<'_> {
         };
         let written = corrected.map_err(same_size)?.write_png(&output);
         written.map_err(|error| (Exit::Incomplete, error.to_string()))?;
-        print(&format!("{}\n", output.display()));
+        print(&format!("{}\n", output.shown()));
         Ok(())
     }
 

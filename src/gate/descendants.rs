@@ -12,10 +12,13 @@
 /// The name of the mark. Its value is of one program and one start.
 pub(super) const MARK: &str = "CALIBENCH_GATE_SOLVER";
 
-/// Times that processes are looked for again after some were ended: between a look and an end they may start
-/// others.
+/// Looks one after the other that must find nothing: a process that starts itself anew may have ended when it
+/// is looked at, and what it started was not there when the look began.
 #[cfg(target_os = "linux")]
-const LOOKS: usize = 50;
+const QUIET_LOOKS: usize = 5;
+/// Time after which looking ends, whatever is left: a process in the kernel's hands does not end either.
+#[cfg(target_os = "linux")]
+const PATIENCE: std::time::Duration = std::time::Duration::from_secs(5);
 
 /// Ends a process group, and every process that carries the mark `value`.
 pub(super) fn end(group: u32, value: &str) {
@@ -26,12 +29,16 @@ pub(super) fn end(group: u32, value: &str) {
     let _ = value;
 }
 
+/// Whether orphans become children of this process.
+#[cfg(target_os = "linux")]
+static ADOPTS: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(false);
+
 /// Makes this process the parent of orphans below it. Only for a program that starts no others than those it
 /// judges.
 pub(super) fn adopt_orphans() {
     // Where the system refuses, the marks remain.
     #[cfg(target_os = "linux")]
-    let _ = nix::sys::prctl::set_child_subreaper(true);
+    ADOPTS.store(nix::sys::prctl::set_child_subreaper(true).is_ok(), std::sync::atomic::Ordering::Relaxed);
 }
 
 /// Ends whatever still runs below this process.
@@ -53,14 +60,21 @@ fn end_group(_: u32) {}
 
 #[cfg(target_os = "linux")]
 mod linux {
-    use super::{LOOKS, MARK};
-    use nix::sys::signal::{Signal, kill};
+    use super::super::process::is_waited_for;
+    use super::{ADOPTS, MARK, PATIENCE, QUIET_LOOKS};
+    use nix::sys::signal::{Signal, kill, killpg};
+    use nix::sys::wait::{WaitPidFlag, waitpid};
     use nix::unistd::Pid;
+    use std::sync::atomic::Ordering;
+    use std::time::{Duration, Instant};
 
-    /// A running process.
+    /// A process of the system.
     pub struct Process {
         pub id: u32,
         pub parent: u32,
+        group: i32,
+        session: i32,
+        has_ended: bool,
     }
 
     impl Process {
@@ -71,38 +85,69 @@ mod linux {
             let environment = std::fs::read(format!("/proc/{}/environ", self.id)).unwrap_or_default();
             environment.split(|byte| *byte == 0).any(|variable| variable == wanted.as_bytes())
         }
+
+        /// Ends it. In a session of its own there are only its like: their group ends in one moment, also with
+        /// what the process has started since it was seen.
+        fn end(&self, our_session: i32) {
+            // Each fails only where all have ended, or are another's children.
+            if self.session != our_session && self.group > 1 {
+                let _ = killpg(Pid::from_raw(self.group), Signal::SIGKILL);
+            }
+            let _ = kill(self.pid(), Signal::SIGKILL);
+        }
+
+        /// Lets go of an orphan that has ended: the system keeps its number until its parent has asked how. What
+        /// was started here is asked by who started it.
+        fn let_go(&self, ourselves: u32) {
+            if ADOPTS.load(Ordering::Relaxed) && self.parent == ourselves && !is_waited_for(self.id) {
+                let _ = waitpid(self.pid(), Some(WaitPidFlag::WNOHANG));
+            }
+        }
+
+        fn pid(&self) -> Pid {
+            Pid::from_raw(self.id as i32)
+        }
     }
 
-    /// Every process that has not ended.
-    fn running() -> Vec<Process> {
+    /// Every process, looked at one after the other, the newest first: one that starts itself anew is among them,
+    /// and ends soon.
+    fn processes() -> impl Iterator<Item = Process> {
         let names = std::fs::read_dir("/proc").into_iter().flatten().flatten();
-        names.filter_map(|name| process(name.file_name().to_str()?.parse().ok()?)).collect()
+        let mut ids: Vec<u32> = names.filter_map(|name| name.file_name().to_str()?.parse().ok()).collect();
+        ids.sort_unstable_by(|a, b| b.cmp(a));
+        ids.into_iter().filter_map(process)
     }
 
     fn process(id: u32) -> Option<Process> {
         let stat = std::fs::read_to_string(format!("/proc/{id}/stat")).ok()?;
-        // The name, in parentheses, may hold spaces; after it come state and parent.
+        // The name, in parentheses, may hold spaces; after it come state, parent, group and session.
         let mut fields = stat.rsplit_once(')')?.1.split_whitespace();
         let (state, parent) = (fields.next()?, fields.next()?.parse().ok()?);
-        (!matches!(state, "Z" | "X")).then_some(Process { id, parent })
+        let (group, session) = (fields.next()?.parse().ok()?, fields.next()?.parse().ok()?);
+        Some(Process { id, parent, group, session, has_ended: matches!(state, "Z" | "X") })
     }
 
     /// Ends the processes that `wanted` names, until none is found.
     pub fn end_while_found(wanted: impl Fn(&Process) -> bool) {
-        for _ in 0..LOOKS {
-            let found: Vec<Pid> = running()
-                .iter()
-                .filter(|p| wanted(p))
-                .filter_map(|p| i32::try_from(p.id).ok().map(Pid::from_raw))
-                .collect();
-            if found.is_empty() {
-                return;
-            }
-            for &id in &found {
-                // Each fails only where the process has ended, or is another's child.
-                let _ = kill(id, Signal::SIGKILL);
-            }
-            std::thread::sleep(std::time::Duration::from_millis(2));
+        let (begun, mut quiet) = (Instant::now(), 0);
+        while quiet < QUIET_LOOKS && begun.elapsed() < PATIENCE {
+            quiet = if end_found(&wanted) { 0 } else { quiet + 1 };
+            std::thread::sleep(Duration::from_micros(500));
         }
+    }
+
+    /// Ends each process that `wanted` names in the moment in which it is seen; whether there was one.
+    fn end_found(wanted: impl Fn(&Process) -> bool) -> bool {
+        let Some(ourselves) = process(std::process::id()) else { return false };
+        let mut found = false;
+        for process in processes() {
+            if process.has_ended {
+                process.let_go(ourselves.id);
+            } else if wanted(&process) {
+                process.end(ourselves.session);
+                found = true;
+            }
+        }
+        found
     }
 }

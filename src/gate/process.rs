@@ -52,6 +52,12 @@ pub fn end_all() {
     descendants::end_below();
 }
 
+/// Whether a process was started here: who started it waits for it.
+#[cfg(target_os = "linux")]
+pub(super) fn is_waited_for(id: u32) -> bool {
+    RUNNING.lock().unwrap_or_else(PoisonError::into_inner).contains_key(&id)
+}
+
 /// A program that reads problems and writes answers, one JSON object a line.
 #[derive(Debug)]
 pub struct Process {
@@ -196,8 +202,11 @@ impl Running {
         // A group of its own: what the shell starts can be ended together with it.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut starter, 0);
+        // Known before anybody looks for children that nobody waits for.
+        let mut running = RUNNING.lock().unwrap_or_else(PoisonError::into_inner);
         let mut child = starter.spawn()?;
-        RUNNING.lock().unwrap_or_else(PoisonError::into_inner).insert(child.id(), mark.clone());
+        running.insert(child.id(), mark.clone());
+        drop(running);
         let broken = || std::io::Error::other("the program has no pipes");
         let mut stdin = child.stdin.take().ok_or_else(broken)?;
         let stdout = child.stdout.take().ok_or_else(broken)?;
@@ -276,9 +285,9 @@ impl Drop for Running {
     fn drop(&mut self) {
         let id = self.child.id();
         descendants::end(id, &self.mark);
-        RUNNING.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
         // As there: it fails only where the program has ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
+        RUNNING.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
     }
 }

@@ -10,6 +10,7 @@ use calibench::calibrate::{Covariance, Settings};
 use calibench::camera::{Camera, FreeParameters};
 use calibench::evaluate::cramer_rao;
 use calibench::geometry::Vec2;
+use calibench::io::shown::on_one_line;
 use calibench::synth::{Scene, Stream, StreamKey, Truth};
 
 /// One combination of levels.
@@ -85,7 +86,8 @@ impl Cell {
         let labels: Vec<String> = spec.factor.iter().zip(&levels).map(|(f, &level)| f.label(level)).collect();
         let named: Vec<String> =
             spec.factor.iter().zip(&labels).map(|(f, label)| format!("{} = {label}", f.name)).collect();
-        let name = if named.is_empty() { "-".to_string() } else { named.join(", ") };
+        let name =
+            if named.is_empty() { "-".to_string() } else { on_one_line(&named.join(", ")).into_owned() };
         let camera = Camera::from(design.scene.camera);
         // Without the cell in the key, trial t draws the same numbers in every cell.
         let scenario =

@@ -9,6 +9,7 @@ use super::run_error::RunError;
 use super::trial::Trial;
 use calibench::evaluate::distribution::normal_two_sided;
 use calibench::evaluate::interval::each_of;
+use calibench::io::ShownPath;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -29,16 +30,16 @@ pub enum CompareError {
         b: String,
     },
     /// One run under both names.
-    #[error("{path} is named twice: a run is no different from itself", path = .0.display())]
+    #[error("{path} is named twice: a run is no different from itself", path = .0.shown())]
     Same(PathBuf),
     /// Cells that draw numbers of their own.
-    #[error("the cells of {path} draw noise of their own (common_random_numbers = false): their trials are no pairs", path = path.display())]
+    #[error("the cells of {path} draw noise of their own (common_random_numbers = false): their trials are no pairs", path = path.shown())]
     NotCommon {
         /// The run.
         path: PathBuf,
     },
     /// No such factor.
-    #[error("`{factor}` is no factor of {path}; there are: {known}", path = path.display())]
+    #[error("`{factor}` is no factor of {path}; there are: {known}", path = path.shown())]
     Factor {
         /// The run.
         path: PathBuf,

@@ -1,5 +1,6 @@
 //! What does every combination of levels come to? The study with the levels in place of its own values.
 
+use super::factor::Factor;
 use super::limits;
 use super::prediction::DRAWS;
 use super::spec::{Estimator, SceneSpec, Spec};
@@ -24,6 +25,7 @@ pub(super) fn designs(spec: &Spec, text: &str) -> Result<Vec<(Vec<usize>, Design
             return Err(SpecError::DuplicateFactor(factor.name.clone()));
         }
     }
+    refuse_set_twice(&spec.factor)?;
     limits::check_trials(
         spec.factor.iter().map(|f| f.levels.len()),
         spec.trials.per_cell,
@@ -45,6 +47,23 @@ pub(super) fn designs(spec: &Spec, text: &str) -> Result<Vec<(Vec<usize>, Design
         .collect()
 }
 
+/// Refuses a field whose level another one overwrites, its own or that of the table around it: cells that seem
+/// to differ would be the same.
+fn refuse_set_twice(factors: &[Factor]) -> Result<(), SpecError> {
+    let fields: Vec<(&str, &str)> = factors
+        .iter()
+        .flat_map(|factor| factor.set.iter().map(|path| (factor.name.as_str(), path.as_str())))
+        .collect();
+    for (i, (by, path)) in fields.iter().enumerate() {
+        let lost = |earlier: &str| earlier == *path || earlier.starts_with(&format!("{path}."));
+        if let Some((before, field)) = fields[..i].iter().find(|(_, earlier)| lost(earlier)) {
+            let [field, before, by] = [field, before, by].map(|text| text.to_string());
+            return Err(SpecError::SetTwice { field, before, by });
+        }
+    }
+    Ok(())
+}
+
 fn design(
     spec: &Spec,
     text: &str,
@@ -62,6 +81,7 @@ fn design(
         factor.error(text, Some(level), format!("with this level: {}", e.message().trim()))
     })?;
     design.scene.check()?;
+    design.estimator.check()?;
     Ok((levels, design))
 }
 

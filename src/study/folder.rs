@@ -4,6 +4,7 @@
 use super::manifest::{Difference, Manifest};
 use super::shard::{Shard, ShardError};
 use super::trial_file::NoParquet;
+use calibench::io::ShownPath;
 use calibench::io::atomic::{remove_leftovers, write_atomically_to};
 use calibench::io::files::{Disk, Files};
 use calibench::io::input::{InputError, MOST_SPEC_BYTES, regular_or_absent};
@@ -26,7 +27,7 @@ pub struct Folder {
 
 /// A file and what the system said about it.
 #[derive(Debug, thiserror::Error)]
-#[error("{path}: {cause}", path = path.display())]
+#[error("{path}: {cause}", path = path.shown())]
 pub struct Located {
     /// The file.
     pub path: PathBuf,
@@ -47,12 +48,12 @@ pub enum FolderError {
     #[error(transparent)]
     Input(#[from] InputError),
     /// There is a run already.
-    #[error("{path} holds a run already: `calibench study resume {path}` continues it, or choose another folder", path = .0.display())]
+    #[error("{path} holds a run already: `calibench study resume {path}` continues it, or choose another folder", path = .0.shown())]
     Taken(PathBuf),
     /// Trials without the manifest that says whose they are.
     #[error(
         "{path} holds {found} but no manifest.json, so nobody knows whose trials they are: choose another folder, or move them away",
-        path = path.display()
+        path = path.shown()
     )]
     Leftover {
         /// The folder.
@@ -64,7 +65,7 @@ pub enum FolderError {
     #[error(
         "{path} counts the trials of another study, part or version of the code (fingerprint {}, this run's is {}): they are not taken \
          over; move it and the trials away, or begin in another folder",
-        short(found), short(expected), path = path.display()
+        short(found), short(expected), path = path.shown()
     )]
     Foreign {
         /// The checkpoint.
@@ -75,16 +76,16 @@ pub enum FolderError {
         expected: String,
     },
     /// There is none.
-    #[error("{path} holds no run: `calibench study run` begins one", path = .0.display())]
+    #[error("{path} holds no run: `calibench study run` begins one", path = .0.shown())]
     Missing(PathBuf),
     /// What stands in the folder is written elsewhere: a run changes its own files only.
-    #[error("{path} is a link: a run writes to its own folder only; remove the link, or begin in another folder", path = .0.display())]
+    #[error("{path} is a link: a run writes to its own folder only; remove the link, or begin in another folder", path = .0.shown())]
     Link(PathBuf),
     /// Another process is at it.
-    #[error("{path} is in use by another run: wait for it, or choose another folder", path = .0.display())]
+    #[error("{path} is in use by another run: wait for it, or choose another folder", path = .0.shown())]
     InUse(PathBuf),
     /// A manifest or checkpoint that cannot be read.
-    #[error("{path} is damaged: {what}; begin again in another folder", path = path.display())]
+    #[error("{path} is damaged: {what}; begin again in another folder", path = path.shown())]
     Damaged {
         /// The file.
         path: PathBuf,
@@ -97,7 +98,7 @@ pub enum FolderError {
     /// Trials of two kinds must not mix.
     #[error(
         "{path} was begun with another specification or other code and is not continued:\n{}\nRestore what differs, or begin again in another folder",
-        differences.iter().map(|d| format!("  {d}")).collect::<Vec<_>>().join("\n"), path = path.display()
+        differences.iter().map(|d| format!("  {d}")).collect::<Vec<_>>().join("\n"), path = path.shown()
     )]
     Differs {
         /// The folder.
@@ -157,6 +158,15 @@ impl Folder {
         spec_text: &str,
         manifest: &Manifest,
     ) -> Result<Folder, FolderError> {
+        let folder = Folder::claim(files, path)?;
+        folder.write("spec.toml", spec_text.as_bytes())?;
+        // The manifest last: a folder without one holds no run.
+        folder.write("manifest.json", manifest.to_text().as_bytes())?;
+        Ok(folder)
+    }
+
+    /// A folder for a run, with nothing of one in it yet.
+    pub(super) fn claim(files: Arc<dyn Files>, path: &Path) -> Result<Folder, FolderError> {
         let located = |cause| Located { path: path.to_path_buf(), cause };
         files.make_folder(path).map_err(located)?;
         let folder = Folder::lock(files, path)?;
@@ -166,9 +176,6 @@ impl Folder {
         if let Some(found) = OF_A_RUN.into_iter().find(|name| folder.file(name).exists()) {
             return Err(FolderError::Leftover { path: path.to_path_buf(), found });
         }
-        folder.write("spec.toml", spec_text.as_bytes())?;
-        // The manifest last: a folder without one holds no run.
-        folder.write("manifest.json", manifest.to_text().as_bytes())?;
         Ok(folder)
     }
 

@@ -24,10 +24,16 @@ pub struct Checkpoint {
     /// [`Manifest::identity`] of the run whose trials it counts; empty in files of versions that did not
     /// write it.
     #[serde(default)]
-    run: String,
-    batches: u64,
-    bytes: u64,
+    pub(super) run: String,
+    pub(super) batches: u64,
+    pub(super) bytes: u64,
     pub(super) sha256: String,
+}
+
+impl Checkpoint {
+    pub(super) fn to_text(&self) -> String {
+        serde_json::to_string(self).expect("a checkpoint holds nothing that JSON cannot")
+    }
 }
 
 /// The end of `trials.csv`, with the running hash of what is before.
@@ -189,25 +195,15 @@ impl Folder {
 
     /// Trials first, on the disk; then the checkpoint that counts them.
     fn append(&self, log: &mut Log, bytes: &[u8], batches: u64) -> Result<(), FolderError> {
-        self.append_only(log, bytes)?;
-        self.count(log, batches)
-    }
-
-    /// Trials that no checkpoint counts yet.
-    pub(super) fn append_only(&self, log: &mut Log, bytes: &[u8]) -> Result<(), FolderError> {
-        self.files.write(&mut log.file, bytes).map_err(|cause| Located { path: log.path.clone(), cause })?;
+        self.files
+            .write(&mut log.file, bytes)
+            .and_then(|()| self.files.sync(&log.file))
+            .map_err(|cause| Located { path: log.path.clone(), cause })?;
         log.bytes += bytes.len() as u64;
         log.hash.update(bytes);
-        Ok(())
-    }
-
-    /// Makes the log durable and counts its batches.
-    pub(super) fn count(&self, log: &mut Log, batches: u64) -> Result<(), FolderError> {
-        self.files.sync(&log.file).map_err(|cause| Located { path: log.path.clone(), cause })?;
         let (run, sha256) = (log.run.clone(), hexadecimal(&log.hash));
         let checkpoint = Checkpoint { run, batches, bytes: log.bytes, sha256 };
-        let text = serde_json::to_string(&checkpoint).expect("a checkpoint holds nothing that JSON cannot");
-        self.write("checkpoint.json", text.as_bytes())
+        self.write("checkpoint.json", checkpoint.to_text().as_bytes())
     }
 }
 

@@ -9,9 +9,13 @@ use super::run_error::RunError;
 use super::shard::Shard;
 use super::tables;
 use super::trial_file::TrialFile;
+use super::whole_log::WholeLog;
 use calibench::io::Commit;
+use calibench::io::ShownPath;
+use calibench::io::files::{Disk, Files};
 use calibench_harness::Build;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Parts that do not make a whole.
 #[derive(Debug, thiserror::Error)]
@@ -23,13 +27,13 @@ pub enum MergeError {
     #[error("no parts were given: name the folders of all shards")]
     Nothing,
     /// The same folder under one name or two.
-    #[error("{path} is named twice: name the folder of each shard once", path = .0.display())]
+    #[error("{path} is named twice: name the folder of each shard once", path = .0.shown())]
     NamedTwice(PathBuf),
     /// The whole would take the place of a part.
-    #[error("{path} is one of the parts: choose another folder for the whole", path = .0.display())]
+    #[error("{path} is one of the parts: choose another folder for the whole", path = .0.shown())]
     IntoPart(PathBuf),
     /// A part that has trials left.
-    #[error("{path} (shard {shard}) is not complete: `calibench study resume {path}` first", path = path.display())]
+    #[error("{path} (shard {shard}) is not complete: `calibench study resume {path}` first", path = path.shown())]
     Incomplete {
         /// Its folder.
         path: PathBuf,
@@ -47,7 +51,7 @@ pub enum MergeError {
         count: u64,
     },
     /// Parts of different studies or code.
-    #[error("{path} differs from the first part:\n{}", differences.iter().map(|d| format!("  {d}")).collect::<Vec<_>>().join("\n"), path = path.display())]
+    #[error("{path} differs from the first part:\n{}", differences.iter().map(|d| format!("  {d}")).collect::<Vec<_>>().join("\n"), path = path.shown())]
     Differs {
         /// The folder.
         path: PathBuf,
@@ -74,7 +78,20 @@ struct Part {
 /// Joins the runs in `parts` into a new folder `out`, which then holds what an undivided run would, byte for
 /// byte. Its trials stand in the kind of file of the first part, or in that asked for: the one part of an
 /// undivided run is put into another file so.
+///
+/// On a disk that is full the folder is left without a file: all are on the disk before one has its name.
 pub fn merge(
+    parts: &[PathBuf],
+    out: &Path,
+    trials: Option<TrialFile>,
+    build: &Build,
+) -> Result<(Folder, Engine), MergeError> {
+    merge_on(Arc::new(Disk), parts, out, trials, build)
+}
+
+/// As [`merge`]; the files of the whole are changed by the given operations.
+pub fn merge_on(
+    files: Arc<dyn Files>,
     parts: &[PathBuf],
     out: &Path,
     trials: Option<TrialFile>,
@@ -98,8 +115,8 @@ pub fn merge(
         .into_iter()
         .map(|part| Reading::begin(part.folder, whole.for_shard(part.shard)))
         .collect::<Result<Vec<Reading>, _>>()?;
-    let folder = Folder::create(out, &text, &manifest)?;
-    let mut log = folder.replay(&mut whole)?;
+    let folder = Folder::claim(files, out)?;
+    let mut log = WholeLog::begin(&folder, &tables::header(&whole.quantities))?;
     while let Some((cell, batch)) = whole.next() {
         let whole_cells = whole.spec.trials.precision.is_some();
         let at = shards.iter().position(|s| s.holds(cell, batch, whole.cells.len(), whole_cells));
@@ -111,9 +128,9 @@ pub fn merge(
             });
         };
         whole.absorb((cell, batch), &trials);
-        folder.append_only(&mut log, tables::rows(&trials).as_bytes())?;
+        log.append(tables::rows(&trials).as_bytes())?;
     }
-    folder.count(&mut log, whole.batches)?;
+    log.place(&text, &manifest, whole.batches)?;
     Ok((folder, whole))
 }
 

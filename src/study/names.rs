@@ -12,9 +12,13 @@ pub(super) mod free {
 
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<FreeParameters, D::Error> {
         let names = Vec::<String>::deserialize(deserializer)?;
-        names
-            .iter()
-            .try_fold(FreeParameters::NONE, |set, name| Ok(set.with(name.parse().map_err(D::Error::custom)?)))
+        names.iter().try_fold(FreeParameters::NONE, |set, name| {
+            let parameter = name.parse().map_err(D::Error::custom)?;
+            if set.contains(parameter) {
+                return Err(D::Error::custom(format!("`{name}` stands twice in a list of parameters")));
+            }
+            Ok(set.with(parameter))
+        })
     }
 }
 
@@ -36,6 +40,14 @@ pub(super) mod held {
         deserializer: D,
     ) -> Result<BTreeMap<Parameter, f64>, D::Error> {
         let named = BTreeMap::<String, f64>::deserialize(deserializer)?;
-        named.into_iter().map(|(name, value)| Ok((name.parse().map_err(D::Error::custom)?, value))).collect()
+        let held = |(name, value): (String, f64)| {
+            if !value.is_finite() {
+                return Err(D::Error::custom(format!(
+                    "`{name}` is held at {value}: it must be a finite number"
+                )));
+            }
+            Ok((name.parse().map_err(D::Error::custom)?, value))
+        };
+        named.into_iter().map(held).collect()
     }
 }

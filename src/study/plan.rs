@@ -3,7 +3,7 @@
 
 use super::engine::{Pace, in_memory};
 use super::moments::Estimated;
-use super::poses::Poses;
+use super::poses::{Poses, PosesError};
 use super::spec::{Spec, Trials};
 use super::spec_error::SpecError;
 use super::summary::summarise;
@@ -90,11 +90,10 @@ pub fn search(spec: &Spec, goal: &Goal, search: &Search) -> Result<Vec<Design>, 
             let at =
                 |views: usize| sd_at(&with_poses(spec, views, tilt_deg, coverage, search.distance_mm), goal);
             designs.push(match at(search.most_views) {
-                // No other tilt would need less.
-                Err(error @ PlanError::Spec(SpecError::TooMuch { .. })) => return Err(error),
-                Err(PlanError::Spec(error)) => {
-                    Design { tilt_deg, coverage, enough: None, best: Err(error.to_string()) }
-                }
+                // Another tilt or coverage may fit.
+                Err(PlanError::Spec(
+                    error @ SpecError::Poses { cause: PosesError::OutsideImage { .. }, .. },
+                )) => Design { tilt_deg, coverage, enough: None, best: Err(error.to_string()) },
                 Err(error) => return Err(error),
                 Ok(best) => {
                     Design { tilt_deg, coverage, enough: fewest(best, &at, goal, search)?, best: Ok(best) }

@@ -1,6 +1,7 @@
 //! Where is the target held? Generators of poses, from a list to random draws, all with the target inside the
 //! image.
 
+use super::lists;
 use calibench::camera::Camera;
 use calibench::geometry::{Mat3, Pose, Vec2, Vec3, rotation};
 use calibench::synth::Stream;
@@ -71,8 +72,10 @@ pub struct RandomPoses {
 #[serde(deny_unknown_fields)]
 pub struct PoseSpec {
     /// Angles about X, Y, Z.
+    #[serde(deserialize_with = "lists::exactly")]
     pub rotation_deg: [f64; 3],
     /// Place of the target's centre in the camera's frame.
+    #[serde(deserialize_with = "lists::exactly")]
     pub translation_mm: [f64; 3],
 }
 
@@ -161,6 +164,7 @@ impl Poses {
         if let Poses::Random(random) = self {
             let (least, most) = (random.tilt_min_deg, random.tilt_deg);
             check("tilt_min_deg", least, "from 0 to tilt_deg", (0.0..=most).contains(&least))?;
+            check("roll_deg", random.roll_deg, "a finite number", random.roll_deg.is_finite())?;
         }
         check("views", views as f64, "1 or more", views >= 1)?;
         check("tilt_deg", tilt, "from 0 to below 90", (0.0..90.0).contains(&tilt))?;

@@ -116,3 +116,125 @@ impl Source for Lines {
         format!("line {}", self.number)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Shard;
+    use std::path::Path;
+
+    /// Two cells of three trials each, in batches of two.
+    const STUDY: &str = r#"
+name = "two-cells"
+question = "Are foreign trials refused?"
+seed = 1
+
+[scene]
+image = [640, 480]
+camera = { fx = 600.0, fy = 600.0, cx = 320.0, cy = 240.0 }
+target = { columns = 3, rows = 3, spacing_mm = 10.0 }
+poses = { kind = "spread", views = 3, tilt_deg = 30.0, distance_mm = 150.0 }
+noise_px = 0.1
+
+[trials]
+per_cell = 3
+batch = 2
+
+[[factor]]
+name = "noise"
+set = ["scene.noise_px"]
+levels = [0.1, 0.3]
+"#;
+
+    /// The order in which they are done: a batch of each cell, round by round.
+    const ORDER: [(usize, u64); 6] = [(0, 0), (0, 1), (1, 0), (1, 1), (0, 2), (1, 2)];
+
+    struct Given {
+        trials: std::vec::IntoIter<Trial>,
+        taken: usize,
+    }
+
+    impl Source for Given {
+        fn next(&mut self) -> Result<Option<Trial>, FolderError> {
+            self.taken += 1;
+            Ok(self.trials.next())
+        }
+
+        fn place(&self) -> String {
+            format!("trial {}", self.taken)
+        }
+    }
+
+    fn engine() -> Engine {
+        Engine::new(STUDY, Shard::WHOLE).unwrap()
+    }
+
+    /// Takes in trials of these cells and numbers; how many batches, or why not.
+    fn replayed(order: &[(usize, u64)]) -> Result<u64, String> {
+        let mut engine = engine();
+        let values = vec![None; engine.quantities.len()];
+        let outcome = "refused".to_string();
+        let trial = |&(cell, trial): &(usize, u64)| Trial {
+            cell,
+            trial,
+            outcome: outcome.clone(),
+            iterations: 0,
+            values: values.clone(),
+        };
+        let trials = order.iter().map(trial).collect::<Vec<_>>().into_iter();
+        let mut replay = Replay::new(Box::new(Given { trials, taken: 0 }), "trials.csv".into());
+        while replay.batch(&mut engine).map_err(|error| error.to_string())? {}
+        Ok(engine.batches)
+    }
+
+    #[test]
+    fn trials_in_their_order_are_taken_in_as_far_as_they_go() {
+        assert_eq!(replayed(&[]), Ok(0));
+        assert_eq!(replayed(&ORDER[..4]), Ok(2));
+        assert_eq!(replayed(&ORDER), Ok(4));
+    }
+
+    #[test]
+    fn trials_of_another_cell_or_number_are_refused_with_their_place() {
+        let refused = |order: &[(usize, u64)], place: &str, what: &str| {
+            let said = replayed(order).unwrap_err();
+            assert!(said.contains(&format!("trials.csv is damaged: {place}: {what}")), "{said}");
+        };
+        refused(&[(1, 0)], "trial 1", "not trial 0 of cell 0");
+        refused(&[(0, 0), (1, 1)], "trial 2", "not trial 1 of cell 0");
+        refused(&[(0, 0), (0, 0)], "trial 2", "not trial 1 of cell 0");
+        refused(&[(0, 0), (0, 1), (1, 0), (1, 1), (0, 3)], "trial 5", "not trial 2 of cell 0");
+        refused(&ORDER[..3], "trial 4", "it ends within a batch");
+        refused(&[&ORDER[..], &[(1, 3)]].concat(), "trial 7", "more trials than the study has");
+    }
+
+    /// The lines of a file that its checkpoint vouches for.
+    fn lines(text: &str, name: &str) -> Result<Lines, FolderError> {
+        let path = std::env::temp_dir().join(format!("calibench-replay-{}-{name}", std::process::id()));
+        std::fs::write(&path, text).unwrap();
+        let file = File::open(&path).unwrap();
+        std::fs::remove_file(path).unwrap();
+        let engine = engine();
+        let header = tables::header(&engine.quantities);
+        Lines::open(file, text.len() as u64, Path::new("trials.csv").into(), &header, engine.quantities.len())
+    }
+
+    #[test]
+    fn rows_that_are_none_of_the_study_are_refused_with_their_line() {
+        let engine = engine();
+        let header = tables::header(&engine.quantities);
+        let row = format!("0,0,refused,0{}\n", ",".repeat(engine.quantities.len()));
+        let mut good = lines(&format!("{header}{row}"), "good").unwrap();
+        assert!(good.next().unwrap().is_some() && good.next().unwrap().is_none());
+        let other = lines(&format!("cell,trial\n{row}"), "header").err().unwrap().to_string();
+        assert!(other.contains("line 1: it is not the header of this study"), "{other}");
+        for broken in
+            [format!(",{row}"), row.replacen("0,0", "0,-1", 1), row.replacen(",\n", ",x\n", 1), "\n".into()]
+        {
+            let mut lines = lines(&format!("{header}{row}{broken}"), "broken").unwrap();
+            assert!(lines.next().unwrap().is_some());
+            let said = lines.next().unwrap_err().to_string();
+            assert!(said.contains("line 3: it is not a trial of this study"), "{broken}: {said}");
+        }
+    }
+}

@@ -3,6 +3,7 @@
 
 use super::factor::Factor;
 use super::limits;
+use super::lists;
 use super::names;
 use super::poses::Poses;
 use super::spec_error::SpecError;
@@ -53,6 +54,7 @@ pub struct SceneSpec {
     /// The virtual camera.
     pub camera: CameraFields,
     /// Image width and height, px.
+    #[serde(deserialize_with = "lists::pair")]
     pub image: (usize, usize),
     /// The board.
     pub target: TargetSpec,
@@ -89,6 +91,7 @@ pub struct TargetSpec {
 #[serde(deny_unknown_fields)]
 pub struct Length {
     /// Middle, in the camera's frame.
+    #[serde(deserialize_with = "lists::exactly")]
     pub centre_mm: [f64; 3],
     /// Length.
     pub length_mm: f64,
@@ -238,15 +241,21 @@ impl SceneSpec {
         let spread = self.outlier_px;
         check("scene.outlier_px", spread, "a positive number", spread > 0.0 && spread.is_finite())?;
         if let Some(length) = &self.length {
-            check("scene.length.length_mm", length.length_mm, "positive", length.length_mm > 0.0)?;
-            check(
-                "scene.length.centre_mm",
-                length.centre_mm[2],
-                "in front of the camera",
-                length.centre_mm[2] > 0.0,
-            )?;
+            length.check()?;
         }
         self.target.board().map(|_| ())
+    }
+}
+
+impl Length {
+    fn check(&self) -> Result<(), SpecError> {
+        let Length { centre_mm: [x, y, z], length_mm, direction_deg } = *self;
+        check("scene.length.length_mm", length_mm, "positive", length_mm > 0.0 && length_mm.is_finite())?;
+        check("scene.length.centre_mm", z, "in front of the camera", z > 0.0 && z.is_finite())?;
+        for value in [x, y] {
+            check("scene.length.centre_mm", value, "a finite number", value.is_finite())?;
+        }
+        check("scene.length.direction_deg", direction_deg, "a finite number", direction_deg.is_finite())
     }
 }
 
@@ -264,6 +273,15 @@ impl TargetSpec {
 }
 
 impl Estimator {
+    pub(super) fn check(&self) -> Result<(), SpecError> {
+        let (field, scale) = match self.loss {
+            LossChoice::Squares {} => return Ok(()),
+            LossChoice::Huber { delta_px } => ("estimator.loss.delta_px", delta_px),
+            LossChoice::Cauchy { scale_px } => ("estimator.loss.scale_px", scale_px),
+        };
+        check(field, scale, "a positive number", self.loss.loss().is_valid())
+    }
+
     /// The solver's settings.
     pub fn settings(&self, image: (usize, usize)) -> Settings {
         let settings = Settings::new(self.free).with_image_size(image).with_loss(self.loss.loss());

@@ -58,6 +58,18 @@ pub enum SpecError {
     /// The same name for two factors.
     #[error("two factors are named `{0}`: give each a name of its own")]
     DuplicateFactor(String),
+    /// A level that another level overwrites.
+    #[error(
+        "`{field}`, which factor `{before}` sets, is set again by factor `{by}`: its levels would be lost; set each field once"
+    )]
+    SetTwice {
+        /// Path of the field.
+        field: String,
+        /// Factor that sets it first.
+        before: String,
+        /// Factor that sets it again, or the table around it.
+        by: String,
+    },
     /// A cell whose poses do not exist.
     #[error("cell {cell}: {cause}")]
     Poses {

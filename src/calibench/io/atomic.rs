@@ -1,6 +1,7 @@
 //! How is a file replaced so that nobody ever sees half of it? Written beside its place, then renamed.
 
 use super::files::{Disk, Files};
+use super::shown::ShownPath;
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, DirEntry, File, OpenOptions};
 use std::io;
@@ -47,10 +48,11 @@ pub fn write_together_to(files: &dyn Files, contents: &[(PathBuf, Vec<u8>)]) -> 
     beside.into_iter().try_for_each(Beside::place)
 }
 
-/// A file that is on the disk, beside its place. It is removed unless it is put there.
-struct Beside<'a> {
+/// A file that is written beside its place, at once or piece by piece. It is removed unless it is put there.
+#[derive(Debug)]
+pub struct Beside<'a> {
     files: &'a dyn Files,
-    path: &'a Path,
+    path: PathBuf,
     temporary: PathBuf,
     /// Open, and so locked, until the file has its name.
     file: File,
@@ -58,24 +60,42 @@ struct Beside<'a> {
 }
 
 impl<'a> Beside<'a> {
-    fn write(files: &'a dyn Files, path: &'a Path, contents: &[u8]) -> io::Result<Beside<'a>> {
+    /// A file without contents.
+    ///
+    /// # Errors
+    /// As [`write_atomically`]; of every function here.
+    pub fn begin(files: &'a dyn Files, path: &Path) -> io::Result<Beside<'a>> {
         let folder = folder_of(path);
         refuse_what_is_no_file(path).map_err(with_path(path))?;
         files.make_folder(folder).map_err(with_path(path))?;
         // What cannot be removed is in nobody's way.
         let _ = remove_leftovers_of(files, folder, path.file_name());
         let (file, temporary) = open_beside(path).map_err(with_path(path))?;
-        let mut beside = Beside { files, path, temporary, file, placed: false };
-        files
-            .write(&mut beside.file, contents)
-            // On the disk before the rename: else a power cut may leave the new name with no contents.
-            .and_then(|()| files.sync(&beside.file))
-            .map_err(with_path(path))?;
+        Ok(Beside { files, path: path.to_path_buf(), temporary, file, placed: false })
+    }
+
+    /// A file with all of its contents, on the disk.
+    pub fn write(files: &'a dyn Files, path: &Path, contents: &[u8]) -> io::Result<Beside<'a>> {
+        let mut beside = Beside::begin(files, path)?;
+        beside.append(contents)?;
+        beside.sync()?;
         Ok(beside)
     }
 
-    fn place(mut self) -> io::Result<()> {
-        self.files.rename(&self.temporary, self.path).map_err(with_path(self.path))?;
+    /// Adds to the contents.
+    pub fn append(&mut self, contents: &[u8]) -> io::Result<()> {
+        self.files.write(&mut self.file, contents).map_err(with_path(&self.path))
+    }
+
+    /// Waits until the contents are on the disk, as they must be before the rename: else a power cut may leave
+    /// the new name without them.
+    pub fn sync(&self) -> io::Result<()> {
+        self.files.sync(&self.file).map_err(with_path(&self.path))
+    }
+
+    /// Puts the file in its place.
+    pub fn place(mut self) -> io::Result<()> {
+        self.files.rename(&self.temporary, &self.path).map_err(with_path(&self.path))?;
         self.placed = true;
         Ok(())
     }
@@ -105,7 +125,7 @@ fn refuse_what_is_no_file(path: &Path) -> io::Result<()> {
 
 /// The error with the file that could not be written.
 fn with_path(path: &Path) -> impl Fn(io::Error) -> io::Error {
-    move |error| io::Error::new(error.kind(), format!("cannot write {}: {error}", path.display()))
+    move |error| io::Error::new(error.kind(), format!("cannot write {}: {error}", path.shown()))
 }
 
 /// The folder in which a file stands.
@@ -157,7 +177,7 @@ pub fn remove_leftovers(folder: &Path) -> io::Result<()> {
 /// The same for the writes of one file, or of any.
 fn remove_leftovers_of(files: &dyn Files, folder: &Path, name: Option<&OsStr>) -> io::Result<()> {
     let with_path = |path: &Path, e: io::Error| {
-        io::Error::new(e.kind(), format!("cannot remove what a killed run left, {}: {e}", path.display()))
+        io::Error::new(e.kind(), format!("cannot remove what a killed run left, {}: {e}", path.shown()))
     };
     let entries = match fs::read_dir(folder) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),

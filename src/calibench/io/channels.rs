@@ -1,6 +1,7 @@
 //! How does a photograph keep its colours? As one raster a channel, with the depth of its file.
 
 use super::image::{self, Decoded, ImageError, opened};
+use super::shown::ShownPath;
 use crate::raster::{Level, Raster};
 use std::path::Path;
 
@@ -21,7 +22,7 @@ pub enum Channels {
 /// # Errors
 /// See [`ImageError`].
 pub fn read_channels(path: &Path) -> Result<Channels, ImageError> {
-    let name = path.display().to_string();
+    let name = path.shown();
     let image = image::decoded(opened(path)?, &name)?;
     let (width, height) = (image.width() as usize, image.height() as usize);
     let u8s = |samples: &[u8], count| Channels::U8(parted(samples, count, width, height));
@@ -107,6 +108,29 @@ mod tests {
                 image.write_png(&path).unwrap();
                 assert_eq!(read_channels(&path).unwrap(), image, "{count} channels");
             }
+        }
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn floating_point_levels_are_kept_by_channels_and_written_with_16_bits() {
+        use ::image::{DynamicImage, ImageBuffer, ImageFormat, Rgb, Rgba};
+        let folder = std::env::temp_dir().join(format!("calibench-float-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let levels = [0.0f32, 0.25, 0.5, 1.0];
+        let colour =
+            DynamicImage::from(ImageBuffer::from_fn(4, 2, |_, _| Rgb([levels[1], levels[2], levels[3]])));
+        let clear = DynamicImage::from(ImageBuffer::from_fn(4, 2, |_, _| Rgba(levels)));
+        for (image, expected) in [(colour, &levels[1..]), (clear, &levels[..])] {
+            let (float, deep) = (folder.join("float.tiff"), folder.join("deep.png"));
+            image.save_with_format(&float, ImageFormat::Tiff).unwrap();
+            let read = read_channels(&float).unwrap();
+            let rasters = expected.iter().map(|&level| Raster::from_fn(4, 2, |_, _| level)).collect();
+            assert_eq!(read, Channels::F32(rasters));
+            assert_eq!(read.size(), (4, 2));
+            read.write_png(&deep).unwrap();
+            let sixteen = |&level: &f32| Raster::from_fn(4, 2, |_, _| (65535.0 * level + 0.5) as u16);
+            assert_eq!(read_channels(&deep).unwrap(), Channels::U16(expected.iter().map(sixteen).collect()));
         }
         std::fs::remove_dir_all(folder).unwrap();
     }

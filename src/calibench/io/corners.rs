@@ -1,7 +1,7 @@
 //! What was seen where? Corner files: `view,point,X,Y,u,v`, one line an observed point, and if it is known how well
 //! each was seen, `weight` or `sigma_px`.
 
-use super::table::{Row, TableError, columns, open, read_table};
+use super::table::{Column, Row, TableError, columns, open, read_table};
 use crate::board::{View, ViewError};
 use crate::geometry::Vec2;
 use std::collections::BTreeMap;
@@ -17,6 +17,10 @@ pub struct CornerFile {
     /// with (0, 0) at the centre of the top-left pixel.
     pub views: Vec<View>,
 }
+
+/// The numbers of a line.
+const COLUMNS: [Column; 4] =
+    [Column::length("X"), Column::length("Y"), Column::pixels("u"), Column::pixels("v")];
 
 /// Reads a corner file.
 ///
@@ -56,10 +60,10 @@ pub fn parse_corners(file: &str, mut input: impl Read) -> Result<CornerFile, Tab
         (true, true) => {
             Err(unreadable("columns 'weight' and 'sigma_px' say the same twice: keep one of them".into()))
         }
-        (true, false) => weighted(file, &bytes, "weight", |weight| weight),
-        (false, true) => weighted(file, &bytes, "sigma_px", |sigma| 1.0 / sigma),
+        (true, false) => weighted(file, &bytes, Column::length("weight"), |weight| weight),
+        (false, true) => weighted(file, &bytes, Column::pixels("sigma_px"), |sigma| 1.0 / sigma),
         (false, false) => {
-            let rows = read_table(file, bytes.as_slice(), ["view", "point"], ["X", "Y", "u", "v"])?;
+            let rows = read_table(file, bytes.as_slice(), ["view", "point"], COLUMNS)?;
             grouped(file, rows, |_| None)
         }
     }
@@ -68,10 +72,11 @@ pub fn parse_corners(file: &str, mut input: impl Read) -> Result<CornerFile, Tab
 fn weighted(
     file: &str,
     bytes: &[u8],
-    column: &'static str,
+    column: Column,
     weight: impl Fn(f64) -> f64,
 ) -> Result<CornerFile, TableError> {
-    let rows = read_table(file, bytes, ["view", "point"], ["X", "Y", "u", "v", column])?;
+    let [x, y, u, v] = COLUMNS;
+    let rows = read_table(file, bytes, ["view", "point"], [x, y, u, v, column])?;
     grouped(file, rows, |numbers| Some(weight(numbers[4])))
 }
 
@@ -212,6 +217,18 @@ mod tests {
             (
                 &format!("{header}0,0,1,2,1e999,4\n"),
                 "c.csv:2: column 'u' (field 5): '1e999' is not a finite number",
+            ),
+            (
+                &format!("{header}0,0,1,2,1e300,4\n"),
+                "c.csv:2: column 'u' (field 5): '1e300' is beyond 1.048576e6, the most there may be",
+            ),
+            (
+                &format!("{header}0,0,1,-1e31,3,4\n"),
+                "c.csv:2: column 'Y' (field 4): '-1e31' is beyond 1e30, the most there may be",
+            ),
+            (
+                &format!("{header}0,0,1,2,3,\"4\nall held\"\n"),
+                "c.csv:2: column 'v' (field 6): '4\\u000aall held' is not a number",
             ),
             (&format!("{header},0,1,2,3,4\n"), "c.csv:2: column 'view' (field 1) is empty"),
             (

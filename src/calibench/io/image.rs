@@ -5,6 +5,7 @@
 
 use super::input::{InputError, MOST_IMAGE_BYTES, open_regular};
 use super::jpeg_end;
+use super::shown::ShownPath;
 use crate::raster::Raster;
 pub(super) use image::DynamicImage as Decoded;
 use image::{DynamicImage, ImageDecoder, ImageReader};
@@ -126,7 +127,7 @@ impl Grey {
 /// # Errors
 /// See [`ImageError`]; a damaged file is an error, never a panic, and a forged size allocates nothing.
 pub fn read_image(path: &Path) -> Result<Grey, ImageError> {
-    Ok(grey(decoded(opened(path)?, &path.display().to_string())?))
+    Ok(grey(decoded(opened(path)?, &path.shown())?))
 }
 
 /// The file of a photograph, which holds at least a byte.
@@ -136,7 +137,7 @@ pub(super) fn opened(path: &Path) -> Result<BufReader<File>, ImageError> {
         error => ImageError::Input(error),
     })?;
     if length == 0 {
-        return Err(ImageError::Empty { path: path.display().to_string() });
+        return Err(ImageError::Empty { path: path.shown() });
     }
     Ok(BufReader::new(file))
 }
@@ -205,7 +206,7 @@ impl Extent {
 /// # Errors
 /// See [`ImageError`].
 pub fn image_extent(path: &Path) -> Result<Extent, ImageError> {
-    let decoder = decoder(opened(path)?, &path.display().to_string())?;
+    let decoder = decoder(opened(path)?, &path.shown())?;
     let (width, height) = decoder.dimensions();
     Ok(Extent { pixels: u64::from(width) * u64::from(height), bytes: decoder.total_bytes() })
 }
@@ -385,6 +386,53 @@ mod tests {
                 Grey::U16(Raster::from_fn(5, 3, |x, y| (9000 * y + 700 * x) as u16)),
                 "{format:?}"
             );
+        }
+    }
+
+    #[test]
+    fn an_alpha_channel_is_ignored_and_colours_are_weighed_at_any_depth() {
+        use image::{ImageBuffer, LumaA, Rgb, Rgba};
+        // Rec. 601: (299 * 40 + 587 * 90 + 114 * 200) / 1000 = 87.59, and of 257 times that 22510.63.
+        let (eight, sixteen) = ([40u8, 90, 200], [40u16 * 257, 90 * 257, 200 * 257]);
+        let levels = |read: Grey| match read {
+            Grey::U8(read) => read.samples().iter().map(|&level| u32::from(level)).collect::<Vec<_>>(),
+            Grey::U16(read) => read.samples().iter().map(|&level| u32::from(level)).collect(),
+            Grey::F32(_) => panic!("a PNG has no floating-point levels"),
+        };
+        let with = |alpha: u8| [eight[0], eight[1], eight[2], alpha];
+        let deep_with = |alpha: u16| [sixteen[0], sixteen[1], sixteen[2], alpha];
+        let cases: [(DynamicImage, u32, bool); 6] = [
+            (ImageBuffer::from_fn(2, 1, |x, _| LumaA([70u8, 255 * x as u8])).into(), 70, false),
+            (ImageBuffer::from_fn(2, 1, |x, _| Rgba(with(255 * x as u8))).into(), 88, false),
+            (ImageBuffer::from_fn(2, 1, |_, _| Rgb(eight)).into(), 88, false),
+            (ImageBuffer::from_fn(2, 1, |x, _| LumaA([7000u16, 65535 * x as u16])).into(), 7000, true),
+            (ImageBuffer::from_fn(2, 1, |x, _| Rgba(deep_with(65535 * x as u16))).into(), 22511, true),
+            (ImageBuffer::from_fn(2, 1, |_, _| Rgb(sixteen)).into(), 22511, true),
+        ];
+        for (image, expected, deep) in cases {
+            let kind = image.color();
+            let read = parse_image(&file_of(image, image::ImageFormat::Png), "png").unwrap();
+            assert_eq!(matches!(read, Grey::U16(_)), deep, "{kind:?}");
+            assert_eq!(levels(read), [expected; 2], "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn floating_point_levels_stay_what_they_are() {
+        use image::{ImageBuffer, Rgb, Rgba};
+        let colour = [0.25f32, 0.5, 1.75];
+        let grey = 0.299 * colour[0] + 0.587 * colour[1] + 0.114 * colour[2];
+        let cases: [DynamicImage; 2] = [
+            ImageBuffer::from_fn(3, 2, |_, _| Rgb(colour)).into(),
+            ImageBuffer::from_fn(3, 2, |_, _| Rgba([colour[0], colour[1], colour[2], 0.0])).into(),
+        ];
+        for image in cases {
+            let kind = image.color();
+            let read = parse_image(&file_of(image, image::ImageFormat::Tiff), "tiff").unwrap();
+            assert_eq!(read, Grey::F32(Raster::from_fn(3, 2, |_, _| grey)), "{kind:?}");
+            // White is 1: brighter is white in 8 bits.
+            assert_eq!(read.to_u8().samples()[0], (255.0 * grey + 0.5) as u8, "{kind:?}");
+            assert_eq!(read.to_f32(), Raster::from_fn(3, 2, |_, _| grey), "{kind:?}");
         }
     }
 

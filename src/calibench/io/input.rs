@@ -1,5 +1,6 @@
 //! How much may come in? Regular files of a known length only: nothing blocks, and nothing grows without end.
 
+use super::shown::ShownPath;
 use std::fs::{File, Metadata};
 use std::io::{self, Read};
 use std::path::Path;
@@ -82,7 +83,7 @@ fn regular(path: &Path, seen: &Metadata) -> Result<(), InputError> {
         return Ok(());
     }
     let kind = if seen.is_dir() { "a folder" } else { "a pipe or a device" };
-    Err(InputError::NotRegular { path: path.display().to_string(), kind, hint: "" })
+    Err(InputError::NotRegular { path: path.shown(), kind, hint: "" })
 }
 
 /// Opens a regular file of at most `most` bytes, and tells its length. It is looked at before it is opened,
@@ -91,7 +92,7 @@ fn regular(path: &Path, seen: &Metadata) -> Result<(), InputError> {
 /// # Errors
 /// See [`InputError`].
 pub fn open_regular(path: &Path, most: u64) -> Result<(File, u64), InputError> {
-    let name = || path.display().to_string();
+    let name = || path.shown();
     let failed = |cause| InputError::Open { path: name(), cause };
     let seen = std::fs::metadata(path).map_err(failed)?;
     regular(path, &seen)?;
@@ -107,7 +108,7 @@ pub fn open_regular(path: &Path, most: u64) -> Result<(File, u64), InputError> {
 /// See [`InputError`]; a file that grows beyond the limit while it is read is too long as well.
 pub fn read_regular(path: &Path, most: u64) -> Result<Vec<u8>, InputError> {
     let (file, length) = open_regular(path, most)?;
-    read_at_most(file, &path.display().to_string(), length as usize, most)
+    read_at_most(file, &path.shown(), length as usize, most)
 }
 
 /// The text of a regular file.
@@ -116,7 +117,7 @@ pub fn read_regular(path: &Path, most: u64) -> Result<Vec<u8>, InputError> {
 /// See [`InputError`]; text that is not UTF-8 counts as unreadable.
 pub fn read_regular_text(path: &Path, most: u64) -> Result<String, InputError> {
     String::from_utf8(read_regular(path, most)?).map_err(|error| InputError::Open {
-        path: path.display().to_string(),
+        path: path.shown(),
         cause: io::Error::new(io::ErrorKind::InvalidData, error.utf8_error()),
     })
 }

@@ -2,6 +2,7 @@
 //! back when it is done with.
 
 use super::input::InputError;
+use super::shown::ShownPath;
 use std::path::Path;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
@@ -37,7 +38,7 @@ impl Memory {
     /// More is needed than there is in all.
     pub fn take(&self, path: &Path, bytes: u64) -> Result<Taken<'_>, InputError> {
         if bytes > self.most {
-            let path = path.display().to_string();
+            let path = path.shown();
             return Err(InputError::NeedsMemory { path, needed: bytes, most: self.most });
         }
         let mut free = self.free();

@@ -41,5 +41,5 @@ pub use overlay::{Colour, Overlay};
 pub use pairs::{PointPairs, parse_point_pairs, read_point_pairs};
 pub use provenance::Commit;
 pub use result::{CalibrationFields, LeftOut, ResultError, read_camera, read_lens_camera};
-pub use shown::shown;
+pub use shown::{ShownPath, shown};
 pub use table::TableError;

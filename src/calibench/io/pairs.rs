@@ -1,6 +1,6 @@
 //! Which pixel shows which world point? Point-pair files: `point,px,py,X,Y`, one line a pair.
 
-use super::table::{Row, TableError, open, read_table};
+use super::table::{Column, Row, TableError, open, read_table};
 use crate::geometry::Vec2;
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -16,6 +16,10 @@ pub struct PointPairs {
     /// World points.
     pub world: Vec<Vec2>,
 }
+
+/// The numbers of a line.
+const COLUMNS: [Column; 4] =
+    [Column::pixels("px"), Column::pixels("py"), Column::length("X"), Column::length("Y")];
 
 /// Reads a point-pair file.
 ///
@@ -42,8 +46,7 @@ pub fn read_point_pairs(path: &Path) -> Result<PointPairs, TableError> {
 pub fn parse_point_pairs(file: &str, input: impl Read) -> Result<PointPairs, TableError> {
     let mut pairs = PointPairs::default();
     let mut first_line = BTreeMap::new();
-    for Row { line, names: [point], numbers: [px, py, x, y] } in
-        read_table(file, input, ["point"], ["px", "py", "X", "Y"])?
+    for Row { line, names: [point], numbers: [px, py, x, y] } in read_table(file, input, ["point"], COLUMNS)?
     {
         if let Some(first) = first_line.insert(point.clone(), line) {
             let place = "of the list".to_string();

@@ -2,6 +2,7 @@
 //! is known of it.
 
 use super::input::{InputError, MOST_TABLE_BYTES, read_regular_text};
+use super::shown::ShownPath;
 use crate::calibrate::{
     BoardShape, Certificate, Compared, LensCalibration, Prior, ProfileInterval, Termination,
 };
@@ -413,7 +414,7 @@ pub enum ResultError {
 
 /// Reads the camera, and the image size if it is there, of a `result.json`.
 pub fn read_camera(path: &Path) -> Result<(Camera, Option<(usize, usize)>), ResultError> {
-    let file = path.display().to_string();
+    let file = path.shown();
     parse_camera(&file, &read_regular_text(path, MOST_TABLE_BYTES)?)
 }
 

@@ -1,6 +1,7 @@
 //! What stands in a table of numbers? CSV with named columns; every complaint carries file, line and column.
 
-use super::input::{InputError, MOST_TABLE_BYTES, read_regular};
+use super::input::{InputError, MOST_SIDE_PX, MOST_TABLE_BYTES, read_regular};
+use super::shown::{ShownPath, on_one_line};
 use crate::board::ViewError;
 use std::io::Read;
 
@@ -101,6 +102,24 @@ pub enum TableError {
         /// The field's text.
         text: String,
     },
+    /// A number with which nothing can be computed, or a pixel of no image.
+    #[error(
+        "{file}:{line}: column '{column}' (field {field}): '{text}' is beyond {most:e}, the most there may be"
+    )]
+    TooLarge {
+        /// The file.
+        file: String,
+        /// The line.
+        line: u64,
+        /// The column's name.
+        column: &'static str,
+        /// The column's position, from 1.
+        field: usize,
+        /// The field's text.
+        text: String,
+        /// Largest absolute value.
+        most: f64,
+    },
     /// A name (of a view or a point) is empty.
     #[error("{file}:{line}: column '{column}' (field {field}) is empty")]
     NoName {
@@ -139,6 +158,27 @@ pub enum TableError {
     },
 }
 
+/// A column of numbers.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Column {
+    name: &'static str,
+    /// Largest absolute value.
+    most: f64,
+}
+
+impl Column {
+    /// Pixels: a mark may lie outside of its image, but not beyond every image.
+    pub(super) const fn pixels(name: &'static str) -> Column {
+        Column { name, most: MOST_SIDE_PX as f64 }
+    }
+
+    /// Lengths in whatever unit. The eighth power of the largest, as fits of homographies form it, is still a
+    /// number.
+    pub(super) const fn length(name: &'static str) -> Column {
+        Column { name, most: 1e30 }
+    }
+}
+
 /// Lines below the header: 150 000 views of 63 points. Each takes some 200 bytes until its view is made.
 pub const MOST_ROWS: usize = 10_000_000;
 
@@ -155,19 +195,20 @@ pub(super) fn read_table<const NAMES: usize, const NUMBERS: usize>(
     file: &str,
     input: impl Read,
     names: [&'static str; NAMES],
-    numbers: [&'static str; NUMBERS],
+    numbers: [Column; NUMBERS],
 ) -> Result<Vec<Row<NAMES, NUMBERS>>, TableError> {
     let bytes = read_all(file, input)?;
     let mut lines = LineCounter { bytes: &bytes, counted_to: 0, line: 1 };
     let mut reader =
         csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(bytes.as_slice());
     let header = reader.headers().map_err(|e| unreadable(file, &mut lines, &e))?.clone();
-    let expected = || names.iter().chain(&numbers).copied().collect::<Vec<_>>().join(",");
+    let expected =
+        || names.into_iter().chain(numbers.map(|column| column.name)).collect::<Vec<_>>().join(",");
     if header.is_empty() {
         return Err(TableError::Empty { file: file.into(), expected: expected() });
     }
     let name_fields = find_columns(file, &header, names, &expected)?;
-    let number_fields = find_columns(file, &header, numbers, &expected)?;
+    let number_fields = find_columns(file, &header, numbers.map(|column| column.name), &expected)?;
     let mut rows = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|e| unreadable(file, &mut lines, &e))?;
@@ -253,7 +294,7 @@ fn find_columns<const N: usize>(
         *place = found.next().ok_or_else(|| TableError::MissingColumn {
             file: file.into(),
             column,
-            header: header.iter().collect::<Vec<_>>().join(","),
+            header: on_one_line(&header.iter().collect::<Vec<_>>().join(",")).into_owned(),
             expected: expected(),
         })?;
         if found.next().is_some() {
@@ -267,13 +308,17 @@ fn name(file: &str, line: u64, column: &'static str, field: usize, text: &str) -
     if text.is_empty() {
         return Err(TableError::NoName { file: file.into(), line, column, field: field + 1 });
     }
-    Ok(text.into())
+    Ok(on_one_line(text).into_owned())
 }
 
-fn number(file: &str, line: u64, column: &'static str, field: usize, text: &str) -> Result<f64, TableError> {
-    let (file, field, owned) = (file.to_string(), field + 1, text.to_string());
+fn number(file: &str, line: u64, column: Column, field: usize, text: &str) -> Result<f64, TableError> {
+    let Column { name: column, most } = column;
+    let (file, field, owned) = (file.to_string(), field + 1, on_one_line(text).into_owned());
     match text.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
+        Ok(value) if value.abs() <= most => Ok(value),
+        Ok(value) if value.is_finite() => {
+            Err(TableError::TooLarge { file, line, column, field, text: owned, most })
+        }
         Ok(_) => Err(TableError::NotFinite { file, line, column, field, text: owned }),
         Err(_) => Err(TableError::NotANumber { file, line, column, field, text: owned }),
     }
@@ -289,7 +334,21 @@ fn unreadable(file: &str, lines: &mut LineCounter<'_>, error: &csv::Error) -> Ta
 
 /// Name and bytes of a file for one of the readers.
 pub(super) fn open(path: &std::path::Path) -> Result<(String, Vec<u8>), TableError> {
-    Ok((path.display().to_string(), read_regular(path, MOST_TABLE_BYTES)?))
+    Ok((path.shown(), read_regular(path, MOST_TABLE_BYTES)?))
+}
+
+/// The number of the last line, if it has no end. Many programs write files so; a file that was cut off inside
+/// its last number looks the same, and its last number may be any.
+///
+/// ```
+/// use calibench::io::table::unended_line;
+///
+/// assert_eq!(unended_line(b"px,py\n1,2.5\n"), None);
+/// assert_eq!(unended_line(b"px,py\n1,2"), Some(2));
+/// ```
+pub fn unended_line(bytes: &[u8]) -> Option<u64> {
+    let ended = bytes.last().is_none_or(|byte| matches!(byte, b'\n' | b'\r'));
+    (!ended).then(|| 1 + bytes.iter().filter(|byte| **byte == b'\n').count() as u64)
 }
 
 /// The names of the columns; none where the first line cannot be read, of which the reader of the table says

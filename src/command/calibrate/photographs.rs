@@ -5,6 +5,7 @@ use super::camera::{self, Observed};
 use super::{Arguments, Exit, Failure, warn};
 use calibench::board::{View, ViewError};
 use calibench::geometry::Vec2;
+use calibench::io::ShownPath;
 use calibench::io::{Grey, ImageError, LeftOut, Memory, Overlay, image_extent, read_image};
 use calibench::photos::{BoardSpec, MarkKind, NotFound};
 use std::collections::BTreeMap;
@@ -143,7 +144,7 @@ fn observed(
         );
     }
     for (path, seen) in photos.iter().zip(seen) {
-        let name = path.display().to_string();
+        let name = path.shown();
         if let Some(overlay) = seen.as_ref().ok().and_then(|seen| seen.overlay.clone()) {
             observed.overlays.insert(name.clone(), overlay.map_err(Failure::unwritten)?);
         }

@@ -2,6 +2,7 @@
 
 use super::super::{Exit, print, warn};
 use super::{Arguments, Stop, incomplete, process, usage};
+use calibench::io::ShownPath;
 use calibench::io::input::MOST_SPEC_BYTES;
 use calibench::io::{read_regular_text, write_atomically};
 use calibench_gate::certified::{DigitsTable, ReferenceProblem, measure, read_with};
@@ -76,7 +77,7 @@ pub(super) fn write_table(arguments: &Arguments, path: &Path, build: &Build) -> 
 pub(super) fn print_table(path: &Path) -> Result<Exit, Stop> {
     let text = read_regular_text(path, MOST_SPEC_BYTES).map_err(usage)?;
     let table = DigitsTable::of_csv(&text)
-        .map_err(|e| usage(format!("{} is no table of digits: {e}", path.display())))?;
+        .map_err(|e| usage(format!("{} is no table of digits: {e}", path.shown())))?;
     print(&table.to_markdown());
     Ok(Exit::Held)
 }

@@ -1,12 +1,44 @@
 //! `calibench gate --against`: two solvers on the same problems.
 
-use super::{Arguments, Stop, incomplete, of_files, process, terms};
+use super::{Arguments, Stop, incomplete, of_files, process, terms, usage};
 use crate::{Exit, print};
-use calibench::io::write_atomically;
+use calibench::io::{ShownPath, write_atomically};
 use calibench_gate::paired::{self, Paired};
 use calibench_gate::{Builtin, Plan, Report, Solver, files};
 use calibench_harness::ProgressDisplay;
 use std::path::Path;
+
+/// Characters of which the names of folders and programs are made; a command of the shell has others.
+const OF_NAMES: &str = "-_.+/";
+
+/// Refuses a folder that holds no recorded run, and a name of which there is neither a folder nor a program:
+/// as a command it would only say that it is not found.
+fn refuse_what_is_not_there(reference: &str) -> Result<(), Stop> {
+    let path = Path::new(reference);
+    if path.is_dir() {
+        return Err(usage(format!(
+            "{} holds no manifest.json: a reference is a folder that `calibench gate --record` wrote, a program, or builtin",
+            path.shown()
+        )));
+    }
+    let is_a_name = reference.chars().all(|c| c.is_alphanumeric() || OF_NAMES.contains(c));
+    let by_the_shell = |folder: &Path| folder.join(reference).is_file();
+    // Windows completes names.
+    let on_path = || {
+        cfg!(windows)
+            || std::env::var_os("PATH")
+                .is_some_and(|all| std::env::split_paths(&all).any(|f| by_the_shell(&f)))
+    };
+    let there = path.exists() || (!reference.contains('/') && on_path());
+    if is_a_name && !there {
+        return Err(usage(format!(
+            "{} is neither there as a folder nor as a program: a reference is a folder that `calibench gate --record` wrote, a \
+             program, or builtin",
+            path.shown()
+        )));
+    }
+    Ok(())
+}
 
 pub(super) fn run(
     arguments: &Arguments,
@@ -20,7 +52,10 @@ pub(super) fn run(
             let (plan, answers) = files::recorded(Path::new(folder)).map_err(of_files)?;
             (plan, Box::new(answers))
         }
-        command => (Plan::new(arguments.seed, samples).map_err(incomplete)?, process(arguments, command)?),
+        command => {
+            refuse_what_is_not_there(command)?;
+            (Plan::new(arguments.seed, samples).map_err(incomplete)?, process(arguments, command)?)
+        }
     };
     let ask = |solver: &dyn Solver| {
         let progress = ProgressDisplay::stderr().start("gate", plan.cases.len());

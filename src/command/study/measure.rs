@@ -2,6 +2,7 @@
 
 use super::{Failure, read};
 use crate::{Exit, print};
+use calibench::io::ShownPath;
 use calibench_harness::resources::{peak_memory_mib, processor_seconds};
 use calibench_harness::stopwatch::{Stopwatch, rate};
 use calibench_study::{RunError, Spec, in_memory};
@@ -19,7 +20,7 @@ pub(crate) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
     let text = read(&arguments.spec)?;
     let mut spec =
-        Spec::parse(&text).map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.display())))?;
+        Spec::parse(&text).map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.shown())))?;
     spec.trials.precision = None;
     let threads = rayon::current_num_threads();
     for trials in [arguments.trials.max(2), arguments.trials.max(2).saturating_mul(4)] {

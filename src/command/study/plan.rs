@@ -2,6 +2,7 @@
 
 use super::{Failure, read};
 use crate::{Exit, print};
+use calibench::io::ShownPath;
 use calibench::io::significant;
 use calibench_harness::ProgressDisplay;
 use calibench_study::plan::{Design, Goal, PlanError, Search, choose, confirm, search};
@@ -53,7 +54,7 @@ impl From<PlanError> for Failure {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
     let mut spec = Spec::parse(&read(&arguments.spec)?)
-        .map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.display())))?;
+        .map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.shown())))?;
     if let Some(length) = length(arguments)? {
         spec.scene.length = Some(length);
     }

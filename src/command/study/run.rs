@@ -2,13 +2,14 @@
 
 use super::{Failure, read};
 use crate::{Exit, print, warn};
+use calibench::io::ShownPath;
 use calibench::io::significant;
 use calibench_harness::project::Project;
 use calibench_harness::stopwatch::{Stopwatch, rate};
 use calibench_harness::{Build, ProgressDisplay};
 use calibench_study::{
-    Engine, Folder, FolderError, Interruption, Manifest, Outcome, RunError, Shard, Summary, TrialFile, Worst,
-    finish, merge,
+    CellSummary, Engine, Folder, FolderError, Interruption, Manifest, Outcome, RunError, Shard, Summary,
+    TrialFile, Worst, finish, merge,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -52,7 +53,7 @@ pub(super) fn run(arguments: &Arguments, build: &Build) -> Result<Exit, Failure>
     arguments.trials.check().map_err(FolderError::from)?;
     let text = read(&arguments.spec)?;
     let engine = Engine::new(&text, arguments.shard)
-        .map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.display())))?;
+        .map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.shown())))?;
     let out = arguments.out.clone().unwrap_or_else(|| default_folder(&engine));
     let manifest = Manifest::new(&engine.spec, arguments.shard, build);
     let manifest = manifest.with_trials(arguments.trials);
@@ -73,7 +74,24 @@ pub(super) fn merge_parts(arguments: &MergeArguments, build: &Build) -> Result<E
     let (folder, engine) = merge(&arguments.parts, &arguments.out, arguments.trials, build)?;
     let summary = finish(&folder, &engine)?;
     print_summary(&folder, &engine, &summary);
-    Ok(Exit::Held)
+    Ok(judged(&engine, &summary))
+}
+
+/// A study of which no trial converged has run to its end and measured nothing. One part may hold nothing but
+/// cells of which that is expected.
+fn judged(engine: &Engine, summary: &Summary) -> Exit {
+    let converged = |cell: &CellSummary| cell.converged().is_some_and(|share| share.value > 0.0);
+    if engine.trials() == 0 || summary.cells.iter().any(converged) {
+        return Exit::Held;
+    }
+    let whole = engine.shard == Shard::WHOLE;
+    warn(&format!(
+        "NOTHING MEASURED: not one of the {} trials {} converged; outcomes.csv counts the reasons. More tilt or views, or fewer free \
+         parameters, determine a camera",
+        engine.trials(),
+        if whole { "of this study" } else { "of this part" },
+    ));
+    if whole { Exit::Deviates } else { Exit::Held }
 }
 
 /// Beside the other results of the source tree, or in the current folder.
@@ -119,7 +137,7 @@ fn drive(folder: &Folder, mut engine: Engine) -> Result<Exit, Failure> {
     drop(progress);
     let took = watch.elapsed();
     if outcome == Outcome::Interrupted {
-        let path = folder.path().display();
+        let path = folder.path().shown();
         warn(&format!(
             "interrupted after {} trials; continue with: calibench study resume {path}",
             engine.trials()
@@ -133,7 +151,7 @@ fn drive(folder: &Folder, mut engine: Engine) -> Result<Exit, Failure> {
         let (seconds, cores) = (took.as_secs_f64(), rayon::current_num_threads());
         print(&format!("{trials} trials in {seconds:.1} s{rate} on {cores} thread(s)\n"));
     }
-    Ok(Exit::Held)
+    Ok(judged(&engine, &summary))
 }
 
 /// `worst: sd(fx) +-8.2 % at tilt = 40`.
@@ -183,5 +201,5 @@ fn print_summary(folder: &Folder, engine: &Engine, summary: &Summary) {
         }
     }
     let report: &Path = &folder.file("report.html");
-    print(&format!("{} trials; written: {}\n", engine.trials(), report.display()));
+    print(&format!("{} trials; written: {}\n", engine.trials(), report.shown()));
 }
