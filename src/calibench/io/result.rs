@@ -420,7 +420,7 @@ pub fn read_camera(path: &Path) -> Result<(Camera, Option<(usize, usize)>), Resu
 
 /// As [`read_camera`], of any lens model.
 pub fn read_lens_camera(path: &Path) -> Result<(Camera<Lens>, Option<(usize, usize)>), ResultError> {
-    let file = path.display().to_string();
+    let file = path.shown();
     parse_lens_camera(&file, &read_regular_text(path, MOST_TABLE_BYTES)?)
 }
 
