@@ -8,14 +8,23 @@ use super::record::{Number, Record};
 
 /// A group of numbers, begun by [`Record::group`] or [`Record::exact`].
 ///
-/// ```text
+/// ```
+/// use calibench_harness::{Band, Record};
+///
+/// let mut record = Record::new("noise", 1);
 /// record
 ///     .exact("px")
-///     .number("sigma", SIGMA_PX, "standard deviation of the noise")
-///     .rounds_to_printed()
+///     .number("sigma", 0.1, "standard deviation of the noise")
 ///     .unit("")
-///     .count("trials", TRIALS, "trials of the Monte Carlo");
+///     .count("trials", 2000, "trials of the Monte Carlo")
+///     .group("px", Band::relative(1e-6, "where the refinement ends"))
+///     .number("rmse", 0.1371, "reprojection RMSE per point");
+/// let units: Vec<&str> = record.numbers().iter().map(|number| number.unit.as_str()).collect();
+/// assert_eq!(units, ["px", "", "px"]);
 /// ```
+///
+/// A number of an experiment that the chapter prints is held against it by the word behind it, such as
+/// [`rounds_to_printed`](Numbers::rounds_to_printed).
 #[derive(Debug)]
 pub struct Numbers<'a> {
     record: &'a mut Record,

@@ -88,6 +88,20 @@ impl Layer {
 }
 
 /// A plot. Every call adds one layer; series look different from one another unless a [`Look`] is given.
+///
+/// ```
+/// use calibench_harness::{Figure, Look, Plot};
+///
+/// let measured = [(1.0, 0.52), (2.0, 0.27), (4.0, 0.12)];
+/// let law: Vec<(f64, f64)> = measured.iter().map(|(n, _)| (*n, 0.5 / n)).collect();
+/// let plot = Plot::new("Spread against views", "views", "sd (px)")
+///     .log_x()
+///     .log_y()
+///     .line_as("1/n", &law, Look::ink())
+///     .points("measured", &measured);
+/// let figure = Figure::plot("spread", &plot, "Three sets of views; notice the slope.");
+/// assert_eq!(figure.file_name(), "spread.svg");
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plot {
     pub(super) title: String,
