@@ -75,6 +75,18 @@ struct Outcome {
     bound_px: f64,
 }
 
+impl Outcome {
+    /// Root mean square of a coordinate's error, px.
+    fn noise_px(&self) -> f64 {
+        rms_coordinate(&self.errors)
+    }
+
+    /// The same over its bound.
+    fn loss(&self) -> f64 {
+        self.noise_px() / self.bound_px
+    }
+}
+
 /// Noise-free photographs of one dot size, with what follows from them.
 struct Exact {
     diameter_mm: f64,
@@ -109,7 +121,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
         "{CHAPTER_NOISE_PX} px is not what a sensor makes of dots like these: noise of {} % of full scale \
          gives {:.1} % of it. What print, flatness and uneven sharpness add is not rendered here.",
         100.0 * BASE.noise,
-        100.0 * rms_coordinate(&base(&outcomes)?.errors) / CHAPTER_NOISE_PX
+        100.0 * base(&outcomes)?.noise_px() / CHAPTER_NOISE_PX
     ));
     let photo = &album.photos(&BASE)[3];
     let caption = format!(
@@ -312,11 +324,11 @@ fn band() -> Band {
 
 fn report_noise(record: &mut Record, outcomes: &[Outcome]) -> Result<(), ExperimentError> {
     let base = base(outcomes)?;
-    let noise = rms_coordinate(&base.errors);
+    let noise = base.noise_px();
     let needed = CHAPTER_NOISE_PX / base.bound_px * BASE.noise;
     let blurred = outcomes.iter().max_by(|a, b| a.node.blur_px.total_cmp(&b.node.blur_px)).unwrap_or(base);
-    let ratio = rms_coordinate(&blurred.errors) / blurred.bound_px;
-    let worst = outcomes.iter().map(|o| rms_coordinate(&o.errors)).fold(0.0, f64::max);
+    let ratio = blurred.loss();
+    let worst = stats::largest(outcomes.iter().map(Outcome::noise_px));
     record
         .group("px", band())
         .number("extraction-noise", noise, "RMS of a coordinate: blur 0.5 px, noise 1 %, dots of 3 mm")
@@ -345,10 +357,11 @@ fn report_bias(record: &mut Record, exact: &[Exact], unit: &[f64]) -> Result<(),
     let (before, after) =
         (differences(&chapter.uncorrected.camera, &truth), differences(&chapter.corrected.camera, &truth));
     for (i, p) in FreeParameters::STANDARD.iter().enumerate() {
-        let what = format!("error of {p} from uncorrected centres, 3 mm dots");
-        record.group(p.unit(), band()).number(format!("{p}-uncorrected"), before[i], what);
-        let what = format!("error of {p} from corrected centres, 3 mm dots");
-        record.group(p.unit(), band()).number(format!("{p}-corrected"), after[i], what);
+        let what = |centres: &str| format!("error of {p} from {centres} centres, 3 mm dots");
+        record
+            .group(p.unit(), band())
+            .number(format!("{p}-uncorrected"), before[i], what("uncorrected"))
+            .number(format!("{p}-corrected"), after[i], what("corrected"));
     }
     let worst = largest_deviation(&before, unit);
     let what =
@@ -369,7 +382,7 @@ fn claim_noise(record: &mut Record, outcomes: &[Outcome]) {
     let (low, high) = (chance.low * (1.0 - BOUND_ERROR), chance.high * (1.0 + BOUND_ERROR) * LOSS);
     let sharp = outcomes.iter().filter(|o| o.node.blur_px <= SHARP_PX);
     let cases = sharp.map(|o| {
-        let ratio = rms_coordinate(&o.errors) / o.bound_px;
+        let ratio = o.loss();
         (format!("{}: {ratio:.3} of the bound", name(&o.node)), (low..=high).contains(&ratio))
     });
     let reason = format!(
@@ -383,7 +396,7 @@ fn claim_noise(record: &mut Record, outcomes: &[Outcome]) {
         .every("cases", cases)
         .at_rate(FALSE_ALARM)
         .because(reason);
-    let worst = outcomes.iter().map(|o| rms_coordinate(&o.errors)).fold(0.0, f64::max);
+    let worst = stats::largest(outcomes.iter().map(Outcome::noise_px));
     let statement = "no blur, noise and dot size of the sweeps makes the chapter's 0.1 px";
     let reason = "the largest bound of the sweeps, widened as above, is below it";
     record
@@ -420,7 +433,7 @@ fn noise_table(outcomes: &[Outcome]) -> Rows<&Outcome> {
         .column("blur", "px", |o| o.node.blur_px)
         .column("noise", "", |o| o.node.noise)
         .column("diameter", "mm", |o| o.node.diameter_mm)
-        .column("extraction_noise", "px", |o| rms_coordinate(&o.errors))
+        .column("extraction_noise", "px", |o| o.noise_px())
         .column("bound", "px", |o| o.bound_px)
 }
 
@@ -446,13 +459,11 @@ fn noise_figure(outcomes: &[Outcome], seed: u64) -> Figure {
     let panel = |title: &str, label: &str, at: fn(&Node) -> f64, others: fn(&Node) -> Node| {
         let mut chosen: Vec<&Outcome> = outcomes.iter().filter(|o| others(&o.node) == BASE).collect();
         chosen.sort_by(|a, b| at(&a.node).total_cmp(&at(&b.node)));
-        let curve = |value: &dyn Fn(&Outcome) -> f64| -> Vec<(f64, f64)> {
-            chosen.iter().map(|o| (at(&o.node), value(o))).collect()
-        };
+        let curve = |value: fn(&Outcome) -> f64| chosen.iter().map(move |o| (at(&o.node), value(o)));
         Plot::new(title, label, "noise of a coordinate (px)")
             .size(400.0, 340.0)
-            .line("bound of the edges", &curve(&|o| o.bound_px))
-            .points_as("detected", &curve(&|o| rms_coordinate(&o.errors)), Look::series(1))
+            .line("bound of the edges", curve(|o| o.bound_px))
+            .points_as("detected", curve(Outcome::noise_px), Look::series(1))
             .y_range(0.0, 0.025)
     };
     let panels = [
@@ -465,11 +476,10 @@ fn noise_figure(outcomes: &[Outcome], seed: u64) -> Figure {
             |n| Node { diameter_mm: BASE.diameter_mm, ..*n },
         ),
     ];
-    let loss = |o: &Outcome| rms_coordinate(&o.errors) / o.bound_px;
     let worst_loss = |chosen: &dyn Fn(&Node) -> bool| {
-        stats::largest(outcomes.iter().filter(|o| chosen(&o.node)).map(loss))
+        stats::largest(outcomes.iter().filter(|o| chosen(&o.node)).map(Outcome::loss))
     };
-    let largest_px = stats::largest(outcomes.iter().map(|o| rms_coordinate(&o.errors)));
+    let largest_px = stats::largest(outcomes.iter().map(Outcome::noise_px));
     let caption = format!(
         "Extraction noise of a coordinate, px, over the {} dots of the chapter's four poses, each node one \
          photograph a pose, seed {seed}; the sweeps cross at blur {} px, noise {} % of full scale, dots of \
@@ -492,22 +502,19 @@ fn bias_figure(exact: &[Exact], unit: &[f64]) -> Figure {
     let curve = |value: &dyn Fn(&Exact) -> f64| -> Vec<(f64, f64)> {
         exact.iter().map(|e| (e.diameter_mm, value(e))).collect()
     };
+    let worst = |camera: &Camera| largest_deviation(&differences(camera, &truth), unit);
     let pixels = Plot::new("centres", "diameter (mm)", "RMS distance from the truth (px)")
         .size(480.0, 360.0)
         .log_y()
-        .line("uncorrected", &curve(&|e| rms(&e.displacements)))
-        .points("predicted bias", &curve(&|e| rms(&e.biases)))
-        .line("corrected", &curve(&|e| rms(&e.remainder())));
+        .line("uncorrected", curve(&|e| rms(&e.displacements)))
+        .points("predicted bias", curve(&|e| rms(&e.biases)))
+        .line("corrected", curve(&|e| rms(&e.remainder())));
     let cameras = Plot::new("camera", "diameter (mm)", "worst error (sd at 0.1 px)")
         .size(480.0, 360.0)
         .log_y()
-        .line(
-            "uncorrected",
-            &curve(&|e| largest_deviation(&differences(&e.uncorrected.camera, &truth), unit)),
-        )
-        .points("predicted", &curve(&|e| largest_deviation(&differences(&e.predicted.camera, &truth), unit)))
-        .line("corrected", &curve(&|e| largest_deviation(&differences(&e.corrected.camera, &truth), unit)));
-    let worst = |camera: &Camera| largest_deviation(&differences(camera, &truth), unit);
+        .line("uncorrected", curve(&|e| worst(&e.uncorrected.camera)))
+        .points("predicted", curve(&|e| worst(&e.predicted.camera)))
+        .line("corrected", curve(&|e| worst(&e.corrected.camera)));
     let last = &exact[exact.len() - 1];
     let caption = format!(
         "Left: RMS distance of detected centres from the true ones, px. Right: error of the worst of the \
