@@ -61,7 +61,7 @@ const COVERAGE: f64 = 0.95;
 const ARROW_SCALE: f64 = 150.0;
 /// Draws that show how much the residuals of neighbours correlate by chance.
 const PATTERN_TRIALS: usize = 200;
-/// Dots of the clouds: enough to show a shape.
+/// Trials that the clouds show: enough for a shape.
 const CLOUD: usize = 600;
 
 fn run(context: &Context) -> Result<Record, ExperimentError> {

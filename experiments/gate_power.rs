@@ -133,7 +133,7 @@ fn thorough(record: &mut Record) -> Result<(), ExperimentError> {
         record.exact("").count("quick-runs", row.seeds, what);
     }
     for textbook in &measured.misled {
-        let draws = "draws of that scene on which the textbook's error bars were measured";
+        let draws = "samples of that scenario on which the textbook's error bars were measured";
         let rate = textbook.misled as f64 / textbook.draws as f64;
         record
             .exact("")

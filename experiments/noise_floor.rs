@@ -87,30 +87,30 @@ struct Watched {
 }
 
 /// A cell of it, with the predicted distribution of its RMSE.
-struct Node<'a> {
-    cell: Swept<'a>,
+struct Cell<'a> {
+    swept: Swept<'a>,
     theory: RmseDistribution,
     alarms: u64,
 }
 
 impl Watched {
-    fn nodes(&self) -> Vec<Node<'_>> {
+    fn cells(&self) -> Vec<Cell<'_>> {
         let cells = self.sweep.cells().zip(&self.alarms);
-        cells.map(|(cell, &alarms)| Node { cell, theory: predicted(cell.design), alarms }).collect()
+        cells.map(|(swept, &alarms)| Cell { swept, theory: predicted(swept.design), alarms }).collect()
     }
 }
 
-impl Node<'_> {
+impl Cell<'_> {
     fn trials(&self) -> u64 {
-        self.cell.found.trials
+        self.swept.found.trials
     }
 
     fn name(&self) -> &str {
-        &self.cell.found.name
+        &self.swept.found.name
     }
 
     fn id(&self) -> String {
-        self.cell.found.labels.join("-")
+        self.swept.found.labels.join("-")
     }
 
     fn alarm_share(&self) -> f64 {
@@ -125,15 +125,15 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     let overstated = sweep(context, &mut record, "overstated", OVERSTATED, Some(0.1))?;
 
     for (name, watched) in [("grid", &grid), ("marks", &marks)] {
-        claim_mean(&mut record, name, &watched.nodes());
-        report_means(&mut record, name, &watched.nodes());
+        claim_mean(&mut record, name, &watched.cells());
+        report_means(&mut record, name, &watched.cells());
     }
-    claim_alarm_rate(&mut record, &grid.nodes());
-    claim_power(&mut record, &overstated.nodes());
-    claim_overfitting(&mut record, &marks.nodes());
-    record.table(table("rmse-noise-views", grid.nodes()));
-    record.table(table("rmse-marks", marks.nodes()));
-    record.table(table("rmse-overstated", overstated.nodes()));
+    claim_alarm_rate(&mut record, &grid.cells());
+    claim_power(&mut record, &overstated.cells());
+    claim_overfitting(&mut record, &marks.cells());
+    record.table(table("rmse-noise-views", grid.cells()));
+    record.table(table("rmse-marks", marks.cells()));
+    record.table(table("rmse-overstated", overstated.cells()));
     record.figure(floor_figure(&grid));
     record.figure(overfitting_figure(&marks));
     record.figure(alarm_figure());
@@ -176,15 +176,15 @@ fn predicted(cell: &Design) -> RmseDistribution {
 }
 
 /// The mean of T values of the predicted distribution.
-fn claim_mean(record: &mut Record, name: &str, nodes: &[Node]) {
-    let each = each_of(nodes.len(), FALSE_ALARM);
-    let cases = nodes.iter().map(|node| {
-        let (mean, theory) = (node.cell.mean("rmse"), &node.theory);
+fn claim_mean(record: &mut Record, name: &str, cells: &[Cell]) {
+    let each = each_of(cells.len(), FALSE_ALARM);
+    let cases = cells.iter().map(|cell| {
+        let (mean, theory) = (cell.swept.mean("rmse"), &cell.theory);
         let (expected, sd) = (theory.mean_px(), theory.standard_deviation_px());
-        let interval = Interval::of_mean(expected, sd, node.trials() as usize, each);
+        let interval = Interval::of_mean(expected, sd, cell.trials() as usize, each);
         let slack = NONLINEARITY * expected;
         let held = (interval.low - slack..=interval.high + slack).contains(&mean);
-        (format!("{}: {mean:.6} px, expected {expected:.6}", node.name()), held)
+        (format!("{}: {mean:.6} px, expected {expected:.6}", cell.name()), held)
     });
     record
         .claim_that(
@@ -199,17 +199,17 @@ fn claim_mean(record: &mut Record, name: &str, nodes: &[Node]) {
         );
 }
 
-fn report_means(record: &mut Record, name: &str, nodes: &[Node]) {
-    for node in nodes {
-        let over = node.cell.mean("rmse") / node.theory.noise_floor_px();
-        let what = format!("mean RMSE over sqrt(2) sigma, {}", node.name());
-        record.group("", solver_band()).number(format!("mean-over-floor-{name}-{}", node.id()), over, what);
+fn report_means(record: &mut Record, name: &str, cells: &[Cell]) {
+    for cell in cells {
+        let over = cell.swept.mean("rmse") / cell.theory.noise_floor_px();
+        let what = format!("mean RMSE over sqrt(2) sigma, {}", cell.name());
+        record.group("", solver_band()).number(format!("mean-over-floor-{name}-{}", cell.id()), over, what);
     }
 }
 
-fn claim_alarm_rate(record: &mut Record, nodes: &[Node]) {
-    let trials: u64 = nodes.iter().map(Node::trials).sum();
-    let alarms: u64 = nodes.iter().map(|node| node.alarms).sum();
+fn claim_alarm_rate(record: &mut Record, cells: &[Cell]) {
+    let trials: u64 = cells.iter().map(Cell::trials).sum();
+    let alarms: u64 = cells.iter().map(|cell| cell.alarms).sum();
     let share = alarms as f64 / trials as f64;
     let band = Band::absolute(1.5 / trials as f64, "one trial that changes sides by a rounding");
     record.group("", band).number(
@@ -229,21 +229,21 @@ fn claim_alarm_rate(record: &mut Record, nodes: &[Node]) {
 }
 
 /// Where the noise is overstated, RMSE falls under the threshold as often as theory says.
-fn claim_power(record: &mut Record, nodes: &[Node]) {
-    let each = each_of(nodes.len(), FALSE_ALARM);
-    for node in nodes {
+fn claim_power(record: &mut Record, cells: &[Cell]) {
+    let each = each_of(cells.len(), FALSE_ALARM);
+    for cell in cells {
         let what = "share of alarms where 0.1 px is assumed and the truth is";
-        record.group("", node.cell.share_band()).number(
-            format!("alarm-share-{}", node.id()),
-            node.alarm_share(),
-            format!("{what} {} px", node.cell.design.noise_px()),
+        record.group("", cell.swept.share_band()).number(
+            format!("alarm-share-{}", cell.id()),
+            cell.alarm_share(),
+            format!("{what} {} px", cell.swept.design.noise_px()),
         );
     }
-    let cases = nodes.iter().map(|node| {
-        let threshold = RmseDistribution { sigma_px: 0.1, ..node.theory }.quantile_px(ALARM_RATE);
-        let power = node.theory.cdf(threshold);
-        let interval = Interval::of_proportion(node.alarms as usize, node.trials() as usize, each);
-        let (name, alarms, trials) = (node.name(), node.alarms, node.trials());
+    let cases = cells.iter().map(|cell| {
+        let threshold = RmseDistribution { sigma_px: 0.1, ..cell.theory }.quantile_px(ALARM_RATE);
+        let power = cell.theory.cdf(threshold);
+        let interval = Interval::of_proportion(cell.alarms as usize, cell.trials() as usize, each);
+        let (name, alarms, trials) = (cell.name(), cell.alarms, cell.trials());
         (format!("{name}: {alarms} alarms of {trials}, expected share {power:.4}"), interval.contains(power))
     });
     record
@@ -257,8 +257,8 @@ fn claim_power(record: &mut Record, nodes: &[Node]) {
 }
 
 /// Fewer marks: a smaller RMSE and a larger error.
-fn claim_overfitting(record: &mut Record, nodes: &[Node]) {
-    let (few, many) = (nodes[0].cell, nodes[nodes.len() - 1].cell);
+fn claim_overfitting(record: &mut Record, cells: &[Cell]) {
+    let (few, many) = (cells[0].swept, cells[cells.len() - 1].swept);
     let apart = |low: Option<Estimated>, high: Option<Estimated>| {
         low.zip(high).is_some_and(|(low, high)| low.high < high.low)
     };
@@ -284,42 +284,42 @@ fn claim_overfitting(record: &mut Record, nodes: &[Node]) {
         );
 }
 
-fn table<'a>(name: &str, nodes: Vec<Node<'a>>) -> Rows<Node<'a>> {
-    Table::of(name, "RMSE against its predicted distribution", nodes)
-        .column("levels", "", |node| node.name().to_string())
-        .column("points", "", |node| node.theory.points)
-        .column("parameters", "", |node| node.theory.parameters)
-        .column("rmse_mean", "px", |node| node.cell.mean("rmse"))
-        .column("rmse_predicted", "px", |node| node.theory.mean_px())
-        .column("rmse_sd", "px", |node| node.cell.sd("rmse"))
-        .column("rmse_sd_predicted", "px", |node| node.theory.standard_deviation_px())
-        .column("noise_floor", "px", |node| node.theory.noise_floor_px())
-        .column("alarm_share", "", Node::alarm_share)
+fn table<'a>(name: &str, cells: Vec<Cell<'a>>) -> Rows<Cell<'a>> {
+    Table::of(name, "RMSE against its predicted distribution", cells)
+        .column("levels", "", |cell| cell.name().to_string())
+        .column("points", "", |cell| cell.theory.points)
+        .column("parameters", "", |cell| cell.theory.parameters)
+        .column("rmse_mean", "px", |cell| cell.swept.mean("rmse"))
+        .column("rmse_predicted", "px", |cell| cell.theory.mean_px())
+        .column("rmse_sd", "px", |cell| cell.swept.sd("rmse"))
+        .column("rmse_sd_predicted", "px", |cell| cell.theory.standard_deviation_px())
+        .column("noise_floor", "px", |cell| cell.theory.noise_floor_px())
+        .column("alarm_share", "", Cell::alarm_share)
 }
 
 fn floor_figure(grid: &Watched) -> Figure {
-    let (nodes, factor) = (grid.nodes(), &grid.sweep.spec().factor[1]);
+    let (cells, factor) = (grid.cells(), &grid.sweep.spec().factor[1]);
     let views = factor.levels.len();
-    let over_floor = |node: &Node, value: f64| value / node.theory.noise_floor_px();
-    let predicted_factor = |node: &Node| over_floor(node, node.theory.mean_px());
+    let over_floor = |cell: &Cell, value: f64| value / cell.theory.noise_floor_px();
+    let predicted_factor = |cell: &Cell| over_floor(cell, cell.theory.mean_px());
     // Over the noises: how far the means of each number of views lie apart, and how wide their intervals are.
     let (mut apart, mut widths) = (Vec::new(), Vec::new());
     let mut plot =
         Plot::new("RMSE over the noise floor", "noise sigma (px)", "mean RMSE / (\u{221a}2 sigma)").log_x();
     for v in 0..views {
-        let of_views = || nodes.iter().skip(v).step_by(views);
+        let of_views = || cells.iter().skip(v).step_by(views);
         // Side by side, so that bars do not cover each other.
-        let noise = |node: &Node| node.theory.sigma_px * (0.94 + 0.04 * v as f64);
-        let mean = |node: &Node| {
-            let mean = node.cell.mean_interval("rmse")?;
-            let [value, low, high] = [mean.value, mean.low, mean.high].map(|px| over_floor(node, px));
-            Some((noise(node), value, low, high))
+        let noise = |cell: &Cell| cell.theory.sigma_px * (0.94 + 0.04 * v as f64);
+        let mean = |cell: &Cell| {
+            let mean = cell.swept.mean_interval("rmse")?;
+            let [value, low, high] = [mean.value, mean.low, mean.high].map(|px| over_floor(cell, px));
+            Some((noise(cell), value, low, high))
         };
         let means: Vec<_> = of_views().filter_map(mean).collect();
         let values = || means.iter().map(|mean| mean.1);
         apart.push(stats::largest(values()) - stats::smallest(values()));
         widths.extend(means.iter().map(|(.., low, high)| high - low));
-        let theory = of_views().map(|node| (noise(node), predicted_factor(node)));
+        let theory = of_views().map(|cell| (noise(cell), predicted_factor(cell)));
         let label = format!("{} views", factor.label(v));
         plot = plot.line_as("", theory, Look::series(v)).measured_as(label, means, Look::series(v));
     }
@@ -332,9 +332,9 @@ fn floor_figure(grid: &Watched) -> Figure {
          differs by {:.4} at most, where the intervals are up to {:.4} wide.",
         grid.sweep.trials(),
         grid.sweep.spec().seed,
-        predicted_factor(&nodes[0]),
+        predicted_factor(&cells[0]),
         factor.label(0),
-        predicted_factor(&nodes[views - 1]),
+        predicted_factor(&cells[views - 1]),
         factor.label(views - 1),
         stats::largest(apart),
         stats::largest(widths)
@@ -343,14 +343,14 @@ fn floor_figure(grid: &Watched) -> Figure {
 }
 
 fn overfitting_figure(marks: &Watched) -> Figure {
-    let nodes = marks.nodes();
-    let share = |node: &Node| node.theory.parameters as f64 / (2 * node.theory.points) as f64;
-    let floor = nodes[0].theory.noise_floor_px();
+    let cells = marks.cells();
+    let share = |cell: &Cell| cell.theory.parameters as f64 / (2 * cell.theory.points) as f64;
+    let floor = cells[0].theory.noise_floor_px();
     let curve = (0..=90).map(|i| 0.005 * f64::from(i)).map(|x| (x, floor * (1.0 - x).sqrt()));
     let measured = |of: &dyn Fn(&Swept) -> Option<Estimated>| -> Vec<_> {
-        nodes.iter().filter_map(|node| Some(at(share(node), of(&node.cell)?))).collect()
+        cells.iter().filter_map(|cell| Some(at(share(cell), of(&cell.swept)?))).collect()
     };
-    let bound = nodes.iter().map(|node| (share(node), node.cell.bound("fx")));
+    let bound = cells.iter().map(|cell| (share(cell), cell.swept.bound("fx")));
     let panels = [
         Plot::new("RMSE", "parameters per measurement p / 2N", "mean RMSE (px)")
             .size(420.0, 340.0)
@@ -371,8 +371,8 @@ fn overfitting_figure(marks: &Watched) -> Figure {
         targets.join(", "),
         marks.sweep.trials(),
         marks.sweep.spec().seed,
-        nodes[0].cell.mean("rmse") / floor,
-        nodes[0].cell.sd("fx") / nodes[nodes.len() - 1].cell.sd("fx")
+        cells[0].swept.mean("rmse") / floor,
+        cells[0].swept.sd("fx") / cells[cells.len() - 1].swept.sd("fx")
     );
     Figure::panels("overfitting", &panels, 2, caption)
 }

@@ -1,12 +1,12 @@
-//! How well do photographs of dots give their centres and a camera, and is the chapter's noise of 0.1 px
+//! How well do photographs of discs give their centres and a camera, and is the chapter's noise of 0.1 px
 //! realistic?
 //!
-//! Expected: image noise moves centres by little more than the information in the dots' edges allows, a few
+//! Expected: image noise moves centres by little more than the information in the discs' edges allows, a few
 //! thousandths of a pixel, far below 0.1 px. Without correction, the bias of imaged discs (the centre of the
 //! ellipse is not the image of the centre) is as large as that noise or larger, and it does not average out,
 //! though the poses take up most of it; with correction the camera is exact up to what the detector leaves.
 //!
-//! What it cannot show: lenses that are not sharp alike over the frame, dots that are printed out of place,
+//! What it cannot show: lenses that are not sharp alike over the frame, discs that are printed out of place,
 //! boards that are not plane. What they add is not measured here.
 
 use calibench::board::{Board, View};
@@ -28,8 +28,8 @@ use rayon::prelude::*;
 pub const EXPERIMENT: Experiment = Experiment {
     id: "photographs",
     title: "From photographs to a camera",
-    question: "The chapter's four poses are photographed, their dots detected, the camera calibrated. What \
-               extraction noise results against blur, image noise and dot size; what does the bias of \
+    question: "The chapter's four poses are photographed, their discs detected, the camera calibrated. What \
+               extraction noise results against blur, image noise and disc size; what does the bias of \
                imaged discs do without correction and with it; is the chapter's 0.1 px realistic? Expected: \
                a few thousandths of a pixel of noise, a bias of more than that without correction and none \
                with it, most of it taken up by the poses. A sensor does not make 0.1 px.",
@@ -38,10 +38,10 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// Where the sweeps cross: blur of a good lens, noise of 40 dB, the dots of the chapter's figure.
+/// Where the sweeps cross: blur of a good lens, noise of 40 dB, the discs of the chapter's figure.
 const BASE: Node = Node { blur_px: 0.5, noise: 0.01, diameter_mm: 3.0 };
 const BLURS_PX: [f64; 4] = [0.0, 0.5, 1.0, 2.0];
-/// Of full scale. Beyond 5 % the dots' outlines break up.
+/// Of full scale. Beyond 5 % the discs' outlines break up.
 const NOISES: [f64; 4] = [0.003, 0.01, 0.02, 0.05];
 const DIAMETERS_MM: [f64; 4] = [2.0, 3.0, 5.0, 7.0];
 /// The chapter's noise of a coordinate.
@@ -87,7 +87,7 @@ impl Outcome {
     }
 }
 
-/// Noise-free photographs of one dot size, with what follows from them.
+/// Noise-free photographs of one disc size, with what follows from them.
 struct Exact {
     diameter_mm: f64,
     /// Predicted bias, px, all views.
@@ -118,14 +118,14 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     record.figure(noise_figure(&outcomes, context.seed));
     record.figure(bias_figure(&exact, &unit));
     record.note(format!(
-        "{CHAPTER_NOISE_PX} px is not what a sensor makes of dots like these: noise of {} % of full scale \
+        "{CHAPTER_NOISE_PX} px is not what a sensor makes of discs like these: noise of {} % of full scale \
          gives {:.1} % of it. What print, flatness and uneven sharpness add is not rendered here.",
         100.0 * BASE.noise,
         100.0 * base(&outcomes)?.noise_px() / CHAPTER_NOISE_PX
     ));
     let photo = &album.photos(&BASE)[3];
     let caption = format!(
-        "The chapter's target in its compound pose, dots of {} mm, blur {} px, without noise: what the \
+        "The chapter's target in its compound pose, discs of {} mm, blur {} px, without noise: what the \
          detector sees.",
         BASE.diameter_mm, BASE.blur_px
     );
@@ -331,8 +331,8 @@ fn report_noise(record: &mut Record, outcomes: &[Outcome]) -> Result<(), Experim
     let worst = stats::largest(outcomes.iter().map(Outcome::noise_px));
     record
         .group("px", band())
-        .number("extraction-noise", noise, "RMS of a coordinate: blur 0.5 px, noise 1 %, dots of 3 mm")
-        .number("extraction-bound", base.bound_px, "what the information in the dots' edges allows there")
+        .number("extraction-noise", noise, "RMS of a coordinate: blur 0.5 px, noise 1 %, discs of 3 mm")
+        .number("extraction-bound", base.bound_px, "what the information in the discs' edges allows there")
         .unit("")
         .number("noise-for-a-tenth", needed, "image noise, of full scale, at which the bound reaches 0.1 px")
         .number("loss-under-blur", ratio, "extraction noise over its bound at the heaviest blur, 2 px")
@@ -345,19 +345,19 @@ fn report_bias(record: &mut Record, exact: &[Exact], unit: &[f64]) -> Result<(),
     let chapter = exact
         .iter()
         .find(|e| e.diameter_mm == BASE.diameter_mm)
-        .ok_or(ExperimentError::Input("the base's dot size is missing".into()))?;
+        .ok_or(ExperimentError::Input("the base's disc size is missing".into()))?;
     let bias = rms(&chapter.displacements);
     let remainder = rms(&chapter.remainder());
     record
         .group("px", band())
-        .number("bias-rms", bias, "RMS displacement of uncorrected centres, 3 mm dots, four poses")
+        .number("bias-rms", bias, "RMS displacement of uncorrected centres, 3 mm discs, four poses")
         .number("bias-largest", largest(&chapter.displacements), "largest displacement")
         .number("remainder-rms", remainder, "RMS distance from the true centres once corrected");
     let truth = Truth::example_camera();
     let (before, after) =
         (differences(&chapter.uncorrected.camera, &truth), differences(&chapter.corrected.camera, &truth));
     for (i, p) in FreeParameters::STANDARD.iter().enumerate() {
-        let what = |centres: &str| format!("error of {p} from {centres} centres, 3 mm dots");
+        let what = |centres: &str| format!("error of {p} from {centres} centres, 3 mm discs");
         record
             .group(p.unit(), band())
             .number(format!("{p}-uncorrected"), before[i], what("uncorrected"))
@@ -389,7 +389,7 @@ fn claim_noise(record: &mut Record, outcomes: &[Outcome]) {
         "chi-squared interval of {coordinates} coordinates a node, 2 % for the bound's Gaussian edge, and a \
          quarter that the detector may lose: {low:.3} to {high:.3}"
     );
-    let statement = "up to 1 px of blur, noise moves centres as much as the information in the dots' edges \
+    let statement = "up to 1 px of blur, noise moves centres as much as the information in the discs' edges \
                      demands, and hardly more";
     record
         .claim_that("noise-is-at-the-bound", statement)
@@ -397,7 +397,7 @@ fn claim_noise(record: &mut Record, outcomes: &[Outcome]) {
         .at_rate(FALSE_ALARM)
         .because(reason);
     let worst = stats::largest(outcomes.iter().map(Outcome::noise_px));
-    let statement = "no blur, noise and dot size of the sweeps makes the chapter's 0.1 px";
+    let statement = "no blur, noise and disc size of the sweeps makes the chapter's 0.1 px";
     let reason = "the largest bound of the sweeps, widened as above, is below it";
     record
         .claim_that("below-a-tenth", statement)
@@ -412,24 +412,24 @@ fn claim_bias(record: &mut Record, exact: &[Exact], unit: &[f64]) {
     let within = |moved: &[f64], reach: &[f64]| moved.iter().zip(reach).all(|(m, r)| m.abs() <= *r);
     let remainder = |e: &Exact| rms(&e.remainder());
     let worst = exact.iter().map(remainder).fold(0.0, f64::max);
-    let statement = "centres less the predicted bias lie on the true ones, for every dot size";
+    let statement = "centres less the predicted bias lie on the true ones, for every disc size";
     let reason = "the project's target for noise-free images, 0.01 px RMS";
     record.claim_that("bias-is-predicted", statement).at_most(worst, 0.01).unit("px").because(reason);
     let reason = "least squares moves a parameter by at most the length of the pixels' error vector times \
                   its standard deviation for unit noise (Cauchy-Schwarz), and a tenth for second order";
     let case = |e: &Exact, moved: Vec<f64>| {
-        (format!("dots of {} mm: {moved:?}", e.diameter_mm), within(&moved, &e.reach(unit)))
+        (format!("discs of {} mm: {moved:?}", e.diameter_mm), within(&moved, &e.reach(unit)))
     };
     let statement = "with correction the camera is true up to what the detector leaves";
     let cases = exact.iter().map(|e| case(e, differences(&e.corrected.camera, &truth)));
-    record.claim_that("corrected-camera-is-true", statement).every("dot sizes", cases).because(reason);
+    record.claim_that("corrected-camera-is-true", statement).every("disc sizes", cases).because(reason);
     let statement = "without correction the camera is wrong as the bias of the discs alone makes it";
     let cases = exact.iter().map(|e| case(e, differences(&e.uncorrected.camera, &e.predicted.camera)));
-    record.claim_that("uncorrected-camera-is-biased", statement).every("dot sizes", cases).because(reason);
+    record.claim_that("uncorrected-camera-is-biased", statement).every("disc sizes", cases).because(reason);
 }
 
 fn noise_table(outcomes: &[Outcome]) -> Rows<&Outcome> {
-    Table::of("noise", "extraction noise against blur, image noise and dot size", outcomes)
+    Table::of("noise", "extraction noise against blur, image noise and disc size", outcomes)
         .column("blur", "px", |o| o.node.blur_px)
         .column("noise", "", |o| o.node.noise)
         .column("diameter", "mm", |o| o.node.diameter_mm)
@@ -470,7 +470,7 @@ fn noise_figure(outcomes: &[Outcome], seed: u64) -> Figure {
         panel("blur", "blur (px)", |n| n.blur_px, |n| Node { blur_px: BASE.blur_px, ..*n }),
         panel("image noise", "noise (of full scale)", |n| n.noise, |n| Node { noise: BASE.noise, ..*n }),
         panel(
-            "dot size",
+            "disc size",
             "diameter (mm)",
             |n| n.diameter_mm,
             |n| Node { diameter_mm: BASE.diameter_mm, ..*n },
@@ -481,8 +481,8 @@ fn noise_figure(outcomes: &[Outcome], seed: u64) -> Figure {
     };
     let largest_px = stats::largest(outcomes.iter().map(Outcome::noise_px));
     let caption = format!(
-        "Extraction noise of a coordinate, px, over the {} dots of the chapter's four poses, each node one \
-         photograph a pose, seed {seed}; the sweeps cross at blur {} px, noise {} % of full scale, dots of \
+        "Extraction noise of a coordinate, px, over the {} discs of the chapter's four poses, each node one \
+         photograph a pose, seed {seed}; the sweeps cross at blur {} px, noise {} % of full scale, discs of \
          {} mm. Notice that the detector's noise is at most {:.2} times its bound up to {SHARP_PX} px of \
          blur and {:.2} times beyond, and that the largest, {largest_px:.3} px, is {:.0} % of the chapter's \
          {CHAPTER_NOISE_PX} px.",
@@ -519,7 +519,7 @@ fn bias_figure(exact: &[Exact], unit: &[f64]) -> Figure {
     let caption = format!(
         "Left: RMS distance of detected centres from the true ones, px. Right: error of the worst of the \
          six parameters in standard deviations under the chapter's noise of {CHAPTER_NOISE_PX} px. Four \
-         poses, blur {} px, nothing drawn at random. Notice that with dots of {} mm centres {:.3} px off \
+         poses, blur {} px, nothing drawn at random. Notice that with discs of {} mm centres {:.3} px off \
          move the camera by {:.2} standard deviations, and that correction leaves {:.4} px and {:.3} \
          standard deviations.",
         BASE.blur_px,

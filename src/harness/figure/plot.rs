@@ -306,7 +306,7 @@ impl Plot {
         self.with(Layer::Horizontal { label: label.into(), y, look })
     }
 
-    /// One dot for each of many draws.
+    /// A small marker for each of many trials.
     pub fn cloud(
         self,
         label: impl Into<String>,
