@@ -26,7 +26,7 @@ use calibench_harness::figure::density;
 use calibench_harness::published::{self, Entry};
 use calibench_harness::stats::{self, Interval, normal_two_sided};
 use calibench_harness::{
-    Band, Cell, Context, Experiment, ExperimentError, Figure, HeatMap, Look, Plot, Predicted, Record, Table,
+    Band, Context, Experiment, ExperimentError, Figure, HeatMap, Look, Plot, Predicted, Record, Table,
 };
 use rayon::prelude::*;
 
@@ -145,39 +145,33 @@ fn report_quantities(record: &mut Record, ours: &[Found], noise_free: &[Found], 
             .drawn_as_printed(predicted(draws, q), FALSE_ALARM_RATE);
     }
     for (i, centre) in CENTRES.iter().enumerate() {
-        let name = centre.name();
-        let exact = noise_free[i].quantities()[3];
+        let mut numbers = record.group("mm", converged());
+        numbers.suffix(format!("-{}", centre.name()), format!(", {}", centre.name()));
         if !centre.is_exact() {
-            let what = format!("RMS of the affine fit without noise, {name}");
-            record.group("mm", converged()).number(format!("affine-rms-exact-{name}"), exact, what);
+            let exact = noise_free[i].quantities()[3];
+            numbers.number("affine-rms-exact", exact, "RMS of the affine fit without noise");
         }
         let affine = column(draws, i, 3);
         let sample = moments(&affine);
-        let mean = format!("mean RMS of the affine fit over the draws, {name}");
-        let sd = format!("standard deviation of the RMS of the affine fit over the draws, {name}");
-        let below = percent_below(&affine, book[3].value());
-        let what = format!("share of the draws whose affine residual is below the published one, {name}");
-        record
-            .group("mm", converged())
-            .number(format!("affine-rms-mean-{name}"), sample.mean(0), mean)
-            .number(format!("affine-rms-sd-{name}"), sample.standard_deviation(0), sd)
+        let sd = "standard deviation of the RMS of the affine fit over the draws";
+        let below = "share of the draws whose affine residual is below the published one";
+        numbers
+            .number("affine-rms-mean", sample.mean(0), "mean RMS of the affine fit over the draws")
+            .number("affine-rms-sd", sample.standard_deviation(0), sd)
             .exact("%")
-            .number(format!("affine-rms-below-{name}"), below, what);
+            .number("affine-rms-below", percent_below(&affine, book[3].value()), below)
+            .group("px", converged());
         if i != MAIN {
-            let what = format!("RMS of the single-plane calibration, {name}");
-            record.group("px", converged()).number(format!("plane-rms-{name}"), ours[i].plane.rms_px, what);
+            numbers.number("plane-rms", ours[i].plane.rms_px, "RMS of the single-plane calibration");
         }
         let sample = moments(&column(draws, i, 0));
-        let mean = format!("mean RMS over the draws, {name}");
-        let sd = format!("standard deviation of the RMS over the draws, {name}");
-        let lens = &ours[i].plane.distortion;
-        record
-            .group("px", converged())
-            .number(format!("plane-rms-mean-{name}"), sample.mean(0), mean)
-            .number(format!("plane-rms-sd-{name}"), sample.standard_deviation(0), sd)
+        let sd = "standard deviation of the RMS over the draws";
+        numbers
+            .number("plane-rms-mean", sample.mean(0), "mean RMS over the draws")
+            .number("plane-rms-sd", sample.standard_deviation(0), sd)
             .unit("")
-            .number(format!("k1-{name}"), lens.k1, format!("k1, {name}"))
-            .number(format!("k2-{name}"), lens.k2, format!("k2, {name}"));
+            .number("k1", ours[i].plane.distortion.k1, "k1")
+            .number("k2", ours[i].plane.distortion.k2, "k2");
     }
     let free = ours[2].plane.centre_px;
     record.group("px", converged()).number("free-cx", free.x, "estimated distortion centre, u").number(
@@ -194,57 +188,43 @@ fn report_quantities(record: &mut Record, ours: &[Found], noise_free: &[Found], 
     }
     let row = noise_free[0].row_before.max_deviation();
     let band = Band::absolute(ROUNDING_PX, "rounding of coordinates below 640 px over 40 operations");
-    record.group("px", band).number(
-        "top-row-before-exact",
-        row,
-        "the top row before correction, without noise",
-    );
+    let what = "the top row before correction, without noise";
+    record.group("px", band).number("top-row-before-exact", row, what);
 }
 
 /// One row for each centre and quantity.
 fn centres_table(ours: &[Found], noise_free: &[Found], draws: &[Draw], book: &Book) -> Table {
-    let columns = [
-        ("centre", ""),
-        ("quantity", ""),
-        ("unit", ""),
-        ("noise_free", ""),
-        ("mean", ""),
-        ("sd", ""),
-        ("low", ""),
-        ("high", ""),
-        ("ours", ""),
-        ("book", ""),
-        ("draws_below_ours", "%"),
-        ("draws_below_book", "%"),
-    ];
+    struct Row {
+        centre: usize,
+        quantity: usize,
+        values: Vec<f64>,
+        sample: Sample,
+        interval: (f64, f64),
+    }
+    let row = |(centre, quantity): (usize, usize)| {
+        let values = column(draws, centre, quantity);
+        let interval = Predicted::from_draws(&values, 1, "").interval(FALSE_ALARM_RATE);
+        Row { centre, quantity, sample: moments(&values), values, interval }
+    };
+    let pairs = (0..CENTRES.len()).flat_map(|centre| (0..QUANTITIES.len()).map(move |q| (centre, q)));
+    let drawn = |row: &Row| ours[row.centre].quantities()[row.quantity];
+    let printed = |row: &Row| book[row.quantity].value();
     let caption = "the five quantities for each treatment of the distortion centre: without noise, over the \
                    draws, ours, the book's";
-    let mut table = Table::new("centres", caption, &columns);
-    for (i, centre) in CENTRES.iter().enumerate() {
-        let (exact, drawn) = (noise_free[i].quantities(), ours[i].quantities());
-        for (q, (id, unit, _)) in QUANTITIES.iter().enumerate() {
-            let values = column(draws, i, q);
-            let sample = moments(&values);
-            let (low, high) = Predicted::from_draws(&values, 1, "").interval(FALSE_ALARM_RATE);
-            let below = |x: f64| percent_below(&values, x);
-            let mut row = vec![Cell::from(centre.name()), Cell::from(*id), Cell::from(*unit)];
-            let (mean, sd) = (sample.mean(0), sample.standard_deviation(0));
-            let numbers = [
-                exact[q],
-                mean,
-                sd,
-                low,
-                high,
-                drawn[q],
-                book[q].value(),
-                below(drawn[q]),
-                below(book[q].value()),
-            ];
-            row.extend(numbers.map(Cell::from));
-            table.push(row);
-        }
-    }
-    table
+    Table::of("centres", caption, pairs.map(row))
+        .column("centre", "", |row| CENTRES[row.centre].name())
+        .column("quantity", "", |row| QUANTITIES[row.quantity].0)
+        .column("unit", "", |row| QUANTITIES[row.quantity].1)
+        .column("noise_free", "", |row| noise_free[row.centre].quantities()[row.quantity])
+        .column("mean", "", |row| row.sample.mean(0))
+        .column("sd", "", |row| row.sample.standard_deviation(0))
+        .column("low", "", |row| row.interval.0)
+        .column("high", "", |row| row.interval.1)
+        .column("ours", "", drawn)
+        .column("book", "", printed)
+        .column("draws_below_ours", "%", |row| percent_below(&row.values, drawn(row)))
+        .column("draws_below_book", "%", |row| percent_below(&row.values, printed(row)))
+        .into()
 }
 
 fn points_table(view: &View, found: &Found) -> Table {

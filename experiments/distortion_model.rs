@@ -235,72 +235,62 @@ fn report_numbers(record: &mut Record, nodes: &[Node], theory: &Theory, unit: Ve
     // less than 1e-6.
     let stop = || Band::relative(1e-6, "where the solver stops");
     let theory_band = || Band::relative(1e-8, "inverse of the information matrix");
-    for (name, thousandths) in [("tenth", TENTH), ("half", HALF)] {
+    for (prefix, thousandths) in [("tenth-", TENTH), ("half-", HALF)] {
         let Some(node) = nodes.iter().find(|n| (n.ratio - f64::from(thousandths) / 1000.0).abs() < 1e-12)
         else {
             continue;
         };
+        let mut numbers = record.group("", stop());
+        numbers.prefix(prefix);
         for p in [Fx, Cx, Cy, K1, K2] {
             let bias = node.bias_of(p);
             let z = bias.abs() / theory.small_sd(p);
-            record
-                .group(p.unit(), stop())
-                .number(format!("{name}-{p}-bias"), bias, format!("{p}, estimate minus truth"))
+            numbers
+                .unit(p.unit())
+                .number(format!("{p}-bias"), bias, format!("{p}, estimate minus truth"))
                 .unit("")
-                .number(format!("{name}-{p}-z"), z, format!("the same in standard deviations of {p}"));
+                .number(format!("{p}-z"), z, format!("the same in standard deviations of {p}"));
         }
         let with_noise = theory.with_noise_px(node.rmse_px);
-        record
-            .group("px", stop())
-            .number(format!("{name}-rmse"), node.rmse_px, "RMSE without noise")
-            .number(format!("{name}-rmse-noisy"), with_noise, "RMSE to expect with noise")
+        let rise = with_noise / theory.with_noise_px(0.0) - 1.0;
+        numbers
+            .unit("px")
+            .number("rmse", node.rmse_px, "RMSE without noise")
+            .number("rmse-noisy", with_noise, "RMSE to expect with noise")
             .unit("")
-            .number(
-                format!("{name}-rmse-rise"),
-                with_noise / theory.with_noise_px(0.0) - 1.0,
-                "rise of the expected RMSE above that of noise alone, as a fraction",
-            )
+            .number("rmse-rise", rise, "rise of the expected RMSE above that of noise alone, as a fraction")
             .unit("mm")
-            .number(format!("{name}-plane-mm"), node.plane_mm.0, "RMS residual on the plane after correction")
-            .number(format!("{name}-plane-max-mm"), node.plane_mm.1, "largest residual on the plane");
+            .number("plane-mm", node.plane_mm.0, "RMS residual on the plane after correction")
+            .number("plane-max-mm", node.plane_mm.1, "largest residual on the plane");
     }
     let notices = theory.rmse_notices(unit);
     let noise = theory.with_noise_px(0.0);
     let noisy = theory.with_noise_px(theory.rmse_px(unit * notices));
     let bias = theory.bias(unit * notices)[2].abs() / theory.small_sd(Cx);
+    let leaves = "ratio at which the expected RMSE leaves the central 99 % of its prediction";
+    let equal = "p1 where tangential and radial displacement are equal in the RMS over the target";
+    let differ = "largest over smallest tangential displacement at the corners of the facing target";
     record
         .group("", theory_band())
-        .number(
-            "rmse-notices",
-            notices,
-            "ratio at which the expected RMSE leaves the central 99 % of its prediction",
-        )
+        .number("rmse-notices", notices, leaves)
         .unit("px")
         .number("rmse-noise", noise, "RMSE to expect from noise alone")
         .number("rmse-notices-px", noisy, "RMSE to expect at that ratio")
         .unit("")
         .number("rmse-notices-cx-z", bias, "bias of cx at that ratio, in standard deviations")
         .band(Band::relative(1e-12, "rounding"))
-        .number(
-            "p1-per-ratio",
-            unit.x,
-            "p1 where tangential and radial displacement are equal in the RMS over the target",
-        )
-        .number(
-            "corners-differ",
-            corners_differ(&Truth::example()),
-            "largest over smallest tangential displacement at the corners of the facing target",
-        )
+        .number("p1-per-ratio", unit.x, equal)
+        .number("corners-differ", corners_differ(&Truth::example()), differ)
         .number("p2-per-ratio", unit.y, "p2 there");
     for p in [Fx, Cx, Cy] {
-        let what = format!("standard deviation of {p} with the tangential terms over that without");
-        record.group("", theory_band()).number(
-            format!("{p}-inflation"),
-            theory.full_sd(p) / theory.small_sd(p),
-            what,
+        let (inflation, even) = (theory.full_sd(p) / theory.small_sd(p), theory.break_even(p, unit));
+        let wider = format!("standard deviation of {p} with the tangential terms over that without");
+        let better = format!("ratio below which {p} is better without them: same mean squared error");
+        record.group("", theory_band()).number(format!("{p}-inflation"), inflation, wider).number(
+            format!("{p}-break-even"),
+            even,
+            better,
         );
-        let what = format!("ratio below which {p} is better without them: same mean squared error");
-        record.group("", theory_band()).number(format!("{p}-break-even"), theory.break_even(p, unit), what);
     }
 }
 
@@ -364,16 +354,9 @@ fn report_directions(record: &mut Record, theory: &Theory) {
         let values = || directions.iter().map(value);
         record
             .group(unit, Band::relative(1e-8, "inverse of the information matrix"))
-            .number(
-                format!("{id}-least"),
-                stats::smallest(values()),
-                format!("{what}, least over the directions"),
-            )
-            .number(
-                format!("{id}-most"),
-                stats::largest(values()),
-                format!("{what}, most over the directions"),
-            );
+            .prefix(id)
+            .number("-least", stats::smallest(values()), format!("{what}, least over the directions"))
+            .number("-most", stats::largest(values()), format!("{what}, most over the directions"));
     };
     let shift = "distance of the principal point from the truth at a tenth";
     ends("tenth-centre-shift", "px", |d| d.centre_shift_px, shift);
@@ -518,18 +501,17 @@ fn bias_figure(nodes: &[Node], theory: &Theory, unit: Vector2<f64>) -> Figure {
     let curve = |p: Parameter| -> Vec<(f64, f64)> {
         shown.iter().map(|n| (n.ratio, n.bias_of(p).abs() / theory.small_sd(p))).collect()
     };
-    let linear: Vec<(f64, f64)> =
-        shown.iter().map(|n| (n.ratio, theory.bias(unit * n.ratio)[2].abs() / theory.small_sd(Cx))).collect();
+    let linear = shown.iter().map(|n| (n.ratio, theory.bias(unit * n.ratio)[2].abs() / theory.small_sd(Cx)));
     let plot = Plot::new(
         "Bias of a model without tangential terms",
         "tangential over radial displacement (RMS)",
         "bias (standard deviations)",
     )
-    .points("cx", &curve(Cx))
-    .points("cy", &curve(Cy))
-    .points("fx", &curve(Fx))
-    .points("k1", &curve(K1))
-    .line("cx, linear theory", &linear)
+    .points("cx", curve(Cx))
+    .points("cy", curve(Cy))
+    .points("fx", curve(Fx))
+    .points("k1", curve(K1))
+    .line("cx, linear theory", linear)
     .hline("one standard deviation", 1.0)
     .log_x()
     .log_y();
@@ -546,8 +528,7 @@ fn bias_figure(nodes: &[Node], theory: &Theory, unit: Vector2<f64>) -> Figure {
 }
 
 fn rmse_figure(nodes: &[Node], theory: &Theory, unit: Vector2<f64>) -> Figure {
-    let exact: Vec<(f64, f64)> = nodes.iter().map(|n| (n.ratio, n.rmse_px)).collect();
-    let noisy: Vec<(f64, f64)> = nodes.iter().map(|n| (n.ratio, theory.with_noise_px(n.rmse_px))).collect();
+    let noisy = nodes.iter().map(|n| (n.ratio, theory.with_noise_px(n.rmse_px)));
     let noise = theory.noise();
     let notices = theory.rmse_notices(unit);
     let plot = Plot::new(
@@ -555,8 +536,8 @@ fn rmse_figure(nodes: &[Node], theory: &Theory, unit: Vector2<f64>) -> Figure {
         "tangential over radial displacement (RMS)",
         "RMSE (px)",
     )
-    .line("without noise", &exact)
-    .line(format!("expected with noise of {SIGMA_PX} px"), &noisy)
+    .line("without noise", nodes.iter().map(|n| (n.ratio, n.rmse_px)))
+    .line(format!("expected with noise of {SIGMA_PX} px"), noisy)
     .hline("noise alone: 99.5 % lie below", noise.interval_px(0.01).high);
     let caption = format!(
         "RMSE per point of the model without tangential terms, without noise and as expected with noise of \

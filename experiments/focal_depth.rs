@@ -8,12 +8,12 @@
 //!
 //! What it cannot show: how other sources of depth, such as a step of known height, would separate the two.
 
+use super::sweep::{Sweep, Swept, solver_band, spread_cases};
 use calibench::camera::Parameter;
-use calibench_harness::stats::{Interval, each_of};
+use calibench_harness::stats::{self, Interval, each_of};
 use calibench_harness::{
-    Band, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
+    Band, Context, Experiment, ExperimentError, Figure, Look, Plot, Record, Rows, Table,
 };
-use calibench_study::{Cell as StudyCell, CellSummary, Engine, Summary, within};
 
 /// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -57,231 +57,163 @@ const NONLINEARITY: f64 = 0.02;
 /// Tilts between which the law of the squared sine is read off the bound: `cos(tilt)` and terms of fourth
 /// order in the sine stay within 1 %.
 const LAW_TILTS_DEG: (f64, f64) = (1.0, 4.0);
-/// The refinement ends within a millionth of a standard deviation of the minimum.
-const SOLVER: f64 = 1e-6;
 
-/// What the Cramer-Rao bound says of one tilt.
-struct Bound {
-    focal_px: f64,
-    depth_mm: f64,
+/// A tilt, with the correlation of focal length and distance that its bound predicts; NaN where there is none.
+struct Tilt<'a> {
+    cell: Swept<'a>,
     correlation: f64,
 }
 
 fn run(context: &Context) -> Result<Record, ExperimentError> {
     let mut record = context.record();
-    let (engine, summary) = within(context, &mut record, "study", STUDY, |_| {})?;
-    let bounds: Vec<Option<Bound>> = engine.cells.iter().map(bound).collect();
+    let sweep = Sweep::run(context, &mut record, "study", STUDY, |_| {})?;
+    let tilts: Vec<Tilt> = sweep.cells().map(Tilt::of).collect();
+    let linear: Vec<&Tilt> = tilts.iter().filter(|tilt| tilt.cell.level >= LINEAR_TILT_DEG).collect();
 
-    report_numbers(&mut record, &engine, &summary, &bounds);
-    claim_facing_refused(&mut record, &summary);
-    claim_tilted_solved(&mut record, &engine, &summary);
-    claim_spread(&mut record, &engine, &summary);
-    claim_correlation(&mut record, &engine, &summary, &bounds);
-    claim_law(&mut record, &engine, &bounds)?;
-    record.table(table(&engine, &summary, &bounds));
-    record.figure(figure(&engine, &summary, &bounds)?);
+    report_numbers(&mut record, &tilts);
+    claim_facing_refused(&mut record, &tilts[0].cell);
+    claim_tilted_solved(&mut record, &linear);
+    claim_spread(&mut record, &linear);
+    claim_correlation(&mut record, &tilts, &linear);
+    claim_law(&mut record, &sweep)?;
+    record.table(table(&tilts));
+    record.figure(figure(&sweep, &tilts)?);
     Ok(record)
 }
 
-fn tilt_deg(engine: &Engine, cell: usize) -> f64 {
-    engine.spec.factor[0].number(engine.cells[cell].levels[0]).unwrap_or(f64::NAN)
-}
-
-/// What the bound of a cell says of the first view.
-fn bound(cell: &StudyCell) -> Option<Bound> {
-    let covariance = cell.bound()?;
-    let focal_px = covariance.standard_deviation(Parameter::Fx)?;
-    let depth_mm = covariance.poses[0][(5, 5)].sqrt();
-    let row = covariance.free.position(Parameter::Fx)?;
-    Some(Bound { focal_px, depth_mm, correlation: covariance.cross[0][(row, 5)] / (focal_px * depth_mm) })
-}
-
-fn sd(cell: &CellSummary, quantity: &str) -> f64 {
-    cell.of(quantity).and_then(|s| s.sd).map_or(f64::NAN, |sd| sd.value)
-}
-
-fn correlation(cell: &CellSummary) -> f64 {
-    let found = cell.correlations.iter().find(|(a, b, _)| a.name() == "fx" && b.name() == "depth");
-    found.map_or(f64::NAN, |r| r.2.value)
-}
-
-fn converged(cell: &CellSummary) -> f64 {
-    cell.converged().map_or(f64::NAN, |c| c.value)
-}
-
-fn report_numbers(record: &mut Record, engine: &Engine, summary: &Summary, bounds: &[Option<Bound>]) {
-    for (cell, result) in summary.cells.iter().enumerate() {
-        let tilt = tilt_deg(engine, cell);
-        let share = Band::absolute(1.5 / result.trials as f64, "one trial that changes sides by a rounding");
-        record.group("", share).number(
-            format!("converged-{tilt}"),
-            converged(result),
-            format!("share of trials with a camera, tilt {tilt} deg"),
-        );
-        let Some(bound) = &bounds[cell] else { continue };
-        // Where trials are refused, one that changes sides moves the statistics of the others.
-        if converged(result) == 1.0 {
-            let band =
-                || Band::relative(SOLVER, "the refinement ends within a millionth of a standard deviation");
-            record
-                .group("px", band())
-                .number(format!("sd-fx-{tilt}"), sd(result, "fx"), format!("sd of fx, tilt {tilt} deg"))
-                .unit("mm")
-                .number(
-                    format!("sd-depth-{tilt}"),
-                    sd(result, "depth"),
-                    format!("sd of the distance, tilt {tilt} deg"),
-                )
-                .unit("")
-                .number(
-                    format!("correlation-{tilt}"),
-                    correlation(result),
-                    format!("correlation of fx and distance, tilt {tilt} deg"),
-                );
-        }
-        let band = || {
-            Band::relative(
-                1e-7,
-                "the normal equations lose as many digits as they have condition, 1e8 at half a degree",
-            )
+impl Tilt<'_> {
+    fn of(cell: Swept<'_>) -> Tilt<'_> {
+        let predicted = || {
+            let covariance = cell.design.bound()?;
+            let row = covariance.free.position(Parameter::Fx)?;
+            Some(covariance.cross[0][(row, 5)] / (cell.bound("fx") * cell.bound("depth")))
         };
-        record
-            .group("px", band())
-            .number(
-                format!("bound-fx-{tilt}"),
-                bound.focal_px,
-                format!("Cramer-Rao bound of fx, tilt {tilt} deg"),
-            )
-            .unit("mm")
-            .number(
-                format!("bound-depth-{tilt}"),
-                bound.depth_mm,
-                format!("Cramer-Rao bound of the distance, tilt {tilt} deg"),
-            )
-            .unit("")
-            .number(
-                format!("bound-correlation-{tilt}"),
-                bound.correlation,
-                format!("predicted correlation, tilt {tilt} deg"),
-            );
+        Tilt { cell, correlation: predicted().unwrap_or(f64::NAN) }
+    }
+
+    fn measured_correlation(&self) -> f64 {
+        let correlations = &self.cell.found.correlations;
+        let found = correlations.iter().find(|(a, b, _)| a.name() == "fx" && b.name() == "depth");
+        found.map_or(f64::NAN, |r| r.2.value)
     }
 }
 
-fn claim_facing_refused(record: &mut Record, summary: &Summary) {
-    let refused =
-        summary.cells[0].outcomes.iter().find(|o| o.0 == "refused-not-identifiable").map_or(0, |o| o.1);
+fn report_numbers(record: &mut Record, tilts: &[Tilt]) {
+    for tilt in tilts {
+        let cell = &tilt.cell;
+        let deg = cell.level;
+        let (id, what) = (format!("-{deg}"), format!(", tilt {deg} deg"));
+        record.group("", cell.share_band()).suffix(&id, &what).number(
+            "converged",
+            cell.converged(),
+            "share of trials with a camera",
+        );
+        if cell.bound("fx").is_nan() {
+            continue;
+        }
+        // Where trials are refused, one that changes sides moves the statistics of the others.
+        if cell.converged() == 1.0 {
+            record
+                .group("px", solver_band())
+                .suffix(&id, &what)
+                .number("sd-fx", cell.sd("fx"), "sd of fx")
+                .unit("mm")
+                .number("sd-depth", cell.sd("depth"), "sd of the distance")
+                .unit("")
+                .number("correlation", tilt.measured_correlation(), "correlation of fx and distance");
+        }
+        let reason = "the normal equations lose as many digits as they have condition, 1e8 at half a degree";
+        record
+            .group("px", Band::relative(1e-7, reason))
+            .suffix(&id, &what)
+            .number("bound-fx", cell.bound("fx"), "Cramer-Rao bound of fx")
+            .unit("mm")
+            .number("bound-depth", cell.bound("depth"), "Cramer-Rao bound of the distance")
+            .unit("")
+            .number("bound-correlation", tilt.correlation, "predicted correlation");
+    }
+}
+
+fn claim_facing_refused(record: &mut Record, facing: &Swept) {
+    let refused = facing.found.outcomes.iter().find(|o| o.0 == "refused-not-identifiable").map_or(0, |o| o.1);
     record
         .claim_that(
             "facing-refused",
             "three views that face the camera are refused as not identifiable, every time",
         )
-        .within(
-            refused as f64,
-            Interval { low: summary.cells[0].trials as f64, high: summary.cells[0].trials as f64 },
-        )
+        .within(refused as f64, Interval::around(facing.found.trials as f64, 0.0))
         .because(
             "parallel planes give f / Z only (Zhang 2000, section 4); the solver's test lets one pass in 1e9",
         );
 }
 
-fn claim_tilted_solved(record: &mut Record, engine: &Engine, summary: &Summary) {
-    let linear = summary.cells.iter().enumerate().filter(|(i, _)| tilt_deg(engine, *i) >= LINEAR_TILT_DEG);
+fn claim_tilted_solved(record: &mut Record, linear: &[&Tilt]) {
     record
         .claim_that("tilted-solved", "from 6 degrees of tilt every trial gives a camera")
-        .every("cells", linear.map(|(_, c)| (c.name.clone(), converged(c) == 1.0)))
+        .every("cells", linear.iter().map(|t| (t.cell.found.name.clone(), t.cell.converged() == 1.0)))
         .because("6 degrees move the edge of the target by 5 px, fifty times the noise");
 }
 
-fn claim_spread(record: &mut Record, engine: &Engine, summary: &Summary) {
-    let quantities = ["fx", "fy", "depth"];
-    let linear: Vec<&CellSummary> = summary
-        .cells
-        .iter()
-        .enumerate()
-        .filter(|(i, _)| tilt_deg(engine, *i) >= LINEAR_TILT_DEG)
-        .map(|(_, c)| c)
-        .collect();
-    let each = each_of(linear.len() * quantities.len(), FALSE_ALARM);
-    let cases = linear.iter().flat_map(|cell| {
-        quantities.map(|quantity| {
-            let predicted = cell.of(quantity).and_then(|s| s.predicted).map_or(f64::NAN, |p| p.sd);
-            let ratio = sd(cell, quantity) / predicted;
-            let interval = Interval::of_deviation_ratio(cell.trials as usize, each);
-            let range = interval.low * (1.0 - NONLINEARITY)..=interval.high * (1.0 + NONLINEARITY);
-            (format!("{quantity}, {}: sd over bound {ratio:.4}", cell.name), range.contains(&ratio))
-        })
-    });
+fn claim_spread(record: &mut Record, linear: &[&Tilt]) {
+    let cells = linear.iter().map(|tilt| tilt.cell);
     record
         .claim_that(
             "bound-attained",
             "from 6 degrees of tilt focal lengths and distance spread as the Cramer-Rao bound says",
         )
-        .every("spreads", cases)
+        .every("spreads", spread_cases(cells, &["fx", "fy", "depth"], FALSE_ALARM, NONLINEARITY))
         .at_rate(FALSE_ALARM)
         .because("sqrt(chi2 / (n - 1)), all cases together at 1e-4, and 2 % for terms of second order");
 }
 
-fn claim_correlation(record: &mut Record, engine: &Engine, summary: &Summary, bounds: &[Option<Bound>]) {
-    let linear: Vec<usize> = (0..bounds.len()).filter(|&i| tilt_deg(engine, i) >= LINEAR_TILT_DEG).collect();
+fn claim_correlation(record: &mut Record, tilts: &[Tilt], linear: &[&Tilt]) {
     let each = each_of(linear.len(), FALSE_ALARM);
-    let cases = linear.iter().map(|&i| {
-        let (result, expected) = (&summary.cells[i], bounds[i].as_ref().map_or(f64::NAN, |b| b.correlation));
-        let measured = correlation(result);
-        let interval = Interval::of_correlation(measured, result.trials as usize, each);
-        (
-            format!("{}: correlation {measured:.6}, expected {expected:.6}", result.name),
-            interval.contains(expected),
-        )
+    let cases = linear.iter().map(|tilt| {
+        let (found, expected, measured) = (tilt.cell.found, tilt.correlation, tilt.measured_correlation());
+        let interval = Interval::of_correlation(measured, found.trials as usize, each);
+        let case = format!("{}: correlation {measured:.6}, expected {expected:.6}", found.name);
+        (case, interval.contains(expected))
     });
     record
         .claim_that("correlation", "focal length and distance err together as the bound predicts")
         .every("cells", cases)
         .at_rate(FALSE_ALARM)
         .because("Fisher's interval of a correlation, all tilts together at 1e-4");
-    let least = bounds.iter().flatten().map(|b| b.correlation).fold(f64::INFINITY, f64::min);
     record
         .claim_that(
             "correlated-throughout",
             "even at 30 degrees the errors of focal length and distance go together",
         )
-        .at_least(least, 0.9)
+        .at_least(stats::smallest(tilts.iter().map(|tilt| tilt.correlation)), 0.9)
         .because(
             "the size of the image gives f / Z at any tilt: with correlation r it is known sqrt(1 - r^2) as \
              badly as f, 0.44 at r = 0.9",
         );
 }
 
-/// The bounds at the two tilts between which the law is read off.
-fn law_bounds<'a>(
-    engine: &Engine,
-    bounds: &'a [Option<Bound>],
-) -> Result<(&'a Bound, &'a Bound), ExperimentError> {
-    let at = |tilt: f64| {
-        let bound = (0..bounds.len()).find(|&i| tilt_deg(engine, i) == tilt).and_then(|i| bounds[i].as_ref());
-        bound.ok_or_else(|| ExperimentError::Input(format!("no bound at {tilt} deg")))
+/// The cells of the two tilts between which the law is read off.
+fn law_cells(sweep: &Sweep) -> Result<(Swept<'_>, Swept<'_>), ExperimentError> {
+    let at = |deg: f64| {
+        let cell = sweep.cells().find(|cell| cell.level == deg && cell.bound("fx").is_finite());
+        cell.ok_or_else(|| ExperimentError::Input(format!("no bound at {deg} deg")))
     };
     Ok((at(LAW_TILTS_DEG.0)?, at(LAW_TILTS_DEG.1)?))
 }
 
-/// Slope of `ln sd` over `ln sin(tilt)` between the same two.
-fn law_exponent(near: f64, far: f64) -> f64 {
+/// Slope of `ln bound` over `ln sin(tilt)` between the same two.
+fn law_exponent((near, far): (Swept, Swept), quantity: &str) -> f64 {
     let run = libm::log(libm::sin(LAW_TILTS_DEG.1.to_radians()) / libm::sin(LAW_TILTS_DEG.0.to_radians()));
-    libm::log(far / near) / run
+    libm::log(far.bound(quantity) / near.bound(quantity)) / run
 }
 
 /// `d ln sd / d ln sin(tilt) = -2`.
-fn claim_law(record: &mut Record, engine: &Engine, bounds: &[Option<Bound>]) -> Result<(), ExperimentError> {
-    let (near, far) = law_bounds(engine, bounds)?;
-    for (id, what, exponent) in [
-        ("fx", "focal length", law_exponent(near.focal_px, far.focal_px)),
-        ("depth", "distance", law_exponent(near.depth_mm, far.depth_mm)),
-    ] {
+fn claim_law(record: &mut Record, sweep: &Sweep) -> Result<(), ExperimentError> {
+    let cells = law_cells(sweep)?;
+    for (id, what) in [("fx", "focal length"), ("depth", "distance")] {
+        let exponent = law_exponent(cells, id);
         let band = Band::relative(1e-6, "a difference of logarithms of numbers known to 1e-7");
-        record.group("", band).number(
-            format!("exponent-{id}"),
-            exponent,
-            format!("slope of ln bound of the {what} over ln sin(tilt), 1 to 4 deg"),
-        );
+        let slope = format!("slope of ln bound of the {what} over ln sin(tilt), 1 to 4 deg");
+        record.group("", band).number(format!("exponent-{id}"), exponent, slope);
         record
             .claim_that(
                 format!("squared-sine-{id}"),
@@ -297,100 +229,64 @@ fn claim_law(record: &mut Record, engine: &Engine, bounds: &[Option<Bound>]) -> 
     Ok(())
 }
 
-fn table(engine: &Engine, summary: &Summary, bounds: &[Option<Bound>]) -> Table {
-    let of = |i: usize, value: fn(&Bound) -> f64| bounds[i].as_ref().map_or(f64::NAN, value);
+fn table<'a>(tilts: &'a [Tilt]) -> Rows<&'a Tilt<'a>> {
     let caption =
         "Spread of focal length and distance, and their correlation; statistics of converged trials";
-    Table::of("tilt", caption, summary.cells.iter().enumerate())
-        .column("tilt", "deg", |(i, _)| tilt_deg(engine, *i))
-        .column("converged", "", |(_, cell)| converged(cell))
-        .column("sd_fx", "px", |(_, cell)| sd(cell, "fx"))
-        .column("bound_fx", "px", |(i, _)| of(*i, |b| b.focal_px))
-        .column("sd_depth", "mm", |(_, cell)| sd(cell, "depth"))
-        .column("bound_depth", "mm", |(i, _)| of(*i, |b| b.depth_mm))
-        .column("correlation", "", |(_, cell)| correlation(cell))
-        .column("bound_correlation", "", |(i, _)| of(*i, |b| b.correlation))
-        .into()
+    Table::of("tilt", caption, tilts)
+        .column("tilt", "deg", |tilt| tilt.cell.level)
+        .column("converged", "", |tilt| tilt.cell.converged())
+        .column("sd_fx", "px", |tilt| tilt.cell.sd("fx"))
+        .column("bound_fx", "px", |tilt| tilt.cell.bound("fx"))
+        .column("sd_depth", "mm", |tilt| tilt.cell.sd("depth"))
+        .column("bound_depth", "mm", |tilt| tilt.cell.bound("depth"))
+        .column("correlation", "", |tilt| tilt.measured_correlation())
+        .column("bound_correlation", "", |tilt| tilt.correlation)
 }
 
-fn figure(engine: &Engine, summary: &Summary, bounds: &[Option<Bound>]) -> Result<Figure, ExperimentError> {
-    let tilts: Vec<f64> = (0..bounds.len()).map(|i| tilt_deg(engine, i)).collect();
-    let curve = |value: &dyn Fn(&Bound) -> f64| -> Vec<(f64, f64)> {
-        tilts.iter().zip(bounds).filter_map(|(t, b)| Some((*t, value(b.as_ref()?)))).collect()
+fn figure(sweep: &Sweep, tilts: &[Tilt]) -> Result<Figure, ExperimentError> {
+    let cells = law_cells(sweep)?;
+    let spread = |title: &str, unit: &str, quantity: &str| {
+        let sine = |deg: f64| libm::sin(deg.to_radians());
+        let (at, value) = (LAW_TILTS_DEG.0, cells.0.bound(quantity));
+        let law = |deg: f64| value * sine(at) * sine(at) / (sine(deg) * sine(deg));
+        sweep.spread_plot((title, "tilt (deg)", unit), quantity, ("1/sin\u{b2}(tilt)", law))
     };
-    let marks = |value: &dyn Fn(&CellSummary) -> f64| -> Vec<(f64, f64)> {
-        tilts
-            .iter()
-            .zip(&summary.cells)
-            .map(|(t, c)| (*t, value(c)))
-            .filter(|(t, v)| *t > 0.0 && v.is_finite())
-            .collect()
+    let one_minus = |value: fn(&Tilt) -> f64| {
+        let tilted = tilts.iter().filter(|tilt| tilt.cell.level > 0.0);
+        tilted.map(move |tilt| (tilt.cell.level, 1.0 - value(tilt)))
     };
-    let spread = |title: &str, unit: &str, bound: &dyn Fn(&Bound) -> f64, quantity: &'static str| {
-        let bound = curve(bound);
-        let bars: Vec<(f64, f64, f64)> = tilts
-            .iter()
-            .zip(&summary.cells)
-            .filter(|(t, _)| **t > 0.0)
-            .filter_map(|(t, c)| c.of(quantity)?.sd.map(|sd| (*t, sd.low, sd.high)))
-            .collect();
-        // Through the bound where the law is read off.
-        let middle = bound.iter().find(|b| b.0 >= LAW_TILTS_DEG.0).copied();
-        let (last, value) = middle.unwrap_or((f64::NAN, f64::NAN));
-        let sine = |t: f64| libm::sin(t.to_radians());
-        let law: Vec<(f64, f64)> = tilts
-            .iter()
-            .filter(|t| **t > 0.0)
-            .map(|t| (*t, value * sine(last) * sine(last) / (sine(*t) * sine(*t))))
-            .collect();
-        Plot::new(title, "tilt (deg)", format!("standard deviation ({unit})"))
-            .size(400.0, 340.0)
-            .log_x()
-            .log_y()
-            .line_as("1/sin\u{b2}(tilt)", &law, Look::ink().dash(Dash::Dotted))
-            .line_as("Cramer-Rao bound", &bound, Look::series(0))
-            .error_bars_as("", &bars, Look::series(1))
-            .points_as("measured", &marks(&|c| sd(c, quantity)), Look::series(1))
-    };
-    let one_minus: Vec<(f64, f64)> = marks(&|c| 1.0 - correlation(c));
     let panels = [
-        spread("Focal length fx", "px", &|b| b.focal_px, "fx"),
-        spread("Distance of the first view", "mm", &|b| b.depth_mm, "depth"),
+        spread("Focal length fx", "px", "fx"),
+        spread("Distance of the first view", "mm", "depth"),
         Plot::new("Correlation of fx and distance", "tilt (deg)", "1 \u{2212} correlation")
             .size(400.0, 340.0)
             .log_x()
             .log_y()
-            .line_as("Cramer-Rao bound", &curve(&|b| 1.0 - b.correlation), Look::series(0))
-            .points_as("measured", &one_minus, Look::series(1)),
+            .line_as("Cramer-Rao bound", one_minus(|tilt| tilt.correlation), Look::series(0))
+            .points_as("measured", one_minus(|tilt| tilt.measured_correlation()), Look::series(1)),
         Plot::new("Trials with a camera", "tilt (deg)", "share of trials")
             .size(400.0, 340.0)
-            .line_as(
-                "",
-                &tilts.iter().zip(&summary.cells).map(|(t, c)| (*t, converged(c))).collect::<Vec<_>>(),
-                Look::series(1),
-            )
+            .line_as("", sweep.cells().map(|cell| (cell.level, cell.converged())), Look::series(1))
             .y_range(-0.03, 1.03),
     ];
-    let (near, far) = law_bounds(engine, bounds)?;
-    let nearly_facing = (0..tilts.len()).find(|&i| sd(&summary.cells[i], "fx").is_finite());
-    let (steepest, least) = (tilts.len() - 1, nearly_facing.unwrap_or(0));
-    let of = |i: usize, value: fn(&Bound) -> f64| bounds[i].as_ref().map_or(f64::NAN, value);
+    let steepest = &tilts[tilts.len() - 1];
+    let least = tilts.iter().find(|tilt| tilt.cell.sd("fx").is_finite()).unwrap_or(&tilts[0]);
     let caption = format!(
         "Three views at 120 mm tilted alike, 0.1 px of noise, {} trials a tilt, seed {}, 95 % intervals; \
          statistics of the trials that gave a camera. Notice that the bound of fx follows the sine to the \
          power {:.2}, and that 1 \u{2212} correlation falls from {:.1e} at {} deg to {:.1e} at {} deg. At \
          {} deg {:.0} % of the trials gave a camera; fx spreads over them by {:.2} of the bound, since they \
          are a selection.",
-        summary.cells[0].trials,
-        engine.spec.seed,
-        law_exponent(near.focal_px, far.focal_px),
-        1.0 - of(steepest, |b| b.correlation),
-        tilts[steepest],
-        1.0 - of(least, |b| b.correlation),
-        tilts[least],
-        tilts[least],
-        100.0 * converged(&summary.cells[least]),
-        sd(&summary.cells[least], "fx") / of(least, |b| b.focal_px)
+        sweep.trials(),
+        sweep.spec().seed,
+        law_exponent(cells, "fx"),
+        1.0 - steepest.correlation,
+        steepest.cell.level,
+        1.0 - least.correlation,
+        least.cell.level,
+        least.cell.level,
+        100.0 * least.cell.converged(),
+        least.cell.sd("fx") / least.cell.bound("fx")
     );
     Ok(Figure::panels("tilt", &panels, 2, caption))
 }

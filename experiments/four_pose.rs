@@ -20,8 +20,8 @@ use calibench_harness::figure::density;
 use calibench_harness::monte_carlo::Estimate;
 use calibench_harness::stats::{Interval, each_of, normal_cdf, normal_two_sided};
 use calibench_harness::{
-    Band, Cell, Context, Dash, Experiment, ExperimentError, Figure, Look, Marker, MonteCarlo, Outcome, Plot,
-    Predicted, Record, Table,
+    Band, Context, Dash, Experiment, ExperimentError, Figure, Look, Marker, MonteCarlo, Outcome, Plot,
+    Predicted, Progress, Record, Table,
 };
 
 mod figures;
@@ -61,7 +61,7 @@ const COVERAGE: f64 = 0.95;
 const ARROW_SCALE: f64 = 150.0;
 /// Draws that show how much the residuals of neighbours correlate by chance.
 const PATTERN_TRIALS: usize = 200;
-/// Dots of the clouds: enough to show a shape.
+/// Trials that the clouds show: enough for a shape.
 const CLOUD: usize = 600;
 
 fn run(context: &Context) -> Result<Record, ExperimentError> {
@@ -73,7 +73,9 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     report_rmse(&mut record, &draw)?;
     claim_residuals(&mut record, &draw);
 
-    let outcome = draw.monte_carlo(context);
+    let progress = context.progress("Monte Carlo", TRIALS);
+    let outcome = monte_carlo(&draw.scene, context.seed, "four-pose/monte-carlo", TRIALS, &progress);
+    drop(progress);
     trials::claim_attained(&mut record, &draw, &outcome);
     trials::claim_rmse_blind(&mut record, &draw, &outcome);
     let grids = weak::few_points(context)?;
@@ -120,11 +122,7 @@ impl Draw {
         let leverage: Vec<f64> = leverages.iter().flatten().flat_map(|h| [h.x, h.y]).collect();
         let residuals = calibration.residuals.iter().flatten().flat_map(|r| [r.x, r.y]);
         let standardised = residuals.zip(&leverage).map(|(r, h)| r / (SIGMA_PX * (1.0 - h).sqrt())).collect();
-        let rmse = RmseDistribution {
-            sigma_px: SIGMA_PX,
-            points: scene.observations(),
-            parameters: unknowns(scene.pixels().len()),
-        };
+        let rmse = predicted_rmse(&scene);
         let leverage_sum = leverage.iter().sum();
         Ok(Draw { seed, scene, views, calibration, bound, errors, rmse, standardised, leverage_sum })
     }
@@ -138,24 +136,18 @@ impl Draw {
         let scale = SIGMA_PX / (self.rmse.points as f64).sqrt();
         Predicted::Chi { scale, dof: self.rmse.degrees_of_freedom() as f64 }
     }
-
-    fn monte_carlo(&self, context: &Context) -> Outcome {
-        let settings = Settings::standard();
-        MonteCarlo {
-            scene: &self.scene,
-            settings: &settings,
-            sigma_px: SIGMA_PX,
-            seed: context.seed,
-            scenario: "four-pose/monte-carlo",
-            trials: TRIALS,
-        }
-        .run(&context.progress("Monte Carlo", TRIALS))
-    }
 }
 
-/// Six intrinsics and six numbers for every pose.
-fn unknowns(views: usize) -> usize {
-    FreeParameters::STANDARD.len() + 6 * views
+/// The distribution of the RMSE: six intrinsics are fitted, and six numbers for every pose.
+fn predicted_rmse(scene: &Scene) -> RmseDistribution {
+    let parameters = FreeParameters::STANDARD.len() + 6 * scene.pixels().len();
+    RmseDistribution { sigma_px: SIGMA_PX, points: scene.observations(), parameters }
+}
+
+/// Calibrations of a scene with other noise each.
+fn monte_carlo(scene: &Scene, seed: u64, scenario: &str, trials: usize, progress: &Progress) -> Outcome {
+    let settings = Settings::standard();
+    MonteCarlo { scene, settings: &settings, sigma_px: SIGMA_PX, seed, scenario, trials }.run(progress)
 }
 
 /// The book's table against the same truth and bound.
@@ -223,19 +215,19 @@ fn report_inputs(record: &mut Record, draw: &Draw) {
 
 fn report_table(record: &mut Record, draw: &Draw, book: &Book) {
     for (ours, theirs) in draw.errors.items.iter().zip(&book.errors.items) {
-        let (parameter, sd) = (ours.parameter, ours.standard_deviation);
-        let (name, unit) = (parameter.name(), parameter.unit());
+        let (name, sd) = (ours.parameter.name(), ours.standard_deviation);
         record
-            .group(unit, of_deviation(sd))
-            .number(name, ours.estimate, format!("calibrated {name}"))
+            .group(ours.parameter.unit(), of_deviation(sd))
+            .prefix(name)
+            .number("", ours.estimate, format!("calibrated {name}"))
             .drawn_as_printed(Predicted::Normal { mean: ours.truth, sd }, RATE)
-            .number(format!("{name}-error"), ours.error, format!("calibrated minus true {name}"))
+            .number("-error", ours.error, format!("calibrated minus true {name}"))
             .drawn_as_printed(Predicted::Normal { mean: 0.0, sd }, RATE)
             .band(relative())
-            .number(format!("{name}-sd"), sd, format!("Cramer-Rao standard deviation of {name} at the truth"))
+            .number("-sd", sd, format!("Cramer-Rao standard deviation of {name} at the truth"))
             .group("", of_deviation(1.0))
-            .number(format!("{name}-z"), ours.z, "our error over its standard deviation")
-            .number(format!("{name}-book-z"), theirs.z, "the book's error over it");
+            .number("-z", ours.z, "our error over its standard deviation")
+            .number("-book-z", theirs.z, "the book's error over it");
     }
     let pairs = draw.errors.items.iter().zip(&book.errors.items);
     record.table(
@@ -312,11 +304,8 @@ fn claim_residuals(record: &mut Record, draw: &Draw) {
     // refinement apart, 1e-6 of a standard deviation at most; a whole standard deviation would not change the
     // derivatives by as much as themselves.
     let convergence = 1e-6 * parameters;
-    record.group("", relative()).number(
-        "leverage-sum",
-        draw.leverage_sum,
-        "sum of the leverages of all coordinates",
-    );
+    let what = "sum of the leverages of all coordinates";
+    record.group("", relative()).number("leverage-sum", draw.leverage_sum, what);
     record
         .claim_that(
             "leverages-count-the-parameters",
@@ -329,11 +318,8 @@ fn claim_residuals(record: &mut Record, draw: &Draw) {
         );
     let largest = draw.standardised.iter().fold(0.0f64, |m, z| m.max(z.abs()));
     let bound = normal_two_sided(each_of(draw.standardised.len(), RATE));
-    record.group("sd", relative()).number(
-        "largest-residual",
-        largest,
-        "largest residual in its own standard deviations",
-    );
+    let what = "largest residual in its own standard deviations";
+    record.group("sd", relative()).number("largest-residual", largest, what);
     record
         .claim_that("no-outlier", "no residual is larger than the noise model allows for 504 of them")
         .at_most(largest, bound)

@@ -126,21 +126,20 @@ fn thorough(record: &mut Record) -> Result<(), ExperimentError> {
         .every("faults", planted().iter().map(|fault| (fault.id.to_string(), caught(fault))))
         .because("the gate's own decision, up to 8192 samples a scenario");
     let samples = measured.faults.iter().filter_map(|row| row.samples_a_scenario).max().unwrap_or(0);
-    record.exact("").count(
-        "most-samples-needed",
-        samples,
-        "samples a scenario that the last planted fault takes, thorough measurement",
-    );
+    let what = "samples a scenario that the last planted fault takes, thorough measurement";
+    record.exact("").count("most-samples-needed", samples, what);
     if let Some(row) = measured.alarms.first() {
         let what = "quick runs of the correct solver in which false alarms were counted";
         record.exact("").count("quick-runs", row.seeds, what);
     }
     for textbook in &measured.misled {
-        let what = "draws of that scene on which the textbook's error bars were measured";
-        record.exact("").number(format!("textbook-draws-{}", textbook.scenario), textbook.draws as f64, what);
-        let what = "share of them in which the textbook is confidently wrong";
+        let draws = "samples of that scenario on which the textbook's error bars were measured";
         let rate = textbook.misled as f64 / textbook.draws as f64;
-        record.exact("").number(format!("textbook-misled-{}", textbook.scenario), rate, what);
+        record
+            .exact("")
+            .suffix(format!("-{}", textbook.scenario), "")
+            .number("textbook-draws", textbook.draws as f64, draws)
+            .number("textbook-misled", rate, "share of them in which the textbook is confidently wrong");
     }
     for row in &measured.alarms {
         let per_thousand = 1000.0 * row.stated_rate;

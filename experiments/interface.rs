@@ -147,19 +147,18 @@ impl Step {
 }
 
 fn report_layouts(record: &mut Record, cases: &[Case]) {
-    let count = || Band::Exact;
     record
-        .group("", count())
-        .number("layouts", cases[0].linear.layouts() as f64, "orders of the four numbers of a row")
+        .exact("")
+        .count("layouts", cases[0].linear.layouts(), "orders of the four numbers of a row")
         .band(Band::relative(1e-9, "inverse of the normal distribution"))
         .number("limit", limit(), "largest deviation of the right layout, in standard deviations");
     let [chapter, different, square, .., worst] = cases else { return };
     for (id, case) in [("chapter", chapter), ("different", different), ("square", square), ("worst", worst)] {
         let what = format!("wrong layouts of the focal lengths' row that this truth hides: {}", case.name);
-        record.group("", count()).number(format!("hidden-{id}"), case.linear.hidden() as f64, what);
+        record.exact("").count(format!("hidden-{id}"), case.linear.hidden(), what);
     }
     let what = "wrong layouts of the distortion's row that the chapter's truth hides";
-    record.group("", count()).number("hidden-chapter-distortion", chapter.distortion.hidden() as f64, what);
+    record.exact("").count("hidden-chapter-distortion", chapter.distortion.hidden(), what);
 
     let caption = "what every truth says of the layouts of both rows; wrong layouts that stay hidden, found \
                    and predicted";
@@ -205,21 +204,17 @@ fn report_sweep(record: &mut Record, sweep: &[Step]) {
     );
     let limit = limit();
     let middle = &sweep[sweep.len() / 2];
-    record.group("px", Band::relative(1e-6, "inverse of the information matrix")).number(
-        "blind-px",
-        limit * middle.sd_px,
-        "difference of fy and cx below which an exchange stays hidden",
-    );
-    let drawn: Vec<(f64, f64)> = sweep.iter().map(|s| (s.difference_px, s.z)).collect();
-    let expected: Vec<(f64, f64)> =
-        sweep.iter().map(|s| (s.difference_px, -s.difference_px / s.sd_px)).collect();
+    let band = Band::relative(1e-6, "inverse of the information matrix");
+    let what = "difference of fy and cx below which an exchange stays hidden";
+    record.group("px", band).number("blind-px", limit * middle.sd_px, what);
+    let expected = sweep.iter().map(|s| (s.difference_px, -s.difference_px / s.sd_px));
     let plot = Plot::new(
         "How far must fy lie from cx?",
         "fy \u{2212} cx of the truth (px)",
         "deviation read as fy (standard deviations)",
     )
-    .line("expected", &expected)
-    .points_as("one calibration each", &drawn, Look::series(1))
+    .line("expected", expected)
+    .points_as("one calibration each", sweep.iter().map(|s| (s.difference_px, s.z)), Look::series(1))
     .hline("limit", limit)
     .hline("", -limit);
     let caption = format!(

@@ -22,7 +22,7 @@ use calibench::camera::{FreeParameters, Parameter};
 use calibench::evaluate::{BoundError, RmseDistribution, cramer_rao};
 use calibench::geometry::{Pose, Vec2, Vec3};
 use calibench::synth::{Scene, Truth, scene::looking_at_centre};
-use calibench_harness::stats::{Interval, each_of};
+use calibench_harness::stats::{self, Interval, each_of};
 use calibench_harness::{
     Band, Context, Experiment, ExperimentError, MonteCarlo, Outcome, Progress, Record, Rows, Table,
 };
@@ -164,6 +164,11 @@ impl Node {
         self.outcome.errors().standard_deviation(position(parameter))
     }
 
+    /// Spread of the trials over the bound.
+    fn sd_over_bound(&self, parameter: Parameter) -> f64 {
+        self.sampled_sd(parameter) / self.bound_sd(parameter)
+    }
+
     fn bound_correlation(&self) -> f64 {
         self.bound.as_ref().and_then(|b| b.correlation(Parameter::K1, Parameter::K2)).unwrap_or(f64::NAN)
     }
@@ -222,7 +227,7 @@ impl Map {
     /// Largest over smallest value among the identifiable nodes.
     fn range(&self, value: impl Fn(&Node) -> f64) -> f64 {
         let values = || self.identifiable().into_iter().map(&value);
-        values().fold(f64::NEG_INFINITY, f64::max) / values().fold(f64::INFINITY, f64::min)
+        stats::largest(values()) / stats::smallest(values())
     }
 }
 
@@ -298,21 +303,18 @@ fn report_numbers(record: &mut Record, map: &Map) {
         .count("trials", TRIALS, "trials of a node");
     for (tenths, tilt_deg) in [(3, 20), (6, 5), (6, 20), (6, 45), (10, 5), (10, 20), (10, 45)] {
         let node = map.at(tenths, tilt_deg);
-        let id = |what: &str| format!("{what}-c{tenths}-t{tilt_deg}");
-        let at = node.name();
-        let [k2, fx] = [Parameter::K2, Parameter::Fx].map(|p| (node.bound_sd(p), node.sampled_sd(p)));
-        let correlation = node.bound_correlation();
         record
             .group("", relative())
-            .number(id("k2-sd"), k2.0, format!("bound of k2, {at}"))
-            .number(id("k2-sd-trials"), k2.1, format!("spread of k2, {at}"))
+            .suffix(format!("-c{tenths}-t{tilt_deg}"), format!(", {}", node.name()))
+            .number("k2-sd", node.bound_sd(Parameter::K2), "bound of k2")
+            .number("k2-sd-trials", node.sampled_sd(Parameter::K2), "spread of k2")
             .unit("px")
-            .number(id("fx-sd"), fx.0, format!("bound of fx, {at}"))
-            .number(id("fx-sd-trials"), fx.1, format!("spread of fx, {at}"))
+            .number("fx-sd", node.bound_sd(Parameter::Fx), "bound of fx")
+            .number("fx-sd-trials", node.sampled_sd(Parameter::Fx), "spread of fx")
             .unit("")
-            .number(id("k1-k2"), correlation, format!("correlation of k1 and k2, {at}"))
+            .number("k1-k2", node.bound_correlation(), "correlation of k1 and k2")
             .unit("px")
-            .number(id("rmse"), node.sampled_rmse_px(), format!("mean RMSE, {at}"));
+            .number("rmse", node.sampled_rmse_px(), "mean RMSE");
     }
 }
 
@@ -341,13 +343,10 @@ fn claim_no_tilt(record: &mut Record, map: &Map) {
     let flat: Vec<&Node> = map.without_tilt().collect();
     let refused: usize = flat.iter().map(|n| n.outcome.refused_naming(&["focal length", "distance"])).sum();
     let trials = map.trials_without_tilt();
-    record.exact("").count(
-        "no-tilt-refused",
-        refused,
-        "trials without tilt refused for focal length and distance",
-    );
-    let endings = flat.iter().map(|n| format!("{}: {:?}", n.name(), n.outcome.endings));
-    let endings: Vec<String> = endings.collect();
+    let what = "trials without tilt refused for focal length and distance";
+    record.exact("").count("no-tilt-refused", refused, what);
+    let endings: Vec<String> =
+        flat.iter().map(|n| format!("{}: {:?}", n.name(), n.outcome.endings)).collect();
     record
         .claim_that(
             "no-tilt-is-refused",
@@ -365,23 +364,22 @@ fn claim_no_tilt(record: &mut Record, map: &Map) {
 
 fn claim_bound_attained(record: &mut Record, map: &Map) {
     let nodes = map.identifiable();
+    let converges =
+        |n: &&Node| (format!("{}: {:?}", n.name(), n.outcome.endings), n.outcome.converged() == TRIALS);
     record
         .claim_that(
             "identifiable-nodes-converge",
             "wherever the bound of fx is below 3 % every trial converges",
         )
-        .every(
-            "nodes",
-            nodes
-                .iter()
-                .map(|n| (format!("{}: {:?}", n.name(), n.outcome.endings), n.outcome.converged() == TRIALS)),
-        )
+        .every("nodes", nodes.iter().map(converges))
         .because("nothing is refused or lost where the camera is determined");
     let each = each_of(nodes.len(), RATE);
     let ratio = Interval::of_deviation_ratio(TRIALS, each);
     for parameter in [Parameter::K2, Parameter::Fx] {
-        let over = |n: &Node| n.sampled_sd(parameter) / n.bound_sd(parameter);
-        let cases = nodes.iter().map(|n| (format!("{}: {}", n.name(), over(n)), ratio.contains(over(n))));
+        let cases = nodes.iter().map(|n| {
+            let over = n.sd_over_bound(parameter);
+            (format!("{}: {over}", n.name()), ratio.contains(over))
+        });
         record
             .claim_that(
                 format!("{parameter}-attains-bound"),

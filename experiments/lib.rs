@@ -18,6 +18,7 @@ pub mod nine_point;
 pub mod noise_floor;
 pub mod photographs;
 pub mod pose_count;
+mod sweep;
 
 /// All experiments, in the order of the book.
 #[rustfmt::skip]

@@ -99,7 +99,7 @@ impl Bent {
             .map(|p| camera.correct_pixel(p))
             .collect::<Result<Vec<Vec2>, _>>()
             .map_err(ExperimentError::at("correction of the line"))?;
-        let round_trip_px = corrected.iter().zip(ideal).map(|(c, i)| (c - i).norm()).fold(0.0, f64::max);
+        let round_trip_px = largest(corrected.iter().zip(ideal).map(|(c, i)| (c - i).norm()));
         Ok(Bent { distorted: fit(&distorted)?, corrected: fit(&corrected)?, round_trip_px })
     }
 
@@ -169,6 +169,13 @@ struct Node {
     first_order: FirstOrder,
 }
 
+impl Node {
+    /// Distance of the largest deviation from what first-order theory makes of it.
+    fn gap_px(&self) -> f64 {
+        (self.max_px - self.first_order.max_px).abs()
+    }
+}
+
 fn node(at: f64, camera: &Camera, ideal: &[Vec2]) -> Result<Node, ExperimentError> {
     let bent = Bent::new(camera, ideal)?;
     Ok(Node {
@@ -209,18 +216,14 @@ fn report_numbers(record: &mut Record, bent: &Bent, opposite: &Bent, barrel: &Ca
         .number("rms-deviation", rms, "RMS distance of the distorted line")
         .rounds_to_printed();
     let (max, rms) = (opposite.distorted.max_deviation(), opposite.distorted.rms_deviation());
-    let corrected = bent.corrected.max_deviation();
+    let (corrected, round_trip) = (bent.corrected.max_deviation(), bent.round_trip_px);
     record
         .group("px", band())
         .number("pincushion-max-deviation", max, "the same line under the pincushion lens")
         .number("pincushion-rms-deviation", rms, "RMS under the pincushion lens")
         .number("max-after-correction", corrected, "largest distance after correction with the true model")
         .rounds_to_printed()
-        .number(
-            "round-trip",
-            bent.round_trip_px,
-            "largest distance of a corrected point from its ideal place",
-        );
+        .number("round-trip", round_trip, "largest distance of a corrected point from its ideal place");
 }
 
 /// That the corrected line is straight follows: its regression line minimises the sum of squares.
@@ -267,16 +270,13 @@ fn claim_centre_line(record: &mut Record, camera: &Camera) -> Result<(), Experim
 }
 
 fn claim_first_order(record: &mut Record, strengths: &[Node]) {
-    let gap = |n: &Node| (n.max_px - n.first_order.max_px).abs();
-    let band = || Band::absolute(1e-10, "differences of sums of 61 coordinates");
-    let largest = strengths.iter().map(gap).fold(0.0, f64::max);
-    let bounds = strengths.iter().map(|n| n.first_order.bound_px);
-    let widest = bounds.fold(0.0, f64::max);
+    let farthest = largest(strengths.iter().map(Node::gap_px));
+    let widest = largest(strengths.iter().map(|n| n.first_order.bound_px));
     record
-        .group("px", band())
-        .number("first-order-gap", largest, "largest gap of the deviation to first-order theory")
+        .group("px", Band::absolute(1e-10, "differences of sums of 61 coordinates"))
+        .number("first-order-gap", farthest, "largest gap of the deviation to first-order theory")
         .number("first-order-bound", widest, "largest bound of the second-order remainder");
-    let holds = |n: &Node| (n.max_px - n.first_order.max_px).abs() <= n.first_order.bound_px + ROUNDING_PX;
+    let holds = |n: &Node| n.gap_px() <= n.first_order.bound_px + ROUNDING_PX;
     record
         .claim_that(
             "first-order-theory",
@@ -363,10 +363,9 @@ fn grid_figure(
             Look::ink().dash(Dash::Dotted),
         );
         let lines = grid_lines(see);
-        let [across, down] =
-            central_lines(barrel, see).map(|line| line.iter().map(|p| (p.x, p.y)).collect::<Vec<_>>());
+        let [across, down] = central_lines(barrel, see).map(|line| line.into_iter().map(|p| (p.x, p.y)));
         let central = Look::series(2).dash(Dash::Dashed).width(1.2);
-        let plot = plot.line_as("through the principal point", &across, central).line_as("", &down, central);
+        let plot = plot.line_as("through the principal point", across, central).line_as("", down, central);
         let plain = Look::series(0).width(0.9);
         let plot = lines[1..].iter().fold(plot, |plot, line| plot.line_as("", line, plain));
         plot.line_as("top line", &lines[0], Look::series(1).dash(Dash::Solid).width(2.2))
@@ -399,18 +398,16 @@ fn deviation_figure(
     k1: (f64, f64),
     printed_max_px: f64,
 ) -> Figure {
-    let along = |fit: &LineFit| -> Vec<(f64, f64)> {
-        ideal.iter().zip(&fit.deviations).map(|(p, d)| (p.x, *d)).collect()
-    };
+    let along = |fit: &LineFit| -> Vec<_> { ideal.iter().map(|p| p.x).zip(fit.deviations.clone()).collect() };
     let plot = Plot::new(
         "Top line: distance from the regression line",
         "u of the ideal point (px)",
         "deviation (px), down positive",
     )
     .y_down()
-    .line(named("barrel", k1.0), &along(&bent.distorted))
-    .line(named("pincushion", k1.1), &along(&opposite.distorted))
-    .line("barrel, corrected", &along(&bent.corrected))
+    .line(named("barrel", k1.0), along(&bent.distorted))
+    .line(named("pincushion", k1.1), along(&opposite.distorted))
+    .line("barrel, corrected", along(&bent.corrected))
     .hline(format!("\u{b1}{printed_max_px} px, as published"), printed_max_px)
     .hline("", -printed_max_px);
     let end = |fit: &LineFit| fit.deviations[0].abs().max(fit.deviations[ideal.len() - 1].abs());
@@ -429,29 +426,25 @@ fn deviation_figure(
     Figure::plot("deviation", &plot, caption)
 }
 
-/// Every tenth point: markers that leave the curve beneath visible.
-fn tenth(curve: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    curve.iter().copied().step_by(10).collect()
+/// Largest and RMS deviation of a sweep as curves, and first-order theory as markers on every tenth node, so
+/// that they leave the curve beneath visible.
+fn swept(plot: Plot, nodes: &[Node]) -> Plot {
+    let curve = |value: fn(&Node) -> f64| nodes.iter().map(move |n| (n.at, value(n)));
+    plot.line("max", curve(|n| n.max_px)).line("RMS", curve(|n| n.rms_px)).points_as(
+        "max, first order (every tenth)",
+        curve(|n| n.first_order.max_px).step_by(10),
+        Look::series(2).marker(Marker::Circle),
+    )
 }
 
 fn height_figure(heights: &[Node], camera: &Camera, (max_px, rms_px): (f64, f64)) -> Figure {
-    let curve =
-        |value: fn(&Node) -> f64| -> Vec<(f64, f64)> { heights.iter().map(|n| (n.at, value(n))).collect() };
     let plot =
-        Plot::new("Bending against the height of the line", "height v of the line (px)", "deviation (px)")
-            .line("max", &curve(|n| n.max_px))
-            .line("RMS", &curve(|n| n.rms_px))
-            .points_as(
-                "max, first order (every tenth)",
-                &tenth(&curve(|n| n.first_order.max_px)),
-                Look::series(2).marker(Marker::Circle),
-            )
-            .vline("principal point", camera.cy)
-            .points_as(
-                format!("published: {max_px} and {rms_px} px"),
-                &[(LINE_V_PX, max_px), (LINE_V_PX, rms_px)],
-                Look::ink(),
-            );
+        Plot::new("Bending against the height of the line", "height v of the line (px)", "deviation (px)");
+    let plot = swept(plot, heights).vline("principal point", camera.cy).points_as(
+        format!("published: {max_px} and {rms_px} px"),
+        [(LINE_V_PX, max_px), (LINE_V_PX, rms_px)],
+        Look::ink(),
+    );
     let away = || heights.iter().filter(|n| n.at != camera.cy);
     let a_tenth = || away().map(|n| 10.0 * n.max_px / (n.at - camera.cy).abs());
     let at_centre = heights.iter().filter(|n| n.at == camera.cy).map(|n| n.max_px);
@@ -470,30 +463,16 @@ fn height_figure(heights: &[Node], camera: &Camera, (max_px, rms_px): (f64, f64)
 }
 
 fn k1_figure(strengths: &[Node], camera: &Camera) -> Figure {
-    let curve =
-        |value: fn(&Node) -> f64| -> Vec<(f64, f64)> { strengths.iter().map(|n| (n.at, value(n))).collect() };
-    let remainder: Vec<(f64, f64, f64)> = strengths
-        .iter()
-        .map(|n| {
-            (
-                n.at,
-                n.first_order.max_px - n.first_order.bound_px,
-                n.first_order.max_px + n.first_order.bound_px,
-            )
-        })
-        .collect();
-    let plot = Plot::new("Bending against k1 (k2 = 0)", "k1", "deviation of the top line (px)")
-        .line("max", &curve(|n| n.max_px))
-        .line("RMS", &curve(|n| n.rms_px))
-        .points_as(
-            "max, first order (every tenth)",
-            &tenth(&curve(|n| n.first_order.max_px)),
-            Look::series(2).marker(Marker::Circle),
-        )
-        .band_as("bound of the second-order remainder", &remainder, Look::series(4))
+    let remainder =
+        strengths.iter().map(|Node { at, first_order: FirstOrder { max_px, bound_px }, .. }| {
+            (*at, max_px - bound_px, max_px + bound_px)
+        });
+    let plot = Plot::new("Bending against k1 (k2 = 0)", "k1", "deviation of the top line (px)");
+    let plot = swept(plot, strengths)
+        .band_as("bound of the second-order remainder", remainder, Look::series(4))
         .y_range(0.0, 14.0)
         .vline("chapter's k1", camera.distortion.k1);
-    let gap = largest(strengths.iter().map(|n| (n.max_px - n.first_order.max_px).abs()));
+    let gap = largest(strengths.iter().map(Node::gap_px));
     let bound = largest(strengths.iter().map(|n| n.first_order.bound_px));
     let a_tenth = || strengths.iter().filter(|n| n.at != 0.0).map(|n| 0.1 * n.max_px / n.at.abs());
     let caption = format!(

@@ -137,15 +137,13 @@ fn mean(points: &[Vec2]) -> Vec2 {
 
 fn claim_nesting(record: &mut Record, fits: &[PlaneCalibration]) {
     let [planar, tilted, similarity] = [fits[0].rms_point, fits[1].rms_point, fits[2].rms_point];
+    let cases = [
+        ("similarity <= planar", planar <= similarity + ROUNDING),
+        ("planar <= tilted", tilted <= planar + ROUNDING),
+    ];
     record
         .claim_that("families-nest", "each family that holds another fits at least as well")
-        .every(
-            "cases",
-            [
-                ("similarity <= planar".to_string(), planar <= similarity + ROUNDING),
-                ("planar <= tilted".to_string(), tilted <= planar + ROUNDING),
-            ],
-        )
+        .every("cases", cases)
         .because(
             "a similarity is an affine map, an affine map is projective; all minimise the same sum of \
              squares",
@@ -207,18 +205,16 @@ fn residual_figure(centres: &[Vec2], fits: &[PlaneCalibration], name: &str) -> F
         .map(|((mode, _), fit)| {
             // A largest arrow of 0.2 units shows, whatever the residuals' size.
             let enlarge = libm::exp10(libm::floor(libm::log10(0.3 / fit.max_point.max(1e-12))));
-            let arrows: Vec<(f64, f64, f64, f64)> = unit_grid()
-                .iter()
-                .zip(&fit.residuals)
-                .map(|(w, r)| (w.x, w.y, enlarge * r.x, enlarge * r.y))
-                .collect();
+            let dots = unit_grid();
+            let arrows =
+                dots.iter().zip(&fit.residuals).map(|(w, r)| (w.x, w.y, enlarge * r.x, enlarge * r.y));
             Plot::new(format!("{mode}: RMS {:.2e}", fit.rms_point), "x", "y")
                 .size(340.0, 350.0)
                 .equal_aspect()
                 .x_range(-1.5, 1.5)
                 .y_range(-1.5, 1.5)
-                .points_as("target", &unit_grid().iter().map(|w| (w.x, w.y)).collect::<Vec<_>>(), Look::ink())
-                .arrows(format!("residual x {enlarge:.0e}"), &arrows)
+                .points_as("target", dots.iter().map(|w| (w.x, w.y)), Look::ink())
+                .arrows(format!("residual x {enlarge:.0e}"), arrows)
         })
         .collect();
     let caption = format!(

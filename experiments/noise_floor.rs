@@ -7,12 +7,13 @@
 //! What it cannot show: an RMSE that is right says nothing about the parameters; with few points RMSE shrinks
 //! while their errors grow.
 
+use super::sweep::{Sweep, Swept, at, solver_band};
 use calibench::evaluate::RmseDistribution;
 use calibench_harness::stats::{self, Interval, each_of, normal_two_sided};
 use calibench_harness::{
-    Band, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
+    Band, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Rows, Table,
 };
-use calibench_study::{Cell as Design, Engine, Estimated, Spec, Statistic, Summary, Trial, within};
+use calibench_study::{Cell as Design, Estimated, Spec, Trial};
 
 /// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -78,15 +79,43 @@ const ALARM_RATE: f64 = 0.01;
 /// Terms of second order in the noise, relative: `(sigma / 600 px)` over the tilt's lever, at most 5e-3 at
 /// 0.5 px.
 const NONLINEARITY: f64 = 0.005;
-/// The refinement ends within a millionth of a standard deviation of the minimum; the RMSE is second order in
-/// that.
-const SOLVER: f64 = 1e-6;
 
-/// A study, its results, and for each cell the share of trials whose RMSE lies under the alarm threshold.
-struct Swept {
-    engine: Engine,
-    summary: Summary,
+/// A study, and for each cell how many trials have an RMSE under the alarm threshold.
+struct Watched {
+    sweep: Sweep,
     alarms: Vec<u64>,
+}
+
+/// A cell of it, with the predicted distribution of its RMSE.
+struct Cell<'a> {
+    swept: Swept<'a>,
+    theory: RmseDistribution,
+    alarms: u64,
+}
+
+impl Watched {
+    fn cells(&self) -> Vec<Cell<'_>> {
+        let cells = self.sweep.cells().zip(&self.alarms);
+        cells.map(|(swept, &alarms)| Cell { swept, theory: predicted(swept.design), alarms }).collect()
+    }
+}
+
+impl Cell<'_> {
+    fn trials(&self) -> u64 {
+        self.swept.found.trials
+    }
+
+    fn name(&self) -> &str {
+        &self.swept.found.name
+    }
+
+    fn id(&self) -> String {
+        self.swept.found.labels.join("-")
+    }
+
+    fn alarm_share(&self) -> f64 {
+        self.alarms as f64 / self.trials() as f64
+    }
 }
 
 fn run(context: &Context) -> Result<Record, ExperimentError> {
@@ -95,16 +124,16 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     let marks = sweep(context, &mut record, "marks", MARKS, None)?;
     let overstated = sweep(context, &mut record, "overstated", OVERSTATED, Some(0.1))?;
 
-    for (name, swept) in [("grid", &grid), ("marks", &marks)] {
-        claim_mean(&mut record, name, swept);
-        report_means(&mut record, name, swept);
+    for (name, watched) in [("grid", &grid), ("marks", &marks)] {
+        claim_mean(&mut record, name, &watched.cells());
+        report_means(&mut record, name, &watched.cells());
     }
-    claim_alarm_rate(&mut record, &grid);
-    claim_power(&mut record, &overstated);
-    claim_overfitting(&mut record, &marks);
-    record.table(table("rmse-noise-views", &grid));
-    record.table(table("rmse-marks", &marks));
-    record.table(table("rmse-overstated", &overstated));
+    claim_alarm_rate(&mut record, &grid.cells());
+    claim_power(&mut record, &overstated.cells());
+    claim_overfitting(&mut record, &marks.cells());
+    record.table(table("rmse-noise-views", grid.cells()));
+    record.table(table("rmse-marks", marks.cells()));
+    record.table(table("rmse-overstated", overstated.cells()));
     record.figure(floor_figure(&grid));
     record.figure(overfitting_figure(&marks));
     record.figure(alarm_figure());
@@ -118,7 +147,7 @@ fn sweep(
     name: &str,
     factors: &str,
     assumed_px: Option<f64>,
-) -> Result<Swept, ExperimentError> {
+) -> Result<Watched, ExperimentError> {
     let text = format!("name = \"{name}\"\n{SCENE}{factors}");
     let cells =
         Spec::parse(&text).and_then(|spec| spec.cells(&text)).map_err(ExperimentError::at("study"))?;
@@ -136,8 +165,8 @@ fn sweep(
             alarms[trial.cell] += 1;
         }
     };
-    let (engine, summary) = within(context, record, name, &text, see)?;
-    Ok(Swept { engine, summary, alarms })
+    let sweep = Sweep::run(context, record, name, &text, see)?;
+    Ok(Watched { sweep, alarms })
 }
 
 /// The predicted distribution of a cell's RMSE: six intrinsics, and six pose parameters a view.
@@ -147,16 +176,15 @@ fn predicted(cell: &Design) -> RmseDistribution {
 }
 
 /// The mean of T values of the predicted distribution.
-fn claim_mean(record: &mut Record, name: &str, swept: &Swept) {
-    let each = each_of(swept.summary.cells.len(), FALSE_ALARM);
-    let cases = swept.summary.cells.iter().zip(&swept.engine.cells).map(|(result, cell)| {
-        let theory = predicted(cell);
-        let statistic = result.of("rmse").and_then(|s| s.mean).map_or(f64::NAN, |m| m.value);
-        let interval =
-            Interval::of_mean(theory.mean_px(), theory.standard_deviation_px(), result.trials as usize, each);
-        let slack = NONLINEARITY * theory.mean_px();
-        let held = (interval.low - slack..=interval.high + slack).contains(&statistic);
-        (format!("{}: {statistic:.6} px, expected {:.6}", result.name, theory.mean_px()), held)
+fn claim_mean(record: &mut Record, name: &str, cells: &[Cell]) {
+    let each = each_of(cells.len(), FALSE_ALARM);
+    let cases = cells.iter().map(|cell| {
+        let (mean, theory) = (cell.swept.mean("rmse"), &cell.theory);
+        let (expected, sd) = (theory.mean_px(), theory.standard_deviation_px());
+        let interval = Interval::of_mean(expected, sd, cell.trials() as usize, each);
+        let slack = NONLINEARITY * expected;
+        let held = (interval.low - slack..=interval.high + slack).contains(&mean);
+        (format!("{}: {mean:.6} px, expected {expected:.6}", cell.name()), held)
     });
     record
         .claim_that(
@@ -171,23 +199,17 @@ fn claim_mean(record: &mut Record, name: &str, swept: &Swept) {
         );
 }
 
-fn report_means(record: &mut Record, name: &str, swept: &Swept) {
-    for (result, cell) in swept.summary.cells.iter().zip(&swept.engine.cells) {
-        let theory = predicted(cell);
-        let mean = result.of("rmse").and_then(|s| s.mean).map_or(f64::NAN, |m| m.value);
-        let id = format!("{name}-{}", result.labels.join("-"));
-        let band = Band::relative(SOLVER, "the refinement ends within a millionth of a standard deviation");
-        record.group("", band).number(
-            format!("mean-over-floor-{id}"),
-            mean / theory.noise_floor_px(),
-            format!("mean RMSE over sqrt(2) sigma, {}", result.name),
-        );
+fn report_means(record: &mut Record, name: &str, cells: &[Cell]) {
+    for cell in cells {
+        let over = cell.swept.mean("rmse") / cell.theory.noise_floor_px();
+        let what = format!("mean RMSE over sqrt(2) sigma, {}", cell.name());
+        record.group("", solver_band()).number(format!("mean-over-floor-{name}-{}", cell.id()), over, what);
     }
 }
 
-fn claim_alarm_rate(record: &mut Record, grid: &Swept) {
-    let trials: u64 = grid.summary.cells.iter().map(|c| c.trials).sum();
-    let alarms: u64 = grid.alarms.iter().sum();
+fn claim_alarm_rate(record: &mut Record, cells: &[Cell]) {
+    let trials: u64 = cells.iter().map(Cell::trials).sum();
+    let alarms: u64 = cells.iter().map(|cell| cell.alarms).sum();
     let share = alarms as f64 / trials as f64;
     let band = Band::absolute(1.5 / trials as f64, "one trial that changes sides by a rounding");
     record.group("", band).number(
@@ -207,34 +229,23 @@ fn claim_alarm_rate(record: &mut Record, grid: &Swept) {
 }
 
 /// Where the noise is overstated, RMSE falls under the threshold as often as theory says.
-fn claim_power(record: &mut Record, overstated: &Swept) {
-    let each = each_of(overstated.alarms.len(), FALSE_ALARM);
-    let cells = overstated.summary.cells.iter().zip(&overstated.engine.cells).zip(&overstated.alarms);
-    let cases: Vec<(String, bool)> = cells
-        .map(|((result, cell), &alarms)| {
-            let own = predicted(cell);
-            let threshold = RmseDistribution { sigma_px: 0.1, ..own }.quantile_px(ALARM_RATE);
-            let power = own.cdf(threshold);
-            let interval = Interval::of_proportion(alarms as usize, result.trials as usize, each);
-            record
-                .group(
-                    "",
-                    Band::absolute(1.5 / result.trials as f64, "one trial that changes sides by a rounding"),
-                )
-                .number(
-                    format!("alarm-share-{}", result.labels.join("-")),
-                    alarms as f64 / result.trials as f64,
-                    format!(
-                        "share of alarms where 0.1 px is assumed and the truth is {} px",
-                        cell.noise_px()
-                    ),
-                );
-            (
-                format!("{}: {alarms} alarms of {}, expected share {power:.4}", result.name, result.trials),
-                interval.contains(power),
-            )
-        })
-        .collect();
+fn claim_power(record: &mut Record, cells: &[Cell]) {
+    let each = each_of(cells.len(), FALSE_ALARM);
+    for cell in cells {
+        let what = "share of alarms where 0.1 px is assumed and the truth is";
+        record.group("", cell.swept.share_band()).number(
+            format!("alarm-share-{}", cell.id()),
+            cell.alarm_share(),
+            format!("{what} {} px", cell.swept.design.noise_px()),
+        );
+    }
+    let cases = cells.iter().map(|cell| {
+        let threshold = RmseDistribution { sigma_px: 0.1, ..cell.theory }.quantile_px(ALARM_RATE);
+        let power = cell.theory.cdf(threshold);
+        let interval = Interval::of_proportion(cell.alarms as usize, cell.trials() as usize, each);
+        let (name, alarms, trials) = (cell.name(), cell.alarms, cell.trials());
+        (format!("{name}: {alarms} alarms of {trials}, expected share {power:.4}"), interval.contains(power))
+    });
     record
         .claim_that(
             "alarm-power",
@@ -246,16 +257,20 @@ fn claim_power(record: &mut Record, overstated: &Swept) {
 }
 
 /// Fewer marks: a smaller RMSE and a larger error.
-fn claim_overfitting(record: &mut Record, marks: &Swept) {
-    let of = |cell: usize, name: &str| marks.summary.cells[cell].of(name);
-    let rmse =
-        |cell| of(cell, "rmse").and_then(|s| s.mean).map(|m| (m.low, m.high)).unwrap_or((f64::NAN, f64::NAN));
-    let sd =
-        |cell| of(cell, "fx").and_then(|s| s.sd).map(|m| (m.low, m.high)).unwrap_or((f64::NAN, f64::NAN));
-    let last = marks.summary.cells.len() - 1;
+fn claim_overfitting(record: &mut Record, cells: &[Cell]) {
+    let (few, many) = (cells[0].swept, cells[cells.len() - 1].swept);
+    let apart = |low: Option<Estimated>, high: Option<Estimated>| {
+        low.zip(high).is_some_and(|(low, high)| low.high < high.low)
+    };
     let cases = [
-        ("RMSE with 9 marks lies under that with 221".to_string(), rmse(0).1 < rmse(last).0),
-        ("the focal length with 9 marks is worse than with 221".to_string(), sd(0).0 > sd(last).1),
+        (
+            "RMSE with 9 marks lies under that with 221",
+            apart(few.mean_interval("rmse"), many.mean_interval("rmse")),
+        ),
+        (
+            "the focal length with 9 marks is worse than with 221",
+            apart(many.sd_interval("fx"), few.sd_interval("fx")),
+        ),
     ];
     record
         .claim_that(
@@ -269,52 +284,44 @@ fn claim_overfitting(record: &mut Record, marks: &Swept) {
         );
 }
 
-fn table(name: &str, swept: &Swept) -> Table {
-    let cells = swept.summary.cells.iter().zip(&swept.engine.cells).zip(&swept.alarms);
-    let rows = cells.filter_map(|((result, cell), &alarms)| {
-        let rmse = result.of("rmse")?;
-        Some((result, predicted(cell), rmse.mean?.value, rmse.sd?.value, alarms))
-    });
-    Table::of(name, "RMSE against its predicted distribution", rows)
-        .column("levels", "", |(result, ..)| result.name.clone())
-        .column("points", "", |(_, theory, ..)| theory.points)
-        .column("parameters", "", |(_, theory, ..)| theory.parameters)
-        .column("rmse_mean", "px", |(_, _, mean, ..)| *mean)
-        .column("rmse_predicted", "px", |(_, theory, ..)| theory.mean_px())
-        .column("rmse_sd", "px", |(_, _, _, sd, _)| *sd)
-        .column("rmse_sd_predicted", "px", |(_, theory, ..)| theory.standard_deviation_px())
-        .column("noise_floor", "px", |(_, theory, ..)| theory.noise_floor_px())
-        .column("alarm_share", "", |(result, .., alarms)| *alarms as f64 / result.trials as f64)
-        .into()
+fn table<'a>(name: &str, cells: Vec<Cell<'a>>) -> Rows<Cell<'a>> {
+    Table::of(name, "RMSE against its predicted distribution", cells)
+        .column("levels", "", |cell| cell.name().to_string())
+        .column("points", "", |cell| cell.theory.points)
+        .column("parameters", "", |cell| cell.theory.parameters)
+        .column("rmse_mean", "px", |cell| cell.swept.mean("rmse"))
+        .column("rmse_predicted", "px", |cell| cell.theory.mean_px())
+        .column("rmse_sd", "px", |cell| cell.swept.sd("rmse"))
+        .column("rmse_sd_predicted", "px", |cell| cell.theory.standard_deviation_px())
+        .column("noise_floor", "px", |cell| cell.theory.noise_floor_px())
+        .column("alarm_share", "", Cell::alarm_share)
 }
 
-fn floor_figure(grid: &Swept) -> Figure {
-    let views = grid.engine.spec.factor[1].levels.len();
-    // Side by side, so that bars do not cover each other.
-    let noise = |cell: usize| grid.engine.cells[cell].noise_px() * (0.94 + 0.04 * (cell % views) as f64);
-    let over_floor = |cell: usize, value: f64| value / predicted(&grid.engine.cells[cell]).noise_floor_px();
-    let predicted_factor = |cell: usize| over_floor(cell, predicted(&grid.engine.cells[cell]).mean_px());
+fn floor_figure(grid: &Watched) -> Figure {
+    let (cells, factor) = (grid.cells(), &grid.sweep.spec().factor[1]);
+    let views = factor.levels.len();
+    let over_floor = |cell: &Cell, value: f64| value / cell.theory.noise_floor_px();
+    let predicted_factor = |cell: &Cell| over_floor(cell, cell.theory.mean_px());
     // Over the noises: how far the means of each number of views lie apart, and how wide their intervals are.
     let (mut apart, mut widths) = (Vec::new(), Vec::new());
     let mut plot =
         Plot::new("RMSE over the noise floor", "noise sigma (px)", "mean RMSE / (\u{221a}2 sigma)").log_x();
     for v in 0..views {
-        let cells: Vec<usize> = (0..grid.summary.cells.len()).filter(|c| c % views == v).collect();
-        let theory: Vec<(f64, f64)> = cells.iter().map(|&c| (noise(c), predicted_factor(c))).collect();
-        let means: Vec<(usize, Estimated)> =
-            cells.iter().filter_map(|&c| Some((c, grid.summary.cells[c].of("rmse")?.mean?))).collect();
-        let points: Vec<(f64, f64)> =
-            means.iter().map(|(c, m)| (noise(*c), over_floor(*c, m.value))).collect();
-        let bars: Vec<(f64, f64, f64)> =
-            means.iter().map(|(c, m)| (noise(*c), over_floor(*c, m.low), over_floor(*c, m.high))).collect();
-        let means = || points.iter().map(|p| p.1);
-        apart.push(stats::largest(means()) - stats::smallest(means()));
-        widths.extend(bars.iter().map(|(_, low, high)| high - low));
-        let label = format!("{} views", grid.engine.spec.factor[1].label(v));
-        plot = plot
-            .line_as("", &theory, Look::series(v))
-            .error_bars_as("", &bars, Look::series(v))
-            .points_as(label, &points, Look::series(v));
+        let of_views = || cells.iter().skip(v).step_by(views);
+        // Side by side, so that bars do not cover each other.
+        let noise = |cell: &Cell| cell.theory.sigma_px * (0.94 + 0.04 * v as f64);
+        let mean = |cell: &Cell| {
+            let mean = cell.swept.mean_interval("rmse")?;
+            let [value, low, high] = [mean.value, mean.low, mean.high].map(|px| over_floor(cell, px));
+            Some((noise(cell), value, low, high))
+        };
+        let means: Vec<_> = of_views().filter_map(mean).collect();
+        let values = || means.iter().map(|mean| mean.1);
+        apart.push(stats::largest(values()) - stats::smallest(values()));
+        widths.extend(means.iter().map(|(.., low, high)| high - low));
+        let theory = of_views().map(|cell| (noise(cell), predicted_factor(cell)));
+        let label = format!("{} views", factor.label(v));
+        plot = plot.line_as("", theory, Look::series(v)).measured_as(label, means, Look::series(v));
     }
     let caption = format!(
         "Mean RMSE over the noise floor sqrt(2) sigma against the noise (marks, {} trials, 95 % intervals, \
@@ -323,67 +330,49 @@ fn floor_figure(grid: &Swept) -> Figure {
          4 (2N - p). Notice that the factor depends on the views, since 6 + 6n parameters absorb noise: \
          {:.4} is predicted for {} views, {:.4} for {}. From noise to noise the mean of equally many views \
          differs by {:.4} at most, where the intervals are up to {:.4} wide.",
-        grid.summary.cells[0].trials,
-        grid.engine.spec.seed,
-        predicted_factor(0),
-        grid.engine.spec.factor[1].label(0),
-        predicted_factor(views - 1),
-        grid.engine.spec.factor[1].label(views - 1),
+        grid.sweep.trials(),
+        grid.sweep.spec().seed,
+        predicted_factor(&cells[0]),
+        factor.label(0),
+        predicted_factor(&cells[views - 1]),
+        factor.label(views - 1),
         stats::largest(apart),
         stats::largest(widths)
     );
     Figure::plot("floor", &plot.y_range(0.96, 0.98), caption)
 }
 
-fn overfitting_figure(marks: &Swept) -> Figure {
-    let share = |cell: usize| {
-        let theory = predicted(&marks.engine.cells[cell]);
-        theory.parameters as f64 / (2 * theory.points) as f64
+fn overfitting_figure(marks: &Watched) -> Figure {
+    let cells = marks.cells();
+    let share = |cell: &Cell| cell.theory.parameters as f64 / (2 * cell.theory.points) as f64;
+    let floor = cells[0].theory.noise_floor_px();
+    let curve = (0..=90).map(|i| 0.005 * f64::from(i)).map(|x| (x, floor * (1.0 - x).sqrt()));
+    let measured = |of: &dyn Fn(&Swept) -> Option<Estimated>| -> Vec<_> {
+        cells.iter().filter_map(|cell| Some(at(share(cell), of(&cell.swept)?))).collect()
     };
-    let cells = 0..marks.summary.cells.len();
-    let floor = predicted(&marks.engine.cells[0]).noise_floor_px();
-    let curve: Vec<(f64, f64)> =
-        (0..=90).map(|i| 0.005 * f64::from(i)).map(|x| (x, floor * (1.0 - x).sqrt())).collect();
-    let means: Vec<(f64, f64)> = cells
-        .clone()
-        .filter_map(|c| Some((share(c), marks.summary.cells[c].of("rmse")?.mean?.value)))
-        .collect();
-    let sds: Vec<(f64, f64)> =
-        cells.clone().filter_map(|c| Some((share(c), marks.summary.cells[c].of("fx")?.sd?.value))).collect();
-    let bars = |quantity: &str, of: fn(&Statistic) -> Option<Estimated>| -> Vec<(f64, f64, f64)> {
-        let bar = |c: usize| {
-            let estimated = of(marks.summary.cells[c].of(quantity)?)?;
-            Some((share(c), estimated.low, estimated.high))
-        };
-        cells.clone().filter_map(bar).collect()
-    };
-    let (mean_bars, sd_bars) = (bars("rmse", |s| s.mean), bars("fx", |s| s.sd));
-    let bound: Vec<(f64, f64)> =
-        cells.filter_map(|c| Some((share(c), marks.summary.cells[c].of("fx")?.predicted?.sd))).collect();
+    let bound = cells.iter().map(|cell| (share(cell), cell.swept.bound("fx")));
     let panels = [
         Plot::new("RMSE", "parameters per measurement p / 2N", "mean RMSE (px)")
             .size(420.0, 340.0)
-            .line_as("\u{221a}2 sigma \u{221a}(1 \u{2212} p/2N)", &curve, Look::series(0))
-            .error_bars_as("", &mean_bars, Look::series(1))
-            .points_as("measured", &means, Look::series(1))
+            .line_as("\u{221a}2 sigma \u{221a}(1 \u{2212} p/2N)", curve, Look::series(0))
+            .measured_as("measured", measured(&|cell| cell.mean_interval("rmse")), Look::series(1))
             .hline_as("noise floor", floor, Look::ink().dash(Dash::Dotted)),
         Plot::new("Focal length", "parameters per measurement p / 2N", "standard deviation of fx (px)")
             .size(420.0, 340.0)
-            .line_as("Cramer-Rao bound", &bound, Look::series(0))
-            .error_bars_as("", &sd_bars, Look::series(1))
-            .points_as("measured", &sds, Look::series(1)),
+            .line_as("Cramer-Rao bound", bound, Look::series(0))
+            .measured_as("measured", measured(&|cell| cell.sd_interval("fx")), Look::series(1)),
     ];
-    let factor = &marks.engine.spec.factor[0];
+    let factor = &marks.sweep.spec().factor[0];
     let targets: Vec<String> = (0..factor.levels.len()).rev().map(|i| factor.label(i).to_string()).collect();
     let caption = format!(
         "Targets of {} marks, 4 views, 0.1 px of noise, {} trials each, 95 % intervals, seed {}. Notice \
          that the RMSE falls to {:.2} of the noise floor where the standard deviation of fx is {:.1} times \
          that of the largest target: a small residual is no proof of a good calibration.",
         targets.join(", "),
-        marks.summary.cells[0].trials,
-        marks.engine.spec.seed,
-        means[0].1 / floor,
-        sds[0].1 / sds[sds.len() - 1].1
+        marks.sweep.trials(),
+        marks.sweep.spec().seed,
+        cells[0].swept.mean("rmse") / floor,
+        cells[0].swept.sd("fx") / cells[cells.len() - 1].swept.sd("fx")
     );
     Figure::panels("overfitting", &panels, 2, caption)
 }
@@ -393,15 +382,15 @@ fn alarm_figure() -> Figure {
     let mut plot =
         Plot::new("How far below the floor is alarming?", "views of 63 marks", "RMSE / (\u{221a}2 sigma)")
             .log_x();
-    let at = |views: usize| RmseDistribution { sigma_px: 1.0, points: 63 * views, parameters: 6 + 6 * views };
+    let of = |views: usize| RmseDistribution { sigma_px: 1.0, points: 63 * views, parameters: 6 + 6 * views };
     let curve = |value: &dyn Fn(&RmseDistribution) -> f64| -> Vec<(f64, f64)> {
-        (3..=64).map(|n| (n as f64, value(&at(n)) / at(n).noise_floor_px())).collect()
+        (3..=64).map(|n| (n as f64, value(&of(n)) / of(n).noise_floor_px())).collect()
     };
-    plot = plot.line("expected", &curve(&|r| r.mean_px()));
+    plot = plot.line("expected", curve(&|r| r.mean_px()));
     for (rate, label) in [(0.05, "alarm, 5 %"), (0.01, "alarm, 1 %"), (0.001, "alarm, 0.1 %")] {
-        plot = plot.line(label, &curve(&|r| r.quantile_px(rate)));
+        plot = plot.line(label, curve(&|r| r.quantile_px(rate)));
     }
-    let below = |views: usize| 100.0 * (1.0 - at(views).quantile_px(ALARM_RATE) / at(views).noise_floor_px());
+    let below = |views: usize| 100.0 * (1.0 - of(views).quantile_px(ALARM_RATE) / of(views).noise_floor_px());
     let caption = format!(
         "Expected RMSE over the noise floor, and the values under which it falls in 5, 1 and 0.1 percent of \
          right calibrations, against the number of views of a 9 x 7 target with six intrinsics free. \

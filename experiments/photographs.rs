@@ -1,12 +1,12 @@
-//! How well do photographs of dots give their centres and a camera, and is the chapter's noise of 0.1 px
+//! How well do photographs of discs give their centres and a camera, and is the chapter's noise of 0.1 px
 //! realistic?
 //!
-//! Expected: image noise moves centres by little more than the information in the dots' edges allows, a few
+//! Expected: image noise moves centres by little more than the information in the discs' edges allows, a few
 //! thousandths of a pixel, far below 0.1 px. Without correction, the bias of imaged discs (the centre of the
 //! ellipse is not the image of the centre) is as large as that noise or larger, and it does not average out,
 //! though the poses take up most of it; with correction the camera is exact up to what the detector leaves.
 //!
-//! What it cannot show: lenses that are not sharp alike over the frame, dots that are printed out of place,
+//! What it cannot show: lenses that are not sharp alike over the frame, discs that are printed out of place,
 //! boards that are not plane. What they add is not measured here.
 
 use calibench::board::{Board, View};
@@ -28,8 +28,8 @@ use rayon::prelude::*;
 pub const EXPERIMENT: Experiment = Experiment {
     id: "photographs",
     title: "From photographs to a camera",
-    question: "The chapter's four poses are photographed, their dots detected, the camera calibrated. What \
-               extraction noise results against blur, image noise and dot size; what does the bias of \
+    question: "The chapter's four poses are photographed, their discs detected, the camera calibrated. What \
+               extraction noise results against blur, image noise and disc size; what does the bias of \
                imaged discs do without correction and with it; is the chapter's 0.1 px realistic? Expected: \
                a few thousandths of a pixel of noise, a bias of more than that without correction and none \
                with it, most of it taken up by the poses. A sensor does not make 0.1 px.",
@@ -38,10 +38,10 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// Where the sweeps cross: blur of a good lens, noise of 40 dB, the dots of the chapter's figure.
+/// Where the sweeps cross: blur of a good lens, noise of 40 dB, the discs of the chapter's figure.
 const BASE: Node = Node { blur_px: 0.5, noise: 0.01, diameter_mm: 3.0 };
 const BLURS_PX: [f64; 4] = [0.0, 0.5, 1.0, 2.0];
-/// Of full scale. Beyond 5 % the dots' outlines break up.
+/// Of full scale. Beyond 5 % the discs' outlines break up.
 const NOISES: [f64; 4] = [0.003, 0.01, 0.02, 0.05];
 const DIAMETERS_MM: [f64; 4] = [2.0, 3.0, 5.0, 7.0];
 /// The chapter's noise of a coordinate.
@@ -75,7 +75,19 @@ struct Outcome {
     bound_px: f64,
 }
 
-/// Noise-free photographs of one dot size, with what follows from them.
+impl Outcome {
+    /// Root mean square of a coordinate's error, px.
+    fn noise_px(&self) -> f64 {
+        rms_coordinate(&self.errors)
+    }
+
+    /// The same over its bound.
+    fn loss(&self) -> f64 {
+        self.noise_px() / self.bound_px
+    }
+}
+
+/// Noise-free photographs of one disc size, with what follows from them.
 struct Exact {
     diameter_mm: f64,
     /// Predicted bias, px, all views.
@@ -106,14 +118,14 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     record.figure(noise_figure(&outcomes, context.seed));
     record.figure(bias_figure(&exact, &unit));
     record.note(format!(
-        "{CHAPTER_NOISE_PX} px is not what a sensor makes of dots like these: noise of {} % of full scale \
+        "{CHAPTER_NOISE_PX} px is not what a sensor makes of discs like these: noise of {} % of full scale \
          gives {:.1} % of it. What print, flatness and uneven sharpness add is not rendered here.",
         100.0 * BASE.noise,
-        100.0 * rms_coordinate(&base(&outcomes)?.errors) / CHAPTER_NOISE_PX
+        100.0 * base(&outcomes)?.noise_px() / CHAPTER_NOISE_PX
     ));
     let photo = &album.photos(&BASE)[3];
     let caption = format!(
-        "The chapter's target in its compound pose, dots of {} mm, blur {} px, without noise: what the \
+        "The chapter's target in its compound pose, discs of {} mm, blur {} px, without noise: what the \
          detector sees.",
         BASE.diameter_mm, BASE.blur_px
     );
@@ -314,15 +326,15 @@ fn band() -> Band {
 
 fn report_noise(record: &mut Record, outcomes: &[Outcome]) -> Result<(), ExperimentError> {
     let base = base(outcomes)?;
-    let noise = rms_coordinate(&base.errors);
+    let noise = base.noise_px();
     let needed = CHAPTER_NOISE_PX / base.bound_px * BASE.noise;
     let blurred = outcomes.iter().max_by(|a, b| a.node.blur_px.total_cmp(&b.node.blur_px)).unwrap_or(base);
-    let ratio = rms_coordinate(&blurred.errors) / blurred.bound_px;
-    let worst = outcomes.iter().map(|o| rms_coordinate(&o.errors)).fold(0.0, f64::max);
+    let ratio = blurred.loss();
+    let worst = stats::largest(outcomes.iter().map(Outcome::noise_px));
     record
         .group("px", band())
-        .number("extraction-noise", noise, "RMS of a coordinate: blur 0.5 px, noise 1 %, dots of 3 mm")
-        .number("extraction-bound", base.bound_px, "what the information in the dots' edges allows there")
+        .number("extraction-noise", noise, "RMS of a coordinate: blur 0.5 px, noise 1 %, discs of 3 mm")
+        .number("extraction-bound", base.bound_px, "what the information in the discs' edges allows there")
         .unit("")
         .number("noise-for-a-tenth", needed, "image noise, of full scale, at which the bound reaches 0.1 px")
         .number("loss-under-blur", ratio, "extraction noise over its bound at the heaviest blur, 2 px")
@@ -335,22 +347,23 @@ fn report_bias(record: &mut Record, exact: &[Exact], unit: &[f64]) -> Result<(),
     let chapter = exact
         .iter()
         .find(|e| e.diameter_mm == BASE.diameter_mm)
-        .ok_or(ExperimentError::Input("the base's dot size is missing".into()))?;
+        .ok_or(ExperimentError::Input("the base's disc size is missing".into()))?;
     let bias = rms(&chapter.displacements);
     let remainder = rms(&chapter.remainder());
     record
         .group("px", band())
-        .number("bias-rms", bias, "RMS displacement of uncorrected centres, 3 mm dots, four poses")
+        .number("bias-rms", bias, "RMS displacement of uncorrected centres, 3 mm discs, four poses")
         .number("bias-largest", largest(&chapter.displacements), "largest displacement")
         .number("remainder-rms", remainder, "RMS distance from the true centres once corrected");
     let truth = Truth::example_camera();
     let (before, after) =
         (differences(&chapter.uncorrected, &truth), differences(&chapter.corrected, &truth));
     for (i, p) in FreeParameters::STANDARD.iter().enumerate() {
-        let what = format!("error of {p} from uncorrected centres, 3 mm dots");
-        record.group(p.unit(), band()).number(format!("{p}-uncorrected"), before[i], what);
-        let what = format!("error of {p} from corrected centres, 3 mm dots");
-        record.group(p.unit(), band()).number(format!("{p}-corrected"), after[i], what);
+        let what = |centres: &str| format!("error of {p} from {centres} centres, 3 mm discs");
+        record
+            .group(p.unit(), band())
+            .number(format!("{p}-uncorrected"), before[i], what("uncorrected"))
+            .number(format!("{p}-corrected"), after[i], what("corrected"));
     }
     let worst = largest_deviation(&before, unit);
     let what =
@@ -371,22 +384,22 @@ fn claim_noise(record: &mut Record, outcomes: &[Outcome]) {
     let (low, high) = (chance.low * (1.0 - BOUND_ERROR), chance.high * (1.0 + BOUND_ERROR) * LOSS);
     let sharp = outcomes.iter().filter(|o| o.node.blur_px <= SHARP_PX);
     let cases = sharp.map(|o| {
-        let ratio = rms_coordinate(&o.errors) / o.bound_px;
+        let ratio = o.loss();
         (format!("{}: {ratio:.3} of the bound", name(&o.node)), (low..=high).contains(&ratio))
     });
     let reason = format!(
         "chi-squared interval of {coordinates} coordinates a node, 2 % for the bound's Gaussian edge, and a \
          quarter that the detector may lose: {low:.3} to {high:.3}"
     );
-    let statement = "up to 1 px of blur, noise moves centres as much as the information in the dots' edges \
+    let statement = "up to 1 px of blur, noise moves centres as much as the information in the discs' edges \
                      demands, and hardly more";
     record
         .claim_that("noise-is-at-the-bound", statement)
         .every("cases", cases)
         .at_rate(FALSE_ALARM)
         .because(reason);
-    let worst = outcomes.iter().map(|o| rms_coordinate(&o.errors)).fold(0.0, f64::max);
-    let statement = "no blur, noise and dot size of the sweeps makes the chapter's 0.1 px";
+    let worst = stats::largest(outcomes.iter().map(Outcome::noise_px));
+    let statement = "no blur, noise and disc size of the sweeps makes the chapter's 0.1 px";
     let reason = "the largest bound of the sweeps, widened as above, is below it";
     record
         .claim_that("below-a-tenth", statement)
@@ -401,28 +414,28 @@ fn claim_bias(record: &mut Record, exact: &[Exact], unit: &[f64]) {
     let within = |moved: &[f64], reach: &[f64]| moved.iter().zip(reach).all(|(m, r)| m.abs() <= *r);
     let remainder = |e: &Exact| rms(&e.remainder());
     let worst = exact.iter().map(remainder).fold(0.0, f64::max);
-    let statement = "centres less the predicted bias lie on the true ones, for every dot size";
+    let statement = "centres less the predicted bias lie on the true ones, for every disc size";
     let reason = "the project's target for noise-free images, 0.01 px RMS";
     record.claim_that("bias-is-predicted", statement).at_most(worst, 0.01).unit("px").because(reason);
     let reason = "least squares moves a parameter by at most the length of the pixels' error vector times \
                   its standard deviation for unit noise (Cauchy-Schwarz), and a tenth for second order";
     let case = |e: &Exact, moved: Vec<f64>| {
-        (format!("dots of {} mm: {moved:?}", e.diameter_mm), within(&moved, &e.reach(unit)))
+        (format!("discs of {} mm: {moved:?}", e.diameter_mm), within(&moved, &e.reach(unit)))
     };
     let statement = "with correction the camera is true up to what the detector leaves";
     let cases = exact.iter().map(|e| case(e, differences(&e.corrected, &truth)));
-    record.claim_that("corrected-camera-is-true", statement).every("dot sizes", cases).because(reason);
+    record.claim_that("corrected-camera-is-true", statement).every("disc sizes", cases).because(reason);
     let statement = "without correction the camera is wrong as the bias of the discs alone makes it";
     let cases = exact.iter().map(|e| case(e, differences(&e.uncorrected, &e.predicted)));
-    record.claim_that("uncorrected-camera-is-biased", statement).every("dot sizes", cases).because(reason);
+    record.claim_that("uncorrected-camera-is-biased", statement).every("disc sizes", cases).because(reason);
 }
 
 fn noise_table(outcomes: &[Outcome]) -> Rows<&Outcome> {
-    Table::of("noise", "extraction noise against blur, image noise and dot size", outcomes)
+    Table::of("noise", "extraction noise against blur, image noise and disc size", outcomes)
         .column("blur", "px", |o| o.node.blur_px)
         .column("noise", "", |o| o.node.noise)
         .column("diameter", "mm", |o| o.node.diameter_mm)
-        .column("extraction_noise", "px", |o| rms_coordinate(&o.errors))
+        .column("extraction_noise", "px", |o| o.noise_px())
         .column("bound", "px", |o| o.bound_px)
 }
 
@@ -448,33 +461,30 @@ fn noise_figure(outcomes: &[Outcome], seed: u64) -> Figure {
     let panel = |title: &str, label: &str, at: fn(&Node) -> f64, others: fn(&Node) -> Node| {
         let mut chosen: Vec<&Outcome> = outcomes.iter().filter(|o| others(&o.node) == BASE).collect();
         chosen.sort_by(|a, b| at(&a.node).total_cmp(&at(&b.node)));
-        let curve = |value: &dyn Fn(&Outcome) -> f64| -> Vec<(f64, f64)> {
-            chosen.iter().map(|o| (at(&o.node), value(o))).collect()
-        };
+        let curve = |value: fn(&Outcome) -> f64| chosen.iter().map(move |o| (at(&o.node), value(o)));
         Plot::new(title, label, "noise of a coordinate (px)")
             .size(400.0, 340.0)
-            .line("bound of the edges", &curve(&|o| o.bound_px))
-            .points_as("detected", &curve(&|o| rms_coordinate(&o.errors)), Look::series(1))
+            .line("bound of the edges", curve(|o| o.bound_px))
+            .points_as("detected", curve(Outcome::noise_px), Look::series(1))
             .y_range(0.0, 0.025)
     };
     let panels = [
         panel("blur", "blur (px)", |n| n.blur_px, |n| Node { blur_px: BASE.blur_px, ..*n }),
         panel("image noise", "noise (of full scale)", |n| n.noise, |n| Node { noise: BASE.noise, ..*n }),
         panel(
-            "dot size",
+            "disc size",
             "diameter (mm)",
             |n| n.diameter_mm,
             |n| Node { diameter_mm: BASE.diameter_mm, ..*n },
         ),
     ];
-    let loss = |o: &Outcome| rms_coordinate(&o.errors) / o.bound_px;
     let worst_loss = |chosen: &dyn Fn(&Node) -> bool| {
-        stats::largest(outcomes.iter().filter(|o| chosen(&o.node)).map(loss))
+        stats::largest(outcomes.iter().filter(|o| chosen(&o.node)).map(Outcome::loss))
     };
-    let largest_px = stats::largest(outcomes.iter().map(|o| rms_coordinate(&o.errors)));
+    let largest_px = stats::largest(outcomes.iter().map(Outcome::noise_px));
     let caption = format!(
-        "Extraction noise of a coordinate, px, over the {} dots of the chapter's four poses, each node one \
-         photograph a pose, seed {seed}; the sweeps cross at blur {} px, noise {} % of full scale, dots of \
+        "Extraction noise of a coordinate, px, over the {} discs of the chapter's four poses, each node one \
+         photograph a pose, seed {seed}; the sweeps cross at blur {} px, noise {} % of full scale, discs of \
          {} mm. Notice that the detector's noise is at most {:.2} times its bound up to {SHARP_PX} px of \
          blur and {:.2} times beyond, and that the largest, {largest_px:.3} px, is {:.0} % of the chapter's \
          {CHAPTER_NOISE_PX} px.",
@@ -494,24 +504,24 @@ fn bias_figure(exact: &[Exact], unit: &[f64]) -> Figure {
     let curve = |value: &dyn Fn(&Exact) -> f64| -> Vec<(f64, f64)> {
         exact.iter().map(|e| (e.diameter_mm, value(e))).collect()
     };
+    let worst = |camera: &Camera| largest_deviation(&differences(camera, &truth), unit);
     let pixels = Plot::new("centres", "diameter (mm)", "RMS distance from the truth (px)")
         .size(480.0, 360.0)
         .log_y()
-        .line("uncorrected", &curve(&|e| rms(&e.displacements)))
-        .points("predicted bias", &curve(&|e| rms(&e.biases)))
-        .line("corrected", &curve(&|e| rms(&e.remainder())));
+        .line("uncorrected", curve(&|e| rms(&e.displacements)))
+        .points("predicted bias", curve(&|e| rms(&e.biases)))
+        .line("corrected", curve(&|e| rms(&e.remainder())));
     let cameras = Plot::new("camera", "diameter (mm)", "worst error (sd at 0.1 px)")
         .size(480.0, 360.0)
         .log_y()
-        .line("uncorrected", &curve(&|e| largest_deviation(&differences(&e.uncorrected, &truth), unit)))
-        .points("predicted", &curve(&|e| largest_deviation(&differences(&e.predicted, &truth), unit)))
-        .line("corrected", &curve(&|e| largest_deviation(&differences(&e.corrected, &truth), unit)));
-    let worst = |camera: &Camera| largest_deviation(&differences(camera, &truth), unit);
+        .line("uncorrected", curve(&|e| worst(&e.uncorrected)))
+        .points("predicted", curve(&|e| worst(&e.predicted)))
+        .line("corrected", curve(&|e| worst(&e.corrected)));
     let last = &exact[exact.len() - 1];
     let caption = format!(
         "Left: RMS distance of detected centres from the true ones, px. Right: error of the worst of the \
          six parameters in standard deviations under the chapter's noise of {CHAPTER_NOISE_PX} px. Four \
-         poses, blur {} px, nothing drawn at random. Notice that with dots of {} mm centres {:.3} px off \
+         poses, blur {} px, nothing drawn at random. Notice that with discs of {} mm centres {:.3} px off \
          move the camera by {:.2} standard deviations, and that correction leaves {:.4} px and {:.3} \
          standard deviations.",
         BASE.blur_px,

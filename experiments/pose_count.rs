@@ -7,12 +7,10 @@
 //! What it cannot show: views that a person takes are not spread evenly, and errors of the target or the lens
 //! model, common to all views, do not average out.
 
+use super::sweep::{Sweep, Swept, solver_band, spread_cases};
 use calibench::camera::{FreeParameters, Parameter};
-use calibench_harness::stats::{self, Interval, each_of};
-use calibench_harness::{
-    Band, Context, Dash, Experiment, ExperimentError, Figure, Look, Plot, Record, Table,
-};
-use calibench_study::{CellSummary, Engine, Summary, within};
+use calibench_harness::stats;
+use calibench_harness::{Band, Context, Experiment, ExperimentError, Figure, Plot, Record, Rows, Table};
 
 /// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -57,105 +55,73 @@ const EXPONENT_SLACK: f64 = 0.045;
 /// Terms of second order in the noise: the bound is of first order, and sd(f)/f is about 2e-3 with three
 /// views; a hundredth covers ten times that.
 const NONLINEARITY: f64 = 0.01;
-/// The refinement ends within a millionth of a standard deviation of the minimum.
-const SOLVER: f64 = 1e-6;
 
 fn run(context: &Context) -> Result<Record, ExperimentError> {
     let mut record = context.record();
-    let (engine, summary) = within(context, &mut record, "study", STUDY, |_| {})?;
+    let sweep = Sweep::run(context, &mut record, "study", STUDY, |_| {})?;
 
-    report_numbers(&mut record, &engine, &summary);
-    claim_all_converged(&mut record, &summary);
-    claim_bound_attained(&mut record, &summary);
-    claim_root_law(&mut record, &engine, &summary);
-    record.table(table(&engine, &summary));
-    record.figure(figure(&engine, &summary));
+    report_numbers(&mut record, &sweep);
+    claim_all_converged(&mut record, &sweep);
+    claim_bound_attained(&mut record, &sweep);
+    claim_root_law(&mut record, &sweep);
+    record.table(table(&sweep));
+    record.figure(figure(&sweep));
     Ok(record)
-}
-
-fn views(engine: &Engine, cell: usize) -> f64 {
-    engine.spec.factor[0].number(engine.cells[cell].levels[0]).unwrap_or(f64::NAN)
-}
-
-/// `(measured, bound)` standard deviation; NaN where nothing converged.
-fn spread(cell: &CellSummary, parameter: Parameter) -> (f64, f64) {
-    let statistic = cell.of(parameter.name());
-    let sd = statistic.and_then(|s| s.sd).map_or(f64::NAN, |sd| sd.value);
-    (sd, statistic.and_then(|s| s.predicted).map_or(f64::NAN, |p| p.sd))
 }
 
 fn parameters() -> impl Iterator<Item = Parameter> {
     FreeParameters::STANDARD.iter()
 }
 
-fn report_numbers(record: &mut Record, engine: &Engine, summary: &Summary) {
-    for (cell, result) in summary.cells.iter().enumerate() {
-        for parameter in parameters() {
-            let (sd, bound) = spread(result, parameter);
-            let band =
-                || Band::relative(SOLVER, "the refinement ends within a millionth of a standard deviation");
-            let n = views(engine, cell);
-            let what = format!("Cramer-Rao bound of {parameter}, {n} views");
+fn report_numbers(record: &mut Record, sweep: &Sweep) {
+    for cell in sweep.cells() {
+        let views = cell.level;
+        for p in parameters() {
             record
-                .group(parameter.unit(), band())
-                .number(format!("sd-{parameter}-{n}"), sd, format!("sd of {parameter}, {n} views"))
-                .number(format!("bound-{parameter}-{n}"), bound, what);
+                .group(p.unit(), solver_band())
+                .suffix(format!("-{p}-{views}"), format!(" of {p}, {views} views"))
+                .number("sd", cell.sd(p.name()), "sd")
+                .number("bound", cell.bound(p.name()), "Cramer-Rao bound");
         }
     }
 }
 
-fn claim_all_converged(record: &mut Record, summary: &Summary) {
-    let cases = summary.cells.iter().map(|c| (c.name.clone(), c.converged().is_some_and(|s| s.value == 1.0)));
+fn claim_all_converged(record: &mut Record, sweep: &Sweep) {
     record
         .claim_that("all-converged", "every trial ends in a minimum")
-        .every("cells", cases)
+        .every("cells", sweep.cells().map(|cell| (cell.found.name.clone(), cell.converged() == 1.0)))
         .because("20 degrees of tilt determine the camera at 0.1 px");
 }
 
-/// The sample standard deviation over the true one is `sqrt(chi2 / (n - 1))`.
-fn claim_bound_attained(record: &mut Record, summary: &Summary) {
-    let family = summary.cells.len() * parameters().count();
-    let cases = summary.cells.iter().flat_map(|cell| {
-        parameters().map(move |parameter| {
-            let (sd, bound) = spread(cell, parameter);
-            let interval = Interval::of_deviation_ratio(cell.trials as usize, each_of(family, FALSE_ALARM));
-            let (low, high) = (interval.low * (1.0 - NONLINEARITY), interval.high * (1.0 + NONLINEARITY));
-            let ratio = sd / bound;
-            (
-                format!("{parameter}, {}: {ratio:.4} not in [{low:.4}, {high:.4}]", cell.name),
-                (low..=high).contains(&ratio),
-            )
-        })
-    });
+fn claim_bound_attained(record: &mut Record, sweep: &Sweep) {
+    let names: Vec<&str> = parameters().map(Parameter::name).collect();
     record
         .claim_that(
             "bound-attained",
             "the spread of every parameter is its Cramer-Rao bound for every number of views",
         )
-        .every("spreads", cases)
+        .every("spreads", spread_cases(sweep.cells(), &names, FALSE_ALARM, NONLINEARITY))
         .at_rate(FALSE_ALARM)
         .because("sqrt(chi2 / (n - 1)), each of 60 cases at 1e-4 / 60, and 1 % for terms of second order");
 }
 
 /// `ln sd = a - b ln n` over the long series.
-fn claim_root_law(record: &mut Record, engine: &Engine, summary: &Summary) {
-    let long: Vec<usize> =
-        (0..summary.cells.len()).filter(|&c| views(engine, c) >= ASYMPTOTIC_VIEWS).collect();
-    let log_views: Vec<f64> = long.iter().map(|&c| libm::log(views(engine, c))).collect();
-    let slope = |value: &dyn Fn(usize) -> f64| {
-        stats::slope(&log_views, &long.iter().map(|&c| libm::log(value(c))).collect::<Vec<_>>())
-    };
+fn claim_root_law(record: &mut Record, sweep: &Sweep) {
+    let long: Vec<Swept> = sweep.cells().filter(|cell| cell.level >= ASYMPTOTIC_VIEWS).collect();
+    let logarithms =
+        |value: &dyn Fn(&Swept) -> f64| long.iter().map(|cell| libm::log(value(cell))).collect::<Vec<_>>();
+    let log_views = logarithms(&|cell| cell.level);
+    let slope = |value: &dyn Fn(&Swept) -> f64| stats::slope(&log_views, &logarithms(value));
     let mut cases = Vec::new();
-    for parameter in parameters() {
-        let band = || Band::relative(1e-5, "a difference of logarithms of numbers known to 1e-6");
-        let bound = slope(&|c| spread(&summary.cells[c], parameter).1);
-        let measured = slope(&|c| spread(&summary.cells[c], parameter).0);
+    for p in parameters() {
+        let bound = slope(&|cell| cell.bound(p.name()));
+        let measured = slope(&|cell| cell.sd(p.name()));
         record
-            .group("", band())
-            .number(format!("exponent-bound-{parameter}"), bound, "slope of ln bound over ln n, n >= 16")
-            .number(format!("exponent-{parameter}"), measured, "slope of ln sd over ln n, n >= 16");
+            .group("", Band::relative(1e-5, "a difference of logarithms of numbers known to 1e-6"))
+            .number(format!("exponent-bound-{p}"), bound, "slope of ln bound over ln n, n >= 16")
+            .number(format!("exponent-{p}"), measured, "slope of ln sd over ln n, n >= 16");
         let low_high = -0.5 - EXPONENT_SLACK..=-0.5 + EXPONENT_SLACK;
-        cases.push((format!("{parameter}: exponent {bound}"), low_high.contains(&bound)));
+        cases.push((format!("{p}: exponent {bound}"), low_high.contains(&bound)));
     }
     // That the measured spreads follow is no claim of its own: they are at the bound for every number of
     // views.
@@ -168,83 +134,47 @@ fn claim_root_law(record: &mut Record, engine: &Engine, summary: &Summary) {
         .because("equal views add equal information; uneven directions leave a part 1/n of it, n >= 16");
 }
 
-fn table(engine: &Engine, summary: &Summary) -> Table {
-    let columns = [
-        ("views", ""),
-        ("parameter", ""),
-        ("sd", "unit"),
-        ("sd_low", "unit"),
-        ("sd_high", "unit"),
-        ("bound", "unit"),
-        ("unit", ""),
-    ];
-    let mut table = Table::new("spread", "Standard deviation and Cramer-Rao bound, 95 % intervals", &columns);
-    for (cell, result) in summary.cells.iter().enumerate() {
-        for parameter in parameters() {
-            let Some(sd) = result.of(parameter.name()).and_then(|s| s.sd) else { continue };
-            let bound = spread(result, parameter).1;
-            use calibench_harness::Cell;
-            table.push([
-                Cell::Integer(views(engine, cell) as i64),
-                parameter.name().into(),
-                sd.value.into(),
-                sd.low.into(),
-                sd.high.into(),
-                bound.into(),
-                parameter.unit().into(),
-            ]);
-        }
-    }
-    table
+fn table(sweep: &Sweep) -> Rows<impl Sized> {
+    let all = sweep.cells().flat_map(|cell| parameters().map(move |p| (cell, p)));
+    let rows = all.filter_map(|(cell, p)| Some((cell, p, cell.sd_interval(p.name())?)));
+    Table::of("spread", "Standard deviation and Cramer-Rao bound, 95 % intervals", rows)
+        .column("views", "", |(cell, ..)| cell.level as i64)
+        .column("parameter", "", |(_, p, _)| p.name())
+        .column("sd", "unit", |(.., sd)| sd.value)
+        .column("sd_low", "unit", |(.., sd)| sd.low)
+        .column("sd_high", "unit", |(.., sd)| sd.high)
+        .column("bound", "unit", |(cell, p, _)| cell.bound(p.name()))
+        .column("unit", "", |(_, p, _)| p.unit())
 }
 
-fn figure(engine: &Engine, summary: &Summary) -> Figure {
-    let panel = |parameter: Parameter| {
-        let unit =
-            if parameter.unit().is_empty() { String::new() } else { format!(" ({})", parameter.unit()) };
-        let at = |cell: usize| views(engine, cell);
-        let all = || summary.cells.iter().enumerate();
-        let bound: Vec<(f64, f64)> = all().map(|(i, c)| (at(i), spread(c, parameter).1)).collect();
-        let sds: Vec<(f64, f64)> = all().map(|(i, c)| (at(i), spread(c, parameter).0)).collect();
-        let bars: Vec<(f64, f64, f64)> = all()
-            .filter_map(|(i, c)| c.of(parameter.name())?.sd.map(|sd| (at(i), sd.low, sd.high)))
-            .collect();
-        // Through the last bound.
-        let last = bound[bound.len() - 1];
-        let law: Vec<(f64, f64)> = bound.iter().map(|(n, _)| (*n, last.1 * (last.0 / n).sqrt())).collect();
-        Plot::new(parameter.name(), "views", format!("standard deviation{unit}"))
-            .size(400.0, 340.0)
-            .log_x()
-            .log_y()
-            .line_as("1/\u{221a}n", &law, Look::ink().dash(Dash::Dotted))
-            .line_as("Cramer-Rao bound", &bound, Look::series(0))
-            .error_bars_as("", &bars, Look::series(1))
-            .points_as("measured", &sds, Look::series(1))
+fn figure(sweep: &Sweep) -> Figure {
+    let cells: Vec<Swept> = sweep.cells().collect();
+    let [first, .., before, last] = &cells[..] else { unreachable!("the study has ten levels") };
+    let panel = |p: Parameter| {
+        let through_last = |n: f64| last.bound(p.name()) * (last.level / n).sqrt();
+        let labels = (p.name(), "views", p.unit());
+        sweep.spread_plot(labels, p.name(), ("1/\u{221a}n", through_last))
     };
     let panels: Vec<Plot> = parameters().map(panel).collect();
-    let off = summary.cells.iter().flat_map(|cell| {
-        parameters().map(|parameter| spread(cell, parameter)).map(|(sd, bound)| (sd / bound - 1.0).abs())
-    });
+    let off = cells
+        .iter()
+        .flat_map(|cell| parameters().map(|p| (cell.sd(p.name()) / cell.bound(p.name()) - 1.0).abs()));
     // The bound before the last, over the law through the last.
-    let last = summary.cells.len() - 1;
-    let of_law = || {
-        let root = (views(engine, last) / views(engine, last - 1)).sqrt();
-        let bound = |cell: usize, p: Parameter| spread(&summary.cells[cell], p).1;
-        parameters().map(move |p| bound(last - 1, p) / (bound(last, p) * root))
-    };
+    let root = (last.level / before.level).sqrt();
+    let of_law = || parameters().map(|p| before.bound(p.name()) / (last.bound(p.name()) * root));
     let caption = format!(
         "Standard deviation of the six parameters against the number of views, {} trials a point with 95 % \
          intervals, seed {}, noise 0.1 px, tilt 20 degrees, distance 120 mm. Notice that no measured one is \
          more than {:.0} % off the bound, from {} views on, and that the bound at {} views is {:.3} to \
          {:.3} of the law of the root drawn through that at {}.",
-        summary.cells[0].trials,
-        engine.spec.seed,
+        sweep.trials(),
+        sweep.spec().seed,
         (100.0 * stats::largest(off)).ceil(),
-        views(engine, 0),
-        views(engine, last - 1),
+        first.level,
+        before.level,
         stats::smallest(of_law()),
         stats::largest(of_law()),
-        views(engine, last)
+        last.level
     );
     Figure::panels("spread", &panels, 3, caption)
 }

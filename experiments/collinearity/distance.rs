@@ -37,23 +37,21 @@ pub fn report_units_mistake(
 /// Two published numbers fix the distance that the chapter does not give.
 pub fn report_distances(record: &mut Record, draws: &[Draw], book: &Book) -> Result<(), ExperimentError> {
     let truth = Truth::example_camera();
-    let columns = [("distance", "mm"), ("top_row_before", "px"), ("units_mistake", "")];
-    let mut table =
-        Table::new("distances", "both numbers without noise against the target's distance", &columns);
-    let (mut rows, mut mistakes) = (Vec::new(), Vec::new());
+    let mut rows = Vec::new();
     for distance in DISTANCES_MM.map(f64::from) {
         let view = scene(distance)?.exact().remove(0);
         let row = line(&view.pixels()[TOP_ROW])?.max_deviation();
         let mistake = pixels_minus_millimetres(&corrected(&truth, view.pixels())?, view.points());
-        table.push([distance, row, mistake]);
-        rows.push((distance, row));
-        mistakes.push((distance, mistake));
+        rows.push([distance, row, mistake]);
     }
-    record.table(table);
+    let columns = [("distance", "mm"), ("top_row_before", "px"), ("units_mistake", "")];
+    let caption = "both numbers without noise against the target's distance";
+    record.table(Table::of_arrays("distances", caption, columns, &rows));
     let sd = moments(&column(draws, MAIN, 1)).standard_deviation(0);
-    let whole: Vec<f64> = mistakes.iter().filter(|(_, m)| m.round() == 427.0).map(|(z, _)| *z).collect();
+    let whole: Vec<f64> = rows.iter().filter(|[.., m]| m.round() == 427.0).map(|[z, ..]| *z).collect();
     let sigmas = |z: f64| {
-        rows.iter().find(|(at, _)| *at == z).map_or(f64::NAN, |(_, d)| (d - book[1].value()).abs() / sd)
+        let row = rows.iter().find(|[at, ..]| *at == z);
+        row.map_or(f64::NAN, |[_, d, _]| (d - book[1].value()).abs() / sd)
     };
     record
         .claim_that(
@@ -75,15 +73,15 @@ pub fn report_distances(record: &mut Record, draws: &[Draw], book: &Book) -> Res
             "the 'residual' in pixels minus millimetres falls by 0.4 a millimetre, so its printed digits \
              allow a range of 2.4 mm",
         );
-    let band: Vec<(f64, f64, f64)> = rows.iter().map(|&(z, d)| (z, d - 3.0 * sd, d + 3.0 * sd)).collect();
+    let band = rows.iter().map(|[z, d, _]| (*z, d - 3.0 * sd, d + 3.0 * sd));
     let size = |plot: Plot| plot.size(440.0, 340.0);
     let panels = [
         size(Plot::new("Top row against the distance", "distance (mm)", "largest deviation (px)"))
-            .band("noise, \u{b1}3 sd", &band)
-            .line("without noise", &rows)
+            .band("noise, \u{b1}3 sd", band)
+            .line("without noise", rows.iter().map(|[z, d, _]| (*z, *d)))
             .hline(format!("published: {} px", book[1].printed), book[1].value()),
         size(Plot::new("Pixels read as millimetres", "distance (mm)", "RMS of pixel minus mm"))
-            .line("without noise", &mistakes)
+            .line("without noise", rows.iter().map(|[z, _, mistake]| (*z, *mistake)))
             .hline("published: 427", 427.0)
             .vline("120 mm", DISTANCE_MM),
     ];

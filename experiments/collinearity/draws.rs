@@ -42,29 +42,21 @@ pub fn predicted(draws: &[Draw], quantity: usize) -> Predicted {
 /// coordinate, smaller by the root of two. The ratio of the largest residual to the RMS depends little on the
 /// noise, so it tells the readings apart.
 pub fn readings_table(draws: &[Draw], book: &Book) -> Table {
-    let columns = [
-        ("centre", ""),
-        ("reading", ""),
-        ("book_rms_per_point", "mm"),
-        ("draws_below_rms", "%"),
-        ("book_max_over_rms", ""),
-        ("draws_below_ratio", "%"),
-    ];
     let caption = "the published affine residual read as RMS per point and per coordinate: where it and its \
                    ratio to the largest residual lie among the draws";
-    let mut table = Table::new("readings", caption, &columns);
-    for (i, centre) in CENTRES.iter().enumerate() {
-        let (rms, max) = (column(draws, i, 3), column(draws, i, 4));
-        let ratios: Vec<f64> = max.iter().zip(&rms).map(|(max, rms)| max / rms).collect();
-        for (reading, factor) in [("per point", 1.0), ("per coordinate", std::f64::consts::SQRT_2)] {
-            let published = factor * book[3].value();
-            let ratio = book[4].value() / published;
-            let row = [Cell::from(centre.name()), Cell::from(reading), Cell::from(published)];
-            let places = [percent_below(&rms, published), ratio, percent_below(&ratios, ratio)];
-            table.push(row.into_iter().chain(places.map(Cell::from)));
-        }
-    }
-    table
+    let readings = [("per point", 1.0), ("per coordinate", std::f64::consts::SQRT_2)];
+    let rows = (0..CENTRES.len())
+        .flat_map(|i| readings.map(|(reading, factor)| (i, reading, factor * book[3].value())));
+    let ratio = |published: f64| book[4].value() / published;
+    let ratios = |i: usize| -> Vec<f64> { draws.iter().map(|d| d[i][4] / d[i][3]).collect() };
+    Table::of("readings", caption, rows)
+        .column("centre", "", |(i, ..)| CENTRES[*i].name())
+        .column("reading", "", |(_, reading, _)| *reading)
+        .column("book_rms_per_point", "mm", |(.., published)| *published)
+        .column("draws_below_rms", "%", |(i, _, published)| percent_below(&column(draws, *i, 3), *published))
+        .column("book_max_over_rms", "", |(.., published)| ratio(*published))
+        .column("draws_below_ratio", "%", |(i, _, published)| percent_below(&ratios(*i), ratio(*published)))
+        .into()
 }
 
 pub fn percent_below(values: &[f64], x: f64) -> f64 {

@@ -3,24 +3,20 @@
 use super::*;
 
 pub fn row_figure(ours: &Found, exact: &Found, book: &Book, seed: u64) -> Figure {
-    let along = |fit: &LineFit| -> Vec<(f64, f64)> {
-        TOP_ROW.zip(&fit.deviations).map(|(i, d)| (10.0 * (i as f64 - 4.0), *d)).collect()
+    let panel = |title: &str, fits: [&LineFit; 2], published: &Entry| {
+        let along =
+            |fit: &LineFit| TOP_ROW.zip(fit.deviations.clone()).map(|(i, d)| (10.0 * (i as f64 - 4.0), d));
+        Plot::new(title, "X on the target (mm)", "deviation (px), down positive")
+            .size(440.0, 360.0)
+            .y_down()
+            .line("without noise", along(fits[0]))
+            .points_as("our draw", along(fits[1]), Look::series(1))
+            .hline(format!("\u{b1}{} px, as published", published.printed), published.value())
+            .hline("", -published.value())
     };
-    let plot = |title: &str| {
-        Plot::new(title, "X on the target (mm)", "deviation (px), down positive").size(440.0, 360.0).y_down()
-    };
-    let published = |q: usize| format!("\u{b1}{} px, as published", book[q].printed);
     let panels = [
-        plot("Top row, as photographed")
-            .line("without noise", &along(&exact.row_before))
-            .points_as("our draw", &along(&ours.row_before), Look::series(1))
-            .hline(published(1), book[1].value())
-            .hline("", -book[1].value()),
-        plot("Top row, corrected")
-            .line("without noise", &along(&exact.row_after))
-            .points_as("our draw", &along(&ours.row_after), Look::series(1))
-            .hline(published(2), book[2].value())
-            .hline("", -book[2].value()),
+        panel("Top row, as photographed", [&exact.row_before, &ours.row_before], book[1]),
+        panel("Top row, corrected", [&exact.row_after, &ours.row_after], book[2]),
     ];
     let caption = format!(
         "Signed distance of the nine points of the target's top row from their regression line, in pixels, \
@@ -44,18 +40,16 @@ pub fn predicted_figure(ours: &[Found], draws: &[Draw], book: &Book, seed: u64) 
                 let reach = 4.5 * spread.standard_deviation(0);
                 (low.min((spread.mean(0) - reach).max(0.0)), high.max(spread.mean(0) + reach))
             });
-            let outline = |centre: usize| -> Vec<(f64, f64)> {
-                density(&column(draws, centre, q), range, 60)
-                    .iter()
-                    .map(|b| (0.5 * (b.0 + b.1), b.2))
-                    .collect()
+            let outline = |centre: usize| {
+                let bins = density(&column(draws, centre, q), range, 60);
+                bins.into_iter().map(|(left, right, height)| (0.5 * (left + right), height))
             };
             Plot::new(id.replace('-', " "), format!("{id} ({unit})"), format!("density (1/{unit})"))
                 .size(400.0, 330.0)
                 .histogram("centre free", &density(&free, range, 60))
-                .line("held at truth", &outline(1))
-                .line("held at image centre", &outline(0))
-                .line("the same, p1, p2 free", &outline(3))
+                .line("held at truth", outline(1))
+                .line("held at image centre", outline(0))
+                .line("the same, p1, p2 free", outline(3))
                 .vline_as("our draw", drawn[q], Look::series(3))
                 .vline("published", book[q].value())
         })
@@ -74,20 +68,15 @@ pub fn predicted_figure(ours: &[Found], draws: &[Draw], book: &Book, seed: u64) 
 }
 
 pub fn residual_figure(view: &View, found: &Found, seed: u64) -> Figure {
-    let arrows = |at: &[Vec2], residuals: &[Vec2], scale: f64| -> Vec<(f64, f64, f64, f64)> {
-        at.iter().zip(residuals).map(|(p, r)| (p.x, p.y, scale * r.x, scale * r.y)).collect()
+    let panel = |plot: Plot, label: &str, at: &[Vec2], residuals: &[Vec2], scale: f64| {
+        let arrows = at.iter().zip(residuals).map(|(p, r)| (p.x, p.y, scale * r.x, scale * r.y));
+        plot.size(460.0, 390.0).equal_aspect().y_down().arrows(format!("{label}, x {scale}"), arrows)
     };
+    let plane = Plot::new("Single-plane calibration", "u (px)", "v (px)");
+    let affine = Plot::new("Affine fit to the target", "X (mm)", "Y (mm)");
     let panels = [
-        Plot::new("Single-plane calibration", "u (px)", "v (px)")
-            .size(460.0, 390.0)
-            .equal_aspect()
-            .y_down()
-            .arrows("predicted minus seen, x 150", &arrows(view.pixels(), &found.plane.residuals_px, 150.0)),
-        Plot::new("Affine fit to the target", "X (mm)", "Y (mm)")
-            .size(460.0, 390.0)
-            .equal_aspect()
-            .y_down()
-            .arrows("fitted minus target, x 100", &arrows(view.points(), &found.affine_residuals, 100.0)),
+        panel(plane, "predicted minus seen", view.pixels(), &found.plane.residuals_px, 150.0),
+        panel(affine, "fitted minus target", view.points(), &found.affine_residuals, 100.0),
     ];
     let caption = format!(
         "Residuals of the {} points of our draw (seed {seed}, sigma {SIGMA_PX} px, centre free): of the \

@@ -109,41 +109,37 @@ pub fn rectify(record: &mut Record, ours: &[Found]) -> Result<(), ExperimentErro
         output_camera(&truth, size, OutputView::AllPixels).map_err(ExperimentError::at("output camera"))?;
     let same = |pixel: &Vec2| *pixel;
     let all = |pixel: &Vec2| truth.pixel_from_normalised(&everything.normalised_from_pixel(pixel));
-    let columns = [
-        ("view", ""),
-        ("lens", ""),
-        ("compared", "px"),
-        ("without_data", "px"),
-        ("data_in_one_only", "px"),
-        ("shift_rms", "px"),
-        ("shift_max", "px"),
-        ("level_mean", "grey"),
-        ("level_rms", "grey"),
-        ("level_max", "grey"),
-    ];
-    let caption = "images rectified by the single-plane calibration against those by the true model, where \
-                   both have data";
-    let mut table = Table::new("rectified", caption, &columns);
-    let mut cases = Vec::new();
+    let mut compared = Vec::new();
     for (view, ideal) in [("same", &same as &dyn Fn(&Vec2) -> Vec2), ("all", &all)] {
         let by_truth = Rectified::new(&photo, &truth, ideal)?;
         for (found, centre) in ours.iter().zip(CENTRES) {
             let by_plane = Rectified::new(&photo, &found.plane.lens_camera(), ideal)?;
             let d = Difference::new(&by_truth, &by_plane, &photo);
-            let mut row = vec![Cell::from(view), Cell::from(centre.name()), Cell::from(d.pixels)];
-            row.extend([by_plane.without_data(), d.masks_differ].map(Cell::from));
-            let shift = d.mean(d.shift_square).sqrt();
-            let levels = [d.mean(d.level_sum), d.mean(d.level_square).sqrt(), d.level_max];
-            row.extend([shift, d.shift_max].into_iter().chain(levels).map(Cell::from));
-            table.push(row);
-            cases.push((format!("{view}, {}: {} pixels", centre.name(), d.unexplained), d.unexplained == 0));
             if centre == CENTRES[MAIN] {
                 report_rectified(record, view, &by_truth, &by_plane, &d);
                 draw_rectified(record, view, &photo, (&by_truth, &by_plane), &d);
             }
+            compared.push((view, centre, by_plane.without_data(), d));
         }
     }
-    record.table(table);
+    let caption = "images rectified by the single-plane calibration against those by the true model, where \
+                   both have data";
+    record.table(
+        Table::of("rectified", caption, &compared)
+            .column("view", "", |(view, ..)| *view)
+            .column("lens", "", |(_, centre, ..)| centre.name())
+            .column("compared", "px", |(.., d)| d.pixels)
+            .column("without_data", "px", |(.., without_data, _)| *without_data)
+            .column("data_in_one_only", "px", |(.., d)| d.masks_differ)
+            .column("shift_rms", "px", |(.., d)| d.mean(d.shift_square).sqrt())
+            .column("shift_max", "px", |(.., d)| d.shift_max)
+            .column("level_mean", "grey", |(.., d)| d.mean(d.level_sum))
+            .column("level_rms", "grey", |(.., d)| d.mean(d.level_square).sqrt())
+            .column("level_max", "grey", |(.., d)| d.level_max),
+    );
+    let cases = compared.iter().map(|(view, centre, _, d)| {
+        (format!("{view}, {}: {} pixels", centre.name(), d.unexplained), d.unexplained == 0)
+    });
     record
         .claim_that(
             "images-agree-as-their-maps-do",
@@ -173,20 +169,19 @@ pub fn report_rectified(
     plane: &Rectified,
     d: &Difference,
 ) {
-    let mut count = |id: &str, value: usize, what: &str| {
-        record.exact("px").count(format!("{view}-{id}"), value, what);
-    };
-    count("empty-true-model", truth.without_data(), "pixels without data, true model");
-    count("empty-single-plane", plane.without_data(), "pixels without data, single-plane calibration");
-    count("data-in-one-only", d.masks_differ, "pixels with data in one of the two images only");
     let shift = d.mean(d.shift_square).sqrt();
     let grey = d.mean(d.level_square).sqrt();
     let band = Band::relative(1e-3, "a source that moves by 1e-8 px turns the rounding of few levels");
     record
-        .group("px", converged())
-        .number(format!("{view}-shift-rms"), shift, "RMS shift between the two maps")
+        .exact("px")
+        .prefix(format!("{view}-"))
+        .count("empty-true-model", truth.without_data(), "pixels without data, true model")
+        .count("empty-single-plane", plane.without_data(), "pixels without data, single-plane calibration")
+        .count("data-in-one-only", d.masks_differ, "pixels with data in one of the two images only")
+        .band(converged())
+        .number("shift-rms", shift, "RMS shift between the two maps")
         .group("grey", band)
-        .number(format!("{view}-grey-rms"), grey, "RMS difference of the two images, of 255 levels");
+        .number("grey-rms", grey, "RMS difference of the two images, of 255 levels");
 }
 
 pub fn draw_rectified(
@@ -247,7 +242,7 @@ pub fn shift_figure(ours: &[Found], seed: u64) -> Result<Figure, ExperimentError
         Ok(Plot::heat_map(title, "u (px)", "v (px)", heat).size(520.0, 380.0))
     };
     let (held, free) = (shifts(&ours[0].plane.lens_camera()), shifts(&ours[MAIN].plane.lens_camera()));
-    let largest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
+    let largest = |values: &[f64]| stats::largest(values.iter().copied());
     let caption = format!(
         "Distance in the photograph between the places at which the true model and the single-plane \
          calibration (seed {seed}, sigma {SIGMA_PX} px) sample an output pixel: up to {:.2} px with the \

@@ -37,30 +37,32 @@ fn place(draws: &[Draw], treatment: usize, book: &Book) -> Result<Place, Experim
 }
 
 pub fn report_joint(record: &mut Record, draws: &[Draw], book: &Book) -> Result<(), ExperimentError> {
-    let columns = [("centre", ""), ("estimated", ""), ("distance", ""), ("probability", ""), ("verdict", "")];
     let caption = "the five published numbers together against each treatment: squared Mahalanobis distance \
                    from the draws' mean, and the share of draws that lie as far out";
-    let mut table = Table::new("joint", caption, &columns);
-    for (i, centre) in CENTRES.iter().enumerate() {
-        let name = centre.name();
-        let Place { distance, probability } = place(draws, i, book)?;
-        let what = format!("share of draws as far out as the five published numbers, {name}");
+    let places: Vec<(Centre, Place)> = CENTRES
+        .iter()
+        .enumerate()
+        .map(|(i, centre)| Ok((*centre, place(draws, i, book)?)))
+        .collect::<Result<_, ExperimentError>>()?;
+    for (centre, Place { distance, probability }) in &places {
+        let what = "share of draws as far out as the five published numbers";
         record
             .group("", Band::relative(1e-6, "an inverse of a covariance of five quantities"))
-            .number(
-                format!("joint-distance-{name}"),
-                distance,
-                format!("squared Mahalanobis distance of the five published numbers, {name}"),
-            )
+            .suffix(format!("-{}", centre.name()), format!(", {}", centre.name()))
+            .number("joint-distance", *distance, "squared Mahalanobis distance of the five published numbers")
             .band(Band::Exact)
-            .number(format!("joint-probability-{name}"), probability, what);
-        let verdict = if probability < EXCLUDED_BELOW { "excluded" } else { "possible" };
-        let names = [name, centre.estimated()].map(Cell::from);
-        let found = [Cell::from(distance), Cell::from(probability), Cell::from(verdict)];
-        table.push(names.into_iter().chain(found));
-        claim(record, *centre, probability);
+            .number("joint-probability", *probability, what);
+        claim(record, *centre, *probability);
     }
-    record.table(table);
+    let verdict = |place: &Place| if place.probability < EXCLUDED_BELOW { "excluded" } else { "possible" };
+    record.table(
+        Table::of("joint", caption, &places)
+            .column("centre", "", |(centre, _)| centre.name())
+            .column("estimated", "", |(centre, _)| centre.estimated())
+            .column("distance", "", |(_, place)| place.distance)
+            .column("probability", "", |(_, place)| place.probability)
+            .column("verdict", "", |(_, place)| verdict(place)),
+    );
     Ok(())
 }
 

@@ -116,15 +116,12 @@ fn drift_numbers(record: &mut Record, r: &Results) {
                      the central 95 % of its stations";
     let opposed = "what would be left had the bracket turned the other way, first order";
     let quarter = "a quarter of 91 days of three shifts; tolerance: half a week";
+    let drawn = "the same at the middle shift of the last day, as the figure draws it";
     record
         .group("mm", rounding_of_sums())
         .number("drift-mm", end, at_the_end)
         .near_printed(0.5 * (high - low), simulated)
-        .number(
-            "drift-middle-mm",
-            mean(&middle),
-            "the same at the middle shift of the last day, as the figure draws it",
-        )
+        .number("drift-middle-mm", mean(&middle), drawn)
         .number("drift-thermal-mm", thermal, "share of the focal length's drift alone")
         .number("drift-bracket-mm", bracket, "share of the bracket's turn alone")
         .number("drift-opposed-mm", thermal - bracket, opposed)
@@ -179,19 +176,20 @@ fn rule_numbers(record: &mut Record, r: &Results) {
         .band(counted())
         .number("threshold-false-alarms", share(&r.alarms, |a| a.0), threshold)
         .number("ewma-false-alarms", share(&r.alarms, |a| a.1), "the same, moving average");
-    for (rule, name) in ["threshold", "ewma"].into_iter().enumerate() {
+    for (rule, prefix) in ["threshold-", "ewma-"].into_iter().enumerate() {
         let (alarms, errors) = (r.alarm_shifts(rule), r.errors_at_alarm(rule));
         let day = |p: f64| days(quantile(&alarms, p));
         let missed = (QUARTERS - errors.len()) as f64 / QUARTERS as f64;
         let late = "day by which 95 % of the stations had their alarm";
         record
             .group("days", counted())
-            .number(format!("{name}-median-days"), day(0.5), "median day of the alarm")
-            .number(format!("{name}-late-days"), day(0.95), late)
+            .prefix(prefix)
+            .number("median-days", day(0.5), "median day of the alarm")
+            .number("late-days", day(0.95), late)
             .group("mm", rounding_of_sums())
-            .number(format!("{name}-error-mm"), median(&errors), "median systematic error at the alarm")
+            .number("error-mm", median(&errors), "median systematic error at the alarm")
             .group("", counted())
-            .number(format!("{name}-missed"), missed, "share of quarters without an alarm");
+            .number("missed", missed, "share of quarters without an alarm");
     }
 }
 
@@ -200,27 +198,18 @@ fn fleet_numbers(record: &mut Record, r: &Results) {
     let by_calendar = r.risk(|_| calendar as usize);
     let action = "smoothed check at which it asks";
     let never = share(&asked, |&shift| shift >= YEAR as f64);
+    let one_per_cent = "calendar interval at which 1 % of a fleet exceed the tolerance";
+    let before = "share of other stations above the tolerance before the calendar's day";
+    let interval = "median interval when the check asks, stations not used to set its limit";
     record
         .group("days", counted())
-        .number(
-            "calendar-days",
-            days(calendar),
-            "calendar interval at which 1 % of a fleet exceed the tolerance",
-        )
+        .number("calendar-days", days(calendar), one_per_cent)
         .unit("")
-        .number(
-            "calendar-risk",
-            by_calendar,
-            "share of other stations above the tolerance before the calendar's day",
-        )
+        .number("calendar-risk", by_calendar, before)
         .number("quarter-risk", r.risk(|_| QUARTER), "share of them above the tolerance within a quarter")
         .number("check-risk", r.risk_of_check(), "share of them above the tolerance before the check asks")
         .unit("days")
-        .number(
-            "check-median-days",
-            days(median(&asked)),
-            "median interval when the check asks, stations not used to set its limit",
-        )
+        .number("check-median-days", days(median(&asked)), interval)
         .group("mm", rounding_of_sums())
         .number("check-action-mm", r.action_limit() * r.sd_mm, action)
         .group("", counted())
@@ -245,26 +234,18 @@ pub(crate) fn claims(record: &mut Record, r: &Results, seed: u64) {
         .every("shifts", cases)
         .because("expansion in warming and turn, twice the second-order terms");
     let alarms = |pick: fn(&(bool, bool)) -> bool| r.alarms.iter().filter(|a| pick(a)).count();
-    let rules = [
-        (
-            "threshold-false-alarms-as-set",
-            "the threshold's false alarms are as often as set",
-            alarms(|a| a.0),
-        ),
-        (
-            "ewma-false-alarms-as-set",
-            "the moving average's false alarms are as often as set",
-            alarms(|a| a.1),
-        ),
-    ];
-    for (id, statement, alarms) in rules {
+    let rules =
+        [("threshold", "the threshold", alarms(|a| a.0)), ("ewma", "the moving average", alarms(|a| a.1))];
+    for (id, rule, alarms) in rules {
         let interval = Interval::of_proportion(alarms, IN_CONTROL, RATE);
         let reason = format!(
             "{alarms} of {IN_CONTROL} simulated quarters, Wilson interval of the rate behind them; the rate \
              that the limit was computed for (product of probabilities; Crowder's integral equation) must \
              lie inside"
         );
-        record.claim_that(id, statement).within(FALSE_ALARM, interval).at_rate(RATE).because(reason);
+        let statement = format!("{rule}'s false alarms are as often as set");
+        let draft = record.claim_that(format!("{id}-false-alarms-as-set"), statement);
+        draft.within(FALSE_ALARM, interval).at_rate(RATE).because(reason);
     }
     // Both shares are counted on as many stations, one of them by choice of the limit: twice the binomial
     // variance.
@@ -314,21 +295,12 @@ pub(crate) fn claims(record: &mut Record, r: &Results, seed: u64) {
 pub(crate) fn tables_and_figures(record: &mut Record, r: &Results, seed: u64) {
     let bands = error_bands(r, seed);
     let caption = "systematic error of the reference against time: 2.5 %, 50 % and 97.5 % of the stations";
-    record.table(
-        Table::of("error", caption, &bands)
-            .column("day", "days", |row| row[0])
-            .column("low", "mm", |row| row[1])
-            .column("median", "mm", |row| row[2])
-            .column("high", "mm", |row| row[3]),
-    );
+    let columns = [("day", "days"), ("low", "mm"), ("median", "mm"), ("high", "mm")];
+    record.table(Table::of_arrays("error", caption, columns, &bands));
     let trade = trade_off(r, seed);
     let caption = "median day of the alarm against the chance of a false alarm in a quarter";
-    record.table(
-        Table::of("trade-off", caption, &trade)
-            .column("false_alarm", "", |row| row[0])
-            .column("threshold_days", "days", |row| row[1])
-            .column("ewma_days", "days", |row| row[2]),
-    );
+    let columns = [("false_alarm", ""), ("threshold_days", "days"), ("ewma_days", "days")];
+    record.table(Table::of_arrays("trade-off", caption, columns, &trade));
     let asked = r.asked_shifts();
     let exceeds: Vec<f64> = r.judged.iter().map(|f| f.exceeds.unwrap_or(YEAR) as f64).collect();
     let caption = "day by which a share of the fleet exceeds the tolerance, and by which the check has \
@@ -384,49 +356,44 @@ fn trade_off(r: &Results, seed: u64) -> Vec<[f64; 3]> {
 }
 
 fn error_figure(r: &Results, seed: u64, bands: &[[f64; 4]]) -> Figure {
-    let edges: Vec<(f64, f64, f64)> = bands.iter().map(|b| (b[0], b[1], b[3])).collect();
-    let median: Vec<(f64, f64)> = bands.iter().map(|b| (b[0], b[2])).collect();
+    let edges = bands.iter().map(|[day, low, _, high]| (*day, *low, *high));
+    let median = bands.iter().map(|[day, _, median, _]| (*day, *median));
     let mut plot = Plot::new(
         format!("Systematic error of the {} mm reference", r.station.reference_mm),
         "days since calibration",
         "error (mm)",
     )
-    .band_as("central 95 % of stations", &edges, Look::series(4));
+    .band_as("central 95 % of stations", edges, Look::series(4));
     for trial in 0..SHOWN {
         let history = History::of(&r.station, seed, "quarter", trial, QUARTER);
         let middle = (0..QUARTER).skip(1).step_by(SHIFTS_A_DAY);
-        let path: Vec<(f64, f64)> = middle.map(|i| (days(i as f64), history.error_mm[i])).collect();
+        let path = middle.map(|i| (days(i as f64), history.error_mm[i]));
         let name = if trial == 0 { "single stations" } else { "" };
-        plot = plot.line_as(name, &path, Look::series(2).dash(Dash::Solid).width(0.7));
+        plot = plot.line_as(name, path, Look::series(2).dash(Dash::Solid).width(0.7));
     }
     let plot = plot
-        .line_as("median", &median, Look::series(0).width(2.0))
+        .line_as("median", median, Look::series(0).width(2.0))
         .hline(format!("case study: {TOLERANCE_MM} mm"), TOLERANCE_MM)
         .x_range(0.0, days(QUARTER as f64));
     let caption = format!(
         "Length error at the middle shift of every day, neither the coldest nor the hottest, for {SHOWN} \
          simulated stations, with median and central 95 % of {WATCHED}, in mm; seed {seed}. Notice that \
          the median station is {:.3} mm off on the last day, where the case study allows {TOLERANCE_MM} mm.",
-        median[median.len() - 1].1
+        bands[bands.len() - 1][2]
     );
     Figure::plot("error", &plot, caption)
 }
 
+/// Day, and the share of `shifts` that lie before it.
+fn share_by_day(shifts: &[f64], last_day: usize) -> impl Iterator<Item = (f64, f64)> {
+    (0..=last_day).map(|day| (day as f64, share(shifts, |&shift| shift < (day * SHIFTS_A_DAY) as f64)))
+}
+
 fn alarm_figure(r: &Results) -> Figure {
-    let curve = |rule: usize| -> Vec<(f64, f64)> {
-        let shifts = r.alarm_shifts(rule);
-        (0..=91)
-            .map(|day| {
-                let limit = f64::from(day * SHIFTS_A_DAY as i32);
-                let count = shifts.iter().filter(|&&s| s < limit).count();
-                (f64::from(day), count as f64 / QUARTERS as f64)
-            })
-            .collect()
-    };
     let plot =
         Plot::new("Which rule notices when?", "days since calibration", "share of stations with an alarm")
-            .line("threshold on one check", &curve(0))
-            .line("moving average (EWMA)", &curve(1))
+            .line("threshold on one check", share_by_day(&r.alarm_shifts(0), 91))
+            .line("moving average (EWMA)", share_by_day(&r.alarm_shifts(1), 91))
             .hline("", 0.5)
             .x_range(0.0, days(QUARTER as f64))
             .y_range(0.0, 1.0);
@@ -443,14 +410,14 @@ fn alarm_figure(r: &Results) -> Figure {
 }
 
 fn trade_off_figure(trade: &[[f64; 3]]) -> Figure {
-    let curve = |column: usize| -> Vec<(f64, f64)> { trade.iter().map(|t| (t[0], t[column])).collect() };
+    let curve = |column: usize| trade.iter().map(move |t| (t[0], t[column]));
     let plot = Plot::new(
         "False alarms against delay",
         "chance of a false alarm in a quarter",
         "median day of the alarm",
     )
-    .line("threshold on one check", &curve(1))
-    .line("moving average (EWMA)", &curve(2))
+    .line("threshold on one check", curve(1))
+    .line("moving average (EWMA)", curve(2))
     .log_x();
     let ends = |column: usize| {
         let at = |row: Option<&[f64; 3]>| row.map_or(f64::NAN, |row| row[column]);
@@ -467,17 +434,9 @@ fn trade_off_figure(trade: &[[f64; 3]]) -> Figure {
 }
 
 fn fleet_figure(r: &Results, exceeds: &[f64], asked: &[f64]) -> Figure {
-    let curve = |sample: &[f64]| -> Vec<(f64, f64)> {
-        (0..365)
-            .map(|day| {
-                let limit = f64::from(day * SHIFTS_A_DAY as i32);
-                (f64::from(day), sample.iter().filter(|&&s| s < limit).count() as f64 / FLEET as f64)
-            })
-            .collect()
-    };
     let plot = Plot::new("A fleet over a year", "days since calibration", "share of the fleet")
-        .line(format!("error above {TOLERANCE_MM} mm"), &curve(exceeds))
-        .line("check has asked for calibration", &curve(asked))
+        .line(format!("error above {TOLERANCE_MM} mm"), share_by_day(exceeds, 364))
+        .line("check has asked for calibration", share_by_day(asked, 364))
         .vline(format!("calendar at {} % risk", 100.0 * RISK), days(r.calendar_shifts()))
         .y_range(0.0, 1.0);
     let caption = format!(

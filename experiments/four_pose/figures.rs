@@ -27,14 +27,14 @@ pub fn views(draw: &Draw) -> Figure {
         .iter()
         .zip(POSE_NAMES)
         .map(|(view, name)| {
-            let seen: Vec<(f64, f64)> = view.pixels().iter().map(|p| (p.x, p.y)).collect();
+            let seen = view.pixels().iter().map(|p| (p.x, p.y));
             Plot::new(name, "u (px)", "v (px)")
                 .size(420.0, 370.0)
                 .equal_aspect()
                 .y_down()
-                .line_as("image border", &border(truth.image_size), Look::ink().dash(Dash::Dotted))
-                .points_as("points as seen", &seen, Look::series(0).size(2.2))
-                .points_as("principal point", &[(camera.cx, camera.cy)], Look::ink())
+                .line_as("image border", border(truth.image_size), Look::ink().dash(Dash::Dotted))
+                .points_as("points as seen", seen, Look::series(0).size(2.2))
+                .points_as("principal point", [(camera.cx, camera.cy)], Look::ink())
         })
         .collect();
     let corners = &border(truth.image_size)[1..];
@@ -61,12 +61,8 @@ pub fn residuals(draw: &Draw) -> Result<Figure, ExperimentError> {
         .zip(&draw.calibration.residuals)
         .zip(POSE_NAMES)
         .map(|((view, residuals), name)| {
-            let arrows: Vec<_> = view
-                .pixels()
-                .iter()
-                .zip(residuals)
-                .map(|(p, r)| (p.x, p.y, ARROW_SCALE * r.x, ARROW_SCALE * r.y))
-                .collect();
+            let arrow = |(p, r): (&Vec2, &Vec2)| (p.x, p.y, ARROW_SCALE * r.x, ARROW_SCALE * r.y);
+            let arrows = view.pixels().iter().zip(residuals).map(arrow);
             let reference = (90.0, 462.0, ARROW_SCALE * REFERENCE_PX, 0.0);
             Plot::new(name, "u (px)", "v (px)")
                 .size(420.0, 400.0)
@@ -74,8 +70,8 @@ pub fn residuals(draw: &Draw) -> Result<Figure, ExperimentError> {
                 .x_range(70.0, 590.0)
                 .y_range(10.0, 475.0)
                 .y_down()
-                .arrows(format!("predicted \u{2212} observed, \u{d7} {ARROW_SCALE}"), &arrows)
-                .arrows(format!("this long: {REFERENCE_PX} px"), &[reference])
+                .arrows(format!("predicted \u{2212} observed, \u{d7} {ARROW_SCALE}"), arrows)
+                .arrows(format!("this long: {REFERENCE_PX} px"), [reference])
         })
         .collect();
     let caption = format!(
@@ -128,17 +124,14 @@ pub fn residual_distribution(draw: &Draw) -> Figure {
     const BINS: usize = 32;
     let range = (-4.0, 4.0);
     let bars = density(&draw.standardised, range, BINS);
-    let curve: Vec<_> = steps(range.0, range.1, 200).map(|z| (z, normal_density(z))).collect();
+    let curve = steps(range.0, range.1, 200).map(|z| (z, normal_density(z)));
     // Counts of a bin scatter by the root of their expectation (binomial).
     let n = draw.standardised.len() as f64;
-    let expected: Vec<_> = bars
-        .iter()
-        .map(|&(left, right, _)| {
-            let share = normal_cdf(right) - normal_cdf(left);
-            let (mean, sd) = (share / (right - left), (share * (1.0 - share) / n).sqrt() / (right - left));
-            (0.5 * (left + right), (mean - 2.0 * sd).max(0.0), mean + 2.0 * sd)
-        })
-        .collect();
+    let expected = bars.iter().map(|&(left, right, _)| {
+        let share = normal_cdf(right) - normal_cdf(left);
+        let (mean, sd) = (share / (right - left), (share * (1.0 - share) / n).sqrt() / (right - left));
+        (0.5 * (left + right), (mean - 2.0 * sd).max(0.0), mean + 2.0 * sd)
+    });
     let plot = Plot::new(
         "Residuals against the noise model",
         "residual over its predicted standard deviation",
@@ -146,8 +139,8 @@ pub fn residual_distribution(draw: &Draw) -> Figure {
     )
     .x_range(range.0, range.1)
     .histogram(format!("{} residual coordinates", draw.standardised.len()), &bars)
-    .error_bars_as("expected, two standard deviations of a bin", &expected, Look::ink())
-    .line_as("standard normal", &curve, Look::series(1).dash(Dash::Solid).width(2.0));
+    .error_bars_as("expected, two standard deviations of a bin", expected, Look::ink())
+    .line_as("standard normal", curve, Look::series(1).dash(Dash::Solid).width(2.0));
     let caption = format!(
         "Every residual coordinate of the calibrated camera over its own predicted standard deviation, \
          {SIGMA_PX} px times sqrt(1 - leverage), with the standard normal density (seed {}). Notice that \
@@ -221,12 +214,12 @@ pub fn rmse(draw: &Draw, book: &Book, trials: &Outcome) -> Figure {
     let half = 0.02 * sd;
     let under_floor = |rmse_px: f64| 100.0 * (1.0 - rmse_px / predicted.noise_floor_px());
     let slope = |x: f64| (predicted.cdf(x + half) - predicted.cdf(x - half)) / (2.0 * half);
-    let curve: Vec<_> = steps(range.0, range.1, 160).map(|x| (x, slope(x))).collect();
+    let curve = steps(range.0, range.1, 160).map(|x| (x, slope(x)));
     let plot = Plot::new("Reprojection error over many draws", "RMSE (px)", "density (1/px)")
         .size(600.0, 420.0)
         .x_range(range.0, range.1)
         .histogram(format!("{TRIALS} trials"), &density(&values, range, 40))
-        .line_as("predicted", &curve, Look::series(1).dash(Dash::Solid).width(2.0))
+        .line_as("predicted", curve, Look::series(1).dash(Dash::Solid).width(2.0))
         .vline_as(
             format!("book {} px", book.rmse_px),
             book.rmse_px,
@@ -285,48 +278,29 @@ pub fn blind(draw: &Draw, trials: &Outcome) -> Figure {
 }
 
 pub fn overfitting(grids: &[Grid]) -> Figure {
-    let over = |f: &dyn Fn(&Grid) -> f64| -> Vec<(f64, f64)> {
-        grids.iter().map(|g| (g.points_per_view as f64, f(g))).collect()
-    };
-    let k2 = position(Parameter::K2);
-    let floor = |g: &Grid| g.rmse.noise_floor_px();
-    let intervals: Vec<_> = grids
-        .iter()
-        .map(|g| {
-            let mean = g.trials.mean(|e| e.rmse_px);
-            let around = Interval::of_mean(mean, g.rmse.standard_deviation_px(), g.trials.converged(), 0.05);
-            (g.points_per_view as f64, around.low, around.high)
-        })
-        .collect();
-    let spreads: Vec<_> = grids
-        .iter()
-        .map(|g| {
-            let sd = g.trials.errors().standard_deviation(k2);
-            let ratio = Interval::of_deviation_ratio(g.trials.converged(), 0.05);
-            (g.points_per_view as f64, sd / ratio.high, sd / ratio.low)
-        })
-        .collect();
+    let over = |f: fn(&Grid) -> f64| grids.iter().map(move |g| (g.points_per_view as f64, f(g)));
+    let intervals = grids.iter().map(|g| {
+        let sd = g.rmse.standard_deviation_px();
+        let around = Interval::of_mean(g.mean_rmse_px(), sd, g.trials.converged(), 0.05);
+        (g.points_per_view as f64, around.low, around.high)
+    });
+    let spreads = grids.iter().map(|g| {
+        let ratio = Interval::of_deviation_ratio(g.trials.converged(), 0.05);
+        (g.points_per_view as f64, g.sampled_k2_sd() / ratio.high, g.sampled_k2_sd() / ratio.low)
+    });
     let (theory, sampled) = (Look::series(1).dash(Dash::Solid), Look::series(0));
     let rmse = Plot::new("RMSE with fewer points", "points a view", "RMSE (px)")
         .size(430.0, 380.0)
-        .line_as("predicted", &over(&|g| g.rmse.mean_px()), theory)
-        .points_as(
-            format!("mean of {GRID_TRIALS} trials, 95 %"),
-            &over(&|g| g.trials.mean(|e| e.rmse_px)),
-            sampled,
-        )
-        .error_bars_as("", &intervals, sampled)
-        .line_as("noise floor", &over(&floor), Look::ink().dash(Dash::Dotted).width(2.0))
+        .line_as("predicted", over(|g| g.rmse.mean_px()), theory)
+        .points_as(format!("mean of {GRID_TRIALS} trials, 95 %"), over(Grid::mean_rmse_px), sampled)
+        .error_bars_as("", intervals, sampled)
+        .line_as("noise floor", over(|g| g.rmse.noise_floor_px()), Look::ink().dash(Dash::Dotted).width(2.0))
         .log_x();
     let k2 = Plot::new("k2 with fewer points", "points a view", "standard deviation of k2")
         .size(430.0, 380.0)
-        .line_as("Cramer-Rao bound", &over(&|g| g.k2_sd), theory)
-        .points_as(
-            format!("{GRID_TRIALS} trials, 95 %"),
-            &over(&|g| g.trials.errors().standard_deviation(k2)),
-            sampled,
-        )
-        .error_bars_as("", &spreads, sampled)
+        .line_as("Cramer-Rao bound", over(|g| g.k2_sd), theory)
+        .points_as(format!("{GRID_TRIALS} trials, 95 %"), over(Grid::sampled_k2_sd), sampled)
+        .error_bars_as("", spreads, sampled)
         .log_x()
         .log_y()
         .y_range(0.01, 0.1);
@@ -340,7 +314,7 @@ pub fn overfitting(grids: &[Grid]) -> Figure {
         grid_name(GRIDS[0]),
         grid_name(GRIDS[GRIDS.len() - 1]),
         few.points_per_view,
-        few.trials.mean(|e| e.rmse_px) / few.rmse.noise_floor_px(),
+        few.mean_rmse_px() / few.rmse.noise_floor_px(),
         few.k2_sd / all.k2_sd,
         all.points_per_view
     );

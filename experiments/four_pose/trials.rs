@@ -63,11 +63,8 @@ fn claim_consistent(record: &mut Record, draw: &Draw, trials: &Outcome) {
     let (n, dof) = (trials.converged(), FreeParameters::STANDARD.len());
     let mean = trials.mean_normalised_error_squared(&draw.bound);
     let interval = Interval::of_mean_chi_squared(dof, n, RATE);
-    record.group("", relative()).number(
-        "nees",
-        mean,
-        "mean normalised estimation error squared under the bound",
-    );
+    let what = "mean normalised estimation error squared under the bound";
+    record.group("", relative()).number("nees", mean, what);
     record
         .claim_that(
             "errors-jointly-as-predicted",
@@ -85,11 +82,8 @@ fn claim_consistent(record: &mut Record, draw: &Draw, trials: &Outcome) {
     let share = trials.mean(covered);
     let interval = Interval::of_mean(COVERAGE, (COVERAGE * (1.0 - COVERAGE)).sqrt(), n, RATE);
     let count_band = Band::absolute(1.5 / TRIALS as f64, "one trial on the region's edge may change sides");
-    record.group("", count_band).number(
-        "coverage",
-        share,
-        "share of 95 % confidence regions that hold the truth",
-    );
+    let what = "share of 95 % confidence regions that hold the truth";
+    record.group("", count_band).number("coverage", share, what);
     record
         .claim_that(
             "own-covariance-covers",
@@ -127,11 +121,8 @@ pub fn claim_rmse_blind(record: &mut Record, draw: &Draw, trials: &Outcome) {
     let values: Vec<f64> = trials.estimates.iter().map(|e| e.rmse_px).collect();
     let distance = stats::kolmogorov_distance(&values, |v| draw.rmse.cdf(v));
     let bound = stats::kolmogorov_limit(n, RATE);
-    record.group("", relative()).number(
-        "rmse-kolmogorov",
-        distance,
-        "largest distance of the distribution of RMSE from its prediction",
-    );
+    let what = "largest distance of the distribution of RMSE from its prediction";
+    record.group("", relative()).number("rmse-kolmogorov", distance, what);
     record
         .claim_that(
             "rmse-distributed-as-predicted",
@@ -162,11 +153,8 @@ pub fn claim_rmse_blind(record: &mut Record, draw: &Draw, trials: &Outcome) {
 
     let blind = k2_and_rmse(trials).correlation(0, 1);
     let chance = libm::tanh(normal_two_sided(RATE) / (n as f64 - 3.0).sqrt());
-    record.group("", of_deviation(1.0)).number(
-        "k2-error-rmse-correlation",
-        blind,
-        "correlation of |error of k2| and RMSE",
-    );
+    let what = "correlation of |error of k2| and RMSE";
+    record.group("", of_deviation(1.0)).number("k2-error-rmse-correlation", blind, what);
     record
         .claim_that("rmse-does-not-notice", "the size of the error of k2 and the RMSE are uncorrelated")
         .within(blind, Interval::around(0.0, chance))

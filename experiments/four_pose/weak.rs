@@ -11,6 +11,16 @@ pub struct Grid {
     pub trials: Outcome,
 }
 
+impl Grid {
+    pub fn mean_rmse_px(&self) -> f64 {
+        self.trials.mean(|e| e.rmse_px)
+    }
+
+    pub fn sampled_k2_sd(&self) -> f64 {
+        self.trials.errors().standard_deviation(position(Parameter::K2))
+    }
+}
+
 pub fn few_points(context: &Context) -> Result<Vec<Grid>, ExperimentError> {
     let progress = context.progress("fewer points", GRIDS.len() * GRID_TRIALS);
     GRIDS
@@ -26,46 +36,31 @@ pub fn few_points(context: &Context) -> Result<Vec<Grid>, ExperimentError> {
             let bound = cramer_rao(&scene.truth, FreeParameters::STANDARD, SIGMA_PX)
                 .map_err(ExperimentError::at("Cramer-Rao bound"))?;
             let scenario = format!("four-pose/grid-{columns}x{rows}");
-            let settings = Settings::standard();
-            let trials = MonteCarlo {
-                scene: &scene,
-                settings: &settings,
-                sigma_px: SIGMA_PX,
-                seed: context.seed,
-                scenario: &scenario,
-                trials: GRID_TRIALS,
-            }
-            .run(&progress);
             Ok(Grid {
                 points_per_view: columns * rows,
-                rmse: RmseDistribution {
-                    sigma_px: SIGMA_PX,
-                    points: scene.observations(),
-                    parameters: unknowns(scene.pixels().len()),
-                },
+                rmse: predicted_rmse(&scene),
                 k2_sd: bound.standard_deviation(Parameter::K2).unwrap_or(f64::NAN),
-                trials,
+                trials: monte_carlo(&scene, context.seed, &scenario, GRID_TRIALS, &progress),
             })
         })
         .collect()
 }
 
 pub fn claim_overfitting(record: &mut Record, grids: &[Grid]) {
-    let columns = [
-        ("points_per_view", ""),
-        ("rmse_mean", "px"),
-        ("rmse_predicted", "px"),
-        ("k2_sd", ""),
-        ("k2_sd_predicted", ""),
-        ("converged", ""),
-    ];
-    let mut table =
-        Table::new("few-points", "RMSE and spread of k2 with fewer points on the same target", &columns);
-    let (each, k2) = (each_of(2 * grids.len(), RATE), position(Parameter::K2));
+    record.table(
+        Table::of("few-points", "RMSE and spread of k2 with fewer points on the same target", grids)
+            .column("points_per_view", "", |grid| grid.points_per_view)
+            .column("rmse_mean", "px", |grid| grid.mean_rmse_px())
+            .column("rmse_predicted", "px", |grid| grid.rmse.mean_px())
+            .column("k2_sd", "", |grid| grid.sampled_k2_sd())
+            .column("k2_sd_predicted", "", |grid| grid.k2_sd)
+            .column("converged", "", |grid| grid.trials.converged()),
+    );
+    let each = each_of(2 * grids.len(), RATE);
     let mut cases = Vec::new();
     for grid in grids {
         let n = grid.trials.converged();
-        let (rmse, sd) = (grid.trials.mean(|e| e.rmse_px), grid.trials.errors().standard_deviation(k2));
+        let (rmse, sd) = (grid.mean_rmse_px(), grid.sampled_k2_sd());
         let around = Interval::of_mean(grid.rmse.mean_px(), grid.rmse.standard_deviation_px(), n, each);
         let name = format!("{} points a view", grid.points_per_view);
         cases.push((format!("{name}: all {GRID_TRIALS} converge, {n} did"), n == GRID_TRIALS));
@@ -78,11 +73,7 @@ pub fn claim_overfitting(record: &mut Record, grids: &[Grid]) {
             format!("{name}: spread of k2 over the bound {}", sd / grid.k2_sd),
             ratio.contains(sd / grid.k2_sd),
         ));
-        let numbers = [rmse, grid.rmse.mean_px(), sd, grid.k2_sd];
-        let row = std::iter::once(Cell::from(grid.points_per_view)).chain(numbers.map(Cell::from));
-        table.push(row.chain([Cell::from(n)]));
     }
-    record.table(table);
     record
         .claim_that(
             "low-rmse-is-overfitting",
@@ -96,41 +87,23 @@ pub fn claim_overfitting(record: &mut Record, grids: &[Grid]) {
              Bonferroni over all grids",
         );
     let (few, all) = (&grids[0], &grids[grids.len() - 1]);
-    let floor = few.rmse.noise_floor_px();
+    let (over_floor, growth) = (few.mean_rmse_px() / few.rmse.noise_floor_px(), few.k2_sd / all.k2_sd);
     record
         .group("", relative())
-        .number(
-            "few-points-rmse-over-floor",
-            few.trials.mean(|e| e.rmse_px) / floor,
-            "mean RMSE over the noise floor with 9 points a view",
-        )
-        .number(
-            "few-points-k2-sd-factor",
-            few.k2_sd / all.k2_sd,
-            "growth of the bound of k2 from 63 points a view to 9",
-        );
+        .prefix("few-points-")
+        .number("rmse-over-floor", over_floor, "mean RMSE over the noise floor with 9 points a view")
+        .number("k2-sd-factor", growth, "growth of the bound of k2 from 63 points a view to 9");
 }
 
 pub fn claim_facing_views(record: &mut Record, context: &Context) -> Result<(), ExperimentError> {
     let poses = FACING_MM.map(|z| looking_at_centre([0.0; 3], z)).to_vec();
     let scene = Scene::new(Truth { cam_from_target: poses, ..Truth::example() })
         .map_err(ExperimentError::at("views that face the camera"))?;
-    let settings = Settings::standard();
-    let trials = MonteCarlo {
-        scene: &scene,
-        settings: &settings,
-        sigma_px: SIGMA_PX,
-        seed: context.seed,
-        scenario: "four-pose/facing",
-        trials: FACING_TRIALS,
-    }
-    .run(&context.progress("views that face the camera", FACING_TRIALS));
+    let progress = context.progress("views that face the camera", FACING_TRIALS);
+    let trials = monte_carlo(&scene, context.seed, "four-pose/facing", FACING_TRIALS, &progress);
     let refused = trials.refused_naming(&["focal length", "distance"]) as f64;
-    record.exact("").number(
-        "facing-refused",
-        refused,
-        "of 200 trials with facing views only, those refused for focal length and distance",
-    );
+    let what = "of 200 trials with facing views only, those refused for focal length and distance";
+    record.exact("").number("facing-refused", refused, what);
     record
         .claim_that(
             "facing-views-are-refused",

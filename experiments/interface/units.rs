@@ -89,6 +89,8 @@ pub(crate) fn report(record: &mut Record, examined: &Examined) {
     // than a pixel a standard deviation.
     let stop = || Band::absolute(1e-6, "where the solver stops");
     let Examined { chapter, black_box, sweep } = examined;
+    let affine = "RMS residual of an affine fit of the black box's answer";
+    let farthest = "largest distance from the top row's line, black box";
     record
         .group("", rounding())
         .number("units-direct", chapter.direct, "RMS of corrected pixels minus millimetres, true camera")
@@ -97,17 +99,9 @@ pub(crate) fn report(record: &mut Record, examined: &Examined) {
         .band(rounding())
         .number("units-spacing-ratio", chapter.spacing_ratio, "spacing of the answer over the target's")
         .group("mm", stop())
-        .number(
-            "units-affine-mm",
-            black_box.affine_mm,
-            "RMS residual of an affine fit of the black box's answer",
-        )
+        .number("units-affine-mm", black_box.affine_mm, affine)
         .unit("")
-        .number(
-            "units-collinearity",
-            black_box.collinearity,
-            "largest distance from the top row's line, black box",
-        );
+        .number("units-collinearity", black_box.collinearity, farthest);
 
     let caption = "what four checks say when corrected pixels are taken for millimetres, target facing the \
                    camera, no noise";
@@ -150,16 +144,17 @@ pub(crate) fn report(record: &mut Record, examined: &Examined) {
         .every("cases", blind.collect::<Vec<_>>())
         .because("both are invariant under a change of scale; rounding");
 
-    let direct: Vec<(f64, f64)> = sweep.iter().map(|c| (c.distance_mm, c.direct)).collect();
-    let ratio: Vec<(f64, f64)> =
-        sweep.iter().map(|c| (c.distance_mm, 100.0 * (c.spacing_ratio - 1.0).abs())).collect();
+    let error_percent = |c: &Checks| 100.0 * (c.spacing_ratio - 1.0).abs();
     let one_to_one = Truth::example_camera().fx;
     let off = |c: &Checks| (c.distance_mm - one_to_one).abs();
     let nearest = sweep.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(chapter);
     let plot =
         Plot::new("Pixels taken for millimetres", "distance of the target (mm)", "what the check shows")
-            .line("difference to the target (\u{201c}mm\u{201d})", &direct)
-            .line("error of the spacing (%)", &ratio)
+            .line(
+                "difference to the target (\u{201c}mm\u{201d})",
+                sweep.iter().map(|c| (c.distance_mm, c.direct)),
+            )
+            .line("error of the spacing (%)", sweep.iter().map(|c| (c.distance_mm, error_percent(c))))
             .vline("one pixel a millimetre", one_to_one);
     let caption = format!(
         "RMS difference of corrected pixels and target millimetres, and error of the spacing of neighbours, \
@@ -169,7 +164,7 @@ pub(crate) fn report(record: &mut Record, examined: &Examined) {
         nearest.distance_mm,
         nearest.distance_mm / one_to_one,
         nearest.direct,
-        100.0 * (nearest.spacing_ratio - 1.0).abs()
+        error_percent(nearest)
     );
     record.figure(Figure::plot("units", &plot, caption));
 }

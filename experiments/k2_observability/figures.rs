@@ -1,7 +1,6 @@
 //! The figures of the observability experiment: maps over coverage and tilt, and sections through them.
 
 use super::*;
-use calibench_harness::stats;
 use calibench_harness::{Dash, Figure, HeatMap, Look, Plot};
 
 /// Confidence of the intervals drawn at the trials.
@@ -43,21 +42,14 @@ fn where_identifiable(value: impl Fn(&Node) -> f64) -> impl Fn(&Node) -> f64 {
 }
 
 pub fn heat_maps(map: &Map, seed: u64) -> Result<Figure, ExperimentError> {
+    let bound = |p: Parameter| move |n: &Node| n.bound_sd(p);
+    let [k2, fx] = ["standard deviation of k2 (bound)", "standard deviation of fx (bound, px)"];
+    let [correlation, rmse] = ["correlation of k1 and k2 (bound)", "mean RMSE of the trials (px)"];
     let panels = [
-        map_plot(map, "k2", "standard deviation of k2 (bound)", HeatMap::logarithmic, |n| {
-            n.bound_sd(Parameter::K2)
-        })?,
-        map_plot(map, "fx", "standard deviation of fx (bound, px)", HeatMap::logarithmic, |n| {
-            n.bound_sd(Parameter::Fx)
-        })?,
-        map_plot(
-            map,
-            "k1 and k2",
-            "correlation of k1 and k2 (bound)",
-            three_digits,
-            Node::bound_correlation,
-        )?,
-        map_plot(map, "RMSE", "mean RMSE of the trials (px)", as_wide_as_one_draw, Node::sampled_rmse_px)?,
+        map_plot(map, "k2", k2, HeatMap::logarithmic, bound(Parameter::K2))?,
+        map_plot(map, "fx", fx, HeatMap::logarithmic, bound(Parameter::Fx))?,
+        map_plot(map, "k1 and k2", correlation, three_digits, Node::bound_correlation)?,
+        map_plot(map, "RMSE", rmse, as_wide_as_one_draw, Node::sampled_rmse_px)?,
     ];
     let caption = format!(
         "Bound of k2 and fx, correlation of k1 and k2, and mean RMSE of {TRIALS} trials (noise {SIGMA_PX} \
@@ -74,26 +66,15 @@ pub fn heat_maps(map: &Map, seed: u64) -> Result<Figure, ExperimentError> {
 }
 
 pub fn ratios(map: &Map, seed: u64) -> Result<Figure, ExperimentError> {
-    let over = |p: Parameter| where_identifiable(move |n: &Node| n.sampled_sd(p) / n.bound_sd(p));
-    let panels = [
-        map_plot(
-            map,
-            "k2 against the bound",
-            "spread of the trials / bound",
-            three_digits,
-            over(Parameter::K2),
-        )?,
-        map_plot(
-            map,
-            "fx against the bound",
-            "spread of the trials / bound",
-            three_digits,
-            over(Parameter::Fx),
-        )?,
-    ];
+    let panel = |p: Parameter| {
+        let over = where_identifiable(move |n: &Node| n.sd_over_bound(p));
+        let title = format!("{p} against the bound");
+        map_plot(map, &title, "spread of the trials / bound", three_digits, over)
+    };
+    let panels = [panel(Parameter::K2)?, panel(Parameter::Fx)?];
     let scatter = |p: Parameter| {
         let nodes = map.identifiable();
-        let ratios: Vec<f64> = nodes.iter().map(|n| n.sampled_sd(p) / n.bound_sd(p)).collect();
+        let ratios: Vec<f64> = nodes.iter().map(|n| n.sd_over_bound(p)).collect();
         let mean = stats::mean(&ratios);
         (mean, stats::root_mean_square(ratios.iter().map(|ratio| ratio - mean)))
     };
@@ -125,15 +106,12 @@ fn sections<'a, L: Copy>(
     levels.iter().enumerate().fold(plot, |plot, (i, (level, name))| {
         let look = Look::series(i);
         let nodes = nodes(*level);
-        let bound: Vec<_> = nodes.iter().map(|(x, n)| (*x, n.bound_sd(parameter))).collect();
-        let seen: Vec<_> = nodes.iter().filter(|(_, n)| n.outcome.converged() == TRIALS).collect();
+        let bound = nodes.iter().map(|(x, n)| (*x, n.bound_sd(parameter)));
+        let complete = nodes.iter().filter(|(_, n)| n.outcome.converged() == TRIALS);
+        let points: Vec<_> = complete.map(|(x, n)| (*x, n.sampled_sd(parameter))).collect();
         let ratio = Interval::of_deviation_ratio(TRIALS, SHOWN);
-        let bars: Vec<_> = seen
-            .iter()
-            .map(|(x, n)| (*x, n.sampled_sd(parameter) / ratio.high, n.sampled_sd(parameter) / ratio.low))
-            .collect();
-        let points: Vec<_> = seen.iter().map(|(x, n)| (*x, n.sampled_sd(parameter))).collect();
-        plot.line_as(name, &bound, look).points_as("", &points, look).error_bars_as("", &bars, look)
+        let bars = points.iter().map(|(x, sd)| (*x, sd / ratio.high, sd / ratio.low));
+        plot.line_as(name, bound, look).points_as("", &points, look).error_bars_as("", bars, look)
     })
 }
 
@@ -194,7 +172,7 @@ pub fn rmse_sections(map: &Map, seed: u64) -> Figure {
             .y_range(0.134, 0.143)
             .band_as(
                 "predicted, 95 %",
-                &[(first, around.low, around.high), (last, around.low, around.high)],
+                [(first, around.low, around.high), (last, around.low, around.high)],
                 Look::ink(),
             );
     let plot = SECTION_TILTS.iter().enumerate().fold(plot, |plot, (i, &t)| {

@@ -150,7 +150,7 @@ fn claim_attained(record: &mut Record, scenes: &[Moved]) {
     let ratio = Interval::of_deviation_ratio(TRIALS, each_of(2 * nodes.len(), RATE));
     let cases = nodes.iter().flat_map(|m| {
         [Parameter::K2, Parameter::Fx].map(|p| {
-            let over = m.node.sampled_sd(p) / m.node.bound_sd(p);
+            let over = m.node.sd_over_bound(p);
             (format!("{p}, {} mm, {}: {over}", m.distance_mm, m.node.name()), ratio.contains(over))
         })
     });
@@ -222,24 +222,17 @@ fn claim_separate(record: &mut Record, scenes: &[Moved]) {
 
 fn figure(map: &Map, scenes: &[Moved], seed: u64) -> Figure {
     let panel = |title: &str, label: &str, p: Parameter| {
-        let coming: Vec<(f64, f64)> = COVERAGE_TENTHS
-            .iter()
-            .map(|&c| map.at(c, SHOWN_DEG))
-            .map(|n| (n.coverage(), n.bound_sd(p)))
-            .collect();
+        let coming = COVERAGE_TENTHS.map(|c| map.at(c, SHOWN_DEG)).map(|n| (n.coverage(), n.bound_sd(p)));
         let plot = Plot::new(title, "coverage (fraction of the way to the border)", label)
             .size(470.0, 380.0)
             .log_y()
-            .line_as("centred, coming nearer", &coming, Look::ink().dash(Dash::Dotted));
+            .line_as("centred, coming nearer", coming, Look::ink().dash(Dash::Dotted));
         DISTANCES_MM.iter().enumerate().fold(plot, |plot, (i, &mm)| {
             let nodes = row(scenes, mm, SHOWN_DEG);
-            let bound: Vec<_> = nodes.iter().map(|n| (n.coverage(), n.bound_sd(p))).collect();
-            let trials: Vec<_> = nodes.iter().map(|n| (n.coverage(), n.sampled_sd(p))).collect();
-            plot.line_as(format!("moved at {mm} mm"), &bound, Look::series(i)).points_as(
-                "",
-                &trials,
-                Look::series(i),
-            )
+            let bound = nodes.iter().map(|n| (n.coverage(), n.bound_sd(p)));
+            let trials = nodes.iter().map(|n| (n.coverage(), n.sampled_sd(p)));
+            let look = Look::series(i);
+            plot.line_as(format!("moved at {mm} mm"), bound, look).points_as("", trials, look)
         })
     };
     let panels = [

@@ -91,16 +91,16 @@ pub fn claim_residual_shape(record: &mut Record, context: &Context) -> Result<()
 pub fn report_derived(record: &mut Record) -> Result<(), ExperimentError> {
     let value = |id: &str| entry(id).map(Entry::value);
     let per_px = 0.5 * (value("sx")? + value("sy")?);
-    let rounding = || Band::relative(1e-12, "a few operations on printed digits");
-    let mut number = |id: &str, value: f64, unit: &str, what: &str| {
-        record.group(unit, rounding()).number(id, value, what);
-    };
-    number("rms-px", value("rms")? / per_px, "px", "printed residual RMS over the mean printed scale");
-    number("max-px", value("max")? / per_px, "px", "printed largest residual over the mean printed scale");
     let gap =
         |ours: &str, gui: &str| -> Result<f64, ExperimentError> { Ok((value(gui)? - value(ours)?).abs()) };
-    number("gui-gap", gap("tx", "gui-tx")?, "", "gap of the two printed translations along x");
-    number("gui-gap-y", gap("ty", "gui-ty")?, "", "gap of the two printed translations along y");
+    let (rms, max) = (value("rms")? / per_px, value("max")? / per_px);
+    record
+        .group("px", Band::relative(1e-12, "a few operations on printed digits"))
+        .number("rms-px", rms, "printed residual RMS over the mean printed scale")
+        .number("max-px", max, "printed largest residual over the mean printed scale")
+        .unit("")
+        .number("gui-gap", gap("tx", "gui-tx")?, "gap of the two printed translations along x")
+        .number("gui-gap-y", gap("ty", "gui-ty")?, "gap of the two printed translations along y");
     Ok(())
 }
 
@@ -112,15 +112,17 @@ const SAID_TO_AGREE: f64 = 1e-6;
 /// thousand.
 pub fn claim_scales_differ(record: &mut Record) -> Result<(), ExperimentError> {
     let value = |id: &str| entry(id).map(Entry::value);
-    let rounding = || Band::relative(1e-9, "a difference of printed digits");
-    for (axis, ours, gui) in [("x", "sx", "gui-sx"), ("y", "sy", "gui-sy")] {
+    for (axis, ours, gui, along) in [("x", "sx", "gui-sx", "u"), ("y", "sy", "gui-sy", "v")] {
         let relative = (value(gui)? / value(ours)? - 1.0).abs();
-        let what = format!("relative difference of the two printed scales along {axis}");
-        record.group("%", rounding()).number(format!("gui-scale-{axis}-percent"), 100.0 * relative, what);
         // A cell of the grid is one unit: 1 / s pixels.
         let px = relative / value(ours)?;
-        let what = format!("what that makes of one spacing along {}", if axis == "x" { "u" } else { "v" });
-        record.group("px", rounding()).number(format!("gui-scale-{axis}-px"), px, what);
+        let what = format!("relative difference of the two printed scales along {axis}");
+        record
+            .group("%", Band::relative(1e-9, "a difference of printed digits"))
+            .prefix(format!("gui-scale-{axis}"))
+            .number("-percent", 100.0 * relative, what)
+            .unit("px")
+            .number("-px", px, format!("what that makes of one spacing along {along}"));
     }
     let (sy, gui) = (before_rounding("sy")?, before_rounding("gui-sy")?);
     record

@@ -134,28 +134,25 @@ pub fn explain_gui(
         record.group(unit, band.clone()).number(*id, number, what);
     }
     let middle = mean(set);
-    let exact = Band::absolute(ROUNDING, "a mean of nine multiples of 0.5");
     record
-        .group("px/18", exact.clone())
+        .group("px/18", Band::absolute(ROUNDING, "a mean of nine multiples of 0.5"))
         .number("gui-centre-u-18ths", 18.0 * (middle.x - 715.0), "mean u less 715")
-        .band(exact)
         .number("gui-centre-v-18ths", 18.0 * (middle.y - 566.0), "mean v less 566");
-    let mut table = Table::new(
-        "gui-centres",
-        "centres on half pixels that print the GUI's six numbers, nearest to ours",
-        &[("u", "px"), ("v", "px"), ("u_gui", "px"), ("v_gui", "px"), ("du", "px"), ("dv", "px")],
+    let caption = "centres on half pixels that print the GUI's six numbers, nearest to ours";
+    record.table(
+        Table::of("gui-centres", caption, centres.iter().zip(set))
+            .column("u", "px", |(ours, _)| ours.x)
+            .column("v", "px", |(ours, _)| ours.y)
+            .column("u_gui", "px", |(_, gui)| gui.x)
+            .column("v_gui", "px", |(_, gui)| gui.y)
+            .column("du", "px", |(ours, gui)| gui.x - ours.x)
+            .column("dv", "px", |(ours, gui)| gui.y - ours.y),
     );
-    for (ours, gui) in centres.iter().zip(set) {
-        table.push([ours.x, ours.y, gui.x, gui.y, gui.x - ours.x, gui.y - ours.y]);
-    }
-    record.table(table);
     record.figure(gui_figure(centres, set));
     let moved = from_corner.moves.unwrap_or(0);
-    record.exact("").count(
-        "gui-moved",
-        moved,
-        "coordinates of the stand-in that must be rounded to the other neighbour for all six printed numbers",
-    );
+    let what =
+        "coordinates of the stand-in that must be rounded to the other neighbour for all six printed numbers";
+    record.exact("").count("gui-moved", moved, what);
     record.note(format!(
         "The GUI's six printed numbers are those of an affine fit to half-pixel centres, counted from the \
          corner of the first pixel; of the stand-in's 18 coordinates {moved} must be rounded to the other \
@@ -186,15 +183,10 @@ pub fn hypotheses_table(hypotheses: &[HalfPixels]) -> Result<Table, ExperimentEr
 
 pub fn gui_figure(centres: &[Vec2], gui: &[Vec2]) -> Figure {
     let apart = mean(gui) - mean(centres);
-    let shifts: Vec<(f64, f64)> = centres.iter().zip(gui).map(|(c, g)| (g.x - c.x, g.y - c.y)).collect();
+    let shifts = centres.iter().zip(gui).map(|(c, g)| (g.x - c.x, g.y - c.y));
     let square = |at: f64| {
-        [
-            (at - 0.25, at - 0.25),
-            (at + 0.25, at - 0.25),
-            (at + 0.25, at + 0.25),
-            (at - 0.25, at + 0.25),
-            (at - 0.25, at - 0.25),
-        ]
+        let (low, high) = (at - 0.25, at + 0.25);
+        [(low, low), (high, low), (high, high), (low, high), (low, low)]
     };
     let plot = Plot::new("GUI's centres less ours", "du (px)", "dv (px)")
         .size(470.0, 430.0)
@@ -202,10 +194,10 @@ pub fn gui_figure(centres: &[Vec2], gui: &[Vec2]) -> Figure {
         .y_down()
         .x_range(-0.4, 1.0)
         .y_range(-0.4, 1.0)
-        .line_as("rounding to half pixels", &square(0.0), Look::series(0))
-        .line_as("the same from the pixel's corner", &square(0.5), Look::series(1))
-        .points_as("nine centres", &shifts, Look::series(2))
-        .points_as("mean", &[(apart.x, apart.y)], Look::series(3).size(6.0));
+        .line_as("rounding to half pixels", square(0.0), Look::series(0))
+        .line_as("the same from the pixel's corner", square(0.5), Look::series(1))
+        .points_as("nine centres", shifts, Look::series(2))
+        .points_as("mean", [(apart.x, apart.y)], Look::series(3).size(6.0));
     let caption = format!(
         "Half-pixel centres that print the GUI's six numbers, less ours, in pixels; nothing is drawn at \
          random. Notice that their mean lies {:.2} px away along u and {:.2} px along v, where rounding \

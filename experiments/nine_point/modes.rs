@@ -8,16 +8,12 @@ pub fn report_geometry(record: &mut Record, image: &Raster<f32>, centres: &[Vec2
         .exact("px")
         .count("image-width", image.width(), "width of the image")
         .count("image-height", image.height(), "height of the image")
-        .band(band.clone())
+        .band(band)
         .number("spacing", 0.5 * (along + between), "mean spacing of the dots")
         .number("spacing-rows", between, "mean spacing from row to row")
-        .number("spacing-columns", along, "mean spacing from column to column");
-    let mean = mean(centres);
-    record
-        .group("px", band.clone())
-        .number("centre-u", mean.x, "mean of the nine centres, u")
-        .band(band)
-        .number("centre-v", mean.y, "mean of the nine centres, v");
+        .number("spacing-columns", along, "mean spacing from column to column")
+        .number("centre-u", mean(centres).x, "mean of the nine centres, u")
+        .number("centre-v", mean(centres).y, "mean of the nine centres, v");
 }
 
 /// Mean distance of neighbours along the rows, and from row to row.
@@ -32,30 +28,25 @@ pub fn spacings(centres: &[Vec2]) -> (f64, f64) {
 
 pub fn report_planar(record: &mut Record, fit: &PlaneCalibration, band: Band) {
     let m = fit.map.matrix();
-    let mut number = |id: &str, value: f64, unit: &str, what: &str| {
-        record.group(unit, band.clone()).number(id, value, what);
-    };
-    number("m11", m[(0, 0)], "1/px", "matrix, row 1, column 1");
-    number("m22", m[(1, 1)], "1/px", "matrix, row 2, column 2");
-    number("tx", m[(0, 2)], "", "matrix, translation along x");
-    number("ty", m[(1, 2)], "", "matrix, translation along y");
-    number("sx", fit.scale_x, "1/px", "scale along u");
-    number("sy", fit.scale_y, "1/px", "scale along v");
-    let fine = Band::absolute(1e-8, "centres repeat to 1e-6 px, 4e-9 units");
     let per_px = 0.5 * (fit.scale_x + fit.scale_y);
-    for (id, value, unit, what) in [
-        ("rms", fit.rms_point, "", "residual RMS per point, target units"),
-        ("max", fit.max_point, "", "largest residual, target units"),
-        ("m12", m[(0, 1)], "1/px", "matrix, row 1, column 2"),
-        ("m21", m[(1, 0)], "1/px", "matrix, row 2, column 1"),
-    ] {
-        record.group(unit, fine.clone()).number(id, value, what);
-    }
-    let fine = Band::absolute(3e-6, "centres repeat to 1e-6 px");
     record
-        .group("px", fine.clone())
+        .group("1/px", band)
+        .number("m11", m[(0, 0)], "matrix, row 1, column 1")
+        .number("m22", m[(1, 1)], "matrix, row 2, column 2")
+        .unit("")
+        .number("tx", m[(0, 2)], "matrix, translation along x")
+        .number("ty", m[(1, 2)], "matrix, translation along y")
+        .unit("1/px")
+        .number("sx", fit.scale_x, "scale along u")
+        .number("sy", fit.scale_y, "scale along v")
+        .group("", Band::absolute(1e-8, "centres repeat to 1e-6 px, 4e-9 units"))
+        .number("rms", fit.rms_point, "residual RMS per point, target units")
+        .number("max", fit.max_point, "largest residual, target units")
+        .unit("1/px")
+        .number("m12", m[(0, 1)], "matrix, row 1, column 2")
+        .number("m21", m[(1, 0)], "matrix, row 2, column 1")
+        .group("px", Band::absolute(3e-6, "centres repeat to 1e-6 px"))
         .number("fit-rms-px", fit.rms_point / per_px, "residual RMS in pixels")
-        .band(fine)
         .number("fit-max-px", fit.max_point / per_px, "largest residual in pixels");
 }
 
@@ -99,23 +90,18 @@ pub fn modes_table(fits: &[PlaneCalibration]) -> Result<Table, ExperimentError> 
 }
 
 pub fn residual_table(centres: &[Vec2], fits: &[PlaneCalibration]) -> Table {
-    let columns = [
-        ("x", ""),
-        ("y", ""),
-        ("u", "px"),
-        ("v", "px"),
-        ("planar_x", ""),
-        ("planar_y", ""),
-        ("tilted_x", ""),
-        ("tilted_y", ""),
-        ("similarity_x", ""),
-        ("similarity_y", ""),
-    ];
-    let mut table =
-        Table::new("residuals", "predicted minus given target point, for the three modes", &columns);
-    for (i, (point, pixel)) in unit_grid().iter().zip(centres).enumerate() {
-        let residuals = fits.iter().flat_map(|f| [f.residuals[i].x, f.residuals[i].y]);
-        table.push([point.x, point.y, pixel.x, pixel.y].into_iter().chain(residuals));
+    let caption = "predicted minus given target point, for the three modes";
+    let mut table = Table::of("residuals", caption, unit_grid().into_iter().zip(centres).zip(0..))
+        .column("x", "", |((point, _), _)| point.x)
+        .column("y", "", |((point, _), _)| point.y)
+        .column("u", "px", |((_, pixel), _)| pixel.x)
+        .column("v", "px", |((_, pixel), _)| pixel.y);
+    for ((mode, _), fit) in MODES.iter().zip(fits) {
+        table = table.column(&format!("{mode}_x"), "", |(_, i)| fit.residuals[*i].x).column(
+            &format!("{mode}_y"),
+            "",
+            |(_, i)| fit.residuals[*i].y,
+        );
     }
-    table
+    table.into()
 }

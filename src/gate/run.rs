@@ -11,6 +11,17 @@ const BATCH: usize = 1024;
 
 /// Asks the solver every case of the plan. `progress` hears how many more are done. `None` stands for a case
 /// that was left out.
+///
+/// ```
+/// use calibench_gate::{Builtin, Plan, Report, Terms, run};
+///
+/// // Seed, and samples of every scenario: two for a first look, a quick run takes 128.
+/// let plan = Plan::new(1, 2)?;
+/// let seen = run(&plan, &Builtin, &|_| ());
+/// let report = Report::new(&plan, "calibench", &seen, &Terms::default(), 0.0);
+/// assert!(report.held(), "{}", report.conclusion());
+/// # Ok::<(), calibench_gate::PlanError>(())
+/// ```
 pub fn run(plan: &Plan, solver: &dyn Solver, progress: &(dyn Fn(usize) + Sync)) -> Vec<Option<Seen>> {
     let mut seen = vec![None; plan.cases.len()];
     ask_where(plan, solver, &mut seen, |_| true, progress);

@@ -52,13 +52,19 @@ impl Claim {
 /// A claim whose statement is said: what must hold, and at which rate it may fail by chance.
 /// [`ClaimDraft::because`] closes it, so that no claim is without a reason.
 ///
-/// ```text
+/// ```
+/// use calibench::evaluate::Interval;
+/// use calibench_harness::Record;
+///
+/// let mut record = Record::new("four-pose", 1);
+/// let (bias_px, sd_px, trials) = (0.004, 0.68, 2000);
 /// record
 ///     .claim_that("fx-unbiased", "the mean error of fx is zero within the uncertainty of the mean")
-///     .within(bias, interval)
+///     .within(bias_px, Interval::of_mean(0.0, sd_px, trials, 1e-4))
 ///     .unit("px")
 ///     .at_rate(1e-4)
 ///     .because("the bound's standard deviation over the root of the number of trials, normal");
+/// assert!(record.claims()[0].held);
 /// ```
 #[derive(Debug)]
 #[must_use = "a claim counts once its reason is said: `because`"]

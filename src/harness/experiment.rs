@@ -8,6 +8,41 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 
 /// An experiment: one file in experiments/.
+///
+/// ```
+/// use calibench::geometry::{LineFit, Vec2};
+/// use calibench_harness::{Context, Experiment, ExperimentError, Record, Table};
+///
+/// const EXPERIMENT: Experiment = Experiment {
+///     id: "straight-line",
+///     title: "A line through points of a line",
+///     question: "How far do points of a straight line leave the line that is fitted to them? Expected: not at all.",
+///     seed: 1,
+///     takes_image: false,
+///     run,
+/// };
+///
+/// fn run(context: &Context) -> Result<Record, ExperimentError> {
+///     let points: Vec<Vec2> = (0..9).map(|k| Vec2::new(f64::from(k), 2.0 * f64::from(k))).collect();
+///     let line = LineFit::new(&points).map_err(ExperimentError::at("line fit"))?;
+///     let mut record = context.record();
+///     record.exact("").count("points", points.len(), "points of the line");
+///     record
+///         .claim_that("straight", "no point leaves the line but by rounding")
+///         .at_most(line.max_deviation(), 1e-13)
+///         .unit("px")
+///         .because("coordinates below 16 px are rounded by 2^-50 px, some tens of times");
+///     record.table(
+///         Table::of("line", "the points", &points).column("u", "px", |p| p.x).column("v", "px", |p| p.y),
+///     );
+///     Ok(record)
+/// }
+///
+/// let record = EXPERIMENT.execute(&Context::of(&EXPERIMENT))?;
+/// assert!(record.claims().iter().all(|claim| claim.held));
+/// assert_eq!(record.tables()[0].rows().len(), 9);
+/// # Ok::<(), ExperimentError>(())
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Experiment {
     /// Name in kebab-case, such as `four-pose`: of the binary, the folder in out/ and figures/, and the

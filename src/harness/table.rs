@@ -89,6 +89,18 @@ impl Table {
         }
     }
 
+    /// A table whose rows are arrays, one cell for each of the columns `(name, unit)`.
+    pub fn of_arrays<C: Into<Cell> + Clone, const N: usize>(
+        name: impl Into<String>,
+        caption: impl Into<String>,
+        columns: [(&str, &str); N],
+        rows: &[[C; N]],
+    ) -> Table {
+        let mut table = Table::new(name, caption, &columns);
+        rows.iter().for_each(|row| table.push(row.iter().cloned()));
+        table
+    }
+
     /// Adds a row. A row of another length than the columns is reported when the record is closed.
     pub fn push<C: Into<Cell>>(&mut self, row: impl IntoIterator<Item = C>) {
         self.rows.push(row.into_iter().map(Into::into).collect());

@@ -63,6 +63,20 @@ const LEAST_FLATNESS: f64 = 0.01;
 ///
 /// # Errors
 /// See [`RefineError`].
+///
+/// ```
+/// use calibench::detect::refine_corner;
+/// use calibench::geometry::Vec2;
+/// use calibench::raster::Raster;
+///
+/// // Four squares meet between the pixels 9 and 10, that is at 9.5.
+/// let image = Raster::from_fn(20, 20, |x, y| if (x < 10) == (y < 10) { 30u8 } else { 220 });
+/// let corner = refine_corner(&image, Vec2::new(8.3, 10.6), 5)?;
+/// assert!((corner - Vec2::new(9.5, 9.5)).norm() < 1e-3);
+/// // Where there is only an edge, there is no corner.
+/// assert!(refine_corner(&image.map(|_| 30u8), Vec2::new(8.3, 10.6), 5).is_err());
+/// # Ok::<(), calibench::detect::RefineError>(())
+/// ```
 pub fn refine_corner<T: Level>(image: &Raster<T>, start: Vec2, half_px: usize) -> Result<Vec2, RefineError> {
     let mut corner = start;
     for _ in 0..MAX_STEPS {

@@ -36,6 +36,21 @@ const LARGEST_MISFIT: f64 = 0.2;
 
 /// The discs of an image, top to bottom by their highest pixel. Marks that touch the image's border are left
 /// out.
+///
+/// ```
+/// use calibench::detect::{BlobOptions, blobs};
+/// use calibench::raster::Raster;
+///
+/// // A bright sheet with a dark disc of radius 8 px about (30, 20), its edge one pixel wide.
+/// let image = Raster::from_fn(60, 40, |x, y| {
+///     let distance = ((x as f64 - 30.0).powi(2) + (y as f64 - 20.0).powi(2)).sqrt();
+///     0.9 - 0.7 * (8.5 - distance).clamp(0.0, 1.0) as f32
+/// });
+/// let found = blobs(&image, &BlobOptions::default());
+/// assert_eq!(found.len(), 1);
+/// assert!((found[0].centre_px.x - 30.0).abs() < 0.01 && (found[0].centre_px.y - 20.0).abs() < 0.01);
+/// assert!((found[0].semi_axes_px().0 - 8.0).abs() < 0.1);
+/// ```
 pub fn blobs<T: Level>(image: &Raster<T>, options: &BlobOptions) -> Vec<Blob> {
     let Some(thresholds) = Thresholds::of(image) else { return Vec::new() };
     components(image, &thresholds, options.polarity)

@@ -27,6 +27,20 @@ pub enum BoundError {
 ///
 /// # Errors
 /// A scene whose information matrix is singular, or with points behind the camera.
+///
+/// ```
+/// use calibench::camera::{FreeParameters, Parameter};
+/// use calibench::evaluate::cramer_rao;
+/// use calibench::synth::Truth;
+///
+/// let bound = cramer_rao(&Truth::example(), FreeParameters::STANDARD, 0.1)?;
+/// // Whoever calibrates from these four views knows fx to 0.68 px at best, and to twice that at twice the noise.
+/// let at_twice = cramer_rao(&Truth::example(), FreeParameters::STANDARD, 0.2)?;
+/// let (fx, fx_at_twice) = (bound.standard_deviation(Parameter::Fx), at_twice.standard_deviation(Parameter::Fx));
+/// assert!(fx.is_some_and(|sd| (sd - 0.681).abs() < 5e-4));
+/// assert!(fx.zip(fx_at_twice).is_some_and(|(one, two)| (two / one - 2.0).abs() < 1e-12));
+/// # Ok::<(), calibench::evaluate::BoundError>(())
+/// ```
 pub fn cramer_rao(truth: &Truth, free: FreeParameters, sigma_px: f64) -> Result<Covariance, BoundError> {
     let information = information(&truth.camera, free, &truth.cam_from_target, &truth.points)
         .ok_or(BoundError::BehindCamera)?;

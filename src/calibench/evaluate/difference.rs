@@ -133,6 +133,19 @@ fn points_seen(a: &Camera, b: &Camera, size: (usize, usize), distance: f64) -> V
 ///
 /// # Errors
 /// [`DifferenceError::TooFewNodes`], [`DifferenceError::Distance`].
+///
+/// ```
+/// use calibench::camera::Camera;
+/// use calibench::evaluate::{TakenOut, frame_difference};
+///
+/// let a = Camera::pinhole(600.0, 600.0, 320.0, 240.0);
+/// // A principal point 6 px further right is nearly a camera turned by a hundredth of a radian.
+/// let b = Camera::pinhole(600.0, 600.0, 326.0, 240.0);
+/// let difference = frame_difference(&a, &b, (640, 480), TakenOut::Rotation)?;
+/// assert!((difference.rotation_rad() - 0.01).abs() < 2e-3);
+/// assert!(difference.rms_px < 1.0);
+/// # Ok::<(), calibench::evaluate::DifferenceError>(())
+/// ```
 pub fn frame_difference(
     a: &Camera,
     b: &Camera,

@@ -33,6 +33,21 @@ pub struct Errors {
 }
 
 /// Compares `estimate` with `truth` under the covariance `predicted`. `None` if the covariance is singular.
+///
+/// ```
+/// use calibench::calibrate::{Settings, calibrate};
+/// use calibench::evaluate::errors_of;
+/// use calibench::synth::{Scene, Stream, StreamKey};
+///
+/// let scene = Scene::example();
+/// let mut stream = Stream::open(StreamKey { seed: 1, scenario: "errors", trial: 0, purpose: "noise" });
+/// let result = calibrate(&scene.observe(0.1, &mut stream), &Settings::standard())?;
+/// let errors = errors_of(&scene.truth.camera, &result.camera, &result.covariance).expect("not singular");
+/// assert_eq!(errors.items.len(), 6);
+/// // The stated covariance covers the errors: chance alone would often make them larger.
+/// assert!(errors.p_value > 0.001 && errors.items.iter().all(|item| item.z.abs() < 4.0));
+/// # Ok::<(), calibench::calibrate::CalibrationError>(())
+/// ```
 pub fn errors_of(truth: &Camera, estimate: &Camera, predicted: &Covariance) -> Option<Errors> {
     let items: Vec<Item> = predicted
         .free

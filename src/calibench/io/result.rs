@@ -413,6 +413,20 @@ pub enum ResultError {
 }
 
 /// Reads the camera, and the image size if it is there, of a `result.json`.
+///
+/// ```
+/// use calibench::calibrate::{Settings, calibrate};
+/// use calibench::io::{CalibrationFields, read_camera, write_atomically};
+/// use calibench::synth::Scene;
+///
+/// let result = calibrate(&Scene::example().exact(), &Settings::standard())?;
+/// let names: Vec<String> = (1..=4).map(|view| format!("view {view}")).collect();
+/// let file = std::env::temp_dir().join("calibench-example-result.json");
+/// write_atomically(&file, CalibrationFields::of(&result, &names, Some((640, 480))).to_json().as_bytes())?;
+/// // The numbers are written with all their digits: the same camera comes back.
+/// assert_eq!(read_camera(&file)?, (result.camera, Some((640, 480))));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read_camera(path: &Path) -> Result<(Camera, Option<(usize, usize)>), ResultError> {
     let file = path.shown();
     parse_camera(&file, &read_regular_text(path, MOST_TABLE_BYTES)?)

@@ -85,6 +85,27 @@ impl Fitter<'_> {
     ///
     /// # Errors
     /// See [`CalibrationError`]; views in it are counted among those given.
+    ///
+    /// ```
+    /// use calibench::calibrate::Settings;
+    /// use calibench::geometry::Vec2;
+    /// use calibench::board::View;
+    /// use calibench::photos::Fitter;
+    /// use calibench::synth::{Scene, Stream, StreamKey};
+    ///
+    /// let mut stream = Stream::open(StreamKey { seed: 1, scenario: "stray", trial: 0, purpose: "noise" });
+    /// let mut views = Scene::example().observe(0.1, &mut stream);
+    /// // In the last photograph every second mark was found three pixels too far right.
+    /// let shifted = views[3].pixels().iter().enumerate();
+    /// let pixels = shifted.map(|(i, p)| p + Vec2::new(3.0 * (i % 2) as f64, 0.0)).collect();
+    /// views[3] = View::new(views[3].points().to_vec(), pixels)?;
+    ///
+    /// let fitter = Fitter { settings: &Settings::standard(), discs: None, reject_factor: Some(3.0) };
+    /// let fit = fitter.fit(&views)?;
+    /// assert_eq!((fit.kept, fit.rejected[0].view), (vec![0, 1, 2], 3));
+    /// assert!(fit.calibration.rmse_px < 0.2);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn fit(&self, views: &[View]) -> Result<Fit, CalibrationError> {
         let mut kept: Vec<usize> = (0..views.len()).collect();
         let mut rejected: Vec<Rejected> = Vec::new();

@@ -19,6 +19,21 @@ const BAND: usize = 64;
 ///
 /// # Errors
 /// Photographs of fewer than 2 x 2 pixels.
+///
+/// ```
+/// use calibench::rectify::{OutputView, output_camera, rectify_image};
+/// use calibench::synth::Truth;
+/// use calibench::synth::render::{Imaging, photograph};
+///
+/// let (camera, size) = (Truth::example_camera(), Truth::EXAMPLE_IMAGE);
+/// let pose = Truth::example_poses()[0];
+/// let photo = photograph(&camera, size, &Truth::example_board(), &pose, &Imaging::default())?.image;
+/// // A camera without distortion that loses no pixel of the photograph; what it sees beyond is white.
+/// let output = output_camera(&camera, size, OutputView::AllPixels)?;
+/// let rectified = rectify_image(&photo, &camera, &output, size, 1.0)?;
+/// assert_eq!((rectified.width(), rectified.height()), size);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn rectify_image<T: Interpolated>(
     photograph: &Raster<T>,
     camera: &Camera,

@@ -6,6 +6,21 @@ use crate::geometry::Vec2;
 /// The pixels of a rectified image in which `pixels` of the photograph are shown: the correction of points,
 /// for `output` the same `K` without distortion. One answer a pixel; results are in pixels of `output`, not
 /// in target units.
+///
+/// ```
+/// use calibench::camera::{BrownConrady, Camera};
+/// use calibench::geometry::Vec2;
+/// use calibench::rectify::rectify_points;
+///
+/// let ideal = Camera::pinhole(600.0, 600.0, 320.0, 240.0);
+/// let camera = ideal.with_distortion(BrownConrady::radial(-0.18, 0.06));
+/// // What a barrel lens draws in goes out again; the centre stays.
+/// let seen = [camera.distort_pixel(&Vec2::new(620.0, 60.0)), Vec2::new(320.0, 240.0)];
+/// let corrected: Vec<Vec2> = rectify_points(&camera, &ideal, &seen).into_iter().collect::<Result<_, _>>()?;
+/// assert!((corrected[0] - Vec2::new(620.0, 60.0)).norm() < 1e-9);
+/// assert!((corrected[1] - seen[1]).norm() < 1e-12);
+/// # Ok::<(), calibench::camera::UndistortError>(())
+/// ```
 pub fn rectify_points(
     camera: &Camera,
     output: &Camera,

@@ -5,6 +5,7 @@ use super::colour::{Dash, Look, Marker};
 use super::heat::HeatMap;
 use calibench::geometry::Vec2;
 use nalgebra::Matrix2;
+use std::borrow::Borrow;
 
 /// One layer; an empty label keeps it out of the legend.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,6 +89,20 @@ impl Layer {
 }
 
 /// A plot. Every call adds one layer; series look different from one another unless a [`Look`] is given.
+///
+/// ```
+/// use calibench_harness::{Figure, Look, Plot};
+///
+/// let measured = [(1.0, 0.52), (2.0, 0.27), (4.0, 0.12)];
+/// let law: Vec<(f64, f64)> = measured.iter().map(|(n, _)| (*n, 0.5 / n)).collect();
+/// let plot = Plot::new("Spread against views", "views", "sd (px)")
+///     .log_x()
+///     .log_y()
+///     .line_as("1/n", &law, Look::ink())
+///     .points("measured", &measured);
+/// let figure = Figure::plot("spread", &plot, "Three sets of views; notice the slope.");
+/// assert_eq!(figure.file_name(), "spread.svg");
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plot {
     pub(super) title: String,
@@ -98,6 +113,11 @@ pub struct Plot {
     pub(super) equal_aspect: bool,
     pub(super) size: (f64, f64),
     series: usize,
+}
+
+/// The items of a slice or of an iterator.
+fn all<P: Copy>(items: impl IntoIterator<Item: Borrow<P>>) -> Vec<P> {
+    items.into_iter().map(|item| *item.borrow()).collect()
 }
 
 impl Plot {
@@ -137,53 +157,108 @@ impl Plot {
     }
 
     /// A line through points, in their order. A point that is not finite interrupts it.
-    pub fn line(mut self, label: impl Into<String>, points: &[(f64, f64)]) -> Plot {
+    pub fn line(
+        mut self,
+        label: impl Into<String>,
+        points: impl IntoIterator<Item: Borrow<(f64, f64)>>,
+    ) -> Plot {
         let look = self.next_look();
         self.line_as(label, points, look)
     }
 
     /// A line of a given look.
-    pub fn line_as(self, label: impl Into<String>, points: &[(f64, f64)], look: Look) -> Plot {
-        self.with(Layer::Line { label: label.into(), points: points.to_vec(), look })
+    pub fn line_as(
+        self,
+        label: impl Into<String>,
+        points: impl IntoIterator<Item: Borrow<(f64, f64)>>,
+        look: Look,
+    ) -> Plot {
+        self.with(Layer::Line { label: label.into(), points: all(points), look })
     }
 
     /// Markers.
-    pub fn points(mut self, label: impl Into<String>, points: &[(f64, f64)]) -> Plot {
+    pub fn points(
+        mut self,
+        label: impl Into<String>,
+        points: impl IntoIterator<Item: Borrow<(f64, f64)>>,
+    ) -> Plot {
         let look = self.next_look();
         self.points_as(label, points, look)
     }
 
     /// Markers of a given look.
-    pub fn points_as(self, label: impl Into<String>, points: &[(f64, f64)], look: Look) -> Plot {
-        self.with(Layer::Points { label: label.into(), points: points.to_vec(), look })
+    pub fn points_as(
+        self,
+        label: impl Into<String>,
+        points: impl IntoIterator<Item: Borrow<(f64, f64)>>,
+        look: Look,
+    ) -> Plot {
+        self.with(Layer::Points { label: label.into(), points: all(points), look })
     }
 
     /// A shaded band between `(x, low, high)`.
-    pub fn band(mut self, label: impl Into<String>, edges: &[(f64, f64, f64)]) -> Plot {
+    pub fn band(
+        mut self,
+        label: impl Into<String>,
+        edges: impl IntoIterator<Item: Borrow<(f64, f64, f64)>>,
+    ) -> Plot {
         let look = self.next_look();
         self.band_as(label, edges, look)
     }
 
     /// A shaded band of a given look.
-    pub fn band_as(self, label: impl Into<String>, edges: &[(f64, f64, f64)], look: Look) -> Plot {
-        self.with(Layer::Band { label: label.into(), edges: edges.to_vec(), look })
+    pub fn band_as(
+        self,
+        label: impl Into<String>,
+        edges: impl IntoIterator<Item: Borrow<(f64, f64, f64)>>,
+        look: Look,
+    ) -> Plot {
+        self.with(Layer::Band { label: label.into(), edges: all(edges), look })
     }
 
     /// Intervals `(x, low, high)`, each a bar with caps.
-    pub fn error_bars_as(self, label: impl Into<String>, bars: &[(f64, f64, f64)], look: Look) -> Plot {
-        self.with(Layer::ErrorBars { label: label.into(), bars: bars.to_vec(), look })
+    pub fn error_bars_as(
+        self,
+        label: impl Into<String>,
+        bars: impl IntoIterator<Item: Borrow<(f64, f64, f64)>>,
+        look: Look,
+    ) -> Plot {
+        self.with(Layer::ErrorBars { label: label.into(), bars: all(bars), look })
+    }
+
+    /// Markers with their intervals, `(x, value, low, high)` each.
+    pub fn measured_as(
+        self,
+        label: impl Into<String>,
+        measured: impl IntoIterator<Item = (f64, f64, f64, f64)>,
+        look: Look,
+    ) -> Plot {
+        let measured: Vec<_> = measured.into_iter().collect();
+        self.error_bars_as("", measured.iter().map(|&(x, _, low, high)| (x, low, high)), look).points_as(
+            label,
+            measured.iter().map(|&(x, value, ..)| (x, value)),
+            look,
+        )
     }
 
     /// Bars `(left, right, height)` from zero.
-    pub fn histogram(mut self, label: impl Into<String>, bars: &[(f64, f64, f64)]) -> Plot {
+    pub fn histogram(
+        mut self,
+        label: impl Into<String>,
+        bars: impl IntoIterator<Item: Borrow<(f64, f64, f64)>>,
+    ) -> Plot {
         let look = self.next_look();
-        self.with(Layer::Histogram { label: label.into(), bars: bars.to_vec(), look })
+        self.with(Layer::Histogram { label: label.into(), bars: all(bars), look })
     }
 
     /// Arrows `(x, y, dx, dy)` in data units; enlarge `dx, dy` beforehand and say so in the label.
-    pub fn arrows(mut self, label: impl Into<String>, arrows: &[(f64, f64, f64, f64)]) -> Plot {
+    pub fn arrows(
+        mut self,
+        label: impl Into<String>,
+        arrows: impl IntoIterator<Item: Borrow<(f64, f64, f64, f64)>>,
+    ) -> Plot {
         let look = self.next_look();
-        self.with(Layer::Arrows { label: label.into(), arrows: arrows.to_vec(), look })
+        self.with(Layer::Arrows { label: label.into(), arrows: all(arrows), look })
     }
 
     /// The curve `(x - centre)' covariance^-1 (x - centre) = scale^2`. With `scale^2 = -2 ln(1 - p)` it holds
@@ -231,8 +306,13 @@ impl Plot {
         self.with(Layer::Horizontal { label: label.into(), y, look })
     }
 
-    /// One dot for each of many draws.
-    pub fn cloud(self, label: impl Into<String>, points: &[(f64, f64)], look: Look) -> Plot {
+    /// A small marker for each of many trials.
+    pub fn cloud(
+        self,
+        label: impl Into<String>,
+        points: impl IntoIterator<Item: Borrow<(f64, f64)>>,
+        look: Look,
+    ) -> Plot {
         self.points_as(label, points, look.marker(Marker::Dot).size(1.2))
     }
 

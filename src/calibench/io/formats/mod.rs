@@ -193,6 +193,18 @@ fn only_one(
 ///
 /// # Errors
 /// See [`FormatError`].
+///
+/// ```
+/// use calibench::io::formats::{Wishes, detect, read_camera_file};
+///
+/// let text = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n1 SIMPLE_RADIAL 640 480 600 320 240 -0.18\n";
+/// let format = detect("cameras.txt", text)?;
+/// let read = read_camera_file(format, "cameras.txt", text, None, &Wishes::default())?;
+/// assert_eq!((format.name, read.image_size), ("colmap", Some((640, 480))));
+/// // COLMAP's first pixel has its centre at (0.5, 0.5), ours at (0, 0).
+/// assert_eq!((read.camera.cx, read.camera.distortion.k1), (319.5, -0.18));
+/// # Ok::<(), calibench::io::formats::FormatError>(())
+/// ```
 pub fn read_camera_file(
     format: &Format,
     file: &str,
