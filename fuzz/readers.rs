@@ -6,7 +6,7 @@ use calibench::io::formats::{
 };
 use calibench::io::image::{parse_extent, parse_image};
 use calibench::io::result::parse_camera;
-use calibench::io::{memory, parse_corners, parse_point_pairs, table};
+use calibench::io::{memory, parse_corners, parse_marks, parse_point_pairs, table};
 use calibench::photos::BoardSpec;
 use calibench_gate::accept::{accept, id_in, read_line};
 use calibench_gate::protocol::{Problem, ProblemView};
@@ -38,9 +38,10 @@ pub fn corners(bytes: &[u8]) {
     let _ = parse_corners("corners", bytes);
 }
 
-/// Point pairs.
+/// Point pairs, and marks of a part.
 pub fn pairs(bytes: &[u8]) {
     let _ = parse_point_pairs("pairs", bytes);
+    let _ = parse_marks("marks", bytes);
 }
 
 /// Results and cameras.

@@ -10,6 +10,7 @@ mod exit;
 mod gate;
 mod list;
 mod ninepoint;
+mod register;
 mod report;
 mod reproduce;
 mod run;
@@ -64,6 +65,8 @@ enum Verb {
     Convert(Box<convert::Arguments>),
     /// Compares two cameras over the frame, and tests whether both may be one
     Diff(diff::Arguments),
+    /// Registers a found part on a taught one: the map between their marks, and how well any point is known
+    Register(register::Arguments),
     /// Monte Carlo studies from a file: resumable, sharded, with intervals
     Study(study::Arguments),
     /// Judges a solver, this library's or any program, on problems with known answers
@@ -97,6 +100,7 @@ pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCo
         Some(Verb::Undistort(arguments)) => undistort::run(&arguments),
         Some(Verb::Convert(arguments)) => convert::run(&arguments),
         Some(Verb::Diff(arguments)) => diff::run(&arguments),
+        Some(Verb::Register(arguments)) => register::run(&arguments),
         Some(Verb::Study(arguments)) => study::run(&arguments, build),
         Some(Verb::Gate(arguments)) => gate::run(&arguments, build),
     };

@@ -14,6 +14,7 @@ pub mod image;
 pub mod input;
 #[cfg(feature = "photo")]
 mod jpeg_end;
+pub mod marks;
 pub mod memory;
 pub mod message;
 #[cfg(feature = "photo")]
@@ -34,6 +35,7 @@ pub use hash::sha256_hex;
 #[cfg(feature = "photo")]
 pub use image::{Extent, Grey, ImageError, image_extent, read_image, write_png, write_png_16};
 pub use input::{InputError, MOST_SIDE_PX, read_regular, read_regular_text};
+pub use marks::{MarkFile, parse_marks, read_marks};
 pub use memory::Memory;
 pub use message::message;
 #[cfg(feature = "photo")]
