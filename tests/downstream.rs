@@ -1,6 +1,14 @@
 //! Do `register`, `measure` and `hand-eye` say what they find, and are their stated uncertainties those of
 //! repeated calibrations?
 
+use calibench::board::View;
+use calibench::calibrate::{Calibration, Settings, calibrate};
+use calibench::downstream::{Conditions, Length, PlaneView, length_in_view, length_on_map};
+use calibench::geometry::Vec2;
+use calibench::planar::{PlaneModel, calibrate_plane};
+use calibench::synth::scene::looking_at_centre;
+use calibench::synth::{Scene, Stream, StreamKey, Truth};
+use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -76,4 +84,218 @@ fn a_part_that_cannot_be_registered_is_refused_with_its_reason() {
     assert!(few.contains("at least 2 marks, got 1") && few.contains("e of other.csv"), "{few}");
     assert!(refused(&folder, &["register", "line.csv", "a.csv", "--model", "affine"]).contains("collinear"));
     assert!(refused(&folder, &["register", "a.csv", "a.csv", "--loss", "huber:-1"]).contains("huber:D"));
+}
+
+/// Five views of the example's board by its camera: four as they are, and one tilted and off the middle.
+fn station() -> Scene {
+    let mut truth = Truth::example();
+    let mut fifth = looking_at_centre([18.0, 24.0, 30.0], 150.0);
+    fifth.translation.x += 12.0;
+    truth.cam_from_target.push(fifth);
+    Scene::new(truth).expect("the board is seen whole")
+}
+
+const NOISE_PX: f64 = 0.1;
+/// The points of the board between which is measured, and the view: the tilted one.
+const ENDS: [usize; 2] = [10, 51];
+const VIEW: usize = 4;
+
+fn noisy(pixel: &Vec2, stream: &mut Stream) -> Vec2 {
+    pixel + NOISE_PX * Vec2::new(stream.normal(), stream.normal())
+}
+
+/// A calibration with noise of its own, and the pixels of both ends with noise of theirs.
+fn drawn(scene: &Scene, trial: u64) -> (Calibration, [Vec2; 2]) {
+    let mut stream = Stream::open(StreamKey { seed: 11, scenario: "measure", trial, purpose: "noise" });
+    let views = scene.observe(NOISE_PX, &mut stream);
+    let settings = Settings::standard().with_image_size(Truth::EXAMPLE_IMAGE);
+    let calibration = calibrate(&views, &settings).expect("five tilted views make a camera");
+    (calibration, ENDS.map(|i| noisy(&scene.pixels()[VIEW][i], &mut stream)))
+}
+
+/// The length with what the calibration knows of its own noise.
+fn length(calibration: &Calibration, pixels: &[Vec2; 2]) -> Length {
+    let (camera, poses) = (&calibration.camera, &calibration.cam_from_target);
+    let plane = PlaneView::of_view(camera, poses, &calibration.covariance, VIEW).expect("the view is there");
+    let conditions = Conditions {
+        noise_freedom: Some(calibration.degrees_of_freedom),
+        mark_is_noise: true,
+        ..Conditions::marks(calibration.sigma_px)
+    };
+    length_in_view(&plane, pixels, &conditions).expect("both ends are on the board")
+}
+
+#[test]
+fn lengths_of_repeated_calibrations_spread_as_each_of_them_states() {
+    const DRAWS: u64 = 600;
+    let scene = station();
+    let truth = (scene.truth.points[ENDS[1]] - scene.truth.points[ENDS[0]]).norm();
+    let lengths: Vec<Length> = (0..DRAWS)
+        .map(|trial| {
+            let (calibration, pixels) = drawn(&scene, trial);
+            length(&calibration, &pixels)
+        })
+        .collect();
+    let mean = |of: &dyn Fn(&Length) -> f64| lengths.iter().map(of).sum::<f64>() / DRAWS as f64;
+    let squared = mean(&|l| {
+        let z = (l.value - truth) / l.standard_uncertainty();
+        z * z
+    });
+    let bias = mean(&|l| (l.value - truth) / l.standard_uncertainty());
+    let covered = lengths
+        .iter()
+        .filter(|l| (l.value - truth).abs() <= l.coverage_factor(0.95) * l.standard_uncertainty());
+    // Fisher's distribution of 1 and some 600 degrees of freedom: mean 1.003, variance 2.02; each limit is
+    // left by one draw in ten thousand.
+    assert!((squared - 1.0).abs() < 3.9 * (2.02 / DRAWS as f64).sqrt(), "mean square {squared}");
+    assert!(bias.abs() < 3.9 / (DRAWS as f64).sqrt(), "mean {bias}");
+    let covered = covered.count();
+    assert!((548..=590).contains(&covered), "{covered} of {DRAWS} intervals of 95 %");
+    // Camera and pose make up for each other, or the calibration would cost more than the marks.
+    let without_correlation = mean(&|l| {
+        l.budget.iter().filter(|c| c.variance > 0.0).map(|c| c.variance).sum::<f64>().sqrt()
+            / l.standard_uncertainty()
+    });
+    assert!(without_correlation > 2.0, "{without_correlation}");
+}
+
+#[test]
+fn the_law_of_propagation_agrees_with_the_propagation_of_distributions() {
+    // JCGM 101:2008, section 8: the interval of 95 % by both, to half of the first digit of u.
+    const DRAWS: usize = 100_000;
+    let (calibration, pixels) = drawn(&station(), 0);
+    let linear = length(&calibration, &pixels);
+    let covariance = &calibration.covariance;
+    let n = covariance.free.len();
+    let entry = |i: usize, j: usize| match (i < n, j < n) {
+        (true, true) => covariance.intrinsics[(i, j)],
+        (true, false) => covariance.cross[VIEW][(i, j - n)],
+        (false, true) => covariance.cross[VIEW][(j, i - n)],
+        (false, false) => covariance.poses[VIEW][(i - n, j - n)],
+    };
+    let joint = DMatrix::from_fn(n + 6, n + 6, entry);
+    let root = joint.cholesky().expect("a covariance is positive definite").unpack();
+    let mut stream =
+        Stream::open(StreamKey { seed: 12, scenario: "measure", trial: 0, purpose: "propagation" });
+    let mut lengths: Vec<f64> = (0..DRAWS)
+        .map(|_| {
+            let step = &root * DVector::from_fn(n + 6, |_, _| stream.normal());
+            let camera = calibration.camera.stepped(covariance.free, &step.as_slice()[..n]);
+            let of_pose = nalgebra::Vector6::from_row_slice(&step.as_slice()[n..]);
+            let pose = calibration.cam_from_target[VIEW].perturbed(&of_pose);
+            let plane = PlaneView::with_pose(&camera, &pose, covariance, [0.0; 6]);
+            let sigma = calibration.sigma_px;
+            let ends = pixels.map(|p| {
+                let moved = p + sigma * Vec2::new(stream.normal(), stream.normal());
+                plane.point(&moved).expect("the ends stay on the board")
+            });
+            (ends[1] - ends[0]).norm()
+        })
+        .collect();
+    lengths.sort_by(f64::total_cmp);
+    let at = |p: f64| lengths[(p * DRAWS as f64) as usize];
+    let u = linear.standard_uncertainty();
+    // u = c 10^l with one digit c: the tolerance is half of 10^l.
+    let tolerance = 0.5 * libm::exp10(libm::floor(libm::log10(u)));
+    let (low, high) = (at(0.025) - (linear.value - 1.96 * u), at(0.975) - (linear.value + 1.96 * u));
+    assert!(low.abs() < tolerance && high.abs() < tolerance, "{low} and {high} against {tolerance}, u {u}");
+    let mean = lengths.iter().sum::<f64>() / DRAWS as f64;
+    let spread = (lengths.iter().map(|l| (l - mean) * (l - mean)).sum::<f64>() / DRAWS as f64).sqrt();
+    // A standard deviation of that many draws is known to 1 / sqrt(2 DRAWS); 3.9 of these.
+    assert!((spread / u - 1.0).abs() < 3.9 / (2.0 * DRAWS as f64).sqrt(), "{spread} against {u}");
+}
+
+#[test]
+fn lengths_on_a_map_of_nine_dots_spread_as_is_stated() {
+    const DRAWS: u64 = 3000;
+    let world: Vec<Vec2> =
+        (0..9).map(|i| Vec2::new(f64::from(i % 3) - 1.0, 1.0 - f64::from(i / 3))).collect();
+    let exact: Vec<Vec2> =
+        world.iter().map(|w| Vec2::new(714.7 + 236.2 * w.x, 566.0 - 236.2 * w.y)).collect();
+    let ends = [Vec2::new(500.0, 400.0), Vec2::new(1100.0, 700.0)];
+    let truth = 10.0 * (ends[1] - ends[0]).norm() / 236.2;
+    let mut squared = 0.0;
+    for trial in 0..DRAWS {
+        let mut stream = Stream::open(StreamKey { seed: 13, scenario: "measure", trial, purpose: "dots" });
+        let pixels: Vec<Vec2> = exact.iter().map(|p| noisy(p, &mut stream)).collect();
+        let map = calibrate_plane(PlaneModel::Affine, &pixels, &world).expect("nine dots make a map");
+        let sigma_px = map.spread.as_ref().expect("12 degrees of freedom").sigma / map.scale_x;
+        let conditions =
+            Conditions { noise_freedom: Some(12), mark_is_noise: true, ..Conditions::marks(sigma_px) };
+        let length = length_on_map(&map, 10.0, &ends.map(|p| noisy(&p, &mut stream)), &conditions)
+            .expect("on the map");
+        let z = (length.value - truth) / length.standard_uncertainty();
+        assert!((length.effective_freedom().expect("estimated") - 12.0).abs() < 1e-9);
+        squared += z * z / DRAWS as f64;
+    }
+    // Fisher's distribution of 1 and 12 degrees of freedom: mean 1.2, variance 3.96.
+    assert!((squared - 1.2).abs() < 3.9 * (3.96 / DRAWS as f64).sqrt(), "mean square {squared}");
+}
+
+/// The example's views with noise as a corner file.
+fn write_corners(path: &Path, views: &[View]) {
+    let mut text = "view,point,X,Y,u,v\n".to_string();
+    for (view, seen) in views.iter().enumerate() {
+        for (point, (at, pixel)) in seen.pairs().enumerate() {
+            text += &format!("{view},{point},{},{},{},{}\n", at.x, at.y, pixel.x, pixel.y);
+        }
+    }
+    fs::write(path, text).expect("written");
+}
+
+#[test]
+fn measure_reads_what_calibrate_and_ninepoint_write() {
+    let folder = folder("measure");
+    let scene = station();
+    let mut stream = Stream::open(StreamKey { seed: 11, scenario: "measure", trial: 0, purpose: "noise" });
+    write_corners(&folder.join("corners.csv"), &scene.observe(NOISE_PX, &mut stream));
+    said(&folder, &["calibrate", "corners.csv", "--image-size", "640x480", "--out", "camera"]);
+    let (calibration, pixels) = drawn(&scene, 0);
+    let [a, b] = pixels;
+    let line = format!("{},{},{},{}", a.x, a.y, b.x, b.y);
+    fs::write(folder.join("ends.csv"), format!("length,u1,v1,u2,v2\ndiagonal,{line}\n")).expect("written");
+    let file = "camera/result.json";
+    let json = said(&folder, &["measure", file, "--view", "4", "--pixels", &line, "--ends", "ends.csv"]);
+    let expected = length(&calibration, &pixels);
+    for (i, name) in ["1", "diagonal"].into_iter().enumerate() {
+        let found = &json["lengths"][i];
+        let number = |what: &str| found[what].as_f64().expect("a number");
+        assert_eq!(found["length"], name);
+        assert!((number("value") - expected.value).abs() < 1e-9);
+        assert!((number("standard_uncertainty") / expected.standard_uncertainty() - 1.0).abs() < 1e-9);
+        assert!((number("expanded_uncertainty") / number("standard_uncertainty") - 2.0).abs() < 1e-12);
+    }
+    let board =
+        ["--scale-sd", "1e-3", "--flatness", "0.02", "--temperature-sd", "2", "--expansion", "11.5e-6"];
+    let more = said(&folder, &[&["measure", file, "--view", "4", "--pixels", &line][..], &board].concat());
+    let u = |json: &Value| json["lengths"][0]["standard_uncertainty"].as_f64().expect("a number");
+    assert!(u(&more) > u(&json));
+    let shown = text(&run(&folder, &["measure", file, "--view", "4", "--pixels", &line]).stdout);
+    assert!(
+        shown.starts_with("length 1: ") && shown.contains("k = 2") && shown.contains("camera and pose"),
+        "{shown}"
+    );
+    for (arguments, why) in [
+        (vec!["measure", file, "--view", "9", "--pixels", &line], "there are: 0, 1, 2, 3, 4"),
+        (vec!["measure", file, "--pixels", &line], "which plane?"),
+        (vec!["measure", file, "--view", "4"], "--pixels"),
+        (vec!["measure", file, "--view", "4", "--pixels", "1,2,3"], "4 numbers"),
+        (vec!["measure", file, "--view", "4", "--pixels", "1,2,9000,3"], "outside the image"),
+        (vec!["measure", "ends.csv", "--pixels", &line], "ends.csv:1:"),
+    ] {
+        let said = refused(&folder, &arguments);
+        assert!(said.contains(why), "{arguments:?}: {said}");
+    }
+    fs::write(
+        folder.join("pairs.csv"),
+        "point,px,py,X,Y\n0,0,0,0,0\n1,100,0,1,0\n2,0,100,0,1\n3,100,101,1,1\n",
+    )
+    .expect("written");
+    said(&folder, &["calibrate", "pairs.csv", "--out", "plane"]);
+    let on_map =
+        said(&folder, &["measure", "plane/result.json", "--pixels", "10,10,60,10", "--spacing", "10"]);
+    assert!((on_map["lengths"][0]["value"].as_f64().expect("a number") - 5.0).abs() < 0.05, "{on_map:#}");
+    let refusal =
+        refused(&folder, &["measure", "plane/result.json", "--view", "0", "--pixels", "10,10,60,10"]);
+    assert!(refusal.contains("the map of one plane"), "{refusal}");
 }

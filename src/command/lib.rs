@@ -9,6 +9,7 @@ mod diff;
 mod exit;
 mod gate;
 mod list;
+mod measure;
 mod ninepoint;
 mod register;
 mod report;
@@ -65,6 +66,8 @@ enum Verb {
     Convert(Box<convert::Arguments>),
     /// Compares two cameras over the frame, and tests whether both may be one
     Diff(diff::Arguments),
+    /// Measures lengths on a plane, with their uncertainty split by cause
+    Measure(Box<measure::Arguments>),
     /// Registers a found part on a taught one: the map between their marks, and how well any point is known
     Register(register::Arguments),
     /// Monte Carlo studies from a file: resumable, sharded, with intervals
@@ -100,6 +103,7 @@ pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCo
         Some(Verb::Undistort(arguments)) => undistort::run(&arguments),
         Some(Verb::Convert(arguments)) => convert::run(&arguments),
         Some(Verb::Diff(arguments)) => diff::run(&arguments),
+        Some(Verb::Measure(arguments)) => measure::run(&arguments),
         Some(Verb::Register(arguments)) => register::run(&arguments),
         Some(Verb::Study(arguments)) => study::run(&arguments, build),
         Some(Verb::Gate(arguments)) => gate::run(&arguments, build),
