@@ -6,6 +6,7 @@ use calibench::io::formats::{
 };
 use calibench::io::image::{parse_extent, parse_image};
 use calibench::io::result::parse_camera;
+use calibench::io::robot::parse_robot;
 use calibench::io::{
     memory, parse_corners, parse_known, parse_marks, parse_pixel_ends, parse_point_pairs, table,
 };
@@ -40,11 +41,12 @@ pub fn corners(bytes: &[u8]) {
     let _ = parse_corners("corners", bytes);
 }
 
-/// Point pairs, marks of a part, and pixels at both ends of lengths.
+/// Point pairs, marks of a part, pixels at both ends of lengths, and poses of a robot.
 pub fn pairs(bytes: &[u8]) {
     let _ = parse_point_pairs("pairs", bytes);
     let _ = parse_marks("marks", bytes);
     let _ = parse_pixel_ends("ends", bytes);
+    let _ = parse_robot("robot", bytes);
 }
 
 /// Results and cameras.

@@ -3,8 +3,10 @@
 
 use calibench::board::View;
 use calibench::calibrate::{Calibration, Settings, calibrate};
-use calibench::downstream::{Conditions, Length, PlaneView, length_in_view, length_on_map};
-use calibench::geometry::Vec2;
+use calibench::downstream::{
+    Conditions, Length, PlaneView, Repeatability, SetUp, Stations, hand_eye, length_in_view, length_on_map,
+};
+use calibench::geometry::{Pose, Vec2, rotation};
 use calibench::planar::{PlaneModel, calibrate_plane};
 use calibench::synth::scene::looking_at_centre;
 use calibench::synth::{Scene, Stream, StreamKey, Truth};
@@ -298,4 +300,131 @@ fn measure_reads_what_calibrate_and_ninepoint_write() {
     let refusal =
         refused(&folder, &["measure", "plane/result.json", "--view", "0", "--pixels", "10,10,60,10"]);
     assert!(refusal.contains("the map of one plane"), "{refusal}");
+}
+
+/// What the robot repeats in these tests: 0.05 mm and 0.02 degrees.
+const ROBOT: Repeatability =
+    Repeatability { position: 0.05, rotation_rad: 0.02 * std::f64::consts::PI / 180.0 };
+
+/// The camera on its robot: gripper_from_cam and base_from_target.
+fn mounted() -> (Pose, Pose) {
+    let pose = |turn: [f64; 3], shift: [f64; 3]| Pose {
+        rotation: rotation::exp(&turn.into()),
+        translation: shift.into(),
+    };
+    (pose([0.1, -0.2, 1.5], [30.0, -55.0, 80.0]), pose([3.0, 0.2, 0.1], [520.0, -90.0, 15.0]))
+}
+
+/// Fourteen views of the example's board; the first four are turned about x only.
+fn fourteen_views() -> Scene {
+    let about_x = [-24.0, -12.0, 12.0, 24.0].map(|degrees| looking_at_centre([degrees, 0.0, 0.0], 130.0));
+    let others = (0..10).map(f64::from).map(|i| {
+        let degrees = [25.0 * libm::sin(i), 25.0 * libm::cos(1.3 * i), 40.0 * libm::sin(2.1 * i)];
+        looking_at_centre(degrees, 125.0 + 3.0 * i)
+    });
+    let cam_from_target = about_x.into_iter().chain(others).collect();
+    Scene::new(Truth { cam_from_target, ..Truth::example() }).expect("the board is seen whole")
+}
+
+/// Where the robot truly is in every view: `G = Y C^-1 X^-1`, base_from_gripper or its inverse.
+fn robot(scene: &Scene, set_up: SetUp) -> Vec<Pose> {
+    let (x, y) = mounted();
+    let station = |cam_from_target: &Pose| {
+        let g = y.compose(&cam_from_target.inverse()).compose(&x.inverse());
+        if set_up == SetUp::EyeInHand { g } else { g.inverse() }
+    };
+    scene.truth.cam_from_target.iter().map(station).collect()
+}
+
+fn with_robot_noise(pose: &Pose, stream: &mut Stream) -> Pose {
+    let deviation = |i: usize| if i < 3 { ROBOT.rotation_rad } else { ROBOT.position };
+    pose.perturbed(&nalgebra::Vector6::from_fn(|i, _| deviation(i) * stream.normal()))
+}
+
+#[test]
+fn hand_eye_errors_of_repeated_calibrations_are_as_large_as_each_states() {
+    const DRAWS: u64 = 250;
+    let scene = fourteen_views();
+    let settings = Settings::standard().with_image_size(Truth::EXAMPLE_IMAGE);
+    for set_up in [SetUp::EyeInHand, SetUp::EyeToHand] {
+        let exact = robot(&scene, set_up);
+        let (mut nees, mut squares, mut closed_form) = (0.0, 0.0, 0.0);
+        for trial in 0..DRAWS {
+            let key = StreamKey { seed: 21, scenario: "hand-eye", trial, purpose: "noise" };
+            let mut stream = Stream::open(key);
+            let calibration = calibrate(&scene.observe(NOISE_PX, &mut stream), &settings).expect("a camera");
+            let said: Vec<Pose> = exact.iter().map(|pose| with_robot_noise(pose, &mut stream)).collect();
+            let found = hand_eye(&Stations {
+                set_up,
+                base_from_gripper: &said,
+                cam_from_target: &calibration.cam_from_target,
+                covariance: &calibration.covariance,
+                robot: ROBOT,
+            })
+            .expect("fourteen stations");
+            let inverse = found.x_covariance().try_inverse().expect("positive definite");
+            let square = |pose: &Pose| {
+                let error = pose.step_to(&mounted().0);
+                error.dot(&(inverse * error))
+            };
+            nees += square(&found.x) / DRAWS as f64;
+            closed_form += square(&found.park_martin) / DRAWS as f64;
+            squares += found.chi_squared / DRAWS as f64;
+        }
+        // Chi-squared of 6 and of 6 * 14 - 12 = 72; each limit is left by one draw in ten thousand.
+        let near = |mean: f64, d: f64| (mean - d).abs() < 3.9 * (2.0 * d / DRAWS as f64).sqrt();
+        assert!(near(nees, 6.0), "{set_up:?}: {nees} of 6");
+        assert!(near(squares, 72.0), "{set_up:?}: {squares} of 72");
+        // Weighing is worth something: the closed form errs more than the most likely pose, in squares by a fifth
+        // when this was written.
+        assert!(closed_form > nees, "{set_up:?}: {closed_form} against {nees}");
+    }
+}
+
+#[test]
+fn hand_eye_pairs_the_views_of_both_files_and_refuses_what_fixes_nothing() {
+    let folder = folder("hand-eye");
+    let scene = fourteen_views();
+    let mut stream = Stream::open(StreamKey { seed: 22, scenario: "hand-eye", trial: 0, purpose: "noise" });
+    write_corners(&folder.join("corners.csv"), &scene.observe(NOISE_PX, &mut stream));
+    said(&folder, &["calibrate", "corners.csv", "--image-size", "640x480", "--out", "camera"]);
+    let stations: Vec<Pose> =
+        robot(&scene, SetUp::EyeInHand).iter().map(|pose| with_robot_noise(pose, &mut stream)).collect();
+    let write = |name: &str, views: &[usize]| {
+        let mut text = "view,x,y,z,rx,ry,rz\n".to_string();
+        for &view in views {
+            let (t, w) = (stations[view].translation, rotation::log(&stations[view].rotation));
+            text += &format!("{view},{},{},{},{},{},{}\n", t.x, t.y, t.z, w.x, w.y, w.z);
+        }
+        fs::write(folder.join(name), text).expect("written");
+    };
+    // In another order, without the last view.
+    write("robot.csv", &(0..13).rev().collect::<Vec<_>>());
+    let robot = ["--robot-sd-mm", "0.05", "--robot-sd-deg", "0.02"];
+    let verb = |file: &'static str| [&["hand-eye", file, "camera/result.json"][..], &robot].concat();
+    let json = said(&folder, &[&verb("robot.csv")[..], &["--out", "out"]].concat());
+    let numbers = |value: &Value| -> Vec<f64> {
+        value.as_array().expect("a list").iter().map(|x| x.as_f64().expect("a number")).collect()
+    };
+    let found = &json["gripper_from_cam"];
+    let x = Pose {
+        rotation: rotation::exp(&nalgebra::Vector3::from_row_slice(&numbers(&found["rotation_vector_rad"]))),
+        translation: nalgebra::Vector3::from_row_slice(&numbers(&found["translation"])),
+    };
+    let (error, deviations) = (x.step_to(&mounted().0), numbers(&json["standard_deviations"]));
+    assert!((0..6).all(|i| error[i].abs() < 4.5 * deviations[i]), "{error} of {deviations:?}");
+    assert!(deviations[3] > 0.01 && deviations[3] < 0.5, "{deviations:?}");
+    assert_eq!(json["left_out"][0], "13 of camera/result.json");
+    assert!(folder.join("out/hand-eye.json").is_file());
+    let shown = text(&run(&folder, &verb("robot.csv")).stdout);
+    assert!(
+        shown.contains("13 stations, eye-in-hand") && shown.contains("Tsai & Lenz 1989 differs"),
+        "{shown}"
+    );
+    write("about_x.csv", &[0, 1, 2, 3]);
+    assert!(refused(&folder, &verb("about_x.csv")).contains("nearly one axis"));
+    write("two.csv", &[0, 5]);
+    assert!(refused(&folder, &verb("two.csv")).contains("at least 3 stations, got 2"));
+    let wrong = refused(&folder, &[&verb("robot.csv")[..], &["--robot-sd-mm", "0"]].concat());
+    assert!(wrong.contains("above 0") || wrong.contains("cannot be used multiple times"), "{wrong}");
 }

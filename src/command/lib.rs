@@ -8,6 +8,7 @@ mod convert;
 mod diff;
 mod exit;
 mod gate;
+mod hand_eye;
 mod list;
 mod measure;
 mod ninepoint;
@@ -70,6 +71,8 @@ enum Verb {
     Measure(Box<measure::Arguments>),
     /// Registers a found part on a taught one: the map between their marks, and how well any point is known
     Register(register::Arguments),
+    /// Calibrates a camera against a robot, on its gripper or beside it
+    HandEye(hand_eye::Arguments),
     /// Monte Carlo studies from a file: resumable, sharded, with intervals
     Study(study::Arguments),
     /// Judges a solver, this library's or any program, on problems with known answers
@@ -105,6 +108,7 @@ pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCo
         Some(Verb::Diff(arguments)) => diff::run(&arguments),
         Some(Verb::Measure(arguments)) => measure::run(&arguments),
         Some(Verb::Register(arguments)) => register::run(&arguments),
+        Some(Verb::HandEye(arguments)) => hand_eye::run(&arguments),
         Some(Verb::Study(arguments)) => study::run(&arguments, build),
         Some(Verb::Gate(arguments)) => gate::run(&arguments, build),
     };

@@ -198,7 +198,7 @@ pub struct Registration {
 ///
 /// The covariance is `(J^T W J)^-1`: with given deviations as it stands, without them times the residual
 /// variance on `2 N - p` degrees of freedom, and under a robust loss times Huber's correction (Huber 1981,
-/// eq. 7.6.8).
+/// section 7.6).
 ///
 /// # Errors
 /// See [`RegistrationError`].

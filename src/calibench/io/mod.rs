@@ -24,6 +24,7 @@ pub mod overlay;
 pub mod pairs;
 pub mod provenance;
 pub mod result;
+pub mod robot;
 pub mod shown;
 pub mod table;
 
