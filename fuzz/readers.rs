@@ -6,7 +6,10 @@ use calibench::io::formats::{
 };
 use calibench::io::image::{parse_extent, parse_image};
 use calibench::io::result::parse_camera;
-use calibench::io::{memory, parse_corners, parse_point_pairs, table};
+use calibench::io::robot::parse_robot;
+use calibench::io::{
+    memory, parse_corners, parse_known, parse_marks, parse_pixel_ends, parse_point_pairs, table,
+};
 use calibench::photos::BoardSpec;
 use calibench_gate::accept::{accept, id_in, read_line};
 use calibench_gate::protocol::{Problem, ProblemView};
@@ -38,14 +41,19 @@ pub fn corners(bytes: &[u8]) {
     let _ = parse_corners("corners", bytes);
 }
 
-/// Point pairs.
+/// Point pairs, marks of a part, pixels at both ends of lengths, and poses of a robot.
 pub fn pairs(bytes: &[u8]) {
     let _ = parse_point_pairs("pairs", bytes);
+    let _ = parse_marks("marks", bytes);
+    let _ = parse_pixel_ends("ends", bytes);
+    let _ = parse_robot("robot", bytes);
 }
 
 /// Results and cameras.
 pub fn camera(bytes: &[u8]) {
-    let _ = parse_camera("camera", &String::from_utf8_lossy(bytes));
+    let text = String::from_utf8_lossy(bytes);
+    let _ = parse_camera("camera", &text);
+    let _ = parse_known("known", &text);
 }
 
 /// Cameras, corners and boards in the files of other programs: the same bytes as every format, and what is read written as every one.

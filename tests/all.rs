@@ -15,6 +15,7 @@ mod detect_chessboard;
 mod detect_circles;
 mod detect_corners;
 mod detect_photos;
+mod downstream;
 mod errors;
 mod examples;
 mod failing_disk;

@@ -92,11 +92,12 @@ fn every_file_of_tests_is_run() {
 
 /// The library's folders from the ground up. Those of one inner list do not know each other: `calibrate`
 /// never sees the truth that `synth` makes.
-const LAYERS: [&[&str]; 6] = [
+const LAYERS: [&[&str]; 7] = [
     &["geometry"],
     &["camera", "board", "raster"],
     &["synth", "detect", "calibrate", "planar", "rectify"],
     &["evaluate"],
+    &["downstream"],
     &["io"],
     &["photos"],
 ];

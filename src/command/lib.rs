@@ -8,8 +8,11 @@ mod convert;
 mod diff;
 mod exit;
 mod gate;
+mod hand_eye;
 mod list;
+mod measure;
 mod ninepoint;
+mod register;
 mod report;
 mod reproduce;
 mod run;
@@ -65,6 +68,12 @@ enum Verb {
     Convert(Box<convert::Arguments>),
     /// Compares two cameras over the frame, and tests whether both may be one
     Diff(diff::Arguments),
+    /// Measures lengths on a plane, with their uncertainty split by cause
+    Measure(Box<measure::Arguments>),
+    /// Registers a found part on a taught one: the map between their marks, and how well any point is known
+    Register(register::Arguments),
+    /// Calibrates a camera against a robot, on its gripper or beside it
+    HandEye(hand_eye::Arguments),
     /// Monte Carlo studies from a file: resumable, sharded, with intervals
     Study(study::Arguments),
     /// Judges a solver, this library's or any program, on problems with known answers
@@ -99,6 +108,9 @@ pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCo
         Some(Verb::Undistort(arguments)) => undistort::run(&arguments),
         Some(Verb::Convert(arguments)) => convert::run(&arguments),
         Some(Verb::Diff(arguments)) => diff::run(&arguments),
+        Some(Verb::Measure(arguments)) => measure::run(&arguments),
+        Some(Verb::Register(arguments)) => register::run(&arguments),
+        Some(Verb::HandEye(arguments)) => hand_eye::run(&arguments),
         Some(Verb::Study(arguments)) => study::run(&arguments, build),
         Some(Verb::Gate(arguments)) => gate::run(&arguments, build),
     };

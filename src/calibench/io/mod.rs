@@ -6,6 +6,7 @@ pub mod channels;
 pub mod corners;
 pub mod data;
 pub mod digits;
+pub mod ends;
 pub mod files;
 pub mod formats;
 pub mod hash;
@@ -14,6 +15,8 @@ pub mod image;
 pub mod input;
 #[cfg(feature = "photo")]
 mod jpeg_end;
+pub mod known;
+pub mod marks;
 pub mod memory;
 pub mod message;
 #[cfg(feature = "photo")]
@@ -21,6 +24,7 @@ pub mod overlay;
 pub mod pairs;
 pub mod provenance;
 pub mod result;
+pub mod robot;
 pub mod shown;
 pub mod table;
 
@@ -30,10 +34,13 @@ pub use channels::{Channels, read_channels};
 pub use corners::{CornerFile, parse_corners, read_corners};
 pub use data::{MissingDataFolder, data_folder};
 pub use digits::significant;
+pub use ends::{PixelEnds, parse_pixel_ends, read_pixel_ends};
 pub use hash::sha256_hex;
 #[cfg(feature = "photo")]
 pub use image::{Extent, Grey, ImageError, image_extent, read_image, write_png, write_png_16};
 pub use input::{InputError, MOST_SIDE_PX, read_regular, read_regular_text};
+pub use known::{Known, KnownCalibration, KnownError, parse_known, read_known};
+pub use marks::{MarkFile, parse_marks, read_marks};
 pub use memory::Memory;
 pub use message::message;
 #[cfg(feature = "photo")]

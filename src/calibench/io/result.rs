@@ -106,6 +106,10 @@ pub struct ViewFields {
     pub translation: [f64; 3],
     /// Standard deviations of the rotation (left perturbation, rad) and of the translation.
     pub standard_deviations: [f64; 6],
+    /// Covariance of these six, row by row.
+    pub covariance: [[f64; 6]; 6],
+    /// Covariance of the estimated parameters, a row each in the order of `free`, with these six.
+    pub covariance_with_camera: Vec<[f64; 6]>,
     /// Predicted - observed `[du, dv]`, px, in the order of the points.
     pub residuals_px: Vec<[f64; 2]>,
 }
@@ -332,13 +336,16 @@ impl CalibrationFields {
 fn view_fields(calibration: &LensCalibration, names: &[String], i: usize) -> ViewFields {
     let pose = &calibration.cam_from_target[i];
     let residuals: &[Vec2] = &calibration.residuals[i];
+    let (of_pose, cross) = (&calibration.covariance.poses[i], &calibration.covariance.cross[i]);
     ViewFields {
         name: names.get(i).cloned().unwrap_or_else(|| i.to_string()),
         points: residuals.len(),
         rmse_px: calibration.view_rmse_px(i).unwrap_or(f64::NAN),
         rotation_vector_rad: rotation::log(&pose.rotation).into(),
         translation: pose.translation.into(),
-        standard_deviations: std::array::from_fn(|k| calibration.covariance.poses[i][(k, k)].sqrt()),
+        standard_deviations: std::array::from_fn(|k| of_pose[(k, k)].sqrt()),
+        covariance: std::array::from_fn(|j| std::array::from_fn(|k| of_pose[(j, k)])),
+        covariance_with_camera: cross.row_iter().map(|row| std::array::from_fn(|k| row[k])).collect(),
         residuals_px: residuals.iter().map(|r| [r.x, r.y]).collect(),
     }
 }

@@ -27,6 +27,14 @@ impl PlaneSpread {
         Some(jacobian * self.local_covariance * jacobian.transpose())
     }
 
+    /// Covariance of the difference of the world points that the map gives for two pixels, `b - a`, world
+    /// units squared; `None` behind the horizon. What both share, as the map's shift, drops out.
+    pub fn difference_covariance(&self, a: &Vec2, b: &Vec2) -> Option<Matrix2<f64>> {
+        let jacobian = |pixel: &Vec2| self.map.entry_jacobian(&(pixel - self.map.pixel_origin));
+        let difference = jacobian(b)? - jacobian(a)?;
+        Some(difference * self.local_covariance * difference.transpose())
+    }
+
     /// The spread of a map whose parameters move the entries of `L` by the columns of `basis` (8 x p); `None`
     /// where the normal equations are singular.
     pub(super) fn of(map: &PlaneMap, pairs: &Pairs, basis: &DMatrix<f64>, sigma: f64) -> Option<PlaneSpread> {

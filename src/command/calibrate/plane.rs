@@ -1,6 +1,7 @@
 //! A map of a plane from a file of point pairs.
 
 use super::{Arguments, Exit, Failure, Format, Mode, print, table};
+use calibench::geometry::Vec2;
 use calibench::io::{PointPairs, parse_point_pairs, significant, write_atomically};
 use calibench::planar::{PlaneCalibration, calibrate_plane};
 
@@ -9,7 +10,7 @@ pub(super) fn run(arguments: &Arguments, file: &str, bytes: &[u8]) -> Result<Exi
         parse_point_pairs(file, bytes).map_err(|error| error.to_string())?;
     let mode = arguments.mode.unwrap_or(Mode::Planar);
     let result = calibrate_plane(mode.into(), &pixels, &world).map_err(|error| format!("{file}: {error}"))?;
-    let json = plane_json(&result);
+    let json = plane_json(mode, &pixels, &world, &result);
     if let Some(folder) = &arguments.out {
         write_atomically(&folder.join("result.json"), json.as_bytes()).map_err(Failure::unwritten)?;
     }
@@ -20,15 +21,20 @@ pub(super) fn run(arguments: &Arguments, file: &str, bytes: &[u8]) -> Result<Exi
     Ok(Exit::Held)
 }
 
-fn plane_json(result: &PlaneCalibration) -> String {
+fn plane_json(mode: Mode, pixels: &[Vec2], world: &[Vec2], result: &PlaneCalibration) -> String {
     let m = result.map.matrix();
+    let points = pixels.iter().zip(world);
     let value = serde_json::json!({
+        "mode": mode.name(),
         "matrix": (0..3).map(|i| (0..3).map(|j| m[(i, j)]).collect::<Vec<f64>>()).collect::<Vec<_>>(),
         "scale_x": result.scale_x,
         "scale_y": result.scale_y,
         "rms_point": result.rms_point,
         "max_point": result.max_point,
         "degrees_of_freedom": result.degrees_of_freedom,
+        "points": points.map(|(pixel, world)| serde_json::json!({
+            "pixel": [pixel.x, pixel.y], "world": [world.x, world.y],
+        })).collect::<Vec<_>>(),
         "residuals": result.residuals.iter().map(|r| [r.x, r.y]).collect::<Vec<_>>(),
     });
     format!("{value:#}\n")

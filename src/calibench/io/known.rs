@@ -1,0 +1,288 @@
+//! What does a result say of a calibration, with everything that is known of its errors? Read back from
+//! `result.json`: a camera with its poses and their joint covariance, or a map of a plane with its points.
+
+use super::input::{InputError, MOST_TABLE_BYTES, read_regular_text};
+use super::result::{ResultError, parse_camera};
+use crate::calibrate::Covariance;
+use crate::camera::{Camera, FreeParameters, Parameter, UnknownParameter};
+use crate::geometry::{Pose, Vec2, Vec3, rotation};
+use crate::planar::{PlaneCalibration, PlaneError, PlaneModel, calibrate_plane};
+use nalgebra::{DMatrix, MatrixXx6, SMatrix};
+use serde::Deserialize;
+use std::path::Path;
+
+/// A calibrated camera as its file tells of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KnownCalibration {
+    /// The camera.
+    pub camera: Camera,
+    /// Width and height, px.
+    pub image_size: Option<(usize, usize)>,
+    /// Names of the views.
+    pub views: Vec<String>,
+    /// Their poses.
+    pub cam_from_target: Vec<Pose>,
+    /// Joint covariance of camera and poses.
+    pub covariance: Covariance,
+    /// Estimated noise of a pixel coordinate, px.
+    pub sigma_px: f64,
+    /// Degrees of freedom of that noise.
+    pub degrees_of_freedom: usize,
+}
+
+/// What a result is of.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Known {
+    /// A camera.
+    Camera(Box<KnownCalibration>),
+    /// A plane, seen by a camera of which nothing is known.
+    Plane(Box<PlaneCalibration>),
+}
+
+/// Why a result does not serve.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum KnownError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// No camera can be read from it.
+    #[error(transparent)]
+    Result(#[from] ResultError),
+    /// It is not JSON, or a field is not what it should be.
+    #[error("{file}:{}:{}: {cause}", cause.line(), cause.column())]
+    Format {
+        /// The file.
+        file: String,
+        /// What is wrong, with line and column.
+        cause: serde_json::Error,
+    },
+    /// Without joint covariances nothing can be said about errors.
+    #[error(
+        "{file}: there is no joint covariance of camera and poses: calibrate again, and with enough marks that the residuals tell the noise"
+    )]
+    NoCovariance {
+        /// The file.
+        file: String,
+    },
+    /// A name in `free` is none.
+    #[error("{file}: free: {cause}")]
+    Free {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        cause: UnknownParameter,
+    },
+    /// Numbers do not fit together.
+    #[error("{file}: {what}")]
+    Shape {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        what: String,
+    },
+    /// The points of a plane give no map.
+    #[error("{file}: {cause}")]
+    Plane {
+        /// The file.
+        file: String,
+        /// Why.
+        cause: PlaneError,
+    },
+}
+
+/// Fields of a camera's result that matter here; a number that is `null` is not known.
+#[derive(Deserialize)]
+struct CameraFields {
+    #[serde(default)]
+    free: Vec<String>,
+    #[serde(default)]
+    fy_per_fx: Option<f64>,
+    #[serde(default)]
+    covariance: Vec<Vec<Option<f64>>>,
+    #[serde(default)]
+    sigma_px: Option<f64>,
+    #[serde(default)]
+    degrees_of_freedom: usize,
+    #[serde(default)]
+    views: Vec<ViewFields>,
+}
+
+#[derive(Deserialize)]
+struct ViewFields {
+    name: String,
+    rotation_vector_rad: [f64; 3],
+    translation: [f64; 3],
+    #[serde(default)]
+    covariance: Vec<Vec<Option<f64>>>,
+    #[serde(default)]
+    covariance_with_camera: Vec<Vec<Option<f64>>>,
+}
+
+/// Fields of a plane's result.
+#[derive(Deserialize)]
+struct PlaneFields {
+    mode: String,
+    points: Vec<PlanePoint>,
+}
+
+#[derive(Deserialize)]
+struct PlanePoint {
+    pixel: [f64; 2],
+    world: [f64; 2],
+}
+
+/// What tells one result from the other.
+#[derive(Deserialize)]
+struct Kind {
+    #[serde(default)]
+    camera: Option<serde::de::IgnoredAny>,
+}
+
+/// Reads a result.
+///
+/// # Errors
+/// See [`KnownError`].
+pub fn read_known(path: &Path) -> Result<Known, KnownError> {
+    parse_known(&path.display().to_string(), &read_regular_text(path, MOST_TABLE_BYTES)?)
+}
+
+/// As [`read_known`], from text; `file` names it in errors.
+///
+/// # Errors
+/// See [`KnownError`].
+pub fn parse_known(file: &str, text: &str) -> Result<Known, KnownError> {
+    let format = |cause| KnownError::Format { file: file.into(), cause };
+    let kind: Kind = serde_json::from_str(text).map_err(format)?;
+    if kind.camera.is_none() {
+        let fields: PlaneFields = serde_json::from_str(text).map_err(format)?;
+        return Ok(Known::Plane(Box::new(plane(file, &fields)?)));
+    }
+    let (camera, image_size) = parse_camera(file, text)?;
+    let fields: CameraFields = serde_json::from_str(text).map_err(format)?;
+    let free = free_of(file, &fields.free)?;
+    let no_covariance = || KnownError::NoCovariance { file: file.into() };
+    Ok(Known::Camera(Box::new(KnownCalibration {
+        camera,
+        image_size,
+        views: fields.views.iter().map(|view| view.name.clone()).collect(),
+        cam_from_target: fields.views.iter().map(|view| pose(file, view)).collect::<Result<_, _>>()?,
+        covariance: covariance(free, &fields).ok_or_else(no_covariance)?,
+        sigma_px: fields.sigma_px.filter(|sigma| *sigma >= 0.0).ok_or_else(no_covariance)?,
+        degrees_of_freedom: fields.degrees_of_freedom,
+    })))
+}
+
+fn free_of(file: &str, names: &[String]) -> Result<FreeParameters, KnownError> {
+    let mut free = FreeParameters::NONE;
+    for name in names {
+        let parameter: Parameter =
+            name.parse().map_err(|cause| KnownError::Free { file: file.into(), cause })?;
+        if free.iter().last() >= Some(parameter) {
+            let what = format!("free: {parameter} is out of order");
+            return Err(KnownError::Shape { file: file.into(), what });
+        }
+        free = free.with(parameter);
+    }
+    Ok(free)
+}
+
+fn pose(file: &str, view: &ViewFields) -> Result<Pose, KnownError> {
+    let pose = Pose {
+        rotation: rotation::exp(&Vec3::from(view.rotation_vector_rad)),
+        translation: Vec3::from(view.translation),
+    };
+    if pose.is_finite() {
+        return Ok(pose);
+    }
+    Err(KnownError::Shape {
+        file: file.into(),
+        what: format!("the pose of view {} is not finite", view.name),
+    })
+}
+
+/// The joint covariance; `None` where a block is missing, of another size or not finite.
+fn covariance(free: FreeParameters, fields: &CameraFields) -> Option<Covariance> {
+    let n = free.len();
+    let block = |rows: &[Vec<Option<f64>>], of_rows: usize, columns: usize| -> Option<DMatrix<f64>> {
+        let fits = rows.len() == of_rows && rows.iter().all(|row| row.len() == columns);
+        let numbers: Option<Vec<f64>> = rows.iter().flatten().copied().collect();
+        let numbers = numbers.filter(|numbers| fits && numbers.iter().all(|x| x.is_finite()))?;
+        Some(DMatrix::from_row_slice(of_rows, columns, &numbers))
+    };
+    let of_pose = |view: &ViewFields| {
+        let block = block(&view.covariance, 6, 6)?;
+        Some(SMatrix::<f64, 6, 6>::from_fn(|i, j| block[(i, j)]))
+    };
+    let cross = |view: &ViewFields| {
+        let block = block(&view.covariance_with_camera, n, 6)?;
+        Some(MatrixXx6::from_fn(n, |i, j| block[(i, j)]))
+    };
+    Some(Covariance {
+        free,
+        fy_per_fx: fields.fy_per_fx,
+        intrinsics: block(&fields.covariance, n, n)?,
+        poses: fields.views.iter().map(of_pose).collect::<Option<_>>()?,
+        cross: fields.views.iter().map(cross).collect::<Option<_>>()?,
+    })
+}
+
+/// The map of a plane, from its points anew: a file keeps no covariance of it.
+fn plane(file: &str, fields: &PlaneFields) -> Result<PlaneCalibration, KnownError> {
+    let model = match fields.mode.as_str() {
+        "planar" => PlaneModel::Affine,
+        "tilted" => PlaneModel::Projective,
+        "similarity" => PlaneModel::Similarity,
+        other => {
+            let what = format!("mode: `{other}` is none of planar, tilted, similarity");
+            return Err(KnownError::Shape { file: file.into(), what });
+        }
+    };
+    let pixels: Vec<Vec2> = fields.points.iter().map(|p| Vec2::from(p.pixel)).collect();
+    let world: Vec<Vec2> = fields.points.iter().map(|p| Vec2::from(p.world)).collect();
+    calibrate_plane(model, &pixels, &world).map_err(|cause| KnownError::Plane { file: file.into(), cause })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::{Calibration, Settings, calibrate};
+    use crate::io::CalibrationFields;
+    use crate::synth::{Scene, Stream, StreamKey};
+
+    fn calibration(settings: &Settings) -> Calibration {
+        let key = StreamKey { seed: 4, scenario: "known", trial: 0, purpose: "noise" };
+        calibrate(&Scene::example().observe(0.1, &mut Stream::open(key)), settings).unwrap()
+    }
+
+    #[test]
+    fn a_calibration_comes_back_from_its_file_with_its_covariance_to_the_bit() {
+        let tied = Settings::standard().with_image_size((640, 480)).tie_focal_lengths(1.0);
+        for settings in [Settings::standard().with_image_size((640, 480)), tied] {
+            let calibration = calibration(&settings);
+            let text = CalibrationFields::of(&calibration, &[], None).to_json();
+            let Known::Camera(known) = parse_known("r.json", &text).unwrap() else { panic!("a camera") };
+            assert_eq!((known.camera, &known.covariance), (calibration.camera, &calibration.covariance));
+            assert_eq!(
+                (known.sigma_px, known.degrees_of_freedom),
+                (calibration.sigma_px, calibration.degrees_of_freedom)
+            );
+            for (a, b) in known.cam_from_target.iter().zip(&calibration.cam_from_target) {
+                assert!((a.rotation - b.rotation).norm() < 1e-14 && a.translation == b.translation);
+            }
+        }
+    }
+
+    #[test]
+    fn results_without_what_is_needed_are_refused_by_name() {
+        let fail = |text: &str| parse_known("r.json", text).unwrap_err().to_string();
+        let camera = r#"{"camera": {"fx": 600, "fy": 600, "cx": 320, "cy": 240}"#;
+        let view = r#""views": [{"name": "a", "rotation_vector_rad": [0,0,0], "translation": [0,0,1]}]"#;
+        assert!(fail(&format!(r#"{camera}, "sigma_px": 0.1, {view}}}"#)).contains("no joint covariance"));
+        assert!(fail(&format!(r#"{camera}, "free": ["cx", "fx"]}}"#)).contains("fx is out of order"));
+        assert!(fail(&format!(r#"{camera}, "free": ["f"]}}"#)).contains("`f`"));
+        assert!(fail(r#"{"mode": "oblique", "points": []}"#).contains("oblique"));
+        assert!(fail(r#"{"mode": "planar", "points": []}"#).contains("at least 4"));
+        assert!(fail("{}").starts_with("r.json:1:"));
+    }
+}
