@@ -77,6 +77,9 @@ fn fisheye_corners(column: Option<(&str, &dyn Fn(usize) -> f64)>) -> (Camera<Len
         for i in 0..63_usize {
             let point = Vec2::new(10.0 * (i % 9) as f64, 10.0 * (i / 9) as f64);
             let pixel = camera.pixel(&pose.apply(&Vec3::new(point.x, point.y, 0.0))).unwrap();
+            if !((0.0..639.0).contains(&pixel.x) && (0.0..479.0).contains(&pixel.y)) {
+                continue;
+            }
             let [du, dv] = [stream.normal(), stream.normal()].map(|n| 0.1 * n);
             let more = column.map(|(_, of)| format!(",{}", of(i))).unwrap_or_default();
             writeln!(file, "{view},{i},{},{},{},{}{more}", point.x, point.y, pixel.x + du, pixel.y + dv)

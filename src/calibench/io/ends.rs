@@ -1,6 +1,6 @@
 //! Which lengths are to be measured? Pairs of pixels: `length,u1,v1,u2,v2`, one line a length.
 
-use super::table::{Row, TableError, open, read_table};
+use super::table::{Column, Row, TableError, open, read_table};
 use crate::geometry::Vec2;
 use std::path::Path;
 
@@ -35,7 +35,7 @@ pub fn read_pixel_ends(path: &Path) -> Result<Vec<PixelEnds>, TableError> {
 /// # Ok::<(), calibench::io::TableError>(())
 /// ```
 pub fn parse_pixel_ends(file: &str, bytes: &[u8]) -> Result<Vec<PixelEnds>, TableError> {
-    let rows = read_table(file, bytes, ["length"], ["u1", "v1", "u2", "v2"])?;
+    let rows = read_table(file, bytes, ["length"], ["u1", "v1", "u2", "v2"].map(Column::pixels))?;
     let ends = |Row { names: [name], numbers: [u1, v1, u2, v2], .. }: Row<1, 4>| PixelEnds {
         name,
         pixels: [Vec2::new(u1, v1), Vec2::new(u2, v2)],

@@ -260,7 +260,7 @@ mod tests {
         let tied = Settings::standard().with_image_size((640, 480)).tie_focal_lengths(1.0);
         for settings in [Settings::standard().with_image_size((640, 480)), tied] {
             let calibration = calibration(&settings);
-            let text = CalibrationFields::of(&calibration, &[], None).to_json();
+            let text = CalibrationFields::of(&calibration.clone().into(), &[], None).to_json();
             let Known::Camera(known) = parse_known("r.json", &text).unwrap() else { panic!("a camera") };
             assert_eq!((known.camera, &known.covariance), (calibration.camera, &calibration.covariance));
             assert_eq!(

@@ -1,7 +1,7 @@
 //! Where are the marks of a part? Mark files: `point,X,Y`, and if known their standard deviations, `sd` for
 //! both coordinates or `sd_X,sd_Y`.
 
-use super::table::{Row, TableError, columns, open, read_table};
+use super::table::{Column, Row, TableError, columns, open, read_table};
 use crate::downstream::Mark;
 use crate::geometry::Vec2;
 use std::collections::BTreeMap;
@@ -41,13 +41,13 @@ pub fn parse_marks(file: &str, bytes: &[u8]) -> Result<MarkFile, TableError> {
     let named = columns(bytes);
     let has = |name: &str| named.iter().any(|column| column == name);
     let rows: Vec<(u64, String, Mark)> = if has("sd_X") || has("sd_Y") {
-        let rows = read_table(file, bytes, ["point"], ["X", "Y", "sd_X", "sd_Y"])?;
+        let rows = read_table(file, bytes, ["point"], ["X", "Y", "sd_X", "sd_Y"].map(Column::length))?;
         rows.into_iter().map(|row| marked(row, |n: &[f64; 4]| Vec2::new(n[2], n[3]))).collect()
     } else if has("sd") {
-        let rows = read_table(file, bytes, ["point"], ["X", "Y", "sd"])?;
+        let rows = read_table(file, bytes, ["point"], ["X", "Y", "sd"].map(Column::length))?;
         rows.into_iter().map(|row| marked(row, |n: &[f64; 3]| Vec2::new(n[2], n[2]))).collect()
     } else {
-        let rows = read_table(file, bytes, ["point"], ["X", "Y"])?;
+        let rows = read_table(file, bytes, ["point"], ["X", "Y"].map(Column::length))?;
         rows.into_iter().map(|row| marked(row, |_: &[f64; 2]| Vec2::zeros())).collect()
     };
     let (mut marks, mut first_line) = (MarkFile::default(), BTreeMap::new());

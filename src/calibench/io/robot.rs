@@ -1,7 +1,7 @@
 //! Where was the robot? Pose files: `view,x,y,z` and the rotation as `rx,ry,rz` (rotation vector, rad),
 //! `qw,qx,qy,qz` (quaternion) or `roll,pitch,yaw` (degrees, `Rz(yaw) Ry(pitch) Rx(roll)`), one line a view.
 
-use super::table::{Row, TableError, columns, open, read_table};
+use super::table::{Column, Row, TableError, columns, open, read_table};
 use crate::geometry::{Mat3, Pose, Vec3, rotation};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -104,14 +104,15 @@ fn turned(
     let pose = |Row { line, names: [view], numbers: [x, y, z, a, b, c] }: Row<1, 6>| {
         (line, view, Pose { rotation: rotation([a, b, c]), translation: Vec3::new(x, y, z) })
     };
-    Ok(read_table(file, bytes, ["view"], columns)?.into_iter().map(pose).collect())
+    Ok(read_table(file, bytes, ["view"], columns.map(Column::length))?.into_iter().map(pose).collect())
 }
 
 /// Controllers print four to six digits: a length that is further off is another error.
 const UNIT_TOLERANCE: f64 = 1e-3;
 
 fn by_quaternion(file: &str, bytes: &[u8]) -> Result<Vec<Station>, RobotError> {
-    let rows = read_table(file, bytes, ["view"], ["x", "y", "z", "qw", "qx", "qy", "qz"])?;
+    let rows =
+        read_table(file, bytes, ["view"], ["x", "y", "z", "qw", "qx", "qy", "qz"].map(Column::length))?;
     let pose = |Row { line, names: [view], numbers: [x, y, z, w, i, j, k] }: Row<1, 7>| {
         let imaginary = Vec3::new(i, j, k);
         let length = libm::hypot(w, imaginary.norm());
