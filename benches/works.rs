@@ -4,8 +4,8 @@
 
 use crate::common;
 use calibench::board::{Board, View};
-use calibench::calibrate::{Calibration, Settings, calibrate, information};
-use calibench::camera::{BrownConrady, Camera, FreeParameters};
+use calibench::calibrate::{Calibration, Settings, calibrate, calibrate_lens, information};
+use calibench::camera::{BrownConrady, Camera, FreeParameters, Model};
 use calibench::detect::{chessboard, circle_grid, sparse_dots};
 use calibench::geometry::{Affine, Homography, Vec2};
 use calibench::raster::Raster;
@@ -60,6 +60,12 @@ pub fn named(row: &str) -> Option<Box<dyn Work>> {
         "calibrate" => {
             let views = common::views(size.parse().ok()?);
             job(move || calibrate(&views, &Settings::standard()).expect("it can be calibrated"), intrinsics)
+        }
+        "fisheye" => {
+            let views = common::fisheye_views(size.parse().ok()?);
+            let settings = Settings::of_model(Model::KannalaBrandt);
+            let run = move || calibrate_lens(&views, &settings).expect("it can be calibrated");
+            job(run, |found| found.camera.values().map(|(_, value)| value).collect())
         }
         "covariance" => {
             let poses = common::poses(size.parse().ok()?);

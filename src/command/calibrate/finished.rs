@@ -84,8 +84,7 @@ fn model(calibration: &LensCalibration) -> String {
     let model = calibration.camera.distortion.model();
     let mut text = String::new();
     if calibration.certificate.is_none() {
-        let _ =
-            writeln!(text, "lens model {model}, the best of {} starts, not certified", calibration.starts);
+        let _ = writeln!(text, "lens model {model}, starts refined: {}, not certified", calibration.starts);
     }
     if let Some(BoardShape { bow_x, bow_y, twist, standard_deviations: sd, .. }) = calibration.board {
         let known = |value: f64, sd: f64| format!("{} \u{b1} {}", significant(value, 4), significant(sd, 2));

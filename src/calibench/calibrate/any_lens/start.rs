@@ -31,17 +31,18 @@ const POSE_STEPS: usize = 6;
 const FIRST_STEPS: usize = 15;
 const LENS_STEPS: usize = 40;
 
-/// States from which the problem is worth minimising: from the angle polynomial, and from the pinhole's solver
-/// where that finds a camera.
+/// States from which the problem is worth minimising: from what the pinhole's solver finds, and, where that is
+/// certified to be no minimum beside the right one, from nothing else; from the angle polynomial otherwise.
 pub(super) fn starts(problem: &Problem<'_>, views: &[View], settings: &Settings) -> Vec<State> {
-    let from_rays = by_rays(problem, settings);
     let from_pinhole = by_pinhole(problem, views, settings);
-    let both = from_rays.into_iter().chain(from_pinhole);
+    let is_certified = from_pinhole.as_ref().is_some_and(|(_, certified)| *certified);
+    let from_rays = if is_certified { None } else { by_rays(problem, settings) };
+    let both = from_pinhole.map(|(state, _)| state).into_iter().chain(from_rays);
     both.flat_map(|state| with_model(problem, &state, settings)).collect()
 }
 
-/// The state that the pinhole's solver finds with k1 and k2, however it fits.
-fn by_pinhole(problem: &Problem<'_>, views: &[View], settings: &Settings) -> Option<State> {
+/// The state that the pinhole's solver finds with k1 and k2, however it fits, and whether that is certified.
+fn by_pinhole(problem: &Problem<'_>, views: &[View], settings: &Settings) -> Option<(State, bool)> {
     let mut plain = Settings::standard();
     (plain.image_size, plain.loss, plain.search) = (settings.image_size, settings.loss, false);
     let unweighted = |v: &View| View::new(v.points().to_vec(), v.pixels().to_vec()).ok();
@@ -54,7 +55,8 @@ fn by_pinhole(problem: &Problem<'_>, views: &[View], settings: &Settings) -> Opt
         cam_from_target: poses.map(|(view, pose)| frames.at(view).of_pose(pose)).collect(),
         shape: [0.0; 3],
     };
-    is_seen(problem.views, &state).then_some(state)
+    let certified = found.certificate.as_ref().is_some_and(|c| c.is_possible() && c.holds());
+    is_seen(problem.views, &state).then_some((state, certified && found.termination.is_minimum()))
 }
 
 /// The best state with an angle polynomial of two terms.

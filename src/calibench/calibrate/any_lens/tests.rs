@@ -136,7 +136,7 @@ fn both_estimators_agree_on_the_lens_that_both_know() {
     for settings in [Settings::standard(), Settings::new(free), Settings::standard().tie_focal_lengths(1.0)] {
         let special = calibrate(&views, &settings).unwrap();
         let general = calibrate_lens(&weighted(&views, |_| 1.0), &settings).unwrap();
-        assert_eq!((general.starts, general.free), (2, special.free));
+        assert!(general.certificate.is_none() && general.free == special.free);
         for parameter in special.free.iter() {
             let sd = special.covariance.standard_deviation(parameter).unwrap();
             let off = general.camera.value(parameter).unwrap() - special.camera.get(parameter);
