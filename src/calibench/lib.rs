@@ -39,6 +39,7 @@ pub mod board;
 pub mod calibrate;
 pub mod camera;
 pub mod detect;
+pub mod distribution;
 pub mod downstream;
 pub mod evaluate;
 pub mod geometry;

@@ -15,7 +15,8 @@ const SCENES: &[&str] = &[
     "src/calibench/synth/stream.rs",
 ];
 /// What a calibration of drawn points and its judgement stand on besides.
-const SOLVER: &[&str] = &["src/calibench/calibrate", "src/calibench/evaluate"];
+const SOLVER: &[&str] =
+    &["src/calibench/calibrate", "src/calibench/distribution.rs", "src/calibench/evaluate"];
 /// What draws the scenes of the experiment global-minimum, and searches from their truth.
 const GLOBAL_MINIMUM: &[&str] = &[
     "experiments/global_minimum/families.rs",

@@ -1,6 +1,5 @@
-//! How likely is an excess by chance? Tails and quantiles, the same digits on every machine.
+//! How likely is an excess by chance? Tails, the same digits on every machine.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 use statrs::function::beta::checked_beta_reg;
 
 /// Digits kept: the last ones of the beta function are the platform's.
@@ -19,12 +18,6 @@ pub(super) fn fisher_tail(f: f64, numerator_freedom: usize, denominator_freedom:
     significant(tail)
 }
 
-/// What a chi-squared variable stays below with the given probability; to nine digits.
-pub(super) fn chi_squared_quantile(probability: f64, degrees_of_freedom: usize) -> f64 {
-    let distribution = ChiSquared::new(degrees_of_freedom.max(1) as f64);
-    significant(distribution.map_or(f64::INFINITY, |distribution| distribution.inverse_cdf(probability)))
-}
-
 /// Rounded to nine significant digits, in binary scale: no logarithm is needed.
 pub(super) fn significant(x: f64) -> f64 {
     if x <= 0.0 || !x.is_finite() {
@@ -37,15 +30,6 @@ pub(super) fn significant(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn quantiles_are_those_of_closed_forms() {
-        // With two degrees of freedom the tail is exp(-x / 2).
-        for tail in [0.3, 1e-3, 1e-6] {
-            let exact = -2.0 * libm::log(tail);
-            assert!((chi_squared_quantile(1.0 - tail, 2) / exact - 1.0).abs() < 1e-8, "{tail}");
-        }
-    }
 
     #[test]
     fn tails_are_those_of_closed_forms() {

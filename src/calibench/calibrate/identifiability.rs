@@ -12,7 +12,6 @@
 //! - Where tilts are no larger than noise makes them, all planes are held parallel: if the data fit as well,
 //!   and the parameters could not be identified were the planes parallel, the calibration is refused.
 
-use super::chance::chi_squared_quantile;
 use super::conditioning::{Conditioning, WeakComponent};
 use super::minimise::{Minimum, Problem, State};
 use super::normal::Observations;
@@ -21,6 +20,7 @@ use super::system::System;
 use super::walk::{Far, Walked};
 use super::{CalibrationError, Unknown};
 use crate::camera::Parameter;
+use crate::distribution::ChiSquare;
 use crate::geometry::{Pose, Vec2, Vec3, rotation};
 
 /// With this probability at most data that determine nothing pass.
@@ -47,7 +47,7 @@ pub(super) fn least_rise(parameter: Parameter) -> f64 {
 
 /// What a chi-squared variable with `d` degrees of freedom exceeds with probability [`FALSE_ACCEPTANCE`].
 fn largest_chance_chi_squared(degrees_of_freedom: usize) -> f64 {
-    chi_squared_quantile(1.0 - FALSE_ACCEPTANCE, degrees_of_freedom)
+    ChiSquare::new(degrees_of_freedom).quantile(1.0 - FALSE_ACCEPTANCE)
 }
 
 /// Whether the tilts of a state are so different, and so different from none, that no test is needed; for

@@ -2,13 +2,13 @@
 
 pub mod bound;
 pub mod difference;
-pub mod distribution;
 pub mod errors;
 pub mod interval;
 pub mod leverage;
 pub mod rmse;
 pub mod sample;
 
+pub use crate::distribution;
 pub use bound::{BoundError, cramer_rao};
 pub use difference::{
     Calibrated, DifferenceError, FrameDifference, OneCamera, TakenOut, frame_difference, one_camera,

@@ -145,6 +145,15 @@ mod tests {
     use super::*;
 
     #[test]
+    fn quantiles_are_those_of_closed_forms() {
+        // With two degrees of freedom the tail is exp(-x / 2).
+        for tail in [0.3, 1e-3, 1e-6] {
+            let exact = -2.0 * libm::log(tail);
+            assert!((ChiSquare::new(2).quantile(1.0 - tail) / exact - 1.0).abs() < 1e-8, "{tail}");
+        }
+    }
+
+    #[test]
     fn tabulated_values_are_met() {
         // Abramowitz & Stegun 1964, tables 26.1 and 26.8.
         assert!((normal_two_sided(0.05) - 1.959_963_985).abs() < 1e-8);
