@@ -77,3 +77,30 @@ impl Tally {
         self.outcomes.iter().filter(|(name, _)| name.starts_with("refused-")).map(|(_, count)| count).sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::example::STUDY;
+    use crate::{Engine, Shard, Trial};
+
+    #[test]
+    fn every_trial_is_counted_and_the_values_of_those_that_converged() {
+        let mut engine = Engine::new(STUDY, Shard::WHOLE).unwrap();
+        let values: Vec<Option<f64>> = (0..engine.quantities.len()).map(|q| Some(q as f64)).collect();
+        let trial = |outcome: &str| Trial {
+            cell: 0,
+            trial: 0,
+            outcome: outcome.to_string(),
+            iterations: 1,
+            values: values.clone(),
+        };
+        let tally = &mut engine.tallies[0];
+        ["converged", "refused-parallel", "converged", "stalled", "refused-strays"]
+            .iter()
+            .for_each(|outcome| tally.add(&trial(outcome)));
+        assert_eq!((tally.trials, tally.converged(), tally.refused()), (5, 2, 2));
+        assert!(tally.moments.iter().all(|moments| moments.count() == 2));
+        assert!(tally.sketches.iter().all(|sketch| sketch.total() == 2));
+        assert_eq!(tally.joint.count(), 2);
+    }
+}

@@ -276,3 +276,32 @@ pub fn in_memory_seeing(
     let Ok(_) = engine.drive(&AtomicBool::new(false), keep, report);
     Ok(engine)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::example::STUDY;
+
+    #[test]
+    fn the_worst_cell_is_one_that_has_begun_and_is_known_least() {
+        let mut engine =
+            Engine::new(&STUDY.replace("per_cell = 3\nbatch = 2", "per_cell = 60\nbatch = 20"), Shard::WHOLE)
+                .unwrap();
+        assert_eq!(engine.worst(), None);
+        let take = |engine: &mut Engine| {
+            let unit = engine.next().unwrap();
+            let trials = engine.run(unit);
+            engine.absorb(unit, &trials);
+        };
+        take(&mut engine);
+        let worst = engine.worst().unwrap();
+        assert_eq!((worst.cell.as_str(), worst.quantity), ("noise = 0.1", "fx"));
+        assert_eq!(worst.relative_half_width, engine.relative_half_width(0, "fx"));
+        take(&mut engine);
+        take(&mut engine);
+        // Forty trials of the first cell, twenty of the second, of which none knows more.
+        let widths = [0, 1].map(|cell| engine.relative_half_width(cell, "fx").unwrap());
+        let least = if widths[0] > widths[1] { "noise = 0.1" } else { "noise = 0.3" };
+        assert_eq!(engine.worst().unwrap().cell, least);
+    }
+}

@@ -14,6 +14,8 @@ mod cells;
 pub mod compare;
 mod design;
 mod engine;
+#[cfg(test)]
+mod example;
 mod factor;
 mod figures;
 mod fingerprint;

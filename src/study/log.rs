@@ -245,3 +245,21 @@ pub(super) fn hash_of(path: &Path, bytes: u64) -> Result<(Sha256, u64), FolderEr
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_hashed_as_far_as_is_asked() {
+        let path = std::env::temp_dir().join(format!("calibench-hash-{}", std::process::id()));
+        std::fs::write(&path, "abcdef").unwrap();
+        let hashed =
+            |bytes| hash_of(&path, bytes).map(|(hash, length)| (hexadecimal(&hash), length)).unwrap();
+        // FIPS 180-4's example.
+        let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(hashed(3), (abc.to_string(), 3));
+        assert_eq!(hashed(u64::MAX).1, 6);
+        std::fs::remove_file(path).unwrap();
+    }
+}

@@ -292,6 +292,32 @@ mod tests {
     }
 
     #[test]
+    fn random_poses_fill_their_ranges_and_do_not_leave_them() {
+        let random = RandomPoses {
+            views: 400,
+            tilt_deg: 35.0,
+            tilt_min_deg: 10.0,
+            roll_deg: 0.0,
+            coverage: 0.0,
+            distance_mm: 200.0,
+            distance_spread: 0.25,
+            redraw: false,
+        };
+        let poses = generate(&Poses::Random(random)).unwrap();
+        let fills = |values: Vec<f64>, low: f64, high: f64| {
+            assert!(values.iter().all(|value| (low - 1e-9..=high + 1e-9).contains(value)), "{values:?}");
+            // None of 400 uniform numbers in the lowest or highest tenth: by chance once in 10^18.
+            let tenth = 0.1 * (high - low);
+            assert!(
+                values.iter().any(|value| *value < low + tenth)
+                    && values.iter().any(|value| *value > high - tenth)
+            );
+        };
+        fills(poses.iter().map(|pose| pose.translation.z).collect(), 150.0, 250.0);
+        fills(poses.iter().map(|pose| libm::acos(pose.rotation[(2, 2)]).to_degrees()).collect(), 10.0, 35.0);
+    }
+
+    #[test]
     fn a_target_that_does_not_fit_is_refused() {
         let near = Poses::Spread { views: 3, tilt_deg: 20.0, coverage: 0.0, distance_mm: 60.0 };
         assert_eq!(generate(&near), Err(PosesError::OutsideImage { view: 0 }));

@@ -102,3 +102,22 @@ fn length_sd(
     let gradient = nalgebra::DVector::from_vec(free.iter().map(slope).collect::<Option<Vec<f64>>>()?);
     Some(gradient.dot(&(&bound.intrinsics * &gradient)).sqrt())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nees_has_the_moments_of_a_ratio_of_chi_squares() {
+        for (n, d) in [(1.0, 5.0), (6.0, 20.0), (10.0, 480.0)] {
+            let Expected { mean, sd } = nees(n, d).unwrap();
+            // Of chi-squared numbers: E[x] = n, E[x^2] = n (n + 2), E[1 / y] = 1 / (d - 2), E[1 / y^2] = 1 / ((d - 2) (d - 4)).
+            let (first, second) = (n * d / (d - 2.0), n * (n + 2.0) * d * d / ((d - 2.0) * (d - 4.0)));
+            assert!(
+                (mean - first).abs() < 1e-12 * first
+                    && (sd * sd + mean * mean - second).abs() < 1e-12 * second
+            );
+        }
+        assert!(nees(6.0, 4.0).is_none() && nees(0.0, 20.0).is_none());
+    }
+}

@@ -161,3 +161,13 @@ fn shown(estimated: Option<Estimated>) -> String {
 fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_share_is_told_without_the_rounding_of_its_binary_fraction() {
+        assert_eq!([0.95, 0.999, 0.997_3].map(percent), [95.0, 99.9, 99.73]);
+    }
+}

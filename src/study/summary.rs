@@ -257,3 +257,25 @@ fn number(value: Option<f64>) -> Entry {
 fn ends(estimated: Option<Estimated>) -> [Entry; 3] {
     [number(estimated.map(|e| e.value)), number(estimated.map(|e| e.low)), number(estimated.map(|e| e.high))]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quantiles_interval_reaches_to_the_ranks_of_the_binomial() {
+        let mut sketch = Sketch::default();
+        (1..=10_000).for_each(|i| sketch.add(f64::from(i)));
+        let found = quantile(&sketch, 1000.0, 0.25, 0.05).unwrap();
+        // 2500 below on average, with a standard deviation of sqrt(10 000 * 0.25 * 0.75) = 43.3, of which 1.96 are 84.9.
+        for (value, rank) in [(found.value, 2500.0), (found.low, 2415.0), (found.high, 2586.0)] {
+            assert!(
+                (value - 1000.0 - rank).abs() <= 1.000_001 * Sketch::RELATIVE_ERROR * rank,
+                "{value} {rank}"
+            );
+        }
+        let mut few = Sketch::default();
+        (0..3).for_each(|i| few.add(f64::from(i)));
+        assert_eq!(quantile(&few, 0.0, 0.5, 0.05), None);
+    }
+}
