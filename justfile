@@ -74,6 +74,10 @@ bless-instructions:
 fuzz SECONDS="30":
     .ci/fuzz {{SECONDS}}
 
+# Every so manieth change of the code that computes and judges: do the unit tests notice?
+mutants NTH="120":
+    .ci/mutants {{NTH}}
+
 # The registers of floating-point lanes under Miri
 miri:
     .ci/miri
