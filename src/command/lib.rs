@@ -4,6 +4,7 @@ mod bless;
 mod book;
 mod calibrate;
 mod check;
+mod check_reference;
 mod convert;
 mod diff;
 mod exit;
@@ -16,6 +17,7 @@ mod register;
 mod report;
 mod reproduce;
 mod run;
+mod said;
 mod study;
 mod terminal;
 mod undistort;
@@ -73,6 +75,8 @@ enum Verb {
     Register(register::Arguments),
     /// Calibrates a camera against a robot, on its gripper or beside it
     HandEye(hand_eye::Arguments),
+    /// Watches a station by one reference measured again and again: control limits, history, exit code
+    CheckReference(check_reference::Arguments),
     /// Monte Carlo studies from a file: resumable, sharded, with intervals
     Study(study::Arguments),
     /// Judges a solver, this library's or any program, on problems with known answers
@@ -109,6 +113,7 @@ pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCo
         Some(Verb::Measure(arguments)) => measure::run(&arguments),
         Some(Verb::Register(arguments)) => register::run(&arguments),
         Some(Verb::HandEye(arguments)) => hand_eye::run(&arguments),
+        Some(Verb::CheckReference(arguments)) => check_reference::run(&arguments),
         Some(Verb::Study(arguments)) => study::run(&arguments, build),
         Some(Verb::Gate(arguments)) => gate::run(&arguments, build),
     };
