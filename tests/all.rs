@@ -36,6 +36,7 @@ mod real_ninepoint;
 mod rectify;
 mod render;
 mod right_minimum;
+mod shell;
 mod study;
 mod study_faults;
 mod study_folder;

@@ -25,7 +25,7 @@ struct Verb {
     arguments: &'static [&'static str],
 }
 
-const VERBS: [Verb; 15] = [
+const VERBS: [Verb; 16] = [
     Verb {
         name: "camera",
         arguments: &["calibrate", "../corners.csv", "--image-size", "640x480", "--out", "out"],
@@ -98,6 +98,7 @@ const VERBS: [Verb; 15] = [
             "out/report.html",
         ],
     },
+    Verb { name: "manual", arguments: &["manual", "--out", "out"] },
     Verb { name: "schema", arguments: &["gate", "--schema", "out"] },
     Verb { name: "run", arguments: &["run", "line-bending"] },
     Verb { name: "bless", arguments: &["bless", "line-bending"] },

@@ -5,12 +5,14 @@ mod book;
 mod calibrate;
 mod check;
 mod check_reference;
+mod completions;
 mod convert;
 mod diff;
 mod exit;
 mod gate;
 mod hand_eye;
 mod list;
+mod manual;
 mod measure;
 mod ninepoint;
 mod register;
@@ -81,6 +83,10 @@ enum Verb {
     Study(study::Arguments),
     /// Judges a solver, this library's or any program, on problems with known answers
     Gate(Box<gate::Arguments>),
+    /// Prints what a shell needs to complete verbs and options
+    Completions(completions::Arguments),
+    /// Writes the pages of the manual
+    Manual(manual::Arguments),
 }
 
 /// The `calibench` command over a table of experiments; `build` is what stands as their origin in what they
@@ -116,6 +122,8 @@ pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCo
         Some(Verb::CheckReference(arguments)) => check_reference::run(&arguments),
         Some(Verb::Study(arguments)) => study::run(&arguments, build),
         Some(Verb::Gate(arguments)) => gate::run(&arguments, build),
+        Some(Verb::Completions(arguments)) => completions::run(&arguments),
+        Some(Verb::Manual(arguments)) => manual::run(&arguments),
     };
     terminal::ended(exit).into()
 }
