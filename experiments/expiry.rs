@@ -11,13 +11,12 @@
 //! are taken to add. That the sum meets 0.03 mm is therefore no test of anything; what follows for the check
 //! and its rules is.
 
-mod control;
 mod results;
 mod station;
 
+use calibench::downstream::control::{Ewma, Rule, Shewhart};
 use calibench::synth::{Stream, StreamKey};
 use calibench_harness::{Context, Experiment, ExperimentError, Record};
-use control::{Ewma, Rule, Shewhart};
 use rayon::prelude::*;
 use station::{History, SHIFTS_A_DAY, Station};
 

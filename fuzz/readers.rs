@@ -8,7 +8,7 @@ use calibench::io::image::{parse_extent, parse_image};
 use calibench::io::result::parse_camera;
 use calibench::io::robot::parse_robot;
 use calibench::io::{
-    memory, parse_corners, parse_known, parse_marks, parse_pixel_ends, parse_point_pairs, table,
+    memory, parse_checks, parse_corners, parse_known, parse_marks, parse_pixel_ends, parse_point_pairs, table,
 };
 use calibench::photos::BoardSpec;
 use calibench_gate::accept::{accept, id_in, read_line};
@@ -41,12 +41,13 @@ pub fn corners(bytes: &[u8]) {
     let _ = parse_corners("corners", bytes);
 }
 
-/// Point pairs, marks of a part, pixels at both ends of lengths, and poses of a robot.
+/// Point pairs, marks of a part, pixels at both ends of lengths, poses of a robot, and checks of a reference.
 pub fn pairs(bytes: &[u8]) {
     let _ = parse_point_pairs("pairs", bytes);
     let _ = parse_marks("marks", bytes);
     let _ = parse_pixel_ends("ends", bytes);
     let _ = parse_robot("robot", bytes);
+    let _ = parse_checks("checks", bytes);
 }
 
 /// Results and cameras.

@@ -37,6 +37,7 @@ mod real_ninepoint;
 mod rectify;
 mod render;
 mod right_minimum;
+mod shell;
 mod study;
 mod study_faults;
 mod study_folder;

@@ -1,6 +1,7 @@
 //! Do `register`, `measure` and `hand-eye` say what they find, and are their stated uncertainties those of
 //! repeated calibrations?
 
+use crate::camera_files::{folder, run, text};
 use calibench::board::View;
 use calibench::calibrate::{Calibration, Settings, calibrate};
 use calibench::downstream::{
@@ -13,25 +14,7 @@ use calibench::synth::{Scene, Stream, StreamKey, Truth};
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-fn run(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_calibench"));
-    command.args(arguments).current_dir(folder).output().expect("the program starts")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
-/// An empty folder of this test's own.
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).expect("a folder is made");
-    folder
-}
+use std::path::Path;
 
 /// What a verb that must succeed prints as JSON.
 fn said(folder: &Path, arguments: &[&str]) -> Value {
@@ -427,4 +410,46 @@ fn hand_eye_pairs_the_views_of_both_files_and_refuses_what_fixes_nothing() {
     assert!(refused(&folder, &verb("two.csv")).contains("at least 3 stations, got 2"));
     let wrong = refused(&folder, &[&verb("robot.csv")[..], &["--robot-sd-mm", "0"]].concat());
     assert!(wrong.contains("above 0") || wrong.contains("cannot be used multiple times"), "{wrong}");
+}
+
+#[test]
+fn a_reference_is_watched_by_its_history_and_an_alarm_ends_with_one() {
+    let folder = folder("check-reference");
+    let station = ["--reference", "25", "--sd", "0.004"];
+    let check =
+        |more: &[&str]| run(&folder, &[&["check-reference", "history.csv"][..], &station, more].concat());
+    assert_eq!(check(&[]).status.code(), Some(2), "there is no history yet");
+    for value in ["25.003", "24.996", "25.001"] {
+        let output = check(&["--add", value]);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        assert!(text(&output.stdout).contains("in control"));
+    }
+    let written = fs::read_to_string(folder.join("history.csv")).expect("a history");
+    assert_eq!(written, "when,value\n1,25.003\n2,24.996\n3,25.001\n");
+    // Nine standard deviations off: beyond any limit.
+    let alarm = check(&["--add", "25.036", "--when", "night shift", "--format", "json", "--out", "out"]);
+    assert_eq!(alarm.status.code(), Some(1), "{}", text(&alarm.stderr));
+    let json: Value = serde_json::from_slice(&alarm.stdout).expect("JSON");
+    assert_eq!(
+        (&json["first_alarm"]["when"], &json["first_alarm"]["rule"]),
+        (&"night shift".into(), &"threshold".into())
+    );
+    assert!(folder.join("out/trend.svg").is_file() && folder.join("out/check.json").is_file());
+    // It stays out of control until a new history begins.
+    let after = check(&["--add", "25.000"]);
+    assert_eq!(after.status.code(), Some(1));
+    assert!(
+        text(&after.stdout).contains("OUT OF CONTROL since check night shift"),
+        "{}",
+        text(&after.stdout)
+    );
+    fs::write(
+        folder.join("drift.csv"),
+        (0..90).fold("when,value\n".to_string(), |t, i| t + &format!("{i},{}\n", 25.0 + 1e-4 * f64::from(i))),
+    )
+    .expect("written");
+    let drift = run(&folder, &[&["check-reference", "drift.csv"][..], &station].concat());
+    assert!(text(&drift.stdout).contains("by the moving average"), "{}", text(&drift.stdout));
+    assert_eq!(check(&["--add", "1", "--when", "a,b"]).status.code(), Some(2));
+    assert_eq!(check(&["--weight", "0.01"]).status.code(), Some(2));
 }

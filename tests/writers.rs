@@ -3,8 +3,9 @@
 #![cfg(target_os = "linux")]
 
 use crate::failing_disk::{Failing, Fault};
+use calibench::calibrate::{Settings, calibrate};
 use calibench::io::atomic::{write_atomically_to, write_together_to};
-use calibench::io::write_png;
+use calibench::io::{CalibrationFields, write_png};
 use calibench::raster::Raster;
 use calibench::synth::render::nine_dot_stand_in;
 use calibench::synth::{Scene, Stream, StreamKey};
@@ -24,7 +25,7 @@ struct Verb {
     arguments: &'static [&'static str],
 }
 
-const VERBS: [Verb; 11] = [
+const VERBS: [Verb; 16] = [
     Verb {
         name: "camera",
         arguments: &["calibrate", "../corners.csv", "--image-size", "640x480", "--out", "out"],
@@ -39,6 +40,47 @@ const VERBS: [Verb; 11] = [
     Verb {
         name: "diff",
         arguments: &["diff", "../camera.json", "../other.json", "--image-size", "640x480", "--out", "out"],
+    },
+    Verb {
+        name: "measure",
+        arguments: &[
+            "measure",
+            "../known.json",
+            "--view",
+            "0",
+            "--pixels",
+            "200,200,300,250",
+            "--out",
+            "out",
+        ],
+    },
+    Verb { name: "register", arguments: &["register", "../marks.csv", "../marks.csv", "--out", "out"] },
+    Verb {
+        name: "hand-eye",
+        arguments: &[
+            "hand-eye",
+            "../robot.csv",
+            "../known.json",
+            "--robot-sd-mm",
+            "0.1",
+            "--robot-sd-deg",
+            "0.1",
+            "--out",
+            "out",
+        ],
+    },
+    Verb {
+        name: "check-reference",
+        arguments: &[
+            "check-reference",
+            "../history.csv",
+            "--reference",
+            "25",
+            "--sd",
+            "0.01",
+            "--out",
+            "out",
+        ],
     },
     Verb {
         name: "gate",
@@ -56,6 +98,7 @@ const VERBS: [Verb; 11] = [
             "out/report.html",
         ],
     },
+    Verb { name: "manual", arguments: &["manual", "--out", "out"] },
     Verb { name: "schema", arguments: &["gate", "--schema", "out"] },
     Verb { name: "run", arguments: &["run", "line-bending"] },
     Verb { name: "bless", arguments: &["bless", "line-bending"] },
@@ -81,10 +124,28 @@ fn with_input(name: &str) -> PathBuf {
     for (name, text) in [("corners.csv", corners.as_str()), ("camera.json", camera), ("pairs.csv", pairs)] {
         fs::write(folder.join(name), text).expect("written");
     }
+    fs::write(folder.join("marks.csv"), "point,X,Y\na,0,0\nb,10,0\nc,0,10\n").expect("written");
+    fs::write(folder.join("history.csv"), "when,value\n1,25.01\n2,24.99\n").expect("written");
+    write_calibration(&folder);
     let photo = Raster::from_fn(160, 120, |x, y| (x + y) as u8);
     write_png(&folder.join("photo.png"), &photo).expect("written");
     write_png(&folder.join("dots.png"), &nine_dot_stand_in().image.to_u8()).expect("written");
     folder
+}
+
+/// A calibration with its joint covariance, and the poses of a robot whose gripper holds the camera.
+fn write_calibration(folder: &Path) {
+    let scene = Scene::example();
+    let key = StreamKey { seed: 1, scenario: "writers", trial: 0, purpose: "noise" };
+    let calibration = calibrate(&scene.observe(0.1, &mut Stream::open(key)), &Settings::standard());
+    let known = CalibrationFields::of(&calibration.expect("four views"), &[], Some((640, 480)));
+    fs::write(folder.join("known.json"), known.to_json()).expect("written");
+    let mut robot = "view,x,y,z,rx,ry,rz\n".to_string();
+    for (view, pose) in scene.truth.cam_from_target.iter().enumerate() {
+        let (t, w) = (pose.inverse().translation, -calibench::geometry::rotation::log(&pose.rotation));
+        writeln!(robot, "{view},{},{},{},{},{},{}", t.x, t.y, t.z, w.x, w.y, w.z).expect("text grows");
+    }
+    fs::write(folder.join("robot.csv"), robot).expect("written");
 }
 
 /// What makes a folder a source tree, with a golden number that has moved and a book of one page, and `old`

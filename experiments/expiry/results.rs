@@ -1,11 +1,11 @@
 //! What did the stations show? Numbers, claims, tables and figures.
 
-use super::control::{Ewma, Rule, Shewhart};
 use super::station::{History, SHIFTS_A_DAY, Station};
 use super::{
     EWMA_WEIGHT, FALSE_ALARM, FLEET, Fleet, IN_CONTROL, QUARTER, QUARTERS, Quarter, RISK, TOLERANCE_MM,
     TRADE_OFF, YEAR,
 };
+use calibench::downstream::control::{Ewma, Rule, Shewhart};
 use calibench_harness::stats::{Interval, mean, median, normal_two_sided, quantile, share};
 use calibench_harness::{Band, Dash, Figure, Look, Plot, Record, Table};
 

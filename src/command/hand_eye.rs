@@ -1,14 +1,15 @@
 //! `calibench hand-eye ROBOT.csv RESULT.json`: where a camera sits on a robot or beside it, with its
 //! uncertainty.
 
+use super::Exit;
 use super::calibrate::Format;
 use super::report::table;
-use super::{Exit, print, warn};
+use super::said::{Said, positive, say};
 use calibench::calibrate::Covariance;
 use calibench::downstream::{HandEye, Repeatability, SetUp, Stations, hand_eye};
 use calibench::geometry::{Pose, Vec3, rotation};
 use calibench::io::robot::{RobotFile, read_robot};
-use calibench::io::{Known, KnownCalibration, read_known, significant, write_atomically};
+use calibench::io::{Known, KnownCalibration, read_known, significant};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -26,10 +27,10 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, default_value_t = Moves::EyeInHand)]
     set_up: Moves,
     /// Standard deviation of each coordinate of the robot's position, in mm (the board's unit): what it repeats
-    #[arg(long, value_name = "MM", value_parser = parse_positive)]
+    #[arg(long, value_name = "MM", value_parser = positive)]
     robot_sd_mm: f64,
     /// Standard deviation of the robot's rotation about each axis, degrees
-    #[arg(long, value_name = "DEG", value_parser = parse_positive)]
+    #[arg(long, value_name = "DEG", value_parser = positive)]
     robot_sd_deg: f64,
     /// Folder for hand-eye.json
     #[arg(long, value_name = "DIR")]
@@ -71,31 +72,10 @@ impl From<Moves> for SetUp {
     }
 }
 
-fn parse_positive(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
-    number.ok_or_else(|| "expected a number above 0".into())
-}
-
 pub(super) fn run(arguments: &Arguments) -> Exit {
-    let found = match found(arguments) {
-        Ok(found) => found,
-        Err(message) => {
-            warn(&message);
-            return Exit::Usage;
-        }
-    };
-    let json = format!("{:#}\n", found.json(arguments));
-    if let Some(folder) = &arguments.out
-        && let Err(error) = write_atomically(&folder.join("hand-eye.json"), json.as_bytes())
-    {
-        warn(&error.to_string());
-        return Exit::Incomplete;
-    }
-    match arguments.format {
-        Format::Text => print(&found.text(arguments)),
-        Format::Json => print(&json),
-    }
-    Exit::Held
+    let found = found(arguments);
+    let said = found.map(|found| Said { text: found.text(arguments), json: found.json(arguments) });
+    say(said, arguments.out.as_deref(), "hand-eye.json", arguments.format)
 }
 
 /// The calibration, and the stations it rests on.

@@ -4,18 +4,22 @@ mod bless;
 mod book;
 mod calibrate;
 mod check;
+mod check_reference;
+mod completions;
 mod convert;
 mod diff;
 mod exit;
 mod gate;
 mod hand_eye;
 mod list;
+mod manual;
 mod measure;
 mod ninepoint;
 mod register;
 mod report;
 mod reproduce;
 mod run;
+mod said;
 mod startup;
 mod study;
 mod terminal;
@@ -74,10 +78,16 @@ enum Verb {
     Register(register::Arguments),
     /// Calibrates a camera against a robot, on its gripper or beside it
     HandEye(hand_eye::Arguments),
+    /// Watches a station by one reference measured again and again: control limits, history, exit code
+    CheckReference(check_reference::Arguments),
     /// Monte Carlo studies from a file: resumable, sharded, with intervals
     Study(study::Arguments),
     /// Judges a solver, this library's or any program, on problems with known answers
     Gate(Box<gate::Arguments>),
+    /// Prints what a shell needs to complete verbs and options
+    Completions(completions::Arguments),
+    /// Writes the pages of the manual
+    Manual(manual::Arguments),
 }
 
 /// The `calibench` command over a table of experiments; `build` is what stands as their origin in what they
@@ -111,8 +121,11 @@ pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCo
         Some(Verb::Measure(arguments)) => measure::run(&arguments),
         Some(Verb::Register(arguments)) => register::run(&arguments),
         Some(Verb::HandEye(arguments)) => hand_eye::run(&arguments),
+        Some(Verb::CheckReference(arguments)) => check_reference::run(&arguments),
         Some(Verb::Study(arguments)) => study::run(&arguments, build),
         Some(Verb::Gate(arguments)) => gate::run(&arguments, build),
+        Some(Verb::Completions(arguments)) => completions::run(&arguments),
+        Some(Verb::Manual(arguments)) => manual::run(&arguments),
     };
     terminal::ended(exit).into()
 }

@@ -1,13 +1,12 @@
 //! `calibench measure RESULT.json`: lengths on a plane, each with its uncertainty split by cause.
 
+use super::Exit;
 use super::calibrate::Format;
 use super::report::table;
-use super::{Exit, print, warn};
+use super::said::{Said, number_that, positive, say};
 use calibench::downstream::{Cause, Conditions, Length, PlaneView, length_in_view, length_on_map};
 use calibench::geometry::{Pose, Vec2, Vec3, rotation};
-use calibench::io::{
-    Known, KnownCalibration, PixelEnds, read_known, read_pixel_ends, significant, write_atomically,
-};
+use calibench::io::{Known, KnownCalibration, PixelEnds, read_known, read_pixel_ends, significant};
 use calibench::planar::PlaneCalibration;
 use clap::Args;
 use serde_json::{Value, json};
@@ -35,7 +34,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     ends: Option<PathBuf>,
     /// Length of a unit of the map of a plane, such as 10 for dots 10 mm apart [default: 1]
-    #[arg(long, value_name = "MM", value_parser = parse_positive)]
+    #[arg(long, value_name = "MM", value_parser = positive)]
     spacing: Option<f64>,
     /// Standard deviation of a coordinate of a mark, px [default: the noise that the calibration found]
     #[arg(long, value_name = "PX", value_parser = parse_deviation)]
@@ -84,35 +83,13 @@ fn parse_ends(text: &str) -> Result<Numbers<4>, String> {
 }
 
 fn parse_deviation(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|x: &f64| x.is_finite() && *x >= 0.0);
-    number.ok_or_else(|| "expected a number of 0 or more".into())
-}
-
-fn parse_positive(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
-    number.ok_or_else(|| "expected a number above 0".into())
+    number_that(text, |x| x >= 0.0, "a number of 0 or more")
 }
 
 pub(super) fn run(arguments: &Arguments) -> Exit {
-    let measured = match measured(arguments) {
-        Ok(measured) => measured,
-        Err(message) => {
-            warn(&message);
-            return Exit::Usage;
-        }
-    };
-    let json = format!("{:#}\n", measured_json(arguments, &measured));
-    if let Some(folder) = &arguments.out
-        && let Err(error) = write_atomically(&folder.join("lengths.json"), json.as_bytes())
-    {
-        warn(&error.to_string());
-        return Exit::Incomplete;
-    }
-    match arguments.format {
-        Format::Text => print(&measured_text(&measured)),
-        Format::Json => print(&json),
-    }
-    Exit::Held
+    let measured = measured(arguments);
+    let said = measured.map(|m| Said { text: measured_text(&m), json: measured_json(arguments, &m) });
+    say(said, arguments.out.as_deref(), "lengths.json", arguments.format)
 }
 
 /// A length under its name.

@@ -1,13 +1,14 @@
 //! `calibench register TAUGHT.csv FOUND.csv`: where a part has moved to, and how well any point of it is
 //! known.
 
+use super::Exit;
 use super::calibrate::Format;
 use super::report::table;
-use super::{Exit, print, warn};
+use super::said::{Said, say};
 use calibench::calibrate::Loss;
 use calibench::downstream::{MapModel, Mark, Registration, coverage_factor, register};
 use calibench::geometry::Vec2;
-use calibench::io::{MarkFile, read_marks, significant, write_atomically};
+use calibench::io::{MarkFile, read_marks, significant};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -85,25 +86,9 @@ fn parse_loss(text: &str) -> Result<Loss, String> {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Exit {
-    let registered = match registered(arguments) {
-        Ok(registered) => registered,
-        Err(message) => {
-            warn(&message);
-            return Exit::Usage;
-        }
-    };
-    let json = format!("{:#}\n", registered.json(arguments));
-    if let Some(folder) = &arguments.out
-        && let Err(error) = write_atomically(&folder.join("registration.json"), json.as_bytes())
-    {
-        warn(&error.to_string());
-        return Exit::Incomplete;
-    }
-    match arguments.format {
-        Format::Text => print(&registered.text(arguments)),
-        Format::Json => print(&json),
-    }
-    Exit::Held
+    let registered = registered(arguments);
+    let said = registered.map(|map| Said { text: map.text(arguments), json: map.json(arguments) });
+    say(said, arguments.out.as_deref(), "registration.json", arguments.format)
 }
 
 /// The map, and the marks that it rests on.

@@ -1,6 +1,7 @@
 //! What does a calibration feed? Positions, lengths and mountings in target units with their uncertainty: what
 //! drawings and machines ask for.
 
+pub mod control;
 pub mod coverage;
 pub mod hand_eye;
 pub mod length;

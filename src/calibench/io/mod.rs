@@ -3,6 +3,7 @@
 pub mod atomic;
 #[cfg(feature = "photo")]
 pub mod channels;
+pub mod checks;
 pub mod corners;
 pub mod data;
 pub mod digits;
@@ -31,6 +32,7 @@ pub mod table;
 pub use atomic::{write_atomically, write_together};
 #[cfg(feature = "photo")]
 pub use channels::{Channels, read_channels};
+pub use checks::{Check, parse_checks};
 pub use corners::{CornerFile, parse_corners, read_corners};
 pub use data::{MissingDataFolder, data_folder};
 pub use digits::significant;

@@ -1,0 +1,51 @@
+//! What a verb found, as text and as JSON: printed in one form, written in the other. And how numbers of options
+//! are read.
+
+use super::calibrate::Format;
+use super::{Exit, print, warn};
+use calibench::io::write_atomically;
+use serde_json::Value;
+use std::path::Path;
+
+/// What was found, in both forms.
+pub(super) struct Said {
+    pub text: String,
+    pub json: Value,
+}
+
+/// Prints what was found in the form that was asked for, once its JSON stands in the folder.
+pub(super) fn say(said: Result<Said, String>, out: Option<&Path>, file_name: &str, format: Format) -> Exit {
+    let said = match said {
+        Ok(said) => said,
+        Err(message) => {
+            warn(&message);
+            return Exit::Usage;
+        }
+    };
+    let json = format!("{:#}\n", said.json);
+    if let Some(folder) = out
+        && let Err(error) = write_atomically(&folder.join(file_name), json.as_bytes())
+    {
+        warn(&error.to_string());
+        return Exit::Incomplete;
+    }
+    match format {
+        Format::Text => print(&said.text),
+        Format::Json => print(&json),
+    }
+    Exit::Held
+}
+
+/// A finite number for which something holds.
+pub(super) fn number_that(
+    text: &str,
+    holds: impl Fn(f64) -> bool,
+    wanted: &'static str,
+) -> Result<f64, String> {
+    let number = text.trim().parse().ok().filter(|x: &f64| x.is_finite() && holds(*x));
+    number.ok_or_else(|| format!("expected {wanted}"))
+}
+
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    number_that(text, |x| x > 0.0, "a number above 0")
+}
