@@ -138,7 +138,7 @@ fn write_calibration(folder: &Path) {
     let scene = Scene::example();
     let key = StreamKey { seed: 1, scenario: "writers", trial: 0, purpose: "noise" };
     let calibration = calibrate(&scene.observe(0.1, &mut Stream::open(key)), &Settings::standard());
-    let known = CalibrationFields::of(&calibration.expect("four views"), &[], Some((640, 480)));
+    let known = CalibrationFields::of(&calibration.expect("four views").into(), &[], Some((640, 480)));
     fs::write(folder.join("known.json"), known.to_json()).expect("written");
     let mut robot = "view,x,y,z,rx,ry,rz\n".to_string();
     for (view, pose) in scene.truth.cam_from_target.iter().enumerate() {
