@@ -3,6 +3,7 @@
 //!
 //! `cargo test --test all golden::` runs those of `tests/golden.rs`.
 
+mod any_lens;
 mod beforehand;
 mod book;
 mod camera_files;

@@ -209,26 +209,3 @@ pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibr
     found.sort_by(|a, b| a.rmse_px.total_cmp(&b.rmse_px));
     found
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::synth::{Scene, Stream, StreamKey};
-
-    #[test]
-    fn the_model_that_made_the_marks_is_chosen() {
-        let mut stream = Stream::open(StreamKey { seed: 3, scenario: "choice", trial: 0, purpose: "noise" });
-        let views: Vec<View> = (0..3).flat_map(|_| Scene::example().observe(0.1, &mut stream)).collect();
-        let (compared, refused) = compare_models(&views, &Settings::standard(), &Candidate::usual());
-        assert!(compared.len() + refused.len() == 8);
-        let best = &compared[0];
-        // The example's lens has k1 and k2: what has fewer coefficients, or others, predicts worse.
-        assert_eq!(best.candidate.model, Model::BrownConrady);
-        let named = |model| compared.iter().find(|c| c.candidate.model == model);
-        let division = named(Model::Division).unwrap();
-        assert!(division.hold_out_px > best.hold_out_px && division.bic > best.bic + 10.0);
-        let (wins, folds) = best.wins_against(division);
-        assert!(wins == folds && folds == 5, "{wins} of {folds}");
-        assert!(best.correlation.abs() < 0.15, "{}", best.correlation);
-    }
-}

@@ -141,9 +141,9 @@ pub enum CalibrationError {
     },
     /// The data do not tell the free parameters apart.
     #[error(
-        "the data cannot separate {}: {why}. Tilt the target by 20 degrees or more, about different axes, in some views, or \
-         give one of them a value to be held at",
-        unknown::joined(inseparable)
+        "the data cannot separate {}: {why}. {}",
+        unknown::joined(inseparable),
+        unknown::advice(inseparable)
     )]
     NotIdentifiable {
         /// What trades off against each other, strongest first.
@@ -154,7 +154,7 @@ pub enum CalibrationError {
     /// No start lets the lens see every mark.
     #[error(
         "no starting values: no {model} lens was found that sees every mark; a lens beyond 90 degrees from the axis needs a fisheye model \
-         (kannala-brandt, double-sphere)"
+         (kannala-brandt, division, double-sphere)"
     )]
     NoImage {
         /// The model.

@@ -216,8 +216,12 @@ pub(super) fn refuse_if_flat(
     }
 }
 
-/// Groups for people: fx and fy together are the focal length, and so on; the poses' share last.
+/// Groups for people: fx and fy together are the focal length, and so on; the poses' share last. Coefficients that
+/// hang together among themselves only are named one by one.
 fn names(weakest: &[WeakComponent]) -> Vec<Unknown> {
+    if weakest.iter().all(|member| member.unknown.group() == Unknown::RadialDistortion) {
+        return weakest.iter().map(|member| member.unknown).collect();
+    }
     let mut names = Vec::new();
     for member in weakest {
         add(&mut names, member.unknown.group());

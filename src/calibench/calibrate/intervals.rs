@@ -12,10 +12,11 @@
 //! Watts 1988, section 6.1). Linear theory has `tau = (v - estimate) / standard deviation`; JCGM 101 (2008),
 //! section 8.1, asks for such a comparison before a standard uncertainty is stated.
 
-use super::minimise::{Minimum, Problem, State};
-use super::system::{Reduction, Step};
+use super::blocks::N;
+use super::minimise::{Descent, Minimum, Problem, State, descend};
+use super::system::Reduction;
 use super::tie::tied;
-use crate::camera::Parameter;
+use crate::camera::{FreeParameters, Parameter};
 use nalgebra::SVector;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -55,35 +56,82 @@ pub(super) struct Skewed {
     pub ratios: [f64; 2],
 }
 
+/// A problem whose parameters can be held one by one.
+pub(super) trait Profiled<const W: usize>: Descent<W> + Sized {
+    /// Parameters that are estimated.
+    fn free(&self) -> FreeParameters;
+
+    /// The same problem with one of them held where the start has it.
+    fn holding(&self, parameter: Parameter) -> Self;
+
+    /// The value of a parameter.
+    fn value(state: &Self::State, parameter: Parameter) -> f64;
+
+    /// The state with another value of a parameter, and what is tied to it.
+    fn with_value(&self, state: Self::State, parameter: Parameter, value: f64) -> Self::State;
+}
+
+impl Profiled<N> for Problem<'_> {
+    fn free(&self) -> FreeParameters {
+        self.free
+    }
+
+    fn holding(&self, parameter: Parameter) -> Self {
+        Problem { free: self.free.without(parameter), ..*self }
+    }
+
+    fn value(state: &State, parameter: Parameter) -> f64 {
+        state.camera.get(parameter)
+    }
+
+    fn with_value(&self, state: State, parameter: Parameter, value: f64) -> State {
+        State { camera: tied(state.camera.with(parameter, value), self.fy_per_fx), ..state }
+    }
+}
+
 /// The profile around a minimum.
-pub(super) struct Profile<'a> {
-    pub problem: &'a Problem<'a>,
-    pub minimum: &'a Minimum,
-    pub reduction: &'a Reduction,
-    /// Covariance of the intrinsics for unit noise.
+pub(super) struct Profile<'a, P: Profiled<W>, const W: usize> {
+    problem: &'a P,
+    minimum: &'a Minimum<P::State, W>,
+    reduction: &'a Reduction<W>,
+    /// Covariance of the shared unknowns for unit noise.
     covariance: nalgebra::DMatrix<f64>,
     noise_px: f64,
 }
 
-impl<'a> Profile<'a> {
+impl<'a, P: Profiled<W>, const W: usize> Profile<'a, P, W> {
     /// `None` where the covariance is singular.
     pub fn new(
-        problem: &'a Problem<'a>,
-        minimum: &'a Minimum,
-        reduction: &'a Reduction,
+        problem: &'a P,
+        minimum: &'a Minimum<P::State, W>,
+        reduction: &'a Reduction<W>,
         noise_px: f64,
-    ) -> Option<Profile<'a>> {
+    ) -> Option<Self> {
         let covariance = reduction.intrinsics_covariance()?;
         Some(Profile { problem, minimum, reduction, covariance, noise_px })
     }
 
     /// The parameters whose profile is no parabola, or a state of lower cost if one is met.
-    pub fn skewed(&self) -> Result<Vec<Skewed>, Box<State>> {
+    pub fn skewed(&self) -> Result<Vec<Skewed>, Box<P::State>> {
+        self.skewed_where(Err)
+    }
+
+    /// The same where lower costs are no reason to go there: on that side the profile never rises.
+    pub fn skewed_or_open(&self) -> Vec<Skewed> {
+        self.skewed_where(|_| Ok(0.0)).unwrap_or_default()
+    }
+
+    /// `at_lower` says what `tau` is where a state of lower cost is met.
+    fn skewed_where(
+        &self,
+        at_lower: impl Fn(Box<P::State>) -> Result<f64, Box<P::State>>,
+    ) -> Result<Vec<Skewed>, Box<P::State>> {
         let mut found = Vec::new();
-        for parameter in self.problem.free.iter() {
+        for parameter in self.problem.free().iter() {
             let mut ratios = [1.0; 2];
             for (ratio, side) in ratios.iter_mut().zip([-1.0, 1.0]) {
-                let tau = self.tau(parameter, side * CHECKED_AT * self.deviation(parameter))?;
+                let tau =
+                    self.tau(parameter, side * CHECKED_AT * self.deviation(parameter)).or_else(&at_lower)?;
                 *ratio = CHECKED_AT / tau;
             }
             // A ratio that is no number counts as far off.
@@ -98,7 +146,7 @@ impl<'a> Profile<'a> {
     pub fn intervals(&self, coverage: f64, degrees_of_freedom: usize) -> Vec<ProfileInterval> {
         let t = student_quantile(coverage, degrees_of_freedom);
         let interval = |parameter: Parameter| {
-            let estimate = self.minimum.state.camera.get(parameter);
+            let estimate = P::value(&self.minimum.state, parameter);
             let half = t * self.deviation(parameter);
             ProfileInterval {
                 parameter,
@@ -108,11 +156,11 @@ impl<'a> Profile<'a> {
                 linear: (estimate - half, estimate + half),
             }
         };
-        self.problem.free.iter().map(interval).collect()
+        self.problem.free().iter().map(interval).collect()
     }
 
     fn deviation(&self, parameter: Parameter) -> f64 {
-        let row = self.problem.free.position(parameter).expect("the parameter is free");
+        let row = self.problem.free().position(parameter).expect("the parameter is free");
         self.covariance[(row, row)].sqrt() * self.noise_px
     }
 
@@ -134,9 +182,8 @@ impl<'a> Profile<'a> {
     }
 
     /// `|tau|` with `parameter` held `offset` away from its estimate; a state of lower cost if one is met.
-    fn tau(&self, parameter: Parameter, offset: f64) -> Result<f64, Box<State>> {
-        let held = Problem { free: self.problem.free.without(parameter), ..*self.problem };
-        let refitted = held.minimise(self.moved(parameter, offset));
+    fn tau(&self, parameter: Parameter, offset: f64) -> Result<f64, Box<P::State>> {
+        let refitted = descend(&self.problem.holding(parameter), self.moved(parameter, offset));
         let rise = (refitted.system.cost - self.minimum.system.cost) / (self.noise_px * self.noise_px);
         if rise < -LOWER {
             return Err(Box::new(refitted.state));
@@ -145,24 +192,17 @@ impl<'a> Profile<'a> {
     }
 
     /// The state with `parameter` moved and all others following it to first order.
-    fn moved(&self, parameter: Parameter, offset: f64) -> State {
-        let free = self.problem.free;
-        let n = free.len();
-        let row = free.position(parameter).expect("the parameter is free");
+    fn moved(&self, parameter: Parameter, offset: f64) -> P::State {
+        let shared = self.covariance.nrows();
+        let row = self.problem.free().position(parameter).expect("the parameter is free");
         let mut intrinsics = SVector::zeros();
-        for i in 0..n {
+        for i in 0..shared {
             intrinsics[i] = self.covariance[(i, row)] / self.covariance[(row, row)] * offset;
         }
-        let poses =
-            self.reduction.eliminated.iter().map(|factors| -factors.response(&intrinsics, n)).collect();
-        let step = Step::along(intrinsics, poses);
-        let mut state = self.minimum.state.clone();
-        let fy_per_fx = self.problem.fy_per_fx;
-        self.problem.retraction.apply(&self.minimum.state, free, fy_per_fx, &step, &mut state);
+        let state = self.problem.stepped(&self.minimum.state, self.reduction.following(intrinsics));
         // A curved path may end beside the value wanted.
-        let value = self.minimum.state.camera.get(parameter) + offset;
-        state.camera = tied(state.camera.with(parameter, value), fy_per_fx);
-        state
+        let value = P::value(&self.minimum.state, parameter) + offset;
+        self.problem.with_value(state, parameter, value)
     }
 }
 

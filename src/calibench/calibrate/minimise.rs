@@ -150,6 +150,13 @@ pub(super) trait Descent<const W: usize> {
     /// Moves `from` by a step.
     fn step(&self, from: &Self::State, step: &Step<W>, to: &mut Self::State);
 
+    /// Where a step leads.
+    fn stepped(&self, from: &Self::State, step: Step<W>) -> Self::State {
+        let mut to = from.clone();
+        self.step(from, &step, &mut to);
+        to
+    }
+
     /// Whether steps follow a curve.
     fn is_curved(&self) -> bool {
         false
@@ -158,6 +165,16 @@ pub(super) trait Descent<const W: usize> {
     /// Whether the search has left all that is possible.
     fn has_run_away(&self, _: &Self::State) -> bool {
         false
+    }
+
+    /// Iterations after which a search creeps: its steps then follow the bend of their path.
+    fn patience(&self) -> usize {
+        usize::MAX
+    }
+
+    /// The second-order correction of a step; `None` where there is none.
+    fn acceleration(&self, _: &Self::State, _damping: f64, _: &Step<W>) -> Option<Step<W>> {
+        None
     }
 
     fn max_iterations(&self) -> usize;
@@ -197,8 +214,17 @@ pub(super) fn descend<D: Descent<W>, const W: usize>(problem: &D, start: D::Stat
             break Termination::Converged;
         }
         iterations += 1;
-        problem.linearise_into(&trial, &mut trial_system);
-        if trial_system.cost < system.cost {
+        let is_followed = iterations <= problem.patience() || {
+            let bent = problem.acceleration(&state, damping, &step);
+            bent.is_some_and(|acceleration| step.bend(&acceleration, &system))
+        };
+        if is_followed && iterations > problem.patience() {
+            problem.step(&state, &step, &mut trial);
+        }
+        if is_followed {
+            problem.linearise_into(&trial, &mut trial_system);
+        }
+        if is_followed && trial_system.cost < system.cost {
             let gained = system.cost - trial_system.cost;
             std::mem::swap(&mut state, &mut trial);
             std::mem::swap(&mut system, &mut trial_system);
@@ -212,7 +238,8 @@ pub(super) fn descend<D: Descent<W>, const W: usize>(problem: &D, start: D::Stat
             if problem.has_run_away(&state) {
                 break Termination::Stalled;
             }
-        } else if step.predicted_gain <= ROUNDINGS * f64::EPSILON * system.cost + rounding_cost {
+        } else if is_followed && step.predicted_gain <= ROUNDINGS * f64::EPSILON * system.cost + rounding_cost
+        {
             // The promised gain is below what the sum of squares can show.
             break Termination::Converged;
         } else {

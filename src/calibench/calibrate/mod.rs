@@ -29,6 +29,7 @@ mod radial_centre;
 mod relaxed;
 mod report;
 mod retraction;
+mod rival;
 mod search;
 mod settings;
 pub mod single_plane;

@@ -14,6 +14,7 @@ use super::minimise::{Minimum, Problem, State};
 use super::radial_centre::radial_centre;
 use super::relaxed::{self, Relaxed};
 use super::retraction::Retraction;
+use super::rival::{Met, RIVALS, Rival};
 use super::start::{Held, focal_from_centre};
 use super::system::Reduction;
 use super::tie::{met_halfway, tied};
@@ -116,22 +117,10 @@ impl Judged {
         let Some(covariance) = self.reduction.as_ref().and_then(Reduction::intrinsics_covariance) else {
             return self;
         };
-        let (noise_px, camera) = (self.noise_px(problem), self.minimum.state.camera);
-        let variance = identifiability::variance(problem, noise_px);
-        let apart = |met: &Met| {
-            let differences = problem.free.iter().enumerate().map(|(i, parameter)| {
-                let difference = (met.camera.get(parameter) - camera.get(parameter)).abs();
-                (parameter, difference / (covariance[(i, i)] * variance).sqrt())
-            });
-            differences.max_by(|a, b| a.1.total_cmp(&b.1))
-        };
-        let rivals = met.iter().filter(|met| met.converged).filter_map(|met| {
-            let excess = (met.cost - self.minimum.system.cost) / variance;
-            let (parameter, deviations) = apart(met)?;
-            let is_rival = excess < RIVALS && deviations > SAME;
-            is_rival.then(|| Rival { parameter, value: met.camera.get(parameter), excess })
-        });
-        self.rival = rivals.min_by(|a, b| a.excess.total_cmp(&b.excess));
+        let variance = identifiability::variance(problem, self.noise_px(problem));
+        let best = Met::of(&self.minimum);
+        let value = |camera: &Camera, parameter| camera.get(parameter);
+        self.rival = best.rival(met, problem.free, &(covariance * variance), variance, value);
         self
     }
 
@@ -381,35 +370,6 @@ fn refuse_undetermined(
     strays::or_blamed(problem, &walked.best.state, refused)
 }
 
-/// A minimum that the search met.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Met {
-    camera: Camera,
-    cost: f64,
-    converged: bool,
-}
-
-impl Met {
-    pub fn of(minimum: &Minimum) -> Met {
-        Met {
-            camera: minimum.state.camera,
-            cost: minimum.system.cost,
-            converged: minimum.termination == Termination::Converged,
-        }
-    }
-}
-
-/// Another camera that explains the data nearly as well.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Rival {
-    /// The parameter that differs most, in standard deviations.
-    pub parameter: Parameter,
-    /// Its value there.
-    pub value: f64,
-    /// By how many variances the cost is higher there.
-    pub excess: f64,
-}
-
 /// A view's other tilt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Twin {
@@ -422,11 +382,6 @@ pub(super) struct Twin {
 
 /// Planes that differ by less are one and the same.
 const APART_DEGREES: f64 = 1.0;
-/// A minimum whose cost is higher by fewer variances than this is a rival: four standard deviations.
-const RIVALS: f64 = 16.0;
-/// A minimum whose parameters all lie within this many standard deviations is the same one.
-const SAME: f64 = 6.0;
-
 /// Minima that profiles may meet on their way before the search is left as it is.
 const BETTER_BY_PROFILE: usize = 3;
 

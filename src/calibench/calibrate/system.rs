@@ -39,6 +39,9 @@ pub(super) struct Reduction<const W: usize = N> {
     pub schur: DMatrix<f64>,
 }
 
+/// An acceleration beyond this part of its step is not trusted (Transtrum & Sethna 2012).
+const LARGEST_BEND: f64 = 0.75;
+
 /// A step of all unknowns.
 #[derive(Debug, Clone)]
 pub(super) struct Step<const W: usize = N> {
@@ -62,6 +65,35 @@ impl<const W: usize> Step<W> {
     /// A step that was not solved for.
     pub fn along(intrinsics: SVector<f64, W>, poses: Vec<SVector<f64, 6>>) -> Step<W> {
         Step { intrinsics, poses, ..Step::default() }
+    }
+
+    /// A part of the step.
+    pub fn times(&self, part: f64) -> Step<W> {
+        Step::along(part * self.intrinsics, self.poses.iter().map(|pose| part * pose).collect())
+    }
+
+    /// Adds half of an acceleration. False, and unchanged, where that is so long, in the metric of `system`, that
+    /// the path is not known to second order.
+    pub fn bend(&mut self, acceleration: &Step<W>, system: &System<W>) -> bool {
+        let is_known = acceleration.square(system) <= LARGEST_BEND * LARGEST_BEND * self.square(system);
+        if is_known {
+            self.intrinsics += 0.5 * acceleration.intrinsics;
+            for (pose, bend) in self.poses.iter_mut().zip(&acceleration.poses) {
+                *pose += 0.5 * bend;
+            }
+        }
+        is_known
+    }
+
+    /// `d^T diag(H) d`.
+    fn square(&self, system: &System<W>) -> f64 {
+        let weighed = |diagonal: f64, d: f64| diagonal * d * d;
+        let shared: f64 =
+            (0..system.shared).map(|i| weighed(system.intrinsics[(i, i)], self.intrinsics[i])).sum();
+        let of_view = |(view, pose): (&ViewBlock<W>, &SVector<f64, 6>)| -> f64 {
+            (0..6).map(|i| weighed(view.pose[(i, i)], pose[i])).sum()
+        };
+        shared + system.views.iter().zip(&self.poses).map(of_view).sum::<f64>()
     }
 }
 
@@ -153,6 +185,12 @@ impl<const W: usize> Reduction<W> {
             return Some(DMatrix::zeros(0, 0));
         }
         Some(self.schur.clone().cholesky()?.inverse())
+    }
+
+    /// The step of what views share with that of every pose which lowers the cost most.
+    pub fn following(&self, intrinsics: SVector<f64, W>) -> Step<W> {
+        let follow = |factors: &Eliminated<W>| -factors.response(&intrinsics, self.shared);
+        Step::along(intrinsics, self.eliminated.iter().map(follow).collect())
     }
 
     /// See [`System::covariance`].

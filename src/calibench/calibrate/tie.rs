@@ -7,7 +7,7 @@
 use crate::camera::Camera;
 
 /// The camera with `fy = a fx`, if they are tied.
-pub(super) fn tied(camera: Camera, fy_per_fx: Option<f64>) -> Camera {
+pub(super) fn tied<L>(camera: Camera<L>, fy_per_fx: Option<f64>) -> Camera<L> {
     match fy_per_fx {
         Some(ratio) => Camera { fy: ratio * camera.fx, ..camera },
         None => camera,

@@ -76,3 +76,13 @@ impl fmt::Display for Unknown {
 pub(super) fn joined(unknowns: &[Unknown]) -> String {
     unknowns.iter().map(|unknown| unknown.name()).collect::<Vec<_>>().join(" and ")
 }
+
+/// What to do where they cannot be told apart: coefficients of the lens alone are too many, all else needs tilts.
+pub(super) fn advice(unknowns: &[Unknown]) -> &'static str {
+    let is_radial = |unknown: &Unknown| unknown.group() == Unknown::RadialDistortion;
+    if unknowns.iter().all(is_radial) {
+        "Take a lens model with fewer coefficients, or give one of them a value to be held at"
+    } else {
+        "Tilt the target by 20 degrees or more, about different axes, in some views, or give one of them a value to be held at"
+    }
+}

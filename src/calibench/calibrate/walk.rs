@@ -9,7 +9,8 @@
 use super::identifiability::{least_rise, variance};
 use super::minimise::{Minimum, Problem};
 use super::retraction::scaled;
-use super::search::{Met, is_better};
+use super::rival::Met;
+use super::search::is_better;
 use super::tilt;
 use crate::camera::Parameter;
 

@@ -3,7 +3,8 @@
 use super::intervals::Skewed;
 use super::intervals::student_quantile;
 use super::report::{STRONG_CORRELATION, UNCERTAIN_FOCAL};
-use super::search::{Rival, Twin};
+use super::rival::Rival;
+use super::search::Twin;
 use super::{Calibration, Certificate, Covariance, LensCalibration, Prior, Termination, Warning};
 use crate::camera::{Camera, FreeParameters, Parameter};
 use crate::geometry::Pose;
@@ -38,17 +39,8 @@ pub(super) fn of(
     warnings.extend(correlated(&calibration.covariance, calibration.free));
     warnings.extend(focal_length_uncertain(calibration, value));
     warnings.extend(folding(&calibration.camera, largest_radius));
-    warnings.extend(skewed.iter().map(|s| Warning::NotLinear {
-        parameter: s.parameter,
-        below: s.ratios[0],
-        above: s.ratios[1],
-    }));
-    warnings.extend(rival.map(|Rival { parameter, value, excess }| Warning::Ambiguous {
-        parameter,
-        value: calibration.camera.get(parameter),
-        other: value,
-        excess,
-    }));
+    warnings.extend(not_linear(skewed));
+    warnings.extend(rival.map(|rival| ambiguous(&rival, value)));
     warnings
 }
 
@@ -57,6 +49,8 @@ pub(super) fn of_lens(
     calibration: &LensCalibration,
     largest_angle: f64,
     neighbours: Option<Warning>,
+    skewed: &[Skewed],
+    rival: Option<Rival>,
 ) -> Vec<Warning> {
     let mut warnings = Vec::new();
     if calibration.termination != Termination::Converged {
@@ -77,7 +71,20 @@ pub(super) fn of_lens(
             largest_observed: largest_angle.to_degrees(),
         });
     }
+    warnings.extend(not_linear(skewed));
+    warnings.extend(rival.map(|rival| ambiguous(&rival, value)));
     warnings
+}
+
+fn not_linear(skewed: &[Skewed]) -> impl Iterator<Item = Warning> {
+    let warning =
+        |s: &Skewed| Warning::NotLinear { parameter: s.parameter, below: s.ratios[0], above: s.ratios[1] };
+    skewed.iter().map(warning)
+}
+
+fn ambiguous(rival: &Rival, value: impl Fn(Parameter) -> f64) -> Warning {
+    let Rival { parameter, value: other, excess } = *rival;
+    Warning::Ambiguous { parameter, value: value(parameter), other, excess }
 }
 
 /// Focal lengths that are known roughly.

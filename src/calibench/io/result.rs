@@ -429,7 +429,7 @@ pub enum ResultError {
 /// let result = calibrate(&Scene::example().exact(), &Settings::standard())?;
 /// let names: Vec<String> = (1..=4).map(|view| format!("view {view}")).collect();
 /// let file = std::env::temp_dir().join("calibench-example-result.json");
-/// write_atomically(&file, CalibrationFields::of(&result, &names, Some((640, 480))).to_json().as_bytes())?;
+/// write_atomically(&file, CalibrationFields::of(&result.clone().into(), &names, Some((640, 480))).to_json().as_bytes())?;
 /// // The numbers are written with all their digits: the same camera comes back.
 /// assert_eq!(read_camera(&file)?, (result.camera, Some((640, 480))));
 /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -59,7 +59,7 @@ pub fn read_robot(path: &Path) -> Result<RobotFile, RobotError> {
 /// See [`RobotError`].
 ///
 /// ```
-/// use calibench::io::parse_robot;
+/// use calibench::io::robot::parse_robot;
 ///
 /// let robot = parse_robot("robot.csv", b"view,x,y,z,roll,pitch,yaw\n0,400,0,300,180,0,90\n")?;
 /// assert_eq!(robot.base_from_gripper[0].translation.z, 300.0);

@@ -8,7 +8,7 @@ use super::super::{Board, CalibrationError, Prior, Settings, Termination, calibr
 use super::marks::Marks;
 use super::problem::{Problem, State, rounding_cost};
 use super::report::{self, LensCalibration};
-use super::{WIDTH, shape, start};
+use super::{WIDTH, judge, shape, start, walk};
 use crate::board::View;
 use crate::camera::{Model, Parameter};
 use crate::geometry::HomographyError;
@@ -29,9 +29,9 @@ const LEAST_MARKS: usize = 4;
 ///
 /// The cost is `sum w^2 |r|^2` under the loss, with the priors' share; see [`Prior`]. The covariance is that of
 /// [`calibrate`], the noise that of a coordinate of weight 1. A camera with Brown-Conrady's lens, marks of
-/// weight 1 and a flat board is handed to [`calibrate`], with all that it checks. For all else the better of
-/// two starts is refined, one by the rays of a fisheye, one by a pinhole; nothing certifies that minimum, and
-/// views given twice count twice.
+/// weight 1 and a flat board is handed to [`calibrate`], with all that it checks. For all else the best of a few
+/// starts is refined, by the rays of a fisheye and by a pinhole, and the profiles of the parameters are walked
+/// where the cost is no parabola; nothing certifies that minimum, and views given twice count twice.
 ///
 /// # Errors
 /// As [`calibrate`]; a parameter that the model does not have; a model that cannot see every mark.
@@ -70,7 +70,6 @@ fn check(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
     check_loss_and_priors(settings)?;
     check_model(settings)?;
     let only_plain = [
-        (settings.profile_coverage.is_some(), "an interval by the profile of the cost"),
         (settings.polish, "the last digits of a minimum"),
         (settings.start.is_some(), "a start for the intrinsics"),
     ];
@@ -123,18 +122,12 @@ fn estimate(views: &[View], settings: &Settings) -> Result<LensCalibration, Cali
         max_iterations: settings.max_iterations,
         rounding_cost: rounding_cost(&marks),
     };
-    let starts = start::starts(&flat, views, settings);
-    let count = starts.len();
-    let best = starts
-        .into_iter()
-        .map(|state| descend(&flat, state))
-        .filter(|minimum| minimum.system.cost.is_finite())
-        .min_by(|a, b| a.system.cost.total_cmp(&b.system.cost))
-        .ok_or(CalibrationError::NoImage { model: settings.model() })?;
-    let state = start::with_better_tilts(&flat, best.state);
+    let walked = walk::walk(&flat, views, settings)?;
+    let state = start::with_better_tilts(&flat, walked.best.state);
     let bent = Problem { bend: settings.board.bend(), ..flat };
-    let (problem, minimum) = settled(bent, state, best.iterations);
-    report::report(minimum, &problem, &frames, region, count)
+    let (problem, minimum) = settled(bent, state, walked.best.iterations);
+    let judged = judge::judge(&problem, minimum, walked.met)?;
+    report::report(judged, &problem, &frames, region, settings)
 }
 
 /// The minimum at which the noise that weighs what is known beforehand is the noise that the residuals show.

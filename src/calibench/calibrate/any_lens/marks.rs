@@ -68,6 +68,11 @@ impl Marks {
                 weight: weight(i),
             })
             .collect();
+        Marks::of_list(list)
+    }
+
+    /// Marks in blocks.
+    pub fn of_list(list: Vec<Mark>) -> Marks {
         let blocks = list.chunks(LANES).map(block).collect();
         Marks { list, blocks }
     }

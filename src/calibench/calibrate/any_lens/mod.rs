@@ -6,7 +6,9 @@
 //!
 //! [`Model`]: crate::camera::Model
 
+mod curvature;
 mod estimate;
+mod judge;
 mod kernel;
 mod locate;
 mod marks;
@@ -15,8 +17,7 @@ mod radial;
 mod report;
 mod shape;
 mod start;
-#[cfg(test)]
-mod tests;
+mod walk;
 
 pub use estimate::calibrate_lens;
 pub use locate::{Located, locate};

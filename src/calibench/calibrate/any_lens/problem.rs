@@ -8,6 +8,7 @@ use super::super::minimise::Descent;
 use super::super::prior::Prior;
 use super::super::settings::Bend;
 use super::super::system::{Step, System};
+use super::super::tie::tied;
 use super::WIDTH;
 use super::kernel::{self, Columns, Share};
 use super::marks::Marks;
@@ -45,6 +46,9 @@ pub(super) struct Problem<'a> {
     pub max_iterations: usize,
     pub rounding_cost: f64,
 }
+
+/// A good start takes fewer iterations.
+const PATIENCE: usize = 12;
 
 /// Residuals of pixels near `p` cannot be known better than this many roundings of `p`.
 const ROUNDINGS: f64 = 8.0;
@@ -163,15 +167,25 @@ impl Descent<WIDTH> for Problem<'_> {
     fn step(&self, from: &State, step: &Step<WIDTH>, to: &mut State) {
         let shared = step.intrinsics.as_slice();
         to.camera = from.camera.moved(self.free, shared);
-        if let Some(ratio) = self.fy_per_fx {
-            to.camera.fy = ratio * to.camera.fx;
-        }
+        to.camera = tied(to.camera, self.fy_per_fx);
         for k in 0..self.deformations() {
             to.shape[k] = from.shape[k] + shared[self.free.len() + k];
         }
         for ((to, from), delta) in to.cam_from_target.iter_mut().zip(&from.cam_from_target).zip(&step.poses) {
             *to = from.perturbed(delta);
         }
+    }
+
+    fn is_curved(&self) -> bool {
+        true
+    }
+
+    fn patience(&self) -> usize {
+        PATIENCE
+    }
+
+    fn acceleration(&self, from: &State, damping: f64, step: &Step<WIDTH>) -> Option<Step<WIDTH>> {
+        Problem::acceleration(self, from, damping, step)
     }
 
     fn max_iterations(&self) -> usize {

@@ -16,6 +16,7 @@ const STEPS: usize = 12;
 /// with slope 1, and a double sphere does so with `1 / (1 + xi)`. Of these there are two, as a rule each a minimum of
 /// its own: one with a negative and one with a positive `xi`. None where a pinhole would have to see beside itself.
 pub(super) fn fitted(lens: Lens, free: FreeParameters, radii: &[[f64; 2]]) -> Vec<(Lens, f64)> {
+    use Parameter::{K4, K5, K6};
     if !lens.model().sees_behind() && radii.iter().any(|[angle, _]| *angle > BESIDE) {
         return Vec::new();
     }
@@ -28,8 +29,34 @@ pub(super) fn fitted(lens: Lens, free: FreeParameters, radii: &[[f64; 2]]) -> Ve
             let xi = lens.get(Parameter::Xi).unwrap_or(0.0);
             best_sphere(lens, free, &[xi], radii).into_iter().collect()
         }
-        _ => least_squares(lens, free, radii).map(|lens| (lens, 1.0)).into_iter().collect(),
+        // A fraction follows the radii in many ways: with all its terms, and with none below the line.
+        _ => [free, free.without(K4).without(K5).without(K6)]
+            .into_iter()
+            .take(if lens.get(K6).is_some() && [K4, K5, K6].iter().any(|&p| free.contains(p)) {
+                2
+            } else {
+                1
+            })
+            .filter_map(|free| Some((least_squares(lens, free, radii)?, 1.0)))
+            .collect(),
     }
+}
+
+/// Other lenses of the same model with nearly the same radii: a fraction follows a curve in many ways, with some of
+/// its terms left out, each perhaps beside a minimum of its own. None where the model is no fraction.
+pub(super) fn alternatives(lens: Lens, free: FreeParameters, radii: &[[f64; 2]]) -> Vec<Lens> {
+    use Parameter::{K1, K2, K3, K4, K5, K6};
+    if lens.get(K6).is_none() {
+        return Vec::new();
+    }
+    let without = |left_out: &&[Parameter]| {
+        let left_out = left_out.iter().copied().filter(|&p| free.contains(p));
+        let (lens, free) = left_out
+            .fold((lens, free), |(lens, free), p| (lens.with(p, 0.0).unwrap_or(lens), free.without(p)));
+        least_squares(lens, free, radii)
+    };
+    let subsets: [&[Parameter]; 4] = [&[K6], &[K3], &[K4, K5, K6], &[K1, K2, K3]];
+    subsets.iter().filter_map(without).collect()
 }
 
 /// A model's equation multiplied out, linear in its radial coefficients: their factors and the right-hand side.

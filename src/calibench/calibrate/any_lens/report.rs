@@ -2,9 +2,11 @@
 
 use super::super::conditioning::Conditioning;
 use super::super::estimate::noise_variance;
+use super::super::intervals::Profile;
 use super::super::minimise::Minimum;
 use super::super::target_frame::TargetFrames;
-use super::super::{Calibration, CalibrationError, Unknown, identifiability, structure, warnings};
+use super::super::{Calibration, CalibrationError, Settings, identifiability, structure, warnings};
+use super::judge::{Judged, singular};
 use super::problem::{Problem, State};
 use super::{BoardShape, WIDTH};
 use crate::camera::{Camera, Lens};
@@ -108,28 +110,25 @@ pub(super) fn variance(problem: &Problem<'_>, minimum: &Minimum<State, WIDTH>) -
 /// # Errors
 /// Normal equations that are singular.
 pub(super) fn report(
-    minimum: Minimum<State, WIDTH>,
+    judged: Judged,
     problem: &Problem<'_>,
     frames: &TargetFrames,
     region: [Vec2; 2],
-    starts: usize,
+    settings: &Settings,
 ) -> Result<LensCalibration, CalibrationError> {
+    let Judged { minimum, reduction, variance, starts, skewed, rival } = judged;
     let Minimum { state, system, termination, iterations } = &minimum;
     let residuals = Residuals::of(problem, state);
-    let settled = problem.settled(system);
-    let freedom = residuals.freedom(&minimum, settled);
-    let variance = noise_variance(&residuals.weighted, residuals.square, problem.loss, freedom);
-    let singular = || CalibrationError::NotIdentifiable {
-        inseparable: vec![Unknown::Camera, Unknown::Poses],
-        why: "the normal equations are singular".into(),
-    };
-    let reduction = system.reduction().ok_or_else(singular)?;
+    let freedom = residuals.freedom(&minimum, problem.settled(system));
     let conditioning = Conditioning::of(system, &reduction);
     if !problem.free.is_empty() {
         let why = || "the normal equations are singular".into();
         identifiability::refuse_if_singular(conditioning.as_ref(), why)?;
     }
     let unit = reduction.covariance().ok_or_else(singular)?;
+    let profile = Profile::new(problem, &minimum, &reduction, variance.sqrt());
+    let intervals = settings.profile_coverage.zip(profile);
+    let intervals = intervals.map_or(Vec::new(), |(coverage, p)| p.intervals(coverage, freedom as usize));
     let mut covariance = frames.covariance(unit, &state.cam_from_target, variance);
     covariance.fy_per_fx = problem.fy_per_fx;
     // The board's shape stands behind the camera's parameters.
@@ -160,13 +159,14 @@ pub(super) fn report(
         conditioning,
         termination: *termination,
         certificate: None,
-        intervals: Vec::new(),
+        intervals,
         starts,
         iterations: *iterations,
         warnings: Vec::new(),
         board,
         residuals: residuals.plain,
     };
-    calibration.warnings = warnings::of_lens(&calibration, residuals.largest_angle, neighbours);
+    calibration.warnings =
+        warnings::of_lens(&calibration, residuals.largest_angle, neighbours, &skewed, rival);
     Ok(calibration)
 }

@@ -8,6 +8,7 @@
 
 use super::super::minimise::descend;
 use super::super::target_frame::TargetFrames;
+use super::super::tie::tied;
 use super::super::tilt::mirrored;
 use super::super::{Settings, calibrate};
 use super::marks::{Mark, Marks};
@@ -31,18 +32,16 @@ const POSE_STEPS: usize = 6;
 const FIRST_STEPS: usize = 15;
 const LENS_STEPS: usize = 40;
 
-/// States from which the problem is worth minimising: from what the pinhole's solver finds, and, where that is
-/// certified to be no minimum beside the right one, from nothing else; from the angle polynomial otherwise.
-pub(super) fn starts(problem: &Problem<'_>, views: &[View], settings: &Settings) -> Vec<State> {
-    let from_pinhole = by_pinhole(problem, views, settings);
-    let is_certified = from_pinhole.as_ref().is_some_and(|(_, certified)| *certified);
-    let from_rays = if is_certified { None } else { by_rays(problem, settings) };
-    let both = from_pinhole.map(|(state, _)| state).into_iter().chain(from_rays);
-    both.flat_map(|state| with_model(problem, &state, settings)).collect()
+/// States with lenses of the wanted model like the one that the pinhole's solver finds with k1 and k2, however it
+/// fits, and whether that is certified.
+pub(super) fn by_pinhole(problem: &Problem<'_>, views: &[View], settings: &Settings) -> (Vec<State>, bool) {
+    match pinhole(problem, views, settings) {
+        Some((state, certified)) => (with_model(problem, &state, settings), certified),
+        None => (Vec::new(), false),
+    }
 }
 
-/// The state that the pinhole's solver finds with k1 and k2, however it fits, and whether that is certified.
-fn by_pinhole(problem: &Problem<'_>, views: &[View], settings: &Settings) -> Option<(State, bool)> {
+fn pinhole(problem: &Problem<'_>, views: &[View], settings: &Settings) -> Option<(State, bool)> {
     let mut plain = Settings::standard();
     (plain.image_size, plain.loss, plain.search) = (settings.image_size, settings.loss, false);
     let unweighted = |v: &View| View::new(v.points().to_vec(), v.pixels().to_vec()).ok();
@@ -59,8 +58,13 @@ fn by_pinhole(problem: &Problem<'_>, views: &[View], settings: &Settings) -> Opt
     is_seen(problem.views, &state).then_some((state, certified && found.termination.is_minimum()))
 }
 
+/// States with lenses of the wanted model like an angle polynomial of two terms.
+pub(super) fn by_rays(problem: &Problem<'_>, settings: &Settings) -> Vec<State> {
+    polynomial(problem, settings).map_or(Vec::new(), |state| with_model(problem, &state, settings))
+}
+
 /// The best state with an angle polynomial of two terms.
-fn by_rays(problem: &Problem<'_>, settings: &Settings) -> Option<State> {
+fn polynomial(problem: &Problem<'_>, settings: &Settings) -> Option<State> {
     let (centre, reach) = frame(problem.views, settings);
     let chosen: Vec<Marks> =
         chosen_views(problem.views).into_iter().map(|view| problem.views[view].clone()).collect();
@@ -194,10 +198,7 @@ fn with_model(problem: &Problem<'_>, state: &State, settings: &Settings) -> Vec<
         if problem.free.contains(Parameter::Fx) {
             (camera.fx, camera.fy) = (factor * camera.fx, factor * camera.fy);
         }
-        if let Some(ratio) = problem.fy_per_fx {
-            camera.fy = ratio * camera.fx;
-        }
-        State { camera, ..state.clone() }
+        State { camera: tied(camera, problem.fy_per_fx), ..state.clone() }
     };
     lenses.into_iter().map(with_lens).filter(|state| is_seen(problem.views, state)).collect()
 }
@@ -214,6 +215,20 @@ fn with_values(problem: &Problem<'_>, camera: &Camera<Lens>, settings: &Settings
         camera = camera.with_value(prior.parameter, prior.mean)?;
     }
     Some(camera)
+}
+
+/// Starts near a minimum that may lead to another one: with the same picture made by other coefficients, and with
+/// the sensor tilted other ways.
+pub(super) fn alternatives(problem: &Problem<'_>, state: &State) -> Vec<State> {
+    use Parameter::{TauX, TauY};
+    let lens = state.camera.distortion;
+    let mut lenses = radial::alternatives(lens, problem.free, &radii(problem.views, state));
+    let turned = |turned: &[Parameter]| turned.iter().try_fold(lens, |lens, &p| lens.with(p, -lens.get(p)?));
+    if problem.free.contains(TauX) && problem.free.contains(TauY) {
+        lenses.extend([[TauX].as_slice(), &[TauY], &[TauX, TauY]].into_iter().filter_map(turned));
+    }
+    let with_lens = |lens| State { camera: Camera { distortion: lens, ..state.camera }, ..state.clone() };
+    lenses.into_iter().map(with_lens).filter(|state| is_seen(problem.views, state)).collect()
 }
 
 /// Angles from the axis and distorted radii, of some marks.

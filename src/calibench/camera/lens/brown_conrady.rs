@@ -38,6 +38,7 @@ impl LensModel<5> for BrownConrady {
                     [cross, g + twice_slope * yy + six * (p1 * y) + two * (p2 * x)],
                 ],
                 by_lens: [radial(s), radial(s * s), [twice_xy, ty], [tx, twice_xy], radial(s * s * s)],
+                inside: one,
             }
         })
     }

@@ -104,7 +104,7 @@ impl Model {
 
     /// Whether its lenses may see beyond 90 degrees from the axis.
     pub fn sees_behind(self) -> bool {
-        matches!(self, Model::KannalaBrandt | Model::DoubleSphere)
+        matches!(self, Model::KannalaBrandt | Model::Division | Model::DoubleSphere)
     }
 }
 

@@ -11,6 +11,8 @@ pub(super) struct Bent<A, const P: usize> {
     /// `d(x_d, y_d) / d(x, y)`.
     pub by_ideal: [[A; 2]; 2],
     pub by_lens: [[A; 2]; P],
+    /// Positive where the formulas are a lens's: a denominator that has not passed through zero.
+    pub inside: A,
 }
 
 /// The projection of a point by a lens that bends the ideal point.
@@ -26,7 +28,7 @@ pub(super) fn project<A: Real, const P: usize>(
         let (a, b) = (a * inverse_depth, b * inverse_depth);
         [a, b, -(a * x + b * y)]
     });
-    Projected { at: bent.at, by_point, by_lens: bent.by_lens, inside: z }
+    Projected { at: bent.at, by_point, by_lens: bent.by_lens, inside: z.min(bent.inside) }
 }
 
 /// The ray of an ideal point.

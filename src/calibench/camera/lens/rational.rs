@@ -7,6 +7,7 @@
 //! x_d = x g + 2 p1 x y + p2 (s + 2 x^2)
 //! y_d = y g + p1 (s + 2 y^2) + 2 p2 x y
 //! ```
+//! A point where the denominator is 0 or less has no image: between there and the axis is a pole.
 //! (Claus & Fitzgibbon 2005 on rational lenses; the form is OpenCV's `CALIB_RATIONAL_MODEL`.)
 
 use super::pinhole::{self, Bent};
@@ -54,7 +55,8 @@ pub(super) fn bend<A: Real>(&[k1, k2, p1, p2, k3, k4, k5, k6]: &[A; 8], [x, y]: 
     let (xx, yy, xy) = (x * x, y * y, x * y);
     let s = xx + yy;
     let above = one + s * (k1 + s * (k2 + s * k3));
-    let below = one / (one + s * (k4 + s * (k5 + s * k6)));
+    let denominator = one + s * (k4 + s * (k5 + s * k6));
+    let below = one / denominator;
     let above_slope = k1 + s * (two * k2 + s * (three * k3));
     let below_slope = k4 + s * (two * k5 + s * (three * k6));
     let g = above * below;
@@ -79,6 +81,7 @@ pub(super) fn bend<A: Real>(&[k1, k2, p1, p2, k3, k4, k5, k6]: &[A; 8], [x, y]: 
             radial(gb * s * s),
             radial(gb * s * s * s),
         ],
+        inside: denominator,
     }
 }
 

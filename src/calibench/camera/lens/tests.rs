@@ -147,8 +147,13 @@ proptest! {
     ) {
         for model in Model::ALL {
             let lens = Lens::new(model, &coefficients(model, &random)).unwrap();
-            // Pinholes are tried up to 80 degrees, where a pixel is far outside of every image.
-            let most = if model.sees_behind() { lens.monotone_angle() } else { lens.monotone_angle().min(1.4) };
+            // Pinholes are tried up to 80 degrees and the division model, whose radius grows without bound too, up
+            // to 120, where a pixel is far outside of every image.
+            let most = match model {
+                Model::KannalaBrandt | Model::DoubleSphere => lens.monotone_angle(),
+                Model::Division => lens.monotone_angle().min(2.1),
+                _ => lens.monotone_angle().min(1.4),
+            };
             let angle = part * most;
             let ray = Vec3::new(libm::sin(angle) * libm::cos(around), libm::sin(angle) * libm::sin(around), libm::cos(angle));
             let at = lens.project(&ray).unwrap();
@@ -203,7 +208,7 @@ fn outside_the_domain_there_is_no_ray() {
         Lens::new(Model::BrownConrady, &[-0.3, 0.0, 0.0, 0.0, 0.0]),
         Lens::new(Model::Rational, &[-0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
         Lens::new(Model::KannalaBrandt, &[-0.1, 0.0, 0.0, 0.0]),
-        Lens::new(Model::Division, &[-1.0]),
+        Lens::new(Model::Division, &[1.0]),
         Lens::new(Model::DoubleSphere, &[0.2, 0.7]),
     ];
     for lens in folding.map(Result::unwrap) {

@@ -62,5 +62,6 @@ pub(super) fn bend<A: Real>(c: &[A; 12], [x, y]: [A; 2]) -> Bent<A, 12> {
         at: [bent.at[0] + s1 * s + s2 * ss, bent.at[1] + s3 * s + s4 * ss],
         by_ideal: [[a + along * x, b + along * y], [c + down * x, d + down * y]],
         by_lens: std::array::from_fn(|i| if i < 8 { bent.by_lens[i] } else { prisms[i - 8] }),
+        inside: bent.inside,
     }
 }

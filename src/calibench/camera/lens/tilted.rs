@@ -107,6 +107,7 @@ fn tilt<A: Real>(angles: &[A; 4], bent: Bent<A, 12>) -> Bent<A, 14> {
             13 => by_tau_y,
             _ => through(bent.by_lens[i]),
         }),
+        inside: bent.inside.min(q[2]),
     }
 }
 

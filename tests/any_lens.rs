@@ -1,8 +1,14 @@
-use super::super::{Board, CalibrationError, Settings, calibrate, calibrate_lens};
-use crate::board::View;
-use crate::camera::{BrownConrady, Camera, Lens, Model, Parameter};
-use crate::geometry::{Pose, Vec2, Vec3, rotation};
-use crate::synth::{Scene, Stream, StreamKey, Truth};
+//! Cameras with lenses of every model, from exact and noisy marks: the estimate, its covariance, and the choice
+//! between models.
+
+use calibench::board::View;
+use calibench::calibrate::{
+    Board, CalibrationError, Candidate, LensCalibration, Settings, Warning, calibrate, calibrate_lens,
+    compare_models,
+};
+use calibench::camera::{BrownConrady, Camera, Lens, Model, Parameter};
+use calibench::geometry::{Pose, Vec2, Vec3, rotation};
+use calibench::synth::{Scene, Stream, StreamKey, Truth};
 
 /// Views of a 9 x 7 board from many sides, close enough for the wanted half field of view.
 fn poses(distance: f64) -> Vec<Pose> {
@@ -160,7 +166,7 @@ fn a_weight_of_two_counts_as_four_marks() {
     // The same camera and covariance, whatever the unit of the weights; the noise is that of weight 1.
     assert!((twice.camera.fx - once.camera.fx).abs() < 1e-6);
     assert!((twice.sigma_px / once.sigma_px - 2.0).abs() < 1e-9);
-    let sd = |c: &super::LensCalibration| c.covariance.standard_deviation(Parameter::Fx).unwrap();
+    let sd = |c: &LensCalibration| c.covariance.standard_deviation(Parameter::Fx).unwrap();
     assert!((sd(&twice) / sd(&once) - 1.0).abs() < 1e-6);
     // A mark of weight w is worth w^2: marks that are 100 times noisier than the rest change nothing.
     let mut pixels: Vec<Vec<Vec2>> = views.iter().map(|view| view.pixels().to_vec()).collect();
@@ -231,4 +237,60 @@ fn a_camera_of_the_special_estimator_is_one_of_any_lens() {
         let seen = truth.cam_from_target[0].apply(&Vec3::new(point.x, point.y, 0.0));
         assert!((any.pixel(&seen).unwrap() - plain.project(&seen).unwrap()).norm() < 1e-12);
     }
+}
+
+#[test]
+fn the_model_that_made_the_marks_is_chosen() {
+    let truth = camera(Model::BrownConrady, 900.0, &[-0.2, 0.06, 1e-3, -5e-4, 0.0]);
+    let views = seen(&truth, &poses(130.0), |_| 0.0, 0.1, 9);
+    let (compared, refused) = compare_models(&views, &Settings::standard(), &Candidate::usual());
+    assert!(compared.len() + refused.len() == 8);
+    let best = &compared[0];
+    // What has fewer coefficients, or others, predicts worse.
+    assert_eq!(best.candidate.model, Model::BrownConrady);
+    let named = |model| compared.iter().find(|c| c.candidate.model == model);
+    let division = named(Model::Division).unwrap();
+    assert!(division.hold_out_px > best.hold_out_px, "{:?} {:?}", division.hold_out_px, best.hold_out_px);
+    assert!(division.bic > best.bic + 10.0, "{} {}", division.bic, best.bic);
+    let (wins, folds) = best.wins_against(division);
+    assert!(wins == folds && folds == 5, "{wins} of {folds}");
+    assert!(best.correlation.abs() < 0.15, "{}", best.correlation);
+}
+
+#[test]
+fn a_division_lens_is_found_from_marks_beside_the_camera() {
+    let truth = camera(Model::Division, 330.0, &[-0.2]);
+    let views = seen(&truth, &poses(16.0), |_| 0.0, 0.1, 3);
+    let found = calibrate_lens(&views, &settings(&truth)).unwrap();
+    let farthest = found
+        .cam_from_target
+        .iter()
+        .zip(&views)
+        .flat_map(|(pose, view)| view.points().iter().map(|p| pose.apply(&Vec3::new(p.x, p.y, 0.0)).z))
+        .fold(f64::INFINITY, f64::min);
+    assert!(farthest < 0.0 && found.termination.is_minimum(), "{farthest} {:?}", found.termination);
+    let error: Vec<f64> =
+        found.free.iter().map(|p| found.camera.value(p).unwrap() - truth.value(p).unwrap()).collect();
+    let square = found.covariance.normalised_error_squared(&error).unwrap();
+    // Chi-squared with five degrees of freedom: 25.7 is exceeded once in ten thousand.
+    assert!(square < 25.7, "{square}");
+}
+
+/// A fraction whose numerator and denominator nearly cancel: the search goes along a curved valley.
+#[test]
+fn a_rational_lens_with_terms_that_nearly_cancel_converges_and_says_what_its_deviations_are_worth() {
+    let truth = camera(Model::Rational, 700.0, &[0.6, 0.05, 1e-3, -5e-4, 0.001, 0.9, 0.2, 0.01]);
+    let settings = Settings::of_model(Model::Rational).with_image_size((1280, 960));
+    let (mut warned, mut sum) = (0, 0.0);
+    for trial in 0..8 {
+        let views = seen(&truth, &poses(80.0), |_| 0.0, 0.2, trial);
+        let found = calibrate_lens(&views, &settings).unwrap();
+        assert!(found.termination.is_minimum(), "{trial}: {:?}", found.termination);
+        sum += found.sigma_px / 0.2;
+        let speaks = |w: &Warning| matches!(w, Warning::NotLinear { .. } | Warning::Ambiguous { .. });
+        warned += usize::from(found.warnings.iter().any(speaks));
+    }
+    // 8 x 1428 degrees of freedom: a fitted noise is that of the marks to 0.7 %.
+    assert!((sum / 8.0 - 1.0).abs() < 0.03, "{sum}");
+    assert!(warned >= 6, "{warned}");
 }

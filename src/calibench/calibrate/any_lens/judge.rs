@@ -1,0 +1,166 @@
+//! Is the cost a parabola around the minimum, and is there another camera that is as good?
+
+use super::super::intervals::{Profile, Profiled, Skewed};
+use super::super::minimise::{Descent, Minimum, descend};
+use super::super::rival::{Met, Rival};
+use super::super::system::Reduction;
+use super::super::tie::tied;
+use super::super::{CalibrationError, Unknown};
+use super::problem::{Problem, State};
+use super::{WIDTH, report, start, walk};
+use crate::camera::{Camera, FreeParameters, Lens, Parameter};
+use nalgebra::SVector;
+
+/// A minimum with what is needed to state it.
+pub(super) struct Judged {
+    pub minimum: Minimum<State, WIDTH>,
+    pub reduction: Reduction<WIDTH>,
+    /// Variance of a coordinate of weight 1, px^2.
+    pub variance: f64,
+    /// Starts that were refined.
+    pub starts: usize,
+    /// Parameters whose cost is no parabola.
+    pub skewed: Vec<Skewed>,
+    /// Another camera that is nearly as good.
+    pub rival: Option<Rival>,
+}
+
+/// Minima that profiles may meet on their way before the search is left as it is.
+const BETTER_BY_PROFILE: usize = 5;
+/// Where the check of linearity looks, in standard deviations.
+const CHECKED_AT: f64 = 2.0;
+/// Iterations of a refit with one parameter held: where it takes more, its cost so far is an upper bound.
+const MOST_REFIT: usize = 40;
+/// A cost that rises by another factor than linear theory says is worth the profiles.
+const TOLERATED: f64 = 0.1;
+
+/// Judges a minimum, and replaces it by a lower one that lies on a profile; `met` are those that the search met.
+///
+/// # Errors
+/// Normal equations that are singular.
+pub(super) fn judge(
+    problem: &Problem<'_>,
+    mut minimum: Minimum<State, WIDTH>,
+    mut met: Vec<Met<Lens>>,
+) -> Result<Judged, CalibrationError> {
+    let mut skewed = Vec::new();
+    if !is_parabola(problem, &minimum)? {
+        for state in start::alternatives(problem, &minimum.state) {
+            take_better(problem, &mut minimum, descend(problem, state), &mut met);
+        }
+        skewed = profiles(problem, &mut minimum, &mut met)?;
+    }
+    let reduction = reduction(&minimum)?;
+    let variance = report::variance(problem, &minimum);
+    let covariance = reduction.intrinsics_covariance();
+    let value = |camera: &Camera<Lens>, parameter| camera.value(parameter).unwrap_or(0.0);
+    let rival = covariance
+        .and_then(|unit| walk::met(&minimum).rival(&met, problem.free, &(unit * variance), variance, value));
+    Ok(Judged { minimum, reduction, variance, starts: met.len(), skewed, rival })
+}
+
+/// Notes a minimum, and takes it where it is better.
+fn take_better(
+    problem: &Problem<'_>,
+    minimum: &mut Minimum<State, WIDTH>,
+    next: Minimum<State, WIDTH>,
+    met: &mut Vec<Met<Lens>>,
+) -> bool {
+    let is_better = walk::is_better(problem, &next, minimum);
+    met.push(walk::met(&next));
+    if is_better {
+        let iterations = minimum.iterations + next.iterations;
+        *minimum = Minimum { iterations, ..next };
+    }
+    is_better
+}
+
+/// The parameters whose profile is no parabola, around the best minimum that a profile meets.
+fn profiles(
+    problem: &Problem<'_>,
+    minimum: &mut Minimum<State, WIDTH>,
+    met: &mut Vec<Met<Lens>>,
+) -> Result<Vec<Skewed>, CalibrationError> {
+    for _ in 0..BETTER_BY_PROFILE {
+        let reduction = reduction(minimum)?;
+        let noise_px = report::variance(problem, minimum).sqrt();
+        let Some(profile) = Profile::new(problem, minimum, &reduction, noise_px) else { break };
+        let lower = match profile.skewed() {
+            Ok(skewed) => return Ok(skewed),
+            Err(lower) => lower,
+        };
+        // What is lower at the end of a valley without end is no camera, but the deviations are worth little.
+        let open = profile.skewed_or_open();
+        if !take_better(problem, minimum, descend(problem, *lower), met) {
+            return Ok(open);
+        }
+    }
+    Ok(Vec::new())
+}
+
+fn reduction(minimum: &Minimum<State, WIDTH>) -> Result<Reduction<WIDTH>, CalibrationError> {
+    minimum.system.reduction().ok_or_else(singular)
+}
+
+/// The normal equations say nothing about some combination.
+pub(super) fn singular() -> CalibrationError {
+    CalibrationError::NotIdentifiable {
+        inseparable: vec![Unknown::Camera, Unknown::Poses],
+        why: "the normal equations are singular".into(),
+    }
+}
+
+/// Whether the cost rises as linear theory says on the straight way to where it says least: two standard
+/// deviations of the worst-known combination of shared unknowns, both ways. Two evaluations say that the
+/// profiles need not be walked.
+fn is_parabola(problem: &Problem<'_>, minimum: &Minimum<State, WIDTH>) -> Result<bool, CalibrationError> {
+    let reduction = &reduction(minimum)?;
+    let noise_px = report::variance(problem, minimum).sqrt();
+    let Some(weakest) = weakest(reduction) else { return Ok(true) };
+    let mut system = problem.system();
+    Ok([-CHECKED_AT, CHECKED_AT].into_iter().all(|deviations| {
+        let step = reduction.following(deviations * noise_px * weakest);
+        problem.linearise_into(&problem.stepped(&minimum.state, step), &mut system);
+        let rise = (system.cost - minimum.system.cost) / (noise_px * noise_px);
+        (CHECKED_AT / rise.max(0.0).sqrt() - 1.0).abs() <= TOLERATED
+    }))
+}
+
+/// One standard deviation, for unit noise, along the worst-known combination in units in which each unknown alone
+/// is known equally well; `None` where nothing is shared or free.
+fn weakest(reduction: &Reduction<WIDTH>) -> Option<SVector<f64, WIDTH>> {
+    let shared = reduction.schur.nrows();
+    let covariance = reduction.intrinsics_covariance().filter(|_| shared > 0)?;
+    let scale = reduction.schur.diagonal().map(f64::sqrt);
+    let scaled = covariance.map_with_location(|i, j, c| c * scale[i] * scale[j]).symmetric_eigen();
+    let worst = scaled.eigenvalues.imax();
+    let deviation = scaled.eigenvalues[worst].max(0.0).sqrt();
+    let mut direction = SVector::zeros();
+    for i in 0..shared {
+        direction[i] = deviation * scaled.eigenvectors[(i, worst)] / scale[i];
+    }
+    Some(direction)
+}
+
+impl Profiled<WIDTH> for Problem<'_> {
+    fn free(&self) -> FreeParameters {
+        self.free
+    }
+
+    fn holding(&self, parameter: Parameter) -> Self {
+        let max_iterations = self.max_iterations.min(MOST_REFIT);
+        Problem { free: self.free.without(parameter), max_iterations, ..*self }
+    }
+
+    fn value(state: &State, parameter: Parameter) -> f64 {
+        state.camera.value(parameter).unwrap_or(0.0)
+    }
+
+    fn with_value(&self, mut state: State, parameter: Parameter, value: f64) -> State {
+        if let Some(camera) = state.camera.with_value(parameter, value) {
+            state.camera = camera;
+        }
+        state.camera = tied(state.camera, self.fy_per_fx);
+        state
+    }
+}

@@ -1,0 +1,69 @@
+//! Which minima do the starts lead to?
+
+use super::super::minimise::{Minimum, descend};
+use super::super::rival::{Met, RIVALS};
+use super::super::{CalibrationError, Settings, Termination};
+use super::problem::{Problem, State};
+use super::{WIDTH, report, start};
+use crate::board::View;
+use crate::camera::Lens;
+
+/// The best of the minima, and all that were met.
+pub(super) struct Walked {
+    pub best: Minimum<State, WIDTH>,
+    pub met: Vec<Met<Lens>>,
+}
+
+/// Refines the starts: those that the pinhole's solver gives, and, unless that is certified to have found no
+/// minimum beside the right one and one of them converges, those that an angle polynomial gives.
+///
+/// # Errors
+/// No lens of the model sees every mark.
+pub(super) fn walk(
+    problem: &Problem<'_>,
+    views: &[View],
+    settings: &Settings,
+) -> Result<Walked, CalibrationError> {
+    let (from_pinhole, is_certified) = start::by_pinhole(problem, views, settings);
+    let mut minima = refined(problem, from_pinhole);
+    let is_found = minima.iter().any(|m| m.termination == Termination::Converged);
+    if !(is_certified && is_found) {
+        minima.extend(refined(problem, start::by_rays(problem, settings)));
+    }
+    let met = minima.iter().map(met).collect();
+    let better = |best, next| if is_better(problem, &next, &best) { next } else { best };
+    let best = minima.into_iter().reduce(better);
+    let best = best.ok_or(CalibrationError::NoImage { model: settings.model() })?;
+    Ok(Walked { best, met })
+}
+
+fn refined(problem: &Problem<'_>, starts: Vec<State>) -> Vec<Minimum<State, WIDTH>> {
+    let minima = starts.into_iter().map(|state| descend(problem, state));
+    minima.filter(|minimum| minimum.system.cost.is_finite()).collect()
+}
+
+/// Whether one minimum is to be preferred to another: it costs less, and if it is none, because the search went on
+/// and on, so much less that chance does not explain it. Where numerator and denominator of a fraction nearly
+/// cancel, a valley goes on to coefficients without end, at a fraction of a variance.
+pub(super) fn is_better(
+    problem: &Problem<'_>,
+    next: &Minimum<State, WIDTH>,
+    best: &Minimum<State, WIDTH>,
+) -> bool {
+    let [next_ends, best_ends] = [next, best].map(|m| m.termination == Termination::Converged);
+    let margin = match (next_ends, best_ends) {
+        (true, false) => -RIVALS * report::variance(problem, next),
+        (false, true) => RIVALS * report::variance(problem, best),
+        _ => 0.0,
+    };
+    next.system.cost + margin < best.system.cost
+}
+
+/// A minimum among those that were met.
+pub(super) fn met(minimum: &Minimum<State, WIDTH>) -> Met<Lens> {
+    Met {
+        camera: minimum.state.camera,
+        cost: minimum.system.cost,
+        converged: minimum.termination == Termination::Converged,
+    }
+}

@@ -1,0 +1,69 @@
+//! Does another camera explain the data nearly as well? Minima that a search met, compared with the one it chose.
+
+use super::Termination;
+use super::blocks::N;
+use super::minimise::{Minimum, State};
+use crate::camera::{BrownConrady, Camera, FreeParameters, Parameter};
+use nalgebra::DMatrix;
+
+/// A minimum whose cost is higher by fewer variances than this is a rival: four standard deviations.
+pub(super) const RIVALS: f64 = 16.0;
+/// A minimum whose parameters all lie within this many standard deviations is the same one.
+const SAME: f64 = 6.0;
+
+/// A minimum that the search met.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Met<L = BrownConrady> {
+    pub camera: Camera<L>,
+    pub cost: f64,
+    pub converged: bool,
+}
+
+/// Another camera that explains the data nearly as well.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Rival {
+    /// The parameter that differs most, in standard deviations.
+    pub parameter: Parameter,
+    /// Its value there.
+    pub value: f64,
+    /// By how many variances the cost is higher there.
+    pub excess: f64,
+}
+
+impl Met {
+    pub fn of(minimum: &Minimum<State, N>) -> Met {
+        Met {
+            camera: minimum.state.camera,
+            cost: minimum.system.cost,
+            converged: minimum.termination == Termination::Converged,
+        }
+    }
+}
+
+impl<L> Met<L> {
+    /// The best of the other minima that is another camera and nearly as good; `covariance` is that of the free
+    /// parameters, px^2 and so on, `variance` that of a coordinate, px^2.
+    pub fn rival(
+        &self,
+        others: &[Met<L>],
+        free: FreeParameters,
+        covariance: &DMatrix<f64>,
+        variance: f64,
+        value: impl Fn(&Camera<L>, Parameter) -> f64,
+    ) -> Option<Rival> {
+        let apart = |other: &Met<L>| {
+            let differences = free.iter().enumerate().map(|(i, parameter)| {
+                let difference = (value(&other.camera, parameter) - value(&self.camera, parameter)).abs();
+                (parameter, difference / covariance[(i, i)].sqrt())
+            });
+            differences.max_by(|a, b| a.1.total_cmp(&b.1))
+        };
+        let rivals = others.iter().filter(|other| other.converged).filter_map(|other| {
+            let excess = (other.cost - self.cost) / variance;
+            let (parameter, deviations) = apart(other)?;
+            let is_rival = excess < RIVALS && deviations > SAME;
+            is_rival.then(|| Rival { parameter, value: value(&other.camera, parameter), excess })
+        });
+        rivals.min_by(|a, b| a.excess.total_cmp(&b.excess))
+    }
+}
