@@ -7,9 +7,10 @@ use super::quantity::Quantity;
 use super::spec::{Length, Spec};
 use super::spec_error::SpecError;
 use calibench::calibrate::{Covariance, Settings};
-use calibench::camera::{Camera, FreeParameters};
+use calibench::camera::{Camera, FreeParameters, Lens, Model};
 use calibench::evaluate::cramer_rao;
 use calibench::geometry::Vec2;
+use calibench::io::result::LensFields;
 use calibench::io::shown::on_one_line;
 use calibench::synth::{Scene, Stream, StreamKey, Truth};
 
@@ -29,10 +30,10 @@ pub struct Cell {
     pub(super) design: Design,
     pub(super) settings: Settings,
     pub(super) free: FreeParameters,
-    pub(super) camera: Camera,
+    pub(super) camera: Camera<Lens>,
     pub(super) points: Vec<Vec2>,
     /// The scene, where every trial meets the same poses.
-    pub(super) scene: Option<Scene>,
+    pub(super) scene: Option<Scene<Lens>>,
     pub(super) length: Option<(Length, [Vec2; 2])>,
     /// Seed and name of the streams.
     pub(super) seed: u64,
@@ -88,7 +89,7 @@ impl Cell {
             spec.factor.iter().zip(&labels).map(|(f, label)| format!("{} = {label}", f.name)).collect();
         let name =
             if named.is_empty() { "-".to_string() } else { on_one_line(&named.join(", ")).into_owned() };
-        let camera = Camera::from(design.scene.camera);
+        let LensFields(camera) = design.scene.camera;
         // Without the cell in the key, trial t draws the same numbers in every cell.
         let scenario =
             if spec.common_random_numbers { "study".to_string() } else { format!("study: {name}") };
@@ -115,7 +116,7 @@ impl Cell {
     }
 
     /// The noise-free scene of a trial.
-    pub(super) fn draw_scene(&self, trial: u64) -> Result<Scene, SpecError> {
+    pub(super) fn draw_scene(&self, trial: u64) -> Result<Scene<Lens>, SpecError> {
         let sight = Sight { camera: &self.camera, image: self.design.scene.image, points: &self.points };
         let poses = self.design.scene.poses.generate(&sight, &mut self.stream(trial, "pose"));
         let cam_from_target = poses.map_err(|cause| SpecError::Poses { cell: self.name.clone(), cause })?;
@@ -134,8 +135,9 @@ impl Cell {
 
     fn predict(&self, quantities: &[Quantity]) -> Result<Prediction, SpecError> {
         let sigma = self.design.scene.noise_px;
-        let of =
-            |scene: &Scene| Prediction::of(quantities, &scene.truth, self.free, sigma, self.length.as_ref());
+        let estimated = (self.model(), self.free);
+        let length = self.length.as_ref();
+        let of = |scene: &Scene<Lens>| Prediction::of(quantities, &scene.truth, estimated, sigma, length);
         match &self.scene {
             Some(scene) => Ok(of(scene)),
             None => {
@@ -147,9 +149,22 @@ impl Cell {
         }
     }
 
-    /// The Cramer-Rao covariance of the cell's scene; `None` where it is singular, and where each trial has
-    /// poses of its own.
+    /// The lens model that is estimated.
+    pub fn model(&self) -> Model {
+        self.settings.model()
+    }
+
+    /// Whether the estimator's lens model is the truth's.
+    pub fn knows_its_lens(&self) -> bool {
+        self.model() == self.camera.distortion.model()
+    }
+
+    /// The Cramer-Rao covariance of the cell's scene; `None` where it is singular, where each trial has poses of
+    /// its own, and where another lens is estimated.
     pub fn bound(&self) -> Option<Covariance> {
+        if !self.knows_its_lens() {
+            return None;
+        }
         cramer_rao(&self.scene.as_ref()?.truth, self.free, self.noise_px()).ok()
     }
 

@@ -32,7 +32,12 @@ pub(super) fn designs(spec: &Spec, text: &str) -> Result<Vec<(Vec<usize>, Design
         spec.trials.batch,
     )?;
     let base = Design { scene: spec.scene.clone(), estimator: spec.estimator.clone() };
-    let base = Table::try_from(&base).expect("a design came from TOML and goes back into it");
+    let mut base = Table::try_from(&base).expect("a design came from TOML and goes back into it");
+    if let Some(estimator) = base.get_mut("estimator").and_then(Value::as_table_mut)
+        && !spec.estimator.is_free_named
+    {
+        estimator.remove("free");
+    }
     let counts: Vec<usize> = spec.factor.iter().map(|f| f.levels.len()).collect();
     let mut points = limits::Points::default();
     let mut count = |(levels, design): (Vec<usize>, Design)| {

@@ -22,6 +22,33 @@ pub(super) mod free {
     }
 }
 
+/// See [`free`].
+#[derive(serde::Deserialize)]
+pub(super) struct Free(#[serde(with = "free")] pub calibench::camera::FreeParameters);
+
+/// A lens model by its name.
+pub(super) mod model {
+    use calibench::camera::Model;
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    pub fn usual() -> Model {
+        Model::BrownConrady
+    }
+
+    pub fn is_usual(model: &Model) -> bool {
+        *model == usual()
+    }
+
+    pub fn serialize<S: Serializer>(model: &Model, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(model.name())
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Model, D::Error> {
+        String::deserialize(deserializer)?.parse().map_err(D::Error::custom)
+    }
+}
+
 /// Values by parameter: `{ k2 = 0.05 }`.
 pub(super) mod held {
     use calibench::camera::Parameter;

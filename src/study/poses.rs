@@ -2,7 +2,7 @@
 //! image.
 
 use super::lists;
-use calibench::camera::Camera;
+use calibench::camera::{Camera, Imaging, Lens};
 use calibench::geometry::{Mat3, Pose, Vec2, Vec3, rotation};
 use calibench::synth::Stream;
 use calibench::synth::scene::looking_at_centre;
@@ -112,7 +112,7 @@ const HALVINGS: usize = 24;
 
 /// What a pose must respect.
 pub(super) struct Sight<'a> {
-    pub camera: &'a Camera,
+    pub camera: &'a Camera<Lens>,
     pub image: (usize, usize),
     pub points: &'a [Vec2],
 }
@@ -224,13 +224,12 @@ fn tilted(direction: f64, tilt: f64, roll: f64) -> Mat3 {
 impl Sight<'_> {
     /// Whether every point lies within the image, where the lens model is one-to-one.
     fn holds(&self, pose: &Pose) -> bool {
-        let radius = self.camera.distortion.monotone_radius();
+        let is_one_to_one = self.camera.distortion.one_to_one();
         let (right, bottom) = (self.image.0 as f64 - 0.5, self.image.1 as f64 - 0.5);
         self.points.iter().all(|p| {
             let c = pose.apply(&Vec3::new(p.x, p.y, 0.0));
-            c.z > 0.0
-                && c.xy().norm() < radius * c.z
-                && self.camera.project(&c).is_some_and(|pixel| {
+            is_one_to_one(&c)
+                && Lens::image(self.camera, &c).is_some_and(|pixel| {
                     (-0.5..=right).contains(&pixel.x) && (-0.5..=bottom).contains(&pixel.y)
                 })
         })
@@ -265,7 +264,7 @@ mod tests {
 
     fn generate(poses: &Poses) -> Result<Vec<Pose>, PosesError> {
         let points = Truth::example_board().points();
-        let camera = Truth::example_camera();
+        let camera = Truth::example_camera().into();
         let sight = Sight { camera: &camera, image: Truth::EXAMPLE_IMAGE, points: &points };
         poses.generate(
             &sight,

@@ -4,7 +4,7 @@
 use super::quantity::Quantity;
 use super::spec::Length;
 use calibench::calibrate::Covariance;
-use calibench::camera::{Camera, FreeParameters};
+use calibench::camera::{Camera, FreeParameters, Lens, Model};
 use calibench::evaluate::{RmseDistribution, cramer_rao};
 use calibench::geometry::Vec2;
 use calibench::synth::Truth;
@@ -33,11 +33,15 @@ impl Prediction {
     /// For one set of poses.
     pub(super) fn of(
         quantities: &[Quantity],
-        truth: &Truth,
-        free: FreeParameters,
+        truth: &Truth<Lens>,
+        (model, free): (Model, FreeParameters),
         sigma_px: f64,
         length: Option<&(Length, [Vec2; 2])>,
     ) -> Prediction {
+        // Theory speaks of estimators that know what lens it is.
+        if model != truth.camera.distortion.model() {
+            return Prediction(vec![None; quantities.len()]);
+        }
         let bound = cramer_rao(truth, free, sigma_px).ok();
         let rmse = RmseDistribution {
             sigma_px,
@@ -89,14 +93,15 @@ fn nees(n: f64, d: f64) -> Option<Expected> {
 
 /// `sqrt(g^T P g)` with the gradient `g` of the measured length by the intrinsics.
 fn length_sd(
-    camera: &Camera,
+    camera: &Camera<Lens>,
     free: FreeParameters,
     bound: &Covariance,
     (length, pixels): &(Length, [Vec2; 2]),
 ) -> Option<f64> {
     let slope = |p| {
         let step = GRADIENT_STEP * bound.standard_deviation(p)?;
-        let at = |sign: f64| length.error_mm(&camera.with(p, camera.get(p) + sign * step), pixels);
+        let value = camera.value(p)?;
+        let at = |sign: f64| length.error_mm(&camera.with_value(p, value + sign * step)?, pixels);
         Some((at(1.0)? - at(-1.0)?) / (2.0 * step))
     };
     let gradient = nalgebra::DVector::from_vec(free.iter().map(slope).collect::<Option<Vec<f64>>>()?);

@@ -1,7 +1,7 @@
 //! What is measured in a trial? Errors of what is estimated, and how well the data were fitted.
 
 use super::spec::Length;
-use calibench::camera::{Camera, FreeParameters, Parameter};
+use calibench::camera::{Camera, FreeParameters, Imaging, Lens, Parameter};
 use calibench::geometry::{Vec2, Vec3};
 
 /// One number of a trial.
@@ -56,19 +56,28 @@ impl Quantity {
 
 impl Length {
     /// The pixels of both ends in the true camera; `None` where the lens shows none.
-    pub(super) fn pixels(&self, camera: &Camera) -> Option<[Vec2; 2]> {
+    pub(super) fn pixels(&self, camera: &Camera<Lens>) -> Option<[Vec2; 2]> {
         let (sin, cos) = libm::sincos(self.direction_deg.to_radians());
         let half = Vec3::new(cos, sin, 0.0) * (0.5 * self.length_mm);
         let centre = Vec3::from(self.centre_mm);
-        let radius = camera.distortion.monotone_radius();
-        let see = |p: Vec3| if p.xy().norm() < radius * p.z { camera.project(&p) } else { None };
+        let is_one_to_one = camera.distortion.one_to_one();
+        let see = |p: Vec3| if is_one_to_one(&p) { Lens::image(camera, &p) } else { None };
         Some([see(centre - half)?, see(centre + half)?])
     }
 
     /// Measured - true length, mm, of the segment seen at `pixels`; `None` where the camera's lens model has
     /// no ray.
-    pub(super) fn error_mm(&self, camera: &Camera, pixels: &[Vec2; 2]) -> Option<f64> {
-        let [a, b] = [camera.normalised_ray(&pixels[0]).ok()?, camera.normalised_ray(&pixels[1]).ok()?];
+    pub(super) fn error_mm(&self, camera: &Camera<Lens>, pixels: &[Vec2; 2]) -> Option<f64> {
+        let [a, b] = [ideal(camera, &pixels[0])?, ideal(camera, &pixels[1])?];
         Some((b - a).norm() * self.centre_mm[2] - self.length_mm)
     }
+}
+
+/// Where the ray of a pixel meets the plane at distance 1; `None` where it does not.
+fn ideal(camera: &Camera<Lens>, pixel: &Vec2) -> Option<Vec2> {
+    if let Some(plain) = camera.brown_conrady() {
+        return plain.normalised_ray(pixel).ok();
+    }
+    let ray = camera.ray(pixel).ok()?;
+    (ray.z > 0.0).then(|| ray.xy() / ray.z)
 }

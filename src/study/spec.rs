@@ -9,9 +9,9 @@ use super::poses::Poses;
 use super::spec_error::SpecError;
 use calibench::board::Board;
 use calibench::calibrate::{Loss, Settings};
-use calibench::camera::{Camera, FreeParameters, Parameter};
+use calibench::camera::{FreeParameters, Model, Parameter};
 use calibench::geometry::Vec2;
-use calibench::io::result::CameraFields;
+use calibench::io::result::LensFields;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -51,8 +51,8 @@ const MOST_NOISE_PX: f64 = 1e6;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneSpec {
-    /// The virtual camera.
-    pub camera: CameraFields,
+    /// The virtual camera: its parameters by name, with `model` where the lens is not Brown-Conrady's.
+    pub camera: LensFields,
     /// Image width and height, px.
     #[serde(deserialize_with = "lists::pair")]
     pub image: (usize, usize),
@@ -102,11 +102,17 @@ pub struct Length {
 
 /// Which parameters are estimated, and by what loss.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(from = "EstimatorText")]
 pub struct Estimator {
-    /// Free parameters.
-    #[serde(default = "chapter_model", with = "names::free")]
+    /// The lens model, which may differ from the truth's.
+    #[serde(with = "names::model", skip_serializing_if = "names::model::is_usual")]
+    pub model: Model,
+    /// Free parameters; the model's usual ones where none are named.
+    #[serde(with = "names::free")]
     pub free: FreeParameters,
+    /// Whether the file names them: if not, they follow a model that a factor sets.
+    #[serde(skip)]
+    pub(super) is_free_named: bool,
     /// Values at which others are held; skew and distortion are held at 0 otherwise, the principal point at
     /// the image's centre.
     #[serde(default, with = "names::held", skip_serializing_if = "BTreeMap::is_empty")]
@@ -114,6 +120,29 @@ pub struct Estimator {
     /// Loss of a residual.
     #[serde(default)]
     pub loss: LossChoice,
+}
+
+/// An estimator as a file says it.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EstimatorText {
+    #[serde(default = "names::model::usual", with = "names::model")]
+    model: Model,
+    #[serde(default)]
+    free: Option<names::Free>,
+    #[serde(default, with = "names::held")]
+    hold: BTreeMap<Parameter, f64>,
+    #[serde(default)]
+    loss: LossChoice,
+}
+
+impl From<EstimatorText> for Estimator {
+    fn from(text: EstimatorText) -> Estimator {
+        let EstimatorText { model, free, hold, loss } = text;
+        let is_free_named = free.is_some();
+        let free = free.map_or_else(|| Settings::of_model(model).free(), |names::Free(free)| free);
+        Estimator { model, free, is_free_named, hold, loss }
+    }
 }
 
 /// See [`Loss`].
@@ -171,13 +200,15 @@ fn ninety_five_percent() -> f64 {
     0.95
 }
 
-fn chapter_model() -> FreeParameters {
-    FreeParameters::STANDARD
-}
-
 impl Default for Estimator {
     fn default() -> Estimator {
-        Estimator { free: chapter_model(), hold: BTreeMap::new(), loss: LossChoice::default() }
+        Estimator {
+            model: Model::BrownConrady,
+            free: FreeParameters::STANDARD,
+            is_free_named: false,
+            hold: BTreeMap::new(),
+            loss: LossChoice::default(),
+        }
     }
 }
 
@@ -230,8 +261,8 @@ fn check(field: &'static str, value: f64, need: &'static str, held: bool) -> Res
 
 impl SceneSpec {
     pub(super) fn check(&self) -> Result<(), SpecError> {
-        let camera = Camera::from(self.camera);
-        check("scene.camera.fx", camera.fx, "positive, and every parameter finite", camera.is_valid())?;
+        let LensFields(camera) = self.camera;
+        check("scene.camera.fx", camera.fx, "positive, and every parameter finite", camera.is_possible())?;
         let side = self.image.0.max(self.image.1);
         check("scene.image", side as f64, "at most 1048576 px a side", side <= limits::MOST_SIDE)?;
         let noise = self.noise_px;
@@ -274,6 +305,11 @@ impl TargetSpec {
 
 impl Estimator {
     pub(super) fn check(&self) -> Result<(), SpecError> {
+        let model = self.model;
+        let has = |parameter: &Parameter| model.parameters().any(|p| p == *parameter);
+        if let Some(parameter) = self.free.iter().chain(self.hold.keys().copied()).find(|p| !has(p)) {
+            return Err(SpecError::NotOfModel { parameter, model });
+        }
         let (field, scale) = match self.loss {
             LossChoice::Squares {} => return Ok(()),
             LossChoice::Huber { delta_px } => ("estimator.loss.delta_px", delta_px),
@@ -284,7 +320,8 @@ impl Estimator {
 
     /// The solver's settings.
     pub fn settings(&self, image: (usize, usize)) -> Settings {
-        let settings = Settings::new(self.free).with_image_size(image).with_loss(self.loss.loss());
+        let settings = Settings::new(self.free).with_model(self.model);
+        let settings = settings.with_image_size(image).with_loss(self.loss.loss());
         self.hold.iter().fold(settings, |settings, (&parameter, &value)| settings.hold(parameter, value))
     }
 

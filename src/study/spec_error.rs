@@ -1,6 +1,7 @@
 //! What is wrong with a study's file, where, and what helps?
 
 use super::poses::PosesError;
+use calibench::camera::{Model, Parameter};
 
 /// A study that cannot be run as written.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -39,6 +40,17 @@ pub enum SpecError {
         what: &'static str,
         /// What helps.
         advice: &'static str,
+    },
+    /// A parameter that the estimator's lens model does not have.
+    #[error(
+        "estimator: the {model} model has no {parameter}; its coefficients are {}",
+        model.coefficients().iter().map(|p| p.name()).collect::<Vec<_>>().join(" ")
+    )]
+    NotOfModel {
+        /// Which.
+        parameter: Parameter,
+        /// The model.
+        model: Model,
     },
     /// No such board.
     #[error("scene.target: {0}")]

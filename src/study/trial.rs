@@ -4,7 +4,8 @@
 use super::cells::Cell;
 use super::quantity::Quantity;
 use calibench::board::View;
-use calibench::calibrate::{Calibration, CalibrationError, Termination, calibrate};
+use calibench::calibrate::{CalibrationError, LensCalibration, Termination, calibrate_lens};
+use calibench::camera::{Lens, Parameter};
 use calibench::geometry::Vec2;
 use calibench::synth::{Scene, Stream};
 
@@ -46,7 +47,7 @@ pub fn run_trial(cell: &Cell, quantities: &[Quantity], trial: u64) -> Trial {
             Err(_) => return failed(cell, quantities, trial, "refused-poses".to_string()),
         },
     };
-    match calibrate(&observe(cell, scene, trial), &cell.settings) {
+    match calibrate_lens(&observe(cell, scene, trial), &cell.settings) {
         Err(error) => failed(cell, quantities, trial, format!("refused-{}", reason(&error))),
         Ok(calibration) => Trial {
             cell: cell.index,
@@ -71,7 +72,7 @@ fn failed(cell: &Cell, quantities: &[Quantity], trial: u64, outcome: String) -> 
 /// Gaussian noise from one stream and gross errors from another, both drawn point by point whatever their
 /// size: cells that differ in noise, outliers or model meet the same draws, and a longer series of views
 /// begins with those of a shorter one.
-fn observe(cell: &Cell, scene: &Scene, trial: u64) -> Vec<View> {
+fn observe(cell: &Cell, scene: &Scene<Lens>, trial: u64) -> Vec<View> {
     let design = &cell.design.scene;
     let exact = scene.observe(design.noise_px, &mut cell.stream(trial, "noise"));
     if design.outlier_share == 0.0 {
@@ -90,17 +91,24 @@ fn spoil(view: &View, share: f64, half_width_px: f64, stream: &mut Stream) -> Vi
     View::new(view.points().to_vec(), pixels.collect()).expect("finite pixels stay finite, one a point")
 }
 
-fn measure(quantity: Quantity, cell: &Cell, scene: &Scene, calibration: &Calibration) -> Option<f64> {
+fn measure(
+    quantity: Quantity,
+    cell: &Cell,
+    scene: &Scene<Lens>,
+    calibration: &LensCalibration,
+) -> Option<f64> {
+    // Coefficients of different models are different things, of one name or not.
+    let error = |p: Parameter| {
+        let is_comparable = cell.knows_its_lens() || Parameter::LINEAR.contains(&p);
+        is_comparable.then(|| Some(calibration.camera.value(p)? - cell.camera.value(p)?)).flatten()
+    };
     let value = match quantity {
         Quantity::Rmse => calibration.rmse_px,
         Quantity::Nees => {
-            let error: Vec<f64> =
-                calibration.free.iter().map(|p| calibration.camera.get(p) - cell.camera.get(p)).collect();
+            let error: Vec<f64> = calibration.free.iter().map(error).collect::<Option<_>>()?;
             calibration.covariance.normalised_error_squared(&error)?
         }
-        Quantity::Parameter(p) if calibration.free.contains(p) => {
-            calibration.camera.get(p) - cell.camera.get(p)
-        }
+        Quantity::Parameter(p) if calibration.free.contains(p) => error(p)?,
         Quantity::Parameter(_) => return None,
         Quantity::Depth => {
             calibration.cam_from_target[0].translation.z - scene.truth.cam_from_target[0].translation.z

@@ -45,7 +45,7 @@ mod unknown;
 mod walk;
 mod warnings;
 
-pub use any_lens::{BoardShape, LensCalibration, Located, calibrate_lens, locate};
+pub use any_lens::{BoardShape, LensCalibration, Located, calibrate_lens, lens_information, locate};
 pub use certificate::Certificate;
 pub use choice::{Candidate, Compared, Freedom, compare_models, explaining_freedoms};
 pub use closed_form::{ClosedFormError, closed_form, pose_from_homography};

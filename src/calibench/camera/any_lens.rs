@@ -142,9 +142,8 @@ impl Camera<Lens> {
     /// The same camera as one whose lens model is known to be Brown-Conrady's; `None` if it is another.
     pub fn brown_conrady(&self) -> Option<Camera> {
         let Camera { fx, fy, cx, cy, skew, distortion } = *self;
-        let [k1, k2, p1, p2, k3] = distortion.coefficients().try_into().ok()?;
-        let is_so = distortion.model() == super::Model::BrownConrady;
-        is_so.then_some(Camera { fx, fy, cx, cy, skew, distortion: BrownConrady { k1, k2, p1, p2, k3 } })
+        let distortion = distortion.brown_conrady()?;
+        Some(Camera { fx, fy, cx, cy, skew, distortion })
     }
 }
 

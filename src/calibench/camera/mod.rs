@@ -3,6 +3,7 @@
 mod any_lens;
 mod brown_conrady;
 mod correction;
+mod imaging;
 mod intrinsics;
 mod lens;
 mod parameter;
@@ -10,6 +11,7 @@ mod projection;
 
 pub use any_lens::PixelDerivatives;
 pub use brown_conrady::{BrownConrady, UndistortError};
+pub use imaging::Imaging;
 pub use intrinsics::Camera;
 pub use lens::{Lens, Model, UnknownModel, WrongCoefficients};
 pub(crate) use lens::{LensModel, LensVisitor, visit};

@@ -1,7 +1,7 @@
 //! How well could any unbiased calibrator do? The Cramer-Rao bound of a scene.
 
-use crate::calibrate::{Covariance, information};
-use crate::camera::FreeParameters;
+use crate::calibrate::{Conditioning, Covariance, information, lens_information};
+use crate::camera::{BrownConrady, FreeParameters, Imaging, Lens};
 use crate::synth::Truth;
 
 /// A scene that bounds nothing.
@@ -41,16 +41,48 @@ pub enum BoundError {
 /// assert!(fx.zip(fx_at_twice).is_some_and(|(one, two)| (two / one - 2.0).abs() < 1e-12));
 /// # Ok::<(), calibench::evaluate::BoundError>(())
 /// ```
-pub fn cramer_rao(truth: &Truth, free: FreeParameters, sigma_px: f64) -> Result<Covariance, BoundError> {
-    let information = information(&truth.camera, free, &truth.cam_from_target, &truth.points)
-        .ok_or(BoundError::BehindCamera)?;
+pub fn cramer_rao<L: Bounded>(
+    truth: &Truth<L>,
+    free: FreeParameters,
+    sigma_px: f64,
+) -> Result<Covariance, BoundError> {
+    let (conditioning, unit) = L::unit(truth, free).ok_or(BoundError::BehindCamera)?;
     let singular = || BoundError::Singular { free: free.to_string(), views: truth.cam_from_target.len() };
     // Rounding can leave a singular matrix with a Cholesky factor: its inverse would be large and
     // meaningless.
-    if information.conditioning().is_some_and(|c| c.is_singular()) {
+    if conditioning.is_some_and(|c| c.is_singular()) {
         return Err(singular());
     }
-    information.covariance().map(|unit| unit.scaled(sigma_px * sigma_px)).ok_or_else(singular)
+    unit.map(|unit| unit.scaled(sigma_px * sigma_px)).ok_or_else(singular)
+}
+
+/// How well the data separate the parameters, and their covariance for unit noise; `None` where there is none.
+pub type Unit = (Option<Conditioning>, Option<Covariance>);
+
+/// A lens whose parameters a scene bounds.
+pub trait Bounded: Imaging {
+    /// What a scene says for unit noise; `None` where a point has no image.
+    fn unit(truth: &Truth<Self>, free: FreeParameters) -> Option<Unit>;
+}
+
+impl Bounded for BrownConrady {
+    fn unit(truth: &Truth, free: FreeParameters) -> Option<Unit> {
+        let information = information(&truth.camera, free, &truth.cam_from_target, &truth.points)?;
+        Some((information.conditioning(), information.covariance()))
+    }
+}
+
+impl Bounded for Lens {
+    fn unit(truth: &Truth<Lens>, free: FreeParameters) -> Option<Unit> {
+        let Truth { camera, points, cam_from_target, image_size } = truth;
+        match camera.brown_conrady() {
+            Some(camera) => {
+                let (points, cam_from_target) = (points.clone(), cam_from_target.clone());
+                BrownConrady::unit(&Truth { camera, image_size: *image_size, points, cam_from_target }, free)
+            }
+            None => lens_information(camera, free, cam_from_target, points),
+        }
+    }
 }
 
 #[cfg(test)]

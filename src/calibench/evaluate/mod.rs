@@ -9,7 +9,7 @@ pub mod rmse;
 pub mod sample;
 
 pub use crate::distribution;
-pub use bound::{BoundError, cramer_rao};
+pub use bound::{BoundError, Bounded, cramer_rao};
 pub use difference::{
     Calibrated, DifferenceError, FrameDifference, OneCamera, TakenOut, frame_difference, one_camera,
 };

@@ -69,6 +69,52 @@ impl Serialize for LensFields {
     }
 }
 
+/// Reads what [`Serialize`] writes, in any order; coefficients that are not named are 0.
+impl<'de> Deserialize<'de> for LensFields {
+    fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<LensFields, D::Error> {
+        from.deserialize_map(NamedParameters)
+    }
+}
+
+struct NamedParameters;
+
+impl<'de> serde::de::Visitor<'de> for NamedParameters {
+    type Value = LensFields;
+
+    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("a camera: fx, fy, cx, cy and the coefficients of its lens, with `model` if that is not brown-conrady")
+    }
+
+    fn visit_map<A: serde::de::MapAccess<'de>>(self, mut map: A) -> Result<LensFields, A::Error> {
+        use serde::de::Error;
+        let (mut model, mut named) = (None, Vec::<(Parameter, f64)>::new());
+        while let Some(name) = map.next_key::<String>()? {
+            if name == "model" {
+                let name: String = map.next_value()?;
+                model = Some(name.parse::<Model>().map_err(A::Error::custom)?);
+                continue;
+            }
+            let parameter = name.parse().map_err(A::Error::custom)?;
+            if named.iter().any(|(other, _)| *other == parameter) {
+                return Err(A::Error::custom(format!("{name} is given twice")));
+            }
+            named.push((parameter, map.next_value()?));
+        }
+        let model = model.unwrap_or(Model::BrownConrady);
+        for needed in [Parameter::Fx, Parameter::Fy, Parameter::Cx, Parameter::Cy] {
+            if !named.iter().any(|(parameter, _)| *parameter == needed) {
+                return Err(A::Error::custom(format!("missing field `{needed}`")));
+            }
+        }
+        let empty = Camera::with_lens(f64::NAN, f64::NAN, f64::NAN, f64::NAN, Lens::ideal(model));
+        let with = |camera: Camera<Lens>, (parameter, value): (Parameter, f64)| {
+            let refused = || A::Error::custom(format!("the {model} model has no {parameter}"));
+            camera.with_value(parameter, value).ok_or_else(refused)
+        };
+        named.into_iter().try_fold(empty, with).map(LensFields)
+    }
+}
+
 /// A [`BoardShape`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BoardFields {

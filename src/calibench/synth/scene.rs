@@ -2,15 +2,16 @@
 
 use super::Stream;
 use crate::board::{Board, View};
-use crate::camera::Camera;
+use crate::camera::{BrownConrady, Camera, Imaging};
 use crate::geometry::{Mat3, Pose, Vec2, Vec3, rotation};
 
-/// The truth of a synthetic experiment: camera, image size, target points and poses.
+/// The truth of a synthetic experiment: camera, image size, target points and poses. The lens is Brown-Conrady's
+/// unless another type is named.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Truth {
+pub struct Truth<L = BrownConrady> {
     /// Intrinsic parameters.
-    pub camera: Camera,
+    pub camera: Camera<L>,
     /// Image width and height, px.
     pub image_size: (usize, usize),
     /// Target points, plane Z = 0.
@@ -33,9 +34,9 @@ pub struct Truth {
 /// assert_ne!(noisy, scene.exact());
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct Scene {
+pub struct Scene<L = BrownConrady> {
     /// What produced the pixels.
-    pub truth: Truth,
+    pub truth: Truth<L>,
     pixels: Vec<Vec<Vec2>>,
 }
 
@@ -66,7 +67,6 @@ pub enum SceneError {
 impl Truth {
     /// A virtual camera: f = 600, principal point (326, 243), k1 = -0.18, k2 = 0.05.
     pub fn example_camera() -> Camera {
-        use crate::camera::BrownConrady;
         Camera::pinhole(600.0, 600.0, 326.0, 243.0).with_distortion(BrownConrady::radial(-0.18, 0.05))
     }
 
@@ -105,9 +105,16 @@ pub fn looking_at_centre(xyz_degrees: [f64; 3], distance: f64) -> Pose {
 }
 
 impl Scene {
+    /// Four photographs of a target, [`Truth::example`].
+    pub fn example() -> Scene {
+        Scene::new(Truth::example()).expect("the target is in front of its camera")
+    }
+}
+
+impl<L: Imaging> Scene<L> {
     /// Projects every target point in every view.
-    pub fn new(truth: Truth) -> Result<Scene, SceneError> {
-        let radius = truth.camera.distortion.monotone_radius();
+    pub fn new(truth: Truth<L>) -> Result<Scene<L>, SceneError> {
+        let is_one_to_one = truth.camera.distortion.one_to_one();
         let see = |view: usize, pose: &Pose| -> Result<Vec<Vec2>, SceneError> {
             truth
                 .points
@@ -115,10 +122,9 @@ impl Scene {
                 .enumerate()
                 .map(|(point, p)| {
                     let point_cam = pose.apply(&Vec3::new(p.x, p.y, 0.0));
-                    let pixel =
-                        truth.camera.project(&point_cam).ok_or(SceneError::BehindCamera { view, point })?;
-                    let ideal_radius = point_cam.xy().norm() / point_cam.z;
-                    if ideal_radius >= radius {
+                    let pixel = L::image(&truth.camera, &point_cam)
+                        .ok_or(SceneError::BehindCamera { view, point })?;
+                    if !is_one_to_one(&point_cam) {
                         return Err(SceneError::BeyondMonotoneRadius { view, point });
                     }
                     Ok(pixel)
@@ -131,12 +137,8 @@ impl Scene {
             .enumerate()
             .map(|(i, pose)| see(i, pose))
             .collect::<Result<_, _>>()?;
+        drop(is_one_to_one);
         Ok(Scene { truth, pixels })
-    }
-
-    /// Four photographs of a target, [`Truth::example`].
-    pub fn example() -> Scene {
-        Scene::new(Truth::example()).expect("the target is in front of its camera")
     }
 
     /// Noise-free pixels, view by view.

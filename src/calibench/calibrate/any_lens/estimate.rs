@@ -5,10 +5,9 @@ use super::super::minimise::{Minimum, descend};
 use super::super::settings::Bend;
 use super::super::target_frame::TargetFrames;
 use super::super::{Board, CalibrationError, Prior, Settings, Termination, calibrate, chunks};
-use super::marks::Marks;
 use super::problem::{Problem, State, rounding_cost};
 use super::report::{self, LensCalibration};
-use super::{WIDTH, judge, shape, start, walk};
+use super::{WIDTH, judge, marks, shape, start, walk};
 use crate::board::View;
 use crate::camera::{Model, Parameter};
 use crate::geometry::HomographyError;
@@ -108,8 +107,7 @@ fn check(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
 fn estimate(views: &[View], settings: &Settings) -> Result<LensCalibration, CalibrationError> {
     let frames = TargetFrames::of(views);
     let region = shape::region(views);
-    let of_view = |(index, view)| Marks::of(view, frames.at(index), &region);
-    let marks: Vec<Marks> = views.iter().enumerate().map(of_view).collect();
+    let marks = marks::of_views(views, &frames, &region);
     let priors: Vec<Prior> = settings.priors().collect();
     let flat = Problem {
         views: &marks,

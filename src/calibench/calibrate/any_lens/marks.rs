@@ -1,6 +1,6 @@
 //! What does one view give the kernel? Marks in blocks of four: place on the board, pixel, weight.
 
-use super::super::target_frame::TargetFrame;
+use super::super::target_frame::{TargetFrame, TargetFrames};
 use super::shape;
 use crate::board::View;
 use crate::geometry::lanes::LANES;
@@ -80,6 +80,12 @@ impl Marks {
     pub fn len(&self) -> usize {
         self.list.len()
     }
+}
+
+/// The marks of all views.
+pub(super) fn of_views(views: &[View], frames: &TargetFrames, region: &[Vec2; 2]) -> Vec<Marks> {
+    let of_view = |(index, view)| Marks::of(view, frames.at(index), region);
+    views.iter().enumerate().map(of_view).collect()
 }
 
 fn block(marks: &[Mark]) -> Block {

@@ -8,6 +8,7 @@
 
 mod curvature;
 mod estimate;
+mod information;
 mod judge;
 mod kernel;
 mod locate;
@@ -20,6 +21,7 @@ mod start;
 mod walk;
 
 pub use estimate::calibrate_lens;
+pub use information::lens_information;
 pub use locate::{Located, locate};
 pub use report::LensCalibration;
 pub use shape::BoardShape;

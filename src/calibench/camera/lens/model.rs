@@ -233,6 +233,12 @@ impl Lens {
         for_model!(self.model, M, P => <M as LensModel<P>>::ray(&self.array::<P>(), at))
     }
 
+    /// The same as a Brown-Conrady lens; `None` if it is another.
+    pub fn brown_conrady(&self) -> Option<crate::camera::BrownConrady> {
+        let [k1, k2, p1, p2, k3] = self.coefficients().try_into().ok()?;
+        (self.model == Model::BrownConrady).then_some(crate::camera::BrownConrady { k1, k2, p1, p2, k3 })
+    }
+
     /// The angle from the optical axis, rad, up to which the model is one-to-one.
     pub fn monotone_angle(&self) -> f64 {
         for_model!(self.model, M, P => <M as LensModel<P>>::monotone_angle(&self.array::<P>()))
