@@ -4,7 +4,7 @@
 use super::input::{InputError, MOST_TABLE_BYTES, read_regular_text};
 use super::shown::ShownPath;
 use crate::calibrate::{
-    BoardShape, Certificate, Compared, LensCalibration, Prior, ProfileInterval, Termination,
+    BoardShape, Certificate, Compared, LensCalibration, Prior, ProfileInterval, Termination, in_words,
 };
 use crate::camera::{Camera, Lens, Model, Parameter};
 use crate::geometry::{Vec2, rotation};
@@ -363,7 +363,7 @@ impl CalibrationFields {
                 .flat_map(|c| c.weakest.iter().map(|m| (m.unknown.to_string(), m.weight)))
                 .collect(),
             weakest_information: calibration.conditioning.as_ref().map(|c| c.smallest_eigenvalue),
-            warnings: calibration.warnings.iter().map(ToString::to_string).collect(),
+            warnings: in_words(&calibration.warnings),
             models: Vec::new(),
             left_out: Vec::new(),
             views: (0..calibration.cam_from_target.len())

@@ -6,7 +6,7 @@ use super::{
     Arguments, Exit, Failure, Format, Intervals, ModelChoice, advice, maps, page, plots, print, table,
 };
 use calibench::board::{Board, View};
-use calibench::calibrate::{Loss, Prior, ProfileInterval, Settings};
+use calibench::calibrate::{Loss, Prior, ProfileInterval, Settings, in_words};
 use calibench::camera::Model;
 use calibench::geometry::Vec2;
 use calibench::io::{CalibrationFields, LeftOut, message, significant, write_together};
@@ -216,7 +216,7 @@ fn text(finished: &Finished) -> String {
     for LeftOut { name, reason } in &finished.left_out {
         let _ = writeln!(text, "left out: {name}: {reason}");
     }
-    let warnings = calibration.warnings.iter().map(ToString::to_string);
+    let warnings = in_words(&calibration.warnings).into_iter();
     for warning in warnings.chain(finished.notes.iter().chain(&finished.advice).cloned()) {
         let _ = writeln!(text, "warning: {warning}");
     }

@@ -1,6 +1,7 @@
 //! The report as a page: one HTML file that needs nothing else, light or dark as the reader's system is.
 
 use super::finished::{Finished, parameter_rows, summary, weakest};
+use calibench::calibrate::in_words;
 use calibench::io::significant;
 use calibench_harness::Figure;
 use std::fmt::Write;
@@ -58,7 +59,7 @@ pub(super) fn html(finished: &Finished, figures: &[Figure]) -> String {
 }
 
 fn warnings(page: &mut String, finished: &Finished) {
-    let own = finished.fit.calibration.warnings.iter().map(ToString::to_string);
+    let own = in_words(&finished.fit.calibration.warnings).into_iter();
     for warning in own.chain(finished.notes.iter().chain(&finished.advice).cloned()) {
         paragraph(page, " class=\"warn\"", &warning);
     }

@@ -1,0 +1,87 @@
+//! How are many warnings said? One line a warning, and one for all of a kind that twelve parameters would repeat.
+
+use super::Warning;
+use crate::camera::Parameter;
+
+/// Of one kind this many stand in lines of their own; more are summed up.
+const EACH: usize = 3;
+
+/// Warnings in lines for people: each its own sentence, but those that say the same of many parameters in one, at
+/// the place of the first.
+///
+/// ```
+/// use calibench::calibrate::{Warning, in_words};
+/// use calibench::camera::Parameter::{K1, K2, K3, K4, K5};
+///
+/// let pair = |a, b| Warning::Correlated { a, b, correlation: 0.99 };
+/// let lines = in_words(&[pair(K1, K2), pair(K1, K4), Warning::NotCertified, pair(K2, K5), pair(K3, K5)]);
+/// assert_eq!(lines.len(), 2);
+/// assert!(lines[0].starts_with("4 pairs of parameters are correlated by up to 0.9900"));
+/// ```
+pub fn in_words(warnings: &[Warning]) -> Vec<String> {
+    let skewed: Vec<(Parameter, f64, f64)> = warnings.iter().filter_map(not_linear).collect();
+    let pairs: Vec<(Parameter, Parameter, f64)> = warnings.iter().filter_map(correlated).collect();
+    let (mut told_skewed, mut told_pairs) = (false, false);
+    let mut lines = Vec::new();
+    for warning in warnings {
+        match warning {
+            Warning::NotLinear { .. } if skewed.len() > EACH => {
+                if !std::mem::replace(&mut told_skewed, true) {
+                    lines.push(all_skewed(&skewed));
+                }
+            }
+            Warning::Correlated { .. } if pairs.len() > EACH => {
+                if !std::mem::replace(&mut told_pairs, true) {
+                    lines.push(all_correlated(&pairs));
+                }
+            }
+            other => lines.push(other.to_string()),
+        }
+    }
+    lines
+}
+
+fn not_linear(warning: &Warning) -> Option<(Parameter, f64, f64)> {
+    match *warning {
+        Warning::NotLinear { parameter, below, above } => Some((parameter, below, above)),
+        _ => None,
+    }
+}
+
+fn correlated(warning: &Warning) -> Option<(Parameter, Parameter, f64)> {
+    match *warning {
+        Warning::Correlated { a, b, correlation } => Some((a, b, correlation)),
+        _ => None,
+    }
+}
+
+fn all_skewed(skewed: &[(Parameter, f64, f64)]) -> String {
+    let names: Vec<&str> = skewed.iter().map(|(parameter, ..)| parameter.name()).collect();
+    let ratios = || skewed.iter().flat_map(|&(_, below, above)| [below, above]);
+    let (least, most) = (ratios().fold(f64::INFINITY, f64::min), ratios().fold(0.0, f64::max));
+    format!(
+        "the standard deviations of {} mislead: intervals of two of them truly reach {least:.2} to {most:.2} times as far; \
+         state intervals by the profile of the cost, or free fewer coefficients",
+        names.join(", ")
+    )
+}
+
+fn all_correlated(pairs: &[(Parameter, Parameter, f64)]) -> String {
+    let strength = |pair: &&(Parameter, Parameter, f64)| pair.2.abs();
+    let Some((a, b, most)) = pairs.iter().max_by(|x, y| strength(x).total_cmp(&strength(y))) else {
+        return String::new();
+    };
+    let mut names: Vec<&str> = Vec::new();
+    for name in pairs.iter().flat_map(|(a, b, _)| [a.name(), b.name()]) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    format!(
+        "{} pairs of parameters are correlated by up to {:.4} ({a} and {b}), of {}: the data hardly tell them apart; their \
+         values mean something together only. Cover the image corners, or hold one of them",
+        pairs.len(),
+        most.abs(),
+        names.join(", ")
+    )
+}
