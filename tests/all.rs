@@ -31,6 +31,7 @@ mod photo_command;
 mod photo_verbs;
 mod planar_single_plane;
 mod planar_statistics;
+mod printed_board;
 mod readme;
 mod real_corner_files;
 mod real_data;

@@ -1,6 +1,7 @@
 //! What can a user ask for? The command line: one verb a file, and the exit codes that all share.
 
 mod bless;
+mod board;
 mod book;
 mod calibrate;
 mod check;
@@ -61,6 +62,8 @@ enum Verb {
     Bless(bless::Arguments),
     /// Builds the book into out/book
     Book(book::Arguments),
+    /// Draws a board to print, true to scale, with rulers to check the printer
+    Board(board::Arguments),
     /// Calibrates a camera from a corner file or from photographs, or a plane from a file of point pairs
     Calibrate(calibrate::Arguments),
     /// Finds the dots of a nine-point board in a photograph, and maps its pixels to the unit grid
@@ -113,6 +116,7 @@ pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCo
         Some(Verb::Check(arguments)) => check::run(experiments, &arguments),
         Some(Verb::Bless(arguments)) => bless::run(experiments, &arguments, build),
         Some(Verb::Book(arguments)) => book::run(experiments, &arguments, build),
+        Some(Verb::Board(arguments)) => board::run(&arguments),
         Some(Verb::Calibrate(arguments)) => calibrate::run(&arguments),
         Some(Verb::Ninepoint(arguments)) => ninepoint::run(&arguments),
         Some(Verb::Undistort(arguments)) => undistort::run(&arguments),
