@@ -19,6 +19,7 @@ mod detect_photos;
 mod downstream;
 mod errors;
 mod examples;
+mod explain;
 mod failing_disk;
 mod fuzz_seeds;
 mod gate;

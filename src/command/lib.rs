@@ -10,6 +10,7 @@ mod completions;
 mod convert;
 mod diff;
 mod exit;
+mod explain;
 mod gate;
 mod hand_eye;
 mod list;
@@ -53,6 +54,8 @@ struct Arguments {
 enum Verb {
     /// Names the experiments and the questions they answer
     List(list::Arguments),
+    /// Explains a number, claim, published value, figure or table: value, origin, what it is worth
+    Explain(explain::Arguments),
     /// Runs one experiment
     Run(run::Arguments),
     /// Runs everything and compares, writing nothing: golden values, claims, published values, committed
@@ -112,6 +115,7 @@ pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCo
     let exit = match arguments.verb {
         None => reproduce::run(experiments, build),
         Some(Verb::List(arguments)) => list::run(experiments, &arguments),
+        Some(Verb::Explain(arguments)) => explain::run(experiments, &arguments),
         Some(Verb::Run(arguments)) => run::run(experiments, &arguments, build),
         Some(Verb::Check(arguments)) => check::run(experiments, &arguments),
         Some(Verb::Bless(arguments)) => bless::run(experiments, &arguments, build),
