@@ -50,17 +50,21 @@ cluster:
 all:
     cargo run --release --locked
 
-# This library beside OpenCV, mrcal and Ceres in one run; `just peers --write README.md` puts the tables there
+# This library beside OpenCV, mrcal and Ceres in one run; `just peers --write benches/peers/README.md` puts the tables there
 peers *ARGUMENTS:
     benches/peers/run {{ARGUMENTS}}
 
-# Digits of the certified problems that this library, OpenCV, SciPy and the minimal solver reach, for README and book
+# Digits of the certified problems that this library, OpenCV, SciPy and the minimal solver reach, for adapters/DIGITS.md and the book
 digits:
     cargo run --release --locked -- gate --certified --digits reference/digits.csv --timeout 600
 
 # The certified problems: sums, observations, and one of them certified anew
 certified PROBLEM="nine-points":
     .ci/certified {{PROBLEM}}
+
+# The pictures of the README, light and dark
+pictures:
+    .ci/pictures
 
 # Instructions of the kernels against golden/instructions.toml
 instructions:

@@ -10,7 +10,7 @@ use calibench::io::robot::parse_robot;
 use calibench::io::{
     memory, parse_checks, parse_corners, parse_known, parse_marks, parse_pixel_ends, parse_point_pairs, table,
 };
-use calibench::photos::BoardSpec;
+use calibench::photos::{BoardSpec, parse_board_file};
 use calibench_gate::accept::{accept, id_in, read_line};
 use calibench_gate::protocol::{Problem, ProblemView};
 use calibench_harness::golden;
@@ -134,6 +134,7 @@ pub fn words(bytes: &[u8]) {
     if let Ok(board) = text.parse::<BoardSpec>() {
         let _ = (board.to_string(), board.board().points());
     }
+    let _ = parse_board_file("board", &text);
     let _ = text.parse::<FreeParameters>();
     let _ = text.parse::<Shard>();
     let _ = memory::parse_bytes(&text);

@@ -219,7 +219,7 @@ fn every_file_beside_the_data_is_in_the_list_of_sums() {
 }
 
 #[test]
-fn the_committed_table_has_our_digits_and_the_readme_shows_it() {
+fn the_committed_table_has_our_digits_and_its_page_shows_it() {
     let text = std::fs::read_to_string(folder().join("digits.csv")).expect("the table");
     let table = DigitsTable::of_csv(&text).expect("a table of digits");
     let problems = problems();
@@ -227,9 +227,9 @@ fn the_committed_table_has_our_digits_and_the_readme_shows_it() {
     ours.add("calibench, polished", &problems, &measure(&problems, &Polished));
     let committed: Vec<_> = table.rows.iter().filter(|row| row.solver == "calibench, polished").collect();
     assert_eq!(committed, ours.rows.iter().collect::<Vec<_>>(), "just digits");
-    let readme =
-        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("README");
-    let shown = readme
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("adapters/DIGITS.md");
+    let page = std::fs::read_to_string(page).expect("the page");
+    let shown = page
         .split_once("<!-- begin certified -->\n")
         .and_then(|(_, rest)| rest.split_once("<!-- end certified -->"))
         .map(|(shown, _)| shown);

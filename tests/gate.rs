@@ -251,12 +251,12 @@ fn time_is_judged_where_a_limit_is_set() {
 }
 
 #[test]
-fn the_readme_quotes_the_committed_table() {
+fn the_page_of_planted_faults_quotes_the_committed_table() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let measured = Measured::read(&root.join("golden/gate-power")).expect("committed tables");
     assert_eq!(measured.wrong(), Vec::<&str>::new());
-    let readme = std::fs::read_to_string(root.join("README.md")).expect("a readme");
-    let quoted = readme
+    let page = std::fs::read_to_string(root.join("adapters/POWER.md")).expect("the page");
+    let quoted = page
         .split_once("<!-- begin gate-power -->\n")
         .and_then(|(_, rest)| rest.split_once("<!-- end gate-power -->"));
     assert_eq!(

@@ -1,4 +1,5 @@
-//! Does README.md say what the program says? Its tables and numbers are compared with golden/ and with a run.
+//! Do README.md and the pages behind it say what the program says? Their tables, numbers and figures are compared with golden/
+//! and with a run.
 
 use calibench_harness::published::{Kind, not_judged};
 use calibench_harness::verdict::ByKind;
@@ -29,7 +30,8 @@ fn published(experiment: &str) -> ByKind {
 
 #[test]
 fn the_table_of_experiments_counts_what_golden_holds() {
-    let counted: BTreeMap<String, Vec<String>> = read("README.md")
+    let page = read("experiments/README.md");
+    let counted: BTreeMap<String, Vec<String>> = page
         .lines()
         .filter_map(|line| line.strip_prefix("| `"))
         .filter_map(|line| line.split_once("` |"))
@@ -52,10 +54,12 @@ fn the_table_of_experiments_counts_what_golden_holds() {
             })
             .collect();
     for (id, counts) in &held {
-        assert_eq!(counted.get(id), Some(counts), "`{id}` in README.md");
+        assert_eq!(counted.get(id), Some(counts), "`{id}` in experiments/README.md");
     }
     let all = held.keys().fold(ByKind::default(), |sum, id| sum.plus(&published(id)));
     let said = format!("| all | | | {all} |");
+    assert!(page.contains(&said), "experiments/README.md should say: {said}");
+    let said = format!("published values: {all}\n");
     assert!(read("README.md").contains(&said), "README.md should say: {said}");
 }
 
@@ -71,17 +75,19 @@ fn the_chi_squared_of_both_tables_are_the_golden_ones() {
         value("chi-squared-book"),
         value("chi-squared-ours")
     );
-    let readme = read("README.md").split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(readme.contains(&said), "README.md should say: {said}");
+    for page in ["README.md", "experiments/README.md"] {
+        let text = read(page).split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(text.contains(&said), "{page} should say: {said}");
+    }
 }
 
 #[test]
 #[cfg_attr(not(calibench_data), ignore = "needs the measurements of others: CONTRIBUTING.md, real data")]
 fn the_output_shown_for_zhangs_data_is_what_the_command_prints() {
     let folder = crate::data::folder();
-    let readme = read("README.md");
+    let page = read("src/command/README.md");
     let (_, shown) =
-        readme.split_once("$ calibench calibrate zhang/points.csv ").expect("the command is shown");
+        page.split_once("$ calibench calibrate zhang/points.csv ").expect("the command is shown");
     let (shown, _) = shown.split_once("\n```").expect("the block ends");
     let (arguments, output) = shown.split_once('\n').expect("output follows the command");
     let run = Command::new(env!("CARGO_BIN_EXE_calibench"))
@@ -92,4 +98,61 @@ fn the_output_shown_for_zhangs_data_is_what_the_command_prints() {
         .expect("the program starts");
     let printed = String::from_utf8_lossy(&run.stdout);
     assert_eq!(printed.trim_end(), output.trim_end(), "{}", String::from_utf8_lossy(&run.stderr));
+}
+
+/// README.md and the pages that its long tables stand on.
+const PAGES: [&str; 6] = [
+    "README.md",
+    "adapters/DIGITS.md",
+    "adapters/POWER.md",
+    "benches/peers/README.md",
+    "experiments/README.md",
+    "src/command/README.md",
+];
+
+#[test]
+fn the_readme_is_read_in_some_minutes_and_its_links_lead_somewhere() {
+    assert!(read("README.md").lines().count() <= 150);
+    for page in PAGES {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(page);
+        let folder = folder.parent().expect("a page lies in a folder");
+        let text = read(page);
+        let links = text.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+        let pictures = ["src=\"", "srcset=\""].into_iter().flat_map(|word| text.split(word).skip(1));
+        let pictures = pictures.filter_map(|rest| rest.split('"').next());
+        let places = links.chain(pictures).map(|place| place.split('#').next().unwrap_or_default());
+        for place in places.filter(|place| !place.is_empty() && !place.contains("://")) {
+            assert!(folder.join(place).exists(), "{page}: nothing at {place}");
+        }
+    }
+}
+
+/// A figure for dark pages, as `.ci/pictures` recolours it.
+fn dark(svg: &str) -> String {
+    let script = read(".ci/pictures");
+    let colours = script.split("-e 's/").skip(1).filter_map(|rest| rest.split_once("/g'")?.0.split_once('/'));
+    colours.fold(svg.to_string(), |svg, (light, dark)| svg.replace(light, dark))
+}
+
+#[test]
+fn figures_of_the_readme_are_those_of_the_program() {
+    let pictures = |name: &str| read(&format!(".github/pictures/{name}"));
+    assert_eq!(pictures("cloud-dark.svg"), dark(&read("figures/four-pose/k1-k2.svg")), "run .ci/pictures");
+    assert_eq!(pictures("study-dark.svg"), dark(&pictures("study.svg")), "run .ci/pictures");
+    assert_ne!(pictures("study-dark.svg"), pictures("study.svg"));
+    let readme = read("README.md");
+    let (_, study) = readme.split_once("```toml\n").expect("a study");
+    let (study, _) = study.split_once("```").expect("the block ends");
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("readme-study");
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("a folder is made");
+    std::fs::write(folder.join("views.toml"), study).expect("written");
+    let run = Command::new(env!("CARGO_BIN_EXE_calibench"))
+        .args(["study", "run", "views.toml", "--out", "views"])
+        .current_dir(&folder)
+        .output()
+        .expect("the program starts");
+    assert_eq!(run.status.code(), Some(0), "{}", String::from_utf8_lossy(&run.stderr));
+    let figure = std::fs::read_to_string(folder.join("views/figures/spread.svg")).expect("a figure");
+    assert!(figure == pictures("study.svg"), "run .ci/pictures");
 }

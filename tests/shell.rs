@@ -11,7 +11,7 @@ fn run(arguments: &[&str]) -> Output {
 }
 
 /// The verbs that the help lists.
-fn verbs() -> Vec<String> {
+pub(crate) fn verbs() -> Vec<String> {
     let help = String::from_utf8_lossy(&run(&["--help"]).stdout).into_owned();
     let (_, listed) = help.split_once("Commands:").expect("verbs are listed");
     let (listed, _) = listed.split_once("Options:").expect("options follow");

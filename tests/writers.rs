@@ -25,7 +25,8 @@ struct Verb {
     arguments: &'static [&'static str],
 }
 
-const VERBS: [Verb; 16] = [
+const VERBS: [Verb; 17] = [
+    Verb { name: "board", arguments: &["board", "circles:9x7:10mm:3mm", "--out", "out"] },
     Verb {
         name: "camera",
         arguments: &["calibrate", "../corners.csv", "--image-size", "640x480", "--out", "out"],

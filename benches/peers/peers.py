@@ -1,7 +1,7 @@
 """How fast is this library beside its peers? Runs all sides alternately on the same problems and prints a table.
 
     just peers                      # everything, with what installs: see benches/peers/run
-    just peers --write README.md    # also puts the tables between the markers there
+    just peers --write benches/peers/README.md    # also puts the tables between the markers there
 
 One process a side, all held to one processor; in every round each side works on a row for a while in turn, and says the median time of one
 repetition. The table has the medians of those over the rounds, and of the ratios of a round their median and quartiles: what slows the

@@ -35,7 +35,8 @@ impl Answer {
         Answer::Open,
     ];
 
-    fn word(self) -> &'static str {
+    /// The word for people.
+    pub fn word(self) -> &'static str {
         match self {
             Answer::Confirmed => "confirmed",
             Answer::Regenerated => "regenerated",

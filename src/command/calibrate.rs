@@ -1,6 +1,7 @@
 //! `calibench calibrate`: a camera from a corner file or from photographs, or a plane map from a file of
 //! point pairs.
 
+use super::board::board_or_file;
 use super::report::table;
 use super::{Exit, print, warn};
 use calibench::calibrate::{Board, Loss, Prior};
@@ -48,8 +49,8 @@ pub(super) struct Arguments {
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// The board in the photographs: chess:9x6:25mm (inner corners), circles:9x7:10mm:3mm (spacing, diameter)
-    /// or dots:3x3:1
-    #[arg(long, value_name = "BOARD")]
+    /// or dots:3x3:1; or the board.toml beside a page that `calibench board` drew
+    #[arg(long, value_name = "BOARD", value_parser = board_or_file)]
     board: Option<BoardSpec>,
     /// Lens model: brown-conrady, rational, thin-prism, tilted, kannala-brandt, division or double-sphere; auto
     /// compares eight by how they predict views that were left out [default: brown-conrady]

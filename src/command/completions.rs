@@ -1,7 +1,7 @@
 //! `calibench completions SHELL`: what a shell needs to complete verbs and options.
 
 use super::{Exit, print};
-use clap::{Args, CommandFactory};
+use clap::Args;
 use clap_complete::Shell;
 
 #[derive(Debug, Args)]
@@ -13,7 +13,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Exit {
     let mut script = Vec::new();
-    clap_complete::generate(arguments.shell, &mut super::Arguments::command(), "calibench", &mut script);
+    clap_complete::generate(arguments.shell, &mut super::examples::command(), "calibench", &mut script);
     print(&String::from_utf8_lossy(&script));
     Exit::Held
 }

@@ -18,8 +18,7 @@ pub enum Exit {
 
 impl Exit {
     /// For `--help`.
-    pub(super) const HELP: &str =
-        "Exit codes: 0 all held, 1 a number deviates, 2 wrong usage or input, 3 interrupted or incomplete";
+    pub(super) const HELP: &str = "Exit codes: 0 all held, 1 a number deviates, 2 wrong usage or input, 3 interrupted or incomplete\n(calibench exit-codes says what they mean for every verb)";
 
     /// The user's input is the user's to mend; anything else left the run incomplete.
     pub fn of_failure(error: &ExperimentError) -> Exit {

@@ -1,6 +1,7 @@
 //! What can a user ask for? The command line: one verb a file, and the exit codes that all share.
 
 mod bless;
+mod board;
 mod book;
 mod calibrate;
 mod check;
@@ -8,12 +9,17 @@ mod check_reference;
 mod completions;
 mod convert;
 mod diff;
+mod doctor;
+mod examples;
 mod exit;
+mod exit_codes;
+mod explain;
 mod gate;
 mod hand_eye;
 mod list;
 mod manual;
 mod measure;
+mod new;
 mod ninepoint;
 mod register;
 mod report;
@@ -30,7 +36,7 @@ pub use terminal::{print, warn};
 
 use calibench_harness::project::Files;
 use calibench_harness::{Build, Experiment};
-use clap::{Parser, Subcommand};
+use clap::{FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// A test bench for camera calibration: every number is reconciled with truth, with theory, with the
@@ -52,6 +58,8 @@ struct Arguments {
 enum Verb {
     /// Names the experiments and the questions they answer
     List(list::Arguments),
+    /// Explains a number, claim, published value, figure or table: value, origin, what it is worth
+    Explain(explain::Arguments),
     /// Runs one experiment
     Run(run::Arguments),
     /// Runs everything and compares, writing nothing: golden values, claims, published values, committed
@@ -61,6 +69,10 @@ enum Verb {
     Bless(bless::Arguments),
     /// Builds the book into out/book
     Book(book::Arguments),
+    /// Writes a file to start from, which runs as it is
+    New(new::Arguments),
+    /// Draws a board to print, true to scale, with rulers to check the printer
+    Board(board::Arguments),
     /// Calibrates a camera from a corner file or from photographs, or a plane from a file of point pairs
     Calibrate(calibrate::Arguments),
     /// Finds the dots of a nine-point board in a photograph, and maps its pixels to the unit grid
@@ -84,6 +96,10 @@ enum Verb {
     Study(study::Arguments),
     /// Judges a solver, this library's or any program, on problems with known answers
     Gate(Box<gate::Arguments>),
+    /// Looks whether this program, its golden values and its data are what they should be
+    Doctor(doctor::Arguments),
+    /// Says what the exit codes mean, of every verb
+    ExitCodes(exit_codes::Arguments),
     /// Prints what a shell needs to complete verbs and options
     Completions(completions::Arguments),
     /// Writes the pages of the manual
@@ -95,7 +111,8 @@ enum Verb {
 pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCode {
     startup::take_large_files_for_errors();
     calibench_harness::project::carry(carried);
-    let arguments = match Arguments::try_parse() {
+    let parsed = examples::command().try_get_matches();
+    let arguments = match parsed.and_then(|matches| Arguments::from_arg_matches(&matches)) {
         Ok(arguments) => arguments,
         Err(error) => return terminal::ended(terminal::usage(&error)).into(),
     };
@@ -109,10 +126,13 @@ pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCo
     let exit = match arguments.verb {
         None => reproduce::run(experiments, build),
         Some(Verb::List(arguments)) => list::run(experiments, &arguments),
+        Some(Verb::Explain(arguments)) => explain::run(experiments, &arguments),
         Some(Verb::Run(arguments)) => run::run(experiments, &arguments, build),
         Some(Verb::Check(arguments)) => check::run(experiments, &arguments),
         Some(Verb::Bless(arguments)) => bless::run(experiments, &arguments, build),
         Some(Verb::Book(arguments)) => book::run(experiments, &arguments, build),
+        Some(Verb::New(arguments)) => new::run(&arguments),
+        Some(Verb::Board(arguments)) => board::run(&arguments),
         Some(Verb::Calibrate(arguments)) => calibrate::run(&arguments),
         Some(Verb::Ninepoint(arguments)) => ninepoint::run(&arguments),
         Some(Verb::Undistort(arguments)) => undistort::run(&arguments),
@@ -124,6 +144,8 @@ pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCo
         Some(Verb::CheckReference(arguments)) => check_reference::run(&arguments),
         Some(Verb::Study(arguments)) => study::run(&arguments, build),
         Some(Verb::Gate(arguments)) => gate::run(&arguments, build),
+        Some(Verb::Doctor(arguments)) => doctor::run(experiments, &arguments, build),
+        Some(Verb::ExitCodes(arguments)) => exit_codes::run(&arguments),
         Some(Verb::Completions(arguments)) => completions::run(&arguments),
         Some(Verb::Manual(arguments)) => manual::run(&arguments),
     };

@@ -2,7 +2,7 @@
 
 use super::{Exit, warn};
 use calibench::io::write_together;
-use clap::{Args, CommandFactory};
+use clap::Args;
 use clap_mangen::Man;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Exit {
-    let mut command = super::Arguments::command().disable_help_subcommand(true);
+    let mut command = super::examples::command().disable_help_subcommand(true);
     command.build();
     let written = pages(&command, &arguments.out).and_then(|pages| write_together(&pages));
     match written {

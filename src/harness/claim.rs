@@ -4,6 +4,7 @@
 use super::predicted::Predicted;
 use super::record::Record;
 use calibench::evaluate::Interval;
+use std::panic::Location;
 
 /// A statement that holds or does not. Blessing never changes it: a claim that fails is a finding about the
 /// code.
@@ -75,10 +76,13 @@ pub struct ClaimDraft<'a> {
     claim: Claim,
     /// What stands before the reason: a predicted distribution.
     prediction: Option<String>,
+    /// Where it was begun.
+    place: &'static Location<'static>,
 }
 
 impl Record {
     /// Begins a claim: its name within the experiment, and what is claimed, as a sentence.
+    #[track_caller]
     pub fn claim_that(&mut self, id: impl Into<String>, statement: impl Into<String>) -> ClaimDraft<'_> {
         let claim = Claim {
             id: id.into(),
@@ -92,7 +96,7 @@ impl Record {
             cases: None,
             failures: Vec::new(),
         };
-        ClaimDraft { record: self, claim, prediction: None }
+        ClaimDraft { record: self, claim, prediction: None, place: Location::caller() }
     }
 }
 
@@ -158,7 +162,7 @@ impl ClaimDraft<'_> {
     pub fn because(self, reason: impl Into<String>) {
         let reason = reason.into();
         let reason = self.prediction.map_or(reason.clone(), |predicted| format!("{predicted}; {reason}"));
-        self.record.add_claim(Claim { reason, ..self.claim });
+        self.record.add_claim(Claim { reason, ..self.claim }, self.place);
     }
 }
 

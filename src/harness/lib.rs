@@ -52,5 +52,5 @@ pub use predicted::Predicted;
 pub use progress::{Progress, ProgressDisplay};
 pub use provenance::Build;
 pub use reconcile::{Expectation, Reconciliation};
-pub use record::{Input, Number, Record, RecordError};
+pub use record::{Entered, Input, Number, Record, RecordError};
 pub use table::{Cell, Column, Rows, Table};

@@ -5,6 +5,7 @@ use super::predicted::Predicted;
 use super::published::Rule;
 use super::reconcile::Reconciliation;
 use super::record::{Number, Record};
+use std::panic::Location;
 
 /// A group of numbers, begun by [`Record::group`] or [`Record::exact`].
 ///
@@ -57,15 +58,17 @@ impl Record {
 
 impl Numbers<'_> {
     /// Adds a number: its name within the experiment, its value, and what it is.
+    #[track_caller]
     pub fn number(&mut self, id: impl Into<String>, value: f64, what: impl Into<String>) -> &mut Self {
         let (unit, band) = (self.unit.clone(), self.band.clone());
         self.last = format!("{}{}{}", self.prefix, id.into(), self.suffix.0);
         let (id, description) = (self.last.clone(), what.into() + &self.suffix.1);
-        self.record.add_number(Number { id, value, unit, band, description });
+        self.record.add_number(Number { id, value, unit, band, description }, Location::caller());
         self
     }
 
     /// Adds a number that counts something.
+    #[track_caller]
     pub fn count(&mut self, id: impl Into<String>, count: usize, what: impl Into<String>) -> &mut Self {
         self.number(id, count as f64, what)
     }

@@ -92,6 +92,17 @@ impl Project {
         }
     }
 
+    /// Files of the source tree that are others than the program carries, or are gone, below a path such as
+    /// `golden/`: the program was built with other ones. None elsewhere.
+    pub fn others_than_carried(&self, below: &str) -> Vec<&'static str> {
+        let carried = CARRIED.get().copied().unwrap_or_default().iter();
+        let below = carried.filter(|(name, _)| self.is_source_tree() && name.starts_with(below));
+        below
+            .filter(|(name, bytes)| self.read(name).ok().as_deref() != Some(*bytes))
+            .map(|(name, _)| *name)
+            .collect()
+    }
+
     /// A text by its path in the source tree.
     ///
     /// # Errors

@@ -7,6 +7,8 @@ use super::published::{self, Entry, PublishedError, Rule};
 use super::reconcile::Reconciliation;
 use super::table::Table;
 use calibench::io::hash::sha256_hex;
+use std::collections::BTreeMap;
+use std::panic::Location;
 
 /// A named number, locked in golden/.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +35,19 @@ pub struct Input {
     pub sha256: String,
 }
 
+/// What a record holds under a name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Entered {
+    /// A number.
+    Number,
+    /// A claim.
+    Claim,
+    /// A table.
+    Table,
+    /// A figure.
+    Figure,
+}
+
 /// The result of one run of one experiment, in the order in which it was recorded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
@@ -47,6 +62,8 @@ pub struct Record {
     notes: Vec<String>,
     /// What is wrong with a reconciliation, reported when the record is closed.
     mistakes: Vec<RecordError>,
+    /// Where in the code each was entered. Neither written nor locked: lines move.
+    places: BTreeMap<(Entered, String), &'static Location<'static>>,
 }
 
 /// A record that contradicts itself or `published.toml`: a mistake in the experiment's file.
@@ -119,10 +136,12 @@ impl Record {
             inputs: Vec::new(),
             notes: Vec::new(),
             mistakes: Vec::new(),
+            places: BTreeMap::new(),
         }
     }
 
-    pub(super) fn add_number(&mut self, number: Number) {
+    pub(super) fn add_number(&mut self, number: Number, place: &'static Location<'static>) {
+        self.places.insert((Entered::Number, number.id.clone()), place);
         self.numbers.push(number);
     }
 
@@ -140,16 +159,22 @@ impl Record {
     }
 
     /// Adds a table, or rows with their columns.
+    #[track_caller]
     pub fn table(&mut self, table: impl Into<Table>) {
-        self.tables.push(table.into());
+        let table = table.into();
+        self.places.insert((Entered::Table, table.name.clone()), Location::caller());
+        self.tables.push(table);
     }
 
     /// Adds a figure.
+    #[track_caller]
     pub fn figure(&mut self, figure: Figure) {
+        self.places.insert((Entered::Figure, figure.name.clone()), Location::caller());
         self.figures.push(figure);
     }
 
-    pub(super) fn add_claim(&mut self, claim: Claim) {
+    pub(super) fn add_claim(&mut self, claim: Claim, place: &'static Location<'static>) {
+        self.places.insert((Entered::Claim, claim.id.clone()), place);
         self.claims.push(claim);
     }
 
@@ -181,6 +206,11 @@ impl Record {
     /// The value of a number.
     pub fn value(&self, id: &str) -> Option<f64> {
         self.numbers.iter().find(|n| n.id == id).map(|n| n.value)
+    }
+
+    /// Where in the code something was entered: its file, as the compiler names it, and line.
+    pub fn place(&self, what: Entered, name: &str) -> Option<&'static Location<'static>> {
+        self.places.get(&(what, name.to_string())).copied()
     }
 
     /// Name of the experiment.
@@ -277,6 +307,17 @@ impl Record {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_entered_is_found_again_by_file_and_line() {
+        let mut record = Record::with_claim();
+        record.exact("px").number("n", 1.0, "");
+        let line = line!() - 1;
+        let place = record.place(Entered::Number, "n").unwrap();
+        assert_eq!((place.file(), place.line()), (file!(), line));
+        assert_ne!(record.place(Entered::Claim, "c").unwrap().line(), line);
+        assert_eq!(record.place(Entered::Table, "n"), None);
+    }
 
     #[test]
     fn a_record_needs_a_claim_and_names_of_its_own() {

@@ -52,6 +52,9 @@ mod trial_file;
 mod whole_log;
 mod within;
 
+/// Whether trials can be read and written as Parquet.
+pub const PARQUET: bool = cfg!(feature = "parquet");
+
 pub use accumulate::Tally;
 pub use cells::Cell;
 pub use engine::{Engine, Interruption, Outcome, Pace, Worst, in_memory, in_memory_seeing};

@@ -163,6 +163,40 @@ impl BoardSpec {
         &self.board
     }
 
+    /// The same board `factor` times as large, as a printer may make it.
+    ///
+    /// # Errors
+    /// No such board exists.
+    pub fn scaled(&self, factor: f64) -> Result<BoardSpec, BoardSpecError> {
+        let pattern = match self.board.pattern() {
+            Pattern::Circles { diameter } => Pattern::Circles { diameter: factor * diameter },
+            Pattern::Chessboard => Pattern::Chessboard,
+        };
+        let (columns, rows) = (self.board.columns(), self.board.rows());
+        let board = Board::new(columns, rows, factor * self.board.spacing(), pattern)?;
+        Ok(BoardSpec { board, ..self.clone() })
+    }
+
+    /// The board as it stands on the command line: what is read from it is this board again.
+    pub fn words(&self) -> String {
+        let (board, unit) = (&self.board, &self.unit);
+        let kind = match self.kind {
+            MarkKind::Chess => "chess",
+            MarkKind::Circles => "circles",
+            MarkKind::Dots => "dots",
+        };
+        let words = format!("{kind}:{}x{}:{}{unit}", board.columns(), board.rows(), board.spacing());
+        match board.pattern() {
+            Pattern::Circles { diameter } => format!("{words}:{diameter}{unit}"),
+            Pattern::Chessboard => words,
+        }
+    }
+
+    /// Millimetres a unit of the board; `None` if no unit was given.
+    pub fn unit_mm(&self) -> Option<f64> {
+        millimetres(&self.unit)
+    }
+
     /// The marks in a photograph, px, in the order of the board's points.
     ///
     /// # Errors
@@ -208,6 +242,15 @@ mod tests {
             "dots:3x3:2mm".parse::<BoardSpec>().unwrap().to_string(),
             "dots of 3 x 3 marks, 2 mm apart"
         );
+    }
+
+    #[test]
+    fn the_words_of_a_board_make_it_again() {
+        for text in ["circles:9x7:10mm:3mm", "chess:9x6:2.5cm", "dots:3x3:1", "circles:4x4:0.3:0.1"] {
+            let spec: BoardSpec = text.parse().unwrap();
+            assert_eq!(spec.words(), text);
+            assert_eq!(spec.scaled(1.0).unwrap(), spec);
+        }
     }
 
     #[test]

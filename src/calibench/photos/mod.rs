@@ -6,9 +6,11 @@
 //! ```
 
 mod board;
+mod board_file;
 mod discs;
 mod fit;
 
 pub use board::{BoardSpec, BoardSpecError, DetectError, MarkKind};
+pub use board_file::{BoardFileError, parse_board_file};
 pub use discs::{NotFound, ordered_discs};
 pub use fit::{BiasCorrection, Fit, Fitter, Rejected};

@@ -1,0 +1,33 @@
+//! A board as it is named on the command line: by words, or by the file that lies beside a printed page.
+
+use calibench::io::input::{MOST_TABLE_BYTES, read_regular};
+use calibench::photos::{BoardSpec, parse_board_file};
+use std::path::Path;
+
+/// What a file of a printed board is called by its ending.
+const ENDING: &str = ".toml";
+
+/// `circles:9x7:10mm:3mm`, or a file such as `board.toml`.
+pub(in super::super) fn board_or_file(text: &str) -> Result<BoardSpec, String> {
+    if !text.ends_with(ENDING) {
+        return text.parse().map_err(|error: calibench::photos::BoardSpecError| {
+            format!("{error}, or the board.toml beside a page that `calibench board` drew")
+        });
+    }
+    let bytes = read_regular(Path::new(text), MOST_TABLE_BYTES).map_err(|error| error.to_string())?;
+    parse_board_file(text, &String::from_utf8_lossy(&bytes)).map_err(|error| error.to_string())
+}
+
+/// The file of a page: what was drawn, and what its owner will measure.
+pub(super) fn file_text(board: &BoardSpec, rulers_mm: [f64; 2]) -> String {
+    let [lower, left] = rulers_mm;
+    format!(
+        "# A printed board, for `calibench calibrate --board board.toml PHOTOS...`.\n\
+         # Printers scale. Measure both rulers on the page, from the middle of the first tick to the middle of the last,\n\
+         # and write their lengths behind measured_mm: the lower ruler first, then the one on the left.\n\
+         board = \"{}\"\n\
+         drawn_mm = [{lower}, {left}]\n\
+         measured_mm = [{lower}, {left}]\n",
+        board.words()
+    )
+}

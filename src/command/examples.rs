@@ -1,0 +1,92 @@
+//! What would one type? Examples at the end of every verb's help. They are commands that run: a test runs them all.
+
+use clap::{Command, CommandFactory};
+
+/// Verbs, those of a verb after it, and what one would type. What it reads is in `tests/verb_examples.rs`.
+const EXAMPLES: [(&str, &[&str]); 31] = [
+    ("list", &["calibench list", "calibench list --names"]),
+    ("explain", &["calibench explain line-bending.max-deviation", "calibench explain 5.4"]),
+    ("run", &["calibench run line-bending", "calibench run line-bending --seed 7 --out another-seed"]),
+    ("check", &["calibench check line-bending", "calibench check line-bending --bits --format json"]),
+    ("bless", &["calibench bless line-bending"]),
+    ("book", &["calibench book"]),
+    ("new study", &["calibench new study my-study"]),
+    ("new experiment", &["calibench new experiment my-question"]),
+    ("new adapter", &["calibench new adapter my-solver"]),
+    ("new board", &["calibench new board my-board"]),
+    (
+        "board",
+        &["calibench board chess:9x6:25mm", "calibench board circles:9x7:20mm:8mm --pdf letter --out page"],
+    ),
+    (
+        "calibrate",
+        &[
+            "calibench calibrate --board circles:9x7:10mm:3mm --out result photo0.png photo1.png photo2.png photo3.png",
+            "calibench calibrate corners.csv --image-size 640x480 --fix k2=0 --out result",
+            "calibench calibrate pairs.csv --mode tilted",
+        ],
+    ),
+    ("ninepoint", &["calibench ninepoint dots.png --out nine"]),
+    ("undistort", &["calibench undistort --camera result/result.json --out corrected photo0.png photo1.png"]),
+    (
+        "convert",
+        &[
+            "calibench convert result/result.json camera.yaml --to opencv-yaml",
+            "calibench convert chess:9x6:25mm target.yaml",
+        ],
+    ),
+    ("diff", &["calibench diff result/result.json camera.yaml --out difference"]),
+    ("measure", &["calibench measure result/result.json --view 0 --pixels 200,200,300,250"]),
+    ("register", &["calibench register taught.csv found.csv"]),
+    ("hand-eye", &["calibench hand-eye robot.csv result/result.json --robot-sd-mm 0.1 --robot-sd-deg 0.1"]),
+    ("check-reference", &["calibench check-reference history.csv --reference 25 --sd 0.01"]),
+    (
+        "study run",
+        &[
+            "calibench study run my-study.toml --out my-study",
+            "calibench study run my-study.toml --shard 0/2 --out part0",
+            "calibench study run my-study.toml --shard 1/2 --out part1",
+        ],
+    ),
+    ("study resume", &["calibench study resume my-study"]),
+    ("study merge", &["calibench study merge part0 part1 --out whole"]),
+    (
+        "study compare",
+        &["calibench study compare my-study whole", "calibench study compare my-study --factor views"],
+    ),
+    ("study plan", &["calibench study plan my-study.toml --want fx=2 --confirm 100"]),
+    ("study measure", &["calibench study measure my-study.toml --trials 100"]),
+    (
+        "gate",
+        &[
+            "calibench gate --html report.html",
+            "calibench gate --solver \"python3 my_solver.py\" --samples 1",
+            "calibench gate --planted k2-ignored --samples 4",
+        ],
+    ),
+    ("doctor", &["calibench doctor"]),
+    ("exit-codes", &["calibench exit-codes"]),
+    ("completions", &["calibench completions bash"]),
+    ("manual", &["calibench manual --out man"]),
+];
+
+/// The command line with its examples.
+pub(super) fn command() -> Command {
+    let plain = super::Arguments::command();
+    EXAMPLES.iter().fold(plain, |command, (verb, lines)| {
+        let words: Vec<&str> = verb.split(' ').collect();
+        with_examples(command, &words, lines)
+    })
+}
+
+/// The command whose verb, or whose verb's verb, has these examples behind what it says.
+fn with_examples(command: Command, verb: &[&str], lines: &[&str]) -> Command {
+    let Some((first, rest)) = verb.split_first() else {
+        let mut after = command.get_after_help().map(|said| format!("{said}\n\n")).unwrap_or_default();
+        after.push_str("Examples:");
+        lines.iter().for_each(|line| after.push_str(&format!("\n  {line}")));
+        return command.after_help(after);
+    };
+    // `study run` has the name `run` below `study`.
+    command.mut_subcommand(first, |below| with_examples(below, rest, lines))
+}

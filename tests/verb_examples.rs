@@ -1,0 +1,151 @@
+//! Does every verb's help end with examples, and do they run? All of them, in the order of the help, in a folder with what
+//! they read.
+
+use crate::shell::verbs;
+use calibench::geometry::rotation;
+use calibench::io::write_png;
+use calibench::synth::render::{Imaging, nine_dot_stand_in, photograph};
+use calibench::synth::{Scene, Truth};
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn calibench(folder: &Path, arguments: &[String]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_calibench"));
+    command.args(arguments).current_dir(folder).output().expect("the program starts")
+}
+
+fn words(text: &str) -> Vec<String> {
+    text.split_whitespace().map(String::from).collect()
+}
+
+/// The words of a command line, quotation marks holding some together.
+fn split(line: &str) -> Vec<String> {
+    let pieces = line.split('"').enumerate();
+    pieces.flat_map(|(i, piece)| if i % 2 == 1 { vec![piece.to_string()] } else { words(piece) }).collect()
+}
+
+fn help_of(verb: &str) -> String {
+    let run = calibench(Path::new("."), &words(&format!("{verb} --help")));
+    assert_eq!(run.status.code(), Some(0), "{verb}");
+    String::from_utf8_lossy(&run.stdout).into_owned()
+}
+
+/// Verbs without verbs of their own, such as `study run`.
+fn leaves() -> Vec<String> {
+    let below = |verb: String| -> Vec<String> {
+        let help = help_of(&verb);
+        let Some((_, listed)) = help.split_once("Commands:\n") else { return vec![verb] };
+        let indented = |line: &&str| line.starts_with("  ") && !line.starts_with("   ");
+        let names = listed.lines().take_while(|line| !line.is_empty()).filter(indented);
+        let names = names.filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help");
+        names.map(|name| format!("{verb} {name}")).collect()
+    };
+    verbs().into_iter().flat_map(below).collect()
+}
+
+/// The examples of a verb.
+fn examples(verb: &str) -> Vec<String> {
+    let help = help_of(verb);
+    let (_, listed) = help.split_once("Examples:\n").unwrap_or_else(|| panic!("{verb} has no examples"));
+    let lines: Vec<String> =
+        listed.lines().map(|line| line.trim().to_string()).filter(|line| !line.is_empty()).collect();
+    assert!(
+        !lines.is_empty() && lines.iter().all(|line| line.starts_with(&format!("calibench {verb}"))),
+        "{lines:?}"
+    );
+    lines
+}
+
+/// What the examples read.
+fn folder() -> PathBuf {
+    // Outside of the source tree: verbs that look for one find the one that the test makes, or none.
+    let folder = std::env::temp_dir().join(format!("calibench-examples-{}", std::process::id()));
+    fs::create_dir_all(&folder).expect("a folder is made");
+    let scene = Scene::example();
+    let mut corners = "view,point,X,Y,u,v\n".to_string();
+    let mut robot = "view,x,y,z,rx,ry,rz\n".to_string();
+    for (view, (seen, pose)) in scene.exact().iter().zip(&scene.truth.cam_from_target).enumerate() {
+        for (point, (at, pixel)) in seen.pairs().enumerate() {
+            writeln!(corners, "{view},{point},{},{},{},{}", at.x, at.y, pixel.x, pixel.y)
+                .expect("text grows");
+        }
+        let (t, w) = (pose.inverse().translation, -rotation::log(&pose.rotation));
+        writeln!(robot, "{view},{},{},{},{},{},{}", t.x, t.y, t.z, w.x, w.y, w.z).expect("text grows");
+        let imaging = Imaging { blur_px: 0.5, ..Imaging::default() };
+        let photo =
+            photograph(&scene.truth.camera, Truth::EXAMPLE_IMAGE, &Truth::example_board(), pose, &imaging);
+        let photo = photo.expect("it is seen").image.to_u8();
+        write_png(&folder.join(format!("photo{view}.png")), &photo).expect("written");
+    }
+    write_png(&folder.join("dots.png"), &nine_dot_stand_in().image.to_u8()).expect("written");
+    for (name, text) in [
+        ("corners.csv", corners.as_str()),
+        ("robot.csv", robot.as_str()),
+        (
+            "pairs.csv",
+            "point,px,py,X,Y\n0,0,0,0,0\n1,100,0,1,0\n2,0,100,0,1\n3,100,101,1,1\n4,50,51,0.5,0.5\n",
+        ),
+        ("taught.csv", "point,X,Y\na,0,0\nb,10,0\nc,0,10\n"),
+        ("found.csv", "point,X,Y\na,1,0\nb,11,0\nc,1,10\n"),
+        ("history.csv", "when,value\n1,25.01\n2,24.99\n"),
+    ] {
+        fs::write(folder.join(name), text).expect("written");
+    }
+    folder
+}
+
+/// A folder that is a source tree to the two verbs that write into one.
+fn tree(folder: &Path) -> PathBuf {
+    let tree = folder.join("tree");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for name in ["golden/published.toml", "golden/line-bending.snap", "experiments/lib.rs", "Cargo.toml"] {
+        let path = tree.join(name);
+        fs::create_dir_all(path.parent().expect("it lies in a folder")).expect("a folder is made");
+        fs::copy(root.join(name), path).expect("copied");
+    }
+    tree
+}
+
+fn has_numpy() -> bool {
+    let run = Command::new("python3").args(["-c", "import numpy"]).output();
+    run.is_ok_and(|output| output.status.success())
+}
+
+#[test]
+fn every_verb_has_examples_and_they_run() {
+    let folder = folder();
+    let tree = tree(&folder);
+    let leaves = leaves();
+    assert!(leaves.len() > 25, "{leaves:?}");
+    for verb in &leaves {
+        for line in examples(verb) {
+            // The book is built by a test of `tests/command.rs`: it takes the runs of all experiments.
+            if line.contains("python3") && !has_numpy() || verb == "book" {
+                continue;
+            }
+            let place = if ["bless", "new experiment"].contains(&verb.as_str()) { &tree } else { &folder };
+            let run = calibench(place, &split(&line)[1..]);
+            // A planted fault is found, which is what its example shows.
+            let expected = if line.contains("--planted") { 1 } else { 0 };
+            let said = String::from_utf8_lossy(&run.stderr);
+            assert_eq!(
+                run.status.code(),
+                Some(expected),
+                "{line}\n{}{said}",
+                String::from_utf8_lossy(&run.stdout)
+            );
+        }
+    }
+    fs::remove_dir_all(folder).expect("removed");
+}
+
+#[test]
+fn the_page_of_exit_codes_names_every_verb() {
+    let run = calibench(Path::new("."), &words("exit-codes"));
+    let page = String::from_utf8_lossy(&run.stdout).into_owned();
+    for verb in verbs() {
+        assert!(page.contains(&format!("`{verb}`")), "`{verb}` is not on the page of exit codes");
+    }
+}
