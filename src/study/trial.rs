@@ -5,7 +5,7 @@ use super::cells::Cell;
 use super::quantity::Quantity;
 use calibench::board::View;
 use calibench::calibrate::{CalibrationError, LensCalibration, Termination, calibrate_lens};
-use calibench::camera::{Lens, Parameter};
+use calibench::camera::{Lens, Model, Parameter};
 use calibench::geometry::Vec2;
 use calibench::synth::{Scene, Stream};
 
@@ -97,9 +97,9 @@ fn measure(
     scene: &Scene<Lens>,
     calibration: &LensCalibration,
 ) -> Option<f64> {
-    // Coefficients of different models are different things, of one name or not.
+    let truth = cell.camera.distortion;
     let error = |p: Parameter| {
-        let is_comparable = cell.knows_its_lens() || Parameter::LINEAR.contains(&p);
+        let is_comparable = cell.knows_its_lens() || is_the_same_thing(p, [cell.model(), truth.model()]);
         is_comparable.then(|| Some(calibration.camera.value(p)? - cell.camera.value(p)?)).flatten()
     };
     let value = match quantity {
@@ -119,6 +119,16 @@ fn measure(
         }
     };
     value.is_finite().then_some(value)
+}
+
+/// Whether a parameter means the same with different models: coefficients never do, of one name or not, and a double
+/// sphere's focal length is not the scale of the image on the axis.
+fn is_the_same_thing(parameter: Parameter, models: [Model; 2]) -> bool {
+    match parameter {
+        Parameter::Cx | Parameter::Cy | Parameter::Skew => true,
+        Parameter::Fx | Parameter::Fy => !models.contains(&Model::DoubleSphere),
+        _ => false,
+    }
 }
 
 fn reason(error: &CalibrationError) -> &'static str {
