@@ -3,6 +3,7 @@
 
 use calibench_harness::{Build, Experiment};
 
+pub mod board_warp;
 pub mod certified_digits;
 pub mod collinearity;
 pub mod distortion_model;
@@ -31,6 +32,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     focal_depth::EXPERIMENT,
     collinearity::EXPERIMENT,
     distortion_model::EXPERIMENT,
+    board_warp::EXPERIMENT,
     nine_point::EXPERIMENT,
     photographs::EXPERIMENT,
     interface::EXPERIMENT,
