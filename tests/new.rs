@@ -71,6 +71,21 @@ fn a_new_experiment_holds_and_is_registered_everywhere() {
     assert!(String::from_utf8_lossy(&elsewhere.stderr).contains("source tree"));
 }
 
+/// A file of C++ needs a compiler, which is not everywhere.
+#[test]
+fn a_new_adapter_is_compiled_and_trusted_by_the_gate() {
+    let folder = folder("new-adapter");
+    succeeds(&folder, &["new", "adapter", "my-solver", "--language", "cpp"]);
+    let compiler = ["-std=c++17", "-O2", "-Wall", "-Wextra", "-Werror", "-o", "my-solver", "my-solver.cpp"];
+    let Ok(compiled) = Command::new("c++").args(compiler).current_dir(&folder).output() else {
+        eprintln!("SKIPPED: there is no C++ compiler");
+        return;
+    };
+    assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
+    let gate = succeeds(&folder, &["gate", "--solver", "./my-solver", "--samples", "1", "--timeout", "120"]);
+    assert!(String::from_utf8_lossy(&gate.stdout).contains("\nTRUSTED"), "{gate:?}");
+}
+
 #[test]
 fn a_new_board_is_taken_by_calibrate() {
     let folder = folder("new-board");

@@ -12,7 +12,7 @@ const EXAMPLES: [(&str, &[&str]); 31] = [
     ("book", &["calibench book"]),
     ("new study", &["calibench new study my-study"]),
     ("new experiment", &["calibench new experiment my-question"]),
-    ("new adapter", &["calibench new adapter my-solver"]),
+    ("new adapter", &["calibench new adapter my-solver", "calibench new adapter my-solver --language cpp"]),
     ("new board", &["calibench new board my-board"]),
     (
         "board",

@@ -46,6 +46,8 @@ struct Adapter {
 enum Language {
     /// Needs NumPy.
     Python,
+    /// C++17, and nothing else.
+    Cpp,
 }
 
 /// What is written, and what to do with it.
@@ -56,6 +58,7 @@ struct Started {
 
 const STUDY: &str = include_str!("new/study.toml");
 const BOARD: &str = include_str!("new/board.toml");
+const CPP: &str = include_str!("../../adapters/templates/solver.cpp");
 const PYTHON: &str = include_str!("../../adapters/minimal_solver.py");
 
 /// The name in the templates.
@@ -128,18 +131,23 @@ fn board(name: &str) -> Started {
 }
 
 fn adapter(name: &str, language: Language) -> Started {
-    let (file, text, command, needs) = match language {
+    let (file, text, needs, command) = match language {
         Language::Python => {
             let file = format!("{}.py", name.replace('-', "_"));
             let text = PYTHON.replace("adapters/minimal_solver.py", &file);
             let command = format!("python3 {file}");
-            (file, text, command, "  python3 -m pip install numpy\n")
+            (file, text, "python3 -m pip install numpy".to_string(), command)
+        }
+        Language::Cpp => {
+            let file = format!("{name}.cpp");
+            let compiled = format!("c++ -std=c++17 -O2 -o {name} {file}");
+            (file, CPP.replace(PLACEHOLDER, name), compiled, format!("./{name}"))
         }
     };
     Started {
         next: format!(
-            "{needs}  calibench gate --solver \"{command}\" --samples 1     # asks every kind of problem once\n  then put your own calibrator in \
-             the place of its `solve`; adapters/PROTOCOL.md says what is asked and judged"
+            "  {needs}\n  calibench gate --solver \"{command}\" --samples 1     # asks every kind of problem once\n  then put your own \
+             calibrator in the place of its `solve`; adapters/PROTOCOL.md says what is asked and judged"
         ),
         files: vec![(Path::new(&file).to_path_buf(), text.into_bytes())],
     }
@@ -160,7 +168,8 @@ mod tests {
 
     #[test]
     fn templates_take_the_name_everywhere() {
-        for started in [study("abc"), board("abc"), adapter("abc", Language::Python)] {
+        let adapters = [Language::Python, Language::Cpp].map(|language| adapter("abc", language));
+        for started in [study("abc"), board("abc")].into_iter().chain(adapters) {
             let text = String::from_utf8(started.files[0].1.clone()).unwrap();
             assert!(!text.contains(PLACEHOLDER) && !text.contains("minimal_solver"), "{text}");
         }
