@@ -129,8 +129,8 @@ fn calibrated_lens(seed: u64) -> Result<Camera, ExperimentError> {
 fn nearest_sample(photo: &Raster<u8>, camera: &Camera) -> Raster<u8> {
     let inside = |p: Vec2| {
         let (x, y) = (libm::round(p.x), libm::round(p.y));
-        (x >= 0.0 && y >= 0.0 && x < photo.width() as f64 && y < photo.height() as f64)
-            .then(|| (x as usize, y as usize))
+        let is_inside = x >= 0.0 && y >= 0.0 && x < photo.width() as f64 && y < photo.height() as f64;
+        is_inside.then_some((x as usize, y as usize))
     };
     Raster::from_fn(photo.width(), photo.height(), |x, y| {
         inside(camera.distort_pixel(&Vec2::new(x as f64, y as f64))).map_or(0, |(x, y)| photo.get(x, y))

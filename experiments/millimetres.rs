@@ -241,7 +241,9 @@ fn claim_scale(record: &mut Record, ways: &[Way], scene: &Scene) -> Result<(), E
 
 /// The stated uncertainty against the errors.
 fn claim_stated(record: &mut Record, trials: &[Measured]) {
-    let squares: Vec<f64> = trials.iter().map(|t| (t.errors_mm[3] / t.stated_mm).powi(2)).collect();
+    let in_standard_deviations = |t: &Measured| t.errors_mm[3] / t.stated_mm;
+    let squares: Vec<f64> =
+        trials.iter().map(|t| in_standard_deviations(t) * in_standard_deviations(t)).collect();
     let found = mean(&squares);
     let interval = Interval::of_mean_chi_squared(1, TRIALS, each_of(1, RATE));
     record.group("", converged()).number(
