@@ -71,6 +71,7 @@ fn decoded(text: &str) -> String {
     while let Some((before, after)) = rest.split_once('&') {
         decoded.push_str(before);
         let Some((name, behind)) = after.split_once(';') else {
+            decoded.push('&');
             rest = after;
             continue;
         };
@@ -112,6 +113,6 @@ mod tests {
             sections(html),
             [section("t", "A title", "One & two. 1 2"), section("b", "Next", "k_1 x")]
         );
-        assert_eq!(decoded("a & b &nonsense; c"), "a & b &nonsense; c");
+        assert_eq!(decoded("a & b &nonsense; c & d"), "a & b &nonsense; c & d");
     }
 }
