@@ -41,7 +41,7 @@ fn main() {
 /// Folders that the command carries with it, so that it works outside the source tree.
 const CARRIED: [&str; 4] = ["book", "figures", "golden", "reference"];
 /// What of them is read there.
-const CARRIED_ENDINGS: [&str; 9] = ["css", "json", "md", "png", "py", "snap", "svg", "toml", "woff2"];
+const CARRIED_ENDINGS: [&str; 10] = ["css", "js", "json", "md", "png", "py", "snap", "svg", "toml", "woff2"];
 
 /// Writes the list of the files that are carried, as `carried.rs`, with the code that the book quotes.
 fn carry(root: &Path) {
@@ -81,9 +81,11 @@ fn files_below(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// The files of `{{code FILE item}}`.
+/// The files of `{{code FILE item}}` and `{{shell FILE command}}`.
 fn quoted_code(page: &str) -> Vec<&str> {
-    page.split("{{code ").skip(1).filter_map(|rest| rest.split(' ').next()).collect()
+    let of =
+        |verb: &str| page.split(verb).skip(1).filter_map(|rest| rest.split(' ').next()).collect::<Vec<_>>();
+    [of("{{code "), of("{{shell ")].concat()
 }
 
 /// Tests that need the measurements of others are ignored, and counted so, where these are absent or CALIBENCH_DATA is `none`.

@@ -17,7 +17,9 @@ use calibench::evaluate::{RmseDistribution, cramer_rao};
 use calibench::geometry::{Affine, Pose, Vec2, Vec3};
 use calibench::synth::{Scene, Truth};
 use calibench_harness::stats;
-use calibench_harness::{Band, Context, Experiment, ExperimentError, Figure, Plot, Record, Table};
+use calibench_harness::{
+    Band, Context, Experiment, ExperimentError, Figure, Look, Marker, Plot, Record, Table,
+};
 use nalgebra::{DMatrix, DVector, Vector2};
 use rayon::prelude::*;
 
@@ -501,6 +503,11 @@ fn bias_figure(nodes: &[Node], theory: &Theory, unit: Vector2<f64>) -> Figure {
     let curve = |p: Parameter| -> Vec<(f64, f64)> {
         shown.iter().map(|n| (n.ratio, n.bias_of(p).abs() / theory.small_sd(p))).collect()
     };
+    // The axis is logarithmic, so that a sign has to be told by the marker.
+    let of_sign = |p: Parameter, sign: f64| {
+        let here = shown.iter().filter(move |n| sign * n.bias_of(p) > 0.0);
+        here.map(move |n| (n.ratio, n.bias_of(p).abs() / theory.small_sd(p))).collect::<Vec<_>>()
+    };
     let linear = shown.iter().map(|n| (n.ratio, theory.bias(unit * n.ratio)[2].abs() / theory.small_sd(Cx)));
     let plot = Plot::new(
         "Bias of a model without tangential terms",
@@ -510,7 +517,8 @@ fn bias_figure(nodes: &[Node], theory: &Theory, unit: Vector2<f64>) -> Figure {
     .points("cx", curve(Cx))
     .points("cy", curve(Cy))
     .points("fx", curve(Fx))
-    .points("k1", curve(K1))
+    .points("k1, above zero", of_sign(K1, 1.0))
+    .points_as("k1, below zero", of_sign(K1, -1.0), Look::series(3).marker(Marker::Circle))
     .line("cx, linear theory", linear)
     .hline("one standard deviation", 1.0)
     .log_x()

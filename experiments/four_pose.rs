@@ -14,7 +14,7 @@ use calibench::calibrate::{Calibration, Settings, calibrate};
 use calibench::camera::{Camera, FreeParameters, Parameter};
 use calibench::evaluate::distribution::{fisher_cdf, round_significant};
 use calibench::evaluate::{BoundError, Errors, RmseDistribution, Sample, cramer_rao, errors_of, leverages};
-use calibench::geometry::Vec2;
+use calibench::geometry::{Vec2, Vec3};
 use calibench::synth::{Scene, Stream, StreamKey, Truth, scene::looking_at_centre};
 use calibench_harness::figure::density;
 use calibench_harness::monte_carlo::Estimate;
@@ -83,6 +83,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     weak::claim_two_views(&mut record)?;
     weak::claim_facing_views(&mut record, context)?;
 
+    record.figure(figures::space(&draw));
     record.figure(figures::views(&draw));
     record.figure(figures::residuals(&draw)?);
     record.figure(figures::residual_distribution(&draw));

@@ -12,13 +12,16 @@ pub mod focal_depth;
 pub mod four_pose;
 pub mod gate_power;
 pub mod global_minimum;
+pub mod grid_image;
 pub mod interface;
 pub mod k2_observability;
 pub mod line_bending;
+pub mod millimetres;
 pub mod nine_point;
 pub mod noise_floor;
 pub mod photographs;
 pub mod pose_count;
+pub mod prediction_map;
 mod sweep;
 
 /// All experiments, in the order of the book.
@@ -27,10 +30,13 @@ pub const EXPERIMENTS: &[Experiment] = &[
     line_bending::EXPERIMENT,
     four_pose::EXPERIMENT,
     k2_observability::EXPERIMENT,
+    prediction_map::EXPERIMENT,
     pose_count::EXPERIMENT,
     noise_floor::EXPERIMENT,
     focal_depth::EXPERIMENT,
     collinearity::EXPERIMENT,
+    grid_image::EXPERIMENT,
+    millimetres::EXPERIMENT,
     distortion_model::EXPERIMENT,
     board_warp::EXPERIMENT,
     nine_point::EXPERIMENT,

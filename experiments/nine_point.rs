@@ -212,9 +212,10 @@ fn residual_figure(centres: &[Vec2], fits: &[PlaneCalibration], name: &str) -> F
                 .size(340.0, 350.0)
                 .equal_aspect()
                 .x_range(-1.5, 1.5)
-                .y_range(-1.5, 1.5)
+                .y_range(-1.8, 1.5)
                 .points_as("target", dots.iter().map(|w| (w.x, w.y)), Look::ink())
-                .arrows(format!("residual x {enlarge:.0e}"), arrows)
+                .arrows("residual", arrows)
+                .arrows(format!("this long: {:.0e} units", 0.2 / enlarge), [(-1.0, -1.6, 0.2, 0.0)])
         })
         .collect();
     let caption = format!(

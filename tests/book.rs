@@ -2,7 +2,7 @@
 
 use calibench_book::{Compiled, Evidence, Page, Sources, build, compile};
 use calibench_harness::project::Project;
-use calibench_harness::{Context, Experiment, ExperimentError, Record};
+use calibench_harness::{Build, Context, Experiment, ExperimentError, Record};
 use std::path::Path;
 
 const LINE_BENDING: Experiment =
@@ -26,7 +26,7 @@ fn page_of(text: &str) -> Page {
 fn book_of(text: &str) -> Compiled {
     let project = project();
     let page = page_of(text);
-    let evidence = Evidence::of_records(&project, &[LINE_BENDING], &[]);
+    let evidence = Evidence::of_records(&project, &[LINE_BENDING], &[], &Build::default());
     let sources = Sources::load(&project, evidence).unwrap();
     compile(&Sources { pages: vec![page], references: Vec::new(), contradictions: Vec::new(), ..sources })
 }
@@ -56,12 +56,39 @@ fn a_number_is_shown_with_its_provenance() {
 }
 
 #[test]
+fn a_number_leads_to_its_record_and_the_record_back_to_the_text() {
+    let compiled =
+        book_of("{{num line-bending.max-deviation .3}} and again {{num line-bending.max-deviation .1}}.");
+    let (page, record) = (&compiled.pages[0].content, &compiled.records[0].content);
+    let place = "at-line-bending.max-deviation";
+    assert_eq!(page.matches(&format!("id=\"{place}\"")).count(), 1, "{page}");
+    assert!(page.contains("href=\"record-line-bending.md#number-max-deviation\""), "{page}");
+    assert!(record.contains(&format!("<a href=\"page.md#{place}\">section 1</a>")), "{record}");
+}
+
+#[test]
+fn a_figure_is_described_and_sized_and_a_listing_leads_to_its_file() {
+    let compiled = book_of(
+        "{{figure line-bending.grids Three \"grids\".}}\n\n{{code experiments/line_bending.rs sweep_k1}}",
+    );
+    let page = &compiled.pages[0].content;
+    assert!(page.contains("alt=\"Three &quot;grids&quot;.\" width="), "{page}");
+    let source = String::from_utf8(compiled.assets["code/experiments-line_bending.rs.html"].clone()).unwrap();
+    let (_, link) = page.split_once("code/experiments-line_bending.rs.html#").unwrap();
+    let line = link.split('"').next().unwrap();
+    let (_, quoted) = source.split_once(&format!("id=\"{line}\"")).unwrap();
+    assert!(quoted.lines().next().unwrap().contains("fn sweep_k1"), "{line}");
+}
+
+#[test]
 fn what_does_not_resolve_is_found_with_its_line() {
     let cases = [
         ("{{num line-bending.nonsense .3}}", "has no number `nonsense`"),
         ("{{num nonsense.rmse .3}}", "there is no experiment `nonsense`"),
         ("{{num line-bending.points x3}}", "is no format"),
         ("{{figure line-bending.nonsense}}", "draws no figure"),
+        ("{{figure line-bending.grids}}", "say behind its name what is seen"),
+        ("{{shell README.md calibench nonsense}}", "has no block"),
         ("{{table line-bending.nonsense *}}", "has no table"),
         ("{{cite nobody1900}}", "has no `nobody1900`"),
         ("{{ref eq:nonsense}}", "nothing is named"),
@@ -104,7 +131,7 @@ fn figures_that_no_page_shows_are_found() {
 #[test]
 fn unused_names_are_found_where_they_are_defined() {
     let project = project();
-    let evidence = Evidence::of_records(&project, &[LINE_BENDING], &[]);
+    let evidence = Evidence::of_records(&project, &[LINE_BENDING], &[], &Build::default());
     let mut sources = Sources::load(&project, evidence).unwrap();
     sources.pages = vec![page_of("# Title\n")];
     let findings = compile(&sources).findings;
@@ -143,7 +170,7 @@ fn a_reference_at_the_head_of_a_sentence_is_capitalised() {
 #[test]
 fn the_book_is_built_whole_and_leads_nowhere_outside() {
     let project = project();
-    let evidence = Evidence::of_records(&project, &[LINE_BENDING], &[]);
+    let evidence = Evidence::of_records(&project, &[LINE_BENDING], &[], &Build::default());
     let sources = Sources::load(&project, evidence).unwrap();
     let compiled = compile(&sources);
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("book");
@@ -155,7 +182,18 @@ fn the_book_is_built_whole_and_leads_nowhere_outside() {
             assert!(!text.contains(outside), "{} has {outside}", page.path);
         }
     }
-    for file in ["print.html", "style/book.css", "style/CalibenchMath.woff2", "record-line-bending.html"] {
+    let index = std::fs::read_to_string(folder.join("search-index.js")).unwrap();
+    assert!(
+        index.contains("[\"line-bending.html\",\"result\",\"How far does a lens bend a straight line?\"")
+    );
+    for file in [
+        "print.html",
+        "search.html",
+        "style/search.js",
+        "style/book.css",
+        "style/CalibenchMath.woff2",
+        "record-line-bending.html",
+    ] {
         assert!(folder.join(file).is_file(), "{file} is missing");
     }
 }

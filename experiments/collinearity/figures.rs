@@ -28,12 +28,21 @@ pub fn row_figure(ours: &Found, exact: &Found, book: &Book, seed: u64) -> Figure
     Figure::panels("top-row", &panels, 2, caption)
 }
 
+/// Title and axis of each of [`QUANTITIES`].
+const QUANTITY_NAMES: [[&str; 2]; 5] = [
+    ["Single-plane calibration", "RMS residual"],
+    ["Top row as photographed", "largest deviation"],
+    ["Top row corrected", "largest deviation"],
+    ["Affine fit", "RMS residual"],
+    ["Affine fit", "largest residual"],
+];
+
 pub fn predicted_figure(ours: &[Found], draws: &[Draw], book: &Book, seed: u64) -> Figure {
     let drawn = ours[MAIN].quantities();
     let panels: Vec<Plot> = QUANTITIES
         .iter()
         .enumerate()
-        .map(|(q, (id, unit, _))| {
+        .map(|(q, (_, unit, _))| {
             let free = column(draws, MAIN, q);
             let range = (0..CENTRES.len()).fold((f64::INFINITY, 0.0f64), |(low, high), centre| {
                 let spread = moments(&column(draws, centre, q));
@@ -44,7 +53,8 @@ pub fn predicted_figure(ours: &[Found], draws: &[Draw], book: &Book, seed: u64) 
                 let bins = density(&column(draws, centre, q), range, 60);
                 bins.into_iter().map(|(left, right, height)| (0.5 * (left + right), height))
             };
-            Plot::new(id.replace('-', " "), format!("{id} ({unit})"), format!("density (1/{unit})"))
+            let [title, axis] = QUANTITY_NAMES[q];
+            Plot::new(title, format!("{axis} ({unit})"), format!("density (1/{unit})"))
                 .size(400.0, 330.0)
                 .histogram("centre free", &density(&free, range, 60))
                 .line("held at truth", outline(1))
@@ -68,15 +78,28 @@ pub fn predicted_figure(ours: &[Found], draws: &[Draw], book: &Book, seed: u64) 
 }
 
 pub fn residual_figure(view: &View, found: &Found, seed: u64) -> Figure {
-    let panel = |plot: Plot, label: &str, at: &[Vec2], residuals: &[Vec2], scale: f64| {
+    // The arrow that shows the scale stands below the points, at the left.
+    let panel = |plot: Plot,
+                 label: &str,
+                 at: &[Vec2],
+                 residuals: &[Vec2],
+                 scale: f64,
+                 (length, unit): (f64, &str)| {
         let arrows = at.iter().zip(residuals).map(|(p, r)| (p.x, p.y, scale * r.x, scale * r.y));
-        plot.size(460.0, 390.0).equal_aspect().y_down().arrows(format!("{label}, x {scale}"), arrows)
+        let left = stats::smallest(at.iter().map(|p| p.x));
+        let (top, bottom) = (stats::smallest(at.iter().map(|p| p.y)), stats::largest(at.iter().map(|p| p.y)));
+        let reference = (left, bottom + 0.17 * (bottom - top), scale * length, 0.0);
+        plot.size(460.0, 400.0)
+            .equal_aspect()
+            .y_down()
+            .arrows(format!("{label}, \u{d7} {scale}"), arrows)
+            .arrows(format!("this long: {length} {unit}"), [reference])
     };
     let plane = Plot::new("Single-plane calibration", "u (px)", "v (px)");
     let affine = Plot::new("Affine fit to the target", "X (mm)", "Y (mm)");
     let panels = [
-        panel(plane, "predicted minus seen", view.pixels(), &found.plane.residuals_px, 150.0),
-        panel(affine, "fitted minus target", view.points(), &found.affine_residuals, 100.0),
+        panel(plane, "predicted minus seen", view.pixels(), &found.plane.residuals_px, 150.0, (0.2, "px")),
+        panel(affine, "fitted minus target", view.points(), &found.affine_residuals, 100.0, (0.05, "mm")),
     ];
     let caption = format!(
         "Residuals of the {} points of our draw (seed {seed}, sigma {SIGMA_PX} px, centre free): of the \

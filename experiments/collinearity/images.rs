@@ -229,8 +229,7 @@ pub fn shift_figure(ours: &[Found], seed: u64) -> Result<Figure, ExperimentError
     let shifts = |plane: &Camera| -> Vec<f64> {
         let shift = |u: u32, v: u32| {
             let pixel = Vec2::new(f64::from(u), f64::from(v));
-            // Hundredths of a pixel are all that a cell has room for.
-            0.01 * (100.0 * (truth.distort_pixel(&pixel) - plane.distort_pixel(&pixel)).norm()).round()
+            (truth.distort_pixel(&pixel) - plane.distort_pixel(&pixel)).norm()
         };
         let places = rows.iter().flat_map(|&v| columns.iter().map(move |&u| (u, v)));
         places.map(|(u, v)| shift(u, v)).collect()
@@ -238,7 +237,8 @@ pub fn shift_figure(ours: &[Found], seed: u64) -> Result<Figure, ExperimentError
     let panel = |title: &str, values: Vec<f64>| -> Result<Plot, ExperimentError> {
         let heat = HeatMap::new("shift (px)", names(&columns), names(&rows), values)
             .map_err(ExperimentError::at("heat map"))?
-            .range(0.0, 2.0);
+            .range(0.0, 2.0)
+            .decimals(2);
         Ok(Plot::heat_map(title, "u (px)", "v (px)", heat).size(520.0, 380.0))
     };
     let (held, free) = (shifts(&ours[0].plane.lens_camera()), shifts(&ours[MAIN].plane.lens_camera()));

@@ -53,6 +53,49 @@ pub fn views(draw: &Draw) -> Figure {
     Figure::panels("views", &panels, 2, caption)
 }
 
+/// Camera and target in space, from above and from the side: the optical axis runs to the right.
+pub fn space(draw: &Draw) -> Figure {
+    const REACH_MM: f64 = 170.0;
+    let truth = &draw.scene.truth;
+    let (width, height) = Truth::EXAMPLE_IMAGE;
+    let rays = |low: f64, high: f64| [(REACH_MM, REACH_MM * low), (0.0, 0.0), (REACH_MM, REACH_MM * high)];
+    let panel = |title: &str, label: &str, axis: usize, (first, last): (f64, f64)| {
+        let camera = &truth.camera;
+        let normalised =
+            |pixel: f64| [(pixel - camera.cx) / camera.fx, (pixel - camera.cy) / camera.fy][axis];
+        let plot = Plot::new(title, "Z, along the optical axis (mm)", label)
+            .size(440.0, 380.0)
+            .equal_aspect()
+            .y_down()
+            .x_range(-10.0, REACH_MM)
+            .y_range(-85.0, 85.0)
+            .line_as(
+                "what the image shows",
+                rays(normalised(first), normalised(last)),
+                Look::ink().dash(Dash::Dotted),
+            )
+            .points_as("camera", [(0.0, 0.0)], Look::ink().marker(Marker::Square));
+        truth.cam_from_target.iter().zip(POSE_NAMES).enumerate().fold(plot, |plot, (i, (pose, name))| {
+            let outline = CORNERS_MM.map(|[x, y]| pose.apply(&Vec3::new(x, y, 0.0))).map(|p| (p.z, p[axis]));
+            plot.line_as(name, outline, Look::series(i))
+        })
+    };
+    let panels = [
+        panel("From above", "X, to the right (mm)", 0, (-0.5, width as f64 - 0.5)),
+        panel("From the side", "Y, down (mm)", 1, (-0.5, height as f64 - 0.5)),
+    ];
+    let caption = format!(
+        "The virtual camera and the outlines of its target in the four poses, all {} mm away, without the lens's bending. Notice that \
+         a facing target is a line here, at one depth, and that tilt brings other depths.",
+        truth.cam_from_target[0].translation.z
+    );
+    Figure::panels("space", &panels, 2, caption)
+}
+
+/// The target's outermost points, once around.
+const CORNERS_MM: [[f64; 2]; 5] =
+    [[-40.0, -30.0], [40.0, -30.0], [40.0, 30.0], [-40.0, 30.0], [-40.0, -30.0]];
+
 pub fn residuals(draw: &Draw) -> Result<Figure, ExperimentError> {
     let others = neighbours_in_other_draws(draw)?;
     let panels: Vec<Plot> = draw

@@ -148,14 +148,15 @@ pub(crate) fn report(record: &mut Record, examined: &Examined) {
     let one_to_one = Truth::example_camera().fx;
     let off = |c: &Checks| (c.distance_mm - one_to_one).abs();
     let nearest = sweep.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(chapter);
-    let plot =
-        Plot::new("Pixels taken for millimetres", "distance of the target (mm)", "what the check shows")
-            .line(
-                "difference to the target (\u{201c}mm\u{201d})",
-                sweep.iter().map(|c| (c.distance_mm, c.direct)),
-            )
-            .line("error of the spacing (%)", sweep.iter().map(|c| (c.distance_mm, error_percent(c))))
-            .vline("one pixel a millimetre", one_to_one);
+    let panel = |title: &str, label: &str, check: &dyn Fn(&Checks) -> f64| {
+        Plot::new(title, "distance of the target (mm)", label)
+            .size(440.0, 360.0)
+            .line("what the check shows", sweep.iter().map(|c| (c.distance_mm, check(c))))
+            .vline("one pixel a millimetre", one_to_one)
+    };
+    let difference = panel("Compared with the target", "difference (\u{201c}mm\u{201d})", &|c| c.direct)
+        .y_range(0.0, 550.0);
+    let spacing = panel("Spacing of neighbours", "error (%)", &error_percent);
     let caption = format!(
         "RMS difference of corrected pixels and target millimetres, and error of the spacing of neighbours, \
          against the distance of a facing target; nothing is drawn at random. Notice that at \
@@ -166,7 +167,7 @@ pub(crate) fn report(record: &mut Record, examined: &Examined) {
         nearest.direct,
         error_percent(nearest)
     );
-    record.figure(Figure::plot("units", &plot, caption));
+    record.figure(Figure::panels("units", &[difference, spacing], 2, caption));
 }
 
 /// By hand: corrected pixel `f/Z X + cx` minus `X`, over a centred grid of 9 x 7 points 10 mm apart, whose

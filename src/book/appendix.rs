@@ -1,41 +1,14 @@
-//! What stands in the appendix? A page for every record, and every published number beside ours.
+//! What stands in the appendix? Every published number beside ours, and the tables of what the experiments found.
 
 use super::evidence::{ExperimentEvidence, RecordClaim, number};
 use super::format::{self, significant, typeset};
 use super::golden_file::GoldenFile;
-use super::page::CompiledPage;
+use super::record_page::page_of;
 use super::sources::Sources;
-use super::text::{attribute, inline, sentence};
+use super::text::{inline, sentence};
 use calibench_harness::published::{Kind, not_judged};
 use calibench_harness::verdict::ByKind;
-use std::collections::BTreeMap;
 use std::fmt::Write;
-
-/// The page of an experiment's record, from the root of the book.
-pub(super) fn page_of(experiment: &str) -> String {
-    format!("record-{experiment}.md")
-}
-
-/// One page an experiment with a snapshot, and its numbers as CSV among the assets.
-pub(super) fn record_pages(sources: &Sources, assets: &mut BTreeMap<String, Vec<u8>>) -> Vec<CompiledPage> {
-    let mut pages = Vec::new();
-    for (id, evidence) in &sources.evidence.experiments {
-        let Some(golden) = &evidence.golden else { continue };
-        assets.insert(format!("data/{id}/numbers.csv"), numbers_csv(evidence, golden).into_bytes());
-        for (name, csv) in &evidence.tables {
-            assets.insert(format!("data/{id}/{name}.csv"), csv.clone().into_bytes());
-        }
-        let content = record_page(id, evidence, golden);
-        pages.push(CompiledPage {
-            path: page_of(id),
-            title: format!("Record: {id}"),
-            number: None,
-            below: true,
-            content,
-        });
-    }
-    pages
-}
 
 /// The published values of an experiment by kind, as its last run judged them.
 pub(super) fn by_kind(id: &str, evidence: &ExperimentEvidence) -> ByKind {
@@ -64,74 +37,6 @@ pub(super) fn verdict(id: &str, evidence: &ExperimentEvidence, golden: &GoldenFi
         counts => format!("; published values: {counts}"),
     };
     format!("{numbers} locked numbers{claims}{published}.")
-}
-
-fn record_page(id: &str, evidence: &ExperimentEvidence, golden: &GoldenFile) -> String {
-    let mut page =
-        format!("# Record: {id}\n\n**{}.** {}\n\n", inline(&evidence.title), inline(&evidence.question));
-    let verdict = verdict(id, evidence, golden);
-    let _ = writeln!(page, "`calibench run {id}`, seed {}. {verdict}\n", golden.seed);
-    for note in evidence.record.iter().flat_map(|r| &r.notes) {
-        let _ = writeln!(page, "Note: {}\n", inline(note));
-    }
-    let _ = writeln!(page, "## Numbers\n\n{}\n", numbers_table(id, evidence, golden));
-    if let Some(record) = &evidence.record {
-        let _ = writeln!(page, "## Claims\n\n{}\n", claims_table(&record.claims, true));
-    }
-    if !evidence.tables.is_empty() {
-        page.push_str("## Tables\n\n");
-        for name in evidence.tables.keys() {
-            let caption = inline(evidence.caption(&format!("{name}.csv")).unwrap_or_default());
-            let _ = writeln!(page, "- <a href=\"data/{id}/{name}.csv\">{name}.csv</a>: {caption}");
-        }
-    }
-    page
-}
-
-fn numbers_csv(evidence: &ExperimentEvidence, golden: &GoldenFile) -> String {
-    let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
-    let mut csv = String::from("id,value,unit,band,band_reason,description\n");
-    for n in &golden.numbers {
-        let description = evidence.description(&n.id).unwrap_or_default();
-        let (unit, band) = (quoted(&n.unit), quoted(&n.band));
-        let _ = writeln!(
-            csv,
-            "{},{:?},{unit},{band},{},{}",
-            n.id,
-            n.value,
-            quoted(&n.reason),
-            quoted(description)
-        );
-    }
-    csv
-}
-
-fn numbers_table(id: &str, evidence: &ExperimentEvidence, golden: &GoldenFile) -> String {
-    let mut rows = String::new();
-    for (row, n) in golden.numbers.iter().enumerate() {
-        let value = significant(n.value, 7);
-        let what = inline(evidence.description(&n.id).unwrap_or_default());
-        let title = attribute(&format!(
-            "{:?}\nseed {}\nrow {} of data/{id}/numbers.csv\ncalibench run {id}\n{}",
-            n.value,
-            golden.seed,
-            row + 1,
-            n.reason
-        ));
-        let (name, band) = (inline(&n.id), inline(&n.band));
-        let unit = format::unit(&n.unit);
-        let _ = write!(
-            rows,
-            "<tr id=\"number-{}\" title=\"{title}\"><td><code>{name}</code></td><td class=\"value\">{value}{unit}</td>\
-             <td>{band}</td><td>{what}</td></tr>",
-            n.id
-        );
-    }
-    let head = "<thead><tr><th>number</th><th>value</th><th>band</th><th>what</th></tr></thead>";
-    let csv = format!("<a href=\"data/{id}/numbers.csv\">numbers.csv</a>");
-    format!(
-        "<div class=\"table-wrapper\"><table class=\"numbers\"><caption>Locked numbers ({csv})</caption>{head}<tbody>{rows}</tbody></table></div>"
-    )
 }
 
 /// The claims of a record, each with its reason and false-alarm rate. With `places`, every row can be linked
@@ -221,8 +126,8 @@ pub(super) fn published_table(sources: &Sources) -> String {
         let _ = write!(
             rows,
             "<tr id=\"published-{}\"><td class=\"text\">{} {}<div class=\"because\">{expectation}{because}</div></td>\
-             <td class=\"value\">{}{}</td><td class=\"value\">{ours}</td>\
-             <td class=\"{class}\">{word}<div class=\"because\">{}</div></td></tr>",
+             <td class=\"value\" data-label=\"printed\">{}{}</td><td class=\"value\" data-label=\"ours\">{ours}</td>\
+             <td class=\"{class}\" data-label=\"verdict\">{word}<div class=\"because\">{}</div></td></tr>",
             entry.id,
             section(&entry.section),
             inline(&entry.what),

@@ -1,12 +1,12 @@
 //! How does a page of sources become a page of markdown? Piece by piece, every fault noted on the way.
 
-use super::appendix;
 use super::finding::Finding;
 use super::labels::Labels;
 use super::links;
 use super::math::Mathematics;
 use super::page::CompiledPage;
 use super::prose;
+use super::record_page;
 use super::resolve::Resolver;
 use super::scan::{Kind, Piece, scan};
 use super::sources::{Page, Sources};
@@ -62,7 +62,7 @@ pub fn compile(sources: &Sources) -> Compiled {
         });
     }
     findings.extend(resolver.unused());
-    let records = appendix::record_pages(sources, &mut resolver.assets);
+    let records = record_page::record_pages(sources, &resolver.used, &mut resolver.assets);
     findings.sort();
     Compiled { pages, records, assets: resolver.assets, findings }
 }

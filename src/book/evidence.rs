@@ -27,6 +27,8 @@ pub struct ExperimentEvidence {
     pub question: String,
     pub(super) golden: Option<GoldenFile>,
     pub(super) record: Option<RecordFile>,
+    /// `record.json` as it was written.
+    pub(super) record_text: String,
     /// CSV text by table name.
     pub(super) tables: BTreeMap<String, String>,
 }
@@ -34,12 +36,29 @@ pub struct ExperimentEvidence {
 /// `record.json`, as far as the book shows it.
 #[derive(Debug, Clone, Deserialize)]
 pub(super) struct RecordFile {
+    pub provenance: RecordProvenance,
     pub numbers: Vec<RecordNumber>,
     pub claims: Vec<RecordClaim>,
     pub published: Vec<RecordPublished>,
     pub tables: Vec<RecordItem>,
     pub figures: Vec<RecordItem>,
     pub notes: Vec<String>,
+}
+
+/// What computed the record: commit and changes are unknown to a program built outside of its repository.
+#[derive(Debug, Clone, Deserialize)]
+pub(super) struct RecordProvenance {
+    pub commit: Option<String>,
+    pub dirty: Option<bool>,
+    pub crates: BTreeMap<String, String>,
+    pub inputs: Vec<RecordInput>,
+}
+
+/// A file that was read.
+#[derive(Debug, Clone, Deserialize)]
+pub(super) struct RecordInput {
+    pub name: String,
+    pub sha256: String,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -84,12 +103,18 @@ pub(super) fn number(value: &Value) -> f64 {
 }
 
 impl Evidence {
-    /// The evidence of records in memory; nothing is read but golden/.
-    pub fn of_records(project: &Project, experiments: &[Experiment], records: &[&Record]) -> Evidence {
+    /// The evidence of records in memory that a program of this build has made; nothing is read but golden/.
+    pub fn of_records(
+        project: &Project,
+        experiments: &[Experiment],
+        records: &[&Record],
+        build: &Build,
+    ) -> Evidence {
         let mut evidence = Evidence::named(project, experiments);
         for record in records {
-            let json = record_json(record, &Build::default());
+            let json = record_json(record, build);
             let Some(entry) = evidence.experiments.get_mut(record.experiment()) else { continue };
+            entry.record_text = format!("{json:#}\n");
             entry.record = serde_json::from_value(json).ok();
             entry.tables = record.tables().iter().map(|t| (t.name.clone(), t.to_csv())).collect();
         }
@@ -136,6 +161,7 @@ impl ExperimentEvidence {
         }
         let fresh = self.golden.as_ref().is_some_and(|golden| self.is_locked_run(golden, &record));
         self.record = Some(record);
+        self.record_text = text;
         fresh
     }
 

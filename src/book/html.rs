@@ -11,7 +11,8 @@ pub(super) fn html(markdown: &str) -> String {
     name_headings(&mut events);
     let mut html = String::with_capacity(markdown.len() * 2);
     pulldown_cmark::html::push_html(&mut html, events.into_iter().flat_map(set));
-    html
+    // All tables have their headings at the top.
+    html.replace("<th>", "<th scope=\"col\">")
 }
 
 /// Gives every heading without a name one of its words, so that it can be linked to.
@@ -110,9 +111,13 @@ mod tests {
     fn headings_have_names_of_their_own_and_tables_may_scroll() {
         let page =
             html("# A title {#mine}\n\n## What, `x`?\n\n## What x\n\n| a | b |\n|---|---|\n| 1 | 2 |\n");
-        for part in
-            ["id=\"mine\"", "id=\"what-x\"", "id=\"what-x-2\"", "<div class=\"table-wrapper\"><table>"]
-        {
+        for part in [
+            "id=\"mine\"",
+            "id=\"what-x\"",
+            "id=\"what-x-2\"",
+            "<div class=\"table-wrapper\"><table>",
+            "<th scope=\"col\">",
+        ] {
             assert!(page.contains(part), "{part}: {page}");
         }
     }

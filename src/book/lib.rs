@@ -14,12 +14,13 @@
 //! | `num four-pose.rmse .4` | the golden value with 4 decimals (`s3`: significant digits, `e1`: power of ten, `%1`: percent), its provenance on it; `unit` adds the unit |
 //! | `published four-pose.rmse` | the digits that the chapter prints |
 //! | `const fx` | a constant of the chapter's scene |
-//! | `figure line-bending.grids` | the committed figure, numbered, with its caption |
+//! | `figure line-bending.grids What is seen` | the committed figure, numbered, with its caption; the words are for those who do not see it |
 //! | `table line-bending.k1 k1,max digits=4 rows=1-5` | columns of a table of the record |
 //! | `caption tab:name Text` | number and caption of the table written below it |
 //! | `claims four-pose` | the experiment's claims with their verdicts |
 //! | `run four-pose` | the command that reproduces the section, with its verdict |
 //! | `code experiments/line_bending.rs sweep_k1` | that item of that file |
+//! | `shell README.md calibench calibrate a.csv` | the block of that file that shows that command with what it prints |
 //! | `cite zhang2000`, `citep zhang2000` | `Zhang (2000)`, `(Zhang 2000)` |
 //! | `ref eq:projection` | `equation (1.1)`, `Figure 2.1`, `Table 3.2` |
 //! | `contradiction two-views` | a statement of the chapter that does not hold, declared where the text says so |
@@ -46,11 +47,14 @@ mod links;
 mod listing;
 mod math;
 mod page;
+mod picture;
 mod prose;
+mod record_page;
 mod references;
 mod render;
 mod resolve;
 mod scan;
+mod search;
 mod sources;
 mod summary;
 mod text;
@@ -70,12 +74,12 @@ pub fn pieces_of(text: &str) -> usize {
 }
 
 use calibench_harness::project::Project;
-use calibench_harness::{Experiment, Record};
+use calibench_harness::{Build, Experiment, Record};
 
 /// Everything in the book's sources that does not resolve: unknown and unused names, stale figures, dead
 /// links, and results typed in by hand. Writes nothing; `records` are those of the present run.
 pub fn check(project: &Project, experiments: &[Experiment], records: &[&Record]) -> Vec<Finding> {
-    let evidence = Evidence::of_records(project, experiments, records);
+    let evidence = Evidence::of_records(project, experiments, records, &Build::default());
     match Sources::load(project, evidence) {
         Ok(sources) => compile(&sources).findings,
         Err(finding) => vec![finding],

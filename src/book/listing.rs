@@ -25,6 +25,14 @@ pub(super) fn item(source: &str, name: &str) -> Option<(usize, String)> {
     Some((first + 1, text.join("\n")))
 }
 
+/// The fenced block whose first line is `$ command` or begins so.
+pub(super) fn shell<'a>(source: &'a str, command: &str) -> Option<&'a str> {
+    let first = format!("$ {command}");
+    let blocks = source.split("\n```").skip(1).step_by(2);
+    let mut bodies = blocks.filter_map(|block| block.split_once('\n')).map(|(_, body)| body);
+    bodies.find(|body| body.starts_with(&first))
+}
+
 /// Whether a line begins the definition of `name` by `keyword`.
 fn defines(line: &str, keyword: &str, name: &str) -> bool {
     let line = line.trim_start();
@@ -59,6 +67,13 @@ mod tests {
     use super::*;
 
     const SOURCE: &str = "const A: [i32; 2] = [\n    1,\n];\n\n/// Doubles.\npub fn f(\n    x: i32,\n) -> i32 {\n    if x > 0 {\n        2 * x\n    } else {\n        0\n    }\n}\n\nimpl B {\n    /// Inner.\n    fn f(&self) -> i32 {\n        3\n    }\n}\n";
+
+    #[test]
+    fn a_command_is_quoted_with_what_it_prints() {
+        let source = "text\n```sh\n$ other\n```\n\nmore\n```text\n$ do this --now\ndone\n```\nend";
+        assert_eq!(shell(source, "do this"), Some("$ do this --now\ndone"));
+        assert_eq!(shell(source, "more"), None);
+    }
 
     #[test]
     fn an_item_is_quoted_whole_with_its_documentation() {

@@ -3,7 +3,7 @@
 
 use super::compile::Compiled;
 use super::page::CompiledPage;
-use super::{html, layout};
+use super::{html, layout, search};
 use calibench_harness::project::Project;
 use std::fs::{File, OpenOptions};
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use std::{fs, io};
 /// The generated pages stand below this page of the summary.
 const RECORDS: &str = "records.md";
 /// Files of the looks, below book/style.
-const STYLE_FILES: [&str; 3] = ["book.css", "CalibenchMath.woff2", "CalibenchMath-LICENSE.txt"];
+const STYLE_FILES: [&str; 4] = ["book.css", "search.js", "CalibenchMath.woff2", "CalibenchMath-LICENSE.txt"];
 
 /// Why the book cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -84,6 +84,8 @@ fn write_all(project: &Project, compiled: &Compiled, folder: &Path) -> Result<()
         write(&folder.join(page.file()), layout::page(&pages, i, &texts[i]).as_bytes())?;
     }
     write(&folder.join("print.html"), layout::print(&pages, &texts).as_bytes())?;
+    write(&folder.join("search.html"), layout::search(&pages, search::PAGE).as_bytes())?;
+    write(&folder.join("search-index.js"), search::index(&pages, &texts).as_bytes())?;
     for (name, bytes) in &compiled.assets {
         write(&folder.join(name), bytes)?;
     }

@@ -9,7 +9,7 @@ use super::labels::Labels;
 use super::scan::{Kind, scan};
 use super::sources::{CONTRADICTIONS, ITEMS, REFERENCES, Sources};
 use super::text::{attribute, escape, inline, sentence};
-use super::{appendix, contradictions, format, items, listing, references};
+use super::{appendix, contradictions, format, items, layout, listing, picture, record_page, references};
 use calibench::io::hash::sha256_hex;
 use calibench_harness::published::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,7 +25,12 @@ pub(super) struct Resolver<'a> {
     shown: BTreeSet<String>,
     /// Contradictions declared so far, with their pages.
     declared: BTreeMap<String, String>,
+    /// Where the text shows a number, `<experiment>.<number>`: links to its first place on each page.
+    pub used: Uses,
 }
+
+/// Links into the text, by what they show.
+pub(super) type Uses = BTreeMap<String, Vec<String>>;
 
 type Resolved = Result<String, String>;
 
@@ -42,6 +47,7 @@ impl<'a> Resolver<'a> {
             cited: BTreeSet::new(),
             shown: BTreeSet::new(),
             declared: BTreeMap::new(),
+            used: Uses::new(),
         }
     }
 
@@ -52,12 +58,13 @@ impl<'a> Resolver<'a> {
             ["num", id, options @ ..] => self.number(id, options),
             ["published", id] => self.published(id),
             ["const", name] => constant(name).ok_or_else(|| format!("`{name}` is no constant of the scene")),
-            ["figure", id] => self.figure(id),
+            ["figure", id, seen @ ..] => self.figure(id, &seen.join(" ")),
             ["table", id, columns, options @ ..] => self.table(id, columns, options),
             ["caption", label, ..] => self.caption(label, placeholder),
             ["claims", experiment] => self.claims(experiment),
             ["run", experiment] => self.command(experiment),
             ["code", file, item] => self.code(file, item),
+            ["shell", file, command @ ..] => self.shell(file, &command.join(" ")),
             ["cite", key] => self.cite(key, false),
             ["citep", key] => self.cite(key, true),
             ["ref", label] => self.refer(label, begins_sentence),
@@ -86,7 +93,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// A golden number with its provenance on it.
-    fn number(&self, id: &str, options: &[&str]) -> Resolved {
+    fn number(&mut self, id: &str, options: &[&str]) -> Resolved {
         let (experiment, name) = split(id)?;
         let (evidence, golden) = self.golden(experiment)?;
         let (row, number) = golden.number(name).ok_or_else(|| {
@@ -107,8 +114,21 @@ impl<'a> Resolver<'a> {
         let held = evidence.published(name).is_none_or(|p| p.book_held && p.ours_held);
         let class = if held { "num" } else { "num deviates" };
         let title = attribute(&provenance(experiment, evidence, golden, row, number));
-        let href = format!("{}#number-{name}", appendix::page_of(experiment));
-        Ok(format!(r#"<a class="{class}" href="{href}" title="{title}">{text}{unit}</a>"#))
+        let href = format!("{}#number-{name}", record_page::page_of(experiment));
+        let place = self.place_in_text(id);
+        Ok(format!(r#"<a class="{class}"{place} href="{href}" title="{title}">{text}{unit}</a>"#))
+    }
+
+    /// The name of a number's first place on this page, noted so that its record can lead there.
+    fn place_in_text(&mut self, id: &str) -> String {
+        let name = format!("at-{id}");
+        let link = format!("{}#{name}", self.page);
+        let places = self.used.entry(id.to_string()).or_default();
+        if places.contains(&link) {
+            return String::new();
+        }
+        places.push(link);
+        format!(r#" id="{name}""#)
     }
 
     fn published(&self, id: &str) -> Resolved {
@@ -128,7 +148,8 @@ impl<'a> Resolver<'a> {
         Ok(format!(r#"<a class="num printed" href="{href}" title="{title}">{text}{unit}</a>"#))
     }
 
-    fn figure(&mut self, id: &str) -> Resolved {
+    /// `seen` describes it to those who do not see it.
+    fn figure(&mut self, id: &str, seen: &str) -> Resolved {
         let (experiment, name) = split(id)?;
         let (evidence, golden) = self.golden(experiment)?;
         let locked = golden.figures.iter().find(|f| stem(&f.file) == name);
@@ -143,15 +164,24 @@ impl<'a> Resolver<'a> {
         if hash.strip_prefix("sha256 ").is_some_and(|digits| !sha256_hex(&bytes).starts_with(digits)) {
             return Err(format!("figure {path} is stale: run `calibench run {experiment}`"));
         }
+        if seen.is_empty() {
+            return Err(format!(
+                "figure `{id}`: say behind its name what is seen, for those who do not see it"
+            ));
+        }
         // Several panels side by side are too small on a phone to be shrunk to its width: there they scroll.
-        let class = if svg_width(&bytes).is_some_and(|w| w > WIDE_PX) { " class=\"wide\"" } else { "" };
+        let size = picture::size(&bytes);
+        let class = if size.is_some_and(|(width, _)| width > WIDE_PX) { " class=\"wide\"" } else { "" };
+        let size = size.map_or(String::new(), |(w, h)| format!(" width=\"{w}\" height=\"{h}\""));
         self.assets.insert(path.clone(), bytes);
         self.shown.insert(id.to_string());
+        self.used.insert(format!("fig:{id}"), vec![format!("{}#fig:{id}", self.page)]);
         let caption = inline(evidence.caption(file).unwrap_or_default());
+        let seen = attribute(seen);
         let number = self.labels.get(&format!("fig:{id}")).map_or(String::new(), |l| l.number.clone());
         let command = command_line(experiment, golden);
         Ok(format!(
-            "<figure id=\"fig:{id}\"{class}><div class=\"drawing\"><img src=\"{path}\" alt=\"{caption}\"></div><figcaption><b>{number}.</b> {caption} {command}\
+            "<figure id=\"fig:{id}\"{class}><div class=\"drawing\"><img src=\"{path}\" alt=\"{seen}\"{size}></div><figcaption><b>{number}.</b> {caption} {command}\
              </figcaption></figure>\n"
         ))
     }
@@ -169,6 +199,7 @@ impl<'a> Resolver<'a> {
         self.assets.insert(path.clone(), csv.clone().into_bytes());
         let label = format!("tab:{id}");
         let number = self.labels.get(&label).map_or(String::new(), |l| l.number.clone());
+        self.used.insert(label.clone(), vec![format!("{}#{label}", self.page)]);
         let caption = inline(&sentence(evidence.caption(&format!("{name}.csv")).unwrap_or_default()));
         let command = command_line(experiment, golden);
         let body = appendix::csv_table(csv, columns, options, &path)?;
@@ -196,7 +227,7 @@ impl<'a> Resolver<'a> {
     fn command(&self, experiment: &str) -> Resolved {
         let (evidence, golden) = self.golden(experiment)?;
         let verdict = appendix::verdict(experiment, evidence, golden);
-        let href = appendix::page_of(experiment);
+        let href = record_page::page_of(experiment);
         Ok(format!(
             "<div class=\"run\"><b>Reproduce it:</b> <code>calibench run {experiment}</code> (seed {}). {verdict} \
              <a href=\"{href}\">All it found</a>.</div>\n",
@@ -204,14 +235,24 @@ impl<'a> Resolver<'a> {
         ))
     }
 
-    fn code(&self, file: &str, item: &str) -> Resolved {
+    fn code(&mut self, file: &str, item: &str) -> Resolved {
         let source = self.sources.project.read_text(file).map_err(|e| format!("code {file}: {e}"))?;
         let (line, text) =
             listing::item(&source, item).ok_or_else(|| format!("{file} has no item `{item}`"))?;
+        let page = format!("code/{}.html", file.replace('/', "-"));
+        self.assets.entry(page.clone()).or_insert_with(|| layout::source(file, &source).into_bytes());
         Ok(format!(
-            "<div class=\"listing\">{}, line {line}</div>\n\n```rust,ignore\n{text}\n```\n",
+            "<div class=\"listing\"><a href=\"{page}#L{line}\">{}, line {line}</a></div>\n\n```rust,ignore\n{text}\n```\n",
             escape(file)
         ))
+    }
+
+    /// A command and what it prints, as another text of the project shows them.
+    fn shell(&self, file: &str, command: &str) -> Resolved {
+        let source = self.sources.project.read_text(file).map_err(|e| format!("shell {file}: {e}"))?;
+        let shown = listing::shell(&source, command)
+            .ok_or_else(|| format!("{file} has no block that begins with `$ {command}`"))?;
+        Ok(format!("```text\n{shown}\n```\n"))
     }
 
     fn cite(&mut self, key: &str, parenthetical: bool) -> Resolved {
@@ -316,7 +357,7 @@ impl<'a> Resolver<'a> {
         if found.record.as_ref().is_some_and(|r| r.claims.iter().any(|c| c.id == claim && !c.held)) {
             return Err(format!("claim `{id}` fails"));
         }
-        let page = appendix::page_of(experiment);
+        let page = record_page::page_of(experiment);
         Ok(format!("<a href=\"{page}#claim-{claim}\"><code>{}</code></a>", inline(id)))
     }
 
@@ -354,12 +395,6 @@ fn split(id: &str) -> Result<(&str, &str), String> {
 /// A file's name without its ending.
 fn stem(file: &str) -> &str {
     file.rsplit_once('.').map_or(file, |(stem, _)| stem)
-}
-
-/// Width of an SVG of ours in CSS pixels, from its first tag.
-fn svg_width(bytes: &[u8]) -> Option<f64> {
-    let tag = std::str::from_utf8(bytes).ok()?.strip_prefix("<svg ")?.split_once('>')?.0;
-    tag.split_once("width=\"")?.1.split_once('"')?.0.parse().ok()
 }
 
 fn names(golden: &GoldenFile) -> String {
@@ -400,18 +435,4 @@ fn provenance(
     lines.push(format!("row {row} of data/{experiment}/numbers.csv"));
     lines.push(format!("calibench run {experiment}"));
     lines.join("\n")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_width_of_a_drawing_is_read_from_its_first_tag() {
-        assert_eq!(
-            svg_width(b"<svg xmlns=\"x\" width=\"880\" height=\"340\"><rect width=\"1\"/>"),
-            Some(880.0)
-        );
-        assert_eq!(svg_width(b"\x89PNG width=\"880\""), None);
-    }
 }

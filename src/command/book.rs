@@ -56,8 +56,13 @@ fn run_one(experiment: &Experiment, project: &Project, build: &Build) -> Exit {
 }
 
 /// Builds the book of records in memory: the last step of `calibench` alone.
-pub(super) fn build_of(project: &Project, experiments: &[Experiment], records: &[&Record]) -> Exit {
-    write(project, Evidence::of_records(project, experiments, records))
+pub(super) fn build_of(
+    project: &Project,
+    experiments: &[Experiment],
+    records: &[&Record],
+    build: &Build,
+) -> Exit {
+    write(project, Evidence::of_records(project, experiments, records, build))
 }
 
 /// Writes out/book and tells what does not resolve.

@@ -34,7 +34,7 @@ pub(super) fn run(experiments: &[Experiment], build: &Build) -> Exit {
     print(&details(&judged));
     failures.iter().for_each(|failure| warn_lines(failure));
     let records: Vec<&Record> = runs.iter().filter_map(|run| run.result.as_ref().ok()).collect();
-    let book = super::book::build_of(&project, experiments, &records);
+    let book = super::book::build_of(&project, experiments, &records, build);
     exit_of(&judged, !failures.is_empty()).max(book)
 }
 

@@ -109,7 +109,7 @@ fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<Tick> {
     (first..=last).map(|k| k as f64 * step + 0.0).map(|value| Tick { value, text: text(value) }).collect()
 }
 
-/// Powers of ten; with few decades in view, their multiples by 2 and 5 as well.
+/// Powers of ten; with few of them in view, their multiples by 2 and 5 as well.
 fn log_ticks(low: f64, high: f64, wanted: usize) -> Vec<Tick> {
     if !(low > 0.0 && high > low && high.is_finite()) {
         return Vec::new();
@@ -117,8 +117,10 @@ fn log_ticks(low: f64, high: f64, wanted: usize) -> Vec<Tick> {
     let (first, last) = (libm::floor(libm::log10(low)) as i32, libm::ceil(libm::log10(high)) as i32);
     let decades = (last - first).max(1) as usize;
     let stride = decades.div_ceil(wanted.max(1)).max(1);
-    let multiples: &[f64] = if high / low <= 100.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
     let inside = |v: f64| v >= low * (1.0 - 1e-9) && v <= high * (1.0 + 1e-9);
+    let powers = (first..=last).filter(|&d| inside(power_of_ten(d))).count();
+    // Two ticks do not tell how an axis is divided.
+    let multiples: &[f64] = if high / low <= 100.0 || powers < 3 { &[1.0, 2.0, 5.0] } else { &[1.0] };
     (first..=last)
         .step_by(stride)
         .flat_map(|d| multiples.iter().map(move |&m| (m, d)))

@@ -16,6 +16,7 @@ pub struct HeatMap {
     logarithmic: bool,
     range: Option<(f64, f64)>,
     digits: usize,
+    decimals: Option<usize>,
 }
 
 /// The values do not fill the grid.
@@ -42,7 +43,16 @@ impl HeatMap {
             return Err(HeatMapError { columns: columns.len(), rows: rows.len(), values: values.len() });
         }
         let label = label.into();
-        Ok(HeatMap { label, columns, rows, values, logarithmic: false, range: None, digits: 2 })
+        Ok(HeatMap {
+            label,
+            columns,
+            rows,
+            values,
+            logarithmic: false,
+            range: None,
+            digits: 2,
+            decimals: None,
+        })
     }
 
     /// Colours follow the logarithm; cells that are not positive stay blank.
@@ -58,6 +68,19 @@ impl HeatMap {
     /// Significant digits written in the cells.
     pub fn digits(self, digits: usize) -> HeatMap {
         HeatMap { digits, ..self }
+    }
+
+    /// Decimals written in the cells, the same in all, in the place of significant digits.
+    pub fn decimals(self, decimals: usize) -> HeatMap {
+        HeatMap { decimals: Some(decimals), ..self }
+    }
+
+    fn cell_text(&self, value: f64) -> String {
+        let text = match self.decimals {
+            Some(decimals) => format!("{value:.decimals$}"),
+            None => significant(value, self.digits),
+        };
+        text.replace('-', "\u{2212}")
     }
 
     fn span(&self) -> Span {
@@ -89,8 +112,7 @@ impl HeatMap {
             if fraction.is_finite() {
                 let colour = heat(fraction);
                 canvas.rectangle((edge_x(i), edge_y(j + 1)), (edge_x(i + 1), edge_y(j)), colour);
-                let text = significant(value, self.digits).replace('-', "\u{2212}");
-                canvas.text(&text, middle, text_px, text_on(colour), Anchor::Middle);
+                canvas.text(&self.cell_text(value), middle, text_px, text_on(colour), Anchor::Middle);
             } else {
                 canvas.text("\u{2013}", middle, text_px, INK, Anchor::Middle);
             }

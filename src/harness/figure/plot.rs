@@ -283,7 +283,7 @@ impl Plot {
         scale: f64,
         look: Look,
     ) -> Plot {
-        self.line_as(label, &ellipse_points(centre, covariance, scale), look)
+        self.line_as(label, ellipse_points(centre, covariance, scale), look)
     }
 
     /// A vertical line across the plot.
