@@ -110,7 +110,7 @@ def run_gate(
     if isinstance(solver, str):
         return gate_command(solver, timeout, jobs, options)
     function = solver
-    return gate_solver(getattr(function, "__name__", "solver"), lambda raw: _ask(function, Problem(**raw)), options)
+    return gate_solver(getattr(function, "__name__", "solver"), lambda raw: answered(function, Problem(**raw)), options)
 
 
 def gate(
@@ -155,8 +155,8 @@ def gate(
     return decorate
 
 
-def _ask(solver: Solver, problem: Problem) -> dict[str, Any]:
-    """The answer to a problem in the protocol's words."""
+def answered(solver: Solver, problem: Problem) -> dict[str, Any]:
+    """What a solver says to a problem, in the words of the protocol (`adapters/PROTOCOL.md`)."""
     try:
         answer = solver(problem)
     except CalibenchError as error:
