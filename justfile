@@ -41,6 +41,10 @@ check:
 reproducible:
     bash .ci/reproducible
 
+# The Python package: built, checked, and tested in a fresh virtual environment
+python:
+    .ci/python
+
 # Studies on a Slurm and a Dask of this machine alone
 cluster:
     bash .ci/slurm

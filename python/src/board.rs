@@ -1,0 +1,115 @@
+//! A board: where its marks are, where they are seen in an image, and what image a virtual camera takes of it.
+
+use crate::arrays::{of_plane, pose};
+use crate::camera::Camera;
+use crate::errors;
+use crate::evaluate::brown_conrady;
+use crate::rectify::{grey, of_intensity};
+use crate::watch::detached;
+use calibench::photos::{BoardSpec, MarkKind};
+use calibench::synth::render::{Imaging, photograph};
+use numpy::PyArray2;
+use pyo3::prelude::*;
+
+/// A board, as on the command line.
+///
+/// Args:
+///     board: ``chess:9x6:25mm`` (inner corners and side of a square), ``circles:9x7:10mm:3mm`` (pitch and diameter of the discs), or
+///         ``dots:3x3:1`` (a few dots); the diameter may be left out.
+///
+/// Raises:
+///     BoardError: a text that is no board, or a board that cannot exist.
+#[pyclass(frozen, eq, skip_from_py_object, module = "calibench")]
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Board(pub(crate) BoardSpec);
+
+#[pymethods]
+impl Board {
+    #[new]
+    fn new(py: Python<'_>, board: &str) -> PyResult<Board> {
+        board.parse().map(Board).map_err(|e| errors::board(py, &e))
+    }
+
+    /// ``chess``, ``circles`` or ``dots``.
+    #[getter]
+    fn kind(&self) -> &'static str {
+        match self.0.kind {
+            MarkKind::Chess => "chess",
+            MarkKind::Circles => "circles",
+            MarkKind::Dots => "dots",
+        }
+    }
+
+    /// Marks along a row.
+    #[getter]
+    fn columns(&self) -> usize {
+        self.0.board().columns()
+    }
+
+    /// Number of rows of marks.
+    #[getter]
+    fn rows(&self) -> usize {
+        self.0.board().rows()
+    }
+
+    /// Distance of neighbouring marks, in `unit`.
+    #[getter]
+    fn spacing(&self) -> f64 {
+        self.0.board().spacing()
+    }
+
+    /// Unit of lengths; empty if none was given.
+    #[getter]
+    fn unit(&self) -> &str {
+        &self.0.unit
+    }
+
+    /// The marks, row by row, about the board's centre, shape (N, 2).
+    #[getter]
+    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        of_plane(py, &self.0.board().points())
+    }
+
+    /// The marks in an image, px, in the order of `points`, shape (N, 2): all of them, or an error.
+    ///
+    /// Args:
+    ///     image: grey, (height, width) of uint8, uint16 or float32.
+    ///
+    /// Raises:
+    ///     DetectError: the board is not seen whole and clearly; `numbers` says what was.
+    fn detect<'py>(&self, py: Python<'py>, image: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (photo, spec) = (grey(image)?, self.0.clone());
+        let marks = detached(py, true, move || spec.detect(&photo))?;
+        of_plane(py, &marks.map_err(|e| errors::not_found(py, &e))?)
+    }
+
+    /// The image that a virtual camera takes of the board: intensity (black 0, white 1), float32, shape (height, width); exact area sampling.
+    ///
+    /// Args:
+    ///     camera: brown-conrady.
+    ///     image_size: width and height, px.
+    ///     rotation, translation: camera from target.
+    ///     blur_px: standard deviation of the Gaussian point spread function.
+    ///
+    /// Raises:
+    ///     SceneError: part of the board is behind the camera, or where the lens folds back.
+    #[pyo3(signature = (camera, image_size, rotation, translation, *, blur_px = 0.0))]
+    fn photograph<'py>(
+        &self,
+        py: Python<'py>,
+        camera: &Camera,
+        image_size: (usize, usize),
+        rotation: &Bound<'py, PyAny>,
+        translation: &Bound<'py, PyAny>,
+        blur_px: f64,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let (camera, pose) = (brown_conrady(camera, "camera")?, pose(rotation, translation)?);
+        let (board, imaging) = (*self.0.board(), Imaging { blur_px, ..Imaging::default() });
+        let photo = detached(py, true, move || photograph(&camera, image_size, &board, &pose, &imaging))?;
+        of_intensity(py, photo.map_err(|e| errors::render(py, &e))?.image)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Board({})", self.0)
+    }
+}

@@ -1,0 +1,200 @@
+//! The virtual camera, and the one place where noise enters: the same bits as in Rust.
+
+use crate::arrays::{
+    Matrix, Vector, of_plane, of_rotations, of_space, of_translations, plane_points, rotation, stacked,
+    vector,
+};
+use crate::camera::Camera;
+use crate::errors;
+use crate::evaluate::brown_conrady;
+use calibench::geometry::{Pose, Vec3};
+use calibench::synth::{Scene as Photographed, Stream as Draws, StreamKey, Truth, scene};
+use numpy::{PyArray1, PyArray2, PyArray3};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// A stream of random numbers, ChaCha8 (Bernstein 2008), keyed by what it is for: the same key gives the same numbers on every machine.
+///
+/// Args:
+///     seed: of the experiment.
+///     scenario: within it.
+///     trial: within the scenario.
+///     purpose: what is drawn.
+#[pyclass(module = "calibench")]
+#[derive(Debug)]
+pub(crate) struct Stream(Draws);
+
+#[pymethods]
+impl Stream {
+    #[new]
+    #[pyo3(signature = (seed, scenario, trial = 0, purpose = "noise"))]
+    fn new(seed: u64, scenario: &str, trial: u64, purpose: &str) -> Stream {
+        Stream(Draws::open(StreamKey { seed, scenario, trial, purpose }))
+    }
+
+    /// Standard normal numbers, shape (count,).
+    fn normal<'py>(&mut self, py: Python<'py>, count: usize) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, (0..count).map(|_| self.0.normal()).collect())
+    }
+
+    /// Uniform numbers in (low, high), (0, 1) if not given, shape (count,).
+    #[pyo3(signature = (count, low = None, high = None))]
+    fn uniform<'py>(
+        &mut self,
+        py: Python<'py>,
+        count: usize,
+        low: Option<f64>,
+        high: Option<f64>,
+    ) -> Bound<'py, PyArray1<f64>> {
+        let draw = |_| match (low, high) {
+            (None, None) => self.0.uniform(),
+            (low, high) => self.0.uniform_in(low.unwrap_or(0.0), high.unwrap_or(1.0)),
+        };
+        PyArray1::from_vec(py, (0..count).map(draw).collect())
+    }
+
+    /// Uniform whole numbers below `bound`, shape (count,).
+    fn below<'py>(
+        &mut self,
+        py: Python<'py>,
+        count: usize,
+        bound: usize,
+    ) -> PyResult<Bound<'py, PyArray1<u64>>> {
+        if bound == 0 {
+            return Err(PyValueError::new_err("no whole number lies below 0"));
+        }
+        Ok(PyArray1::from_vec(py, (0..count).map(|_| self.0.below(bound) as u64).collect()))
+    }
+}
+
+/// A virtual camera of known truth before a target: what it sees without noise, and with.
+///
+/// Args:
+///     camera: brown-conrady.
+///     image_size: width and height, px.
+///     points: (N, 2) of the target.
+///     rotations, translations: (V, 3, 3) and (V, 3), camera from target.
+///
+/// Raises:
+///     SceneError: a point behind the camera, or beyond the radius where the lens is one-to-one.
+#[pyclass(frozen, module = "calibench")]
+#[derive(Debug)]
+pub(crate) struct Scene(pub(crate) Photographed);
+
+#[pymethods]
+impl Scene {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        camera: &Camera,
+        image_size: (usize, usize),
+        points: &Bound<'_, PyAny>,
+        rotations: &Bound<'_, PyAny>,
+        translations: &Bound<'_, PyAny>,
+    ) -> PyResult<Scene> {
+        let rotations =
+            rotations.try_iter()?.map(|r| rotation(&r?, "rotations")).collect::<PyResult<Vec<_>>>()?;
+        let translations =
+            translations.try_iter()?.map(|t| vector(&t?, "translations")).collect::<PyResult<Vec<_>>>()?;
+        if rotations.len() != translations.len() {
+            let (r, t) = (rotations.len(), translations.len());
+            return Err(PyValueError::new_err(format!(
+                "{r} rotations and {t} translations: a pose is one of each"
+            )));
+        }
+        let poses = rotations.into_iter().zip(translations);
+        let truth = Truth {
+            camera: brown_conrady(camera, "camera")?,
+            image_size,
+            points: plane_points(points, "points")?,
+            cam_from_target: poses.map(|(rotation, translation)| Pose { rotation, translation }).collect(),
+        };
+        Photographed::new(truth).map(Scene).map_err(|e| errors::scene(py, &e))
+    }
+
+    /// Four photographs of a 9 x 7 grid, 10 mm apart, at 120 mm: f = 600 px, principal point (326, 243), k1 = -0.18, k2 = 0.05, 640 x 480 px.
+    #[staticmethod]
+    fn example() -> Scene {
+        Scene(Photographed::example())
+    }
+
+    /// The true camera.
+    #[getter]
+    fn camera(&self) -> Camera {
+        Camera(self.0.truth.camera.into())
+    }
+
+    /// Width and height, px.
+    #[getter]
+    fn image_size(&self) -> (usize, usize) {
+        self.0.truth.image_size
+    }
+
+    /// Points of the target, shape (N, 2).
+    #[getter]
+    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        of_plane(py, &self.0.truth.points)
+    }
+
+    /// True rotations, camera from target, shape (V, 3, 3).
+    #[getter]
+    fn rotations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        of_rotations(py, &self.0.truth.cam_from_target)
+    }
+
+    /// True translations, camera from target, shape (V, 3).
+    #[getter]
+    fn translations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        of_translations(py, &self.0.truth.cam_from_target)
+    }
+
+    /// Pixels without noise, shape (V, N, 2).
+    #[getter]
+    fn pixels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let pixels = self.0.pixels();
+        stacked(py, pixels.len(), (self.0.truth.points.len(), 2), |v, i, j| pixels[v][i][j])
+    }
+
+    /// Pixels with Gaussian noise, shape (V, N, 2), drawn view by view, point by point, u before v.
+    ///
+    /// Args:
+    ///     sigma_px: standard deviation on each of u and v, px.
+    ///     stream: the noise; it is used up as far as it is drawn.
+    fn observe<'py>(
+        &self,
+        py: Python<'py>,
+        sigma_px: f64,
+        stream: &mut Stream,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        // Noise that is not finite would make views that nobody can photograph.
+        if !(sigma_px >= 0.0 && sigma_px.is_finite()) {
+            return Err(PyValueError::new_err(format!(
+                "sigma_px = {sigma_px}: a standard deviation is not negative"
+            )));
+        }
+        let views = self.0.observe(sigma_px, &mut stream.0);
+        stacked(py, views.len(), (self.0.truth.points.len(), 2), |v, i, j| views[v].pixels()[i][j])
+    }
+
+    fn __repr__(&self) -> String {
+        let Truth { image_size, points, cam_from_target, .. } = &self.0.truth;
+        format!(
+            "Scene({}, image_size={image_size:?}, points={}, views={})",
+            self.camera().__repr__(),
+            points.len(),
+            cam_from_target.len()
+        )
+    }
+}
+
+/// The pose of a target whose centre lies on the optical axis: rotation ``Rz Ry Rx`` (3, 3) of degrees, and translation (3,).
+#[pyfunction]
+pub(crate) fn looking_at_centre<'py>(
+    py: Python<'py>,
+    xyz_degrees: [f64; 3],
+    distance: f64,
+) -> PyResult<(Matrix<'py>, Vector<'py>)> {
+    let pose = scene::looking_at_centre(xyz_degrees, distance);
+    let rows: [Vec3; 3] = std::array::from_fn(|i| pose.rotation.row(i).transpose());
+    Ok((of_space(py, &rows)?, PyArray1::from_slice(py, pose.translation.as_slice())))
+}

@@ -1,0 +1,42 @@
+//! How does a long call let Python go on, and hear Ctrl-C?
+
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+/// How long Ctrl-C waits at most: a person does not notice a twentieth of a second.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+/// Runs `work` without the interpreter's lock, so that other threads of Python run meanwhile.
+///
+/// A `long` call is done by a thread of its own, while this one asks every 50 ms whether Ctrl-C was pressed. If so `KeyboardInterrupt` is
+/// raised at once; the solver cannot be stopped half way, so its thread ends its work unseen. A short call is done here: starting a thread
+/// would take longer than many a calibration.
+pub(crate) fn detached<T: Send + 'static>(
+    py: Python<'_>,
+    long: bool,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    if !long {
+        return Ok(py.detach(work));
+    }
+    let (sender, mut receiver) = channel();
+    std::thread::spawn(move || {
+        // Nobody listens any more after Ctrl-C.
+        let _ = sender.send(work());
+    });
+    loop {
+        let (received, back) = py.detach(move || (receiver.recv_timeout(PATIENCE), receiver));
+        receiver = back;
+        match received {
+            Ok(result) => return Ok(result),
+            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(PyRuntimeError::new_err(
+                    "the calculation ended without a result: a fault of calibench",
+                ));
+            }
+        }
+    }
+}
