@@ -54,6 +54,8 @@ const QUIET: f64 = 3.0;
 /// Shortest ruler: read to half a millimetre, 30 mm tell the scale to 2 %, and less is of no use.
 const SHORTEST_RULER: f64 = 30.0;
 
+/// Helvetica's letters are about half as wide as high on average.
+const LETTER_WIDTH: f64 = 0.52;
 /// Height of the type: of the words, and of the rulers' numbers.
 const TYPE: f64 = 2.6;
 /// Width of a tick, and of a ruler's line. Its middle is meant.
@@ -94,9 +96,11 @@ impl Sheet {
             "{board}. Drawn at 100 %: the rulers are {} and {} mm long. Print without scaling, measure both, and write it into board.toml.",
             sheet.rulers[0], sheet.rulers[1]
         );
+        let at = Vec2::new(EDGE + STRIP_LEFT, size.y - EDGE - 0.4);
+        let room = size.x - EDGE - at.x;
         sheet.ink.push(Ink::Words {
-            at: Vec2::new(EDGE + STRIP_LEFT, size.y - EDGE - 0.4),
-            height: TYPE,
+            at,
+            height: TYPE.min(room / (LETTER_WIDTH * words.len() as f64)),
             text: words,
         });
         Ok(sheet)
@@ -257,10 +261,10 @@ mod tests {
                     (centre - radius, centre + radius)
                 }
                 Ink::Rectangle { corner, size } => (*corner, corner + size),
-                // Helvetica's letters are half as wide as high on average.
-                Ink::Words { at, height, text } => {
-                    (at - Vec2::new(0.0, *height), at + Vec2::new(0.52 * height * text.len() as f64, 0.0))
-                }
+                Ink::Words { at, height, text } => (
+                    at - Vec2::new(0.0, *height),
+                    at + Vec2::new(LETTER_WIDTH * height * text.len() as f64, 0.0),
+                ),
             };
             for ink in &sheet.ink {
                 let (low, high) = bounds(ink);
