@@ -153,7 +153,9 @@ fn write_calibration(folder: &Path) {
 /// in place of every file of `whole`.
 fn fill(disk: &Path, whole: &Tree) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    for name in ["style/book.css", "style/CalibenchMath.woff2", "style/CalibenchMath-LICENSE.txt"] {
+    for name in
+        ["style/book.css", "style/search.js", "style/CalibenchMath.woff2", "style/CalibenchMath-LICENSE.txt"]
+    {
         fs::create_dir_all(disk.join("book/style")).expect("a folder is made");
         fs::copy(root.join("book").join(name), disk.join("book").join(name)).expect("copied");
     }
