@@ -231,8 +231,8 @@ impl Judged {
             "check",
             "from the reference",
         )
-        .points("checks", &at(&self.deviations))
-        .line("moving average", &at(&self.averages))
+        .points("checks", at(&self.deviations))
+        .line("moving average", at(&self.averages))
         .hline_as("limits of a check", threshold, Look::ink())
         .hline_as("", -threshold, Look::ink())
         .hline("limits of the average", average)

@@ -254,7 +254,7 @@ fn arrows(compared: &Compared) -> Figure {
     let border = [(-0.5, -0.5), (right, -0.5), (right, bottom), (-0.5, bottom), (-0.5, -0.5)];
     let title = format!("Difference of projection, B \u{2212} A, {factor} times enlarged");
     let plot = Plot::new(title, "u (px)", "v (px)").equal_aspect().y_down();
-    let plot = plot.line_as("", &border, Look::ink()).arrows("", &arrows);
+    let plot = plot.line_as("", border, Look::ink()).arrows("", &arrows);
     let caption = "Where camera B shows what camera A shows at the arrow's foot, px, after the best motion between them.";
     Figure::plot("difference", &plot, caption)
 }

@@ -3,6 +3,7 @@
 use super::{ClosedFormError, Unknown, unknown};
 use crate::camera::{Model, Parameter};
 use crate::geometry::HomographyError;
+use std::borrow::Cow;
 
 fn coefficients(model: Model) -> String {
     model.coefficients().iter().map(|p| p.name()).collect::<Vec<_>>().join(" ")
@@ -75,13 +76,13 @@ pub enum CalibrationError {
     #[error("{what} is known to `calibrate_lens` only: call that")]
     OfAnyLens {
         /// Another lens model, marks of unequal weight, a board that is not flat.
-        what: &'static str,
+        what: Cow<'static, str>,
     },
     /// What only the estimator for brown-conrady lenses, flat boards and marks of one weight knows.
     #[error("{what} is known for brown-conrady lenses, flat boards and marks without weights only")]
     OfBrownConrady {
         /// Profile intervals, last digits, a start.
-        what: &'static str,
+        what: Cow<'static, str>,
     },
     /// A standard deviation that no board has.
     #[error("a board's bow cannot be known to {standard_deviation}: a standard deviation is positive")]

@@ -170,7 +170,7 @@ fn refuse_other_lenses(views: &[View], settings: &Settings) -> Result<(), Calibr
     } else {
         return Ok(());
     };
-    Err(CalibrationError::OfAnyLens { what })
+    Err(CalibrationError::OfAnyLens { what: what.into() })
 }
 
 /// Refuses a role for a parameter that the model does not have.

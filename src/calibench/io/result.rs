@@ -485,17 +485,17 @@ pub fn read_camera(path: &Path) -> Result<(Camera, Option<(usize, usize)>), Resu
     parse_camera(&file, &read_regular_text(path, MOST_TABLE_BYTES)?)
 }
 
+/// Width and height, px, where a file states them.
+pub type ImageSize = Option<(usize, usize)>;
+
 /// As [`read_camera`], of any lens model.
-pub fn read_lens_camera(path: &Path) -> Result<(Camera<Lens>, Option<(usize, usize)>), ResultError> {
+pub fn read_lens_camera(path: &Path) -> Result<(Camera<Lens>, ImageSize), ResultError> {
     let file = path.shown();
     parse_lens_camera(&file, &read_regular_text(path, MOST_TABLE_BYTES)?)
 }
 
 /// As [`read_lens_camera`], from text; `file` names it in errors.
-pub fn parse_lens_camera(
-    file: &str,
-    text: &str,
-) -> Result<(Camera<Lens>, Option<(usize, usize)>), ResultError> {
+pub fn parse_lens_camera(file: &str, text: &str) -> Result<(Camera<Lens>, ImageSize), ResultError> {
     let Some(model) = stated_model(file, text)? else {
         return parse_camera(file, text).map(|(camera, size)| (camera.into(), size));
     };

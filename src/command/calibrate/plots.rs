@@ -31,7 +31,7 @@ fn residuals(calibration: &LensCalibration, views: &[View], image_size: Option<(
     if let Some((width, height)) = image_size {
         let (right, bottom) = (width as f64 - 0.5, height as f64 - 0.5);
         let border = [(-0.5, -0.5), (right, -0.5), (right, bottom), (-0.5, bottom), (-0.5, -0.5)];
-        plot = plot.line_as("", &border, Look::ink());
+        plot = plot.line_as("", border, Look::ink());
     }
     let caption = "Residual of every point where it was seen, px. Arrows that point the same way in a region show that the \
                    model misses something there.";

@@ -73,7 +73,7 @@ fn check(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
         (settings.start.is_some(), "a start for the intrinsics"),
     ];
     if let Some((_, what)) = only_plain.into_iter().find(|(asked, _)| *asked) {
-        return Err(CalibrationError::OfBrownConrady { what });
+        return Err(CalibrationError::OfBrownConrady { what: what.into() });
     }
     if let Some(Bend { standard_deviation, .. }) = settings.board.bend()
         && (standard_deviation.is_nan() || standard_deviation <= 0.0)
