@@ -359,7 +359,7 @@ fn grid_figure(
         let border = [(-0.5, -0.5), (right, -0.5), (right, bottom), (-0.5, bottom), (-0.5, -0.5)];
         let plot = Plot::new(title, "u (px)", "v (px)").size(400.0, 350.0).equal_aspect().y_down().line_as(
             "image border",
-            &border,
+            border,
             Look::ink().dash(Dash::Dotted),
         );
         let lines = grid_lines(see);

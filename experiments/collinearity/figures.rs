@@ -56,7 +56,7 @@ pub fn predicted_figure(ours: &[Found], draws: &[Draw], book: &Book, seed: u64) 
             let [title, axis] = QUANTITY_NAMES[q];
             Plot::new(title, format!("{axis} ({unit})"), format!("density (1/{unit})"))
                 .size(400.0, 330.0)
-                .histogram("centre free", &density(&free, range, 60))
+                .histogram("centre free", density(&free, range, 60))
                 .line("held at truth", outline(1))
                 .line("held at image centre", outline(0))
                 .line("the same, p1, p2 free", outline(3))

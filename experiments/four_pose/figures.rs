@@ -224,9 +224,9 @@ pub fn ellipse(draw: &Draw, book: &Book, trials: &Outcome) -> Figure {
         )
     });
     let plot = plot
-        .points_as("truth", &[(truth.x, truth.y)], Look::ink().size(7.0))
-        .points_as("ours", &of(&draw.calibration.camera), Look::series(0).marker(Marker::Square).size(5.0))
-        .points_as("book", &of(&book.camera), Look::series(1).marker(Marker::Diamond).size(5.0));
+        .points_as("truth", [(truth.x, truth.y)], Look::ink().size(7.0))
+        .points_as("ours", of(&draw.calibration.camera), Look::series(0).marker(Marker::Square).size(5.0))
+        .points_as("book", of(&book.camera), Look::series(1).marker(Marker::Diamond).size(5.0));
     let whitened = nalgebra::Cholesky::new(covariance).map(|c| c.l());
     let distance = |&(k1, k2): &(f64, f64)| {
         let error = Vec2::new(k1, k2) - truth;
@@ -261,7 +261,7 @@ pub fn rmse(draw: &Draw, book: &Book, trials: &Outcome) -> Figure {
     let plot = Plot::new("Reprojection error over many draws", "RMSE (px)", "density (1/px)")
         .size(600.0, 420.0)
         .x_range(range.0, range.1)
-        .histogram(format!("{TRIALS} trials"), &density(&values, range, 40))
+        .histogram(format!("{TRIALS} trials"), density(&values, range, 40))
         .line_as("predicted", curve, Look::series(1).dash(Dash::Solid).width(2.0))
         .vline_as(
             format!("book {} px", book.rmse_px),

@@ -119,7 +119,7 @@ mod tests {
 
     #[test]
     fn a_plot_is_svg_with_selectable_text_and_without_traces_of_the_machine() {
-        let plot = Plot::new("Title & more", "x (px)", "y (px)").line("curve", &[(0.0, 0.0), (1.0, 2.0)]);
+        let plot = Plot::new("Title & more", "x (px)", "y (px)").line("curve", [(0.0, 0.0), (1.0, 2.0)]);
         let figure = Figure::plot("curve", &plot, "what to <notice>");
         let text = String::from_utf8(figure.bytes.clone()).unwrap();
         assert!(text.starts_with("<svg") && text.trim_end().ends_with("</svg>"));
