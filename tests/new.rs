@@ -106,6 +106,13 @@ fn a_new_adapter_in_rust_is_compiled_and_trusted_by_the_gate() {
 }
 
 #[test]
+fn a_new_adapter_in_octave_is_trusted_by_the_gate() {
+    if let Some(folder) = adapter_made_ready("octave", &["octave-cli", "--version"]) {
+        is_trusted(&folder, "octave-cli --quiet --eval my_solver");
+    }
+}
+
+#[test]
 fn a_new_board_is_taken_by_calibrate() {
     let folder = folder("new-board");
     succeeds(&folder, &["new", "board", "mine"]);

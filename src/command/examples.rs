@@ -18,6 +18,7 @@ const EXAMPLES: [(&str, &[&str]); 31] = [
             "calibench new adapter my-solver",
             "calibench new adapter my-solver --language cpp",
             "calibench new adapter my-solver --language rust",
+            "calibench new adapter my-solver --language octave",
         ],
     ),
     ("new board", &["calibench new board my-board"]),

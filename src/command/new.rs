@@ -50,6 +50,8 @@ enum Language {
     Cpp,
     /// Rust, without Cargo and without crates.
     Rust,
+    /// Octave 7 without packages; MATLAB by files, which was not tried.
+    Octave,
 }
 
 /// What is written, and what to do with it.
@@ -61,6 +63,7 @@ struct Started {
 const STUDY: &str = include_str!("new/study.toml");
 const BOARD: &str = include_str!("new/board.toml");
 const CPP: &str = include_str!("../../adapters/templates/solver.cpp");
+const OCTAVE: &str = include_str!("../../adapters/templates/solver.m");
 const RUST: &str = include_str!("../../adapters/templates/solver.rs");
 const PYTHON: &str = include_str!("../../adapters/minimal_solver.py");
 
@@ -151,6 +154,13 @@ fn adapter(name: &str, language: Language) -> Started {
             let compiled = format!("rustc --edition 2021 -O -o {name} {file}");
             (file, RUST.replace(PLACEHOLDER, name), compiled, format!("./{name}"))
         }
+        Language::Octave => {
+            // Octave calls a file by its name, which is that of a function.
+            let function = name.replace('-', "_");
+            let text = OCTAVE.replace(PLACEHOLDER, name).replace("my_name", &function);
+            let command = format!("octave-cli --quiet --eval {function}");
+            (format!("{function}.m"), text, "octave-cli --version     # 7 or later".to_string(), command)
+        }
     };
     Started {
         next: format!(
@@ -179,7 +189,10 @@ mod tests {
         let adapters = Language::value_variants().iter().map(|language| adapter("abc", *language));
         for started in [study("abc"), board("abc")].into_iter().chain(adapters) {
             let text = String::from_utf8(started.files[0].1.clone()).unwrap();
-            assert!(!text.contains(PLACEHOLDER) && !text.contains("minimal_solver"), "{text}");
+            assert!(
+                !text.contains(PLACEHOLDER) && !text.contains("my_name") && !text.contains("minimal_solver"),
+                "{text}"
+            );
         }
     }
 
