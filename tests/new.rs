@@ -71,19 +71,45 @@ fn a_new_experiment_holds_and_is_registered_everywhere() {
     assert!(String::from_utf8_lossy(&elsewhere.stderr).contains("source tree"));
 }
 
-/// A file of C++ needs a compiler, which is not everywhere.
-#[test]
-fn a_new_adapter_is_compiled_and_trusted_by_the_gate() {
-    let folder = folder("new-adapter");
-    succeeds(&folder, &["new", "adapter", "my-solver", "--language", "cpp"]);
-    let compiler = ["-std=c++17", "-O2", "-Wall", "-Wextra", "-Werror", "-o", "my-solver", "my-solver.cpp"];
-    let Ok(compiled) = Command::new("c++").args(compiler).current_dir(&folder).output() else {
-        eprintln!("SKIPPED: there is no C++ compiler");
-        return;
+/// Starts an adapter in a language and makes it ready with a command; `None`, and a word about it, where the command is not there.
+fn adapter_made_ready(language: &str, command: &[&str]) -> Option<PathBuf> {
+    let folder = folder(&format!("new-adapter-{language}"));
+    succeeds(&folder, &["new", "adapter", "my-solver", "--language", language]);
+    let Ok(run) = Command::new(command[0]).args(&command[1..]).current_dir(&folder).output() else {
+        eprintln!("SKIPPED: an adapter in {language}: there is no {}", command[0]);
+        return None;
     };
-    assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
-    let gate = succeeds(&folder, &["gate", "--solver", "./my-solver", "--samples", "1", "--timeout", "120"]);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    Some(folder)
+}
+
+fn is_trusted(folder: &Path, solver: &str) {
+    let gate = succeeds(folder, &["gate", "--solver", solver, "--samples", "1", "--timeout", "120"]);
     assert!(String::from_utf8_lossy(&gate.stdout).contains("\nTRUSTED"), "{gate:?}");
+}
+
+#[test]
+fn a_new_adapter_in_cpp_is_compiled_and_trusted_by_the_gate() {
+    let compiler =
+        ["c++", "-std=c++17", "-O2", "-Wall", "-Wextra", "-Werror", "-o", "my-solver", "my-solver.cpp"];
+    if let Some(folder) = adapter_made_ready("cpp", &compiler) {
+        is_trusted(&folder, "./my-solver");
+    }
+}
+
+#[test]
+fn a_new_adapter_in_rust_is_compiled_and_trusted_by_the_gate() {
+    let compiler = ["rustc", "--edition", "2021", "-O", "-D", "warnings", "-o", "my-solver", "my-solver.rs"];
+    if let Some(folder) = adapter_made_ready("rust", &compiler) {
+        is_trusted(&folder, "./my-solver");
+    }
+}
+
+#[test]
+fn a_new_adapter_in_octave_is_trusted_by_the_gate() {
+    if let Some(folder) = adapter_made_ready("octave", &["octave-cli", "--version"]) {
+        is_trusted(&folder, "octave-cli --quiet --eval my_solver");
+    }
 }
 
 #[test]

@@ -12,7 +12,15 @@ const EXAMPLES: [(&str, &[&str]); 31] = [
     ("book", &["calibench book"]),
     ("new study", &["calibench new study my-study"]),
     ("new experiment", &["calibench new experiment my-question"]),
-    ("new adapter", &["calibench new adapter my-solver", "calibench new adapter my-solver --language cpp"]),
+    (
+        "new adapter",
+        &[
+            "calibench new adapter my-solver",
+            "calibench new adapter my-solver --language cpp",
+            "calibench new adapter my-solver --language rust",
+            "calibench new adapter my-solver --language octave",
+        ],
+    ),
     ("new board", &["calibench new board my-board"]),
     (
         "board",

@@ -48,6 +48,10 @@ enum Language {
     Python,
     /// C++17, and nothing else.
     Cpp,
+    /// Rust, without Cargo and without crates.
+    Rust,
+    /// Octave 7 without packages; MATLAB by files, which was not tried.
+    Octave,
 }
 
 /// What is written, and what to do with it.
@@ -59,6 +63,8 @@ struct Started {
 const STUDY: &str = include_str!("new/study.toml");
 const BOARD: &str = include_str!("new/board.toml");
 const CPP: &str = include_str!("../../adapters/templates/solver.cpp");
+const OCTAVE: &str = include_str!("../../adapters/templates/solver.m");
+const RUST: &str = include_str!("../../adapters/templates/solver.rs");
 const PYTHON: &str = include_str!("../../adapters/minimal_solver.py");
 
 /// The name in the templates.
@@ -143,6 +149,18 @@ fn adapter(name: &str, language: Language) -> Started {
             let compiled = format!("c++ -std=c++17 -O2 -o {name} {file}");
             (file, CPP.replace(PLACEHOLDER, name), compiled, format!("./{name}"))
         }
+        Language::Rust => {
+            let file = format!("{name}.rs");
+            let compiled = format!("rustc --edition 2021 -O -o {name} {file}");
+            (file, RUST.replace(PLACEHOLDER, name), compiled, format!("./{name}"))
+        }
+        Language::Octave => {
+            // Octave calls a file by its name, which is that of a function.
+            let function = name.replace('-', "_");
+            let text = OCTAVE.replace(PLACEHOLDER, name).replace("my_name", &function);
+            let command = format!("octave-cli --quiet --eval {function}");
+            (format!("{function}.m"), text, "octave-cli --version     # 7 or later".to_string(), command)
+        }
     };
     Started {
         next: format!(
@@ -168,10 +186,13 @@ mod tests {
 
     #[test]
     fn templates_take_the_name_everywhere() {
-        let adapters = [Language::Python, Language::Cpp].map(|language| adapter("abc", language));
+        let adapters = Language::value_variants().iter().map(|language| adapter("abc", *language));
         for started in [study("abc"), board("abc")].into_iter().chain(adapters) {
             let text = String::from_utf8(started.files[0].1.clone()).unwrap();
-            assert!(!text.contains(PLACEHOLDER) && !text.contains("minimal_solver"), "{text}");
+            assert!(
+                !text.contains(PLACEHOLDER) && !text.contains("my_name") && !text.contains("minimal_solver"),
+                "{text}"
+            );
         }
     }
 
