@@ -53,7 +53,15 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
     if arguments.svg.is_some() {
         files.push((place("board.svg"), svg::svg(&sheet).into_bytes()));
     }
-    files.push((place("board.toml"), named::file_text(&arguments.board, sheet.rulers).into_bytes()));
+    let named = place("board.toml");
+    if std::fs::read_to_string(&named).is_ok_and(|text| named::is_measured(&text)) {
+        warn(&format!(
+            "{}: somebody has measured the rulers of this page; draw the other into a folder of its own (--out DIR), or remove this file first",
+            named.shown()
+        ));
+        return Exit::Usage;
+    }
+    files.push((named, named::file_text(&arguments.board, sheet.rulers).into_bytes()));
     if let Err(error) = write_together(&files) {
         warn(&error.to_string());
         return Exit::Incomplete;
@@ -84,8 +92,15 @@ fn told(board: &BoardSpec, paper: &Paper, written: &[String]) -> String {
     text + &format!(
         "\nnext:\n  1. print it without scaling (\"actual size\", 100 %), and glue it to something flat\n  2. measure both rulers, and write \
          their lengths into {file}\n  3. take 10 to 20 photographs without zoom or autofocus: the board tilted by 20 to 45 degrees, each \
-         time another way, in all parts of the frame\n  4. calibench calibrate --board {file} --out result PHOTOS...\n"
+         time another way, in all parts of the frame\n  4. calibench calibrate --board {} --out result PHOTOS...\n",
+        as_a_word(file)
     )
+}
+
+/// A path as a shell takes it for one word.
+fn as_a_word(path: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "._-/+:".contains(c);
+    if path.chars().all(is_plain) { path.to_string() } else { format!("'{}'", path.replace('\'', r"'\''")) }
 }
 
 /// A board that may grow by less fills its page.

@@ -101,7 +101,10 @@ fn belonging(experiments: &[Experiment], project: &Project) -> Vec<Look> {
     let golden = if !missing.is_empty() {
         Look {
             name: "golden",
-            found: format!("no snapshot of {}: run `calibench bless`", missing.join(", ")),
+            found: format!(
+                "no snapshot of {0}: run `calibench bless {0}` in the source tree",
+                missing.join(" ")
+            ),
             well: false,
         }
     } else if !other.is_empty() {

@@ -31,3 +31,26 @@ pub(super) fn file_text(board: &BoardSpec, rulers_mm: [f64; 2]) -> String {
         board.words()
     )
 }
+
+/// Whether the owner of a page has written into its file what the rulers measure: it cannot be drawn anew.
+pub(super) fn is_measured(text: &str) -> bool {
+    let lengths = |name: &str| {
+        let stated =
+            text.lines().find_map(|line| line.trim().strip_prefix(name)?.trim_start().strip_prefix('='));
+        stated.map(str::trim)
+    };
+    lengths("measured_mm") != lengths("drawn_mm")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_measured_once_its_lengths_are_others() {
+        let drawn = file_text(&"circles:9x7:10mm:3mm".parse().unwrap(), [270.0, 180.0]);
+        assert!(!is_measured(&drawn));
+        assert!(is_measured(&drawn.replace("measured_mm = [270, 180]", "measured_mm = [261.9, 174.6]")));
+        assert!(is_measured(&drawn.replace("measured_mm = [270, 180]\n", "")));
+    }
+}
