@@ -29,6 +29,13 @@ struct Refused : std::runtime_error {
 // --- What is asked -----------------------------------------------------------------------------------------------------------
 
 const std::array<std::string, 10> NAMES = {"fx", "fy", "cx", "cy", "skew", "k1", "k2", "p1", "p2", "k3"};
+
+// The place of a parameter in NAMES.
+int place(const std::string &name) {
+    const auto found = std::find(NAMES.begin(), NAMES.end(), name);
+    if (found == NAMES.end()) throw std::runtime_error("no parameter is called `" + name + "`");
+    return static_cast<int>(found - NAMES.begin());
+}
 using Camera = std::array<double, 10>;
 
 struct Point {
@@ -236,7 +243,7 @@ void start(const Problem &problem, Camera &camera, std::vector<Pose> &poses) {
     camera[2] = (problem.width - 1) / 2;
     camera[3] = (problem.height - 1) / 2;
     for (const auto &[name, value] : problem.held)
-        camera[std::find(NAMES.begin(), NAMES.end(), name) - NAMES.begin()] = value;
+        camera[place(name)] = value;
     std::vector<Matrix> homographies;
     Matrix rows;
     Vector right;
@@ -501,7 +508,7 @@ Problem problem_of(const Json &json) {
     for (const Json &view : json.at("views").list)
         problem.views.push_back({points_of(view.at("target")), points_of(view.at("pixels"))});
     for (const Json &name : json.at("free").list)
-        problem.free.push_back(static_cast<int>(std::find(NAMES.begin(), NAMES.end(), name.text) - NAMES.begin()));
+        problem.free.push_back(place(name.text));
     for (const auto &[name, value] : json.at("held").fields) problem.held[name] = value.number;
     return problem;
 }
