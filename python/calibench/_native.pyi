@@ -30,7 +30,35 @@ _Outside = Literal["raise", "nan"]
 _Path = str | PathLike[str]
 _PerView = ArrayLike | Sequence[ArrayLike]
 
-__all__: list[str]
+__all__ = [
+    "Board",
+    "Calibration",
+    "Camera",
+    "Covariance",
+    "RectifyMap",
+    "Report",
+    "RmseDistribution",
+    "Scene",
+    "Stream",
+    "__version__",
+    "calibrate",
+    "compare_models",
+    "cramer_rao",
+    "digits",
+    "errors_of",
+    "fit_views",
+    "format_names",
+    "gate_builtin",
+    "gate_command",
+    "gate_properties",
+    "gate_solver",
+    "locate",
+    "looking_at_centre",
+    "read_camera",
+    "read_corners",
+    "write_camera",
+    "write_corners",
+]
 __version__: str
 
 class _Coefficients(TypedDict, total=False):
