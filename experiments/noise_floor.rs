@@ -299,7 +299,7 @@ fn table<'a>(name: &str, cells: Vec<Cell<'a>>) -> Rows<Cell<'a>> {
 
 fn floor_figure(grid: &Watched) -> Figure {
     let (cells, factor) = (grid.cells(), &grid.sweep.spec().factor[1]);
-    let views = factor.levels.len();
+    let views = factor.count();
     let over_floor = |cell: &Cell, value: f64| value / cell.theory.noise_floor_px();
     let predicted_factor = |cell: &Cell| over_floor(cell, cell.theory.mean_px());
     // Over the noises: how far the means of each number of views lie apart, and how wide their intervals are.
@@ -363,7 +363,7 @@ fn overfitting_figure(marks: &Watched) -> Figure {
             .measured_as("measured", measured(&|cell| cell.sd_interval("fx")), Look::series(1)),
     ];
     let factor = &marks.sweep.spec().factor[0];
-    let targets: Vec<String> = (0..factor.levels.len()).rev().map(|i| factor.label(i).to_string()).collect();
+    let targets: Vec<String> = (0..factor.count()).rev().map(|i| factor.label(i).to_string()).collect();
     let caption = format!(
         "Targets of {} marks, 4 views, 0.1 px of noise, {} trials each, 95 % intervals, seed {}. Notice \
          that the RMSE falls to {:.2} of the noise floor where the standard deviation of fx is {:.1} times \

@@ -81,7 +81,7 @@ const DRAWS: usize = 200;
 pub fn study(bytes: &[u8]) {
     let text = String::from_utf8_lossy(bytes);
     let Ok(spec) = Spec::parse(&text) else { return };
-    let levels = spec.factor.iter().fold(1usize, |product, f| product.saturating_mul(f.levels.len()));
+    let levels = spec.factor.iter().fold(1usize, |product, f| product.saturating_mul(f.count()));
     let target = spec.scene.target;
     let marks = target.columns.saturating_mul(target.rows);
     let draws = if spec.scene.poses.redraws() { DRAWS } else { 1 };

@@ -34,6 +34,7 @@ mod photo_verbs;
 mod planar_single_plane;
 mod planar_statistics;
 mod printed_board;
+mod program;
 mod readme;
 mod real_corner_files;
 mod real_data;

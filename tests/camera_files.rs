@@ -1,30 +1,12 @@
 //! Do `convert` and `diff` say what they do, and are mrcal's own files read?
 
 use crate::data;
+use crate::program::{calibench as run, folder, text};
 use calibench::camera::Camera;
 use calibench::io::formats::{FormatError, VnlBoard, Wishes, detect, parse_vnl, read_camera_file};
 use calibench::io::read_camera;
 use serde_json::Value;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-pub(crate) fn run(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_calibench"));
-    command.args(arguments).current_dir(folder).output().expect("the program starts")
-}
-
-pub(crate) fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
-/// An empty folder of this test's own.
-pub(crate) fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).expect("a folder is made");
-    folder
-}
 
 const CAMERA: &str = r#"{"camera": {"fx": 600.5, "fy": 599.5, "cx": 326.25, "cy": 243.75, "k1": -0.18, "k2": 0.05},
     "image_size": [640, 480], "free": ["fx"], "covariance": [[1]], "degrees_of_freedom": 100}"#;

@@ -1,8 +1,9 @@
 //! Does the command end as it says it does? Exit codes, files and streams of `calibench` and of an
 //! experiment's own binary.
 
+use crate::program::folder;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 const CALIBENCH: &str = env!("CARGO_BIN_EXE_calibench");
@@ -14,16 +15,6 @@ fn run(program: &str, folder: &Path, arguments: &[&str]) -> Output {
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-/// An empty folder of this test's own.
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    if folder.exists() {
-        fs::remove_dir_all(&folder).expect("an old folder is removed");
-    }
-    fs::create_dir_all(&folder).expect("a folder is made");
-    folder
 }
 
 fn text(bytes: &[u8]) -> String {

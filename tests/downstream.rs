@@ -1,7 +1,7 @@
 //! Do `register`, `measure` and `hand-eye` say what they find, and are their stated uncertainties those of
 //! repeated calibrations?
 
-use crate::camera_files::{folder, run, text};
+use crate::program::{calibench as run, folder, text};
 use calibench::board::View;
 use calibench::calibrate::{Calibration, Settings, calibrate};
 use calibench::downstream::{

@@ -2,24 +2,13 @@
 //! memory, and loses nothing.
 #![cfg(target_os = "linux")]
 
+use crate::program::{folder, text};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 const CALIBENCH: &str = env!("CARGO_BIN_EXE_calibench");
-
-/// An empty folder of this test's own.
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).expect("a folder is made");
-    folder
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
 
 /// Address space that a run may take: threads reserve much and use little.
 const ADDRESS_SPACE_KIB: u64 = 4 << 20;

@@ -1,5 +1,6 @@
 //! Lens models against other programs, and as the command's user meets them.
 
+use crate::program::{calibench as run, folder, text};
 use calibench::camera::{Camera, Lens, Model};
 use calibench::geometry::{Pose, Vec2, Vec3, rotation};
 use calibench::io::read_lens_camera;
@@ -8,8 +9,7 @@ use calibench::synth::{Stream, StreamKey};
 use serde_json::Value;
 use std::fmt::Write;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
 
 /// The lens and linear parameters of `reference/lenses/make.py`.
 fn reference_camera(model: &str, coefficients: &str) -> Camera<Lens> {
@@ -38,23 +38,6 @@ fn pixels_are_those_of_other_programs() {
         seen += 1;
     }
     assert_eq!(seen, 40 * Model::ALL.len());
-}
-
-fn run(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_calibench"));
-    command.args(arguments).current_dir(folder).output().expect("the program starts")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
-/// An empty folder of this test's own.
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).expect("a folder is made");
-    folder
 }
 
 /// A corner file of a fisheye with noise of 0.1 px: eight views of a 9 x 7 board, `column` besides if given.

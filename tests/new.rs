@@ -1,5 +1,6 @@
 //! Does what `calibench new` writes run as it is?
 
+use crate::program::{calibench, folder};
 use calibench_harness::Context;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,19 +9,6 @@ use std::process::{Command, Output};
 /// The file of a new experiment, compiled as it is written.
 #[path = "../src/command/new/experiment_template.rs"]
 mod experiment_template;
-
-fn calibench(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_calibench"));
-    command.args(arguments).current_dir(folder).output().expect("the program starts")
-}
-
-/// An empty folder of this test's own.
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).expect("a folder is made");
-    folder
-}
 
 fn succeeds(folder: &Path, arguments: &[&str]) -> Output {
     let run = calibench(folder, arguments);

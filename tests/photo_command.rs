@@ -1,5 +1,6 @@
 //! Does `calibench calibrate --board` get from image files to a camera, and say what it left out?
 
+use crate::program::folder;
 use calibench::board::Board;
 use calibench::camera::Camera;
 use calibench::geometry::Pose;
@@ -9,7 +10,7 @@ use calibench::synth::Truth;
 use calibench::synth::render::{Imaging, photograph};
 use calibench::synth::scene::looking_at_centre;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 
 const CALIBENCH: &str = env!("CARGO_BIN_EXE_calibench");
@@ -21,16 +22,6 @@ fn calibrate(folder: &Path, arguments: &[&str]) -> Output {
         .current_dir(folder)
         .output()
         .expect("the program starts")
-}
-
-/// An empty folder of this test's own.
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    if folder.exists() {
-        fs::remove_dir_all(&folder).expect("an old folder is removed");
-    }
-    fs::create_dir_all(&folder).expect("a folder is made");
-    folder
 }
 
 fn text(bytes: &[u8]) -> String {

@@ -1,6 +1,7 @@
 //! Do the verbs on photographs do what they say? `calibench ninepoint` and `calibench undistort`, from file
 //! to file.
 
+use crate::program::folder;
 use calibench::geometry::Vec2;
 use calibench::io::{Channels, Grey, read_channels, read_image, write_png, write_png_16};
 use calibench::raster::Raster;
@@ -8,19 +9,11 @@ use calibench::synth::Truth;
 use calibench::synth::render::nine_dot_stand_in;
 use calibench_harness::Context;
 use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 
 fn calibench(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_calibench")).args(arguments).output().expect("the program starts")
-}
-
-/// An empty folder of this test's own.
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).expect("a folder is made");
-    folder
 }
 
 fn text(path: &Path) -> &str {

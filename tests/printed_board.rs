@@ -1,6 +1,7 @@
 //! Is a printed board as large as it says, and does the way from its page to a camera lead anywhere? The page as PDF and as
 //! SVG, read back; and photographs of the whole page, rulers and all, through the command that a newcomer types.
 
+use crate::program::{calibench, folder};
 use calibench::camera::Camera;
 use calibench::geometry::{Pose, Vec2, Vec3};
 use calibench::io::write_png;
@@ -9,21 +10,7 @@ use calibench::synth::Truth;
 use calibench::synth::scene::looking_at_centre;
 use serde_json::Value;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-fn calibench(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_calibench"));
-    command.args(arguments).current_dir(folder).output().expect("the program starts")
-}
-
-/// An empty folder of this test's own.
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).expect("a folder is made");
-    folder
-}
+use std::path::Path;
 
 /// The page that the command draws, as text.
 fn drawn(folder: &Path, board: &str, form: &str) -> String {

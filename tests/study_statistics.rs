@@ -177,6 +177,12 @@ fn a_wrong_file_is_refused_with_place_and_reason() {
     assert!(error.to_string().contains("no table `lens`"), "{error}");
     let error = refuse(&factor("\"scene.camera.k1\", \"scene.camera.k2\"", "[[0.1, 0.2], [0.3]]"));
     assert!(error.to_string().contains("list of 2 values"), "{error}");
+    let error = refuse(&factor("\"scene.camera.k1\"", "[]"));
+    assert!(matches!(error, SpecError::Factor { line: 16, column: 10, .. }), "{error}");
+    let error = refuse(&good.replace("per_cell = 100", "per_cell = 1.5"));
+    assert!(error.to_string().contains("number `1.5`, expected a whole number from 0"), "{error}");
+    let error = refuse(&good.replace("noise_px = 0.1", "noise_px = true"));
+    assert!(error.to_string().contains("expected a number"), "{error}");
     let error = refuse(&good.replace(
         "per_cell = 100",
         "per_cell = 100, precision = { quantity = \"k3\", relative_half_width = 0.1 }",

@@ -1,5 +1,5 @@
-//! Which code do committed measurements depend on? Its lines are put into the program, so that it can tell
-//! whether they are stale.
+//! What of the source tree travels in the program? The chapter's values, and the code that committed measurements depend on, so that it can
+//! tell whether they are stale. Neither where the crate is built outside the source tree.
 
 #[path = "fingerprint/code.rs"]
 mod code;
@@ -38,14 +38,24 @@ fn main() {
     let root = variable("CARGO_MANIFEST_DIR").join("../..");
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=fingerprint/code.rs");
+    let write = |name: &str, text: &str| {
+        let file = variable("OUT_DIR").join(name);
+        std::fs::write(&file, text).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+    };
+    write("published.toml", &published(&root));
     for (name, lists) in MEASUREMENTS {
-        let lines = lines_of(&root, &lists.concat());
-        let file = variable("OUT_DIR").join(format!("{name}.code"));
-        std::fs::write(&file, lines).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+        write(&format!("{name}.code"), &lines_of(&root, &lists.concat()));
     }
 }
 
-/// The code lines below these paths; none where the crate is built outside the source tree.
+/// The values that the chapter prints.
+fn published(root: &Path) -> String {
+    let file = root.join("golden/published.toml");
+    println!("cargo:rerun-if-changed={}", file.display());
+    std::fs::read_to_string(file).unwrap_or_else(|_| "value = []".to_string())
+}
+
+/// The code lines below these paths.
 fn lines_of(root: &Path, paths: &[&str]) -> String {
     if !root.join("golden/published.toml").is_file() {
         return String::new();

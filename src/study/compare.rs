@@ -192,7 +192,7 @@ pub fn compare_levels(path: &Path, factor: &str) -> Result<Comparison, CompareEr
         factor: factor.to_string(),
         known: spec.factor.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", "),
     })?;
-    let after: usize = spec.factor[at + 1..].iter().map(|f| f.levels.len()).product();
+    let after: usize = spec.factor[at + 1..].iter().map(|f| f.count()).product();
     // Cells are numbered in mixed radix, so the first level's comes first in every round.
     let levels: Vec<usize> = run.engine.cells.iter().map(|cell| cell.levels[at]).collect();
     let errors = run.engine.quantities.iter().enumerate().filter(|(_, q)| q.is_error());

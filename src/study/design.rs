@@ -26,11 +26,7 @@ pub(super) fn designs(spec: &Spec, text: &str) -> Result<Vec<(Vec<usize>, Design
         }
     }
     refuse_set_twice(&spec.factor)?;
-    limits::check_trials(
-        spec.factor.iter().map(|f| f.levels.len()),
-        spec.trials.per_cell,
-        spec.trials.batch,
-    )?;
+    limits::check_trials(spec.factor.iter().map(|f| f.count()), spec.trials.per_cell, spec.trials.batch)?;
     let base = Design { scene: spec.scene.clone(), estimator: spec.estimator.clone() };
     let mut base = Table::try_from(&base).expect("a design came from TOML and goes back into it");
     if let Some(estimator) = base.get_mut("estimator").and_then(Value::as_table_mut)
@@ -38,7 +34,7 @@ pub(super) fn designs(spec: &Spec, text: &str) -> Result<Vec<(Vec<usize>, Design
     {
         estimator.remove("free");
     }
-    let counts: Vec<usize> = spec.factor.iter().map(|f| f.levels.len()).collect();
+    let counts: Vec<usize> = spec.factor.iter().map(|f| f.count()).collect();
     let mut points = limits::Points::default();
     let mut count = |(levels, design): (Vec<usize>, Design)| {
         let scene = &design.scene;

@@ -265,16 +265,27 @@ pub fn in_memory(spec: Spec, text: &str, report: impl FnMut(&Pace)) -> Result<En
 pub fn in_memory_seeing(
     spec: Spec,
     text: &str,
-    mut see: impl FnMut(&Trial),
+    see: impl FnMut(&Trial),
     report: impl FnMut(&Pace),
 ) -> Result<Engine, SpecError> {
+    Ok(in_memory_until(spec, text, &AtomicBool::new(false), see, report)?.0)
+}
+
+/// As [`in_memory_seeing`], to the end or until asked to stop.
+pub fn in_memory_until(
+    spec: Spec,
+    text: &str,
+    stop: &Interruption,
+    mut see: impl FnMut(&Trial),
+    report: impl FnMut(&Pace),
+) -> Result<(Engine, Outcome), SpecError> {
     let mut engine = Engine::of(spec, text, Shard::WHOLE)?;
     let keep = |trials: &[Trial]| {
         trials.iter().for_each(&mut see);
         Ok::<(), Infallible>(())
     };
-    let Ok(_) = engine.drive(&AtomicBool::new(false), keep, report);
-    Ok(engine)
+    let Ok(outcome) = engine.drive(stop, keep, report);
+    Ok((engine, outcome))
 }
 
 #[cfg(test)]

@@ -18,16 +18,25 @@ pub struct Factor {
     /// list of as many values.
     pub set: Vec<String>,
     /// The levels.
-    pub levels: Vec<Spanned<Value>>,
+    pub levels: Spanned<Vec<Spanned<Value>>>,
     /// Names of the levels; their values otherwise.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub labels: Vec<String>,
 }
 
 impl Factor {
+    /// How many levels there are.
+    pub fn count(&self) -> usize {
+        self.levels.get_ref().len()
+    }
+
+    fn value(&self, level: usize) -> &Value {
+        self.levels.get_ref()[level].get_ref()
+    }
+
     /// What a level is called.
     pub fn label(&self, level: usize) -> String {
-        match (self.labels.get(level), self.levels[level].get_ref()) {
+        match (self.labels.get(level), self.value(level)) {
             (Some(label), _) => label.clone(),
             (None, Value::String(text)) => text.clone(),
             (None, value) => value.to_string(),
@@ -36,7 +45,7 @@ impl Factor {
 
     /// The level as a number, where it is one.
     pub fn number(&self, level: usize) -> Option<f64> {
-        match self.levels[level].get_ref() {
+        match self.value(level) {
             Value::Integer(i) => Some(*i as f64),
             Value::Float(f) => Some(*f),
             _ => None,
@@ -45,20 +54,20 @@ impl Factor {
 
     /// Whether every level is a number.
     pub fn is_numeric(&self) -> bool {
-        (0..self.levels.len()).all(|level| self.number(level).is_some())
+        (0..self.count()).all(|level| self.number(level).is_some())
     }
 
     pub(super) fn check(&self, text: &str) -> Result<(), SpecError> {
-        if self.levels.is_empty() || self.set.is_empty() {
+        if self.count() == 0 || self.set.is_empty() {
             return Err(self.error(
                 text,
                 None,
                 "it needs at least one level, and a field to `set`".to_string(),
             ));
         }
-        if !self.labels.is_empty() && self.labels.len() != self.levels.len() {
+        if !self.labels.is_empty() && self.labels.len() != self.count() {
             let counts =
-                format!("{} labels for {} levels: give one a level", self.labels.len(), self.levels.len());
+                format!("{} labels for {} levels: give one a level", self.labels.len(), self.count());
             return Err(self.error(text, None, counts));
         }
         Ok(())
@@ -66,7 +75,7 @@ impl Factor {
 
     /// Puts a level into the study's tree.
     pub(super) fn apply(&self, tree: &mut Table, level: usize, text: &str) -> Result<(), SpecError> {
-        let value = self.levels[level].get_ref();
+        let value = self.value(level);
         let parts: Vec<&Value> = match (self.set.len(), value) {
             (1, value) => vec![value],
             (n, Value::Array(parts)) if parts.len() == n => parts.iter().collect(),
@@ -83,8 +92,8 @@ impl Factor {
     }
 
     pub(super) fn error(&self, text: &str, level: Option<usize>, message: String) -> SpecError {
-        let at = level.or((!self.levels.is_empty()).then_some(0)).map_or(0, |l| self.levels[l].span().start);
-        let (line, column) = place(text, at);
+        let span = level.map_or(self.levels.span(), |level| self.levels.get_ref()[level].span());
+        let (line, column) = place(text, span.start);
         SpecError::Factor { line, column, factor: self.name.clone(), message }
     }
 }

@@ -50,7 +50,7 @@ impl Grid<'_> {
         let factors = &self.engine.spec.factor;
         (0..factors.len())
             .filter(|&f| factors[f].is_numeric())
-            .max_by_key(|&f| (factors[f].levels.len(), usize::MAX - f))
+            .max_by_key(|&f| (factors[f].count(), usize::MAX - f))
     }
 
     fn series(&self, x: usize) -> Vec<Series> {
@@ -221,8 +221,8 @@ impl Grid<'_> {
     /// Two factors across and up: the spread of each estimated quantity.
     fn maps(&self) -> Option<Figure> {
         let [across, up] = [&self.engine.spec.factor[1], &self.engine.spec.factor[0]];
-        let labels = |f: &super::factor::Factor| (0..f.levels.len()).map(|l| f.label(l)).collect::<Vec<_>>();
-        let width = (170.0 + 62.0 * across.levels.len() as f64).max(400.0);
+        let labels = |f: &super::factor::Factor| (0..f.count()).map(|l| f.label(l)).collect::<Vec<_>>();
+        let width = (170.0 + 62.0 * across.count() as f64).max(400.0);
         let panels: Vec<Plot> = self
             .errors()
             .filter_map(|q| {

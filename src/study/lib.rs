@@ -57,7 +57,7 @@ pub const PARQUET: bool = cfg!(feature = "parquet");
 
 pub use accumulate::Tally;
 pub use cells::Cell;
-pub use engine::{Engine, Interruption, Outcome, Pace, Worst, in_memory, in_memory_seeing};
+pub use engine::{Engine, Interruption, Outcome, Pace, Worst, in_memory, in_memory_seeing, in_memory_until};
 pub use fingerprint::Fingerprint;
 pub use finish::finish;
 pub use folder::{Folder, FolderError, Located};
@@ -74,6 +74,7 @@ pub use sketch::Sketch;
 pub use spec::{Estimator, Length, LossChoice, Precision, SceneSpec, Spec, TargetSpec, Trials};
 pub use spec_error::SpecError;
 pub use summary::{CellSummary, Statistic, Summary, summarise};
+pub use tables::columns;
 pub use trial::{Trial, run_trial};
 pub use trial_file::{NoParquet, TrialFile, TrialFileError};
 pub use within::within;

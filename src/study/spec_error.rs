@@ -105,8 +105,20 @@ pub enum SpecError {
 impl SpecError {
     pub(super) fn toml(text: &str, error: &toml::de::Error) -> SpecError {
         let (line, column) = place(text, error.span().map_or(0, |span| span.start));
-        SpecError::Toml { line, column, message: error.message().trim().to_string() }
+        SpecError::Toml { line, column, message: in_words(error.message().trim()) }
     }
+}
+
+/// What the reader expects, in words instead of names of Rust's types.
+fn in_words(message: &str) -> String {
+    let words = [
+        ("expected u64", "expected a whole number from 0"),
+        ("expected usize", "expected a whole number from 0"),
+        ("expected f64", "expected a number"),
+        ("floating point", "number"),
+        ("integer", "number"),
+    ];
+    words.iter().fold(message.to_string(), |text, (typed, said)| text.replace(typed, said))
 }
 
 /// Line and column, both from 1, of a byte; the column counts characters.

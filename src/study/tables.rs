@@ -5,7 +5,7 @@ use super::trial::Trial;
 use std::fmt::Write;
 
 /// Names of the columns, units in brackets.
-pub(super) fn columns(quantities: &[Quantity]) -> Vec<String> {
+pub fn columns(quantities: &[Quantity]) -> Vec<String> {
     let column = |q: &Quantity| {
         let what = if q.is_error() { "_error" } else { "" };
         match q.unit() {

@@ -21,7 +21,7 @@ pub fn within(
     let mut spec = Spec::parse(text).map_err(ExperimentError::at("study"))?;
     spec.seed = context.seed;
     record.input(name, text.as_bytes());
-    let cells: usize = spec.factor.iter().map(|factor| factor.levels.len()).product();
+    let cells: usize = spec.factor.iter().map(|factor| factor.count()).product();
     let progress = context.progress(name, cells * spec.trials.per_cell as usize);
     let mut done = 0;
     let engine = in_memory_seeing(spec, text, see, |pace| {

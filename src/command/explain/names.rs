@@ -73,16 +73,17 @@ impl<'a> Names<'a> {
         )
     }
 
-    /// The nearest names, nearest first: whoever leaves out the experiment means any one.
+    /// The nearest names, nearest first: whoever leaves out the experiment means any one. Names have no capitals.
     fn nearest(&self, name: &str) -> Vec<&str> {
-        let all = self.entries.iter().chain(&self.sections).chain(&self.contradictions).map(String::as_str);
-        let mut near: Vec<(f64, &str)> = all
-            .chain(self.experiments.iter().map(|e| e.id))
-            .map(|known| {
-                let own = known.split_once('.').map_or(known, |(_, own)| own);
-                (strsim::jaro_winkler(name, known).max(strsim::jaro_winkler(name, own)), known)
-            })
-            .collect();
+        let name = name.to_lowercase();
+        let entries = self.entries.iter().map(|known| {
+            let own = known.split_once('.').map_or(known.as_str(), |(_, own)| own);
+            (strsim::jaro_winkler(&name, known).max(strsim::jaro_winkler(&name, own)), known.as_str())
+        });
+        let others = self.sections.iter().chain(&self.contradictions).map(String::as_str);
+        let others = others.chain(self.experiments.iter().map(|e| e.id));
+        let others = others.map(|known| (strsim::jaro_winkler(&name, known), known));
+        let mut near: Vec<(f64, &str)> = entries.chain(others).collect();
         near.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(b.1)));
         near.into_iter().take(OFFERED).map(|(_, known)| known).collect()
     }
@@ -124,6 +125,7 @@ mod tests {
         assert_eq!(names().nearest("four-pose.xf")[0], "four-pose.fx");
         assert_eq!(names().nearest("max-devation")[0], "line-bending.max-deviation");
         assert_eq!(names().nearest("two-views-sufice")[0], "two-views-suffice");
+        assert_eq!(names().nearest("FX")[0], "four-pose.fx");
         assert!(names().not_found("fx").contains("\n  four-pose.fx\n"));
     }
 
