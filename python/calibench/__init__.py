@@ -37,6 +37,7 @@ from ._native import (
     looking_at_centre,
     read_camera,
     read_corners,
+    run_study,
     write_camera,
     write_corners,
 )
@@ -51,6 +52,7 @@ from .errors import (
     RectifyError,
     SceneError,
     SettingsError,
+    StudyError,
     UndistortError,
     ViewError,
 )
@@ -77,6 +79,7 @@ __all__ = [
     "SceneError",
     "SettingsError",
     "Stream",
+    "StudyError",
     "UndistortError",
     "ViewError",
     "__version__",
@@ -95,6 +98,7 @@ __all__ = [
     "read_camera",
     "read_corners",
     "run_gate",
+    "run_study",
     "write_camera",
     "write_corners",
 ]

@@ -20,6 +20,7 @@ from .records import (
     Located,
     Prior,
     ProfileInterval,
+    Study,
     Warning,
     Written,
 )
@@ -56,6 +57,7 @@ __all__ = [
     "looking_at_centre",
     "read_camera",
     "read_corners",
+    "run_study",
     "write_camera",
     "write_corners",
 ]
@@ -301,6 +303,7 @@ class RectifyMap:
     @property
     def sources(self) -> _Floats: ...
 
+def run_study(text: str) -> Study: ...
 def format_names() -> list[str]: ...
 def read_camera(
     path: _Path,

@@ -64,3 +64,7 @@ class RectifyError(CalibenchError):
 
 class FormatError(CalibenchError):
     """A file that cannot be read, or that cannot hold what is to be written; ``numbers`` has its line and column where there is one."""
+
+
+class StudyError(CalibenchError):
+    """A study that cannot be run as written; ``numbers`` has line and column where there are some."""

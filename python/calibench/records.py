@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -224,6 +225,64 @@ class Check:
     """What was seen, with numbers."""
     problems: int
     """Number of problems behind it."""
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """A number with its interval, at the study's confidence."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Statistic:
+    """What the converged trials of a cell say of one quantity; ``None`` where too few have it."""
+
+    unit: str
+    count: int
+    """Trials that have a value."""
+    mean: Estimated | None
+    """Of an error, the bias."""
+    sd: Estimated | None
+    rms: Estimated | None
+    """Root mean square; of an error, about the truth."""
+    predicted_sd: float | None
+    """What the Cramer-Rao bound says."""
+    ratio: Estimated | None
+    """`sd` over `predicted_sd`."""
+
+
+@dataclass(frozen=True)
+class StudyCell:
+    """The results of one combination of levels."""
+
+    name: str
+    labels: tuple[str, ...]
+    """Of its levels, one a factor."""
+    trials: int
+    outcomes: dict[str, int]
+    """Trials by how they ended: ``converged``, or why not."""
+    statistics: dict[str, Statistic]
+    """By the name of the quantity: parameters, ``rmse`` and others."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """A Monte Carlo study that was run."""
+
+    name: str
+    question: str
+    confidence: float
+    """Of the intervals."""
+    cells: tuple[StudyCell, ...]
+    trials: dict[str, Any] = field(repr=False)
+    """The columns of `trials.csv` by their names there, in order: arrays, and a list of outcomes."""
+
+    def to_frame(self) -> Any:
+        """The trials as a DataFrame of pandas, one row a trial; its ``to_parquet`` writes them as Parquet."""
+        return import_module("pandas").DataFrame(self.trials)
 
 
 @dataclass(frozen=True)

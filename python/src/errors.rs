@@ -11,6 +11,7 @@ use calibench::photos::{BoardSpecError, DetectError, NotFound};
 use calibench::rectify::{OutputCameraError, RectifyError};
 use calibench::synth::SceneError;
 use calibench::synth::render::RenderError;
+use calibench_study::SpecError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::error::Error;
@@ -157,6 +158,16 @@ pub(crate) fn output_camera(py: Python<'_>, error: &OutputCameraError) -> PyErr 
     exception_of!(py, "RectifyError", error;
         OutputCameraError::Border { u, v }
         OutputCameraError::NothingValid { width, height })
+}
+
+pub(crate) fn study(py: Python<'_>, error: &SpecError) -> PyErr {
+    exception_of!(py, "StudyError", error;
+        SpecError::Toml { line, column }
+        SpecError::Value { field, value }
+        SpecError::TooMuch { needed, limit, what }
+        SpecError::Factor { line, column, factor }
+        SpecError::SetTwice { field, before, by }
+        SpecError::Precision { quantity, cell, known })
 }
 
 pub(crate) fn format(py: Python<'_>, error: &FormatError) -> PyErr {

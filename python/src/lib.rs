@@ -1,7 +1,7 @@
 //! How does Python reach calibench? The compiled half of the package: arrays in, arrays out, and every number that of the Rust library.
 //!
 //! ```text
-//! NumPy arrays --arrays--> Vec2 --calibrate | camera | synth | board | rectify | formats | gate--> classes whose attributes are arrays
+//! NumPy arrays --arrays--> Vec2 --calibrate | camera | synth | board | rectify | formats | study | gate--> classes whose attributes are arrays
 //! ```
 //! What is data and no computation (dataclasses, exceptions, the certified problems, the decorator for pytest) is Python and stands in
 //! `calibench/`. Every long call lets other threads of Python run, and hears Ctrl-C ([`watch`]).
@@ -19,6 +19,7 @@ mod gate;
 mod records;
 mod rectify;
 mod settings;
+mod study;
 mod synth;
 mod watch;
 
@@ -43,6 +44,8 @@ mod _native {
     use crate::gate::{Report, digits, gate_builtin, gate_command, gate_properties, gate_solver};
     #[pymodule_export]
     use crate::rectify::RectifyMap;
+    #[pymodule_export]
+    use crate::study::run_study;
     #[pymodule_export]
     use crate::synth::{Scene, Stream, looking_at_centre};
 

@@ -2,6 +2,8 @@
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
@@ -21,17 +23,30 @@ pub(crate) fn detached<T: Send + 'static>(
     if !long {
         return Ok(py.detach(work));
     }
+    interruptible(py, move |_| work())
+}
+
+/// Runs `work` in a thread of its own while this one asks every 50 ms whether Ctrl-C was pressed. If so `KeyboardInterrupt` is raised at
+/// once, and `work` may see by its flag that nobody waits for it any more.
+pub(crate) fn interruptible<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce(&AtomicBool) -> T + Send + 'static,
+) -> PyResult<T> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let seen = stop.clone();
     let (sender, mut receiver) = channel();
     std::thread::spawn(move || {
         // Nobody listens any more after Ctrl-C.
-        let _ = sender.send(work());
+        let _ = sender.send(work(&seen));
     });
     loop {
         let (received, back) = py.detach(move || (receiver.recv_timeout(PATIENCE), receiver));
         receiver = back;
         match received {
             Ok(result) => return Ok(result),
-            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+            Err(RecvTimeoutError::Timeout) => {
+                py.check_signals().inspect_err(|_| stop.store(true, Ordering::Relaxed))?;
+            }
             Err(RecvTimeoutError::Disconnected) => {
                 return Err(PyRuntimeError::new_err(
                     "the calculation ended without a result: a fault of calibench",
