@@ -1,17 +1,20 @@
-"""Public calibrators before one judge: which are trusted, how many digits they reach, how long they take.
+"""Public calibrators before one judge: which are trusted, how many digits they reach, whether they find the right minimum, how long they take.
 
-    pip install calibench
-    python3 adapters/scoreboard.py [NAME...] [--write README.md]
+    pip install ./python
+    python3 adapters/scoreboard.py [NAME...] [--write]
 
-Each is installed from PyPI into a virtual environment of its own below target/scoreboard and only run. All go through the same pipe. What cannot
-be installed is named and left out. A row is repeated by its name: `python3 adapters/scoreboard.py opencv-5`.
+Each is installed from PyPI into a virtual environment of its own below target/scoreboard, or is Debian's, and only run. All go through the same
+pipe. What cannot be installed is named and left out. A row is repeated by its name: `python3 adapters/scoreboard.py opencv-5`.
 """
 
 import argparse
+import csv
 import json
+import resource
 import shlex
 import subprocess
 import sys
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -20,6 +23,13 @@ import calibench
 
 ADAPTERS = Path(__file__).resolve().parent
 VENVS = ADAPTERS.parent / "target/scoreboard"
+DEBIAN = "debian:"
+DETERMINED = 0.02
+"""Bound of sd(fx)/fx below which data determine the camera, as in the experiment global-minimum."""
+ROWS, PAGE = ADAPTERS.parent / "golden/scoreboard.csv", ADAPTERS / "SCOREBOARD.md"
+REPEATED = 201
+"""How often a problem is answered to time it."""
+SCENES = "cargo run --release --quiet --bin global-minimum-scenes --"
 BEGIN, END = "<!-- begin scoreboard -->", "<!-- end scoreboard -->"
 
 
@@ -29,10 +39,12 @@ class Entry:
 
     name: str
     packages: tuple[str, ...]
-    """To be installed, the calibrator first."""
+    """To be installed, the calibrator first; of Debian's where it starts with `debian:`."""
     adapter: str
     licence: str
     note: str
+    first: int = 50
+    """At most so many scenes of each family of the experiment global-minimum."""
 
 
 ENTRIES = [
@@ -41,9 +53,14 @@ ENTRIES = [
           "200 iterations to machine precision; its binding takes points in single precision"),
     Entry("opencv-5", ("opencv-python-headless>=5", "numpy"), "opencv_solver.py", "Apache-2.0",
           "200 iterations to machine precision; its binding takes points in single precision"),
-    Entry("scipy", ("scipy", "numpy"), "scipy_solver.py", "BSD-3-Clause", "a general solver: start and camera are the adapter's"),
+    Entry("scipy", ("scipy", "numpy"), "scipy_solver.py", "BSD-3-Clause",
+          "a general solver: start, camera and differences are the adapter's; asked fewer scenes, since fifty views take it minutes", first=3),
     Entry("lensboy", ("lensboy", "numpy"), "lensboy_solver.py", "not stated in the package",
           "its OpenCV model without warp and outliers; made for richer lenses, states no covariance"),
+    Entry("colmap", ("pycolmap", "pyceres", "numpy"), "colmap_solver.py", "BSD-3-Clause",
+          "its bundle adjustment, made for scenes; start and held coefficients are the adapter's"),
+    Entry("mrcal", ("debian:python3-mrcal",), "mrcal_solver.py", "Apache-2.0",
+          "frees all coefficients of a lens together, so that few scenes can be asked; start and covariance are the adapter's"),
     Entry("vision-calibration", ("vision-calibration",), "vision_calibration_solver.py", "MIT",
           "200 iterations, no robust loss; states no covariance; an alpha release"),
 ]
@@ -56,20 +73,30 @@ class Score:
     entry: Entry
     version: str
     report: calibench.Report
-    digits: list[float]
+    digits: dict[str, float]
     """The least digits of each certified problem that was answered."""
+    processor_ms: float | None
+    """Processor time of a problem."""
+    endings: Counter
+    """How it ended on the scenes of the experiment global-minimum that determine the camera."""
 
     def row(self):
-        failed = sorted({check.property for check in self.report.checks if check.verdict in ("FAILED", "GRAVE")})
-        unsupported = sum("not supported" in check.evidence for check in self.report.checks)
-        verdict = "trusted" if self.report.held else f"not trusted: {', '.join(failed)}"
-        if unsupported:
-            verdict += f" ({unsupported} scenes not supported)"
-        problems = len(calibench.certified_problems())
-        digits = f"{median(self.digits):.1f} ({len(self.digits)} of {problems})" if self.digits else f"none of {problems}"
-        milliseconds = 1e3 * self.report.seconds / self.report.problems
-        cells = [self.entry.name, self.version, verdict, digits, f"{milliseconds:.2g}", self.entry.licence, self.entry.note]
-        return f"| {' | '.join(cells)} |"
+        checks = self.report.checks
+        failed = sorted({check.property for check in checks if check.verdict in ("FAILED", "GRAVE")})
+        unsupported = sum("not supported" in check.evidence for check in checks)
+        asked = self.endings.total() - self.endings["unsupported"]
+        return {
+            "calibrator": self.entry.name,
+            "version": self.version,
+            "the gate says": "trusted" if self.report.held else f"not trusted: {', '.join(failed)}",
+            "scenes not supported": str(unsupported),
+            "certified digits, median": f"{median(self.digits.values()):.1f}" if self.digits else "-",
+            "certified problems answered": f"{len(self.digits)} of {len(calibench.certified_problems())}",
+            "right minimum": f"{self.endings['right']} of {asked}" if asked else "-",
+            "processor ms a problem": f"{self.processor_ms:.2g}" if self.processor_ms else "-",
+            "licence": self.entry.licence,
+            "fairness": self.entry.note,
+        }
 
 
 def installed(entry):
@@ -78,6 +105,8 @@ def installed(entry):
     python = venv / "bin/python"
     if entry.name == "calibench":
         return Path(sys.executable), calibench.__version__
+    if entry.packages[0].startswith(DEBIAN):
+        return of_debian(entry)
     if not python.exists():
         subprocess.run([sys.executable, "-m", "venv", venv], check=True)
     pip = [python, "-m", "pip", "--disable-pip-version-check"]
@@ -91,17 +120,46 @@ def installed(entry):
     return python, next(package["version"] for package in listed if package["name"] == name)
 
 
+def of_debian(entry):
+    """The system's interpreter and the package's version; `None` if it is not there."""
+    package = entry.packages[0].removeprefix(DEBIAN)
+    asked = ["dpkg-query", "--show", "--showformat", "${Version}", package]
+    try:
+        done = subprocess.run(asked, capture_output=True, text=True)
+    except FileNotFoundError:
+        done = None
+    if done is None or done.returncode != 0 or not done.stdout:
+        print(f"SKIPPED {entry.name}: apt-get install {package}", file=sys.stderr)
+        return None
+    return Path("/usr/bin/python3"), done.stdout
+
+
+def endings_of(entry, command, most, scenes):
+    """How the program ends on the first scenes of each family whose data determine the camera."""
+    if most == 0:
+        return Counter()
+    VENVS.mkdir(parents=True, exist_ok=True)
+    out = VENVS / f"{entry.name}.csv"
+    peer = ["--peer", entry.name, "--solver", command, "--jobs", "2", "--first", str(min(entry.first, most)), "--out", str(out)]
+    subprocess.run([*shlex.split(scenes), *peer], check=True, cwd=ADAPTERS.parent)
+    with open(out, newline="") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    return Counter(row["ending"] for row in rows if float(row["bound"]) < DETERMINED)
+
+
 def digits_reached(command):
     """The least digits over the parameters of every certified problem that the program answers."""
     problems = {problem.name: problem for problem in calibench.certified_problems()}
     lines = "".join(line_of(problem) + "\n" for problem in problems.values())
     said = subprocess.run(shlex.split(command), input=lines, capture_output=True, text=True, timeout=1800).stdout
     answers = [json.loads(line) for line in said.splitlines()]
-    return [
-        min(calibench.digits(answer["parameters"][name], value) for name, value in problems[answer["id"]].parameters.items())
+    return {
+        answer["id"]: min(
+            calibench.digits(answer["parameters"][name], value) for name, value in problems[answer["id"]].parameters.items()
+        )
         for answer in answers
         if answer["status"] == "ok"
-    ]
+    }
 
 
 def line_of(problem):
@@ -111,38 +169,73 @@ def line_of(problem):
     return json.dumps(fields)
 
 
-def score(entry, samples):
+def processor_ms(command, answered):
+    """Processor time of one certified problem, the first it answers: of many less that of one, over their difference."""
+    if not answered:
+        return None
+    first = next(problem for problem in calibench.certified_problems() if problem.name in answered)
+    taken = []
+    for count in (1, REPEATED):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run(shlex.split(command), input=(line_of(first) + "\n") * count, capture_output=True, text=True, timeout=1800)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        taken.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    return 1e3 * (taken[1] - taken[0]) / (REPEATED - 1)
+
+
+def score(entry, samples, first, scenes):
     found = installed(entry)
     if found is None:
         return None
     python, version = found
     command = f"{python} {ADAPTERS / entry.adapter}"
     report = calibench.run_gate(command, samples=samples, timeout=60.0)
-    return Score(entry, version, report, digits_reached(command))
+    digits = digits_reached(command)
+    return Score(entry, version, report, digits, processor_ms(command, digits), endings_of(entry, command, first, scenes))
 
 
-def table(scores):
-    head = ["calibrator", "version", "the gate says", "certified digits, median (answered)", "ms a problem", "licence", "fairness"]
-    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|", *(score.row() for score in scores)]
-    return "\n".join(lines)
+def table(rows):
+    """The rows for a page."""
+    lines = [rows[0].keys(), ["---"] * len(rows[0]), *(row.values() for row in rows)]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def written(rows):
+    """Puts the rows in the places of those of the same name, and writes them and the page."""
+    known = {}
+    if ROWS.exists():
+        with open(ROWS, newline="") as file:
+            known = {row["calibrator"]: row for row in csv.DictReader(file)}
+    known |= {row["calibrator"]: row for row in rows}
+    ordered = [known[entry.name] for entry in ENTRIES if entry.name in known]
+    with open(ROWS, "w", newline="") as file:
+        writer = csv.DictWriter(file, ordered[0], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(ordered)
+    before, rest = PAGE.read_text().split(BEGIN)
+    PAGE.write_text(f"{before}{BEGIN}\n{table(ordered)}{END}{rest.split(END)[1]}")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("names", nargs="*", help=f"of {', '.join(entry.name for entry in ENTRIES)} [default: all]")
-    parser.add_argument("--samples", type=int, default=128, help="samples a scene")
-    parser.add_argument("--write", type=Path, help="puts the table between its marks in this file")
+    parser.add_argument("--samples", type=int, default=32, help="samples a scene")
+    first = "at most so many scenes of a family of the experiment global-minimum; 0: none are asked"
+    parser.add_argument("--first", type=int, default=1000, help=first)
+    parser.add_argument("--scenes", default=SCENES, help="the command that asks about them [default: %(default)s]")
+    parser.add_argument("--write", action="store_true", help="puts the rows into golden/scoreboard.csv and adapters/SCOREBOARD.md")
     given = parser.parse_args()
-    chosen = [entry for entry in ENTRIES if not given.names or entry.name in given.names]
-    scores = []
-    for entry in chosen:
+    rows = []
+    for entry in ENTRIES:
+        if given.names and entry.name not in given.names:
+            continue
         print(f"{entry.name} ...", file=sys.stderr, flush=True)
-        scores.append(score(entry, given.samples))
-    text = table([found for found in scores if found is not None])
-    print(text)
-    if given.write:
-        before, rest = given.write.read_text().split(BEGIN)
-        given.write.write_text(f"{before}{BEGIN}\n{text}\n{END}{rest.split(END)[1]}")
+        found = score(entry, given.samples, given.first, given.scenes)
+        rows += [found.row()] if found else []
+        if found and given.write:
+            written(rows[-1:])
+    if rows:
+        print(table(rows), end="")
 
 
 if __name__ == "__main__":

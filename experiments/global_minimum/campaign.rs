@@ -37,8 +37,8 @@ struct Arguments {
     /// Prints the rows of scenes that ended so: right, wrong, not-converged, refused
     #[arg(long)]
     list: Option<String>,
-    /// Asks another program, given with --solver, about the first scenes of every family, and writes its file
-    /// under this name
+    /// Asks another program, given with --solver, about the first scenes of every family, and writes how it ended
+    /// to golden/global-minimum/<PEER>.csv, or where --out says
     #[arg(long, requires = "solver", conflicts_with_all = ["family", "from", "to", "write"])]
     peer: Option<String>,
     /// The program, as for `calibench gate`
@@ -47,6 +47,9 @@ struct Arguments {
     /// Copies of the program that run at once
     #[arg(long, default_value_t = 1)]
     jobs: usize,
+    /// At most so many scenes of a family for another program
+    #[arg(long, requires = "peer", default_value_t = u64::MAX, hide_default_value = true)]
+    first: u64,
     /// Draws other scenes
     #[arg(long, default_value_t = SEED)]
     seed: u64,
@@ -61,7 +64,11 @@ pub fn judged(family: &Family, seed: u64, index: u64) -> Option<Judged> {
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let outcome = match (&arguments.peer, &arguments.solver) {
-        (Some(name), Some(command)) => peers::measure(command, name, arguments.jobs),
+        (Some(name), Some(command)) => {
+            let file = || Path::new(FOLDER).join(format!("{name}.csv"));
+            let path = arguments.out.clone().unwrap_or_else(file);
+            peers::measure(command, name, arguments.jobs, arguments.first, &path)
+        }
         _ if arguments.write => write(Path::new(FOLDER)),
         _ => show(&arguments),
     };

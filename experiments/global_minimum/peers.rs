@@ -2,7 +2,6 @@
 //! reference.
 
 use super::SEED;
-use super::campaign::FOLDER;
 use super::committed::DETERMINED;
 use super::families::{FAMILIES, Family};
 use super::oracle;
@@ -64,15 +63,18 @@ pub enum Ending {
     Refused,
     /// No answer.
     Broken,
+    /// It is not made for what is asked.
+    Unsupported,
 }
 
 impl Ending {
     /// All, in order.
-    pub const ALL: [Ending; 4] = [Ending::Right, Ending::Wrong, Ending::Refused, Ending::Broken];
+    pub const ALL: [Ending; 5] =
+        [Ending::Right, Ending::Wrong, Ending::Refused, Ending::Broken, Ending::Unsupported];
 
     /// The word for it.
     pub fn name(self) -> &'static str {
-        ["right", "wrong", "refused", "broken"][self as usize]
+        ["right", "wrong", "refused", "broken", "unsupported"][self as usize]
     }
 }
 
@@ -105,13 +107,14 @@ impl Line {
 /// The command that asks OpenCV.
 pub const COMMAND: &str = "cargo run --release --bin global-minimum-scenes -- --peer opencv --solver 'python3 adapters/opencv_solver.py'";
 
-/// Asks a program about the first scenes of every family and writes `<name>.csv` beside the committed scenes.
+/// Asks a program about the first scenes of every family, at most `first` of each, and writes how it ended to `path`.
 /// Scenes whose skew is unknown are left out: few programs know it.
-pub fn measure(command: &str, name: &str, jobs: usize) -> Result<(), String> {
+pub fn measure(command: &str, name: &str, jobs: usize, first: u64, path: &Path) -> Result<(), String> {
     let process = Process::new(command, TIMEOUT, jobs);
     let mut lines = String::new();
     for family in FAMILIES {
-        let scenes = family.scenes.min(if family.name == FAMILIES[0].name { SCENES } else { NAMED_SCENES });
+        let usual = if family.name == FAMILIES[0].name { SCENES } else { NAMED_SCENES };
+        let scenes = family.scenes.min(usual).min(first);
         let progress = ProgressDisplay::stderr().start(family.name, scenes as usize);
         for first in (0..scenes).step_by(CHUNK as usize) {
             let drawn: Vec<Drawn> = (first..scenes.min(first + CHUNK))
@@ -132,8 +135,7 @@ pub fn measure(command: &str, name: &str, jobs: usize) -> Result<(), String> {
     }
     let head = Fingerprint::of_global_minimum_scenes()
         .head(&format!("global-minimum-scenes --peer {name}; seed {SEED}"));
-    let path = Path::new(FOLDER).join(format!("{name}.csv"));
-    write_atomically(&path, format!("{head}\n{HEADER}\n{lines}").as_bytes()).map_err(|e| e.to_string())
+    write_atomically(path, format!("{head}\n{HEADER}\n{lines}").as_bytes()).map_err(|e| e.to_string())
 }
 
 /// The scene as the protocol tells it; every program is told the image size.
@@ -163,7 +165,8 @@ fn judge(family: &Family, drawn: &Drawn, outcome: &Outcome) -> Option<Line> {
         .and_then(|bound| bound.standard_deviation(Parameter::Fx))
         .map_or(f64::INFINITY, |sd| sd / truth.camera.fx);
     let (ending, excess, fx) = match outcome {
-        Outcome::Refused(_) | Outcome::Unsupported(_) => (Ending::Refused, 0.0, 0.0),
+        Outcome::Refused(_) => (Ending::Refused, 0.0, 0.0),
+        Outcome::Unsupported(_) => (Ending::Unsupported, 0.0, 0.0),
         Outcome::Broken(_) => (Ending::Broken, 0.0, 0.0),
         Outcome::Estimate(estimate) => {
             let cost =
