@@ -22,6 +22,7 @@ pub mod noise_floor;
 pub mod photographs;
 pub mod pose_count;
 pub mod prediction_map;
+pub mod scoreboard;
 mod sweep;
 
 /// All experiments, in the order of the book.
@@ -45,6 +46,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     expiry::EXPERIMENT,
     gate_power::EXPERIMENT,
     certified_digits::EXPERIMENT,
+    scoreboard::EXPERIMENT,
     global_minimum::EXPERIMENT,
 ];
 

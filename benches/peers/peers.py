@@ -36,6 +36,8 @@ def rows(arguments):
     for peer in ["mrcal", "Ceres"]:
         for n in VIEWS:
             found.append((f"calibrate-{n}", peer, f"refine-{n}", f"its refinement alone, {n} views"))
+    for n in VIEWS:
+        found.append((f"calibrate-{n}", "Python", f"calibrate-{n}", f"the same called from Python, {n} views"))
     found += [
         ("homography", "OpenCV", "homography", "homography, 63 points"),
         ("affine", "OpenCV", "affine", "affine map, 9 points"),
@@ -107,6 +109,8 @@ def peers(folder, cpus):
 
     opencv = [sys.executable, str(HERE / "opencv_peer.py"), str(folder)]
     add("OpenCV", opencv, opencv + ["version"])
+    python = [sys.executable, str(HERE / "python_peer.py"), str(folder)]
+    add("Python", python, python + ["version"])
     debian = "/usr/bin/python3"
     if os.path.exists(debian):
         version = ["sh", "-c", f"{debian} -c 'import mrcal' && dpkg-query -W -f '${{Version}}' python3-mrcal"]
