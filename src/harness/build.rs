@@ -66,25 +66,5 @@ fn lines_of(root: &Path, paths: &[&str]) -> String {
     let lines =
         code::of_paths(root, paths).unwrap_or_else(|error| panic!("a path of src/harness/build.rs: {error}"));
     println!("cargo:rerun-if-changed={}", root.join("Cargo.lock").display());
-    lines + &versions(&std::fs::read_to_string(root.join("Cargo.lock")).unwrap_or_default())
-}
-
-/// Crates whose arithmetic stands in the path of a number.
-const NUMERIC_CRATES: [&str; 6] = ["libm", "nalgebra", "rand", "rand_chacha", "rand_distr", "statrs"];
-
-/// `name version` of the numeric crates, a line each.
-fn versions(lock: &str) -> String {
-    let field =
-        |line: &str, key: &str| line.strip_prefix(key).map(|value| value.trim_matches('"').to_string());
-    let mut found = String::new();
-    let mut lines = lock.lines();
-    while let Some(line) = lines.next() {
-        let Some(name) = field(line, "name = ").filter(|name| NUMERIC_CRATES.contains(&name.as_str())) else {
-            continue;
-        };
-        if let Some(version) = lines.next().and_then(|line| field(line, "version = ")) {
-            found += &format!("{name} {version}\n");
-        }
-    }
-    found
+    lines + &code::versions(&std::fs::read_to_string(root.join("Cargo.lock")).unwrap_or_default())
 }

@@ -2,8 +2,7 @@
 //! repeated by every check: it carries the fingerprint of the code it depends on, and is stale as soon as a
 //! line of that code changes.
 
-#[cfg(test)]
-mod code;
+pub mod code;
 
 use calibench::io::sha256_hex;
 

@@ -50,6 +50,26 @@ fn rust_files(start: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(found)
 }
 
+/// Crates whose arithmetic stands in the path of a number.
+const NUMERIC_CRATES: [&str; 6] = ["libm", "nalgebra", "rand", "rand_chacha", "rand_distr", "statrs"];
+
+/// `name version` of the numeric crates, a line each, of a lock file.
+pub fn versions(lock: &str) -> String {
+    let field =
+        |line: &str, key: &str| line.strip_prefix(key).map(|value| value.trim_matches('"').to_string());
+    let mut found = String::new();
+    let mut lines = lock.lines();
+    while let Some(line) = lines.next() {
+        let Some(name) = field(line, "name = ").filter(|name| NUMERIC_CRATES.contains(&name.as_str())) else {
+            continue;
+        };
+        if let Some(version) = lines.next().and_then(|line| field(line, "version = ")) {
+            found += &format!("{name} {version}\n");
+        }
+    }
+    found
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
