@@ -41,7 +41,8 @@ fn main() {
 /// Folders that the command carries with it, so that it works outside the source tree.
 const CARRIED: [&str; 4] = ["book", "figures", "golden", "reference"];
 /// What of them is read there.
-const CARRIED_ENDINGS: [&str; 10] = ["css", "js", "json", "md", "png", "py", "snap", "svg", "toml", "woff2"];
+const CARRIED_ENDINGS: [&str; 11] =
+    ["css", "js", "json", "md", "png", "py", "snap", "svg", "toml", "wasm", "woff2"];
 
 /// Writes the list of the files that are carried, as `carried.rs`, with the code that the book quotes.
 fn carry(root: &Path) {

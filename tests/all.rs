@@ -26,6 +26,7 @@ mod gate;
 mod golden;
 mod hard_sets;
 mod hostile;
+mod laboratory;
 mod layout;
 mod lens_models;
 mod new;

@@ -81,6 +81,24 @@ fn a_figure_is_described_and_sized_and_a_listing_leads_to_its_file() {
 }
 
 #[test]
+fn a_laboratory_is_an_empty_element_with_golden_values_to_the_last_bit() {
+    let compiled = book_of("{{lab line-bending}}\n\n{{figure line-bending.grids Three grids.}}\n");
+    let page = &compiled.pages[0].content;
+    assert!(
+        page.contains("data-lab=\"line-bending\" data-golden=\"") && page.contains("\"></div>"),
+        "{page}"
+    );
+    let golden = std::fs::read_to_string(project().root().join("golden/line-bending.snap")).unwrap();
+    let rms = golden.lines().find_map(|line| line.strip_prefix("number | rms-deviation | ")).unwrap();
+    let value = rms.split(' ').next().unwrap();
+    assert!(
+        page.contains(&format!("&quot;line-bending.rms-deviation&quot;,{value},&quot;px&quot;")),
+        "{page}"
+    );
+    assert_eq!(page.matches("<figure").count(), 1, "the figure is there for paper: {page}");
+}
+
+#[test]
 fn what_does_not_resolve_is_found_with_its_line() {
     let cases = [
         ("{{num line-bending.nonsense .3}}", "has no number `nonsense`"),
@@ -90,6 +108,9 @@ fn what_does_not_resolve_is_found_with_its_line() {
         ("{{figure line-bending.grids}}", "say behind its name what is seen"),
         ("{{shell README.md calibench nonsense}}", "has no block"),
         ("{{table line-bending.nonsense *}}", "has no table"),
+        ("{{lab nonsense}}", "there is no laboratory `nonsense`"),
+        // Of this book only one experiment is known.
+        ("{{lab four-pose}}", "golden/ has no such number"),
         ("{{cite nobody1900}}", "has no `nobody1900`"),
         ("{{ref eq:nonsense}}", "nothing is named"),
         ("{{const nonsense}}", "is no constant"),
@@ -193,9 +214,27 @@ fn the_book_is_built_whole_and_leads_nowhere_outside() {
         "style/book.css",
         "style/CalibenchMath.woff2",
         "record-line-bending.html",
+        "style/laboratory.css",
+        "laboratory/solver.js",
+        "laboratory/line-bending.js",
     ] {
         assert!(folder.join(file).is_file(), "{file} is missing");
     }
+}
+
+#[test]
+fn the_solver_stands_in_the_book_once_and_only_laboratories_load_it() {
+    let project = project();
+    let compiled = book_of("{{lab line-bending}}\n\n{{figure line-bending.grids Three grids.}}\n");
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("book-laboratory");
+    build(&project, &compiled, &folder).unwrap();
+    let read = |file: &str| std::fs::read_to_string(folder.join(file)).unwrap();
+    let loads = |file: &str| read(file).contains("laboratory/calibench.js");
+    assert!(loads("page.html") && !loads("record-line-bending.html") && !loads("print.html"));
+    let bytes = std::fs::metadata(project.root().join(calibench_book::WEB_ASSEMBLY)).unwrap().len();
+    // Base64 takes four characters for three bytes; the rest is the statement around it.
+    let digits = 4 * bytes.div_ceil(3);
+    assert_eq!(read("laboratory/calibench.js").len() as u64, digits + "Laboratory.code = '';\n".len() as u64);
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! What stands around the text of a page? The contents and the search beside it, the neighbours below it;
-//! nothing from outside, and no script but that of the search.
+//! nothing from outside, and no scripts but those of the search and of the laboratories.
 
 use super::html::attributes;
+use super::laboratory;
 use super::page::CompiledPage;
 use super::text::escape;
 
@@ -29,7 +30,8 @@ pub(super) fn page(pages: &[&CompiledPage], at: usize, text: &str) -> String {
     let neighbours = format!(
         "<nav class=\"neighbours\" aria-label=\"Neighbouring pages\">{before}<span></span>{after}</nav>"
     );
-    document(&format!("{} \u{2013} {TITLE}", pages[at].title), &around(&contents, text, &neighbours))
+    let title = format!("{} \u{2013} {TITLE}", pages[at].title);
+    document(&title, &laboratory::head(text), &around(&contents, text, &neighbours))
 }
 
 /// The bar at the top, the contents beside the text, and what stands below it.
@@ -46,7 +48,7 @@ fn around(contents: &str, text: &str, below: &str) -> String {
 pub(super) fn search(pages: &[&CompiledPage], text: &str) -> String {
     let listed = pages.iter().filter(|page| !page.below);
     let contents: String = listed.map(|page| line_of_contents(page, false)).collect();
-    document(&format!("Search \u{2013} {TITLE}"), &around(&contents, text, ""))
+    document(&format!("Search \u{2013} {TITLE}"), "", &around(&contents, text, ""))
 }
 
 /// A file of the code that the book quotes, a place to link to on every line.
@@ -59,7 +61,7 @@ pub(super) fn source(path: &str, text: &str) -> String {
     let page = format!(
         "<main class=\"source\"><h1><code>{path}</code></h1><pre><code>{lines}</code></pre></main>\n"
     );
-    document(&path, &page).replace("href=\"style/", "href=\"../style/")
+    document(&path, "", &page).replace("href=\"style/", "href=\"../style/")
 }
 
 /// The whole book on one page, to be printed or searched.
@@ -81,7 +83,7 @@ pub(super) fn print(pages: &[&CompiledPage], texts: &[String]) -> String {
         "<section class=\"contents\"><h1>Contents</h1><ol>\n{}</ol></section>\n",
         within_one_page(&lines, "")
     );
-    document(TITLE, &format!("<div class=\"content\"><main>\n{title}{contents}{sections}</main></div>\n"))
+    document(TITLE, "", &format!("<div class=\"content\"><main>\n{title}{contents}{sections}</main></div>\n"))
 }
 
 /// The text of a page with its names and links as they are when all pages are one: `#place` of page `stem` is
@@ -108,11 +110,12 @@ fn line_of_contents(page: &CompiledPage, here: bool) -> String {
     format!("<li{class}><a href=\"{}\"{current}>{number}{}</a></li>\n", page.file(), escape(&page.title))
 }
 
-fn document(title: &str, body: &str) -> String {
+/// A file of HTML; `head` is what its head has besides.
+fn document(title: &str, head: &str, body: &str) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<meta name=\"color-scheme\" content=\"light dark\">\n\
-         <title>{}</title>\n<link rel=\"icon\" href=\"data:,\">\n<link rel=\"stylesheet\" href=\"style/book.css\">\n</head>\n<body>\n{body}</body>\n</html>\n",
+         <title>{}</title>\n<link rel=\"icon\" href=\"data:,\">\n<link rel=\"stylesheet\" href=\"style/book.css\">\n{head}</head>\n<body>\n{body}</body>\n</html>\n",
         escape(title)
     )
 }

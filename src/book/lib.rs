@@ -15,6 +15,7 @@
 //! | `published four-pose.rmse` | the digits that the chapter prints |
 //! | `const fx` | a constant of the chapter's scene |
 //! | `figure line-bending.grids What is seen` | the committed figure, numbered, with its caption; the words are for those who do not see it |
+//! | `lab four-pose` | the place of a figure that the reader moves, filled by scripts where they run |
 //! | `table line-bending.k1 k1,max digits=4 rows=1-5` | columns of a table of the record |
 //! | `caption tab:name Text` | number and caption of the table written below it |
 //! | `claims four-pose` | the experiment's claims with their verdicts |
@@ -42,6 +43,7 @@ mod golden_file;
 mod html;
 mod items;
 mod labels;
+mod laboratory;
 mod layout;
 mod links;
 mod listing;
@@ -64,6 +66,7 @@ pub use contradictions::Contradiction;
 pub use evidence::{Evidence, ExperimentEvidence};
 pub use finding::Finding;
 pub use items::Item;
+pub use laboratory::WEB_ASSEMBLY;
 pub use page::CompiledPage;
 pub use render::{BookError, build, index_of};
 pub use sources::{Page, Sources};

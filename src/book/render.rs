@@ -3,7 +3,7 @@
 
 use super::compile::Compiled;
 use super::page::CompiledPage;
-use super::{html, layout, search};
+use super::{html, laboratory, layout, search};
 use calibench_harness::project::Project;
 use std::fs::{File, OpenOptions};
 use std::path::{Path, PathBuf};
@@ -93,6 +93,10 @@ fn write_all(project: &Project, compiled: &Compiled, folder: &Path) -> Result<()
         let path = format!("book/style/{name}");
         let bytes = project.read(&path).map_err(|cause| BookError { path: path.into(), cause })?;
         write(&folder.join("style").join(name), &bytes)?;
+    }
+    for (path, bytes) in laboratory::files(project, &texts) {
+        let bytes = bytes.map_err(|cause| BookError { path: path.clone().into(), cause })?;
+        write(&folder.join(path), &bytes)?;
     }
     Ok(())
 }

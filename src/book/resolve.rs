@@ -9,7 +9,9 @@ use super::labels::Labels;
 use super::scan::{Kind, scan};
 use super::sources::{CONTRADICTIONS, ITEMS, REFERENCES, Sources};
 use super::text::{attribute, escape, inline, sentence};
-use super::{appendix, contradictions, format, items, layout, listing, picture, record_page, references};
+use super::{
+    appendix, contradictions, format, items, laboratory, layout, listing, picture, record_page, references,
+};
 use calibench::io::hash::sha256_hex;
 use calibench_harness::published::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -59,6 +61,7 @@ impl<'a> Resolver<'a> {
             ["published", id] => self.published(id),
             ["const", name] => constant(name).ok_or_else(|| format!("`{name}` is no constant of the scene")),
             ["figure", id, seen @ ..] => self.figure(id, &seen.join(" ")),
+            ["lab", name] => laboratory::place(name, &self.sources.evidence),
             ["table", id, columns, options @ ..] => self.table(id, columns, options),
             ["caption", label, ..] => self.caption(label, placeholder),
             ["claims", experiment] => self.claims(experiment),

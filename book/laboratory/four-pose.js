@@ -1,0 +1,273 @@
+// The four poses with everything that can be moved: what the camera sees, how well the bound says it is known, and calibrations that show
+// whether that is so.
+
+'use strict';
+
+{
+  const { html, svg, drawing, path, dots, polyline, digits, plot } = Laboratory;
+
+  const TARGETS = [[3, 3], [5, 4], [7, 5], [9, 7], [13, 9]];
+  const PARAMETERS = ['fx', 'fy', 'cx', 'cy', 'k1', 'k2'];
+  const UNITS = ['px', 'px', 'px', 'px', '', ''];
+  // Of the parameters, which two the cloud shows.
+  const PAIRS = [[4, 5], [0, 1], [0, 2], [0, 5], [2, 3]];
+  // As many as the experiment has: then both say the same.
+  const TRIALS = 2000;
+  const OF_A_TRIAL = PARAMETERS.length + 1;
+  const [WIDTH, HEIGHT] = [640, 480];
+  // From the principal point to the corner that is farthest from it.
+  const CORNER_PX = 403;
+  // Residuals are drawn so long that the noise is this many pixels.
+  const ARROW_PX = 15;
+  // Squared radius of the ellipse that holds this share of a plane's normal points: -2 log(1 - share).
+  const SHARES = [0.5, 0.95];
+  const radius = (share) => Math.sqrt(-2 * Math.log(1 - share));
+
+  const knobs = {
+    tilt: { label: 'tilt of the views', unit: '\u00b0', min: 0, max: 45, chapter: 20 },
+    distance: { label: 'distance of the target', unit: ' mm', min: 90, max: 240, step: 2, chapter: 120 },
+    views: { label: 'views', min: 1, max: 12, chapter: 4 },
+    noise: { label: 'noise on each of u and v', unit: ' px', min: 0.01, max: 0.5, step: 0.01, chapter: 0.1 },
+    k1: { label: 'k1 of the lens', min: -0.3, max: 0.3, step: 0.01, chapter: -0.18 },
+    k2: { label: 'k2 of the lens', min: -0.1, max: 0.2, step: 0.01, chapter: 0.05 },
+    target: { label: 'points of the target', min: 0, max: TARGETS.length - 1, chapter: 3, words: (i) => TARGETS[i].join(' \u00d7 ') },
+    draw: { label: 'draw of the noise', min: 0, max: 99, chapter: 0 },
+    pair: { label: 'cloud of', options: PAIRS.map((pair) => pair.map((i) => PARAMETERS[i]).join(' and ')), min: 0, max: PAIRS.length - 1, chapter: 0 },
+  };
+
+  // What `predict` answers.
+  const prediction = (numbers) => ({
+    truth: numbers.slice(0, 6),
+    covariance: (i, j) => numbers[6 + 6 * i + j],
+    rmseMean: numbers[42],
+    rmseSd: numbers[43],
+    floor: numbers[44],
+    reach: numbers[45],
+    low: numbers[46],
+    width: numbers[47],
+    bars: numbers.slice(48),
+  });
+
+  // What `calibrate` answers.
+  const calibration = (numbers) => ({
+    estimate: numbers.slice(0, 6),
+    rmse: numbers[12],
+    chiSquared: numbers[13],
+    residuals: numbers.slice(14),
+  });
+
+  // A panel for each view: its points as seen and their residuals, enlarged.
+  const viewsOf = (holder) => ([perView, ...points], found, views, noise, reach) => {
+    const columns = views <= 4 ? 2 : views <= 9 ? 3 : 4;
+    const rows = Math.ceil(views / columns);
+    const element = drawing(columns * (WIDTH + 20), rows * (HEIGHT + 20), `The points in ${views} views, each with its residual`);
+    const scale = ARROW_PX / noise;
+    for (let view = 0; view < views; view += 1) {
+      const group = svg('g', { transform: `translate(${(view % columns) * (WIDTH + 20) + 10} ${Math.floor(view / columns) * (HEIGHT + 20) + 10})` });
+      group.append(svg('rect', { class: 'frame', width: WIDTH, height: HEIGHT }));
+      const seen = [];
+      const arrows = [];
+      for (let i = 2 * view * perView; i < 2 * (view + 1) * perView; i += 2) {
+        seen.push([points[i], points[i + 1]]);
+        if (found) arrows.push(`M${points[i]} ${points[i + 1]}l${scale * found.residuals[i]} ${scale * found.residuals[i + 1]}`);
+      }
+      path(group, 'residuals')(arrows.join(''));
+      path(group, 'points')(dots(seen));
+      element.append(group);
+    }
+    const words = `Points as seen, and residuals \u00d7 ${digits(scale)}; points reach ${digits(reach, 3)} px from the principal point, the farthest corner is ${CORNER_PX} px away.`;
+    holder.replaceChildren(html('h4', {}, 'The views'), element, html('p', { class: 'says' }, words));
+  };
+
+  // The ellipse that holds a share of the errors of two parameters, in standard deviations of each.
+  const ellipse = (correlation, share) => {
+    const points = [];
+    for (let k = 0; k <= 72; k += 1) {
+      const angle = k / 36 * Math.PI;
+      const [c, s] = [Math.cos(angle), Math.sin(angle)].map((x) => radius(share) * x);
+      points.push([c, correlation * c + Math.sqrt(1 - correlation * correlation) * s]);
+    }
+    return points;
+  };
+
+  const cloudOf = (holder) => {
+    const words = html('p', { class: 'says' });
+    let now;
+    return {
+      begin: (theory, [i, j], estimate) => {
+        const [si, sj] = [i, j].map((k) => Math.sqrt(theory.covariance(k, k)));
+        const known = Number.isFinite(si);
+        const label = `Estimates of ${PARAMETERS[i]} and ${PARAMETERS[j]} inside the ellipses that the bound predicts`;
+        const axis = (k) => `${PARAMETERS[k]}${UNITS[k] && ` (${UNITS[k]})`}`;
+        const chart = plot({ label, xLabel: axis(i), yLabel: axis(j) });
+        const correlation = theory.covariance(i, j) / (si * sj);
+        if (known) {
+          chart.ranges([theory.truth[i] - 4 * si, theory.truth[i] + 4 * si], [theory.truth[j] - 4 * sj, theory.truth[j] + 4 * sj]);
+        }
+        const put = ([a, b]) => [chart.x(theory.truth[i] + a * si), chart.y(theory.truth[j] + b * sj)].map((v) => v.toFixed(1));
+        const cloud = chart.layer('cloud');
+        if (known) SHARES.forEach((share) => chart.layer('predicted')(polyline(ellipse(correlation, share).map(put))));
+        if (known && estimate) chart.layer('own')(dots([put([(estimate[i] - theory.truth[i]) / si, (estimate[j] - theory.truth[j]) / sj])]));
+        holder.replaceChildren(html('h4', {}, `${PARAMETERS[i]} against ${PARAMETERS[j]}`), chart.element, words);
+        words.textContent = known ? '' : 'The bound is infinite: these views determine no camera.';
+        now = { i, j, si, sj, correlation, put, cloud, known };
+      },
+      trials: (values) => {
+        if (!now.known) return;
+        const { i, j, si, sj, correlation, put, cloud } = now;
+        const points = [];
+        let inside = 0;
+        let estimated = 0;
+        const limit = radius(SHARES[1]) ** 2;
+        for (let at = 0; at < values.length; at += OF_A_TRIAL) {
+          const [a, b] = [values[at + i] / si, values[at + j] / sj];
+          if (Number.isNaN(a)) continue;
+          estimated += 1;
+          if ((a * a - 2 * correlation * a * b + b * b) / (1 - correlation * correlation) <= limit) inside += 1;
+          points.push(put([a, b]));
+        }
+        cloud(dots(points));
+        if (estimated) words.textContent = `${(100 * inside / estimated).toFixed(1)} % of ${estimated} calibrations lie inside the outer ellipse, which is to hold ${100 * SHARES[1]} %.`;
+      },
+    };
+  };
+
+  const histogramOf = (holder) => {
+    const words = html('p', { class: 'says' });
+    let now;
+    return {
+      begin: (theory, own) => {
+        const label = 'Histogram of the reprojection error over the calibrations, and the law that it should follow';
+        const chart = plot({ label, xLabel: 'RMSE (px)', yLabel: 'share of calibrations' });
+        const high = theory.low + theory.width * theory.bars.length;
+        chart.ranges([theory.low, high], [0, 1.5 * Math.max(...theory.bars)]);
+        const bars = chart.layer('bars');
+        const middle = (k) => theory.low + (k + 0.5) * theory.width;
+        chart.layer('predicted')(polyline([...theory.bars].map((share, k) => [chart.x(middle(k)), chart.y(share)])));
+        const upright = (value, style) => {
+          if (value > theory.low && value < high) chart.layer(style)(`M${chart.x(value)} ${chart.y(0)}V10`);
+        };
+        upright(theory.floor, 'floor');
+        if (own) upright(own.rmse, 'own-line');
+        holder.replaceChildren(html('h4', {}, 'RMSE, and its law'), chart.element, words);
+        words.textContent = `Predicted ${digits(theory.rmseMean)} \u00b1 ${digits(theory.rmseSd, 2)} px, under the floor of ${digits(theory.floor)} px (dotted)` +
+          (own ? `; this draw: ${digits(own.rmse)} px.` : '.');
+        now = { theory, chart, bars };
+      },
+      trials: (values) => {
+        const { theory, chart, bars } = now;
+        const counts = new Array(theory.bars.length).fill(0);
+        let estimated = 0;
+        for (let at = OF_A_TRIAL - 1; at < values.length; at += OF_A_TRIAL) {
+          if (Number.isNaN(values[at])) continue;
+          estimated += 1;
+          const bar = Math.floor((values[at] - theory.low) / theory.width);
+          if (bar >= 0 && bar < counts.length) counts[bar] += 1;
+        }
+        const left = (k) => chart.x(theory.low + k * theory.width);
+        const bar = (count, k) => `M${left(k)} ${chart.y(0)}V${chart.y(Math.min(count / estimated, 1.5 * Math.max(...theory.bars)))}H${left(k + 1)}V${chart.y(0)}Z`;
+        bars(estimated ? counts.map(bar).join('') : '');
+      },
+    };
+  };
+
+  const tableOf = (holder) => {
+    const cells = PARAMETERS.map(() => [0, 1, 2, 3, 4].map(() => html('td')));
+    const heads = ['', 'true', 'this draw', 's, predicted', 's of the trials', 'ratio'];
+    const row = (name, k) => html('tr', {}, html('th', { scope: 'row' }, name + (UNITS[k] && ` (${UNITS[k]})`)), ...cells[k]);
+    const head = html('thead', {}, html('tr', {}, ...heads.map((words) => html('th', { scope: 'col' }, words))));
+    const words = html('p', { class: 'says' });
+    const pace = html('p', { class: 'says pace' });
+    holder.append(html('div', { class: 'table-wrapper' }, html('table', {}, head, html('tbody', {}, ...PARAMETERS.map(row)))), words, pace);
+    const sd = (theory, k) => Math.sqrt(theory.covariance(k, k));
+    return {
+      begin: (theory, own) => cells.forEach((cell, k) => {
+        cell[0].textContent = digits(theory.truth[k]);
+        cell[1].textContent = own ? digits(own.estimate[k], 6) : '\u2013';
+        cell[2].textContent = digits(sd(theory, k), 3);
+        cell[3].textContent = cell[4].textContent = '';
+        words.textContent = '';
+        pace.textContent = '';
+      }),
+      trials: (theory, spread, done, inFrame) => {
+        cells.forEach((cell, k) => {
+          cell[3].textContent = digits(spread[1 + k], 3);
+          cell[4].textContent = digits(spread[1 + k] / sd(theory, k), 3);
+        });
+        const refused = done - spread[0];
+        words.textContent = `${done} of ${TRIALS} calibrations; mean RMSE ${digits(spread[7])} px${refused ? `; ${refused} without a result.` : '.'}`;
+        pace.textContent = `${inFrame} calibrations in the last frame.`;
+      },
+    };
+  };
+
+  // The golden numbers that a single draw gives, and those of all trials.
+  const ofDraw = (theory, own) => ({
+    ...Object.fromEntries(PARAMETERS.flatMap((name, k) => [[`four-pose.${name}`, own.estimate[k]], [`four-pose.${name}-sd`, Math.sqrt(theory.covariance(k, k))]])),
+    'four-pose.rmse': own.rmse,
+    'four-pose.rmse-expected': theory.rmseMean,
+    'four-pose.chi-squared-ours': own.chiSquared,
+  });
+  const ofTrials = (theory, spread) => ({
+    'four-pose.converged': spread[0],
+    'four-pose.rmse-mean': spread[7],
+    ...Object.fromEntries(PARAMETERS.map((name, k) => [`four-pose.${name}-sd-ratio`, spread[1 + k] / Math.sqrt(theory.covariance(k, k))])),
+  });
+
+  const sceneOf = (values) => [values.tilt, values.distance, values.views, values.noise, values.k1, values.k2, ...TARGETS[values.target]];
+  const CHAPTER = sceneOf(Object.fromEntries(Object.entries(knobs).map(([knob, spec]) => [knob, spec.chapter])));
+
+  const start = ({ element, stage, ask, same }) => {
+    const holders = [0, 1, 2, 3].map(() => html('div', { class: 'panel' }));
+    stage.append(...holders);
+    const views = viewsOf(holders[0]);
+    const [cloud, histogram, table] = [cloudOf(holders[1]), histogramOf(holders[2]), tableOf(holders[3])];
+    let [theory, shown, atChapter] = [null, '', false];
+    const trials = Laboratory.monteCarlo({
+      element,
+      ask,
+      trials: TRIALS,
+      numbers: OF_A_TRIAL,
+      drawn: (values, done, inFrame) => {
+        const spread = ask('spread', values);
+        cloud.trials(values);
+        histogram.trials(values);
+        table.trials(theory, spread, done, inFrame);
+        if (done < TRIALS) return;
+        stage.setAttribute('aria-busy', 'false');
+        if (atChapter) same(ofTrials(theory, spread));
+      },
+    });
+    same(ofDraw(prediction(ask('predict', CHAPTER)), calibration(ask('calibrate', [...CHAPTER, 0]))));
+
+    const pause = html('button', { type: 'button', 'aria-pressed': 'false' }, 'Pause');
+    pause.addEventListener('click', () => {
+      const on = pause.getAttribute('aria-pressed') === 'false';
+      pause.setAttribute('aria-pressed', on);
+      trials.pause(on);
+    });
+
+    const show = (values) => {
+      const scene = sceneOf(values);
+      theory = prediction(ask('predict', scene));
+      const draw = [...scene, values.draw];
+      let [own, refusal] = [null, null];
+      try {
+        own = calibration(ask('calibrate', draw));
+      } catch (error) {
+        refusal = error;
+      }
+      atChapter = scene.every((number, k) => number === CHAPTER[k]);
+      views(ask('observe', draw), own, values.views, values.noise, theory.reach);
+      cloud.begin(theory, PAIRS[values.pair], own && own.estimate);
+      histogram.begin(theory, own);
+      table.begin(theory, own);
+      stage.setAttribute('aria-busy', 'true');
+      trials.restart(scene);
+      if (refusal) throw refusal;
+    };
+    return { show, buttons: [pause] };
+  };
+
+  Laboratory.widgets['four-pose'] = { title: 'Laboratory: the four poses', knobs, start };
+}

@@ -1,0 +1,48 @@
+// Calibrations while the reader watches: as many in a frame as it has time for, stopped when nobody sees them.
+
+'use strict';
+
+{
+  // Of a frame of a sixtieth of a second, ms: the rest is for drawing.
+  const BUDGET_MS = 11;
+  // Asked for at once.
+  const PORTION = 6;
+
+  // Runs `trials` trials of a scene, `numbers` numbers each. `drawn` is called after each frame with all that are done, and how many came
+  // in this frame. Those who want no motion get one call at the end.
+  Laboratory.monteCarlo = ({ element, ask, trials, numbers, drawn }) => {
+    const calm = matchMedia('(prefers-reduced-motion: reduce)');
+    const values = new Float64Array(trials * numbers);
+    let [scene, done, seen, paused, asked] = [null, 0, false, false, 0];
+    const frame = () => {
+      asked = 0;
+      if (!scene || paused || !seen || done === trials) return;
+      const [began, before] = [performance.now(), done];
+      while (done < trials && performance.now() - began < BUDGET_MS) {
+        const count = Math.min(PORTION, trials - done);
+        values.set(ask('trials', [...scene, done, count]), done * numbers);
+        done += count;
+      }
+      if (!calm.matches || done === trials) drawn(values.subarray(0, done * numbers), done, done - before);
+      next();
+    };
+    const next = () => {
+      if (!asked && done < trials) asked = requestAnimationFrame(frame);
+    };
+    new IntersectionObserver((entries) => {
+      seen = entries[entries.length - 1].isIntersecting;
+      if (seen) next();
+    }).observe(element);
+    return {
+      // Begins anew with another scene; null ends it.
+      restart: (other) => {
+        [scene, done] = [other, 0];
+        next();
+      },
+      pause: (on) => {
+        paused = on;
+        next();
+      },
+    };
+  };
+}

@@ -1,0 +1,40 @@
+// Starts the laboratories of the page. Each stands in an element that names it and holds its golden values; without scripts, and on paper,
+// the element is empty and the figure beside it is all there is.
+
+'use strict';
+
+{
+  const { html } = Laboratory;
+
+  const startOne = (element, ask) => {
+    const name = element.dataset.lab;
+    const { title, knobs: specs, start } = Laboratory.widgets[name];
+    const same = Laboratory.sameNumbers(JSON.parse(element.dataset.golden));
+    const words = html('p', { class: 'refusal', role: 'status' });
+    const stage = html('div', { class: 'stage' });
+    const answering = (show) => (values) => {
+      try {
+        show(values);
+        words.textContent = '';
+      } catch (error) {
+        if (!(error instanceof Laboratory.Refusal)) throw error;
+        words.textContent = `The library refuses: ${error.message}.`;
+      }
+      stage.classList.toggle('refused', words.textContent !== '');
+    };
+    let show = () => {};
+    const knobs = Laboratory.knobs(name, specs, (values) => answering(show)(values));
+    const data = element.dataset.columns ? JSON.parse(element.dataset.columns) : {};
+    const parts = start({ element, stage, ask, same: same.judge, set: knobs.set, data });
+    show = parts.show;
+    element.setAttribute('role', 'group');
+    element.setAttribute('aria-label', title);
+    element.append(html('p', { class: 'lab-title' }, title), knobs.element,
+      html('p', { class: 'buttons' }, ...(parts.buttons || []), ...knobs.buttons), words, stage, same.element);
+    knobs.start();
+    if (knobs.here) element.scrollIntoView();
+  };
+
+  const all = [...document.querySelectorAll('.laboratory[data-lab]')];
+  Laboratory.solver(Laboratory.bytes(Laboratory.code)).then((ask) => all.forEach((element) => startOne(element, ask)));
+}
