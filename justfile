@@ -21,6 +21,10 @@ book:
     .ci/browser --planted
     .ci/browser
 
+# What the pages of the book compute, as WebAssembly: the bits of native code? `just laboratory --write` builds it anew
+laboratory *ARGUMENTS:
+    .ci/laboratory {{ARGUMENTS}}
+
 # This library's solver, OpenCV and SciPy behind the gate
 gate:
     bash .ci/gate
