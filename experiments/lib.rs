@@ -14,6 +14,7 @@ pub mod gate_power;
 pub mod global_minimum;
 pub mod grid_image;
 pub mod interface;
+pub mod interval_coverage;
 pub mod k2_observability;
 pub mod line_bending;
 pub mod millimetres;
@@ -33,6 +34,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     k2_observability::EXPERIMENT,
     prediction_map::EXPERIMENT,
     pose_count::EXPERIMENT,
+    interval_coverage::EXPERIMENT,
     noise_floor::EXPERIMENT,
     focal_depth::EXPERIMENT,
     collinearity::EXPERIMENT,
