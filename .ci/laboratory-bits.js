@@ -35,10 +35,18 @@ const answer = (ask, question, numbers) => {
   }
 };
 
+// The section in which it carries the fingerprint of its sources, as src/laboratory/lib.rs names it.
+const fingerprint = (code) => {
+  const [section] = WebAssembly.Module.customSections(new WebAssembly.Module(code), 'calibench-fingerprint');
+  return section ? Buffer.from(section).toString() : 'none';
+};
+
 const main = async () => {
   const code = fs.readFileSync(process.argv[2]);
   const ask = await Laboratory.solver(code);
-  const lines = fs.readFileSync(0, 'utf8').split('\n').filter(Boolean);
+  const [first, ...lines] = fs.readFileSync(0, 'utf8').split('\n').filter(Boolean);
+  const stale = `fingerprint | ${fingerprint(code)}` !== first;
+  if (stale) console.log(`FAILED laboratory: ${process.argv[2]} is stale, its sources have changed: run \`.ci/laboratory --write\` and commit it`);
   let [same, compared] = [0, 0];
   for (const line of lines) {
     const [question, numbers, native] = line.split(' | ');
@@ -55,7 +63,7 @@ const main = async () => {
   }
   console.log(`wasm32 under node ${process.version}: ${same} of ${lines.length} answers have the bits of native code, ${compared} numbers`);
   console.log(`${code.length} bytes; ${microseconds.toFixed(0)} us a calibration of four views with covariance`);
-  if (lines.length === 0 || same < lines.length) process.exitCode = 1;
+  if (stale || lines.length === 0 || same < lines.length) process.exitCode = 1;
 };
 
 main();

@@ -4,9 +4,8 @@
 'use strict';
 
 {
-  const { html, svg, drawing, path, dots, polyline, digits, plot } = Laboratory;
+  const { html, svg, drawing, path, dots, polyline, digits, plot, scene: { chapter: CHAPTER, size: [WIDTH, HEIGHT], ...scene } } = Laboratory;
 
-  const TARGETS = [[3, 3], [5, 4], [7, 5], [9, 7], [13, 9]];
   const PARAMETERS = ['fx', 'fy', 'cx', 'cy', 'k1', 'k2'];
   const UNITS = ['px', 'px', 'px', 'px', '', ''];
   // Of the parameters, which two the cloud shows.
@@ -14,9 +13,8 @@
   // As many as the experiment has: then both say the same.
   const TRIALS = 2000;
   const OF_A_TRIAL = PARAMETERS.length + 1;
-  const [WIDTH, HEIGHT] = [640, 480];
-  // From the principal point to the corner that is farthest from it.
-  const CORNER_PX = 403;
+  // Around each view's panel, px of its image.
+  const GAP = 20;
   // Residuals are drawn so long that the noise is this many pixels.
   const ARROW_PX = 15;
   // Squared radius of the ellipse that holds this share of a plane's normal points: -2 log(1 - share).
@@ -24,13 +22,7 @@
   const radius = (share) => Math.sqrt(-2 * Math.log(1 - share));
 
   const knobs = {
-    tilt: { label: 'tilt of the views', unit: '\u00b0', min: 0, max: 45, chapter: 20 },
-    distance: { label: 'distance of the target', unit: ' mm', min: 90, max: 240, step: 2, chapter: 120 },
-    views: { label: 'views', min: 1, max: 12, chapter: 4 },
-    noise: { label: 'noise on each of u and v', unit: ' px', min: 0.01, max: 0.5, step: 0.01, chapter: 0.1 },
-    k1: { label: 'k1 of the lens', min: -0.3, max: 0.3, step: 0.01, chapter: -0.18 },
-    k2: { label: 'k2 of the lens', min: -0.1, max: 0.2, step: 0.01, chapter: 0.05 },
-    target: { label: 'points of the target', min: 0, max: TARGETS.length - 1, chapter: 3, words: (i) => TARGETS[i].join(' \u00d7 ') },
+    ...scene.knobs,
     draw: { label: 'draw of the noise', min: 0, max: 99, chapter: 0 },
     pair: { label: 'cloud of', options: PAIRS.map((pair) => pair.map((i) => PARAMETERS[i]).join(' and ')), min: 0, max: PAIRS.length - 1, chapter: 0 },
   };
@@ -56,27 +48,36 @@
     residuals: numbers.slice(14),
   });
 
-  // A panel for each view: its points as seen and their residuals, enlarged.
-  const viewsOf = (holder) => ([perView, ...points], found, views, noise, reach) => {
+  // A view in its frame: the points as seen, and their residuals so many times enlarged.
+  const viewOf = (points, residuals, enlarged) => {
+    const group = svg('g', {}, svg('rect', { class: 'frame', width: WIDTH, height: HEIGHT }));
+    path(group, 'residuals')(residuals.map(([u, v], i) => `M${points[i].join(' ')}l${enlarged * u} ${enlarged * v}`).join(''));
+    path(group, 'points')(dots(points));
+    return group;
+  };
+
+  // Pixel (0, 0) is the middle of the first pixel.
+  const isBeyond = ([u, v]) => Math.min(u, v) < -0.5 || u > WIDTH - 0.5 || v > HEIGHT - 0.5;
+
+  const pairs = (numbers) => Array.from({ length: numbers.length / 2 }, (_, i) => [numbers[2 * i], numbers[2 * i + 1]]);
+
+  const viewsOf = (holder) => ([perView, ...seen], found, { views, noise }, reach) => {
+    const [points, residuals] = [pairs(seen), found ? pairs(found.residuals) : []];
     const columns = views <= 4 ? 2 : views <= 9 ? 3 : 4;
-    const rows = Math.ceil(views / columns);
-    const element = drawing(columns * (WIDTH + 20), rows * (HEIGHT + 20), `The points in ${views} views, each with its residual`);
-    const scale = ARROW_PX / noise;
+    const [across, down] = [WIDTH + GAP, HEIGHT + GAP];
+    const element = drawing(columns * across, Math.ceil(views / columns) * down, `The points in ${views} views, each with its residual`);
+    const enlarged = ARROW_PX / noise;
     for (let view = 0; view < views; view += 1) {
-      const group = svg('g', { transform: `translate(${(view % columns) * (WIDTH + 20) + 10} ${Math.floor(view / columns) * (HEIGHT + 20) + 10})` });
-      group.append(svg('rect', { class: 'frame', width: WIDTH, height: HEIGHT }));
-      const seen = [];
-      const arrows = [];
-      for (let i = 2 * view * perView; i < 2 * (view + 1) * perView; i += 2) {
-        seen.push([points[i], points[i + 1]]);
-        if (found) arrows.push(`M${points[i]} ${points[i + 1]}l${scale * found.residuals[i]} ${scale * found.residuals[i + 1]}`);
-      }
-      path(group, 'residuals')(arrows.join(''));
-      path(group, 'points')(dots(seen));
+      const of = (all) => all.slice(view * perView, (view + 1) * perView);
+      const group = viewOf(of(points), of(residuals), enlarged);
+      group.setAttribute('transform', `translate(${(view % columns) * across + GAP / 2} ${Math.floor(view / columns) * down + GAP / 2})`);
       element.append(group);
     }
-    const words = `Points as seen, and residuals \u00d7 ${digits(scale)}; points reach ${digits(reach, 3)} px from the principal point, the farthest corner is ${CORNER_PX} px away.`;
-    holder.replaceChildren(html('h4', {}, 'The views'), element, html('p', { class: 'says' }, words));
+    const share = Math.round(100 * reach / Math.hypot(scene.corner[0] - scene.centre[0], scene.corner[1] - scene.centre[1]));
+    const beyond = points.filter(isBeyond).length;
+    const words = `Points as seen, and residuals \u00d7 ${digits(enlarged)}; points reach ${digits(reach, 3)} px from the principal point, ${share} % of the way to the farthest corner.` +
+      (beyond ? ` ${beyond} of ${points.length} points lie beyond the border of the image: a real camera would not see them.` : '');
+    holder.replaceChildren(html('p', { class: 'panel-title' }, 'The views'), element, html('p', { class: 'says' }, words));
   };
 
   // The ellipse that holds a share of the errors of two parameters, in standard deviations of each.
@@ -108,7 +109,7 @@
         const cloud = chart.layer('cloud');
         if (known) SHARES.forEach((share) => chart.layer('predicted')(polyline(ellipse(correlation, share).map(put))));
         if (known && estimate) chart.layer('own')(dots([put([(estimate[i] - theory.truth[i]) / si, (estimate[j] - theory.truth[j]) / sj])]));
-        holder.replaceChildren(html('h4', {}, `${PARAMETERS[i]} against ${PARAMETERS[j]}`), chart.element, words);
+        holder.replaceChildren(html('p', { class: 'panel-title' }, `${PARAMETERS[i]} against ${PARAMETERS[j]}`), chart.element, words);
         words.textContent = known ? '' : 'The bound is infinite: these views determine no camera.';
         now = { i, j, si, sj, correlation, put, cloud, known };
       },
@@ -149,7 +150,7 @@
         };
         upright(theory.floor, 'floor');
         if (own) upright(own.rmse, 'own-line');
-        holder.replaceChildren(html('h4', {}, 'RMSE, and its law'), chart.element, words);
+        holder.replaceChildren(html('p', { class: 'panel-title' }, 'RMSE, and its law'), chart.element, words);
         words.textContent = `Predicted ${digits(theory.rmseMean)} \u00b1 ${digits(theory.rmseSd, 2)} px, under the floor of ${digits(theory.floor)} px (dotted)` +
           (own ? `; this draw: ${digits(own.rmse)} px.` : '.');
         now = { theory, chart, bars };
@@ -189,14 +190,14 @@
         words.textContent = '';
         pace.textContent = '';
       }),
-      trials: (theory, spread, done, inFrame) => {
+      trials: (theory, spread, done, aFrame) => {
         cells.forEach((cell, k) => {
           cell[3].textContent = digits(spread[1 + k], 3);
           cell[4].textContent = digits(spread[1 + k] / sd(theory, k), 3);
         });
         const refused = done - spread[0];
         words.textContent = `${done} of ${TRIALS} calibrations; mean RMSE ${digits(spread[7])} px${refused ? `; ${refused} without a result.` : '.'}`;
-        pace.textContent = `${inFrame} calibrations in the last frame.`;
+        pace.textContent = `${Math.round(aFrame)} calibrations a frame.`;
       },
     };
   };
@@ -214,9 +215,6 @@
     ...Object.fromEntries(PARAMETERS.map((name, k) => [`four-pose.${name}-sd-ratio`, spread[1 + k] / Math.sqrt(theory.covariance(k, k))])),
   });
 
-  const sceneOf = (values) => [values.tilt, values.distance, values.views, values.noise, values.k1, values.k2, ...TARGETS[values.target]];
-  const CHAPTER = sceneOf(Object.fromEntries(Object.entries(knobs).map(([knob, spec]) => [knob, spec.chapter])));
-
   const start = ({ element, stage, ask, same }) => {
     const holders = [0, 1, 2, 3].map(() => html('div', { class: 'panel' }));
     stage.append(...holders);
@@ -228,11 +226,11 @@
       ask,
       trials: TRIALS,
       numbers: OF_A_TRIAL,
-      drawn: (values, done, inFrame) => {
+      drawn: (values, done, aFrame) => {
         const spread = ask('spread', values);
         cloud.trials(values);
         histogram.trials(values);
-        table.trials(theory, spread, done, inFrame);
+        table.trials(theory, spread, done, aFrame);
         if (done < TRIALS) return;
         stage.setAttribute('aria-busy', 'false');
         if (atChapter) same(ofTrials(theory, spread));
@@ -248,23 +246,24 @@
     });
 
     const show = (values) => {
-      const scene = sceneOf(values);
-      theory = prediction(ask('predict', scene));
-      const draw = [...scene, values.draw];
+      const numbers = scene.numbers(values);
+      theory = prediction(ask('predict', numbers));
+      const draw = [...numbers, values.draw];
       let [own, refusal] = [null, null];
       try {
         own = calibration(ask('calibrate', draw));
       } catch (error) {
+        if (!(error instanceof Laboratory.Refusal)) throw error;
         refusal = error;
       }
-      atChapter = scene.every((number, k) => number === CHAPTER[k]);
-      views(ask('observe', draw), own, values.views, values.noise, theory.reach);
+      atChapter = numbers.every((number, k) => number === CHAPTER[k]);
+      views(ask('observe', draw), own, values, theory.reach);
       cloud.begin(theory, PAIRS[values.pair], own && own.estimate);
       histogram.begin(theory, own);
       table.begin(theory, own);
       stage.setAttribute('aria-busy', 'true');
-      trials.restart(scene);
-      if (refusal) throw refusal;
+      trials.restart(numbers);
+      return refusal;
     };
     return { show, buttons: [pause] };
   };

@@ -51,8 +51,8 @@
     const deviation = chart.layer('residuals');
     const axis = chart.layer('predicted');
     const words = html('p', { class: 'says' });
-    stage.append(html('div', { class: 'panel' }, html('h4', {}, 'The line in the image: drag it'), image),
-      html('div', { class: 'panel' }, html('h4', {}, 'Distance from the regression line'), chart.element, words));
+    stage.append(html('div', { class: 'panel' }, html('p', { class: 'panel-title' }, 'The line in the image: drag it'), image),
+      html('div', { class: 'panel' }, html('p', { class: 'panel-title' }, 'Distance from the regression line'), chart.element, words));
 
     // Both lenses of the book, at the chapter's line.
     const [barrel, pincushion] = [-0.18, 0.18].map((k1) => bending(ask('bend', [k1, 0.05, k1, 0.05, 60])));

@@ -8,22 +8,23 @@
   // Asked for at once.
   const PORTION = 6;
 
-  // Runs `trials` trials of a scene, `numbers` numbers each. `drawn` is called after each frame with all that are done, and how many came
-  // in this frame. Those who want no motion get one call at the end.
+  // Runs `trials` trials of a scene, `numbers` numbers each. `drawn` is called after each frame with all that are done, their
+  // number, and how many came in a frame on average. Those who want no motion get one call at the end.
   Laboratory.monteCarlo = ({ element, ask, trials, numbers, drawn }) => {
     const calm = matchMedia('(prefers-reduced-motion: reduce)');
     const values = new Float64Array(trials * numbers);
-    let [scene, done, seen, paused, asked] = [null, 0, false, false, 0];
+    let [scene, done, frames, seen, paused, asked] = [null, 0, 0, false, false, 0];
     const frame = () => {
       asked = 0;
       if (!scene || paused || !seen || done === trials) return;
-      const [began, before] = [performance.now(), done];
+      const began = performance.now();
+      frames += 1;
       while (done < trials && performance.now() - began < BUDGET_MS) {
         const count = Math.min(PORTION, trials - done);
         values.set(ask('trials', [...scene, done, count]), done * numbers);
         done += count;
       }
-      if (!calm.matches || done === trials) drawn(values.subarray(0, done * numbers), done, done - before);
+      if (!calm.matches || done === trials) drawn(values.subarray(0, done * numbers), done, done / frames);
       next();
     };
     const next = () => {
@@ -34,9 +35,9 @@
       if (seen) next();
     }).observe(element);
     return {
-      // Begins anew with another scene; null ends it.
+      // Begins anew, with another scene.
       restart: (other) => {
-        [scene, done] = [other, 0];
+        [scene, done, frames] = [other, 0, 0];
         next();
       },
       pause: (on) => {

@@ -51,7 +51,7 @@
     chart.layer('cloud')(Laboratory.dots(places.map(([x, y]) => [chart.x(x), chart.y(y)])));
     const arrows = chart.layer('residuals');
     const words = html('p', { class: 'says' });
-    const element = html('div', { class: 'panel' }, html('h4', {}, name), chart.element, words);
+    const element = html('div', { class: 'panel' }, html('p', { class: 'panel-title' }, name), chart.element, words);
     return {
       element,
       show: ({ residuals, rms, max, scales }) => {
@@ -76,7 +76,7 @@
     let held = 0;
     const move = (dot, [du, dv]) => set({ [`u${dot + 1}`]: Math.round(du), [`v${dot + 1}`]: Math.round(dv) });
     const marks = found.map(([u, v], dot) => {
-      const mark = svg('circle', { class: 'dot', r: 40, tabindex: 0, role: 'button' });
+      const mark = svg('circle', { class: 'dot', r: 40, tabindex: 0, role: 'button', 'aria-roledescription': 'dot to move' });
       mark.addEventListener('keydown', (event) => {
         const step = KEYS[event.key];
         if (!step) return;
@@ -94,7 +94,7 @@
     image.addEventListener('pointerdown', (event) => { if (!marks.includes(event.target)) held = null; }, true);
     const panels = MODELS.map(panelOf);
     const hint = html('p', { class: 'says' }, 'Drag a dot, or go to one with the Tab key and move it with the arrow keys, with Shift by ten pixels.');
-    stage.append(html('div', { class: 'panel' }, html('h4', {}, 'The image'), image, hint), ...panels.map((panel) => panel.element));
+    stage.append(html('div', { class: 'panel' }, html('p', { class: 'panel-title' }, 'The image'), image, hint), ...panels.map((panel) => panel.element));
 
     same(golden(fitted(ask('nine_points', found.flat()), 0)));
 

@@ -12,15 +12,18 @@
     const same = Laboratory.sameNumbers(JSON.parse(element.dataset.golden));
     const words = html('p', { class: 'refusal', role: 'status' });
     const stage = html('div', { class: 'stage' });
+    // A question that is refused leaves the drawings as they were, faint; a laboratory that draws all the same returns its refusal.
     const answering = (show) => (values) => {
+      let refusal = null;
+      let stale = false;
       try {
-        show(values);
-        words.textContent = '';
+        refusal = show(values);
       } catch (error) {
         if (!(error instanceof Laboratory.Refusal)) throw error;
-        words.textContent = `The library refuses: ${error.message}.`;
+        [refusal, stale] = [error, true];
       }
-      stage.classList.toggle('refused', words.textContent !== '');
+      words.textContent = refusal ? `The library refuses: ${refusal.message}.` : '';
+      stage.classList.toggle('stale', stale);
     };
     let show = () => {};
     const knobs = Laboratory.knobs(name, specs, (values) => answering(show)(values));

@@ -3,28 +3,18 @@
 'use strict';
 
 {
-  const { html, svg, drawing, digits } = Laboratory;
+  const { html, svg, drawing, digits, scene: { size: [WIDTH, HEIGHT], centre: CENTRE, ...scene } } = Laboratory;
 
-  const [WIDTH, HEIGHT] = [640, 480];
   // The map's cells are as wide as the frame over this.
   const CELL = WIDTH / 30;
   // Darkest at so many times the noise of a point.
   const DARKEST = 4;
-  const TARGETS = [[3, 3], [5, 4], [7, 5], [9, 7], [13, 9]];
   const USES = ['points at the target\u2019s distance', 'directions'];
-  // Principal point of the chapter's camera, px.
-  const CENTRE = [326, 243];
 
   const knobs = {
-    tilt: { label: 'tilt of the views', unit: '\u00b0', min: 1, max: 45, chapter: 20 },
-    distance: { label: 'distance of the target', unit: ' mm', min: 90, max: 240, step: 2, chapter: 120 },
-    views: { label: 'views', min: 2, max: 12, chapter: 4 },
-    noise: { label: 'noise on each of u and v', unit: ' px', min: 0.01, max: 0.5, step: 0.01, chapter: 0.1 },
-    target: { label: 'points of the target', min: 0, max: TARGETS.length - 1, chapter: 3, words: (i) => TARGETS[i].join(' \u00d7 ') },
+    ...scene.knobs,
     use: { label: 'the camera is used for', options: USES, min: 0, max: 1, chapter: 0 },
   };
-
-  const ofScene = ({ tilt, distance, views, noise, target, use }) => [tilt, distance, views, noise, -0.18, 0.05, ...TARGETS[target], use];
 
   // What `uncertainty` answers.
   const mapped = (numbers) => ({ reach: numbers[0], within: numbers[1], beyond: numbers[2], nodes: numbers.subarray(3) });
@@ -38,8 +28,7 @@
     const words = html('p', { class: 'says' });
     stage.append(html('div', { class: 'panel wide' }, image, legend, words));
 
-    const chapter = Object.fromEntries(Object.entries(knobs).map(([knob, spec]) => [knob, spec.chapter]));
-    const [atTarget, directions] = [0, 1].map((use) => mapped(ask('uncertainty', ofScene({ ...chapter, use }))));
+    const [atTarget, directions] = [0, 1].map((use) => mapped(ask('uncertainty', [...scene.chapter, use])));
     same({
       'prediction-map.covered-radius': atTarget.reach,
       'prediction-map.predicted-at-target-covered': atTarget.within,
@@ -49,7 +38,7 @@
     });
 
     const show = (values) => {
-      const map = mapped(ask('uncertainty', ofScene(values)));
+      const map = mapped(ask('uncertainty', [...scene.numbers(values), values.use]));
       const floor = Math.SQRT2 * values.noise;
       const shade = (error) => Math.min(1, error / (DARKEST * floor)).toFixed(3);
       const found = [];

@@ -102,8 +102,8 @@ const LABORATORIES: [Laboratory; 5] = [
 
 /// What all laboratories share, in the order in which a page loads it; that of the solver's code is made of the
 /// WebAssembly.
-const SHARED: [&str; 6] =
-    ["solver.js", "calibench.js", "drawing.js", "knobs.js", "same-numbers.js", "monte-carlo.js"];
+const SHARED: [&str; 7] =
+    ["solver.js", "calibench.js", "drawing.js", "knobs.js", "same-numbers.js", "monte-carlo.js", "scene.js"];
 /// Starts them; loaded last.
 const START: &str = "page.js";
 const CODE: &str = "calibench.js";

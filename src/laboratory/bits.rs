@@ -1,5 +1,6 @@
-//! Which bits do the questions of the laboratory give natively? One case a line, for `.ci/laboratory` to ask the
-//! WebAssembly the same: `question | its numbers | the bits of the answer, hexadecimal`, or the words of a refusal.
+//! Which bits do the questions of the laboratory give natively? First the fingerprint of the sources, then one case a
+//! line, for `.ci/laboratory` to ask the WebAssembly the same: `question | its numbers | the bits of the answer,
+//! hexadecimal`, or the words of a refusal.
 
 use calibench_laboratory::answer;
 use std::io::{BufWriter, Write};
@@ -12,6 +13,7 @@ const DRAWS: u32 = 200;
 
 fn main() -> std::io::Result<()> {
     let mut out = BufWriter::new(std::io::stdout().lock());
+    writeln!(out, "fingerprint | {}", env!("LABORATORY_FINGERPRINT"))?;
     for (question, numbers) in cases() {
         let shown = numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
         let found = answer(question, &numbers);
@@ -63,4 +65,18 @@ fn cases() -> Vec<(&'static str, Vec<f64>)> {
     cases.extend([0.0, 0.1, 20.0].map(|wrong| ("nine_points", dots(wrong))));
     cases.push(("spread", (0..70).map(|k| libm::sin(f64::from(k))).collect()));
     cases
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use calibench_laboratory::questions;
+
+    #[test]
+    fn every_question_is_compared() {
+        let cases = cases();
+        for question in questions() {
+            assert!(cases.iter().any(|(name, _)| *name == question), "`{question}` is asked nowhere");
+        }
+    }
 }

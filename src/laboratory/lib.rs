@@ -18,7 +18,7 @@ mod scene;
 mod trials;
 mod uncertainty;
 
-pub use questions::{QUESTIONS, answer};
+pub use questions::{answer, questions};
 
 /// Of the sources, in a section of the WebAssembly that has its own name: `tests/laboratory.rs` compares it with theirs.
 #[cfg(target_arch = "wasm32")]

@@ -24,15 +24,9 @@ const TABLE: [(&str, Question); 11] = [
 ];
 
 /// The names of all questions.
-pub const QUESTIONS: [&str; TABLE.len()] = {
-    let mut names = [""; TABLE.len()];
-    let mut i = 0;
-    while i < TABLE.len() {
-        names[i] = TABLE[i].0;
-        i += 1;
-    }
-    names
-};
+pub fn questions() -> impl Iterator<Item = &'static str> {
+    TABLE.iter().map(|(name, _)| *name)
+}
 
 /// The answer to the question of that name.
 ///
