@@ -209,7 +209,7 @@ impl Found {
             Some(pose) => line("Tsai & Lenz 1989", pose),
             None => "Tsai & Lenz 1989 has no solution: the rotation is a half turn\n".to_string(),
         };
-        tsai_lenz + &line("Park & Martin 1994", &result.park_martin)
+        tsai_lenz + &line("Park & Martin 1994", &result.park_martin) + &line("Shah 2013", &result.shah[0])
     }
 
     /// The station with the largest residual, its rotation counted in the robot's standard deviations.
@@ -252,6 +252,7 @@ impl Found {
             "covariance": covariance,
             "tsai_lenz": result.tsai_lenz.as_ref().map(pose),
             "park_martin": pose(&result.park_martin),
+            "shah": { x: pose(&result.shah[0]), y: pose(&result.shah[1]) },
             "chi_squared": result.chi_squared,
             "degrees_of_freedom": result.degrees_of_freedom,
             "p_value": result.p_value(),

@@ -12,11 +12,13 @@
 //! | camera on the gripper, target fixed | base_from_gripper | gripper_from_cam | base_from_target |
 //! | camera fixed, target on the gripper | gripper_from_base | base_from_cam | gripper_from_target |
 //!
-//! Two stations give `A X = X B` with `A = G_j^-1 G_i`, `B = C_j C_i^-1`.
+//! Two stations give `A X = X B` with `A = G_j^-1 G_i`, `B = C_j C_i^-1`. With `A = G`, `Z = Y` and `B = C^-1` the
+//! equation is that of robot, world, hand and eye, `A X = Z B`: both poses are found.
 
 mod closed_form;
 mod motions;
 mod refine;
+mod robot_world;
 
 use crate::calibrate::Covariance;
 use crate::evaluate::distribution::ChiSquare;
@@ -159,6 +161,8 @@ pub struct HandEye {
     pub tsai_lenz: Option<Pose>,
     /// X by Park & Martin 1994.
     pub park_martin: Pose,
+    /// X and Y by Shah 2013.
+    pub shah: [Pose; 2],
     /// Predicted less measured `cam_from_target`, station by station: rotation in rad, then translation.
     pub residuals: Vec<SMatrix<f64, 6, 1>>,
     /// Sum of the squared residuals over their covariances.
@@ -187,8 +191,8 @@ impl HandEye {
     }
 }
 
-/// Calibrates a camera against a robot: closed forms of Tsai & Lenz 1989 and Park & Martin 1994, then the most
-/// likely X and Y under the errors of both sides.
+/// Calibrates a camera against a robot: closed forms of Tsai & Lenz 1989 and Park & Martin 1994 for `A X = X B`, of
+/// Shah 2013 for `A X = Z B`, then the most likely X and Y under the errors of both sides.
 ///
 /// The refinement minimises `sum r_i^T S_i^-1 r_i`, `r_i` the step from the measured `C_i` to the predicted
 /// `X^-1 G_i^-1 Y`. A measured pose errs by `K_i d + e_i`: `d` is the error of the camera's parameters, the
@@ -208,7 +212,15 @@ pub fn hand_eye(stations: &Stations<'_>) -> Result<HandEye, HandEyeError> {
         Err(HandEyeError::HalfTurn) => None,
         Err(error) => return Err(error),
     };
-    refine::refine(stations, park_martin, tsai_lenz)
+    let shah = robot_world::shah(stations)?;
+    refine::refine(stations, ClosedForms { tsai_lenz, park_martin, shah })
+}
+
+/// What the refinement starts from, and what it is held against.
+struct ClosedForms {
+    tsai_lenz: Option<Pose>,
+    park_martin: Pose,
+    shah: [Pose; 2],
 }
 
 const LEAST_STATIONS: usize = 3;
@@ -363,10 +375,12 @@ mod tests {
             let (robot, camera) = exact(set_up, &true_x(), &wide());
             let found = solved(set_up, &robot, &camera, &covariance(12, 1.0)).unwrap();
             // Some thirty roundings of coordinates of 1000 and of rotations, over turns of half a radian.
-            for x in [found.x, found.park_martin, found.tsai_lenz.unwrap()] {
+            for x in [found.x, found.park_martin, found.tsai_lenz.unwrap(), found.shah[0]] {
                 assert!(distance(&x, &true_x()) < 1e-12, "{set_up:?}: {x:?}");
             }
-            assert!(distance(&found.y, &true_y()) < 1e-12);
+            for y in [found.y, found.shah[1]] {
+                assert!(distance(&y, &true_y()) < 1e-12, "{set_up:?}: {y:?}");
+            }
             assert!(found.chi_squared < 1e-12);
         }
     }
@@ -380,7 +394,7 @@ mod tests {
         let (robot, camera) = exact(SetUp::EyeInHand, &x, &wide());
         let found = solved(SetUp::EyeInHand, &robot, &camera, &covariance(12, 1.0)).unwrap();
         assert_eq!(found.tsai_lenz, None);
-        assert!(distance(&found.x, &x) < 1e-12);
+        assert!(distance(&found.x, &x) < 1e-12 && distance(&found.shah[0], &x) < 1e-12);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Which X and Y are the most likely ones? Gauss-Newton over X, Y and the error of the camera's parameters
 //! that all stations share.
 
-use super::{HandEye, HandEyeError, SetUp, Stations};
+use super::{ClosedForms, HandEye, HandEyeError, SetUp, Stations};
 use crate::geometry::{Mat3, Pose, Vec3, rotation};
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector6};
 
@@ -20,12 +20,9 @@ struct Residual {
     information: Matrix6<f64>,
 }
 
-pub(super) fn refine(
-    stations: &Stations<'_>,
-    park_martin: Pose,
-    tsai_lenz: Option<Pose>,
-) -> Result<HandEye, HandEyeError> {
+pub(super) fn refine(stations: &Stations<'_>, begun: ClosedForms) -> Result<HandEye, HandEyeError> {
     let by_camera = stations.by_camera().ok_or(HandEyeError::Singular)?;
+    let ClosedForms { tsai_lenz, park_martin, shah } = begun;
     let (mut x, mut y) = (park_martin, target(stations, &park_martin)?);
     let n = stations.covariance.free.len();
     let mut shared = DVector::zeros(n);
@@ -46,6 +43,7 @@ pub(super) fn refine(
                 covariance: inverse.fixed_view::<POSES, POSES>(0, 0).into_owned(),
                 tsai_lenz,
                 park_martin,
+                shah,
                 chi_squared: cost(stations, &by_camera, &at, &shared)?,
                 residuals: at.iter().map(|r| r.value).collect(),
                 degrees_of_freedom: 6 * stations.base_from_gripper.len() - POSES,
