@@ -29,12 +29,14 @@ fn main() {
     }
     let tree = Tree::at(&root);
     let (commit, changed) = tree.as_ref().and_then(Tree::state).unwrap_or_default();
+    let day = tree.as_ref().and_then(Tree::day).unwrap_or_default();
     // Elsewhere than in its own tree Cargo may have chosen other versions than those of the lock file that came along.
     let crates = if tree.is_some() { versions(&root.join("Cargo.lock")) } else { String::new() };
     look_for_data();
     carry(&root);
     println!("cargo::rustc-env=CALIBENCH_COMMIT={commit}");
     println!("cargo::rustc-env=CALIBENCH_CHANGED={changed}");
+    println!("cargo::rustc-env=CALIBENCH_DAY={day}");
     println!("cargo::rustc-env=CALIBENCH_CRATES={crates}");
 }
 
@@ -121,6 +123,11 @@ impl Tree<'_> {
         }
         let status = [&["status", "--porcelain", "--untracked-files=all", "--"], &SOURCES[..]].concat();
         Some((self.git(&["rev-parse", "HEAD"])?, !self.git(&status)?.is_empty()))
+    }
+
+    /// The day of the commit, `2026-01-31`: it belongs to the commit, and is the same wherever that is built.
+    fn day(&self) -> Option<String> {
+        self.git(&["show", "-s", "--format=%cs", "HEAD"])
     }
 
     fn git(&self, arguments: &[&str]) -> Option<String> {

@@ -55,6 +55,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
 /// What this program was built from, as `build.rs` found it.
 pub fn build() -> Build {
     Build::read(env!("CALIBENCH_COMMIT"), env!("CALIBENCH_CHANGED"), env!("CALIBENCH_CRATES"))
+        .dated(env!("CALIBENCH_DAY"))
 }
 
 /// The README's example, compiled and run with the documentation's tests.

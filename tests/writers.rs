@@ -25,7 +25,7 @@ struct Verb {
     arguments: &'static [&'static str],
 }
 
-const VERBS: [Verb; 17] = [
+const VERBS: [Verb; 18] = [
     Verb { name: "board", arguments: &["board", "circles:9x7:10mm:3mm", "--out", "out"] },
     Verb {
         name: "camera",
@@ -103,6 +103,7 @@ const VERBS: [Verb; 17] = [
     Verb { name: "schema", arguments: &["gate", "--schema", "out"] },
     Verb { name: "run", arguments: &["run", "line-bending"] },
     Verb { name: "bless", arguments: &["bless", "line-bending"] },
+    Verb { name: "claims", arguments: &["claims", "line-bending", "--out", "out/claims.md"] },
     Verb { name: "book", arguments: &["book"] },
 ];
 

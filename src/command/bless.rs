@@ -49,7 +49,7 @@ fn bless(experiment: &Experiment, project: &Project, build: &Build) -> Exit {
     let before = project.snapshot_text(id).unwrap_or_default();
     let after = golden::file_text(record);
     let comparison = golden::compare(golden::contents(&before), golden::contents(&after));
-    let written = emit(record, &project.out(), &project.figures(id), build)
+    let written = emit(experiment, record, &project.out(), &project.figures(id), build)
         .and_then(|()| write_atomically(&path, after.as_bytes()));
     if let Err(error) = written {
         warn(&error.to_string());

@@ -41,9 +41,8 @@ fn run_one(experiment: &Experiment, project: &Project, build: &Build) -> Exit {
     let context = Context::of(experiment).with_progress(ProgressDisplay::stderr());
     let run = verdict::run(experiment, &context);
     let written = match &run.result {
-        Ok(record) => {
-            emit(record, &project.out(), &project.figures(experiment.id), build).map_err(|e| e.to_string())
-        }
+        Ok(record) => emit(experiment, record, &project.out(), &project.figures(experiment.id), build)
+            .map_err(|e| e.to_string()),
         Err(error) => Err(format!("FAILED {}: {error}", experiment.id)),
     };
     written.map_or_else(

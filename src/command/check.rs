@@ -85,7 +85,7 @@ fn print_outcome(runs: &[Run], verdicts: &[Option<Verdict>], findings: &[Finding
             print(&super::book::findings_text(findings));
         }
         Format::Json => {
-            let experiments: Vec<Value> = judged.iter().map(to_json).collect();
+            let experiments: Vec<Value> = judged.iter().map(verdict_json).collect();
             let book: Vec<String> = findings.iter().map(ToString::to_string).collect();
             let report = json!({
                 "outcome": exit.name(), "experiments": experiments, "failures": failures, "book": book,
@@ -97,7 +97,8 @@ fn print_outcome(runs: &[Run], verdicts: &[Option<Verdict>], findings: &[Finding
     exit
 }
 
-fn to_json(verdict: &Verdict) -> Value {
+/// A verdict with its counts.
+pub(super) fn verdict_json(verdict: &Verdict) -> Value {
     let golden = match verdict.golden {
         Golden::Compared(t) => json!({"held": t.held, "total": t.total}),
         Golden::Skipped(reason) => json!({"skipped": reason}),

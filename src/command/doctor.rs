@@ -1,14 +1,20 @@
 //! `calibench doctor`: is this program what one thinks it is? Its build, what it can do here, and whether it belongs to the
 //! golden values beside it.
 
+use super::calibrate::Format;
 use super::report::table;
 use super::{Exit, print};
 use calibench::io::data::data_folder;
 use calibench_harness::project::Project;
 use calibench_harness::{Build, Experiment};
+use serde_json::json;
 
 #[derive(Debug, clap::Args)]
-pub(super) struct Arguments {}
+pub(super) struct Arguments {
+    /// Text for people or JSON for programs
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
 
 /// What was looked at: its name, what was found, and whether that is well.
 struct Look {
@@ -23,18 +29,30 @@ impl Look {
     }
 }
 
-pub(super) fn run(experiments: &[Experiment], _: &Arguments, build: &Build) -> Exit {
+pub(super) fn run(experiments: &[Experiment], arguments: &Arguments, build: &Build) -> Exit {
     let mut looks = vec![program(build), arithmetic(build), features(), threads(), data()];
     match Project::find() {
         Ok(project) => looks.extend(belonging(experiments, &project)),
         Err(error) => looks.push(Look { name: "golden", found: error.to_string(), well: false }),
     }
+    print(&match arguments.format {
+        Format::Text => as_text(&looks),
+        Format::Json => as_json(&looks),
+    });
+    if looks.iter().all(|look| look.well) { Exit::Held } else { Exit::Deviates }
+}
+
+fn as_text(looks: &[Look]) -> String {
     let mut rows = table(&["what", "found", ""]);
-    for look in &looks {
+    for look in looks {
         rows.add_row([look.name, &look.found, if look.well { "ok" } else { "LOOK" }]);
     }
-    print(&format!("{}\n", rows.trim_fmt()));
-    if looks.iter().all(|look| look.well) { Exit::Held } else { Exit::Deviates }
+    format!("{}\n", rows.trim_fmt())
+}
+
+fn as_json(looks: &[Look]) -> String {
+    let look = |look: &Look| json!({ "what": look.name, "found": look.found, "well": look.well });
+    format!("{:#}\n", json!(looks.iter().map(look).collect::<Vec<_>>()))
 }
 
 fn program(build: &Build) -> Look {

@@ -3,12 +3,13 @@
 use clap::{Command, CommandFactory};
 
 /// Verbs, those of a verb after it, and what one would type. What it reads is in `tests/verb_examples.rs`.
-const EXAMPLES: [(&str, &[&str]); 31] = [
-    ("list", &["calibench list", "calibench list --names"]),
+const EXAMPLES: [(&str, &[&str]); 32] = [
+    ("list", &["calibench list", "calibench list --names", "calibench list --format json"]),
     ("explain", &["calibench explain line-bending.max-deviation", "calibench explain 5.4"]),
     ("run", &["calibench run line-bending", "calibench run line-bending --seed 7 --out another-seed"]),
     ("check", &["calibench check line-bending", "calibench check line-bending --bits --format json"]),
     ("bless", &["calibench bless line-bending"]),
+    ("claims", &["calibench claims line-bending", "calibench claims line-bending --out claims.md"]),
     ("book", &["calibench book"]),
     ("new study", &["calibench new study my-study"]),
     ("new experiment", &["calibench new experiment my-question"]),

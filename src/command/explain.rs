@@ -7,6 +7,7 @@ mod names;
 mod pages;
 mod words;
 
+use super::calibrate::Format;
 use super::terminal::warn_lines;
 use super::{Exit, print};
 use calibench_book::{Evidence, Sources};
@@ -14,12 +15,16 @@ use calibench_harness::project::Project;
 use calibench_harness::{Context, Experiment, Record, golden};
 use clap::Args;
 use names::{Meant, Names};
+use words::Answer;
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// What is asked for: a number, claim, published value, figure or table (four-pose.fx), an experiment (four-pose), a
     /// section of the chapter (5.1), or one of the book's contradictions (two-views-suffice)
     name: String,
+    /// Text for people or JSON for programs
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
 }
 
 /// What an explanation draws on.
@@ -41,8 +46,11 @@ impl Known<'_> {
 
 pub(super) fn run(experiments: &[Experiment], arguments: &Arguments) -> Exit {
     match explained(experiments, &arguments.name) {
-        Ok(text) => {
-            print(&text);
+        Ok(answer) => {
+            match arguments.format {
+                Format::Text => print(&answer.text()),
+                Format::Json => print(&format!("{:#}\n", answer.json())),
+            }
             Exit::Held
         }
         Err((exit, message)) => {
@@ -52,7 +60,7 @@ pub(super) fn run(experiments: &[Experiment], arguments: &Arguments) -> Exit {
     }
 }
 
-fn explained(experiments: &[Experiment], name: &str) -> Result<String, (Exit, String)> {
+fn explained(experiments: &[Experiment], name: &str) -> Result<Answer, (Exit, String)> {
     let project = Project::find().map_err(|error| (Exit::Usage, error.to_string()))?;
     let sources = Sources::load(&project, Evidence::default()).map_err(|finding| {
         (Exit::Incomplete, format!("{}:{}: {}", finding.file, finding.line, finding.message))

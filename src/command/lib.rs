@@ -6,6 +6,7 @@ mod book;
 mod calibrate;
 mod check;
 mod check_reference;
+mod claims;
 mod completions;
 mod convert;
 mod diff;
@@ -67,6 +68,9 @@ enum Verb {
     Check(check::Arguments),
     /// Accepts the present result of an experiment as its golden snapshot, and its figures with it
     Bless(bless::Arguments),
+    /// Runs every experiment in a process of its own, and says which command shows which claim in how many
+    /// seconds and megabytes
+    Claims(claims::Arguments),
     /// Builds the book into out/book
     Book(book::Arguments),
     /// Writes a file to start from, which runs as it is
@@ -130,6 +134,7 @@ pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCo
         Some(Verb::Run(arguments)) => run::run(experiments, &arguments, build),
         Some(Verb::Check(arguments)) => check::run(experiments, &arguments),
         Some(Verb::Bless(arguments)) => bless::run(experiments, &arguments, build),
+        Some(Verb::Claims(arguments)) => claims::run(experiments, &arguments, build),
         Some(Verb::Book(arguments)) => book::run(experiments, &arguments, build),
         Some(Verb::New(arguments)) => new::run(&arguments),
         Some(Verb::Board(arguments)) => board::run(&arguments),

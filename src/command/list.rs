@@ -1,13 +1,18 @@
 //! `calibench list`: which experiments are there, and what do they ask?
 
+use super::calibrate::Format;
 use super::{Exit, print};
 use calibench_harness::Experiment;
+use serde_json::{Value, json};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     /// Prints names only, one a line
     #[arg(long)]
     names: bool,
+    /// Text for people or JSON for programs
+    #[arg(long, value_enum, default_value_t = Format::Text, conflicts_with = "names")]
+    format: Format,
 }
 
 pub(super) fn run(experiments: &[Experiment], arguments: &Arguments) -> Exit {
@@ -18,8 +23,19 @@ pub(super) fn run(experiments: &[Experiment], arguments: &Arguments) -> Exit {
             format!("{} (seed {})\n  {}\n{}\n\n", e.id, e.seed, e.title, wrapped(e.question, 96))
         }
     };
-    print(&experiments.iter().map(entry).collect::<String>());
+    match arguments.format {
+        Format::Text => print(&experiments.iter().map(entry).collect::<String>()),
+        Format::Json => {
+            let all: Vec<Value> = experiments.iter().map(as_json).collect();
+            print(&format!("{:#}\n", json!(all)));
+        }
+    }
     Exit::Held
+}
+
+fn as_json(experiment: &Experiment) -> Value {
+    let Experiment { id, title, question, seed, takes_image, .. } = experiment;
+    json!({ "id": id, "title": title, "question": question, "seed": seed, "takes_image": takes_image })
 }
 
 /// The text in lines of at most `width` characters, indented by two.

@@ -41,7 +41,9 @@ pub(super) fn run(experiments: &[Experiment], build: &Build) -> Exit {
 /// Each experiment is written as soon as it is finished: an interruption keeps what is done.
 fn write(run: &Run, project: &Project, build: &Build) -> io::Result<()> {
     match &run.result {
-        Ok(record) => emit(record, &project.out(), &project.figures(run.experiment.id), build),
+        Ok(record) => {
+            emit(&run.experiment, record, &project.out(), &project.figures(run.experiment.id), build)
+        }
         Err(_) => Ok(()),
     }
 }

@@ -1,13 +1,17 @@
 //! `calibench run ID`, and the own binary of every experiment: one run, its files, its verdict.
 
+use super::calibrate::Format;
+use super::check::verdict_json;
 use super::report::{details, summary};
 use super::terminal::{self, warn_lines};
 use super::{Exit, find, print, warn};
 use calibench::io::ShownPath;
 use calibench_harness::project::Project;
+use calibench_harness::resources::{peak_memory_mib, processor_seconds};
 use calibench_harness::verdict::{self, Run, Verdict};
-use calibench_harness::{Build, Context, Experiment, ProgressDisplay, emit};
+use calibench_harness::{Build, Context, Experiment, ProgressDisplay, Record, emit, record_json};
 use clap::{Args, CommandFactory, FromArgMatches, Parser};
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// What a run can be told.
@@ -23,6 +27,9 @@ struct Options {
     /// Image in place of the experiment's own, for experiments that take one
     #[arg(long, value_name = "FILE")]
     image: Option<PathBuf>,
+    /// The record as text for people, or with verdict and cost as JSON for programs
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
 }
 
 #[derive(Debug, Args)]
@@ -77,17 +84,35 @@ fn run_one(experiment: &Experiment, options: &Options, build: &Build) -> Exit {
         }
     };
     let (out, figures) = places(&run, options.out.as_deref(), project.as_ref());
-    if let Err(error) = emit(record, &out, &figures, build) {
+    if let Err(error) = emit(experiment, record, &out, &figures, build) {
         warn(&error.to_string());
         return Exit::Incomplete;
     }
     let snapshot = project.as_ref().and_then(|p| p.snapshot_text(experiment.id));
     let verdict = Verdict::of(record, snapshot.as_deref(), run.locked && project.is_some());
-    print(&summary(record));
-    let written = out.join(experiment.id);
-    print(&format!("\nwritten: {} and {}\n", written.shown(), figures.shown()));
-    print(&details(std::slice::from_ref(&verdict)));
+    match options.format {
+        Format::Text => {
+            print(&summary(record));
+            let written = out.join(experiment.id);
+            print(&format!("\nwritten: {} and {}\n", written.shown(), figures.shown()));
+            print(&details(std::slice::from_ref(&verdict)));
+        }
+        Format::Json => print(&format!("{:#}\n", as_json(record, &verdict, &run, build))),
+    }
     if verdict.held() { Exit::Held } else { Exit::Deviates }
+}
+
+/// The record, the verdict, and what the run took of this process.
+fn as_json(record: &Record, verdict: &Verdict, run: &Run, build: &Build) -> Value {
+    json!({
+        "record": record_json(record, build),
+        "verdict": verdict_json(verdict),
+        "cost": {
+            "seconds": run.took.as_secs_f64(),
+            "processor_seconds": processor_seconds(),
+            "peak_memory_mib": peak_memory_mib(),
+        },
+    })
 }
 
 /// Where tables and figures go. Committed figures are drawn by the locked run only.

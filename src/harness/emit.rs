@@ -1,26 +1,45 @@
 //! How does a record reach the disk? CSV, JSON and figures, each written beside its place and renamed into
 //! it.
 
+use super::data_package::{Resource, data_package};
+use super::experiment::Experiment;
 use super::provenance::Build;
 use super::published::not_judged;
 use super::reconcile::{Expectation, Reconciliation};
-use super::record::Record;
+use super::record::{Input, Record};
+use super::run_crate::{PartFile, RunCrate};
 use calibench::io::input::{MOST_TABLE_BYTES, read_regular};
 use calibench::io::write_atomically;
 use serde_json::{Value, json};
 use std::io;
 use std::path::Path;
 
-/// Writes `<out>/<experiment>/*.csv` and `record.json`, and the figures to the folder `figures`. An
-/// interrupted run leaves whole files only.
+/// Writes `<out>/<experiment>/*.csv`, `record.json`, `datapackage.json` and `ro-crate-metadata.json`, and the figures to the folder
+/// `figures`. An interrupted run leaves whole files only.
 ///
 /// # Errors
 /// What the file system says, with the path.
-pub fn emit(record: &Record, out: &Path, figures: &Path, build: &Build) -> io::Result<()> {
+pub fn emit(
+    experiment: &Experiment,
+    record: &Record,
+    out: &Path,
+    figures: &Path,
+    build: &Build,
+) -> io::Result<()> {
     let folder = out.join(record.experiment());
+    let mut written = Vec::new();
+    let mut write = |name: &str, what: &str, bytes: &[u8]| {
+        written.push(PartFile::new(name, what, bytes));
+        write_atomically(&folder.join(name), bytes)
+    };
     for table in record.tables() {
-        write_atomically(&folder.join(format!("{}.csv", table.name)), table.to_csv().as_bytes())?;
+        write(&format!("{}.csv", table.name), &table.caption, table.to_csv().as_bytes())?;
     }
+    let json = |value: Value| format!("{value:#}\n").into_bytes();
+    write("record.json", RECORD, &json(record_json(record, build)))?;
+    let resources: Vec<Resource> = record.tables().iter().map(Resource::of).collect();
+    let package = data_package(record.experiment(), experiment.title, experiment.question, &resources);
+    write("datapackage.json", "The columns of the tables: types, units, descriptions", &json(package))?;
     for figure in record.figures() {
         let path = figures.join(figure.file_name());
         // A figure that is what it was keeps its time: the program carries the committed ones, and is not
@@ -29,8 +48,47 @@ pub fn emit(record: &Record, out: &Path, figures: &Path, build: &Build) -> io::R
             write_atomically(&path, &figure.bytes)?;
         }
     }
-    let text = format!("{:#}\n", record_json(record, build));
-    write_atomically(&folder.join("record.json"), text.as_bytes())
+    written.extend(figures_below(&folder, figures, record));
+    let text = run_crate(experiment, record, written, build).to_text();
+    write_atomically(&folder.join("ro-crate-metadata.json"), text.as_bytes())
+}
+
+const RECORD: &str = "Every number with its band, every claim, and every published value beside ours";
+
+/// The figures, where they stand in the folder; those of the locked run stand with the sources.
+fn figures_below<'a>(
+    folder: &Path,
+    figures: &'a Path,
+    record: &'a Record,
+) -> impl Iterator<Item = PartFile> + 'a {
+    let within = figures.strip_prefix(folder).ok().map(|path| path.to_string_lossy().replace('\\', "/"));
+    within.into_iter().flat_map(|within| {
+        record.figures().iter().map(move |figure| {
+            PartFile::new(format!("{within}/{}", figure.file_name()), figure.caption.as_str(), &figure.bytes)
+        })
+    })
+}
+
+fn run_crate<'a>(
+    experiment: &Experiment,
+    record: &Record,
+    results: Vec<PartFile>,
+    build: &'a Build,
+) -> RunCrate<'a> {
+    let input = |input: &Input| PartFile {
+        path: format!("#{}", input.name),
+        what: "What went into the experiment, known by the hash of its bytes".to_string(),
+        sha256: Some(input.sha256.clone()),
+    };
+    RunCrate {
+        title: experiment.title,
+        description: experiment.question,
+        command: format!("calibench run {} --seed {}", record.experiment(), record.seed()),
+        seed: record.seed(),
+        inputs: record.inputs().iter().map(input).collect(),
+        results,
+        build,
+    }
 }
 
 /// The record as JSON. A number that is not finite stands as a word, since JSON has none for it.

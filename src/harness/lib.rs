@@ -20,6 +20,7 @@
 
 mod band;
 mod claim;
+mod data_package;
 mod emit;
 mod experiment;
 pub mod figure;
@@ -35,6 +36,7 @@ pub mod published;
 mod reconcile;
 mod record;
 pub mod resources;
+mod run_crate;
 mod simulated;
 pub mod stats;
 pub mod stopwatch;
@@ -43,6 +45,7 @@ pub mod verdict;
 
 pub use band::Band;
 pub use claim::{Cases, Claim, ClaimDraft};
+pub use data_package::{Field, Resource, data_package};
 pub use emit::{emit, record_json};
 pub use experiment::{Context, Experiment, ExperimentError};
 pub use figure::{Dash, Figure, HeatMap, Look, Marker, Plot};
@@ -53,4 +56,5 @@ pub use progress::{Progress, ProgressDisplay};
 pub use provenance::Build;
 pub use reconcile::{Expectation, Reconciliation};
 pub use record::{Entered, Input, Number, Record, RecordError};
+pub use run_crate::{PartFile, RunCrate};
 pub use table::{Cell, Column, Rows, Table};

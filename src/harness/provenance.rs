@@ -10,6 +10,8 @@ use std::collections::BTreeMap;
 pub struct Build {
     /// The commit; `None` if it was built outside of a repository of its own.
     pub commit: Option<Commit>,
+    /// The day of the commit, `2026-01-31`; `None` where no commit is known.
+    pub date: Option<String>,
     /// Versions of the crates whose arithmetic stands in the path of a number; none if they are not known for
     /// certain.
     pub crates: BTreeMap<String, String>,
@@ -23,8 +25,16 @@ impl Build {
         let named = crates.split(',').filter_map(|text| text.split_once(' '));
         Build {
             commit,
+            date: None,
             crates: named.map(|(name, version)| (name.to_string(), version.to_string())).collect(),
         }
+    }
+}
+
+impl Build {
+    /// With the day of its commit, as a build script found it; empty if there is none.
+    pub fn dated(self, day: &str) -> Build {
+        Build { date: (!day.is_empty()).then(|| day.to_string()), ..self }
     }
 }
 

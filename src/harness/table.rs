@@ -11,6 +11,16 @@ pub struct Column {
     pub unit: String,
 }
 
+impl Column {
+    /// `name [unit]`, as the CSV file has it.
+    pub fn header(&self) -> String {
+        match self.unit.as_str() {
+            "" => self.name.clone(),
+            unit => format!("{} [{unit}]", self.name),
+        }
+    }
+}
+
 /// One entry of a table.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cell {
@@ -119,11 +129,7 @@ impl Table {
     /// The table as CSV, a header of `name [unit]` first.
     pub fn to_csv(&self) -> String {
         let mut writer = csv::WriterBuilder::new().flexible(true).from_writer(Vec::new());
-        let header = self.columns.iter().map(|c| match c.unit.as_str() {
-            "" => c.name.clone(),
-            unit => format!("{} [{unit}]", c.name),
-        });
-        let records = std::iter::once(header.collect())
+        let records = std::iter::once(self.columns.iter().map(Column::header).collect())
             .chain(self.rows.iter().map(|r| r.iter().map(Cell::text).collect()));
         for record in records {
             let record: Vec<String> = record;

@@ -12,6 +12,7 @@
 mod accumulate;
 mod cells;
 pub mod compare;
+mod described;
 mod design;
 mod engine;
 #[cfg(test)]

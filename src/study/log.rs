@@ -82,7 +82,7 @@ impl Folder {
                 let unfinished = self.file(".trials.parquet");
                 let mut written =
                     Written { files: self.files.as_ref(), file: File::create(&unfinished).map_err(located)? };
-                super::parquet::write(&mut written, &path, engine, lines.as_mut())?;
+                super::parquet::write(&mut written, &path, engine, manifest, lines.as_mut())?;
                 self.files
                     .sync(&written.file)
                     .and_then(|()| self.files.rename(&unfinished, &path))

@@ -30,6 +30,9 @@ pub struct Manifest {
     pub commit: Option<String>,
     /// Whether the tree differed from that commit.
     pub dirty: Option<bool>,
+    /// The day of that commit, where known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub day: Option<String>,
     /// Code.
     pub code: Fingerprint,
     /// SHA-256 of the canonical specification.
@@ -69,6 +72,7 @@ impl Manifest {
             complete: false,
             commit: build.commit.as_ref().map(|c| c.hash.clone()),
             dirty: build.commit.as_ref().map(|c| c.dirty),
+            day: build.date.clone(),
             code: Fingerprint::of(build),
             spec_sha256: sha256_hex(canonical.to_string().as_bytes()),
             spec: canonical,

@@ -105,7 +105,9 @@ pub fn merge_on(
     trials.check().map_err(FolderError::from)?;
     let text = first.folder.read("spec.toml")?;
     let mut whole = Engine::new(&text, Shard::WHOLE).map_err(RunError::from)?;
-    let build = Build { commit: commit(&parts), ..build.clone() };
+    let commit = commit(&parts);
+    let date = first.manifest.day.clone().filter(|_| commit.is_some());
+    let build = Build { commit, date, ..build.clone() };
     let manifest = Manifest::new(&whole.spec, Shard::WHOLE, &build).with_trials(trials);
     // Bounds and statistics of the whole come from this code, its trials from that of the parts: the manifest
     // names one.

@@ -4,8 +4,10 @@
 //! Nothing is compressed: errors are noise, which no codec shortens, and the other columns are counters and
 //! words, which the encodings of the format pack already.
 
+use super::described;
 use super::engine::Engine;
 use super::folder::{FolderError, Located};
+use super::manifest::Manifest;
 use super::replay::Source;
 use super::tables;
 use super::trial::Trial;
@@ -14,6 +16,7 @@ use ::parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use ::parquet::column::writer::ColumnWriter;
 use ::parquet::data_type::{ByteArray, DataType};
 use ::parquet::errors::{ParquetError, Result as ParquetResult};
+use ::parquet::file::metadata::KeyValue;
 use ::parquet::file::properties::{EnabledStatistics, WriterProperties};
 use ::parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
 use ::parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
@@ -33,12 +36,14 @@ pub(super) fn write(
     sink: impl Write + Send,
     path: &Path,
     engine: &Engine,
+    manifest: &Manifest,
     source: &mut dyn Source,
 ) -> Result<(), FolderError> {
     let failed = |error: ParquetError| unwritten(path, error);
     let columns = tables::columns(&engine.quantities);
     let schema = schema(&columns).map_err(failed)?;
-    let mut writer = SerializedFileWriter::new(sink, schema, Arc::new(properties())).map_err(failed)?;
+    let mut writer =
+        SerializedFileWriter::new(sink, schema, Arc::new(properties(manifest))).map_err(failed)?;
     loop {
         let mut trials = Vec::with_capacity(GROUP);
         while trials.len() < GROUP
@@ -71,9 +76,12 @@ fn schema(columns: &[String]) -> ParquetResult<TypePtr> {
 }
 
 /// Counters by their differences, outcomes by a dictionary; a dictionary of errors would hold nearly all of
-/// them.
-fn properties() -> WriterProperties {
+/// them. What made the trials stands in the head.
+fn properties(manifest: &Manifest) -> WriterProperties {
+    let head =
+        described::in_head(manifest).into_iter().map(|(key, value)| KeyValue::new(key, value)).collect();
     let mut properties = WriterProperties::builder()
+        .set_key_value_metadata(Some(head))
         .set_dictionary_enabled(false)
         .set_column_dictionary_enabled("outcome".into(), true)
         .set_statistics_enabled(EnabledStatistics::Chunk);

@@ -3,6 +3,7 @@
 
 use super::engine::Engine;
 use super::folder::FolderError;
+use super::manifest::Manifest;
 use super::replay::Source;
 use super::trial_file::NoParquet;
 use std::io::Write;
@@ -12,6 +13,7 @@ pub(super) fn write(
     _: impl Write + Send,
     _: &Path,
     _: &Engine,
+    _: &Manifest,
     _: &mut dyn Source,
 ) -> Result<(), FolderError> {
     Err(NoParquet.into())

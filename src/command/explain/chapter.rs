@@ -10,18 +10,18 @@ use calibench_harness::Experiment;
 use calibench_harness::published::Kind;
 use rayon::prelude::*;
 
-pub(super) fn experiment(experiment: &Experiment, names: &Names) -> String {
+pub(super) fn experiment(experiment: &Experiment, names: &Names) -> Answer {
     let mut answer = Answer::headed(experiment.id);
     answer.say("title", experiment.title);
     answer.say("question", experiment.question);
     answer.say("seed", &experiment.seed.to_string());
     answer.say("again", &format!("calibench run {}", experiment.id));
     answer.say("names", &names.within(experiment.id).join(" "));
-    answer.text()
+    answer
 }
 
 /// The section's printed values beside ours, its items, and what of it does not hold.
-pub(super) fn section(known: &Known, section: &str) -> Result<String, (Exit, String)> {
+pub(super) fn section(known: &Known, section: &str) -> Result<Answer, (Exit, String)> {
     let mut answer = Answer::headed(&format!("section {section} of the chapter"));
     let is_of = |text: &str| sections_of(text).any(|one| one == section);
     let entries: Vec<_> = known.sources.published.iter().filter(|e| is_of(&e.section)).collect();
@@ -52,10 +52,10 @@ pub(super) fn section(known: &Known, section: &str) -> Result<String, (Exit, Str
     for contradiction in known.sources.contradictions.iter().filter(|c| is_of(&c.section)) {
         say_contradiction(&mut answer, known, contradiction);
     }
-    Ok(answer.text())
+    Ok(answer)
 }
 
-pub(super) fn contradiction(known: &Known, id: &str) -> String {
+pub(super) fn contradiction(known: &Known, id: &str) -> Answer {
     let mut answer = Answer::headed("against the chapter");
     known
         .sources
@@ -63,7 +63,7 @@ pub(super) fn contradiction(known: &Known, id: &str) -> String {
         .iter()
         .filter(|c| c.id == id)
         .for_each(|c| say_contradiction(&mut answer, known, c));
-    answer.text()
+    answer
 }
 
 fn say_contradiction(answer: &mut Answer, known: &Known, contradiction: &Contradiction) {

@@ -8,7 +8,7 @@ use calibench_harness::published::Entry;
 use calibench_harness::{Claim, Entered, Experiment, Number, Reconciliation, Record};
 
 /// Everything under one name; a figure and the table behind it may share theirs.
-pub(super) fn explained(known: &Known, experiment: &Experiment, record: &Record, own: &str) -> String {
+pub(super) fn explained(known: &Known, experiment: &Experiment, record: &Record, own: &str) -> Answer {
     let mut answer = Answer::headed(&format!("{}.{own}", experiment.id));
     let place = |what| match record.place(what, own) {
         Some(place) => format!("{}:{}", place.file(), place.line()),
@@ -65,7 +65,7 @@ pub(super) fn explained(known: &Known, experiment: &Experiment, record: &Record,
         "again",
         &format!("calibench run {0}; calibench check {0} compares it with golden/{0}.snap", experiment.id),
     );
-    answer.text()
+    answer
 }
 
 fn say_number(answer: &mut Answer, number: &Number, locked: Option<f64>, place: &str) {

@@ -2,10 +2,12 @@
 //! level?
 
 use super::Failure;
+use crate::calibrate::Format;
 use crate::{Exit, print};
 use calibench::io::significant;
 use calibench_study::compare::{CompareError, Comparison, Verdict, compare, compare_levels};
 use comfy_table::{Table, presets};
+use serde_json::{Value, json};
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -18,6 +20,9 @@ pub(crate) struct Arguments {
     /// Instead of a second run: each level of this factor with its first level, within one run
     #[arg(long, value_name = "NAME", conflicts_with = "second")]
     factor: Option<String>,
+    /// Text for people or JSON for programs
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
 }
 
 impl From<CompareError> for Failure {
@@ -37,8 +42,34 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
             (compare_levels(&arguments.first, factor)?, ["first level", "this"])
         }
     };
-    print(&comparison_text(&comparison, names));
+    match arguments.format {
+        Format::Text => print(&comparison_text(&comparison, names)),
+        Format::Json => print(&format!("{:#}\n", comparison_json(&comparison))),
+    }
     Ok(Exit::Held)
+}
+
+fn comparison_json(comparison: &Comparison) -> Value {
+    let effects = comparison.effects.iter().map(|e| {
+        json!({
+            "cell": e.cell,
+            "quantity": e.quantity.name(),
+            "pairs": e.pairs,
+            "rms": e.rms,
+            "ratio": { "value": e.ratio.value, "low": e.ratio.low, "high": e.ratio.high },
+            "better": match e.verdict {
+                Verdict::FirstBetter => Some("first"),
+                Verdict::SecondBetter => Some("second"),
+                Verdict::NotTold => None,
+            },
+        })
+    });
+    let only = comparison.only.iter().filter(|o| o.1 + o.2 > 0);
+    json!({
+        "effects": effects.collect::<Vec<_>>(),
+        "converged_in_one_only": only.map(|(cell, a, b)| json!({ "cell": cell, "first": a, "second": b })).collect::<Vec<_>>(),
+        "false_alarm_rate_each": comparison.each,
+    })
 }
 
 fn comparison_text(comparison: &Comparison, [first, second]: [&str; 2]) -> String {

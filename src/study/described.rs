@@ -1,0 +1,105 @@
+//! How do others read a study's folder? `datapackage.json` says what the columns of its tables are, `ro-crate-metadata.json` what made
+//! them, and the same stands in the head of a Parquet file.
+
+use super::engine::Engine;
+use super::manifest::Manifest;
+use super::tables;
+use super::trial_file::TrialFile;
+use calibench::io::Commit;
+use calibench_harness::{Build, Field, PartFile, Resource, RunCrate, Table, data_package};
+
+/// `datapackage.json`: the tables of the summary, and the trials where they are CSV.
+pub(super) fn package(engine: &Engine, tables: &[Table], manifest: &Manifest) -> String {
+    let mut resources: Vec<Resource> = tables.iter().map(Resource::of).collect();
+    if manifest.trials == TrialFile::Csv {
+        resources.push(trials(engine, &manifest.files[TrialFile::Csv.name()]));
+    }
+    let package = data_package(&engine.spec.name, &title(engine), &engine.spec.question, &resources);
+    format!("{package:#}\n")
+}
+
+fn title(engine: &Engine) -> String {
+    format!("The study {}", engine.spec.name)
+}
+
+/// `trials.csv`.
+fn trials(engine: &Engine, sha256: &str) -> Resource {
+    let field = |header: String| {
+        let kind = match header.as_str() {
+            "cell" | "trial" | "iterations" => "integer",
+            "outcome" => "string",
+            _ => "number",
+        };
+        let unit = header.split_once(" [").map(|(_, unit)| unit.trim_end_matches(']').to_string());
+        Field { kind, unit: unit.unwrap_or_default(), header }
+    };
+    Resource {
+        name: "trials".to_string(),
+        description: "Every trial: its cell, what became of it, and the errors of its estimates".to_string(),
+        fields: tables::columns(&engine.quantities).into_iter().map(field).collect(),
+        sha256: sha256.to_string(),
+        bytes: None,
+    }
+}
+
+/// `ro-crate-metadata.json`: all that the manifest names, and the manifest itself.
+pub(super) fn run_crate(engine: &Engine, manifest: &Manifest) -> String {
+    let part = |name: &str| PartFile {
+        path: name.to_string(),
+        what: what(name).to_string(),
+        sha256: manifest.files.get(name).cloned(),
+    };
+    let results =
+        manifest.files.keys().map(String::as_str).filter(|name| *name != SPEC).chain(["manifest.json"]);
+    let build = Build {
+        commit: manifest
+            .commit
+            .as_ref()
+            .map(|hash| Commit { hash: hash.clone(), dirty: manifest.dirty == Some(true) }),
+        date: manifest.day.clone(),
+        crates: manifest.code.crates.clone(),
+    };
+    let shard = if manifest.shard == "0/1" { String::new() } else { format!(" --shard {}", manifest.shard) };
+    let run = RunCrate {
+        title: &title(engine),
+        description: &engine.spec.question,
+        command: format!("calibench study run {SPEC}{shard}"),
+        seed: manifest.seed,
+        inputs: vec![part(SPEC)],
+        results: results.map(part).collect(),
+        build: &build,
+    };
+    run.to_text()
+}
+
+const SPEC: &str = "spec.toml";
+
+/// What a file of a study's folder is.
+fn what(name: &str) -> &'static str {
+    match name {
+        SPEC => "The study: its question, factors, scene and seed",
+        "manifest.json" => "The hash of every file, the specification with its defaults, and the code",
+        "report.html" => "The report",
+        "datapackage.json" => "The columns of the tables: types, units, descriptions",
+        "trials.csv" | "trials.parquet" => "Every trial",
+        _ if name.starts_with("figures/") => "A figure of the report",
+        _ => "A table of the report",
+    }
+}
+
+/// Keys and values in the head of a Parquet file.
+#[cfg_attr(not(feature = "parquet"), allow(dead_code))]
+pub(super) fn in_head(manifest: &Manifest) -> Vec<(String, String)> {
+    let seed = manifest.seed.to_string();
+    let commit = manifest.commit.as_deref().unwrap_or("unknown");
+    [
+        ("study", manifest.study.as_str()),
+        ("seed", &seed),
+        ("shard", &manifest.shard),
+        ("spec_sha256", &manifest.spec_sha256),
+        ("version", &manifest.code.calibench),
+        ("commit", commit),
+    ]
+    .map(|(key, value)| (format!("calibench.{key}"), value.to_string()))
+    .to_vec()
+}
