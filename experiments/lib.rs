@@ -13,6 +13,7 @@ pub mod four_pose;
 pub mod gate_power;
 pub mod global_minimum;
 pub mod grid_image;
+pub mod hand_eye;
 pub mod interface;
 pub mod interval_coverage;
 pub mod k2_observability;
@@ -22,6 +23,7 @@ pub mod nine_point;
 pub mod noise_floor;
 pub mod photographs;
 pub mod pose_count;
+pub mod position_correction;
 pub mod prediction_map;
 pub mod scoreboard;
 mod sweep;
@@ -42,6 +44,8 @@ pub const EXPERIMENTS: &[Experiment] = &[
     millimetres::EXPERIMENT,
     distortion_model::EXPERIMENT,
     board_warp::EXPERIMENT,
+    hand_eye::EXPERIMENT,
+    position_correction::EXPERIMENT,
     nine_point::EXPERIMENT,
     photographs::EXPERIMENT,
     interface::EXPERIMENT,

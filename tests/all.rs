@@ -36,6 +36,7 @@ mod planar_single_plane;
 mod planar_statistics;
 mod printed_board;
 mod program;
+mod provenance;
 mod readme;
 mod real_corner_files;
 mod real_data;

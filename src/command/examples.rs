@@ -71,6 +71,7 @@ const EXAMPLES: [(&str, &[&str]); 32] = [
             "calibench gate --html report.html",
             "calibench gate --solver \"python3 my_solver.py\" --samples 1",
             "calibench gate --planted k2-ignored --samples 4",
+            "calibench gate --hand-eye",
         ],
     ),
     ("doctor", &["calibench doctor"]),

@@ -2,8 +2,10 @@
 
 mod certified;
 mod compare;
+mod hand_eye;
 mod power;
 
+use super::calibrate::Format;
 use super::terminal::warn_lines;
 use super::{Exit, MOST_THREADS, print, warn};
 use calibench::io::ShownPath;
@@ -61,6 +63,11 @@ pub(super) struct Arguments {
     /// Property whose failure is known and does not fail the run; may be repeated
     #[arg(long, value_name = "PROPERTY", value_parser = property)]
     accept: Vec<Property>,
+    /// The verdict as text for people, or the report as JSON for programs
+    #[arg(long, value_enum, default_value_t = Format::Text, conflicts_with_all = [
+        "export", "record", "against", "power", "certified", "planted", "methods",
+    ])]
+    format: Format,
     /// Writes the report as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -99,6 +106,16 @@ pub(super) struct Arguments {
         "false_alarms",
     ])]
     certified: bool,
+    /// Judges a solver that finds where a camera sits on a robot (see adapters/HAND-EYE-PROTOCOL.md) [default
+    /// solver here: this library's]
+    #[arg(long, conflicts_with_all = [
+        "export", "judge", "power", "planted", "record", "against", "junit", "html", "accept", "median_time", "certified", "jobs",
+    ])]
+    hand_eye: bool,
+    /// Judges this library and the hand-eye methods of the programs in adapters/, and writes the table as
+    /// Markdown
+    #[arg(long, value_name = "FILE", requires = "hand_eye", conflicts_with_all = ["solver", "json"])]
+    methods: Option<PathBuf>,
     /// The only certified problem to put
     #[arg(long, value_name = "NAME", requires = "certified")]
     problem: Option<String>,
@@ -224,6 +241,9 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
     if arguments.certified {
         return certified::run(arguments);
     }
+    if arguments.hand_eye {
+        return hand_eye::run(arguments, build);
+    }
     if let Some(folder) = &arguments.power_table {
         return power::print_table(folder);
     }
@@ -271,12 +291,15 @@ fn solver(arguments: &Arguments) -> Result<Box<dyn Solver>, Stop> {
 }
 
 fn process(arguments: &Arguments, command: &str) -> Result<Box<dyn Solver>, Stop> {
+    Ok(Box::new(Process::new(command, timeout(arguments)?, arguments.jobs)))
+}
+
+/// How long a program may take for a problem.
+fn timeout(arguments: &Arguments) -> Result<Duration, Stop> {
     let timeout = Duration::try_from_secs_f64(arguments.timeout)
         .ok()
         .filter(|t| (1..=LONGEST.as_nanos()).contains(&t.as_nanos()));
-    let timeout =
-        timeout.ok_or_else(|| usage("--timeout must be a positive number of seconds, at most a day"))?;
-    Ok(Box::new(Process::new(command, timeout, arguments.jobs)))
+    timeout.ok_or_else(|| usage("--timeout must be a positive number of seconds, at most a day"))
 }
 
 fn terms(arguments: &Arguments) -> Terms {
@@ -311,7 +334,10 @@ fn judge(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build)
             write_atomically(path, text(&report).as_bytes()).map_err(incomplete)?;
         }
     }
-    print(&report.to_text(columns()));
+    match arguments.format {
+        Format::Text => print(&report.to_text(columns())),
+        Format::Json => print(&report.to_json()),
+    }
     if !report.held() {
         warn_lines(&report.details());
     }

@@ -1,0 +1,98 @@
+//! `calibench gate --hand-eye`: is a solver to be trusted that finds where a camera sits on a robot?
+
+use super::super::calibrate::Format;
+use super::super::{Exit, print, warn};
+use super::{Arguments, Size, Stop, incomplete, terms, timeout, usage};
+use calibench::io::write_atomically;
+use calibench_gate::THOROUGH;
+use calibench_hand_eye_gate::{Builtin, MOST_SAMPLES, Program, QUICK, Report, Solver, run as judge};
+use calibench_harness::Build;
+use std::fmt::Write;
+use std::path::Path;
+
+/// Methods of the table besides this library's, with their programs.
+const METHODS: [(&str, &str); 16] = [
+    ("OpenCV, Tsai & Lenz", "python3 adapters/hand_eye_opencv_solver.py tsai"),
+    ("OpenCV, Park & Martin", "python3 adapters/hand_eye_opencv_solver.py park"),
+    ("OpenCV, Horaud & Dornaika", "python3 adapters/hand_eye_opencv_solver.py horaud"),
+    ("OpenCV, Andreff", "python3 adapters/hand_eye_opencv_solver.py andreff"),
+    ("OpenCV, Daniilidis", "python3 adapters/hand_eye_opencv_solver.py daniilidis"),
+    ("OpenCV, Shah", "python3 adapters/hand_eye_opencv_solver.py shah"),
+    ("OpenCV, Li", "python3 adapters/hand_eye_opencv_solver.py li"),
+    ("KinHEC, Tsai & Lenz", "python3 adapters/hand_eye_kinhec_solver.py tsai_lenz"),
+    ("KinHEC, Park & Martin", "python3 adapters/hand_eye_kinhec_solver.py park_martin"),
+    ("KinHEC, Horaud & Dornaika", "python3 adapters/hand_eye_kinhec_solver.py horaud_dornaika"),
+    ("KinHEC, Andreff", "python3 adapters/hand_eye_kinhec_solver.py andreff"),
+    ("KinHEC, Daniilidis", "python3 adapters/hand_eye_kinhec_solver.py daniilidis"),
+    ("KinHEC, Shah", "python3 adapters/hand_eye_kinhec_solver.py shah"),
+    ("KinHEC, Li", "python3 adapters/hand_eye_kinhec_solver.py li_kronecker"),
+    ("KinHEC, refined", "python3 adapters/hand_eye_kinhec_solver.py refine"),
+    ("KinHEC, X and Y refined", "python3 adapters/hand_eye_kinhec_solver.py refine_world"),
+];
+
+/// Judges one solver; without a program that is this library's.
+pub(super) fn run(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
+    if let Some(path) = &arguments.methods {
+        return write_table(arguments, path, build);
+    }
+    let mut solver: Box<dyn Solver> = match &arguments.solver {
+        Some(command) => Box::new(Program::new(command, timeout(arguments)?)),
+        None => Box::new(Builtin),
+    };
+    let report = judged(arguments, solver.as_mut())?;
+    if let Some(path) = &arguments.json {
+        write_atomically(path, report.to_json().as_bytes()).map_err(incomplete)?;
+    }
+    match arguments.format {
+        Format::Text => print(&report.to_text()),
+        Format::Json => print(&report.to_json()),
+    }
+    Ok(if report.trusted { Exit::Held } else { Exit::Deviates })
+}
+
+fn judged(arguments: &Arguments, solver: &mut dyn Solver) -> Result<Report, Stop> {
+    let samples = arguments.samples.unwrap_or(match arguments.size {
+        Size::Quick => QUICK,
+        Size::Thorough => THOROUGH,
+    });
+    if samples > MOST_SAMPLES {
+        return Err(usage(format!("{samples} samples a scene, and the limit is {MOST_SAMPLES}")));
+    }
+    Ok(judge(solver, arguments.seed, samples, &terms(arguments)))
+}
+
+/// What stands above the table.
+const TABLE_HEAD: &str = "\
+# Hand-eye methods at the gate
+
+How large are the errors of X, in terms of the Cramer-Rao bound, and what does not hold? Eight scenes that determine X
+([the protocol](HAND-EYE-PROTOCOL.md) says which), 1 is as good as can be; then the properties that fail, with the scenes.
+";
+
+/// Judges this library and the methods of the adapters, and writes the table.
+fn write_table(arguments: &Arguments, path: &Path, build: &Build) -> Result<Exit, Stop> {
+    let project = calibench_harness::project::Project::find().map_err(usage)?;
+    std::env::set_current_dir(project.root()).map_err(incomplete)?;
+    let ours = judged(arguments, &mut Builtin)?;
+    let commit = build.commit.as_ref().map_or("unknown".to_string(), ToString::to_string);
+    let mut text = format!("{TABLE_HEAD}\n{}\n{}\n", ours.head(), ours.to_row("calibench"));
+    for (name, command) in METHODS {
+        let report = judged(arguments, &mut Program::new(command, timeout(arguments)?))?;
+        if report.scenes.iter().all(|scene| scene.over_bound.is_none()) {
+            return Err(incomplete(format!(
+                "{name} answered nothing: adapters/requirements-hand-eye.txt names what it needs"
+            )));
+        }
+        // Writing to a string cannot fail, here and below.
+        let _ = writeln!(text, "{}", report.to_row(name));
+        warn(&format!("{name}: judged"));
+    }
+    let _ = writeln!(
+        text,
+        "\nWritten by `calibench gate --hand-eye --methods FILE` with {} samples a scene, seed {}, commit {commit}. A dash: nothing was answered.",
+        ours.samples, ours.seed
+    );
+    write_atomically(path, text.as_bytes()).map_err(incomplete)?;
+    print(&text);
+    Ok(Exit::Held)
+}
