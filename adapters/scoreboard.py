@@ -54,7 +54,7 @@ ENTRIES = [
     Entry("opencv-5", ("opencv-python-headless>=5", "numpy"), "opencv_solver.py", "Apache-2.0",
           "200 iterations to machine precision; its binding takes points in single precision"),
     Entry("scipy", ("scipy", "numpy"), "scipy_solver.py", "BSD-3-Clause",
-          "a general solver: start, camera and differences are the adapter's; asked fewer scenes, since fifty views take it minutes", first=3),
+          "a general solver: start, camera and differences are the adapter's; not asked for the right minimum, since fifty views take it minutes", first=0),
     Entry("lensboy", ("lensboy", "numpy"), "lensboy_solver.py", "not stated in the package",
           "its OpenCV model without warp and outliers; made for richer lenses, states no covariance"),
     Entry("colmap", ("pycolmap", "pyceres", "numpy"), "colmap_solver.py", "BSD-3-Clause",
