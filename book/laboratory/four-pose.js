@@ -192,11 +192,11 @@
       }),
       trials: (theory, spread, done, aFrame) => {
         cells.forEach((cell, k) => {
-          cell[3].textContent = digits(spread[1 + k], 3);
-          cell[4].textContent = digits(spread[1 + k] / sd(theory, k), 3);
+          cell[3].textContent = spread[0] > 1 ? digits(spread[1 + k], 3) : '';
+          cell[4].textContent = spread[0] > 1 ? (spread[1 + k] / sd(theory, k)).toFixed(3) : '';
         });
         const refused = done - spread[0];
-        words.textContent = `${done} of ${TRIALS} calibrations; mean RMSE ${digits(spread[7])} px${refused ? `; ${refused} without a result.` : '.'}`;
+        words.textContent = `${done} of ${TRIALS} calibrations${spread[0] ? `; mean RMSE ${digits(spread[7])} px` : ''}${refused ? `; ${refused} without a result.` : '.'}`;
         pace.textContent = `${Math.round(aFrame)} calibrations a frame.`;
       },
     };
