@@ -15,7 +15,7 @@
 
   const knobs = {
     k1: { label: 'k1 of the lens', min: -0.4, max: 0.4, step: 0.01, chapter: -0.18 },
-    k2: { label: 'k2 of the lens', min: -0.1, max: 0.2, step: 0.01, chapter: 0.05 },
+    k2: { label: 'k2 of the lens', min: -0.2, max: 0.5, step: 0.01, chapter: 0.05 },
     height: { label: 'height of the line', unit: ' px', min: 0, max: HEIGHT - 1, chapter: 60 },
   };
 
