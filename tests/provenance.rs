@@ -1,6 +1,6 @@
 //! Can others read what a run wrote? `datapackage.json` and `ro-crate-metadata.json` against the files beside them.
 
-use crate::camera_files::{folder, run, text};
+use crate::program::{calibench as run, folder, text};
 use calibench::io::hash::sha256_hex;
 use serde_json::Value;
 use std::collections::BTreeMap;
