@@ -24,6 +24,7 @@ use calibench_harness::{
     Predicted, Progress, Record, Table,
 };
 
+mod drawings;
 mod figures;
 mod trials;
 mod weak;
@@ -83,6 +84,9 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     weak::claim_two_views(&mut record)?;
     weak::claim_facing_views(&mut record, context)?;
 
+    record.figure(drawings::imaging(&draw));
+    let verdicts = drawings::verdicts(&record)?;
+    record.figure(verdicts);
     record.figure(figures::space(&draw));
     record.figure(figures::views(&draw));
     record.figure(figures::residuals(&draw)?);

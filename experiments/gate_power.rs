@@ -11,9 +11,12 @@
 
 use calibench_gate::faults::{Class, Planted, planted};
 use calibench_gate::power::{Catch, FaultRow, Measured, catch, false_alarms};
+use calibench_gate::suite::suite;
 use calibench_harness::fingerprint::Fingerprint;
 use calibench_harness::{Band, Context, Experiment, ExperimentError, Record, Table};
 use rayon::prelude::*;
+
+mod figures;
 
 /// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -67,6 +70,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     let reason = "p-value of sums over the solver's results: bits of the solver move it in its last digits";
     record
         .exact("")
+        .count("samples-at-most", MOST_SAMPLES, "samples a scenario at which this run stops looking")
         .count("planted-faults", all, "planted faults, gross and subtle")
         .count("gross-faults", faults.len(), "gross faults")
         .count("gross-caught", caught, "gross faults caught")
@@ -102,6 +106,8 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
         .because("exact data, the same bits twice, invariances, refusals");
     record.table(table(&faults, &catches));
     thorough(&mut record)?;
+    let scenarios = suite().map_err(ExperimentError::at("the gate's suite"))?.len();
+    record.figure(figures::steps(scenarios, all));
     Ok(record)
 }
 

@@ -18,6 +18,8 @@ use calibench::synth::{Scene, Stream, StreamKey, Truth};
 use calibench_harness::stats::largest;
 use calibench_harness::{Band, Context, Experiment, ExperimentError, Figure, Plot, Record, Table};
 
+mod directions;
+
 /// The experiment.
 pub const EXPERIMENT: Experiment = Experiment {
     id: "grid-image",
@@ -79,6 +81,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     claim_holes(&mut record, &forward, size);
     record.table(line_table(&lines));
     draw(&mut record, context.seed, &lines, (&photo, &by_truth, &by_plane, &forward.image));
+    record.figure(directions::figure(&truth)?);
     Ok(record)
 }
 

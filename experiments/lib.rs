@@ -5,6 +5,7 @@ use calibench_harness::{Build, Experiment};
 
 pub mod board_warp;
 pub mod certified_digits;
+pub mod closed_form;
 pub mod collinearity;
 pub mod distortion_model;
 pub mod expiry;
@@ -32,6 +33,7 @@ mod sweep;
 #[rustfmt::skip]
 pub const EXPERIMENTS: &[Experiment] = &[
     line_bending::EXPERIMENT,
+    closed_form::EXPERIMENT,
     four_pose::EXPERIMENT,
     k2_observability::EXPERIMENT,
     prediction_map::EXPERIMENT,

@@ -32,6 +32,7 @@ use calibench_harness::{
 mod book;
 mod gui;
 mod modes;
+mod perspective;
 mod shown;
 
 use book::{
@@ -39,6 +40,7 @@ use book::{
 };
 use gui::{GUI, explain_gui};
 use modes::{modes_table, report_geometry, report_planar, residual_table};
+use perspective::judge_perspective;
 use shown::Shown;
 
 /// The experiment.
@@ -98,6 +100,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     claim_residual_shape(&mut record, context)?;
     report_derived(&mut record)?;
     claim_scales_differ(&mut record)?;
+    judge_perspective(&mut record)?;
     if shown.is_published() {
         explain_gui(&mut record, &centres, &fits[0], shown.band())?;
         reconcile(&mut record, shown.stand_in_text())?;

@@ -48,7 +48,7 @@ pub use claim::{Cases, Claim, ClaimDraft};
 pub use data_package::{Field, Resource, data_package};
 pub use emit::{emit, record_json};
 pub use experiment::{Context, Experiment, ExperimentError};
-pub use figure::{Dash, Figure, HeatMap, Look, Marker, Plot};
+pub use figure::{Align, Dash, Drawing, Figure, HeatMap, Look, Marker, Plot};
 pub use monte_carlo::{MonteCarlo, Outcome};
 pub use numbers::Numbers;
 pub use predicted::Predicted;

@@ -37,6 +37,30 @@ pub(super) fn draw_marker(canvas: &mut Canvas<'_>, (x, y): Point, look: Look) {
     }
 }
 
+/// A line with a head of two barbs, as long as the line allows.
+pub(super) fn draw_arrow(canvas: &mut Canvas<'_>, tail: Point, tip: Point, look: Look) {
+    for stroke in dashes(&[tail, tip], look.dash.pattern()) {
+        canvas.line(&stroke, look.colour, look.width_px);
+    }
+    if let Some(head) = arrow_head(tail, tip, 8.0) {
+        canvas.line(&head, look.colour, look.width_px);
+    }
+}
+
+/// Barb, tip, barb; none for an arrow that is shorter than a pixel.
+pub(super) fn arrow_head(tail: Point, tip: Point, longest_px: f64) -> Option<[Point; 3]> {
+    let (ax, ay) = (tip.0 - tail.0, tip.1 - tail.1);
+    let length = libm::hypot(ax, ay);
+    if length <= 1.0 {
+        return None;
+    }
+    let (ux, uy) = (ax / length, ay / length);
+    let head = length.min(longest_px);
+    let barb =
+        |side: f64| (tip.0 - head * ux + side * 0.5 * head * uy, tip.1 - head * uy - side * 0.5 * head * ux);
+    Some([barb(1.0), tip, barb(-1.0)])
+}
+
 /// The sample of a layer in the legend, from `(x, y)` to the right.
 pub(super) fn draw_sample(canvas: &mut Canvas<'_>, layer: &Layer, (x, y): Point, width: f64) {
     let patch = [(x, y - 5.0), (x + width, y - 5.0), (x + width, y + 5.0), (x, y + 5.0)];

@@ -5,6 +5,7 @@ mod bins;
 mod canvas;
 mod clip;
 mod colour;
+mod drawing;
 mod heat;
 mod legend;
 mod mark;
@@ -13,6 +14,7 @@ mod render;
 
 pub use bins::density;
 pub use colour::{Dash, Look, Marker};
+pub use drawing::{Align, At, Drawing};
 pub use heat::HeatMap;
 pub use plot::Plot;
 
@@ -67,6 +69,14 @@ impl Figure {
     ) -> Figure {
         let caption = caption.into();
         let bytes = render::svg(plots, columns, &caption).into_bytes();
+        Figure { name: name.into(), caption, format: Format::Svg, bytes, reproducible: true }
+    }
+
+    /// A drawing without axes. With debug assertions, words that run over its edge are a panic.
+    pub fn drawing(name: impl Into<String>, drawing: &Drawing, caption: impl Into<String>) -> Figure {
+        debug_assert_eq!(drawing.words_beyond_the_sheet(), Vec::<&str>::new());
+        let caption = caption.into();
+        let bytes = drawing.svg(&caption).into_bytes();
         Figure { name: name.into(), caption, format: Format::Svg, bytes, reproducible: true }
     }
 

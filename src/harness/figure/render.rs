@@ -5,7 +5,7 @@ use super::canvas::{self, Anchor, Canvas, Point, text_width};
 use super::clip::{Frame, dashes};
 use super::colour::{Dash, GRID, INK, Look, PAPER};
 use super::legend;
-use super::mark::draw_marker;
+use super::mark::{arrow_head, draw_marker};
 use super::plot::{Layer, Plot};
 
 const TITLE_PX: f64 = 14.0;
@@ -193,15 +193,8 @@ impl Panel {
         for &(x, y, dx, dy) in arrows {
             let (tail, tip) = (self.place((x, y)), self.place((x + dx, y + dy)));
             self.stroke_px(canvas, &[tail, tip], look);
-            let (ax, ay) = (tip.0 - tail.0, tip.1 - tail.1);
-            let length = libm::hypot(ax, ay);
-            if length > 1.0 {
-                let (ux, uy) = (ax / length, ay / length);
-                let head = length.min(4.5);
-                let barb = |side: f64| {
-                    (tip.0 - head * ux + side * 0.5 * head * uy, tip.1 - head * uy - side * 0.5 * head * ux)
-                };
-                self.stroke_px(canvas, &[barb(1.0), tip, barb(-1.0)], look);
+            if let Some(head) = arrow_head(tail, tip, 4.5) {
+                self.stroke_px(canvas, &head, look);
             }
         }
     }
