@@ -109,7 +109,11 @@ fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<Tick> {
     (first..=last).map(|k| k as f64 * step + 0.0).map(|value| Tick { value, text: text(value) }).collect()
 }
 
-/// Powers of ten; with few of them in view, their multiples by 2 and 5 as well.
+/// Fewer ticks do not tell how an axis is divided.
+const FEWEST_LOG_TICKS: usize = 3;
+
+/// Powers of ten; with few of them in view, their multiples by 2 and 5 as well, and with fewer those by 3 and 7 too. All
+/// are plain digits, or all that are powers of ten are raised.
 fn log_ticks(low: f64, high: f64, wanted: usize) -> Vec<Tick> {
     if !(low > 0.0 && high > low && high.is_finite()) {
         return Vec::new();
@@ -118,20 +122,31 @@ fn log_ticks(low: f64, high: f64, wanted: usize) -> Vec<Tick> {
     let decades = (last - first).max(1) as usize;
     let stride = decades.div_ceil(wanted.max(1)).max(1);
     let inside = |v: f64| v >= low * (1.0 - 1e-9) && v <= high * (1.0 + 1e-9);
+    let places = |multiples: &'static [f64]| -> Vec<(f64, i32)> {
+        let all = (first..=last).step_by(stride).flat_map(|d| multiples.iter().map(move |&m| (m, d)));
+        all.filter(|&(m, d)| inside(m * power_of_ten(d))).collect()
+    };
     let powers = (first..=last).filter(|&d| inside(power_of_ten(d))).count();
-    // Two ticks do not tell how an axis is divided.
-    let multiples: &[f64] = if high / low <= 100.0 || powers < 3 { &[1.0, 2.0, 5.0] } else { &[1.0] };
-    (first..=last)
-        .step_by(stride)
-        .flat_map(|d| multiples.iter().map(move |&m| (m, d)))
-        .map(|(m, d)| Tick { value: m * power_of_ten(d), text: log_text(m, d) })
-        .filter(|tick| inside(tick.value))
+    let few = high / low <= 100.0 || powers < FEWEST_LOG_TICKS;
+    let mut chosen = places(if few { &[1.0, 2.0, 5.0] } else { &[1.0] });
+    if few && chosen.len() < FEWEST_LOG_TICKS {
+        chosen = places(&[1.0, 2.0, 3.0, 5.0, 7.0]);
+    }
+    let raised = chosen.iter().any(|&(_, d)| !is_plain(d));
+    chosen
+        .into_iter()
+        .map(|(m, d)| Tick { value: m * power_of_ten(d), text: log_text(m, d, raised) })
         .collect()
 }
 
-/// `0.01 ... 1000` in plain digits, other powers with a raised exponent.
-fn log_text(multiple: f64, decade: i32) -> String {
-    if (-3..4).contains(&decade) {
+/// Whether `0.001 ... 5000` are written with all their digits.
+fn is_plain(decade: i32) -> bool {
+    (-3..4).contains(&decade)
+}
+
+/// Plain digits, or a power of ten with a raised exponent.
+fn log_text(multiple: f64, decade: i32, raised: bool) -> String {
+    if decade == 0 || !raised {
         let decimals = (-decade).max(0) as usize;
         return format!("{:.decimals$}", multiple * power_of_ten(decade));
     }
@@ -173,8 +188,9 @@ mod tests {
     fn log_ticks_are_powers_of_ten_or_their_simple_multiples() {
         assert_eq!(
             texts(&log_ticks(1e-6, 1.0, 4)),
-            ["10\u{207b}\u{2076}", "10\u{207b}\u{2074}", "0.01", "1"]
+            ["10\u{207b}\u{2076}", "10\u{207b}\u{2074}", "10\u{207b}\u{b2}", "1"]
         );
+        assert_eq!(texts(&log_ticks(0.12, 0.6, 4)), ["0.2", "0.3", "0.5"]);
         assert_eq!(texts(&log_ticks(0.9, 12.0, 4)), ["1", "2", "5", "10"]);
         assert!(log_ticks(0.0, 1.0, 4).is_empty());
     }
