@@ -177,6 +177,7 @@ fn predicted(cell: &Design) -> RmseDistribution {
 
 /// The mean of T values of the predicted distribution.
 fn claim_mean(record: &mut Record, name: &str, cells: &[Cell]) {
+    let over = if name == "grid" { "noise and views" } else { "marks" };
     let each = each_of(cells.len(), FALSE_ALARM);
     let cases = cells.iter().map(|cell| {
         let (mean, theory) = (cell.swept.mean("rmse"), &cell.theory);
@@ -189,7 +190,7 @@ fn claim_mean(record: &mut Record, name: &str, cells: &[Cell]) {
     record
         .claim_that(
             format!("mean-rmse-{name}"),
-            "the mean RMSE is that of sigma sqrt(chi2 / N) with 2N - p degrees of freedom in every cell",
+            format!("the mean RMSE is that of sigma sqrt(chi2 / N) with 2N - p degrees of freedom in every cell of the study of {over}"),
         )
         .every("cells", cases)
         .at_rate(FALSE_ALARM)

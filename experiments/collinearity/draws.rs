@@ -80,7 +80,10 @@ pub fn claim_theory(record: &mut Record, ours: &[Found], noise_free: &[Found], d
         record
             .claim_that(
                 format!("chi-squared-mean-{name}"),
-                "over the draws the sum of squares has the mean of its chi-squared distribution",
+                format!(
+                    "over the draws the sum of squares has the mean of its chi-squared distribution: {}",
+                    centre.in_words()
+                ),
             )
             .within(sample.mean(0), mean)
             .at_rate(THEORY_RATE)
@@ -93,7 +96,10 @@ pub fn claim_theory(record: &mut Record, ours: &[Found], noise_free: &[Found], d
         record
             .claim_that(
                 format!("chi-squared-variance-{name}"),
-                "over the draws the sum of squares has the variance of its chi-squared distribution",
+                format!(
+                    "over the draws the sum of squares has the variance of its chi-squared distribution: {}",
+                    centre.in_words()
+                ),
             )
             .within(sample.covariance(0, 0) / variance, Interval::around(1.0, half))
             .at_rate(THEORY_RATE)
@@ -105,7 +111,10 @@ pub fn claim_theory(record: &mut Record, ours: &[Found], noise_free: &[Found], d
             record
                 .claim_that(
                     format!("rms-{name}"),
-                    "our RMS comes from the distribution of residuals under the right model",
+                    format!(
+                        "our RMS comes from the distribution of residuals under the right model: {}",
+                        centre.in_words()
+                    ),
                 )
                 .drawn_from(ours[i].plane.rms_px, &predicted, FALSE_ALARM_RATE)
                 .unit("px")

@@ -24,6 +24,16 @@ pub const CENTRES: [Centre; 4] = [Centre::Image, Centre::Truth, Centre::Free, Ce
 pub const MAIN: usize = 2;
 
 impl Centre {
+    /// The treatment in words, as a statement ends with it.
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Centre::Image => "centre held at the image's",
+            Centre::Truth => "centre held at its true place",
+            Centre::Free => "centre free",
+            Centre::ImageTangential => "centre held at the image's, p1 and p2 free",
+        }
+    }
+
     pub fn name(self) -> &'static str {
         match self {
             Centre::Image => "image-centre",

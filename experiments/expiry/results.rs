@@ -252,12 +252,13 @@ pub(crate) fn claims(record: &mut Record, r: &Results, seed: u64) {
     let spread = (2.0 * RISK * (1.0 - RISK) / FLEET as f64).sqrt();
     let reason =
         "the limits were set on other stations: binomial, twice, as the setting has chance in it too";
-    for (id, risk) in [
-        ("calendar-keeps-its-risk", r.risk(|_| r.calendar_shifts() as usize)),
-        ("check-keeps-its-risk", r.risk_of_check()),
+    for (id, rule, risk) in [
+        ("calendar-keeps-its-risk", "calendar", r.risk(|_| r.calendar_shifts() as usize)),
+        ("check-keeps-its-risk", "check", r.risk_of_check()),
     ] {
-        let statement = "on stations it was not set by, it lets no more exceed the tolerance unnoticed than \
-                         it was set to";
+        let statement = format!(
+            "on stations that it was not set by, the {rule} lets no more exceed the tolerance unnoticed than it was set to"
+        );
         let highest = RISK + normal_two_sided(2.0 * RATE) * spread;
         record.claim_that(id, statement).at_most(risk, highest).at_rate(RATE).because(reason);
     }
