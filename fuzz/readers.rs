@@ -8,7 +8,8 @@ use calibench::io::image::{parse_extent, parse_image};
 use calibench::io::result::parse_camera;
 use calibench::io::robot::parse_robot;
 use calibench::io::{
-    memory, parse_checks, parse_corners, parse_known, parse_marks, parse_pixel_ends, parse_point_pairs, table,
+    memory, parse_checks, parse_corners, parse_known, parse_marks, parse_pixel_ends, parse_point_pairs,
+    parse_spatial, table,
 };
 use calibench::photos::{BoardSpec, parse_board_file};
 use calibench_gate::accept::{accept, id_in, read_line};
@@ -39,6 +40,7 @@ pub const READERS: [Reader; 12] = [
 pub fn corners(bytes: &[u8]) {
     let _ = table::columns(bytes);
     let _ = parse_corners("corners", bytes);
+    let _ = parse_spatial("spatial", bytes);
 }
 
 /// Point pairs, marks of a part, pixels at both ends of lengths, poses of a robot, and checks of a reference.

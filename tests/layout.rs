@@ -95,7 +95,7 @@ fn every_file_of_tests_is_run() {
 const LAYERS: [&[&str]; 7] = [
     &["distribution", "geometry"],
     &["camera", "board", "raster"],
-    &["synth", "detect", "calibrate", "planar", "rectify"],
+    &["synth", "detect", "calibrate", "tsai", "planar", "rectify"],
     &["evaluate"],
     &["downstream"],
     &["io"],

@@ -51,3 +51,4 @@ pub mod planar;
 pub mod raster;
 pub mod rectify;
 pub mod synth;
+pub mod tsai;

@@ -126,7 +126,10 @@ fn grouped<const N: usize>(
     Ok(corners)
 }
 
-fn refuse_repeated_points<const N: usize>(file: &str, rows: &[Row<2, N>]) -> Result<(), TableError> {
+pub(super) fn refuse_repeated_points<const N: usize>(
+    file: &str,
+    rows: &[Row<2, N>],
+) -> Result<(), TableError> {
     let mut first_line = BTreeMap::new();
     for row in rows {
         if let Some(first) = first_line.insert(&row.names, row.line) {

@@ -27,6 +27,7 @@ pub mod provenance;
 pub mod result;
 pub mod robot;
 pub mod shown;
+pub mod spatial;
 pub mod table;
 
 pub use atomic::{write_atomically, write_together};
@@ -51,4 +52,5 @@ pub use pairs::{PointPairs, parse_point_pairs, read_point_pairs};
 pub use provenance::Commit;
 pub use result::{CalibrationFields, LeftOut, ResultError, read_camera, read_lens_camera};
 pub use shown::{ShownPath, shown};
+pub use spatial::{SpatialFile, parse_spatial};
 pub use table::TableError;
