@@ -97,7 +97,7 @@ const LAYERS: [&[&str]; 7] = [
     &["camera", "board", "raster"],
     &["synth", "detect", "calibrate", "tsai", "planar", "rectify"],
     &["evaluate"],
-    &["downstream"],
+    &["downstream", "validate"],
     &["io"],
     &["photos"],
 ];

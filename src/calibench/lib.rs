@@ -52,3 +52,4 @@ pub mod raster;
 pub mod rectify;
 pub mod synth;
 pub mod tsai;
+pub mod validate;

@@ -13,4 +13,4 @@ mod fit;
 pub use board::{BoardSpec, BoardSpecError, DetectError, MarkKind};
 pub use board_file::{BoardFileError, parse_board_file};
 pub use discs::{NotFound, ordered_discs};
-pub use fit::{BiasCorrection, Fit, Fitter, Rejected};
+pub use fit::{BiasCorrection, Fit, Fitter, Rejected, without_disc_bias};
