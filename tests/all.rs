@@ -51,5 +51,7 @@ mod study_folder;
 mod study_parquet;
 mod study_statistics;
 mod thread_count;
+mod tsai;
+mod validate;
 mod verb_examples;
 mod writers;

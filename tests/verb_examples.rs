@@ -2,8 +2,10 @@
 //! they read.
 
 use crate::shell::verbs;
-use calibench::geometry::rotation;
-use calibench::io::write_png;
+use calibench::calibrate::{Settings, calibrate};
+use calibench::camera::Parameter;
+use calibench::geometry::{Pose, Vec3, rotation};
+use calibench::io::{CalibrationFields, write_png};
 use calibench::synth::render::{Imaging, nine_dot_stand_in, photograph};
 use calibench::synth::{Scene, Truth};
 use std::fmt::Write;
@@ -65,10 +67,17 @@ fn folder() -> PathBuf {
     fs::create_dir_all(&folder).expect("a folder is made");
     let scene = Scene::example();
     let mut corners = "view,point,X,Y,u,v\n".to_string();
+    let mut solid = "view,point,X,Y,Z,u,v\n".to_string();
     let mut robot = "view,x,y,z,rx,ry,rz\n".to_string();
     for (view, (seen, pose)) in scene.exact().iter().zip(&scene.truth.cam_from_target).enumerate() {
         for (point, (at, pixel)) in seen.pairs().enumerate() {
             writeln!(corners, "{view},{point},{},{},{},{}", at.x, at.y, pixel.x, pixel.y)
+                .expect("text grows");
+            // The target folded along a column, and taken further away.
+            let place = Vec3::new(at.x.min(0.0), at.y, at.x.max(0.0));
+            let pose = Pose { translation: 1.5 * pose.translation, ..*pose };
+            let pixel = scene.truth.camera.project(&pose.apply(&place)).expect("it is before the camera");
+            writeln!(solid, "{view},{point},{},{},{},{},{}", place.x, place.y, place.z, pixel.x, pixel.y)
                 .expect("text grows");
         }
         let (t, w) = (pose.inverse().translation, -rotation::log(&pose.rotation));
@@ -80,8 +89,17 @@ fn folder() -> PathBuf {
         write_png(&folder.join(format!("photo{view}.png")), &photo).expect("written");
     }
     write_png(&folder.join("dots.png"), &nine_dot_stand_in().image.to_u8()).expect("written");
+    // The same calibration, and other photographs from the same places, by other names.
+    let settings = Settings::standard().hold(Parameter::K2, 0.0).with_image_size(Truth::EXAMPLE_IMAGE);
+    let result = calibrate(&scene.exact(), &settings).expect("four views");
+    let again = CalibrationFields::of(&result.into(), &[], Some(Truth::EXAMPLE_IMAGE)).to_json();
+    let renamed = corners.replace("\n0,", "\nnew0,").replace("\n1,", "\nnew1,");
+    let renamed = renamed.replace("\n2,", "\nnew2,").replace("\n3,", "\nnew3,");
     for (name, text) in [
         ("corners.csv", corners.as_str()),
+        ("new.csv", renamed.as_str()),
+        ("solid.csv", solid.as_str()),
+        ("again.json", again.as_str()),
         ("robot.csv", robot.as_str()),
         (
             "pairs.csv",

@@ -25,7 +25,7 @@ struct Verb {
     arguments: &'static [&'static str],
 }
 
-const VERBS: [Verb; 18] = [
+const VERBS: [Verb; 20] = [
     Verb { name: "board", arguments: &["board", "circles:9x7:10mm:3mm", "--out", "out"] },
     Verb {
         name: "camera",
@@ -42,6 +42,8 @@ const VERBS: [Verb; 18] = [
         name: "diff",
         arguments: &["diff", "../camera.json", "../other.json", "--image-size", "640x480", "--out", "out"],
     },
+    Verb { name: "tsai", arguments: &["tsai", "../corners.csv", "--image-size", "640x480", "--out", "out"] },
+    Verb { name: "validate", arguments: &["validate", "../known.json", "../corners.csv", "--out", "out"] },
     Verb {
         name: "measure",
         arguments: &[

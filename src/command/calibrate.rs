@@ -4,6 +4,7 @@
 use super::board::board_or_file;
 use super::report::table;
 use super::{Exit, print, warn};
+use calibench::board::View;
 use calibench::calibrate::{Board, Loss, Prior};
 use calibench::camera::{FreeParameters, Model, Parameter, UnknownModel};
 use calibench::io::ShownPath;
@@ -303,6 +304,43 @@ fn from_table(arguments: &Arguments, file: &Path) -> Result<Exit, Failure> {
         ..Observed::default()
     };
     camera::run(arguments, observed)
+}
+
+/// Views of a board, for verbs that judge a camera: from a corner file, or with a board from photographs.
+#[derive(Debug)]
+pub(super) struct Views {
+    pub(super) source: String,
+    pub(super) names: Vec<String>,
+    pub(super) views: Vec<View>,
+    /// The board whose discs' bias is to be corrected.
+    pub(super) discs: Option<calibench::board::Board>,
+}
+
+/// Reads them.
+pub(super) fn views_of(
+    files: &[PathBuf],
+    board: Option<&BoardSpec>,
+    image_size: Option<(usize, usize)>,
+    memory: u64,
+) -> Result<Views, String> {
+    if let Some(board) = board {
+        let reading = photographs::Reading { image_size, memory, overlays: None };
+        let Observed { source, names, views, discs, notes, .. } =
+            reading.observe(board, files).map_err(|failure| failure.message)?;
+        notes.iter().for_each(|note| warn(&format!("warning: {note}")));
+        return Ok(Views { source, names, views, discs });
+    }
+    let [file] = files else {
+        return Err(format!(
+            "{} files but no --board: give one CSV file, or the board that the photographs show",
+            files.len()
+        ));
+    };
+    let bytes = read_named(file, MOST_TABLE_BYTES).map_err(|error| error.to_string())?;
+    let source = file.shown();
+    unended(&source, &bytes).iter().for_each(|said| warn(&format!("warning: {said}")));
+    let corners = parse_corners(&source, bytes.as_slice()).map_err(|error| error.to_string())?;
+    Ok(Views { source, names: corners.view_names, views: corners.views, discs: None })
 }
 
 /// What is to be said of a table whose last line has no end.

@@ -51,7 +51,7 @@ fn parse_distance(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected a distance in mm, above 0".into())
 }
 
-fn parse_rate(text: &str) -> Result<f64, String> {
+pub(super) fn parse_rate(text: &str) -> Result<f64, String> {
     let rate = text.parse().ok().filter(|rate| 0.0 < *rate && *rate < 1.0);
     rate.ok_or_else(|| "expected a rate between 0 and 1, such as 0.01".into())
 }

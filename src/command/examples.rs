@@ -3,7 +3,7 @@
 use clap::{Command, CommandFactory};
 
 /// Verbs, those of a verb after it, and what one would type. What it reads is in `tests/verb_examples.rs`.
-const EXAMPLES: [(&str, &[&str]); 32] = [
+const EXAMPLES: [(&str, &[&str]); 34] = [
     ("list", &["calibench list", "calibench list --names", "calibench list --format json"]),
     ("explain", &["calibench explain line-bending.max-deviation", "calibench explain 5.4"]),
     ("run", &["calibench run line-bending", "calibench run line-bending --seed 7 --out another-seed"]),
@@ -42,6 +42,20 @@ const EXAMPLES: [(&str, &[&str]); 32] = [
         &[
             "calibench convert result/result.json camera.yaml --to opencv-yaml",
             "calibench convert chess:9x6:25mm target.yaml",
+        ],
+    ),
+    (
+        "tsai",
+        &[
+            "calibench tsai corners.csv --image-size 640x480 --out one-view",
+            "calibench tsai solid.csv --principal-point 326,243 --aspect free",
+        ],
+    ),
+    (
+        "validate",
+        &[
+            "calibench validate result/result.json new.csv --out validation",
+            "calibench validate result/result.json --again again.json",
         ],
     ),
     ("diff", &["calibench diff result/result.json camera.yaml --out difference"]),

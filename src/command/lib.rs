@@ -30,7 +30,9 @@ mod said;
 mod startup;
 mod study;
 mod terminal;
+mod tsai;
 mod undistort;
+mod validate;
 
 pub use exit::Exit;
 pub use terminal::{print, warn};
@@ -86,6 +88,10 @@ enum Verb {
     /// Converts cameras, corners and boards between the files of OpenCV, ROS, Kalibr, mrcal, COLMAP, MATLAB,
     /// HALCON and this program
     Convert(Box<convert::Arguments>),
+    /// Calibrates a camera from one view of a tilted plane or of a target in three dimensions, by Tsai's two stages
+    Tsai(tsai::Arguments),
+    /// Judges a calibration by views that it has not seen, by its own in parts, or by repetitions
+    Validate(validate::Arguments),
     /// Compares two cameras over the frame, and tests whether both may be one
     Diff(diff::Arguments),
     /// Measures lengths on a plane, with their uncertainty split by cause
@@ -142,6 +148,8 @@ pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCo
         Some(Verb::Ninepoint(arguments)) => ninepoint::run(&arguments),
         Some(Verb::Undistort(arguments)) => undistort::run(&arguments),
         Some(Verb::Convert(arguments)) => convert::run(&arguments),
+        Some(Verb::Tsai(arguments)) => tsai::run(&arguments),
+        Some(Verb::Validate(arguments)) => validate::run(&arguments),
         Some(Verb::Diff(arguments)) => diff::run(&arguments),
         Some(Verb::Measure(arguments)) => measure::run(&arguments),
         Some(Verb::Register(arguments)) => register::run(&arguments),

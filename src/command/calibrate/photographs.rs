@@ -52,20 +52,47 @@ struct Seen {
 }
 
 pub(super) fn run(arguments: &Arguments, board: &BoardSpec, photos: &[PathBuf]) -> Result<Exit, Failure> {
-    let memory = Memory::new(arguments.memory);
-    let seen = each(photos, |index, path| {
-        let needed = image_extent(path)?.memory_to_detect();
-        let _taken = memory.take(path, needed).map_err(ImageError::Input)?;
-        see(path, index, board, arguments.out.as_deref())
-    });
-    let observed = observed(arguments, board, photos, seen)?;
-    for LeftOut { name, reason } in &observed.left_out {
-        warn(&format!("left out: {name}: {reason}"));
+    let reading = Reading {
+        image_size: arguments.image_size,
+        memory: arguments.memory,
+        overlays: arguments.out.as_deref(),
+    };
+    camera::run(arguments, reading.observe(board, photos)?)
+}
+
+/// How photographs are read.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::calibrate) struct Reading<'a> {
+    /// The size they must have; else that of most.
+    pub(in crate::calibrate) image_size: Option<Size>,
+    /// Bytes that they may take together.
+    pub(in crate::calibrate) memory: u64,
+    /// Folder for pictures with the marks drawn in.
+    pub(in crate::calibrate) overlays: Option<&'a Path>,
+}
+
+impl Reading<'_> {
+    /// The marks of a board in photographs; those that fail are named and left out.
+    pub(in crate::calibrate) fn observe(
+        &self,
+        board: &BoardSpec,
+        photos: &[PathBuf],
+    ) -> Result<Observed, Failure> {
+        let memory = Memory::new(self.memory);
+        let seen = each(photos, |index, path| {
+            let needed = image_extent(path)?.memory_to_detect();
+            let _taken = memory.take(path, needed).map_err(ImageError::Input)?;
+            see(path, index, board, self.overlays)
+        });
+        let observed = observed(self.image_size, board, photos, seen)?;
+        for LeftOut { name, reason } in &observed.left_out {
+            warn(&format!("left out: {name}: {reason}"));
+        }
+        if observed.views.is_empty() {
+            return Err(format!("none of {} photographs shows the {board}", photos.len()).into());
+        }
+        Ok(observed)
     }
-    if observed.views.is_empty() {
-        return Err(format!("none of {} photographs shows the {board}", photos.len()).into());
-    }
-    camera::run(arguments, observed)
 }
 
 /// What `work` gives for each photograph, in their order. Threads of its own: one of a pool that waits for
@@ -120,12 +147,12 @@ fn draw(photo: &Grey, marks: &Result<Vec<Vec2>, NotFound>, columns: usize) -> Ov
 }
 
 fn observed(
-    arguments: &Arguments,
+    image_size: Option<Size>,
     board: &BoardSpec,
     photos: &[PathBuf],
     seen: Vec<Result<Seen, ImageError>>,
 ) -> Result<Observed, Failure> {
-    let expected = match arguments.image_size {
+    let expected = match image_size {
         Some(size) => Some((size, "--image-size has".to_string())),
         None => ruling_size(&seen)?,
     };
