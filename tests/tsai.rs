@@ -1,7 +1,7 @@
 //! Does Tsai's method give the camera of one view, refuse the views that have none, and start the refinement well?
 
-use crate::camera_files::{folder, run, text};
 use crate::data;
+use crate::program::{calibench as run, folder, text};
 use calibench::board::View;
 use calibench::calibrate::{Settings, calibrate};
 use calibench::camera::{Camera, FreeParameters, Parameter};

@@ -1,6 +1,6 @@
 //! Does validation fail right calibrations as rarely as it says, and wrong ones?
 
-use crate::camera_files::{folder, run, text};
+use crate::program::{calibench as run, folder, text};
 use calibench::board::View;
 use calibench::calibrate::{Calibration, Settings, calibrate};
 use calibench::camera::{Camera, Parameter};
