@@ -242,7 +242,7 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
         return certified::run(arguments);
     }
     if arguments.hand_eye {
-        return hand_eye::run(arguments, build);
+        return hand_eye::run(arguments);
     }
     if let Some(folder) = &arguments.power_table {
         return power::print_table(folder);

@@ -6,7 +6,6 @@ use super::{Arguments, Size, Stop, incomplete, terms, timeout, usage};
 use calibench::io::write_atomically;
 use calibench_gate::THOROUGH;
 use calibench_hand_eye_gate::{Builtin, MOST_SAMPLES, Program, QUICK, Report, Solver, run as judge};
-use calibench_harness::Build;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -30,9 +29,9 @@ const METHODS: [(&str, &str); 14] = [
 ];
 
 /// Judges one solver; without a program that is this library's.
-pub(super) fn run(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, Stop> {
     if let Some(path) = &arguments.methods {
-        return write_table(arguments, path, build);
+        return write_table(arguments, path);
     }
     let mut solver: Box<dyn Solver> = match &arguments.solver {
         Some(command) => Box::new(Program::new(command, timeout(arguments)?)),
@@ -69,11 +68,10 @@ How large are the errors of X, in terms of the Cramer-Rao bound, and what does n
 ";
 
 /// Judges this library and the methods of the adapters, and writes the table.
-fn write_table(arguments: &Arguments, path: &Path, build: &Build) -> Result<Exit, Stop> {
+fn write_table(arguments: &Arguments, path: &Path) -> Result<Exit, Stop> {
     let project = calibench_harness::project::Project::find().map_err(usage)?;
     std::env::set_current_dir(project.root()).map_err(incomplete)?;
     let ours = judged(arguments, &mut Builtin)?;
-    let commit = build.commit.as_ref().map_or("unknown".to_string(), ToString::to_string);
     let mut text = format!("{TABLE_HEAD}\n{}\n{}\n", ours.head(), ours.to_row("calibench"));
     for (name, command) in METHODS {
         let report = judged(arguments, &mut Program::new(command, timeout(arguments)?))?;
@@ -88,7 +86,7 @@ fn write_table(arguments: &Arguments, path: &Path, build: &Build) -> Result<Exit
     }
     let _ = writeln!(
         text,
-        "\nWritten by `calibench gate --hand-eye --methods FILE` with {} samples a scene, seed {}, commit {commit}. A dash: nothing was answered.",
+        "\nWritten by `calibench gate --hand-eye --methods FILE` with {} samples a scene, seed {}. A dash: nothing was answered.",
         ours.samples, ours.seed
     );
     write_atomically(path, text.as_bytes()).map_err(incomplete)?;
