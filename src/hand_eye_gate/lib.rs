@@ -121,12 +121,13 @@ mod tests {
     }
 
     #[test]
-    fn a_closed_form_is_exact_and_less_precise_than_the_bound() {
+    fn a_closed_form_is_exact_and_less_precise_than_the_bound_and_knows_the_order_of_stations() {
         let report = judged(|problem, answer| match problem.solve() {
             Ok(found) => Answer { x: Some(rows(&found.park_martin)), covariance: None, ..answer },
             Err(_) => answer,
         });
-        assert_eq!(failing(&report), [Property::Nees], "{}", report.to_text());
+        // A motion and its inverse leave other equations for the translation where rotations of robot and camera differ.
+        assert_eq!(failing(&report), [Property::Nees, Property::ViewOrder], "{}", report.to_text());
     }
 
     #[test]
