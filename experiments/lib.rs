@@ -22,6 +22,7 @@ pub mod line_bending;
 pub mod millimetres;
 pub mod nine_point;
 pub mod noise_floor;
+pub mod one_view;
 pub mod photographs;
 pub mod pose_count;
 pub mod position_correction;
@@ -41,6 +42,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     interval_coverage::EXPERIMENT,
     noise_floor::EXPERIMENT,
     focal_depth::EXPERIMENT,
+    one_view::EXPERIMENT,
     collinearity::EXPERIMENT,
     grid_image::EXPERIMENT,
     millimetres::EXPERIMENT,
