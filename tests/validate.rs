@@ -47,7 +47,7 @@ fn estimate(result: &Calibration) -> Estimate<'_> {
 
 /// Whether so many of so many trials go with a rate of at most this, and of no less than the other.
 fn counted(count: usize, trials: usize, least: f64, most: f64) {
-    println!("{count} of {trials}");
+    eprintln!("{count} of {trials}");
     let of_rate = Interval::of_proportion(count, trials, DOUBT);
     assert!(of_rate.low <= most && of_rate.high >= least, "{count} of {trials}: {of_rate:?}");
 }
