@@ -70,7 +70,7 @@
       surface.fillStyle = '#d55e00';
       surface.fillRect(at - 1, 0, 2, HEIGHT);
       const found = line(k1, k2);
-      words.textContent = `The top line leaves its regression line by ${digits(found[0])} px in the photograph and by ${digits(found[2], found[2] < 1e-9 ? 1 : 4)} px after the correction.`;
+      words.textContent = `The computed points of the top line leave their regression line by ${digits(found[0])} px in the photograph and by ${digits(found[2], found[2] < 1e-9 ? 1 : 4)} px after the correction.`;
     };
     return { show };
   };

@@ -112,7 +112,8 @@ impl Moments {
 const FEWEST: u64 = 4;
 
 /// The interval of the root of a mean square: `ln(c s^2)` is nearly normal with the standard deviation `c r`, `c = n / (n - z)`, and r the
-/// relative standard deviation of `s^2` (Bonett, Computational Statistics & Data Analysis 50, 2006, equation 3). `None` where z exceeds n.
+/// relative standard deviation of `s^2`: after Bonett (Computational Statistics & Data Analysis 50, 2006), with the kurtosis about the mean in
+/// place of his trimmed one, which power sums do not have. `None` where z exceeds n.
 fn root_interval(value: f64, n: f64, relative: f64, false_alarm: f64) -> Option<Estimated> {
     let z = normal_two_sided(false_alarm);
     let c = n / (n - z);
