@@ -13,7 +13,7 @@ const script = path.join(__dirname, '../book/laboratory/solver.js');
 const Laboratory = vm.runInThisContext(`${fs.readFileSync(script, 'utf8')}\nLaboratory`);
 
 // The chapter's scene of four poses.
-const CHAPTER = [20, 120, 4, 0.1, -0.18, 0.05, 9, 7];
+const CHAPTER = [20, 120, 0, 4, 0.1, -0.18, 0.05, 9, 7];
 // The least of so many portions is the time: what else the machine does only adds.
 const PORTIONS = 40;
 const OF_A_PORTION = 25;

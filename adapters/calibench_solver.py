@@ -17,16 +17,26 @@ def problem_of(line):
     said = json.loads(line)
     arrays = {key: [np.array(view[name], dtype=float).reshape(-1, 2) for view in said["views"]]
               for key, name in (("points", "target"), ("pixels", "pixels"))}
-    return Problem(id=said["id"], image_size=tuple(said["image_size"]), free=tuple(said["free"]), hold=said["held"], **arrays)
+    model = said.get("model", "brown-conrady")
+    return Problem(id=said["id"], image_size=tuple(said["image_size"]), model=model, free=tuple(said["free"]), hold=said["held"], **arrays)
 
 
 def solve(problem):
     return calibench.calibrate(
-        problem.points, problem.pixels, free=problem.free, hold=problem.hold, image_size=problem.image_size
+        problem.points,
+        problem.pixels,
+        model=problem.model,
+        free=problem.free,
+        hold=problem.hold,
+        image_size=problem.image_size,
     )
 
 
+MODELS = ["brown-conrady", "rational", "thin-prism", "tilted", "kannala-brandt", "division", "double-sphere"]
+
+
 def main():
+    print(json.dumps({"protocol": 2, "models": MODELS}), flush=True)
     for line in sys.stdin:
         print(json.dumps(answered(solve, problem_of(line))), flush=True)
 

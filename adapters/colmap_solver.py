@@ -8,31 +8,14 @@ together; those that are to be held are held here by the manifold of Ceres, as i
 start from a target: the starting values are those of `minimal_solver.py`. The covariance is that of Ceres, times `s^2`.
 """
 
-import json
-import sys
-
 # First, because it sets the number of threads.
-from minimal_solver import NAMES, rotation_matrix, start
+from minimal_solver import NAMES, Unsupported, main, rotation_matrix, start, views_of
 
 import numpy as np
 import pyceres
 import pycolmap
 
 ORDER = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]
-
-
-class Unsupported(ValueError):
-    """COLMAP's camera cannot say this."""
-
-
-def views_of(problem):
-    views = [(np.array(view["target"], float), np.array(view["pixels"], float)) for view in problem["views"]]
-    for target, pixels in views:
-        if target.shape != pixels.shape or target.ndim != 2 or not np.isfinite(pixels).all():
-            raise ValueError("points and pixels do not pair, or a pixel was not measured")
-    if not views:
-        raise ValueError("no views")
-    return views
 
 
 def camera_of(problem, values):
@@ -116,20 +99,5 @@ def solve(problem):
     }
 
 
-def answer(problem):
-    try:
-        return {"id": problem["id"]} | solve(problem)
-    except Unsupported as error:
-        return {"id": problem["id"], "status": "unsupported", "message": str(error)}
-    except (ValueError, ArithmeticError, np.linalg.LinAlgError, IndexError) as error:
-        return {"id": problem["id"], "status": "refused", "message": str(error)}
-
-
-def main():
-    np.seterr(all="ignore")
-    for line in sys.stdin:
-        print(json.dumps(answer(json.loads(line))), flush=True)
-
-
 if __name__ == "__main__":
-    main()
+    main(solve)

@@ -3,7 +3,8 @@
     calibench gate --solver "python3 adapters/minimal_solver.py"
 
 It estimates what it is asked to by Gauss-Newton with Levenberg damping and numerical derivatives, states its covariance, and
-refuses what it cannot solve. Start your own adapter from `main` and `answer`.
+refuses what it cannot solve. It writes no greeting, so that it is asked about Brown-Conrady's lens only. Start your own
+adapter from `main` and `answer`.
 """
 
 import json
@@ -90,17 +91,20 @@ def start(problem, views, held):
     return camera, poses
 
 
+def views_of(problem):
+    views = [(np.array(view["target"], float), np.array(view["pixels"], float)) for view in problem["views"]]
+    for target, pixels in views:
+        if target.shape != pixels.shape or target.ndim != 2 or not np.isfinite(pixels).all():
+            raise ValueError("points and pixels do not pair, or a pixel was not measured")
+    if not views:
+        raise ValueError("no views")
+    return views
+
+
 def solve(problem):
     held = problem["held"]
     free = [NAMES.index(name) for name in problem["free"]]
-    views = []
-    for view in problem["views"]:
-        target, pixels = np.array(view["target"], float), np.array(view["pixels"], float)
-        if target.shape != pixels.shape or target.ndim != 2 or not np.isfinite(pixels).all():
-            raise ValueError("points and pixels do not pair, or a pixel was not measured")
-        views.append((target, pixels))
-    if not views:
-        raise ValueError("no views")
+    views = views_of(problem)
     # A target of unit size makes the damping mean the same for rotations and translations.
     unit = np.sqrt(np.mean([np.sum(t**2, axis=1).mean() for t, _ in views]))
     views = [(t / unit, p) for t, p in views]
@@ -175,18 +179,24 @@ def solve(problem):
     }
 
 
-def answer(problem):
+class Unsupported(ValueError):
+    """The program is not made for this problem."""
+
+
+def answer(problem, solve):
     try:
         return {"id": problem["id"]} | solve(problem)
-    except (ValueError, ArithmeticError, np.linalg.LinAlgError, IndexError) as error:
+    except Unsupported as error:
+        return {"id": problem["id"], "status": "unsupported", "message": str(error)}
+    except (ValueError, ArithmeticError, RuntimeError, np.linalg.LinAlgError, IndexError) as error:
         return {"id": problem["id"], "status": "refused", "message": str(error)}
 
 
-def main():
+def main(solve):
     np.seterr(all="ignore")
     for line in sys.stdin:
-        print(json.dumps(answer(json.loads(line))), flush=True)
+        print(json.dumps(answer(json.loads(line), solve)), flush=True)
 
 
 if __name__ == "__main__":
-    main()
+    main(solve)

@@ -8,21 +8,14 @@ says otherwise. mrcal frees all coefficients of a lens together and takes marks 
 it is put: the starting values are those of `minimal_solver.py`. The covariance is `s^2 (J^T J)^-1` from the Jacobian that mrcal gives.
 """
 
-import json
-import sys
-
 # First, because it sets the number of threads.
-from minimal_solver import NAMES, start
+from minimal_solver import NAMES, Unsupported, main, start, views_of
 
 import mrcal
 import numpy as np
 
 CORE = ["fx", "fy", "cx", "cy"]
 LENSES = {"LENSMODEL_OPENCV4": ["k1", "k2", "p1", "p2"], "LENSMODEL_OPENCV5": ["k1", "k2", "p1", "p2", "k3"]}
-
-
-class Unsupported(ValueError):
-    """mrcal cannot be asked this."""
 
 
 def lens_of(problem):
@@ -58,16 +51,6 @@ def observations_of(views, lattice):
         seen[view, row, column, :2] = pixels
         seen[view, row, column, 2] = 1.0
     return seen
-
-
-def views_of(problem):
-    views = [(np.array(view["target"], float), np.array(view["pixels"], float)) for view in problem["views"]]
-    for target, pixels in views:
-        if target.shape != pixels.shape or target.ndim != 2 or not np.isfinite(pixels).all():
-            raise ValueError("points and pixels do not pair, or a pixel was not measured")
-    if not views:
-        raise ValueError("no views")
-    return views
 
 
 def inputs_of(problem, views, lens, names):
@@ -138,20 +121,5 @@ def solve(problem):
     }
 
 
-def answer(problem):
-    try:
-        return {"id": problem["id"]} | solve(problem)
-    except Unsupported as error:
-        return {"id": problem["id"], "status": "unsupported", "message": str(error)}
-    except (ValueError, ArithmeticError, RuntimeError, np.linalg.LinAlgError, IndexError) as error:
-        return {"id": problem["id"], "status": "refused", "message": str(error)}
-
-
-def main():
-    np.seterr(all="ignore")
-    for line in sys.stdin:
-        print(json.dumps(answer(json.loads(line))), flush=True)
-
-
 if __name__ == "__main__":
-    main()
+    main(solve)

@@ -14,7 +14,13 @@ import sys
 import cv2
 import numpy as np
 
-ORDER = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"]
+ORDER = "fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tau_x tau_y".split()
+MODELS = {  # Flags, and how many coefficients there are.
+    "brown-conrady": (0, 5),
+    "rational": (cv2.CALIB_RATIONAL_MODEL, 8),
+    "thin-prism": (cv2.CALIB_RATIONAL_MODEL | cv2.CALIB_THIN_PRISM_MODEL, 12),
+    "tilted": (cv2.CALIB_RATIONAL_MODEL | cv2.CALIB_THIN_PRISM_MODEL | cv2.CALIB_TILTED_MODEL, 14),
+}
 CRITERIA = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, np.finfo(float).eps)
 
 
@@ -27,10 +33,15 @@ def flags_and_guess(problem, views):
     free, held = set(problem["free"]), problem["held"]
     if "skew" in free or held.get("skew", 0.0) != 0.0:
         raise Unsupported("OpenCV's camera has no skew")
-    flags = 0
-    for name, flag in [("k1", cv2.CALIB_FIX_K1), ("k2", cv2.CALIB_FIX_K2), ("k3", cv2.CALIB_FIX_K3)]:
-        if name not in free:
+    flags, coefficients = MODELS[problem.get("model", "brown-conrady")]
+    for name in ["k1", "k2", "k3", "k4", "k5", "k6"]:
+        if name not in free and (name in held or name in ORDER[:9]):
+            flags |= getattr(cv2, f"CALIB_FIX_{name.upper()}")
+    for names, flag in [(ORDER[12:16], cv2.CALIB_FIX_S1_S2_S3_S4), (ORDER[16:], cv2.CALIB_FIX_TAUX_TAUY)]:
+        if set(names) <= set(held):
             flags |= flag
+        elif set(names) & set(held):
+            raise Unsupported(f"OpenCV holds {', '.join(names)} only together")
     if "p1" not in free and "p2" not in free:
         flags |= cv2.CALIB_FIX_TANGENT_DIST
         if held.get("p1", 0.0) == held.get("p2", 0.0) == 0.0:
@@ -45,10 +56,10 @@ def flags_and_guess(problem, views):
         flags |= cv2.CALIB_FIX_FOCAL_LENGTH
     if "cx" not in free:
         flags |= cv2.CALIB_FIX_PRINCIPAL_POINT
-    distortion = np.array([held.get(name, 0.0) for name in ["k1", "k2", "p1", "p2", "k3"]])
+    distortion = np.array([held.get(name, 0.0) for name in ORDER[4:]][:coefficients])
     needs_guess = "fx" not in free or "cx" not in free or distortion.any()
     if not needs_guess:
-        return flags, None, np.zeros(5)
+        return flags, None, np.zeros(coefficients)
     target, pixels = views
     matrix = cv2.initCameraMatrix2D(target, pixels, tuple(problem["image_size"]))
     for name, place in [("fx", (0, 0)), ("fy", (1, 1)), ("cx", (0, 2)), ("cy", (1, 2))]:
@@ -67,7 +78,7 @@ def solve(problem):
         target, pixels, tuple(problem["image_size"]), matrix, distortion, flags=flags, criteria=CRITERIA
     )
     d = distortion.ravel()
-    values = dict(zip(ORDER, [matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *d[:5]]))
+    values = dict(zip(ORDER, [matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *d]))
     stated = dict(zip(ORDER, deviations.ravel()))
     return {
         "status": "ok",
@@ -81,7 +92,7 @@ def solve(problem):
     }
 
 
-def answer(problem):
+def answer(problem, solve=solve):
     try:
         return {"id": problem["id"]} | solve(problem)
     except (cv2.error, ValueError) as error:

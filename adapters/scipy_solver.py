@@ -7,11 +7,8 @@ The model and the starting values are those of `minimal_solver.py`; the search, 
 differences are SciPy's, as a user would call them. The covariance is `s^2 (J^T J)^-1` at the solution.
 """
 
-import json
-import sys
-
 # First, because it sets the number of threads.
-from minimal_solver import NAMES, project, rotation_matrix, start
+from minimal_solver import NAMES, main, project, rotation_matrix, start, views_of
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -19,12 +16,7 @@ from scipy.optimize import least_squares
 
 def solve(problem):
     free = [NAMES.index(name) for name in problem["free"]]
-    views = [(np.array(v["target"], float), np.array(v["pixels"], float)) for v in problem["views"]]
-    for target, pixels in views:
-        if target.shape != pixels.shape or target.ndim != 2 or not np.isfinite(pixels).all():
-            raise ValueError("points and pixels do not pair, or a pixel was not measured")
-    if not views:
-        raise ValueError("no views")
+    views = views_of(problem)
     camera, poses = start(problem, views, problem["held"])
     count = len(free)
 
@@ -55,18 +47,5 @@ def solve(problem):
     }
 
 
-def answer(problem):
-    try:
-        return {"id": problem["id"]} | solve(problem)
-    except (ValueError, ArithmeticError, np.linalg.LinAlgError, IndexError) as error:
-        return {"id": problem["id"], "status": "refused", "message": str(error)}
-
-
-def main():
-    np.seterr(all="ignore")
-    for line in sys.stdin:
-        print(json.dumps(answer(json.loads(line))), flush=True)
-
-
 if __name__ == "__main__":
-    main()
+    main(solve)

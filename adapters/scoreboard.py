@@ -27,8 +27,13 @@ DEBIAN = "debian:"
 DETERMINED = 0.02
 """Bound of sd(fx)/fx below which data determine the camera, as in the experiment global-minimum."""
 ROWS, PAGE = ADAPTERS.parent / "golden/scoreboard.csv", ADAPTERS / "SCOREBOARD.md"
+TIMED_ON = "tangential"
+"""The certified problem that every row answers, on which all are timed."""
 REPEATED = 201
 """How often a problem is answered to time it."""
+SAMPLES, FIRST = 32, 1000
+"""Samples a scene, and scenes of a family, of the page's rows."""
+OURS = f"{sys.executable} {ADAPTERS / 'calibench_solver.py'}"
 SCENES = "cargo run --release --quiet --bin global-minimum-scenes --"
 BEGIN, END = "<!-- begin scoreboard -->", "<!-- end scoreboard -->"
 
@@ -54,7 +59,7 @@ ENTRIES = [
     Entry("opencv-5", ("opencv-python-headless>=5", "numpy"), "opencv_solver.py", "Apache-2.0",
           "200 iterations to machine precision; its binding takes points in single precision"),
     Entry("scipy", ("scipy", "numpy"), "scipy_solver.py", "BSD-3-Clause",
-          "a general solver: start, camera and differences are the adapter's; not asked for the right minimum, since fifty views take it minutes", first=0),
+          "a general solver: start and camera are the adapter's, the finite differences SciPy's; not asked for the right minimum, since fifty views take it minutes", first=0),
     Entry("lensboy", ("lensboy", "numpy"), "lensboy_solver.py", "not stated in the package",
           "its OpenCV model without warp and outliers; made for richer lenses, states no covariance"),
     Entry("colmap", ("pycolmap", "pyceres", "numpy"), "colmap_solver.py", "BSD-3-Clause",
@@ -67,6 +72,15 @@ ENTRIES = [
 
 
 @dataclass(frozen=True)
+class Timed:
+    """Processor time of a problem, beside that of this library on the same one."""
+
+    problem: str
+    milliseconds: float
+    ours: float
+
+
+@dataclass(frozen=True)
 class Score:
     """A row of the table."""
 
@@ -75,8 +89,8 @@ class Score:
     report: calibench.Report
     digits: dict[str, float]
     """The least digits of each certified problem that was answered."""
-    processor_ms: float | None
-    """Processor time of a problem."""
+    timed: Timed | None
+    """Processor time of a problem; `None` where none was answered."""
     endings: Counter
     """How it ended on the scenes of the experiment global-minimum that determine the camera."""
 
@@ -93,10 +107,17 @@ class Score:
             "certified digits, median": f"{median(self.digits.values()):.1f}" if self.digits else "-",
             "certified problems answered": f"{len(self.digits)} of {len(calibench.certified_problems())}",
             "right minimum": f"{self.endings['right']} of {asked}" if asked else "-",
-            "processor ms a problem": f"{self.processor_ms:.2g}" if self.processor_ms else "-",
+            "processor ms a problem": two_digits(self.timed.milliseconds) if self.timed else "-",
+            "timed on": self.timed.problem if self.timed else "-",
+            "calibench's ms on it": two_digits(self.timed.ours) if self.timed else "-",
             "licence": self.entry.licence,
             "fairness": self.entry.note,
         }
+
+
+def two_digits(number):
+    """As people write it: 170, not 1.7e+02."""
+    return f"{float(f'{number:.2g}'):g}"
 
 
 def installed(entry):
@@ -152,7 +173,8 @@ def digits_reached(command):
     problems = {problem.name: problem for problem in calibench.certified_problems()}
     lines = "".join(line_of(problem) + "\n" for problem in problems.values())
     said = subprocess.run(shlex.split(command), input=lines, capture_output=True, text=True, timeout=1800).stdout
-    answers = [json.loads(line) for line in said.splitlines()]
+    # A greeting has no number of a problem.
+    answers = [answer for answer in map(json.loads, said.splitlines()) if "id" in answer]
     return {
         answer["id"]: min(
             calibench.digits(answer["parameters"][name], value) for name, value in problems[answer["id"]].parameters.items()
@@ -169,15 +191,22 @@ def line_of(problem):
     return json.dumps(fields)
 
 
-def processor_ms(command, answered):
-    """Processor time of one certified problem, the first it answers: of many less that of one, over their difference."""
-    if not answered:
+def timed(command, answered):
+    """The processor time of a problem: of the one that all rows are timed on, or of the first that is answered where that is not."""
+    problems = {problem.name: problem for problem in calibench.certified_problems()}
+    name = next((name for name in (TIMED_ON, *problems) if name in answered), None)
+    if name is None:
         return None
-    first = next(problem for problem in calibench.certified_problems() if problem.name in answered)
+    line = line_of(problems[name])
+    return Timed(name, processor_ms(command, line), processor_ms(OURS, line))
+
+
+def processor_ms(command, line):
+    """Processor time of the problem of a line: of many less that of one, over their difference."""
     taken = []
     for count in (1, REPEATED):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        subprocess.run(shlex.split(command), input=(line_of(first) + "\n") * count, capture_output=True, text=True, timeout=1800)
+        subprocess.run(shlex.split(command), input=(line + "\n") * count, capture_output=True, text=True, timeout=1800)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         taken.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
     return 1e3 * (taken[1] - taken[0]) / (REPEATED - 1)
@@ -189,9 +218,10 @@ def score(entry, samples, first, scenes):
         return None
     python, version = found
     command = f"{python} {ADAPTERS / entry.adapter}"
-    report = calibench.run_gate(command, samples=samples, timeout=60.0)
+    # All rows answer the same questions, whatever else a program knows.
+    report = calibench.run_gate(command, samples=samples, models=["brown-conrady"], timeout=60.0)
     digits = digits_reached(command)
-    return Score(entry, version, report, digits, processor_ms(command, digits), endings_of(entry, command, first, scenes))
+    return Score(entry, version, report, digits, timed(command, digits), endings_of(entry, command, first, scenes))
 
 
 def table(rows):
@@ -219,12 +249,19 @@ def written(rows):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("names", nargs="*", help=f"of {', '.join(entry.name for entry in ENTRIES)} [default: all]")
-    parser.add_argument("--samples", type=int, default=32, help="samples a scene")
+    parser.add_argument("--samples", type=int, default=SAMPLES, help="samples a scene")
     first = "at most so many scenes of a family of the experiment global-minimum; 0: none are asked"
-    parser.add_argument("--first", type=int, default=1000, help=first)
+    parser.add_argument("--first", type=int, default=FIRST, help=first)
     parser.add_argument("--scenes", default=SCENES, help="the command that asks about them [default: %(default)s]")
     parser.add_argument("--write", action="store_true", help="puts the rows into golden/scoreboard.csv and adapters/SCOREBOARD.md")
     given = parser.parse_args()
+    known = [entry.name for entry in ENTRIES]
+    if unknown := [name for name in given.names if name not in known]:
+        parser.error(f"no calibrator {', '.join(unknown)}; there are: {', '.join(known)}")
+    if given.samples < 1 or given.first < 0:
+        parser.error("--samples is at least 1, --first at least 0")
+    if given.write and (given.samples, given.first, given.scenes) != (SAMPLES, FIRST, SCENES):
+        parser.error(f"--write writes what the page says: --samples {SAMPLES}, --first {FIRST} and the usual --scenes")
     rows = []
     for entry in ENTRIES:
         if given.names and entry.name not in given.names:

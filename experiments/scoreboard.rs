@@ -59,8 +59,8 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
 const NAME: usize = 0;
 const VERDICT: usize = 2;
 const MINIMUM: usize = 6;
-const LICENCE: usize = 8;
-const FAIRNESS: usize = 9;
+const LICENCE: usize = 10;
+const FAIRNESS: usize = 11;
 
 /// A calibrator, its fields as the script writes them.
 struct Row(csv::StringRecord);
@@ -96,6 +96,8 @@ fn table(rows: &[Row]) -> Table {
         ("problems_answered", ""),
         ("right_minimum", ""),
         ("time_of_a_problem", "ms"),
+        ("timed_on", ""),
+        ("our_time_on_it", "ms"),
     ];
     let mut table = Table::new("calibrators", "public calibrators, as they were measured", &columns);
     rows.iter().for_each(|row| table.push(row.0.iter().take(columns.len())));

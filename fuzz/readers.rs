@@ -13,6 +13,7 @@ use calibench::io::{
 };
 use calibench::photos::{BoardSpec, parse_board_file};
 use calibench_gate::accept::{accept, id_in, read_line};
+use calibench_gate::greeting::Greeting;
 use calibench_gate::protocol::{Problem, ProblemView};
 use calibench_harness::golden;
 use calibench_study::{Checkpoint, Manifest, Shard, Spec};
@@ -108,9 +109,13 @@ pub fn checkpoint(bytes: &[u8]) {
 pub fn answer(bytes: &[u8]) {
     let line = String::from_utf8_lossy(bytes);
     let _ = id_in(&line);
+    if let Ok(Some(greeting)) = Greeting::read(&line) {
+        let _ = (greeting.models(), greeting.warm_up());
+    }
     let problem = Problem {
         id: "a".into(),
         image_size: [640, 480],
+        model: "brown-conrady".into(),
         views: vec![ProblemView { target: vec![[0.0, 0.0]], pixels: vec![[0.0, 0.0]] }],
         free: ["fx", "fy", "cx", "cy"].map(String::from).into(),
         held: [("k1".to_string(), 0.0)].into(),

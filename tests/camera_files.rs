@@ -2,7 +2,7 @@
 
 use crate::data;
 use crate::program::{calibench as run, folder, text};
-use calibench::camera::Camera;
+use calibench::camera::{Camera, Lens, Model};
 use calibench::io::formats::{FormatError, VnlBoard, Wishes, detect, parse_vnl, read_camera_file};
 use calibench::io::read_camera;
 use serde_json::Value;
@@ -42,9 +42,14 @@ fn what_cannot_be_converted_ends_with_two_and_writes_nothing() {
     let folder = folder("convert-refused");
     fs::write(folder.join("result.json"), CAMERA).expect("written");
     fs::write(folder.join("fisheye.txt"), "1 OPENCV_FISHEYE 640 480 1 1 0 0 0 0 0 0\n").expect("written");
-    let cases: [(&[&str], &str); 6] = [
+    fs::write(folder.join("field.txt"), "1 FOV 640 480 1 1 0 0 0\n").expect("written");
+    let cases: [(&[&str], &str); 7] = [
         (&["convert", "result.json", "camera.yaml"], "name it with --to, one of ros, kalibr, opencv-yaml"),
-        (&["convert", "fisheye.txt", "out.xml"], "OPENCV_FISHEYE is not Brown-Conrady"),
+        (&["convert", "field.txt", "out.xml"], "the model FOV is none of the lenses here (brown-conrady"),
+        (
+            &["convert", "fisheye.txt", "out.cameramodel"],
+            "mrcal cannot hold a kannala-brandt lens: calibrate again with another --model; it holds brown-conrady, rational, thin-prism",
+        ),
         (&["convert", "result.json", "out.dat"], "--fit"),
         (&["convert", "result.json", "result.json"], "would be overwritten"),
         (&["convert", "result.json", "out.xml", "--image-size", "1x1"], "--resize 1x1"),
@@ -55,7 +60,7 @@ fn what_cannot_be_converted_ends_with_two_and_writes_nothing() {
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");
         assert!(text(&output.stderr).contains(expected), "{}", text(&output.stderr));
     }
-    assert_eq!(fs::read_dir(&folder).expect("a folder").count(), 2);
+    assert_eq!(fs::read_dir(&folder).expect("a folder").count(), 3);
     let schema = run(&folder, &["convert", "--schema"]);
     assert!(serde_json::from_slice::<Value>(&schema.stdout).is_ok());
 }
@@ -106,6 +111,20 @@ fn diff_tells_a_turned_camera_from_another() {
     let far = run(&folder, &["diff", "a.json", "far.json"]);
     assert_eq!(far.status.code(), Some(1), "{}", text(&far.stdout));
     assert!(text(&far.stdout).contains("they are two cameras"));
+    // Where a file says that its standard deviations mislead, nothing is decided by them.
+    let warned = "\"warnings\": [\"the standard deviation of fx misleads: an interval of two of them truly reaches 0.5 times\"], \"camera\"";
+    fs::write(folder.join("warned.json"), camera(610.0, 320.0).replacen("\"camera\"", warned, 1))
+        .expect("written");
+    let doubted = run(&folder, &["diff", "a.json", "warned.json"]);
+    assert_eq!(doubted.status.code(), Some(0), "{}", text(&doubted.stdout));
+    assert!(text(&doubted.stdout).contains("not decided"), "{}", text(&doubted.stdout));
+    assert!(text(&doubted.stdout).contains("warned.json: the standard deviation of fx misleads"));
+    let json = run(&folder, &["diff", "a.json", "warned.json", "--format", "json"]);
+    let said: Value = serde_json::from_slice(&json.stdout).expect("JSON");
+    assert_eq!(
+        (&said["test"]["one_camera"], said["doubts"].as_array().map(Vec::len)),
+        (&Value::Null, Some(1))
+    );
     // At one distance a camera that stands nearer shows the same.
     let at = run(&folder, &["diff", "a.json", "far.json", "--at", "1000", "--format", "json"]);
     let said: Value = serde_json::from_slice(&at.stdout).expect("JSON");
@@ -116,7 +135,11 @@ fn diff_tells_a_turned_camera_from_another() {
     );
 }
 
-fn mrcals(name: &str) -> Result<Camera, FormatError> {
+/// mrcal's files of a rational lens: fx and the last coefficient, as they stand there.
+const MRCALS: [(&str, f64, f64); 2] =
+    [("cam0.opencv8.cameramodel", 1761.181055, 0.0500223357), ("cam1.opencv8.cameramodel", 1761.0, 0.04)];
+
+fn mrcals(name: &str) -> Result<Camera<Lens>, FormatError> {
     let path = data::folder().join("mrcal_models").join(name);
     let text = fs::read_to_string(path).expect("the file is there");
     assert_eq!(detect(name, &text)?.name, "mrcal");
@@ -125,16 +148,15 @@ fn mrcals(name: &str) -> Result<Camera, FormatError> {
 
 #[test]
 #[cfg_attr(not(calibench_data), ignore = "needs the measurements of others: CONTRIBUTING.md, real data")]
-fn mrcals_lenses_beyond_brown_conrady_are_refused_by_name() {
-    let cases = [
-        ("cam0.opencv8.cameramodel", "a lens with k4 k5 k6"),
-        ("cam1.opencv8.cameramodel", "a lens with k4 k5 k6"),
-        ("cam0.splined.cameramodel", "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3"),
-    ];
-    for (name, model) in cases {
-        let error = mrcals(name).expect_err("another lens").to_string();
-        assert!(error.contains(model) && error.contains("mrcal-convert-lensmodel"), "{error}");
+fn mrcals_rational_lenses_are_read_and_its_splines_refused_by_name() {
+    for (name, fx, k6) in MRCALS {
+        let camera = mrcals(name).expect("a rational lens");
+        assert_eq!(camera.distortion.model(), Model::Rational);
+        assert_eq!((camera.fx, camera.distortion.coefficients().last()), (fx, Some(&k6)), "{name}");
     }
+    let error = mrcals("cam0.splined.cameramodel").expect_err("another lens").to_string();
+    assert!(error.contains("LENSMODEL_SPLINED_STEREOGRAPHIC_order=3"), "{error}");
+    assert!(error.contains("mrcal-convert-lensmodel"), "{error}");
 }
 
 #[test]

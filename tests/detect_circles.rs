@@ -201,7 +201,9 @@ fn a_grid_with_missing_marks_is_refused_with_their_number() {
     }
     let mut image = photo.image.clone();
     (0..7).for_each(|row| erase(&mut image, photo.centres_true[9 * row + 8], 9.0));
-    assert!(matches!(circle_grid(&image, 9, 7), Err(GridError::Partial { found: 56, .. })));
+    // Without a column it is a complete grid of another size, and it cannot be told which of both it is.
+    let named = GridError::WrongSize { columns: 9, rows: 7, found_columns: 8, found_rows: 7 };
+    assert_eq!(circle_grid(&image, 9, 7), Err(named));
     // A board that reaches beyond the image.
     let aside = Pose {
         translation: calibench::geometry::Vec3::new(30.0, 0.0, 120.0),
@@ -209,21 +211,17 @@ fn a_grid_with_missing_marks_is_refused_with_their_number() {
     };
     assert!(matches!(
         circle_grid(&chapter_photo(&aside, &Imaging::default()).image, 9, 7),
-        Err(GridError::Partial { .. })
+        Err(GridError::Partial { .. } | GridError::WrongSize { .. })
     ));
 }
 
 #[test]
 fn a_grid_of_another_size_is_refused() {
     let photo = chapter_photo(&looking_at_centre([0.0; 3], 120.0), &Imaging::default());
-    for (columns, rows) in [(8, 7), (9, 6), (8, 6), (7, 8)] {
+    for (columns, rows) in [(8, 7), (9, 6), (8, 6), (7, 8), (9, 8), (10, 8), (10, 10)] {
         let expected = GridError::WrongSize { columns, rows, found_columns: 9, found_rows: 7 };
         assert_eq!(circle_grid(&photo.image, columns, rows), Err(expected));
     }
-    assert!(matches!(
-        circle_grid(&photo.image, 9, 8),
-        Err(GridError::Partial { found: 63, expected: 72, .. })
-    ));
     // Asked the other way round it is the same board, its rows and columns exchanged.
     assert_eq!(circle_grid(&photo.image, 7, 9).unwrap().columns(), 7);
 }

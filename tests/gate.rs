@@ -2,12 +2,13 @@
 //! babble.
 #![cfg(unix)]
 
+use calibench::camera::Model;
 use calibench_gate::accept::{Breakage, Outcome};
 use calibench_gate::faults::{Faulty, planted};
 use calibench_gate::plan::Purpose;
 use calibench_gate::power::Measured;
 use calibench_gate::protocol::{Answer, Problem, Status, schemas};
-use calibench_gate::{Builtin, Plan, Process, Property, Report, Solver, Terms, Verdict, run};
+use calibench_gate::{Asked, Builtin, Plan, Process, Property, Report, Solver, Terms, Verdict, run};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -105,6 +106,91 @@ fn a_program_that_breaks_on_bad_input_is_asked_again() {
     let refused = |outcome: &Outcome| matches!(outcome, Outcome::Refused(_));
     assert!(refused(&replies[0].outcome), "{replies:?}");
     assert!(replies.iter().all(|r| crashed(&r.outcome) || refused(&r.outcome)), "{replies:?}");
+}
+
+/// A program that says `greeting`, does nothing for `seconds`, and then refuses whatever it is asked.
+fn greets_and_refuses(greeting: &str, seconds: f64) -> String {
+    let refuses = r#"sed -u 's/^{"id":"\([^"]*\)".*/{"id":"\1","status":"refused"}/'"#;
+    format!("echo '{greeting}'; sleep {seconds}; {refuses}")
+}
+
+#[test]
+fn a_program_that_announces_its_warm_up_is_given_it() {
+    let answers = |greeting: &str| {
+        let process = Process::new(&greets_and_refuses(greeting, 1.5), Duration::from_millis(500), 1);
+        let replies = process.ask_all(&problems(2));
+        replies.iter().all(|reply| matches!(reply.outcome, Outcome::Refused(_)))
+    };
+    assert!(answers(r#"{"protocol": 2, "warm_up_seconds": 60}"#));
+    assert!(!answers(r#"{"protocol": 2}"#));
+    assert!(!answers("warming up for 60 seconds"));
+}
+
+#[test]
+fn a_program_is_asked_what_it_says_it_knows() {
+    let known = |greeting: &str| {
+        Process::new(&greets_and_refuses(greeting, 0.0), Duration::from_secs(20), 1).models()
+    };
+    assert_eq!(known(r#"{"protocol": 2, "models": ["kannala-brandt", "splined"]}"#), [Model::KannalaBrandt]);
+    assert_eq!(known(r#"{"protocol": 2}"#), [Model::BrownConrady]);
+    let malformed = breakages(&greets_and_refuses(r#"{"protocol": 2, "models": "rational"}"#, 0.0), 20.0, 1);
+    assert!(
+        matches!(&malformed[0], Breakage::Garbage { reason, .. } if reason.contains("greeting is malformed")),
+        "{malformed:?}"
+    );
+    assert_eq!(Process::new("exit 1", Duration::from_secs(20), 1).models(), [Model::BrownConrady]);
+    // Who names nothing that can be asked is not trusted for it.
+    let nothing = gate(&["--solver", &greets_and_refuses(r#"{"protocol": 2, "models": ["Division"]}"#, 0.0)]);
+    assert_eq!(nothing.status.code(), Some(1));
+    assert!(
+        String::from_utf8_lossy(&nothing.stderr)
+            .contains("NOT TRUSTED: the program's greeting names no lens")
+    );
+    let greeting = r#"{"protocol": 2, "models": ["division"]}"#;
+    let output = gate(&["--samples", "1", "--solver", &greets_and_refuses(greeting, 0.0)]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(text.contains("lens models: division\n"), "{text}");
+    assert!(text.lines().all(|line| !line.starts_with("bad-input")), "{text}");
+}
+
+#[test]
+fn the_correct_solver_is_trusted_with_every_lens() {
+    let plan = Plan::of(1, 2, Asked::of(&Builtin.models()[1..])).expect("a plan");
+    assert_eq!(plan.scenarios.len(), 7);
+    let report = Report::new(&plan, "", &run(&plan, &Builtin, &|_| ()), &Terms::default(), 0.0);
+    assert!(report.held(), "{}{}", report.to_text(200), report.details());
+}
+
+#[test]
+fn one_scene_is_asked_alone_and_the_verdict_says_so() {
+    let planted = ["--planted", "fy-cx-swapped"];
+    let one = gate(&[&planted[..], &["--samples", "2", "--scene", "non-square"]].concat());
+    let text = String::from_utf8_lossy(&one.stdout).into_owned();
+    let details = String::from_utf8_lossy(&one.stderr).into_owned();
+    assert_eq!(one.status.code(), Some(1), "{text}{details}");
+    assert!(text.contains("; only non-square\n"), "{text}");
+    let again = "again: calibench gate --planted fy-cx-swapped --models brown-conrady --samples 2 --seed 1 \
+                 --scene non-square";
+    assert!(details.contains(again), "{details}");
+    let held = gate(&["--samples", "1", "--scene", "no-views", "--scene", "four-pose"]);
+    assert_eq!(held.status.code(), Some(0));
+    assert!(String::from_utf8_lossy(&held.stdout).contains("HELD on the scenes asked, which is no verdict"));
+    let unknown = gate(&["--scene", "five-pose"]);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&unknown.stderr).contains("there are: four-pose, many-views"));
+}
+
+#[test]
+fn files_keep_the_lens_models_that_were_asked() {
+    let dir = folder("gate-lenses");
+    let path = dir.display().to_string();
+    let written = gate(&["--samples", "1", "--models", "division,kannala-brandt", "--record", &path]);
+    assert_eq!(written.status.code(), Some(0), "{}", String::from_utf8_lossy(&written.stderr));
+    let judged = gate(&["--judge", &path]);
+    assert_eq!(judged.status.code(), Some(0), "{}", String::from_utf8_lossy(&judged.stderr));
+    assert!(String::from_utf8_lossy(&judged.stdout).contains("lens models: division, kannala-brandt\n"));
+    let problems = std::fs::read_to_string(dir.join("problems.jsonl")).expect("problems");
+    assert!(problems.lines().all(|line| line.contains(r#""model":"#)), "{problems}");
 }
 
 #[test]
@@ -278,7 +364,7 @@ fn the_same_seed_gives_the_same_problems_and_another_does_not() {
 
 #[test]
 fn the_schemas_know_every_field_that_is_sent() {
-    let [(_, problem), (_, answer)] = schemas();
+    let [_, (_, problem), (_, answer)] = schemas();
     let fields = |schema: &str| -> Vec<String> {
         let schema: serde_json::Value = serde_json::from_str(schema).expect("JSON");
         schema["properties"].as_object().expect("an object").keys().cloned().collect()

@@ -105,6 +105,47 @@ fn photographs_give_the_camera_and_bad_files_are_named_and_left_out() {
 }
 
 #[test]
+fn the_marks_are_written_and_give_the_same_camera_again() {
+    let folder = folder("photo-command-corners");
+    chapter_photos(&folder);
+    // A disc of the last photograph is covered: it costs itself.
+    let mut photo = rendered(&Truth::example_board(), &Truth::example_poses()[3]);
+    let exact = photograph(
+        &Truth::example_camera(),
+        Truth::EXAMPLE_IMAGE,
+        &Truth::example_board(),
+        &Truth::example_poses()[3],
+        &Imaging::default(),
+    );
+    let at = exact.expect("it is seen").centres_true[31];
+    for y in 0..photo.height() {
+        for x in 0..photo.width() {
+            if (x as f64 - at.x).abs() < 9.0 && (y as f64 - at.y).abs() < 9.0 {
+                photo.set(x, y, 0.85);
+            }
+        }
+    }
+    write_png_16(&folder.join("pose3.png"), &photo.to_u16()).expect("it is written");
+    let mut arguments = vec!["--board", "circles:9x7:10mm:3mm", "--out", "out"];
+    arguments.extend(CHAPTER_PHOTOS);
+    let output = calibrate(&folder, &arguments);
+    let out = text(&output.stdout);
+    assert_eq!(output.status.code(), Some(0), "{out}");
+    assert!(out.contains("first mark: not fixed by this board") && out.contains("pose3.png (1)"), "{out}");
+    let first = result(&folder);
+    assert_eq!(first["orientation"], "half-turn");
+    assert_eq!((&first["views"][0]["points"], &first["views"][3]["points"]), (&63.into(), &62.into()));
+    let output = calibrate(&folder, &["out/corners.csv", "--image-size", "640x480", "--format", "json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let again: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    for field in ["camera", "covariance", "sigma_px", "views"] {
+        assert_eq!(first[field], again[field], "{field}");
+    }
+    // Corners that were given do not say which is the first.
+    assert!(again["orientation"].is_null());
+}
+
+#[test]
 fn without_the_diameter_the_bias_stays_and_is_said() {
     let folder = folder("photo-command-bias");
     chapter_photos(&folder);

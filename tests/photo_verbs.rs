@@ -43,7 +43,11 @@ fn nine_dots_are_calibrated_from_file_to_json_and_overlay() {
     assert_eq!(read_image(&out.join("overlay.png")).unwrap().size(), (1571, 1053));
     let wrong = calibench(&["ninepoint", text(&image), "--columns", "4"]);
     assert_eq!(wrong.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&wrong.stderr).contains("found 9 of the 12"), "{wrong:?}");
+    assert!(
+        String::from_utf8_lossy(&wrong.stderr)
+            .contains("a grid of 4 x 3 was asked, a complete 3 x 3 was seen"),
+        "{wrong:?}"
+    );
 }
 
 #[test]

@@ -110,7 +110,7 @@ fn a_run_is_described_as_it_is_and_twice_alike() {
 }
 
 /// A study of two cells.
-const SPEC: &str = r#"
+pub const SPEC: &str = r#"
 name = "small"
 question = "Is a study described as it is?"
 seed = 1

@@ -2,7 +2,7 @@
 
 use crate::program::{calibench as run, folder, text};
 use calibench::board::View;
-use calibench::calibrate::{Calibration, Settings, calibrate};
+use calibench::calibrate::{LensCalibration, Settings, calibrate_lens};
 use calibench::camera::{Camera, Parameter};
 use calibench::evaluate::Interval;
 use calibench::io::CalibrationFields;
@@ -32,11 +32,11 @@ fn photographs(camera: Camera, count: usize, trial: u64, purpose: &'static str) 
     Scene::new(truth).unwrap().observe(0.1, &mut stream)
 }
 
-fn calibrated(views: &[View]) -> Calibration {
-    calibrate(views, &Settings::standard().with_image_size(SIZE)).unwrap()
+fn calibrated(views: &[View]) -> LensCalibration {
+    calibrate_lens(views, &Settings::standard().with_image_size(SIZE)).unwrap()
 }
 
-fn estimate(result: &Calibration) -> Estimate<'_> {
+pub fn estimate(result: &LensCalibration) -> Estimate<'_> {
     Estimate {
         camera: &result.camera,
         covariance: &result.covariance,
@@ -128,7 +128,7 @@ fn repetitions_of_one_camera_disagree_as_rarely_as_is_said() {
         let of = |purpose| calibrated(&photographs(camera, 6, trial, purpose));
         [of("first"), of("second"), of("third")]
     };
-    let judged = |results: &[Calibration]| {
+    let judged = |results: &[LensCalibration]| {
         let estimates: Vec<Estimate> = results.iter().map(estimate).collect();
         repeated(&estimates, SIZE, RATE).unwrap()
     };
@@ -157,7 +157,7 @@ fn what_cannot_be_judged_is_refused_with_its_view() {
 }
 
 /// A corner file of views, numbered from `first`.
-fn csv(views: &[View], first: usize) -> String {
+pub fn csv(views: &[View], first: usize) -> String {
     let mut text = "view,point,X,Y,u,v\n".to_string();
     for (k, view) in views.iter().enumerate() {
         for (i, (p, u)) in view.pairs().enumerate() {
@@ -174,7 +174,7 @@ fn the_command_says_by_its_exit_code_whether_a_calibration_holds() {
     let moved = camera.with(Parameter::Fx, 606.0).with(Parameter::Fy, 606.0);
     let seen = photographs(camera, 6, 0, "seen");
     let write = |name: &str, text: String| fs::write(folder.join(name), text).unwrap();
-    let result = |views: &[View]| CalibrationFields::of(&calibrated(views).into(), &[], Some(SIZE)).to_json();
+    let result = |views: &[View]| CalibrationFields::of(&calibrated(views), &[], Some(SIZE)).to_json();
     write("seen.csv", csv(&seen, 0));
     write("new.csv", csv(&photographs(camera, 3, 0, "new"), 10));
     write("moved.csv", csv(&photographs(moved, 3, 0, "new"), 10));

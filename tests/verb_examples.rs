@@ -4,10 +4,11 @@
 use crate::shell::verbs;
 use calibench::calibrate::{Settings, calibrate};
 use calibench::camera::Parameter;
+use calibench::detect::circle_grid;
 use calibench::geometry::{Pose, Vec3, rotation};
 use calibench::io::{CalibrationFields, write_png};
-use calibench::synth::render::{Imaging, nine_dot_stand_in, photograph};
-use calibench::synth::{Scene, Truth};
+use calibench::synth::render::{Imaging, SensorNoise, nine_dot_stand_in, photograph};
+use calibench::synth::{Scene, Stream, StreamKey, Truth};
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -60,6 +61,28 @@ fn examples(verb: &str) -> Vec<String> {
     lines
 }
 
+/// Photographs of a board that nobody touches, and their marks.
+fn still_frames(folder: &Path) -> String {
+    let pose = Truth::example_poses()[1];
+    let imaging = Imaging { blur_px: 0.5, ..Imaging::default() };
+    let board = Truth::example_board();
+    let photo = photograph(&Truth::example_camera(), Truth::EXAMPLE_IMAGE, &board, &pose, &imaging);
+    let photo = photo.expect("it is seen").image;
+    let mut marks = "view,point,X,Y,u,v\n".to_string();
+    for trial in 0..4 {
+        let key = StreamKey { seed: 1, scenario: "examples", trial, purpose: "still" };
+        let mut frame = photo.clone();
+        SensorNoise::constant(0.01).add_to(&mut frame, &mut Stream::open(key));
+        let frame = frame.to_u8();
+        write_png(&folder.join(format!("still{trial}.png")), &frame).expect("written");
+        let centres = circle_grid(&frame, 9, 7).expect("it is seen").centres_px();
+        for (point, (at, pixel)) in board.points().iter().zip(centres).enumerate() {
+            writeln!(marks, "{trial},{point},{},{},{},{}", at.x, at.y, pixel.x, pixel.y).expect("text grows");
+        }
+    }
+    marks
+}
+
 /// What the examples read.
 fn folder() -> PathBuf {
     // Outside of the source tree: verbs that look for one find the one that the test makes, or none.
@@ -88,6 +111,7 @@ fn folder() -> PathBuf {
         let photo = photo.expect("it is seen").image.to_u8();
         write_png(&folder.join(format!("photo{view}.png")), &photo).expect("written");
     }
+    let still = still_frames(&folder);
     write_png(&folder.join("dots.png"), &nine_dot_stand_in().image.to_u8()).expect("written");
     // The same calibration, and other photographs from the same places, by other names.
     let settings = Settings::standard().hold(Parameter::K2, 0.0).with_image_size(Truth::EXAMPLE_IMAGE);
@@ -100,7 +124,12 @@ fn folder() -> PathBuf {
         ("new.csv", renamed.as_str()),
         ("solid.csv", solid.as_str()),
         ("again.json", again.as_str()),
+        ("still.csv", still.as_str()),
         ("robot.csv", robot.as_str()),
+        (
+            "fisheye.json",
+            r#"{"camera": {"model": "kannala-brandt", "fx": 310, "fy": 312, "cx": 322, "cy": 241, "k1": -0.03}, "image_size": [640, 480]}"#,
+        ),
         (
             "pairs.csv",
             "point,px,py,X,Y\n0,0,0,0,0\n1,100,0,1,0\n2,0,100,0,1\n3,100,101,1,1\n4,50,51,0.5,0.5\n",

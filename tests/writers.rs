@@ -25,7 +25,7 @@ struct Verb {
     arguments: &'static [&'static str],
 }
 
-const VERBS: [Verb; 20] = [
+const VERBS: [Verb; 21] = [
     Verb { name: "board", arguments: &["board", "circles:9x7:10mm:3mm", "--out", "out"] },
     Verb {
         name: "camera",
@@ -42,6 +42,7 @@ const VERBS: [Verb; 20] = [
         name: "diff",
         arguments: &["diff", "../camera.json", "../other.json", "--image-size", "640x480", "--out", "out"],
     },
+    Verb { name: "noise", arguments: &["noise", "../still.csv", "--out", "out"] },
     Verb { name: "tsai", arguments: &["tsai", "../corners.csv", "--image-size", "640x480", "--out", "out"] },
     Verb { name: "validate", arguments: &["validate", "../known.json", "../later.csv", "--out", "out"] },
     Verb {
@@ -125,6 +126,7 @@ fn with_input(name: &str) -> PathBuf {
     }
     fs::write(folder.join("marks.csv"), "point,X,Y\na,0,0\nb,10,0\nc,0,10\n").expect("written");
     fs::write(folder.join("history.csv"), "when,value\n1,25.01\n2,24.99\n").expect("written");
+    fs::write(folder.join("still.csv"), still()).expect("written");
     write_calibration(&folder);
     let photo = Raster::from_fn(160, 120, |x, y| (x + y) as u8);
     write_png(&folder.join("photo.png"), &photo).expect("written");
@@ -139,6 +141,20 @@ fn corners(first: usize) -> String {
         for (point, (at, pixel)) in seen.pairs().enumerate() {
             let view = first + view;
             writeln!(corners, "{view},{point},{},{},{},{}", at.x, at.y, pixel.x, pixel.y)
+                .expect("text grows");
+        }
+    }
+    corners
+}
+
+/// A view three times, as noise leaves it.
+fn still() -> String {
+    let mut corners = "view,point,X,Y,u,v\n".to_string();
+    for trial in 0..3 {
+        let key = StreamKey { seed: 1, scenario: "writers", trial, purpose: "still" };
+        let seen = &Scene::example().observe(0.05, &mut Stream::open(key))[0];
+        for (point, (at, pixel)) in seen.pairs().enumerate() {
+            writeln!(corners, "{trial},{point},{},{},{},{}", at.x, at.y, pixel.x, pixel.y)
                 .expect("text grows");
         }
     }

@@ -38,7 +38,12 @@
     return (small ? value.toExponential(count - 1) : Number(value.toPrecision(count)).toString()).replaceAll('-', '\u2212');
   };
 
-  const MARGIN = { left: 58, right: 10, top: 10, bottom: 38 };
+  // So many of them, in words: `1 view`, `4 views`.
+  Laboratory.counted = (count, noun) => `${count} ${noun}${count === 1 ? '' : 's'}`;
+
+  const MARGIN = { left: 66, right: 10, top: 10, bottom: 38 };
+  // A digit of the labels is so wide, in the units of a drawing.
+  const DIGIT = 6.5;
 
   // Round numbers between two, about five.
   const ticks = (from, to) => {
@@ -51,19 +56,22 @@
     return found;
   };
 
-  // Where the pointer is, in the units of a drawing, while it is held down on it: calls `moved(x, y)`.
-  Laboratory.dragged = (element, moved) => {
-    const told = (event) => {
-      const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(element.getScreenCTM().inverse());
-      moved(at.x, at.y);
-    };
+  // Where the pointer is in the units of a drawing, and how many of these are a pixel of the screen.
+  const inDrawing = (element, event) => {
+    const inverse = element.getScreenCTM().inverse();
+    const { x, y } = new DOMPoint(event.clientX, event.clientY).matrixTransform(inverse);
+    return [x, y, inverse.a];
+  };
+
+  // While the pointer is held down on a drawing: `pressed(x, y, unitsPerPixel)` where it goes down, which says whether there is something to
+  // move, and then `moved(x, y)`.
+  Laboratory.dragged = (element, pressed, moved) => {
     element.classList.add('dragged');
     element.addEventListener('pointerdown', (event) => {
-      element.setPointerCapture(event.pointerId);
-      told(event);
+      if (pressed(...inDrawing(element, event))) element.setPointerCapture(event.pointerId);
     });
     element.addEventListener('pointermove', (event) => {
-      if (element.hasPointerCapture(event.pointerId)) told(event);
+      if (element.hasPointerCapture(event.pointerId)) moved(...inDrawing(element, event));
     });
   };
 
@@ -77,6 +85,11 @@
     const text = (x, y, anchor, content) => Laboratory.svg('text', { x, y, 'text-anchor': anchor }, content);
     const names = [text((MARGIN.left + right) / 2, height - 5, 'middle', xLabel), text(0, 0, 'middle', yLabel)];
     names[1].setAttribute('transform', `translate(12 ${(MARGIN.top + bottom) / 2}) rotate(-90)`);
+    // A label of the horizontal axis stays within the drawing.
+    const along = (value) => {
+      const words = Laboratory.digits(value);
+      return text(Math.min(plot.x(value), width - DIGIT * words.length / 2), bottom + 14, 'middle', words);
+    };
     let place;
     const plot = {
       element,
@@ -85,10 +98,10 @@
       layer: (style) => Laboratory.path(element, style),
       ranges: (xRange, yRange) => {
         place = [xRange, yRange];
-        const [along, up] = [ticks(...xRange), ticks(...yRange)];
-        grid(along.map((v) => `M${plot.x(v)} ${bottom}V${MARGIN.top}`).join('') + up.map((v) => `M${MARGIN.left} ${plot.y(v)}H${right}`).join(''));
+        const [across, up] = [ticks(...xRange), ticks(...yRange)];
+        grid(across.map((v) => `M${plot.x(v)} ${bottom}V${MARGIN.top}`).join('') + up.map((v) => `M${MARGIN.left} ${plot.y(v)}H${right}`).join(''));
         words.replaceChildren(
-          ...along.map((v) => text(plot.x(v), bottom + 14, 'middle', Laboratory.digits(v))),
+          ...across.map(along),
           ...up.map((v) => text(MARGIN.left - 5, plot.y(v) + 4, 'end', Laboratory.digits(v))),
           ...names,
         );

@@ -4,7 +4,7 @@
 'use strict';
 
 {
-  const { html, svg, drawing, path, dots, polyline, digits, plot, scene: { chapter: CHAPTER, size: [WIDTH, HEIGHT], ...scene } } = Laboratory;
+  const { html, svg, drawing, path, dots, polyline, digits, counted, plot, scene: { chapter: CHAPTER, size: [WIDTH, HEIGHT], ...scene } } = Laboratory;
 
   const PARAMETERS = ['fx', 'fy', 'cx', 'cy', 'k1', 'k2'];
   const UNITS = ['px', 'px', 'px', 'px', '', ''];
@@ -56,16 +56,13 @@
     return group;
   };
 
-  // Pixel (0, 0) is the middle of the first pixel.
-  const isBeyond = ([u, v]) => Math.min(u, v) < -0.5 || u > WIDTH - 0.5 || v > HEIGHT - 0.5;
-
   const pairs = (numbers) => Array.from({ length: numbers.length / 2 }, (_, i) => [numbers[2 * i], numbers[2 * i + 1]]);
 
   const viewsOf = (holder) => ([perView, ...seen], found, { views, noise }, reach) => {
     const [points, residuals] = [pairs(seen), found ? pairs(found.residuals) : []];
     const columns = views <= 4 ? 2 : views <= 9 ? 3 : 4;
     const [across, down] = [WIDTH + GAP, HEIGHT + GAP];
-    const element = drawing(columns * across, Math.ceil(views / columns) * down, `The points in ${views} views, each with its residual`);
+    const element = drawing(columns * across, Math.ceil(views / columns) * down, `The points in ${counted(views, 'view')}, each with its residual`);
     const enlarged = ARROW_PX / noise;
     for (let view = 0; view < views; view += 1) {
       const of = (all) => all.slice(view * perView, (view + 1) * perView);
@@ -74,11 +71,15 @@
       element.append(group);
     }
     const share = Math.round(100 * reach / Math.hypot(scene.corner[0] - scene.centre[0], scene.corner[1] - scene.centre[1]));
-    const beyond = points.filter(isBeyond).length;
+    const beyond = points.filter(scene.isBeyond).length;
     const words = `Points as seen, and residuals \u00d7 ${digits(enlarged)}; points reach ${digits(reach, 3)} px from the principal point, ${share} % of the way to the farthest corner.` +
-      (beyond ? ` ${beyond} of ${points.length} points lie beyond the border of the image: a real camera would not see them.` : '');
+      (beyond ? ` Beyond the border of the image, where a real camera would not see them: ${beyond} of ${points.length} points.` : '');
     holder.replaceChildren(html('p', { class: 'panel-title' }, 'The views'), element, html('p', { class: 'says' }, words));
   };
+
+  // What must be said where some calibrations have no result, or nothing.
+  const selection = (answered, done) => (answered === done ? ''
+    : ` Only ${answered} of ${done} calibrations gave an answer, the rest were refused: what is shown is a selection, and need not follow the prediction.`);
 
   // The ellipse that holds a share of the errors of two parameters, in standard deviations of each.
   const ellipse = (correlation, share) => {
@@ -128,7 +129,8 @@
           points.push(put([a, b]));
         }
         cloud(dots(points));
-        if (estimated) words.textContent = `${(100 * inside / estimated).toFixed(1)} % of ${estimated} calibrations lie inside the outer ellipse, which is to hold ${100 * SHARES[1]} %.`;
+        const share = estimated ? `Inside the outer ellipse, which is to hold ${100 * SHARES[1]} %: ${(100 * inside / estimated).toFixed(1)} % of ${counted(estimated, 'calibration')}.` : '';
+        words.textContent = share + selection(estimated, values.length / OF_A_TRIAL);
       },
     };
   };
@@ -151,12 +153,13 @@
         upright(theory.floor, 'floor');
         if (own) upright(own.rmse, 'own-line');
         holder.replaceChildren(html('p', { class: 'panel-title' }, 'RMSE, and its law'), chart.element, words);
-        words.textContent = `Predicted ${digits(theory.rmseMean)} \u00b1 ${digits(theory.rmseSd, 2)} px, under the floor of ${digits(theory.floor)} px (dotted)` +
+        const said = `Predicted ${digits(theory.rmseMean)} \u00b1 ${digits(theory.rmseSd, 2)} px, under the floor of ${digits(theory.floor)} px (dotted)` +
           (own ? `; this draw: ${digits(own.rmse)} px.` : '.');
-        now = { theory, chart, bars };
+        words.textContent = said;
+        now = { theory, chart, bars, said };
       },
       trials: (values) => {
-        const { theory, chart, bars } = now;
+        const { theory, chart, bars, said } = now;
         const counts = new Array(theory.bars.length).fill(0);
         let estimated = 0;
         for (let at = OF_A_TRIAL - 1; at < values.length; at += OF_A_TRIAL) {
@@ -168,6 +171,7 @@
         const left = (k) => chart.x(theory.low + k * theory.width);
         const bar = (count, k) => `M${left(k)} ${chart.y(0)}V${chart.y(Math.min(count / estimated, 1.5 * Math.max(...theory.bars)))}H${left(k + 1)}V${chart.y(0)}Z`;
         bars(estimated ? counts.map(bar).join('') : '');
+        words.textContent = said + selection(estimated, values.length / OF_A_TRIAL);
       },
     };
   };
@@ -195,9 +199,9 @@
           cell[3].textContent = spread[0] > 1 ? digits(spread[1 + k], 3) : '';
           cell[4].textContent = spread[0] > 1 ? (spread[1 + k] / sd(theory, k)).toFixed(3) : '';
         });
-        const refused = done - spread[0];
-        words.textContent = `${done} of ${TRIALS} calibrations${spread[0] ? `; mean RMSE ${digits(spread[7])} px` : ''}${refused ? `; ${refused} without a result.` : '.'}`;
-        pace.textContent = `${Math.round(aFrame)} calibrations a frame.`;
+        const mean = spread[0] ? `; mean RMSE ${digits(spread[7])} px` : '';
+        words.textContent = `${done} of ${TRIALS} calibrations${mean}.${selection(spread[0], done)}`;
+        pace.textContent = `${counted(Math.round(aFrame), 'calibration')} a frame.`;
       },
     };
   };
@@ -220,7 +224,7 @@
     stage.append(...holders);
     const views = viewsOf(holders[0]);
     const [cloud, histogram, table] = [cloudOf(holders[1]), histogramOf(holders[2]), tableOf(holders[3])];
-    let [theory, shown, atChapter] = [null, '', false];
+    let [theory, scenery, atChapter] = [null, '', false];
     const trials = Laboratory.monteCarlo({
       element,
       ask,
@@ -261,6 +265,12 @@
       cloud.begin(theory, PAIRS[values.pair], own && own.estimate);
       histogram.begin(theory, own);
       table.begin(theory, own);
+      // Another draw or another cloud is another view of the same calibrations.
+      if (scenery === numbers.join()) {
+        trials.redraw();
+        return refusal;
+      }
+      scenery = numbers.join();
       stage.setAttribute('aria-busy', 'true');
       trials.restart(numbers);
       return refusal;

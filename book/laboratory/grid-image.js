@@ -3,16 +3,15 @@
 'use strict';
 
 {
-  const { html, svg, digits } = Laboratory;
+  const { html, digits, scene: { size: [WIDTH, HEIGHT] } } = Laboratory;
 
-  const [WIDTH, HEIGHT] = [640, 480];
   // The lens that took the photograph is the chapter's.
   const LENS = [-0.18, 0.05];
   // Height of the line that is measured, ideal px.
   const LINE = 60;
 
   const knobs = {
-    divider: { label: 'divider', unit: ' %', min: 0, max: 100, chapter: 50 },
+    divider: { label: 'divider of the images', min: 0, max: 100, chapter: 50, words: (share) => `${share} % photograph` },
     k1: { label: 'k1 of the correction', min: -0.4, max: 0.2, step: 0.01, chapter: -0.18 },
     k2: { label: 'k2 of the correction', min: -0.1, max: 0.2, step: 0.01, chapter: 0.05 },
   };

@@ -76,6 +76,8 @@
     reset.addEventListener('click', () => {
       put({});
       tell();
+      // The address, if it names a state of this laboratory, names the one that is shown.
+      if (addressed(name)) history.replaceState(null, '', link.href);
     });
     addEventListener('hashchange', () => {
       if (fromAddress()) tell();

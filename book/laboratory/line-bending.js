@@ -3,9 +3,8 @@
 'use strict';
 
 {
-  const { html, svg, drawing, path, polyline, digits, plot, dragged } = Laboratory;
+  const { html, svg, drawing, path, polyline, digits, plot, dragged, scene: { size: [WIDTH, HEIGHT], isBeyond } } = Laboratory;
 
-  const [WIDTH, HEIGHT] = [640, 480];
   // Lines of the chapter's grid, ideal pixels.
   const ACROSS = [20, 80, 140, 200, 260, 320, 380, 440, 500, 560, 620];
   const DOWN = [60, 120, 180, 240, 300, 360, 420];
@@ -33,6 +32,12 @@
     };
   };
 
+  // What of the line the image does not show, in words.
+  const outside = (count) => {
+    if (count === 0) return '';
+    return count === POINTS ? ' The line lies outside of the image.' : ` Outside of the image: ${count} of its ${POINTS} points.`;
+  };
+
   // The grid's lines as lists of ideal points.
   const straight = (() => {
     const along = (a, b, k) => a + (b - a) * k / PIECES;
@@ -46,7 +51,11 @@
     const image = drawing(WIDTH, HEIGHT, 'A grid as the lens shows it, and one of its level lines');
     image.append(svg('rect', { class: 'frame', width: WIDTH, height: HEIGHT }));
     const [grid, ideal, line] = ['grid', 'floor', 'points'].map((style) => path(image, style));
-    dragged(image, (x, y) => set({ height: Math.round(y) }));
+    const place = (x, y) => {
+      set({ height: Math.round(y) });
+      return true;
+    };
+    dragged(image, place, place);
     const chart = plot({ label: 'Distance of every point of the line from the regression line', xLabel: 'u of the point (px)', yLabel: 'distance (px)' });
     const deviation = chart.layer('residuals');
     const axis = chart.layer('predicted');
@@ -76,10 +85,14 @@
       line(polyline(found.seen));
       // Room for a pixel, or for twice as much, and so on.
       const room = 2 ** Math.max(0, Math.ceil(Math.log2(1.1 * found.max)));
-      chart.ranges([0, WIDTH], [room, -room]);
+      // A point outside of the image is shown too.
+      const across = found.seen.map(([u]) => u);
+      const [left, right] = [Math.min(0, ...across), Math.max(WIDTH, ...across)];
+      chart.ranges([left, right], [room, -room]);
       deviation(polyline(found.seen.map(([u], i) => [chart.x(u), chart.y(found.deviation[i])])));
-      axis(`M${chart.x(0)} ${chart.y(0)}H${chart.x(WIDTH)}`);
-      words.textContent = `At most ${digits(found.max)} px, RMS ${digits(found.rms)} px; corrected with the same lens ${digits(found.maxCorrected, 1)} px.`;
+      axis(`M${chart.x(left)} ${chart.y(0)}H${chart.x(right)}`);
+      words.textContent = `At most ${digits(found.max)} px, RMS ${digits(found.rms)} px; corrected with the same lens ${digits(found.maxCorrected, 1)} px.` +
+        outside(found.seen.filter(isBeyond).length);
     };
     return { show };
   };

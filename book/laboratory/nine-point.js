@@ -11,6 +11,9 @@
   const REACH_PX = 150;
   const DOTS = [0, 1, 2, 3, 4, 5, 6, 7, 8];
   const AXES = ['u', 'v'];
+  // Of a dot, in the image; and how far beside a small one a finger may press, pixels of the screen.
+  const RADIUS = 40;
+  const FINGER_PX = 22;
   // Keys that move the dot that has the focus, by a pixel; with Shift by ten.
   const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
@@ -73,10 +76,10 @@
     image.append(svg('rect', { class: 'frame', width: WIDTH, height: HEIGHT }));
     const joined = path(image, 'grid');
     let moved = DOTS.map(() => [0, 0]);
-    let held = 0;
+    let held = null;
     const move = (dot, [du, dv]) => set({ [`u${dot + 1}`]: Math.round(du), [`v${dot + 1}`]: Math.round(dv) });
     const marks = found.map(([u, v], dot) => {
-      const mark = svg('circle', { class: 'dot', r: 40, tabindex: 0, role: 'button', 'aria-roledescription': 'dot to move' });
+      const mark = svg('circle', { class: 'dot', r: RADIUS, tabindex: 0, role: 'button', 'aria-roledescription': 'dot to move' });
       mark.addEventListener('keydown', (event) => {
         const step = KEYS[event.key];
         if (!step) return;
@@ -84,14 +87,21 @@
         const by = event.shiftKey ? 10 : 1;
         move(dot, moved[dot].map((at, axis) => at + by * step[axis]));
       });
-      mark.addEventListener('pointerdown', () => { held = dot; });
       image.append(mark);
       return mark;
     });
-    dragged(image, (x, y) => {
-      if (held !== null) move(held, [x - found[held][0], y - found[held][1]]);
+    // The dot that is pressed, and how far from its middle: it follows the pointer and does not jump to it.
+    const grabbed = (x, y, unitsPerPixel) => {
+      const from = DOTS.map((dot) => AXES.map((_, axis) => found[dot][axis] + moved[dot][axis] - [x, y][axis]));
+      const dot = DOTS.reduce((least, other) => (Math.hypot(...from[other]) < Math.hypot(...from[least]) ? other : least));
+      const isReached = Math.hypot(...from[dot]) <= Math.max(RADIUS, FINGER_PX * unitsPerPixel);
+      held = isReached ? { dot, from: from[dot] } : null;
+      return isReached;
+    };
+    dragged(image, grabbed, (x, y) => {
+      const { dot, from } = held;
+      move(dot, AXES.map((_, axis) => [x, y][axis] + from[axis] - found[dot][axis]));
     });
-    image.addEventListener('pointerdown', (event) => { if (!marks.includes(event.target)) held = null; }, true);
     const panels = MODELS.map(panelOf);
     const hint = html('p', { class: 'says' }, 'Drag a dot, or go to one with the Tab key and move it with the arrow keys, with Shift by ten pixels.');
     stage.append(html('div', { class: 'panel' }, html('p', { class: 'panel-title' }, 'The image'), image, hint), ...panels.map((panel) => panel.element));

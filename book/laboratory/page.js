@@ -41,5 +41,12 @@
   const all = [...document.querySelectorAll('.laboratory[data-lab]')];
   // A browser too old for the code shows the figures alone.
   const solver = Laboratory.solver(Laboratory.bytes(Laboratory.code)).catch(() => null);
-  solver.then((ask) => ask && all.forEach((element) => startOne(element, ask)));
+  solver.then((ask) => {
+    if (!ask) return;
+    document.documentElement.classList.add('laboratories-run');
+    all.forEach((element) => startOne(element, ask));
+    // What the address names may have been hidden until now.
+    const named = document.querySelector('.with-laboratory :target');
+    if (named) named.scrollIntoView();
+  });
 }

@@ -10,7 +10,7 @@
     const found = new Map();
     const line = html('summary', { role: 'status' });
     const body = html('tbody');
-    const head = html('tr', {}, ...['number', 'golden', 'computed in this page', ''].map((words) => html('th', { scope: 'col' }, words)));
+    const head = html('tr', {}, ...['number', 'verdict', 'golden', 'computed in this page'].map((words) => html('th', { scope: 'col' }, words)));
     const table = html('div', { class: 'table-wrapper' }, html('table', {}, html('thead', {}, head), body));
     const element = html('details', { class: 'same-numbers' }, line, table);
     const row = ([id, value, unit]) => {
@@ -18,8 +18,8 @@
       const ours = found.get(id);
       const verdict = ours === undefined ? 'not yet' : Object.is(ours, value) ? 'same bits' : 'differs';
       const link = html('a', { href: `record-${experiment}.html#number-${number}` }, html('code', {}, id));
-      return html('tr', verdict === 'differs' ? { class: 'deviates' } : {}, html('td', {}, link), html('td', {}, `${value} ${unit}`),
-        html('td', {}, ours === undefined ? '' : `${ours} ${unit}`), html('td', {}, verdict));
+      return html('tr', verdict === 'differs' ? { class: 'deviates' } : {}, html('td', {}, link), html('td', {}, verdict), html('td', {}, `${value} ${unit}`),
+        html('td', {}, ours === undefined ? '' : `${ours} ${unit}`));
     };
     const judge = (values) => {
       Object.entries(values).forEach(([id, value]) => found.set(id, value));

@@ -9,6 +9,7 @@
   const knobs = {
     tilt: { label: 'tilt of the views', unit: '\u00b0', min: 0, max: 45, chapter: 20 },
     distance: { label: 'distance of the target', unit: ' mm', min: 90, max: 240, step: 2, chapter: 120 },
+    shift: { label: 'shift towards the corners', unit: ' mm', min: 0, max: 80, step: 2, chapter: 0 },
     views: { label: 'views', min: 1, max: 12, chapter: 4 },
     noise: { label: 'noise on each of u and v', unit: ' px', min: 0.01, max: 0.5, step: 0.01, chapter: 0.1 },
     k1: { label: 'k1 of the lens', min: -0.3, max: 0.3, step: 0.01, chapter: -0.18 },
@@ -16,7 +17,7 @@
     target: { label: 'points of the target', min: 0, max: TARGETS.length - 1, chapter: 3, words: (i) => TARGETS[i].join(' \u00d7 ') },
   };
 
-  const numbers = ({ tilt, distance, views, noise, k1, k2, target }) => [tilt, distance, views, noise, k1, k2, ...TARGETS[target]];
+  const numbers = ({ tilt, distance, shift, views, noise, k1, k2, target }) => [tilt, distance, shift, views, noise, k1, k2, ...TARGETS[target]];
 
   Laboratory.scene = {
     knobs,
@@ -26,5 +27,7 @@
     size: [640, 480],
     centre: [326, 243],
     corner: [-0.5, 479.5],
+    // Whether a pixel lies outside of the image: pixel (0, 0) is the middle of the first one.
+    isBeyond: ([u, v]) => Math.min(u, v) < -0.5 || u > 639.5 || v > 479.5,
   };
 }

@@ -11,7 +11,7 @@ use calibench::evaluate::cramer_rao;
 use calibench::geometry::Pose;
 use calibench::io::write_atomically;
 use calibench_gate::accept::Outcome;
-use calibench_gate::protocol::{Problem, ProblemView};
+use calibench_gate::protocol::Problem;
 use calibench_gate::{Process, Solver};
 use calibench_harness::ProgressDisplay;
 use calibench_harness::fingerprint::Fingerprint;
@@ -141,19 +141,8 @@ pub fn measure(command: &str, name: &str, jobs: usize, first: u64, path: &Path) 
 /// The scene as the protocol tells it; every program is told the image size.
 fn problem(family: &Family, drawn: &Drawn) -> Problem {
     let truth = drawn.truth();
-    let held = Parameter::ALL.into_iter().filter(|&p| !drawn.free.contains(p));
-    let coordinates = |list: &[calibench::geometry::Vec2]| list.iter().map(|p| [p.x, p.y]).collect();
-    let view = |view: &calibench::board::View| ProblemView {
-        target: coordinates(view.points()),
-        pixels: coordinates(view.pixels()),
-    };
-    Problem {
-        id: format!("{}-{}", family.name, drawn.index),
-        image_size: truth.image_size.into(),
-        views: drawn.views.iter().map(view).collect(),
-        free: drawn.free.iter().map(|p| p.name().to_string()).collect(),
-        held: held.map(|p| (p.name().to_string(), truth.camera.get(p))).collect(),
-    }
+    let id = format!("{}-{}", family.name, drawn.index);
+    Problem::of_views(id, truth.image_size, &drawn.views, &truth.camera.into(), drawn.free)
 }
 
 fn judge(family: &Family, drawn: &Drawn, outcome: &Outcome) -> Option<Line> {
@@ -169,8 +158,8 @@ fn judge(family: &Family, drawn: &Drawn, outcome: &Outcome) -> Option<Line> {
         Outcome::Unsupported(_) => (Ending::Unsupported, 0.0, 0.0),
         Outcome::Broken(_) => (Ending::Broken, 0.0, 0.0),
         Outcome::Estimate(estimate) => {
-            let cost =
-                estimate.cam_from_target.as_ref().and_then(|poses| cost(&estimate.camera, poses, drawn));
+            let answered = estimate.camera.brown_conrady().zip(estimate.cam_from_target.as_ref());
+            let cost = answered.and_then(|(camera, poses)| cost(&camera, poses, drawn));
             let excess = cost.map_or(f64::INFINITY, |cost| (cost - reference) / variance);
             let same = excess <= SAME_COST_VARIANCES;
             (if same { Ending::Right } else { Ending::Wrong }, excess, estimate.camera.fx)

@@ -43,6 +43,7 @@ from ._native import (
 )
 from .certified import certified_problems
 from .errors import (
+    ArrayError,
     BoardError,
     BoundError,
     CalibenchError,
@@ -60,6 +61,7 @@ from .gate import Answer, Problem, gate, run_gate
 
 __all__ = [
     "Answer",
+    "ArrayError",
     "Board",
     "BoardError",
     "BoundError",

@@ -26,16 +26,20 @@ class CalibenchError(ValueError):
         return self.message
 
 
+class ArrayError(CalibenchError):
+    """What is no array of numbers as it is needed: another shape, complex, masked; ``numbers["argument"]`` says which argument."""
+
+
 class CalibrationError(CalibenchError):
     """The data determine no camera: too few views or points, degenerate views, gross errors, a model that cannot be told from the data."""
 
 
 class SettingsError(CalibenchError):
-    """An option that cannot be: an unknown parameter or lens model, a loss without a scale."""
+    """An argument that cannot be: an unknown parameter or lens model, a loss without a scale, a number out of its range."""
 
 
 class ViewError(CalibenchError):
-    """Points and pixels that do not pair up, or are not finite; ``numbers["view"]`` says in which view."""
+    """Points and pixels that do not pair up, are not finite, or lie outside of the image for the most part; ``numbers["view"]`` says in which view."""
 
 
 class UndistortError(CalibenchError):

@@ -1,12 +1,15 @@
 //! A board: where its marks are, where they are seen in an image, and what image a virtual camera takes of it.
 
+use crate::arguments;
 use crate::arrays::{of_plane, pose};
 use crate::camera::Camera;
 use crate::errors;
 use crate::evaluate::brown_conrady;
 use crate::rectify::{grey, of_intensity};
 use crate::watch::detached;
+use calibench::board::Pattern;
 use calibench::photos::{BoardSpec, MarkKind};
+use calibench::synth::fnv1a;
 use calibench::synth::render::{Imaging, photograph};
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -22,6 +25,18 @@ use pyo3::prelude::*;
 #[pyclass(frozen, eq, skip_from_py_object, module = "calibench")]
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Board(pub(crate) BoardSpec);
+
+impl Board {
+    /// The text of which it is made.
+    fn text(&self) -> String {
+        let (kind, unit) = (self.kind(), self.unit());
+        let plain = format!("{kind}:{}x{}:{}{unit}", self.columns(), self.rows(), self.spacing());
+        match self.0.board().pattern() {
+            Pattern::Circles { diameter } if self.0.diameter_known => format!("{plain}:{diameter}{unit}"),
+            _ => plain,
+        }
+    }
+}
 
 #[pymethods]
 impl Board {
@@ -92,21 +107,33 @@ impl Board {
     ///     blur_px: standard deviation of the Gaussian point spread function.
     ///
     /// Raises:
-    ///     SceneError: part of the board is behind the camera, or where the lens folds back.
+    ///     SceneError: part of the board is behind the camera, or where the lens folds back; a pose that is not finite.
+    ///     SettingsError: an image without pixels, or of more than 2^28.
     #[pyo3(signature = (camera, image_size, rotation, translation, *, blur_px = 0.0))]
     fn photograph<'py>(
         &self,
         py: Python<'py>,
         camera: &Camera,
-        image_size: (usize, usize),
+        image_size: &Bound<'py, PyAny>,
         rotation: &Bound<'py, PyAny>,
         translation: &Bound<'py, PyAny>,
         blur_px: f64,
     ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let image_size = arguments::size_to_make(image_size, "image_size")?;
         let (camera, pose) = (brown_conrady(camera, "camera")?, pose(rotation, translation)?);
         let (board, imaging) = (*self.0.board(), Imaging { blur_px, ..Imaging::default() });
         let photo = detached(py, true, move || photograph(&camera, image_size, &board, &pose, &imaging))?;
         of_intensity(py, photo.map_err(|e| errors::render(py, &e))?.image)
+    }
+
+    /// A copy, and what `pickle` keeps: the text.
+    fn __getnewargs__(&self) -> (String,) {
+        (self.text(),)
+    }
+
+    /// Equal boards have equal hashes.
+    fn __hash__(&self) -> u64 {
+        fnv1a(self.text().bytes())
     }
 
     fn __repr__(&self) -> String {

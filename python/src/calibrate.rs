@@ -1,24 +1,26 @@
 //! From arrays of points and pixels to a camera, and all that is known of it.
 
 use crate::arrays::{
-    is_shared, of_plane, of_rotations, of_space, of_translations, plane_points, views_of_points,
+    is_shared, list, of_plane, of_rotations, of_space, of_translations, plane_points, refuse_masked,
+    views_of_points,
 };
 use crate::board::Board;
 use crate::camera::Camera;
 use crate::covariance::{Covariance, names, standard_deviations};
 use crate::errors;
+use crate::pickled::{Reduced, reduced};
 use crate::records::{all_mirrored, certificate, conditioning, mirrored, record, warnings};
 use crate::settings::settings;
-use crate::watch::detached;
+use crate::watch::{detached, needs_threads};
 use calibench::board::View;
 use calibench::calibrate::{LensCalibration, Settings, calibrate_lens};
 use calibench::geometry::{Vec2, Vec3, rotation};
 use calibench::io::CalibrationFields;
 use calibench::photos::Fitter;
-use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArray3, PyArrayLike1};
-use pyo3::exceptions::PyValueError;
+use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
+use pythonize::pythonize;
 use std::time::Instant;
 
 /// Calibrations of more views or marks than this may take longer than a person waits before pressing Ctrl-C; fewer take about a
@@ -27,13 +29,20 @@ const MANY_VIEWS: usize = 64;
 const MANY_MARKS: usize = 5000;
 
 /// A calibrated camera, how sure it is, how it fits, and what to be careful about.
-#[pyclass(frozen, module = "calibench")]
-#[derive(Debug)]
+#[pyclass(frozen, eq, skip_from_py_object, module = "calibench")]
+#[derive(Debug, Clone)]
 pub(crate) struct Calibration {
     pub(crate) result: LensCalibration,
     image_size: Option<(usize, usize)>,
     /// Time that the estimator took, where it alone was called.
     solver_seconds: Option<f64>,
+}
+
+/// Equal numbers, whatever time they took.
+impl PartialEq for Calibration {
+    fn eq(&self, other: &Calibration) -> bool {
+        (&self.result, self.image_size) == (&other.result, other.image_size)
+    }
 }
 
 /// The views of arrays.
@@ -44,15 +53,17 @@ pub(crate) fn views(
 ) -> PyResult<Vec<View>> {
     let py = points.py();
     let pixels = views_of_points(pixels, "pixels")?;
-    let points = match is_shared(points) {
+    let points = match is_shared(points)? {
         true => vec![plane_points(points, "points")?; pixels.len()],
         false => views_of_points(points, "points")?,
     };
     if points.len() != pixels.len() {
         let (p, v) = (points.len(), pixels.len());
-        return Err(PyValueError::new_err(format!(
-            "points of {p} views, pixels of {v}: give one array a view, or one for all views"
-        )));
+        let text = format!("points of {p} views, pixels of {v}: give one array a view, or one for all views");
+        return Err(errors::numbered(py, "ViewError", "Views", text, |numbers| {
+            numbers.set_item("points", p)?;
+            numbers.set_item("pixels", v)
+        }));
     }
     let view = |(index, (points, pixels))| View::new(points, pixels).map_err(|e| errors::view(py, index, &e));
     let views: Vec<View> = points.into_iter().zip(pixels).enumerate().map(view).collect::<PyResult<_>>()?;
@@ -64,21 +75,68 @@ pub(crate) fn views(
 
 fn weighted(views: Vec<View>, weights: &Bound<'_, PyAny>) -> PyResult<Vec<View>> {
     let py = weights.py();
-    let given: Vec<Vec<f64>> = weights
-        .try_iter()?
-        .map(|w| Ok(w?.extract::<PyArrayLike1<'_, f64, AllowTypeChange>>()?.as_array().to_vec()))
-        .collect::<PyResult<_>>()?;
+    refuse_masked(weights, "weights")?;
+    let of_view =
+        |(i, weights): (usize, PyResult<Bound<'_, PyAny>>)| list(&weights?, &format!("weights[{i}]"));
+    let given: Vec<Vec<f64>> = weights.try_iter()?.enumerate().map(of_view).collect::<PyResult<_>>()?;
     if given.len() != views.len() {
-        return Err(PyValueError::new_err(format!(
-            "weights of {} views, pixels of {}",
-            given.len(),
-            views.len()
-        )));
+        let (w, v) = (given.len(), views.len());
+        let text = format!("weights of {w} views, pixels of {v}");
+        return Err(errors::numbered(py, "ViewError", "Views", text, |numbers| {
+            numbers.set_item("weights", w)?;
+            numbers.set_item("pixels", v)
+        }));
     }
     let with = |(index, (view, weights)): (usize, (View, Vec<f64>))| {
         view.with_weights(weights).map_err(|e| errors::view(py, index, &e))
     };
     views.into_iter().zip(given).enumerate().map(with).collect()
+}
+
+/// A mark may lie this part of the image's longer side beyond the centres of the outermost pixels, one pixel at least: as on the command line.
+const BEYOND: f64 = 0.02;
+
+/// Whether a mark lies in an image, or as little outside as noise puts it.
+fn is_within(pixel: &Vec2, (width, height): (usize, usize)) -> bool {
+    let beyond = (BEYOND * width.max(height) as f64).max(1.0);
+    let on_side = |at: f64, length: usize| (-beyond..=length as f64 - 1.0 + beyond).contains(&at);
+    on_side(pixel.x, width) && on_side(pixel.y, height)
+}
+
+/// Refuses marks of another image: where most lie outside of it, or where all lie inside when its sides are swapped. Single ones may come from
+/// a made-up scene.
+pub(crate) fn refuse_marks_outside(
+    py: Python<'_>,
+    views: &[View],
+    image_size: Option<(usize, usize)>,
+) -> PyResult<()> {
+    let Some((width, height)) = image_size else { return Ok(()) };
+    let marks = || views.iter().enumerate().flat_map(|(v, view)| view.pixels().iter().map(move |p| (v, p)));
+    let outside = || marks().filter(|(_, pixel)| !is_within(pixel, (width, height)));
+    let Some((view, pixel)) = outside().next() else { return Ok(()) };
+    let (all, count) = (marks().count(), outside().count());
+    let is_swapped = marks().all(|(_, pixel)| is_within(pixel, (height, width)));
+    if !is_swapped && 2 * count <= all {
+        return Ok(());
+    }
+    let help =
+        if is_swapped { "were the sides of image_size swapped?" } else { "check image_size and pixels" };
+    let text = format!(
+        "{count} of {all} marks lie outside of the image of {width} x {height} px, the first, of view {view}, at ({}, {}): {help}",
+        pixel.x, pixel.y
+    );
+    Err(errors::numbered(py, "ViewError", "OutsideImage", text, |numbers| {
+        numbers.set_item("view", view)?;
+        numbers.set_item("marks", all)?;
+        numbers.set_item("outside", count)?;
+        numbers.set_item("u", pixel.x)?;
+        numbers.set_item("v", pixel.y)
+    }))
+}
+
+/// Whether the work is shared among the library's threads.
+pub(crate) fn is_shared_out(views: &[View]) -> bool {
+    views.len() >= MANY_VIEWS
 }
 
 /// Whether Ctrl-C should be heard meanwhile.
@@ -112,7 +170,8 @@ pub(crate) fn is_long(views: &[View], settings: &Settings) -> bool {
 ///
 /// Raises:
 ///     CalibrationError: the data determine no camera; `kind` and `numbers` say why.
-///     ViewError: points and pixels that do not pair up or are not finite.
+///     ArrayError: what is no array of points: another shape, complex, masked.
+///     ViewError: points and pixels that do not pair up, are not finite, or lie outside of the image for the most part.
 ///     SettingsError: an option that cannot be.
 #[pyfunction]
 #[pyo3(signature = (points, pixels, *, weights = None, **options))]
@@ -126,6 +185,10 @@ pub(crate) fn calibrate(
     let settings = settings(py, options)?;
     let views = views(points, pixels, weights)?;
     let (image_size, long) = (settings.image_size, is_long(&views, &settings));
+    refuse_marks_outside(py, &views, image_size)?;
+    if is_shared_out(&views) {
+        needs_threads(py)?;
+    }
     let (result, took) = detached(py, long, move || {
         let started = Instant::now();
         (calibrate_lens(&views, &settings), started.elapsed())
@@ -158,6 +221,10 @@ pub(crate) fn fit_views<'py>(
     let views: Vec<View> =
         views_of_points(pixels, "pixels")?.into_iter().enumerate().map(view).collect::<PyResult<_>>()?;
     let image_size = settings.image_size;
+    refuse_marks_outside(py, &views, image_size)?;
+    if is_shared_out(&views) {
+        needs_threads(py)?;
+    }
     let fit = detached(py, true, move || {
         let discs = spec.diameter_known.then(|| spec.board());
         Fitter { settings: &settings, discs, reject_factor: reject_views }.fit(&views)
@@ -190,6 +257,9 @@ pub(crate) fn locate<'py>(
 ) -> PyResult<Option<Bound<'py, PyAny>>> {
     let (points, pixels) = (plane_points(points, "points")?, plane_points(pixels, "pixels")?);
     let view = View::new(points, pixels).map_err(|e| errors::view(py, 0, &e))?;
+    if view.len() < 4 {
+        return Ok(None);
+    }
     let camera = camera.0;
     let found = detached(py, false, move || calibench::calibrate::locate(&camera, &view))?;
     let of = |located: calibench::calibrate::Located| {
@@ -209,6 +279,18 @@ pub(crate) fn locate<'py>(
 impl Calibration {
     pub(crate) fn of(result: LensCalibration, image_size: Option<(usize, usize)>) -> Calibration {
         Calibration { result, image_size, solver_seconds: None }
+    }
+
+    /// A calibration from what `__reduce__` gave.
+    pub(crate) fn restored(
+        camera: Camera,
+        result: calibench::calibrate::Calibration,
+        image_size: Option<(usize, usize)>,
+        solver_seconds: Option<f64>,
+    ) -> Calibration {
+        let mut result: LensCalibration = result.into();
+        result.camera = camera.0;
+        Calibration { result, image_size, solver_seconds }
     }
 
     /// Width and height, px, where they were stated.
@@ -270,20 +352,22 @@ impl Calibration {
         PyList::new(py, self.result.residuals.iter().map(view).collect::<PyResult<Vec<_>>>()?)
     }
 
-    /// ``sqrt(sum |r|^2 / N)`` over all N points, px: as OpenCV's.
+    /// ``sqrt(sum w^2 |r|^2 / N)`` over all N points, px, w being the marks' weights: as OpenCV's where none were given. A robust loss does not
+    /// enter: outliers that it set aside count in full.
     #[getter]
     fn rmse_px(&self) -> f64 {
         self.result.rmse_px
     }
 
-    /// The same of every view, shape (V,).
+    /// ``sqrt(sum |r|^2 / n)`` over the n points of every view, px, shape (V,); weights do not enter.
     #[getter]
     fn view_rmse_px<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let views = 0..self.result.residuals.len();
         PyArray1::from_iter(py, views.map(|view| self.result.view_rmse_px(view).unwrap_or(f64::NAN)))
     }
 
-    /// Estimated standard deviation of a pixel coordinate, ``sqrt(sum |r|^2 / (2 N - p))``, px.
+    /// Estimated standard deviation of a pixel coordinate of a mark of weight 1, ``sqrt(sum w^2 |r|^2 / (2 N - p))``, px. A robust loss does not
+    /// enter: outliers count in full. The covariance is scaled by Huber's correction instead (Huber & Ronchetti 2009, section 7.6).
     #[getter]
     fn sigma_px(&self) -> f64 {
         self.result.sigma_px
@@ -365,6 +449,16 @@ impl Calibration {
     #[getter]
     fn solver_seconds(&self) -> Option<f64> {
         self.solver_seconds
+    }
+
+    /// A copy, and what `pickle` keeps: every number.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
+        // What serde writes is a calibration with Brown-Conrady's lens; the camera goes beside it.
+        let mut result = self.result.clone();
+        result.camera = calibench::camera::Camera::pinhole(1.0, 1.0, 0.0, 0.0).into();
+        let data = result.brown_conrady().map(|plain| pythonize(py, &plain)).transpose()?;
+        let state = (self.camera(), data, self.image_size, self.solver_seconds);
+        reduced(py, "Calibration", state.into_pyobject(py)?.into_any())
     }
 
     /// The text of `result.json` as the command writes it, all digits kept.

@@ -6,10 +6,17 @@ use crate::rectify;
 use crate::watch::detached;
 use calibench::camera::{Camera as LensCamera, Lens, Model, Parameter, UndistortError};
 use calibench::geometry::{Pose, Vec2, Vec3};
+use calibench::synth::fnv1a;
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
+
+/// Of what has no image.
+const NOWHERE: Vec2 = Vec2::new(f64::NAN, f64::NAN);
+
+/// How far, of the angle itself, a ray of `unproject` may lie beyond the last one of the lens by rounding.
+const AT_THE_LIMIT: f64 = 1e-12;
 
 /// More points than this are a long call: some milliseconds.
 const MANY: usize = 100_000;
@@ -92,7 +99,17 @@ impl Camera {
             Some(camera) => camera.project(point_cam),
             None => self.0.pixel(point_cam),
         };
-        seen.unwrap_or(Vec2::repeat(f64::NAN))
+        seen.unwrap_or(NOWHERE)
+    }
+
+    /// Tells of points in camera coordinates whether the lens has one image of them: not beyond the angle up to which it is one-to-one, and not
+    /// exactly behind it, where no direction from the axis is theirs.
+    fn sees(&self) -> impl Fn(&Vec3) -> bool + use<> {
+        let limit = self.0.distortion.monotone_angle() * (1.0 + AT_THE_LIMIT);
+        move |point| {
+            let across = point.xy().norm();
+            libm::atan2(across, point.z) <= limit && (across > 0.0 || point.z > 0.0)
+        }
     }
 
     /// Where an ideal lens with the same focal lengths, principal point and skew would have shown it.
@@ -100,7 +117,7 @@ impl Camera {
         let ray = self.0.ray(pixel)?;
         let (x, y) = (ray.x / ray.z, ray.y / ray.z);
         let seen = Vec2::new(self.0.fx * x + self.0.skew * y + self.0.cx, self.0.fy * y + self.0.cy);
-        Ok(if ray.z > 0.0 { seen } else { Vec2::repeat(f64::NAN) })
+        Ok(if ray.z > 0.0 { seen } else { NOWHERE })
     }
 
     fn ideal_pixels(&self, pixels: &[Vec2], outside: Outside) -> Result<Vec<Vec2>, (usize, UndistortError)> {
@@ -108,7 +125,7 @@ impl Camera {
         if let Some(corrected) = plain.and_then(|camera| camera.correct_pixels(pixels).ok()) {
             return Ok(corrected);
         }
-        each(pixels, outside, Vec2::repeat(f64::NAN), |pixel| match &plain {
+        each(pixels, outside, NOWHERE, |pixel| match &plain {
             Some(camera) => camera.correct_pixel(pixel),
             None => self.ideal_pixel(pixel),
         })
@@ -218,7 +235,8 @@ impl Camera {
         self.0.distortion.monotone_angle()
     }
 
-    /// Pixels of points, shape (N, 2); NaN where the lens has no image of a point.
+    /// Pixels of points, shape (N, 2); NaN where the lens has no image of a point: behind the camera, or further than `monotone_angle` from
+    /// the axis, where the formulas of the model show what no lens shows.
     ///
     /// Args:
     ///     points: (N, 3), or (N, 2) with Z = 0; in camera coordinates, or with a pose in the target's.
@@ -231,7 +249,7 @@ impl Camera {
         rotation: Option<&Bound<'py, PyAny>>,
         translation: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let points = Rows::of(points, "points")?.space("points")?;
+        let points = Rows::of(points, "points")?.space(py, "points")?;
         let pose = match (rotation, translation) {
             (Some(rotation), Some(translation)) => Some(pose(rotation, translation)?),
             (None, None) => None,
@@ -244,8 +262,10 @@ impl Camera {
         let (camera, many) = (self.clone(), points.len() > MANY);
         let pixels: Vec<Vec2> = detached(py, many, move || {
             let plain = camera.0.brown_conrady();
+            let sees = camera.sees();
             let seen = |point: &Vec3| {
-                camera.pixel(plain.as_ref(), &pose.as_ref().map_or(*point, |pose: &Pose| pose.apply(point)))
+                let point = pose.as_ref().map_or(*point, |pose: &Pose| pose.apply(point));
+                if sees(&point) { camera.pixel(plain.as_ref(), &point) } else { NOWHERE }
             };
             points.iter().map(seen).collect()
         })?;
@@ -290,7 +310,8 @@ impl Camera {
         of_plane(py, &ideal.map_err(|(index, error)| errors::undistort(py, index, &error))?)
     }
 
-    /// The pixels at which the lens shows what one without distortion would show at `pixels`, shape (N, 2), px.
+    /// The pixels at which the lens shows what one without distortion would show at `pixels`, shape (N, 2), px; NaN further than
+    /// `monotone_angle` from the axis.
     #[pyo3(signature = (pixels))]
     fn distort_points<'py>(
         &self,
@@ -302,13 +323,15 @@ impl Camera {
         let seen: Vec<Vec2> = detached(py, many, move || {
             let plain = camera.0.brown_conrady();
             let LensCamera { fx, fy, cx, cy, skew, .. } = camera.0;
+            let sees = camera.sees();
             let one = |pixel: &Vec2| {
                 let y = (pixel.y - cy) / fy;
-                let x = (pixel.x - cx - skew * y) / fx;
-                plain.map_or_else(
-                    || camera.pixel(None, &Vec3::new(x, y, 1.0)),
-                    |plain| plain.distort_pixel(pixel),
-                )
+                let ray = Vec3::new((pixel.x - cx - skew * y) / fx, y, 1.0);
+                match plain {
+                    _ if !sees(&ray) => NOWHERE,
+                    Some(plain) => plain.distort_pixel(pixel),
+                    None => camera.pixel(None, &ray),
+                }
             };
             pixels.iter().map(one).collect()
         })?;
@@ -334,6 +357,13 @@ impl Camera {
         border: f64,
     ) -> PyResult<(Bound<'py, PyAny>, Option<Camera>)> {
         rectify::undistort_image(py, self, image, view, border)
+    }
+
+    /// Equal cameras have equal hashes.
+    fn __hash__(&self) -> u64 {
+        // 0.0 and -0.0 are equal.
+        let bits = self.0.values().flat_map(|(_, value)| (value + 0.0).to_bits().to_le_bytes());
+        fnv1a(self.model().bytes().chain(bits))
     }
 
     pub(crate) fn __repr__(&self) -> String {

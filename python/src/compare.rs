@@ -1,10 +1,10 @@
 //! Which lens model do the views speak for?
 
-use crate::calibrate::{Calibration, views};
+use crate::calibrate::{Calibration, is_shared_out, refuse_marks_outside, views};
 use crate::errors;
 use crate::records::record;
 use crate::settings::settings;
-use crate::watch::detached;
+use crate::watch::{detached, needs_threads};
 use calibench::calibrate::{Candidate, Compared};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -28,6 +28,10 @@ pub(crate) fn compare_models<'py>(
     let settings = settings(py, options)?;
     let views = views(points, pixels, weights)?;
     let image_size = settings.image_size;
+    refuse_marks_outside(py, &views, image_size)?;
+    if is_shared_out(&views) {
+        needs_threads(py)?;
+    }
     let compare = move || calibench::calibrate::compare_models(&views, &settings, &Candidate::usual());
     let (compared, refused) = detached(py, true, compare)?;
     if let (true, Some((_, error))) = (compared.is_empty(), refused.first()) {

@@ -1,12 +1,15 @@
 //! How well the unknowns are known, as matrices.
 
-use crate::arrays::{of_matrix, stacked};
+use crate::arguments::not_negative;
+use crate::arrays::{list, of_matrix, stacked};
 use crate::camera::parameter;
+use crate::pickled::{Reduced, reduced};
 use calibench::calibrate::Covariance as Blocks;
 use calibench::camera::Parameter;
 use numpy::{PyArray2, PyArray3};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
+use pythonize::pythonize;
 
 /// How well the unknowns are known, to first order: ``sigma^2 (J^T J)^-1``.
 ///
@@ -78,13 +81,31 @@ impl Covariance {
     }
 
     /// ``e^T P^-1 e`` of an error of the parameters in `free`: chi-squared with n degrees of freedom if the covariance is right (Bar-Shalom, Li & Kirubarajan 2001). ``None`` if it is singular.
-    fn normalised_error_squared(&self, errors: Vec<f64>) -> Option<f64> {
-        self.0.normalised_error_squared(&errors)
+    ///
+    /// Raises:
+    ///     ArrayError: not one number a parameter.
+    fn normalised_error_squared(&self, errors: &Bound<'_, PyAny>) -> PyResult<Option<f64>> {
+        let numbers = list(errors, "errors")?;
+        let n = self.0.free.len();
+        if numbers.len() != n {
+            let text = format!("errors: {} numbers for {n} parameters: {}", numbers.len(), self.0.free);
+            return Err(crate::errors::numbered(errors.py(), "ArrayError", "Shape", text, |fields| {
+                fields.set_item("argument", "errors")?;
+                fields.set_item("expected", n)?;
+                fields.set_item("got", numbers.len())
+            }));
+        }
+        Ok(self.0.normalised_error_squared(&numbers))
     }
 
     /// The covariance for noise of `factor` times the variance.
-    fn scaled(&self, factor: f64) -> Covariance {
-        Covariance(self.0.clone().scaled(factor))
+    fn scaled(&self, py: Python<'_>, factor: f64) -> PyResult<Covariance> {
+        Ok(Covariance(self.0.clone().scaled(not_negative(py, "factor", factor)?)))
+    }
+
+    /// A copy, and what `pickle` keeps: every number.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
+        reduced(py, "Covariance", pythonize(py, &self.0)?)
     }
 
     fn __repr__(&self) -> String {

@@ -6,7 +6,6 @@ use calibench::camera::UndistortError;
 use calibench::detect::{ChessboardError, GridError};
 use calibench::evaluate::BoundError;
 use calibench::io::formats::FormatError;
-use calibench::io::message;
 use calibench::photos::{BoardSpecError, DetectError, NotFound};
 use calibench::rectify::{OutputCameraError, RectifyError};
 use calibench::synth::SceneError;
@@ -15,6 +14,23 @@ use calibench_study::SpecError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::error::Error;
+use std::fmt::Display;
+
+/// Options of the command line in the library's advice, and what they are here.
+const OPTIONS: [(&str, &str); 7] = [
+    ("--fix k3=0", "hold={\"k3\": 0.0}"),
+    ("--image-size WxH", "image_size=(width, height)"),
+    ("--fit", "fit=True"),
+    ("--camera", "camera="),
+    ("--from", "format="),
+    ("--to", "format="),
+    (": see --memory", ""),
+];
+
+/// The text of an error, with its causes, in the words of Python.
+fn message(error: &(dyn Error + 'static)) -> String {
+    OPTIONS.iter().fold(calibench::io::message(error), |text, (option, here)| text.replace(option, here))
+}
 
 /// An exception of the class `class`: its text, kind and numbers.
 pub(crate) fn exception(
@@ -27,6 +43,35 @@ pub(crate) fn exception(
     let raised =
         py.import("calibench.errors").and_then(|errors| errors.getattr(class)?.call1((text, kind, numbers)));
     raised.map_or_else(|error| error, PyErr::from_value)
+}
+
+/// An exception whose numbers are filled in by `fill`.
+pub(crate) fn numbered<'py>(
+    py: Python<'py>,
+    class: &str,
+    kind: &str,
+    text: String,
+    fill: impl FnOnce(&Bound<'py, PyDict>) -> PyResult<()>,
+) -> PyErr {
+    let numbers = PyDict::new(py);
+    match fill(&numbers) {
+        Ok(()) => exception(py, class, text, kind, numbers.into_any()),
+        Err(error) => error,
+    }
+}
+
+/// An argument that cannot be: what it is, and what is wanted.
+pub(crate) fn argument<'py>(
+    py: Python<'py>,
+    name: &str,
+    value: impl IntoPyObject<'py> + Display + Copy,
+    wanted: &str,
+) -> PyErr {
+    let text = format!("{name} = {value}: {wanted}");
+    numbered(py, "SettingsError", "Argument", text, |numbers| {
+        numbers.set_item("argument", name)?;
+        numbers.set_item("value", value)
+    })
 }
 
 /// A refusal that carries no numbers beside its text.
@@ -98,6 +143,7 @@ pub(crate) fn scene(py: Python<'_>, error: &SceneError) -> PyErr {
 pub(crate) fn render(py: Python<'_>, error: &RenderError) -> PyErr {
     exception_of!(py, "SceneError", error;
         RenderError::BehindCamera { x, y }
+        RenderError::TooNear { x, y }
         RenderError::BeyondMonotoneRadius { x, y, radius, limit }
         RenderError::Setting { name, value, need })
 }

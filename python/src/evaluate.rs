@@ -1,5 +1,6 @@
 //! How far is an estimate from the truth, and how far should it be?
 
+use crate::arguments;
 use crate::camera::Camera;
 use crate::covariance::Covariance;
 use crate::errors;
@@ -20,6 +21,7 @@ use pyo3::types::PyDict;
 ///
 /// Raises:
 ///     BoundError: the scene does not determine them.
+///     SettingsError: a standard deviation that is not positive.
 #[pyfunction]
 #[pyo3(signature = (scene, sigma_px, *, free = None))]
 pub(crate) fn cramer_rao(
@@ -28,6 +30,7 @@ pub(crate) fn cramer_rao(
     sigma_px: f64,
     free: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Covariance> {
+    let sigma_px = arguments::positive(py, "sigma_px", sigma_px)?;
     let free = free.map_or(Ok(calibench::camera::FreeParameters::STANDARD), free_parameters)?;
     let truth = scene.0.truth.clone();
     let bound = detached(py, false, move || calibench::evaluate::cramer_rao(&truth, free, sigma_px))?;
@@ -73,15 +76,39 @@ pub(crate) fn errors_of<'py>(
 ///     sigma_px: standard deviation of the noise on each of u and v, px.
 ///     points: number of points N.
 ///     parameters: number of fitted parameters p, six a pose included.
-#[pyclass(frozen, module = "calibench")]
-#[derive(Debug)]
+#[pyclass(frozen, eq, skip_from_py_object, module = "calibench")]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct RmseDistribution(Distribution);
 
 #[pymethods]
 impl RmseDistribution {
     #[new]
-    fn new(sigma_px: f64, points: usize, parameters: usize) -> RmseDistribution {
-        RmseDistribution(Distribution { sigma_px, points, parameters })
+    fn new(
+        py: Python<'_>,
+        sigma_px: f64,
+        points: &Bound<'_, PyAny>,
+        parameters: &Bound<'_, PyAny>,
+    ) -> PyResult<RmseDistribution> {
+        let sigma_px = arguments::positive(py, "sigma_px", sigma_px)?;
+        let points: usize = arguments::value(points, "points")?;
+        let parameters: usize = arguments::value(parameters, "parameters")?;
+        // Beyond 2^52 a number of points is no longer exact in double precision.
+        if !(1..=1 << 52).contains(&points) {
+            return Err(errors::argument(py, "points", points, "expected 1 to 2^52 points"));
+        }
+        if parameters >= 2 * points {
+            let wanted = format!(
+                "{points} points have {} coordinates, and more than the parameters are needed",
+                2 * points
+            );
+            return Err(errors::argument(py, "parameters", parameters, &wanted));
+        }
+        Ok(RmseDistribution(Distribution { sigma_px, points, parameters }))
+    }
+
+    /// A copy, and what `pickle` keeps: the arguments.
+    fn __getnewargs__(&self) -> (f64, usize, usize) {
+        (self.0.sigma_px, self.0.points, self.0.parameters)
     }
 
     /// ``sqrt(2) sigma``, px: what perfect knowledge of the camera would leave.
@@ -103,12 +130,12 @@ impl RmseDistribution {
     }
 
     /// ``P(RMSE <= rmse_px)``.
-    fn cdf(&self, rmse_px: f64) -> f64 {
-        self.0.cdf(rmse_px)
+    fn cdf(&self, py: Python<'_>, rmse_px: f64) -> PyResult<f64> {
+        Ok(self.0.cdf(arguments::not_negative(py, "rmse_px", rmse_px)?))
     }
 
     /// Two-sided probability of an RMSE as far from the middle.
-    fn p_value(&self, rmse_px: f64) -> f64 {
-        self.0.p_value(rmse_px)
+    fn p_value(&self, py: Python<'_>, rmse_px: f64) -> PyResult<f64> {
+        Ok(self.0.p_value(arguments::not_negative(py, "rmse_px", rmse_px)?))
     }
 }

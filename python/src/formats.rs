@@ -5,13 +5,11 @@ use crate::calibrate::{Calibration, views};
 use crate::camera::Camera;
 use crate::covariance::names;
 use crate::errors;
-use crate::evaluate::brown_conrady;
 use crate::records::record;
 use calibench::io::formats::{
     self, CameraFile, Estimated, Format, FormatError, MOST_BYTES, Wishes, corner_text, detect,
     format_of_name, format_to_write, read_camera_file, write_camera_file,
 };
-use calibench::io::result::parse_lens_camera;
 use calibench::io::{CornerFile, read_regular_text, write_atomically};
 use numpy::PyArray1;
 use pyo3::exceptions::{PyOSError, PyValueError};
@@ -63,32 +61,13 @@ pub(crate) fn read_camera<'py>(
     let text = read_regular_text(&path, MOST_BYTES).map_err(|e| refused(e.into()))?;
     let format = format.map_or_else(|| detect(&file, &text).map_err(refused), named)?;
     let wishes = wishes(fit, pixel_height_m, first_pixel);
-    match read_camera_file(format, &file, &text, camera, &wishes) {
-        Ok(read) => camera_file(py, format.name, &read),
-        // This library's own files hold lenses of every model; the other formats that of Brown and Conrady.
-        Err(error) if format.name == "calibench" => match parse_lens_camera(&file, &text) {
-            Ok((camera, image_size)) => lens_file(py, Camera(camera), image_size),
-            Err(_) => Err(refused(error)),
-        },
-        Err(error) => Err(refused(error)),
-    }
-}
-
-fn lens_file(
-    py: Python<'_>,
-    camera: Camera,
-    image_size: Option<(usize, usize)>,
-) -> PyResult<Bound<'_, PyAny>> {
-    let fields = PyDict::new(py);
-    fields.set_item("camera", camera)?;
-    fields.set_item("format", "calibench")?;
-    fields.set_item("image_size", image_size)?;
-    record(py, "CameraFile", &fields)
+    let read = read_camera_file(format, &file, &text, camera, &wishes).map_err(refused)?;
+    camera_file(py, format.name, &read)
 }
 
 fn camera_file<'py>(py: Python<'py>, format: &str, read: &CameraFile) -> PyResult<Bound<'py, PyAny>> {
     let fields = PyDict::new(py);
-    fields.set_item("camera", Camera(read.camera.into()))?;
+    fields.set_item("camera", Camera(read.camera))?;
     fields.set_item("format", format)?;
     fields.set_item("image_size", read.image_size)?;
     fields.set_item("name", &read.name)?;
@@ -114,22 +93,18 @@ fn contents(
 ) -> PyResult<CameraFile> {
     if let Ok(calibration) = camera.cast::<Calibration>() {
         let result = &calibration.get().result;
-        let plain = Camera(result.camera);
         let estimated = Estimated {
             free: result.free,
+            fy_per_fx: result.covariance.fy_per_fx,
             covariance: result.covariance.intrinsics.clone(),
             degrees_of_freedom: Some(result.degrees_of_freedom),
         };
-        let file = CameraFile::of(brown_conrady(&plain, "a file of another program")?);
+        let file = CameraFile::of(result.camera);
         let image_size = image_size.or(calibration.get().size());
         return Ok(CameraFile { image_size, name, estimated: Some(estimated), ..file });
     }
     let camera: Camera = camera.extract()?;
-    Ok(CameraFile {
-        image_size,
-        name,
-        ..CameraFile::of(brown_conrady(&camera, "a file of another program")?)
-    })
+    Ok(CameraFile { image_size, name, ..CameraFile::of(camera.0) })
 }
 
 /// Writes a camera, or a calibration with its covariance, whole or not at all; says what was converted and what is lost.

@@ -1,20 +1,23 @@
 //! The gate in Python: a function of Python's, a program or this library's solver is asked, and its answers are judged.
 
 use crate::arrays::of_plane;
+use crate::gate_program::StoppableProgram;
 use crate::records::record;
-use crate::watch::detached;
+use crate::watch::{detached, needs_threads};
+use calibench::camera::{Model, UnknownModel};
 use calibench::geometry::Vec2;
 use calibench_gate::accept::Breakage;
 use calibench_gate::protocol::{Answer, Problem};
 use calibench_gate::solver::Given;
-use calibench_gate::{
-    Builtin, Check, Plan, Process, Property, Report as Judged, Solver, Terms, process, run,
-};
+use calibench_gate::{Asked, Builtin, Check, Plan, Property, Report as Judged, Solver, Terms, run};
 use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
+
+/// Copies of a program: each is a process and three threads.
+const MOST_JOBS: usize = 1024;
 
 /// How a run is made and judged.
 #[derive(FromPyObject)]
@@ -25,17 +28,32 @@ pub(crate) struct Options {
     false_alarms: f64,
     accept: Vec<String>,
     median_time: Option<f64>,
+    /// Lens models; empty for those that the solver knows.
+    models: Vec<String>,
+    /// Names of scenes; empty for all.
+    scenes: Vec<String>,
 }
 
 impl Options {
-    fn plan(&self) -> PyResult<Plan> {
+    /// What is asked; of a solver that knows `known` unless lens models were named.
+    fn plan(&self, known: impl FnOnce() -> Vec<Model>) -> PyResult<Plan> {
+        let wrong = |message: String| PyValueError::new_err(message);
         if self.samples == 0 {
-            return Err(PyValueError::new_err("samples must be at least 1"));
+            return Err(wrong("samples must be at least 1".into()));
         }
-        Plan::new(self.seed, self.samples).map_err(|e| PyValueError::new_err(e.to_string()))
+        let named: Result<Vec<Model>, UnknownModel> = self.models.iter().map(|name| name.parse()).collect();
+        let named = named.map_err(|e| wrong(e.to_string()))?;
+        let models = if named.is_empty() { known() } else { named };
+        let asked = Asked { models, scenes: self.scenes.clone() };
+        Plan::of(self.seed, self.samples, asked).map_err(|e| wrong(e.to_string()))
     }
 
     fn terms(&self) -> PyResult<Terms> {
+        if let Some(seconds) = self.median_time.filter(|seconds| seconds.is_nan() || *seconds <= 0.0) {
+            return Err(PyValueError::new_err(format!(
+                "median_time = {seconds}: expected a positive number of seconds"
+            )));
+        }
         if !(self.false_alarms > 0.0 && self.false_alarms < 1.0) {
             return Err(PyValueError::new_err("false_alarms must lie between 0 and 1"));
         }
@@ -59,10 +77,12 @@ pub(crate) fn gate_properties() -> Vec<&'static str> {
     Property::ALL.iter().map(|property| property.name()).collect()
 }
 
-/// Digits that a number shares with a certified one: `-log10(|x - c| / |c|)`, between 0 and 15 (McCullough 1998).
+/// Digits that a number shares with a certified one: `-log10(|x - c| / |c|)`, of a certified 0 `-log10(|x|)`, between 0 and 15 (McCullough
+/// 1998).
 #[pyfunction]
 pub(crate) fn digits(estimate: f64, certified: f64) -> f64 {
-    calibench_gate::certified::log_relative_error(estimate, certified)
+    // Minus the logarithm of 1 is -0.
+    calibench_gate::certified::log_relative_error(estimate, certified) + 0.0
 }
 
 fn judged(solver: &dyn Solver, plan: &Plan, terms: &Terms) -> Judged {
@@ -74,7 +94,8 @@ fn judged(solver: &dyn Solver, plan: &Plan, terms: &Terms) -> Judged {
 /// `run_gate` of this library's solver.
 #[pyfunction]
 pub(crate) fn gate_builtin(py: Python<'_>, options: Options) -> PyResult<Report> {
-    let (plan, terms) = (options.plan()?, options.terms()?);
+    let (plan, terms) = (options.plan(|| Builtin.models())?, options.terms()?);
+    needs_threads(py)?;
     detached(py, true, move || judged(&Builtin, &plan, &terms)).map(Report)
 }
 
@@ -87,14 +108,24 @@ pub(crate) fn gate_command(
     jobs: usize,
     options: Options,
 ) -> PyResult<Report> {
-    let (plan, terms) = (options.plan()?, options.terms()?);
+    let terms = options.terms()?;
+    // Mistakes are told before the program is started.
+    options.plan(|| Model::ALL.to_vec())?;
     let limit = Duration::try_from_secs_f64(timeout).ok().filter(|limit| !limit.is_zero());
     let limit = limit.ok_or_else(|| PyValueError::new_err("timeout must be a positive number of seconds"))?;
-    let report = detached(py, true, move || judged(&Process::new(&command, limit, jobs), &plan, &terms));
-    if report.is_err() {
-        process::end_all();
+    if !(1..=MOST_JOBS).contains(&jobs) {
+        return Err(PyValueError::new_err(format!("jobs = {jobs}: expected 1 to {MOST_JOBS}")));
     }
-    report.map(Report)
+    needs_threads(py)?;
+    let program = Arc::new(StoppableProgram::new(&command, limit, jobs));
+    let asked = Arc::clone(&program);
+    let report = detached(py, true, move || {
+        options.plan(|| asked.models()).map(|plan| judged(&*asked, &plan, &terms))
+    });
+    if report.is_err() {
+        py.detach(|| program.stop());
+    }
+    report?.map(Report)
 }
 
 /// `run_gate` of a function from the fields of a problem to those of an answer.
@@ -105,8 +136,9 @@ pub(crate) fn gate_solver(
     ask: Py<PyAny>,
     options: Options,
 ) -> PyResult<Report> {
-    let (plan, terms) = (options.plan()?, options.terms()?);
     let solver = Function { name, ask, stopped: Mutex::new(None) };
+    let (plan, terms) = (options.plan(|| solver.models())?, options.terms()?);
+    needs_threads(py)?;
     let report = py.detach(|| judged(&solver, &plan, &terms));
     match solver.stopped.into_inner().unwrap_or_else(PoisonError::into_inner) {
         Some(stop) => Err(stop),
@@ -169,6 +201,7 @@ fn fields<'py>(py: Python<'py>, problem: &Problem) -> PyResult<Bound<'py, PyDict
     let fields = PyDict::new(py);
     fields.set_item("id", &problem.id)?;
     fields.set_item("image_size", (problem.image_size[0], problem.image_size[1]))?;
+    fields.set_item("model", &problem.model)?;
     let points = problem.views.iter().map(|view| array(&view.target)).collect::<PyResult<Vec<_>>>()?;
     let pixels = problem.views.iter().map(|view| array(&view.pixels)).collect::<PyResult<Vec<_>>>()?;
     fields.set_item("points", points)?;

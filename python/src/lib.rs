@@ -6,6 +6,7 @@
 //! What is data and no computation (dataclasses, exceptions, the certified problems, the decorator for pytest) is Python and stands in
 //! `calibench/`. Every long call lets other threads of Python run, and hears Ctrl-C ([`watch`]).
 
+mod arguments;
 mod arrays;
 mod board;
 mod calibrate;
@@ -16,6 +17,8 @@ mod errors;
 mod evaluate;
 mod formats;
 mod gate;
+mod gate_program;
+mod pickled;
 mod records;
 mod rectify;
 mod settings;
@@ -42,6 +45,8 @@ mod _native {
     use crate::formats::{format_names, read_camera, read_corners, write_camera, write_corners};
     #[pymodule_export]
     use crate::gate::{Report, digits, gate_builtin, gate_command, gate_properties, gate_solver};
+    #[pymodule_export]
+    use crate::pickled::restored;
     #[pymodule_export]
     use crate::rectify::RectifyMap;
     #[pymodule_export]

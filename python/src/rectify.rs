@@ -1,5 +1,7 @@
 //! Images as an ideal lens would have shown them: levels of 8 bits, of 16 bits, and intensities of 32 bits.
 
+use crate::arguments;
+use crate::arrays::refuse_masked;
 use crate::camera::Camera;
 use crate::errors;
 use crate::evaluate::brown_conrady;
@@ -17,6 +19,7 @@ use std::sync::Arc;
 
 /// A grey image from an array of shape (height, width).
 pub(crate) fn grey(image: &Bound<'_, PyAny>) -> PyResult<Grey> {
+    refuse_masked(image, "image")?;
     if let Ok(levels) = image.extract::<PyReadonlyArray2<'_, u8>>() {
         return Ok(Grey::U8(raster(&levels)));
     }
@@ -161,7 +164,11 @@ fn size_of(image: &Bound<'_, PyAny>) -> PyResult<(usize, usize)> {
 ///     output_size: width and height, px; as the photographs if not given.
 #[pyclass(frozen, module = "calibench")]
 #[derive(Debug)]
-pub(crate) struct RectifyMap(Arc<Table>);
+pub(crate) struct RectifyMap {
+    table: Arc<Table>,
+    /// Of the photographs, and of what is made of them.
+    cameras: (Camera, Camera),
+}
 
 #[pymethods]
 impl RectifyMap {
@@ -170,14 +177,27 @@ impl RectifyMap {
     fn new(
         py: Python<'_>,
         camera: &Camera,
-        image_size: (usize, usize),
+        image_size: &Bound<'_, PyAny>,
         output: &Camera,
-        output_size: Option<(usize, usize)>,
+        output_size: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<RectifyMap> {
+        let cameras = (camera.clone(), output.clone());
         let (camera, output) = (brown_conrady(camera, "camera")?, brown_conrady(output, "output")?);
-        let between = move || Table::between(&camera, image_size, &output, output_size.unwrap_or(image_size));
+        // The photographs' size is one to make where the output has it.
+        let output_size = match output_size {
+            Some(size) => arguments::size_to_make(size, "output_size")?,
+            None => arguments::size_to_make(image_size, "image_size")?,
+        };
+        let image_size = arguments::image_size(image_size, "image_size")?;
+        let between = move || Table::between(&camera, image_size, &output, output_size);
         let table = detached(py, true, between)?.map_err(|e| errors::rectify(py, &e))?;
-        Ok(RectifyMap(Arc::new(table)))
+        Ok(RectifyMap { table: Arc::new(table), cameras })
+    }
+
+    /// A copy, and what `pickle` keeps: the arguments, from which the table is made again.
+    fn __getnewargs__(&self) -> (Camera, (usize, usize), Camera, (usize, usize)) {
+        let (camera, output) = self.cameras.clone();
+        (camera, self.table.input_size(), output, self.table.output_size())
     }
 
     /// The photograph as the output camera would have taken it; what has no data gets the level `border`.
@@ -194,20 +214,20 @@ impl RectifyMap {
         image: &Bound<'py, PyAny>,
         border: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
-        changed(py, ByTable(self.0.clone()), image, border)
+        changed(py, ByTable(self.table.clone()), image, border)
     }
 
     /// Which output pixels have data, shape (height, width).
     #[getter]
     fn valid<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
-        array(py, self.0.mask())
+        array(py, self.table.mask())
     }
 
     /// The photograph's pixel that every output pixel is sampled at, shape (height, width, 2); NaN without data.
     #[getter]
     fn sources<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, numpy::PyArray3<f64>>> {
-        let (width, height) = self.0.output_size();
-        let at = |y, x, axis| self.0.source(x, y).unwrap_or(Vec2::repeat(f64::NAN))[axis];
+        let (width, height) = self.table.output_size();
+        let at = |y, x, axis| self.table.source(x, y).unwrap_or(Vec2::repeat(f64::NAN))[axis];
         crate::arrays::stacked(py, height, (width, 2), at)
     }
 }

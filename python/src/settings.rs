@@ -1,5 +1,6 @@
 //! What does Python ask of the estimator? Options by name, as on the command line.
 
+use crate::arguments::{self, image_size, value};
 use crate::camera::{Camera, model, parameter};
 use crate::errors;
 use calibench::calibrate::{Board, Loss, Settings};
@@ -29,12 +30,13 @@ const OPTIONS: [&str; 13] = [
 pub(crate) fn settings(py: Python<'_>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Settings> {
     let Some(options) = options else { return Ok(Settings::standard()) };
     let given = |name: &str| Ok::<_, PyErr>(options.get_item(name)?.filter(|value| !value.is_none()));
-    let lens = given("model")?.map_or(Ok(Model::default()), |name| model(py, &name.extract::<String>()?))?;
+    let lens =
+        given("model")?.map_or(Ok(Model::default()), |name| model(py, &value::<String>(&name, "model")?))?;
     let mut settings = match given("free")? {
         Some(free) => Settings::new(free_parameters(&free)?).with_model(lens),
         None => Settings::of_model(lens),
     };
-    for (name, value) in options {
+    for (name, given) in options {
         let name: String = name.extract()?;
         if !OPTIONS.contains(&name.as_str()) {
             return Err(PyTypeError::new_err(format!(
@@ -42,8 +44,8 @@ pub(crate) fn settings(py: Python<'_>, options: Option<&Bound<'_, PyDict>>) -> P
                 OPTIONS.join(" ")
             )));
         }
-        if !value.is_none() {
-            settings = with_option(settings, &name, &value)?;
+        if !given.is_none() {
+            settings = with_option(settings, &name, &given)?;
         }
     }
     Ok(settings)
@@ -54,38 +56,45 @@ pub(crate) fn free_parameters(value: &Bound<'_, PyAny>) -> PyResult<FreeParamete
     let unknown = |e| errors::plain(value.py(), "SettingsError", "UnknownParameter", &e);
     match value.extract::<String>() {
         Ok(list) => list.parse().map_err(unknown),
-        Err(_) => value.extract::<Vec<String>>()?.join(",").parse().map_err(unknown),
+        Err(_) => arguments::value::<Vec<String>>(value, "free")?.join(",").parse().map_err(unknown),
     }
 }
 
-fn with_option(mut settings: Settings, name: &str, value: &Bound<'_, PyAny>) -> PyResult<Settings> {
-    let py = value.py();
+fn with_option(mut settings: Settings, name: &str, given: &Bound<'_, PyAny>) -> PyResult<Settings> {
+    let py = given.py();
     match name {
-        "image_size" => settings.image_size = Some(value.extract()?),
+        "image_size" => settings.image_size = Some(image_size(given, name)?),
         "hold" => {
-            for (name, held) in value.cast::<PyDict>()? {
-                settings = settings.hold(parameter(py, &name.extract::<String>()?)?, held.extract()?);
+            for (of, held) in by_name(given, name)? {
+                let held = value(&held, &format!("{name}[{of:?}]"))?;
+                settings = settings.hold(parameter(py, &of)?, held);
             }
         }
-        "tie" => settings = settings.tie_focal_lengths(value.extract()?),
+        "tie" => settings = settings.tie_focal_lengths(value(given, name)?),
         "priors" => {
-            for (name, known) in value.cast::<PyDict>()? {
-                let (mean, standard_deviation) = known.extract()?;
-                settings =
-                    settings.with_prior(parameter(py, &name.extract::<String>()?)?, mean, standard_deviation);
+            for (of, known) in by_name(given, name)? {
+                let (mean, standard_deviation) = value(&known, &format!("{name}[{of:?}]"))?;
+                settings = settings.with_prior(parameter(py, &of)?, mean, standard_deviation);
             }
         }
-        "loss" => settings.loss = loss(py, &value.extract::<String>()?)?,
-        "board_shape" => settings.board = board_shape(py, &value.extract::<String>()?)?,
-        "start" => settings.start = Some(start(&value.extract::<Camera>()?, py)?),
-        "intervals" => settings.profile_coverage = Some(coverage(py, value.extract()?)?),
-        "max_iterations" => settings.max_iterations = value.extract()?,
-        "polish" => settings.polish = value.extract()?,
-        "search" => settings.search = value.extract()?,
+        "loss" => settings.loss = loss(py, &value::<String>(given, name)?)?,
+        "board_shape" => settings.board = board_shape(py, &value::<String>(given, name)?)?,
+        "start" => settings.start = Some(start(&value::<Camera>(given, name)?, py)?),
+        "intervals" => settings.profile_coverage = Some(coverage(py, value(given, name)?)?),
+        "max_iterations" => settings.max_iterations = value(given, name)?,
+        "polish" => settings.polish = value(given, name)?,
+        "search" => settings.search = value(given, name)?,
         // Model and free parameters are what the settings began with.
         _ => {}
     }
     Ok(settings)
+}
+
+/// What is given by the names of parameters.
+fn by_name<'py>(given: &Bound<'py, PyAny>, name: &str) -> PyResult<Vec<(String, Bound<'py, PyAny>)>> {
+    let wanted = |_| PyTypeError::new_err(format!("{name}: expected a dict by the names of parameters"));
+    let items = given.call_method0("items").map_err(wanted)?;
+    items.try_iter()?.map(|item| item?.extract()).collect()
 }
 
 fn refused(py: Python<'_>, kind: &str, text: String) -> PyErr {

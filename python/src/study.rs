@@ -2,7 +2,7 @@
 
 use crate::errors;
 use crate::records::record;
-use crate::watch::interruptible;
+use crate::watch::{interruptible, needs_threads};
 use calibench_study::{
     CellSummary, Engine, Estimated, Spec, SpecError, Statistic, Trial, columns, in_memory_until, summarise,
 };
@@ -29,7 +29,8 @@ fn parsed(text: &str) -> Result<Spec, SpecError> {
 /// Runs a Monte Carlo study, on all cores, to the bits that the command `calibench study run` gives.
 ///
 /// Args:
-///     text: the study as in a file of `studies/`: TOML with the scene, its noise, the estimator, factors with their levels, and the trials.
+///     text: the study as in a file of `calibench study`: TOML with the scene, its noise, the estimator, factors with their levels, and the trials. The README
+///         of this package has one.
 ///
 /// Returns:
 ///     Statistics of every cell with their intervals beside what the Cramer-Rao bound expects, and the columns of all trials.
@@ -38,6 +39,7 @@ fn parsed(text: &str) -> Result<Spec, SpecError> {
 ///     StudyError: the study cannot be run as written; ``numbers`` says what and where.
 #[pyfunction]
 pub(crate) fn run_study<'py>(py: Python<'py>, text: String) -> PyResult<Bound<'py, PyAny>> {
+    needs_threads(py)?;
     let ran = interruptible(py, move |stop| -> Result<_, SpecError> {
         let mut trials = Vec::new();
         let see = |trial: &Trial| trials.push(trial.clone());

@@ -1,17 +1,19 @@
 //! The virtual camera, and the one place where noise enters: the same bits as in Rust.
 
+use crate::arguments;
 use crate::arrays::{
-    Matrix, Vector, of_plane, of_rotations, of_space, of_translations, plane_points, rotation, stacked,
-    vector,
+    Matrix, Vector, of_plane, of_rotations, of_space, of_translations, plane_points, refuse_masked, room,
+    rotation, stacked, vector,
 };
 use crate::camera::Camera;
 use crate::errors;
 use crate::evaluate::brown_conrady;
 use calibench::geometry::{Pose, Vec3};
 use calibench::synth::{Scene as Photographed, Stream as Draws, StreamKey, Truth, scene};
-use numpy::{PyArray1, PyArray2, PyArray3};
-use pyo3::exceptions::PyValueError;
+use numpy::{Element, PyArray1, PyArray2, PyArray3};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
 /// A stream of random numbers, ChaCha8 (Bernstein 2008), keyed by what it is for: the same key gives the same numbers on every machine.
 ///
@@ -24,46 +26,72 @@ use pyo3::prelude::*;
 #[derive(Debug)]
 pub(crate) struct Stream(Draws);
 
+/// So many draws, in an array for which there is room.
+fn drawn<'py, T: Element>(
+    count: &Bound<'py, PyAny>,
+    draw: impl FnMut() -> T,
+) -> PyResult<Bound<'py, PyArray1<T>>> {
+    let py = count.py();
+    let count = arguments::value(count, "count")?;
+    let mut numbers = room(count)?;
+    numbers.extend(std::iter::repeat_with(draw).take(count));
+    Ok(PyArray1::from_vec(py, numbers))
+}
+
 #[pymethods]
 impl Stream {
     #[new]
-    #[pyo3(signature = (seed, scenario, trial = 0, purpose = "noise"))]
-    fn new(seed: u64, scenario: &str, trial: u64, purpose: &str) -> Stream {
-        Stream(Draws::open(StreamKey { seed, scenario, trial, purpose }))
+    #[pyo3(signature = (seed, scenario, trial = None, purpose = "noise"), text_signature = "(seed, scenario, trial=0, purpose='noise')")]
+    fn new(
+        seed: &Bound<'_, PyAny>,
+        scenario: &str,
+        trial: Option<&Bound<'_, PyAny>>,
+        purpose: &str,
+    ) -> PyResult<Stream> {
+        let (seed, trial) =
+            (arguments::value(seed, "seed")?, trial.map_or(Ok(0), |trial| arguments::value(trial, "trial"))?);
+        Ok(Stream(Draws::open(StreamKey { seed, scenario, trial, purpose })))
     }
 
     /// Standard normal numbers, shape (count,).
-    fn normal<'py>(&mut self, py: Python<'py>, count: usize) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, (0..count).map(|_| self.0.normal()).collect())
+    fn normal<'py>(&mut self, count: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        drawn(count, || self.0.normal())
     }
 
-    /// Uniform numbers in (low, high), (0, 1) if not given, shape (count,).
+    /// Uniform numbers in (low, high), (0, 1) if neither is given, shape (count,).
     #[pyo3(signature = (count, low = None, high = None))]
     fn uniform<'py>(
         &mut self,
-        py: Python<'py>,
-        count: usize,
+        count: &Bound<'py, PyAny>,
         low: Option<f64>,
         high: Option<f64>,
-    ) -> Bound<'py, PyArray1<f64>> {
-        let draw = |_| match (low, high) {
-            (None, None) => self.0.uniform(),
-            (low, high) => self.0.uniform_in(low.unwrap_or(0.0), high.unwrap_or(1.0)),
-        };
-        PyArray1::from_vec(py, (0..count).map(draw).collect())
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let py = count.py();
+        match (low, high) {
+            (None, None) => drawn(count, || self.0.uniform()),
+            (Some(low), Some(high)) => {
+                let (low, high) = (arguments::finite(py, "low", low)?, arguments::finite(py, "high", high)?);
+                if low > high {
+                    let wanted = format!("the range ends at high = {high}, below its begin");
+                    return Err(errors::argument(py, "low", low, &wanted));
+                }
+                drawn(count, || self.0.uniform_in(low, high))
+            }
+            _ => Err(PyTypeError::new_err("a range is low and high: give both or none")),
+        }
     }
 
     /// Uniform whole numbers below `bound`, shape (count,).
     fn below<'py>(
         &mut self,
-        py: Python<'py>,
-        count: usize,
-        bound: usize,
+        count: &Bound<'py, PyAny>,
+        bound: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<u64>>> {
+        let bound: usize = arguments::value(bound, "bound")?;
         if bound == 0 {
-            return Err(PyValueError::new_err("no whole number lies below 0"));
+            return Err(errors::argument(count.py(), "bound", bound, "no whole number lies below 0"));
         }
-        Ok(PyArray1::from_vec(py, (0..count).map(|_| self.0.below(bound) as u64).collect()))
+        drawn(count, || self.0.below(bound) as u64)
     }
 }
 
@@ -77,36 +105,50 @@ impl Stream {
 ///
 /// Raises:
 ///     SceneError: a point behind the camera, or beyond the radius where the lens is one-to-one.
-#[pyclass(frozen, module = "calibench")]
-#[derive(Debug)]
+#[pyclass(frozen, eq, skip_from_py_object, module = "calibench")]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Scene(pub(crate) Photographed);
 
 #[pymethods]
 impl Scene {
     #[new]
     fn new(
-        py: Python<'_>,
         camera: &Camera,
-        image_size: (usize, usize),
+        image_size: &Bound<'_, PyAny>,
         points: &Bound<'_, PyAny>,
         rotations: &Bound<'_, PyAny>,
         translations: &Bound<'_, PyAny>,
     ) -> PyResult<Scene> {
+        let py = points.py();
+        // A masked array of poses would lose its mask when it is taken apart.
+        refuse_masked(rotations, "rotations")?;
+        refuse_masked(translations, "translations")?;
         let rotations =
             rotations.try_iter()?.map(|r| rotation(&r?, "rotations")).collect::<PyResult<Vec<_>>>()?;
         let translations =
             translations.try_iter()?.map(|t| vector(&t?, "translations")).collect::<PyResult<Vec<_>>>()?;
         if rotations.len() != translations.len() {
             let (r, t) = (rotations.len(), translations.len());
-            return Err(PyValueError::new_err(format!(
-                "{r} rotations and {t} translations: a pose is one of each"
-            )));
+            let text = format!("{r} rotations and {t} translations: a pose is one of each");
+            return Err(errors::numbered(py, "SceneError", "Poses", text, |numbers| {
+                numbers.set_item("rotations", r)?;
+                numbers.set_item("translations", t)
+            }));
+        }
+        let points = plane_points(points, "points")?;
+        if points.is_empty() || rotations.is_empty() {
+            let (n, v) = (points.len(), rotations.len());
+            let text = format!("{n} points in {v} views: a scene has at least one of each");
+            return Err(errors::numbered(py, "SceneError", "Empty", text, |numbers| {
+                numbers.set_item("points", n)?;
+                numbers.set_item("views", v)
+            }));
         }
         let poses = rotations.into_iter().zip(translations);
         let truth = Truth {
             camera: brown_conrady(camera, "camera")?,
-            image_size,
-            points: plane_points(points, "points")?,
+            image_size: arguments::image_size(image_size, "image_size")?,
+            points,
             cam_from_target: poses.map(|(rotation, translation)| Pose { rotation, translation }).collect(),
         };
         Photographed::new(truth).map(Scene).map_err(|e| errors::scene(py, &e))
@@ -167,13 +209,22 @@ impl Scene {
         stream: &mut Stream,
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
         // Noise that is not finite would make views that nobody can photograph.
-        if !(sigma_px >= 0.0 && sigma_px.is_finite()) {
-            return Err(PyValueError::new_err(format!(
-                "sigma_px = {sigma_px}: a standard deviation is not negative"
-            )));
-        }
+        let sigma_px = arguments::not_negative(py, "sigma_px", sigma_px)?;
         let views = self.0.observe(sigma_px, &mut stream.0);
         stacked(py, views.len(), (self.0.truth.points.len(), 2), |v, i, j| views[v].pixels()[i][j])
+    }
+
+    /// A copy, and what `pickle` keeps: the arguments.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let (py, scene) = (slf.py(), slf.borrow());
+        let arguments = (
+            scene.camera(),
+            scene.image_size(),
+            scene.points(py)?,
+            scene.rotations(py)?,
+            scene.translations(py)?,
+        );
+        Ok((slf.get_type().into_any(), arguments.into_pyobject(py)?))
     }
 
     fn __repr__(&self) -> String {
@@ -194,6 +245,10 @@ pub(crate) fn looking_at_centre<'py>(
     xyz_degrees: [f64; 3],
     distance: f64,
 ) -> PyResult<(Matrix<'py>, Vector<'py>)> {
+    for degrees in xyz_degrees {
+        arguments::finite(py, "xyz_degrees", degrees)?;
+    }
+    arguments::finite(py, "distance", distance)?;
     let pose = scene::looking_at_centre(xyz_degrees, distance);
     let rows: [Vec3; 3] = std::array::from_fn(|i| pose.rotation.row(i).transpose());
     Ok((of_space(py, &rows)?, PyArray1::from_slice(py, pose.translation.as_slice())))

@@ -1,14 +1,32 @@
 //! How does a long call let Python go on, and hear Ctrl-C?
 
+use crate::errors;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 /// How long Ctrl-C waits at most: a person does not notice a twentieth of a second.
 const PATIENCE: Duration = Duration::from_millis(50);
+
+/// The process in which the library's threads were first needed.
+static OF_THREADS: OnceLock<u32> = OnceLock::new();
+
+/// Refuses work that is shared among threads in a process that was forked after they were started: they did not come along, and it would wait
+/// for them for ever.
+pub(crate) fn needs_threads(py: Python<'_>) -> PyResult<()> {
+    let ourselves = std::process::id();
+    match *OF_THREADS.get_or_init(|| ourselves) == ourselves {
+        true => Ok(()),
+        false => {
+            let text = "this process was forked from one that had used the library's threads, and has none of them: start workers by \
+                        multiprocessing.get_context(\"spawn\") or \"forkserver\"";
+            Err(errors::numbered(py, "CalibenchError", "Forked", text.to_string(), |_| Ok(())))
+        }
+    }
+}
 
 /// Runs `work` without the interpreter's lock, so that other threads of Python run meanwhile.
 ///

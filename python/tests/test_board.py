@@ -51,8 +51,14 @@ def test_a_stray_view_is_left_out_and_named() -> None:
 
 def test_a_board_that_is_not_whole_is_refused_with_what_was_seen() -> None:
     board = calibench.Board("circles:9x7:10mm:3mm")
-    image = photographs(board, 120.0)[0].copy()
-    image[:, :200] = 0.85
+    whole = photographs(board, 120.0)[0]
+    without_columns = whole.copy()
+    without_columns[:, :200] = 0.85
+    with pytest.raises(calibench.DetectError, match="a complete 7 x 7 was seen") as of_columns:
+        board.detect(without_columns)
+    assert of_columns.value.kind == "WrongSize"
+    image = whole.copy()
+    image[:200, :200] = 0.85
     with pytest.raises(calibench.DetectError, match="the whole board must be visible") as error:
         board.detect(image)
     numbers = error.value.numbers

@@ -91,3 +91,40 @@ def test_a_million_points_are_those_of_one_at_a_time() -> None:
     ideal = camera.undistort_points(many)
     some = [0, 1, 77_777, 199_999]
     assert all((camera.undistort_points(many[i : i + 1])[0] == ideal[i]).all() for i in some)
+
+
+FISHEYES = {
+    "brown-conrady": {"k1": -0.18},
+    "rational": {"k1": -0.2, "k2": 0.01},
+    "thin-prism": {"k1": -0.2},
+    "tilted": {"k1": -0.2, "tau_x": 0.02},
+    "kannala-brandt": {"k1": -0.05},
+    "division": {"k1": -0.1},
+    "double-sphere": {"xi": -0.2, "alpha": 0.6},
+}
+
+
+@pytest.mark.parametrize("model", FISHEYES)
+def test_no_lens_has_an_image_beyond_its_monotone_angle_or_exactly_behind(model: str) -> None:
+    camera = calibench.Camera(300.0, 300.0, 320.0, 240.0, model=model, **FISHEYES[model])
+    limit = camera.monotone_angle
+    for turn in (0.0, 1.0, 2.5):
+        angles = np.concatenate([limit * np.linspace(0.01, 0.999, 9), np.minimum(limit * np.array([1.001, 1.2, 2.0]), np.pi)])
+        angles = angles[angles < np.pi - 1e-6]
+        rays = np.c_[np.sin(angles) * np.cos(turn), np.sin(angles) * np.sin(turn), np.cos(angles)]
+        assert np.isnan(camera.project(rays)).all(axis=1).tolist() == (angles > limit).tolist()
+    assert np.isnan(camera.project([[0.0, 0.0, -1.0], [0.0, 0.0, 0.0], [np.nan, 0.0, 1.0]])).all()
+    wide = 320.0 + 300.0 * np.tan(min(limit, 1.5) * 1.01)
+    ideal = camera.distort_points([[wide, 240.0], [330.0, 240.0]])
+    assert np.isnan(ideal[0]).all() == (limit < 1.5) and np.isfinite(ideal[1]).all()
+
+
+@pytest.mark.parametrize("model", FISHEYES)
+def test_every_ray_of_a_pixel_is_seen_there_up_to_the_last(model: str) -> None:
+    camera = calibench.Camera(300.0, 300.0, 320.0, 240.0, model=model, **FISHEYES[model])
+    limit = min(camera.monotone_angle, 3.0) * (1.0 - 1e-9)
+    edge = camera.project([[np.sin(limit), 0.0, np.cos(limit)]])[0, 0]
+    pixels = np.c_[np.linspace(320.0, edge, 1000), np.full(1000, 240.0)]
+    rays = camera.unproject(pixels, outside="nan")
+    seen = camera.project(rays[np.isfinite(rays).all(axis=1)])
+    assert len(seen) > 900 and np.isfinite(seen).all()

@@ -46,8 +46,10 @@ def test_a_result_of_another_lens_is_read(tmp_path: Path) -> None:
     result = calibench.calibrate(SCENE.points, pixels, model="kannala-brandt", free="fx,fy,cx,cy,k1,k2", image_size=(640, 480))
     (tmp_path / "result.json").write_text(result.to_json())
     assert calibench.read_camera(tmp_path / "result.json").camera == result.camera
-    with pytest.raises(ValueError, match="brown-conrady"):
-        calibench.write_camera(tmp_path / "camera.yaml", result, format="opencv-yaml")
+    written = calibench.write_camera(tmp_path / "camera.yaml", result, format="opencv-yaml")
+    assert calibench.read_camera(tmp_path / "camera.yaml").camera == result.camera and "covariance" in written.lost[0]
+    with pytest.raises(calibench.FormatError, match="it holds brown-conrady, rational, thin-prism"):
+        calibench.write_camera(tmp_path / "camera.cameramodel", result)
 
 
 def test_what_is_wrong_in_a_file_is_named_with_its_line(tmp_path: Path) -> None:
@@ -75,3 +77,17 @@ def test_corners_survive_their_file(tmp_path: Path) -> None:
     (tmp_path / "broken.csv").write_text("view,point,X,Y,u,v\na,0,0,0,?,2\n")
     with pytest.raises(calibench.FormatError, match="broken.csv:2: column 'u'"):
         calibench.read_corners(tmp_path / "broken.csv")
+
+
+def test_advice_is_in_the_words_of_python(tmp_path: Path) -> None:
+    camera = calibench.Camera(600.0, 600.0, 320.0, 240.0, k1=-0.1, k3=0.01)
+    cases = (
+        (lambda: calibench.write_camera(tmp_path / "a.yaml", camera), "format="),
+        (lambda: calibench.write_camera(tmp_path / "a.yaml", camera, format="ros"), r"image_size=\(width, height\)"),
+        (lambda: calibench.write_camera(tmp_path / "a.yaml", camera, format="kalibr", image_size=(640, 480)), 'hold={"k3": 0.0}'),
+        (lambda: calibench.write_camera(tmp_path / "a.cal", camera, format="halcon", image_size=(640, 480)), "fit=True"),
+    )
+    for write, text in cases:
+        with pytest.raises(calibench.FormatError, match=text) as error:
+            write()
+        assert "--" not in str(error.value)

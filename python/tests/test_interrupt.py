@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -43,3 +44,58 @@ def test_an_interrupt_is_heard(call: str) -> None:
     process.send_signal(signal.SIGINT)
     said, _ = process.communicate(timeout=30)
     assert said == "heard\n" and process.returncode == 0
+
+
+def running(word: str) -> list[str]:
+    """Command lines of processes that have the word in theirs, but for this one."""
+    found = []
+    for process in Path("/proc").iterdir():
+        if process.name.isdigit() and int(process.name) != os.getpid():
+            try:
+                line = (process / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
+                state = (process / "stat").read_text().rsplit(")", 1)[1].split()[0]
+            except OSError:
+                continue
+            if word in line and state != "Z":
+                found.append(line)
+    return found
+
+
+COMMAND = [sys.executable, "-m", "calibench", "gate", "--samples", "1", "--jobs", "3"]
+FUNCTION = """
+import calibench
+try:
+    calibench.run_gate("{program}", samples=1, jobs=3)
+except KeyboardInterrupt:
+    print("heard", flush=True)
+    import time
+    time.sleep(0.5)
+"""
+# That does not answer, that starts others, that ends at once and is started again, that hears no signal but one.
+PROGRAMS = {
+    "sleeps": "sleep {seconds}",
+    "starts others": "(sleep {seconds} & sleep {seconds}) | cat",
+    "ends at once": "sleep 0.7{seconds}; exit 1",
+    "ignores": "trap '' INT TERM HUP; while true; do sleep {seconds}; done",
+}
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="processes are looked for in /proc")
+@pytest.mark.parametrize("after", [0.3, 0.9])
+@pytest.mark.parametrize("program", PROGRAMS.values(), ids=PROGRAMS.keys())
+@pytest.mark.parametrize("way", ["command", "function"])
+def test_no_program_is_left_after_an_interrupt(way: str, program: str, after: float) -> None:
+    # A number of seconds that is in nobody else's command line.
+    seconds = f"72{os.getpid():07d}"
+    program = program.replace("{seconds}", seconds)
+    command = [*COMMAND, program] if way == "command" else [sys.executable, "-c", FUNCTION.replace("{program}", program)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    begun = time.monotonic()
+    while not [line for line in running(seconds) if sys.executable not in line] and time.monotonic() - begun < 10:
+        time.sleep(0.01)
+    time.sleep(after)
+    process.send_signal(signal.SIGINT)
+    said, told = process.communicate(timeout=20)
+    assert (said, process.returncode) == (("", 3) if way == "command" else ("heard\n", 0)), told
+    time.sleep(0.1)
+    assert running(seconds) == []

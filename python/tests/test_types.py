@@ -34,6 +34,17 @@ def test_the_tests_use_the_package_as_its_types_allow() -> None:
     run("mypy", "--warn-unused-ignores", str(HERE))
 
 
+def test_the_quick_start_holds_for_mypy_as_users_run_it(tmp_path: Path) -> None:
+    pytest.importorskip("mypy")
+    (tmp_path / "readme.py").write_text("\n".join(blocks()))
+    run("mypy", "--strict", str(tmp_path / "readme.py"))
+
+
+def blocks() -> list[str]:
+    """Every block of Python in the README."""
+    return re.findall(r"```python\n(.*?)```", (HERE.parent / "README.md").read_text(), re.DOTALL)
+
+
 def public() -> list[tuple[str, object]]:
     names = [(name, getattr(calibench, name)) for name in calibench.__all__ if name != "__version__"]
     members = [
@@ -58,8 +69,7 @@ def test_the_example_of_the_package_runs() -> None:
 def test_the_quick_start_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every block of Python in the README, one after the other in one namespace."""
     monkeypatch.chdir(tmp_path)
-    blocks = re.findall(r"```python\n(.*?)```", (HERE.parent / "README.md").read_text(), re.DOTALL)
-    assert len(blocks) >= 3
+    assert len(blocks()) >= 3
     namespace: dict[str, object] = {}
-    for block in blocks:
+    for block in blocks():
         exec(compile(block, "README.md", "exec"), namespace)

@@ -2,11 +2,11 @@
 
 use super::evidence::{ExperimentEvidence, RecordClaim, number};
 use super::format::{self, significant, typeset};
-use super::golden_file::GoldenFile;
+use super::golden_file::{GoldenFile, GoldenNumber};
 use super::record_page::page_of;
 use super::sources::Sources;
 use super::text::{inline, sentence};
-use calibench_harness::published::{Kind, not_judged};
+use calibench_harness::published::{Entry, Kind, not_judged};
 use calibench_harness::verdict::ByKind;
 use std::fmt::Write;
 
@@ -93,53 +93,61 @@ pub(super) fn published_counts(sources: &Sources) -> String {
 /// Every number that the chapter prints: ours, what both are held against, what the verdict is worth, and the
 /// verdict.
 pub(super) fn published_table(sources: &Sources) -> String {
-    let mut rows = String::new();
-    for entry in &sources.published {
-        let evidence = sources.evidence.experiments.get(entry.experiment());
-        let golden = evidence.and_then(|e| e.golden.as_ref());
-        let ours = golden.and_then(|g| g.number(entry.number())).filter(|_| entry.rule.is_some());
-        let locked = golden.and_then(|g| g.published.iter().find(|p| p.id == entry.number()));
-        let judged = evidence.and_then(|e| e.published(entry.number()));
-        let (word, class) = match judged.map(|p| (p.book_held, p.ours_held)) {
-            None if entry.rule.is_none() => ("not judged", "missing"),
-            None => ("not reproduced yet", "missing"),
-            Some((true, true)) => ("held", "held"),
-            Some((false, true)) => ("book outside", "deviates"),
-            Some((true, false)) => ("ours outside", "deviates"),
-            Some((false, false)) => ("both outside", "deviates"),
-        };
-        let ours = ours.map_or("\u{2013}".to_string(), |(_, n)| {
-            let decimals = entry.decimals() + 1;
-            let value = typeset(&format!("{:.decimals$}", n.value));
-            let page = page_of(entry.experiment());
-            format!("<a class=\"num\" href=\"{page}#number-{}\" title=\"{:?}\">{value}</a>", n.id, n.value)
-        });
-        let expectation = locked.map_or(String::new(), |p| {
-            let (low, high) = p.interval;
-            let interval = format!("[{}, {}]", significant(low, 6), significant(high, 6));
-            format!("Ours in {interval}. {}.", inline(&sentence(&format!("{}: {}", p.rule, p.expectation))))
-        });
-        let because = match entry.because.as_str() {
-            "" => String::new(),
-            because => format!(" {}.", inline(&sentence(because))),
-        };
-        let _ = write!(
-            rows,
-            "<tr id=\"published-{}\"><td class=\"text\">{} {}<div class=\"because\">{expectation}{because}</div></td>\
-             <td class=\"value\" data-label=\"printed\">{}{}</td><td class=\"value\" data-label=\"ours\">{ours}</td>\
-             <td class=\"{class}\" data-label=\"verdict\">{word}<div class=\"because\">{}</div></td></tr>",
-            entry.id,
-            section(&entry.section),
-            inline(&entry.what),
-            typeset(&entry.printed),
-            format::unit(&entry.unit),
-            entry.kind.name()
-        );
-    }
+    let rows: String = sources.published.iter().map(|entry| published_row(entry, sources)).collect();
     let head = "<thead><tr><th>what, and what it is held against</th><th>printed</th><th>ours</th><th>verdict</th></tr></thead>";
     format!(
         "<div class=\"table-wrapper\"><table class=\"published\">{head}<tbody>{rows}</tbody></table></div>\n"
     )
+}
+
+fn published_row(entry: &Entry, sources: &Sources) -> String {
+    let evidence = sources.evidence.experiments.get(entry.experiment());
+    let golden = evidence.and_then(|e| e.golden.as_ref());
+    let ours = golden.and_then(|g| g.number(entry.number())).filter(|_| entry.rule.is_some());
+    let ours = ours.map_or("\u{2013}".to_string(), |(_, number)| golden_link(entry, number));
+    let locked = golden.and_then(|g| g.published.iter().find(|p| p.id == entry.number()));
+    let expectation = locked.map_or(String::new(), |p| {
+        let (low, high) = p.interval;
+        let interval = format!("[{}, {}]", significant(low, 6), significant(high, 6));
+        format!("Ours in {interval}. {}.", inline(&sentence(&format!("{}: {}", p.rule, p.expectation))))
+    });
+    let because = match entry.because.as_str() {
+        "" => String::new(),
+        because => format!(" {}.", inline(&sentence(because))),
+    };
+    let (word, class) = judged(entry, evidence);
+    format!(
+        "<tr id=\"published-{}\"><td class=\"text\">{} {}<div class=\"because\">{expectation}{because}</div></td>\
+         <td class=\"value\" data-label=\"printed\">{}{}</td><td class=\"value\" data-label=\"ours\">{ours}</td>\
+         <td class=\"{class}\" data-label=\"verdict\">{word}<div class=\"because\">{}</div></td></tr>",
+        entry.id,
+        section(&entry.section),
+        inline(&entry.what),
+        typeset(&entry.printed),
+        format::unit(&entry.unit),
+        entry.kind.name()
+    )
+}
+
+/// Our number with a digit more than the chapter prints.
+fn golden_link(entry: &Entry, number: &GoldenNumber) -> String {
+    let decimals = entry.decimals() + 1;
+    let value = typeset(&format!("{:.decimals$}", number.value));
+    let page = page_of(entry.experiment());
+    format!("<a class=\"num\" href=\"{page}#number-{}\" title=\"{:?}\">{value}</a>", number.id, number.value)
+}
+
+/// The verdict on a published value, and the style of its cell.
+fn judged(entry: &Entry, evidence: Option<&ExperimentEvidence>) -> (&'static str, &'static str) {
+    let judged = evidence.and_then(|e| e.published(entry.number()));
+    match judged.map(|p| (p.book_held, p.ours_held)) {
+        None if entry.rule.is_none() => ("not judged", "missing"),
+        None => ("not reproduced yet", "missing"),
+        Some((true, true)) => ("held", "held"),
+        Some((false, true)) => ("book outside", "deviates"),
+        Some((true, false)) => ("ours outside", "deviates"),
+        Some((false, false)) => ("both outside", "deviates"),
+    }
 }
 
 /// A section with its sign; `case study` has no number.
@@ -162,57 +170,4 @@ pub(super) fn record_list(sources: &Sources) -> String {
         );
     }
     list
-}
-
-/// Columns and rows of a CSV table as HTML. `columns` names those to show, `*` all; `digits=4`, `rows=1-5`.
-pub(super) fn csv_table(csv: &str, columns: &str, options: &[&str], path: &str) -> Result<String, String> {
-    let (mut digits, mut rows) = (4, (1, usize::MAX));
-    for option in options {
-        let bad = || format!("`{option}` is no option of a table: digits=4, rows=1-5");
-        match option.split_once('=') {
-            Some(("digits", value)) => digits = value.parse().map_err(|_| bad())?,
-            Some(("rows", value)) => {
-                let (first, last) = value.split_once('-').ok_or_else(bad)?;
-                rows = (first.parse().map_err(|_| bad())?, last.parse().map_err(|_| bad())?);
-            }
-            _ => return Err(bad()),
-        }
-    }
-    let mut reader = csv::ReaderBuilder::new().from_reader(csv.as_bytes());
-    let header: Vec<String> =
-        reader.headers().map_err(|e| format!("{path}: {e}"))?.iter().map(str::to_string).collect();
-    let bare = |name: &String| name.split(" [").next().unwrap_or_default().to_string();
-    let known: Vec<String> = header.iter().map(bare).collect();
-    let wanted: Vec<usize> = if columns == "*" {
-        (0..header.len()).collect()
-    } else {
-        let place = |name: &str| {
-            let at = known.iter().position(|k| k == name);
-            at.ok_or_else(|| format!("{path} has no column `{name}`; it has: {}", known.join(", ")))
-        };
-        columns.split(',').map(place).collect::<Result<_, _>>()?
-    };
-    let head: String =
-        wanted.iter().map(|&i| format!("<th>{}</th>", inline(&header[i].replace('_', " ")))).collect();
-    let mut body = String::new();
-    for (i, record) in reader.records().enumerate() {
-        let record = record.map_err(|e| format!("{path}: {e}"))?;
-        let row = i + 1;
-        if !(rows.0..=rows.1).contains(&row) {
-            continue;
-        }
-        let _ = write!(body, "<tr title=\"row {row} of {path}\">");
-        for &column in &wanted {
-            let cell = record.get(column).unwrap_or_default();
-            let _ = match cell.parse::<f64>() {
-                Ok(value) if cell.contains(['.', 'e']) => {
-                    write!(body, "<td class=\"value\">{}</td>", significant(value, digits))
-                }
-                Ok(_) => write!(body, "<td class=\"value\">{}</td>", typeset(cell)),
-                Err(_) => write!(body, "<td>{}</td>", inline(cell)),
-            };
-        }
-        body.push_str("</tr>");
-    }
-    Ok(format!("<thead><tr>{head}</tr></thead><tbody>{body}</tbody>"))
 }

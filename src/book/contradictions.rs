@@ -2,9 +2,9 @@
 //! one page.
 
 use super::appendix::section;
+use super::listed;
 use super::text::inline;
 use serde::Deserialize;
-use toml::Spanned;
 
 /// A statement of the chapter that does not hold as it stands.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
@@ -25,22 +25,9 @@ pub struct Contradiction {
     pub line: usize,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    contradiction: Vec<Spanned<Contradiction>>,
-}
-
 /// Reads the list; an error comes with its line.
 pub(super) fn parse(text: &str) -> Result<Vec<Contradiction>, (usize, String)> {
-    let line_at = |at: usize| 1 + text[..at].bytes().filter(|&b| b == b'\n').count();
-    let file: File = toml::from_str(text)
-        .map_err(|e| (e.span().map_or(1, |span| line_at(span.start)), e.message().to_string()))?;
-    let with_line = |entry: Spanned<Contradiction>| {
-        let line = line_at(entry.span().start);
-        Contradiction { line, ..entry.into_inner() }
-    };
-    let entries: Vec<Contradiction> = file.contradiction.into_iter().map(with_line).collect();
+    let entries = listed::entries(text, "contradiction", |entry, line| Contradiction { line, ..entry })?;
     for (i, entry) in entries.iter().enumerate() {
         if entries[..i].iter().any(|other| other.id == entry.id) {
             return Err((entry.line, format!("`{}` stands twice", entry.id)));

@@ -1,10 +1,10 @@
 //! What became of every item of the chapter? book/items.toml, listed on one page with links to what shows it.
 
 use super::appendix::section;
+use super::listed;
 use super::text::inline;
 use serde::Deserialize;
 use std::fmt::Write;
-use toml::Spanned;
 
 /// What became of an item.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -85,22 +85,9 @@ pub struct Item {
     pub line: usize,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    item: Vec<Spanned<Item>>,
-}
-
 /// Reads the list; an error comes with its line.
 pub(super) fn parse(text: &str) -> Result<Vec<Item>, (usize, String)> {
-    let line_at = |at: usize| 1 + text[..at].bytes().filter(|&b| b == b'\n').count();
-    let file: File = toml::from_str(text)
-        .map_err(|e| (e.span().map_or(1, |span| line_at(span.start)), e.message().to_string()))?;
-    let with_line = |entry: Spanned<Item>| {
-        let line = line_at(entry.span().start);
-        Item { line, ..entry.into_inner() }
-    };
-    let items: Vec<Item> = file.item.into_iter().map(with_line).collect();
+    let items = listed::entries(text, "item", |item, line| Item { line, ..item })?;
     for item in &items {
         if item.answer.needs_evidence() && item.places.is_empty() {
             return Err((
@@ -118,8 +105,8 @@ pub(super) fn parse(text: &str) -> Result<Vec<Item>, (usize, String)> {
 /// How many there are of each answer, in words.
 pub(super) fn counts(items: &[Item]) -> String {
     let count = |answer: Answer| items.iter().filter(|item| item.answer == answer).count();
-    let told = Answer::ALL.map(|answer| format!("{} {}", count(answer), answer.word()));
-    format!("{} items: {}", items.len(), told.join(", "))
+    let counted = Answer::ALL.map(|answer| format!("{} {}", count(answer), answer.word()));
+    format!("{} items: {}", items.len(), counted.join(", "))
 }
 
 /// A row of the list; `shown` are the links to what shows it.
@@ -143,8 +130,8 @@ pub(super) fn row(item: &Item, shown: &str) -> String {
 /// The list around its rows.
 pub(super) fn table(rows: &str) -> String {
     format!(
-        "<div class=\"table-wrapper\"><table class=\"items\"><thead><tr><th scope=\"col\">section</th>\
-         <th scope=\"col\">the chapter has</th><th scope=\"col\">answer</th><th scope=\"col\">where, and what is left out</th></tr></thead>\
+        "<div class=\"table-wrapper\"><table class=\"items\"><thead><tr><th>section</th>\
+         <th>the chapter has</th><th>answer</th><th>where, and what is left out</th></tr></thead>\
          <tbody>{rows}</tbody></table></div>\n"
     )
 }

@@ -38,6 +38,34 @@ pub(super) fn label_of(placeholder: &str) -> Option<String> {
     }
 }
 
+/// The name that a piece of a page gives.
+fn name_of(piece: &Piece<'_>, page: &str) -> Option<String> {
+    match &piece.kind {
+        Kind::Equation { label, .. } => label.map(str::to_string),
+        // Places may bear the same name on different pages.
+        Kind::Place(name) => Some(format!("{page}#{name}")),
+        Kind::Placeholder(text) => label_of(text),
+        _ => None,
+    }
+}
+
+/// What kind of thing a name is of; empty for a place.
+fn class_of(name: &str) -> &'static str {
+    let class = name.split_once(':').map_or("", |(class, _)| class);
+    ["eq", "fig", "tab"].into_iter().find(|known| *known == class).unwrap_or("")
+}
+
+/// How the text says the number of a thing, and how the thing bears it.
+fn numbered(class: &str, count: &str) -> (String, String) {
+    let same = |words: String| (words.clone(), words);
+    match class {
+        "eq" => (format!("equation\u{a0}({count})"), format!("({count})")),
+        "fig" => same(format!("Figure\u{a0}{count}")),
+        "tab" => same(format!("Table\u{a0}{count}")),
+        _ => same(String::new()),
+    }
+}
+
 impl Labels {
     /// Takes the names of one page. Counts begin anew in every chapter.
     pub(super) fn take(
@@ -48,31 +76,15 @@ impl Labels {
         findings: &mut Vec<Finding>,
     ) {
         let mut in_chapter = BTreeMap::new();
-        for piece in pieces {
-            let name = match &piece.kind {
-                Kind::Equation { label: Some(label), .. } => label.to_string(),
-                // Places may bear the same name on different pages.
-                Kind::Place(name) => format!("{page}#{name}"),
-                Kind::Placeholder(text) => match label_of(text) {
-                    Some(name) => name,
-                    None => continue,
-                },
-                _ => continue,
-            };
-            let class = name.split_once(':').map_or("", |(class, _)| class);
-            let class = ["eq", "fig", "tab"].into_iter().find(|c| *c == class).unwrap_or("");
+        let named = pieces.iter().filter_map(|piece| Some((piece.line, name_of(piece, page)?)));
+        for (line, name) in named {
+            let class = class_of(&name);
             let counts = if chapter.is_none() { &mut self.unnumbered } else { &mut in_chapter };
             let count = counts.entry(class).or_insert(0);
             *count += 1;
             let prefix = chapter.map(|n| format!("{n}.")).unwrap_or_default();
-            let count = format!("{prefix}{count}");
-            let (words, number) = match class {
-                "eq" => (format!("equation\u{a0}({count})"), format!("({count})")),
-                "fig" => (format!("Figure\u{a0}{count}"), format!("Figure\u{a0}{count}")),
-                "tab" => (format!("Table\u{a0}{count}"), format!("Table\u{a0}{count}")),
-                _ => (String::new(), String::new()),
-            };
-            let (page, file, line) = (page.to_string(), file.to_string(), piece.line);
+            let (words, number) = numbered(class, &format!("{prefix}{count}"));
+            let (page, file) = (page.to_string(), file.to_string());
             let label = Label { page, words, number, file: file.clone(), line };
             if self.known.insert(name.clone(), label).is_some() {
                 findings.push(Finding::new(file, line, format!("the name `{name}` is given twice")));

@@ -1,8 +1,8 @@
 //! Which works does the book cite? book/references.toml, and the two ways to name one in the text.
 
-use super::text::inline;
+use super::listed;
+use super::text::{attribute, inline};
 use serde::Deserialize;
-use toml::Spanned;
 
 /// A work.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
@@ -28,35 +28,20 @@ pub struct Reference {
     pub line: usize,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    reference: Vec<Spanned<Reference>>,
-}
-
 /// The page on which the list of references stands.
 pub(super) const PAGE: &str = "references.md";
 
 /// Reads the list; an error comes with its line.
 pub(super) fn parse(text: &str) -> Result<Vec<Reference>, (usize, String)> {
-    let line = |at: usize| 1 + text.bytes().take(at).filter(|&b| b == b'\n').count();
-    let file = toml::from_str::<File>(text).map_err(|e| {
-        let at = e.span().map_or(1, |span| line(span.start));
-        (at, e.message().to_string())
-    })?;
-    let placed = |entry: Spanned<Reference>| {
-        let line = line(entry.span().start);
-        Reference { line, ..entry.into_inner() }
-    };
-    Ok(file.reference.into_iter().map(placed).collect())
+    listed::entries(text, "reference", |entry, line| Reference { line, ..entry })
 }
 
 impl Reference {
     /// `Zhang (2000)`, or with parentheses around all.
-    pub(super) fn link(&self, to_root: &str, parenthetical: bool) -> String {
+    pub(super) fn link(&self, parenthetical: bool) -> String {
         let (short, year) = (inline(&self.short), self.year);
-        let title = super::text::attribute(&format!("{} ({year}): {}", self.authors, self.title));
-        let target = format!("{to_root}{PAGE}#ref-{}", self.key);
+        let title = attribute(&format!("{} ({year}): {}", self.authors, self.title));
+        let target = format!("{PAGE}#ref-{}", self.key);
         if parenthetical {
             format!(r#"(<a class="cite" href="{target}" title="{title}">{short} {year}</a>)"#)
         } else {
@@ -87,19 +72,4 @@ pub(super) fn list(references: &[Reference]) -> String {
     sorted.sort_by(|a, b| (&a.authors, a.year).cmp(&(&b.authors, b.year)));
     let entries: Vec<String> = sorted.into_iter().map(Reference::entry).collect();
     format!("<ul class=\"references\">\n{}\n</ul>", entries.join("\n"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const ENTRY: &str = "[[reference]]\nkey = \"a\"\nshort = \"A\"\nauthors = \"A\"\nyear = 1900\ntitle = \"t\"\nvenue = \"v\"\n";
-
-    #[test]
-    fn an_entry_knows_its_line_and_so_does_an_error() {
-        let read = parse(&format!("# Works.\n\n{ENTRY}\n{ENTRY}")).unwrap();
-        assert_eq!(read.iter().map(|r| r.line).collect::<Vec<_>>(), [3, 11]);
-        let (line, message) = parse(&format!("{ENTRY}\n[[reference]]\nkey = 1\n")).unwrap_err();
-        assert_eq!(line, 10, "{message}");
-    }
 }

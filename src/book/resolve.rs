@@ -2,6 +2,7 @@
 
 use super::constants::constant;
 use super::contradictions::Contradiction;
+use super::csv_table::csv_table;
 use super::evidence::ExperimentEvidence;
 use super::finding::Finding;
 use super::golden_file::{GoldenFigure, GoldenFile, GoldenNumber};
@@ -205,7 +206,7 @@ impl<'a> Resolver<'a> {
         self.used.insert(label.clone(), vec![format!("{}#{label}", self.page)]);
         let caption = inline(&sentence(evidence.caption(&format!("{name}.csv")).unwrap_or_default()));
         let command = command_line(experiment, golden);
-        let body = appendix::csv_table(csv, columns, options, &path)?;
+        let body = csv_table(csv, columns, options, &path)?;
         Ok(format!(
             "<div class=\"caption\" id=\"{label}\"><b>{number}.</b> {caption} (<a href=\"{path}\">CSV</a>) {command}</div>\n\
              <div class=\"table-wrapper\"><table>{body}</table></div>\n"
@@ -262,7 +263,7 @@ impl<'a> Resolver<'a> {
         let reference = self.sources.references.iter().find(|r| r.key == key);
         let reference = reference.ok_or_else(|| format!("book/references.toml has no `{key}`"))?;
         self.cited.insert(key.to_string());
-        Ok(reference.link("", parenthetical))
+        Ok(reference.link(parenthetical))
     }
 
     fn refer(&mut self, name: &str, begins_sentence: bool) -> Resolved {

@@ -9,7 +9,9 @@ mod svg;
 
 pub(super) use named::board_or_file;
 
-use super::{Exit, print, warn};
+use super::calibrate::Format;
+use super::said::say_written;
+use super::{Exit, warn};
 use calibench::io::{ShownPath, write_together};
 use calibench::photos::BoardSpec;
 use clap::Args;
@@ -31,6 +33,9 @@ pub(super) struct Arguments {
     /// Folder for board.pdf or board.svg, and board.toml
     #[arg(long, value_name = "DIR", default_value = ".")]
     out: PathBuf,
+    /// Text for people or JSON for programs
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Exit {
@@ -66,8 +71,11 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
         warn(&error.to_string());
         return Exit::Incomplete;
     }
-    let written: Vec<String> = files.iter().map(|(path, _)| path.shown()).collect();
-    print(&told(&arguments.board, &paper, &written));
+    let written: Vec<PathBuf> = files.into_iter().map(|(path, _)| path).collect();
+    say_written(&written, arguments.format, || {
+        let names: Vec<String> = written.iter().map(|path| path.shown()).collect();
+        told(&arguments.board, &paper, &names)
+    });
     Exit::Held
 }
 

@@ -1,12 +1,15 @@
 //! `calibench book`: the book alone, from the last run; what the last run lacks is run.
 
+use super::calibrate::Format;
+use super::said::{print_as, written_by};
 use super::terminal::warn_lines;
-use super::{Exit, print, warn};
+use super::{Exit, warn};
 use calibench::io::ShownPath;
 use calibench_book::{Evidence, Finding, Sources};
 use calibench_harness::project::Project;
 use calibench_harness::{Build, Context, Experiment, ProgressDisplay, Record, emit, verdict};
 use rayon::prelude::*;
+use serde_json::json;
 use std::path::Path;
 
 #[derive(Debug, clap::Args)]
@@ -14,6 +17,9 @@ pub(super) struct Arguments {
     /// Opens it in the browser
     #[arg(long)]
     open: bool,
+    /// Text for people or JSON for programs
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
 }
 
 pub(super) fn run(experiments: &[Experiment], arguments: &Arguments, build: &Build) -> Exit {
@@ -29,7 +35,7 @@ pub(super) fn run(experiments: &[Experiment], arguments: &Arguments, build: &Bui
         experiments.iter().filter(|e| stale.iter().any(|id| id == e.id)).collect();
     let ran = missing.par_iter().map(|experiment| run_one(experiment, &project, build)).max();
     let (evidence, _) = Evidence::of_last_run(&project, experiments);
-    let exit = write(&project, evidence).max(ran.unwrap_or(Exit::Held));
+    let exit = write(&project, evidence, arguments.format).max(ran.unwrap_or(Exit::Held));
     if arguments.open {
         open(&calibench_book::index_of(&project.out().join("book")));
     }
@@ -61,11 +67,11 @@ pub(super) fn build_of(
     records: &[&Record],
     build: &Build,
 ) -> Exit {
-    write(project, Evidence::of_records(project, experiments, records, build))
+    write(project, Evidence::of_records(project, experiments, records, build), Format::Text)
 }
 
 /// Writes out/book and tells what does not resolve.
-fn write(project: &Project, evidence: Evidence) -> Exit {
+fn write(project: &Project, evidence: Evidence, format: Format) -> Exit {
     let compiled = match Sources::load(project, evidence) {
         Ok(sources) => calibench_book::compile(&sources),
         Err(finding) => {
@@ -78,8 +84,15 @@ fn write(project: &Project, evidence: Evidence) -> Exit {
         warn(&error.to_string());
         return Exit::Incomplete;
     }
-    print(&format!("book: {}\n", calibench_book::index_of(&folder).shown()));
-    print(&findings_text(&compiled.findings));
+    let index = calibench_book::index_of(&folder);
+    let text = || format!("book: {}\n{}", index.shown(), findings_text(&compiled.findings));
+    print_as(format, text, || {
+        json!({
+            "written_by": written_by(),
+            "written": [index.display().to_string()],
+            "findings": compiled.findings.iter().map(Finding::to_string).collect::<Vec<_>>(),
+        })
+    });
     if compiled.findings.is_empty() { Exit::Held } else { Exit::Deviates }
 }
 

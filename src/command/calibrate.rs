@@ -96,7 +96,8 @@ pub(super) struct Arguments {
     /// [default: 2GiB]
     #[arg(long, value_name = "BYTES", value_parser = parse_bytes, default_value_t = DEFAULT_MEMORY, hide_default_value = true)]
     memory: u64,
-    /// Folder for result.json, the page report.html, plots, and the photographs with their marks drawn in
+    /// Folder for result.json, the page report.html, plots, and of photographs corners.csv, with the marks as they were
+    /// fitted, and pictures with the marks drawn in
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Text for people or JSON for programs
@@ -314,6 +315,8 @@ pub(super) struct Views {
     pub(super) views: Vec<View>,
     /// The board whose discs' bias is to be corrected.
     pub(super) discs: Option<calibench::board::Board>,
+    /// Mean level of each photograph over the board; none of a corner file.
+    pub(super) light: Vec<f64>,
 }
 
 /// Reads them.
@@ -325,10 +328,10 @@ pub(super) fn views_of(
 ) -> Result<Views, String> {
     if let Some(board) = board {
         let reading = photographs::Reading { image_size, memory, overlays: None };
-        let Observed { source, names, views, discs, notes, .. } =
+        let Observed { source, names, views, discs, notes, light, .. } =
             reading.observe(board, files).map_err(|failure| failure.message)?;
         notes.iter().for_each(|note| warn(&format!("warning: {note}")));
-        return Ok(Views { source, names, views, discs });
+        return Ok(Views { source, names, views, discs, light });
     }
     let [file] = files else {
         return Err(format!(
@@ -340,7 +343,7 @@ pub(super) fn views_of(
     let source = file.shown();
     unended(&source, &bytes).iter().for_each(|said| warn(&format!("warning: {said}")));
     let corners = parse_corners(&source, bytes.as_slice()).map_err(|error| error.to_string())?;
-    Ok(Views { source, names: corners.view_names, views: corners.views, discs: None })
+    Ok(Views { source, names: corners.view_names, views: corners.views, discs: None, light: Vec::new() })
 }
 
 /// What is to be said of a table whose last line has no end.

@@ -2,7 +2,7 @@
 //! again and again.
 
 use super::calibrate::Format;
-use super::said::{number_that, positive};
+use super::said::{number_that, positive, written_by};
 use super::{Exit, print, warn};
 use calibench::downstream::control::{Ewma, Rule, Shewhart};
 use calibench::io::input::{MOST_TABLE_BYTES, read_regular};
@@ -206,7 +206,7 @@ impl Judged {
         });
         let alarm = self.first_alarm();
         json!({
-            "written_by": format!("calibench {}", env!("CARGO_PKG_VERSION")),
+            "written_by": written_by(),
             "reference": arguments.reference,
             "sd": arguments.sd,
             "rate": arguments.rate,

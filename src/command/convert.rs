@@ -1,6 +1,7 @@
 //! `calibench convert IN OUT`: a camera, corners or a board from the file of one program to that of another.
 
 use super::calibrate::{Format as Shown, parse_size, unended};
+use super::said::written_by;
 use super::{Exit, print, warn};
 use calibench::io::ShownPath;
 use calibench::io::formats::{
@@ -18,7 +19,8 @@ use std::path::{Path, PathBuf};
 const FORMATS: &str = "\
 Cameras: calibench (.json), opencv-yaml, opencv-xml (.xml), opencv-json, ros, kalibr, mrcal (.cameramodel), colmap (.txt), matlab (JSON of \
 toStruct), halcon (.dat). Corners: this program's .csv to mrcal's .vnl and back, with --board. Boards: chess:9x6:25mm to Kalibr's target.yaml \
-and back. The format of IN is told by its contents, that of OUT by its ending.";
+and back. The format of IN is told by its contents, that of OUT by its ending. Every lens goes where the format has its equal; where it has none, the \
+refusal says which lenses it has.";
 
 #[derive(Debug, Args)]
 #[command(after_help = FORMATS)]
@@ -48,7 +50,7 @@ pub(super) struct Arguments {
     /// says]
     #[arg(long, value_name = "PX", value_parser = parse_finite, allow_negative_numbers = true)]
     first_pixel: Option<f64>,
-    /// Fits the nearest lens where there is no equal one (HALCON's), and says the largest error
+    /// Fits the nearest lens where there is no equal one (HALCON's polynomial), and says the largest error
     #[arg(long)]
     fit: bool,
     /// Height of a pixel in micrometres, for HALCON, which states focal lengths in metres
@@ -134,7 +136,7 @@ impl Converted {
 
     fn json(&self, from: &Path, to: &Path) -> String {
         let value = json!({
-            "written_by": format!("calibench {}", env!("CARGO_PKG_VERSION")),
+            "written_by": written_by(),
             "in": {"file": from.display().to_string(), "format": self.from},
             "out": {"file": to.display().to_string(), "format": self.to},
             "noted": self.noted,
@@ -213,7 +215,7 @@ fn camera(arguments: &Arguments, name: &str, text: &str, to: &Path) -> Result<Co
     }
     if from.coefficients != to.coefficients {
         converted.push(format!(
-            "coefficients of the lens: {} in IN, {} in {}",
+            "coefficients of the lens: {} in IN and {} in {}",
             from.coefficients, to.coefficients, to.of
         ));
     }

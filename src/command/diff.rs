@@ -1,13 +1,15 @@
 //! `calibench diff A B`: how two cameras differ over the frame, and whether both may be one.
 
 use super::calibrate::{Format as Shown, parse_size, round_down};
+use super::said::written_by;
 use super::{Exit, print, warn};
-use calibench::evaluate::{
-    Calibrated, FrameDifference, OneCamera, TakenOut, difference::frame_nodes, frame_difference, one_camera,
-};
+use calibench::camera::Model;
+use calibench::evaluate::{FrameDifference, OneCamera, TakenOut, difference::frame_nodes};
 use calibench::io::ShownPath;
+use calibench::io::doubts::doubts;
 use calibench::io::formats::{CameraFile, FormatError, MOST_BYTES, Wishes, detect, read_camera_file};
 use calibench::io::{read_regular_text, significant, write_atomically};
+use calibench::validate::{Calibrated, frame_difference, one_camera};
 use calibench_harness::{Figure, HeatMap, Look, Plot};
 use clap::Args;
 use serde_json::{Value, json};
@@ -21,7 +23,7 @@ const EXIT_CODES: &str = "Exit codes: 0 nothing speaks against one camera, or th
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_CODES)]
 pub(super) struct Arguments {
-    /// A camera in any format that `calibench convert` reads; result.json of `calibench calibrate` brings its
+    /// A camera with any lens in any format that `calibench convert` reads; result.json of `calibench calibrate` brings its
     /// covariance along
     a: PathBuf,
     /// The other camera
@@ -76,7 +78,7 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
         Shown::Json => print(&json),
     }
     match &compared.test {
-        Ok(test) if test.p_value < arguments.rate => Exit::Deviates,
+        Ok(test) if test.p_value < arguments.rate && compared.doubts.is_empty() => Exit::Deviates,
         _ => Exit::Held,
     }
 }
@@ -84,9 +86,13 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
 /// What was found.
 struct Compared {
     size: (usize, usize),
+    /// Lens models of A and B.
+    models: [Model; 2],
     difference: FrameDifference,
     /// The test, or why there is none.
     test: Result<OneCamera, String>,
+    /// What the files themselves say against it.
+    doubts: Vec<String>,
 }
 
 fn compared(arguments: &Arguments) -> Result<Compared, String> {
@@ -101,7 +107,19 @@ fn compared(arguments: &Arguments) -> Result<Compared, String> {
         (None, _) => Err(format!("{} has no covariance", arguments.a.shown())),
         (_, None) => Err(format!("{} has no covariance", arguments.b.shown())),
     };
-    Ok(Compared { size, difference, test })
+    let models = [&a, &b].map(|file| file.camera.distortion.model());
+    let doubts = doubts_of([&arguments.a, &arguments.b])?;
+    Ok(Compared { size, models, difference, test, doubts })
+}
+
+/// Where a result says that its standard deviations mislead, chi-squared has no law.
+pub(super) const NOT_DECIDED: &str =
+    "not decided, since standard deviations that mislead, as the files say, give this probability no meaning";
+
+/// What results say against their own standard deviations.
+pub(super) fn doubts_of<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> Result<Vec<String>, String> {
+    let each = paths.into_iter().map(|path| doubts(path).map_err(|error| error.to_string()));
+    Ok(each.collect::<Result<Vec<_>, _>>()?.concat())
 }
 
 fn read(path: &Path) -> Result<CameraFile, String> {
@@ -136,6 +154,7 @@ fn calibrated(file: &CameraFile) -> Option<Calibrated<'_>> {
     Some(Calibrated {
         camera: &file.camera,
         free: estimated.free,
+        fy_per_fx: estimated.fy_per_fx,
         covariance: &estimated.covariance,
         degrees_of_freedom: estimated.degrees_of_freedom,
     })
@@ -159,12 +178,38 @@ impl Compared {
         let _ =
             writeln!(text, "\ndifference left: {} px RMS{}", significant(*rms_px, 3), self.largest_text());
         match &self.test {
-            Ok(test) => text += &test_text(test, arguments.rate),
+            Ok(test) => text += &self.test_text(test, arguments.rate),
             Err(why) => {
                 let _ = writeln!(text, "not tested whether both are one camera: {why}");
             }
         }
         text
+    }
+
+    fn test_text(&self, test: &OneCamera, rate: f64) -> String {
+        let [a, b] = self.models;
+        let says = match (test.p_value < rate, a == b) {
+            (true, _) if !self.doubts.is_empty() => NOT_DECIDED.to_string(),
+            (false, _) => "nothing speaks against one camera".to_string(),
+            (true, true) => "they are two cameras".to_string(),
+            (true, false) => format!("they are two cameras, or {a} and {b} do not both fit one"),
+        };
+        let mut text = format!(
+            "chi-squared {} on {} degrees of freedom, by chance with probability {}: {says} (false alarms at {rate})\n",
+            significant(test.chi_squared, 4),
+            test.degrees_of_freedom,
+            significant(test.p_value, 2),
+        );
+        if test.imitated > 0 {
+            let by = if a == b {
+                "what was taken out imitates them"
+            } else {
+                "both models share them, or what was taken out imitates them"
+            };
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "{} combinations of parameters are left out: {by}", test.imitated);
+        }
+        text + &self.doubts.iter().map(|doubt| format!("{doubt}\n")).collect::<String>()
     }
 
     fn largest_text(&self) -> String {
@@ -186,13 +231,14 @@ impl Compared {
                 "noise_freedom": test.noise_freedom,
                 "p_value": test.p_value,
                 "rate": arguments.rate,
-                "one_camera": test.p_value >= arguments.rate,
+                "one_camera": (test.p_value >= arguments.rate || self.doubts.is_empty()).then_some(test.p_value >= arguments.rate),
             })
         });
         json!({
-            "written_by": format!("calibench {}", env!("CARGO_PKG_VERSION")),
+            "written_by": written_by(),
             "a": arguments.a.display().to_string(),
             "b": arguments.b.display().to_string(),
+            "models": self.models.map(Model::name),
             "image_size": [self.size.0, self.size.1],
             "at_mm": arguments.at,
             "rotation_vector_rad": [rotation.x, rotation.y, rotation.z],
@@ -205,29 +251,9 @@ impl Compared {
             ]).collect::<Vec<_>>(),
             "test": test.as_ref().ok(),
             "not_tested": self.test.as_ref().err(),
+            "doubts": self.doubts,
         })
     }
-}
-
-fn test_text(test: &OneCamera, rate: f64) -> String {
-    let says = match test.p_value < rate {
-        true => "they are two cameras",
-        false => "nothing speaks against one camera",
-    };
-    let mut text = format!(
-        "chi-squared {} on {} degrees of freedom, by chance with probability {}: {says} (false alarms at {rate})\n",
-        significant(test.chi_squared, 4),
-        test.degrees_of_freedom,
-        significant(test.p_value, 2),
-    );
-    if test.imitated > 0 {
-        let _ = writeln!(
-            text,
-            "{} combinations of parameters are left out: what was taken out imitates them",
-            test.imitated
-        );
-    }
-    text
 }
 
 fn write_files(folder: &Path, json: &str, compared: &Compared) -> std::io::Result<()> {

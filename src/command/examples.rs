@@ -3,7 +3,7 @@
 use clap::{Command, CommandFactory};
 
 /// Verbs, those of a verb after it, and what one would type. What it reads is in `tests/verb_examples.rs`.
-const EXAMPLES: [(&str, &[&str]); 34] = [
+const EXAMPLES: &[(&str, &[&str])] = &[
     ("list", &["calibench list", "calibench list --names", "calibench list --format json"]),
     ("explain", &["calibench explain line-bending.max-deviation", "calibench explain 5.4"]),
     ("run", &["calibench run line-bending", "calibench run line-bending --seed 7 --out another-seed"]),
@@ -36,11 +36,19 @@ const EXAMPLES: [(&str, &[&str]); 34] = [
         ],
     ),
     ("ninepoint", &["calibench ninepoint dots.png --out nine"]),
+    (
+        "noise",
+        &[
+            "calibench noise --board circles:9x7:10mm:3mm still0.png still1.png still2.png still3.png",
+            "calibench noise still.csv --want 2 --out noise",
+        ],
+    ),
     ("undistort", &["calibench undistort --camera result/result.json --out corrected photo0.png photo1.png"]),
     (
         "convert",
         &[
             "calibench convert result/result.json camera.yaml --to opencv-yaml",
+            "calibench convert fisheye.json fisheye.yaml --to kalibr",
             "calibench convert chess:9x6:25mm target.yaml",
         ],
     ),
@@ -58,7 +66,13 @@ const EXAMPLES: [(&str, &[&str]); 34] = [
             "calibench validate result/result.json --again again.json",
         ],
     ),
-    ("diff", &["calibench diff result/result.json camera.yaml --out difference"]),
+    (
+        "diff",
+        &[
+            "calibench diff result/result.json camera.yaml --out difference",
+            "calibench diff fisheye.json fisheye.yaml",
+        ],
+    ),
     ("measure", &["calibench measure result/result.json --view 0 --pixels 200,200,300,250"]),
     ("register", &["calibench register taught.csv found.csv"]),
     ("hand-eye", &["calibench hand-eye robot.csv result/result.json --robot-sd-mm 0.1 --robot-sd-deg 0.1"]),
@@ -69,9 +83,17 @@ const EXAMPLES: [(&str, &[&str]); 34] = [
             "calibench study run my-study.toml --out my-study",
             "calibench study run my-study.toml --shard 0/2 --out part0",
             "calibench study run my-study.toml --shard 1/2 --out part1",
+            "calibench study run my-study.toml --solver \"python3 my_solver.py\" --out theirs",
         ],
     ),
-    ("study resume", &["calibench study resume my-study"]),
+    ("study resume", &["calibench study resume my-study --format json"]),
+    (
+        "study commands",
+        &[
+            "calibench study commands my-study.toml --shards 2 --out parts",
+            "calibench study commands my-study.toml --shards 2 --out parts --merge",
+        ],
+    ),
     ("study merge", &["calibench study merge part0 part1 --out whole"]),
     (
         "study compare",

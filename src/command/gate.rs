@@ -6,23 +6,22 @@ mod hand_eye;
 mod power;
 
 use super::calibrate::Format;
+use super::said::say_written;
 use super::terminal::warn_lines;
-use super::{Exit, MOST_THREADS, print, warn};
+use super::{Exit, print, program, warn};
+use calibench::camera::Model;
 use calibench::io::ShownPath;
 use calibench::io::write_atomically;
 use calibench_gate::faults::{Faulty, planted};
 use calibench_gate::files::{self, FilesError};
 use calibench_gate::{
-    Builtin, EXPECTED_FALSE_ALARMS, Plan, PlanError, Process, Property, QUICK, Recorder, Report, Solver,
+    Asked, Builtin, EXPECTED_FALSE_ALARMS, Plan, PlanError, Property, QUICK, Recorder, Report, Solver,
     THOROUGH, Terms, plan, protocol,
 };
 use calibench_harness::{Build, ProgressDisplay};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
-
-/// Longest time for a problem.
-const LONGEST: Duration = Duration::from_secs(86_400);
+use std::time::Instant;
 
 /// How many problems.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -54,6 +53,13 @@ pub(super) struct Arguments {
     /// Seed of the noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// Lens models whose scenes are asked, such as brown-conrady,rational [default: those that the solver says
+    /// it knows; brown-conrady of a program that says nothing, and in files]
+    #[arg(long, value_name = "MODELS", value_delimiter = ',', conflicts_with_all = ["judge", "power", "certified", "hand_eye"])]
+    models: Vec<Model>,
+    /// The only scene or bad input to ask, by its name in reports; may be repeated
+    #[arg(long = "scene", value_name = "SCENE", conflicts_with_all = ["judge", "power", "certified", "hand_eye"])]
+    scenes: Vec<String>,
     /// Chance that a correct solver fails the run
     #[arg(long, value_name = "RATE", default_value_t = EXPECTED_FALSE_ALARMS)]
     false_alarms: f64,
@@ -144,12 +150,12 @@ fn property(name: &str) -> Result<Property, String> {
 }
 
 pub(super) fn run(arguments: &Arguments, build: &Build) -> Exit {
-    calibench_gate::process::adopt_orphans();
+    calibench_gate::program::adopt_orphans();
     let exit = dispatch(arguments, build).unwrap_or_else(|(exit, message)| {
         warn(&message);
         exit
     });
-    calibench_gate::process::end_all();
+    calibench_gate::program::end_all();
     exit
 }
 
@@ -166,7 +172,7 @@ fn incomplete(message: impl ToString) -> Stop {
 
 fn of_files(error: FilesError) -> Stop {
     match error {
-        FilesError::Plan(PlanError::TooManySamples { .. }) => usage(error),
+        FilesError::Plan(PlanError::TooManySamples { .. } | PlanError::UnknownScene { .. }) => usage(error),
         FilesError::Write(_) | FilesError::Plan(_) => incomplete(error),
         _ => usage(error),
     }
@@ -213,15 +219,11 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
     if samples > plan::MOST_SAMPLES {
         return Err(usage(PlanError::TooManySamples { samples }));
     }
-    if arguments.jobs > MOST_THREADS {
-        return Err(usage(format!("--jobs {}, and the limit is {MOST_THREADS}", arguments.jobs)));
-    }
     if samples == 0 || !(arguments.false_alarms > 0.0 && arguments.false_alarms < 1.0) {
         return Err(usage("--samples must be at least 1 and --false-alarms between 0 and 1"));
     }
-    if !(arguments.timeout > 0.0 && arguments.timeout.is_finite()) || arguments.jobs == 0 {
-        return Err(usage("--timeout must be a positive number of seconds and --jobs at least 1"));
-    }
+    // Told before anything else is done, whether a program is asked or not.
+    program::process("", arguments.timeout, arguments.jobs).map_err(usage)?;
     if !arguments.least_digits.is_finite() {
         return Err(usage("--least-digits must be a number"));
     }
@@ -251,9 +253,11 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
         return power::measure(arguments, folder, samples, build);
     }
     if let Some(folder) = &arguments.export {
-        let plan = Plan::new(arguments.seed, samples).map_err(incomplete)?;
+        let plan = plan_of(arguments, samples, || vec![Model::BrownConrady])?;
         files::export(&plan, folder).map_err(of_files)?;
-        print(&format!("{} problems written to {}\n", plan.cases.len(), folder.shown()));
+        say_written(std::slice::from_ref(folder), arguments.format, || {
+            format!("{} problems written to {}\n", plan.cases.len(), folder.shown())
+        });
         return Ok(Exit::Held);
     }
     if let Some(folder) = &arguments.judge {
@@ -262,19 +266,59 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
     }
     let solver = solver(arguments)?;
     if let Some(folder) = &arguments.record {
-        let plan = Plan::new(arguments.seed, samples).map_err(incomplete)?;
+        let plan = plan_of(arguments, samples, || solver.models())?;
         files::export(&plan, folder).map_err(of_files)?;
         let recorder = Recorder::new(solver.as_ref());
         let exit = judge(arguments, &plan, &recorder, build)?;
         files::file_answers(&plan, folder, &recorder).map_err(of_files)?;
-        print(&format!("{} problems and answers written to {}\n", plan.cases.len(), folder.shown()));
+        // The report is the one object on standard output.
+        if arguments.format == Format::Text {
+            print(&format!("{} problems and answers written to {}\n", plan.cases.len(), folder.shown()));
+        }
         return Ok(exit);
     }
     if let Some(reference) = &arguments.against {
         return compare::run(arguments, solver.as_ref(), reference, samples);
     }
-    let plan = Plan::new(arguments.seed, samples).map_err(incomplete)?;
+    let plan = plan_of(arguments, samples, || solver.models())?;
     judge(arguments, &plan, solver.as_ref(), build)
+}
+
+/// The plan of the arguments, with the lens models that are `known` unless they name some.
+fn plan_of(arguments: &Arguments, samples: usize, known: impl FnOnce() -> Vec<Model>) -> Result<Plan, Stop> {
+    let models = if arguments.models.is_empty() { known() } else { arguments.models.clone() };
+    if models.is_empty() {
+        let known: Vec<&str> = Model::ALL.iter().map(|model| model.name()).collect();
+        return Err((
+            Exit::Deviates,
+            format!(
+                "NOT TRUSTED: the program's greeting names no lens model that the gate knows, so that nothing can be asked; there are: {}",
+                known.join(", ")
+            ),
+        ));
+    }
+    let asked = Asked { models, scenes: arguments.scenes.clone() };
+    Plan::of(arguments.seed, samples, asked).map_err(|error| match error {
+        PlanError::UnknownScene { .. } | PlanError::TooManySamples { .. } => usage(error),
+        _ => incomplete(error),
+    })
+}
+
+/// The command that asks the same again, to which a scene may be added; none for answers in files.
+fn repeat(arguments: &Arguments, plan: &Plan) -> Option<String> {
+    let solver = match (&arguments.judge, &arguments.solver, &arguments.planted) {
+        (Some(_), ..) => return None,
+        (None, Some(command), _) => format!(" --solver '{}'", command.replace('\'', "'\\''")),
+        (None, None, Some(fault)) => format!(" --planted {fault}"),
+        (None, None, None) => String::new(),
+    };
+    let models: Vec<&str> = plan.asked.models.iter().map(|model| model.name()).collect();
+    Some(format!(
+        "calibench gate{solver} --models {} --samples {} --seed {}",
+        models.join(","),
+        plan.samples,
+        plan.seed
+    ))
 }
 
 fn solver(arguments: &Arguments) -> Result<Box<dyn Solver>, Stop> {
@@ -291,15 +335,7 @@ fn solver(arguments: &Arguments) -> Result<Box<dyn Solver>, Stop> {
 }
 
 fn process(arguments: &Arguments, command: &str) -> Result<Box<dyn Solver>, Stop> {
-    Ok(Box::new(Process::new(command, timeout(arguments)?, arguments.jobs)))
-}
-
-/// How long a program may take for a problem.
-fn timeout(arguments: &Arguments) -> Result<Duration, Stop> {
-    let timeout = Duration::try_from_secs_f64(arguments.timeout)
-        .ok()
-        .filter(|t| (1..=LONGEST.as_nanos()).contains(&t.as_nanos()));
-    timeout.ok_or_else(|| usage("--timeout must be a positive number of seconds, at most a day"))
+    Ok(Box::new(program::process(command, arguments.timeout, arguments.jobs).map_err(usage)?))
 }
 
 fn terms(arguments: &Arguments) -> Terms {
@@ -316,7 +352,12 @@ fn asked(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build)
     let started = Instant::now();
     let seen = calibench_gate::run(plan, solver, &|done| progress.advance(done));
     let seconds = started.elapsed().as_secs_f64();
-    Report::new(plan, &solver.name(), &seen, &terms(arguments), seconds).with_commit(build.commit.as_ref())
+    let report = Report::new(plan, &solver.name(), &seen, &terms(arguments), seconds);
+    let report = report.with_commit(build.commit.as_ref());
+    match repeat(arguments, plan) {
+        Some(command) => report.with_repeat(command),
+        None => report,
+    }
 }
 
 /// A report in one form, and where it goes if it is wanted.

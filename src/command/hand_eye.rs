@@ -4,7 +4,7 @@
 use super::Exit;
 use super::calibrate::Format;
 use super::report::table;
-use super::said::{Said, positive, say};
+use super::said::{Said, positive, say, written_by};
 use calibench::calibrate::Covariance;
 use calibench::downstream::{HandEye, Repeatability, SetUp, Stations, hand_eye};
 use calibench::geometry::{Pose, Vec3, rotation};
@@ -239,7 +239,7 @@ impl Found {
         let [x, y] = arguments.set_up.poses();
         let stations = self.stations.iter().zip(&result.residuals);
         json!({
-            "written_by": format!("calibench {}", env!("CARGO_PKG_VERSION")),
+            "written_by": written_by(),
             "robot": arguments.robot.display().to_string(),
             "result": arguments.result.display().to_string(),
             "set_up": arguments.set_up.name(),

@@ -22,6 +22,8 @@ mod manual;
 mod measure;
 mod new;
 mod ninepoint;
+mod noise;
+mod program;
 mod register;
 mod report;
 mod reproduce;
@@ -83,6 +85,8 @@ enum Verb {
     Calibrate(calibrate::Arguments),
     /// Finds the dots of a nine-point board in a photograph, and maps its pixels to the unit grid
     Ninepoint(ninepoint::Arguments),
+    /// Measures the noise of extraction from repeated photographs of a still board, and whether it was still
+    Noise(noise::Arguments),
     /// Removes a calibrated lens's distortion from photographs
     Undistort(undistort::Arguments),
     /// Converts cameras, corners and boards between the files of OpenCV, ROS, Kalibr, mrcal, COLMAP, MATLAB,
@@ -146,6 +150,7 @@ pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCo
         Some(Verb::Board(arguments)) => board::run(&arguments),
         Some(Verb::Calibrate(arguments)) => calibrate::run(&arguments),
         Some(Verb::Ninepoint(arguments)) => ninepoint::run(&arguments),
+        Some(Verb::Noise(arguments)) => noise::run(&arguments),
         Some(Verb::Undistort(arguments)) => undistort::run(&arguments),
         Some(Verb::Convert(arguments)) => convert::run(&arguments),
         Some(Verb::Tsai(arguments)) => tsai::run(&arguments),
@@ -177,7 +182,7 @@ pub fn main_for(experiment: &Experiment, build: &Build) -> ExitCode {
 fn end_well_on_interrupt() {
     let handler = || {
         warn("interrupted: what was finished and written is kept, the rest is missing");
-        calibench_gate::process::end_all();
+        calibench_gate::program::end_all();
         std::process::exit(Exit::Incomplete as i32);
     };
     // A handler that was set before stays in charge.

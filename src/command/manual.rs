@@ -1,5 +1,7 @@
 //! `calibench manual --out DIR`: a page of the manual for the command and for every verb.
 
+use super::calibrate::Format;
+use super::said::say_written;
 use super::{Exit, warn};
 use calibench::io::write_together;
 use clap::Args;
@@ -12,14 +14,24 @@ pub(super) struct Arguments {
     /// Folder for calibench.1 and a page for every verb, such as ~/.local/share/man/man1
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Text for people or JSON for programs
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Exit {
     let mut command = super::examples::command().disable_help_subcommand(true);
     command.build();
-    let written = pages(&command, &arguments.out).and_then(|pages| write_together(&pages));
+    let written = pages(&command, &arguments.out).and_then(|pages| {
+        write_together(&pages)?;
+        Ok(pages.into_iter().map(|(path, _)| path).collect::<Vec<_>>())
+    });
     match written {
-        Ok(()) => Exit::Held,
+        // People see the folder that they named.
+        Ok(files) => {
+            say_written(&files, arguments.format, String::new);
+            Exit::Held
+        }
         Err(error) => {
             warn(&error.to_string());
             Exit::Incomplete

@@ -3,10 +3,13 @@
 use super::Exit;
 use super::calibrate::Format;
 use super::report::table;
-use super::said::{Said, number_that, positive, say};
+use super::said::{Said, number_that, positive, say, written_by};
+use calibench::camera::Camera;
 use calibench::downstream::{Cause, Conditions, Length, PlaneView, length_in_view, length_on_map};
 use calibench::geometry::{Pose, Vec2, Vec3, rotation};
-use calibench::io::{Known, KnownCalibration, PixelEnds, read_known, read_pixel_ends, significant};
+use calibench::io::{
+    Known, KnownCalibration, PixelEnds, ShownPath, read_known, read_pixel_ends, significant,
+};
 use calibench::planar::PlaneCalibration;
 use clap::Args;
 use serde_json::{Value, json};
@@ -116,7 +119,9 @@ fn measured_in_view(
         return Err("--spacing is for the map of a plane: a camera's poses are in its board's unit".into());
     }
     refuse_outside(known, &ends)?;
-    let plane = plane(arguments, known)?;
+    let file = arguments.result.shown();
+    let camera = known.brown_conrady(&file).map_err(|error| error.to_string())?;
+    let plane = plane(arguments, known, &camera)?;
     let noise = Noise { sigma_px: known.sigma_px, freedom: known.degrees_of_freedom };
     let conditions = noise.conditions(arguments);
     each(ends, |pixels| length_in_view(&plane, pixels, &conditions).map_err(|error| error.to_string()))
@@ -183,14 +188,14 @@ fn refuse_outside(known: &KnownCalibration, ends: &[PixelEnds]) -> Result<(), St
 }
 
 /// The plane: a view of the calibration, or a pose.
-fn plane(arguments: &Arguments, known: &KnownCalibration) -> Result<PlaneView, String> {
+fn plane(arguments: &Arguments, known: &KnownCalibration, camera: &Camera) -> Result<PlaneView, String> {
     if let Some(p) = arguments.pose {
         let pose = Pose {
             rotation: rotation::exp(&Vec3::new(p[0], p[1], p[2])),
             translation: Vec3::new(p[3], p[4], p[5]),
         };
         let deviations = arguments.pose_sd.unwrap_or_else(Numbers::zeros);
-        return Ok(PlaneView::with_pose(&known.camera, &pose, &known.covariance, deviations.into()));
+        return Ok(PlaneView::with_pose(camera, &pose, &known.covariance, deviations.into()));
     }
     let names = || known.views.join(", ");
     let name = arguments
@@ -202,7 +207,7 @@ fn plane(arguments: &Arguments, known: &KnownCalibration) -> Result<PlaneView, S
         .iter()
         .position(|view| view == name)
         .ok_or_else(|| format!("no view `{name}`; there are: {}", names()))?;
-    PlaneView::of_view(&known.camera, &known.cam_from_target, &known.covariance, index)
+    PlaneView::of_view(camera, &known.cam_from_target, &known.covariance, index)
         .map_err(|error| error.to_string())
 }
 
@@ -325,7 +330,7 @@ fn shown_causes(length: &Length) -> Vec<(&'static str, f64)> {
 
 fn measured_json(arguments: &Arguments, measured: &[Measured]) -> Value {
     json!({
-        "written_by": format!("calibench {}", env!("CARGO_PKG_VERSION")),
+        "written_by": written_by(),
         "result": arguments.result.display().to_string(),
         "view": arguments.view,
         "lengths": measured.iter().map(length_json).collect::<Vec<_>>(),

@@ -2,7 +2,9 @@
 
 mod experiment;
 
-use super::{Exit, print, warn};
+use super::calibrate::Format;
+use super::said::say_written;
+use super::{Exit, warn};
 use calibench::io::{ShownPath, write_together};
 use calibench_harness::project::Project;
 use clap::{Args, Subcommand, ValueEnum};
@@ -12,6 +14,9 @@ use std::path::{Path, PathBuf};
 pub(super) struct Arguments {
     #[command(subcommand)]
     what: What,
+    /// Text for people or JSON for programs
+    #[arg(long, value_enum, default_value_t = Format::Text, global = true)]
+    format: Format,
 }
 
 #[derive(Debug, Subcommand)]
@@ -100,8 +105,12 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
         warn(&error.to_string());
         return Exit::Incomplete;
     }
-    let names: Vec<String> = started.files.iter().map(|(path, _)| path.shown()).collect();
-    print(&format!("wrote {}\n\nnext:\n{}\n", names.join(", "), started.next));
+    let Started { files, next } = started;
+    let written: Vec<PathBuf> = files.into_iter().map(|(path, _)| path).collect();
+    say_written(&written, arguments.format, || {
+        let names: Vec<String> = written.iter().map(|path| path.shown()).collect();
+        format!("wrote {}\n\nnext:\n{next}\n", names.join(", "))
+    });
     Exit::Held
 }
 

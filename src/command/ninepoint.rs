@@ -1,6 +1,7 @@
 //! `calibench ninepoint IMAGE`: the dots of a photograph, and the map from its pixels to the unit grid.
 
 use super::calibrate::{Format, Mode, plane_text};
+use super::said::written_by;
 use super::{Exit, print, warn};
 use calibench::board::Board;
 use calibench::detect::{DotGrid, sparse_dots_of};
@@ -95,7 +96,7 @@ fn result_json(arguments: &Arguments, found: &Found) -> Value {
     let per_px = 0.5 * (plane.scale_x + plane.scale_y);
     let points = found.centres_px.iter().zip(&found.world).zip(&plane.residuals);
     json!({
-        "written_by": format!("calibench {}", env!("CARGO_PKG_VERSION")),
+        "written_by": written_by(),
         "mode": arguments.mode.name(),
         "columns": arguments.columns,
         "rows": arguments.rows,

@@ -4,7 +4,7 @@
 use super::Exit;
 use super::calibrate::Format;
 use super::report::table;
-use super::said::{Said, say};
+use super::said::{Said, say, written_by};
 use calibench::calibrate::Loss;
 use calibench::downstream::{MapModel, Mark, Registration, coverage_factor, register};
 use calibench::geometry::Vec2;
@@ -230,7 +230,7 @@ impl Registered {
         let m = map.matrix();
         let marks = self.names.iter().zip(&map.residuals).zip(&map.weights);
         json!({
-            "written_by": format!("calibench {}", env!("CARGO_PKG_VERSION")),
+            "written_by": written_by(),
             "taught": arguments.taught.display().to_string(),
             "found": arguments.found.display().to_string(),
             "model": arguments.model.name(),

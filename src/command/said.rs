@@ -1,11 +1,11 @@
-//! What a verb found, as text and as JSON: printed in one form, written in the other. And how numbers of options
-//! are read.
+//! What a verb found or wrote, as text and as JSON: printed in one form, written in the other. And how numbers of
+//! options are read.
 
 use super::calibrate::Format;
 use super::{Exit, print, warn};
 use calibench::io::write_atomically;
-use serde_json::Value;
-use std::path::Path;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
 
 /// What was found, in both forms.
 pub(super) struct Said {
@@ -34,6 +34,25 @@ pub(super) fn say(said: Result<Said, String>, out: Option<&Path>, file_name: &st
         Format::Json => print(&json),
     }
     Exit::Held
+}
+
+/// The program, as it stands in what it writes.
+pub(super) fn written_by() -> String {
+    format!("calibench {}", env!("CARGO_PKG_VERSION"))
+}
+
+/// Prints one of both forms, JSON as one object on lines of its own.
+pub(super) fn print_as(format: Format, text: impl FnOnce() -> String, json: impl FnOnce() -> Value) {
+    match format {
+        Format::Text => print(&text()),
+        Format::Json => print(&format!("{:#}\n", json())),
+    }
+}
+
+/// Tells which files a verb has written: `text` to people, their paths to programs.
+pub(super) fn say_written(files: &[PathBuf], format: Format, text: impl FnOnce() -> String) {
+    let paths = || files.iter().map(|path| path.display().to_string()).collect::<Vec<_>>();
+    print_as(format, text, || json!({ "written_by": written_by(), "written": paths() }));
 }
 
 /// A finite number for which something holds.

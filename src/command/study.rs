@@ -1,9 +1,12 @@
 //! `calibench study`: Monte Carlo studies from a file, one verb a file.
 
+mod commands;
 mod compare;
+mod finished;
 mod measure;
 mod plan;
 mod run;
+mod solver;
 
 use super::Exit;
 use super::terminal::warn_lines;
@@ -21,6 +24,8 @@ pub(super) enum Verb {
     Run(run::Arguments),
     /// Continues a run that was interrupted; refuses if specification or code have changed
     Resume(run::ResumeArguments),
+    /// Prints one command a shard, for GNU parallel, HyperQueue or whatever runs lines
+    Commands(commands::Arguments),
     /// Joins the shards of a study into what an undivided run gives, bit for bit
     Merge(run::MergeArguments),
     /// Compares two runs trial by trial: effect with interval, and a verdict only where the interval clears
@@ -43,6 +48,7 @@ pub(super) fn run(arguments: &Arguments, build: &Build) -> Exit {
     let ended = match &arguments.verb {
         Verb::Run(arguments) => run::run(arguments, build),
         Verb::Resume(arguments) => run::resume(arguments, build),
+        Verb::Commands(arguments) => commands::run(arguments),
         Verb::Merge(arguments) => run::merge_parts(arguments, build),
         Verb::Compare(arguments) => compare::run(arguments),
         Verb::Plan(arguments) => plan::run(arguments),

@@ -3,7 +3,7 @@
 
 use super::calibrate::{Format, parse_size, unended};
 use super::report::table;
-use super::said::{Said, number_that, say};
+use super::said::{Said, number_that, say, written_by};
 use super::{Exit, warn};
 use calibench::board::{View, ViewError};
 use calibench::calibrate::{Settings, calibrate};
@@ -277,7 +277,7 @@ impl Found {
     fn json(&self, arguments: &Arguments) -> Value {
         let Assumed { principal_point_px: centre, fy_per_fx } = arguments.assumed();
         json!({
-            "written_by": format!("calibench {}", env!("CARGO_PKG_VERSION")),
+            "written_by": written_by(),
             "source": self.source,
             "image_size": arguments.image_size.map(|(width, height)| [width, height]),
             "principal_point_px": [centre.x, centre.y],

@@ -1,5 +1,7 @@
 //! `calibench undistort --camera RESULT.json PHOTOS...`: what an ideal lens would have shown.
 
+use super::calibrate::Format;
+use super::said::{say_written, written_by};
 use super::{Exit, print, warn};
 use calibench::camera::{Camera, Lens};
 use calibench::io::ShownPath;
@@ -41,6 +43,9 @@ pub(super) struct Arguments {
     /// Also writes mask-<W>x<H>.png: white where the output has data
     #[arg(long)]
     mask: bool,
+    /// Text for people, a line as each photograph is finished, or JSON for programs
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -101,7 +106,7 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
         warn(&message);
         return Exit::Usage;
     }
-    let mut work = Work { arguments, camera, image_size, maps: BTreeMap::new() };
+    let mut work = Work { arguments, camera, image_size, maps: BTreeMap::new(), written: Vec::new() };
     let mut exit = Exit::Held;
     // A photograph that cannot be corrected does not keep the others from it.
     for photo in &arguments.photos {
@@ -110,6 +115,8 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
             exit = exit.max(failed);
         }
     }
+    // People saw each as it was finished.
+    say_written(&work.written, arguments.format, String::new);
     exit
 }
 
@@ -173,6 +180,8 @@ struct Work<'a> {
     image_size: Option<Size>,
     /// One look-up table for all photographs of a size.
     maps: BTreeMap<Size, RectifyMap>,
+    /// Files written so far.
+    written: Vec<PathBuf>,
 }
 
 /// How to end, and what to say.
@@ -210,7 +219,10 @@ impl Work<'_> {
         };
         let written = corrected.map_err(same_size)?.write_png(&output);
         written.map_err(|error| (Exit::Incomplete, error.to_string()))?;
-        print(&format!("{}\n", output.shown()));
+        if self.arguments.format == Format::Text {
+            print(&format!("{}\n", output.shown()));
+        }
+        self.written.push(output);
         Ok(())
     }
 
@@ -237,12 +249,19 @@ impl Work<'_> {
                 return Err((Exit::Usage, message.to_string()));
             }
         };
-        self.describe(size, output, &map).map_err(|message| (Exit::Incomplete, message))?;
+        let written = self.describe(size, output, &map).map_err(|message| (Exit::Incomplete, message))?;
+        self.written.extend(written);
         self.maps.insert(size, map);
         Ok(())
     }
 
-    fn describe(&self, size: Size, output: Option<Camera<Lens>>, map: &RectifyMap) -> Result<(), String> {
+    /// Writes the camera of an output, and where it has data; the files' paths.
+    fn describe(
+        &self,
+        size: Size,
+        output: Option<Camera<Lens>>,
+        map: &RectifyMap,
+    ) -> Result<Vec<PathBuf>, String> {
         let (width, height) = size;
         let mask = map.mask();
         let empty = mask.samples().iter().filter(|&&has_data| !has_data).count();
@@ -254,19 +273,21 @@ impl Work<'_> {
             }
         };
         let result = serde_json::json!({
-            "written_by": format!("calibench {}", env!("CARGO_PKG_VERSION")),
+            "written_by": written_by(),
             "camera": camera,
             "image_size": [width, height],
             "pixels_without_data": empty,
         });
         let file = self.arguments.out.join(format!("camera-{width}x{height}.json"));
         write_atomically(&file, format!("{result:#}\n").as_bytes()).map_err(|error| error.to_string())?;
+        let mut written = vec![file];
         if self.arguments.mask {
             let file = self.arguments.out.join(format!("mask-{width}x{height}.png"));
             let white: Raster<u8> = mask.map(|&has_data| if has_data { 255 } else { 0 });
             write_png(&file, &white).map_err(|error| error.to_string())?;
+            written.push(file);
         }
-        Ok(())
+        Ok(written)
     }
 }
 

@@ -2,14 +2,13 @@
 //! predict each other, and do repeated calibrations agree?
 
 use super::calibrate::{Format, Views, parse_size, views_of};
-use super::diff::parse_rate;
+use super::diff::{NOT_DECIDED, doubts_of, parse_rate};
 use super::report::table;
-use super::said::{Said, say};
+use super::said::{Said, say, written_by};
 use super::{Exit, warn};
 use crate::board::board_or_file;
 use calibench::board::View;
 use calibench::calibrate::Settings;
-use calibench::camera::Parameter;
 use calibench::io::input::MOST_TABLE_BYTES;
 use calibench::io::memory::{DEFAULT_MEMORY, parse_bytes};
 use calibench::io::{
@@ -35,7 +34,7 @@ Exit codes:
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_CODES)]
 pub(super) struct Arguments {
-    /// result.json of `calibench calibrate`
+    /// result.json of `calibench calibrate`, with a lens of any model
     result: PathBuf,
     /// Views that the calibration has not seen: a corner file (view,point,X,Y,u,v), or with --board photographs
     #[arg(required_unless_present = "again")]
@@ -86,13 +85,22 @@ struct Found {
     /// Files of the repetitions, the result first.
     repetitions: Vec<String>,
     agreement: Option<Agreement>,
+    /// What the repetitions themselves say against their comparison.
+    doubts: Vec<String>,
 }
 
 fn found(arguments: &Arguments) -> Result<Found, String> {
     let known = read(&arguments.result)?;
-    let mut found =
-        Found { names: Vec::new(), hold_out: None, folds: None, repetitions: Vec::new(), agreement: None };
+    let mut found = Found {
+        names: Vec::new(),
+        hold_out: None,
+        folds: None,
+        repetitions: Vec::new(),
+        agreement: None,
+        doubts: Vec::new(),
+    };
     if !arguments.files.is_empty() {
+        refuse_bent_board(arguments, &known)?;
         let size = arguments.image_size.or(known.image_size);
         let views = views_of(&arguments.files, arguments.board.as_ref(), size, arguments.memory)?;
         match arguments.k_fold {
@@ -103,7 +111,10 @@ fn found(arguments: &Arguments) -> Result<Found, String> {
     }
     if !arguments.again.is_empty() {
         let others = arguments.again.iter().map(|path| read(path)).collect::<Result<Vec<_>, _>>()?;
+        refuse_other_sizes(arguments, &known, &others)?;
         let all: Vec<&KnownCalibration> = std::iter::once(&known).chain(&others).collect();
+        warn_of_copies(arguments, &all);
+        found.doubts = doubts_of(std::iter::once(&arguments.result).chain(&arguments.again))?;
         let size = arguments.image_size.or(known.image_size);
         let size = size.ok_or("the frame is not known: give --image-size WxH")?;
         let estimates: Vec<Estimate> = all.iter().map(|known| estimate(known)).collect();
@@ -121,17 +132,52 @@ fn read(path: &Path) -> Result<KnownCalibration, String> {
     let text = read_regular_text(path, MOST_TABLE_BYTES).map_err(|error| error.to_string())?;
     match parse_known(&file, &text).map_err(|error| error.to_string())? {
         Known::Plane(_) => Err(format!("{file}: the map of a plane has no camera to validate")),
-        Known::Camera(_) if has(&text, "board") => {
-            Err(format!("{file}: the board's shape was estimated: validation knows flat boards only"))
-        }
         Known::Camera(known) => Ok(*known),
     }
 }
 
-/// Whether a result says something under this name.
-fn has(text: &str, name: &str) -> bool {
-    serde_json::from_str::<Value>(text)
-        .is_ok_and(|value| value.get(name).is_some_and(|value| !value.is_null()))
+/// Parameters of images of two sizes are not those of one camera.
+fn refuse_other_sizes(
+    arguments: &Arguments,
+    known: &KnownCalibration,
+    others: &[KnownCalibration],
+) -> Result<(), String> {
+    let other = |(path, other): (&PathBuf, &KnownCalibration)| {
+        let (size, given) = (known.image_size?, other.image_size?);
+        (size != given).then(|| {
+            format!(
+                "{}: {} x {} px, and the result's image has {} x {}: bring both to one size first, with calibench convert --resize",
+                path.shown(),
+                given.0,
+                given.1,
+                size.0,
+                size.1
+            )
+        })
+    };
+    arguments.again.iter().zip(others).find_map(other).map_or(Ok(()), Err)
+}
+
+fn warn_of_copies(arguments: &Arguments, all: &[&KnownCalibration]) {
+    for (i, path) in arguments.again.iter().enumerate() {
+        if all[..=i].iter().any(|earlier| earlier.camera == all[i + 1].camera) {
+            warn(&format!(
+                "warning: {} has the camera of an earlier file to the last digit: a copy agrees with itself",
+                path.shown()
+            ));
+        }
+    }
+}
+
+/// Views are located by the marks of a plane.
+fn refuse_bent_board(arguments: &Arguments, known: &KnownCalibration) -> Result<(), String> {
+    match known.has_board {
+        false => Ok(()),
+        true => Err(format!(
+            "{}: the board's shape was estimated: views are validated on flat boards only (--again compares cameras)",
+            arguments.result.shown()
+        )),
+    }
 }
 
 fn estimate(known: &KnownCalibration) -> Estimate<'_> {
@@ -173,8 +219,7 @@ fn in_parts(
     views: &Views,
     parts: usize,
 ) -> Result<Vec<Fold>, String> {
-    let text = read_regular_text(&arguments.result, MOST_TABLE_BYTES).map_err(|error| error.to_string())?;
-    if has(&text, "priors") {
+    if known.has_priors {
         return Err(format!(
             "{}: it rests on priors, which every part would count again: parts are for calibrations without",
             arguments.result.shown()
@@ -187,8 +232,9 @@ fn in_parts(
 /// What was estimated once, to be estimated again.
 fn settings(known: &KnownCalibration) -> Settings {
     let (free, ratio) = (known.covariance.free, known.covariance.fy_per_fx);
-    let held = Parameter::ALL.into_iter().filter(|p| !free.contains(*p));
-    let mut settings = held.fold(Settings::new(free), |settings, p| settings.hold(p, known.camera.get(p)));
+    let held = known.camera.values().filter(|(parameter, _)| !free.contains(*parameter));
+    let of_model = Settings::new(free).with_model(known.camera.distortion.model());
+    let mut settings = held.fold(of_model, |settings, (parameter, value)| settings.hold(parameter, value));
     settings.image_size = known.image_size;
     ratio.map_or(settings.clone(), |ratio| settings.tie_focal_lengths(ratio))
 }
@@ -228,7 +274,7 @@ impl Found {
     fn holds(&self) -> bool {
         self.hold_out.as_ref().is_none_or(HoldOut::holds)
             && self.folds.iter().flatten().all(|fold| fold.hold_out.holds())
-            && self.agreement.as_ref().is_none_or(Agreement::holds)
+            && self.agreement.as_ref().is_none_or(|agreement| agreement.holds() || !self.doubts.is_empty())
     }
 
     fn text(&self) -> String {
@@ -306,28 +352,26 @@ impl Found {
             significant(agreement.p_value, 2)
         );
         for (name, (difference, test)) in self.repetitions[1..].iter().zip(&agreement.in_pixels) {
-            let tested = test.map_or("not tested where fy is tied".to_string(), |test| {
-                format!("by chance with probability {}", significant(test.p_value, 2))
-            });
             // Writing to a string cannot fail.
             let _ = writeln!(
                 text,
-                "{name} against {}: {} px RMS over the frame, {tested}",
+                "{name} against {}: {} px RMS over the frame, by chance with probability {}",
                 self.repetitions[0],
-                significant(difference.rms_px, 3)
+                significant(difference.rms_px, 3),
+                significant(test.p_value, 2)
             );
         }
-        text + &verdict(
-            agreement.holds(),
-            "the calibrations agree",
-            "the calibrations do not agree: the camera changed, or their covariances are too small",
-            agreement.false_alarm,
-        )
+        let bad = match self.doubts.is_empty() {
+            true => "the calibrations do not agree: the camera changed, or their covariances are too small",
+            false => NOT_DECIDED,
+        };
+        text += &verdict(agreement.holds(), "the calibrations agree", bad, agreement.false_alarm);
+        text + &self.doubts.iter().map(|doubt| format!("{doubt}\n")).collect::<String>()
     }
 
     fn json(&self, arguments: &Arguments) -> Value {
         json!({
-            "written_by": format!("calibench {}", env!("CARGO_PKG_VERSION")),
+            "written_by": written_by(),
             "result": arguments.result.display().to_string(),
             "rate": arguments.rate,
             "holds": self.holds(),
@@ -355,11 +399,12 @@ impl Found {
             "in_pixels": pairs.map(|(file, (difference, test))| json!({
                 "file": file,
                 "rms_px": difference.rms_px,
-                "chi_squared": test.map(|test| test.chi_squared),
-                "degrees_of_freedom": test.map(|test| test.degrees_of_freedom),
-                "p_value": test.map(|test| test.p_value),
+                "chi_squared": test.chi_squared,
+                "degrees_of_freedom": test.degrees_of_freedom,
+                "p_value": test.p_value,
             })).collect::<Vec<_>>(),
-            "holds": agreement.holds(),
+            "holds": (agreement.holds() || self.doubts.is_empty()).then_some(agreement.holds()),
+            "doubts": self.doubts,
         })
     }
 }

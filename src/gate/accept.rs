@@ -3,7 +3,7 @@
 use super::covariance_form::{self, CovarianceFault};
 use super::protocol::{Answer, AnswerPose, Problem, Status};
 use super::quoted::quoted;
-use calibench::camera::{Camera, FreeParameters, Parameter};
+use calibench::camera::{Camera, FreeParameters, Lens, Parameter};
 use calibench::geometry::Pose;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
     /// Estimated and held parameters.
-    pub camera: Camera,
+    pub camera: Camera<Lens>,
     /// One pose a view, if they were given.
     pub cam_from_target: Option<Vec<Pose>>,
     /// Standard deviations of the free parameters, in order.
@@ -132,7 +132,7 @@ pub fn free_of(problem: &Problem) -> FreeParameters {
 }
 
 /// Characters of a wrong line that are quoted.
-const LINE_HEAD: usize = 80;
+pub(super) const LINE_HEAD: usize = 80;
 
 /// An answer, or why the line is none.
 pub fn read_line(line: &str) -> Result<Answer, Breakage> {
@@ -203,13 +203,14 @@ fn camera(
     problem: &Problem,
     answer: &Answer,
     free: FreeParameters,
-) -> Result<(Camera, HeldChange), Breakage> {
-    let mut values = [0.0; Parameter::COUNT];
+) -> Result<(Camera<Lens>, HeldChange), Breakage> {
+    let model = problem.lens_model();
+    let mut camera = Camera::with_lens(0.0, 0.0, 0.0, 0.0, Lens::ideal(model));
     let mut changed = None;
-    for parameter in Parameter::ALL {
+    for parameter in model.parameters() {
         let given = answer.parameters.get(parameter.name()).copied();
         let held = problem.held.get(parameter.name()).copied();
-        values[parameter as usize] = match (free.contains(parameter), given, held) {
+        let value = match (free.contains(parameter), given, held) {
             (true, Some(value), _) => finite(parameter.name(), value)?,
             (true, None, _) => return Err(Breakage::Missing { what: format!("parameter {parameter}") }),
             (false, given, held) => {
@@ -220,8 +221,9 @@ fn camera(
                 given.unwrap_or(wanted)
             }
         };
+        camera = camera.with_value(parameter, value).unwrap_or(camera);
     }
-    Ok((Camera::from_parameters(values), changed))
+    Ok((camera, changed))
 }
 
 fn covariance(answer: &Answer, free: FreeParameters) -> Result<Option<DMatrix<f64>>, Breakage> {
@@ -291,6 +293,7 @@ mod tests {
         Problem {
             id: "a".into(),
             image_size: [640, 480],
+            model: "brown-conrady".into(),
             views: vec![ProblemView { target: vec![[0.0, 0.0]], pixels: vec![[0.0, 0.0]] }],
             free: vec!["fx".into()],
             held: [("cx".to_string(), 320.0)].into(),

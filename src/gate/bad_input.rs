@@ -1,11 +1,10 @@
 //! Which data deserve no camera? Sets that cannot determine one, and input that is broken.
 
 use super::protocol::{Problem, ProblemView};
-use calibench::camera::{Camera, Parameter};
+use calibench::camera::{Camera, FreeParameters, Lens};
 use calibench::geometry::{Pose, Vec2};
 use calibench::synth::scene::looking_at_centre;
 use calibench::synth::{Scene, SceneError, Stream, StreamKey, Truth};
-use std::collections::BTreeMap;
 
 /// What is wrong with the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,7 +25,7 @@ pub struct BadCase {
     /// The problem.
     pub problem: Problem,
     /// The camera that took the pictures.
-    pub truth: Camera,
+    pub truth: Camera<Lens>,
 }
 
 /// Noise of the degenerate sets, px. Without noise their normal equations are singular and nearly every
@@ -76,7 +75,7 @@ fn degenerate(seed: u64) -> Result<Vec<BadCase>, SceneError> {
         .map(|(id, cam_from_target, points)| {
             let truth = Truth { cam_from_target, points, ..Truth::example() };
             let problem = observed(id, &truth, seed)?;
-            Ok(BadCase { id, fault: Fault::Degenerate, problem, truth: truth.camera })
+            Ok(BadCase { id, fault: Fault::Degenerate, problem, truth: truth.camera.into() })
         })
         .collect()
 }
@@ -86,7 +85,7 @@ fn malformed(seed: u64) -> Result<Vec<BadCase>, SceneError> {
     let case = |id: &'static str, spoil: &dyn Fn(&mut Problem)| {
         let mut problem = observed(id, &truth, seed)?;
         spoil(&mut problem);
-        Ok(BadCase { id, fault: Fault::Malformed, problem, truth: truth.camera })
+        Ok(BadCase { id, fault: Fault::Malformed, problem, truth: truth.camera.into() })
     };
     Ok(vec![
         case("no-views", &|p| p.views.clear())?,
@@ -101,24 +100,6 @@ fn malformed(seed: u64) -> Result<Vec<BadCase>, SceneError> {
 fn observed(id: &str, truth: &Truth, seed: u64) -> Result<Problem, SceneError> {
     let key = StreamKey { seed, scenario: id, trial: 0, purpose: "noise" };
     let views = Scene::new(truth.clone())?.observe(SIGMA_PX, &mut Stream::open(key));
-    let pair = |p: &Vec2| [p.x, p.y];
-    let free = [Parameter::Fx, Parameter::Fy, Parameter::Cx, Parameter::Cy, Parameter::K1, Parameter::K2];
-    let (width, height) = truth.image_size;
-    Ok(Problem {
-        id: id.to_string(),
-        image_size: [width, height],
-        views: views
-            .iter()
-            .map(|v| ProblemView {
-                target: v.points().iter().map(pair).collect(),
-                pixels: v.pixels().iter().map(pair).collect(),
-            })
-            .collect(),
-        free: free.iter().map(|p| p.name().to_string()).collect(),
-        held: Parameter::ALL
-            .into_iter()
-            .filter(|p| !free.contains(p))
-            .map(|p| (p.name().to_string(), 0.0))
-            .collect::<BTreeMap<_, _>>(),
-    })
+    let free = FreeParameters::STANDARD;
+    Ok(Problem::of_views(id.to_string(), truth.image_size, &views, &truth.camera.into(), free))
 }

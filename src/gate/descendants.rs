@@ -60,7 +60,7 @@ fn end_group(_: u32) {}
 
 #[cfg(target_os = "linux")]
 mod linux {
-    use super::super::process::is_waited_for;
+    use super::super::program::is_waited_for;
     use super::{ADOPTS, MARK, PATIENCE, QUIET_LOOKS};
     use nix::sys::signal::{Signal, kill, killpg};
     use nix::sys::wait::{WaitPidFlag, waitpid};

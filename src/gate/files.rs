@@ -2,11 +2,11 @@
 //! files.
 
 use super::accept::{Breakage, id_in, read_line};
-use super::plan::{Plan, PlanError, Purpose};
+use super::plan::{Asked, Plan, PlanError, Purpose};
 use super::protocol::{Answer, Problem};
 use super::recorder::{self, Recorder};
 use super::solver::Solver;
-use calibench::camera::Parameter;
+use calibench::camera::{Model, UnknownModel};
 use calibench::io::hash::sha256_hex;
 use calibench::io::{InputError, read_regular_text, write_atomically};
 use rayon::prelude::*;
@@ -20,9 +20,23 @@ use std::path::{Path, PathBuf};
 struct Manifest {
     seed: u64,
     samples: usize,
+    /// Names of the lens models; one of Brown-Conrady's only does not say so.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    models: Vec<String>,
+    /// Names of the scenes, unless all were asked.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    scenes: Vec<String>,
     problems: usize,
     /// SHA-256 of `problems.jsonl`.
     sha256: String,
+}
+
+impl Manifest {
+    fn asked(&self) -> Result<Asked, FilesError> {
+        let models = self.models.iter().map(|name| name.parse()).collect::<Result<Vec<Model>, _>>()?;
+        let models = if models.is_empty() { vec![Model::BrownConrady] } else { models };
+        Ok(Asked { models, scenes: self.scenes.clone() })
+    }
 }
 
 /// Bytes of a file of answers: those of ten thorough runs.
@@ -55,6 +69,9 @@ pub enum FilesError {
         /// Of the problems made now.
         now: String,
     },
+    /// A lens model that there is not.
+    #[error(transparent)]
+    Model(#[from] UnknownModel),
     /// A plan that cannot be made.
     #[error(transparent)]
     Plan(#[from] PlanError),
@@ -69,6 +86,11 @@ pub fn export(plan: &Plan, folder: &Path) -> Result<(), FilesError> {
     let manifest = Manifest {
         seed: plan.seed,
         samples: plan.samples,
+        models: match &plan.asked.models[..] {
+            [Model::BrownConrady] => Vec::new(),
+            models => models.iter().map(|model| model.name().to_string()).collect(),
+        },
+        scenes: plan.asked.scenes.clone(),
         problems: plan.cases.len(),
         sha256: sha256_hex(problems.as_bytes()),
     };
@@ -101,13 +123,15 @@ fn problem_lines(plan: &Plan) -> String {
 /// Camera and poses behind every problem; variants follow from their samples and have no line.
 fn truth_lines(plan: &Plan) -> String {
     let lines = plan.cases.iter().filter(|c| !matches!(c.purpose, Purpose::Variant(_))).map(|case| {
-        let scenario = &plan.scenarios[case.scenario];
         let (camera, poses) = match case.purpose {
             Purpose::Bad(index) => (plan.bad[index].truth, &[][..]),
-            _ => (scenario.scene.truth.camera, &scenario.scene.truth.cam_from_target[..]),
+            _ => {
+                let truth = &plan.scenarios[case.scenario].scene.truth;
+                (truth.camera, &truth.cam_from_target[..])
+            }
         };
         let parameters: BTreeMap<&str, f64> =
-            Parameter::ALL.into_iter().map(|p| (p.name(), camera.get(p))).collect();
+            camera.values().map(|(parameter, value)| (parameter.name(), value)).collect();
         let poses: Vec<serde_json::Value> = poses
             .iter()
             .map(|pose| {
@@ -140,7 +164,7 @@ pub fn recorded(folder: &Path) -> Result<(Plan, Recorded), FilesError> {
     let path = folder.join("manifest.json");
     let manifest: Manifest =
         serde_json::from_str(&read(&path)?).map_err(|cause| FilesError::Manifest { path, cause })?;
-    let plan = Plan::new(manifest.seed, manifest.samples)?;
+    let plan = Plan::of(manifest.seed, manifest.samples, manifest.asked()?)?;
     let now = sha256_hex(problem_lines(&plan).as_bytes());
     if now != manifest.sha256 {
         return Err(FilesError::OtherVersion { found: manifest.sha256, now });

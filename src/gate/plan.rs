@@ -2,11 +2,11 @@
 //! else.
 
 use super::bad_input::{BadCase, bad_cases};
-use super::protocol::{Problem, ProblemView};
+use super::protocol::Problem;
 use super::suite::{Demand, OUTLIER_PX, Scenario, SuiteError, suite};
 use super::variant::Variant;
 use calibench::board::View;
-use calibench::camera::Parameter;
+use calibench::camera::Model;
 use calibench::geometry::Vec2;
 use calibench::synth::{SceneError, Stream, StreamKey, fnv1a};
 
@@ -45,13 +45,42 @@ pub struct Plan {
     pub bad: Vec<BadCase>,
     /// Seed of the noise.
     pub seed: u64,
+    /// What was wanted.
+    pub asked: Asked,
     /// Samples a scenario.
     pub samples: usize,
     /// The problems, in the order in which they are asked.
     pub cases: Vec<Case>,
 }
 
-/// A plan that cannot be made: a mistake in the suite.
+/// Which part of the suite is asked.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Asked {
+    /// Lens models.
+    pub models: Vec<Model>,
+    /// Names of scenarios and of bad input; empty for all.
+    pub scenes: Vec<String>,
+}
+
+impl Default for Asked {
+    /// All that a solver must answer that says nothing of itself: every scene with Brown-Conrady's lens.
+    fn default() -> Asked {
+        Asked::of(&[Model::BrownConrady])
+    }
+}
+
+impl Asked {
+    /// All scenes of some lens models.
+    pub fn of(models: &[Model]) -> Asked {
+        Asked { models: models.to_vec(), scenes: Vec::new() }
+    }
+
+    fn wants(&self, scene: &str) -> bool {
+        self.scenes.is_empty() || self.scenes.iter().any(|name| name == scene)
+    }
+}
+
+/// A plan that cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
     /// A scenario.
@@ -66,6 +95,19 @@ pub enum PlanError {
     /// Bad input that cannot be photographed.
     #[error(transparent)]
     Bad(#[from] SceneError),
+    /// No lens model whose scenes could be asked.
+    #[error("no lens model to ask about: name at least one")]
+    NothingToAsk,
+    /// A scene that is not in the suite, or not of the lens models that are asked.
+    #[error("no scene `{scene}` among those of {models}; there are: {known}")]
+    UnknownScene {
+        /// As asked.
+        scene: String,
+        /// The lens models.
+        models: String,
+        /// The names there are.
+        known: String,
+    },
 }
 
 /// Samples a scenario: ten times a thorough run. What was seen of each stays in memory.
@@ -78,35 +120,51 @@ const VARIED: usize = 2;
 const HONEST: usize = 32;
 
 impl Plan {
-    /// `samples` draws of the noise a scenario, and with them the exact, repeated, varied and bad problems.
+    /// [`Plan::of`] for every scene with Brown-Conrady's lens.
+    ///
+    /// # Errors
+    /// Too many samples.
     pub fn new(seed: u64, samples: usize) -> Result<Plan, PlanError> {
+        Plan::of(seed, samples, Asked::default())
+    }
+
+    /// `samples` draws of the noise a scenario, and with them the exact, repeated, varied and bad problems.
+    ///
+    /// # Errors
+    /// Too many samples; a scene that there is not.
+    pub fn of(seed: u64, samples: usize, asked: Asked) -> Result<Plan, PlanError> {
         if samples > MOST_SAMPLES {
             return Err(PlanError::TooManySamples { samples });
         }
-        let scenarios = suite()?;
-        let bad = bad_cases(seed)?;
+        if asked.models.is_empty() {
+            return Err(PlanError::NothingToAsk);
+        }
+        let mut scenarios = suite()?;
+        scenarios.retain(|scenario| asked.models.contains(&scenario.model()));
+        let mut bad = bad_cases(seed)?;
+        bad.retain(|_| asked.models.contains(&Model::BrownConrady));
+        check_scenes(&asked, &scenarios, &bad)?;
+        scenarios.retain(|scenario| asked.wants(scenario.id));
+        bad.retain(|case| asked.wants(case.id));
         let mut cases: Vec<Case> = Vec::new();
         for (i, scenario) in scenarios.iter().enumerate() {
             cases.extend(cases_of(i, scenario, samples));
         }
         // Last: a program that breaks on bad input has been heard on good data by then.
         cases.extend((0..bad.len()).map(|i| Case { scenario: 0, purpose: Purpose::Bad(i), trial: 0 }));
-        Ok(Plan { scenarios, bad, seed, samples, cases })
+        Ok(Plan { scenarios, bad, seed, asked, samples, cases })
     }
 
     /// The problem of a case.
     pub fn problem(&self, case: &Case) -> Problem {
-        let scenario = &self.scenarios[case.scenario];
+        // Bad input has none.
+        let scenario = || &self.scenarios[case.scenario];
+        let sample = |id| problem_of(scenario(), &self.observe(scenario(), case.trial), id);
         match case.purpose {
             Purpose::Bad(index) => Problem { id: self.id(case), ..self.bad[index].problem.clone() },
-            Purpose::Exact => problem_of(scenario, &scenario.scene.exact(), self.id(case)),
-            Purpose::Sample | Purpose::Repeat => {
-                problem_of(scenario, &self.observe(scenario, case.trial), self.id(case))
-            }
-            Purpose::Variant(variant) => {
-                let original = problem_of(scenario, &self.observe(scenario, case.trial), String::new());
-                variant.apply(&original, self.id(case))
-            }
+            Purpose::Exact => problem_of(scenario(), &scenario().scene.exact(), self.id(case)),
+            Purpose::Sample | Purpose::Repeat => sample(self.id(case)),
+            Purpose::Variant(variant) => variant.apply(&sample(String::new()), self.id(case)),
         }
     }
 
@@ -121,13 +179,13 @@ impl Plan {
 
     /// What a case is, for people: scenario, purpose and trial.
     pub fn name(&self, case: &Case) -> String {
-        let scenario = self.scenarios[case.scenario].id;
+        let of_scenario = |what: &str| format!("{}.{what}", self.scenarios[case.scenario].id);
         match case.purpose {
             Purpose::Bad(index) => self.bad[index].id.to_string(),
-            Purpose::Exact => format!("{scenario}.exact"),
-            Purpose::Sample => format!("{scenario}.sample.{}", case.trial),
-            Purpose::Repeat => format!("{scenario}.repeat.{}", case.trial),
-            Purpose::Variant(variant) => format!("{scenario}.{}.{}", variant.name(), case.trial),
+            Purpose::Exact => of_scenario("exact"),
+            Purpose::Sample => of_scenario(&format!("sample.{}", case.trial)),
+            Purpose::Repeat => of_scenario(&format!("repeat.{}", case.trial)),
+            Purpose::Variant(variant) => of_scenario(&format!("{}.{}", variant.name(), case.trial)),
         }
     }
 
@@ -139,6 +197,18 @@ impl Plan {
         }
         let mut stream = Stream::open(key("outliers"));
         views.iter().map(|view| displaced(view, scenario.outliers, &mut stream)).collect()
+    }
+}
+
+fn check_scenes(asked: &Asked, scenarios: &[Scenario], bad: &[BadCase]) -> Result<(), PlanError> {
+    let known: Vec<&str> = scenarios.iter().map(|s| s.id).chain(bad.iter().map(|case| case.id)).collect();
+    match asked.scenes.iter().find(|name| !known.contains(&name.as_str())) {
+        None => Ok(()),
+        Some(scene) => {
+            let models: Vec<&str> = asked.models.iter().map(|model| model.name()).collect();
+            let (scene, models, known) = (scene.clone(), models.join(", "), known.join(", "));
+            Err(PlanError::UnknownScene { scene, models, known })
+        }
     }
 }
 
@@ -155,7 +225,8 @@ fn cases_of(index: usize, scenario: &Scenario, samples: usize) -> Vec<Case> {
             cases.push(case(Purpose::Repeat, trial));
         }
         if trial < VARIED {
-            cases.extend(Variant::ALL.map(|variant| case(Purpose::Variant(variant), trial)));
+            let variants = Variant::ALL.into_iter().filter(|variant| variant.is_known_of(scenario.model()));
+            cases.extend(variants.map(|variant| case(Purpose::Variant(variant), trial)));
         }
     }
     cases
@@ -174,22 +245,7 @@ fn displaced(view: &View, share: f64, stream: &mut Stream) -> View {
 
 fn problem_of(scenario: &Scenario, views: &[View], id: String) -> Problem {
     let truth = &scenario.scene.truth;
-    let pair = |p: &Vec2| [p.x, p.y];
-    let (width, height) = truth.image_size;
-    let held = Parameter::ALL.into_iter().filter(|p| !scenario.free.contains(*p));
-    Problem {
-        id,
-        image_size: [width, height],
-        views: views
-            .iter()
-            .map(|v| ProblemView {
-                target: v.points().iter().map(pair).collect(),
-                pixels: v.pixels().iter().map(pair).collect(),
-            })
-            .collect(),
-        free: scenario.free.iter().map(|p| p.name().to_string()).collect(),
-        held: held.map(|p| (p.name().to_string(), truth.camera.get(p))).collect(),
-    }
+    Problem::of_views(id, truth.image_size, views, &truth.camera, scenario.free)
 }
 
 #[cfg(test)]

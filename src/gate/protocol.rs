@@ -2,7 +2,9 @@
 //!
 //! The page for authors of solvers is `adapters/PROTOCOL.md`; the schemas in `src/gate/schema` are those of these types, which a test checks.
 
-use calibench::geometry::{Mat3, Pose, Vec3};
+use calibench::board::View;
+use calibench::camera::{Camera, FreeParameters, Lens, Model};
+use calibench::geometry::{Mat3, Pose, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -14,12 +16,23 @@ pub struct Problem {
     pub id: String,
     /// Image width and height, px.
     pub image_size: [usize; 2],
+    /// The lens model: `brown-conrady` where nothing stands, else one that the program named in its greeting.
+    #[serde(default = "brown_conrady", skip_serializing_if = "is_brown_conrady")]
+    pub model: String,
     /// What was seen in each photograph.
     pub views: Vec<ProblemView>,
-    /// Names of the parameters to estimate, among `fx fy cx cy skew k1 k2 p1 p2 k3`.
+    /// Names of the parameters to estimate, of the model's: `fx fy cx cy skew k1 k2 p1 p2 k3` for Brown-Conrady's.
     pub free: Vec<String>,
-    /// Values of all the other parameters. The answer must keep them.
+    /// Values of all the other parameters of the model. The answer must keep them.
     pub held: BTreeMap<String, f64>,
+}
+
+fn brown_conrady() -> String {
+    Model::BrownConrady.name().to_string()
+}
+
+fn is_brown_conrady(model: &str) -> bool {
+    model == Model::BrownConrady.name()
 }
 
 /// One photograph: `target[i]` was seen at `pixels[i]`.
@@ -128,6 +141,35 @@ impl AnswerPose {
 }
 
 impl Problem {
+    /// To find `free` from `views`, all else held at the values of `camera`.
+    pub fn of_views(
+        id: String,
+        (width, height): (usize, usize),
+        views: &[View],
+        camera: &Camera<Lens>,
+        free: FreeParameters,
+    ) -> Problem {
+        let pair = |p: &Vec2| [p.x, p.y];
+        let view = |view: &View| ProblemView {
+            target: view.points().iter().map(pair).collect(),
+            pixels: view.pixels().iter().map(pair).collect(),
+        };
+        let held = camera.values().filter(|(parameter, _)| !free.contains(*parameter));
+        Problem {
+            id,
+            image_size: [width, height],
+            model: camera.distortion.model().name().to_string(),
+            views: views.iter().map(view).collect(),
+            free: free.iter().map(|p| p.name().to_string()).collect(),
+            held: held.map(|(parameter, value)| (parameter.name().to_string(), value)).collect(),
+        }
+    }
+
+    /// The lens model; Brown-Conrady's where its name is unknown, which no problem of the gate's has.
+    pub fn lens_model(&self) -> Model {
+        self.model.parse().unwrap_or_default()
+    }
+
     /// Number of points over all views.
     pub fn points(&self) -> usize {
         self.views.iter().map(|view| view.pixels.len()).sum()
@@ -140,9 +182,10 @@ impl Problem {
     }
 }
 
-/// The JSON schemas of problem and answer, name and text.
-pub fn schemas() -> [(&'static str, &'static str); 2] {
+/// The JSON schemas of problem, answer and greeting, name and text.
+pub fn schemas() -> [(&'static str, &'static str); 3] {
     [
+        ("greeting.schema.json", include_str!("schema/greeting.schema.json")),
         ("problem.schema.json", include_str!("schema/problem.schema.json")),
         ("answer.schema.json", include_str!("schema/answer.schema.json")),
     ]
@@ -154,7 +197,8 @@ mod tests {
 
     #[test]
     fn the_schemas_are_those_of_the_types() {
-        let generated = [schemars::schema_for!(Problem), schemars::schema_for!(Answer)];
+        let greeting = schemars::schema_for!(crate::greeting::Greeting);
+        let generated = [greeting, schemars::schema_for!(Problem), schemars::schema_for!(Answer)];
         for ((name, text), schema) in schemas().into_iter().zip(generated) {
             let expected = format!("{:#}\n", schema.to_value());
             assert_eq!(text, expected, "src/gate/schema/{name} is not what the types say");

@@ -4,6 +4,7 @@
 use super::accept::Breakage;
 use super::protocol::{Answer, Problem};
 use super::solver::{Given, Solver};
+use calibench::camera::Model;
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
@@ -39,6 +40,10 @@ impl<'a> Recorder<'a> {
 impl Solver for Recorder<'_> {
     fn name(&self) -> String {
         self.solver.name()
+    }
+
+    fn models(&self) -> Vec<Model> {
+        self.solver.models()
     }
 
     fn ask(&self, problem: &Problem) -> Result<Answer, Breakage> {

@@ -4,8 +4,8 @@
 use super::accept::{Breakage, Outcome, accept, free_of};
 use super::protocol::{Answer, AnswerCovariance, AnswerPose, Problem, Status};
 use calibench::board::{View, ViewError};
-use calibench::calibrate::{Calibration, Settings, Termination, Warning, calibrate};
-use calibench::camera::Parameter;
+use calibench::calibrate::{LensCalibration, Settings, Termination, Warning, calibrate_lens};
+use calibench::camera::{Camera, FreeParameters, Lens, Model};
 use calibench::geometry::{Pose, Vec2};
 use calibench::io::message;
 use rayon::prelude::*;
@@ -24,6 +24,11 @@ pub struct Reply {
 pub trait Solver: Sync {
     /// What it is called in reports.
     fn name(&self) -> String;
+
+    /// The lens models it knows: scenes of others are not asked.
+    fn models(&self) -> Vec<Model> {
+        vec![Model::BrownConrady]
+    }
 
     /// Solves one problem.
     ///
@@ -75,6 +80,10 @@ impl Solver for Builtin {
         "calibench".into()
     }
 
+    fn models(&self) -> Vec<Model> {
+        Model::ALL.to_vec()
+    }
+
     fn ask(&self, problem: &Problem) -> Result<Answer, Breakage> {
         Ok(solved(problem, |settings| settings))
     }
@@ -105,9 +114,9 @@ impl Solver for Polished {
 pub(super) fn solve(
     problem: &Problem,
     adjust: impl FnOnce(Settings) -> Settings,
-) -> Result<Calibration, String> {
+) -> Result<LensCalibration, String> {
     let views = views(problem).map_err(|e| message(&e))?;
-    calibrate(&views, &adjust(settings(problem))).map_err(|e| message(&e))
+    calibrate_lens(&views, &adjust(settings(problem))).map_err(|e| message(&e))
 }
 
 /// The problem's correspondences as views.
@@ -119,26 +128,37 @@ pub(super) fn views(problem: &Problem) -> Result<Vec<View>, ViewError> {
 /// What the problem wants estimated and held.
 pub(super) fn settings(problem: &Problem) -> Settings {
     let [width, height] = problem.image_size;
-    let settings = Settings::new(free_of(problem)).with_image_size((width, height));
-    Parameter::ALL
-        .into_iter()
+    let model = problem.lens_model();
+    let settings = Settings::new(free_of(problem)).with_model(model).with_image_size((width, height));
+    model
+        .parameters()
         .filter_map(|p| problem.held.get(p.name()).map(|&value| (p, value)))
         .fold(settings, |settings, (parameter, value)| settings.hold(parameter, value))
 }
 
+/// Nothing but poses is free.
+pub(super) fn only_poses(camera: &Camera<Lens>) -> Settings {
+    let settings = Settings::new(FreeParameters::NONE).with_model(camera.distortion.model());
+    camera.values().fold(settings, |settings, (parameter, value)| settings.hold(parameter, value))
+}
+
 /// A calibration in the words of the protocol. Only warnings that question the estimate flag it: a
-/// correlation between two coefficients stands in the covariance already.
-pub(super) fn answer(id: &str, calibration: &Calibration) -> Answer {
+/// correlation between two coefficients stands in the covariance already, and that a minimum is not certified
+/// is said of every lens but Brown-Conrady's.
+pub(super) fn answer(id: &str, calibration: &LensCalibration) -> Answer {
+    let is_plain = calibration.camera.distortion.model() == Model::BrownConrady;
+    let is_flag = |warning: &&Warning| match warning {
+        Warning::Correlated { .. } => false,
+        Warning::NotCertified => is_plain,
+        _ => true,
+    };
     let covariance = &calibration.covariance;
     let names = || calibration.free.iter().map(|p| p.name().to_string());
-    let flags = calibration.warnings.iter().filter(|w| !matches!(w, Warning::Correlated { .. }));
+    let flags = calibration.warnings.iter().filter(is_flag);
     Answer {
         id: id.to_string(),
         status: if calibration.is_usable() { Status::Ok } else { Status::NotConverged },
-        parameters: Parameter::ALL
-            .into_iter()
-            .map(|p| (p.name().to_string(), calibration.camera.get(p)))
-            .collect(),
+        parameters: calibration.camera.values().map(|(p, value)| (p.name().to_string(), value)).collect(),
         poses: Some(calibration.cam_from_target.iter().map(answer_pose).collect()),
         standard_deviations: None,
         covariance: Some(AnswerCovariance {

@@ -7,8 +7,8 @@ use super::plan::{Case, Plan, Purpose};
 use super::protocol::Problem;
 use super::solver::{self, Reply};
 use super::suite::Scenario;
-use calibench::calibrate::{Settings, calibrate};
-use calibench::camera::{Camera, FreeParameters, Parameter};
+use calibench::calibrate::calibrate_lens;
+use calibench::camera::{Camera, FreeParameters, Imaging, Lens, Parameter};
 use calibench::geometry::{Pose, Vec3};
 use calibench::synth::fnv1a;
 use nalgebra::DVector;
@@ -35,7 +35,7 @@ pub enum Seen {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
     /// The camera as answered.
-    pub camera: Camera,
+    pub camera: Camera<Lens>,
     /// Estimate - truth of the free parameters, in order.
     pub errors: Vec<f64>,
     /// `e^T P^-1 e` under the bound: chi-squared with as many degrees of freedom as parameters.
@@ -81,13 +81,10 @@ pub fn reduce(plan: &Plan, case: &Case, problem: &Problem, reply: Reply) -> Seen
         Outcome::Broken(breakage) => Seen::Broken(breakage),
         Outcome::Refused(reason) => Seen::Refused { reason, seconds },
         Outcome::Unsupported(reason) => Seen::Unsupported(reason),
-        Outcome::Estimate(estimate) => {
-            let scenario = &plan.scenarios[case.scenario];
-            Seen::Estimate(Box::new(match case.purpose {
-                Purpose::Bad(index) => measure_bad(&plan.bad[index].truth, problem, &estimate, seconds),
-                _ => measure(scenario, case, problem, &estimate, seconds),
-            }))
-        }
+        Outcome::Estimate(estimate) => Seen::Estimate(Box::new(match case.purpose {
+            Purpose::Bad(index) => measure_bad(&plan.bad[index].truth, problem, &estimate, seconds),
+            _ => measure(&plan.scenarios[case.scenario], case, problem, &estimate, seconds),
+        })),
     }
 }
 
@@ -97,7 +94,7 @@ fn measure(scenario: &Scenario, case: &Case, problem: &Problem, estimate: &Estim
         Purpose::Variant(variant) => variant.undo(&estimate.camera),
         _ => estimate.camera,
     };
-    let errors: Vec<f64> = scenario.free.iter().map(|p| camera.get(p) - truth.camera.get(p)).collect();
+    let errors = errors(&camera, &truth.camera, scenario.free);
     let plain = !matches!(case.purpose, Purpose::Variant(_));
     let poses = estimate.cam_from_target.as_ref().filter(|_| plain);
     Trial {
@@ -119,11 +116,16 @@ fn measure(scenario: &Scenario, case: &Case, problem: &Problem, estimate: &Estim
     }
 }
 
+/// Estimate - truth of the free parameters, in order.
+fn errors(estimate: &Camera<Lens>, truth: &Camera<Lens>, free: FreeParameters) -> Vec<f64> {
+    let value = |camera: &Camera<Lens>, p: Parameter| camera.value(p).unwrap_or(f64::NAN);
+    free.iter().map(|p| value(estimate, p) - value(truth, p)).collect()
+}
+
 /// Bad input has no bound: only the camera and what the solver says of it are kept.
-fn measure_bad(truth: &Camera, problem: &Problem, estimate: &Estimate, seconds: f64) -> Trial {
-    let free = super::accept::free_of(problem);
+fn measure_bad(truth: &Camera<Lens>, problem: &Problem, estimate: &Estimate, seconds: f64) -> Trial {
     Trial {
-        errors: free.iter().map(|p| estimate.camera.get(p) - truth.get(p)).collect(),
+        errors: errors(&estimate.camera, truth, super::accept::free_of(problem)),
         ..unmeasured(estimate, seconds)
     }
 }
@@ -153,12 +155,13 @@ fn own_nees(estimate: &Estimate, errors: &[f64]) -> Option<f64> {
     Some(e.dot(&estimate.covariance.clone()?.cholesky()?.solve(&e)))
 }
 
-/// Infinite where a point is not in front of the camera.
-fn square(camera: &Camera, poses: &[Pose], problem: &Problem) -> f64 {
+/// Infinite where the lens has no image of a point.
+fn square(camera: &Camera<Lens>, poses: &[Pose], problem: &Problem) -> f64 {
     let mut sum = 0.0;
     for (pose, view) in poses.iter().zip(&problem.views) {
         for (&[x, y], &[u, v]) in view.target.iter().zip(&view.pixels) {
-            let Some(seen) = camera.project(&pose.apply(&Vec3::new(x, y, 0.0))) else { return f64::INFINITY };
+            let point = pose.apply(&Vec3::new(x, y, 0.0));
+            let Some(seen) = Lens::image(camera, &point) else { return f64::INFINITY };
             sum += (seen.x - u) * (seen.x - u) + (seen.y - v) * (seen.y - v);
         }
     }
@@ -166,10 +169,8 @@ fn square(camera: &Camera, poses: &[Pose], problem: &Problem) -> f64 {
 }
 
 /// The least sum of squares that the answered camera allows: only poses are free.
-fn refitted_square(camera: &Camera, problem: &Problem) -> Option<f64> {
-    let settings =
-        Parameter::ALL.into_iter().fold(Settings::new(FreeParameters::NONE), |s, p| s.hold(p, camera.get(p)));
-    let fit = calibrate(&solver::views(problem).ok()?, &settings).ok()?;
+fn refitted_square(camera: &Camera<Lens>, problem: &Problem) -> Option<f64> {
+    let fit = calibrate_lens(&solver::views(problem).ok()?, &solver::only_poses(camera)).ok()?;
     Some(fit.rmse_px * fit.rmse_px * fit.points() as f64)
 }
 
@@ -190,7 +191,7 @@ fn pose_nees(scenario: &Scenario, poses: &[Pose]) -> Vec<f64> {
 /// FNV-1a over the bits of every number.
 fn fingerprint(estimate: &Estimate) -> u64 {
     let poses = estimate.cam_from_target.iter().flatten();
-    let numbers = estimate.camera.parameters().into_iter();
+    let numbers = estimate.camera.values().map(|(_, value)| value);
     let numbers = numbers.chain(poses.flat_map(|p| p.rotation.iter().chain(p.translation.iter()).copied()));
     let numbers = numbers.chain(estimate.standard_deviations.iter().flatten().copied());
     let numbers = numbers.chain(estimate.covariance.iter().flat_map(|c| c.iter().copied()));

@@ -2,7 +2,7 @@
 //! undoes them.
 
 use super::protocol::Problem;
-use calibench::camera::{BrownConrady, Camera};
+use calibench::camera::{BrownConrady, Camera, Lens, Model, Parameter};
 
 /// A change of a problem that leaves the camera the same, but for a known change of its parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -45,6 +45,12 @@ impl Variant {
         }
     }
 
+    /// Whether the camera behind the changed problem is known for a lens model. The two angles of a tilted
+    /// sensor are applied one after the other: with the axes exchanged no two angles give the same sensor.
+    pub fn is_known_of(self, model: Model) -> bool {
+        self != Variant::SwappedAxes || model != Model::Tilted
+    }
+
     /// The changed problem, under another id.
     pub fn apply(self, problem: &Problem, id: String) -> Problem {
         let mut changed = Problem { id, ..problem.clone() };
@@ -66,14 +72,17 @@ impl Variant {
     }
 
     /// The camera of the original problem behind the camera of the changed one.
-    pub fn undo(self, camera: &Camera) -> Camera {
+    pub fn undo(self, camera: &Camera<Lens>) -> Camera<Lens> {
         match self {
             Variant::ViewOrder | Variant::PointOrder | Variant::TargetUnits => *camera,
             Variant::ImageShift => {
                 let (du, dv) = (SHIFT_PX.0 as f64, SHIFT_PX.1 as f64);
                 Camera { cx: camera.cx - du, cy: camera.cy - dv, ..*camera }
             }
-            Variant::SwappedAxes => with_axes_swapped(camera),
+            Variant::SwappedAxes => match camera.brown_conrady() {
+                Some(plain) => with_axes_swapped(&plain).into(),
+                None => with_names_swapped(camera),
+            },
         }
     }
 }
@@ -100,6 +109,25 @@ fn with_axes_swapped(camera: &Camera) -> Camera {
     }
 }
 
+/// The same without skew, for the other models: parameters are exchanged, no more.
+fn with_names_swapped(camera: &Camera<Lens>) -> Camera<Lens> {
+    camera.values().fold(*camera, |swapped, (parameter, value)| {
+        swapped.with_value(partner(parameter), value).unwrap_or(swapped)
+    })
+}
+
+/// The parameter that takes another's place when the axes are exchanged.
+fn partner(parameter: Parameter) -> Parameter {
+    use Parameter::{Cx, Cy, Fx, Fy, P1, P2, S1, S2, S3, S4};
+    const PAIRS: [(Parameter, Parameter); 5] = [(Fx, Fy), (Cx, Cy), (P1, P2), (S1, S3), (S2, S4)];
+    let found = PAIRS.iter().find_map(|&(a, b)| match parameter {
+        _ if parameter == a => Some(b),
+        _ if parameter == b => Some(a),
+        _ => None,
+    });
+    found.unwrap_or(parameter)
+}
+
 fn shift(problem: &mut Problem) {
     let margin = [SHIFT_PX.0, SHIFT_PX.1];
     for (axis, name) in ["cx", "cy"].into_iter().enumerate() {
@@ -114,15 +142,7 @@ fn shift(problem: &mut Problem) {
 }
 
 fn swap(problem: &mut Problem) {
-    const PAIRS: [(&str, &str); 3] = [("fx", "fy"), ("cx", "cy"), ("p1", "p2")];
-    let partner = |name: &str| {
-        let found = PAIRS.iter().find_map(|&(a, b)| match name {
-            _ if name == a => Some(b),
-            _ if name == b => Some(a),
-            _ => None,
-        });
-        found.unwrap_or(name).to_string()
-    };
+    let partner = |name: &str| name.parse().map_or_else(|_| name.to_string(), |p| partner(p).to_string());
     problem.image_size.reverse();
     for view in &mut problem.views {
         view.target.iter_mut().chain(view.pixels.iter_mut()).for_each(|p| p.reverse());

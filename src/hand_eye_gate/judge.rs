@@ -7,6 +7,7 @@ use calibench::distribution::{ChiSquare, fisher_tail};
 use calibench::geometry::Pose;
 use calibench::io::significant;
 use calibench_gate::judge::{Basis, Check, Property, Verdict};
+use calibench_gate::quoted::quoted;
 use nalgebra::{Matrix6, Vector6};
 
 /// Samples of a scene that wants a refusal.
@@ -180,7 +181,7 @@ impl Answered {
     fn convergence(&self, asked: usize, answered: usize) -> Check {
         let first = self.samples().iter().find_map(|answer| match answer {
             Ok(answer) if answer.status != Status::Ok => {
-                Some(format!(", first: {}", answer.message.as_deref().unwrap_or("no reason given")))
+                Some(format!(", first: {}", quoted(answer.message.as_deref().unwrap_or("no reason given"))))
             }
             _ => None,
         });

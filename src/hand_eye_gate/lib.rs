@@ -174,6 +174,14 @@ mod tests {
     }
 
     #[test]
+    fn what_a_program_writes_commands_no_terminal() {
+        let mut program = Program::new("printf 'dead\\033[2J' >&2", Duration::from_secs(5));
+        let answers = program.answer_all(&[scenes()[0].exact()]);
+        let said = answers[0].as_ref().unwrap_err();
+        assert!(said.contains("dead\\u001b[2J"), "{said}");
+    }
+
+    #[test]
     fn a_program_that_says_nothing_is_given_up() {
         let mut program = Program::new("sleep 60", Duration::from_millis(50));
         let problem = scenes()[0].exact();

@@ -29,6 +29,11 @@ impl PartFile {
     pub fn new(path: impl Into<String>, what: impl Into<String>, bytes: &[u8]) -> PartFile {
         PartFile { path: path.into(), what: what.into(), sha256: Some(sha256_hex(bytes)) }
     }
+
+    /// An input that is known by its hash alone is none of the folder's files.
+    fn is_in_folder(&self) -> bool {
+        !self.path.starts_with('#')
+    }
 }
 
 /// A run of the program, and the files in its folder.
@@ -57,26 +62,6 @@ impl RunCrate<'_> {
     }
 
     fn json(&self) -> Value {
-        let of = |files: &[PartFile]| {
-            files.iter().map(|file| json!({ "@id": id(&file.path) })).collect::<Vec<_>>()
-        };
-        let (inputs, results) = (of(&self.inputs), of(&self.results));
-        let seed = json!({ "@id": "#seed" });
-        let mut root = json!({
-            "@id": "./",
-            "@type": "Dataset",
-            "conformsTo": { "@id": PROFILE },
-            "name": self.title,
-            "description": self.description,
-            "license": { "@id": LICENCE },
-            "hasPart": values(of_folder(&self.inputs).chain(of_folder(&self.results))),
-            "author": { "@id": AGENT },
-            "publisher": { "@id": AGENT },
-            "mentions": { "@id": self.action() },
-        });
-        if let Some(date) = &self.build.date {
-            root["datePublished"] = json!(date);
-        }
         let mut graph = vec![
             json!({
                 "@id": "ro-crate-metadata.json",
@@ -84,30 +69,57 @@ impl RunCrate<'_> {
                 "conformsTo": { "@id": "https://w3id.org/ro/crate/1.1" },
                 "about": { "@id": "./" },
             }),
-            root,
+            self.folder(),
             json!({ "@id": PROFILE, "@type": "CreativeWork", "name": "Process Run Crate", "version": "0.5" }),
             json!({
                 "@id": LICENCE, "@type": "CreativeWork", "name": "MIT License",
                 "description": "The licence of the program, at choice beside Apache-2.0, whose output these files are",
             }),
             self.software(),
-            json!({
-                "@id": self.action(),
-                "@type": "CreateAction",
-                "name": format!("Run of {}", self.title),
-                "description": self.command,
-                "instrument": { "@id": SOFTWARE },
-                "agent": { "@id": AGENT },
-                "object": values(inputs.into_iter().chain([seed])),
-                "result": values(results),
-                "actionStatus": COMPLETED,
-            }),
+            self.run(),
             json!({ "@id": AGENT, "@type": "Organization", "name": "The calibench authors" }),
-            json!({ "@id": "#seed", "@type": "PropertyValue", "name": "seed", "value": self.seed.to_string() }),
+            json!({ "@id": SEED, "@type": "PropertyValue", "name": "seed", "value": self.seed.to_string() }),
         ];
         graph.extend(self.build.crates.iter().map(|(name, version)| library(name, version)));
         graph.extend(self.inputs.iter().chain(&self.results).map(entity));
         json!({ "@context": CONTEXT, "@graph": graph })
+    }
+
+    /// The folder as a data set.
+    fn folder(&self) -> Value {
+        let files = self.inputs.iter().chain(&self.results);
+        let mut root = json!({
+            "@id": "./",
+            "@type": "Dataset",
+            "conformsTo": { "@id": PROFILE },
+            "name": self.title,
+            "description": self.description,
+            "license": { "@id": LICENCE },
+            "hasPart": values(files.filter(|file| file.is_in_folder()).map(reference)),
+            "author": { "@id": AGENT },
+            "publisher": { "@id": AGENT },
+            "mentions": { "@id": self.action() },
+        });
+        if let Some(date) = &self.build.date {
+            root["datePublished"] = json!(date);
+        }
+        root
+    }
+
+    /// What was done: from inputs and seed to results, by the program.
+    fn run(&self) -> Value {
+        let seed = json!({ "@id": SEED });
+        json!({
+            "@id": self.action(),
+            "@type": "CreateAction",
+            "name": format!("Run of {}", self.title),
+            "description": self.command,
+            "instrument": { "@id": SOFTWARE },
+            "agent": { "@id": AGENT },
+            "object": values(self.inputs.iter().map(reference).chain([seed])),
+            "result": values(self.results.iter().map(reference)),
+            "actionStatus": COMPLETED,
+        })
     }
 
     /// One command, seed and program is one run.
@@ -139,6 +151,7 @@ impl RunCrate<'_> {
 /// A package URL, which is a URI that belongs to no host.
 const SOFTWARE: &str = "pkg:generic/calibench";
 const AGENT: &str = "#authors";
+const SEED: &str = "#seed";
 const LICENCE: &str = "https://spdx.org/licenses/MIT";
 
 /// One value as it stands, several as a list: so the standard writes them.
@@ -147,9 +160,9 @@ fn values(each: impl IntoIterator<Item = Value>) -> Value {
     if each.len() == 1 { each.remove(0) } else { json!(each) }
 }
 
-/// The files of the folder among these: an input that is known by its hash alone is none.
-fn of_folder(files: &[PartFile]) -> impl Iterator<Item = Value> + '_ {
-    files.iter().filter(|file| !file.path.starts_with('#')).map(|file| json!({ "@id": id(&file.path) }))
+/// How a file is referred to.
+fn reference(file: &PartFile) -> Value {
+    json!({ "@id": id(&file.path) })
 }
 
 /// A path as part of a URI.
@@ -168,7 +181,7 @@ fn library(name: &str, version: &str) -> Value {
 }
 
 fn entity(file: &PartFile) -> Value {
-    let kind = if file.path.starts_with('#') { "CreativeWork" } else { "File" };
+    let kind = if file.is_in_folder() { "File" } else { "CreativeWork" };
     let mut entity =
         json!({ "@id": id(&file.path), "@type": kind, "name": file.path, "description": file.what });
     if let Some(format) = encoding(&file.path) {

@@ -2,11 +2,8 @@
 //! line, for `.ci/laboratory` to ask the WebAssembly the same: `question | its numbers | the bits of the answer,
 //! hexadecimal`, or the words of a refusal.
 
-use calibench_laboratory::answer;
+use calibench_laboratory::{CHAPTER, answer};
 use std::io::{BufWriter, Write};
-
-/// The chapter's scene of four poses.
-const CHAPTER: [f64; 8] = [20.0, 120.0, 4.0, 0.1, -0.18, 0.05, 9.0, 7.0];
 
 /// Draws of the four poses that are compared.
 const DRAWS: u32 = 200;
@@ -36,10 +33,13 @@ fn cases() -> Vec<(&'static str, Vec<f64>)> {
         (0..DRAWS).map(|draw| ("calibrate", with(&CHAPTER, &[f64::from(draw)]))).collect();
     let scenes = [
         CHAPTER,
-        [0.0, 120.0, 4.0, 0.1, -0.18, 0.05, 9.0, 7.0],
-        [35.0, 150.0, 2.0, 0.5, 0.1, -0.02, 13.0, 9.0],
-        [5.0, 105.0, 12.0, 0.02, -0.3, 0.1, 3.0, 3.0],
-        [45.0, 20.0, 4.0, 0.1, -0.18, 0.05, 9.0, 7.0],
+        [0.0, 120.0, 0.0, 4.0, 0.1, -0.18, 0.05, 9.0, 7.0],
+        [20.0, 200.0, 60.0, 4.0, 0.1, -0.18, 0.05, 9.0, 7.0],
+        [35.0, 150.0, 5.0, 2.0, 0.5, 0.1, -0.02, 13.0, 9.0],
+        [5.0, 105.0, 0.0, 12.0, 0.02, -0.3, 0.1, 3.0, 3.0],
+        // A lens that folds back within the frame.
+        [20.0, 120.0, 0.0, 4.0, 0.1, -0.3, -0.1, 9.0, 7.0],
+        [45.0, 20.0, 0.0, 4.0, 0.1, -0.18, 0.05, 9.0, 7.0],
     ];
     for scene in scenes {
         cases.push(("predict", scene.to_vec()));

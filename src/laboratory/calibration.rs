@@ -97,9 +97,8 @@ fn deviations(covariance: &Covariance) -> impl Iterator<Item = f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::scene::CHAPTER;
     use super::*;
-
-    const CHAPTER: [f64; KNOBS] = [20.0, 120.0, 4.0, 0.1, -0.18, 0.05, 9.0, 7.0];
 
     #[test]
     fn the_chapters_prediction_is_met() {
@@ -135,7 +134,8 @@ mod tests {
 
     #[test]
     fn without_tilt_the_data_are_refused_and_nothing_is_bounded() {
-        let facing = [0.0, 120.0, 4.0, 0.1, -0.18, 0.05, 9.0, 7.0];
+        let mut facing = CHAPTER;
+        facing[0] = 0.0;
         assert!(calibrate_once(&[&facing[..], &[0.0]].concat()).is_err_and(|e| e.contains("focal length")));
         assert!(predict(&facing).unwrap()[6].is_nan());
     }

@@ -103,7 +103,7 @@ mod tests {
         lab_input(1);
         let length = lab_calibrate();
         assert_eq!(lock(&REFUSAL).len() as isize, -length);
-        assert!(lock(&REFUSAL).contains("9 numbers"));
+        assert!(lock(&REFUSAL).contains("10 numbers"));
         assert!(!lab_refusal().is_null());
     }
 }

@@ -19,6 +19,7 @@ mod trials;
 mod uncertainty;
 
 pub use questions::{answer, questions};
+pub use scene::CHAPTER;
 
 /// Of the sources, in a section of the WebAssembly that has its own name: `tests/laboratory.rs` compares it with theirs.
 #[cfg(target_arch = "wasm32")]

@@ -17,12 +17,12 @@ pub(crate) fn nine_points(numbers: &[f64]) -> Answer {
     let mut answer = Vec::new();
     for model in MODELS {
         let plane = calibrate_plane(model, &pixels, &unit_grid()).map_err(|error| error.to_string())?;
-        answer.extend(told(&plane));
+        answer.extend(numbers_of(&plane));
     }
     Ok(answer)
 }
 
-fn told(plane: &PlaneCalibration) -> impl Iterator<Item = f64> {
+fn numbers_of(plane: &PlaneCalibration) -> impl Iterator<Item = f64> {
     let matrix = plane.map.matrix();
     let entries = (0..9).map(move |at| matrix[(at / 3, at % 3)]);
     let rest = [plane.scale_x, plane.scale_y, plane.rms_point, plane.max_point];

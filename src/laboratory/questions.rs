@@ -34,8 +34,10 @@ pub fn questions() -> impl Iterator<Item = &'static str> {
 /// There is no such question, it has other numbers, or the library refuses them.
 ///
 /// ```
-/// // The chapter's scene: tilt 20 degrees, 120 mm, 4 views, 0.1 px, k1, k2, 9 x 7 points, draw 0.
-/// let found = calibench_laboratory::answer("calibrate", &[20.0, 120.0, 4.0, 0.1, -0.18, 0.05, 9.0, 7.0, 0.0])?;
+/// use calibench_laboratory::{CHAPTER, answer};
+///
+/// // The chapter's scene, draw 0.
+/// let found = answer("calibrate", &[&CHAPTER[..], &[0.0]].concat())?;
 /// assert!((found[0] - 600.0).abs() < 3.0);
 /// # Ok::<(), String>(())
 /// ```

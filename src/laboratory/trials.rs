@@ -56,13 +56,12 @@ pub(crate) fn spread(numbers: &[f64]) -> Answer {
 
 #[cfg(test)]
 mod tests {
+    use super::super::scene::CHAPTER;
     use super::*;
 
     #[test]
     fn trials_can_be_asked_for_in_any_portions() {
-        let ask = |first: f64, many: f64| {
-            trials(&[20.0, 120.0, 4.0, 0.1, -0.18, 0.05, 9.0, 7.0, first, many]).unwrap()
-        };
+        let ask = |first: f64, many: f64| trials(&[&CHAPTER[..], &[first, many]].concat()).unwrap();
         let together = ask(0.0, 5.0);
         assert_eq!(together.len(), 5 * OF_A_TRIAL);
         assert_eq!([ask(0.0, 2.0), ask(2.0, 3.0)].concat(), together);
@@ -70,7 +69,7 @@ mod tests {
 
     #[test]
     fn refused_trials_are_counted_out() {
-        let refused = trials(&[0.0, 120.0, 4.0, 0.1, -0.18, 0.05, 9.0, 7.0, 0.0, 2.0]).unwrap();
+        let refused = trials(&[&[0.0], &CHAPTER[1..], &[0.0, 2.0]].concat()).unwrap();
         assert!(refused.len() == 2 * OF_A_TRIAL && refused.iter().all(|number| number.is_nan()));
         let one = |x: f64| [x, 0.0, 0.0, 0.0, 0.0, 2.0 * x, 0.1 * x];
         let answer = spread(&[&refused[..], &one(1.0), &one(3.0)].concat()).unwrap();

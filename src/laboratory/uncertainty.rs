@@ -4,7 +4,8 @@ use super::questions::{Answer, count, exactly};
 use super::scene::{KNOBS, Knobs};
 use calibench::calibrate::Covariance;
 use calibench::camera::{Camera, FreeParameters, Parameter};
-use calibench::evaluate::{TakenOut, cramer_rao, frame_difference};
+use calibench::evaluate::cramer_rao;
+use calibench::evaluate::difference::{TakenOut, frame_difference, frame_nodes};
 use calibench::geometry::Vec2;
 use calibench::synth::Truth;
 
@@ -14,7 +15,8 @@ const STEP: f64 = 1e-3;
 
 /// Knobs, and what the camera is used for (0: points at the target's distance, 1: directions) -> how far from the
 /// principal point points are seen, px; root of the mean squared error of a pixel as far as that and beyond, px; then
-/// every node of the frame: u, v, and the root of its mean squared error, px.
+/// every node of the frame, row by row from the top: u, v, and the root of its mean squared error, px, NaN where the lens
+/// folds back.
 pub(crate) fn uncertainty(numbers: &[f64]) -> Answer {
     let [knobs @ .., used_for] = exactly::<{ KNOBS + 1 }>(numbers)?;
     let knobs = Knobs::read(knobs)?;
@@ -30,7 +32,9 @@ pub(crate) fn uncertainty(numbers: &[f64]) -> Answer {
     let reach = super::calibration::reach_px(&scene);
     let centre = Vec2::new(camera.cx, camera.cy);
     let rms = |within: bool| {
-        let part = nodes.iter().filter(|(pixel, _)| ((pixel - centre).norm() <= reach) == within);
+        let is_in_part =
+            |(pixel, error): &&(Vec2, f64)| !error.is_nan() && ((pixel - centre).norm() <= reach) == within;
+        let part = nodes.iter().filter(is_in_part);
         let (sum, count) =
             part.fold((0.0, 0.0), |(sum, count), (_, error)| (sum + error * error, count + 1.0));
         (sum / count).sqrt()
@@ -42,7 +46,7 @@ pub(crate) fn uncertainty(numbers: &[f64]) -> Answer {
 
 /// To first order the error at a pixel is `G (estimate - truth)`, with the derivatives `G` of the pixel by the parameters,
 /// the motion that fits best taken out, and its mean square is the trace of `G P G^T`, `P` the bound. `G` comes from
-/// difference quotients of the comparison of two cameras.
+/// difference quotients of the comparison of two cameras. NaN at nodes that one of these leaves out.
 fn errors(camera: &Camera, bound: &Covariance, taken_out: TakenOut) -> Result<Vec<(Vec2, f64)>, String> {
     let column = |parameter: Parameter| -> Result<Vec<(Vec2, Vec2)>, String> {
         let step = STEP * bound.standard_deviation(parameter).unwrap_or(0.0);
@@ -52,33 +56,57 @@ fn errors(camera: &Camera, bound: &Covariance, taken_out: TakenOut) -> Result<Ve
         Ok(map.nodes.into_iter().map(|node| (node.pixel, node.difference / step)).collect())
     };
     let columns = FreeParameters::STANDARD.iter().map(column).collect::<Result<Vec<_>, _>>()?;
-    let all = columns.len();
-    let mean_square = |node: usize| -> f64 {
-        let pairs = (0..all).flat_map(|i| (0..all).map(move |j| (i, j)));
-        pairs.map(|(i, j)| bound.intrinsics[(i, j)] * columns[i][node].1.dot(&columns[j][node].1)).sum()
+    // A lens that folds back within the frame leaves out other nodes with one parameter than with another.
+    let at = |pixel: &Vec2, column: &[(Vec2, Vec2)]| {
+        column.iter().find(|(place, _)| place == pixel).map(|(_, derivative)| *derivative)
     };
-    // A lens that folds back within the frame has fewer nodes with one parameter than with another.
-    let nodes = columns.iter().map(Vec::len).min().unwrap_or(0);
-    Ok((0..nodes).map(|node| (columns[0][node].0, mean_square(node).sqrt())).collect())
+    let error = |pixel: &Vec2| {
+        let derivatives: Option<Vec<Vec2>> = columns.iter().map(|column| at(pixel, column)).collect();
+        derivatives.map_or(f64::NAN, |derivatives| mean_square(bound, &derivatives).sqrt())
+    };
+    Ok(frame_nodes(Truth::EXAMPLE_IMAGE).0.into_iter().map(|pixel| (pixel, error(&pixel))).collect())
+}
+
+/// The trace of `G P G^T`; the columns of `G` are the derivatives.
+fn mean_square(bound: &Covariance, derivatives: &[Vec2]) -> f64 {
+    let all = derivatives.len();
+    let pairs = (0..all).flat_map(|i| (0..all).map(move |j| (i, j)));
+    pairs.map(|(i, j)| bound.intrinsics[(i, j)] * derivatives[i].dot(&derivatives[j])).sum()
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::scene::CHAPTER;
     use super::*;
 
     #[test]
     fn farther_out_than_points_were_seen_is_worse_and_directions_are_worse_still() {
-        let ask =
-            |used_for: f64| uncertainty(&[20.0, 120.0, 4.0, 0.1, -0.18, 0.05, 9.0, 7.0, used_for]).unwrap();
+        let ask = |used_for: f64| uncertainty(&[&CHAPTER[..], &[used_for]].concat()).unwrap();
         let (at_target, directions) = (ask(0.0), ask(1.0));
         assert!(at_target[2] > 2.0 * at_target[1] && directions[1] > at_target[1]);
-        assert_eq!((at_target.len() - 3) % 3, 0);
-        assert!(at_target.len() > 3 * 600);
+        assert_eq!(at_target.len() - 3, 3 * 30 * 23);
+        assert!(at_target.iter().all(|number| number.is_finite()));
+    }
+
+    #[test]
+    fn where_the_lens_folds_back_nothing_is_said_and_the_middle_is_as_good_as_ever() {
+        let mut folding = CHAPTER;
+        (folding[5], folding[6]) = (-0.3, -0.1);
+        let answer = uncertainty(&[&folding[..], &[0.0]].concat()).unwrap();
+        let (nodes, _) = answer[3..].as_chunks::<3>();
+        let silent: Vec<f64> = nodes
+            .iter()
+            .filter(|[.., error]| error.is_nan())
+            .map(|[u, v, _]| libm::hypot(u - 326.0, v - 243.0))
+            .collect();
+        // Only corners are left out, as points went nowhere near them.
+        assert!(!silent.is_empty() && silent.iter().all(|radius| *radius > answer[0]), "{silent:?}");
+        assert!(answer[1] < 0.2 && answer[2].is_finite());
     }
 
     #[test]
     fn a_scene_that_bounds_nothing_is_refused_in_words() {
-        let facing = uncertainty(&[0.0, 120.0, 4.0, 0.1, -0.18, 0.05, 9.0, 7.0, 0.0]);
+        let facing = uncertainty(&[&[0.0], &CHAPTER[1..], &[0.0]].concat());
         assert!(facing.is_err_and(|words| words.contains("no unbiased estimate")));
     }
 }

@@ -6,7 +6,7 @@ use super::prediction::{DRAWS, Prediction};
 use super::quantity::Quantity;
 use super::spec::{Length, Spec};
 use super::spec_error::SpecError;
-use calibench::calibrate::{Covariance, Settings};
+use calibench::calibrate::{CalibrationError, Covariance, Loss, Settings};
 use calibench::camera::{Camera, FreeParameters, Lens, Model};
 use calibench::evaluate::cramer_rao;
 use calibench::geometry::Vec2;
@@ -152,6 +152,33 @@ impl Cell {
     /// The lens model that is estimated.
     pub fn model(&self) -> Model {
         self.settings.model()
+    }
+
+    /// What is estimated.
+    pub fn free(&self) -> FreeParameters {
+        self.free
+    }
+
+    /// Image width and height, px.
+    pub fn image_size(&self) -> (usize, usize) {
+        self.design.scene.image
+    }
+
+    /// Whether the residuals are squared, and nothing else.
+    pub fn minimises_squares(&self) -> bool {
+        self.settings.loss == Loss::Squares
+    }
+
+    /// A camera whose parameters that are held have the values at which the estimator holds them.
+    ///
+    /// # Errors
+    /// A parameter that is neither free nor given a value.
+    pub fn held(&self) -> Result<Camera<Lens>, CalibrationError> {
+        let ideal = Camera::with_lens(1.0, 1.0, 0.0, 0.0, Lens::ideal(self.model()));
+        self.model().parameters().try_fold(ideal, |camera, parameter| {
+            let value = self.settings.held(parameter)?;
+            Ok(value.and_then(|value| camera.with_value(parameter, value)).unwrap_or(camera))
+        })
     }
 
     /// Whether the estimator's lens model is the truth's.

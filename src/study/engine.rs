@@ -2,14 +2,16 @@
 //! other, round by round.
 
 use super::accumulate::Tally;
+use super::calibrator::Calibrator;
 use super::cells::Cell;
 use super::quantity::Quantity;
 use super::shard::Shard;
 use super::spec::Spec;
 use super::spec_error::SpecError;
-use super::trial::{Trial, run_trial};
+use super::trial::{Trial, run_trial, run_trials_of};
 use rayon::prelude::*;
 use std::convert::Infallible;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A study in progress: what is done, and what comes next.
@@ -27,6 +29,8 @@ pub struct Engine {
     pub tallies: Vec<Tally>,
     /// Batches absorbed.
     pub batches: u64,
+    /// Who calibrates; this library's solver where it is nobody else.
+    calibrator: Option<Arc<dyn Calibrator>>,
     finished: Vec<bool>,
     round: u64,
     place: usize,
@@ -69,6 +73,9 @@ pub enum Outcome {
 /// A request to stop after the present batch.
 pub type Interruption = AtomicBool;
 
+/// Trials that somebody else's solver is given at once: what they have seen is held in memory.
+const ASKED_AT_ONCE: u64 = 64;
+
 /// The stop rule needs this many batches.
 const LEAST_BATCHES: u64 = 2;
 
@@ -84,7 +91,30 @@ impl Engine {
         let quantities = spec.quantities(&cells);
         let tallies = cells.iter().map(Tally::new).collect();
         let finished = vec![false; cells.len()];
-        Ok(Engine { spec, quantities, tallies, finished, cells, shard, batches: 0, round: 0, place: 0 })
+        let calibrator = None;
+        Ok(Engine {
+            spec,
+            quantities,
+            tallies,
+            finished,
+            cells,
+            shard,
+            calibrator,
+            batches: 0,
+            round: 0,
+            place: 0,
+        })
+    }
+
+    /// The same, calibrated by somebody else's solver.
+    #[must_use]
+    pub fn calibrated_by(self, calibrator: Arc<dyn Calibrator>) -> Engine {
+        Engine { calibrator: Some(calibrator), ..self }
+    }
+
+    /// Whether this library's solver calibrates.
+    pub fn is_calibrated_here(&self) -> bool {
+        self.calibrator.is_none()
     }
 
     /// The same study's beginning in another part.
@@ -123,7 +153,17 @@ impl Engine {
     /// Runs the batch that comes next, in parallel; the trials are in order.
     fn run(&self, (cell, batch): (usize, u64)) -> Vec<Trial> {
         let cell = &self.cells[cell];
-        self.trials_of(batch).into_par_iter().map(|trial| run_trial(cell, &self.quantities, trial)).collect()
+        let trials = self.trials_of(batch);
+        let Some(calibrator) = &self.calibrator else {
+            return trials.into_par_iter().map(|trial| run_trial(cell, &self.quantities, trial)).collect();
+        };
+        let chunks = trials.clone().step_by(ASKED_AT_ONCE as usize);
+        chunks
+            .flat_map(|first| {
+                let chunk = first..trials.end.min(first + ASKED_AT_ONCE);
+                run_trials_of(calibrator.as_ref(), cell, &self.quantities, chunk)
+            })
+            .collect()
     }
 
     /// Takes in the trials of the batch that comes next.

@@ -10,6 +10,7 @@
 //! neither the number of threads nor the split can move a bit of it.
 
 mod accumulate;
+mod calibrator;
 mod cells;
 pub mod compare;
 mod described;
@@ -57,6 +58,7 @@ mod within;
 pub const PARQUET: bool = cfg!(feature = "parquet");
 
 pub use accumulate::Tally;
+pub use calibrator::{Calibrator, Estimate};
 pub use cells::Cell;
 pub use engine::{Engine, Interruption, Outcome, Pace, Worst, in_memory, in_memory_seeing, in_memory_until};
 pub use fingerprint::Fingerprint;

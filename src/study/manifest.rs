@@ -33,6 +33,10 @@ pub struct Manifest {
     /// The day of that commit, where known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub day: Option<String>,
+    /// The command of the program that calibrates, where it is not this library's solver. Whether it gives the same
+    /// answers another day is its own business.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub solver: Option<String>,
     /// Code.
     pub code: Fingerprint,
     /// SHA-256 of the canonical specification.
@@ -73,6 +77,7 @@ impl Manifest {
             commit: build.commit.as_ref().map(|c| c.hash.clone()),
             dirty: build.commit.as_ref().map(|c| c.dirty),
             day: build.date.clone(),
+            solver: None,
             code: Fingerprint::of(build),
             spec_sha256: sha256_hex(canonical.to_string().as_bytes()),
             spec: canonical,
@@ -86,6 +91,12 @@ impl Manifest {
         Manifest { trials, ..self }
     }
 
+    /// The same, calibrated by the program of a command.
+    #[must_use]
+    pub fn with_solver(self, solver: Option<String>) -> Manifest {
+        Manifest { solver, ..self }
+    }
+
     /// Whatever would make trials of `now` unfit to stand beside those of `self`. Commits may differ as long
     /// as the code behaves alike.
     pub fn differences(&self, now: &Manifest) -> Vec<Difference> {
@@ -93,12 +104,18 @@ impl Manifest {
         differ("spec", &self.spec, &now.spec, &mut found);
         let code = |manifest: &Manifest| serde_json::to_value(&manifest.code).unwrap_or(Value::Null);
         differ("code", &code(self), &code(now), &mut found);
+        let solver = |manifest: &Manifest| manifest.solver.clone().map_or(Value::Null, Value::String);
+        differ("solver", &solver(self), &solver(now), &mut found);
         found
     }
 
-    /// Which trials may stand in the run's folder: SHA-256 of specification, part and code.
+    /// Which trials may stand in the run's folder: SHA-256 of specification, part, code, and solver if it is not
+    /// this library's.
     pub(super) fn identity(&self) -> String {
-        let parts = serde_json::json!([self.spec, self.shard, self.code]);
+        let parts = match &self.solver {
+            None => serde_json::json!([self.spec, self.shard, self.code]),
+            Some(solver) => serde_json::json!([self.spec, self.shard, self.code, solver]),
+        };
         sha256_hex(parts.to_string().as_bytes())
     }
 

@@ -109,6 +109,7 @@ pub fn merge_on(
     let date = first.manifest.day.clone().filter(|_| commit.is_some());
     let build = Build { commit, date, ..build.clone() };
     let manifest = Manifest::new(&whole.spec, Shard::WHOLE, &build).with_trials(trials);
+    let manifest = manifest.with_solver(first.manifest.solver.clone());
     // Bounds and statistics of the whole come from this code, its trials from that of the parts: the manifest
     // names one.
     first.folder.check(&manifest)?;

@@ -41,6 +41,9 @@ pub(super) fn page(
         percent(summary.confidence),
         if engine.shard == Shard::WHOLE { String::new() } else { format!(" Part {} only.", engine.shard) },
     ));
+    if let Some(solver) = &manifest.solver {
+        page.push_str(&format!("<p>Calibrated by <code>{}</code>.</p>\n", escape(solver)));
+    }
     let imprecise: Vec<String> = engine.imprecise().iter().map(|cell| escape(&cell.name)).collect();
     if !imprecise.is_empty() {
         page.push_str(&format!(

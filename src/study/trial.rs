@@ -1,13 +1,16 @@
 //! What happens in one trial? Noise is drawn, a camera is calibrated without seeing the truth, and both are
 //! compared.
 
+use super::calibrator::{self, Calibrator, Estimate};
 use super::cells::Cell;
 use super::quantity::Quantity;
 use calibench::board::View;
-use calibench::calibrate::{CalibrationError, LensCalibration, Termination, calibrate_lens};
+use calibench::calibrate::Termination;
 use calibench::camera::{Lens, Model, Parameter};
 use calibench::geometry::Vec2;
 use calibench::synth::{Scene, Stream};
+use std::borrow::Cow;
+use std::ops::Range;
 
 /// The result of one trial.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,33 +37,64 @@ impl Trial {
     }
 }
 
-/// Runs trial `trial` of a cell. It depends on nothing but its arguments.
+/// Runs trial `trial` of a cell with this library's solver. It depends on nothing but its arguments.
 pub fn run_trial(cell: &Cell, quantities: &[Quantity], trial: u64) -> Trial {
-    let drawn;
-    let scene = match &cell.scene {
-        Some(scene) => scene,
-        None => match cell.draw_scene(trial) {
-            Ok(scene) => {
-                drawn = scene;
-                &drawn
-            }
-            Err(_) => return failed(cell, quantities, trial, "refused-poses".to_string()),
-        },
+    match scene_of(cell, trial) {
+        Err(outcome) => failed(cell, quantities, trial, outcome),
+        Ok(scene) => {
+            let estimate = calibrator::builtin(cell, &observe(cell, &scene, trial));
+            measured(cell, quantities, trial, &scene, estimate)
+        }
+    }
+}
+
+/// The same for several trials with somebody else's solver, which is asked all at once.
+pub(super) fn run_trials_of(
+    calibrator: &dyn Calibrator,
+    cell: &Cell,
+    quantities: &[Quantity],
+    trials: Range<u64>,
+) -> Vec<Trial> {
+    let scenes: Vec<_> = trials.clone().map(|trial| scene_of(cell, trial)).collect();
+    let seen: Vec<Vec<View>> = trials
+        .clone()
+        .zip(&scenes)
+        .filter_map(|(trial, scene)| Some(observe(cell, scene.as_ref().ok()?, trial)))
+        .collect();
+    let mut estimates = calibrator.calibrate(cell, &seen).into_iter();
+    let of_trial = |(trial, scene): (u64, Result<Cow<'_, Scene<Lens>>, String>)| match scene {
+        Err(outcome) => failed(cell, quantities, trial, outcome),
+        Ok(scene) => {
+            let estimate = estimates.next().unwrap_or_else(|| Err("broken".to_string()));
+            measured(cell, quantities, trial, &scene, estimate)
+        }
     };
-    match calibrate_lens(&observe(cell, scene, trial), &cell.settings) {
-        Err(error) => failed(cell, quantities, trial, format!("refused-{}", reason(&error))),
-        Ok(calibration) => Trial {
+    trials.zip(scenes).map(of_trial).collect()
+}
+
+/// What a trial photographs; without poses the name of its outcome.
+fn scene_of(cell: &Cell, trial: u64) -> Result<Cow<'_, Scene<Lens>>, String> {
+    match &cell.scene {
+        Some(scene) => Ok(Cow::Borrowed(scene)),
+        None => cell.draw_scene(trial).map(Cow::Owned).map_err(|_| "refused-poses".to_string()),
+    }
+}
+
+fn measured(
+    cell: &Cell,
+    quantities: &[Quantity],
+    trial: u64,
+    scene: &Scene<Lens>,
+    estimate: Result<Estimate, String>,
+) -> Trial {
+    match estimate {
+        Err(outcome) => failed(cell, quantities, trial, outcome),
+        Ok(estimate) => Trial {
             cell: cell.index,
             trial,
-            // Where the world is not the model, as with gross errors, a minimum is a minimum.
-            outcome: if calibration.termination.is_minimum() {
-                CONVERGED
-            } else {
-                calibration.termination.name()
-            }
-            .to_string(),
-            iterations: calibration.iterations,
-            values: quantities.iter().map(|q| measure(*q, cell, scene, &calibration)).collect(),
+            iterations: estimate.iterations,
+            values: quantities.iter().map(|q| measure(*q, cell, scene, &estimate)).collect(),
+            outcome: estimate.outcome,
         },
     }
 }
@@ -91,31 +125,27 @@ fn spoil(view: &View, share: f64, half_width_px: f64, stream: &mut Stream) -> Vi
     View::new(view.points().to_vec(), pixels.collect()).expect("finite pixels stay finite, one a point")
 }
 
-fn measure(
-    quantity: Quantity,
-    cell: &Cell,
-    scene: &Scene<Lens>,
-    calibration: &LensCalibration,
-) -> Option<f64> {
+fn measure(quantity: Quantity, cell: &Cell, scene: &Scene<Lens>, estimate: &Estimate) -> Option<f64> {
     let truth = cell.camera.distortion;
     let error = |p: Parameter| {
         let is_comparable = cell.knows_its_lens() || is_the_same_thing(p, [cell.model(), truth.model()]);
-        is_comparable.then(|| Some(calibration.camera.value(p)? - cell.camera.value(p)?)).flatten()
+        is_comparable.then(|| Some(estimate.camera.value(p)? - cell.camera.value(p)?)).flatten()
     };
     let value = match quantity {
-        Quantity::Rmse => calibration.rmse_px,
+        Quantity::Rmse => estimate.rmse_px?,
         Quantity::Nees => {
-            let error: Vec<f64> = calibration.free.iter().map(error).collect::<Option<_>>()?;
-            calibration.covariance.normalised_error_squared(&error)?
+            let error: Vec<f64> = cell.free.iter().map(error).collect::<Option<_>>()?;
+            estimate.normalised_error_squared(&error)?
         }
-        Quantity::Parameter(p) if calibration.free.contains(p) => error(p)?,
+        Quantity::Parameter(p) if cell.free.contains(p) => error(p)?,
         Quantity::Parameter(_) => return None,
         Quantity::Depth => {
-            calibration.cam_from_target[0].translation.z - scene.truth.cam_from_target[0].translation.z
+            let first = estimate.cam_from_target.as_ref()?.first()?;
+            first.translation.z - scene.truth.cam_from_target[0].translation.z
         }
         Quantity::Length => {
             let (length, pixels) = cell.length.as_ref()?;
-            length.error_mm(&calibration.camera, pixels)?
+            length.error_mm(&estimate.camera, pixels)?
         }
     };
     value.is_finite().then_some(value)
@@ -128,19 +158,5 @@ fn is_the_same_thing(parameter: Parameter, models: [Model; 2]) -> bool {
         Parameter::Cx | Parameter::Cy | Parameter::Skew => true,
         Parameter::Fx | Parameter::Fy => !models.contains(&Model::DoubleSphere),
         _ => false,
-    }
-}
-
-fn reason(error: &CalibrationError) -> &'static str {
-    match error {
-        CalibrationError::TooFewViews { .. } => "too-few-views",
-        CalibrationError::TooFewPoints { .. } => "too-few-points",
-        CalibrationError::View { .. } => "homography",
-        CalibrationError::HeldWithoutValue { .. } | CalibrationError::BadHeldValue { .. } => "held-value",
-        CalibrationError::BadLoss | CalibrationError::NarrowLoss { .. } => "loss",
-        CalibrationError::Strays { .. } => "gross-errors",
-        CalibrationError::NotIdentifiable { .. } => "not-identifiable",
-        CalibrationError::NoStart { .. } => "no-start",
-        _ => "refused",
     }
 }

@@ -286,7 +286,11 @@ impl Settings {
     /// The value a parameter is held at; `None` if it is free, or tied to one that is.
     ///
     /// A principal point that is neither free nor given is the image's centre: `(w - 1) / 2`.
-    pub(super) fn held(&self, parameter: Parameter) -> Result<Option<f64>, CalibrationError> {
+    ///
+    /// # Errors
+    /// A value that no camera has; a focal length, or a principal point of an image of unknown size, that is held
+    /// without one.
+    pub fn held(&self, parameter: Parameter) -> Result<Option<f64>, CalibrationError> {
         if self.is_tied(parameter) {
             return Ok(self.held(Parameter::Fx)?.zip(self.fy_per_fx).map(|(fx, ratio)| ratio * fx));
         }

@@ -9,7 +9,8 @@
 //! 4. Its corners are fitted in the photograph ([`refine`]).
 //!
 //! The level of about a megapixel comes first, then finer ones (small squares), then coarser ones (noise and
-//! blur). A board is returned complete and in order, or not at all.
+//! blur). [`chessboard`] returns a board complete and in order, or not at all; [`seen_chessboard`] also one of which
+//! corners are hidden, where it is certain which.
 
 mod board;
 mod candidates;
@@ -18,14 +19,18 @@ mod level;
 mod places;
 mod probe;
 mod refine;
-mod smoothness;
 
 use super::lattice::Lattice;
+use super::order::is_certain;
+use super::orientation::Orientation;
+use super::rectangle::Rectangle;
+use super::seen::SeenBoard;
 use crate::geometry::Vec2;
 use crate::raster::{Level, Raster};
-use board::{Found, Rectangle};
+use board::Found;
 use candidates::Strength;
 use level::{Pyramid, Smoothed};
+use refine::Fitted;
 
 /// A complete chessboard in a photograph.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,19 +39,6 @@ pub struct Chessboard {
     rows: usize,
     corners_px: Vec<Vec2>,
     orientation: Orientation,
-}
-
-/// How far the image tells which corner is the board's first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Orientation {
-    /// The first corner is the physical one in every view: before it lies the dark square at the board's
-    /// origin. So it is where one of columns and rows is odd and the other even.
-    Fixed,
-    /// Half a turn looks the same: the first corner is the one of two that lies nearer to the image's top
-    /// left.
-    HalfTurn,
-    /// Every quarter turn looks the same (as many rows as columns, an even number): the first of four.
-    QuarterTurn,
 }
 
 impl Chessboard {
@@ -85,8 +77,8 @@ pub enum ChessboardError {
     },
     /// A complete board of another size.
     #[error(
-        "found a board of {found_columns} x {found_rows} inner corners, asked for {columns} x {rows}: count the corners where four \
-         squares meet, not the squares; or a row of the board is covered or outside"
+        "chess:{columns}x{rows} was asked, a complete {found_columns} x {found_rows} was seen: count inner corners, where four \
+         squares meet, not squares; or a row of the board is covered or outside"
     )]
     WrongSize {
         /// Asked corners along a row.
@@ -166,22 +158,53 @@ pub fn chessboard<T: Level>(
     columns: usize,
     rows: usize,
 ) -> Result<Chessboard, ChessboardError> {
-    if columns.min(rows) < 2 {
-        return Err(ChessboardError::TooSmall { columns, rows });
-    }
+    complete(&Pyramid::new(image), columns, rows).map(|(board, _)| board).map_err(|failure| failure.error)
+}
+
+/// Finds a chessboard of `columns x rows` inner corners of which some may be hidden, outside of the image, in glare or too
+/// blurred.
+///
+/// It is certain which corners these are where the board's outer rows and columns are each seen in part (three corners and
+/// a third of the side), and half of the corners in all; and corners whose squares do not look like those of the others,
+/// because something covers them in part, are left out.
+///
+/// # Errors
+/// See [`ChessboardError`]: no such board, or none that is certain.
+pub fn seen_chessboard<T: Level>(
+    image: &Raster<T>,
+    columns: usize,
+    rows: usize,
+) -> Result<SeenBoard, ChessboardError> {
     let pyramid = Pyramid::new(image);
-    let mut best = Failure { found: 0, error: nothing(columns, rows, 0) };
-    for level in search_order(image, pyramid.levels()) {
-        match search(&pyramid, level, columns, rows) {
-            Ok(seen) => match finished(image, &pyramid, level, &seen, columns, rows) {
-                Some(board) => return Ok(board),
-                None => best = Failure::unclear(columns, rows),
-            },
-            Err(failure) if failure.found > best.found => best = failure,
-            Err(_) => {}
+    match complete(&pyramid, columns, rows) {
+        Ok((board, fitted)) => certain(fitted.alike(image, columns), columns, rows, board.orientation)
+            .ok_or(ChessboardError::Unclear { columns, rows }),
+        Err(failure) => {
+            let part = failure.part.and_then(|(level, seen)| in_part(&pyramid, level, &seen, columns, rows));
+            part.ok_or(failure.error)
         }
     }
-    Err(best.error)
+}
+
+fn complete<T: Level>(
+    pyramid: &Pyramid<'_, T>,
+    columns: usize,
+    rows: usize,
+) -> Result<(Chessboard, Fitted), Failure> {
+    if columns.min(rows) < 2 {
+        return Err(Failure { found: 0, error: ChessboardError::TooSmall { columns, rows }, part: None });
+    }
+    let mut best = Failure { found: 0, error: nothing(columns, rows, 0), part: None };
+    for level in search_order(pyramid.photo(), pyramid.levels()) {
+        match search(pyramid, level, columns, rows) {
+            Ok(seen) => match finished(pyramid, level, &seen, columns, rows) {
+                Some(board) => return Ok(board),
+                None => best = Failure::unclear(columns, rows, best.part, (level, seen)),
+            },
+            Err(failure) => best = best.or(failure.at(level)),
+        }
+    }
+    Err(best)
 }
 
 /// The level of about a megapixel, finer ones, coarser ones.
@@ -192,17 +215,49 @@ fn search_order<T: Level>(image: &Raster<T>, levels: usize) -> impl Iterator<Ite
 }
 
 /// A level without the board.
-struct Failure {
+struct Failure<Part = (usize, Box<Seen>)> {
     /// Corners of its largest lattice.
     found: usize,
     error: ChessboardError,
+    /// The board with corners missing, and its level.
+    part: Option<Part>,
 }
 
 impl Failure {
     /// The board was found, but its corners have no fit.
-    fn unclear(columns: usize, rows: usize) -> Failure {
-        Failure { found: columns * rows, error: ChessboardError::Unclear { columns, rows } }
+    fn unclear(
+        columns: usize,
+        rows: usize,
+        part: Option<(usize, Box<Seen>)>,
+        (level, seen): (usize, Seen),
+    ) -> Failure {
+        let error = ChessboardError::Unclear { columns, rows };
+        Failure { found: columns * rows, error, part: more(part, Some((level, Box::new(seen)))) }
     }
+
+    /// The failure with more corners, and the part with more.
+    fn or(self, other: Failure) -> Failure {
+        let part = more(self.part, other.part);
+        let Failure { found, error, .. } = if other.found > self.found {
+            Failure { part: None, ..other }
+        } else {
+            Failure { part: None, ..self }
+        };
+        Failure { found, error, part }
+    }
+}
+
+impl Failure<Box<Seen>> {
+    /// In a level.
+    fn at(self, level: usize) -> Failure {
+        Failure { found: self.found, error: self.error, part: self.part.map(|seen| (level, seen)) }
+    }
+}
+
+/// The part with more corners, the first of equal ones.
+fn more(a: Option<(usize, Box<Seen>)>, b: Option<(usize, Box<Seen>)>) -> Option<(usize, Box<Seen>)> {
+    let count = |part: &Option<(usize, Box<Seen>)>| part.as_ref().map_or(0, |(_, seen)| seen.lattice.len());
+    if count(&b) > count(&a) { b } else { a }
 }
 
 /// A board in a level.
@@ -222,7 +277,7 @@ fn search<T: Level>(
     level: usize,
     columns: usize,
     rows: usize,
-) -> Result<Seen, Failure> {
+) -> Result<Seen, Failure<Box<Seen>>> {
     let smoothed = pyramid.smoothed(level);
     search_among(&smoothed, Strength::Strong, columns, rows).or_else(|strong| {
         search_among(&smoothed, Strength::Any, columns, rows)
@@ -235,12 +290,12 @@ fn search_among(
     strength: Strength,
     columns: usize,
     rows: usize,
-) -> Result<Seen, Failure> {
+) -> Result<Seen, Failure<Box<Seen>>> {
     let candidates = candidates::candidates(smoothed, strength);
     let seen = candidates.len();
     let grown = growth::lattices(smoothed, candidates, columns * rows);
     let places: Vec<Vec2> = grown.corners.iter().map(|corner| corner.at).collect();
-    let mut failure: Option<Failure> = None;
+    let mut failure: Option<Failure<Box<Seen>>> = None;
     for lattice in grown.lattices {
         let found = lattice.len();
         let error = match board::find(&lattice, columns, rows) {
@@ -254,22 +309,55 @@ fn search_among(
             Found::Incomplete => ChessboardError::NotRectangular { columns, rows, found },
         };
         // The largest comes first.
-        failure.get_or_insert(Failure { found, error });
+        let failure = failure.get_or_insert(Failure { found, error, part: None });
+        if failure.part.is_none()
+            && let Some(rectangle) = Rectangle::in_part(&lattice, columns, rows)
+        {
+            failure.part = Some(Box::new(Seen { rectangle, lattice, places: places.clone() }));
+        }
     }
-    Err(failure.unwrap_or(Failure { found: 0, error: nothing(columns, rows, seen) }))
+    Err(failure.unwrap_or(Failure { found: 0, error: nothing(columns, rows, seen), part: None }))
 }
 
 fn finished<T: Level>(
-    image: &Raster<T>,
     pyramid: &Pyramid<'_, T>,
     level: usize,
     seen: &Seen,
     columns: usize,
     rows: usize,
-) -> Option<Chessboard> {
-    let (marks, orientation, starts_dark) =
-        board::ordered(&seen.lattice, &seen.rectangle, &seen.places, (columns, rows));
-    let found: Vec<Vec2> = marks.into_iter().map(|mark| seen.places[mark]).collect();
-    let corners_px = refine::refined(image, pyramid, level, &found, columns, starts_dark)?;
-    Some(Chessboard { columns, rows, corners_px, orientation })
+) -> Option<(Chessboard, Fitted)> {
+    let ordered = board::ordered(&seen.lattice, &seen.rectangle, &seen.places, (columns, rows));
+    let fitted = refine::refined(pyramid, level, &seen.found(&ordered.marks), columns, ordered.starts_dark);
+    let corners_px = fitted.corners.iter().copied().collect::<Option<Vec<Vec2>>>()?;
+    Some((Chessboard { columns, rows, corners_px, orientation: ordered.orientation }, fitted))
+}
+
+/// The board with the corners that are seen, if after their fit it is still certain which they are.
+fn in_part<T: Level>(
+    pyramid: &Pyramid<'_, T>,
+    level: usize,
+    seen: &Seen,
+    columns: usize,
+    rows: usize,
+) -> Option<SeenBoard> {
+    let ordered = board::ordered(&seen.lattice, &seen.rectangle, &seen.places, (columns, rows));
+    let fitted = refine::refined(pyramid, level, &seen.found(&ordered.marks), columns, ordered.starts_dark);
+    certain(fitted.alike(pyramid.photo(), columns), columns, rows, ordered.orientation)
+}
+
+/// A board of these corners, if it is certain which they are.
+fn certain(
+    corners: Vec<Option<Vec2>>,
+    columns: usize,
+    rows: usize,
+    orientation: Orientation,
+) -> Option<SeenBoard> {
+    is_certain(&corners, columns, rows).then(|| SeenBoard::new(columns, rows, corners, orientation))
+}
+
+impl Seen {
+    /// The places of marks.
+    fn found(&self, marks: &[Option<usize>]) -> Vec<Option<Vec2>> {
+        marks.iter().map(|mark| mark.map(|mark| self.places[mark])).collect()
+    }
 }

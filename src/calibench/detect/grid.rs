@@ -3,9 +3,14 @@
 use super::blob::Blob;
 use super::discs::{BlobOptions, blobs};
 use super::lattice::largest;
-use super::order::{GridError, ordered_rectangle};
-use crate::geometry::Vec2;
+use super::order::is_certain;
+use super::order::{GridError, ordered_part, ordered_rectangle};
+use super::orientation::Orientation;
+use super::seen::SeenBoard;
+use super::smoothness::out_of_line;
+use crate::geometry::{Vec2, Vec3};
 use crate::raster::{Level, Raster};
+use nalgebra::Matrix3;
 
 /// A complete grid of discs.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +34,11 @@ impl DotGrid {
     /// The imaged discs, row by row.
     pub fn blobs(&self) -> &[Blob] {
         &self.blobs
+    }
+
+    /// How far the image tells which disc is the board's first: discs look alike, so that half a turn cannot be seen.
+    pub fn orientation(&self) -> Orientation {
+        Orientation::of_discs(self.columns, self.rows)
     }
 
     /// Their centres, px, row by row.
@@ -73,6 +83,72 @@ pub fn circle_grid_of(discs: &[Blob], columns: usize, rows: usize) -> Result<Dot
         return Err(GridError::TooFewForGrid { columns, rows, found: discs.len(), need: DENSE_SIDE });
     }
     order(discs, columns, rows)
+}
+
+/// Largest misfit of a disc of a board of which discs are hidden, against the middle one of all, and what is allowed
+/// beside it. Noise, blur and size enter all alike; the edge of what covers a disc in part does not.
+const LARGEST_MISFIT: f64 = 1.5;
+const MISFIT_ALLOWED: f64 = 0.01;
+
+/// Orders discs that are already found into a dense grid of which some may be hidden, outside of the image or in glare.
+///
+/// It is certain which these are where the outer rows and columns are each seen in part (three discs and a third of the
+/// side), and half of the discs in all. Discs whose outline is no ellipse as the others' are, because something covers them
+/// in part, are left out, and so are those out of line with their neighbours.
+///
+/// # Errors
+/// See [`GridError`]: no such grid, or none that is certain.
+pub fn seen_circle_grid_of(discs: &[Blob], columns: usize, rows: usize) -> Result<SeenBoard, GridError> {
+    circle_grid_of(discs, columns, rows).map(SeenBoard::from).or_else(|error| {
+        let may_be_part = matches!(
+            error,
+            GridError::Partial { .. } | GridError::NotRectangular { .. } | GridError::Irregular { .. }
+        );
+        let part = may_be_part.then(|| grid_in_part(discs, columns, rows)).flatten();
+        part.ok_or(error)
+    })
+}
+
+fn grid_in_part(discs: &[Blob], columns: usize, rows: usize) -> Option<SeenBoard> {
+    let mut misfits: Vec<f64> = discs.iter().map(|disc| disc.misfit).collect();
+    misfits.sort_by(f64::total_cmp);
+    let middle = *misfits.get(misfits.len() / 2)?;
+    let is_alike = |disc: &&Blob| disc.misfit <= LARGEST_MISFIT * middle + MISFIT_ALLOWED;
+    let alike: Vec<Blob> = discs.iter().filter(is_alike).copied().collect();
+    let on_board: Vec<Blob> = largest(&alike).values().map(|&mark| alike[mark]).collect();
+    let alike = evenly_lit(on_board);
+    let centres: Vec<Vec2> = alike.iter().map(|disc| disc.centre_px).collect();
+    let marks = ordered_part(&largest(&alike), &centres, columns, rows)?;
+    let mut places_px: Vec<Option<Vec2>> = marks.into_iter().map(|mark| Some(centres[mark?])).collect();
+    out_of_line(&mut places_px, columns);
+    is_certain(&places_px, columns, rows)
+        .then(|| SeenBoard::new(columns, rows, places_px, Orientation::of_discs(columns, rows)))
+}
+
+/// Largest difference of a disc's contrast from the plane through those of the others, as part of their middle, round by
+/// round: light that falls off over the board is a plane within this, and glare is not.
+const LARGEST_CONTRASTS: [f64; 5] = [0.3, 0.15, 0.08, 0.05, 0.05];
+
+/// The discs whose contrast is that of light which is even or falls off.
+fn evenly_lit(discs: Vec<Blob>) -> Vec<Blob> {
+    let mut contrasts: Vec<f64> = discs.iter().map(|disc| disc.contrast).collect();
+    contrasts.sort_by(f64::total_cmp);
+    let Some(&middle) = contrasts.get(contrasts.len() / 2) else { return discs };
+    let row = |disc: &Blob| Vec3::new(1.0, 1e-3 * disc.centre_px.x, 1e-3 * disc.centre_px.y);
+    let mut plane = Vec3::new(1.0, 0.0, 0.0);
+    let mut left = discs.clone();
+    for largest in LARGEST_CONTRASTS {
+        let is_even = |disc: &&Blob| (disc.contrast / middle - plane.dot(&row(disc))).abs() <= largest;
+        left = discs.iter().filter(is_even).copied().collect();
+        let (mut normal, mut right) = (Matrix3::zeros(), Vec3::zeros());
+        for disc in &left {
+            normal += row(disc) * row(disc).transpose();
+            right += row(disc) * (disc.contrast / middle);
+        }
+        let Some(inverse) = normal.try_inverse() else { return left };
+        plane = inverse * right;
+    }
+    left
 }
 
 /// Finds a sparse board of `columns x rows` dark dots, such as the 3 x 3 of a nine-point calibration.

@@ -9,7 +9,8 @@
 //! it only turns the board's frame by half a turn about its normal.
 
 use super::lattice::{Lattice, Place};
-use crate::geometry::Vec2;
+use super::rectangle::Rectangle;
+use crate::geometry::{Homography, Vec2};
 
 /// Why there is no complete, unambiguous grid in an image.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -57,7 +58,10 @@ pub enum GridError {
         seen: usize,
     },
     /// A complete grid of another size.
-    #[error("found a {found_columns} x {found_rows} grid of marks, asked for {columns} x {rows}")]
+    #[error(
+        "a grid of {columns} x {rows} was asked, a complete {found_columns} x {found_rows} was seen: count the discs of a row, and the \
+         rows; or a row of the board is covered or outside"
+    )]
     WrongSize {
         /// Asked marks along a row.
         columns: usize,
@@ -120,19 +124,89 @@ pub fn ordered_rectangle(
     Ok(marks)
 }
 
+/// The marks of a lattice in the order of a `columns x rows` board of which marks are hidden; `None` where it is not
+/// certain which.
+pub fn ordered_part(
+    lattice: &Lattice,
+    centres: &[Vec2],
+    columns: usize,
+    rows: usize,
+) -> Option<Vec<Option<usize>>> {
+    let read = |straightening: &[i32; 4]| {
+        let straight = straightened(lattice, straightening);
+        SeenPart::of(Rectangle::in_part(&straight, columns, rows)?, &straight, centres)
+    };
+    let mut parts = STRAIGHTENINGS.iter().filter_map(read);
+    // Read in two ways it is not certain.
+    let only = parts.next().filter(|_| parts.next().is_none())?;
+    Some(only.first_nearest_top_left(columns, rows))
+}
+
+/// Whether marks in the order of a board are enough of it ([`Rectangle::is_certain`]).
+pub fn is_certain(places_px: &[Option<Vec2>], columns: usize, rows: usize) -> bool {
+    let place = |index: usize| ((index % columns) as i32, (index / columns) as i32);
+    let seen = (0..places_px.len()).filter(|&index| places_px[index].is_some());
+    let lattice: Lattice = seen.map(|index| (place(index), index)).collect();
+    Rectangle { low: (0, 0), width: columns, height: rows }.is_certain(&lattice)
+}
+
+/// A board in a lattice, some of its marks hidden.
+struct SeenPart {
+    rectangle: Rectangle,
+    /// Row by row.
+    marks: Vec<Option<usize>>,
+    /// Where the rectangle's corners are, px, hidden or not: at (0, 0), (w, 0), (0, h) and (w, h).
+    corners_px: [Vec2; 4],
+}
+
+impl SeenPart {
+    fn of(rectangle: Rectangle, lattice: &Lattice, centres: &[Vec2]) -> Option<SeenPart> {
+        let marks: Vec<Option<usize>> =
+            rectangle.places().map(|place| lattice.get(&place).copied()).collect();
+        let (width, count) = (rectangle.width, marks.len());
+        let on_board = |index: usize| Vec2::new((index % width) as f64, (index / width) as f64);
+        let seen = || (0..count).filter_map(|index| Some((index, marks[index]?)));
+        let from: Vec<Vec2> = seen().map(|(index, _)| on_board(index)).collect();
+        let to: Vec<Vec2> = seen().map(|(_, mark)| centres[mark]).collect();
+        let plane = Homography::fit(&from, &to).ok()?.homography;
+        let place = |index: usize| match marks[index] {
+            Some(mark) => Some(centres[mark]),
+            None => plane.apply(&on_board(index)),
+        };
+        let [a, b, c, d] = [0, width - 1, count - width, count - 1].map(place);
+        let corners_px = [a?, b?, c?, d?];
+        Some(SeenPart { rectangle, marks, corners_px })
+    }
+
+    /// The marks in the order of the convention above.
+    fn first_nearest_top_left(&self, columns: usize, rows: usize) -> Vec<Option<usize>> {
+        let (width, height) = (self.rectangle.width, self.rectangle.height);
+        let order = first_nearest_top_left(self.corners_px, (width, height), (columns, rows));
+        order.of(columns, rows, width, height).map(|place| self.marks[place]).collect()
+    }
+}
+
 /// A full rectangle of marks: `marks[j * width + i]`.
-struct Rectangle {
+struct FullRectangle {
     width: usize,
     height: usize,
     marks: Vec<usize>,
 }
+
+/// Least side of a complete grid that is told to be another board than the one asked for.
+const LEAST_NAMED_SIDE: usize = 3;
 
 /// The steps that a seed may have taken for rows and columns, undone: none, or a diagonal for one of them.
 const STRAIGHTENINGS: [[i32; 4]; 5] =
     [[1, 0, 0, 1], [1, 1, 0, 1], [1, -1, 0, 1], [1, 0, 1, 1], [1, 0, -1, 1]];
 
 /// Reads the lattice as a full rectangle of the asked size, either way round.
-fn rectangle(lattice: &Lattice, seen: usize, columns: usize, rows: usize) -> Result<Rectangle, GridError> {
+fn rectangle(
+    lattice: &Lattice,
+    seen: usize,
+    columns: usize,
+    rows: usize,
+) -> Result<FullRectangle, GridError> {
     let found = lattice.len();
     let full = STRAIGHTENINGS.iter().find_map(|straightening| full_rectangle(lattice, straightening));
     if let Some(full) = full {
@@ -140,9 +214,8 @@ fn rectangle(lattice: &Lattice, seen: usize, columns: usize, rows: usize) -> Res
         if sides == (columns.max(rows), columns.min(rows)) {
             return Ok(full);
         }
-        // A complete grid of another size, unless it is one whose outer row or column is missing.
-        if found > columns.saturating_mul(rows) || sides.0 > columns.max(rows) || sides.1 > columns.min(rows)
-        {
+        // Texture makes complete grids too, of two by some.
+        if sides.1 >= LEAST_NAMED_SIDE || found > columns.saturating_mul(rows) {
             let (found_columns, found_rows) = sides;
             return Err(GridError::WrongSize { columns, rows, found_columns, found_rows });
         }
@@ -162,11 +235,10 @@ fn rectangle(lattice: &Lattice, seen: usize, columns: usize, rows: usize) -> Res
 /// The one full rectangle of the asked size in a lattice with a few stray marks beside it (texture that
 /// happens to lie where the next mark would). A larger board has at least a whole row more, which is more
 /// strays than the caller lets pass.
-fn only_rectangle(lattice: &Lattice, columns: usize, rows: usize) -> Option<Rectangle> {
+fn only_rectangle(lattice: &Lattice, columns: usize, rows: usize) -> Option<FullRectangle> {
     let mut only = None;
-    for [a, b, c, d] in STRAIGHTENINGS {
-        let straight: Lattice =
-            lattice.iter().map(|((i, j), &mark)| ((a * i + b * j, c * i + d * j), mark)).collect();
+    for straightening in STRAIGHTENINGS {
+        let straight = straightened(lattice, &straightening);
         for (width, height) in [(columns, rows), (rows, columns)] {
             for &(i, j) in straight.keys() {
                 let marks: Option<Vec<usize>> = (0..height as i32)
@@ -177,7 +249,7 @@ fn only_rectangle(lattice: &Lattice, columns: usize, rows: usize) -> Option<Rect
                 if only.is_some() {
                     return None;
                 }
-                only = Some(Rectangle { width, height, marks });
+                only = Some(FullRectangle { width, height, marks });
             }
             if columns == rows {
                 break;
@@ -187,8 +259,13 @@ fn only_rectangle(lattice: &Lattice, columns: usize, rows: usize) -> Option<Rect
     only
 }
 
+/// The lattice seen in other steps.
+fn straightened(lattice: &Lattice, [a, b, c, d]: &[i32; 4]) -> Lattice {
+    lattice.iter().map(|((i, j), &mark)| ((a * i + b * j, c * i + d * j), mark)).collect()
+}
+
 /// The lattice seen in other steps, if it fills its bounding rectangle there.
-fn full_rectangle(lattice: &Lattice, [a, b, c, d]: &[i32; 4]) -> Option<Rectangle> {
+fn full_rectangle(lattice: &Lattice, [a, b, c, d]: &[i32; 4]) -> Option<FullRectangle> {
     let straight = |(i, j): &Place| (a * i + b * j, c * i + d * j);
     let places = || lattice.keys().map(straight);
     let (low_i, high_i) = (places().map(|p| p.0).min()?, places().map(|p| p.0).max()?);
@@ -202,46 +279,70 @@ fn full_rectangle(lattice: &Lattice, [a, b, c, d]: &[i32; 4]) -> Option<Rectangl
         let (i, j) = straight(place);
         marks[(j - low_j) as usize * width + (i - low_i) as usize] = mark;
     }
-    Some(Rectangle { width, height, marks })
+    Some(FullRectangle { width, height, marks })
 }
 
-impl Rectangle {
+impl FullRectangle {
     fn mark(&self, i: usize, j: usize) -> usize {
         self.marks[j * self.width + i]
     }
 
     /// The marks in the order of the convention above.
     fn first_nearest_top_left(&self, centres: &[Vec2], columns: usize, rows: usize) -> Vec<usize> {
-        let centre = |i: usize, j: usize| centres[self.mark(i, j)];
-        // Does (i, j) turn the way (u, v) does? Summed over the whole outline, so no single cell decides.
         let (w, h) = (self.width - 1, self.height - 1);
-        let diagonals = ((centre(w, h) - centre(0, 0)), (centre(0, h) - centre(w, 0)));
-        let is_right_handed = diagonals.0.perp(&diagonals.1) > 0.0;
-        // Orders: swap the axes or not, reverse either. Handedness flips with each swap and each reversal.
-        let mut best: Option<(f64, [bool; 3])> = None;
-        for swap in [false, true] {
-            for (flip_i, flip_j) in [(false, false), (true, false), (false, true), (true, true)] {
-                let size = if swap { (self.height, self.width) } else { (self.width, self.height) };
-                let keeps_hand = is_right_handed ^ swap ^ flip_i ^ flip_j;
-                if size != (columns, rows) || !keeps_hand {
-                    continue;
-                }
-                let first = centre(if flip_i { w } else { 0 }, if flip_j { h } else { 0 });
-                let distance = first.x + first.y;
-                if best.is_none_or(|(least, _)| distance < least) {
-                    best = Some((distance, [swap, flip_i, flip_j]));
-                }
+        let corners_px = [(0, 0), (w, 0), (0, h), (w, h)].map(|(i, j)| centres[self.mark(i, j)]);
+        let order = first_nearest_top_left(corners_px, (self.width, self.height), (columns, rows));
+        order.of(columns, rows, self.width, self.height).map(|place| self.marks[place]).collect()
+    }
+}
+
+/// Whether the axes of a rectangle are swapped, and which are reversed.
+struct Order {
+    swap: bool,
+    flip_i: bool,
+    flip_j: bool,
+}
+
+impl Order {
+    /// The places of a `width x height` rectangle in the order of a board.
+    fn of(self, columns: usize, rows: usize, width: usize, height: usize) -> impl Iterator<Item = usize> {
+        let Order { swap, flip_i, flip_j } = self;
+        (0..rows).flat_map(move |row| (0..columns).map(move |column| (column, row))).map(
+            move |(column, row)| {
+                let (i, j) = if swap { (row, column) } else { (column, row) };
+                let i = if flip_i { width - 1 - i } else { i };
+                (if flip_j { height - 1 - j } else { j }) * width + i
+            },
+        )
+    }
+}
+
+/// The order of the convention above, of a rectangle with these corners: at (0, 0), (w, 0), (0, h) and (w, h).
+fn first_nearest_top_left(
+    corners_px: [Vec2; 4],
+    (width, height): (usize, usize),
+    asked: (usize, usize),
+) -> Order {
+    let [start, right, below, across] = corners_px;
+    // Does (i, j) turn the way (u, v) does? Summed over the whole outline, so no single cell decides.
+    let is_right_handed = (across - start).perp(&(below - right)) > 0.0;
+    // Orders: swap the axes or not, reverse either. Handedness flips with each swap and each reversal.
+    let mut best: Option<(f64, Order)> = None;
+    for swap in [false, true] {
+        for (flip_i, flip_j) in [(false, false), (true, false), (false, true), (true, true)] {
+            let size = if swap { (height, width) } else { (width, height) };
+            let keeps_hand = is_right_handed ^ swap ^ flip_i ^ flip_j;
+            if size != asked || !keeps_hand {
+                continue;
+            }
+            let first = corners_px[usize::from(flip_i) + 2 * usize::from(flip_j)];
+            let distance = first.x + first.y;
+            if best.as_ref().is_none_or(|(least, _)| distance < *least) {
+                best = Some((distance, Order { swap, flip_i, flip_j }));
             }
         }
-        let [swap, flip_i, flip_j] = best.map_or([false; 3], |(_, order)| order);
-        (0..rows)
-            .flat_map(|row| (0..columns).map(move |column| (column, row)))
-            .map(|(column, row)| {
-                let (i, j) = if swap { (row, column) } else { (column, row) };
-                self.mark(if flip_i { w - i } else { i }, if flip_j { h - j } else { j })
-            })
-            .collect()
     }
+    best.map_or(Order { swap: false, flip_i: false, flip_j: false }, |(_, order)| order)
 }
 
 /// Every inner mark of a row or column lies near the middle of its neighbours.

@@ -110,6 +110,31 @@ pub(super) fn fit_near_edges<T: Level>(
     None
 }
 
+/// Root mean square of what a crossing leaves of the levels in a window about its corner, as part of its amplitude.
+pub(super) fn misfit<T: Level>(
+    image: &Raster<T>,
+    crossing: &Crossing,
+    window: &Window,
+    curvatures: [f64; 2],
+) -> Option<f64> {
+    let pixels = pixels_in(image, crossing.corner, window)?;
+    let along = directions(crossing);
+    let side = |i: usize, offset: &Vec2| {
+        let normal = Vec2::new(-along[i].y, along[i].x);
+        let (t, edge) = (along[i].dot(offset), Edge::new(crossing.edges_px[i]));
+        let reach_px = edge.reach_px();
+        let d = (normal.dot(offset) - 0.5 * curvatures[i] * t * t).clamp(-reach_px, reach_px);
+        1.0 - 2.0 * edge.coverage(d, &normal).0
+    };
+    let left = |(offset, level): &Pixel| {
+        let product = crossing.amplitude * side(0, offset) * side(1, offset);
+        let left = level - (crossing.mean + crossing.slope.dot(offset) + product);
+        left * left
+    };
+    let mean = pixels.iter().map(left).sum::<f64>() / pixels.len() as f64;
+    Some(mean.sqrt() / crossing.amplitude.abs())
+}
+
 fn fit(
     pixels: &[Pixel],
     start: Crossing,

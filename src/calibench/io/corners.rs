@@ -80,19 +80,16 @@ fn weighted(
     grouped(file, rows, |numbers| Some(weight(numbers[4])))
 }
 
-/// One view's marks while they are collected.
-#[derive(Default)]
-struct Marks {
-    points: Vec<Vec2>,
-    pixels: Vec<Vec2>,
-    weights: Vec<f64>,
-}
-
-impl Marks {
-    fn view(self) -> Result<View, ViewError> {
-        let view = View::new(self.points, self.pixels)?;
-        if self.weights.is_empty() { Ok(view) } else { view.with_weights(self.weights) }
-    }
+/// The view of rows of points and pixels, weighted if `weight` tells any.
+fn view_of<const N: usize>(
+    rows: &[[f64; N]],
+    weight: impl Fn(&[f64; N]) -> Option<f64>,
+) -> Result<View, ViewError> {
+    let points = rows.iter().map(|row| Vec2::new(row[0], row[1])).collect();
+    let pixels = rows.iter().map(|row| Vec2::new(row[2], row[3])).collect();
+    let weights: Vec<f64> = rows.iter().filter_map(weight).collect();
+    let view = View::new(points, pixels)?;
+    if weights.is_empty() { Ok(view) } else { view.with_weights(weights) }
 }
 
 fn grouped<const N: usize>(
@@ -100,36 +97,34 @@ fn grouped<const N: usize>(
     rows: Vec<Row<2, N>>,
     weight: impl Fn(&[f64; N]) -> Option<f64>,
 ) -> Result<CornerFile, TableError> {
-    refuse_repeated_points(file, &rows)?;
-    let mut index_of = BTreeMap::new();
-    let mut views: Vec<(String, Marks)> = Vec::new();
-    for Row { names: [view, _], numbers, .. } in rows {
-        let index = *index_of.entry(view.clone()).or_insert_with(|| {
-            views.push((view, Marks::default()));
-            views.len() - 1
-        });
-        let marks = &mut views[index].1;
-        marks.points.push(Vec2::new(numbers[0], numbers[1]));
-        marks.pixels.push(Vec2::new(numbers[2], numbers[3]));
-        marks.weights.extend(weight(&numbers));
-    }
-    let mut corners = CornerFile { view_names: Vec::new(), views: Vec::new() };
-    for (name, marks) in views {
-        let view = marks.view().map_err(|cause| TableError::View {
-            file: file.into(),
-            view: name.clone(),
-            cause,
-        })?;
-        corners.view_names.push(name);
-        corners.views.push(view);
-    }
-    Ok(corners)
+    let (view_names, views) = by_view(file, rows, |rows| view_of(rows, &weight))?;
+    Ok(CornerFile { view_names, views })
 }
 
-pub(super) fn refuse_repeated_points<const N: usize>(
+/// Names and views of rows `view, point`, both in order of first appearance.
+pub(super) fn by_view<const N: usize, V>(
     file: &str,
-    rows: &[Row<2, N>],
-) -> Result<(), TableError> {
+    rows: Vec<Row<2, N>>,
+    view_of: impl Fn(&[[f64; N]]) -> Result<V, ViewError>,
+) -> Result<(Vec<String>, Vec<V>), TableError> {
+    refuse_repeated_points(file, &rows)?;
+    let mut index_of = BTreeMap::new();
+    let mut groups: Vec<(String, Vec<[f64; N]>)> = Vec::new();
+    for Row { names: [view, _], numbers, .. } in rows {
+        let index = *index_of.entry(view.clone()).or_insert_with(|| {
+            groups.push((view, Vec::new()));
+            groups.len() - 1
+        });
+        groups[index].1.push(numbers);
+    }
+    let of_group = |(view, rows): (String, Vec<[f64; N]>)| match view_of(&rows) {
+        Ok(seen) => Ok((view, seen)),
+        Err(cause) => Err(TableError::View { file: file.into(), view, cause }),
+    };
+    Ok(groups.into_iter().map(of_group).collect::<Result<Vec<_>, _>>()?.into_iter().unzip())
+}
+
+fn refuse_repeated_points<const N: usize>(file: &str, rows: &[Row<2, N>]) -> Result<(), TableError> {
     let mut first_line = BTreeMap::new();
     for row in rows {
         if let Some(first) = first_line.insert(&row.names, row.line) {

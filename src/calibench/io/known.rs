@@ -2,20 +2,21 @@
 //! `result.json`: a camera with its poses and their joint covariance, or a map of a plane with its points.
 
 use super::input::{InputError, MOST_TABLE_BYTES, read_regular_text};
-use super::result::{ResultError, parse_camera};
+use super::result::{ResultError, parse_lens_camera};
 use crate::calibrate::Covariance;
-use crate::camera::{Camera, FreeParameters, Parameter, UnknownParameter};
+use crate::camera::{Camera, FreeParameters, Lens, Model, Parameter, UnknownParameter};
 use crate::geometry::{Pose, Vec2, Vec3, rotation};
 use crate::planar::{PlaneCalibration, PlaneError, PlaneModel, calibrate_plane};
 use nalgebra::{DMatrix, MatrixXx6, SMatrix};
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 use std::path::Path;
 
 /// A calibrated camera as its file tells of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KnownCalibration {
-    /// The camera.
-    pub camera: Camera,
+    /// The camera, with a lens of any model.
+    pub camera: Camera<Lens>,
     /// Width and height, px.
     pub image_size: Option<(usize, usize)>,
     /// Names of the views.
@@ -28,6 +29,21 @@ pub struct KnownCalibration {
     pub sigma_px: f64,
     /// Degrees of freedom of that noise.
     pub degrees_of_freedom: usize,
+    /// Whether something was known of parameters beforehand, and counts in the covariance.
+    pub has_priors: bool,
+    /// Whether the board's shape was estimated: its marks then do not lie in a plane.
+    pub has_board: bool,
+}
+
+impl KnownCalibration {
+    /// The camera for what knows Brown-Conrady's lens only; `file` names the result in the error.
+    ///
+    /// # Errors
+    /// [`ResultError::OtherModel`].
+    pub fn brown_conrady(&self, file: &str) -> Result<Camera, ResultError> {
+        let model = self.camera.distortion.model();
+        self.camera.brown_conrady().ok_or(ResultError::OtherModel { file: file.into(), model })
+    }
 }
 
 /// What a result is of.
@@ -106,6 +122,10 @@ struct CameraFields {
     degrees_of_freedom: usize,
     #[serde(default)]
     views: Vec<ViewFields>,
+    #[serde(default)]
+    priors: Vec<IgnoredAny>,
+    #[serde(default)]
+    board: Option<IgnoredAny>,
 }
 
 #[derive(Deserialize)]
@@ -136,7 +156,7 @@ struct PlanePoint {
 #[derive(Deserialize)]
 struct Kind {
     #[serde(default)]
-    camera: Option<serde::de::IgnoredAny>,
+    camera: Option<IgnoredAny>,
 }
 
 /// Reads a result.
@@ -158,9 +178,9 @@ pub fn parse_known(file: &str, text: &str) -> Result<Known, KnownError> {
         let fields: PlaneFields = serde_json::from_str(text).map_err(format)?;
         return Ok(Known::Plane(Box::new(plane(file, &fields)?)));
     }
-    let (camera, image_size) = parse_camera(file, text)?;
+    let (camera, image_size) = parse_lens_camera(file, text)?;
     let fields: CameraFields = serde_json::from_str(text).map_err(format)?;
-    let free = free_of(file, &fields.free)?;
+    let free = free_of(file, &fields.free, camera.distortion.model())?;
     let no_covariance = || KnownError::NoCovariance { file: file.into() };
     Ok(Known::Camera(Box::new(KnownCalibration {
         camera,
@@ -170,17 +190,22 @@ pub fn parse_known(file: &str, text: &str) -> Result<Known, KnownError> {
         covariance: covariance(free, &fields).ok_or_else(no_covariance)?,
         sigma_px: fields.sigma_px.filter(|sigma| *sigma >= 0.0).ok_or_else(no_covariance)?,
         degrees_of_freedom: fields.degrees_of_freedom,
+        has_priors: !fields.priors.is_empty(),
+        has_board: fields.board.is_some(),
     })))
 }
 
-fn free_of(file: &str, names: &[String]) -> Result<FreeParameters, KnownError> {
+fn free_of(file: &str, names: &[String], model: Model) -> Result<FreeParameters, KnownError> {
+    let wrong = |what: String| Err(KnownError::Shape { file: file.into(), what });
     let mut free = FreeParameters::NONE;
     for name in names {
         let parameter: Parameter =
             name.parse().map_err(|cause| KnownError::Free { file: file.into(), cause })?;
         if free.iter().last() >= Some(parameter) {
-            let what = format!("free: {parameter} is out of order");
-            return Err(KnownError::Shape { file: file.into(), what });
+            return wrong(format!("free: {parameter} is out of order"));
+        }
+        if !model.parameters().any(|other| other == parameter) {
+            return wrong(format!("free: the {model} model has no {parameter}"));
         }
         free = free.with(parameter);
     }
@@ -262,7 +287,11 @@ mod tests {
             let calibration = calibration(&settings);
             let text = CalibrationFields::of(&calibration.clone().into(), &[], None).to_json();
             let Known::Camera(known) = parse_known("r.json", &text).unwrap() else { panic!("a camera") };
-            assert_eq!((known.camera, &known.covariance), (calibration.camera, &calibration.covariance));
+            assert_eq!(
+                (known.camera, &known.covariance),
+                (calibration.camera.into(), &calibration.covariance)
+            );
+            assert!(!known.has_priors && !known.has_board);
             assert_eq!(
                 (known.sigma_px, known.degrees_of_freedom),
                 (calibration.sigma_px, calibration.degrees_of_freedom)
@@ -281,6 +310,9 @@ mod tests {
         assert!(fail(&format!(r#"{camera}, "sigma_px": 0.1, {view}}}"#)).contains("no joint covariance"));
         assert!(fail(&format!(r#"{camera}, "free": ["cx", "fx"]}}"#)).contains("fx is out of order"));
         assert!(fail(&format!(r#"{camera}, "free": ["f"]}}"#)).contains("`f`"));
+        assert!(
+            fail(&format!(r#"{camera}, "free": ["k4"]}}"#)).contains("the brown-conrady model has no k4")
+        );
         assert!(fail(r#"{"mode": "oblique", "points": []}"#).contains("oblique"));
         assert!(fail(r#"{"mode": "planar", "points": []}"#).contains("at least 4"));
         assert!(fail("{}").starts_with("r.json:1:"));

@@ -7,6 +7,7 @@ pub mod checks;
 pub mod corners;
 pub mod data;
 pub mod digits;
+pub mod doubts;
 pub mod ends;
 pub mod files;
 pub mod formats;

@@ -76,15 +76,27 @@ impl Overlay {
     /// Draws a detected grid: a cross on every mark, a line along each row in the row's colour, a circle
     /// around the first mark. `marks` are in rows of `columns`.
     pub fn grid(&mut self, marks: &[Vec2], columns: usize) {
+        let marks: Vec<Option<Vec2>> = marks.iter().copied().map(Some).collect();
+        self.seen_grid(&marks, columns);
+    }
+
+    /// The same of a grid of which some marks were not seen.
+    pub fn seen_grid(&mut self, marks: &[Option<Vec2>], columns: usize) {
         let colour = |mark: usize| ROW_COLOURS[mark / columns.max(1) % ROW_COLOURS.len()];
         for (row, marks) in marks.chunks(columns.max(1)).enumerate() {
-            marks.windows(2).for_each(|pair| self.line(pair[0], pair[1], colour(row * columns)));
+            for pair in marks.windows(2) {
+                if let [Some(from), Some(to)] = *pair {
+                    self.line(from, to, colour(row * columns));
+                }
+            }
         }
-        for (i, &mark) in marks.iter().enumerate() {
-            self.cross(mark, 2.5, colour(i));
+        for (i, mark) in marks.iter().enumerate() {
+            if let Some(mark) = *mark {
+                self.cross(mark, 2.5, colour(i));
+            }
         }
-        if let Some(&first) = marks.first() {
-            self.circle(first, 6.0, ROW_COLOURS[0]);
+        if let Some(Some(first)) = marks.first() {
+            self.circle(*first, 6.0, ROW_COLOURS[0]);
         }
     }
 

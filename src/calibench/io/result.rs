@@ -277,6 +277,10 @@ pub struct CalibrationFields {
     pub camera: LensFields,
     /// Width and height, px, if known.
     pub image_size: Option<(usize, usize)>,
+    /// How far the photographs tell which mark is the board's first: `fixed`, `half-turn` or `quarter-turn`; the caller adds
+    /// it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub orientation: Option<&'static str>,
     /// The shape of the board, where it was estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub board: Option<BoardFields>,
@@ -339,6 +343,7 @@ impl CalibrationFields {
             written_by: format!("calibench {}", env!("CARGO_PKG_VERSION")),
             camera: LensFields(calibration.camera),
             image_size,
+            orientation: None,
             board: calibration.board.map(BoardFields::of),
             free: calibration.free.iter().map(Parameter::name).collect(),
             fy_per_fx: calibration.covariance.fy_per_fx,

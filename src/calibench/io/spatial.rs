@@ -1,9 +1,8 @@
 //! What was seen of a target in three dimensions? Corner files with a column Z: `view,point,X,Y,Z,u,v`.
 
-use super::corners::{parse_corners, refuse_repeated_points};
+use super::corners::{by_view, parse_corners};
 use super::table::{Column, Row, TableError, columns, read_table};
 use crate::tsai::SpatialView;
-use std::collections::BTreeMap;
 
 /// The views of a file, in order of first appearance.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,23 +36,11 @@ pub fn parse_spatial(file: &str, bytes: &[u8]) -> Result<SpatialFile, TableError
         return Ok(SpatialFile { view_names: flat.view_names, views });
     }
     let rows: Vec<Row<2, 5>> = read_table(file, bytes, ["view", "point"], COLUMNS)?;
-    refuse_repeated_points(file, &rows)?;
-    let mut index_of = BTreeMap::new();
-    let mut views: Vec<(String, Vec<[f64; 5]>)> = Vec::new();
-    for Row { names: [view, _], numbers, .. } in rows {
-        let index = *index_of.entry(view.clone()).or_insert_with(|| {
-            views.push((view, Vec::new()));
-            views.len() - 1
-        });
-        views[index].1.push(numbers);
-    }
-    let of_view = |(view, marks): (String, Vec<[f64; 5]>)| {
+    let (view_names, views) = by_view(file, rows, |marks| {
         let points = marks.iter().map(|[x, y, z, ..]| [*x, *y, *z].into()).collect();
         let pixels = marks.iter().map(|[.., u, v]| [*u, *v].into()).collect();
-        let refused = |cause| TableError::View { file: file.into(), view: view.clone(), cause };
-        SpatialView::new(points, pixels).map(|seen| (view.clone(), seen)).map_err(refused)
-    };
-    let (view_names, views) = views.into_iter().map(of_view).collect::<Result<_, _>>()?;
+        SpatialView::new(points, pixels)
+    })?;
     Ok(SpatialFile { view_names, views })
 }
 

@@ -3,7 +3,10 @@
 
 use super::discs::{NotFound, ordered_discs};
 use crate::board::{Board, BoardError, Pattern};
-use crate::detect::{ChessboardError, GridError, chessboard, circle_grid_of, sparse_dots_of};
+use crate::detect::{
+    ChessboardError, GridError, SeenBoard, chessboard, circle_grid_of, seen_chessboard, seen_circle_grid_of,
+    sparse_dots_of,
+};
 use crate::geometry::Vec2;
 use crate::io::Grey;
 use std::fmt;
@@ -212,6 +215,33 @@ impl BoardSpec {
             MarkKind::Circles => ordered_discs(photo, |discs| circle_grid_of(discs, columns, rows)),
         };
         Ok(grid?.centres_px())
+    }
+
+    /// The marks that are seen in a photograph. Of a chessboard or a dense grid of discs some may be hidden, outside of the
+    /// image or in glare, where it is certain which ([`seen_chessboard`], [`seen_circle_grid_of`]); a few dots must all be
+    /// there.
+    ///
+    /// # Errors
+    /// See [`DetectError`].
+    pub fn see(&self, photo: &Grey) -> Result<SeenBoard, NotFound> {
+        let (columns, rows) = (self.board.columns(), self.board.rows());
+        match self.kind {
+            MarkKind::Chess => {
+                let seen = match photo {
+                    Grey::U8(image) => seen_chessboard(image, columns, rows),
+                    Grey::U16(image) => seen_chessboard(image, columns, rows),
+                    Grey::F32(image) => seen_chessboard(image, columns, rows),
+                };
+                seen.map_err(|reason| NotFound { reason: reason.into(), candidates_px: Vec::new() })
+            }
+            MarkKind::Dots => {
+                ordered_discs(photo, |discs| sparse_dots_of(discs, columns, rows)).map(SeenBoard::from)
+            }
+            // A whole board of either kind of discs comes before a part of one.
+            MarkKind::Circles => ordered_discs(photo, |discs| circle_grid_of(discs, columns, rows))
+                .map(SeenBoard::from)
+                .or_else(|_| ordered_discs(photo, |discs| seen_circle_grid_of(discs, columns, rows))),
+        }
     }
 
     fn corners(&self, photo: &Grey) -> Result<Vec<Vec2>, DetectError> {

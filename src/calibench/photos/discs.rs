@@ -1,7 +1,7 @@
 //! Where are a board's discs in a photograph, be they dark on bright ground or bright on dark?
 
 use super::DetectError;
-use crate::detect::{Blob, BlobOptions, DotGrid, GridError, Polarity, blobs};
+use crate::detect::{Blob, BlobOptions, GridError, Polarity, blobs};
 use crate::geometry::Vec2;
 use crate::io::Grey;
 use crate::raster::{Level, Raster};
@@ -21,10 +21,10 @@ pub struct NotFound {
 ///
 /// # Errors
 /// Neither makes the board: the reason of whichever kind has more discs.
-pub fn ordered_discs(
+pub fn ordered_discs<Ordered>(
     photo: &Grey,
-    order: impl Fn(&[Blob]) -> Result<DotGrid, GridError>,
-) -> Result<DotGrid, NotFound> {
+    order: impl Fn(&[Blob]) -> Result<Ordered, GridError>,
+) -> Result<Ordered, NotFound> {
     match photo {
         Grey::U8(image) => of_either_polarity(image, order),
         Grey::U16(image) => of_either_polarity(image, order),
@@ -32,10 +32,10 @@ pub fn ordered_discs(
     }
 }
 
-fn of_either_polarity<T: Level>(
+fn of_either_polarity<T: Level, Ordered>(
     image: &Raster<T>,
-    order: impl Fn(&[Blob]) -> Result<DotGrid, GridError>,
-) -> Result<DotGrid, NotFound> {
+    order: impl Fn(&[Blob]) -> Result<Ordered, GridError>,
+) -> Result<Ordered, NotFound> {
     let of = |polarity| {
         let discs = blobs(image, &BlobOptions { polarity, ..BlobOptions::default() });
         order(&discs).map_err(|reason| NotFound {

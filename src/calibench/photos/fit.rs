@@ -9,9 +9,9 @@
 
 use crate::board::{Board, Pattern, View};
 use crate::calibrate::{CalibrationError, LensCalibration, Settings, calibrate_lens, locate};
-use crate::camera::Camera;
+use crate::camera::{Camera, Lens};
 use crate::detect::disc_biases;
-use crate::geometry::Vec2;
+use crate::geometry::{Pose, Vec2};
 
 /// Rounds end when no disc's bias changes by more than this, px: a tenth of what the best detection on
 /// noise-free images leaves.
@@ -187,7 +187,9 @@ impl Fitter<'_> {
         loop {
             // An estimate that puts a disc behind the camera predicts no bias: it is left uncorrected, and
             // the RMSE tells.
-            let Some(biases) = biases(&calibration, board) else { return Ok((calibration, corrected, None)) };
+            let Some(biases) = biases(&calibration, views, board) else {
+                return Ok((calibration, corrected, None));
+            };
             let change = last.as_ref().map_or(f64::INFINITY, |last| largest_change(last, &biases));
             if change < SETTLED_PX || rounds == MOST_ROUNDS {
                 let bias = BiasCorrection {
@@ -206,22 +208,37 @@ impl Fitter<'_> {
     }
 }
 
-fn biases(calibration: &LensCalibration, board: &Board) -> Option<Vec<Vec<Vec2>>> {
-    let poses = calibration.cam_from_target.iter();
-    match calibration.camera.brown_conrady() {
-        Some(camera) => poses.map(|pose| disc_biases(&camera, pose, board).ok()).collect(),
-        None => poses.map(|pose| disc_biases(&calibration.camera, pose, board).ok()).collect(),
+fn biases(calibration: &LensCalibration, views: &[View], board: &Board) -> Option<Vec<Vec<Vec2>>> {
+    let views = views.iter().zip(&calibration.cam_from_target);
+    views.map(|(view, pose)| of_marks(view, board, biases_at(&calibration.camera, pose, board)?)).collect()
+}
+
+/// A Brown-Conrady lens gives the bits of that model's own projection.
+fn biases_at(camera: &Camera<Lens>, pose: &Pose, board: &Board) -> Option<Vec<Vec2>> {
+    match camera.brown_conrady() {
+        Some(plain) => disc_biases(&plain, pose, board).ok(),
+        None => disc_biases(camera, pose, board).ok(),
     }
+}
+
+/// Of the values of a board's marks those of the marks in a view; `None` if one of them is none of the board's.
+fn of_marks(view: &View, board: &Board, all: Vec<Vec2>) -> Option<Vec<Vec2>> {
+    let points = board.points();
+    if view.points() == points {
+        return Some(all);
+    }
+    let value = |point: &Vec2| Some(all[points.iter().position(|other| other == point)?]);
+    view.points().iter().map(value).collect()
 }
 
 /// A view of discs without the bias that a known camera predicts for them at the pose that it finds, in turns until
 /// that settles; `None` where the camera does not find the board.
-pub fn without_disc_bias(camera: &Camera, view: &View, board: &Board) -> Option<View> {
+pub fn without_disc_bias(camera: &Camera<Lens>, view: &View, board: &Board) -> Option<View> {
     let mut corrected = view.clone();
     let mut last: Option<Vec<Vec2>> = None;
     for _ in 0..MOST_ROUNDS {
-        let pose = locate(&(*camera).into(), &corrected)?.cam_from_target;
-        let biases = disc_biases(camera, &pose, board).ok()?;
+        let pose = locate(camera, &corrected)?.cam_from_target;
+        let biases = of_marks(view, board, biases_at(camera, &pose, board)?)?;
         corrected = without_bias(view, &biases);
         let now = [biases];
         if last.replace(now[0].clone()).is_some_and(|last| largest_change(&[last], &now) < SETTLED_PX) {
@@ -289,11 +306,28 @@ mod tests {
     fn a_known_camera_takes_the_bias_off_views_it_has_not_seen() {
         let (truth, scene) = (Truth::example(), Scene::example());
         for (view, exact) in biased_views().iter().zip(scene.exact()) {
-            let corrected = without_disc_bias(&truth.camera, view, &Truth::example_board()).unwrap();
+            let corrected = without_disc_bias(&truth.camera.into(), view, &Truth::example_board()).unwrap();
             let left = corrected.pixels().iter().zip(exact.pixels()).map(|(a, b)| (a - b).norm());
             // The bias changes by a part in a thousand of its change with the pose.
             assert!(left.fold(0.0, f64::max) < SETTLED_PX);
         }
+    }
+
+    #[test]
+    fn discs_that_are_hidden_leave_the_bias_of_the_others() {
+        let settings = Settings::standard();
+        let board = Truth::example_board();
+        let fitter = Fitter { settings: &settings, discs: Some(&board), reject_factor: None };
+        let mut views = biased_views();
+        let (points, pixels) = (views[2].points()[5..].to_vec(), views[2].pixels()[5..].to_vec());
+        views[2] = View::new(points, pixels).unwrap();
+        let fit = fitter.fit(&views).unwrap();
+        assert!(fit.bias.unwrap().settled() && fit.calibration.rmse_px < SETTLED_PX);
+        assert_eq!(fit.calibration.residuals[2].len(), 58);
+        let known = without_disc_bias(&Truth::example_camera().into(), &views[2], &board).unwrap();
+        let exact = &Scene::example().exact()[2];
+        let left = known.pixels().iter().zip(&exact.pixels()[5..]).map(|(a, b)| (a - b).norm());
+        assert!(left.fold(0.0, f64::max) < SETTLED_PX);
     }
 
     #[test]

@@ -12,6 +12,7 @@ mod blur;
 mod coverage;
 mod outline;
 mod sensor;
+mod window;
 
 pub use sensor::{SensorNoise, Shading};
 
@@ -20,7 +21,8 @@ use crate::camera::Camera;
 use crate::geometry::{Pose, Vec2, Vec3};
 use crate::raster::Raster;
 use coverage::Coverage;
-use outline::{Outline, Piece};
+use outline::{Arc, Outline, Piece};
+use window::Window;
 
 /// Levels of a board, and what surrounds it. Intensity is linear: black 0, white 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,6 +101,17 @@ pub enum RenderError {
         /// Radius up to which the model is one-to-one.
         limit: f64,
     },
+    /// Part of the board lies so close to the plane of the camera that its pixel is beyond all numbers, or is
+    /// known to no part of a pixel.
+    #[error(
+        "board point ({x:.3}, {y:.3}) is too close to the plane of the camera for a pixel; increase the distance"
+    )]
+    TooNear {
+        /// Board X.
+        x: f64,
+        /// Board Y.
+        y: f64,
+    },
     /// A setting is out of its domain.
     #[error("{name} = {value} cannot be rendered: {need}")]
     Setting {
@@ -130,7 +143,11 @@ impl Projector<'_> {
         if radius >= self.monotone_radius {
             return Err(RenderError::BeyondMonotoneRadius { x, y, radius, limit: self.monotone_radius });
         }
-        Ok(self.camera.pixel_from_normalised(&self.camera.distortion.distort(&ideal)))
+        let pixel = self.camera.pixel_from_normalised(&self.camera.distortion.distort(&ideal));
+        match pixel.x.is_finite() && pixel.y.is_finite() {
+            true => Ok(pixel),
+            false => Err(RenderError::TooNear { x, y }),
+        }
     }
 }
 
@@ -151,6 +168,7 @@ pub fn photograph(
     imaging: &Imaging,
 ) -> Result<Photograph, RenderError> {
     check(camera, imaging)?;
+    check_pose(cam_from_target)?;
     let monotone_radius = camera.distortion.monotone_radius();
     let projector = Projector { camera, cam_from_target, monotone_radius };
     let covered_by = |outlines: &[Outline]| -> Result<Coverage, RenderError> {
@@ -227,8 +245,19 @@ fn check(camera: &Camera, imaging: &Imaging) -> Result<(), RenderError> {
     )
 }
 
+fn check_pose(pose: &Pose) -> Result<(), RenderError> {
+    let mut entries = pose.rotation.iter().chain(pose.translation.iter());
+    match entries.find(|entry| !entry.is_finite()) {
+        Some(&value) => Err(RenderError::Setting { name: "pose", value, need: "need finite" }),
+        None => Ok(()),
+    }
+}
+
 /// A blur wider than any board's marks is a mistake of units, and its cost grows with the square.
 const MAX_BLUR_PX: f64 = 50.0;
+
+/// How far the end of a closed outline may lie from its begin, px: what is between them is covered wrongly.
+const CLOSED_PX: f64 = 1e-5;
 
 fn add_piece(
     coverage: &mut Coverage,
@@ -237,11 +266,23 @@ fn add_piece(
     blur_px: f64,
 ) -> Result<(), RenderError> {
     let curve = |t: f64| projector.pixel(&piece.at(t));
+    if let Piece::Circle { .. } = piece {
+        // Both ends are the same point but for the rounding of an angle, which a lens may make large.
+        let end = piece.at(1.0);
+        if (curve(1.0)? - curve(0.0)?).norm() > CLOSED_PX {
+            return Err(RenderError::TooNear { x: end.x, y: end.y });
+        }
+    }
+    let size = (coverage.width(), coverage.height());
     if blur_px > 0.0 {
         let kernel = blur::Kernel::new(blur_px);
-        outline::trace(&curve, piece.start_parts(), &kernel.steps(), &mut |arc| kernel.add(coverage, arc))
+        let window = Window::of(size, kernel.reach_px());
+        let add = &mut |arc: &Arc| kernel.add(coverage, arc);
+        outline::trace(&curve, piece.start_parts(), &kernel.steps(), &window, add)
     } else {
-        outline::trace(&curve, piece.start_parts(), &outline::Steps::SHARP, &mut |arc| coverage.add_arc(arc))
+        let window = Window::of(size, 0.0);
+        let add = &mut |arc: &Arc| coverage.add_arc(arc);
+        outline::trace(&curve, piece.start_parts(), &outline::Steps::SHARP, &window, add)
     }
 }
 
@@ -277,4 +318,40 @@ fn sheet_outline(board: &Board, margin: f64) -> Outline {
     let points = board.points();
     let reach = Vec2::new(beyond_mark, beyond_mark);
     Outline::rectangle(points[0] - reach, points[points.len() - 1] + reach)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::BrownConrady;
+
+    fn photographed(translation: Vec3) -> Result<Photograph, RenderError> {
+        let camera = Camera::pinhole(58.0, 58.0, 28.5, 18.0).with_distortion(BrownConrady::radial(0.1, 0.0));
+        let board = Board::chessboard(4, 3, 10.0).expect("4 x 3 corners are a board");
+        let pose = Pose { translation, ..Pose::identity() };
+        photograph(&camera, (58, 37), &board, &pose, &Imaging::default())
+    }
+
+    #[test]
+    fn a_pose_that_is_not_finite_is_refused() {
+        for translation in
+            [Vec3::new(0.0, f64::NAN, 50.0), Vec3::new(0.0, 0.0, f64::INFINITY), Vec3::repeat(f64::NAN)]
+        {
+            let refused = photographed(translation).unwrap_err();
+            assert!(matches!(refused, RenderError::Setting { name: "pose", .. }), "{refused}");
+        }
+    }
+
+    #[test]
+    fn a_board_whose_pixels_are_beyond_all_numbers_is_refused() {
+        let refused = photographed(Vec3::new(0.0, 0.0, 1e-150)).unwrap_err();
+        assert!(matches!(refused, RenderError::TooNear { .. }), "{refused}");
+    }
+
+    #[test]
+    fn a_board_before_the_lens_fills_the_image_with_one_mark() {
+        let image = photographed(Vec3::new(1.0, 2.0, 1e-6)).unwrap().image;
+        let first = image.get(0, 0);
+        assert!((0..37).all(|y| (0..58).all(|x| (image.get(x, y) - first).abs() < 1e-6)), "{first}");
+    }
 }

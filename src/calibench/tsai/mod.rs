@@ -100,6 +100,7 @@ pub struct TwoStage {
 /// [`TsaiError::Facing`].
 ///
 /// ```
+/// use calibench::geometry::Vec2;
 /// use calibench::synth::{Scene, Truth};
 /// use calibench::tsai::{Assumed, SpatialView, two_stage};
 ///
@@ -107,14 +108,13 @@ pub struct TwoStage {
 /// // The second view is tilted by 20 degrees; the camera's principal point is known.
 /// let view = SpatialView::from(&scene.exact()[1]);
 /// let truth = Truth::example_camera();
-/// let assumed = Assumed { principal_point_px: nalgebra_point(truth.cx, truth.cy), fy_per_fx: Some(1.0) };
+/// let assumed = Assumed { principal_point_px: Vec2::new(truth.cx, truth.cy), fy_per_fx: Some(1.0) };
 /// let found = two_stage(&view, &assumed)?;
 /// // Tsai's lens has one coefficient, the true one two: the focal length is off by a part in a thousand.
 /// assert!((found.camera.fy - 600.0).abs() < 2.0 && (found.camera.distortion.k1 + 0.18).abs() < 0.02);
 /// // The first faces the camera.
 /// let facing = two_stage(&SpatialView::from(&scene.exact()[0]), &assumed);
 /// assert!(facing.unwrap_err().to_string().contains("inseparable"));
-/// # fn nalgebra_point(u: f64, v: f64) -> calibench::geometry::Vec2 { calibench::geometry::Vec2::new(u, v) }
 /// # Ok::<(), calibench::tsai::TsaiError>(())
 /// ```
 pub fn two_stage(view: &SpatialView, assumed: &Assumed) -> Result<TwoStage, TsaiError> {

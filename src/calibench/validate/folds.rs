@@ -3,8 +3,8 @@
 
 use super::{Estimate, HoldOut, HoldOutError, hold_out};
 use crate::board::View;
-use crate::calibrate::{CalibrationError, Settings, calibrate};
-use crate::camera::Camera;
+use crate::calibrate::{CalibrationError, Settings, calibrate_lens};
+use crate::camera::{Camera, Lens};
 
 /// One part left out.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,7 +13,7 @@ pub struct Fold {
     /// Indices of the views left out: every so many-th.
     pub left_out: Vec<usize>,
     /// The camera of the others.
-    pub camera: Camera,
+    pub camera: Camera<Lens>,
     /// What the views left out say of it.
     pub hold_out: HoldOut,
 }
@@ -87,7 +87,7 @@ fn judged(
 ) -> Result<Fold, FoldError> {
     let (left_out, kept): (Vec<usize>, Vec<usize>) = (0..views.len()).partition(|view| view % folds == fold);
     let of = |indices: &[usize]| -> Vec<View> { indices.iter().map(|&view| views[view].clone()).collect() };
-    let result = calibrate(&of(&kept), settings).map_err(|source| FoldError::Rest { fold, source })?;
+    let result = calibrate_lens(&of(&kept), settings).map_err(|source| FoldError::Rest { fold, source })?;
     let estimate = Estimate {
         camera: &result.camera,
         covariance: &result.covariance,

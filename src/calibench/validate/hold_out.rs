@@ -17,9 +17,11 @@
 //! wrong by a few of its standard deviations moves the RMSE of hundreds of points hardly, and this by as many.
 
 use super::Ratio;
+use super::root::root;
+use super::slopes::{Estimated, Slopes};
 use crate::board::View;
 use crate::calibrate::{Covariance, locate};
-use crate::camera::{Camera, project_with_jacobian};
+use crate::camera::{Camera, Lens};
 use crate::distribution::{ChiSquare, fisher_tail};
 use crate::evaluate::Interval;
 use crate::geometry::{Pose, Vec2, Vec3};
@@ -28,8 +30,8 @@ use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector6};
 /// A calibration to be judged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate<'a> {
-    /// The camera.
-    pub camera: &'a Camera,
+    /// The camera, with a lens of any model.
+    pub camera: &'a Camera<Lens>,
     /// Covariance of what was estimated of it; of poses nothing is asked.
     pub covariance: &'a Covariance,
     /// Noise of a pixel coordinate (of a mark of weight 1), px.
@@ -145,7 +147,7 @@ pub enum HoldOutError {
 /// See [`HoldOutError`].
 ///
 /// ```
-/// use calibench::calibrate::{Settings, calibrate};
+/// use calibench::calibrate::{Settings, calibrate_lens};
 /// use calibench::synth::{Scene, Stream, StreamKey};
 /// use calibench::validate::{Estimate, hold_out};
 ///
@@ -153,7 +155,7 @@ pub enum HoldOutError {
 /// let photographs = |trial: u64| {
 ///     scene.observe(0.1, &mut Stream::open(StreamKey { seed: 1, scenario: "hold-out", trial, purpose: "noise" }))
 /// };
-/// let result = calibrate(&photographs(0), &Settings::standard())?;
+/// let result = calibrate_lens(&photographs(0), &Settings::standard())?;
 /// let estimate = |camera| Estimate {
 ///     camera,
 ///     covariance: &result.covariance,
@@ -175,7 +177,7 @@ pub fn hold_out(estimate: &Estimate, views: &[View], false_alarm: f64) -> Result
     }
     let unit =
         (sigma_px > 0.0 && sigma_px.is_finite()).then(|| &covariance.intrinsics / (sigma_px * sigma_px));
-    let root = unit.and_then(|unit| lower_root(&unit)).ok_or(HoldOutError::NoPrediction { sigma_px })?;
+    let root = unit.and_then(|unit| root(&unit)).ok_or(HoldOutError::NoPrediction { sigma_px })?;
     let mut all = Sums::zero(root.ncols());
     let mut judged = Vec::new();
     for (index, view) in views.iter().enumerate() {
@@ -192,21 +194,6 @@ pub fn hold_out(estimate: &Estimate, views: &[View], false_alarm: f64) -> Result
     })
 }
 
-/// `L` with `L L^T` the matrix, by its eigenvalues: what priors settle leaves next to nothing of some.
-fn lower_root(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    if matrix.iter().any(|x| !x.is_finite()) {
-        return None;
-    }
-    // Parameters differ in size by orders of magnitude.
-    let size = matrix.diagonal().map(|d| d.max(0.0).sqrt().max(f64::MIN_POSITIVE));
-    let n = matrix.nrows();
-    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] / (size[i] * size[j]));
-    let eigen = scaled.symmetric_eigen();
-    let root =
-        |i: usize, k: usize| size[i] * eigen.eigenvectors[(i, k)] * eigen.eigenvalues[k].max(0.0).sqrt();
-    Some(DMatrix::from_fn(n, n, root))
-}
-
 /// A located view: its pose, its residuals and its share of the sums.
 fn seen(
     estimate: &Estimate,
@@ -218,7 +205,7 @@ fn seen(
         return Err(HoldOutError::TooFewPoints { view: index, points: view.len() });
     }
     let lost = HoldOutError::NotLocated { view: index };
-    let located = locate(&(*estimate.camera).into(), view).ok_or(lost)?;
+    let located = locate(estimate.camera, view).ok_or(lost)?;
     let pose = located.cam_from_target;
     let sums = Sums::of_view(estimate, view, &pose, &located.residuals, root).ok_or(lost)?;
     Ok((pose, located.residuals, sums))
@@ -263,15 +250,17 @@ impl Sums {
         root: &DMatrix<f64>,
     ) -> Option<Sums> {
         let n = root.ncols();
+        let Covariance { free, fy_per_fx, .. } = *estimate.covariance;
+        let estimated = Estimated { free, fy_per_fx };
         let mut of_pose = Matrix6::<f64>::zeros();
         let mut cross = DMatrix::<f64>::zeros(6, n);
         let mut sums = Sums { points: view.len(), views: 1, ..Sums::zero(n) };
         for (i, (point, residual)) in view.points().iter().zip(residuals).enumerate() {
             let weight = view.weights().map_or(1.0, |weights| weights[i]);
-            let of = project_with_jacobian(estimate.camera, pose, &Vec3::new(point.x, point.y, 0.0)).ok()?;
-            let columns = estimate.covariance.columns(&of.intrinsics);
+            let of = Slopes::of(estimate.camera, pose, &Vec3::new(point.x, point.y, 0.0))?;
+            let columns = of.by_estimated(&estimated);
             let by_camera = DMatrix::from_fn(2, n, |i, j| weight * columns[j][i]) * root;
-            let by_pose: SMatrix<f64, 2, 6> = of.pose * weight;
+            let by_pose: SMatrix<f64, 2, 6> = of.by_pose * weight;
             let weighted = residual * weight;
             of_pose += by_pose.transpose() * by_pose;
             cross += by_pose.transpose() * &by_camera;

@@ -6,16 +6,15 @@
 //! m = (sum P_i^-1)^-1 sum P_i^-1 a_i
 //! chi^2 = sum (a_i - m)^T P_i^-1 (a_i - m)   with (k - 1) n degrees of freedom
 //! ```
-//! Parameters that trade against each other may scatter and predict the same pixels; in pixels over the frame two
-//! calibrations are compared by [`one_camera`], the rotation between them taken out.
+//! Where fy is tied to fx the two are one parameter. Parameters that trade against each other may scatter and predict the
+//! same pixels; in pixels over the frame two calibrations are compared by [`one_camera`], the rotation between them taken
+//! out.
 
-use super::Estimate;
+use super::{Calibrated, Estimate, frame_difference, one_camera};
 use crate::calibrate::Covariance;
-use crate::camera::Parameter;
+use crate::camera::{Model, Parameter};
 use crate::distribution::{ChiSquare, fisher_tail};
-use crate::evaluate::{
-    Calibrated, DifferenceError, FrameDifference, OneCamera, TakenOut, frame_difference, one_camera,
-};
+use crate::evaluate::{DifferenceError, FrameDifference, OneCamera, TakenOut};
 use nalgebra::{DMatrix, DVector};
 
 /// What repeated calibrations say together.
@@ -30,9 +29,8 @@ pub struct Agreement {
     pub p_value: f64,
     /// The weighted mean of each estimated parameter, and its standard deviation.
     pub mean: Vec<(Parameter, f64, f64)>,
-    /// Every other calibration against the first, in pixels over the frame; no test where fy is tied to fx, which
-    /// [`one_camera`] does not know.
-    pub in_pixels: Vec<(FrameDifference, Option<OneCamera>)>,
+    /// Every other calibration against the first, in pixels over the frame.
+    pub in_pixels: Vec<(FrameDifference, OneCamera)>,
     /// Chance that calibrations of one camera fail.
     pub false_alarm: f64,
 }
@@ -41,14 +39,13 @@ impl Agreement {
     /// Whether they agree: none of the tests is rarer than its share of the rate of false alarms (Bonferroni).
     pub fn holds(&self) -> bool {
         let each = self.each();
-        let tests = self.in_pixels.iter().filter_map(|(_, test)| test.as_ref());
-        tests.map(|test| test.p_value).chain([self.p_value]).all(|p_value| p_value >= each)
+        let tests = self.in_pixels.iter().map(|(_, test)| test.p_value);
+        tests.chain([self.p_value]).all(|p_value| p_value >= each)
     }
 
     /// The rate of each test.
     pub fn each(&self) -> f64 {
-        let tests = 1 + self.in_pixels.iter().filter(|(_, test)| test.is_some()).count();
-        self.false_alarm / tests as f64
+        self.false_alarm / (1 + self.in_pixels.len()) as f64
     }
 }
 
@@ -61,6 +58,18 @@ pub enum RepeatedError {
     TooFew {
         /// Number given.
         got: usize,
+    },
+    /// Parameters of two lens models have no mean.
+    #[error(
+        "calibration {index} has a {other} lens and the first a {first} lens: compare two models with calibench diff"
+    )]
+    OtherModel {
+        /// Which, from 0.
+        index: usize,
+        /// The first's.
+        first: Model,
+        /// The other's.
+        other: Model,
     },
     /// Not the same was estimated.
     #[error(
@@ -108,16 +117,16 @@ pub enum RepeatedError {
 /// See [`RepeatedError`].
 ///
 /// ```
-/// use calibench::calibrate::{Calibration, Settings, calibrate};
+/// use calibench::calibrate::{LensCalibration, Settings, calibrate_lens};
 /// use calibench::synth::{Scene, Stream, StreamKey};
 /// use calibench::validate::{Estimate, repeated};
 ///
 /// let scene = Scene::example();
 /// let again = |trial: u64| {
 ///     let key = StreamKey { seed: 1, scenario: "repeated", trial, purpose: "noise" };
-///     calibrate(&scene.observe(0.1, &mut Stream::open(key)), &Settings::standard())
+///     calibrate_lens(&scene.observe(0.1, &mut Stream::open(key)), &Settings::standard())
 /// };
-/// let results: Vec<Calibration> = (0..3).map(again).collect::<Result<_, _>>()?;
+/// let results: Vec<LensCalibration> = (0..3).map(again).collect::<Result<_, _>>()?;
 /// let estimates: Vec<Estimate> = results
 ///     .iter()
 ///     .map(|r| Estimate {
@@ -169,14 +178,17 @@ pub fn repeated(
 }
 
 fn same_parameters(first: &Estimate, other: &Estimate, index: usize) -> Result<(), RepeatedError> {
+    let models = [first, other].map(|estimate| estimate.camera.distortion.model());
+    if models[0] != models[1] {
+        return Err(RepeatedError::OtherModel { index, first: models[0], other: models[1] });
+    }
     let (a, b): (&Covariance, &Covariance) = (first.covariance, other.covariance);
     if (a.free, a.fy_per_fx) != (b.free, b.fy_per_fx) {
         return Err(RepeatedError::OtherParameters { index });
     }
     let is_tied = |p: Parameter| p == Parameter::Fy && a.fy_per_fx.is_some();
     let is_held = |p: &Parameter| !a.free.contains(*p) && !is_tied(*p);
-    let value = |estimate: &Estimate, p: Parameter| estimate.camera.get(p);
-    let apart = Parameter::ALL.into_iter().filter(is_held).find(|&p| value(first, p) != value(other, p));
+    let apart = models[0].parameters().filter(is_held).find(|&p| value(first, p) != value(other, p));
     match apart {
         None => Ok(()),
         Some(parameter) => {
@@ -184,6 +196,11 @@ fn same_parameters(first: &Estimate, other: &Estimate, index: usize) -> Result<(
             Err(RepeatedError::HeldApart { parameter, first, other, index })
         }
     }
+}
+
+/// A parameter of the model that both have.
+fn value(estimate: &Estimate, parameter: Parameter) -> f64 {
+    estimate.camera.value(parameter).unwrap_or_default()
 }
 
 /// Weighted mean, its covariance and the scatter about it.
@@ -199,7 +216,7 @@ impl Scatter {
         let n = free.len();
         let not_positive = |index: usize| RepeatedError::NotPositive { index };
         // In units of the first's standard deviations, from the first's values.
-        let origin = DVector::from_iterator(n, free.iter().map(|p| estimates[0].camera.get(p)));
+        let origin = DVector::from_iterator(n, free.iter().map(|p| value(&estimates[0], p)));
         let unit = estimates[0].covariance.intrinsics.diagonal().map(|d| d.max(0.0).sqrt());
         let (mut weight, mut weighted) = (DMatrix::zeros(n, n), DVector::zeros(n));
         let mut scaled = Vec::new();
@@ -207,7 +224,7 @@ impl Scatter {
             let p = &estimate.covariance.intrinsics;
             let p = DMatrix::from_fn(n, n, |i, j| p[(i, j)] / (unit[i] * unit[j]));
             let inverse = p.cholesky().ok_or(not_positive(index))?.inverse();
-            let at = DVector::from_iterator(n, free.iter().map(|p| estimate.camera.get(p)));
+            let at = DVector::from_iterator(n, free.iter().map(|p| value(estimate, p)));
             let at = (at - &origin).component_div(&unit);
             weight += &inverse;
             weighted += &inverse * &at;
@@ -231,21 +248,20 @@ fn against(
     first: &Estimate,
     other: &Estimate,
     size: (usize, usize),
-) -> Result<(FrameDifference, Option<OneCamera>), DifferenceError> {
-    let (a, b) = (calibrated(first), calibrated(other));
+) -> Result<(FrameDifference, OneCamera), DifferenceError> {
+    let (a, b) = (first.calibrated(), other.calibrated());
     let difference = frame_difference(a.camera, b.camera, size, TakenOut::Rotation)?;
-    let test = match first.covariance.fy_per_fx {
-        None => Some(one_camera(&a, &b, size, TakenOut::Rotation)?),
-        Some(_) => None,
-    };
-    Ok((difference, test))
+    Ok((difference, one_camera(&a, &b, size, TakenOut::Rotation)?))
 }
 
-fn calibrated<'a>(estimate: &Estimate<'a>) -> Calibrated<'a> {
-    Calibrated {
-        camera: estimate.camera,
-        free: estimate.covariance.free,
-        covariance: &estimate.covariance.intrinsics,
-        degrees_of_freedom: estimate.degrees_of_freedom,
+impl<'a> Estimate<'a> {
+    fn calibrated(&self) -> Calibrated<'a> {
+        Calibrated {
+            camera: self.camera,
+            free: self.covariance.free,
+            fy_per_fx: self.covariance.fy_per_fx,
+            covariance: &self.covariance.intrinsics,
+            degrees_of_freedom: self.degrees_of_freedom,
+        }
     }
 }

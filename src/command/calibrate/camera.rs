@@ -8,8 +8,10 @@ use super::{
 use calibench::board::{Board, View};
 use calibench::calibrate::{Loss, Prior, ProfileInterval, Settings, in_words};
 use calibench::camera::Model;
+use calibench::detect::Orientation;
 use calibench::geometry::Vec2;
-use calibench::io::{CalibrationFields, LeftOut, message, significant, write_together};
+use calibench::io::formats::corner_text;
+use calibench::io::{CalibrationFields, CornerFile, LeftOut, message, significant, write_together};
 use calibench::photos::{Fit, Fitter};
 use calibench_harness::Figure;
 use std::collections::BTreeMap;
@@ -25,6 +27,10 @@ pub(super) struct Observed {
     pub(super) names: Vec<String>,
     pub(super) views: Vec<View>,
     pub(super) image_size: Option<(usize, usize)>,
+    /// How far photographs tell which mark is the board's first.
+    pub(super) orientation: Option<Orientation>,
+    /// Mean level of each photograph over the board.
+    pub(super) light: Vec<f64>,
     /// The board whose discs' bias is to be corrected.
     pub(super) discs: Option<Board>,
     /// Input that gave no view.
@@ -111,6 +117,7 @@ pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, Fai
     finished.comparison = comparison;
     let mut fields = CalibrationFields::of(&finished.fit.calibration, &finished.names, finished.image_size);
     fields.left_out = finished.left_out.clone();
+    fields.orientation = finished.orientation.map(Orientation::name);
     fields.models = finished.comparison.iter().flat_map(|c| c.fields()).collect();
     fields.warnings.extend(finished.notes.iter().chain(&finished.advice).cloned());
     if let Some(folder) = &arguments.out {
@@ -133,8 +140,19 @@ fn finish(observed: Observed, fit: Fit) -> Finished {
     let mut notes = observed.notes;
     notes.extend(bias_note(&fit));
     let advice = advice::of(&fit, &names, observed.image_size);
-    let (image_size, overlays, source) = (observed.image_size, observed.overlays, observed.source);
-    Finished { source, fit, names, image_size, left_out, overlays, notes, advice, comparison: None }
+    let Observed { image_size, overlays, source, orientation, .. } = observed;
+    Finished {
+        source,
+        fit,
+        names,
+        image_size,
+        left_out,
+        overlays,
+        notes,
+        advice,
+        orientation,
+        comparison: None,
+    }
 }
 
 /// A correction that did not settle is no correction to trust.
@@ -154,8 +172,22 @@ fn write_files(folder: &Path, fields: &CalibrationFields, finished: &Finished) -
     let mut files: Vec<(PathBuf, Vec<u8>)> =
         figures.into_iter().map(|figure| (folder.join(figure.file_name()), figure.bytes)).collect();
     files.push((folder.join("report.html"), page));
+    if finished.orientation.is_some() {
+        files.push((folder.join("corners.csv"), corners(finished).into_bytes()));
+    }
     files.push((folder.join("result.json"), fields.to_json().into_bytes()));
     write_together(&files)
+}
+
+/// The marks of photographs as they were fitted, without the bias of discs: calibrated again they give the same camera.
+fn corners(finished: &Finished) -> String {
+    let mut seen = BTreeMap::new();
+    let mut name = |name: &String| {
+        let times = seen.entry(name.clone()).and_modify(|times| *times += 1).or_insert(1);
+        if *times == 1 { name.clone() } else { format!("{name} ({times})") }
+    };
+    let view_names = finished.names.iter().map(&mut name).collect();
+    corner_text(&CornerFile { view_names, views: finished.fit.views.clone() })
 }
 
 fn figures(finished: &Finished) -> Vec<Figure> {

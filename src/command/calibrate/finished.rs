@@ -3,6 +3,7 @@
 use super::models::Comparison;
 use calibench::calibrate::{BoardShape, Certificate, LensCalibration};
 use calibench::camera::Parameter;
+use calibench::detect::Orientation;
 use calibench::io::{LeftOut, significant};
 use calibench::photos::Fit;
 use std::collections::BTreeMap;
@@ -19,6 +20,8 @@ pub(super) struct Finished {
     pub(super) overlays: BTreeMap<String, String>,
     pub(super) notes: Vec<String>,
     pub(super) advice: Vec<String>,
+    /// How far photographs tell which mark is the board's first.
+    pub(super) orientation: Option<Orientation>,
     /// Of lens models, if one was to be chosen.
     pub(super) comparison: Option<Comparison>,
 }
@@ -66,6 +69,7 @@ pub(super) fn summary(finished: &Finished) -> String {
     }
     text.push_str(&model(calibration));
     text.push_str(&beforehand(calibration));
+    text.push_str(first_mark(finished.orientation));
     if let Some(bias) = &finished.fit.bias {
         // Writing to a string cannot fail.
         let _ = writeln!(
@@ -93,6 +97,22 @@ fn model(calibration: &LensCalibration) -> String {
         let _ = writeln!(text, "board: bow along x {x}, along y {y}{twist}, in the target's unit");
     }
     text
+}
+
+/// Which mark is the first; nothing of marks that were given.
+fn first_mark(orientation: Option<Orientation>) -> &'static str {
+    match orientation {
+        None => "",
+        Some(Orientation::Fixed) => {
+            "first mark: the same one of the board in every view, by the colours of its squares\n"
+        }
+        Some(Orientation::HalfTurn) => {
+            "first mark: not fixed by this board, which looks the same after half a turn; in each view that nearer to the top left\n"
+        }
+        Some(Orientation::QuarterTurn) => {
+            "first mark: not fixed by this board, which looks the same after a quarter turn; in each view that nearest to the top left\n"
+        }
+    }
 }
 
 /// What was tied and what was known, a line each.

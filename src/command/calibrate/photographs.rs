@@ -4,10 +4,12 @@
 use super::camera::{self, Observed};
 use super::{Arguments, Exit, Failure, warn};
 use calibench::board::{View, ViewError};
+use calibench::detect::SeenBoard;
 use calibench::geometry::Vec2;
 use calibench::io::ShownPath;
 use calibench::io::{Grey, ImageError, LeftOut, Memory, Overlay, image_extent, read_image};
 use calibench::photos::{BoardSpec, MarkKind, NotFound};
+use calibench::raster::{Level, Raster};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -46,7 +48,9 @@ enum PhotoError {
 /// A photograph that was read.
 struct Seen {
     size: (usize, usize),
-    marks: Result<Vec<Vec2>, NotFound>,
+    marks: Result<SeenBoard, NotFound>,
+    /// Mean level between the outermost marks; 0 without marks.
+    light: f64,
     /// The overlay's path in the output folder, or why it could not be written.
     overlay: Option<Result<String, String>>,
 }
@@ -118,15 +122,37 @@ fn each<T: Send>(photos: &[PathBuf], work: impl Fn(usize, &Path) -> T + Sync) ->
 /// Reads a photograph, finds the marks, draws them in.
 fn see(path: &Path, index: usize, board: &BoardSpec, out: Option<&Path>) -> Result<Seen, ImageError> {
     let photo = read_image(path)?;
-    let marks = board.detect(&photo);
+    let marks = board.see(&photo);
     let overlay = out.map(|out| {
         let stem = plain(&path.file_stem().map(|stem| stem.to_string_lossy()).unwrap_or_default());
         // Photographs of two folders may share a name; their place in the list they do not.
         let name = format!("overlay/{:03}-{stem}.png", index + 1);
-        let written = draw(&photo, &marks, board.board().columns()).write_png(&out.join(&name));
+        let written = draw(&photo, &marks).write_png(&out.join(&name));
         written.map(|()| name).map_err(|error| error.to_string())
     });
-    Ok(Seen { size: photo.size(), marks, overlay })
+    let light = marks.as_ref().map_or(0.0, |marks| light(&photo, marks));
+    Ok(Seen { size: photo.size(), marks, light, overlay })
+}
+
+/// Mean level of the upright rectangle that holds all marks.
+fn light(photo: &Grey, seen: &SeenBoard) -> f64 {
+    let low = seen.seen().fold(Vec2::repeat(f64::INFINITY), |low, (_, mark)| low.inf(&mark));
+    let high = seen.seen().fold(Vec2::zeros(), |high, (_, mark)| high.sup(&mark));
+    match photo {
+        Grey::U8(image) => mean_level(image, low, high),
+        Grey::U16(image) => mean_level(image, low, high),
+        Grey::F32(image) => mean_level(image, low, high),
+    }
+}
+
+fn mean_level<T: Level>(image: &Raster<T>, low: Vec2, high: Vec2) -> f64 {
+    // Casts saturate: marks may lie a little outside.
+    let rows = low.y as usize..image.height().min(high.y as usize + 1);
+    let right = image.width().min(high.x as usize + 1);
+    let columns = right.min(low.x as usize)..right;
+    let count = (rows.len() * columns.len()) as f64;
+    let sum: f64 = rows.flat_map(|y| &image.row(y)[columns.clone()]).map(|level| level.to_f64()).sum();
+    sum / count
 }
 
 /// A name that needs no escape in a link.
@@ -134,13 +160,13 @@ fn plain(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect()
 }
 
-/// The board's marks in their order; where it was not found, a red cross on each disc that might be one of
+/// The board's marks that are seen, in their order; where it was not found, a red cross on each disc that might be one of
 /// them.
-fn draw(photo: &Grey, marks: &Result<Vec<Vec2>, NotFound>, columns: usize) -> Overlay {
+fn draw(photo: &Grey, marks: &Result<SeenBoard, NotFound>) -> Overlay {
     let scale = if photo.width() < ENLARGED_BELOW_PX { 2 } else { 1 };
     let mut overlay = Overlay::new(&photo.to_u8(), scale);
     match marks {
-        Ok(marks) => overlay.grid(marks, columns),
+        Ok(seen) => overlay.seen_grid(seen.places_px(), seen.columns()),
         Err(missing) => missing.candidates_px.iter().for_each(|&at| overlay.cross(at, 4.0, CANDIDATE)),
     }
     overlay
@@ -170,18 +196,34 @@ fn observed(
                 .to_string(),
         );
     }
+    let mut parts = Vec::new();
     for (path, seen) in photos.iter().zip(seen) {
         let name = path.shown();
         if let Some(overlay) = seen.as_ref().ok().and_then(|seen| seen.overlay.clone()) {
             observed.overlays.insert(name.clone(), overlay.map_err(Failure::unwritten)?);
         }
+        let light = seen.as_ref().map_or(0.0, |seen| seen.light);
+        let board = seen.as_ref().ok().and_then(|seen| seen.marks.as_ref().ok());
+        let (orientation, missing) = (board.map(SeenBoard::orientation), board.map_or(0, SeenBoard::missing));
         match view(seen, expected.as_ref(), &points) {
             Ok(view) => {
+                observed.light.push(light);
+                observed.orientation = orientation;
+                if missing > 0 {
+                    parts.push(format!("{name} ({missing})"));
+                }
                 observed.names.push(name);
                 observed.views.push(view);
             }
             Err(error) => observed.left_out.push(LeftOut { reason: reason(&error, &name), name }),
         }
+    }
+    if !parts.is_empty() {
+        observed.notes.push(format!(
+            "not all of the {} marks are seen, because something covers them, they lie outside or in glare; the others count: {}",
+            points.len(),
+            parts.join(", ")
+        ));
     }
     Ok(observed)
 }
@@ -222,7 +264,10 @@ fn view(
         Some((size, of)) if *size != seen.size => {
             Err(PhotoError::Size { got: seen.size, size: *size, of: of.clone() })
         }
-        _ => Ok(View::new(points.to_vec(), seen.marks?)?),
+        _ => {
+            let (points, pixels) = seen.marks?.seen().map(|(mark, place)| (points[mark], place)).unzip();
+            Ok(View::new(points, pixels)?)
+        }
     }
 }
 

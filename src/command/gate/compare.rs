@@ -1,6 +1,6 @@
 //! `calibench gate --against`: two solvers on the same problems.
 
-use super::{Arguments, Stop, incomplete, of_files, process, terms, usage};
+use super::{Arguments, Stop, incomplete, of_files, plan_of, process, terms, usage};
 use crate::{Exit, print};
 use calibench::io::{ShownPath, write_atomically};
 use calibench_gate::paired::{self, Paired};
@@ -47,14 +47,16 @@ pub(super) fn run(
     samples: usize,
 ) -> Result<Exit, Stop> {
     let (plan, other): (Plan, Box<dyn Solver>) = match reference {
-        "builtin" => (Plan::new(arguments.seed, samples).map_err(incomplete)?, Box::new(Builtin)),
+        "builtin" => (plan_of(arguments, samples, || solver.models())?, Box::new(Builtin)),
         folder if Path::new(folder).join("manifest.json").is_file() => {
             let (plan, answers) = files::recorded(Path::new(folder)).map_err(of_files)?;
             (plan, Box::new(answers))
         }
         command => {
             refuse_what_is_not_there(command)?;
-            (Plan::new(arguments.seed, samples).map_err(incomplete)?, process(arguments, command)?)
+            let other = process(arguments, command)?;
+            let both = || solver.models().into_iter().filter(|m| other.models().contains(m)).collect();
+            (plan_of(arguments, samples, both)?, other)
         }
     };
     let ask = |solver: &dyn Solver| {

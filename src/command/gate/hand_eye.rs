@@ -1,8 +1,9 @@
 //! `calibench gate --hand-eye`: is a solver to be trusted that finds where a camera sits on a robot?
 
 use super::super::calibrate::Format;
+use super::super::program::timeout;
 use super::super::{Exit, print, warn};
-use super::{Arguments, Size, Stop, incomplete, terms, timeout, usage};
+use super::{Arguments, Size, Stop, incomplete, terms, usage};
 use calibench::io::write_atomically;
 use calibench_gate::THOROUGH;
 use calibench_hand_eye_gate::{Builtin, MOST_SAMPLES, Program, QUICK, Report, Solver, run as judge};
@@ -34,7 +35,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Stop> {
         return write_table(arguments, path);
     }
     let mut solver: Box<dyn Solver> = match &arguments.solver {
-        Some(command) => Box::new(Program::new(command, timeout(arguments)?)),
+        Some(command) => Box::new(Program::new(command, timeout(arguments.timeout).map_err(usage)?)),
         None => Box::new(Builtin),
     };
     let report = judged(arguments, solver.as_mut())?;
@@ -74,7 +75,8 @@ fn write_table(arguments: &Arguments, path: &Path) -> Result<Exit, Stop> {
     let ours = judged(arguments, &mut Builtin)?;
     let mut text = format!("{TABLE_HEAD}\n{}\n{}\n", ours.head(), ours.to_row("calibench"));
     for (name, command) in METHODS {
-        let report = judged(arguments, &mut Program::new(command, timeout(arguments)?))?;
+        let report =
+            judged(arguments, &mut Program::new(command, timeout(arguments.timeout).map_err(usage)?))?;
         if report.scenes.iter().all(|scene| scene.over_bound.is_none()) {
             return Err(incomplete(format!(
                 "{name} answered nothing: adapters/requirements-hand-eye.txt names what it needs"

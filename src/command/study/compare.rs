@@ -2,8 +2,10 @@
 //! level?
 
 use super::Failure;
+use super::finished::estimated_json;
+use crate::Exit;
 use crate::calibrate::Format;
-use crate::{Exit, print};
+use crate::said::print_as;
 use calibench::io::significant;
 use calibench_study::compare::{CompareError, Comparison, Verdict, compare, compare_levels};
 use comfy_table::{Table, presets};
@@ -42,10 +44,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
             (compare_levels(&arguments.first, factor)?, ["first level", "this"])
         }
     };
-    match arguments.format {
-        Format::Text => print(&comparison_text(&comparison, names)),
-        Format::Json => print(&format!("{:#}\n", comparison_json(&comparison))),
-    }
+    print_as(arguments.format, || comparison_text(&comparison, names), || comparison_json(&comparison));
     Ok(Exit::Held)
 }
 
@@ -56,7 +55,7 @@ fn comparison_json(comparison: &Comparison) -> Value {
             "quantity": e.quantity.name(),
             "pairs": e.pairs,
             "rms": e.rms,
-            "ratio": { "value": e.ratio.value, "low": e.ratio.low, "high": e.ratio.high },
+            "ratio": estimated_json(&e.ratio),
             "better": match e.verdict {
                 Verdict::FirstBetter => Some("first"),
                 Verdict::SecondBetter => Some("second"),

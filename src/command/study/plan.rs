@@ -1,13 +1,17 @@
 //! `calibench study plan`: what must be photographed for a wanted accuracy?
 
+use super::finished::estimated_json;
 use super::{Failure, read};
+use crate::calibrate::Format;
+use crate::said::{print_as, written_by};
 use crate::{Exit, print};
 use calibench::io::ShownPath;
 use calibench::io::significant;
 use calibench_harness::ProgressDisplay;
-use calibench_study::plan::{Design, Goal, PlanError, Search, choose, confirm, search};
+use calibench_study::plan::{Confirmation, Design, Goal, PlanError, Search, choose, confirm, search};
 use calibench_study::{Length, Spec};
 use comfy_table::{Table, presets};
+use serde_json::{Value, json};
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -38,6 +42,9 @@ pub(crate) struct Arguments {
     /// Trials that confirm the plan
     #[arg(long, default_value_t = 500)]
     confirm: u64,
+    /// Text for people or JSON for programs
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
 }
 
 fn parse_goal(text: &str) -> Result<Goal, String> {
@@ -68,12 +75,24 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
         distance_mm: arguments.distance,
     };
     let designs = search(&spec, &arguments.want, &range)?;
-    print(&designs_text(&designs, arguments));
-    let Some(chosen) = choose(&designs) else {
-        print("No design suffices: allow more views or tilt, reduce the noise, or hold parameters.\n");
-        return Ok(Exit::Deviates);
-    };
-    judge(&spec, chosen, arguments)
+    // People see the designs before the trials, which take a while.
+    if arguments.format == Format::Text {
+        print(&designs_text(&designs, arguments));
+    }
+    let chosen = choose(&designs);
+    let confirmed = chosen.map(|chosen| confirmation(&spec, chosen, arguments)).transpose()?.flatten();
+    print_as(
+        arguments.format,
+        || outcome_text(chosen, confirmed.as_ref(), arguments),
+        || plan_json(&designs, chosen, confirmed.as_ref(), arguments),
+    );
+    let is_met = confirmed.is_some_and(|confirmed| is_met(&confirmed, &arguments.want));
+    Ok(if is_met { Exit::Held } else { Exit::Deviates })
+}
+
+/// The plan fails where the measured interval lies above what is wanted.
+fn is_met(confirmed: &Confirmation, want: &Goal) -> bool {
+    confirmed.sd.low <= want.sd
 }
 
 fn length(arguments: &Arguments) -> Result<Option<Length>, Failure> {
@@ -104,26 +123,32 @@ fn designs_text(designs: &[Design], arguments: &Arguments) -> String {
     format!("Fewest views for sd({}) <= {}:\n{table}\n", arguments.want.quantity, arguments.want.sd)
 }
 
-fn judge(spec: &Spec, chosen: &Design, arguments: &Arguments) -> Result<Exit, Failure> {
+/// What trials say of the chosen design; `None` where too few converge.
+fn confirmation(
+    spec: &Spec,
+    chosen: &Design,
+    arguments: &Arguments,
+) -> Result<Option<Confirmation>, Failure> {
     let progress = ProgressDisplay::stderr().start("confirming", arguments.confirm as usize);
     let mut shown = 0;
-    let confirmed = confirm(spec, &arguments.want, chosen, arguments.distance, arguments.confirm, |pace| {
+    Ok(confirm(spec, &arguments.want, chosen, arguments.distance, arguments.confirm, |pace| {
         progress.advance((pace.trials - shown) as usize);
         shown = pace.trials;
-    })?;
-    drop(progress);
-    let views = chosen.enough.map_or(0, |e| e.0);
-    let Some(c) = confirmed else {
-        print(
-            "Too few trials converged to confirm anything: the bound promises what no calibration of these views keeps.\n",
-        );
-        return Ok(Exit::Deviates);
+    })?)
+}
+
+fn outcome_text(chosen: Option<&Design>, confirmed: Option<&Confirmation>, arguments: &Arguments) -> String {
+    let Some(chosen) = chosen else {
+        return "No design suffices: allow more views or tilt, reduce the noise, or hold parameters.\n"
+            .into();
     };
-    // The plan fails where the measured interval lies above what is wanted.
-    let met = c.sd.low <= arguments.want.sd;
-    print(&format!(
-        "Chosen: {views} views, tilt {} deg, coverage {}. {} trials, {:.1} % converged: sd({}) = {} [{}, {}], {} [{}, {}] of the \
+    let Some(c) = confirmed else {
+        return "Too few trials converged to confirm anything: the bound promises what no calibration of these views keeps.\n".into();
+    };
+    format!(
+        "Chosen: {} views, tilt {} deg, coverage {}. {} trials, {:.1} % converged: sd({}) = {} [{}, {}], {} [{}, {}] of the \
          prediction: {}.\n",
+        chosen.enough.map_or(0, |e| e.0),
         chosen.tilt_deg,
         chosen.coverage,
         c.trials,
@@ -135,7 +160,41 @@ fn judge(spec: &Spec, chosen: &Design, arguments: &Arguments) -> Result<Exit, Fa
         significant(c.ratio.value, 4),
         significant(c.ratio.low, 4),
         significant(c.ratio.high, 4),
-        if met { "confirmed" } else { "NOT confirmed, plan with more views" },
-    ));
-    Ok(if met { Exit::Held } else { Exit::Deviates })
+        if is_met(c, &arguments.want) { "confirmed" } else { "NOT confirmed, plan with more views" },
+    )
+}
+
+fn plan_json(
+    designs: &[Design],
+    chosen: Option<&Design>,
+    confirmed: Option<&Confirmation>,
+    arguments: &Arguments,
+) -> Value {
+    json!({
+        "written_by": written_by(),
+        "want": { "quantity": arguments.want.quantity, "sd": arguments.want.sd },
+        "most_views": arguments.most_views,
+        "distance_mm": arguments.distance,
+        "designs": designs.iter().map(design_json).collect::<Vec<_>>(),
+        "chosen": chosen.map(design_json),
+        "confirmed": confirmed.map(|c| json!({
+            "trials": c.trials,
+            "converged": c.converged,
+            "sd": estimated_json(&c.sd),
+            "ratio": estimated_json(&c.ratio),
+            "met": is_met(c, &arguments.want),
+        })),
+    })
+}
+
+/// `views` is `null` where no number of them suffices; `predicted_sd` is then that of the most views, if there is one.
+fn design_json(design: &Design) -> Value {
+    let best = design.best.as_ref();
+    json!({
+        "tilt_deg": design.tilt_deg,
+        "coverage": design.coverage,
+        "views": design.enough.map(|(views, _)| views),
+        "predicted_sd": design.enough.map(|(_, sd)| sd).or(best.ok().copied().flatten()),
+        "refused": best.err(),
+    })
 }

@@ -1,17 +1,20 @@
 //! `calibench study run`, `resume` and `merge`: from a file to a folder of results.
 
+use super::finished::{Finished, Ran};
+use super::solver::ProgramArguments;
 use super::{Failure, read};
-use crate::{Exit, print, warn};
+use crate::calibrate::Format;
+use crate::{Exit, warn};
 use calibench::io::ShownPath;
 use calibench::io::significant;
 use calibench_harness::project::Project;
-use calibench_harness::stopwatch::{Stopwatch, rate};
+use calibench_harness::stopwatch::Stopwatch;
 use calibench_harness::{Build, ProgressDisplay};
 use calibench_study::{
     CellSummary, Engine, Folder, FolderError, Interruption, Manifest, Outcome, RunError, Shard, Summary,
     TrialFile, Worst, finish, merge,
 };
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -28,12 +31,23 @@ pub(crate) struct Arguments {
     /// File of the trials: csv, or parquet where this program was built with that feature
     #[arg(long, value_name = "csv|parquet", default_value_t = TrialFile::Csv)]
     trials: TrialFile,
+    #[command(flatten)]
+    program: ProgramArguments,
+    /// Text for people or JSON for programs
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
 }
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct ResumeArguments {
     /// Folder of the run
     run: PathBuf,
+    /// The program must be the one that began the run
+    #[command(flatten)]
+    program: ProgramArguments,
+    /// Text for people or JSON for programs
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
 }
 
 #[derive(Debug, clap::Args)]
@@ -47,6 +61,9 @@ pub(crate) struct MergeArguments {
     /// File of the trials, csv or parquet [default: as in the first shard]
     #[arg(long, value_name = "csv|parquet")]
     trials: Option<TrialFile>,
+    /// Text for people or JSON for programs
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
 }
 
 pub(super) fn run(arguments: &Arguments, build: &Build) -> Result<Exit, Failure> {
@@ -56,9 +73,10 @@ pub(super) fn run(arguments: &Arguments, build: &Build) -> Result<Exit, Failure>
         .map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.shown())))?;
     let out = arguments.out.clone().unwrap_or_else(|| default_folder(&engine));
     let manifest = Manifest::new(&engine.spec, arguments.shard, build);
-    let manifest = manifest.with_trials(arguments.trials);
+    let manifest = manifest.with_trials(arguments.trials).with_solver(arguments.program.solver.clone());
+    let engine = arguments.program.applied(engine)?;
     let folder = Folder::create(&out, &text, &manifest)?;
-    drive(&folder, engine)
+    drive(&folder, engine, arguments.format)
 }
 
 pub(super) fn resume(arguments: &ResumeArguments, build: &Build) -> Result<Exit, Failure> {
@@ -66,14 +84,17 @@ pub(super) fn resume(arguments: &ResumeArguments, build: &Build) -> Result<Exit,
     folder.manifest()?.trials.check().map_err(FolderError::from)?;
     let shard = folder.shard()?;
     let engine = Engine::new(&folder.read("spec.toml")?, shard).map_err(RunError::from)?;
-    folder.check(&Manifest::new(&engine.spec, shard, build))?;
-    drive(&folder, engine)
+    // A command in a folder may be a stranger's: it is compared with the user's, and never run by itself.
+    let manifest = Manifest::new(&engine.spec, shard, build).with_solver(arguments.program.solver.clone());
+    folder.check(&manifest)?;
+    drive(&folder, arguments.program.applied(engine)?, arguments.format)
 }
 
 pub(super) fn merge_parts(arguments: &MergeArguments, build: &Build) -> Result<Exit, Failure> {
     let (folder, engine) = merge(&arguments.parts, &arguments.out, arguments.trials, build)?;
     let summary = finish(&folder, &engine)?;
-    print_summary(&folder, &engine, &summary);
+    let finished = Finished { folder: &folder, engine: &engine, summary: &summary, ran: None };
+    finished.say(arguments.format)?;
     Ok(judged(&engine, &summary))
 }
 
@@ -85,9 +106,14 @@ fn judged(engine: &Engine, summary: &Summary) -> Exit {
         return Exit::Held;
     }
     let whole = engine.shard == Shard::WHOLE;
+    let advice = match engine.is_calibrated_here() {
+        true => "More tilt or views, or fewer free parameters, determine a camera",
+        false => {
+            "The first reason of each outcome stands above: look at the program's command, and at what it says"
+        }
+    };
     warn(&format!(
-        "NOTHING MEASURED: not one of the {} trials {} converged; outcomes.csv counts the reasons. More tilt or views, or fewer free \
-         parameters, determine a camera",
+        "NOTHING MEASURED: not one of the {} trials {} converged; outcomes.csv counts the reasons. {advice}",
         engine.trials(),
         if whole { "of this study" } else { "of this part" },
     ));
@@ -111,6 +137,7 @@ fn interruption() -> Arc<Interruption> {
     let seen = stop.clone();
     let installed = ctrlc::set_handler(move || {
         if seen.swap(true, Ordering::Relaxed) {
+            calibench_gate::program::end_all();
             std::process::exit(Exit::Incomplete as i32);
         }
         warn("finishing the batch; once more stops at once");
@@ -121,7 +148,7 @@ fn interruption() -> Arc<Interruption> {
     stop
 }
 
-fn drive(folder: &Folder, mut engine: Engine) -> Result<Exit, Failure> {
+fn drive(folder: &Folder, mut engine: Engine, format: Format) -> Result<Exit, Failure> {
     let stop = interruption();
     let progress = ProgressDisplay::stderr().start(&engine.spec.name, engine.most_trials() as usize);
     let (watch, mut shown) = (Stopwatch::start(), None);
@@ -138,19 +165,16 @@ fn drive(folder: &Folder, mut engine: Engine) -> Result<Exit, Failure> {
     let took = watch.elapsed();
     if outcome == Outcome::Interrupted {
         let path = folder.path().shown();
+        let again = if engine.is_calibrated_here() { "" } else { " --solver 'THE SAME COMMAND'" };
         warn(&format!(
-            "interrupted after {} trials; continue with: calibench study resume {path}",
+            "interrupted after {} trials; continue with: calibench study resume {path}{again}",
             engine.trials()
         ));
         return Ok(Exit::Incomplete);
     }
     let summary = finish(folder, &engine)?;
-    print_summary(folder, &engine, &summary);
-    if let Some(trials) = shown {
-        let rate = rate(trials, took).map_or_else(String::new, |rate| format!(": {rate:.0} a second"));
-        let (seconds, cores) = (took.as_secs_f64(), rayon::current_num_threads());
-        print(&format!("{trials} trials in {seconds:.1} s{rate} on {cores} thread(s)\n"));
-    }
+    let ran = shown.map(|trials| Ran { trials, took });
+    Finished { folder, engine: &engine, summary: &summary, ran }.say(format)?;
     Ok(judged(&engine, &summary))
 }
 
@@ -163,43 +187,4 @@ fn worst(worst: &Worst) -> String {
         }
         None => format!("worst: too few trials converge at {}", worst.cell),
     }
-}
-
-/// A few lines for the terminal; everything stands in the report.
-fn print_summary(folder: &Folder, engine: &Engine, summary: &Summary) {
-    for cell in &summary.cells {
-        let failed: Vec<String> =
-            cell.outcomes.iter().filter(|o| o.0 != "converged").map(|o| format!("{} {}", o.1, o.0)).collect();
-        let failed = if failed.is_empty() { String::new() } else { format!("; {}", failed.join(", ")) };
-        let ratio = cell
-            .statistics
-            .iter()
-            .filter(|s| s.quantity.is_error())
-            .find_map(|s| Some((s.quantity, s.sd?, s.ratio?)));
-        let spread = ratio.map_or_else(String::new, |(quantity, sd, ratio)| {
-            format!(
-                ": sd({}) = {} {} [{}, {}], {} of the bound",
-                quantity.name(),
-                significant(sd.value, 4),
-                quantity.unit(),
-                significant(sd.low, 4),
-                significant(sd.high, 4),
-                significant(ratio.value, 4)
-            )
-        });
-        print(&format!("{} ({} trials){spread}{failed}\n", cell.name, cell.trials));
-    }
-    if let Some(precision) = &engine.spec.trials.precision {
-        for cell in engine.imprecise() {
-            print(&format!(
-                "{}: sd({}) is not known to {} % after {} trials\n",
-                cell.name,
-                precision.quantity,
-                significant(100.0 * precision.relative_half_width, 3),
-                engine.spec.trials.per_cell
-            ));
-        }
-    }
-    let report: &Path = &folder.file("report.html");
-    print(&format!("{} trials; written: {}\n", engine.trials(), report.shown()));
 }

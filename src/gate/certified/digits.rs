@@ -31,7 +31,15 @@ impl Digits {
     fn of(estimate: &Estimate, certified: &Certified) -> Digits {
         let free = || Parameter::ALL.into_iter().filter(|p| certified.parameters.contains_key(p.name()));
         let parameters = free()
-            .map(|p| (p, log_relative_error(estimate.camera.get(p), certified.parameters[p.name()])))
+            .map(|p| {
+                (
+                    p,
+                    log_relative_error(
+                        estimate.camera.value(p).unwrap_or(f64::NAN),
+                        certified.parameters[p.name()],
+                    ),
+                )
+            })
             .collect();
         let least = |deviations: &Vec<f64>| {
             deviations

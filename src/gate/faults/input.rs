@@ -2,10 +2,9 @@
 
 use super::{Planted, correct, gross};
 use crate::protocol::{Answer, Problem, Status};
-use crate::solver::{answer, settings, views};
+use crate::solver::{answer, only_poses, settings, views};
 use calibench::board::View;
-use calibench::calibrate::{Settings, calibrate};
-use calibench::camera::{Camera, FreeParameters, Parameter};
+use calibench::calibrate::calibrate_lens;
 
 pub(super) const FAULTS: &[Planted] = &[
     gross("rounded-to-half-pixels", "observations rounded to half pixels", |p, _| {
@@ -72,18 +71,13 @@ fn last_view_unused(problem: &Problem) -> Answer {
     let whole = correct(problem);
     let (Status::Ok, Ok(mut all)) = (whole.status, views(problem)) else { return whole };
     let last: Option<View> = all.pop();
-    let Ok(calibration) = calibrate(&all, &settings(problem)) else { return whole };
+    let Ok(calibration) = calibrate_lens(&all, &settings(problem)) else { return whole };
     let mut given = answer(&problem.id, &calibration);
-    let pose = last.and_then(|view| calibrate(&[view], &holding(&calibration.camera)).ok());
+    let pose = last.and_then(|view| calibrate_lens(&[view], &only_poses(&calibration.camera)).ok());
     if let (Some(poses), Some(found)) = (&mut given.poses, pose) {
         poses.extend(answer("", &found).poses.into_iter().flatten());
     }
     given
-}
-
-/// Nothing but poses is free.
-fn holding(camera: &Camera) -> Settings {
-    Parameter::ALL.into_iter().fold(Settings::new(FreeParameters::NONE), |s, p| s.hold(p, camera.get(p)))
 }
 
 fn mended(problem: &Problem) -> Answer {

@@ -3,6 +3,7 @@
 
 mod estimation;
 mod input;
+mod lens;
 mod output;
 mod protocol;
 mod uncertainty;
@@ -11,7 +12,7 @@ use super::accept::Breakage;
 use super::protocol::{Answer, Problem, Status};
 use super::solver::{Builtin, Solver, answer, solve};
 use calibench::calibrate::Settings;
-use calibench::camera::{Camera, Parameter};
+use calibench::camera::{Camera, Model, Parameter};
 use calibench::geometry::{Vec2, Vec3};
 use calibench::synth::fnv1a;
 use serde::{Deserialize, Serialize};
@@ -40,12 +41,15 @@ pub struct Planted {
     pub about: &'static str,
     /// How hard it is to see.
     pub class: Class,
+    /// The lens models on whose scenes it is looked for.
+    pub models: &'static [Model],
     how: How,
 }
 
 /// All planted faults.
 pub fn planted() -> Vec<Planted> {
-    [output::FAULTS, uncertainty::FAULTS, input::FAULTS, estimation::FAULTS, protocol::FAULTS].concat()
+    [output::FAULTS, uncertainty::FAULTS, input::FAULTS, estimation::FAULTS, protocol::FAULTS, lens::FAULTS]
+        .concat()
 }
 
 /// A solver with a planted fault.
@@ -78,17 +82,21 @@ impl Solver for Faulty {
         format!("calibench with {}", self.fault.id)
     }
 
+    fn models(&self) -> Vec<Model> {
+        self.fault.models.to_vec()
+    }
+
     fn ask(&self, problem: &Problem) -> Result<Answer, Breakage> {
         Ok((self.fault.how)(problem, &|| self.asked_before(problem)))
     }
 }
 
 const fn gross(id: &'static str, about: &'static str, how: How) -> Planted {
-    Planted { id, about, class: Class::Gross, how }
+    Planted { id, about, class: Class::Gross, models: &[Model::BrownConrady], how }
 }
 
 const fn subtle(id: &'static str, about: &'static str, how: How) -> Planted {
-    Planted { id, about, class: Class::Subtle, how }
+    Planted { id, about, class: Class::Subtle, models: &[Model::BrownConrady], how }
 }
 
 /// The correct answer.

@@ -6,7 +6,7 @@ pub use measured::{AlarmRow, FaultRow, Measured, MeasuredError, MisledRow, Sizes
 
 use super::faults::{Faulty, Planted};
 use super::judge::{self, Basis, Check, Property, Terms, Verdict};
-use super::plan::{Plan, PlanError};
+use super::plan::{Asked, Plan, PlanError};
 use super::run::ask_where;
 use super::solver::Solver;
 use super::trial::Seen;
@@ -41,7 +41,7 @@ pub fn catch(fault: Planted, seed: u64, most: usize) -> Result<Catch, PlanError>
 /// # Errors
 /// A plan that cannot be made.
 pub fn catch_solver(solver: &dyn Solver, seed: u64, most: usize) -> Result<Catch, PlanError> {
-    let plan = Plan::new(seed, most)?;
+    let plan = Plan::of(seed, most, Asked::of(&solver.models()))?;
     let terms = Terms::default();
     let mut seen = vec![None; plan.cases.len()];
     let mut before = 0;
@@ -136,7 +136,8 @@ impl Alarms {
     }
 }
 
-/// Judges the correct solver on `seeds` seeds from `first` on.
+/// Judges the correct solver on `seeds` seeds from `first` on, on the scenes with Brown-Conrady's lens: those
+/// of the others take many times as long.
 ///
 /// # Errors
 /// A plan that cannot be made.

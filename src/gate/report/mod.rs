@@ -22,6 +22,13 @@ pub struct Report {
     pub seed: u64,
     /// Samples a scenario.
     pub samples: usize,
+    /// Names of the lens models whose scenes were asked.
+    pub models: Vec<&'static str>,
+    /// Names of the scenes that were asked; empty if none was left out.
+    pub only: Vec<String>,
+    /// The command that repeats the run, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub repeat: Option<String>,
     /// Problems asked.
     pub problems: usize,
     /// Chance that a correct solver fails this run.
@@ -72,6 +79,9 @@ impl Report {
             solver: solver.to_string(),
             seed: plan.seed,
             samples: plan.samples,
+            models: plan.asked.models.iter().map(|model| model.name()).collect(),
+            only: plan.asked.scenes.clone(),
+            repeat: None,
             problems: seen.iter().flatten().count(),
             false_alarm_rate: terms.false_alarm_rate,
             statistical_checks: statistical,
@@ -86,6 +96,11 @@ impl Report {
     /// States the commit of the gate.
     pub fn with_commit(self, commit: Option<&Commit>) -> Report {
         Report { commit: commit.map(Commit::to_string), ..self }
+    }
+
+    /// States the command that repeats the run.
+    pub fn with_repeat(self, command: String) -> Report {
+        Report { repeat: Some(command), ..self }
     }
 
     /// Whether nothing fails.

@@ -14,12 +14,14 @@ impl Report {
     /// One line a property, no longer than `columns`, then what follows.
     pub fn to_text(&self, columns: usize) -> String {
         let mut text = format!(
-            "gate: {} on {} problems, {} samples a scenario, seed {}, {} s\n\n",
+            "gate: {} on {} problems, {} samples a scenario, seed {}, {} s\nlens models: {}{}\n\n",
             self.solver,
             self.problems,
             self.samples,
             self.seed,
-            significant(self.seconds, 3)
+            significant(self.seconds, 3),
+            self.models.join(", "),
+            if self.only.is_empty() { String::new() } else { format!("; only {}", self.only.join(", ")) },
         );
         for row in self.rows() {
             text.push_str(&line(&row, columns));
@@ -47,6 +49,9 @@ impl Report {
                 let fail = if failures.len() == 1 { "check fails" } else { "checks fail" };
                 format!("NOT TRUSTED: {} {fail}, {grave} gravely; {rate}", failures.len())
             }
+            _ if !self.only.is_empty() => {
+                format!("HELD on the scenes asked, which is no verdict on the whole{accepted}; {rate}")
+            }
             _ => format!(
                 "TRUSTED: every check that could be judged holds{accepted}{}; {rate}",
                 self.unsupported()
@@ -69,12 +74,12 @@ impl Report {
         for check in self.failures() {
             groups.entry((check.property, check.verdict)).or_default().push(check);
         }
-        groups.values().map(|checks| finding(checks)).collect()
+        groups.values().map(|checks| finding(checks, self.repeat.as_deref())).collect()
     }
 }
 
-/// What one property does wrong.
-fn finding(checks: &[&Check]) -> String {
+/// What one property does wrong, and how its first scene is asked again.
+fn finding(checks: &[&Check], repeat: Option<&str>) -> String {
     let first = checks[0];
     let p = match first.basis {
         Basis::Chance(p) => format!(" (p = {})", significant(p, 2)),
@@ -85,6 +90,9 @@ fn finding(checks: &[&Check]) -> String {
     let others: Vec<&str> = checks[1..].iter().map(|c| c.scenario).collect();
     if !others.is_empty() {
         text.push_str(&format!("    likewise {}\n", others.join(", ")));
+    }
+    if let Some(repeat) = repeat {
+        text.push_str(&format!("    again: {repeat} --scene {}\n", first.scenario));
     }
     text
 }

@@ -25,6 +25,25 @@ pub enum Align {
     End,
 }
 
+impl Align {
+    fn anchor(self) -> Anchor {
+        match self {
+            Align::Start => Anchor::Start,
+            Align::Middle => Anchor::Middle,
+            Align::End => Anchor::End,
+        }
+    }
+
+    /// How much of the words' length lies before their point.
+    fn share_before(self) -> f64 {
+        match self {
+            Align::Start => 0.0,
+            Align::Middle => 0.5,
+            Align::End => 1.0,
+        }
+    }
+}
+
 #[derive(Debug, Clone, PartialEq)]
 enum Stroke {
     Line { points: Vec<At>, look: Look },
@@ -129,19 +148,15 @@ impl Drawing {
     /// Words that run over the edge of the sheet: a mistake of whoever draws.
     pub(super) fn words_beyond_the_sheet(&self) -> Vec<&str> {
         let (width, height) = self.size;
-        let beyond = |stroke: &'_ Stroke| match stroke {
-            Stroke::Words { text, at, align, size_px } => {
-                let length = text_width(text, *size_px);
-                let left = at.0 - [0.0, 0.5, 1.0][*align as usize] * length;
-                let half = 0.5 * size_px;
-                left < 0.0 || left + length > width || at.1 < half || at.1 + half > height
-            }
-            _ => false,
-        };
-        let texts = self.strokes.iter().filter(|stroke| beyond(stroke));
-        texts
-            .filter_map(|s| if let Stroke::Words { text, .. } = s { Some(text.as_str()) } else { None })
-            .collect()
+        let beyond = self.strokes.iter().filter_map(|stroke| {
+            let Stroke::Words { text, at, align, size_px } = stroke else { return None };
+            let length = text_width(text, *size_px);
+            let left = at.0 - align.share_before() * length;
+            let half = 0.5 * size_px;
+            let runs_over = left < 0.0 || left + length > width || at.1 < half || at.1 + half > height;
+            runs_over.then_some(text.as_str())
+        });
+        beyond.collect()
     }
 }
 
@@ -157,12 +172,7 @@ impl Stroke {
             Stroke::Arrow { tail, tip, look } => draw_arrow(canvas, *tail, *tip, *look),
             Stroke::Mark { at, look } => draw_marker(canvas, *at, *look),
             Stroke::Words { text, at, align, size_px } => {
-                let anchor = match align {
-                    Align::Start => Anchor::Start,
-                    Align::Middle => Anchor::Middle,
-                    Align::End => Anchor::End,
-                };
-                canvas.text(text, *at, *size_px, INK, anchor);
+                canvas.text(text, *at, *size_px, INK, align.anchor());
             }
         }
     }

@@ -112,8 +112,11 @@ pub(super) fn singular() -> CalibrationError {
 
 /// Whether the cost rises as linear theory says on the straight way to where it says least: two standard
 /// deviations of the worst-known combination of shared unknowns, both ways. Two evaluations say that the
-/// profiles need not be walked.
+/// profiles need not be walked. Nor need they where exact data leave no cost but rounding, which has any shape.
 fn is_parabola(problem: &Problem<'_>, minimum: &Minimum<State, WIDTH>) -> Result<bool, CalibrationError> {
+    if minimum.system.cost <= problem.rounding_cost {
+        return Ok(true);
+    }
     let reduction = &reduction(minimum)?;
     let noise_px = report::variance(problem, minimum).sqrt();
     let Some(weakest) = weakest(reduction) else { return Ok(true) };

@@ -4,18 +4,8 @@
 use super::Orientation;
 use super::growth::axes_at;
 use crate::detect::lattice::{Lattice, Place};
-use crate::geometry::Vec2;
-
-/// A full rectangle of places of a lattice.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Rectangle {
-    /// The place of least i and j.
-    pub low: Place,
-    /// Places along i.
-    pub width: usize,
-    /// Places along j.
-    pub height: usize,
-}
+use crate::detect::rectangle::Rectangle;
+use crate::geometry::{Homography, Vec2};
 
 /// What a lattice holds of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,35 +21,6 @@ pub enum Found {
     },
     /// No such rectangle.
     Incomplete,
-}
-
-/// Corners beside a rectangle that may be chance, as part of the side: texture that looks like one more
-/// corner.
-const MOST_STRAYS: f64 = 0.34;
-
-impl Rectangle {
-    fn is_full(&self, lattice: &Lattice) -> bool {
-        self.places().all(|place| lattice.contains_key(&place))
-    }
-
-    fn places(self) -> impl Iterator<Item = Place> {
-        let (width, height) = (self.width as i32, self.height as i32);
-        (0..height).flat_map(move |j| (0..width).map(move |i| (self.low.0 + i, self.low.1 + j)))
-    }
-
-    /// Whether the board goes on beyond a side.
-    fn goes_on(&self, lattice: &Lattice) -> bool {
-        let (w, h) = (self.width as i32, self.height as i32);
-        let along_i =
-            |j: i32| (0..w).filter(|i| lattice.contains_key(&(self.low.0 + i, self.low.1 + j))).count();
-        let along_j =
-            |i: i32| (0..h).filter(|j| lattice.contains_key(&(self.low.0 + i, self.low.1 + j))).count();
-        let many = |count: usize, of: usize| count as f64 > MOST_STRAYS * of as f64;
-        many(along_i(-1), self.width)
-            || many(along_i(h), self.width)
-            || many(along_j(-1), self.height)
-            || many(along_j(w), self.height)
-    }
 }
 
 /// Looks for a board of `columns x rows` in a lattice.
@@ -106,8 +67,17 @@ fn largest(lattice: &Lattice) -> Option<Rectangle> {
     best
 }
 
-/// The rectangle's marks in the board's order, how far the image fixes it, and whether the square before the
-/// first mark is dark.
+/// A rectangle's marks in the board's order.
+pub struct Ordered {
+    /// Marks of the lattice, row by row; `None` for those that are hidden.
+    pub marks: Vec<Option<usize>>,
+    /// How far the image fixes the first.
+    pub orientation: Orientation,
+    /// Whether the square before the first is dark.
+    pub starts_dark: bool,
+}
+
+/// The order of a rectangle's marks.
 ///
 /// Orders that see the board from its front and have the asked columns and rows: one, of a rectangle, or two
 /// of a square, and as many from the other end. Where some have a dark square at the board's origin, before
@@ -118,13 +88,15 @@ pub fn ordered(
     rectangle: &Rectangle,
     places_px: &[Vec2],
     (columns, rows): (usize, usize),
-) -> (Vec<usize>, Orientation, bool) {
+) -> Ordered {
     let orders: Vec<Order> =
         Order::all(rectangle).into_iter().filter(|order| order.size == (columns, rows)).collect();
     let some_dark = orders.iter().any(Order::starts_dark);
-    let first_px = |order: &Order| places_px[lattice[&order.place(0, 0)]];
     let mut left: Vec<Order> = orders.into_iter().filter(|order| order.starts_dark() == some_dark).collect();
-    left.sort_by(|a, b| first_px(a).sum().total_cmp(&first_px(b).sum()));
+    if left.len() > 1 {
+        let first_px = |order: &Order| place_px(lattice, places_px, order.place(0, 0)).sum();
+        left.sort_by(|a, b| first_px(a).total_cmp(&first_px(b)));
+    }
     let orientation = match left.len() {
         1 => Orientation::Fixed,
         2 => Orientation::HalfTurn,
@@ -132,8 +104,21 @@ pub fn ordered(
     };
     let marks = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
     let order = left[0];
-    let ordered = marks.map(|(column, row)| lattice[&order.place(column as i32, row as i32)]).collect();
-    (ordered, orientation, some_dark)
+    let marks =
+        marks.map(|(column, row)| lattice.get(&order.place(column as i32, row as i32)).copied()).collect();
+    Ordered { marks, orientation, starts_dark: some_dark }
+}
+
+/// Where a place of a lattice is, or, where its mark is hidden, where the plane through the others has it.
+fn place_px(lattice: &Lattice, places_px: &[Vec2], place: Place) -> Vec2 {
+    if let Some(&mark) = lattice.get(&place) {
+        return places_px[mark];
+    }
+    let on_board = |(i, j): Place| Vec2::new(f64::from(i), f64::from(j));
+    let from: Vec<Vec2> = lattice.keys().map(|&place| on_board(place)).collect();
+    let to: Vec<Vec2> = lattice.values().map(|&mark| places_px[mark]).collect();
+    let plane = Homography::fit(&from, &to).ok();
+    plane.and_then(|plane| plane.homography.apply(&on_board(place))).unwrap_or_else(Vec2::zeros)
 }
 
 /// A way to count a rectangle's places.
@@ -215,11 +200,17 @@ mod tests {
         // on, it does not.
         let (lattice_96, places) = (lattice(9, 6), places_px(9, 6));
         let board = Rectangle { low: (0, 0), width: 9, height: 6 };
-        let (marks, orientation, _) = ordered(&lattice_96, &board, &places, (9, 6));
-        assert_eq!((marks[0], marks[53], orientation), (0, 53, Orientation::Fixed));
+        let found = ordered(&lattice_96, &board, &places, (9, 6));
+        assert_eq!(
+            (found.marks[0], found.marks[53], found.orientation),
+            (Some(0), Some(53), Orientation::Fixed)
+        );
         let shifted: Lattice = lattice_96.iter().map(|(&(i, j), &mark)| ((i + 1, j), mark)).collect();
-        let (marks, orientation, _) = ordered(&shifted, &Rectangle { low: (1, 0), ..board }, &places, (9, 6));
-        assert_eq!((marks[0], marks[53], orientation), (53, 0, Orientation::Fixed));
+        let found = ordered(&shifted, &Rectangle { low: (1, 0), ..board }, &places, (9, 6));
+        assert_eq!(
+            (found.marks[0], found.marks[53], found.orientation),
+            (Some(53), Some(0), Orientation::Fixed)
+        );
     }
 
     #[test]
@@ -227,8 +218,8 @@ mod tests {
         let both = |width: i32, height: i32, asked: (usize, usize)| {
             let (lattice, places) = (lattice(width, height), places_px(width as usize, height as usize));
             let board = Rectangle { low: (0, 0), width: width as usize, height: height as usize };
-            let (marks, orientation, _) = ordered(&lattice, &board, &places, asked);
-            (marks[0], marks[1], orientation)
+            let found = ordered(&lattice, &board, &places, asked);
+            (found.marks[0].unwrap(), found.marks[1].unwrap(), found.orientation)
         };
         assert_eq!(both(7, 5, (7, 5)), (0, 1, Orientation::HalfTurn));
         assert_eq!(both(8, 6, (8, 6)), (0, 1, Orientation::HalfTurn));
@@ -238,5 +229,17 @@ mod tests {
         // six runs along them, with the nine rows to its right hand; so the first corner is the lower one,
         // and the next lies above it.
         assert_eq!(both(9, 6, (6, 9)), (45, 36, Orientation::Fixed));
+    }
+
+    #[test]
+    fn a_hidden_corner_is_told_apart_by_where_it_would_be() {
+        let board = Rectangle { low: (0, 0), width: 8, height: 6 };
+        for (hidden, first) in [((0, 0), None), ((7, 5), Some(0))] {
+            let mut part = lattice(8, 6);
+            part.remove(&hidden);
+            let found = ordered(&part, &board, &places_px(8, 6), (8, 6));
+            assert_eq!((found.marks[0], found.orientation), (first, Orientation::HalfTurn));
+            assert_eq!(found.marks[1], Some(1));
+        }
     }
 }

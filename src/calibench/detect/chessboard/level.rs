@@ -29,6 +29,11 @@ impl<'a, T: Level> Pyramid<'a, T> {
         Pyramid { photo, reduced }
     }
 
+    /// Level 0.
+    pub fn photo(&self) -> &'a Raster<T> {
+        self.photo
+    }
+
     /// Number of levels, the photograph included.
     pub fn levels(&self) -> usize {
         self.reduced.len() + 1

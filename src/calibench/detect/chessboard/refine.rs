@@ -5,9 +5,9 @@
 //! itself.
 
 use super::level::{Pyramid, level_from_photo, photo_from_level, scale};
-use super::smoothness::{expected, out_of_line};
 use crate::detect::edge::SHARPEST_EDGE_PX;
-use crate::detect::saddle::{Crossing, Window, fit_near_edges};
+use crate::detect::saddle::{Crossing, Window, fit_near_edges, misfit};
+use crate::detect::smoothness::{expected, out_of_line};
 use crate::geometry::Vec2;
 use crate::raster::{Level, Raster};
 
@@ -25,9 +25,14 @@ const LARGEST_START_PX: f64 = 8.0;
 /// How far the fit in a level may lie from where the corner was found, px of the level.
 const LARGEST_MOVE_PX: f64 = 2.0;
 
-/// Corners of a complete board, row by row, px.
+/// Largest misfit of a corner against the middle one of all, and what is allowed beside it. Noise and blur enter all
+/// alike; an edge of what covers a corner in part does not.
+const LARGEST_MISFIT: f64 = 2.0;
+const MISFIT_ALLOWED: f64 = 0.05;
+
+/// Corners of a board, row by row, px; `None` for those that are hidden.
 pub struct Corners<'a> {
-    pub places: &'a [Vec2],
+    pub places: &'a [Option<Vec2>],
     pub columns: usize,
 }
 
@@ -48,13 +53,15 @@ impl Corners<'_> {
         } else {
             (index / self.columns, rows, self.columns)
         };
-        [(at > 0).then(|| self.places[index - stride]), (at + 1 < count).then(|| self.places[index + stride])]
+        let at_place = |is_there: bool, place: usize| if is_there { self.places[place] } else { None };
+        [at_place(at > 0, index.wrapping_sub(stride)), at_place(at + 1 < count, index + stride)]
     }
 
-    fn around(&self, index: usize) -> Around {
+    /// `None` for a corner that is hidden or alone in its row or column.
+    fn around(&self, index: usize) -> Option<Around> {
         let (mut steps, mut curvatures) = ([Vec2::zeros(); 2], [0.0; 2]);
+        let here = self.places[index]?;
         for axis in 0..2 {
-            let here = self.places[index];
             let [before, behind] = self.beside(index, axis);
             let stride = if axis == 0 { 1 } else { self.columns };
             (steps[axis], curvatures[axis]) = match (before, behind) {
@@ -65,10 +72,10 @@ impl Corners<'_> {
                     // Walked backwards, the line turns the other way.
                     (-step, -bent)
                 }
-                (None, None) => (Vec2::zeros(), 0.0),
+                (None, None) => return None,
             };
         }
-        Around { steps, curvatures }
+        Some(Around { steps, curvatures })
     }
 }
 
@@ -90,42 +97,82 @@ fn curvature(a: &Vec2, b: &Vec2, c: &Vec2) -> f64 {
     2.0 * ab.perp(&bc) / (ab.norm() * bc.norm() * ac.norm())
 }
 
-/// All corners of a board that was found in a level, fitted in the photograph; `None` where one has no fit or
-/// lies out of line. `starts_dark`: the square between the first row and column of corners is dark.
+/// The corners of a board, fitted.
+pub struct Fitted {
+    /// Row by row, px; `None` for those that were not found, have no fit or lie out of line.
+    pub corners: Vec<Option<Vec2>>,
+    /// Their fits in the photograph; `None` also where a reduced image gave the corner.
+    crossings: Vec<Option<Crossing>>,
+}
+
+/// The corners of a board that were found in a level, fitted in the photograph. `starts_dark`: the square between the
+/// first row and column of corners is dark.
 pub fn refined<T: Level>(
-    photo: &Raster<T>,
     pyramid: &Pyramid<'_, T>,
     level: usize,
-    found: &[Vec2],
+    found: &[Option<Vec2>],
     columns: usize,
     starts_dark: bool,
-) -> Option<Vec<Vec2>> {
+) -> Fitted {
     let is_dark = |index: usize| (index % columns + index / columns).is_multiple_of(2) == starts_dark;
     let start_edge_px = [1.5 * SHARPEST_EDGE_PX; 2];
-    let mut places: Vec<Vec2> = found.iter().map(|place| photo_from_level(place, level)).collect();
+    let mut places: Vec<Option<Vec2>> =
+        found.iter().map(|place| place.map(|place| photo_from_level(&place, level))).collect();
     let mut edges_px = vec![start_edge_px; found.len()];
     if let Some(reduced) = pyramid.reduced(level) {
         let fitting = Fitting { image: reduced, is_dark: &is_dark, columns, largest_px: LARGEST_START_PX };
         for (index, crossing) in fitting.all(found, &edges_px).into_iter().enumerate() {
             let Some(crossing) = crossing else { continue };
-            places[index] = photo_from_level(&crossing.corner, level);
+            places[index] = Some(photo_from_level(&crossing.corner, level));
             edges_px[index] = crossing.edges_px.map(|edge_px| edge_px * scale(level) * START_WIDTH);
         }
     }
-    let fitting = Fitting { image: photo, is_dark: &is_dark, columns, largest_px: LARGEST_REACH_PX };
-    let fits = fitting.all(&places, &edges_px);
-    let mut good: Vec<Option<Vec2>> = fits.iter().map(|fit| fit.map(|fit| fit.corner)).collect();
+    let fitting =
+        Fitting { image: pyramid.photo(), is_dark: &is_dark, columns, largest_px: LARGEST_REACH_PX };
+    let mut crossings = fitting.all(&places, &edges_px);
+    let mut good: Vec<Option<Vec2>> = crossings.iter().map(|fit| fit.map(|fit| fit.corner)).collect();
     for index in out_of_line(&mut good, columns) {
-        let (place, tolerance_px) = expected(&good, columns, index)?;
-        places[index] = place;
+        crossings[index] = None;
+        let Some((place, tolerance_px)) = expected(&good, columns, index).filter(|_| found[index].is_some())
+        else {
+            continue;
+        };
+        places[index] = Some(place);
         let is_near = |corner: &Vec2| (corner - place).norm() < tolerance_px;
-        let fit = fitting.one(&places, index, edges_px[index]).map(|fit| fit.corner).filter(is_near);
-        good[index] = fit.or_else(|| {
+        let fit = fitting.one(&places, index, edges_px[index]).filter(|fit| is_near(&fit.corner));
+        crossings[index] = fit;
+        good[index] = fit.map(|fit| fit.corner).or_else(|| {
             let in_level = |level| fit_in_level(pyramid, level, &is_dark, &places, columns, index);
             (1..=BLURRED_LEVELS).find_map(|level| in_level(level).filter(is_near))
         });
     }
-    good.into_iter().collect()
+    Fitted { corners: good, crossings }
+}
+
+impl Fitted {
+    /// The corners whose squares look like those of the others: something that covers a corner in part moves it, and
+    /// leaves of the levels around it more than noise. A corner that only a reduced image shows is one of a blurred
+    /// photograph where most are, and else is covered.
+    pub fn alike<T: Level>(&self, photo: &Raster<T>, columns: usize) -> Vec<Option<Vec2>> {
+        let neighbours = Corners { places: &self.corners, columns };
+        let misfit_of = |index: usize| {
+            let (crossing, around) = (self.crossings[index]?, neighbours.around(index)?);
+            let window = Window::Along(sides(&around, LARGEST_REACH_PX));
+            misfit(photo, &crossing, &window, around.curvatures)
+        };
+        let misfits: Vec<Option<f64>> = (0..self.corners.len()).map(misfit_of).collect();
+        let mut sorted: Vec<f64> = misfits.iter().copied().flatten().collect();
+        sorted.sort_by(f64::total_cmp);
+        let middle = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+        let most = LARGEST_MISFIT * middle + MISFIT_ALLOWED;
+        let blurred = 2 * sorted.len() < self.corners.iter().flatten().count();
+        let is_alike = |misfit: &Option<f64>| misfit.map_or(blurred, |misfit| misfit <= most);
+        self.corners
+            .iter()
+            .zip(&misfits)
+            .map(|(corner, misfit)| corner.filter(|_| is_alike(misfit)))
+            .collect()
+    }
 }
 
 /// Levels in which a corner is fitted that has no fit in the photograph: motion of twelve pixels is one of
@@ -137,12 +184,13 @@ fn fit_in_level<T: Level>(
     pyramid: &Pyramid<'_, T>,
     level: usize,
     is_dark: &dyn Fn(usize) -> bool,
-    places: &[Vec2],
+    places: &[Option<Vec2>],
     columns: usize,
     index: usize,
 ) -> Option<Vec2> {
     let image = pyramid.reduced(level)?;
-    let in_level: Vec<Vec2> = places.iter().map(|place| level_from_photo(place, level)).collect();
+    let in_level: Vec<Option<Vec2>> =
+        places.iter().map(|place| place.map(|place| level_from_photo(&place, level))).collect();
     let fitting = Fitting { image, is_dark, columns, largest_px: LARGEST_REACH_PX };
     let fit = fitting.one(&in_level, index, [1.5 * SHARPEST_EDGE_PX; 2])?;
     Some(photo_from_level(&fit.corner, level))
@@ -163,7 +211,7 @@ struct Fitting<'a, T> {
 impl<T: Level> Fitting<'_, T> {
     /// Every fit; each starts from the widths of the one before, whose edges have the same blur and
     /// direction.
-    fn all(&self, places: &[Vec2], edges_px: &[[f64; 2]]) -> Vec<Option<Crossing>> {
+    fn all(&self, places: &[Option<Vec2>], edges_px: &[[f64; 2]]) -> Vec<Option<Crossing>> {
         let mut before = None;
         let mut fit = |index: usize| {
             let crossing = self.one(places, index, before.unwrap_or(edges_px[index]));
@@ -173,9 +221,9 @@ impl<T: Level> Fitting<'_, T> {
         (0..places.len()).map(&mut fit).collect()
     }
 
-    fn one(&self, places: &[Vec2], index: usize, edges_px: [f64; 2]) -> Option<Crossing> {
-        let around = Corners { places, columns: self.columns }.around(index);
-        let start = start(self.image, places[index], &around, (self.is_dark)(index), edges_px)?;
+    fn one(&self, places: &[Option<Vec2>], index: usize, edges_px: [f64; 2]) -> Option<Crossing> {
+        let around = Corners { places, columns: self.columns }.around(index)?;
+        let start = start(self.image, places[index]?, &around, (self.is_dark)(index), edges_px)?;
         fitted(self.image, &start, &around, self.largest_px)
     }
 }

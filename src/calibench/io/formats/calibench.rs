@@ -3,12 +3,12 @@
 //! The centre of the first pixel is (0, 0); parameters stand under their names. `camera.schema.json` is its
 //! schema.
 
-use super::super::result::{CameraFields, parse_camera};
+use super::super::result::{LensFields, parse_lens_camera};
 use super::camera_file::{CameraFile, Estimated};
 use super::error::FormatError;
 use super::node::Source;
 use super::{Format, Found, Room, Size, Written};
-use crate::camera::{FreeParameters, Parameter};
+use crate::camera::{FreeParameters, Model, Parameter};
 use crate::geometry::{Pose, Vec3, rotation};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -21,8 +21,16 @@ pub(super) const FORMAT: Format = Format {
     of: "calibench",
     endings: &["json"],
     first_pixel: 0.0,
-    coefficients: "k1 k2 p1 p2 k3, by name",
-    room: Room { skew: true, covariance: true, pose: true, name: true, size: Size::Kept },
+    coefficients: "by name",
+    room: Room {
+        lenses: &Model::ALL,
+        behind: &Model::ALL,
+        skew: true,
+        covariance: true,
+        pose: true,
+        name: true,
+        size: Size::Kept,
+    },
     looks_like: |text| {
         text.trim_start().starts_with('{') && text.contains("\"camera\"") && text.contains("\"fx\"")
     },
@@ -37,11 +45,13 @@ struct Fields {
     written_by: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     name: Option<String>,
-    camera: CameraFields,
+    camera: LensFields,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     image_size: Option<(usize, usize)>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     free: Vec<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    fy_per_fx: Option<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     covariance: Vec<Vec<f64>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -62,7 +72,7 @@ struct PoseFields {
 }
 
 fn read(source: &Source) -> Result<Vec<Found>, FormatError> {
-    let (camera, image_size) = parse_camera(source.file, source.text)?;
+    let (camera, image_size) = parse_lens_camera(source.file, source.text)?;
     let syntax = |error: serde_json::Error| FormatError::Syntax {
         file: source.file.into(),
         line: error.line(),
@@ -79,7 +89,7 @@ fn read(source: &Source) -> Result<Vec<Found>, FormatError> {
     Ok(vec![
         CameraFile {
             image_size,
-            estimated: estimated(source, &fields)?,
+            estimated: estimated(source, &fields, camera.distortion.model())?,
             cam_from_reference: pose,
             notes: views.then(|| note.to_string()).into_iter().collect(),
             name: fields.name,
@@ -89,7 +99,7 @@ fn read(source: &Source) -> Result<Vec<Found>, FormatError> {
     ])
 }
 
-fn estimated(source: &Source, fields: &Fields) -> Result<Option<Estimated>, FormatError> {
+fn estimated(source: &Source, fields: &Fields, model: Model) -> Result<Option<Estimated>, FormatError> {
     if fields.covariance.is_empty() {
         return Ok(None);
     }
@@ -98,6 +108,9 @@ fn estimated(source: &Source, fields: &Fields) -> Result<Option<Estimated>, Form
     let mut free = FreeParameters::NONE;
     for name in &fields.free {
         match name.parse::<Parameter>() {
+            Ok(parameter) if !model.parameters().any(|other| other == parameter) => {
+                return wrong("free", format!("the {model} model has no {parameter}"));
+            }
             Ok(parameter) if free.is_empty() || free.iter().last() < Some(parameter) => {
                 free = free.with(parameter)
             }
@@ -114,7 +127,8 @@ fn estimated(source: &Source, fields: &Fields) -> Result<Option<Estimated>, Form
     if covariance.iter().any(|value| !value.is_finite()) {
         return wrong("covariance", "a number is not finite".into());
     }
-    Ok(Some(Estimated { free, covariance, degrees_of_freedom: fields.degrees_of_freedom }))
+    let (fy_per_fx, degrees_of_freedom) = (fields.fy_per_fx, fields.degrees_of_freedom);
+    Ok(Some(Estimated { free, fy_per_fx, covariance, degrees_of_freedom }))
 }
 
 fn write(camera: &CameraFile) -> Written {
@@ -123,9 +137,10 @@ fn write(camera: &CameraFile) -> Written {
     let fields = Fields {
         written_by: Some(format!("calibench {}", env!("CARGO_PKG_VERSION"))),
         name: camera.name.clone(),
-        camera: camera.camera.into(),
+        camera: LensFields(camera.camera),
         image_size: camera.image_size,
         free: estimated.map_or(Vec::new(), |e| e.free.iter().map(|p| p.name().to_string()).collect()),
+        fy_per_fx: estimated.and_then(|e| e.fy_per_fx),
         covariance: estimated.map_or(Vec::new(), rows),
         degrees_of_freedom: estimated.and_then(|e| e.degrees_of_freedom),
         cam_from_reference: camera.cam_from_reference.map(|pose| PoseFields {
@@ -142,8 +157,9 @@ fn write(camera: &CameraFile) -> Written {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Camera;
+    use crate::camera::{Camera, Lens};
     use serde_json::Value;
+    use std::collections::BTreeSet;
 
     /// A file in which every field stands.
     fn whole() -> CameraFile {
@@ -152,6 +168,7 @@ mod tests {
             image_size: Some((640, 480)),
             estimated: Some(Estimated {
                 free: FreeParameters::of(&[Parameter::Fx, Parameter::Cx]),
+                fy_per_fx: Some(1.25),
                 covariance: DMatrix::from_row_slice(2, 2, &[1.0, 0.1, 0.1, 2.0]),
                 degrees_of_freedom: Some(100),
             }),
@@ -182,7 +199,21 @@ mod tests {
         let names = |value: &Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
         let of_schema = |path: &str| names(schema.pointer(path).unwrap());
         assert_eq!(of_schema("/properties"), names(&written));
-        assert_eq!(of_schema("/properties/camera/properties"), names(&written["camera"]));
+        let of_model = |model: Model| {
+            let camera = Camera::with_lens(600.0, 600.0, 320.0, 240.0, Lens::ideal(model));
+            let written: Value = serde_json::from_str(&write(&CameraFile::of(camera)).text).unwrap();
+            names(&written["camera"])
+        };
+        let of_cameras: BTreeSet<String> = Model::ALL.into_iter().flat_map(of_model).collect();
+        assert_eq!(
+            of_schema("/properties/camera/properties").into_iter().collect::<BTreeSet<_>>(),
+            of_cameras
+        );
+        let listed = |path: &str| -> Vec<String> {
+            serde_json::from_value(schema.pointer(path).unwrap().clone()).unwrap()
+        };
+        assert_eq!(listed("/properties/camera/properties/model/enum"), Model::ALL.map(Model::name));
+        assert_eq!(listed("/properties/free/items/enum"), Parameter::OF_ALL_MODELS.map(Parameter::name));
         assert_eq!(
             of_schema("/properties/cam_from_reference/properties"),
             names(&written["cam_from_reference"])
@@ -195,6 +226,7 @@ mod tests {
         let cases = [
             ("\"free\": [\"fx\"],\n\"covariance\": [[1, 2]]}", "f:2:1: covariance: 1 rows of 1 numbers"),
             ("\"free\": [\"cx\", \"fx\"], \"covariance\": [[1]]}", "free: fx is out of order"),
+            ("\"free\": [\"alpha\"], \"covariance\": [[1]]}", "the brown-conrady model has no alpha"),
             ("\"free\": [\"f\"], \"covariance\": [[1]]}", "unknown camera parameter `f`"),
         ];
         for (rest, expected) in cases {

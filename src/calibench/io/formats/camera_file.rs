@@ -1,6 +1,6 @@
 //! What may a file say of a camera? All that any of the formats holds, in the conventions of this library.
 
-use crate::camera::{Camera, FreeParameters, Parameter};
+use crate::camera::{Camera, FreeParameters, Lens, Parameter};
 use crate::geometry::Pose;
 use nalgebra::DMatrix;
 
@@ -9,6 +9,8 @@ use nalgebra::DMatrix;
 pub struct Estimated {
     /// Which parameters the rows are, in order; the others were held.
     pub free: FreeParameters,
+    /// fy over fx, if the two were tied: fy then has no row.
+    pub fy_per_fx: Option<f64>,
     /// n x n.
     pub covariance: DMatrix<f64>,
     /// Degrees of freedom behind the noise that scales the covariance, if known.
@@ -21,7 +23,7 @@ pub struct CameraFile {
     /// Its name, where the format gives one.
     pub name: Option<String>,
     /// The camera; pixel (0, 0) is the centre of the top-left pixel.
-    pub camera: Camera,
+    pub camera: Camera<Lens>,
     /// Width and height, px.
     pub image_size: Option<(usize, usize)>,
     /// How well it is known.
@@ -34,10 +36,10 @@ pub struct CameraFile {
 
 impl CameraFile {
     /// A camera of which nothing more is known.
-    pub fn of(camera: Camera) -> CameraFile {
+    pub fn of(camera: impl Into<Camera<Lens>>) -> CameraFile {
         CameraFile {
             name: None,
-            camera,
+            camera: camera.into(),
             image_size: None,
             estimated: None,
             cam_from_reference: None,
@@ -72,6 +74,7 @@ impl CameraFile {
             let factors: Vec<f64> = estimated.free.iter().map(factor).collect();
             let scaled = |i: usize, j: usize| factors[i] * factors[j] * estimated.covariance[(i, j)];
             estimated.covariance = DMatrix::from_fn(factors.len(), factors.len(), scaled);
+            estimated.fy_per_fx = estimated.fy_per_fx.map(|ratio| ratio * sv / su);
         }
         self.image_size = Some(to);
         Some(self)
@@ -91,7 +94,7 @@ mod tests {
         let file = CameraFile { image_size: Some((640, 480)), ..CameraFile::of(camera) };
         let smaller = file.clone().resized((320, 160)).unwrap();
         let point = Vec3::new(0.3, -0.2, 1.0);
-        let (before, after) = (camera.project(&point).unwrap(), smaller.camera.project(&point).unwrap());
+        let (before, after) = (camera.project(&point).unwrap(), smaller.camera.pixel(&point).unwrap());
         // Edges meet edges: -1/2 stays, and 639.5 becomes 319.5.
         assert!((after.x - (0.5 * (before.x + 0.5) - 0.5)).abs() < 1e-12);
         assert!((after.y - ((before.y + 0.5) / 3.0 - 0.5)).abs() < 1e-12);

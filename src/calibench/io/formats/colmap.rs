@@ -1,23 +1,32 @@
 //! COLMAP: `cameras.txt`, a line a camera: `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`.
 //!
 //! The upper left corner of the image is (0, 0) and the centre of its first pixel (0.5, 0.5). The
-//! coefficients of `OPENCV` and `FULL_OPENCV` are OpenCV's; `SIMPLE_RADIAL` and `RADIAL` have one focal
-//! length and k1, or k1 and k2. (COLMAP documentation, "Output Format"; `src/colmap/sensor/models.h`.)
+//! coefficients of `OPENCV`, `FULL_OPENCV` and `OPENCV_FISHEYE` are OpenCV's; `SIMPLE_RADIAL` and `RADIAL` have one
+//! focal length and k1, or k1 and k2, and so have their fisheyes; `DIVISION` divides by `1 + k r^2` of the seen point, as
+//! here. (COLMAP documentation, "Output Format"; `src/colmap/sensor/models.h`.)
 
 use super::camera_file::CameraFile;
 use super::decimal::decimals;
 use super::error::FormatError;
 use super::node::{Source, shortened, side};
 use super::{Format, Found, Room, Size, Written, lens};
-use crate::camera::{BrownConrady, Camera};
+use crate::camera::{Camera, Lens, Model};
 
 pub(super) const FORMAT: Format = Format {
     name: "colmap",
     of: "COLMAP",
     endings: &["txt"],
     first_pixel: 0.5,
-    coefficients: "k1 k2 p1 p2 k3",
-    room: Room { skew: false, covariance: false, pose: false, name: true, size: Size::Needed },
+    coefficients: lens::IN_OPENCVS_ORDER,
+    room: Room {
+        lenses: &[Model::BrownConrady, Model::Rational, Model::KannalaBrandt, Model::Division],
+        behind: &[],
+        skew: false,
+        covariance: false,
+        pose: false,
+        name: true,
+        size: Size::Needed,
+    },
     looks_like,
     read: |source, _| read(source),
     write: |camera, _| Ok(write(camera)),
@@ -80,41 +89,68 @@ fn read_line(source: &Source, offset: usize, line: &str) -> Result<CameraFile, F
     Ok(CameraFile { name: Some((*id).to_string()), image_size, ..CameraFile::of(camera) })
 }
 
-fn camera_of(source: &Source, offset: usize, model: &str, p: &[f64]) -> Result<Camera, FormatError> {
-    let pinhole = Camera::pinhole;
-    Ok(match (model, p) {
-        ("SIMPLE_PINHOLE", &[f, cx, cy]) => pinhole(f, f, cx, cy),
-        ("PINHOLE", &[fx, fy, cx, cy]) => pinhole(fx, fy, cx, cy),
-        ("SIMPLE_RADIAL", &[f, cx, cy, k]) => {
-            pinhole(f, f, cx, cy).with_distortion(BrownConrady::radial(k, 0.0))
-        }
-        ("RADIAL", &[f, cx, cy, k1, k2]) => {
-            pinhole(f, f, cx, cy).with_distortion(BrownConrady::radial(k1, k2))
-        }
-        ("OPENCV", &[fx, fy, cx, cy, _, _, _, _])
-        | ("FULL_OPENCV", &[fx, fy, cx, cy, _, _, _, _, _, _, _, _]) => {
-            let distortion = lens::from_opencv_order(source, offset, &p[4..], lens::CALIBRATE_AGAIN)?;
-            pinhole(fx, fy, cx, cy).with_distortion(distortion)
-        }
-        ("SIMPLE_PINHOLE" | "PINHOLE" | "SIMPLE_RADIAL" | "RADIAL" | "OPENCV" | "FULL_OPENCV", _) => {
-            return Err(source.value(
-                offset,
-                model,
-                format!("{} numbers are not what this model has", p.len()),
-            ));
-        }
-        _ => return Err(source.lens(format!("the model {}", shortened(model)), lens::CALIBRATE_AGAIN)),
+/// What the numbers behind the focal lengths and the principal point are.
+type Coefficients = fn(&[f64]) -> Option<Lens>;
+
+/// COLMAP's models that have an equal here: name, focal lengths, how many coefficients, which lens.
+const MODELS: [(&str, usize, usize, Coefficients); 13] = [
+    ("SIMPLE_PINHOLE", 1, 0, opencv),
+    ("PINHOLE", 2, 0, opencv),
+    ("SIMPLE_RADIAL", 1, 1, opencv),
+    ("RADIAL", 1, 2, opencv),
+    ("OPENCV", 2, 4, opencv),
+    ("FULL_OPENCV", 2, 8, opencv),
+    ("SIMPLE_FISHEYE", 1, 0, lens::fisheye),
+    ("FISHEYE", 2, 0, lens::fisheye),
+    ("SIMPLE_RADIAL_FISHEYE", 1, 1, lens::fisheye),
+    ("RADIAL_FISHEYE", 1, 2, lens::fisheye),
+    ("OPENCV_FISHEYE", 2, 4, lens::fisheye),
+    ("SIMPLE_DIVISION", 1, 1, division),
+    ("DIVISION", 2, 1, division),
+];
+
+fn division(k: &[f64]) -> Option<Lens> {
+    k.first().map(|k1| lens::division(*k1))
+}
+
+/// In OpenCV's order: k1 k2 p1 p2, of which there may be fewer, k3 k4 k5 k6.
+fn opencv(coefficients: &[f64]) -> Option<Lens> {
+    Some(lens::least_of(coefficients))
+}
+
+fn camera_of(source: &Source, offset: usize, model: &str, p: &[f64]) -> Result<Camera<Lens>, FormatError> {
+    let known = MODELS.iter().find(|(name, ..)| *name == model);
+    let Some((_, focal, coefficients, lens)) = known else {
+        return Err(source.lens(format!("the model {}", shortened(model)), lens::CALIBRATE_AGAIN));
+    };
+    let linear = match p {
+        [f, cx, cy, ..] if *focal == 1 => Some([*f, *f, *cx, *cy]),
+        [fx, fy, cx, cy, ..] => Some([*fx, *fy, *cx, *cy]),
+        _ => None,
+    };
+    let behind = p.get(focal + 2..).filter(|behind| behind.len() == *coefficients);
+    let camera = linear.zip(behind.and_then(lens)).map(|(linear, lens)| lens::camera(linear, lens));
+    camera.ok_or_else(|| {
+        source.value(offset, model, format!("{} numbers are not what this model has", p.len()))
     })
+}
+
+/// The model in which a lens is written, and its coefficients.
+fn said(lens: &Lens) -> (&'static str, Vec<f64>) {
+    match lens.model() {
+        Model::KannalaBrandt => ("OPENCV_FISHEYE", lens.coefficients().to_vec()),
+        Model::Division => ("DIVISION", lens.coefficients().to_vec()),
+        _ => match lens::least_count(lens, &[0, 4]) {
+            Some(0) => ("PINHOLE", vec![]),
+            Some(_) => ("OPENCV", lens::padded(lens, 4)),
+            None => ("FULL_OPENCV", lens::padded(lens, 8)),
+        },
+    }
 }
 
 fn write(camera: &CameraFile) -> Written {
     let Camera { fx, fy, cx, cy, distortion, .. } = camera.camera;
-    let [k1, k2, p1, p2, k3] = lens::opencv_order(&distortion);
-    let (model, lens) = match (distortion.is_ideal(), k3 == 0.0) {
-        (true, _) => ("PINHOLE", vec![]),
-        (false, true) => ("OPENCV", vec![k1, k2, p1, p2]),
-        (false, false) => ("FULL_OPENCV", vec![k1, k2, p1, p2, k3, 0.0, 0.0, 0.0]),
-    };
+    let (model, lens) = said(&distortion);
     let (width, height) = camera.image_size.unwrap_or_default();
     // An identifier is a number to COLMAP.
     let number = camera.name.as_deref().filter(|name| name.parse::<u32>().is_ok());

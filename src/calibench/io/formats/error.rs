@@ -3,6 +3,7 @@
 use super::super::input::InputError;
 use super::super::result::ResultError;
 use super::super::table::TableError;
+use crate::camera::Model;
 
 /// Why a file is not converted.
 #[derive(Debug, thiserror::Error)]
@@ -54,7 +55,7 @@ pub enum FormatError {
         message: String,
     },
     /// A lens that this library does not have.
-    #[error("{file}: {model} is not Brown-Conrady (k1 k2 p1 p2 k3), the only lens here: {help}")]
+    #[error("{file}: {model} is none of the lenses here ({}): {help}", lens_names())]
     Lens {
         /// The file.
         file: String,
@@ -107,4 +108,9 @@ pub enum FormatError {
         /// What can be done.
         help: String,
     },
+}
+
+/// The names of the lenses that this library has.
+fn lens_names() -> String {
+    Model::ALL.map(Model::name).join(", ")
 }

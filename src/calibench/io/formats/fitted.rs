@@ -1,7 +1,7 @@
 //! How near does one lens come to another of a different kind? A linear fit over the frame, and its largest
 //! error.
 
-use crate::camera::{BrownConrady, Camera};
+use crate::camera::{BrownConrady, Camera, Lens};
 use crate::geometry::Vec2;
 use nalgebra::{SMatrix, SVector};
 
@@ -62,9 +62,9 @@ fn terms(p: &Vec2) -> SMatrix<f64, 2, 5> {
 }
 
 /// Largest distance between pixels and where a camera shows the rays that another lens sees there, px.
-pub(super) fn largest_error_px(camera: &Camera, seen: &[(Vec2, Vec2)]) -> f64 {
+pub(super) fn largest_error_px(camera: &Camera<Lens>, seen: &[(Vec2, Vec2)]) -> f64 {
     seen.iter()
-        .map(|(ray, pixel)| (camera.pixel_from_normalised(&camera.distortion.distort(ray)) - pixel).norm())
+        .map(|(ray, pixel)| camera.pixel(&ray.push(1.0)).map_or(f64::INFINITY, |seen| (seen - pixel).norm()))
         .fold(0.0, f64::max)
 }
 

@@ -10,16 +10,17 @@
 //! polynomial:  u = u~ (1 + K1 r^2 + K2 r^4 + K3 r^6) + P1 (r^2 + 2 u~^2) + 2 P2 u~ v~      r^2 = u~^2 + v~^2
 //!              v = v~ (1 + K1 r^2 + K2 r^4 + K3 r^6) + 2 P1 u~ v~ + P2 (r^2 + 2 v~^2)
 //! ```
-//! So only a lens without distortion has an equal here; any other is refused, or on request fitted over the
-//! frame, with the largest error said. (MVTec HALCON operator reference, `read_cam_par`, "Calibration", "2D
+//! The division is the one here, with `k1 = Kappa Focus^2`. The polynomial has no equal: it is refused, or on request
+//! the nearest Brown-Conrady lens fitted over the frame, with the largest error said; and every lens here but the
+//! division the other way round. (MVTec HALCON operator reference, `read_cam_par`, "Calibration", "2D
 //! Transformations".)
 
 use super::camera_file::CameraFile;
 use super::decimal::decimal;
 use super::error::FormatError;
 use super::node::{MOST_NAMES, Source, side};
-use super::{Format, Found, Room, Size, Wishes, Written, fitted};
-use crate::camera::{BrownConrady, Camera};
+use super::{Format, Found, Room, Size, Wishes, Written, fitted, lens};
+use crate::camera::{BrownConrady, Camera, Lens, Model};
 use crate::geometry::Vec2;
 
 pub(super) const FORMAT: Format = Format {
@@ -27,36 +28,28 @@ pub(super) const FORMAT: Format = Format {
     of: "HALCON",
     endings: &["dat", "cal"],
     first_pixel: 0.0,
-    coefficients: "K1 K2 K3 P1 P2 of its own lens",
-    room: Room { skew: false, covariance: false, pose: false, name: false, size: Size::Needed },
+    coefficients: "Kappa, or K1 K2 K3 P1 P2, of its own lenses",
+    room: Room {
+        // All but the division with --fit, which the writer asks for.
+        lenses: &Model::ALL,
+        behind: &[],
+        skew: false,
+        covariance: false,
+        pose: false,
+        name: false,
+        size: Size::Needed,
+    },
     looks_like: |text| text.contains("ParGroup:"),
     read,
     write,
 };
 
-const FIT: &str = "it takes what is seen to what is ideal, so no lens here is its equal; --fit finds the nearest one and says its largest error";
+const FIT: &str = "its polynomial takes what is seen to what is ideal, the other way round than here; --fit finds the nearest lens and says its largest error, and HALCON's division is division here";
 
-/// A lens of HALCON's: from the seen point to the ideal one, m.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Lens {
-    Division(f64),
-    Polynomial([f64; 5]),
-}
-
-impl Lens {
-    fn is_ideal(&self) -> bool {
-        matches!(self, Lens::Division(0.0) | Lens::Polynomial([0.0, 0.0, 0.0, 0.0, 0.0]))
-    }
-
-    fn ideal_from_seen(&self, seen: &Vec2) -> Vec2 {
-        match *self {
-            Lens::Division(kappa) => seen / (1.0 + kappa * seen.norm_squared()),
-            // Its P1 stands where p2 does here, and the other way round.
-            Lens::Polynomial([k1, k2, k3, p1, p2]) => {
-                BrownConrady { k1, k2, p1: p2, p2: p1, k3 }.distort(seen)
-            }
-        }
-    }
+/// HALCON's polynomial `K1 K2 K3 P1 P2`: the ideal point of a seen one, m.
+fn ideal_from_seen([k1, k2, k3, p1, p2]: [f64; 5], seen: &Vec2) -> Vec2 {
+    // Its P1 stands where p2 does here, and the other way round.
+    BrownConrady { k1, k2, p1: p2, p2: p1, k3 }.distort(seen)
 }
 
 /// The parameters of a file: name, place of the value, value.
@@ -132,43 +125,61 @@ fn read(source: &Source, wishes: &Wishes) -> Result<Vec<Found>, FormatError> {
         ));
     }
     let (sx, sy) = (entries.number("Sx")?, entries.number("Sy")?);
-    let ideal = Camera::pinhole(focus / sx, focus / sy, entries.number("Cx")?, entries.number("Cy")?);
+    let linear = [focus / sx, focus / sy, entries.number("Cx")?, entries.number("Cy")?];
     let size = (entries.side("ImageWidth")?, entries.side("ImageHeight")?);
-    let lens = lens_of(&entries)?;
-    let mut file = CameraFile { image_size: Some(size), ..CameraFile::of(ideal) };
-    file.notes.push(format!("a pixel measures {sx} x {sy} m, which is not kept"));
-    if lens.is_ideal() {
-        return Ok(vec![file.into()]);
-    }
-    let kind =
-        if matches!(lens, Lens::Division(_)) { "HALCON's division lens" } else { "HALCON's polynomial lens" };
-    if !wishes.fit {
-        return Err(source.lens(kind, FIT));
-    }
-    // Seen and ideal points over the frame, in units of the focal length.
-    let seen = |pixel: &Vec2| Vec2::new((pixel.x - ideal.cx) * sx, (pixel.y - ideal.cy) * sy);
-    let pixels: Vec<Vec2> = fitted::frame(size).collect();
-    let rays: Vec<Vec2> = pixels.iter().map(|pixel| lens.ideal_from_seen(&seen(pixel)) / focus).collect();
-    let pairs: Vec<(Vec2, Vec2)> =
-        rays.iter().zip(&pixels).map(|(ray, pixel)| (*ray, seen(pixel) / focus)).collect();
-    let fitted = fitted::polynomial(&pairs)
-        .ok_or_else(|| source.lens(kind, "no lens here comes near it over the frame"))?;
-    file.camera = ideal.with_distortion(fitted);
-    let error = fitted::largest_error_px(&file.camera, &rays.into_iter().zip(pixels).collect::<Vec<_>>());
-    file.notes.push(format!("{kind} is fitted over the frame: the largest error is {error:.2e} px"));
-    Ok(vec![file.into()])
+    let mut notes = vec![format!("a pixel measures {sx} x {sy} m, which is not kept")];
+    let lens = match polynomial_of(&entries)? {
+        None => lens::simplest(lens::division(entries.number("Kappa")? * focus * focus)),
+        Some([0.0, 0.0, 0.0, 0.0, 0.0]) => lens::ideal(),
+        Some(_) if !wishes.fit => return Err(source.lens(POLYNOMIAL, FIT)),
+        Some(coefficients) => {
+            let seen = |pixel: &Vec2| Vec2::new((pixel.x - linear[2]) * sx, (pixel.y - linear[3]) * sy);
+            let (lens, error_px) = nearest(coefficients, focus, seen, linear, size)
+                .ok_or_else(|| source.lens(POLYNOMIAL, "no lens here comes near it over the frame"))?;
+            notes.push(format!(
+                "{POLYNOMIAL} is fitted over the frame: the largest error is {error_px:.2e} px"
+            ));
+            lens
+        }
+    };
+    let camera = lens::camera(linear, lens);
+    Ok(vec![CameraFile { image_size: Some(size), notes, ..CameraFile::of(camera) }.into()])
 }
 
-fn lens_of(entries: &Entries) -> Result<Lens, FormatError> {
-    let names = ["Poly1", "Poly2", "Poly3", "Poly4", "Poly5"];
+const POLYNOMIAL: &str = "HALCON's polynomial lens";
+
+/// The Brown-Conrady lens nearest to a polynomial over the frame, and its largest error, px.
+fn nearest(
+    coefficients: [f64; 5],
+    focus: f64,
+    seen: impl Fn(&Vec2) -> Vec2,
+    linear: [f64; 4],
+    size: (usize, usize),
+) -> Option<(Lens, f64)> {
+    // Seen and ideal points over the frame, in units of the focal length.
+    let pixels: Vec<Vec2> = fitted::frame(size).collect();
+    let rays: Vec<Vec2> =
+        pixels.iter().map(|pixel| ideal_from_seen(coefficients, &seen(pixel)) / focus).collect();
+    let pairs: Vec<(Vec2, Vec2)> =
+        rays.iter().zip(&pixels).map(|(ray, pixel)| (*ray, seen(pixel) / focus)).collect();
+    let lens = fitted::polynomial(&pairs)?.into();
+    let error = fitted::largest_error_px(
+        &lens::camera(linear, lens),
+        &rays.into_iter().zip(pixels).collect::<Vec<_>>(),
+    );
+    Some((lens, error))
+}
+
+/// The polynomial of a file, if it has one.
+fn polynomial_of(entries: &Entries) -> Result<Option<[f64; 5]>, FormatError> {
     if entries.get("Poly1").is_none() {
-        return Ok(Lens::Division(entries.number("Kappa")?));
+        return Ok(None);
     }
     let mut coefficients = [0.0; 5];
-    for (coefficient, name) in coefficients.iter_mut().zip(names) {
+    for (coefficient, name) in coefficients.iter_mut().zip(["Poly1", "Poly2", "Poly3", "Poly4", "Poly5"]) {
         *coefficient = entries.number(name)?;
     }
-    Ok(Lens::Polynomial(coefficients))
+    Ok(Some(coefficients))
 }
 
 fn write(file: &CameraFile, wishes: &Wishes) -> Result<Written, FormatError> {
@@ -180,12 +191,12 @@ fn write(file: &CameraFile, wishes: &Wishes) -> Result<Written, FormatError> {
         "focal lengths are in metres there: a pixel is taken to be {} m high, which changes no ray",
         wishes.pixel_height_m
     )];
-    let lens = if camera.distortion.is_ideal() {
-        vec![("Kappa", "kappa", 0.0, "Radial distortion coefficient [1/(meter*meter)]")]
+    let f2 = focus * focus;
+    let lens = if let Some(k1) = division(&camera.distortion) {
+        vec![("Kappa", "kappa", k1 / f2, "Radial distortion coefficient [1/(meter*meter)]")]
     } else {
-        let (coefficients, error) = polynomial_of(camera, (width, height), wishes)?;
+        let (coefficients, error) = inverse_polynomial(camera, (width, height), wishes)?;
         converted.push(format!("the lens is fitted over the frame: the largest error is {error:.2e} px"));
-        let f2 = focus * focus;
         let metres = [f2, f2 * f2, f2 * f2 * f2, focus, focus];
         let c = |i: usize| coefficients[i] / metres[i];
         vec![
@@ -213,9 +224,17 @@ fn write(file: &CameraFile, wishes: &Wishes) -> Result<Written, FormatError> {
     Ok(Written { text, converted, lost: Vec::new() })
 }
 
+/// k1 of a division, 0 of an ideal lens.
+fn division(lens: &Lens) -> Option<f64> {
+    match lens.model() {
+        Model::Division => lens.coefficients().first().copied(),
+        _ => lens::is_ideal(lens).then_some(0.0),
+    }
+}
+
 /// K1, K2, K3, P1, P2 in units of the focal length, and the largest error, px.
-fn polynomial_of(
-    camera: &Camera,
+fn inverse_polynomial(
+    camera: &Camera<Lens>,
     size: (usize, usize),
     wishes: &Wishes,
 ) -> Result<([f64; 5], f64), FormatError> {
@@ -225,20 +244,20 @@ fn polynomial_of(
     if !wishes.fit {
         return refuse(FIT.into());
     }
+    let seen = |pixel: &Vec2| Vec2::new((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy);
     let mut pairs = Vec::new();
     for pixel in fitted::frame(size) {
-        let seen = camera.normalised_from_pixel(&pixel);
-        match camera.normalised_ray(&pixel) {
-            Ok(ray) => pairs.push((seen, ray)),
+        match camera.ray(&pixel) {
+            Ok(ray) if ray.z > 0.0 => pairs.push((seen(&pixel), ray.xy() / ray.z)),
+            Ok(_) => return refuse("it sees beyond 90 degrees, where its lens has no image".into()),
             Err(error) => return refuse(format!("it does not reach the whole frame: {error}")),
         }
     }
     let Some(fit) = fitted::polynomial(&pairs) else {
         return refuse("no lens there comes near it over the frame".into());
     };
-    let by_halcon: Vec<(Vec2, Vec2)> = fitted::frame(size)
-        .map(|pixel| (fit.distort(&camera.normalised_from_pixel(&pixel)), pixel))
-        .collect();
+    let by_halcon: Vec<(Vec2, Vec2)> =
+        fitted::frame(size).map(|pixel| (fit.distort(&seen(&pixel)), pixel)).collect();
     let BrownConrady { k1, k2, p1, p2, k3 } = fit;
     Ok(([k1, k2, k3, p2, p1], fitted::largest_error_px(camera, &by_halcon)))
 }

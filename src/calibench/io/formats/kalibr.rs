@@ -1,7 +1,8 @@
 //! Kalibr: `camchain.yaml` with a camera or several, and the YAML of a target.
 //!
 //! `intrinsics` of the model `pinhole` are `[fu, fv, pu, pv]`, `distortion_coeffs` of `radtan` `[k1, k2, r1,
-//! r2]`, which are OpenCV's first four; the centre of the first pixel is (0, 0), since marks come from
+//! r2]`, which are OpenCV's first four, of `equidistant` `[k1, k2, k3, k4]`, OpenCV's fisheye; `intrinsics` of the model
+//! `ds` (double sphere, without further distortion) are `[xi, alpha, fu, fv, pu, pv]`; the centre of the first pixel is (0, 0), since marks come from
 //! OpenCV's detectors. `T_cn_cnm1` takes coordinates of the camera before to those of this one. (Kalibr wiki,
 //! "yaml formats", "Supported models", "Calibration targets".)
 
@@ -9,17 +10,26 @@ use super::camera_file::CameraFile;
 use super::decimal::{decimal, decimals};
 use super::error::FormatError;
 use super::node::{Field, Source, shortened};
+use super::opencv::fisheye_of;
 use super::ros::plain;
 use super::{Format, Found, Room, Size, Written, lens, yaml};
-use crate::camera::{BrownConrady, Camera};
+use crate::camera::{Camera, Lens, Model};
 
 pub(super) const FORMAT: Format = Format {
     name: "kalibr",
     of: "Kalibr",
     endings: &["yaml", "yml"],
     first_pixel: 0.0,
-    coefficients: "k1 k2 p1 p2",
-    room: Room { skew: false, covariance: false, pose: false, name: true, size: Size::Needed },
+    coefficients: lens::IN_OPENCVS_ORDER,
+    room: Room {
+        lenses: &[Model::BrownConrady, Model::KannalaBrandt, Model::DoubleSphere],
+        behind: &[Model::DoubleSphere],
+        skew: false,
+        covariance: false,
+        pose: false,
+        name: true,
+        size: Size::Needed,
+    },
     looks_like: |text| ["camera_model:", "intrinsics:", "resolution:"].iter().all(|key| text.contains(key)),
     read: |source, _| read(source),
     write: |camera, _| write(camera),
@@ -41,24 +51,10 @@ fn read(source: &Source) -> Result<Vec<Found>, FormatError> {
 }
 
 fn read_one(source: &Source, name: &str, camera: &Field) -> Result<CameraFile, FormatError> {
-    let model = camera.need("camera_model")?.text()?;
-    if model != "pinhole" {
-        return Err(source.lens(format!("the camera model {model} of {name}"), lens::CALIBRATE_AGAIN));
-    }
-    let [fx, fy, cx, cy] = camera.need("intrinsics")?.array()?;
+    let lens = lens_of(source, name, camera)?;
     let [width, height] = camera.need("resolution")?.array()?;
     let size = |side: f64| {
         super::node::side(side).ok_or_else(|| camera.wrong(format!("{side} is no number of pixels")))
-    };
-    let distortion = match camera.need("distortion_model")?.text()? {
-        "none" => BrownConrady::default(),
-        "radtan" => {
-            let [k1, k2, p1, p2] = camera.need("distortion_coeffs")?.array()?;
-            BrownConrady { k1, k2, p1, p2, k3: 0.0 }
-        }
-        other => {
-            return Err(source.lens(format!("the distortion model {other} of {name}"), lens::CALIBRATE_AGAIN));
-        }
     };
     let further = ["T_cn_cnm1", "T_cam_imu", "timeshift_cam_imu"];
     let notes = further
@@ -70,20 +66,71 @@ fn read_one(source: &Source, name: &str, camera: &Field) -> Result<CameraFile, F
         name: Some(name.to_string()),
         image_size: Some((size(width)?, size(height)?)),
         notes,
-        ..CameraFile::of(Camera::pinhole(fx, fy, cx, cy).with_distortion(distortion))
+        ..CameraFile::of(lens)
     })
+}
+
+/// The camera of both of Kalibr's models: that of the projection and that of the distortion.
+fn lens_of(source: &Source, name: &str, camera: &Field) -> Result<Camera<Lens>, FormatError> {
+    let refused = |what: &str, model: &str| {
+        Err(source.lens(format!("the {what} model {} of {name}", shortened(model)), lens::CALIBRATE_AGAIN))
+    };
+    let distortion = camera.need("distortion_model")?;
+    let coefficients = || camera.need("distortion_coeffs");
+    match (camera.need("camera_model")?.text()?, distortion.text()?) {
+        ("ds", "none") => {
+            let [xi, alpha, linear @ ..] = camera.need("intrinsics")?.array::<6>()?;
+            let lens = Lens::new(Model::DoubleSphere, &[xi, alpha]).ok();
+            Ok(lens::camera(linear, lens.ok_or_else(|| camera.wrong("xi and alpha are expected"))?))
+        }
+        ("pinhole", model) => {
+            let lens = match model {
+                "none" => lens::ideal(),
+                "radtan" => {
+                    let field = coefficients()?;
+                    lens::from_opencv_order(source, field.node.offset, &field.array::<4>()?)?
+                }
+                "equidistant" => fisheye_of(&coefficients()?, &coefficients()?.numbers()?)?,
+                other => return refused("distortion", other),
+            };
+            Ok(lens::camera(camera.need("intrinsics")?.array()?, lens))
+        }
+        ("ds", other) => refused("distortion", other),
+        (other, _) => refused("camera", other),
+    }
+}
+
+/// How Kalibr says a lens.
+struct Said {
+    camera_model: &'static str,
+    /// Intrinsics before the focal lengths.
+    before: Vec<f64>,
+    distortion_model: &'static str,
+    coefficients: Vec<f64>,
+}
+
+fn said(lens: &Lens) -> Result<Said, FormatError> {
+    let pinhole = |distortion_model, coefficients| {
+        Ok(Said { camera_model: "pinhole", before: vec![], distortion_model, coefficients })
+    };
+    let own = lens.coefficients().to_vec();
+    match lens.model() {
+        Model::DoubleSphere => {
+            Ok(Said { camera_model: "ds", before: own, distortion_model: "none", coefficients: vec![] })
+        }
+        Model::KannalaBrandt => pinhole("equidistant", own),
+        _ if lens::least_count(lens, &[4]).is_some() => pinhole("radtan", lens::padded(lens, 4)),
+        _ => Err(FormatError::CannotHold {
+            format: "Kalibr",
+            what: format!("k3 = {}", lens::padded(lens, 5)[4]),
+            help: "its radtan lens ends with k2: calibrate with --fix k3=0".into(),
+        }),
+    }
 }
 
 fn write(camera: &CameraFile) -> Result<Written, FormatError> {
     let Camera { fx, fy, cx, cy, distortion, .. } = camera.camera;
-    let BrownConrady { k1, k2, p1, p2, k3 } = distortion;
-    if k3 != 0.0 {
-        return Err(FormatError::CannotHold {
-            format: "Kalibr",
-            what: format!("k3 = {k3}"),
-            help: "its radtan lens ends with k2: calibrate with --fix k3=0".into(),
-        });
-    }
+    let Said { camera_model, before, distortion_model, coefficients } = said(&distortion)?;
     let (width, height) = camera.image_size.unwrap_or_default();
     let name = plain(camera.name.as_deref().unwrap_or("cam0"));
     // Kalibr asks for cam0, cam1, ...: any other name is no camera to it.
@@ -91,10 +138,10 @@ fn write(camera: &CameraFile) -> Result<Written, FormatError> {
         name.strip_prefix("cam").is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
     let kept = if numbered { name.as_str() } else { "cam0" };
     let text = format!(
-        "{kept}:\n  camera_model: pinhole\n  intrinsics: [{}]\n  distortion_model: radtan\n  distortion_coeffs: [{}]\n  rostopic: /{name}/image_raw\n  \
+        "{kept}:\n  camera_model: {camera_model}\n  intrinsics: [{}]\n  distortion_model: {distortion_model}\n  distortion_coeffs: [{}]\n  rostopic: /{name}/image_raw\n  \
          resolution: [{width}, {height}]\n",
-        decimals(&[fx, fy, cx, cy], ", "),
-        decimals(&[k1, k2, p1, p2], ", "),
+        decimals(&[before, vec![fx, fy, cx, cy]].concat(), ", "),
+        decimals(&coefficients, ", "),
     );
     let renamed = camera.name.as_ref().filter(|_| !numbered);
     let lost =

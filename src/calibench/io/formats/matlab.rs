@@ -3,15 +3,16 @@
 //! MATLAB counts pixels from 1: the centre of the first pixel is (1, 1), and a principal point is 1 px more
 //! than in OpenCV (MathWorks, `cameraIntrinsicsToOpenCV`). `ImageSize` is rows, columns. `K` is `[[fx, s,
 //! cx], [0, fy, cy], [0, 0, 1]]`; its older form `IntrinsicMatrix` is the transpose. `RadialDistortion` is
-//! `[k1 k2]` or `[k1 k2 k3]`, `TangentialDistortion` `[p1 p2]`, in the equations of OpenCV. (MathWorks,
-//! `cameraParameters`, `cameraIntrinsics`.) Skew is in pixels, as here.
+//! `[k1 k2]` or `[k1 k2 k3]`, `TangentialDistortion` `[p1 p2]`, in the equations of OpenCV. Skew is in pixels, as here.
+//! Its fisheye is Scaramuzza's polynomial (`MappingCoefficients`), which has no equal here. (MathWorks,
+//! `cameraParameters`, `cameraIntrinsics`, `fisheyeIntrinsics`.)
 
 use super::camera_file::CameraFile;
 use super::decimal::decimals;
 use super::error::FormatError;
 use super::node::{Field, Source};
-use super::{Format, Found, Room, Size, Written, flow};
-use crate::camera::{BrownConrady, Camera};
+use super::{Format, Found, Room, Size, Written, flow, lens};
+use crate::camera::{BrownConrady, Camera, Model};
 
 pub(super) const FORMAT: Format = Format {
     name: "matlab",
@@ -20,8 +21,19 @@ pub(super) const FORMAT: Format = Format {
     endings: &[],
     first_pixel: 1.0,
     coefficients: "k1 k2 k3, then p1 p2",
-    room: Room { skew: true, covariance: false, pose: false, name: false, size: Size::Kept },
-    looks_like: |text| text.trim_start().starts_with('{') && text.contains("\"RadialDistortion\""),
+    room: Room {
+        lenses: &[Model::BrownConrady],
+        behind: &[],
+        skew: true,
+        covariance: false,
+        pose: false,
+        name: false,
+        size: Size::Kept,
+    },
+    looks_like: |text| {
+        let of_a_lens = ["\"RadialDistortion\"", "\"MappingCoefficients\""];
+        text.trim_start().starts_with('{') && of_a_lens.iter().any(|key| text.contains(key))
+    },
     read: |source, _| read(source),
     write: |camera, _| Ok(write(camera)),
 };
@@ -31,6 +43,9 @@ fn read(source: &Source) -> Result<Vec<Found>, FormatError> {
     let root = Field::root(*source, &node);
     // A cameraParameters may keep its intrinsics in an object of their own.
     let intrinsics = root.get("Intrinsics").unwrap_or_else(|| root.clone());
+    if intrinsics.get("MappingCoefficients").is_some() {
+        return Err(source.lens("MATLAB's fisheye lens (Scaramuzza's)", lens::CALIBRATE_AGAIN));
+    }
     let mut camera = linear(&intrinsics)?;
     let radial = intrinsics.need("RadialDistortion")?;
     let (k1, k2, k3) = match radial.numbers()?[..] {
@@ -81,7 +96,9 @@ fn linear(root: &Field) -> Result<Camera, FormatError> {
 }
 
 fn write(camera: &CameraFile) -> Written {
-    let Camera { fx, fy, cx, cy, skew, distortion: BrownConrady { k1, k2, p1, p2, k3 } } = camera.camera;
+    let Camera { fx, fy, cx, cy, skew, distortion } = camera.camera;
+    let distortion = lens::padded(&distortion, Model::BrownConrady.coefficients().len());
+    let [k1, k2, p1, p2, k3] = distortion.try_into().unwrap_or_default();
     let list = |numbers: &[f64]| format!("[{}]", decimals(numbers, ", "));
     let size = camera.image_size.map_or("[]".to_string(), |(width, height)| format!("[{height}, {width}]"));
     let text = format!(

@@ -32,8 +32,8 @@ pub use error::FormatError;
 pub use kalibr::{ChessTarget, parse_target, target_text};
 pub use vnl::{VnlBoard, corner_text, looks_like_vnl, parse_vnl, vnl_text};
 
-use crate::camera::Camera;
-use crate::geometry::Vec2;
+use crate::camera::Model;
+use crate::geometry::Vec3;
 use node::Source;
 
 /// Bytes of a file of a camera: mrcal keeps whole calibrations beside one.
@@ -42,6 +42,10 @@ pub const MOST_BYTES: u64 = 1 << 28;
 /// What a format has room for, beyond focal lengths, principal point and lens.
 #[derive(Debug, Clone, Copy)]
 struct Room {
+    /// Lenses that have an equal there.
+    lenses: &'static [Model],
+    /// Those of them with which its program sees beyond 90 degrees from the axis, as here.
+    behind: &'static [Model],
     skew: bool,
     covariance: bool,
     pose: bool,
@@ -67,7 +71,7 @@ pub struct Format {
     pub endings: &'static [&'static str],
     /// Both coordinates of the centre of the first pixel.
     pub first_pixel: f64,
-    /// The lens's coefficients in the order of its files.
+    /// The order of the lens's coefficients in its files.
     pub coefficients: &'static str,
     room: Room,
     looks_like: fn(&str) -> bool,
@@ -195,6 +199,7 @@ fn only_one(
 /// See [`FormatError`].
 ///
 /// ```
+/// use calibench::camera::Parameter;
 /// use calibench::io::formats::{Wishes, detect, read_camera_file};
 ///
 /// let text = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n1 SIMPLE_RADIAL 640 480 600 320 240 -0.18\n";
@@ -202,7 +207,7 @@ fn only_one(
 /// let read = read_camera_file(format, "cameras.txt", text, None, &Wishes::default())?;
 /// assert_eq!((format.name, read.image_size), ("colmap", Some((640, 480))));
 /// // COLMAP's first pixel has its centre at (0.5, 0.5), ours at (0, 0).
-/// assert_eq!((read.camera.cx, read.camera.distortion.k1), (319.5, -0.18));
+/// assert_eq!((read.camera.cx, read.camera.value(Parameter::K1)), (319.5, Some(-0.18)));
 /// # Ok::<(), calibench::io::formats::FormatError>(())
 /// ```
 pub fn read_camera_file(
@@ -216,7 +221,7 @@ pub fn read_camera_file(
     let cameras = (format.read)(&Source { file, text }, wishes)?;
     let first_pixel = wishes.first_pixel.unwrap_or(format.first_pixel);
     let read = chosen(file, cameras, camera)?.with_origin_moved(-first_pixel);
-    match read.camera.is_valid() {
+    match read.camera.is_possible() {
         true => Ok(read),
         false => Err(FormatError::NoCamera { file: file.into() }),
     }
@@ -248,18 +253,8 @@ pub fn write_camera_file(
     camera: &CameraFile,
     wishes: &Wishes,
 ) -> Result<Written, FormatError> {
-    let refuse = |what: &str, help: &str| {
-        Err(FormatError::CannotHold { format: format.of, what: what.into(), help: help.into() })
-    };
-    if !camera.camera.is_valid() {
-        return refuse("this camera", "fx and fy must be positive, and every parameter finite");
-    }
-    if camera.camera.skew != 0.0 && !format.room.skew {
-        return refuse("skew", "calibrate without it (--fix skew=0), or write calibench or matlab");
-    }
-    if camera.image_size.is_none() && format.room.size == Size::Needed {
-        return refuse("a camera without its image's size", "give --image-size WxH");
-    }
+    let camera = &with_simplest_lens(format, camera);
+    refuse_what_has_no_room(format, camera)?;
     let mut written = (format.write)(&camera.clone().with_origin_moved(format.first_pixel), wishes)?;
     let room = format.room;
     let losses = [
@@ -269,7 +264,54 @@ pub fn write_camera_file(
     ];
     let lost = losses.into_iter().filter(|(lost, _)| *lost);
     written.lost.extend(lost.map(|(_, what)| format!("{what}: {} has no place for it", format.of)));
+    written.lost.extend(lost_behind(format, camera));
     Ok(written)
+}
+
+/// The same camera with its lens by the model with the fewest coefficients, where no covariance speaks of them.
+fn with_simplest_lens(format: &Format, camera: &CameraFile) -> CameraFile {
+    let mut camera = camera.clone();
+    if !format.room.covariance {
+        camera.camera.distortion = lens::simplest(camera.camera.distortion);
+    }
+    camera
+}
+
+fn refuse_what_has_no_room(format: &Format, camera: &CameraFile) -> Result<(), FormatError> {
+    let refuse = |what: &str, help: &str| {
+        Err(FormatError::CannotHold { format: format.of, what: what.into(), help: help.into() })
+    };
+    let Format { room, .. } = format;
+    let lens = camera.camera.distortion.model();
+    if !camera.camera.is_possible() {
+        return refuse("this camera", "fx and fy must be positive, and every parameter finite");
+    }
+    if !room.lenses.contains(&lens) {
+        let held: Vec<&str> = room.lenses.iter().map(|model| model.name()).collect();
+        let help = format!("calibrate again with another --model; it holds {}", held.join(", "));
+        return refuse(&format!("a {lens} lens"), &help);
+    }
+    if camera.camera.skew != 0.0 && !room.skew {
+        return refuse("skew", "calibrate without it (--fix skew=0), or write calibench or matlab");
+    }
+    if camera.image_size.is_none() && room.size == Size::Needed {
+        return refuse("a camera without its image's size", "give --image-size WxH");
+    }
+    Ok(())
+}
+
+/// What a program does not see that this library does: rays from beside and behind, where it divides by their depth.
+fn lost_behind(format: &Format, camera: &CameraFile) -> Option<String> {
+    if format.room.behind.contains(&camera.camera.distortion.model()) {
+        return None;
+    }
+    let rays: Vec<Vec3> =
+        fitted::frame(camera.image_size?).filter_map(|pixel| camera.camera.ray(&pixel).ok()).collect();
+    let behind = rays.iter().filter(|ray| ray.z <= 0.0).count();
+    let share = 100.0 * behind as f64 / rays.len() as f64;
+    (behind > 0).then(|| {
+        format!("what is seen at 90 degrees from the axis and beyond, {share:.1} % of the frame: {} projects what lies in front of the camera", format.of)
+    })
 }
 
 /// Largest distance between the pixels of a written file's camera and those of the camera it was written
@@ -285,8 +327,7 @@ pub fn read_back_px(
     let wishes = Wishes { fit: true, ..Wishes::default() };
     let back = read_camera_file(format, "what was written", &written.text, None, &wishes)?;
     let Some(size) = camera.image_size else { return Ok(None) };
-    let rays = fitted::frame(size).filter_map(|pixel| camera.camera.normalised_ray(&pixel).ok());
-    let pixel = |camera: &Camera, ray: &Vec2| camera.pixel_from_normalised(&camera.distortion.distort(ray));
-    let distances = rays.map(|ray| (pixel(&back.camera, &ray) - pixel(&camera.camera, &ray)).norm());
-    Ok(Some(distances.fold(0.0, f64::max)))
+    let apart = |ray: &Vec3| Some((back.camera.pixel(ray)? - camera.camera.pixel(ray)?).norm());
+    let rays = fitted::frame(size).filter_map(|pixel| camera.camera.ray(&pixel).ok());
+    Ok(Some(rays.map(|ray| apart(&ray).unwrap_or(f64::INFINITY)).fold(0.0, f64::max)))
 }

@@ -10,7 +10,7 @@ use super::decimal::decimals;
 use super::error::FormatError;
 use super::node::{Field, Source};
 use super::{Format, Found, Room, Size, Written, flow, lens};
-use crate::camera::Camera;
+use crate::camera::{Camera, Model};
 use crate::geometry::{Pose, Vec3, rotation};
 
 pub(super) const FORMAT: Format = Format {
@@ -18,8 +18,16 @@ pub(super) const FORMAT: Format = Format {
     of: "mrcal",
     endings: &["cameramodel"],
     first_pixel: 0.0,
-    coefficients: "k1 k2 p1 p2 k3",
-    room: Room { skew: false, covariance: false, pose: true, name: false, size: Size::Needed },
+    coefficients: lens::IN_OPENCVS_ORDER,
+    room: Room {
+        lenses: &[Model::BrownConrady, Model::Rational, Model::ThinPrism],
+        behind: &[],
+        skew: false,
+        covariance: false,
+        pose: true,
+        name: false,
+        size: Size::Needed,
+    },
     looks_like: |text| ["'lensmodel'", "\"lensmodel\"", "'lens_model'"].iter().any(|key| text.contains(key)),
     read: |source, _| read(source),
     write: |camera, _| Ok(write(camera)),
@@ -43,12 +51,11 @@ fn read(source: &Source) -> Result<Vec<Found>, FormatError> {
     };
     let field = root.need("intrinsics")?;
     let numbers = field.numbers()?;
-    let (4, [fx, fy, cx, cy]) =
-        (numbers.len().wrapping_sub(count), numbers.first_chunk().copied().unwrap_or_default())
+    let (4, linear) = (numbers.len().wrapping_sub(count), numbers.first_chunk().copied().unwrap_or_default())
     else {
         return Err(field.wrong(format!("{model} has {} numbers, got {}", 4 + count, numbers.len())));
     };
-    let distortion = lens::from_opencv_order(source, field.node.offset, &numbers[4..], lens::REFIT_BY_MRCAL)?;
+    let distortion = lens::from_opencv_order(source, field.node.offset, &numbers[4..])?;
     let [width, height] = root.need("imagersize")?.numbers()?[..] else {
         return Err(root.need("imagersize")?.wrong("width and height are expected"));
     };
@@ -72,7 +79,7 @@ fn read(source: &Source) -> Result<Vec<Found>, FormatError> {
             image_size: Some((size(width)?, size(height)?)),
             cam_from_reference: pose.filter(|pose| *pose != Pose::identity()),
             notes,
-            ..CameraFile::of(Camera::pinhole(fx, fy, cx, cy).with_distortion(distortion))
+            ..CameraFile::of(lens::camera(linear, distortion))
         }
         .into(),
     ])
@@ -80,17 +87,14 @@ fn read(source: &Source) -> Result<Vec<Found>, FormatError> {
 
 fn write(camera: &CameraFile) -> Written {
     let Camera { fx, fy, cx, cy, distortion, .. } = camera.camera;
-    let coefficients = lens::opencv_order(&distortion);
-    let count = match (distortion.is_ideal(), distortion.k3 == 0.0) {
-        (true, _) => 0,
-        (false, true) => 4,
-        (false, false) => 5,
-    };
+    // The longest of mrcal's models holds whatever `lenses` lets in.
+    let counts = OPENCV.map(|(_, count)| count);
+    let count = lens::least_count(&distortion, &counts).unwrap_or_default();
     let model = OPENCV.iter().find(|(_, n)| *n == count).map_or("", |(name, _)| *name);
     let (width, height) = camera.image_size.unwrap_or_default();
     let pose = camera.cam_from_reference.unwrap_or_else(Pose::identity);
     let (r, t) = (rotation::log(&pose.rotation), pose.translation);
-    let intrinsics = [&[fx, fy, cx, cy], &coefficients[..count]].concat();
+    let intrinsics = [vec![fx, fy, cx, cy], lens::padded(&distortion, count)].concat();
     let text = format!(
         "{{\n    'lensmodel':  '{model}',\n\n    # fx, fy, cx, cy and the lens\n    'intrinsics': [ {}, ],\n\n    \
          # rotation vector and translation from the reference to the camera\n    'extrinsics': [ {}, ],\n\n    'imagersize': [ {width}, {height}, ],\n}}\n",

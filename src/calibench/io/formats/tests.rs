@@ -2,8 +2,8 @@
 //! formats?
 
 use super::*;
-use crate::camera::BrownConrady;
-use crate::geometry::{Pose, Vec3, rotation};
+use crate::camera::{BrownConrady, Camera, Lens, Parameter};
+use crate::geometry::{Pose, Vec2, Vec3, rotation};
 
 /// The camera of the samples.
 const CAMERA: Camera = Camera {
@@ -26,15 +26,43 @@ fn without_k3() -> Camera {
     CAMERA.with_distortion(BrownConrady { k3: 0.0, ..CAMERA.distortion })
 }
 
-fn whole(camera: Camera) -> CameraFile {
+/// The camera of the samples with the lens of each model.
+fn with_lens(model: Model) -> Camera<Lens> {
+    let opencv = [
+        -0.223606797749979,
+        0.0648074069840786,
+        0.0013038404810405,
+        -0.0009486832980505,
+        -0.0173205080756888,
+        0.01,
+        0.002,
+        0.003,
+        1e-3,
+        -2e-4,
+        -1e-3,
+        3e-4,
+        0.01,
+        -0.02,
+    ];
+    let coefficients: &[f64] = match model {
+        Model::KannalaBrandt => &[0.01, 0.02, 0.003, 0.004],
+        Model::Division => &[-0.18],
+        Model::DoubleSphere => &[-0.2, 0.55],
+        model => &opencv[..model.coefficients().len()],
+    };
+    let Camera { fx, fy, cx, cy, .. } = CAMERA;
+    Camera::with_lens(fx, fy, cx, cy, Lens::new(model, coefficients).unwrap())
+}
+
+fn whole(camera: impl Into<Camera<Lens>>) -> CameraFile {
     CameraFile { image_size: Some(SIZE), ..CameraFile::of(camera) }
 }
 
 /// Largest difference of two cameras' pixels over the frame, px.
-fn largest_px(a: &Camera, b: &Camera) -> f64 {
-    let pixel = |camera: &Camera, ray: &Vec2| camera.pixel_from_normalised(&camera.distortion.distort(ray));
-    let rays = fitted::frame(SIZE).map(|pixel| a.normalised_ray(&pixel).unwrap());
-    rays.map(|ray| (pixel(a, &ray) - pixel(b, &ray)).norm()).fold(0.0, f64::max)
+fn largest_px(a: impl Into<Camera<Lens>>, b: &Camera<Lens>) -> f64 {
+    let a = a.into();
+    let rays = fitted::frame(SIZE).map(|pixel| a.ray(&pixel).unwrap());
+    rays.map(|ray| (a.pixel(&ray).unwrap() - b.pixel(&ray).unwrap()).norm()).fold(0.0, f64::max)
 }
 
 fn read(file: &str, text: &str, camera: Option<&str>, wishes: &Wishes) -> Result<CameraFile, FormatError> {
@@ -68,17 +96,17 @@ fn what_other_programs_wrote_projects_as_the_camera_it_was_written_from() {
     for ((file, text), format, name, expected, tolerance_px) in cases {
         assert_eq!(detect(file, text).unwrap().name, format);
         let found = read(file, text, name, &Wishes::default()).unwrap();
-        let error = largest_px(&expected, &found.camera);
+        let error = largest_px(expected, &found.camera);
         assert!(error <= tolerance_px, "{file}: {error:.1e} px");
         assert_eq!(found.image_size, Some(SIZE), "{file}");
     }
     let (file, text) = sample!("halcon.dat");
     let ideal = CAMERA.with_distortion(BrownConrady::default());
-    assert!(largest_px(&ideal, &read(file, text, None, &Wishes::default()).unwrap().camera) < ROUNDING_PX);
+    assert!(largest_px(ideal, &read(file, text, None, &Wishes::default()).unwrap().camera) < ROUNDING_PX);
     let radial = read("c.txt", sample!("colmap.txt").1, Some("3"), &Wishes::default()).unwrap().camera;
     assert_eq!(
         (radial.fx, radial.fy, radial.distortion),
-        (CAMERA.fx, CAMERA.fx, BrownConrady::radial(CAMERA.distortion.k1, CAMERA.distortion.k2))
+        (CAMERA.fx, CAMERA.fx, BrownConrady::radial(CAMERA.distortion.k1, CAMERA.distortion.k2).into())
     );
 }
 
@@ -93,26 +121,141 @@ fn pixels_are_those_of_opencv() {
 }
 
 #[test]
-fn a_camera_survives_the_way_through_every_two_formats() {
-    for first in &FORMATS {
-        for second in &FORMATS {
-            let has = |name: &str| [first.name, second.name].contains(&name);
-            let camera = match (has("halcon"), has("kalibr")) {
-                (true, _) => CAMERA.with_distortion(BrownConrady::default()),
-                (_, true) => without_k3(),
-                _ => CAMERA,
-            };
-            let wishes = Wishes::default();
-            let once = write_camera_file(first, &whole(camera), &wishes).unwrap();
-            let between = read("file", &once.text, None, &wishes).unwrap();
-            let twice = write_camera_file(second, &between, &wishes).unwrap();
-            assert_eq!(detect("file", &twice.text).unwrap().name, second.name);
-            let back = read("file", &twice.text, None, &wishes).unwrap();
-            let error = largest_px(&camera, &back.camera);
-            assert!(error < 1e-9, "{} to {}: {error:.1e} px", first.name, second.name);
-            assert_eq!(back.image_size, Some(SIZE));
-            assert!(read_back_px(second, &twice, &between).unwrap().unwrap() < 1e-9);
+fn what_other_programs_wrote_of_other_lenses_projects_as_the_camera_it_was_written_from() {
+    const ROUNDING_PX: f64 = 1e-11;
+    let cases = [
+        (sample!("opencv-rational.yaml"), None, Model::Rational, ROUNDING_PX),
+        (sample!("opencv-thin-prism.json"), None, Model::ThinPrism, ROUNDING_PX),
+        (sample!("opencv-tilted.xml"), None, Model::Tilted, ROUNDING_PX),
+        (sample!("opencv-fisheye.yaml"), None, Model::KannalaBrandt, ROUNDING_PX),
+        (sample!("colmap-lenses.txt"), Some("1"), Model::Rational, ROUNDING_PX),
+        (sample!("colmap-lenses.txt"), Some("2"), Model::KannalaBrandt, ROUNDING_PX),
+        (sample!("colmap-lenses.txt"), Some("8"), Model::Division, ROUNDING_PX),
+        (sample!("kalibr.yaml"), Some("cam1"), Model::KannalaBrandt, ROUNDING_PX),
+        // Ten digits.
+        (sample!("mrcal-opencv8.cameramodel"), None, Model::Rational, 2e-7),
+        (sample!("mrcal-opencv12.cameramodel"), None, Model::ThinPrism, 2e-7),
+        // Its metres are multiplied by themselves and by a focal length of millimetres.
+        (sample!("halcon-division.dat"), None, Model::Division, ROUNDING_PX),
+    ];
+    for ((file, text), name, model, tolerance_px) in cases {
+        let found = read(file, text, name, &Wishes::default()).unwrap();
+        assert_eq!(found.camera.distortion.model(), model, "{file}");
+        assert!(found.image_size.is_none_or(|size| size == SIZE), "{file}");
+        // The script that wrote the division for HALCON took another coefficient than COLMAP's.
+        let expected = match (file, model) {
+            ("halcon-division.dat", _) => {
+                Camera { distortion: lens::division(HALCONS_DIVISION), ..with_lens(model) }
+            }
+            _ => with_lens(model),
+        };
+        let error = largest_px(expected, &found.camera);
+        assert!(error <= tolerance_px, "{file}: {error:.1e} px");
+    }
+    let found = |name| read("c.txt", sample!("colmap-lenses.txt").1, Some(name), &Wishes::default()).unwrap();
+    for (name, coefficients) in [
+        ("3", vec![0.01, 0.0, 0.0, 0.0]),
+        ("4", vec![0.01, 0.02, 0.0, 0.0]),
+        ("6", vec![0.0; 4]),
+        ("7", vec![-0.18]),
+    ] {
+        assert_eq!(found(name).camera.distortion.coefficients(), coefficients, "camera {name}");
+    }
+    assert_eq!((found("7").camera.fy, found("6").camera.fy), (CAMERA.fx, CAMERA.fy));
+}
+
+/// Kappa of the sample, -25688.96721004612 / m^2, times its focal length squared, by hand.
+const HALCONS_DIVISION: f64 = -25688.96721004612 * 0.002790240740779074 * 0.002790240740779074;
+
+#[test]
+fn pixels_of_other_lenses_are_those_of_opencv_and_colmap() {
+    let (_, text) = sample!("lens-projections.csv");
+    for line in text.lines().skip(1) {
+        let (model, numbers) = line.split_once(',').unwrap();
+        let n: Vec<f64> = numbers.split(',').map(|word| word.parse().unwrap()).collect();
+        let pixel = with_lens(model.parse().unwrap()).pixel(&Vec3::new(n[0], n[1], n[2])).unwrap();
+        assert!((pixel - Vec2::new(n[3], n[4])).norm() < 1e-9, "{line}: {pixel}");
+    }
+}
+
+/// The camera of a lens that two formats hold alike: without what Kalibr has no place for, or HALCON without a fit.
+fn held_by(formats: [&Format; 2], model: Model) -> Option<Camera<Lens>> {
+    let has = |name: &str| formats.iter().any(|format| format.name == name);
+    if !formats.iter().all(|format| format.room.lenses.contains(&model)) {
+        return None;
+    }
+    match model {
+        Model::Division => Some(with_lens(model)),
+        Model::BrownConrady if has("halcon") => {
+            Some(lens::camera([800.0, 790.0, 320.0, 240.0], lens::ideal()))
         }
+        _ if has("halcon") => None,
+        Model::BrownConrady if has("kalibr") => Some(without_k3().into()),
+        _ => Some(with_lens(model)),
+    }
+}
+
+#[test]
+fn a_camera_of_every_lens_survives_the_way_through_every_two_formats() {
+    let mut ways = 0;
+    for model in Model::ALL {
+        for first in &FORMATS {
+            for second in &FORMATS {
+                let Some(camera) = held_by([first, second], model) else { continue };
+                let wishes = Wishes::default();
+                let once = write_camera_file(first, &whole(camera), &wishes).unwrap();
+                let between = read("file", &once.text, None, &wishes).unwrap();
+                let twice = write_camera_file(second, &between, &wishes).unwrap();
+                assert_eq!(detect("file", &twice.text).unwrap().name, second.name);
+                let back = read("file", &twice.text, None, &wishes).unwrap();
+                let error = largest_px(camera, &back.camera);
+                assert!(error < 1e-9, "{model}: {} to {}: {error:.1e} px", first.name, second.name);
+                assert_eq!((back.camera.distortion.model(), back.image_size), (model, Some(SIZE)));
+                assert!(read_back_px(second, &twice, &between).unwrap().unwrap() < 1e-9);
+                ways += 1;
+            }
+        }
+    }
+    // Brown-Conrady's in 10 formats; rational in 7, thin prism in 5, tilted in 4, Kannala-Brandt in 7, division in 3,
+    // double sphere in 2.
+    assert_eq!(ways, 100 + 49 + 25 + 16 + 49 + 9 + 4);
+}
+
+#[test]
+fn a_lens_that_a_format_has_no_place_for_is_refused_with_those_it_has() {
+    for format in &FORMATS {
+        for model in Model::ALL.into_iter().filter(|model| !format.room.lenses.contains(model)) {
+            let error = write_camera_file(format, &whole(with_lens(model)), &Wishes::default())
+                .unwrap_err()
+                .to_string();
+            assert!(error.contains(&format!("cannot hold a {model} lens")), "{error}");
+            assert!(error.ends_with(format.room.lenses[format.room.lenses.len() - 1].name()), "{error}");
+        }
+    }
+    // A longer model whose further coefficients are 0 is the shorter one.
+    let tilted = Lens::new(Model::Tilted, &lens::padded(&CAMERA.distortion.into(), 14)).unwrap();
+    let camera = whole(Camera { distortion: tilted, ..with_lens(Model::Tilted) });
+    let text = write_camera_file(&mrcal::FORMAT, &camera, &Wishes::default()).unwrap().text;
+    assert!(text.contains("LENSMODEL_OPENCV5"), "{text}");
+}
+
+#[test]
+fn what_lies_beside_and_behind_the_camera_is_named_where_a_program_does_not_see_it() {
+    let wide = |model: Model, coefficients: &[f64]| {
+        whole(Camera::with_lens(180.0, 180.0, 320.0, 240.0, Lens::new(model, coefficients).unwrap()))
+    };
+    let fisheye = wide(Model::KannalaBrandt, &[0.0; 4]);
+    let double_sphere = wide(Model::DoubleSphere, &[-0.2, 0.55]);
+    for (camera, name, lost) in [
+        (&fisheye, "opencv-yaml", true),
+        (&fisheye, "kalibr", true),
+        (&fisheye, "calibench", false),
+        (&double_sphere, "kalibr", false),
+        (&whole(with_lens(Model::KannalaBrandt)), "ros", false),
+    ] {
+        let written = write_camera_file(format_of_name(name).unwrap(), camera, &Wishes::default()).unwrap();
+        let named = written.lost.iter().any(|line| line.contains("90 degrees from the axis and beyond"));
+        assert_eq!(named, lost, "{name}: {:?}", written.lost);
     }
 }
 
@@ -133,20 +276,27 @@ fn the_first_pixel_is_where_each_format_says() {
 #[test]
 fn a_lens_of_another_kind_is_refused_by_its_name() {
     let splined = "{'lensmodel': 'LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=16_Ny=11_fov_x_deg=120', 'intrinsics': [1,2,3,4], 'imagersize': [1,1]}";
-    let fisheye = "%YAML:1.0\n---\nfisheye_model: 1\ncamera_matrix: [1., 0., 0., 0., 1., 0., 0., 0., 1.]\n";
-    let ros = "image_width: 6\nimage_height: 4\ncamera_matrix:\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\ndistortion_model: equidistant\n\
+    let kalibr = |camera: &str, distortion: &str| {
+        format!(
+            "cam0:\n  camera_model: {camera}\n  intrinsics: [1, 1, 1, 1]\n  distortion_model: {distortion}\n  resolution: [6, 4]\n"
+        )
+    };
+    let (omni, fov) = (kalibr("omni", "none"), kalibr("pinhole", "fov"));
+    let scaramuzza = "{\"MappingCoefficients\": [350, -1e-3, 0, 0], \"ImageSize\": [4, 6]}";
+    let ros = "image_width: 6\nimage_height: 4\ncamera_matrix:\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\ndistortion_model: fov\n\
                distortion_coefficients:\n  data: [1, 2, 3, 4]\n";
     let telecentric = "ParGroup: Camera: Parameter;\nMagnification:mag: 0.2;\n";
     let cases = [
-        (sample!("opencv-rational.yaml"), None, "a lens with k4 k5 k6"),
         (sample!("mrcal-cahvor.cameramodel"), None, "LENSMODEL_CAHVOR"),
-        (sample!("colmap.txt"), Some("4"), "the model OPENCV_FISHEYE"),
-        (sample!("kalibr.yaml"), Some("cam1"), "the distortion model equidistant of cam1"),
-        (sample!("halcon-division.dat"), None, "HALCON's division lens"),
+        (sample!("colmap-lenses.txt"), Some("9"), "the model EUCM"),
+        (sample!("colmap-lenses.txt"), Some("10"), "the model THIN_PRISM_FISHEYE"),
+        (sample!("colmap-lenses.txt"), Some("11"), "the model FOV"),
         (sample!("halcon-polynomial.dat"), None, "HALCON's polynomial lens"),
         (("s.cameramodel", splined), None, "LENSMODEL_SPLINED_STEREOGRAPHIC"),
-        (("f.yml", fisheye), None, "OpenCV's fisheye model"),
-        (("r.yaml", ros), None, "the distortion model equidistant"),
+        (("m.json", scaramuzza), None, "MATLAB's fisheye lens"),
+        (("k.yaml", omni.as_str()), None, "the camera model omni of cam0"),
+        (("k.yaml", fov.as_str()), None, "the distortion model fov of cam0"),
+        (("r.yaml", ros), None, "the distortion model fov"),
         (("t.dat", telecentric), None, "a telecentric lens"),
     ];
     for ((file, text), name, model) in cases {
@@ -157,26 +307,21 @@ fn a_lens_of_another_kind_is_refused_by_its_name() {
 }
 
 #[test]
-fn halcons_lenses_are_fitted_with_the_error_that_is_said() {
+fn halcons_polynomial_is_fitted_with_the_error_that_is_said() {
     let wishes = Wishes { fit: true, ..Wishes::default() };
-    // The largest errors of NumPy's least squares on the same nodes.
-    let cases = [(sample!("halcon-division.dat"), 1.368e-3), (sample!("halcon-polynomial.dat"), 7.462e-2)];
-    for ((file, text), expected_px) in cases {
-        let read = read(file, text, None, &wishes).unwrap();
-        let said = read
-            .notes
-            .iter()
-            .find_map(|note| note.split_once("the largest error is "))
-            .expect("it is said")
-            .1;
-        let said: f64 = said.trim_end_matches(" px").parse().unwrap();
-        assert!((said / expected_px - 1.0).abs() < 0.01, "{file}: {said} px, expected {expected_px} px");
-        // Barrel: what is seen far out comes from farther out.
-        assert!(read.camera.distortion.k1 < -0.1, "{:?}", read.camera);
-        // And back: HALCON's polynomial is near to what was fitted to it.
-        let written = write_camera_file(&halcon::FORMAT, &read, &wishes).unwrap();
-        assert!(read_back_px(&halcon::FORMAT, &written, &read).unwrap().unwrap() < 0.1);
-    }
+    // The largest error of NumPy's least squares on the same nodes.
+    let (file, text) = sample!("halcon-polynomial.dat");
+    let expected_px = 7.462e-2;
+    let read = read(file, text, None, &wishes).unwrap();
+    let said =
+        read.notes.iter().find_map(|note| note.split_once("the largest error is ")).expect("it is said").1;
+    let said: f64 = said.trim_end_matches(" px").parse().unwrap();
+    assert!((said / expected_px - 1.0).abs() < 0.01, "{file}: {said} px, expected {expected_px} px");
+    // Barrel: what is seen far out comes from farther out.
+    assert!(read.camera.value(Parameter::K1).unwrap() < -0.1, "{:?}", read.camera);
+    // And back: HALCON's polynomial is near to what was fitted to it.
+    let written = write_camera_file(&halcon::FORMAT, &read, &wishes).unwrap();
+    assert!(read_back_px(&halcon::FORMAT, &written, &read).unwrap().unwrap() < 0.1);
 }
 
 #[test]
@@ -234,6 +379,10 @@ fn complaints_name_file_line_and_value() {
         (
             "{'lensmodel': 'LENSMODEL_OPENCV4', 'intrinsics': [1, 2, 3], 'imagersize': [6, 4]}",
             "LENSMODEL_OPENCV4 has 8 numbers, got 3",
+        ),
+        (
+            "%YAML:1.0\n---\nfisheye_model: 1\ncamera_matrix: [1., 0., 0., 0., 1., 0., 0., 0., 1.]\nD: [1., 2., 3.]\n",
+            "a fisheye has 4 coefficients, k1 k2 k3 k4, got 3",
         ),
         ("1 OPENCV 640 480 1 2 3\n", "f:1:1: OPENCV: 3 numbers are not what this model has"),
         ("1 PINHOLE 640 480.5 1 1 0 0\n", "f:1:1"),

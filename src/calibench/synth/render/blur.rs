@@ -35,6 +35,11 @@ impl Kernel {
         Kernel { sigma_px, reach_px: REACH * sigma_px + 0.5 }
     }
 
+    /// How far from an outline pixels are blurred, px.
+    pub fn reach_px(&self) -> f64 {
+        self.reach_px
+    }
+
     /// Arcs short enough for the quadrature: over a chord of sigma/2 three Gauss points integrate the
     /// Gaussian to 1e-8, and slivers of 1e-5 px^2 leave the arc within 1e-8 px of its parabola.
     pub fn steps(&self) -> Steps {
@@ -116,6 +121,7 @@ fn room<'a>(stack: &'a mut [f64; ROOM], heap: &'a mut Vec<f64>, length: usize) -
 #[cfg(test)]
 mod tests {
     use super::super::outline::{Outline, trace};
+    use super::super::window::Window;
     use super::*;
     use std::convert::Infallible;
 
@@ -123,7 +129,10 @@ mod tests {
         let mut coverage = Coverage::new(24, 24);
         for piece in &outline.pieces {
             let curve = |t: f64| Ok::<_, Infallible>(piece.at(t));
-            trace(&curve, piece.start_parts(), steps, &mut |arc| kernel.add(&mut coverage, arc)).unwrap();
+            trace(&curve, piece.start_parts(), steps, &Window::ALL, &mut |arc| {
+                kernel.add(&mut coverage, arc)
+            })
+            .unwrap();
         }
         coverage.finish();
         coverage

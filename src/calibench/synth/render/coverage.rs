@@ -138,6 +138,7 @@ impl Coverage {
 #[cfg(test)]
 mod tests {
     use super::super::outline::{Outline, Steps, trace};
+    use super::super::window::Window;
     use super::*;
     use std::convert::Infallible;
 
@@ -145,7 +146,8 @@ mod tests {
         let mut coverage = Coverage::new(width, height);
         for piece in &outline.pieces {
             let curve = |t: f64| Ok::<_, Infallible>(piece.at(t));
-            trace(&curve, piece.start_parts(), &Steps::SHARP, &mut |arc| coverage.add_arc(arc)).unwrap();
+            trace(&curve, piece.start_parts(), &Steps::SHARP, &Window::ALL, &mut |arc| coverage.add_arc(arc))
+                .unwrap();
         }
         coverage.finish();
         coverage

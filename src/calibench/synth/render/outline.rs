@@ -1,6 +1,7 @@
 //! Where does the edge of a mark run in the image? Smooth pieces of outline, cut into arcs that are nearly
 //! straight.
 
+use super::window::{Side, Window};
 use crate::geometry::Vec2;
 
 /// A smooth piece of a mark's outline on the board.
@@ -102,24 +103,32 @@ impl Steps {
     pub const SHARP: Steps = Steps { sliver: 8e-7, chord_px: f64::INFINITY };
 }
 
-/// Halvings of a part of a piece: 2^24 arcs a part is beyond any board that projects to finite pixels.
-const MAX_HALVINGS: u32 = 24;
+/// Halvings of a part of a piece: the parameter's double precision has no more.
+const MAX_HALVINGS: u32 = 48;
 
-/// Cuts a curve over t in 0 ... 1 into arcs and hands them on in order.
+/// Cuts a curve over t in 0 ... 1 into arcs and hands them on in order. What the image does not see is left out, and what lies
+/// far to its left becomes a straight line, however long it is: the cost is bounded by the image.
 pub fn trace<E>(
     curve: &impl Fn(f64) -> Result<Vec2, E>,
     parts: usize,
     steps: &Steps,
+    window: &Window,
     emit: &mut impl FnMut(&Arc),
 ) -> Result<(), E> {
     let mut from = curve(0.0)?;
     for part in 0..parts {
         let span = (part as f64 / parts as f64, (part + 1) as f64 / parts as f64);
         let to = curve(span.1)?;
-        halve(curve, span, (from, to), MAX_HALVINGS, steps, emit)?;
+        halve(curve, span, (from, to), MAX_HALVINGS, &Cut { steps, window }, emit)?;
         from = to;
     }
     Ok(())
+}
+
+/// Where an arc ends, and where it need not be followed.
+struct Cut<'a> {
+    steps: &'a Steps,
+    window: &'a Window,
 }
 
 fn halve<E>(
@@ -127,18 +136,27 @@ fn halve<E>(
     (start, end): (f64, f64),
     (from, to): (Vec2, Vec2),
     halvings: u32,
-    steps: &Steps,
+    cut: &Cut<'_>,
     emit: &mut impl FnMut(&Arc),
 ) -> Result<(), E> {
     let half = 0.5 * (start + end);
     let arc = Arc { from, middle: curve(half)?, to };
+    match cut.window.side(&arc) {
+        Side::Unseen => return Ok(()),
+        Side::FarLeft => {
+            cut.window.down_the_left(&arc, cut.steps.chord_px).for_each(|arc| emit(&arc));
+            return Ok(());
+        }
+        Side::Seen => {}
+    }
+    let Cut { steps, .. } = cut;
     let short = arc.sliver().abs() <= steps.sliver && (to - from).norm() <= steps.chord_px;
     if short || halvings == 0 {
         emit(&arc);
         return Ok(());
     }
-    halve(curve, (start, half), (from, arc.middle), halvings - 1, steps, emit)?;
-    halve(curve, (half, end), (arc.middle, to), halvings - 1, steps, emit)
+    halve(curve, (start, half), (from, arc.middle), halvings - 1, cut, emit)?;
+    halve(curve, (half, end), (arc.middle, to), halvings - 1, cut, emit)
 }
 
 #[cfg(test)]
@@ -151,7 +169,7 @@ mod tests {
         let circle = Piece::Circle { centre: Vec2::new(3.0, -2.0), radius: 7.5 };
         let curve = |t: f64| Ok::<_, Infallible>(circle.at(t));
         let (mut polygon, mut slivers) = (0.0, 0.0);
-        trace(&curve, circle.start_parts(), &Steps::SHARP, &mut |arc| {
+        trace(&curve, circle.start_parts(), &Steps::SHARP, &Window::ALL, &mut |arc| {
             polygon += 0.5 * (arc.from.x * arc.to.y - arc.from.y * arc.to.x);
             slivers += arc.sliver();
         })

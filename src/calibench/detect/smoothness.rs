@@ -1,4 +1,4 @@
-//! Does a corner lie where the corners beside it put it? Rows and columns are smooth: perspective and lens
+//! Does a mark lie where the marks beside it put it? Rows and columns are smooth: perspective and lens
 //! change a step little by little.
 //!
 //! A corner is compared with the polynomial through its neighbours on a line, of the highest degree that they

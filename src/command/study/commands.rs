@@ -1,0 +1,65 @@
+//! `calibench study commands`: one line a shard, for whatever runs lines.
+
+use super::{Failure, read};
+use crate::{Exit, print};
+use calibench::io::ShownPath;
+use calibench_study::{Engine, Shard};
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// The study
+    spec: PathBuf,
+    /// Parts of the study
+    #[arg(long, value_name = "N")]
+    shards: u64,
+    /// Folder for the parts, and for the whole in `whole`
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Prints the command that joins the parts, and nothing else
+    #[arg(long)]
+    merge: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
+    let count = arguments.shards;
+    if !(1..=Shard::MOST).contains(&count) {
+        return Err(Failure::usage(format!("--shards must be from 1 to {}", Shard::MOST)));
+    }
+    // What cannot be run is said here, not once a shard.
+    Engine::new(&read(&arguments.spec)?, Shard { index: 0, count })
+        .map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.shown())))?;
+    let part = |index: u64| quoted(&arguments.out.join(format!("part-{index}-of-{count}")));
+    if arguments.merge {
+        let parts: Vec<String> = (0..count).map(part).collect();
+        let whole = quoted(&arguments.out.join("whole"));
+        print(&format!("calibench study merge {} --out {whole}\n", parts.join(" ")));
+        return Ok(Exit::Held);
+    }
+    let spec = quoted(&arguments.spec);
+    for index in 0..count {
+        print(&format!("calibench study run {spec} --shard {index}/{count} --out {}\n", part(index)));
+    }
+    Ok(Exit::Held)
+}
+
+/// A path as one word of a shell.
+fn quoted(path: &Path) -> String {
+    let text = path.to_string_lossy();
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./,:@%+=".contains(c);
+    match !text.is_empty() && text.chars().all(is_plain) {
+        true => text.into_owned(),
+        false => format!("'{}'", text.replace('\'', "'\\''")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_is_one_word_of_a_shell() {
+        assert_eq!(quoted(Path::new("out/a-1.toml")), "out/a-1.toml");
+        assert_eq!(quoted(Path::new("my study's.toml")), r"'my study'\''s.toml'");
+    }
+}

@@ -1,0 +1,98 @@
+//! Faults in a lens model: another is fitted, a part of it is left out, or it is right only near the axis.
+
+use super::{Class, How, Planted, correct, with_settings};
+use crate::protocol::{Answer, Problem};
+use calibench::calibrate::Settings;
+use calibench::camera::{Model, Parameter};
+
+pub(super) const FAULTS: &[Planted] = &[
+    of_models(
+        "another-lens",
+        "a fisheye fitted as a division model, its k1 stated",
+        &[Model::KannalaBrandt],
+        |p, _| another_lens(p),
+    ),
+    of_models("last-coefficient-ignored", "the last free coefficient held at 0", OTHERS, |p, _| {
+        with_settings(p, without_last_coefficient)
+    }),
+    of_models(
+        "prisms-exchanged",
+        "s1, s2 taken for those of y and s3, s4 for those of x",
+        &[Model::ThinPrism],
+        |p, _| prisms_exchanged(p),
+    ),
+    of_models(
+        "marks-far-out-dropped",
+        "marks in the outer third of the image are not used",
+        OTHERS,
+        |p, _| far_out_dropped(p),
+    ),
+];
+
+const OTHERS: &[Model] = &[
+    Model::Rational,
+    Model::ThinPrism,
+    Model::Tilted,
+    Model::KannalaBrandt,
+    Model::Division,
+    Model::DoubleSphere,
+];
+
+const fn of_models(id: &'static str, about: &'static str, models: &'static [Model], how: How) -> Planted {
+    Planted { id, about, class: Class::Gross, models, how }
+}
+
+/// The answer with another model's parameters under the names that are asked; what it lacks is 0.
+fn another_lens(problem: &Problem) -> Answer {
+    let linear = |name: &&String| Parameter::LINEAR.iter().any(|p| p.name() == **name);
+    let changed = Problem {
+        model: Model::Division.name().into(),
+        free: problem.free.iter().filter(linear).cloned().chain(["k1".to_string()]).collect(),
+        ..problem.clone()
+    };
+    let right = correct(problem);
+    let mut given = correct(&changed);
+    if right.parameters.is_empty() || given.parameters.is_empty() {
+        return right;
+    }
+    for name in &problem.free {
+        given.parameters.entry(name.clone()).or_insert(0.0);
+    }
+    given.covariance = right.covariance;
+    given.warnings = right.warnings;
+    given
+}
+
+fn without_last_coefficient(settings: Settings) -> Settings {
+    match settings.free().iter().filter(|p| *p > Parameter::Skew).last() {
+        Some(last) => settings.hold(last, 0.0),
+        None => settings,
+    }
+}
+
+fn prisms_exchanged(problem: &Problem) -> Answer {
+    let mut given = correct(problem);
+    for (x, y) in [("s1", "s3"), ("s2", "s4")] {
+        if let (Some(&of_x), Some(&of_y)) = (given.parameters.get(x), given.parameters.get(y)) {
+            given.parameters.insert(x.into(), of_y);
+            given.parameters.insert(y.into(), of_x);
+        }
+    }
+    given
+}
+
+fn far_out_dropped(problem: &Problem) -> Answer {
+    let mut changed = problem.clone();
+    let [width, height] = problem.image_size.map(|size| size as f64);
+    let is_near =
+        |&[u, v]: &[f64; 2]| (u / width - 0.5).abs() < 1.0 / 3.0 && (v / height - 0.5).abs() < 1.0 / 3.0;
+    for view in &mut changed.views {
+        let pairs = view.target.iter().zip(&view.pixels).filter(|(_, pixel)| is_near(pixel));
+        let (target, pixels): (Vec<_>, Vec<_>) = pairs.map(|(t, p)| (*t, *p)).unzip();
+        // A view with hardly a mark left is used whole.
+        if pixels.len() >= 8 {
+            (view.target, view.pixels) = (target, pixels);
+        }
+    }
+    correct(&changed)
+}
