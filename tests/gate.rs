@@ -54,6 +54,36 @@ fn a_program_that_hangs_is_ended_and_at_last_not_asked_any_more() {
 }
 
 #[test]
+fn a_judged_program_is_stopped_by_another_thread_and_no_other_with_it() {
+    let start = |command| Process::new(command, Duration::from_secs(600), 2);
+    let (stopped, other) = (start("sleep 1000"), start("sleep 1001"));
+    let begun = Instant::now();
+    std::thread::scope(|scope| {
+        let asked = scope.spawn(|| stopped.ask_all(&problems(6)));
+        let goes_on = scope.spawn(|| other.ask_all(&problems(2)));
+        std::thread::sleep(Duration::from_millis(300));
+        stopped.stop();
+        let replies = asked.join().expect("no panic");
+        assert_eq!(replies.len(), 6);
+        assert!(replies.iter().all(|reply| matches!(
+            &reply.outcome,
+            Outcome::Broken(Breakage::Crashed { .. } | Breakage::NotAsked(_))
+        )));
+        assert!(!goes_on.is_finished(), "the other program was ended too");
+        other.stop();
+        goes_on.join().expect("no panic");
+    });
+    assert!(
+        stopped
+            .ask_all(&problems(1))
+            .iter()
+            .all(|reply| matches!(reply.outcome, Outcome::Broken(Breakage::NotAsked(_))))
+    );
+    // 600 s are allowed a problem.
+    assert!(begun.elapsed() < Duration::from_secs(120));
+}
+
+#[test]
 fn an_interrupted_gate_leaves_no_program_behind() {
     let out = folder("gate-interrupted");
     std::fs::create_dir_all(&out).expect("a folder");

@@ -5,7 +5,7 @@ use crate::validate::{csv, estimate};
 use calibench::board::View;
 use calibench::calibrate::{LensCalibration, Settings, calibrate_lens};
 use calibench::camera::{Camera, FreeParameters, Lens, Model, Parameter};
-use calibench::evaluate::{Interval, OneCamera, TakenOut};
+use calibench::evaluate::{Interval, TakenOut};
 use calibench::geometry::Vec3;
 use calibench::io::CalibrationFields;
 use calibench::synth::scene::looking_at_centre;

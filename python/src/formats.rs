@@ -10,7 +10,7 @@ use calibench::io::formats::{
     self, CameraFile, Estimated, Format, FormatError, MOST_BYTES, Wishes, corner_text, detect,
     format_of_name, format_to_write, read_camera_file, write_camera_file,
 };
-use calibench::io::{CornerFile, read_regular_text, write_atomically};
+use calibench::io::{CornerFile, doubts, read_regular_text, write_atomically};
 use numpy::PyArray1;
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
@@ -98,6 +98,7 @@ fn contents(
             fy_per_fx: result.covariance.fy_per_fx,
             covariance: result.covariance.intrinsics.clone(),
             degrees_of_freedom: Some(result.degrees_of_freedom),
+            doubts: doubts(result.warnings.iter().map(ToString::to_string).collect()),
         };
         let file = CameraFile::of(result.camera);
         let image_size = image_size.or(calibration.get().size());

@@ -1,7 +1,6 @@
 //! The gate in Python: a function of Python's, a program or this library's solver is asked, and its answers are judged.
 
 use crate::arrays::of_plane;
-use crate::gate_program::StoppableProgram;
 use crate::records::record;
 use crate::watch::{detached, needs_threads};
 use calibench::camera::{Model, UnknownModel};
@@ -9,7 +8,7 @@ use calibench::geometry::Vec2;
 use calibench_gate::accept::Breakage;
 use calibench_gate::protocol::{Answer, Problem};
 use calibench_gate::solver::Given;
-use calibench_gate::{Asked, Builtin, Check, Plan, Property, Report as Judged, Solver, Terms, run};
+use calibench_gate::{Asked, Builtin, Check, Plan, Process, Property, Report as Judged, Solver, Terms, run};
 use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -117,7 +116,7 @@ pub(crate) fn gate_command(
         return Err(PyValueError::new_err(format!("jobs = {jobs}: expected 1 to {MOST_JOBS}")));
     }
     needs_threads(py)?;
-    let program = Arc::new(StoppableProgram::new(&command, limit, jobs));
+    let program = Arc::new(Process::new(&command, limit, jobs));
     let asked = Arc::clone(&program);
     let report = detached(py, true, move || {
         options.plan(|| asked.models()).map(|plan| judged(&*asked, &plan, &terms))

@@ -17,7 +17,6 @@ mod errors;
 mod evaluate;
 mod formats;
 mod gate;
-mod gate_program;
 mod pickled;
 mod records;
 mod rectify;

@@ -24,7 +24,14 @@ use pyo3::types::PyTuple;
 ///     purpose: what is drawn.
 #[pyclass(module = "calibench")]
 #[derive(Debug)]
-pub(crate) struct Stream(Draws);
+pub(crate) struct Stream {
+    draws: Draws,
+    /// What it was opened with.
+    key: Key,
+}
+
+/// Seed, scenario, trial and purpose.
+type Key = (u64, String, u64, String);
 
 /// So many draws, in an array for which there is room.
 fn drawn<'py, T: Element>(
@@ -50,12 +57,28 @@ impl Stream {
     ) -> PyResult<Stream> {
         let (seed, trial) =
             (arguments::value(seed, "seed")?, trial.map_or(Ok(0), |trial| arguments::value(trial, "trial"))?);
-        Ok(Stream(Draws::open(StreamKey { seed, scenario, trial, purpose })))
+        let draws = Draws::open(StreamKey { seed, scenario, trial, purpose });
+        Ok(Stream { draws, key: (seed, scenario.into(), trial, purpose.into()) })
+    }
+
+    /// A copy, and what `pickle` keeps: the key, and how far it was drawn.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, Key, u128) {
+        let stream = slf.borrow();
+        (slf.get_type().into_any(), stream.key.clone(), stream.draws.position())
+    }
+
+    fn __setstate__(&mut self, position: u128) {
+        self.draws = self.draws.clone().drawn_to(position);
+    }
+
+    fn __repr__(&self) -> String {
+        let (seed, scenario, trial, purpose) = &self.key;
+        format!("Stream(seed={seed}, scenario={scenario:?}, trial={trial}, purpose={purpose:?})")
     }
 
     /// Standard normal numbers, shape (count,).
     fn normal<'py>(&mut self, count: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        drawn(count, || self.0.normal())
+        drawn(count, || self.draws.normal())
     }
 
     /// Uniform numbers in (low, high), (0, 1) if neither is given, shape (count,).
@@ -68,14 +91,14 @@ impl Stream {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let py = count.py();
         match (low, high) {
-            (None, None) => drawn(count, || self.0.uniform()),
+            (None, None) => drawn(count, || self.draws.uniform()),
             (Some(low), Some(high)) => {
                 let (low, high) = (arguments::finite(py, "low", low)?, arguments::finite(py, "high", high)?);
                 if low > high {
                     let wanted = format!("the range ends at high = {high}, below its begin");
                     return Err(errors::argument(py, "low", low, &wanted));
                 }
-                drawn(count, || self.0.uniform_in(low, high))
+                drawn(count, || self.draws.uniform_in(low, high))
             }
             _ => Err(PyTypeError::new_err("a range is low and high: give both or none")),
         }
@@ -91,7 +114,7 @@ impl Stream {
         if bound == 0 {
             return Err(errors::argument(count.py(), "bound", bound, "no whole number lies below 0"));
         }
-        drawn(count, || self.0.below(bound) as u64)
+        drawn(count, || self.draws.below(bound) as u64)
     }
 }
 
@@ -210,7 +233,7 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
         // Noise that is not finite would make views that nobody can photograph.
         let sigma_px = arguments::not_negative(py, "sigma_px", sigma_px)?;
-        let views = self.0.observe(sigma_px, &mut stream.0);
+        let views = self.0.observe(sigma_px, &mut stream.draws);
         stacked(py, views.len(), (self.0.truth.points.len(), 2), |v, i, j| views[v].pixels()[i][j])
     }
 

@@ -68,6 +68,16 @@ def test_what_is_made_of_arguments_is_made_again_of_them() -> None:
     assert again.calibration == fit.calibration and again.kept == fit.kept
 
 
+def test_a_stream_goes_on_elsewhere_where_it_was_left() -> None:
+    stream = calibench.Stream(seed=7, scenario="pickled", trial=2, purpose="pose")
+    stream.normal(1001)
+    for way in (copy.copy, copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))):
+        other, again = way(stream), way(stream)
+        assert repr(other) == "Stream(seed=7, scenario=\"pickled\", trial=2, purpose=\"pose\")"
+        assert other.normal(5).tobytes() == again.normal(5).tobytes()
+    assert pickle.loads(pickle.dumps(stream)).uniform(3).tobytes() == stream.uniform(3).tobytes()
+
+
 def test_errors_go_through_pickle_too() -> None:
     with pytest.raises(calibench.CalibrationError) as error:
         calibench.calibrate(SCENE.points, SCENE.pixels[:1])

@@ -4,12 +4,11 @@ use super::calibrate::{Format as Shown, parse_size, round_down};
 use super::said::written_by;
 use super::{Exit, print, warn};
 use calibench::camera::Model;
-use calibench::evaluate::{FrameDifference, OneCamera, TakenOut, difference::frame_nodes};
+use calibench::evaluate::{FrameDifference, TakenOut, difference::frame_nodes};
 use calibench::io::ShownPath;
-use calibench::io::doubts::doubts;
 use calibench::io::formats::{CameraFile, FormatError, MOST_BYTES, Wishes, detect, read_camera_file};
 use calibench::io::{read_regular_text, significant, write_atomically};
-use calibench::validate::{Calibrated, frame_difference, one_camera};
+use calibench::validate::{Calibrated, OneCamera, frame_difference, one_camera};
 use calibench_harness::{Figure, HeatMap, Look, Plot};
 use clap::Args;
 use serde_json::{Value, json};
@@ -108,7 +107,8 @@ fn compared(arguments: &Arguments) -> Result<Compared, String> {
         (_, None) => Err(format!("{} has no covariance", arguments.b.shown())),
     };
     let models = [&a, &b].map(|file| file.camera.distortion.model());
-    let doubts = doubts_of([&arguments.a, &arguments.b])?;
+    let doubts_in = |file: &CameraFile| file.estimated.as_ref().map_or(Vec::new(), |e| e.doubts.clone());
+    let doubts = doubts_of([(&arguments.a, doubts_in(&a)), (&arguments.b, doubts_in(&b))]);
     Ok(Compared { size, models, difference, test, doubts })
 }
 
@@ -116,10 +116,12 @@ fn compared(arguments: &Arguments) -> Result<Compared, String> {
 pub(super) const NOT_DECIDED: &str =
     "not decided, since standard deviations that mislead, as the files say, give this probability no meaning";
 
-/// What results say against their own standard deviations.
-pub(super) fn doubts_of<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> Result<Vec<String>, String> {
-    let each = paths.into_iter().map(|path| doubts(path).map_err(|error| error.to_string()));
-    Ok(each.collect::<Result<Vec<_>, _>>()?.concat())
+/// What results say against their own standard deviations, each after the name of its file.
+pub(super) fn doubts_of<'a>(files: impl IntoIterator<Item = (&'a PathBuf, Vec<String>)>) -> Vec<String> {
+    let of_file = |(path, doubts): (&PathBuf, Vec<String>)| {
+        doubts.into_iter().map(|doubt| format!("{}: {doubt}", path.shown())).collect::<Vec<_>>()
+    };
+    files.into_iter().flat_map(of_file).collect()
 }
 
 fn read(path: &Path) -> Result<CameraFile, String> {

@@ -3,7 +3,7 @@
 use super::calibrate::{Format, Views, parse_size, views_of};
 use super::diff::parse_rate;
 use super::report::table;
-use super::said::{Said, number_that, say};
+use super::said::{Said, number_that, say, written_by};
 use super::{Exit, warn};
 use crate::board::board_or_file;
 use calibench::evaluate::Interval;
@@ -240,7 +240,7 @@ impl Found {
         let light = self.light.as_deref();
         let frames = self.noise.frames.iter().zip(&self.views.names).enumerate();
         json!({
-            "written_by": format!("calibench {}", env!("CARGO_PKG_VERSION")),
+            "written_by": written_by(),
             "source": self.views.source,
             "rate": arguments.rate,
             "still": still.holds(),

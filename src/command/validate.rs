@@ -114,7 +114,8 @@ fn found(arguments: &Arguments) -> Result<Found, String> {
         refuse_other_sizes(arguments, &known, &others)?;
         let all: Vec<&KnownCalibration> = std::iter::once(&known).chain(&others).collect();
         warn_of_copies(arguments, &all);
-        found.doubts = doubts_of(std::iter::once(&arguments.result).chain(&arguments.again))?;
+        let files = std::iter::once(&arguments.result).chain(&arguments.again);
+        found.doubts = doubts_of(files.zip(all.iter().map(|known| known.doubts.clone())));
         let size = arguments.image_size.or(known.image_size);
         let size = size.ok_or("the frame is not known: give --image-size WxH")?;
         let estimates: Vec<Estimate> = all.iter().map(|known| estimate(known)).collect();

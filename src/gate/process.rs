@@ -2,12 +2,12 @@
 
 use super::accept::{Breakage, LINE_HEAD, id_in, read_line};
 use super::greeting::{Greeting, probe};
-use super::program::{MOST_LINE_BYTES, PipedProgram, Silence};
+use super::program::{Ending, MOST_LINE_BYTES, PipedProgram, Silence};
 use super::protocol::{Answer, Problem};
 use super::quoted::quoted;
 use super::solver::{Given, Solver};
 use calibench::camera::Model;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -20,6 +20,10 @@ const LONG_PATIENCE: usize = 24;
 /// Lines that are no answer before a problem is given up: a program that talks much is told from one that
 /// never ends.
 const MOST_WRONG_LINES: usize = 1000;
+/// Between two looks whether a thread is still with a program that is to be ended.
+const MOMENT: Duration = Duration::from_millis(10);
+/// How long is waited for a program that cannot be ended.
+const ENDING: Duration = Duration::from_secs(5);
 
 /// A program that reads problems and writes answers, one JSON object a line.
 #[derive(Debug)]
@@ -27,6 +31,11 @@ pub struct Process {
     command: String,
     timeout: Duration,
     workers: Vec<Mutex<Worker>>,
+    /// Whatever was started.
+    started: Mutex<Vec<Ending>>,
+    is_stopped: AtomicBool,
+    /// Threads that may start a program, or wait for one.
+    busy: AtomicUsize,
 }
 
 /// One running copy of the program.
@@ -95,7 +104,38 @@ impl Process {
     /// A program started by the shell as `command`, `jobs` copies of it, each given `timeout` for a problem.
     pub fn new(command: &str, timeout: Duration, jobs: usize) -> Process {
         let workers = (0..jobs.max(1)).map(|_| Mutex::new(Worker::default())).collect();
-        Process { command: command.to_string(), timeout, workers }
+        Process {
+            command: command.to_string(),
+            timeout,
+            workers,
+            started: Mutex::default(),
+            is_stopped: AtomicBool::new(false),
+            busy: AtomicUsize::new(0),
+        }
+    }
+
+    /// Ends every copy, and starts none after it: what is asked from now on is not answered. For a thread that hears an
+    /// interrupt while others ask; other programs of this process go on.
+    pub fn stop(&self) {
+        self.is_stopped.store(true, Ordering::SeqCst);
+        let begun = Instant::now();
+        loop {
+            let started = self.started.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            started.iter().for_each(Ending::end);
+            if self.busy.load(Ordering::SeqCst) == 0 || begun.elapsed() > ENDING {
+                break;
+            }
+            std::thread::sleep(MOMENT);
+        }
+    }
+
+    /// Does what may start a program, unless the run was stopped. Who is seen by [`stop`](Process::stop) as busy is waited
+    /// for; who is not sees that it came.
+    fn unless_stopped<T>(&self, work: impl FnOnce() -> T) -> Option<T> {
+        self.busy.fetch_add(1, Ordering::SeqCst);
+        let done = (!self.is_stopped.load(Ordering::SeqCst)).then(work);
+        self.busy.fetch_sub(1, Ordering::SeqCst);
+        done
     }
 
     fn ask_worker(&self, worker: &mut Worker, problem: &Problem) -> Result<Answer, Breakage> {
@@ -103,7 +143,8 @@ impl Process {
         if worker.broken_in_a_row >= patience {
             return Err(Breakage::NotAsked(format!("{patience} breakages in a row before")));
         }
-        let result = self.converse(worker, problem);
+        let result = self.unless_stopped(|| self.converse(worker, problem));
+        let result = result.unwrap_or_else(|| Err(Breakage::NotAsked("the run was ended".into())));
         worker.has_answered |= result.is_ok();
         worker.broken_in_a_row = if result.is_ok() { 0 } else { worker.broken_in_a_row + 1 };
         worker.heard(&result);
@@ -118,7 +159,10 @@ impl Process {
             none => {
                 let crashed =
                     |e: std::io::Error| Breakage::Crashed { how: e.to_string(), stderr: String::new() };
-                none.insert(Running::start(&self.command).map_err(crashed)?)
+                let running = Running::start(&self.command).map_err(crashed)?;
+                let mut started = self.started.lock().unwrap_or_else(PoisonError::into_inner);
+                started.push(running.program.ending());
+                none.insert(running)
             }
         };
         let mut allowed = self.timeout;
@@ -162,7 +206,9 @@ impl Solver for Process {
     /// Asks the program a first easy problem: what it says of itself comes before the answer.
     fn models(&self) -> Vec<Model> {
         let mut worker = self.workers[0].lock().unwrap_or_else(PoisonError::into_inner);
-        let answer = self.converse(&mut worker, &probe());
+        let Some(answer) = self.unless_stopped(|| self.converse(&mut worker, &probe())) else {
+            return Vec::new();
+        };
         let greeting = worker.running.as_ref().and_then(|running| running.greeting.as_ref());
         let models = greeting.map_or(vec![Model::BrownConrady], Greeting::models);
         worker.heard(&answer);

@@ -41,6 +41,23 @@ pub fn end_all() {
     descendants::end_below();
 }
 
+/// What ends a program from another thread than the one that talks with it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Ending {
+    group: u32,
+    mark: String,
+}
+
+impl Ending {
+    /// Ends the program with what it started, if it still runs: its number may be another's by now.
+    pub fn end(&self) {
+        let running = RUNNING.lock().unwrap_or_else(PoisonError::into_inner).get(&self.group).cloned();
+        if running.as_ref() == Some(&self.mark) {
+            descendants::end(self.group, &self.mark);
+        }
+    }
+}
+
 /// Whether a process was started here: who started it waits for it.
 #[cfg(target_os = "linux")]
 pub(super) fn is_waited_for(id: u32) -> bool {
@@ -120,6 +137,10 @@ impl PipedProgram {
         std::thread::spawn(move || read_lines(stdout, &lines_out));
         let stderr_reader = std::thread::spawn(move || keep_tail(errors, &kept));
         Ok(PipedProgram { child, to_child, from_child, mark, stderr, stderr_reader })
+    }
+
+    pub(super) fn ending(&self) -> Ending {
+        Ending { group: self.child.id(), mark: self.mark.clone() }
     }
 
     /// Sends a line, given without its end.

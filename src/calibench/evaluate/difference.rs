@@ -1,13 +1,11 @@
-//! How do two cameras differ, and may both be one? Their projections compared over the frame, and a test by
-//! both covariances.
+//! How do two cameras differ? Their projections compared over the frame.
 //!
 //! Rays of camera A are turned by the rotation that makes B's pixels meet A's best, in least squares over the
 //! frame: a calibration cannot tell where its camera looks, so a rotation that all poses share is no
 //! difference of the lenses (the implied transformation of mrcal; Kogan 2021). Where the points lie at one
 //! distance, a translation may be taken out as well.
 
-use super::distribution::{ChiSquare, fisher_tail};
-use crate::camera::{Camera, FreeParameters, Parameter, project_with_jacobian};
+use crate::camera::{Camera, Parameter, project_with_jacobian};
 use crate::geometry::{Pose, Vec2, Vec3, rotation};
 use nalgebra::{DMatrix, DVector};
 
@@ -213,227 +211,13 @@ fn motion_scale(taken_out: TakenOut) -> impl Fn(usize) -> f64 {
     move |j| if j < 3 { 1.0 } else { taken_out.distance() }
 }
 
-/// A camera that was calibrated.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Calibrated<'a> {
-    /// The estimate.
-    pub camera: &'a Camera,
-    /// What was estimated.
-    pub free: FreeParameters,
-    /// Its covariance, n x n.
-    pub covariance: &'a DMatrix<f64>,
-    /// Degrees of freedom of the noise that scales it; without them the covariance is taken as known.
-    pub degrees_of_freedom: Option<usize>,
-}
-
-/// A test of whether two calibrations are of one camera.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OneCamera {
-    /// Squared Mahalanobis distance of the difference that is left.
-    pub chi_squared: f64,
-    /// Its degrees of freedom: combinations of parameters that the motion cannot imitate.
-    pub degrees_of_freedom: usize,
-    /// Combinations that the motion imitates: no difference that is left could show them.
-    pub imitated: usize,
-    /// Degrees of freedom of the noise estimates together, where both are known.
-    pub noise_freedom: Option<usize>,
-    /// Probability of such a distance or a larger one if both are one camera.
-    pub p_value: f64,
-}
-
-/// A combination of parameters whose difference, the motion taken out, is less than this part of that of the
-/// combination seen best is one that the motion imitates: what the linear model leaves out is larger than a
-/// ten-thousandth.
-const IMITATED: f64 = 1e-4;
-
-/// Tests whether two independent calibrations are of one camera.
-///
-/// With `delta` the difference of the parameters, `P = P_A + P_B` its covariance if the camera is one, `J`
-/// the derivatives of the frame's pixels by the parameters and `W` those by the motion, the difference that
-/// is left is `d = M J delta`, `M = 1 - W (W^T W)^-1 W^T`. Its covariance `M J P J^T M` has the rank `r` of
-/// `M J`, and `d^T (M J P J^T M)^+ d` is chi-squared with `r` degrees of freedom: with `P = L L^T` and the
-/// eigenvectors `v` of `L^T J^T M J L` that belong to eigenvalues above zero, it is the sum of `(v^T L^-1
-/// delta)^2`. A rotation turns a principal point into something like it and never quite, so it takes no
-/// degree of freedom, unless the lens is so long that what is left is nothing; a translation at one distance
-/// imitates more. The noise that scales both covariances is estimated: over `r` the sum follows Fisher's
-/// distribution, with the degrees of freedom of Satterthwaite (1946).
-///
-/// # Errors
-/// See [`DifferenceError`].
-pub fn one_camera(
-    a: &Calibrated,
-    b: &Calibrated,
-    size: (usize, usize),
-    taken_out: TakenOut,
-) -> Result<OneCamera, DifferenceError> {
-    let free: Vec<Parameter> =
-        Parameter::ALL.into_iter().filter(|&p| a.free.contains(p) || b.free.contains(p)).collect();
-    let apart =
-        Parameter::ALL.into_iter().find(|p| !free.contains(p) && a.camera.get(*p) != b.camera.get(*p));
-    if let Some(parameter) = apart {
-        return Err(DifferenceError::HeldApart(parameter));
-    }
-    if free.is_empty() {
-        return Err(DifferenceError::NothingFree);
-    }
-    let n = free.len();
-    let delta = DVector::from_fn(n, |i, _| b.camera.get(free[i]) - a.camera.get(free[i]));
-    let (p_a, p_b) = (among(a, &free), among(b, &free));
-    let factor = (&p_a + &p_b).cholesky().ok_or(DifferenceError::NotPositive)?;
-    let l = factor.l();
-    let whitened = l.solve_lower_triangular(&delta).ok_or(DifferenceError::NotPositive)?;
-    let left = left_by_motion(&between(a.camera, b.camera), &free, size, taken_out)?;
-    let seen = (l.transpose() * left * &l).symmetric_eigen();
-    let limit = IMITATED * IMITATED * seen.eigenvalues.max();
-    let kept = (0..n).filter(|&k| seen.eigenvalues[k] > limit);
-    let components: Vec<f64> = kept.map(|k| seen.eigenvectors.column(k).dot(&whitened)).collect();
-    let chi_squared = components.iter().map(|c| c * c).sum();
-    let rank = components.len();
-    let noise_freedom = match (a.degrees_of_freedom, b.degrees_of_freedom) {
-        (Some(of_a), Some(of_b)) => {
-            let share = factor.solve(&p_a).trace() / n as f64;
-            Some(satterthwaite(share, of_a, of_b))
-        }
-        _ => None,
-    };
-    let p_value = match noise_freedom {
-        Some(freedom) => fisher_tail(chi_squared / rank as f64, rank, freedom),
-        None => ChiSquare::new(rank).survival(chi_squared),
-    };
-    Ok(OneCamera { chi_squared, degrees_of_freedom: rank, imitated: n - rank, noise_freedom, p_value })
-}
-
-/// A covariance among more parameters, those that were held known exactly.
-fn among(calibrated: &Calibrated, free: &[Parameter]) -> DMatrix<f64> {
-    let place = |p: Parameter| calibrated.free.position(p);
-    DMatrix::from_fn(free.len(), free.len(), |i, j| match (place(free[i]), place(free[j])) {
-        (Some(i), Some(j)) => calibrated.covariance[(i, j)],
-        _ => 0.0,
-    })
-}
-
-/// The camera half-way.
-fn between(a: &Camera, b: &Camera) -> Camera {
-    let (a, b) = (a.parameters(), b.parameters());
-    Camera::from_parameters(std::array::from_fn(|i| 0.5 * (a[i] + b[i])))
-}
-
-/// `J^T M J`: what parameters move, the motion that fits best taken out.
-fn left_by_motion(
-    camera: &Camera,
-    free: &[Parameter],
-    size: (usize, usize),
-    taken_out: TakenOut,
-) -> Result<DMatrix<f64>, DifferenceError> {
-    let points = points_seen(camera, camera, size, taken_out.distance());
-    let derivatives: Vec<_> = points
-        .iter()
-        .filter_map(|(_, point)| project_with_jacobian(camera, &Pose::identity(), point).ok())
-        .collect();
-    let rows = 2 * derivatives.len();
-    if derivatives.len() < LEAST_NODES {
-        return Err(DifferenceError::TooFewNodes { need: LEAST_NODES, got: derivatives.len() });
-    }
-    let scale = motion_scale(taken_out);
-    let j =
-        DMatrix::from_fn(rows, free.len(), |i, k| derivatives[i / 2].intrinsics[(i % 2, free[k] as usize)]);
-    let w =
-        DMatrix::from_fn(rows, taken_out.unknowns(), |i, k| derivatives[i / 2].pose[(i % 2, k)] * scale(k));
-    let motion = (w.transpose() * &w).cholesky().ok_or(DifferenceError::NotPositive)?;
-    // Twice: what rounding leaves of the motion after the first time is of the size of what a long lens
-    // leaves of a principal point.
-    let once = &j - &w * motion.solve(&(w.transpose() * &j));
-    let left = &once - &w * motion.solve(&(w.transpose() * &once));
-    Ok(left.transpose() * &left)
-}
-
-/// Degrees of freedom of a sum of two variances in proportion `share` to `1 - share` (Satterthwaite 1946),
-/// rounded down.
-fn satterthwaite(share: f64, of_a: usize, of_b: usize) -> usize {
-    let part = |share: f64, freedom: usize| share * share / freedom.max(1) as f64;
-    let freedom = 1.0 / (part(share, of_a) + part(1.0 - share, of_b));
-    (freedom as usize).max(1)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibrate::{Calibration, Settings, calibrate};
-    use crate::synth::scene::looking_at_centre;
-    use crate::synth::{Scene, Stream, StreamKey, Truth};
+    use crate::camera::Parameter;
+    use crate::synth::Truth;
 
     const SIZE: (usize, usize) = Truth::EXAMPLE_IMAGE;
-    const NOISE_PX: f64 = 0.1;
-
-    /// A calibration of a camera from five views of its own.
-    fn calibration(camera: Camera, trial: u64, purpose: &'static str) -> Calibration {
-        let mut stream = Stream::open(StreamKey { seed: 20, scenario: "difference", trial, purpose });
-        let cam_from_target = [0.0, 1.2, 2.5, 3.7, 5.0].map(|direction: f64| {
-            let tilt = stream.uniform_in(15.0, 30.0);
-            let turned = direction + stream.uniform_in(-0.3, 0.3);
-            let degrees =
-                [tilt * libm::cos(turned), tilt * libm::sin(turned), stream.uniform_in(-20.0, 20.0)];
-            looking_at_centre(degrees, stream.uniform_in(110.0, 140.0))
-        });
-        let truth = Truth { camera, cam_from_target: cam_from_target.to_vec(), ..Truth::example() };
-        let views = Scene::new(truth).unwrap().observe(NOISE_PX, &mut stream);
-        calibrate(&views, &Settings::standard().with_image_size(SIZE)).unwrap()
-    }
-
-    fn known(calibration: &Calibration) -> Calibrated<'_> {
-        Calibrated {
-            camera: &calibration.camera,
-            free: calibration.free,
-            covariance: &calibration.covariance.intrinsics,
-            degrees_of_freedom: Some(calibration.degrees_of_freedom),
-        }
-    }
-
-    fn tested(camera: Camera, trial: u64) -> OneCamera {
-        let (a, b) = (calibration(camera, trial, "first"), calibration(camera, trial, "second"));
-        one_camera(&known(&a), &known(&b), SIZE, TakenOut::Rotation).unwrap()
-    }
-
-    #[test]
-    fn one_camera_is_doubted_as_often_as_is_said() {
-        const DRAWS: u64 = 400;
-        const RATE: f64 = 0.01;
-        let camera = Truth::example_camera();
-        let tests: Vec<OneCamera> = (0..DRAWS).map(|trial| tested(camera, trial)).collect();
-        assert!(tests.iter().all(|test| test.degrees_of_freedom == 6 && test.imitated == 0));
-        let below = |limit: f64| tests.iter().filter(|test| test.p_value < limit).count() as u64;
-        // Binomial counts, of which each interval holds all but a thousandth: of 400, 4 are expected at 1 %,
-        // 40 at 10 %, 200 at 50 %; 3, 31 and 196 were counted when this was written.
-        assert!(below(RATE) <= 11, "{} of {DRAWS} below {RATE}", below(RATE));
-        assert!((22..=61).contains(&below(0.1)), "{} of {DRAWS} below 0.1", below(0.1));
-        assert!((167..=233).contains(&below(0.5)), "{} of {DRAWS} below 0.5", below(0.5));
-    }
-
-    #[test]
-    fn another_camera_is_seen_as_often_as_its_distance_says() {
-        const DRAWS: u64 = 100;
-        let camera = Truth::example_camera();
-        // A lens half a percent longer.
-        let longer = camera.with(Parameter::Fx, 1.005 * camera.fx).with(Parameter::Fy, 1.005 * camera.fy);
-        let tests = (0..DRAWS).map(|trial| {
-            let (a, b) = (calibration(camera, trial, "first"), calibration(longer, trial, "second"));
-            let test = one_camera(&known(&a), &known(&b), SIZE, TakenOut::Rotation).unwrap();
-            // The distance of the true cameras by the same covariances: the noncentrality.
-            let (true_a, true_b) =
-                (Calibrated { camera: &camera, ..known(&a) }, Calibrated { camera: &longer, ..known(&b) });
-            (test, one_camera(&true_a, &true_b, SIZE, TakenOut::Rotation).unwrap().chi_squared)
-        });
-        let tests: Vec<(OneCamera, f64)> = tests.collect();
-        let mean = |of: fn(&(OneCamera, f64)) -> f64| tests.iter().map(of).sum::<f64>() / DRAWS as f64;
-        let (found, noncentrality) = (mean(|t| t.0.chi_squared), mean(|t| t.1));
-        // Noncentral chi-squared: mean r + lambda, variance 2 (r + 2 lambda); 3.3 standard deviations of the
-        // mean leave a thousandth.
-        let spread = (2.0 * (6.0 + 2.0 * noncentrality) / DRAWS as f64).sqrt();
-        assert!((found - 6.0 - noncentrality).abs() < 3.3 * spread, "{found} against 6 + {noncentrality}");
-        let seen = tests.iter().filter(|(test, _)| test.p_value < 0.01).count();
-        // 83 were seen when this was written; 3.3 standard deviations of such a count are 12.
-        assert!(seen >= 71, "{seen} of {DRAWS} seen at a rate of 0.01");
-    }
 
     #[test]
     fn a_principal_point_apart_is_mostly_a_rotation() {
@@ -461,37 +245,5 @@ mod tests {
         assert!((near.b_from_a.translation.z - 10.0).abs() < 3.0, "{}", near.b_from_a.translation);
         let nowhere = TakenOut::RotationAndTranslation { distance: 0.0 };
         assert_eq!(frame_difference(&camera, &longer, SIZE, nowhere), Err(DifferenceError::Distance(0.0)));
-    }
-
-    #[test]
-    fn a_long_lens_leaves_no_trace_of_its_principal_point() {
-        // A field of a third of a degree: what a rotation leaves of a principal point is a hundred-thousandth
-        // of it.
-        let camera = Camera::pinhole(1e5, 1e5, 320.0, 240.0);
-        let free: FreeParameters = "fx,fy,cx,cy".parse().unwrap();
-        // A focal length known to a hundredth, a principal point to a pixel.
-        let covariance = DMatrix::from_diagonal(&DVector::from_vec(vec![1e6, 1e6, 1.0, 1.0]));
-        let known = Calibrated { camera: &camera, free, covariance: &covariance, degrees_of_freedom: None };
-        let moved = camera.with(Parameter::Cx, 321.0);
-        let other = Calibrated { camera: &moved, ..known };
-        let test = one_camera(&known, &other, SIZE, TakenOut::Rotation).unwrap();
-        assert_eq!((test.degrees_of_freedom, test.imitated), (2, 2), "{test:?}");
-        assert!(test.chi_squared < 1e-6, "{test:?}");
-    }
-
-    #[test]
-    fn parameters_held_apart_are_two_cameras_by_definition() {
-        let camera = Truth::example_camera();
-        let free: FreeParameters = "fx".parse().unwrap();
-        let covariance = DMatrix::identity(1, 1);
-        let a = Calibrated { camera: &camera, free, covariance: &covariance, degrees_of_freedom: None };
-        let bent = camera.with(Parameter::K3, 0.1);
-        let b = Calibrated { camera: &bent, ..a };
-        assert_eq!(
-            one_camera(&a, &b, SIZE, TakenOut::Rotation),
-            Err(DifferenceError::HeldApart(Parameter::K3))
-        );
-        let one = one_camera(&a, &a, SIZE, TakenOut::Rotation).unwrap();
-        assert_eq!((one.chi_squared, one.p_value), (0.0, 1.0));
     }
 }

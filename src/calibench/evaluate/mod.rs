@@ -10,9 +10,7 @@ pub mod sample;
 
 pub use crate::distribution;
 pub use bound::{BoundError, Bounded, cramer_rao};
-pub use difference::{
-    Calibrated, DifferenceError, FrameDifference, OneCamera, TakenOut, frame_difference, one_camera,
-};
+pub use difference::{DifferenceError, FrameDifference, TakenOut, frame_difference};
 pub use errors::{Errors, errors_of};
 pub use interval::Interval;
 pub use leverage::leverages;

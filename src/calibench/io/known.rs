@@ -1,6 +1,7 @@
 //! What does a result say of a calibration, with everything that is known of its errors? Read back from
 //! `result.json`: a camera with its poses and their joint covariance, or a map of a plane with its points.
 
+use super::doubts::doubts;
 use super::input::{InputError, MOST_TABLE_BYTES, read_regular_text};
 use super::result::{ResultError, parse_lens_camera};
 use crate::calibrate::Covariance;
@@ -33,6 +34,8 @@ pub struct KnownCalibration {
     pub has_priors: bool,
     /// Whether the board's shape was estimated: its marks then do not lie in a plane.
     pub has_board: bool,
+    /// What the result itself says against its standard deviations: tests by them then mean nothing.
+    pub doubts: Vec<String>,
 }
 
 impl KnownCalibration {
@@ -126,6 +129,8 @@ struct CameraFields {
     priors: Vec<IgnoredAny>,
     #[serde(default)]
     board: Option<IgnoredAny>,
+    #[serde(default)]
+    warnings: Vec<String>,
 }
 
 #[derive(Deserialize)]
@@ -192,6 +197,7 @@ pub fn parse_known(file: &str, text: &str) -> Result<Known, KnownError> {
         degrees_of_freedom: fields.degrees_of_freedom,
         has_priors: !fields.priors.is_empty(),
         has_board: fields.board.is_some(),
+        doubts: doubts(fields.warnings),
     })))
 }
 

@@ -7,7 +7,7 @@ pub mod checks;
 pub mod corners;
 pub mod data;
 pub mod digits;
-pub mod doubts;
+mod doubts;
 pub mod ends;
 pub mod files;
 pub mod formats;
@@ -38,6 +38,7 @@ pub use checks::{Check, parse_checks};
 pub use corners::{CornerFile, parse_corners, read_corners};
 pub use data::{MissingDataFolder, data_folder};
 pub use digits::significant;
+pub use doubts::doubts;
 pub use ends::{PixelEnds, parse_pixel_ends, read_pixel_ends};
 pub use hash::sha256_hex;
 #[cfg(feature = "photo")]

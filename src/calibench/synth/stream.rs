@@ -43,6 +43,17 @@ impl Stream {
         Stream(ChaCha8Rng::from_seed(bytes))
     }
 
+    /// How far it was drawn, in words of 32 bits.
+    pub fn position(&self) -> u128 {
+        self.0.get_word_pos()
+    }
+
+    /// The same stream, drawn as far as `position`: with its key what is needed to go on elsewhere.
+    pub fn drawn_to(mut self, position: u128) -> Stream {
+        self.0.set_word_pos(position);
+        self
+    }
+
     /// A uniform number in (0, 1).
     pub fn uniform(&mut self) -> f64 {
         self.0.sample(Open01)
@@ -100,6 +111,14 @@ mod tests {
     use super::*;
 
     const KEY: StreamKey<'_> = StreamKey { seed: 1, scenario: "four-pose", trial: 0, purpose: "noise" };
+
+    #[test]
+    fn a_stream_goes_on_elsewhere_where_it_was_left() {
+        let mut stream = Stream::open(KEY);
+        let _ = (0..1001).map(|_| stream.normal()).sum::<f64>();
+        let mut other = Stream::open(KEY).drawn_to(stream.position());
+        assert_eq!([stream.normal(), stream.uniform()], [other.normal(), other.uniform()]);
+    }
 
     #[test]
     fn every_part_of_the_key_matters() {

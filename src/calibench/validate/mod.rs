@@ -16,6 +16,6 @@ mod slopes;
 pub use folds::{Fold, FoldError, folds};
 pub use frame::frame_difference;
 pub use hold_out::{CameraTest, Estimate, HoldOut, HoldOutError, Outcome, Unseen, hold_out};
-pub use one_camera::{Calibrated, one_camera};
+pub use one_camera::{Calibrated, OneCamera, one_camera};
 pub use quadratic::Ratio;
 pub use repeated::{Agreement, RepeatedError, repeated};

@@ -25,7 +25,7 @@ use super::root::root;
 use super::slopes::{Estimated, Slopes};
 use crate::camera::{Camera, FreeParameters, Lens, Parameter};
 use crate::distribution::{ChiSquare, fisher_tail};
-use crate::evaluate::{DifferenceError, OneCamera, TakenOut};
+use crate::evaluate::{DifferenceError, TakenOut};
 use crate::geometry::{Pose, Vec2, Vec3};
 use nalgebra::{DMatrix, DVector};
 
@@ -48,6 +48,21 @@ impl Calibrated<'_> {
     fn estimated(&self) -> Estimated {
         Estimated { free: self.free, fy_per_fx: self.fy_per_fx }
     }
+}
+
+/// A test of whether two calibrations are of one camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OneCamera {
+    /// Squared Mahalanobis distance of the difference that is left.
+    pub chi_squared: f64,
+    /// Its degrees of freedom: combinations of parameters that the motion cannot imitate.
+    pub degrees_of_freedom: usize,
+    /// Combinations that the motion imitates: no difference that is left could show them.
+    pub imitated: usize,
+    /// Degrees of freedom of the noise estimates together, where both are known.
+    pub noise_freedom: Option<usize>,
+    /// Probability of such a distance or a larger one if both are one camera.
+    pub p_value: f64,
 }
 
 /// With one model a combination whose difference is less than this part of that of the combination seen best is one that
@@ -271,10 +286,12 @@ fn satterthwaite(share: f64, of_a: usize, of_b: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibrate::{Calibration, Settings, calibrate};
     use crate::camera::{BrownConrady, Model};
-    use crate::evaluate;
+    use crate::synth::scene::looking_at_centre;
+    use crate::synth::{Scene, Stream, StreamKey, Truth};
 
-    const SIZE: (usize, usize) = (640, 480);
+    const SIZE: (usize, usize) = Truth::EXAMPLE_IMAGE;
 
     /// A covariance of parameters with these standard deviations and correlations of 0.3.
     fn covariance(deviations: &[f64]) -> DMatrix<f64> {
@@ -292,35 +309,87 @@ mod tests {
         Camera::pinhole(600.0, 598.0, 320.0, 240.0).with_distortion(BrownConrady::radial(-0.2, 0.05))
     }
 
+    /// A calibration of a camera from five views of its own.
+    fn calibration(camera: Camera, trial: u64, purpose: &'static str) -> Calibration {
+        let mut stream = Stream::open(StreamKey { seed: 20, scenario: "difference", trial, purpose });
+        let cam_from_target = [0.0, 1.2, 2.5, 3.7, 5.0].map(|direction: f64| {
+            let tilt = stream.uniform_in(15.0, 30.0);
+            let turned = direction + stream.uniform_in(-0.3, 0.3);
+            let degrees =
+                [tilt * libm::cos(turned), tilt * libm::sin(turned), stream.uniform_in(-20.0, 20.0)];
+            looking_at_centre(degrees, stream.uniform_in(110.0, 140.0))
+        });
+        let truth = Truth { camera, cam_from_target: cam_from_target.to_vec(), ..Truth::example() };
+        let views = Scene::new(truth).unwrap().observe(0.1, &mut stream);
+        calibrate(&views, &Settings::standard().with_image_size(SIZE)).unwrap()
+    }
+
+    /// The test of two calibrations, each with its own covariance at the camera that is given.
+    fn tested(a: &Calibration, at_a: Camera, b: &Calibration, at_b: Camera) -> OneCamera {
+        let (at_a, at_b) = (at_a.into(), at_b.into());
+        let known = |calibration, camera| Calibrated {
+            camera,
+            free: calibration.free,
+            fy_per_fx: None,
+            covariance: &calibration.covariance.intrinsics,
+            degrees_of_freedom: Some(calibration.degrees_of_freedom),
+        };
+        one_camera(&known(a, &at_a), &known(b, &at_b), SIZE, TakenOut::Rotation).unwrap()
+    }
+
     #[test]
-    fn with_brown_conradys_lens_it_is_the_test_of_evaluate() {
-        let other =
-            Camera::pinhole(600.5, 598.2, 321.0, 239.0).with_distortion(BrownConrady::radial(-0.199, 0.046));
-        let (of_a, of_b) =
-            (covariance(&[0.5, 0.4, 0.6, 0.7, 2e-3, 5e-3]), covariance(&[0.9, 0.8, 0.5, 0.7, 4e-3, 6e-3]));
-        let free: FreeParameters = "fx,fy,cx,cy,k1,k2".parse().unwrap();
-        for taken_out in [TakenOut::Rotation, TakenOut::RotationAndTranslation { distance: 500.0 }] {
-            let plain = |camera, covariance| evaluate::Calibrated {
-                camera,
-                free,
-                covariance,
-                degrees_of_freedom: Some(400),
-            };
-            let (a, b) = (bent().into(), other.into());
-            let of_one =
-                evaluate::one_camera(&plain(&bent(), &of_a), &plain(&other, &of_b), SIZE, taken_out).unwrap();
-            let list = "fx,fy,cx,cy,k1,k2";
-            let of_any =
-                one_camera(&known(&a, list, &of_a), &known(&b, list, &of_b), SIZE, taken_out).unwrap();
-            assert_eq!(
-                (of_one.degrees_of_freedom, of_one.imitated),
-                (of_any.degrees_of_freedom, of_any.imitated)
-            );
-            assert!((of_one.chi_squared / of_any.chi_squared - 1.0).abs() < 1e-6, "{of_one:?} {of_any:?}");
-            // Satterthwaite's shares are equal but for combinations that the motion imitates.
-            let apart = of_one.noise_freedom.unwrap().abs_diff(of_any.noise_freedom.unwrap());
-            assert!(apart < 60, "{of_one:?} {of_any:?}");
-        }
+    fn one_camera_is_doubted_as_often_as_is_said() {
+        const DRAWS: u64 = 400;
+        let camera = Truth::example_camera();
+        let test = |trial| {
+            let (a, b) = (calibration(camera, trial, "first"), calibration(camera, trial, "second"));
+            tested(&a, a.camera, &b, b.camera)
+        };
+        let tests: Vec<OneCamera> = (0..DRAWS).map(test).collect();
+        assert!(tests.iter().all(|test| test.degrees_of_freedom == 6 && test.imitated == 0));
+        let below = |limit: f64| tests.iter().filter(|test| test.p_value < limit).count() as u64;
+        // Binomial counts, of which each interval holds all but a thousandth: of 400, 4 are expected at 1 %,
+        // 40 at 10 %, 200 at 50 %.
+        assert!(below(0.01) <= 11, "{} of {DRAWS} below 0.01", below(0.01));
+        assert!((22..=61).contains(&below(0.1)), "{} of {DRAWS} below 0.1", below(0.1));
+        assert!((167..=233).contains(&below(0.5)), "{} of {DRAWS} below 0.5", below(0.5));
+    }
+
+    #[test]
+    fn another_camera_is_seen_as_often_as_its_distance_says() {
+        const DRAWS: u64 = 100;
+        let camera = Truth::example_camera();
+        // A lens half a percent longer.
+        let longer = camera.with(Parameter::Fx, 1.005 * camera.fx).with(Parameter::Fy, 1.005 * camera.fy);
+        let tests = (0..DRAWS).map(|trial| {
+            let (a, b) = (calibration(camera, trial, "first"), calibration(longer, trial, "second"));
+            // The distance of the true cameras by the same covariances is the noncentrality.
+            (tested(&a, a.camera, &b, b.camera), tested(&a, camera, &b, longer).chi_squared)
+        });
+        let tests: Vec<(OneCamera, f64)> = tests.collect();
+        let mean = |of: fn(&(OneCamera, f64)) -> f64| tests.iter().map(of).sum::<f64>() / DRAWS as f64;
+        let (found, noncentrality) = (mean(|t| t.0.chi_squared), mean(|t| t.1));
+        // Noncentral chi-squared: mean r + lambda, variance 2 (r + 2 lambda); 3.3 standard deviations of the
+        // mean leave a thousandth.
+        let spread = (2.0 * (6.0 + 2.0 * noncentrality) / DRAWS as f64).sqrt();
+        assert!((found - 6.0 - noncentrality).abs() < 3.3 * spread, "{found} against 6 + {noncentrality}");
+        let seen = tests.iter().filter(|(test, _)| test.p_value < 0.01).count();
+        // 83 were seen when this was written; 3.3 standard deviations of such a count are 12.
+        assert!(seen >= 71, "{seen} of {DRAWS} seen at a rate of 0.01");
+    }
+
+    #[test]
+    fn a_long_lens_leaves_no_trace_of_its_principal_point() {
+        // A field of a third of a degree: what a rotation leaves of a principal point is a hundred-thousandth
+        // of it.
+        let camera: Camera<Lens> = Camera::pinhole(1e5, 1e5, 320.0, 240.0).into();
+        let moved = Camera { cx: 321.0, ..camera };
+        // A focal length known to a hundredth, a principal point to a pixel.
+        let covariance = DMatrix::from_diagonal(&DVector::from_vec(vec![1e6, 1e6, 1.0, 1.0]));
+        let of = |camera| known(camera, "fx,fy,cx,cy", &covariance);
+        let test = one_camera(&of(&camera), &of(&moved), SIZE, TakenOut::Rotation).unwrap();
+        assert_eq!((test.degrees_of_freedom, test.imitated), (2, 2), "{test:?}");
+        assert!(test.chi_squared < 1e-6, "{test:?}");
     }
 
     #[test]

@@ -10,11 +10,12 @@
 //! same pixels; in pixels over the frame two calibrations are compared by [`one_camera`], the rotation between them taken
 //! out.
 
+use super::one_camera::OneCamera;
 use super::{Calibrated, Estimate, frame_difference, one_camera};
 use crate::calibrate::Covariance;
 use crate::camera::{Model, Parameter};
 use crate::distribution::{ChiSquare, fisher_tail};
-use crate::evaluate::{DifferenceError, FrameDifference, OneCamera, TakenOut};
+use crate::evaluate::{DifferenceError, FrameDifference, TakenOut};
 use nalgebra::{DMatrix, DVector};
 
 /// What repeated calibrations say together.

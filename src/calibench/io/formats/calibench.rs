@@ -3,6 +3,7 @@
 //! The centre of the first pixel is (0, 0); parameters stand under their names. `camera.schema.json` is its
 //! schema.
 
+use super::super::doubts::doubts;
 use super::super::result::{LensFields, parse_lens_camera};
 use super::camera_file::{CameraFile, Estimated};
 use super::error::FormatError;
@@ -58,6 +59,9 @@ struct Fields {
     degrees_of_freedom: Option<usize>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     cam_from_reference: Option<PoseFields>,
+    /// Of a result all; only those that doubt the covariance are kept.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    warnings: Vec<String>,
     /// Only whether there are any.
     #[serde(default, skip_serializing)]
     views: Option<serde::de::IgnoredAny>,
@@ -128,7 +132,8 @@ fn estimated(source: &Source, fields: &Fields, model: Model) -> Result<Option<Es
         return wrong("covariance", "a number is not finite".into());
     }
     let (fy_per_fx, degrees_of_freedom) = (fields.fy_per_fx, fields.degrees_of_freedom);
-    Ok(Some(Estimated { free, fy_per_fx, covariance, degrees_of_freedom }))
+    let doubts = doubts(fields.warnings.clone());
+    Ok(Some(Estimated { free, fy_per_fx, covariance, degrees_of_freedom, doubts }))
 }
 
 fn write(camera: &CameraFile) -> Written {
@@ -147,6 +152,7 @@ fn write(camera: &CameraFile) -> Written {
             rotation_vector_rad: rotation::log(&pose.rotation).into(),
             translation: pose.translation.into(),
         }),
+        warnings: estimated.map_or(Vec::new(), |e| e.doubts.clone()),
         views: None,
     };
     // Plain fields and string keys: nothing in them can fail to serialise.
@@ -171,6 +177,10 @@ mod tests {
                 fy_per_fx: Some(1.25),
                 covariance: DMatrix::from_row_slice(2, 2, &[1.0, 0.1, 0.1, 2.0]),
                 degrees_of_freedom: Some(100),
+                doubts: vec![
+                    "the standard deviation of fx misleads: an interval of two of them is not one of 95 %"
+                        .into(),
+                ],
             }),
             cam_from_reference: Some(Pose {
                 rotation: rotation::exp(&Vec3::new(0.1, 0.2, 0.3)),

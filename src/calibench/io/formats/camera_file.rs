@@ -15,6 +15,8 @@ pub struct Estimated {
     pub covariance: DMatrix<f64>,
     /// Degrees of freedom behind the noise that scales the covariance, if known.
     pub degrees_of_freedom: Option<usize>,
+    /// What the file itself says against its standard deviations: tests by them then mean nothing.
+    pub doubts: Vec<String>,
 }
 
 /// A camera as a file holds it.
