@@ -10,7 +10,7 @@ use calibench::geometry::Vec3;
 use calibench::io::CalibrationFields;
 use calibench::synth::scene::looking_at_centre;
 use calibench::synth::{Scene, Stream, StreamKey, Truth};
-use calibench::validate::{Calibrated, RepeatedError, folds, hold_out, one_camera, repeated};
+use calibench::validate::{Calibrated, OneCamera, RepeatedError, folds, hold_out, one_camera, repeated};
 use serde_json::Value;
 use std::fs;
 

@@ -324,17 +324,20 @@ mod tests {
         calibrate(&views, &Settings::standard().with_image_size(SIZE)).unwrap()
     }
 
-    /// The test of two calibrations, each with its own covariance at the camera that is given.
-    fn tested(a: &Calibration, at_a: Camera, b: &Calibration, at_b: Camera) -> OneCamera {
-        let (at_a, at_b) = (at_a.into(), at_b.into());
-        let known = |calibration, camera| Calibrated {
+    fn of<'a>(calibration: &'a Calibration, camera: &'a Camera<Lens>) -> Calibrated<'a> {
+        Calibrated {
             camera,
             free: calibration.free,
             fy_per_fx: None,
             covariance: &calibration.covariance.intrinsics,
             degrees_of_freedom: Some(calibration.degrees_of_freedom),
-        };
-        one_camera(&known(a, &at_a), &known(b, &at_b), SIZE, TakenOut::Rotation).unwrap()
+        }
+    }
+
+    /// The test of two calibrations, each with its own covariance at the camera that is given.
+    fn tested(a: &Calibration, at_a: Camera, b: &Calibration, at_b: Camera) -> OneCamera {
+        let (at_a, at_b) = (at_a.into(), at_b.into());
+        one_camera(&of(a, &at_a), &of(b, &at_b), SIZE, TakenOut::Rotation).unwrap()
     }
 
     #[test]
