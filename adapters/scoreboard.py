@@ -61,7 +61,7 @@ ENTRIES = [
     Entry("scipy", ("scipy", "numpy"), "scipy_solver.py", "BSD-3-Clause",
           "a general solver: start and camera are the adapter's, the finite differences SciPy's; not asked for the right minimum, since fifty views take it minutes", first=0),
     Entry("lensboy", ("lensboy", "numpy"), "lensboy_solver.py", "not stated in the package",
-          "its OpenCV model without warp and outliers; made for richer lenses, states no covariance"),
+          "its OpenCV model without warp and outliers; its convergence cannot be set; made for richer lenses, states no covariance"),
     Entry("colmap", ("pycolmap", "pyceres", "numpy"), "colmap_solver.py", "BSD-3-Clause",
           "its bundle adjustment, made for scenes; start and held coefficients are the adapter's"),
     Entry("mrcal", ("debian:python3-mrcal",), "mrcal_solver.py", "Apache-2.0",
