@@ -23,6 +23,7 @@ pub mod millimetres;
 pub mod nine_point;
 pub mod noise_floor;
 pub mod one_view;
+pub mod other_solvers;
 pub mod photographs;
 pub mod pose_count;
 pub mod position_correction;
@@ -57,6 +58,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     gate_power::EXPERIMENT,
     certified_digits::EXPERIMENT,
     scoreboard::EXPERIMENT,
+    other_solvers::EXPERIMENT,
     global_minimum::EXPERIMENT,
 ];
 

@@ -33,6 +33,7 @@ mod layout;
 mod lens_models;
 mod new;
 mod noise;
+mod other_solvers;
 mod photo_command;
 mod photo_verbs;
 mod planar_single_plane;

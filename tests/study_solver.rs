@@ -84,6 +84,7 @@ fn a_solver_that_answers_as_this_library_does_gives_its_trials_to_the_last_bit()
     assert_eq!(trials("ours"), trials("told"));
     let report = std::fs::read_to_string(out.join("told/report.html")).expect("a report");
     assert!(report.contains("Calibrated by <code>told</code>"));
+    assert!(report.contains("They move together") && report.contains("<th>jointly</th>"));
     // Runs that met the same noise can be compared, whoever calibrated.
     compare::compare(&out.join("ours"), &out.join("told")).expect("a comparison");
 }

@@ -211,3 +211,25 @@ fn the_studies_that_ship_can_be_run() {
     }
     assert!(count >= 7, "{count}");
 }
+
+#[test]
+fn intervals_that_hold_together_are_those_of_a_share_of_the_rate() {
+    let poses = r#"{ kind = "spread", views = 4, tilt_deg = 25.0, distance_mm = 160.0 }"#;
+    let factor = r#"factor = [{ name = "views", set = ["scene.poses.views"], levels = [3, 5] }]"#;
+    let text = spec(poses, &format!("trials = {{ per_cell = 200 }}\n{factor}"));
+    let summary = |confidence: f64| {
+        let mut spec = Spec::parse(&text).unwrap();
+        spec.confidence = confidence;
+        summarise(&in_memory(spec, &text, |_| {}).unwrap())
+    };
+    let usual = summary(0.95);
+    let statistics = || usual.cells.iter().flat_map(|cell| &cell.statistics);
+    // Two cells, each with rmse, nees, six parameters and depth.
+    assert_eq!(statistics().filter(|s| s.ratio_jointly.is_some()).count(), 18);
+    let shared = summary(1.0 - 0.05 / 18.0);
+    for (one, other) in statistics().zip(shared.cells.iter().flat_map(|cell| &cell.statistics)) {
+        let (jointly, alone) = (one.ratio_jointly.unwrap(), other.ratio.unwrap());
+        assert!((jointly.low - alone.low).abs() < 1e-9 && (jointly.high - alone.high).abs() < 1e-9);
+        assert!(jointly.low < one.ratio.unwrap().low && jointly.high > one.ratio.unwrap().high);
+    }
+}

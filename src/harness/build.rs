@@ -26,11 +26,24 @@ const GLOBAL_MINIMUM: &[&str] = &[
 /// What judges its solver and rounds the result.
 const JUDGED: &[&str] = &["experiments/global_minimum/committed.rs", "experiments/global_minimum/judged.rs"];
 
+/// What draws the trials of the experiment other-solvers: grids, poses, and the streams of their noise.
+const OTHER_SOLVERS: &[&str] = &[
+    "experiments/other_solvers/grid.rs",
+    "src/study/cells.rs",
+    "src/study/poses.rs",
+    "src/study/trial.rs",
+    "studies/coverage-tilt.toml",
+    "studies/few-flat-views.toml",
+    "studies/pose-count.toml",
+];
+
 /// Measurements by name: the folders and files whose lines change them.
 const MEASUREMENTS: &[(&str, &[&[&str]])] = &[
     ("global-minimum", &[SCENES, SOLVER, GLOBAL_MINIMUM, JUDGED]),
     ("global-minimum-scenes", &[SCENES, GLOBAL_MINIMUM]),
     ("gate-power", &[SCENES, SOLVER, &["src/gate"]]),
+    ("other-solvers", &[SCENES, SOLVER, OTHER_SOLVERS]),
+    ("other-solvers-scenes", &[SCENES, OTHER_SOLVERS]),
 ];
 
 fn main() {

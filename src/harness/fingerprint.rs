@@ -31,6 +31,16 @@ impl Fingerprint {
         Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/global-minimum-scenes.code")))
     }
 
+    /// The trials of the experiment other-solvers, and this library's solver.
+    pub fn of_other_solvers() -> Fingerprint {
+        Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/other-solvers.code")))
+    }
+
+    /// Those trials alone.
+    pub fn of_other_solvers_scenes() -> Fingerprint {
+        Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/other-solvers-scenes.code")))
+    }
+
     fn of(code_lines: &str) -> Fingerprint {
         let hash = || sha256_hex(code_lines.as_bytes())[..DIGITS].to_string();
         Fingerprint((!code_lines.is_empty()).then(hash))
@@ -83,6 +93,8 @@ mod tests {
             Fingerprint::of_gate_power(),
             Fingerprint::of_global_minimum(),
             Fingerprint::of_global_minimum_scenes(),
+            Fingerprint::of_other_solvers(),
+            Fingerprint::of_other_solvers_scenes(),
         ];
         for (i, a) in all.iter().enumerate() {
             assert!(a.0.is_some() && all[i + 1..].iter().all(|b| a != b));

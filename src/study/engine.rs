@@ -311,6 +311,25 @@ pub fn in_memory_seeing(
     Ok(in_memory_until(spec, text, &AtomicBool::new(false), see, report)?.0)
 }
 
+/// As [`in_memory_seeing`], calibrated by somebody else's solver.
+///
+/// # Errors
+/// A study that cannot be run as written.
+pub fn in_memory_by(
+    calibrator: Arc<dyn Calibrator>,
+    spec: Spec,
+    text: &str,
+    mut see: impl FnMut(&Trial),
+) -> Result<Engine, SpecError> {
+    let mut engine = Engine::of(spec, text, Shard::WHOLE)?.calibrated_by(calibrator);
+    let keep = |trials: &[Trial]| {
+        trials.iter().for_each(&mut see);
+        Ok::<(), Infallible>(())
+    };
+    let Ok(_) = engine.drive(&AtomicBool::new(false), keep, |_| {});
+    Ok(engine)
+}
+
 /// As [`in_memory_seeing`], to the end or until asked to stop.
 pub fn in_memory_until(
     spec: Spec,

@@ -60,7 +60,9 @@ pub const PARQUET: bool = cfg!(feature = "parquet");
 pub use accumulate::Tally;
 pub use calibrator::{Calibrator, Estimate};
 pub use cells::Cell;
-pub use engine::{Engine, Interruption, Outcome, Pace, Worst, in_memory, in_memory_seeing, in_memory_until};
+pub use engine::{
+    Engine, Interruption, Outcome, Pace, Worst, in_memory, in_memory_by, in_memory_seeing, in_memory_until,
+};
 pub use fingerprint::Fingerprint;
 pub use finish::finish;
 pub use folder::{Folder, FolderError, Located};

@@ -63,12 +63,33 @@ pub(super) fn page(
     page.push_str(&endings(summary));
     page.push_str("<h2>Errors</h2>\n<p>sd / bound is the spread over the Cramer-Rao bound: 1 is the best that is possible. \
                    Bias and sd are of the trials that converged.</p>\n");
+    page.push_str(&together(engine, summary));
     for statistic in engine.quantities.iter() {
         page.push_str(&quantity_table(summary, statistic.name()));
     }
     page.push_str(&provenance(manifest, spec_text));
     page.push_str("</body></html>\n");
     page
+}
+
+/// What holds of all cells at once.
+fn together(engine: &Engine, summary: &Summary) -> String {
+    let cells = match (engine.cells.len(), engine.spec.common_random_numbers) {
+        (1, _) => "",
+        (_, true) => {
+            " Trial t meets the same noise in every cell (common random numbers): cells are compared pair by pair, more sharply \
+             than these intervals tell, but they are not independent. They move together, and what is unusual in one is \
+             likely to be so in its neighbours."
+        }
+        (_, false) => " Every cell draws noise of its own: cells are independent.",
+    };
+    let all = summary.cells.iter().flat_map(|cell| &cell.statistics);
+    let judged = all.filter(|s| s.ratio_jointly.is_some()).count();
+    let confidence = percent(summary.confidence);
+    format!(
+        "<p>An interval holds with {confidence} % by itself. Under \u{201c}jointly\u{201d} those of all {judged} ratios sd / bound of this \
+         study hold together with {confidence} % (Bonferroni), whether or not cells are independent.{cells}</p>\n"
+    )
 }
 
 /// A share without the rounding of its binary fraction: 95, 99.9.
@@ -100,7 +121,7 @@ fn quantity_table(summary: &Summary, name: &str) -> String {
         0.5 => "median".to_string(),
         share => format!("{} %", percent(*share)),
     }));
-    heads.extend(["predicted", "sd / bound"].map(String::from));
+    heads.extend(["predicted", "sd / bound", "jointly"].map(String::from));
     let mut rows = String::new();
     for (cell, s) in statistics {
         let predicted = s.predicted.map_or_else(dash, |p| match first.quantity.is_error() {
@@ -110,7 +131,7 @@ fn quantity_table(summary: &Summary, name: &str) -> String {
         let mut entries =
             vec![escape(&cell.name), s.count.to_string(), shown(s.mean), shown(s.sd), shown(s.rms)];
         entries.extend(s.quantiles.iter().map(|(_, q)| shown(*q)));
-        entries.extend([predicted, shown(s.ratio)]);
+        entries.extend([predicted, shown(s.ratio), interval(s.ratio_jointly)]);
         row(&mut rows, &entries);
     }
     let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
@@ -158,6 +179,13 @@ fn shown(estimated: Option<Estimated>) -> String {
     estimated.map_or_else(dash, |e| {
         let [value, low, high] = [e.value, e.low, e.high].map(|x| significant(x, 4));
         format!("{value}<br><small>[{low}, {high}]</small>")
+    })
+}
+
+/// The interval alone.
+fn interval(estimated: Option<Estimated>) -> String {
+    estimated.map_or_else(dash, |e| {
+        format!("<small>[{}, {}]</small>", significant(e.low, 4), significant(e.high, 4))
     })
 }
 

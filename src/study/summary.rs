@@ -8,6 +8,7 @@ use super::quantity::Quantity;
 use super::sketch::Sketch;
 use calibench::evaluate::Interval;
 use calibench::evaluate::distribution::normal_two_sided;
+use calibench::evaluate::interval::each_of;
 use calibench_harness::Cell as Entry;
 use calibench_harness::Table;
 
@@ -56,6 +57,9 @@ pub struct Statistic {
     pub predicted: Option<Expected>,
     /// Standard deviation over the predicted one.
     pub ratio: Option<Estimated>,
+    /// The same with the interval widened so that all such intervals of the study hold together with its confidence
+    /// (Bonferroni), whether or not its cells are independent.
+    pub ratio_jointly: Option<Estimated>,
 }
 
 /// Shares whose quantiles are told.
@@ -80,7 +84,22 @@ pub fn summarise(engine: &Engine) -> Summary {
             correlations: correlations(&engine.quantities, tally, false_alarm),
         }
     };
-    Summary { cells: engine.cells.iter().map(one).collect(), confidence: engine.spec.confidence }
+    let mut cells: Vec<CellSummary> = engine.cells.iter().map(one).collect();
+    widen(&mut cells, &engine.tallies, false_alarm);
+    Summary { cells, confidence: engine.spec.confidence }
+}
+
+/// Fills in [`Statistic::ratio_jointly`].
+fn widen(cells: &mut [CellSummary], tallies: &[Tally], false_alarm: f64) {
+    let judged = cells.iter().flat_map(|cell| &cell.statistics).filter(|s| s.ratio.is_some()).count();
+    let each = each_of(judged, false_alarm);
+    for (cell, tally) in cells.iter_mut().zip(tallies) {
+        for (statistic, moments) in cell.statistics.iter_mut().zip(&tally.moments) {
+            let predicted = statistic.predicted.filter(|_| statistic.ratio.is_some());
+            statistic.ratio_jointly =
+                predicted.and_then(|p| Some(moments.sd_interval(each)?.scaled(1.0 / p.sd)));
+        }
+    }
 }
 
 fn outcomes(tally: &Tally, false_alarm: f64) -> Vec<(String, u64, Estimated)> {
@@ -120,6 +139,7 @@ fn statistic(
             .to_vec(),
         predicted,
         ratio,
+        ratio_jointly: None,
     }
 }
 

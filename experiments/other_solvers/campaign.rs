@@ -1,0 +1,99 @@
+//! The whole measurement of a program: asks it all trials, and writes what is committed.
+
+use super::programs::{PROGRAMS, Program};
+use super::row::HEADER;
+use super::trials::{Asked, ask};
+use calibench::io::write_atomically;
+use calibench_gate::{Builtin, Process};
+use calibench_harness::fingerprint::Fingerprint;
+use clap::Parser;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+use std::time::Duration;
+
+/// Where the committed lines stand, from the root of the project.
+pub const FOLDER: &str = "golden/other-solvers";
+/// Longest time for one answer.
+const TIMEOUT: Duration = Duration::from_secs(120);
+
+/// Asks a program about the trials of the experiment other-solvers, and writes how it did to golden/other-solvers/NAME.csv.
+#[derive(Debug, Parser)]
+struct Arguments {
+    /// calibench, opencv, colmap, scipy or minimal
+    name: String,
+    /// The Python that has what the adapter needs
+    #[arg(long, default_value = "python3")]
+    python: String,
+    /// First trials of each cell alone
+    #[arg(long, requires = "out")]
+    trials: Option<u64>,
+    /// Writes there instead
+    #[arg(long)]
+    out: Option<PathBuf>,
+}
+
+/// The command.
+pub fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("{message}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), String> {
+    let known = || PROGRAMS.iter().map(|program| program.name).collect::<Vec<_>>().join(", ");
+    let program = PROGRAMS
+        .iter()
+        .find(|program| program.name == arguments.name)
+        .ok_or_else(|| format!("no program {}; there are: {}", arguments.name, known()))?;
+    let trials = arguments.trials.unwrap_or(program.trials);
+    let text = measured(program, &arguments.python, trials)?;
+    let file = || Path::new(FOLDER).join(format!("{}.csv", program.name));
+    write_atomically(&arguments.out.clone().unwrap_or_else(file), text.as_bytes()).map_err(|e| e.to_string())
+}
+
+/// The first `trials` trials of every cell, as they are committed.
+fn measured(program: &Program, python: &str, trials: u64) -> Result<String, String> {
+    let (asked, versions, fingerprint) = match program.adapter {
+        None => {
+            let versions = format!("calibench {}", env!("CARGO_PKG_VERSION"));
+            (ask(Builtin, trials), versions, Fingerprint::of_other_solvers())
+        }
+        Some((adapter, _)) => {
+            let versions = versions(python, program.modules)?;
+            let process = Process::new(&format!("{python} adapters/{adapter}"), TIMEOUT, 1);
+            (ask(process, trials), versions, Fingerprint::of_other_solvers_scenes())
+        }
+    };
+    let Asked { rows, .. } = asked.map_err(|error| error.to_string())?;
+    let what = format!(
+        "other-solvers-trials {}; versions {versions}; adapter {}",
+        program.name,
+        program.adapter_hash()
+    );
+    let lines: Vec<String> = rows.iter().map(|row| row.text() + "\n").collect();
+    Ok(format!("{}\n{HEADER}\n{}", fingerprint.head(&what), lines.concat()))
+}
+
+/// The versions of modules of Python, which must be there.
+fn versions(python: &str, modules: &[&str]) -> Result<String, String> {
+    let names = modules.join(", ");
+    let told = modules
+        .iter()
+        .map(|module| format!("'{module} ' + {module}.__version__"))
+        .collect::<Vec<_>>()
+        .join(", ");
+    let asks = format!("import {names}\nprint(', '.join([{told}]))");
+    let done = Command::new(python).args(["-c", &asks]).output().map_err(|e| format!("{python}: {e}"))?;
+    if !done.status.success() {
+        let lines = String::from_utf8_lossy(&done.stderr).into_owned();
+        return Err(format!(
+            "{python} lacks {names}: {}; name a Python that has them with --python",
+            lines.lines().last().unwrap_or_default()
+        ));
+    }
+    Ok(String::from_utf8_lossy(&done.stdout).trim().to_string())
+}
