@@ -179,7 +179,6 @@ mod tests {
     #[test]
     fn the_shares_in_the_suite_are_those_of_the_tests() {
         for seen in measure(200, Demand::Assumptions).unwrap() {
-            println!("{}: {} of {}", seen.scenario.id, seen.count, seen.draws);
             assert!(seen.agrees(), "{}: {} of {}", seen.scenario.id, seen.count, seen.draws);
         }
     }

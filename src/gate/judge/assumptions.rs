@@ -222,7 +222,6 @@ mod tests {
         let stretched = worst("board-stretched");
         assert!(stretched.interval.0 > 3.0 && !of("board-stretched").is_visible(), "{stretched:?}");
         assert!(of("lens-decentred").is_visible() && of("lens-decentred").flagged == 16);
-        println!("{}", report.to_text(200));
         for text in [report.to_text(200), report.to_html(), report.to_json()] {
             assert!(text.contains("board-stretched") && text.contains("three thousandths wider"), "{text}");
         }
