@@ -474,3 +474,48 @@ fn what_is_not_supported_is_named_and_not_judged_but_not_everything_can_be() {
     // fx is free in all good scenes.
     assert!(!report("fx").held());
 }
+
+#[test]
+fn what_is_known_stands_in_a_file_with_its_reason() {
+    let dir = folder("gate-allowances");
+    std::fs::create_dir_all(&dir).expect("a folder");
+    let path = dir.join("known.toml");
+    let name = path.display().to_string();
+    let allowed = |text: &str| {
+        std::fs::write(&path, text).expect("written");
+        let planted = ["--planted", "rounded-to-f32", "--samples", "1", "--allow", &name];
+        let output = gate(&planted);
+        (
+            output.status.code(),
+            [output.stdout, output.stderr].map(|o| String::from_utf8_lossy(&o).into_owned()).concat(),
+        )
+    };
+    let single = "[[allow]]\nproperty = 'exactness'\nlimit_px = 1e-4\nreason = 'single precision'\n";
+    let (code, text) = allowed(single);
+    assert_eq!(code, Some(0), "{text}");
+    assert!(
+        text.contains("TRUSTED: every check that could be judged holds, with one stated allowance;"),
+        "{text}"
+    );
+    assert!(
+        text.contains("allowed: exactness up to 0.0001 px: single precision (needed by four-pose, "),
+        "{text}"
+    );
+    let idle =
+        format!("{single}[[allow]]\nproperty = 'degenerate'\nscenes = ['one-view']\nreason = 'none'\n");
+    let (code, text) = allowed(&idle);
+    assert!(code == Some(0) && text.contains("NOTHING NEEDS IT; not needed by one-view"), "{text}");
+    // Too small a limit covers nothing.
+    assert_eq!(allowed(&single.replace("1e-4", "1e-9")).0, Some(1));
+    let (code, text) = allowed(&single.replace("limit_px", "limit"));
+    assert!(code == Some(2) && text.contains("line 3: unknown field `limit`"), "{text}");
+}
+
+#[test]
+fn the_allowances_of_the_adapters_can_be_read() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("adapters");
+    for name in ["opencv.allow.toml", "opencv_lenses.allow.toml"] {
+        let allowances = calibench_gate::Allowance::read(&root.join(name)).expect("allowances");
+        assert!(!allowances.is_empty(), "{name}");
+    }
+}

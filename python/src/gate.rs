@@ -66,7 +66,12 @@ impl Options {
             })
         };
         let accepted = self.accept.iter().map(property).collect::<PyResult<Vec<_>>>()?;
-        Ok(Terms { false_alarm_rate: self.false_alarms, accepted, median_seconds: self.median_time })
+        Ok(Terms {
+            false_alarm_rate: self.false_alarms,
+            accepted,
+            median_seconds: self.median_time,
+            ..Terms::default()
+        })
     }
 }
 

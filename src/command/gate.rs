@@ -15,8 +15,8 @@ use calibench::io::write_atomically;
 use calibench_gate::faults::{Faulty, planted};
 use calibench_gate::files::{self, FilesError};
 use calibench_gate::{
-    Asked, Builtin, EXPECTED_FALSE_ALARMS, Plan, PlanError, Property, QUICK, Recorder, Report, Solver,
-    THOROUGH, Terms, plan, protocol,
+    Allowance, Asked, Builtin, EXPECTED_FALSE_ALARMS, Plan, PlanError, Property, QUICK, Recorder, Report,
+    Solver, THOROUGH, Terms, plan, protocol,
 };
 use calibench_harness::{Build, ProgressDisplay};
 use std::io::IsTerminal;
@@ -69,6 +69,9 @@ pub(super) struct Arguments {
     /// Property whose failure is known and does not fail the run; may be repeated
     #[arg(long, value_name = "PROPERTY", value_parser = property)]
     accept: Vec<Property>,
+    /// File of failures that are known, by property and scene, with a reason each (see adapters/PROTOCOL.md)
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["export", "power", "certified", "hand_eye"])]
+    allow: Option<PathBuf>,
     /// The verdict as text for people, or the report as JSON for programs
     #[arg(long, value_enum, default_value_t = Format::Text, conflicts_with_all = [
         "export", "record", "against", "power", "certified", "planted", "methods",
@@ -338,25 +341,29 @@ fn process(arguments: &Arguments, command: &str) -> Result<Box<dyn Solver>, Stop
     Ok(Box::new(program::process(command, arguments.timeout, arguments.jobs).map_err(usage)?))
 }
 
-fn terms(arguments: &Arguments) -> Terms {
-    Terms {
+fn terms(arguments: &Arguments) -> Result<Terms, Stop> {
+    let allowances = arguments.allow.as_deref().map_or(Ok(Vec::new()), Allowance::read).map_err(usage)?;
+    Ok(Terms {
         false_alarm_rate: arguments.false_alarms,
         accepted: arguments.accept.clone(),
+        allowances,
         median_seconds: arguments.median_time,
-    }
+    })
 }
 
 /// Asks every problem of the plan, showing progress.
-fn asked(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build) -> Report {
+fn asked(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build) -> Result<Report, Stop> {
+    // A mistake in a file is told before anything is asked.
+    let terms = terms(arguments)?;
     let progress = ProgressDisplay::stderr().start("gate", plan.cases.len());
     let started = Instant::now();
     let seen = calibench_gate::run(plan, solver, &|done| progress.advance(done));
     let seconds = started.elapsed().as_secs_f64();
-    let report = Report::new(plan, &solver.name(), &seen, &terms(arguments), seconds);
+    let report = Report::new(plan, &solver.name(), &seen, &terms, seconds);
     let report = report.with_commit(build.commit.as_ref());
     match repeat(arguments, plan) {
-        Some(command) => report.with_repeat(command),
-        None => report,
+        Some(command) => Ok(report.with_repeat(command)),
+        None => Ok(report),
     }
 }
 
@@ -364,7 +371,7 @@ fn asked(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build)
 type Output<'a> = (&'a Option<PathBuf>, fn(&Report) -> String);
 
 fn judge(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build) -> Result<Exit, Stop> {
-    let report = asked(arguments, plan, solver, build);
+    let report = asked(arguments, plan, solver, build)?;
     let outputs: [Output<'_>; 3] = [
         (&arguments.json, Report::to_json),
         (&arguments.junit, Report::to_junit),

@@ -11,6 +11,7 @@
 //! runs.
 
 pub mod accept;
+pub mod allowances;
 pub mod bad_input;
 pub mod certified;
 pub mod covariance_form;
@@ -29,13 +30,16 @@ pub mod protocol;
 pub mod quoted;
 pub mod recorder;
 pub mod report;
+pub mod residual_tests;
 pub mod run;
 pub mod solver;
 pub mod suite;
 pub mod textbook;
 pub mod trial;
 pub mod variant;
+pub mod violation;
 
+pub use allowances::{AllowError, Allowance, Allowed};
 pub use judge::{Check, EXPECTED_FALSE_ALARMS, Property, Terms, Verdict};
 pub use plan::{Asked, Plan, PlanError};
 pub use process::Process;

@@ -118,6 +118,9 @@ const REPEATS: usize = 4;
 const VARIED: usize = 2;
 /// Samples a scenario that test honesty: each takes a verdict of its own.
 const HONEST: usize = 32;
+/// Samples a scenario that breaks an assumption: fits that go wrong take long, and sixteen tell a ratio to two
+/// fifths.
+const BROKEN: usize = 16;
 
 impl Plan {
     /// [`Plan::of`] for every scene with Brown-Conrady's lens.
@@ -191,6 +194,9 @@ impl Plan {
 
     fn observe(&self, scenario: &Scenario, trial: u64) -> Vec<View> {
         let key = |purpose| StreamKey { seed: self.seed, scenario: scenario.id, trial, purpose };
+        if let Some(violation) = &scenario.violation {
+            return violation.observe(&scenario.scene, scenario.sigma_px, &mut Stream::open(key("noise")));
+        }
         let views = scenario.scene.observe(scenario.sigma_px, &mut Stream::open(key("noise")));
         if scenario.outliers == 0.0 {
             return views;
@@ -215,8 +221,11 @@ fn check_scenes(asked: &Asked, scenarios: &[Scenario], bad: &[BadCase]) -> Resul
 fn cases_of(index: usize, scenario: &Scenario, samples: usize) -> Vec<Case> {
     let case = |purpose, trial: usize| Case { scenario: index, purpose, trial: trial as u64 };
     let samples = samples.min(scenario.most);
-    if scenario.demand == Demand::Honesty {
-        return (0..samples.min(HONEST)).map(|trial| case(Purpose::Sample, trial)).collect();
+    let only = |most: usize| (0..samples.min(most)).map(|trial| case(Purpose::Sample, trial)).collect();
+    match scenario.demand {
+        Demand::Honesty => return only(HONEST),
+        Demand::Assumptions => return only(BROKEN),
+        Demand::Law => {}
     }
     let mut cases = vec![case(Purpose::Exact, 0)];
     for trial in 0..samples {

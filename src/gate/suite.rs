@@ -1,8 +1,10 @@
 //! On which scenes is a solver judged? Families of cameras and poses with known truth, as data.
 
 mod other_lenses;
+mod violations;
 
 use super::principal::Principal;
+use super::violation::Violation;
 use calibench::board::{Board, BoardError, Pattern};
 use calibench::calibrate::Covariance;
 use calibench::camera::{BrownConrady, Camera, FreeParameters, Lens, Model, Parameter};
@@ -18,6 +20,9 @@ pub enum Demand {
     Law,
     /// The data are poor or contaminated: a solver must refuse, warn, or admit its uncertainty.
     Honesty,
+    /// The world is not the model: a solver should say so where the residuals show it, or state a covariance
+    /// that covers what follows ([`super::residual_tests`]).
+    Assumptions,
 }
 
 /// A scene with its noise and the parameters to estimate.
@@ -40,6 +45,11 @@ pub struct Scenario {
     /// Share of samples to which textbook least squares gives a confidently wrong answer: measured for the
     /// doubtful scenes, none where the law holds ([`super::textbook`]).
     pub textbook_misled: f64,
+    /// What the model leaves out of the world; nothing but where [`Demand::Assumptions`] stands.
+    pub violation: Option<Violation>,
+    /// Share of samples whose residuals show the violation to an ordinary test: measured for these scenes
+    /// ([`super::residual_tests`]).
+    pub seen_in_residuals: f64,
     /// Most samples for which the second-order terms that the law neglects stay below its resolution.
     pub most: usize,
     /// Cramer-Rao bound at `sigma_px`.
@@ -273,6 +283,14 @@ pub fn suite() -> Result<Vec<Scenario>, SuiteError> {
         ..build(wrong, ORDINARY_SIGMA_PX)?
     });
     scenarios.extend(other_lenses.collect::<Result<Vec<_>, SuiteError>>()?);
+    for (draft, violation, seen_in_residuals) in violations::drafts() {
+        scenarios.push(Scenario {
+            demand: Demand::Assumptions,
+            violation: Some(violation),
+            seen_in_residuals,
+            ..build(draft, ORDINARY_SIGMA_PX)?
+        });
+    }
     Ok(scenarios)
 }
 
@@ -297,6 +315,8 @@ fn build(draft: Draft, sigma_px: f64) -> Result<Scenario, SuiteError> {
         sigma_px,
         outliers: 0.0,
         textbook_misled: 0.0,
+        violation: None,
+        seen_in_residuals: 0.0,
         most: usize::MAX,
         principal: Principal::of(&bound.intrinsics, bound.free),
         bound,

@@ -113,6 +113,7 @@ impl Answered {
             grave: false,
             evidence,
             problems,
+            size_px: None,
             verdict: Verdict::NotJudged,
         }
     }

@@ -59,10 +59,11 @@ pub(super) fn run(
             (plan_of(arguments, samples, both)?, other)
         }
     };
+    let terms = terms(arguments)?;
     let ask = |solver: &dyn Solver| {
         let progress = ProgressDisplay::stderr().start("gate", plan.cases.len());
         let seen = calibench_gate::run(&plan, solver, &|done| progress.advance(done));
-        let report = Report::new(&plan, "", &seen, &terms(arguments), 0.0);
+        let report = Report::new(&plan, "", &seen, &terms, 0.0);
         (seen, report.checks)
     };
     let (old, old_checks) = ask(other.as_ref());

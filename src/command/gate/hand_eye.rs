@@ -57,7 +57,7 @@ fn judged(arguments: &Arguments, solver: &mut dyn Solver) -> Result<Report, Stop
     if samples > MOST_SAMPLES {
         return Err(usage(format!("{samples} samples a scene, and the limit is {MOST_SAMPLES}")));
     }
-    Ok(judge(solver, arguments.seed, samples, &terms(arguments)))
+    Ok(judge(solver, arguments.seed, samples, &terms(arguments)?))
 }
 
 /// What stands above the table.

@@ -29,14 +29,12 @@ pub(super) const FAULTS: &[Planted] = &[
     ),
 ];
 
-const OTHERS: &[Model] = &[
-    Model::Rational,
-    Model::ThinPrism,
-    Model::Tilted,
-    Model::KannalaBrandt,
-    Model::Division,
-    Model::DoubleSphere,
-];
+/// Every model but Brown-Conrady's, which is the first of all.
+const OTHERS: &[Model] = {
+    let [first, others @ ..] = &Model::ALL;
+    assert!(matches!(first, Model::BrownConrady));
+    others
+};
 
 const fn of_models(id: &'static str, about: &'static str, models: &'static [Model], how: How) -> Planted {
     Planted { id, about, class: Class::Gross, models, how }

@@ -45,6 +45,7 @@ pub(super) const FAULTS: &[Planted] = &[
     gross("last-bits", "the last bit of fx changes when a problem is asked again", |p, asked_before| {
         spoilt(p, |a| change(a, "fx", |x| f64::from_bits(x.to_bits() ^ (asked_before() & 1))))
     }),
+    gross("never-warns", "no warning is ever given", |p, _| spoilt(p, |a| a.warnings.clear())),
     subtle("silent-failure", "one answer in a hundred has fx 10 % too large", |p, _| {
         spoilt(p, |a| change(a, "fx", |x| if chosen(p, 100) { 1.1 * x } else { x }))
     }),

@@ -45,6 +45,8 @@ properties! {
     Degenerate = "degenerate",
     /// Poor or contaminated data mislead no more often than they mislead textbook least squares.
     Honesty = "honesty",
+    /// Where the world is not the model and residuals show it, that is said, or covered by what is stated.
+    Assumptions = "assumptions",
     /// Good data are answered.
     Convergence = "convergence",
     /// No answer is far from the truth without a warning.
@@ -141,12 +143,15 @@ pub struct Check {
     pub evidence: String,
     /// Number of problems behind it.
     pub problems: usize,
+    /// What was compared with a limit, px: of exactness and of the invariances.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_px: Option<f64>,
     /// What was decided; `NotJudged` until then.
     pub verdict: Verdict,
 }
 
 impl Check {
-    pub(super) fn new(
+    pub(crate) fn new(
         property: Property,
         scenario: &'static str,
         basis: Basis,
@@ -154,11 +159,35 @@ impl Check {
         evidence: impl Into<String>,
     ) -> Check {
         let evidence = evidence.into();
-        Check { property, scenario, basis, grave: false, evidence, problems, verdict: Verdict::NotJudged }
+        Check {
+            property,
+            scenario,
+            basis,
+            grave: false,
+            evidence,
+            problems,
+            size_px: None,
+            verdict: Verdict::NotJudged,
+        }
+    }
+
+    /// Properties whose checks compare a size in px with a limit.
+    pub const HAVE_SIZE: [Property; 6] = [
+        Property::Exactness,
+        Property::ViewOrder,
+        Property::PointOrder,
+        Property::TargetUnits,
+        Property::ImageShift,
+        Property::SwappedAxes,
+    ];
+
+    /// States what was compared with a limit; what is no number is not stated.
+    pub(super) fn of_size(self, px: f64) -> Check {
+        Check { size_px: px.is_finite().then_some(px), ..self }
     }
 
     /// Failing this check is a confident wrong answer.
-    pub(super) fn gravely(self) -> Check {
+    pub(crate) fn gravely(self) -> Check {
         Check { grave: true, ..self }
     }
 }

@@ -1,6 +1,7 @@
 //! Which checks fail, at one stated rate of false alarms for all of them together?
 
 use super::checks::{Basis, Check, Property, Verdict};
+use crate::allowances::Allowance;
 
 /// Chance that a correct solver fails any check of a run, unless the user asks for another.
 pub const EXPECTED_FALSE_ALARMS: f64 = 1e-3;
@@ -12,13 +13,27 @@ pub struct Terms {
     pub false_alarm_rate: f64,
     /// Properties whose failure is known and does not fail the run.
     pub accepted: Vec<Property>,
+    /// Failures that are known, with a reason each.
+    pub allowances: Vec<Allowance>,
     /// Longest median time for a problem, s; without it, time is told and not judged.
     pub median_seconds: Option<f64>,
 }
 
 impl Default for Terms {
     fn default() -> Terms {
-        Terms { false_alarm_rate: EXPECTED_FALSE_ALARMS, accepted: Vec::new(), median_seconds: None }
+        Terms {
+            false_alarm_rate: EXPECTED_FALSE_ALARMS,
+            accepted: Vec::new(),
+            allowances: Vec::new(),
+            median_seconds: None,
+        }
+    }
+}
+
+impl Terms {
+    /// Whether the failure of a check is known.
+    fn allow(&self, check: &Check) -> bool {
+        self.accepted.contains(&check.property) || self.allowances.iter().any(|a| a.covers(check))
     }
 }
 
@@ -45,7 +60,7 @@ pub fn decide(mut checks: Vec<Check>, terms: &Terms) -> Vec<Check> {
             // What nothing was asked of does not hold.
             (_, false) if check.problems == 0 => Verdict::NotJudged,
             (_, false) => Verdict::Held,
-            (_, true) if terms.accepted.contains(&check.property) => Verdict::Accepted,
+            (_, true) if terms.allow(check) => Verdict::Accepted,
             (_, true) if check.grave => Verdict::Grave,
             (_, true) => Verdict::Failed,
         };

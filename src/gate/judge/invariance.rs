@@ -61,5 +61,7 @@ fn compare(scenario: &Scenario, answers: &Answers<'_>, variant: Variant) -> Opti
         evidence.push_str(&format!("; {one_sided} of {pairs} answered only one way round"));
     }
     let problems = 2 * (compared + one_sided);
-    (pairs > 0).then(|| Check::new(property(variant), scenario.id, basis, problems, evidence))
+    let check = Check::new(property(variant), scenario.id, basis, problems, evidence);
+    let check = worst_px.into_iter().fold(check, Check::of_size);
+    (pairs > 0).then_some(check)
 }

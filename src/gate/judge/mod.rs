@@ -1,5 +1,6 @@
 //! What follows from the answers? One check a property and scenario, then one decision over all of them.
 
+mod assumptions;
 mod bad;
 mod chance;
 mod checks;
@@ -10,6 +11,7 @@ mod invariance;
 mod rmse;
 mod statistics;
 
+pub use assumptions::{Admission, TOLERATED, TooSmall, VISIBLE, admissions};
 pub(super) use bad::misled;
 pub(super) use chance::at_least;
 pub use checks::{Basis, Check, Property, Verdict};
@@ -39,6 +41,7 @@ pub fn check(plan: &Plan, seen: &[Option<Seen>], terms: &Terms) -> Vec<Check> {
         checks.extend(exact::protocol(scenario, &answers));
         match scenario.demand {
             Demand::Honesty => checks.push(bad::honesty(scenario, &answers)),
+            Demand::Assumptions => checks.push(assumptions::check(scenario, &answers)),
             Demand::Law => {
                 checks.extend(exact::check(scenario, &answers, terms));
                 checks.push(habits::specificity(scenario, &answers));

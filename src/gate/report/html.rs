@@ -52,7 +52,12 @@ impl Report {
                 escape(&row.told()),
             );
         }
-        page.push_str("</table>\n<h2>Every check</h2>\n");
+        page.push_str("</table>\n");
+        for allowed in &self.allowances {
+            let _ = writeln!(page, "<p>Allowed: {}</p>", escape(&allowed.told()));
+        }
+        self.assumptions_of(&mut page);
+        page.push_str("<h2>Every check</h2>\n");
         self.rows().iter().for_each(|row| self.checks_of(row, &mut page));
         page.push_str("<h2>Scenarios</h2>\n<table>\n");
         for scenario in &self.scenarios {
@@ -60,6 +65,32 @@ impl Report {
         }
         page.push_str("</table>\n</html>\n");
         page
+    }
+
+    /// The table of scenes whose world is not the model.
+    fn assumptions_of(&self, page: &mut String) {
+        if self.assumptions.is_empty() {
+            return;
+        }
+        page.push_str(
+            "<h2>Where the world is not the model</h2>\n<p>Visible: the share of samples whose residuals show it to ordinary tests. \
+             Flagged: refused, or answered with a warning. Errors are told in stated standard deviations, of the parameter that is \
+             covered least.</p>\n<table><tr><th>scenario<th>what is left out<th class=n>visible<th class=n>flagged<th>errors over \
+             stated deviations</tr>\n",
+        );
+        for row in &self.assumptions {
+            let errors = row.errors_told();
+            let _ = writeln!(
+                page,
+                "<tr><td>{}<td>{}<td class=n>{} %<td class=n>{} / {}<td>{errors}</tr>",
+                row.scenario,
+                escape(row.about),
+                significant(100.0 * row.seen_in_residuals, 3),
+                row.flagged,
+                row.samples,
+            );
+        }
+        page.push_str("</table>\n");
     }
 
     fn checks_of(&self, row: &Row<'_>, page: &mut String) {

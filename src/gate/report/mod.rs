@@ -6,8 +6,9 @@ mod text;
 
 pub use text::COLUMNS;
 
+use super::allowances::Allowed;
 use super::bad_input::Fault;
-use super::judge::{self, Basis, Check, Property, Terms, Verdict};
+use super::judge::{self, Admission, Basis, Check, Property, Terms, Verdict};
 use super::plan::Plan;
 use super::trial::Seen;
 use calibench::io::Commit;
@@ -43,6 +44,11 @@ pub struct Report {
     pub commit: Option<String>,
     /// Every check.
     pub checks: Vec<Check>,
+    /// What the solver says where the world is not the model.
+    pub assumptions: Vec<Admission>,
+    /// What was stated as known, and what became of it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub allowances: Vec<Allowed>,
     /// What was asked.
     pub scenarios: Vec<Described>,
 }
@@ -88,7 +94,9 @@ impl Report {
             verdict: checks.iter().map(|c| c.verdict).max().unwrap_or(Verdict::NotJudged),
             seconds,
             commit: None,
+            allowances: terms.allowances.iter().map(|allowance| allowance.applied(&checks)).collect(),
             checks,
+            assumptions: judge::admissions(plan, seen),
             scenarios: described(plan),
         }
     }

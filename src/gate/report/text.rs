@@ -26,7 +26,31 @@ impl Report {
         for row in self.rows() {
             text.push_str(&line(&row, columns));
         }
-        text.push_str(&format!("\n{}\n", self.conclusion()));
+        text.push_str(&self.assumptions_table(columns));
+        text.push_str(&format!("\n{}\n{}", self.conclusion(), self.allowances_told()));
+        text
+    }
+
+    /// What the solver says where the world is not the model, a line a scene.
+    fn assumptions_table(&self, columns: usize) -> String {
+        if self.assumptions.is_empty() {
+            return String::new();
+        }
+        let mut text = format!(
+            "\n{:<22} {:>9} {:>9}  {:<32} what is left out\n",
+            "where the model fails", "visible", "flagged", "errors over stated deviations"
+        );
+        for row in &self.assumptions {
+            let errors = row.errors_told();
+            let line = format!(
+                "{:<22} {:>7} % {:>9}  {errors:<32} {}",
+                row.scenario,
+                significant(100.0 * row.seen_in_residuals, 3),
+                format!("{}/{}", row.flagged, row.samples),
+                row.about
+            );
+            text.push_str(&format!("{}\n", cut(line, columns)));
+        }
         text
     }
 
@@ -38,11 +62,7 @@ impl Report {
             significant(1.0 / self.false_alarm_rate, 3),
             self.statistical_checks
         );
-        let accepted = match self.checks.iter().filter(|c| c.verdict == Verdict::Accepted).count() {
-            0 => String::new(),
-            1 => ", but for one that was accepted".to_string(),
-            count => format!(", but for {count} that were accepted"),
-        };
+        let accepted = self.accepted();
         match self.verdict {
             Verdict::Grave | Verdict::Failed => {
                 let grave = failures.iter().filter(|c| c.verdict == Verdict::Grave).count();
@@ -57,6 +77,29 @@ impl Report {
                 self.unsupported()
             ),
         }
+    }
+
+    /// What fails and is known: stated in a file, or accepted as a whole.
+    fn accepted(&self) -> String {
+        let stated = self.allowances.iter().filter(|allowed| !allowed.needed_by.is_empty()).count();
+        let of_files: usize = self.allowances.iter().map(|allowed| allowed.needed_by.len()).sum();
+        let all = self.checks.iter().filter(|c| c.verdict == Verdict::Accepted).count();
+        let stated = match stated {
+            0 => String::new(),
+            1 => ", with one stated allowance".to_string(),
+            count => format!(", with {count} stated allowances"),
+        };
+        match all.saturating_sub(of_files) {
+            0 => stated,
+            1 => format!("{stated}, but for one that was accepted"),
+            count => format!("{stated}, but for {count} that were accepted"),
+        }
+    }
+
+    /// The stated allowances, a line each.
+    fn allowances_told(&self) -> String {
+        let told = self.allowances.iter().map(|allowed| format!("allowed: {}\n", allowed.told()));
+        told.collect()
     }
 
     /// The scenes for which the solver is not made.
@@ -108,14 +151,18 @@ impl Row<'_> {
     }
 }
 
+/// A text that is no longer than `room`.
+fn cut(text: String, room: usize) -> String {
+    match text.chars().count() > room {
+        true => text.chars().take(room.saturating_sub(1)).chain(['…']).collect(),
+        false => text,
+    }
+}
+
 fn line(row: &Row<'_>, columns: usize) -> String {
     let (held, judged) = row.held;
     let count = if judged == 0 { "-".to_string() } else { format!("{held}/{judged}") };
     let told = row.told();
-    let room = columns.saturating_sub(BEFORE_EVIDENCE);
-    let evidence = match told.chars().count() > room {
-        true => told.chars().take(room.saturating_sub(1)).chain(['…']).collect(),
-        false => told,
-    };
+    let evidence = cut(told, columns.saturating_sub(BEFORE_EVIDENCE));
     format!("{:<18} {:<10} {count:>6}  {evidence}\n", row.property.name(), row.verdict.word())
 }
