@@ -52,6 +52,7 @@ mod study;
 mod study_faults;
 mod study_folder;
 mod study_parquet;
+mod study_plan;
 mod study_solver;
 mod study_statistics;
 mod thread_count;

@@ -99,7 +99,7 @@ const EXAMPLES: &[(&str, &[&str])] = &[
         "study compare",
         &["calibench study compare my-study whole", "calibench study compare my-study --factor views"],
     ),
-    ("study plan", &["calibench study plan my-study.toml --want fx=2 --confirm 100"]),
+    ("study plan", &["calibench study plan my-study.toml --want fx=2 --want depth=1 --confirm 100"]),
     ("study measure", &["calibench study measure my-study.toml --trials 100"]),
     (
         "gate",
