@@ -32,6 +32,7 @@ mod laboratory;
 mod layout;
 mod lens_models;
 mod new;
+mod next_pose;
 mod noise;
 mod photo_command;
 mod photo_verbs;
