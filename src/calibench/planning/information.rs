@@ -42,6 +42,10 @@ impl Estimated {
     }
 }
 
+/// A smaller part of an unknown's information than this is rounding, of which marks on a line leave some 1e-16: a board that faces
+/// the camera from n times its size tells tilt from shift by about the part 1 / n^2, far more.
+const SINGULAR: f64 = 1e-12;
+
 /// The information of a view about the estimated parameters, n x n, in units of their inverse squares: `S = (A - B C^-1
 /// B^T) / sigma^2`, with `A = sum J^T J` over the marks' derivatives by the parameters, `C` the same by the six numbers
 /// of the view's pose and `B` the products of both. The pose is eliminated (Schur complement): what the view says of
@@ -61,7 +65,12 @@ pub fn view_information(
     let unit = SMatrix::<f64, 6, 1>::from_fn(|i, _| 1.0 / c[(i, i)].sqrt());
     let scaled = Matrix6::from_fn(|i, j| c[(i, j)] * unit[i] * unit[j]);
     let b = MatrixXx6::from_fn(estimated.len(), |i, j| b[(i, j)] * unit[j]);
-    let explained = scaled.cholesky()?.solve(&b.transpose());
+    let factor = scaled.cholesky()?;
+    // A pivot is the part of an unknown's information that the others before it leave.
+    if factor.l_dirty().diagonal().iter().any(|root| root * root < SINGULAR) {
+        return None;
+    }
+    let explained = factor.solve(&b.transpose());
     let information = (a - b * explained) / (sigma_px * sigma_px);
     information.iter().all(|x| x.is_finite()).then_some(information)
 }
