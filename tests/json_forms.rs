@@ -55,7 +55,10 @@ fn studies_say_what_they_found_to_programs() {
     let runs = measured["runs"].as_array().unwrap();
     assert_eq!(runs.iter().map(|run| run["trials"].as_u64().unwrap()).collect::<Vec<_>>(), [20, 80]);
     let plan = object(&folder, &["study", "plan", "small.toml", "--want", "fx=5", "--confirm", "20"]);
-    assert_eq!((&plan["want"]["quantity"], &plan["confirmed"]["met"]), (&"fx".into(), &true.into()));
+    assert_eq!((&plan["want"][0]["quantity"], &plan["outcome"]), (&"fx".into(), &"confirmed".into()));
+    let last = plan["attempts"].as_array().unwrap().last().unwrap();
+    assert_eq!((&last["outcome"], &last["views"]), (&"confirmed".into(), &plan["confirmed_views"]));
+    assert!(last["quantities"][0]["sd"]["high"].as_f64() <= Some(5.0), "{last:#}");
     assert!(plan["designs"].as_array().unwrap().contains(&plan["chosen"]), "{plan:#}");
 }
 

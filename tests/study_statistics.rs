@@ -1,7 +1,7 @@
 //! Do studies say what is true? Against the Cramer-Rao bound, against theory, and of designs that must fail.
 
 use calibench::evaluate::interval::each_of;
-use calibench_study::plan::{Goal, Search, choose, confirm, search};
+use calibench_study::plan::{Attempt, Goal, Outcome, Search, attempt, choose, next_views, search};
 use calibench_study::{Spec, SpecError, in_memory, summarise};
 
 /// Rate at which each test of this file may fail a correct program.
@@ -132,24 +132,76 @@ fn a_robust_loss_knows_its_own_spread() {
     }
 }
 
+fn wish(quantity: &str, sd: f64) -> Goal {
+    Goal { quantity: quantity.to_string(), sd }
+}
+
 #[test]
 fn a_plan_finds_the_fewest_views_and_trials_confirm_it() {
     let text = spec("{ kind = \"chapter\" }", "trials = { per_cell = 100 }");
     let mut spec = Spec::parse(&text).unwrap();
-    let goal = Goal { quantity: "fx".to_string(), sd: 0.4 };
+    let goals = [wish("fx", 0.4)];
     let range =
         Search { tilts_deg: vec![0.0, 10.0, 30.0], coverages: vec![0.5], most_views: 60, distance_mm: 160.0 };
-    let designs = search(&spec, &goal, &range).unwrap();
+    let designs = search(&spec, &goals, &range).unwrap();
     assert_eq!(designs[0].enough, None, "views that face the camera never suffice");
-    let chosen = choose(&designs).unwrap();
+    let chosen = choose(&designs, &goals).unwrap();
     assert_eq!(chosen.tilt_deg, 30.0);
-    let (views, sd) = chosen.enough.unwrap();
-    assert!(sd <= 0.4);
+    let (views, sds) = chosen.enough.clone().unwrap();
+    assert!(sds[0] <= 0.4);
     let fewer = Search { most_views: views - 1, ..range.clone() };
-    assert_eq!(search(&spec, &goal, &fewer).unwrap()[2].enough, None, "one view less does not suffice");
+    assert_eq!(search(&spec, &goals, &fewer).unwrap()[2].enough, None, "one view less does not suffice");
     spec.confidence = 1.0 - FALSE_ALARM;
-    let confirmed = confirm(&spec, &goal, chosen, 160.0, 300, |_| {}).unwrap().unwrap();
-    assert!(confirmed.ratio.contains(1.0), "{confirmed:?}");
+    let tried = attempt(&spec, &goals, (views, chosen), 160.0, 300, |_| {}).unwrap();
+    assert!(tried.findings[0].ratio.contains(1.0), "{tried:?}");
+}
+
+#[test]
+fn several_wishes_take_the_most_views_that_one_of_them_needs() {
+    let text = spec("{ kind = \"chapter\" }", "trials = { per_cell = 100 }");
+    let spec = Spec::parse(&text).unwrap();
+    let range = Search { tilts_deg: vec![30.0], coverages: vec![0.5], most_views: 60, distance_mm: 160.0 };
+    let views = |goals: &[Goal]| search(&spec, goals, &range).unwrap()[0].enough.clone().unwrap().0;
+    let (fx, cx) = (wish("fx", 0.4), wish("cx", 0.15));
+    let (of_fx, of_cx) = (views(&[fx.clone()]), views(&[cx.clone()]));
+    assert_ne!(of_fx, of_cx);
+    assert_eq!(views(&[fx.clone(), cx]), of_fx.max(of_cx));
+    let twice = search(&spec, &[fx.clone(), fx], &range).unwrap_err().to_string();
+    assert!(twice.contains("`fx` is wanted twice"), "{twice}");
+}
+
+/// A wish that the bound of some number of views meets to a hair: trials cannot confirm that number, and are asked for more
+/// until they do.
+#[test]
+fn a_number_of_views_that_is_too_near_the_wish_is_followed_by_a_larger_one_that_is_confirmed() {
+    let text = spec("{ kind = \"chapter\" }", "trials = { per_cell = 100 }");
+    let spec = Spec::parse(&text).unwrap();
+    let range = Search { tilts_deg: vec![30.0], coverages: vec![0.5], most_views: 60, distance_mm: 160.0 };
+    let twelve = Search { most_views: 12, ..range.clone() };
+    let of_twelve = search(&spec, &[wish("fx", 1e-3)], &twelve).unwrap()[0].best.clone().unwrap().unwrap()[0];
+    let goals = [wish("fx", 1.0001 * of_twelve)];
+    let designs = search(&spec, &goals, &range).unwrap();
+    let design = choose(&designs, &goals).unwrap();
+    assert_eq!(design.enough.as_ref().unwrap().0, 12);
+    let mut tried = vec![attempt(&spec, &goals, (12, design), 160.0, 200, |_| {}).unwrap()];
+    // Trials know the spread to a tenth: a wish that is met to a hair lies within.
+    assert_eq!(tried[0].outcome(), Outcome::Undecided, "{tried:?}");
+    assert!(tried[0].findings[0].deciding_trials.is_none_or(|trials| trials > 200));
+    while let Some(views) = next_views(&spec, &goals, (tried.last().unwrap(), design), &range).unwrap() {
+        assert!(views > tried.last().unwrap().views && views <= 60);
+        tried.push(attempt(&spec, &goals, (views, design), 160.0, 200, |_| {}).unwrap());
+        if tried.last().unwrap().outcome() == Outcome::Confirmed {
+            break;
+        }
+    }
+    let last = tried.last().unwrap();
+    assert_eq!(last.outcome(), Outcome::Confirmed, "{tried:?}");
+    assert!(last.findings[0].sd.high <= goals[0].sd);
+    // Beyond the most views there are none, and an attempt of which nothing converged asks for twice as many.
+    let most = Search { most_views: last.views, ..range.clone() };
+    assert_eq!(next_views(&spec, &goals, (last, design), &most).unwrap(), None);
+    let nothing = Attempt { findings: Vec::new(), views: 7, ..last.clone() };
+    assert_eq!(next_views(&spec, &goals, (&nothing, design), &range).unwrap(), Some(14));
 }
 
 #[test]

@@ -25,7 +25,7 @@ struct Verb {
     arguments: &'static [&'static str],
 }
 
-const VERBS: [Verb; 21] = [
+const VERBS: [Verb; 22] = [
     Verb { name: "board", arguments: &["board", "circles:9x7:10mm:3mm", "--out", "out"] },
     Verb {
         name: "camera",
@@ -54,6 +54,21 @@ const VERBS: [Verb; 21] = [
             "0",
             "--pixels",
             "200,200,300,250",
+            "--out",
+            "out",
+        ],
+    },
+    Verb {
+        name: "next-pose",
+        arguments: &[
+            "next-pose",
+            "../known.json",
+            "--board",
+            "circles:9x7:10mm:3mm",
+            "--want",
+            "fx",
+            "--distance",
+            "120,150",
             "--out",
             "out",
         ],

@@ -49,6 +49,7 @@ pub mod noise;
 #[cfg(feature = "photo")]
 pub mod photos;
 pub mod planar;
+pub mod planning;
 pub mod raster;
 pub mod rectify;
 pub mod synth;

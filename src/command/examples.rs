@@ -74,6 +74,13 @@ const EXAMPLES: &[(&str, &[&str])] = &[
         ],
     ),
     ("measure", &["calibench measure result/result.json --view 0 --pixels 200,200,300,250"]),
+    (
+        "next-pose",
+        &[
+            "calibench next-pose result/result.json --board circles:9x7:10mm:3mm --want fx",
+            "calibench next-pose result/result.json --corners corners.csv --want pixel --want length --at 0,0,150 --length 50 --out next",
+        ],
+    ),
     ("register", &["calibench register taught.csv found.csv"]),
     ("hand-eye", &["calibench hand-eye robot.csv result/result.json --robot-sd-mm 0.1 --robot-sd-deg 0.1"]),
     ("check-reference", &["calibench check-reference history.csv --reference 25 --sd 0.01"]),
@@ -99,7 +106,7 @@ const EXAMPLES: &[(&str, &[&str])] = &[
         "study compare",
         &["calibench study compare my-study whole", "calibench study compare my-study --factor views"],
     ),
-    ("study plan", &["calibench study plan my-study.toml --want fx=2 --confirm 100"]),
+    ("study plan", &["calibench study plan my-study.toml --want fx=2 --want depth=1 --confirm 100"]),
     ("study measure", &["calibench study measure my-study.toml --trials 100"]),
     (
         "gate",

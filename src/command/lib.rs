@@ -21,6 +21,7 @@ mod list;
 mod manual;
 mod measure;
 mod new;
+mod next_pose;
 mod ninepoint;
 mod noise;
 mod program;
@@ -100,6 +101,8 @@ enum Verb {
     Diff(diff::Arguments),
     /// Measures lengths on a plane, with their uncertainty split by cause
     Measure(Box<measure::Arguments>),
+    /// Finds how to hold the board for the next photograph, so that what is wanted is known best
+    NextPose(Box<next_pose::Arguments>),
     /// Registers a found part on a taught one: the map between their marks, and how well any point is known
     Register(register::Arguments),
     /// Calibrates a camera against a robot, on its gripper or beside it
@@ -157,6 +160,7 @@ pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCo
         Some(Verb::Validate(arguments)) => validate::run(&arguments),
         Some(Verb::Diff(arguments)) => diff::run(&arguments),
         Some(Verb::Measure(arguments)) => measure::run(&arguments),
+        Some(Verb::NextPose(arguments)) => next_pose::run(&arguments),
         Some(Verb::Register(arguments)) => register::run(&arguments),
         Some(Verb::HandEye(arguments)) => hand_eye::run(&arguments),
         Some(Verb::CheckReference(arguments)) => check_reference::run(&arguments),

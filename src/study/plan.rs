@@ -1,12 +1,13 @@
-//! How many views, how far tilted, how widely placed, for a wanted accuracy? Predicted from the bound,
-//! confirmed by trials.
+//! How many views, how far tilted, how widely placed, for a wanted accuracy? Predicted from the bound, confirmed by
+//! trials: the bound is what no unbiased calibration of many views exceeds, and trials say whether the estimator keeps
+//! it with these.
 
 use super::engine::{Pace, in_memory};
 use super::moments::Estimated;
 use super::poses::{Poses, PosesError};
 use super::spec::{Spec, Trials};
 use super::spec_error::SpecError;
-use super::summary::summarise;
+use super::summary::{CellSummary, summarise};
 
 /// What is wanted.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,24 +38,117 @@ pub struct Design {
     pub tilt_deg: f64,
     /// See [`Poses::Spread`].
     pub coverage: f64,
-    /// Fewest views that suffice, and the predicted standard deviation with them.
-    pub enough: Option<(usize, f64)>,
-    /// Where no number suffices: the predicted standard deviation with the most views, if there is one, or
-    /// why there is none.
-    pub best: Result<Option<f64>, String>,
+    /// Fewest views that suffice, and the predicted standard deviation of each goal with them.
+    pub enough: Option<(usize, Vec<f64>)>,
+    /// Where no number suffices: the predicted standard deviations with the most views, if there are any, or
+    /// why there are none.
+    pub best: Result<Option<Vec<f64>>, String>,
 }
 
-/// What trials say of the chosen design.
+/// What is known of a goal, or of all of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// The whole interval of the standard deviation lies at or below what is wanted.
+    Confirmed,
+    /// The whole interval lies above what is wanted, or too few trials found a camera.
+    Refuted,
+    /// The interval holds what is wanted.
+    Undecided,
+}
+
+impl Outcome {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Outcome::Confirmed => "confirmed",
+            Outcome::Refuted => "refuted",
+            Outcome::Undecided => "undecided",
+        }
+    }
+
+    fn of(sd: &Estimated, wanted: f64) -> Outcome {
+        match () {
+            () if sd.high <= wanted => Outcome::Confirmed,
+            () if sd.low > wanted => Outcome::Refuted,
+            () => Outcome::Undecided,
+        }
+    }
+}
+
+/// What the trials of one attempt say of a goal.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Confirmation {
-    /// Trials.
-    pub trials: u64,
-    /// Share that converged.
-    pub converged: f64,
+pub struct Finding {
+    /// The goal.
+    pub goal: Goal,
+    /// The bound.
+    pub predicted_sd: f64,
     /// Measured standard deviation.
     pub sd: Estimated,
     /// Measured over predicted.
     pub ratio: Estimated,
+    /// What follows.
+    pub outcome: Outcome,
+    /// Where nothing is decided: about how many trials would, if their standard deviation were the one measured; the
+    /// logarithm of the interval narrows with the root of their number. `None` where that is no number of use.
+    pub deciding_trials: Option<u64>,
+}
+
+impl Finding {
+    fn of(goal: &Goal, predicted_sd: f64, sd: Estimated, ratio: Estimated, trials: u64) -> Finding {
+        let outcome = Outcome::of(&sd, goal.sd);
+        let deciding_trials = match outcome {
+            Outcome::Undecided => deciding_trials(&sd, goal.sd, trials),
+            _ => None,
+        };
+        Finding { goal: goal.clone(), predicted_sd, sd, ratio, outcome, deciding_trials }
+    }
+}
+
+/// More trials than these are no answer: the measured value cannot be told from what is wanted.
+const MOST_DECIDING: f64 = 1e9;
+
+fn deciding_trials(sd: &Estimated, wanted: f64, trials: u64) -> Option<u64> {
+    let end = if sd.value <= wanted { sd.high } else { sd.low };
+    let factor = libm::log(end / sd.value) / libm::log(wanted / sd.value);
+    let needed = libm::ceil(trials as f64 * factor * factor);
+    (needed <= MOST_DECIDING).then_some(needed as u64)
+}
+
+/// Trials of one number of views.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Attempt {
+    /// Views.
+    pub views: usize,
+    /// Trials.
+    pub trials: u64,
+    /// Share that converged.
+    pub converged: f64,
+    /// One a goal; none where too few trials converged to say anything.
+    pub findings: Vec<Finding>,
+}
+
+impl Attempt {
+    /// Confirmed if every goal is, refuted if one is.
+    pub fn outcome(&self) -> Outcome {
+        let is = |outcome| self.findings.iter().any(|finding| finding.outcome == outcome);
+        match () {
+            () if self.findings.is_empty() || is(Outcome::Refuted) => Outcome::Refuted,
+            () if is(Outcome::Undecided) => Outcome::Undecided,
+            () => Outcome::Confirmed,
+        }
+    }
+
+    /// About how many trials would decide every goal, where nothing is decided.
+    pub fn deciding_trials(&self) -> Option<u64> {
+        let undecided = || self.findings.iter().filter(|finding| finding.outcome == Outcome::Undecided);
+        undecided().map(|finding| finding.deciding_trials).collect::<Option<Vec<u64>>>()?.into_iter().max()
+    }
+
+    /// Whether these predictions, taken by as much as the trials of this attempt exceed its own, would be confirmed by
+    /// as many trials.
+    fn expects(&self, predicted: &[f64]) -> bool {
+        self.findings.iter().zip(predicted).all(|(finding, sd)| sd * finding.ratio.high <= finding.goal.sd)
+    }
 }
 
 /// A plan that cannot be made.
@@ -74,21 +168,29 @@ pub enum PlanError {
     /// A wanted value that is none.
     #[error("a standard deviation of {0} cannot be wanted: give a positive number")]
     Wanted(f64),
+    /// Two wishes for one quantity.
+    #[error("`{0}` is wanted twice: give the smaller standard deviation alone")]
+    Twice(String),
+    /// Nothing is wanted.
+    #[error("nothing is wanted: give a quantity and its largest standard deviation")]
+    Nothing,
 }
 
-/// For every tilt and coverage the fewest views whose Cramer-Rao bound meets the goal.
+/// For every tilt and coverage the fewest views whose Cramer-Rao bound meets every goal.
 ///
-/// The views of a longer series contain those of a shorter one, so the bound falls with every view and
+/// The views of a longer series contain those of a shorter one, so the bound of every quantity falls with every view and
 /// halving finds the fewest.
-pub fn search(spec: &Spec, goal: &Goal, search: &Search) -> Result<Vec<Design>, PlanError> {
-    if !(goal.sd > 0.0 && goal.sd.is_finite()) {
-        return Err(PlanError::Wanted(goal.sd));
-    }
+///
+/// # Errors
+/// [`PlanError`]: a scene that cannot be, a goal that is none.
+pub fn search(spec: &Spec, goals: &[Goal], search: &Search) -> Result<Vec<Design>, PlanError> {
+    check(goals)?;
     let mut designs = Vec::new();
     for &tilt_deg in &search.tilts_deg {
         for &coverage in &search.coverages {
-            let at =
-                |views: usize| sd_at(&with_poses(spec, views, tilt_deg, coverage, search.distance_mm), goal);
+            let at = |views: usize| {
+                predicted(&with_poses(spec, views, tilt_deg, coverage, search.distance_mm), goals)
+            };
             designs.push(match at(search.most_views) {
                 // Another tilt or coverage may fit.
                 Err(PlanError::Spec(
@@ -96,7 +198,13 @@ pub fn search(spec: &Spec, goal: &Goal, search: &Search) -> Result<Vec<Design>, 
                 )) => Design { tilt_deg, coverage, enough: None, best: Err(error.to_string()) },
                 Err(error) => return Err(error),
                 Ok(best) => {
-                    Design { tilt_deg, coverage, enough: fewest(best, &at, goal, search)?, best: Ok(best) }
+                    let enough = match best.clone().filter(|sds| suffice(sds, goals)) {
+                        Some(sds) => {
+                            Some(fewest((0, search.most_views, sds), at, |sds| suffice(sds, goals))?)
+                        }
+                        None => None,
+                    };
+                    Design { tilt_deg, coverage, enough, best: Ok(best) }
                 }
             });
         }
@@ -104,22 +212,39 @@ pub fn search(spec: &Spec, goal: &Goal, search: &Search) -> Result<Vec<Design>, 
     Ok(designs)
 }
 
+fn check(goals: &[Goal]) -> Result<(), PlanError> {
+    if goals.is_empty() {
+        return Err(PlanError::Nothing);
+    }
+    for (i, goal) in goals.iter().enumerate() {
+        if !(goal.sd > 0.0 && goal.sd.is_finite()) {
+            return Err(PlanError::Wanted(goal.sd));
+        }
+        if goals[..i].iter().any(|other| other.quantity == goal.quantity) {
+            return Err(PlanError::Twice(goal.quantity.clone()));
+        }
+    }
+    Ok(())
+}
+
+fn suffice(sds: &[f64], goals: &[Goal]) -> bool {
+    sds.iter().zip(goals).all(|(sd, goal)| *sd <= goal.sd)
+}
+
+/// The fewest views, more than `short`, whose predictions are good; `enough` views have predictions that are.
 fn fewest(
-    best: Option<f64>,
-    at: &impl Fn(usize) -> Result<Option<f64>, PlanError>,
-    goal: &Goal,
-    search: &Search,
-) -> Result<Option<(usize, f64)>, PlanError> {
-    let Some(mut sd) = best.filter(|sd| *sd <= goal.sd) else { return Ok(None) };
-    let (mut short, mut enough) = (0, search.most_views);
+    (mut short, mut enough, mut sds): (usize, usize, Vec<f64>),
+    at: impl Fn(usize) -> Result<Option<Vec<f64>>, PlanError>,
+    is_good: impl Fn(&[f64]) -> bool,
+) -> Result<(usize, Vec<f64>), PlanError> {
     while enough - short > 1 {
         let middle = short + (enough - short) / 2;
         match at(middle)? {
-            Some(found) if found <= goal.sd => (enough, sd) = (middle, found),
+            Some(found) if is_good(&found) => (enough, sds) = (middle, found),
             _ => short = middle,
         }
     }
-    Ok(Some((enough, sd)))
+    Ok((enough, sds))
 }
 
 /// The study's scene with other poses, without factors.
@@ -131,46 +256,142 @@ fn with_poses(spec: &Spec, views: usize, tilt_deg: f64, coverage: f64, distance_
     spec
 }
 
-/// The predicted standard deviation; `None` where the scene determines no camera.
-fn sd_at(spec: &Spec, goal: &Goal) -> Result<Option<f64>, PlanError> {
+/// The predicted standard deviation of each goal; `None` where the scene determines no camera.
+fn predicted(spec: &Spec, goals: &[Goal]) -> Result<Option<Vec<f64>>, PlanError> {
     let cells = spec.cells("")?;
     let quantities = spec.quantities(&cells);
-    let at = quantities.iter().position(|q| q.is_error() && q.name() == goal.quantity);
-    let at = at.ok_or_else(|| PlanError::Quantity {
-        quantity: goal.quantity.clone(),
-        known: quantities.iter().filter(|q| q.is_error()).map(|q| q.name()).collect::<Vec<_>>().join(", "),
-    })?;
-    Ok(cells[0].prediction.0[at].map(|p| p.sd))
+    let of = |goal: &Goal| {
+        let at = quantities.iter().position(|q| q.is_error() && q.name() == goal.quantity);
+        at.ok_or_else(|| PlanError::Quantity {
+            quantity: goal.quantity.clone(),
+            known: quantities
+                .iter()
+                .filter(|q| q.is_error())
+                .map(|q| q.name())
+                .collect::<Vec<_>>()
+                .join(", "),
+        })
+    };
+    let places = goals.iter().map(of).collect::<Result<Vec<_>, _>>()?;
+    Ok(places.into_iter().map(|at| cells[0].prediction.0[at].map(|p| p.sd)).collect())
 }
 
-/// Fewest views first; among equals the smaller standard deviation.
-pub fn choose(designs: &[Design]) -> Option<&Design> {
-    let known = designs.iter().filter_map(|d| Some((d.enough?, d)));
-    known.min_by(|(a, _), (b, _)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))).map(|(_, design)| design)
+/// Fewest views first; among equals the one whose predictions stay furthest below what is wanted.
+pub fn choose<'a>(designs: &'a [Design], goals: &[Goal]) -> Option<&'a Design> {
+    let largest = |sds: &[f64]| sds.iter().zip(goals).map(|(sd, goal)| sd / goal.sd).fold(0.0, f64::max);
+    let known = designs.iter().filter_map(|d| Some((d.enough.as_ref()?, d)));
+    known
+        .min_by(|((a, of_a), _), ((b, of_b), _)| a.cmp(b).then(largest(of_a).total_cmp(&largest(of_b))))
+        .map(|(_, design)| design)
 }
 
-/// A short Monte Carlo run of a design. `None` if too few trials converged to say anything.
-pub fn confirm(
+/// Trials of a design with some number of views.
+///
+/// # Errors
+/// [`PlanError`]: a scene that cannot be.
+pub fn attempt(
     spec: &Spec,
-    goal: &Goal,
-    design: &Design,
+    goals: &[Goal],
+    (views, design): (usize, &Design),
     distance_mm: f64,
     trials: u64,
     report: impl FnMut(&Pace),
-) -> Result<Option<Confirmation>, PlanError> {
-    let Some((views, _)) = design.enough else { return Ok(None) };
+) -> Result<Attempt, PlanError> {
     let mut spec = with_poses(spec, views, design.tilt_deg, design.coverage, distance_mm);
     spec.trials = Trials { per_cell: trials, ..spec.trials };
     let engine = in_memory(spec, "", report)?;
-    let summary = summarise(&engine);
-    let cell = &summary.cells[0];
-    let statistic = cell.of(&goal.quantity);
-    Ok(statistic.and_then(|s| {
-        Some(Confirmation {
-            trials: cell.trials,
-            converged: cell.converged()?.value,
-            sd: s.sd?,
-            ratio: s.ratio?,
-        })
-    }))
+    let cell = &summarise(&engine).cells[0];
+    let findings = goals.iter().map(|goal| finding(cell, goal)).collect::<Option<Vec<_>>>();
+    let converged = cell.converged().map_or(0.0, |share| share.value);
+    Ok(Attempt { views, trials: cell.trials, converged, findings: findings.unwrap_or_default() })
+}
+
+fn finding(cell: &CellSummary, goal: &Goal) -> Option<Finding> {
+    let statistic = cell.of(&goal.quantity)?;
+    Some(Finding::of(goal, statistic.predicted?.sd, statistic.sd?, statistic.ratio?, cell.trials))
+}
+
+/// The number of views to try after an attempt that confirmed nothing: the fewest more whose bound, taken by as much as
+/// the trials exceeded it at most, meets every goal, so that as many trials are expected to confirm it. The most views
+/// where none does, and twice as many where too few trials converged; `None` beyond the most views.
+///
+/// # Errors
+/// [`PlanError`]: a scene that cannot be.
+pub fn next_views(
+    spec: &Spec,
+    goals: &[Goal],
+    (after, design): (&Attempt, &Design),
+    search: &Search,
+) -> Result<Option<usize>, PlanError> {
+    let most = search.most_views;
+    if after.views >= most {
+        return Ok(None);
+    }
+    if after.findings.is_empty() {
+        return Ok(Some((2 * after.views).min(most)));
+    }
+    let poses = |views| with_poses(spec, views, design.tilt_deg, design.coverage, search.distance_mm);
+    let at = |views| predicted(&poses(views), goals);
+    match at(most)?.filter(|sds| after.expects(sds)) {
+        Some(sds) => Ok(Some(fewest((after.views, most, sds), at, |sds| after.expects(sds))?.0)),
+        None => Ok(Some(most)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn estimated(value: f64, part: f64) -> Estimated {
+        Estimated { value, low: value * (1.0 - part), high: value * (1.0 + part) }
+    }
+
+    fn finding(value: f64, part: f64, wanted: f64) -> Finding {
+        let goal = Goal { quantity: "fx".into(), sd: wanted };
+        Finding::of(&goal, value, estimated(value, part), estimated(1.0, part), 500)
+    }
+
+    fn attempt(findings: Vec<Finding>) -> Attempt {
+        Attempt { views: 5, trials: 500, converged: 1.0, findings }
+    }
+
+    #[test]
+    fn only_an_interval_that_lies_at_or_below_the_wish_as_a_whole_confirms_it() {
+        // An interval of 0.94 to 1.06 of the value.
+        for (value, outcome) in [
+            (0.90, Outcome::Confirmed),
+            (0.95, Outcome::Undecided),
+            (1.00, Outcome::Undecided),
+            (1.06, Outcome::Undecided),
+            (1.07, Outcome::Refuted),
+        ] {
+            assert_eq!(finding(value, 0.06, 1.0).outcome, outcome, "{value}");
+        }
+        let exact = finding(1.0, 0.0, 1.0);
+        assert_eq!(
+            exact.outcome,
+            Outcome::Confirmed,
+            "an interval that ends at the wish lies at or below it"
+        );
+    }
+
+    #[test]
+    fn an_attempt_is_as_good_as_its_worst_goal() {
+        let [good, open, bad] = [0.5, 1.0, 2.0].map(|value| finding(value, 0.06, 1.0));
+        assert_eq!(attempt(vec![good.clone(), good.clone()]).outcome(), Outcome::Confirmed);
+        assert_eq!(attempt(vec![good.clone(), open.clone()]).outcome(), Outcome::Undecided);
+        assert_eq!(attempt(vec![open, good, bad]).outcome(), Outcome::Refuted);
+        assert_eq!(attempt(vec![]).outcome(), Outcome::Refuted, "nothing converged");
+    }
+
+    #[test]
+    fn as_many_trials_decide_as_narrow_the_interval_to_the_wish() {
+        // The upper end has to come down from 6 to 3 per cent above: four times the trials, but for the curvature of the logarithm.
+        let trials = finding(1.0, 0.06, 1.03).deciding_trials.unwrap();
+        assert!((1900..2000).contains(&trials), "{trials}");
+        let trials = finding(1.0, 0.06, 0.98).deciding_trials.unwrap();
+        assert!((4600..4800).contains(&trials), "{trials}");
+        assert_eq!(finding(1.0, 0.06, 1.0).deciding_trials, None, "nothing decides between equals");
+        assert_eq!(finding(0.5, 0.06, 1.0).deciding_trials, None, "it is decided");
+    }
 }

@@ -1,4 +1,5 @@
-//! `calibench study plan`: what must be photographed for a wanted accuracy?
+//! `calibench study plan`: what must be photographed for a wanted accuracy? Designs by the bound, then trials of the
+//! smallest one that suffices, with more views until they confirm it.
 
 use super::finished::estimated_json;
 use super::{Failure, read};
@@ -8,19 +9,31 @@ use crate::{Exit, print};
 use calibench::io::ShownPath;
 use calibench::io::significant;
 use calibench_harness::ProgressDisplay;
-use calibench_study::plan::{Confirmation, Design, Goal, PlanError, Search, choose, confirm, search};
-use calibench_study::{Length, Spec};
+use calibench_study::plan::{
+    Attempt, Design, Finding, Goal, Outcome, PlanError, Search, attempt, choose, next_views, search,
+};
+use calibench_study::{Estimated, Length, Spec};
 use comfy_table::{Table, presets};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
+/// What the exit codes mean here.
+const EXIT_CODES: &str = "\
+Exit codes:
+  0  confirmed: the whole interval of every wanted standard deviation lies at or below the wish
+  1  no design reaches what is wanted, or trials with the most views refute it
+  2  wrong usage or input
+  3  undecided: with the most views the interval still holds the wish; it is said how many trials would decide";
+
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXIT_CODES)]
 pub(crate) struct Arguments {
     /// A study whose camera, target, noise and estimator are planned for
     spec: PathBuf,
-    /// What is wanted: a quantity and its largest standard deviation, such as fx=0.5 (px) or length=0.01 (mm)
-    #[arg(long, value_name = "QUANTITY=SD", value_parser = parse_goal)]
-    want: Goal,
+    /// What is wanted: a quantity and its largest standard deviation, such as fx=0.5 (px) or length=0.01 (mm); may be
+    /// repeated, and then all must hold
+    #[arg(long, value_name = "QUANTITY=SD", value_parser = parse_goal, required = true)]
+    want: Vec<Goal>,
     /// For `length`: place of its middle in the camera's frame, mm
     #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_negative_numbers = true)]
     at: Option<Vec<f64>>,
@@ -36,10 +49,10 @@ pub(crate) struct Arguments {
     /// Depth of the target, mm
     #[arg(long, default_value_t = 160.0)]
     distance: f64,
-    /// Most views
+    /// Most views, also of those tried after a number that trials did not confirm
     #[arg(long, default_value_t = 200)]
     most_views: usize,
-    /// Trials that confirm the plan
+    /// Trials of each number of views that is tried
     #[arg(long, default_value_t = 500)]
     confirm: u64,
     /// Text for people or JSON for programs
@@ -76,23 +89,118 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
     };
     let designs = search(&spec, &arguments.want, &range)?;
     // People see the designs before the trials, which take a while.
-    if arguments.format == Format::Text {
-        print(&designs_text(&designs, arguments));
-    }
-    let chosen = choose(&designs);
-    let confirmed = chosen.map(|chosen| confirmation(&spec, chosen, arguments)).transpose()?.flatten();
-    print_as(
-        arguments.format,
-        || outcome_text(chosen, confirmed.as_ref(), arguments),
-        || plan_json(&designs, chosen, confirmed.as_ref(), arguments),
-    );
-    let is_met = confirmed.is_some_and(|confirmed| is_met(&confirmed, &arguments.want));
-    Ok(if is_met { Exit::Held } else { Exit::Deviates })
+    say(arguments, || designs_text(&designs, arguments));
+    let chosen = choose(&designs, &arguments.want);
+    let attempts = match chosen {
+        Some(chosen) => attempts(&spec, chosen, &range, arguments)?,
+        None => Vec::new(),
+    };
+    let reached = Reached { designs: &designs, chosen, attempts: &attempts };
+    print_as(arguments.format, || reached.text(arguments), || reached.json(arguments));
+    Ok(reached.exit())
 }
 
-/// The plan fails where the measured interval lies above what is wanted.
-fn is_met(confirmed: &Confirmation, want: &Goal) -> bool {
-    confirmed.sd.low <= want.sd
+/// To people only.
+fn say(arguments: &Arguments, text: impl FnOnce() -> String) {
+    if arguments.format == Format::Text {
+        print(&text());
+    }
+}
+
+/// Trials of the design, with more views until they confirm it or there may be no more.
+fn attempts(
+    spec: &Spec,
+    design: &Design,
+    range: &Search,
+    arguments: &Arguments,
+) -> Result<Vec<Attempt>, Failure> {
+    let mut made = Vec::new();
+    let mut views = design.enough.as_ref().map(|(views, _)| *views);
+    while let Some(count) = views {
+        let progress =
+            ProgressDisplay::stderr().start(&format!("confirming {count} views"), arguments.confirm as usize);
+        let mut shown = 0;
+        let (goals, distance_mm) = (&arguments.want, arguments.distance);
+        let tried = attempt(spec, goals, (count, design), distance_mm, arguments.confirm, |pace| {
+            progress.advance((pace.trials - shown) as usize);
+            shown = pace.trials;
+        })?;
+        drop(progress);
+        say(arguments, || attempt_text(&tried));
+        views = match tried.outcome() {
+            Outcome::Confirmed => None,
+            Outcome::Refuted | Outcome::Undecided => next_views(spec, goals, (&tried, design), range)?,
+        };
+        made.push(tried);
+    }
+    Ok(made)
+}
+
+/// All that was found.
+struct Reached<'a> {
+    designs: &'a [Design],
+    chosen: Option<&'a Design>,
+    attempts: &'a [Attempt],
+}
+
+impl Reached<'_> {
+    /// What the last attempt says; `None` where no design suffices.
+    fn outcome(&self) -> Option<Outcome> {
+        self.attempts.last().map(Attempt::outcome)
+    }
+
+    fn exit(&self) -> Exit {
+        match self.outcome() {
+            Some(Outcome::Confirmed) => Exit::Held,
+            Some(Outcome::Undecided) => Exit::Incomplete,
+            Some(Outcome::Refuted) | None => Exit::Deviates,
+        }
+    }
+
+    fn text(&self, arguments: &Arguments) -> String {
+        let (Some(chosen), Some(last)) = (self.chosen, self.attempts.last()) else {
+            return "NOT REACHED by any design: allow more views or tilt, reduce the noise, or hold parameters.\n".into();
+        };
+        let most = arguments.most_views;
+        match last.outcome() {
+            Outcome::Confirmed => format!(
+                "CONFIRMED: {} views, tilt {} deg, coverage {}.\n",
+                last.views, chosen.tilt_deg, chosen.coverage
+            ),
+            Outcome::Refuted if last.findings.is_empty() => format!(
+                "REFUTED: too few trials converged with up to {most} views: the bound promises what no calibration of these views \
+                 keeps.\n"
+            ),
+            Outcome::Refuted => format!(
+                "REFUTED with {most} views, the most: the estimator does not keep the bound here. Allow more views (--most-views), or \
+                 reduce the noise.\n"
+            ),
+            Outcome::Undecided => format!(
+                "UNDECIDED with {most} views, the most: the interval holds what is wanted. {}, or allow more views (--most-views).\n",
+                match last.deciding_trials() {
+                    Some(trials) => format!("About {trials} trials would decide it (--confirm {trials})"),
+                    None => "No number of trials of use would decide it".into(),
+                }
+            ),
+        }
+    }
+
+    fn json(&self, arguments: &Arguments) -> Value {
+        let wanted = |goal: &Goal| json!({ "quantity": goal.quantity, "sd": goal.sd });
+        let last = self.attempts.last();
+        json!({
+            "written_by": written_by(),
+            "want": arguments.want.iter().map(wanted).collect::<Vec<_>>(),
+            "most_views": arguments.most_views,
+            "distance_mm": arguments.distance,
+            "designs": self.designs.iter().map(|design| design_json(design, arguments)).collect::<Vec<_>>(),
+            "chosen": self.chosen.map(|design| design_json(design, arguments)),
+            "attempts": self.attempts.iter().map(attempt_json).collect::<Vec<_>>(),
+            "outcome": self.outcome().map_or("not-reached", Outcome::name),
+            "confirmed_views": last.filter(|last| last.outcome() == Outcome::Confirmed).map(|last| last.views),
+            "deciding_trials": last.and_then(Attempt::deciding_trials),
+        })
+    }
 }
 
 fn length(arguments: &Arguments) -> Result<Option<Length>, Failure> {
@@ -108,93 +216,86 @@ fn length(arguments: &Arguments) -> Result<Option<Length>, Failure> {
 }
 
 fn designs_text(designs: &[Design], arguments: &Arguments) -> String {
+    let wanted: Vec<String> =
+        arguments.want.iter().map(|goal| format!("sd({}) <= {}", goal.quantity, goal.sd)).collect();
+    let predicted = arguments.want.iter().map(|goal| format!("predicted sd({})", goal.quantity));
     let mut table = Table::new();
     table.load_style(presets::NOTHING);
-    table.set_header(["tilt (deg)", "coverage", "views", "predicted sd"]);
+    table.set_header(["tilt (deg)", "coverage", "views"].map(String::from).into_iter().chain(predicted));
     for d in designs {
-        let (views, sd) = match (&d.enough, &d.best) {
-            (Some((views, sd)), _) => (views.to_string(), significant(*sd, 4)),
-            (None, Ok(Some(sd))) => (format!("> {}", arguments.most_views), significant(*sd, 4)),
-            (None, Ok(None)) => ("none".to_string(), "not determined".to_string()),
-            (None, Err(why)) => ("none".to_string(), why.clone()),
+        let numbers = |sds: &[f64]| sds.iter().map(|sd| significant(*sd, 4)).collect::<Vec<_>>();
+        let (views, sds) = match (&d.enough, &d.best) {
+            (Some((views, sds)), _) => (views.to_string(), numbers(sds)),
+            (None, Ok(Some(sds))) => (format!("> {}", arguments.most_views), numbers(sds)),
+            (None, Ok(None)) => ("none".to_string(), vec!["not determined".to_string()]),
+            (None, Err(why)) => ("none".to_string(), vec![why.clone()]),
         };
-        table.add_row([d.tilt_deg.to_string(), d.coverage.to_string(), views, sd]);
+        table.add_row([d.tilt_deg.to_string(), d.coverage.to_string(), views].into_iter().chain(sds));
     }
-    format!("Fewest views for sd({}) <= {}:\n{table}\n", arguments.want.quantity, arguments.want.sd)
+    format!("Fewest views for {}:\n{table}\n", wanted.join(" and "))
 }
 
-/// What trials say of the chosen design; `None` where too few converge.
-fn confirmation(
-    spec: &Spec,
-    chosen: &Design,
-    arguments: &Arguments,
-) -> Result<Option<Confirmation>, Failure> {
-    let progress = ProgressDisplay::stderr().start("confirming", arguments.confirm as usize);
-    let mut shown = 0;
-    Ok(confirm(spec, &arguments.want, chosen, arguments.distance, arguments.confirm, |pace| {
-        progress.advance((pace.trials - shown) as usize);
-        shown = pace.trials;
-    })?)
+fn attempt_text(tried: &Attempt) -> String {
+    let head =
+        format!("{} views: {} trials, {:.1} % converged", tried.views, tried.trials, 100.0 * tried.converged);
+    if tried.findings.is_empty() {
+        return format!("{head}: too few to say anything.\n");
+    }
+    let findings: Vec<String> = tried.findings.iter().map(finding_text).collect();
+    format!("{head}: {}.\n", findings.join("; "))
 }
 
-fn outcome_text(chosen: Option<&Design>, confirmed: Option<&Confirmation>, arguments: &Arguments) -> String {
-    let Some(chosen) = chosen else {
-        return "No design suffices: allow more views or tilt, reduce the noise, or hold parameters.\n"
-            .into();
+fn finding_text(f: &Finding) -> String {
+    let interval = |e: &Estimated| {
+        format!("{} [{}, {}]", significant(e.value, 4), significant(e.low, 4), significant(e.high, 4))
     };
-    let Some(c) = confirmed else {
-        return "Too few trials converged to confirm anything: the bound promises what no calibration of these views keeps.\n".into();
+    let outcome = match (f.outcome, f.deciding_trials) {
+        (Outcome::Confirmed, _) => "confirmed".into(),
+        (Outcome::Refuted, _) => "REFUTED".into(),
+        (Outcome::Undecided, Some(trials)) => format!("undecided, about {trials} trials would decide"),
+        (Outcome::Undecided, None) => "undecided".into(),
     };
     format!(
-        "Chosen: {} views, tilt {} deg, coverage {}. {} trials, {:.1} % converged: sd({}) = {} [{}, {}], {} [{}, {}] of the \
-         prediction: {}.\n",
-        chosen.enough.map_or(0, |e| e.0),
-        chosen.tilt_deg,
-        chosen.coverage,
-        c.trials,
-        100.0 * c.converged,
-        arguments.want.quantity,
-        significant(c.sd.value, 4),
-        significant(c.sd.low, 4),
-        significant(c.sd.high, 4),
-        significant(c.ratio.value, 4),
-        significant(c.ratio.low, 4),
-        significant(c.ratio.high, 4),
-        if is_met(c, &arguments.want) { "confirmed" } else { "NOT confirmed, plan with more views" },
+        "sd({}) = {}, {} of the prediction: {outcome}",
+        f.goal.quantity,
+        interval(&f.sd),
+        interval(&f.ratio)
     )
 }
 
-fn plan_json(
-    designs: &[Design],
-    chosen: Option<&Design>,
-    confirmed: Option<&Confirmation>,
-    arguments: &Arguments,
-) -> Value {
+fn attempt_json(tried: &Attempt) -> Value {
+    let finding = |f: &Finding| {
+        json!({
+            "quantity": f.goal.quantity,
+            "wanted_sd": f.goal.sd,
+            "predicted_sd": f.predicted_sd,
+            "sd": estimated_json(&f.sd),
+            "ratio": estimated_json(&f.ratio),
+            "outcome": f.outcome.name(),
+            "deciding_trials": f.deciding_trials,
+        })
+    };
     json!({
-        "written_by": written_by(),
-        "want": { "quantity": arguments.want.quantity, "sd": arguments.want.sd },
-        "most_views": arguments.most_views,
-        "distance_mm": arguments.distance,
-        "designs": designs.iter().map(design_json).collect::<Vec<_>>(),
-        "chosen": chosen.map(design_json),
-        "confirmed": confirmed.map(|c| json!({
-            "trials": c.trials,
-            "converged": c.converged,
-            "sd": estimated_json(&c.sd),
-            "ratio": estimated_json(&c.ratio),
-            "met": is_met(c, &arguments.want),
-        })),
+        "views": tried.views,
+        "trials": tried.trials,
+        "converged": tried.converged,
+        "quantities": tried.findings.iter().map(finding).collect::<Vec<_>>(),
+        "outcome": tried.outcome().name(),
     })
 }
 
 /// `views` is `null` where no number of them suffices; `predicted_sd` is then that of the most views, if there is one.
-fn design_json(design: &Design) -> Value {
+fn design_json(design: &Design, arguments: &Arguments) -> Value {
     let best = design.best.as_ref();
+    let sds = design.enough.as_ref().map(|(_, sds)| sds).or(best.ok().and_then(Option::as_ref));
+    let named = |sds: &Vec<f64>| -> serde_json::Map<String, Value> {
+        arguments.want.iter().zip(sds).map(|(goal, sd)| (goal.quantity.clone(), json!(sd))).collect()
+    };
     json!({
         "tilt_deg": design.tilt_deg,
         "coverage": design.coverage,
-        "views": design.enough.map(|(views, _)| views),
-        "predicted_sd": design.enough.map(|(_, sd)| sd).or(best.ok().copied().flatten()),
+        "views": design.enough.as_ref().map(|(views, _)| views),
+        "predicted_sd": sds.map(named),
         "refused": best.err(),
     })
 }
