@@ -20,6 +20,7 @@ pub mod interval_coverage;
 pub mod k2_observability;
 pub mod line_bending;
 pub mod millimetres;
+pub mod next_pose;
 pub mod nine_point;
 pub mod noise_floor;
 pub mod one_view;
@@ -43,6 +44,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     interval_coverage::EXPERIMENT,
     noise_floor::EXPERIMENT,
     focal_depth::EXPERIMENT,
+    next_pose::EXPERIMENT,
     one_view::EXPERIMENT,
     collinearity::EXPERIMENT,
     grid_image::EXPERIMENT,

@@ -9,7 +9,7 @@ use super::spec_error::SpecError;
 use calibench::calibrate::{CalibrationError, Covariance, Loss, Settings};
 use calibench::camera::{Camera, FreeParameters, Lens, Model};
 use calibench::evaluate::cramer_rao;
-use calibench::geometry::Vec2;
+use calibench::geometry::{Pose, Vec2};
 use calibench::io::result::LensFields;
 use calibench::io::shown::on_one_line;
 use calibench::synth::{Scene, Stream, StreamKey, Truth};
@@ -83,6 +83,11 @@ impl Spec {
 }
 
 impl Cell {
+    /// The poses that every trial meets; `None` where each draws its own.
+    pub fn poses(&self) -> Option<&[Pose]> {
+        self.scene.as_ref().map(|scene| &scene.truth.cam_from_target[..])
+    }
+
     fn new(spec: &Spec, index: usize, levels: Vec<usize>, design: Design) -> Result<Cell, SpecError> {
         let labels: Vec<String> = spec.factor.iter().zip(&levels).map(|(f, &level)| f.label(level)).collect();
         let named: Vec<String> =
