@@ -163,7 +163,8 @@ fn several_wishes_take_the_most_views_that_one_of_them_needs() {
     let range = Search { tilts_deg: vec![30.0], coverages: vec![0.5], most_views: 60, distance_mm: 160.0 };
     let views = |goals: &[Goal]| search(&spec, goals, &range).unwrap()[0].enough.clone().unwrap().0;
     let (fx, cx) = (wish("fx", 0.4), wish("cx", 0.15));
-    let (of_fx, of_cx) = (views(&[fx.clone()]), views(&[cx.clone()]));
+    let one = std::slice::from_ref;
+    let (of_fx, of_cx) = (views(one(&fx)), views(one(&cx)));
     assert_ne!(of_fx, of_cx);
     assert_eq!(views(&[fx.clone(), cx]), of_fx.max(of_cx));
     let twice = search(&spec, &[fx.clone(), fx], &range).unwrap_err().to_string();
