@@ -254,7 +254,8 @@ fn our_solver_is_trusted_and_every_report_is_written() {
     let output = gate(&["--samples", "4", "--json", &json, "--junit", &junit, "--html", &html]);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stdout));
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(text.lines().count() <= 30, "one screen:\n{text}");
+    // A line for each of 25 properties, and one for each of nine scenes where the model fails.
+    assert!(text.lines().count() <= 42, "one screen:\n{text}");
     let report: serde_json::Value =
         serde_json::from_slice(&std::fs::read(&json).expect("written")).expect("JSON");
     assert_eq!(report["verdict"], "held");
