@@ -178,6 +178,19 @@ fn another_board_or_another_unit_is_noticed() {
 }
 
 #[test]
+fn a_result_that_doubts_its_deviations_is_told_to() {
+    let (folder, mut result) = calibrated_folder("next-pose-doubts");
+    let doubt = "another camera explains the data nearly as well: fx = 1 beside 2";
+    result["warnings"] = serde_json::json!([doubt]);
+    fs::write(folder.join("doubting.json"), result.to_string()).expect("written");
+    let asks = ["next-pose", "doubting.json", "--board", BOARD, "--want", "fx", "--format", "json"];
+    let output = run(&folder, &asks);
+    assert!(text(&output.stderr).contains(doubt), "{}", text(&output.stderr));
+    let said: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(said["doubts"], serde_json::json!([doubt]));
+}
+
+#[test]
 fn what_cannot_be_planned_is_wrong_usage_with_what_to_do() {
     let (folder, mut result) = calibrated_folder("next-pose-usage");
     let write = |name: &str, value: &Value| fs::write(folder.join(name), value.to_string()).expect("written");
@@ -217,6 +230,7 @@ fn what_cannot_be_planned_is_wrong_usage_with_what_to_do() {
     let whole = "result/result.json";
     for (arguments, words) in [
         (of("no-size.json", &["fx"]), "--image-size"),
+        (of(whole, &["fx", "--image-size", "320x240"]), "its image has 640 x 480 px"),
         (of("no-covariance.json", &["fx"]), "no joint covariance"),
         (of("negative.json", &["fx"]), "not positive definite"),
         (of("silent.json", &["fx"]), "--mark-sd"),

@@ -52,7 +52,7 @@ pub(super) struct Arguments {
     /// found]
     #[arg(long, value_name = "PX", value_parser = positive)]
     mark_sd: Option<f64>,
-    /// Size of the image [default: the result's]
+    /// Size of the image, where the result does not say it
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     image_size: Option<(usize, usize)>,
     /// How many poses are told, the best first
@@ -143,9 +143,10 @@ const OTHER_BOARD: f64 = 1.1;
 fn plan(arguments: &Arguments) -> Result<Plan, String> {
     let file = arguments.result.shown();
     let known = known(arguments)?;
-    let image_size = arguments.image_size.or(known.image_size);
-    let image_size = image_size
-        .ok_or_else(|| format!("{file}: it does not say how large the image is: give --image-size WxH"))?;
+    for doubt in &known.doubts {
+        warn(&format!("warning: {file}: {doubt}: what is promised here rests on these standard deviations"));
+    }
+    let image_size = image_size(arguments, &known)?;
     let (points, unit) = marks(arguments)?;
     let sigma_px = match arguments.mark_sd.unwrap_or(known.sigma_px) {
         sigma if sigma > 0.0 => sigma,
@@ -187,6 +188,19 @@ fn plan(arguments: &Arguments) -> Result<Plan, String> {
         ));
     }
     Ok(Plan { known, wishes, points, unit, sigma_px, image_size, reach, found, repeated })
+}
+
+/// The size of the image, of which there is one.
+fn image_size(arguments: &Arguments, known: &KnownCalibration) -> Result<(usize, usize), String> {
+    let file = arguments.result.shown();
+    match (known.image_size, arguments.image_size) {
+        (Some((width, height)), Some(given)) if given != (width, height) => Err(format!(
+            "{file}: its image has {width} x {height} px: --image-size is for results that do not say theirs"
+        )),
+        (of_result, given) => of_result
+            .or(given)
+            .ok_or_else(|| format!("{file}: it does not say how large the image is: give --image-size WxH")),
+    }
 }
 
 /// A camera's result on a flat board.

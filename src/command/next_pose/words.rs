@@ -170,6 +170,7 @@ impl Plan {
             "written_by": written_by(),
             "result": arguments.result.display().to_string(),
             "image_size": [self.image_size.0, self.image_size.1],
+            "doubts": self.known.doubts,
             "mark_sd_px": self.sigma_px,
             "unit": self.unit,
             "marks": self.points.len(),
