@@ -231,6 +231,7 @@ fn what_cannot_be_planned_is_wrong_usage_with_what_to_do() {
     for (arguments, words) in [
         (of("no-size.json", &["fx"]), "--image-size"),
         (of(whole, &["fx", "--image-size", "320x240"]), "its image has 640 x 480 px"),
+        (of(whole, &["fx", "--at", "0,0,150", "--length", "20"]), "are for --want length"),
         (of("no-covariance.json", &["fx"]), "no joint covariance"),
         (of("negative.json", &["fx"]), "not positive definite"),
         (of("silent.json", &["fx"]), "--mark-sd"),

@@ -63,9 +63,46 @@ fn what_is_confirmed_refuted_open_and_out_of_reach_is_told_apart() {
         assert!(quantity["sd"]["high"].as_f64() <= quantity["wanted_sd"].as_f64(), "{quantity:#}");
     }
     for attempt in attempts {
-        assert!(said.contains(&format!("{} views: 200 trials", attempt["views"])), "{said}");
+        assert!(
+            said.contains(&format!("{} views, tilt 30 deg, coverage 0.5: 200 trials", attempt["views"])),
+            "{said}"
+        );
     }
     assert!(said.contains(&format!("CONFIRMED: {} views", more["confirmed_views"])), "{said}");
+}
+
+/// By the bound one view at 30 degrees and two at 2 degrees know fx to 100 px. No trial of one view has an answer, and of two
+/// at 2 degrees a third.
+#[test]
+fn a_design_that_is_not_answered_gives_way_to_others() {
+    let folder = folder("plan-unanswered");
+    fs::write(folder.join("spec.toml"), spec("")).expect("written");
+    let arguments = ["study", "plan", "spec.toml", "--want", "fx=100", "--tilt", "2,30", "--coverage", "0"];
+    let output = run(&folder, &[&arguments[..], &["--confirm", "100", "--format", "json"]].concat());
+    let found: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let attempts = found["attempts"].as_array().expect("attempts");
+    assert_eq!((&attempts[0]["tilt_deg"], &attempts[0]["views"]), (&30.0.into(), &1.into()), "{found:#}");
+    assert_eq!(attempts[0]["outcome"], "refuted", "{found:#}");
+    let by_views: Vec<_> = attempts.iter().map(|attempt| attempt["views"].as_u64()).collect();
+    assert!(by_views.is_sorted(), "fewest views first: {found:#}");
+    let last = attempts.last().expect("one");
+    for attempt in attempts {
+        let is_answered = attempt["converged"].as_f64() >= Some(0.95);
+        assert_eq!(attempt["quantities"].as_array().is_some_and(|q| !q.is_empty()), is_answered, "{found:#}");
+    }
+    assert_eq!((output.status.code(), &found["outcome"]), (Some(0), &"confirmed".into()), "{found:#}");
+    assert_eq!(found["chosen"]["tilt_deg"], last["tilt_deg"], "{found:#}");
+}
+
+#[test]
+fn factors_are_left_out_with_a_word() {
+    let folder = folder("plan-factors");
+    let factor = "[[factor]]\nname = \"noise\"\nset = [\"scene.noise_px\"]\nlevels = [0.1, 0.2]";
+    fs::write(folder.join("spec.toml"), spec(factor)).expect("written");
+    let wish = ["study", "plan", "spec.toml", "--want", "fx=0.5"];
+    let output = run(&folder, &[&wish[..], &DESIGN].concat());
+    assert!(text(&output.stderr).contains("factors are left out of the plan"), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains(": noise"), "{}", text(&output.stderr));
 }
 
 /// Least squares with gross errors do not keep the bound, which knows none.
@@ -90,6 +127,8 @@ fn wishes_that_cannot_be_are_wrong_usage() {
         (&["--want", "fx=0"], "positive"),
         (&["--want", "rmse=1"], "not measured in this study"),
         (&["--want", "fx"], "QUANTITY=SD"),
+        (&["--want", "fx=1", "--distance", "16"], "no tilt and coverage shows the whole target"),
+        (&["--want", "fx=1", "--at", "0,0,160", "--length", "20"], "are for --want length"),
         (&[], "--want"),
     ] {
         let output = run(&folder, &[&["study", "plan", "spec.toml"], wishes].concat());

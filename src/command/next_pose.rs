@@ -164,6 +164,9 @@ fn plan(arguments: &Arguments) -> Result<Plan, String> {
         refuse_outside(&wanted, &known, image_size)?;
         Wish::of(wanted, &known.camera, &estimated).map_err(|error| format!("{file}: {error}"))
     };
+    if arguments.at.is_some() && !arguments.want.contains(&Quantity::Length) {
+        return Err("--at and --length are for --want length".into());
+    }
     let wishes = arguments.want.iter().map(wish).collect::<Result<Vec<_>, _>>()?;
     refuse_twice(&wishes)?;
     let reach = reach(arguments, &known, &points, image_size)?;

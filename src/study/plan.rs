@@ -117,13 +117,17 @@ fn deciding_trials(sd: &Estimated, wanted: f64, trials: u64) -> Option<u64> {
 /// Trials of one number of views.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Attempt {
+    /// Tilt of every view.
+    pub tilt_deg: f64,
+    /// See [`Poses::Spread`].
+    pub coverage: f64,
     /// Views.
     pub views: usize,
     /// Trials.
     pub trials: u64,
     /// Share that converged.
     pub converged: f64,
-    /// One a goal; none where too few trials converged to say anything.
+    /// One a goal; none where too few trials converged, fewer than 95 %.
     pub findings: Vec<Finding>,
 }
 
@@ -171,6 +175,9 @@ pub enum PlanError {
     /// Two wishes for one quantity.
     #[error("`{0}` is wanted twice: give the smaller standard deviation alone")]
     Twice(String),
+    /// No view of the search shows the whole target.
+    #[error("no tilt and coverage shows the whole target: {0}")]
+    Nowhere(String),
     /// Nothing is wanted.
     #[error("nothing is wanted: give a quantity and its largest standard deviation")]
     Nothing,
@@ -193,9 +200,10 @@ pub fn search(spec: &Spec, goals: &[Goal], search: &Search) -> Result<Vec<Design
             };
             designs.push(match at(search.most_views) {
                 // Another tilt or coverage may fit.
-                Err(PlanError::Spec(
-                    error @ SpecError::Poses { cause: PosesError::OutsideImage { .. }, .. },
-                )) => Design { tilt_deg, coverage, enough: None, best: Err(error.to_string()) },
+                Err(PlanError::Spec(SpecError::Poses {
+                    cause: cause @ PosesError::OutsideImage { .. },
+                    ..
+                })) => Design { tilt_deg, coverage, enough: None, best: Err(cause.to_string()) },
                 Err(error) => return Err(error),
                 Ok(best) => {
                     let enough = match best.clone().filter(|sds| suffice(sds, goals)) {
@@ -209,7 +217,10 @@ pub fn search(spec: &Spec, goals: &[Goal], search: &Search) -> Result<Vec<Design
             });
         }
     }
-    Ok(designs)
+    match designs.iter().map(|design| design.best.as_ref().err()).collect::<Option<Vec<_>>>().as_deref() {
+        Some([why, ..]) => Err(PlanError::Nowhere(why.to_string())),
+        _ => Ok(designs),
+    }
 }
 
 fn check(goals: &[Goal]) -> Result<(), PlanError> {
@@ -276,14 +287,19 @@ fn predicted(spec: &Spec, goals: &[Goal]) -> Result<Option<Vec<f64>>, PlanError>
     Ok(places.into_iter().map(|at| cells[0].prediction.0[at].map(|p| p.sd)).collect())
 }
 
-/// Fewest views first; among equals the one whose predictions stay furthest below what is wanted.
-pub fn choose<'a>(designs: &'a [Design], goals: &[Goal]) -> Option<&'a Design> {
+/// The designs that suffice, fewest views first; among equals the one whose predictions stay furthest below what is wanted.
+pub fn ranked<'a>(designs: &'a [Design], goals: &[Goal]) -> Vec<(usize, &'a Design)> {
     let largest = |sds: &[f64]| sds.iter().zip(goals).map(|(sd, goal)| sd / goal.sd).fold(0.0, f64::max);
-    let known = designs.iter().filter_map(|d| Some((d.enough.as_ref()?, d)));
-    known
-        .min_by(|((a, of_a), _), ((b, of_b), _)| a.cmp(b).then(largest(of_a).total_cmp(&largest(of_b))))
-        .map(|(_, design)| design)
+    let known =
+        designs.iter().filter_map(|d| d.enough.as_ref().map(|(views, sds)| (*views, largest(sds), d)));
+    let mut known: Vec<_> = known.collect();
+    known.sort_by(|(a, of_a, _), (b, of_b, _)| a.cmp(b).then(of_a.total_cmp(of_b)));
+    known.into_iter().map(|(views, _, design)| (views, design)).collect()
 }
+
+/// Where fewer trials converge, the standard deviation is that of a selection, and the photographs of a user are often
+/// refused.
+const CONVERGED: f64 = 0.95;
 
 /// Trials of a design with some number of views.
 ///
@@ -303,7 +319,9 @@ pub fn attempt(
     let cell = &summarise(&engine).cells[0];
     let findings = goals.iter().map(|goal| finding(cell, goal)).collect::<Option<Vec<_>>>();
     let converged = cell.converged().map_or(0.0, |share| share.value);
-    Ok(Attempt { views, trials: cell.trials, converged, findings: findings.unwrap_or_default() })
+    let Design { tilt_deg, coverage, .. } = *design;
+    let findings = findings.filter(|_| converged >= CONVERGED).unwrap_or_default();
+    Ok(Attempt { tilt_deg, coverage, views, trials: cell.trials, converged, findings })
 }
 
 fn finding(cell: &CellSummary, goal: &Goal) -> Option<Finding> {
@@ -352,7 +370,7 @@ mod tests {
     }
 
     fn attempt(findings: Vec<Finding>) -> Attempt {
-        Attempt { views: 5, trials: 500, converged: 1.0, findings }
+        Attempt { tilt_deg: 30.0, coverage: 0.5, views: 5, trials: 500, converged: 1.0, findings }
     }
 
     #[test]

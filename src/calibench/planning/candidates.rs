@@ -71,6 +71,10 @@ const MOST_MARKS: usize = 200_000_000;
 /// A plane that is seen more flatly than this, rad from its face, shows marks that nobody finds.
 const FLATTEST: f64 = 80.0 * PI / 180.0;
 
+/// How many times as far from the axis, as an angle, the lens has to be one-to-one as a mark is seen: near the angle at which
+/// it folds back nothing was calibrated, and the smallest error of the camera takes the mark beyond it.
+const FOLD_MARGIN: f64 = 1.1;
+
 /// A pose of the board that can be reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidate {
@@ -129,8 +133,8 @@ impl Reach {
         Ok(())
     }
 
-    /// Every pose of the grid, in its order, at which each mark is seen where the lens is one-to-one, inside of the image's
-    /// margin and not too flatly; with how many were tried.
+    /// Every pose of the grid, in its order, at which each mark is seen where the lens is one-to-one to a tenth further out,
+    /// inside of the image's margin and not too flatly; with how many were tried.
     ///
     /// # Errors
     /// [`ReachError`].
@@ -213,10 +217,20 @@ impl Reach {
         let inside =
             |x: f64, side: usize| (self.margin_px - 0.5..=side as f64 - 0.5 - self.margin_px).contains(&x);
         !is_flat
-            && is_one_to_one(&seen)
+            && is_one_to_one(&further_out(&seen))
             && Lens::image(camera, &seen)
                 .is_some_and(|p| inside(p.x, self.image_size.0) && inside(p.y, self.image_size.1))
     }
+}
+
+/// A point in the direction [`FOLD_MARGIN`] times as far from the axis.
+fn further_out(point: &Vec3) -> Vec3 {
+    let radius = point.xy().norm();
+    if radius == 0.0 {
+        return *point;
+    }
+    let (sin, cos) = libm::sincos((FOLD_MARGIN * libm::atan2(radius, point.z)).min(PI));
+    Vec3::new(point.x / radius * sin, point.y / radius * sin, cos)
 }
 
 /// Middle of the rectangle that holds all marks.

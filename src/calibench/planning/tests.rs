@@ -306,3 +306,22 @@ fn what_cannot_be_is_refused_with_its_numbers() {
         Pose { rotation: rotation::exp(&Vec3::new(0.3, 0.1, 0.0)), translation: Vec3::new(0.0, 0.0, 120.0) };
     assert_eq!(view_information(&truth.camera, &estimated, &pose, &line, SIGMA_PX), None);
 }
+
+#[test]
+fn no_mark_is_wanted_near_where_the_lens_folds_back() {
+    // r (1 - r^2 / 2) is largest at r = sqrt(2 / 3), which this image shows.
+    let lens = Lens::new(Model::BrownConrady, &[-0.5, 0.0, 0.0, 0.0, 0.0]).unwrap();
+    let fold = libm::atan(libm::sqrt(2.0 / 3.0));
+    let camera = Camera::with_lens(400.0, 404.0, 322.0, 243.0, lens);
+    let points = Truth::example().points;
+    let (candidates, tried) = reach().candidates(&camera, &points).unwrap();
+    assert!(candidates.len() < tried);
+    let angle = |pose: &Pose, point: &Vec2| {
+        let seen = pose.apply(&Vec3::new(point.x, point.y, 0.0));
+        libm::atan2(seen.xy().norm(), seen.z)
+    };
+    let all = || candidates.iter().flat_map(|c| points.iter().map(|point| angle(&c.cam_from_target, point)));
+    let furthest = all().fold(0.0, f64::max);
+    assert!(furthest < fold / 1.1, "{furthest} of {fold}");
+    assert!(furthest > 0.8 * fold, "the margin is what bounds it: {furthest} of {fold}");
+}

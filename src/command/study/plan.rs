@@ -5,12 +5,12 @@ use super::finished::estimated_json;
 use super::{Failure, read};
 use crate::calibrate::Format;
 use crate::said::{print_as, written_by};
-use crate::{Exit, print};
+use crate::{Exit, print, warn};
 use calibench::io::ShownPath;
 use calibench::io::significant;
 use calibench_harness::ProgressDisplay;
 use calibench_study::plan::{
-    Attempt, Design, Finding, Goal, Outcome, PlanError, Search, attempt, choose, next_views, search,
+    Attempt, Design, Finding, Goal, Outcome, PlanError, Search, attempt, next_views, ranked, search,
 };
 use calibench_study::{Estimated, Length, Spec};
 use comfy_table::{Table, presets};
@@ -78,6 +78,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
     if let Some(length) = length(arguments)? {
         spec.scene.length = Some(length);
     }
+    warn_of_factors(&spec);
     if arguments.confirm < 4 || arguments.most_views == 0 {
         return Err(Failure::usage("--confirm needs at least 4 trials, --most-views at least 1 view"));
     }
@@ -90,12 +91,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
     let designs = search(&spec, &arguments.want, &range)?;
     // People see the designs before the trials, which take a while.
     say(arguments, || designs_text(&designs, arguments));
-    let chosen = choose(&designs, &arguments.want);
-    let attempts = match chosen {
-        Some(chosen) => attempts(&spec, chosen, &range, arguments)?,
-        None => Vec::new(),
-    };
-    let reached = Reached { designs: &designs, chosen, attempts: &attempts };
+    let tried = attempts(&spec, ranked(&designs, &arguments.want), &range, arguments)?;
+    let (chosen, attempts) = tried.into_iter().unzip::<_, _, Vec<_>, Vec<_>>();
+    let reached = Reached { designs: &designs, chosen: chosen.last().copied(), attempts: &attempts };
     print_as(arguments.format, || reached.text(arguments), || reached.json(arguments));
     Ok(reached.exit())
 }
@@ -107,33 +105,64 @@ fn say(arguments: &Arguments, text: impl FnOnce() -> String) {
     }
 }
 
-/// Trials of the design, with more views until they confirm it or there may be no more.
-fn attempts(
+/// A plan is for one scene: that of `[scene]`.
+fn warn_of_factors(spec: &Spec) {
+    let names: Vec<String> = spec.factor.iter().map(|factor| factor.name.clone()).collect();
+    if !names.is_empty() {
+        warn(&format!(
+            "warning: the study's factors are left out of the plan, which is for [scene] alone: {}",
+            names.join(", ")
+        ));
+    }
+}
+
+/// Trials of the designs that suffice by the bound, fewest views first, each with more views until they confirm it or there
+/// may be no more. A design with which too few trials converge waits, with twice its views, until none has fewer; one that
+/// answers is the last.
+fn attempts<'a>(
     spec: &Spec,
-    design: &Design,
+    mut open: Vec<(usize, &'a Design)>,
     range: &Search,
     arguments: &Arguments,
-) -> Result<Vec<Attempt>, Failure> {
+) -> Result<Vec<(&'a Design, Attempt)>, Failure> {
     let mut made = Vec::new();
-    let mut views = design.enough.as_ref().map(|(views, _)| *views);
-    while let Some(count) = views {
-        let progress =
-            ProgressDisplay::stderr().start(&format!("confirming {count} views"), arguments.confirm as usize);
-        let mut shown = 0;
-        let (goals, distance_mm) = (&arguments.want, arguments.distance);
-        let tried = attempt(spec, goals, (count, design), distance_mm, arguments.confirm, |pace| {
-            progress.advance((pace.trials - shown) as usize);
-            shown = pace.trials;
-        })?;
-        drop(progress);
-        say(arguments, || attempt_text(&tried));
-        views = match tried.outcome() {
+    while !open.is_empty() {
+        let (views, design) = open.remove(0);
+        let tried = shown_attempt(spec, (views, design), arguments)?;
+        if !tried.findings.is_empty() {
+            open.clear();
+        }
+        let next = match tried.outcome() {
             Outcome::Confirmed => None,
-            Outcome::Refuted | Outcome::Undecided => next_views(spec, goals, (&tried, design), range)?,
+            Outcome::Refuted | Outcome::Undecided => {
+                next_views(spec, &arguments.want, (&tried, design), range)?
+            }
         };
-        made.push(tried);
+        if let Some(next) = next {
+            open.insert(open.partition_point(|(views, _)| *views <= next), (next, design));
+        }
+        made.push((design, tried));
     }
     Ok(made)
+}
+
+/// Trials of a design, with their progress and what came of them.
+fn shown_attempt(
+    spec: &Spec,
+    (views, design): (usize, &Design),
+    arguments: &Arguments,
+) -> Result<Attempt, Failure> {
+    let what = format!("trying {views} views, tilt {} deg, coverage {}", design.tilt_deg, design.coverage);
+    let progress = ProgressDisplay::stderr().start(&what, arguments.confirm as usize);
+    let mut shown = 0;
+    let (goals, distance_mm) = (&arguments.want, arguments.distance);
+    let tried = attempt(spec, goals, (views, design), distance_mm, arguments.confirm, |pace| {
+        progress.advance((pace.trials - shown) as usize);
+        shown = pace.trials;
+    })?;
+    drop(progress);
+    say(arguments, || attempt_text(&tried));
+    Ok(tried)
 }
 
 /// All that was found.
@@ -168,8 +197,8 @@ impl Reached<'_> {
                 last.views, chosen.tilt_deg, chosen.coverage
             ),
             Outcome::Refuted if last.findings.is_empty() => format!(
-                "REFUTED: too few trials converged with up to {most} views: the bound promises what no calibration of these views \
-                 keeps.\n"
+                "REFUTED: too few trials converged with any of these designs, with up to {most} views: the bound promises what no \
+                 calibration of these views keeps.\n"
             ),
             Outcome::Refuted => format!(
                 "REFUTED with {most} views, the most: the estimator does not keep the bound here. Allow more views (--most-views), or \
@@ -204,8 +233,10 @@ impl Reached<'_> {
 }
 
 fn length(arguments: &Arguments) -> Result<Option<Length>, Failure> {
+    let is_wanted = arguments.want.iter().any(|goal| goal.quantity == "length");
     match (&arguments.at, arguments.length) {
         (None, _) => Ok(None),
+        (Some(_), _) if !is_wanted => Err(Failure::usage("--at and --length are for --want length=SD")),
         (Some(at), Some(length_mm)) => {
             let centre_mm =
                 at.as_slice().try_into().map_err(|_| Failure::usage("--at needs three numbers: X,Y,Z"))?;
@@ -236,10 +267,16 @@ fn designs_text(designs: &[Design], arguments: &Arguments) -> String {
 }
 
 fn attempt_text(tried: &Attempt) -> String {
-    let head =
-        format!("{} views: {} trials, {:.1} % converged", tried.views, tried.trials, 100.0 * tried.converged);
+    let head = format!(
+        "{} views, tilt {} deg, coverage {}: {} trials, {:.1} % converged",
+        tried.views,
+        tried.tilt_deg,
+        tried.coverage,
+        tried.trials,
+        100.0 * tried.converged
+    );
     if tried.findings.is_empty() {
-        return format!("{head}: too few to say anything.\n");
+        return format!("{head}: too few, 95 % are wanted.\n");
     }
     let findings: Vec<String> = tried.findings.iter().map(finding_text).collect();
     format!("{head}: {}.\n", findings.join("; "))
@@ -276,6 +313,8 @@ fn attempt_json(tried: &Attempt) -> Value {
         })
     };
     json!({
+        "tilt_deg": tried.tilt_deg,
+        "coverage": tried.coverage,
         "views": tried.views,
         "trials": tried.trials,
         "converged": tried.converged,
