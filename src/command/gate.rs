@@ -307,7 +307,7 @@ fn plan_of(arguments: &Arguments, samples: usize, known: impl FnOnce() -> Vec<Mo
     })
 }
 
-/// The command that asks the same again, to which a scene may be added; none for answers in files.
+/// The command that asks all scenes again, to which some may be added; none for answers in files.
 fn repeat(arguments: &Arguments, plan: &Plan) -> Option<String> {
     let solver = match (&arguments.judge, &arguments.solver, &arguments.planted) {
         (Some(_), ..) => return None,
@@ -316,8 +316,9 @@ fn repeat(arguments: &Arguments, plan: &Plan) -> Option<String> {
         (None, None, None) => String::new(),
     };
     let models: Vec<&str> = plan.asked.models.iter().map(|model| model.name()).collect();
+    let limit = arguments.median_time.map_or(String::new(), |seconds| format!(" --median-time {seconds}"));
     Some(format!(
-        "calibench gate{solver} --models {} --samples {} --seed {}",
+        "calibench gate{solver} --models {} --samples {} --seed {}{limit}",
         models.join(","),
         plan.samples,
         plan.seed
@@ -362,7 +363,7 @@ fn asked(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build)
     let report = Report::new(plan, &solver.name(), &seen, &terms, seconds);
     let report = report.with_commit(build.commit.as_ref());
     match repeat(arguments, plan) {
-        Some(command) => Ok(report.with_repeat(command)),
+        Some(command) => Ok(report.with_repeat(&command)),
         None => Ok(report),
     }
 }

@@ -148,6 +148,9 @@ pub struct Check {
     pub size_px: Option<f64>,
     /// What was decided; `NotJudged` until then.
     pub verdict: Verdict,
+    /// The command that asks its scene again, where it fails.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub repeat: Option<String>,
 }
 
 impl Check {
@@ -168,6 +171,7 @@ impl Check {
             problems,
             size_px: None,
             verdict: Verdict::NotJudged,
+            repeat: None,
         }
     }
 

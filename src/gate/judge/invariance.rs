@@ -42,7 +42,10 @@ fn compare(scenario: &Scenario, answers: &Answers<'_>, variant: Variant) -> Opti
                 let px = equivalent_noise_px(scenario, square, moved.len());
                 worst_px = Some(worst_px.map_or(px, |worst| worst.max(px)));
             }
-            (Seen::Refused { .. }, Seen::Refused { .. }) | (Seen::Broken(_), _) | (_, Seen::Broken(_)) => {}
+            (Seen::Refused { .. }, Seen::Refused { .. })
+            | (Seen::Unsupported(_), Seen::Unsupported(_))
+            | (Seen::Broken(_), _)
+            | (_, Seen::Broken(_)) => {}
             _ => one_sided += 1,
         }
     }

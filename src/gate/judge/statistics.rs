@@ -36,7 +36,9 @@ pub(super) fn check(scenario: &Scenario, answers: &Answers<'_>) -> Vec<Check> {
 fn convergence(scenario: &Scenario, answers: &Answers<'_>) -> Check {
     let mut first = None;
     let (mut asked, mut refused) = (0, 0);
-    for (_, seen) in answers.for_purpose(Purpose::Sample) {
+    // Where the protocol is broken nothing is known of the data.
+    let heard = answers.for_purpose(Purpose::Sample).filter(|(_, seen)| !matches!(seen, Seen::Broken(_)));
+    for (_, seen) in heard {
         asked += 1;
         if let Seen::Refused { reason, .. } | Seen::Unsupported(reason) = seen {
             refused += 1;
@@ -45,6 +47,7 @@ fn convergence(scenario: &Scenario, answers: &Answers<'_>) -> Check {
     }
     let p = chance::at_least(refused, asked, UNANSWERED);
     let evidence = match first {
+        None if asked == 0 => "nothing answered".to_string(),
         None => format!("no good problem of {asked} left unanswered"),
         Some(reason) => format!("{refused} of {asked} good problems left unanswered, first: {reason}"),
     };

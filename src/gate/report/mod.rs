@@ -27,7 +27,8 @@ pub struct Report {
     pub models: Vec<&'static str>,
     /// Names of the scenes that were asked; empty if none was left out.
     pub only: Vec<String>,
-    /// The command that repeats the run, if there is one.
+    /// The command that repeats the run, if there is one. Every check that fails has the command that asks its
+    /// scene again.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub repeat: Option<String>,
     /// Problems asked.
@@ -42,6 +43,8 @@ pub struct Report {
     pub seconds: f64,
     /// Commit of the gate.
     pub commit: Option<String>,
+    /// Scenes that were asked and that the solver says it is not made for.
+    pub unsupported: Vec<&'static str>,
     /// Every check.
     pub checks: Vec<Check>,
     /// What the solver says where the world is not the model.
@@ -96,6 +99,7 @@ impl Report {
             commit: None,
             allowances: terms.allowances.iter().map(|allowance| allowance.applied(&checks)).collect(),
             checks,
+            unsupported: judge::unsupported(plan, seen),
             assumptions: judge::admissions(plan, seen),
             scenarios: described(plan),
         }
@@ -106,9 +110,15 @@ impl Report {
         Report { commit: commit.map(Commit::to_string), ..self }
     }
 
-    /// States the command that repeats the run.
-    pub fn with_repeat(self, command: String) -> Report {
-        Report { repeat: Some(command), ..self }
+    /// States the command that asks all scenes of the run, from which follow that of the run and that of every
+    /// check that fails.
+    pub fn with_repeat(mut self, command: &str) -> Report {
+        let of_scene = |scene: &str| format!(" --scene {scene}");
+        for check in self.checks.iter_mut().filter(|c| c.verdict >= Verdict::Failed) {
+            check.repeat = Some(format!("{command}{}", of_scene(check.scenario)));
+        }
+        let scenes: String = self.only.iter().map(|scene| of_scene(scene)).collect();
+        Report { repeat: Some(format!("{command}{scenes}")), ..self }
     }
 
     /// Whether nothing fails.
