@@ -9,6 +9,7 @@ use calibench_gate::plan::Purpose;
 use calibench_gate::power::Measured;
 use calibench_gate::protocol::{Answer, Problem, Status, schemas};
 use calibench_gate::{Asked, Builtin, Plan, Process, Property, Report, Solver, Terms, Verdict, run};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -442,6 +443,14 @@ fn a_matrix_that_is_no_covariance_and_lost_correlations_are_findings_of_a_quick_
     let report = judged("correlations-dropped", 1);
     assert!(verdicts(&report, Property::Covariance).contains(&Verdict::Failed), "{}", report.details());
     assert!(!verdicts(&report, Property::CovarianceForm).contains(&Verdict::Failed), "{}", report.details());
+}
+
+#[test]
+fn views_that_see_different_marks_show_who_reads_them_as_a_table() {
+    let report = judged("views-cut-to-the-shortest", 16);
+    let scenes: BTreeSet<&str> = report.failures().iter().map(|check| check.scenario).collect();
+    // Everywhere else all views see as many marks.
+    assert_eq!(scenes, BTreeSet::from(["marks-missing", "over-the-edge"]), "{}", report.details());
 }
 
 #[test]

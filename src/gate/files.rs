@@ -124,10 +124,10 @@ fn problem_lines(plan: &Plan) -> String {
 fn truth_lines(plan: &Plan) -> String {
     let lines = plan.cases.iter().filter(|c| !matches!(c.purpose, Purpose::Variant(_))).map(|case| {
         let (camera, poses) = match case.purpose {
-            Purpose::Bad(index) => (plan.bad[index].truth, &[][..]),
+            Purpose::Bad(index) => (plan.bad[index].truth, Vec::new()),
             _ => {
-                let truth = &plan.scenarios[case.scenario].scene.truth;
-                (truth.camera, &truth.cam_from_target[..])
+                let setup = plan.scenarios[case.scenario].setup_of(plan.seed, case.trial);
+                (setup.scene.truth.camera, setup.scene.truth.cam_from_target.clone())
             }
         };
         let parameters: BTreeMap<&str, f64> =

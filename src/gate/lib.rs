@@ -13,6 +13,7 @@
 pub mod accept;
 pub mod allowances;
 pub mod bad_input;
+pub mod bound;
 pub mod certified;
 pub mod covariance_form;
 mod descendants;
@@ -32,6 +33,7 @@ pub mod recorder;
 pub mod report;
 pub mod residual_tests;
 pub mod run;
+pub mod setup;
 pub mod solver;
 pub mod suite;
 pub mod textbook;

@@ -132,10 +132,8 @@ fn of_scenario(scenario: &Scenario, replies: Vec<(&Seen, &Seen)>) -> Comparison 
             _ => None,
         })
         .collect();
-    let sd: Vec<f64> =
-        scenario.free.iter().map(|p| scenario.bound.standard_deviation(p).unwrap_or(f64::NAN)).collect();
     let standardised = |i: usize| -> Vec<(f64, f64)> {
-        both.iter().map(|(n, o)| (n.errors[i] / sd[i], o.errors[i] / sd[i])).collect()
+        both.iter().map(|(n, o)| (n.standardised[i], o.standardised[i])).collect()
     };
     let names: Vec<Parameter> = scenario.free.iter().collect();
     let estimates = |test: Test, matters: fn(f64) -> bool| {

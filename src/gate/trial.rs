@@ -5,13 +5,14 @@ use super::accept::{Breakage, Estimate, Outcome};
 use super::covariance_form::CovarianceFault;
 use super::plan::{Case, Plan, Purpose};
 use super::protocol::Problem;
+use super::setup::Setup;
 use super::solver::{self, Reply};
 use super::suite::Scenario;
 use calibench::calibrate::calibrate_lens;
 use calibench::camera::{Camera, FreeParameters, Imaging, Lens, Parameter};
 use calibench::geometry::{Pose, Vec3};
 use calibench::synth::fnv1a;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 /// What became of a case.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,10 +39,17 @@ pub struct Trial {
     pub camera: Camera<Lens>,
     /// Estimate - truth of the free parameters, in order.
     pub errors: Vec<f64>,
-    /// `e^T P^-1 e` under the bound: chi-squared with as many degrees of freedom as parameters.
+    /// The errors over the standard deviations of this trial's bound.
+    pub standardised: Vec<f64>,
+    /// `L^-1 e` with the bound `P = L L^T` of this trial: uncorrelated, of variance 1.
+    pub whitened: Vec<f64>,
+    /// `e^T P^-1 e` under the bound, the square of `whitened`: chi-squared with as many degrees of freedom as
+    /// parameters.
     pub nees: f64,
     /// Reported standard deviations.
     pub standard_deviations: Option<Vec<f64>>,
+    /// The same over those of the bound.
+    pub deviations_over_bound: Option<Vec<f64>>,
     /// What is wrong with the form of the reported covariance.
     pub covariance_fault: Option<CovarianceFault>,
     /// Variances of the reported covariance along the bound's principal directions, over the bound's
@@ -83,13 +91,15 @@ pub fn reduce(plan: &Plan, case: &Case, problem: &Problem, reply: Reply) -> Seen
         Outcome::Unsupported(reason) => Seen::Unsupported(reason),
         Outcome::Estimate(estimate) => Seen::Estimate(Box::new(match case.purpose {
             Purpose::Bad(index) => measure_bad(&plan.bad[index].truth, problem, &estimate, seconds),
-            _ => measure(&plan.scenarios[case.scenario], case, problem, &estimate, seconds),
+            _ => measure(plan, case, problem, &estimate, seconds),
         })),
     }
 }
 
-fn measure(scenario: &Scenario, case: &Case, problem: &Problem, estimate: &Estimate, seconds: f64) -> Trial {
-    let truth = &scenario.scene.truth;
+fn measure(plan: &Plan, case: &Case, problem: &Problem, estimate: &Estimate, seconds: f64) -> Trial {
+    let scenario = &plan.scenarios[case.scenario];
+    let setup = scenario.setup_of(plan.seed, case.trial);
+    let truth = &setup.scene.truth;
     let camera = match case.purpose {
         Purpose::Variant(variant) => variant.undo(&estimate.camera),
         _ => estimate.camera,
@@ -97,19 +107,25 @@ fn measure(scenario: &Scenario, case: &Case, problem: &Problem, estimate: &Estim
     let errors = errors(&camera, &truth.camera, scenario.free);
     let plain = !matches!(case.purpose, Purpose::Variant(_));
     let poses = estimate.cam_from_target.as_ref().filter(|_| plain);
+    let whitened = whitened(&setup, &errors);
+    let sd: Vec<f64> = setup.bound.intrinsics.diagonal().iter().map(|variance| variance.sqrt()).collect();
+    let over_bound = |values: &[f64]| values.iter().zip(&sd).map(|(x, sd)| x / sd).collect();
     Trial {
-        nees: scenario.bound.normalised_error_squared(&errors).unwrap_or(f64::INFINITY),
+        standardised: over_bound(&errors),
+        nees: whitened.iter().map(|z| z * z).sum(),
+        whitened,
+        deviations_over_bound: estimate.standard_deviations.as_deref().map(over_bound),
         own_nees: own_nees(estimate, &errors),
         principal_variances: estimate
             .covariance
             .as_ref()
             .filter(|_| plain)
-            .map(|c| scenario.principal.variances(c)),
+            .map(|c| principal_variances(scenario, &setup, c)),
         square: poses.map(|poses| square(&estimate.camera, poses, problem)),
         refitted_square: (case.purpose == Purpose::Sample && case.trial < REFITTED)
             .then(|| refitted_square(&estimate.camera, problem))
             .flatten(),
-        pose_nees: poses.map(|poses| pose_nees(scenario, poses)),
+        pose_nees: poses.map(|poses| pose_nees(&setup, poses)),
         camera,
         errors,
         ..unmeasured(estimate, seconds)
@@ -134,8 +150,11 @@ fn unmeasured(estimate: &Estimate, seconds: f64) -> Trial {
     Trial {
         camera: estimate.camera,
         errors: Vec::new(),
+        standardised: Vec::new(),
+        whitened: Vec::new(),
         nees: f64::NAN,
         standard_deviations: estimate.standard_deviations.clone(),
+        deviations_over_bound: None,
         covariance_fault: estimate.covariance_fault,
         principal_variances: None,
         own_nees: None,
@@ -148,6 +167,25 @@ fn unmeasured(estimate: &Estimate, seconds: f64) -> Trial {
         bits: fingerprint(estimate),
         seconds,
     }
+}
+
+/// Infinite where the bound is none.
+fn whitened(setup: &Setup, errors: &[f64]) -> Vec<f64> {
+    let factor = setup.bound.intrinsics.clone().cholesky();
+    let solved = factor.and_then(|f| f.l_dirty().solve_lower_triangular(&DVector::from_row_slice(errors)));
+    solved.map_or_else(|| vec![f64::INFINITY; errors.len()], |z| z.iter().copied().collect())
+}
+
+/// Variances along the principal directions of the scene's bound, over those of this trial's bound there.
+fn principal_variances(scenario: &Scenario, setup: &Setup, stated: &DMatrix<f64>) -> Vec<f64> {
+    let bound = scenario.principal.variances(&setup.bound.intrinsics);
+    scenario
+        .principal
+        .variances(stated)
+        .into_iter()
+        .zip(bound)
+        .map(|(stated, bound)| stated / bound)
+        .collect()
 }
 
 fn own_nees(estimate: &Estimate, errors: &[f64]) -> Option<f64> {
@@ -174,8 +212,8 @@ fn refitted_square(camera: &Camera<Lens>, problem: &Problem) -> Option<f64> {
     Some(fit.rmse_px * fit.rmse_px * fit.points() as f64)
 }
 
-fn pose_nees(scenario: &Scenario, poses: &[Pose]) -> Vec<f64> {
-    let truth = &scenario.scene.truth.cam_from_target;
+fn pose_nees(setup: &Setup, poses: &[Pose]) -> Vec<f64> {
+    let truth = &setup.scene.truth.cam_from_target;
     let distance = |((estimate, truth), block): ((&Pose, &Pose), &nalgebra::SMatrix<f64, 6, 6>)| {
         let r = &estimate.rotation;
         let defect = (r.transpose() * r - nalgebra::Matrix3::identity()).amax();
@@ -185,7 +223,7 @@ fn pose_nees(scenario: &Scenario, poses: &[Pose]) -> Vec<f64> {
         let e = truth.step_to(estimate);
         block.cholesky().map_or(f64::INFINITY, |factor| e.dot(&factor.solve(&e)))
     };
-    poses.iter().zip(truth).zip(&scenario.bound.poses).map(distance).collect()
+    poses.iter().zip(truth).zip(&setup.bound.poses).map(distance).collect()
 }
 
 /// FNV-1a over the bits of every number.

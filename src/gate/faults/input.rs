@@ -28,6 +28,11 @@ pub(super) const FAULTS: &[Planted] = &[
         });
         correct(&changed)
     }),
+    gross(
+        "views-cut-to-the-shortest",
+        "marks beyond the number of the view with fewest are not used: a table of fixed width",
+        |p, _| cut_to_the_shortest(p),
+    ),
     gross("first-view-twice", "the first view counts twice", |p, _| {
         let mut changed = p.clone();
         // A hundredth of a pixel aside, as noise would put it: what is the same but for rounding the solver
@@ -64,6 +69,16 @@ pub(super) const FAULTS: &[Planted] = &[
 fn on_pixels(problem: &Problem, how: impl Fn(f64) -> f64) -> Answer {
     let mut changed = problem.clone();
     changed.views.iter_mut().flat_map(|v| v.pixels.iter_mut().flatten()).for_each(|x| *x = how(*x));
+    correct(&changed)
+}
+
+fn cut_to_the_shortest(problem: &Problem) -> Answer {
+    let mut changed = problem.clone();
+    let fewest = problem.views.iter().map(|view| view.pixels.len()).min().unwrap_or(0);
+    changed.views.iter_mut().for_each(|view| {
+        view.target.truncate(fewest);
+        view.pixels.truncate(fewest);
+    });
     correct(&changed)
 }
 

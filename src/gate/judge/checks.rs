@@ -154,7 +154,8 @@ pub struct Check {
 }
 
 impl Check {
-    pub(crate) fn new(
+    /// A check that is not decided yet.
+    pub fn new(
         property: Property,
         scenario: &'static str,
         basis: Basis,
