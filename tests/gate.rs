@@ -319,6 +319,51 @@ fn a_change_far_below_the_noise_shows_on_common_noise() {
 }
 
 #[test]
+fn two_files_of_answers_are_compared_as_the_solvers_behind_them_are() {
+    let place = |name: &str| folder(name).to_string_lossy().into_owned();
+    let (before, after, other) = (place("gate-before"), place("gate-after"), place("gate-other"));
+    let scene = ["--scene", "four-pose", "--scene", "marks-missing"];
+    let record = |to: &str, more: &[&str]| {
+        let arguments = [&["--samples", "64", "--record", to][..], &scene, more].concat();
+        assert!(gate(&arguments).status.code().is_some_and(|code| code < 2), "{to}");
+    };
+    record(&before, &[]);
+    record(&after, &["--planted", "biased-fx"]);
+    record(&other, &["--seed", "2"]);
+    let compare = |new: &str, reference: &str| {
+        let output = gate(&["--judge", new, "--against", reference]);
+        let text = [output.stdout, output.stderr].map(|o| String::from_utf8_lossy(&o).into_owned()).concat();
+        (output.status.code(), text)
+    };
+    let (code, text) = compare(&after, &before);
+    assert_eq!(code, Some(1), "{text}");
+    // The table is that of the live program, but for the times, which no file has.
+    let live = [&["--samples", "64", "--against", "builtin", "--planted", "biased-fx"][..], &scene].concat();
+    let live = String::from_utf8_lossy(&gate(&live).stdout).into_owned();
+    let row = |text: &str| {
+        let line = text.lines().find(|l| l.starts_with("marks-missing")).expect("a row");
+        line.replace("MOVED", "").trim_end().rsplit_once(' ').expect("columns").0.trim_end().to_string()
+    };
+    assert_eq!(row(&text), row(&live));
+    assert!(text.contains("MOVED") && text.contains("times are not known of answers in files"), "{text}");
+    let (code, text) = compare(&before, &before);
+    assert!(code == Some(0) && text.contains("SAME: not a bit differs"), "{text}");
+    let (code, text) = compare(&before, "builtin");
+    assert!(code == Some(0) && text.contains("SAME: not a bit differs"), "{text}");
+    let (code, text) = compare(&before, &other);
+    assert!(code == Some(2) && text.contains("answer other problems (seed 1, 64 samples"), "{text}");
+    let (code, text) = compare(&before, "no-such-folder");
+    assert!(code == Some(2) && text.contains("neither there as a folder nor as a program"), "{text}");
+    // Where nothing took the time, nothing is said of it.
+    let judged = gate(&["--judge", &before, "--median-time", "600"]);
+    let text = String::from_utf8_lossy(&judged.stdout).into_owned();
+    assert!(
+        text.lines().any(|l| l.starts_with("time ") && l.contains("not known of answers in files")),
+        "{text}"
+    );
+}
+
+#[test]
 fn wrong_usage_ends_with_two() {
     for arguments in [
         &["--samples", "0"][..],

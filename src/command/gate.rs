@@ -86,8 +86,9 @@ pub(super) struct Arguments {
     /// Writes the report as a page
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
-    /// Compares with a reference on the same problems: `builtin`, a program, or a folder written by --record
-    #[arg(long, value_name = "REF", conflicts_with_all = ["export", "judge", "power"])]
+    /// Compares with a reference on the same problems: `builtin`, a program, or a folder written by --record;
+    /// with --judge what is compared are the answers in that folder
+    #[arg(long, value_name = "REF", conflicts_with_all = ["export", "power"])]
     against: Option<String>,
     /// Writes the problems to a folder, truth kept apart, for programs that cannot be driven by a pipe
     #[arg(long, value_name = "DIR", conflicts_with_all = ["solver", "json", "junit", "html", "accept"])]
@@ -264,6 +265,9 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
         return Ok(Exit::Held);
     }
     if let Some(folder) = &arguments.judge {
+        if let Some(reference) = &arguments.against {
+            return compare::of_answers(arguments, folder, reference);
+        }
         let (plan, answers) = files::recorded(folder).map_err(of_files)?;
         return judge(arguments, &plan, &answers, build);
     }

@@ -16,7 +16,7 @@ use std::time::Instant;
 pub struct Reply {
     /// What became of the problem.
     pub outcome: Outcome,
-    /// From question to answer, s.
+    /// From question to answer, s; NaN where it is not known, as of answers in files.
     pub seconds: f64,
 }
 
@@ -52,7 +52,7 @@ pub trait Solver: Sync {
 pub struct Given {
     /// The answer as it came.
     pub answer: Result<Answer, Breakage>,
-    /// From question to answer, s.
+    /// From question to answer, s; NaN where it is not known.
     pub seconds: f64,
 }
 

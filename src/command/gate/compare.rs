@@ -1,4 +1,5 @@
-//! `calibench gate --against`: two solvers on the same problems.
+//! `calibench gate --against`: two solvers on the same problems, asked now or judged by the answers they gave
+//! before.
 
 use super::{Arguments, Stop, incomplete, of_files, plan_of, process, terms, usage};
 use crate::{Exit, print};
@@ -40,6 +41,7 @@ fn refuse_what_is_not_there(reference: &str) -> Result<(), Stop> {
     Ok(())
 }
 
+/// Compares a solver that is asked now.
 pub(super) fn run(
     arguments: &Arguments,
     solver: &dyn Solver,
@@ -48,7 +50,7 @@ pub(super) fn run(
 ) -> Result<Exit, Stop> {
     let (plan, other): (Plan, Box<dyn Solver>) = match reference {
         "builtin" => (plan_of(arguments, samples, || solver.models())?, Box::new(Builtin)),
-        folder if Path::new(folder).join("manifest.json").is_file() => {
+        folder if holds_a_run(folder) => {
             let (plan, answers) = files::recorded(Path::new(folder)).map_err(of_files)?;
             (plan, Box::new(answers))
         }
@@ -59,17 +61,70 @@ pub(super) fn run(
             (plan_of(arguments, samples, both)?, other)
         }
     };
+    compared(arguments, &plan, solver, other.as_ref())
+}
+
+/// Compares the answers in a folder, whose problems the reference is asked if it has not answered them before.
+pub(super) fn of_answers(arguments: &Arguments, folder: &Path, reference: &str) -> Result<Exit, Stop> {
+    let (plan, answers) = files::recorded(folder).map_err(of_files)?;
+    let other: Box<dyn Solver> = match reference {
+        "builtin" => Box::new(Builtin),
+        before if holds_a_run(before) => {
+            let (theirs, answers) = files::recorded(Path::new(before)).map_err(of_files)?;
+            refuse_other_problems((folder, &plan), (Path::new(before), &theirs))?;
+            Box::new(answers)
+        }
+        command => {
+            refuse_what_is_not_there(command)?;
+            process(arguments, command)?
+        }
+    };
+    compared(arguments, &plan, &answers, other.as_ref())
+}
+
+fn holds_a_run(reference: &str) -> bool {
+    Path::new(reference).join("manifest.json").is_file()
+}
+
+/// Answers to other problems have nothing in common that could be compared.
+fn refuse_other_problems((ours, plan): (&Path, &Plan), (theirs, other): (&Path, &Plan)) -> Result<(), Stop> {
+    let asked = |plan: &Plan| {
+        let models: Vec<&str> = plan.asked.models.iter().map(|model| model.name()).collect();
+        let scenes = match &plan.asked.scenes[..] {
+            [] => "all scenes".to_string(),
+            scenes => scenes.join(", "),
+        };
+        format!("seed {}, {} samples of {scenes} of {}", plan.seed, plan.samples, models.join(", "))
+    };
+    if (plan.seed, plan.samples, &plan.asked) == (other.seed, other.samples, &other.asked) {
+        return Ok(());
+    }
+    Err(usage(format!(
+        "{} and {} answer other problems ({}; {}): record both with the same --seed, --samples, --models and --scene",
+        ours.shown(),
+        theirs.shown(),
+        asked(plan),
+        asked(other)
+    )))
+}
+
+fn compared(
+    arguments: &Arguments,
+    plan: &Plan,
+    solver: &dyn Solver,
+    other: &dyn Solver,
+) -> Result<Exit, Stop> {
     let terms = terms(arguments)?;
     let ask = |solver: &dyn Solver| {
         let progress = ProgressDisplay::stderr().start("gate", plan.cases.len());
-        let seen = calibench_gate::run(&plan, solver, &|done| progress.advance(done));
-        let report = Report::new(&plan, "", &seen, &terms, 0.0);
+        let seen = calibench_gate::run(plan, solver, &|done| progress.advance(done));
+        let report = Report::new(plan, "", &seen, &terms, 0.0);
         (seen, report.checks)
     };
-    let (old, old_checks) = ask(other.as_ref());
+    let (old, old_checks) = ask(other);
     let (new, new_checks) = ask(solver);
     let paired: Paired = paired::compare(
-        &plan,
+        plan,
         (&solver.name(), &new, &new_checks),
         (&other.name(), &old, &old_checks),
         arguments.false_alarms,
