@@ -225,6 +225,54 @@ fn files_keep_the_lens_models_that_were_asked() {
 }
 
 #[test]
+fn how_a_program_ends_and_its_memory_are_reported_and_no_finding() {
+    let refuses = r#"sed -u 's/^{"id":"\([^"]*\)".*/{"id":"\1","status":"refused"}/'"#;
+    let end = |command: String| {
+        let process = Process::new(&command, Duration::from_secs(20), 2);
+        assert_eq!(process.ask_all(&problems(4)).len(), 4);
+        let ends = process.finish();
+        // Both copies have been asked, or the first was so quick that it took all.
+        assert!((1..=2).contains(&ends.len()), "{command}: {ends:?}");
+        assert!(process.finish().is_empty());
+        ends[0]
+    };
+    let good = end(refuses.to_string());
+    assert_eq!((good.by_itself, good.exit_code, good.signal), (true, Some(0), None));
+    let late = end(format!("{refuses}; exit 7"));
+    assert_eq!((late.by_itself, late.exit_code, late.how().as_str()), (true, Some(7), "exit code 7"));
+    let killed = end(format!("{refuses}; kill -9 $$"));
+    assert_eq!((killed.by_itself, killed.exit_code, killed.signal), (true, None, Some(9)));
+    let stays = end(format!("{refuses}; sleep 1000"));
+    assert_eq!((stays.by_itself, stays.how().as_str()), (false, "did not end with its input"));
+    // The shell itself is small; what it started counts too: here a process that holds 60 MB.
+    let holds = end(format!("x=$(head -c 60000000 /dev/zero | tr '\\0' x); {refuses}"));
+    if cfg!(target_os = "linux") {
+        let (small, large) =
+            (good.peak_memory_bytes.expect("known"), holds.peak_memory_bytes.expect("known"));
+        assert!((100_000..50_000_000).contains(&small) && large > 60_000_000, "{small} {large}");
+    } else {
+        assert_eq!(good.peak_memory_bytes, None);
+    }
+    // A program that answered everything is not held to its exit code.
+    let json = folder("gate-ends").join("report.json");
+    std::fs::create_dir_all(json.parent().expect("a folder")).expect("made");
+    let path = json.to_string_lossy().into_owned();
+    let solver = format!("{refuses}; exit 7");
+    let one = ["--samples", "1", "--scene", "no-views", "--models", "brown-conrady"];
+    let output = gate(&[&one[..], &["--solver", &solver, "--json", &path]].concat());
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{text}");
+    assert!(text.lines().next().expect("a line").contains(" s; exit code 7, peak memory "), "{text}");
+    let report: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(&json).expect("written")).expect("JSON");
+    assert_eq!((&report["program_ends"][0]["exit_code"], &report["verdict"]), (&7.into(), &"held".into()));
+    // Our own solver is no program.
+    let ours = gate(&["--samples", "1", "--scene", "no-views", "--format", "json"]);
+    let report: serde_json::Value = serde_json::from_slice(&ours.stdout).expect("JSON");
+    assert!(report["program_ends"].is_null() && report["verdict"] == "held");
+}
+
+#[test]
 fn garbage_foreign_ids_and_nan_are_named() {
     let babble = breakages("while read line; do echo hello; done", 0.3, 1);
     assert!(matches!(&babble[0], Breakage::Garbage { line, .. } if line == "hello"), "{babble:?}");

@@ -365,7 +365,7 @@ fn asked(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build)
     let seen = calibench_gate::run(plan, solver, &|done| progress.advance(done));
     let seconds = started.elapsed().as_secs_f64();
     let report = Report::new(plan, &solver.name(), &seen, &terms, seconds);
-    let report = report.with_commit(build.commit.as_ref());
+    let report = report.with_program_ends(solver.finish()).with_commit(build.commit.as_ref());
     match repeat(arguments, plan) {
         Some(command) => Ok(report.with_repeat(&command)),
         None => Ok(report),

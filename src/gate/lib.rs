@@ -45,6 +45,7 @@ pub use allowances::{AllowError, Allowance, Allowed};
 pub use judge::{Check, EXPECTED_FALSE_ALARMS, Property, Terms, Verdict};
 pub use plan::{Asked, Plan, PlanError};
 pub use process::Process;
+pub use program::ProgramEnd;
 pub use recorder::Recorder;
 pub use report::Report;
 pub use run::run;

@@ -2,6 +2,7 @@
 //! process.
 
 use super::accept::{Breakage, Outcome, accept, free_of};
+use super::program::ProgramEnd;
 use super::protocol::{Answer, AnswerCovariance, AnswerPose, Problem, Status};
 use calibench::board::{View, ViewError};
 use calibench::calibrate::{LensCalibration, Settings, Termination, Warning, calibrate_lens};
@@ -39,6 +40,11 @@ pub trait Solver: Sync {
     /// Solves many, in parallel; answers in the order of the problems.
     fn give_all(&self, problems: &[Problem]) -> Vec<Given> {
         problems.par_iter().map(|problem| Given::taken(|| self.ask(problem))).collect()
+    }
+
+    /// Ends the programs that were started to answer, and says how each ended: for the end of a run.
+    fn finish(&self) -> Vec<ProgramEnd> {
+        Vec::new()
     }
 
     /// The answers to many, checked.

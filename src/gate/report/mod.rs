@@ -10,8 +10,9 @@ use super::allowances::Allowed;
 use super::bad_input::Fault;
 use super::judge::{self, Admission, Basis, Check, Property, Terms, Verdict};
 use super::plan::Plan;
+use super::program::ProgramEnd;
 use super::trial::Seen;
-use calibench::io::Commit;
+use calibench::io::{Commit, significant};
 use serde::Serialize;
 
 /// The outcome of a run.
@@ -41,6 +42,9 @@ pub struct Report {
     pub verdict: Verdict,
     /// Wall-clock time, s.
     pub seconds: f64,
+    /// How each copy of the program ended when its input did, and its memory; empty where no program ran at the end.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub program_ends: Vec<ProgramEnd>,
     /// Commit of the gate.
     pub commit: Option<String>,
     /// Scenes that were asked and that the solver says it is not made for.
@@ -96,6 +100,7 @@ impl Report {
             statistical_checks: statistical,
             verdict: checks.iter().map(|c| c.verdict).max().unwrap_or(Verdict::NotJudged),
             seconds,
+            program_ends: Vec::new(),
             commit: None,
             allowances: terms.allowances.iter().map(|allowance| allowance.applied(&checks)).collect(),
             checks,
@@ -103,6 +108,26 @@ impl Report {
             assumptions: judge::admissions(plan, seen),
             scenarios: described(plan),
         }
+    }
+
+    /// States how the program ended.
+    pub fn with_program_ends(self, program_ends: Vec<ProgramEnd>) -> Report {
+        Report { program_ends, ..self }
+    }
+
+    /// How the program ended and its memory, in words; nothing where none ran at the end.
+    fn program_ended(&self) -> String {
+        let mut how: Vec<String> = self.program_ends.iter().map(ProgramEnd::how).collect();
+        how.sort();
+        how.dedup();
+        if how.is_empty() {
+            return String::new();
+        }
+        let memory = match self.program_ends.iter().filter_map(|end| end.peak_memory_bytes).max() {
+            Some(bytes) => format!("peak memory {} MB", significant(bytes as f64 / 1e6, 3)),
+            None => "peak memory not known".to_string(),
+        };
+        format!("; {}, {memory}", how.join(" and "))
     }
 
     /// States the commit of the gate.

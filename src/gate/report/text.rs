@@ -14,12 +14,13 @@ impl Report {
     /// One line a property, no longer than `columns`, then what follows.
     pub fn to_text(&self, columns: usize) -> String {
         let mut text = format!(
-            "gate: {} on {} problems, {} samples a scenario, seed {}, {} s\nlens models: {}{}\n\n",
+            "gate: {} on {} problems, {} samples a scenario, seed {}, {} s{}\nlens models: {}{}\n\n",
             self.solver,
             self.problems,
             self.samples,
             self.seed,
             significant(self.seconds, 3),
+            self.program_ended(),
             self.models.join(", "),
             if self.only.is_empty() { String::new() } else { format!("; only {}", self.only.join(", ")) },
         );
