@@ -303,7 +303,7 @@ fn our_solver_is_trusted_and_every_report_is_written() {
     let output = gate(&["--samples", "4", "--json", &json, "--junit", &junit, "--html", &html]);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stdout));
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    // A line for each of 25 properties, and one for each of nine scenes where the model fails.
+    // A line for each of 26 properties, and one for each of nine scenes where the model fails.
     assert!(text.lines().count() <= 42, "one screen:\n{text}");
     let report: serde_json::Value =
         serde_json::from_slice(&std::fs::read(&json).expect("written")).expect("JSON");
@@ -544,6 +544,47 @@ fn views_that_see_different_marks_show_who_reads_them_as_a_table() {
     let scenes: BTreeSet<&str> = report.failures().iter().map(|check| check.scenario).collect();
     // Everywhere else all views see as many marks.
     assert_eq!(scenes, BTreeSet::from(["marks-missing", "over-the-edge"]), "{}", report.details());
+}
+
+#[test]
+fn pose_covariances_are_judged_by_their_form_unit_axes_and_what_they_leave_out() {
+    let of = |id: &str| {
+        let fault = planted().into_iter().find(|f| f.id == id).expect("the fault");
+        let scenes = ["four-pose", "marks-missing", "poses-anew"].map(String::from).to_vec();
+        let plan = Plan::of(1, 32, Asked { scenes, ..Asked::default() }).expect("a plan");
+        Report::new(&plan, "", &run(&plan, &Faulty::new(fault), &|_| ()), &Terms::default(), 0.0)
+    };
+    for id in ["of-a-known-camera", "in-degrees", "about-the-target"] {
+        let report = of(&format!("pose-covariance-{id}"));
+        let failed: BTreeSet<&str> = report.failures().iter().map(|check| check.property.name()).collect();
+        assert_eq!(failed, BTreeSet::from(["pose-covariance"]), "{id}: {}", report.details());
+        assert_eq!(report.failures().len(), 3, "{id}: {}", report.details());
+    }
+    assert!(!verdicts(&of("last-bits"), Property::PoseCovariance).contains(&Verdict::NotJudged));
+    // One triangle only.
+    struct OneTriangle;
+    impl Solver for OneTriangle {
+        fn name(&self) -> String {
+            "a solver".into()
+        }
+        fn ask(&self, problem: &Problem) -> Result<Answer, Breakage> {
+            let mut answer = Builtin.ask(problem)?;
+            for row in answer.pose_covariances.iter_mut().flatten().flat_map(|m| m.iter_mut().enumerate()) {
+                row.1[..row.0].fill(0.0);
+            }
+            Ok(answer)
+        }
+    }
+    let plan =
+        Plan::of(1, 2, Asked { scenes: vec!["four-pose".into()], ..Asked::default() }).expect("a plan");
+    let report = Report::new(&plan, "", &run(&plan, &OneTriangle, &|_| ()), &Terms::default(), 0.0);
+    assert!(
+        report.details().contains(
+            "pose-covariance / four-pose: 2 of 2 answers have a pose covariance that is not symmetric"
+        ),
+        "{}",
+        report.details()
+    );
 }
 
 #[test]

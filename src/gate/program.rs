@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Bytes of a line. The answer to the largest problem, poses of all views and a full covariance, takes 20 kB.
+/// Bytes of a line. The answer to the largest problem, thirty-two poses with their covariances, takes 37 kB.
 pub const MOST_LINE_BYTES: usize = 1 << 20;
 /// How long is waited before something is looked at again.
 const MOMENT: Duration = Duration::from_millis(5);

@@ -9,6 +9,7 @@ use calibench::calibrate::{LensCalibration, Settings, Termination, Warning, cali
 use calibench::camera::{Camera, FreeParameters, Lens, Model};
 use calibench::geometry::{Pose, Vec2};
 use calibench::io::message;
+use nalgebra::Matrix6;
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -171,11 +172,17 @@ pub(super) fn answer(id: &str, calibration: &LensCalibration) -> Answer {
             parameters: names().collect(),
             matrix: covariance.intrinsics.row_iter().map(|row| row.iter().copied().collect()).collect(),
         }),
+        pose_covariances: Some(covariance.poses.iter().map(rows).collect()),
         rmse: Some(calibration.rmse_px),
         warnings: flags.map(ToString::to_string).collect(),
         message: (calibration.termination != Termination::Converged)
             .then(|| calibration.termination.name().to_string()),
     }
+}
+
+/// A pose covariance in the words of the protocol.
+pub(super) fn rows(covariance: &Matrix6<f64>) -> Vec<Vec<f64>> {
+    covariance.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 
 fn answer_pose(pose: &Pose) -> AnswerPose {

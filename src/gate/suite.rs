@@ -68,6 +68,8 @@ pub struct Scenario {
     pub most: usize,
     /// The bound's uncorrelated combinations of parameters.
     pub principal: Principal,
+    /// And those of every pose.
+    pub of_poses: Vec<Principal>,
 }
 
 /// A scene of the suite that cannot be built: a mistake in the suite.
@@ -338,6 +340,7 @@ fn scenario(draft: &Draft, sigma_px: f64, setup: Setup) -> Scenario {
         seen_in_residuals: 0.0,
         most: usize::MAX,
         principal: Principal::of(&setup.bound.intrinsics, setup.bound.free),
+        of_poses: setup.bound.poses.iter().map(Principal::of_pose).collect(),
         setup,
     }
 }

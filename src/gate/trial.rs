@@ -12,7 +12,7 @@ use calibench::calibrate::calibrate_lens;
 use calibench::camera::{Camera, FreeParameters, Imaging, Lens, Parameter};
 use calibench::geometry::{Pose, Vec3};
 use calibench::synth::fnv1a;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix6};
 
 /// What became of a case.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,6 +57,10 @@ pub struct Trial {
     pub principal_variances: Option<Vec<f64>>,
     /// `e^T P^-1 e` under the reported covariance.
     pub own_nees: Option<f64>,
+    /// What is wrong with the form of a reported pose covariance.
+    pub pose_covariance_fault: Option<CovarianceFault>,
+    /// The reported covariance of one pose against the bound: of another view in every trial.
+    pub pose_spread: Option<Box<PoseSpread>>,
     /// Reported RMSE, px.
     pub rmse_px: Option<f64>,
     /// Sum of squared residuals at the reported camera and poses, px^2.
@@ -74,6 +78,17 @@ pub struct Trial {
     pub bits: u64,
     /// Time it took, s.
     pub seconds: f64,
+}
+
+/// A reported pose covariance against the bound, both marginal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PoseSpread {
+    /// Variances of rotation about x, y, z and translation along them, over the bound's.
+    pub over_bound: Vec<f64>,
+    /// The same along the bound's uncorrelated combinations.
+    pub principal: Vec<f64>,
+    /// `e^T S^-1 e` of the reported pose under the reported covariance S, where both are stated.
+    pub own_nees: Option<f64>,
 }
 
 /// Trials whose poses are refitted, to learn how the solver defines its RMSE.
@@ -126,6 +141,7 @@ fn measure(plan: &Plan, case: &Case, problem: &Problem, estimate: &Estimate, sec
             .then(|| refitted_square(&estimate.camera, problem))
             .flatten(),
         pose_nees: poses.map(|poses| pose_nees(&setup, poses)),
+        pose_spread: plain.then(|| pose_spread(scenario, &setup, case.trial, estimate)).flatten(),
         camera,
         errors,
         ..unmeasured(estimate, seconds)
@@ -158,6 +174,8 @@ fn unmeasured(estimate: &Estimate, seconds: f64) -> Trial {
         covariance_fault: estimate.covariance_fault,
         principal_variances: None,
         own_nees: None,
+        pose_covariance_fault: estimate.pose_covariance_fault,
+        pose_spread: None,
         rmse_px: estimate.rmse_px,
         square: None,
         refitted_square: None,
@@ -214,16 +232,45 @@ fn refitted_square(camera: &Camera<Lens>, problem: &Problem) -> Option<f64> {
 
 fn pose_nees(setup: &Setup, poses: &[Pose]) -> Vec<f64> {
     let truth = &setup.scene.truth.cam_from_target;
-    let distance = |((estimate, truth), block): ((&Pose, &Pose), &nalgebra::SMatrix<f64, 6, 6>)| {
-        let r = &estimate.rotation;
-        let defect = (r.transpose() * r - nalgebra::Matrix3::identity()).amax();
-        if defect > NOT_A_ROTATION || r.determinant() < 0.0 {
-            return f64::INFINITY;
-        }
-        let e = truth.step_to(estimate);
-        block.cholesky().map_or(f64::INFINITY, |factor| e.dot(&factor.solve(&e)))
-    };
-    poses.iter().zip(truth).zip(&setup.bound.poses).map(distance).collect()
+    let each = poses.iter().zip(truth).zip(&setup.bound.poses);
+    each.map(|((estimate, truth), bound)| pose_distance(truth, estimate, bound)).collect()
+}
+
+/// `e^T P^-1 e` of a pose; infinite where the matrix is no rotation or `P` no covariance.
+fn pose_distance(truth: &Pose, estimate: &Pose, covariance: &Matrix6<f64>) -> f64 {
+    let r = &estimate.rotation;
+    let defect = (r.transpose() * r - nalgebra::Matrix3::identity()).amax();
+    if defect > NOT_A_ROTATION || r.determinant() < 0.0 {
+        return f64::INFINITY;
+    }
+    let e = truth.step_to(estimate);
+    covariance.cholesky().map_or(f64::INFINITY, |factor| e.dot(&factor.solve(&e)))
+}
+
+/// All pose covariances have the estimated noise in common: one a trial says what all do, and the views take
+/// turns.
+fn pose_spread(
+    scenario: &Scenario,
+    setup: &Setup,
+    trial: u64,
+    estimate: &Estimate,
+) -> Option<Box<PoseSpread>> {
+    let stated = estimate.pose_covariances.as_ref()?;
+    let view = (trial % stated.len() as u64) as usize;
+    let (stated, bound) = (stated.get(view)?, setup.bound.poses.get(view)?);
+    let along =
+        |m: &Matrix6<f64>| scenario.of_poses[view].variances(&DMatrix::from_fn(6, 6, |i, j| m[(i, j)]));
+    let truth = &setup.scene.truth.cam_from_target[view];
+    let pose = estimate.cam_from_target.as_ref().map(|poses| &poses[view]);
+    Some(Box::new(PoseSpread {
+        over_bound: (0..6).map(|i| stated[(i, i)] / bound[(i, i)]).collect(),
+        principal: along(stated)
+            .into_iter()
+            .zip(along(bound))
+            .map(|(stated, bound)| stated / bound)
+            .collect(),
+        own_nees: pose.map(|pose| pose_distance(truth, pose, stated)),
+    }))
 }
 
 /// FNV-1a over the bits of every number.
@@ -233,5 +280,7 @@ fn fingerprint(estimate: &Estimate) -> u64 {
     let numbers = numbers.chain(poses.flat_map(|p| p.rotation.iter().chain(p.translation.iter()).copied()));
     let numbers = numbers.chain(estimate.standard_deviations.iter().flatten().copied());
     let numbers = numbers.chain(estimate.covariance.iter().flat_map(|c| c.iter().copied()));
+    let of_poses = estimate.pose_covariances.iter().flatten();
+    let numbers = numbers.chain(of_poses.flat_map(|c| c.iter().copied()));
     fnv1a(numbers.chain(estimate.rmse_px).flat_map(|x| x.to_bits().to_le_bytes()))
 }

@@ -3,9 +3,10 @@
 
 use super::{Arguments, Stop, incomplete, of_files, plan_of, process, terms, usage};
 use crate::{Exit, print};
+use calibench::camera::Model;
 use calibench::io::{ShownPath, write_atomically};
 use calibench_gate::paired::{self, Paired};
-use calibench_gate::{Builtin, Plan, Report, Solver, files};
+use calibench_gate::{Asked, Builtin, Plan, Report, Solver, files};
 use calibench_harness::ProgressDisplay;
 use std::path::Path;
 
@@ -67,16 +68,16 @@ pub(super) fn run(
 /// Compares the answers in a folder, whose problems the reference is asked if it has not answered them before.
 pub(super) fn of_answers(arguments: &Arguments, folder: &Path, reference: &str) -> Result<Exit, Stop> {
     let (plan, answers) = files::recorded(folder).map_err(of_files)?;
-    let other: Box<dyn Solver> = match reference {
-        "builtin" => Box::new(Builtin),
+    let (plan, other): (Plan, Box<dyn Solver>) = match reference {
+        "builtin" => (plan, Box::new(Builtin)),
         before if holds_a_run(before) => {
-            let (theirs, answers) = files::recorded(Path::new(before)).map_err(of_files)?;
-            refuse_other_problems((folder, &plan), (Path::new(before), &theirs))?;
-            Box::new(answers)
+            let before = Path::new(before);
+            let (theirs, answers) = files::recorded(before).map_err(of_files)?;
+            (common((folder, &plan), (before, &theirs))?, Box::new(answers))
         }
         command => {
             refuse_what_is_not_there(command)?;
-            process(arguments, command)?
+            (plan, process(arguments, command)?)
         }
     };
     compared(arguments, &plan, &answers, other.as_ref())
@@ -86,26 +87,32 @@ fn holds_a_run(reference: &str) -> bool {
     Path::new(reference).join("manifest.json").is_file()
 }
 
-/// Answers to other problems have nothing in common that could be compared.
-fn refuse_other_problems((ours, plan): (&Path, &Plan), (theirs, other): (&Path, &Plan)) -> Result<(), Stop> {
-    let asked = |plan: &Plan| {
-        let models: Vec<&str> = plan.asked.models.iter().map(|model| model.name()).collect();
-        let scenes = match &plan.asked.scenes[..] {
-            [] => "all scenes".to_string(),
-            scenes => scenes.join(", "),
-        };
-        format!("seed {}, {} samples of {scenes} of {}", plan.seed, plan.samples, models.join(", "))
-    };
-    if (plan.seed, plan.samples, &plan.asked) == (other.seed, other.samples, &other.asked) {
-        return Ok(());
+/// The problems that both folders answer: of the lens models that both have.
+fn common((ours, plan): (&Path, &Plan), (theirs, other): (&Path, &Plan)) -> Result<Plan, Stop> {
+    let of_both = |model: &Model| other.asked.models.contains(model);
+    let models: Vec<Model> = plan.asked.models.iter().copied().filter(of_both).collect();
+    let asked = |plan: &Plan| (plan.seed, plan.samples, plan.asked.scenes.clone());
+    if asked(plan) != asked(other) || models.is_empty() {
+        return Err(usage(format!(
+            "{} and {} answer other problems ({}; {}): record both with the same --seed, --samples, --scene and --models",
+            ours.shown(),
+            theirs.shown(),
+            in_words(plan),
+            in_words(other)
+        )));
     }
-    Err(usage(format!(
-        "{} and {} answer other problems ({}; {}): record both with the same --seed, --samples, --models and --scene",
-        ours.shown(),
-        theirs.shown(),
-        asked(plan),
-        asked(other)
-    )))
+    let asked = Asked { models, scenes: plan.asked.scenes.clone() };
+    Plan::of(plan.seed, plan.samples, asked).map_err(usage)
+}
+
+/// What a plan asks.
+fn in_words(plan: &Plan) -> String {
+    let models: Vec<&str> = plan.asked.models.iter().map(|model| model.name()).collect();
+    let scenes = match &plan.asked.scenes[..] {
+        [] => "all scenes".to_string(),
+        scenes => scenes.join(", "),
+    };
+    format!("seed {}, {} samples of {scenes} with {}", plan.seed, plan.samples, models.join(", "))
 }
 
 fn compared(

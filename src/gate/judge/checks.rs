@@ -73,6 +73,8 @@ properties! {
     CovarianceForm = "covariance-form",
     /// The stated covariance is the true one.
     Covariance = "covariance",
+    /// Stated pose covariances are symmetric, positive definite, and the true ones.
+    PoseCovariance = "pose-covariance",
     /// The order of views does not matter.
     ViewOrder = "view-order",
     /// The order of points does not matter.

@@ -8,6 +8,7 @@ mod decide;
 mod exact;
 mod habits;
 mod invariance;
+mod pose_covariance;
 mod rmse;
 mod statistics;
 

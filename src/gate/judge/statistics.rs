@@ -6,7 +6,7 @@
 
 use super::checks::{Basis, Check, Property};
 use super::habits::Habits;
-use super::{Answers, chance};
+use super::{Answers, chance, pose_covariance};
 use crate::plan::Purpose;
 use crate::suite::Scenario;
 use crate::trial::{Seen, Trial};
@@ -30,6 +30,7 @@ pub(super) fn check(scenario: &Scenario, answers: &Answers<'_>) -> Vec<Check> {
     checks.push(about.poses());
     checks.push(about.covariance_form());
     checks.push(about.covariance());
+    checks.push(pose_covariance::check(scenario, &samples));
     checks
 }
 
