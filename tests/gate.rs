@@ -400,6 +400,21 @@ fn two_files_of_answers_are_compared_as_the_solvers_behind_them_are() {
     assert!(code == Some(0) && text.contains("SAME: not a bit differs"), "{text}");
     let (code, text) = compare(&before, &other);
     assert!(code == Some(2) && text.contains("answer other problems (seed 1, 64 samples"), "{text}");
+    // A program is asked the problems that were answered.
+    let (code, text) = compare(&before, &greets_and_refuses(r#"{"protocol": 2}"#, 0.0));
+    assert!(code.is_some_and(|code| code < 2) && text.contains("0 answers lost, 64 gained"), "{text}");
+    let (code, text) =
+        compare(&before, &greets_and_refuses(r#"{"protocol": 2, "models": ["division"]}"#, 0.0));
+    assert!(code == Some(2), "{text}");
+    // Of runs with other lens models the common part is compared.
+    let (plain, more) = (place("gate-plain"), place("gate-more"));
+    let all_scenes = |to: &str, models: &str| {
+        assert_eq!(gate(&["--samples", "1", "--models", models, "--record", to]).status.code(), Some(0));
+    };
+    all_scenes(&plain, "brown-conrady");
+    all_scenes(&more, "brown-conrady,division");
+    let (code, text) = compare(&plain, &more);
+    assert!(code == Some(0) && text.contains("four-pose") && !text.contains("division"), "{text}");
     let (code, text) = compare(&before, "no-such-folder");
     assert!(code == Some(2) && text.contains("neither there as a folder nor as a program"), "{text}");
     // Where nothing took the time, nothing is said of it.

@@ -77,7 +77,15 @@ pub(super) fn of_answers(arguments: &Arguments, folder: &Path, reference: &str) 
         }
         command => {
             refuse_what_is_not_there(command)?;
-            (plan, process(arguments, command)?)
+            let other = process(arguments, command)?;
+            let known = other.models();
+            let plan = of_models(&plan, &known)?.ok_or_else(|| {
+                usage(format!(
+                    "{command} knows none of the lens models whose problems {} answers",
+                    folder.shown()
+                ))
+            })?;
+            (plan, other)
         }
     };
     compared(arguments, &plan, &answers, other.as_ref())
@@ -89,20 +97,28 @@ fn holds_a_run(reference: &str) -> bool {
 
 /// The problems that both folders answer: of the lens models that both have.
 fn common((ours, plan): (&Path, &Plan), (theirs, other): (&Path, &Plan)) -> Result<Plan, Stop> {
-    let of_both = |model: &Model| other.asked.models.contains(model);
-    let models: Vec<Model> = plan.asked.models.iter().copied().filter(of_both).collect();
     let asked = |plan: &Plan| (plan.seed, plan.samples, plan.asked.scenes.clone());
-    if asked(plan) != asked(other) || models.is_empty() {
-        return Err(usage(format!(
+    let common = if asked(plan) == asked(other) { of_models(plan, &other.asked.models)? } else { None };
+    common.ok_or_else(|| {
+        usage(format!(
             "{} and {} answer other problems ({}; {}): record both with the same --seed, --samples, --scene and --models",
             ours.shown(),
             theirs.shown(),
             in_words(plan),
             in_words(other)
-        )));
+        ))
+    })
+}
+
+/// The part of a plan that is of these lens models; `None` if it is empty.
+fn of_models(plan: &Plan, known: &[Model]) -> Result<Option<Plan>, Stop> {
+    let models: Vec<Model> =
+        plan.asked.models.iter().copied().filter(|model| known.contains(model)).collect();
+    if models.is_empty() {
+        return Ok(None);
     }
     let asked = Asked { models, scenes: plan.asked.scenes.clone() };
-    Plan::of(plan.seed, plan.samples, asked).map_err(usage)
+    Plan::of(plan.seed, plan.samples, asked).map(Some).map_err(usage)
 }
 
 /// What a plan asks.
