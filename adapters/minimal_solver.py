@@ -35,6 +35,24 @@ def rotation_vector(r):
     return axis * (0.5 if angle < 1e-9 else angle / (2 * np.sin(angle)))
 
 
+def pose_covariances(covariance, count, poses, unit=1.0):
+    """Of `exp([w]x) R` in place of rotation vectors v: a step dv is the small rotation w = J dv with
+    J = I + (1 - cos a) / a^2 [v]x + (a - sin a) / a^3 [v]x^2, a = |v| (the left Jacobian). The first `count` rows are the
+    camera's, translations are in `unit`."""
+    stated = []
+    for i, pose in enumerate(poses):
+        x, y, z = pose[:3]
+        angle, cross = np.linalg.norm(pose[:3]), np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        small = angle < 1e-4  # 1 - cos a has no digits left
+        first = 0.5 if small else (1 - np.cos(angle)) / angle**2
+        second = 1 / 6 if small else (angle - np.sin(angle)) / angle**3
+        step = unit * np.eye(6)
+        step[:3, :3] = np.eye(3) + first * cross + second * (cross @ cross)
+        rows = slice(count + 6 * i, count + 6 * i + 6)
+        stated.append((step @ covariance[rows, rows] @ step.T).tolist())
+    return stated
+
+
 def project(camera, pose, target):
     fx, fy, cx, cy, skew, k1, k2, p1, p2, k3 = camera
     r = rotation_matrix(pose[:3])
@@ -175,6 +193,7 @@ def solve(problem):
             {"rotation": rotation_matrix(b[:3]).tolist(), "translation": (b[3:] * unit).tolist()} for b in blocks
         ],
         "covariance": {"parameters": problem["free"], "matrix": covariance[:count, :count].tolist()},
+        "pose_covariances": pose_covariances(covariance, count, blocks, unit),
         "rmse": float(np.sqrt(r @ r / (len(r) / 2))),
     }
 

@@ -8,7 +8,7 @@ differences are SciPy's, as a user would call them. The covariance is `s^2 (J^T 
 """
 
 # First, because it sets the number of threads.
-from minimal_solver import NAMES, main, project, rotation_matrix, start, views_of
+from minimal_solver import NAMES, main, pose_covariances, project, rotation_matrix, start, views_of
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -42,6 +42,7 @@ def solve(problem):
         "parameters": {NAMES[i]: float(v) for i, v in zip(free, fit.x)},
         "poses": [{"rotation": rotation_matrix(b[:3]).tolist(), "translation": b[3:].tolist()} for b in blocks],
         "covariance": {"parameters": problem["free"], "matrix": covariance[:count, :count].tolist()},
+        "pose_covariances": pose_covariances(covariance, count, blocks),
         "rmse": float(np.sqrt(r @ r / (len(r) / 2))),
         "message": fit.message,
     }

@@ -55,7 +55,7 @@ fn with_causes() -> Vec<(Box<dyn Error>, String)> {
         (TableError::from(input()).into(), input().to_string()),
         (DetectError::from(grid).into(), grid.to_string()),
         (SuiteError::from(board.clone()).into(), board.to_string()),
-        (SuiteError::Scene { id: "four", cause: scene() }.into(), scene().to_string()),
+        (SuiteError::Setup { id: "four", cause: scene().into() }.into(), scene().to_string()),
         (PlanError::from(scene()).into(), scene().to_string()),
         (FilesError::from(PlanError::from(scene())).into(), scene().to_string()),
         (FilesError::from(input()).into(), input().to_string()),

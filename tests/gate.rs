@@ -9,6 +9,7 @@ use calibench_gate::plan::Purpose;
 use calibench_gate::power::Measured;
 use calibench_gate::protocol::{Answer, Problem, Status, schemas};
 use calibench_gate::{Asked, Builtin, Plan, Process, Property, Report, Solver, Terms, Verdict, run};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -224,6 +225,54 @@ fn files_keep_the_lens_models_that_were_asked() {
 }
 
 #[test]
+fn how_a_program_ends_and_its_memory_are_reported_and_no_finding() {
+    let refuses = r#"sed -u 's/^{"id":"\([^"]*\)".*/{"id":"\1","status":"refused"}/'"#;
+    let end = |command: String| {
+        let process = Process::new(&command, Duration::from_secs(20), 2);
+        assert_eq!(process.ask_all(&problems(4)).len(), 4);
+        let ends = process.finish();
+        // Both copies have been asked, or the first was so quick that it took all.
+        assert!((1..=2).contains(&ends.len()), "{command}: {ends:?}");
+        assert!(process.finish().is_empty());
+        ends[0]
+    };
+    let good = end(refuses.to_string());
+    assert_eq!((good.by_itself, good.exit_code, good.signal), (true, Some(0), None));
+    let late = end(format!("{refuses}; exit 7"));
+    assert_eq!((late.by_itself, late.exit_code, late.how().as_str()), (true, Some(7), "exit code 7"));
+    let killed = end(format!("{refuses}; kill -9 $$"));
+    assert_eq!((killed.by_itself, killed.exit_code, killed.signal), (true, None, Some(9)));
+    let stays = end(format!("{refuses}; sleep 1000"));
+    assert_eq!((stays.by_itself, stays.how().as_str()), (false, "did not end with its input"));
+    // The shell itself is small; what it started counts too: here a process that holds 60 MB.
+    let holds = end(format!("x=$(head -c 60000000 /dev/zero | tr '\\0' x); {refuses}"));
+    if cfg!(target_os = "linux") {
+        let (small, large) =
+            (good.peak_memory_bytes.expect("known"), holds.peak_memory_bytes.expect("known"));
+        assert!((100_000..50_000_000).contains(&small) && large > 60_000_000, "{small} {large}");
+    } else {
+        assert_eq!(good.peak_memory_bytes, None);
+    }
+    // A program that answered everything is not held to its exit code.
+    let json = folder("gate-ends").join("report.json");
+    std::fs::create_dir_all(json.parent().expect("a folder")).expect("made");
+    let path = json.to_string_lossy().into_owned();
+    let solver = format!("{refuses}; exit 7");
+    let one = ["--samples", "1", "--scene", "no-views", "--models", "brown-conrady"];
+    let output = gate(&[&one[..], &["--solver", &solver, "--json", &path]].concat());
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{text}");
+    assert!(text.lines().next().expect("a line").contains(" s; exit code 7, peak memory "), "{text}");
+    let report: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(&json).expect("written")).expect("JSON");
+    assert_eq!((&report["program_ends"][0]["exit_code"], &report["verdict"]), (&7.into(), &"held".into()));
+    // Our own solver is no program.
+    let ours = gate(&["--samples", "1", "--scene", "no-views", "--format", "json"]);
+    let report: serde_json::Value = serde_json::from_slice(&ours.stdout).expect("JSON");
+    assert!(report["program_ends"].is_null() && report["verdict"] == "held");
+}
+
+#[test]
 fn garbage_foreign_ids_and_nan_are_named() {
     let babble = breakages("while read line; do echo hello; done", 0.3, 1);
     assert!(matches!(&babble[0], Breakage::Garbage { line, .. } if line == "hello"), "{babble:?}");
@@ -254,7 +303,7 @@ fn our_solver_is_trusted_and_every_report_is_written() {
     let output = gate(&["--samples", "4", "--json", &json, "--junit", &junit, "--html", &html]);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stdout));
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    // A line for each of 25 properties, and one for each of nine scenes where the model fails.
+    // A line for each of 26 properties, and one for each of nine scenes where the model fails.
     assert!(text.lines().count() <= 42, "one screen:\n{text}");
     let report: serde_json::Value =
         serde_json::from_slice(&std::fs::read(&json).expect("written")).expect("JSON");
@@ -313,6 +362,66 @@ fn a_change_far_below_the_noise_shows_on_common_noise() {
     assert_eq!(biased.status.code(), Some(1));
     assert!(
         text.lines().any(|l| l.starts_with("four-pose") && l.contains("fx 0.") && l.contains("MOVED")),
+        "{text}"
+    );
+}
+
+#[test]
+fn two_files_of_answers_are_compared_as_the_solvers_behind_them_are() {
+    let place = |name: &str| folder(name).to_string_lossy().into_owned();
+    let (before, after, other) = (place("gate-before"), place("gate-after"), place("gate-other"));
+    let scene = ["--scene", "four-pose", "--scene", "marks-missing"];
+    let record = |to: &str, more: &[&str]| {
+        let arguments = [&["--samples", "64", "--record", to][..], &scene, more].concat();
+        assert!(gate(&arguments).status.code().is_some_and(|code| code < 2), "{to}");
+    };
+    record(&before, &[]);
+    record(&after, &["--planted", "biased-fx"]);
+    record(&other, &["--seed", "2"]);
+    let compare = |new: &str, reference: &str| {
+        let output = gate(&["--judge", new, "--against", reference]);
+        let text = [output.stdout, output.stderr].map(|o| String::from_utf8_lossy(&o).into_owned()).concat();
+        (output.status.code(), text)
+    };
+    let (code, text) = compare(&after, &before);
+    assert_eq!(code, Some(1), "{text}");
+    // The table is that of the live program, but for the times, which no file has.
+    let live = [&["--samples", "64", "--against", "builtin", "--planted", "biased-fx"][..], &scene].concat();
+    let live = String::from_utf8_lossy(&gate(&live).stdout).into_owned();
+    let row = |text: &str| {
+        let line = text.lines().find(|l| l.starts_with("marks-missing")).expect("a row");
+        line.replace("MOVED", "").trim_end().rsplit_once(' ').expect("columns").0.trim_end().to_string()
+    };
+    assert_eq!(row(&text), row(&live));
+    assert!(text.contains("MOVED") && text.contains("times are not known of answers in files"), "{text}");
+    let (code, text) = compare(&before, &before);
+    assert!(code == Some(0) && text.contains("SAME: not a bit differs"), "{text}");
+    let (code, text) = compare(&before, "builtin");
+    assert!(code == Some(0) && text.contains("SAME: not a bit differs"), "{text}");
+    let (code, text) = compare(&before, &other);
+    assert!(code == Some(2) && text.contains("answer other problems (seed 1, 64 samples"), "{text}");
+    // A program is asked the problems that were answered.
+    let (code, text) = compare(&before, &greets_and_refuses(r#"{"protocol": 2}"#, 0.0));
+    assert!(code.is_some_and(|code| code < 2) && text.contains("0 answers lost, 64 gained"), "{text}");
+    let (code, text) =
+        compare(&before, &greets_and_refuses(r#"{"protocol": 2, "models": ["division"]}"#, 0.0));
+    assert!(code == Some(2), "{text}");
+    // Of runs with other lens models the common part is compared.
+    let (plain, more) = (place("gate-plain"), place("gate-more"));
+    let all_scenes = |to: &str, models: &str| {
+        assert_eq!(gate(&["--samples", "1", "--models", models, "--record", to]).status.code(), Some(0));
+    };
+    all_scenes(&plain, "brown-conrady");
+    all_scenes(&more, "brown-conrady,division");
+    let (code, text) = compare(&plain, &more);
+    assert!(code == Some(0) && text.contains("four-pose") && !text.contains("division"), "{text}");
+    let (code, text) = compare(&before, "no-such-folder");
+    assert!(code == Some(2) && text.contains("neither there as a folder nor as a program"), "{text}");
+    // Where nothing took the time, nothing is said of it.
+    let judged = gate(&["--judge", &before, "--median-time", "600"]);
+    let text = String::from_utf8_lossy(&judged.stdout).into_owned();
+    assert!(
+        text.lines().any(|l| l.starts_with("time ") && l.contains("not known of answers in files")),
         "{text}"
     );
 }
@@ -442,6 +551,55 @@ fn a_matrix_that_is_no_covariance_and_lost_correlations_are_findings_of_a_quick_
     let report = judged("correlations-dropped", 1);
     assert!(verdicts(&report, Property::Covariance).contains(&Verdict::Failed), "{}", report.details());
     assert!(!verdicts(&report, Property::CovarianceForm).contains(&Verdict::Failed), "{}", report.details());
+}
+
+#[test]
+fn views_that_see_different_marks_show_who_reads_them_as_a_table() {
+    let report = judged("views-cut-to-the-shortest", 16);
+    let scenes: BTreeSet<&str> = report.failures().iter().map(|check| check.scenario).collect();
+    // Everywhere else all views see as many marks.
+    assert_eq!(scenes, BTreeSet::from(["marks-missing", "over-the-edge"]), "{}", report.details());
+}
+
+#[test]
+fn pose_covariances_are_judged_by_their_form_unit_axes_and_what_they_leave_out() {
+    let of = |id: &str| {
+        let fault = planted().into_iter().find(|f| f.id == id).expect("the fault");
+        let scenes = ["four-pose", "marks-missing", "poses-anew"].map(String::from).to_vec();
+        let plan = Plan::of(1, 32, Asked { scenes, ..Asked::default() }).expect("a plan");
+        Report::new(&plan, "", &run(&plan, &Faulty::new(fault), &|_| ()), &Terms::default(), 0.0)
+    };
+    for id in ["of-a-known-camera", "in-degrees", "about-the-target"] {
+        let report = of(&format!("pose-covariance-{id}"));
+        let failed: BTreeSet<&str> = report.failures().iter().map(|check| check.property.name()).collect();
+        assert_eq!(failed, BTreeSet::from(["pose-covariance"]), "{id}: {}", report.details());
+        assert_eq!(report.failures().len(), 3, "{id}: {}", report.details());
+    }
+    assert!(!verdicts(&of("last-bits"), Property::PoseCovariance).contains(&Verdict::NotJudged));
+    // One triangle only.
+    struct OneTriangle;
+    impl Solver for OneTriangle {
+        fn name(&self) -> String {
+            "a solver".into()
+        }
+        fn ask(&self, problem: &Problem) -> Result<Answer, Breakage> {
+            let mut answer = Builtin.ask(problem)?;
+            for row in answer.pose_covariances.iter_mut().flatten().flat_map(|m| m.iter_mut().enumerate()) {
+                row.1[..row.0].fill(0.0);
+            }
+            Ok(answer)
+        }
+    }
+    let plan =
+        Plan::of(1, 2, Asked { scenes: vec!["four-pose".into()], ..Asked::default() }).expect("a plan");
+    let report = Report::new(&plan, "", &run(&plan, &OneTriangle, &|_| ()), &Terms::default(), 0.0);
+    assert!(
+        report.details().contains(
+            "pose-covariance / four-pose: 2 of 2 answers have a pose covariance that is not symmetric"
+        ),
+        "{}",
+        report.details()
+    );
 }
 
 #[test]

@@ -114,6 +114,8 @@ const EXAMPLES: &[(&str, &[&str])] = &[
             "calibench gate --html report.html",
             "calibench gate --solver \"python3 my_solver.py\" --samples 1",
             "calibench gate --planted k2-ignored --samples 4",
+            "calibench gate --samples 2 --record before",
+            "calibench gate --judge before --against builtin",
             "calibench gate --hand-eye",
         ],
     ),

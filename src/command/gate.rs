@@ -86,8 +86,9 @@ pub(super) struct Arguments {
     /// Writes the report as a page
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
-    /// Compares with a reference on the same problems: `builtin`, a program, or a folder written by --record
-    #[arg(long, value_name = "REF", conflicts_with_all = ["export", "judge", "power"])]
+    /// Compares with a reference on the same problems: `builtin`, a program, or a folder written by --record;
+    /// with --judge what is compared are the answers in that folder
+    #[arg(long, value_name = "REF", conflicts_with_all = ["export", "power"])]
     against: Option<String>,
     /// Writes the problems to a folder, truth kept apart, for programs that cannot be driven by a pipe
     #[arg(long, value_name = "DIR", conflicts_with_all = ["solver", "json", "junit", "html", "accept"])]
@@ -264,6 +265,9 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
         return Ok(Exit::Held);
     }
     if let Some(folder) = &arguments.judge {
+        if let Some(reference) = &arguments.against {
+            return compare::of_answers(arguments, folder, reference);
+        }
         let (plan, answers) = files::recorded(folder).map_err(of_files)?;
         return judge(arguments, &plan, &answers, build);
     }
@@ -307,7 +311,7 @@ fn plan_of(arguments: &Arguments, samples: usize, known: impl FnOnce() -> Vec<Mo
     })
 }
 
-/// The command that asks the same again, to which a scene may be added; none for answers in files.
+/// The command that asks all scenes again, to which some may be added; none for answers in files.
 fn repeat(arguments: &Arguments, plan: &Plan) -> Option<String> {
     let solver = match (&arguments.judge, &arguments.solver, &arguments.planted) {
         (Some(_), ..) => return None,
@@ -316,8 +320,9 @@ fn repeat(arguments: &Arguments, plan: &Plan) -> Option<String> {
         (None, None, None) => String::new(),
     };
     let models: Vec<&str> = plan.asked.models.iter().map(|model| model.name()).collect();
+    let limit = arguments.median_time.map_or(String::new(), |seconds| format!(" --median-time {seconds}"));
     Some(format!(
-        "calibench gate{solver} --models {} --samples {} --seed {}",
+        "calibench gate{solver} --models {} --samples {} --seed {}{limit}",
         models.join(","),
         plan.samples,
         plan.seed
@@ -360,9 +365,9 @@ fn asked(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build)
     let seen = calibench_gate::run(plan, solver, &|done| progress.advance(done));
     let seconds = started.elapsed().as_secs_f64();
     let report = Report::new(plan, &solver.name(), &seen, &terms, seconds);
-    let report = report.with_commit(build.commit.as_ref());
+    let report = report.with_program_ends(solver.finish()).with_commit(build.commit.as_ref());
     match repeat(arguments, plan) {
-        Some(command) => Ok(report.with_repeat(command)),
+        Some(command) => Ok(report.with_repeat(&command)),
         None => Ok(report),
     }
 }

@@ -5,7 +5,7 @@ use super::protocol::{Answer, AnswerPose, Problem, Status};
 use super::quoted::quoted;
 use calibench::camera::{Camera, FreeParameters, Lens, Parameter};
 use calibench::geometry::Pose;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix6};
 use std::collections::BTreeMap;
 
 /// An answer that keeps the protocol.
@@ -21,6 +21,10 @@ pub struct Estimate {
     pub covariance: Option<DMatrix<f64>>,
     /// What is wrong with its form.
     pub covariance_fault: Option<CovarianceFault>,
+    /// Covariance of every pose.
+    pub pose_covariances: Option<Vec<Matrix6<f64>>>,
+    /// What is wrong with the form of the first of them that can be none.
+    pub pose_covariance_fault: Option<CovarianceFault>,
     /// Reprojection error as the solver states it, px.
     pub rmse_px: Option<f64>,
     /// What the solver warns of.
@@ -184,6 +188,11 @@ fn estimate(problem: &Problem, answer: Answer) -> Result<Estimate, Breakage> {
     let of_diagonal = |c: &DMatrix<f64>| c.diagonal().iter().map(|v| v.sqrt()).collect();
     let standard_deviations = stated.or_else(|| covariance.as_ref().map(of_diagonal));
     let rmse_px = answer.rmse.map(|x| positive("rmse", x)).transpose()?;
+    let pose_covariances = answer.pose_covariances.as_deref();
+    let pose_covariances =
+        pose_covariances.map(|given| self::pose_covariances(given, problem.views.len())).transpose()?;
+    let form = |c: &Matrix6<f64>| covariance_form::fault(&DMatrix::from_fn(6, 6, |i, j| c[(i, j)]), None);
+    let pose_covariance_fault = pose_covariances.iter().flatten().find_map(form);
     let cam_from_target = answer.poses.map(|poses| self::poses(&poses, problem.views.len())).transpose()?;
     Ok(Estimate {
         camera,
@@ -191,6 +200,8 @@ fn estimate(problem: &Problem, answer: Answer) -> Result<Estimate, Breakage> {
         standard_deviations,
         covariance,
         covariance_fault,
+        pose_covariances,
+        pose_covariance_fault,
         rmse_px,
         warnings: answer.warnings,
         held_changed,
@@ -275,6 +286,26 @@ fn poses(given: &[AnswerPose], need: usize) -> Result<Vec<Pose>, Breakage> {
         .collect()
 }
 
+fn pose_covariances(given: &[Vec<Vec<f64>>], need: usize) -> Result<Vec<Matrix6<f64>>, Breakage> {
+    if given.len() != need {
+        return Err(Breakage::Count { what: "pose covariances", need, got: given.len() });
+    }
+    let of_pose = |(i, matrix): (usize, &Vec<Vec<f64>>)| {
+        let lengths = std::iter::once(matrix.len()).chain(matrix.iter().map(Vec::len));
+        if let Some(got) = lengths.into_iter().find(|&length| length != 6) {
+            return Err(Breakage::Count { what: "rows and columns of a pose covariance", need: 6, got });
+        }
+        let read = Matrix6::from_fn(|row, column| matrix[row][column]);
+        match read.iter().find(|x| !x.is_finite()) {
+            Some(&value) => {
+                Err(Breakage::BadNumber { what: format!("an entry of pose covariance {i}"), value })
+            }
+            None => Ok(read),
+        }
+    };
+    given.iter().enumerate().map(of_pose).collect()
+}
+
 fn finite(what: &str, value: f64) -> Result<f64, Breakage> {
     if value.is_finite() { Ok(value) } else { Err(Breakage::BadNumber { what: what.to_string(), value }) }
 }
@@ -319,6 +350,12 @@ mod tests {
         assert_eq!(broken(r#"{"id":"a","status":"ok","parameters":{"fx":1},"rmse":-1}"#), "rmse is -1");
         let line = r#"{"id":"a","status":"ok","parameters":{"fx":1},"covariance":{"parameters":["fx"],"matrix":[]}}"#;
         assert_eq!(broken(line), "rows and columns of the covariance: 1 needed, got 0");
+        let posed = |covariances: &str| {
+            let start = r#"{"id":"a","status":"ok","parameters":{"fx":1},"pose_covariances":"#;
+            broken(&format!("{start}{covariances}}}"))
+        };
+        assert_eq!(posed("[]"), "pose covariances: 1 needed, got 0");
+        assert_eq!(posed("[[[1]]]"), "rows and columns of a pose covariance: 6 needed, got 1");
     }
 
     #[test]

@@ -8,9 +8,11 @@
 //! reason = "cv2 takes points in single precision"
 //! ```
 
-use super::bad_input::bad_cases;
+use super::bad_input::{Fault, bad_cases};
 use super::judge::{Check, Property, Verdict};
-use super::suite::suite;
+use super::quoted::quoted;
+use super::suite::{Demand, Scenario, suite};
+use super::variant::Variant;
 use calibench::io::input::MOST_SPEC_BYTES;
 use calibench::io::{InputError, read_regular_text};
 use serde::{Deserialize, Serialize};
@@ -29,7 +31,7 @@ pub struct Allowance {
     /// ([`Check::size_px`]).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit_px: Option<f64>,
-    /// Why.
+    /// Why, on one line.
     pub reason: String,
 }
 
@@ -41,7 +43,7 @@ pub struct Allowed {
     pub allowance: Allowance,
     /// Scenes that needed it.
     pub needed_by: Vec<&'static str>,
-    /// Of the scenes that it names those that were judged and did not need it.
+    /// Of the scenes that it names those that were asked and did not need it.
     pub not_needed_by: Vec<String>,
     /// Whether anything that it speaks of was judged.
     pub is_judged: bool,
@@ -68,6 +70,8 @@ pub enum AllowError {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
+    /// A file in which nothing stands allows nothing.
+    #[serde(default)]
     allow: Vec<Spanned<Entry>>,
 }
 
@@ -90,8 +94,9 @@ impl Allowance {
     /// Reads a file.
     ///
     /// # Errors
-    /// A file that cannot be read or is no list of allowances; a property or scene that there is not; a reason
-    /// that is empty; a limit where nothing has a size.
+    /// A file that cannot be read or is no list of allowances (an empty one is a list of none); a property or scene
+    /// that there is not; a scene on which the property is never judged, or that is named twice; a reason that is
+    /// empty; a limit where nothing has a size.
     pub fn read(path: &Path) -> Result<Vec<Allowance>, AllowError> {
         let text = read_regular_text(path, MOST_SPEC_BYTES)?;
         Allowance::of_toml(&text).map_err(|(line, message)| AllowError::At {
@@ -112,7 +117,7 @@ impl Allowance {
         };
         let syntax = |e: toml::de::Error| (e.span().map_or(0, |s| s.start), e.message().trim().to_string());
         let file: File = toml::from_str(text).map_err(|e| line(syntax(e)))?;
-        let known = known_scenes();
+        let known = Known::scenes();
         let mut allowances: Vec<Allowance> = Vec::new();
         for entry in file.allow {
             let at = entry.span().start;
@@ -153,12 +158,20 @@ impl Allowance {
         let spoken_of = || checks.iter().filter(|check| self.speaks_of(check));
         let judged = || spoken_of().filter(|check| check.verdict != Verdict::NotJudged);
         let is_named = |check: &&Check| self.scenes.iter().any(|scene| scene == check.scenario);
-        let holds = |check: &&Check| check.verdict == Verdict::Held;
+        // What was asked and is told only fails nobody: a violation that residuals do not show, a time without
+        // a limit.
+        let cannot_fail = |check: &Check| check.verdict == Verdict::NotJudged && check.problems > 0;
+        let holds = |check: &&Check| check.verdict == Verdict::Held || cannot_fail(check);
         Allowed {
             allowance: self.clone(),
             needed_by: judged().filter(|c| c.verdict == Verdict::Accepted).map(|c| c.scenario).collect(),
-            not_needed_by: judged().filter(is_named).filter(holds).map(|c| c.scenario.to_string()).collect(),
-            is_judged: judged().next().is_some(),
+            not_needed_by: spoken_of()
+                .filter(is_named)
+                .filter(holds)
+                .map(|c| c.scenario.to_string())
+                .collect(),
+            is_judged: judged().next().is_some()
+                || spoken_of().any(|check| is_named(&check) && cannot_fail(check)),
         }
     }
 }
@@ -186,14 +199,43 @@ impl Allowed {
     }
 }
 
-/// Names of all scenes and bad input.
-fn known_scenes() -> Vec<&'static str> {
-    let scenes = suite().into_iter().flatten().map(|scenario| scenario.id);
-    let bad = bad_cases(1).into_iter().flatten().map(|case| case.id);
-    scenes.chain(bad).collect()
+/// A scene or bad input, and what is asked on it.
+struct Known {
+    name: &'static str,
+    properties: Vec<Property>,
 }
 
-fn of_entry(entry: Entry, known: &[&str]) -> Result<Allowance, Wrong> {
+impl Known {
+    /// All scenes and bad input.
+    fn scenes() -> Vec<Known> {
+        let scenes = suite().into_iter().flatten();
+        let scenes = scenes.map(|scenario| Known { name: scenario.id, properties: properties_of(&scenario) });
+        let bad = bad_cases(1).into_iter().flatten().map(|case| {
+            let property = match case.fault {
+                Fault::Degenerate => Property::Degenerate,
+                Fault::Malformed => Property::BadInput,
+            };
+            Known { name: case.id, properties: vec![property] }
+        });
+        scenes.chain(bad).collect()
+    }
+}
+
+/// The properties that a scene can fail.
+fn properties_of(scenario: &Scenario) -> Vec<Property> {
+    let is_of_law = |property: &Property| match property {
+        Property::BadInput | Property::Degenerate | Property::Honesty | Property::Assumptions => false,
+        Property::SwappedAxes => Variant::SwappedAxes.is_known_of(scenario.model()),
+        _ => true,
+    };
+    match scenario.demand {
+        Demand::Honesty => vec![Property::Protocol, Property::HeldValues, Property::Honesty],
+        Demand::Assumptions => vec![Property::Protocol, Property::HeldValues, Property::Assumptions],
+        Demand::Law => Property::ALL.iter().copied().filter(is_of_law).collect(),
+    }
+}
+
+fn of_entry(entry: Entry, known: &[Known]) -> Result<Allowance, Wrong> {
     let property = property(&entry.property)?;
     let has_size = Check::HAVE_SIZE.contains(&property);
     if let Some(limit) = &entry.limit_px {
@@ -207,9 +249,12 @@ fn of_entry(entry: Entry, known: &[&str]) -> Result<Allowance, Wrong> {
             return Err((at, format!("{name} has no size in px: leave limit_px out; {SIZED} have one")));
         }
     }
-    let scenes =
-        entry.scenes.map(|scenes| scenes_of(&scenes, known, entry.property.span().start)).transpose()?;
-    let reason = entry.reason.get_ref().trim();
+    let scenes = entry
+        .scenes
+        .map(|scenes| scenes_of(&scenes, known, property, entry.property.span().start))
+        .transpose()?;
+    // A report has a line for it.
+    let reason = quoted(&entry.reason.get_ref().split_whitespace().collect::<Vec<_>>().join(" "));
     if reason.is_empty() {
         return Err((entry.reason.span().start, "the reason is empty: say why this is known".to_string()));
     }
@@ -217,7 +262,7 @@ fn of_entry(entry: Entry, known: &[&str]) -> Result<Allowance, Wrong> {
         property,
         scenes: scenes.unwrap_or_default(),
         limit_px: entry.limit_px.map(Spanned::into_inner),
-        reason: reason.to_string(),
+        reason,
     })
 }
 
@@ -229,15 +274,34 @@ fn property(name: &Spanned<String>) -> Result<Property, Wrong> {
     })
 }
 
-fn scenes_of(scenes: &[Spanned<String>], known: &[&str], at: usize) -> Result<Vec<String>, Wrong> {
+fn scenes_of(
+    scenes: &[Spanned<String>],
+    known: &[Known],
+    property: Property,
+    at: usize,
+) -> Result<Vec<String>, Wrong> {
     if scenes.is_empty() {
         return Err((at, "no scenes: name some, or leave `scenes` out for every scene".to_string()));
     }
-    if let Some(unknown) = scenes.iter().find(|scene| !known.contains(&scene.get_ref().as_str())) {
-        let message = format!("no scene `{}`; there are: {}", unknown.get_ref(), known.join(", "));
-        return Err((unknown.span().start, message));
+    let names = |list: Vec<&Known>| list.iter().map(|scene| scene.name).collect::<Vec<_>>().join(", ");
+    let mut read: Vec<String> = Vec::new();
+    for scene in scenes {
+        let (at, name) = (scene.span().start, scene.get_ref());
+        let Some(found) = known.iter().find(|known| known.name == name) else {
+            let message = format!("no scene `{name}`; there are: {}", names(known.iter().collect()));
+            return Err((at, message));
+        };
+        if !found.properties.contains(&property) {
+            let judged = known.iter().filter(|known| known.properties.contains(&property)).collect();
+            let property = property.name();
+            return Err((at, format!("{property} is never judged on `{name}`, but on: {}", names(judged))));
+        }
+        if read.contains(name) {
+            return Err((at, format!("the scene `{name}` is named twice: keep one of the two")));
+        }
+        read.push(name.clone());
     }
-    Ok(scenes.iter().map(|scene| scene.get_ref().clone()).collect())
+    Ok(read)
 }
 
 #[cfg(test)]
@@ -258,6 +322,21 @@ mod tests {
         for (from, to, line, word) in [
             ("'exactness'", "'beauty'", 3, "no property `beauty`; there are: protocol"),
             ("'one-view'", "'two-view'", 9, "no scene `two-view`; there are: four-pose"),
+            ("'one-view'", "'four-pose'", 9, "never judged on `four-pose`, but on: three-parallel-views"),
+            ("'one-view'", "'no-views'", 9, "never judged on `no-views`"),
+            ("'one-view'", "'same-tilt'", 9, "`same-tilt` is named twice"),
+            (
+                "limit_px = 1e-4",
+                "scenes = ['board-bowed']",
+                4,
+                "exactness is never judged on `board-bowed`, but on: four-pose",
+            ),
+            (
+                "'exactness'\nlimit_px = 1e-4",
+                "'swapped-axes'\nscenes = ['tilted']",
+                4,
+                "swapped-axes is never judged on `tilted`",
+            ),
             ("1e-4", "-1.0", 4, "a positive number"),
             ("1e-4", "nan", 4, "a positive number"),
             ("1e-4", "'small'", 4, "invalid type"),
@@ -306,5 +385,31 @@ mod tests {
         assert!(!idle.is_judged && !idle.is_idle());
         let all_hold = [Check { verdict: Held, ..check(Property::Exactness, "four-pose", true, Some(1e-9)) }];
         assert!(allowances[0].applied(&all_hold).told().contains("NOTHING NEEDS IT"));
+    }
+
+    #[test]
+    fn an_allowance_for_what_cannot_fail_is_not_needed() {
+        let text = "[[allow]]\nproperty = 'assumptions'\nscenes = ['board-stretched', 'board-bowed']\nreason = 'x'\n";
+        let allowance = Allowance::of_toml(text).unwrap().remove(0);
+        let told =
+            |scenario| Check::new(Property::Assumptions, scenario, crate::judge::Basis::Told, 16, "told");
+        let applied = allowance.applied(&[told("board-stretched")]);
+        assert!(applied.is_idle(), "{applied:?}");
+        assert!(
+            applied.told().contains("NOTHING NEEDS IT; not needed by board-stretched"),
+            "{}",
+            applied.told()
+        );
+        // What was not asked needs nothing, and does not say so.
+        assert!(!allowance.applied(&[]).is_judged);
+    }
+
+    #[test]
+    fn a_reason_takes_one_line_and_a_file_with_nothing_in_it_allows_nothing() {
+        let text = "[[allow]]\nproperty = 'bias'\nreason = \"\"\"two\n\n  lines \\u001b[2J\"\"\"\n";
+        assert_eq!(Allowance::of_toml(text).unwrap()[0].reason, "two lines \\u001b[2J");
+        for nothing in ["", "# nothing is known\n", "allow = []\n"] {
+            assert_eq!(Allowance::of_toml(nothing), Ok(Vec::new()), "{nothing:?}");
+        }
     }
 }

@@ -29,6 +29,18 @@ pub(super) fn end(group: u32, value: &str) {
     let _ = value;
 }
 
+/// Most memory that was resident at a time of the largest process among the program `group` and those that carry
+/// the mark `value`, bytes; `None` where the system does not say.
+pub(super) fn peak_memory_bytes(group: u32, value: &str) -> Option<u64> {
+    #[cfg(target_os = "linux")]
+    return linux::peak_memory_bytes(|process| process.id == group || process.carries(value));
+    #[cfg(not(target_os = "linux"))]
+    {
+        let _ = (group, value);
+        None
+    }
+}
+
 /// Whether orphans become children of this process.
 #[cfg(target_os = "linux")]
 static ADOPTS: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(false);
@@ -125,6 +137,17 @@ mod linux {
         let (state, parent) = (fields.next()?, fields.next()?.parse().ok()?);
         let (group, session) = (fields.next()?.parse().ok()?, fields.next()?.parse().ok()?);
         Some(Process { id, parent, group, session, has_ended: matches!(state, "Z" | "X") })
+    }
+
+    /// The largest peak of resident memory of the processes that `wanted` names, bytes.
+    pub fn peak_memory_bytes(wanted: impl Fn(&Process) -> bool) -> Option<u64> {
+        let peaks = processes().filter(wanted).filter_map(|process| {
+            let status = std::fs::read_to_string(format!("/proc/{}/status", process.id)).ok()?;
+            // `VmHWM:     1234 kB`, see proc_pid_status(5).
+            let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+            line.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok()
+        });
+        peaks.max().map(|kilobytes| 1024 * kilobytes)
     }
 
     /// Ends the processes that `wanted` names, until none is found.

@@ -5,7 +5,7 @@ use super::accept::{Breakage, id_in, read_line};
 use super::plan::{Asked, Plan, PlanError, Purpose};
 use super::protocol::{Answer, Problem};
 use super::recorder::{self, Recorder};
-use super::solver::Solver;
+use super::solver::{Given, Solver};
 use calibench::camera::{Model, UnknownModel};
 use calibench::io::hash::sha256_hex;
 use calibench::io::{InputError, read_regular_text, write_atomically};
@@ -124,10 +124,10 @@ fn problem_lines(plan: &Plan) -> String {
 fn truth_lines(plan: &Plan) -> String {
     let lines = plan.cases.iter().filter(|c| !matches!(c.purpose, Purpose::Variant(_))).map(|case| {
         let (camera, poses) = match case.purpose {
-            Purpose::Bad(index) => (plan.bad[index].truth, &[][..]),
+            Purpose::Bad(index) => (plan.bad[index].truth, Vec::new()),
             _ => {
-                let truth = &plan.scenarios[case.scenario].scene.truth;
-                (truth.camera, &truth.cam_from_target[..])
+                let setup = plan.scenarios[case.scenario].setup_of(plan.seed, case.trial);
+                (setup.scene.truth.camera, setup.scene.truth.cam_from_target.clone())
             }
         };
         let parameters: BTreeMap<&str, f64> =
@@ -222,5 +222,10 @@ impl Solver for Recorded {
         let stray = self.stray.as_ref().map_or(String::new(), |stray| format!(" ({stray})"));
         let missing = || Err(Breakage::Missing { what: format!("the answer to {}{stray}", problem.id) });
         self.answers.get(&problem.id).cloned().unwrap_or_else(missing)
+    }
+
+    /// How long an answer took is not in the file: its time is no number.
+    fn give_all(&self, problems: &[Problem]) -> Vec<Given> {
+        problems.iter().map(|problem| Given { answer: self.ask(problem), seconds: f64::NAN }).collect()
     }
 }

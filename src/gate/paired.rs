@@ -42,7 +42,7 @@ pub struct Comparison {
     /// The same of the stated uncertainty: a parameter or an uncorrelated combination of some, the ratio of
     /// its stated variances.
     pub stated: Option<(String, f64, f64)>,
-    /// Median time new / reference.
+    /// Median time new / reference; NaN, and `null` in JSON, where one of the two is not known.
     pub time: f64,
 }
 
@@ -132,10 +132,8 @@ fn of_scenario(scenario: &Scenario, replies: Vec<(&Seen, &Seen)>) -> Comparison 
             _ => None,
         })
         .collect();
-    let sd: Vec<f64> =
-        scenario.free.iter().map(|p| scenario.bound.standard_deviation(p).unwrap_or(f64::NAN)).collect();
     let standardised = |i: usize| -> Vec<(f64, f64)> {
-        both.iter().map(|(n, o)| (n.errors[i] / sd[i], o.errors[i] / sd[i])).collect()
+        both.iter().map(|(n, o)| (n.standardised[i], o.standardised[i])).collect()
     };
     let names: Vec<Parameter> = scenario.free.iter().collect();
     let estimates = |test: Test, matters: fn(f64) -> bool| {
@@ -287,7 +285,7 @@ impl Paired {
                 told(&c.shift),
                 told(&c.spread),
                 told(&c.stated),
-                significant(c.time, 2),
+                if c.time.is_finite() { significant(c.time, 2) } else { "-".to_string() },
                 if self.moved(c) { "  MOVED" } else { "" }
             ));
             if c.lost + c.gained > 0 {
@@ -314,10 +312,14 @@ impl Paired {
             (true, _) => "SAME LAW: bits differ, nothing that matters does",
             (false, _) => "CHANGED",
         };
+        let time = median(self.comparisons.iter().map(|c| c.time).filter(|time| time.is_finite()));
+        let time = match time.is_finite() {
+            true => format!("median time {} of the reference's", significant(time, 3)),
+            false => "times are not known of answers in files".to_string(),
+        };
         text.push_str(&format!(
-            "\n{conclusion}; median time {} of the reference's\nby chance two solvers of one law are told apart in one run of {} \
+            "\n{conclusion}; {time}\nby chance two solvers of one law are told apart in one run of {} \
              ({} tests, Bonferroni)\n",
-            significant(median(self.comparisons.iter().map(|c| c.time)), 3),
             significant(1.0 / self.false_alarm_rate, 3),
             self.tests
         ));

@@ -165,7 +165,9 @@ impl Plan {
         let sample = |id| problem_of(scenario(), &self.observe(scenario(), case.trial), id);
         match case.purpose {
             Purpose::Bad(index) => Problem { id: self.id(case), ..self.bad[index].problem.clone() },
-            Purpose::Exact => problem_of(scenario(), &scenario().scene.exact(), self.id(case)),
+            Purpose::Exact => {
+                problem_of(scenario(), &scenario().setup_of(self.seed, case.trial).exact(), self.id(case))
+            }
             Purpose::Sample | Purpose::Repeat => sample(self.id(case)),
             Purpose::Variant(variant) => variant.apply(&sample(String::new()), self.id(case)),
         }
@@ -195,9 +197,14 @@ impl Plan {
     fn observe(&self, scenario: &Scenario, trial: u64) -> Vec<View> {
         let key = |purpose| StreamKey { seed: self.seed, scenario: scenario.id, trial, purpose };
         if let Some(violation) = &scenario.violation {
-            return violation.observe(&scenario.scene, scenario.sigma_px, &mut Stream::open(key("noise")));
+            return violation.observe(
+                &scenario.setup.scene,
+                scenario.sigma_px,
+                &mut Stream::open(key("noise")),
+            );
         }
-        let views = scenario.scene.observe(scenario.sigma_px, &mut Stream::open(key("noise")));
+        let setup = scenario.setup_of(self.seed, trial);
+        let views = setup.observe(scenario.sigma_px, &mut Stream::open(key("noise")));
         if scenario.outliers == 0.0 {
             return views;
         }
@@ -253,7 +260,7 @@ fn displaced(view: &View, share: f64, stream: &mut Stream) -> View {
 }
 
 fn problem_of(scenario: &Scenario, views: &[View], id: String) -> Problem {
-    let truth = &scenario.scene.truth;
+    let truth = &scenario.setup.scene.truth;
     Problem::of_views(id, truth.image_size, views, &truth.camera, scenario.free)
 }
 

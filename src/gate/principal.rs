@@ -7,12 +7,15 @@
 //! every one if `w_i^T S w_i = 1`. A correlation of 0.996 that is left out makes that 250.
 
 use calibench::camera::{FreeParameters, Parameter};
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, Matrix6, SymmetricEigen};
 
 /// Components below this part of the largest are left out of the name.
 const NAMED: f64 = 0.5;
 
-/// The uncorrelated combinations of parameters under a covariance.
+/// Names of what a pose covariance is of.
+pub const OF_POSE: [&str; 6] = ["rx", "ry", "rz", "tx", "ty", "tz"];
+
+/// The uncorrelated combinations of parameters under a covariance, the best known first.
 #[derive(Debug, Clone)]
 pub struct Principal {
     directions: Vec<Direction>,
@@ -27,19 +30,29 @@ struct Direction {
 impl Principal {
     /// Those of the parameters `free`, whose covariance is positive definite.
     pub fn of(covariance: &DMatrix<f64>, free: FreeParameters) -> Principal {
+        Principal::named(covariance, &free.iter().map(Parameter::name).collect::<Vec<_>>())
+    }
+
+    /// Those of a pose: rotation about x, y, z, then translation along them.
+    pub fn of_pose(covariance: &Matrix6<f64>) -> Principal {
+        Principal::named(&DMatrix::from_fn(6, 6, |i, j| covariance[(i, j)]), &OF_POSE)
+    }
+
+    fn named(covariance: &DMatrix<f64>, names: &[&'static str]) -> Principal {
         let sd = covariance.diagonal().map(f64::sqrt);
         let n = sd.len();
         let correlations = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / (sd[i] * sd[j]));
         let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(correlations);
-        let parameters: Vec<Parameter> = free.iter().collect();
         let direction = |i: usize| {
             let v = eigenvectors.column(i);
             Direction {
-                name: name(&v.into_owned(), &parameters),
+                name: name(&v.into_owned(), names),
                 weights: v.component_div(&sd) / eigenvalues[i].sqrt(),
             }
         };
-        Principal { directions: (0..n).map(direction).collect() }
+        let mut best_known_first: Vec<usize> = (0..n).collect();
+        best_known_first.sort_by(|&a, &b| eigenvalues[a].total_cmp(&eigenvalues[b]));
+        Principal { directions: best_known_first.into_iter().map(direction).collect() }
     }
 
     /// `w_i^T S w_i` for a covariance of the same parameters.
@@ -53,20 +66,16 @@ impl Principal {
     }
 }
 
-fn name(v: &DVector<f64>, parameters: &[Parameter]) -> String {
+fn name(v: &DVector<f64>, names: &[&'static str]) -> String {
     let largest = v.amax();
-    let mut parts: Vec<(f64, Parameter)> = v
-        .iter()
-        .copied()
-        .zip(parameters.iter().copied())
-        .filter(|(x, _)| x.abs() >= NAMED * largest)
-        .collect();
+    let mut parts: Vec<(f64, &str)> =
+        v.iter().copied().zip(names.iter().copied()).filter(|(x, _)| x.abs() >= NAMED * largest).collect();
     // Of a direction and its opposite the one whose first part is positive.
     if parts.first().is_some_and(|(x, _)| *x < 0.0) {
         parts.iter_mut().for_each(|(x, _)| *x = -*x);
     }
     let mut text = String::new();
-    for (i, (x, parameter)) in parts.into_iter().enumerate() {
+    for (i, (x, part)) in parts.into_iter().enumerate() {
         text.push_str(if i == 0 {
             ""
         } else if x < 0.0 {
@@ -74,7 +83,7 @@ fn name(v: &DVector<f64>, parameters: &[Parameter]) -> String {
         } else {
             " + "
         });
-        text.push_str(parameter.name());
+        text.push_str(part);
     }
     text
 }

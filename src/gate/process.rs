@@ -2,7 +2,7 @@
 
 use super::accept::{Breakage, LINE_HEAD, id_in, read_line};
 use super::greeting::{Greeting, probe};
-use super::program::{Ending, MOST_LINE_BYTES, PipedProgram, Silence};
+use super::program::{Ending, MOST_LINE_BYTES, PipedProgram, ProgramEnd, Silence};
 use super::protocol::{Answer, Problem};
 use super::quoted::quoted;
 use super::solver::{Given, Solver};
@@ -218,6 +218,20 @@ impl Solver for Process {
     fn ask(&self, problem: &Problem) -> Result<Answer, Breakage> {
         let mut worker = self.workers[0].lock().unwrap_or_else(PoisonError::into_inner);
         self.ask_worker(&mut worker, problem)
+    }
+
+    /// Of the copies that run; one that broke last is ended already.
+    fn finish(&self) -> Vec<ProgramEnd> {
+        let running = self
+            .workers
+            .iter()
+            .filter_map(|worker| worker.lock().unwrap_or_else(PoisonError::into_inner).running.take());
+        let running: Vec<Running> = running.collect();
+        std::thread::scope(|scope| {
+            let ends: Vec<_> =
+                running.into_iter().map(|running| scope.spawn(|| running.program.finish())).collect();
+            ends.into_iter().filter_map(|end| end.join().ok()).collect()
+        })
     }
 
     fn give_all(&self, problems: &[Problem]) -> Vec<Given> {

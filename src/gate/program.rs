@@ -2,21 +2,24 @@
 
 use super::descendants;
 use super::quoted::quoted;
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read, Write};
-use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, Stdio};
+use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Bytes of a line. The answer to the largest problem, poses of all views and a full covariance, takes 20 kB.
+/// Bytes of a line. The answer to the largest problem, thirty-two poses with their covariances, takes 37 kB.
 pub const MOST_LINE_BYTES: usize = 1 << 20;
 /// How long is waited before something is looked at again.
 const MOMENT: Duration = Duration::from_millis(5);
 /// How long a program whose output is closed is given to end by itself.
 const LAST_WORDS: Duration = Duration::from_millis(500);
+/// How long a program is given to end by itself when its input has ended: some write out what they learnt.
+const AFTER_INPUT: Duration = Duration::from_secs(5);
 /// Bytes of standard error that are quoted.
 const STDERR_TAIL: usize = 400;
 /// Lines that are read ahead: with the longest lines 16 MB a program. A program that writes on waits for its
@@ -91,11 +94,46 @@ pub enum Silence {
     },
 }
 
+/// How a program ended when its input had ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct ProgramEnd {
+    /// Whether it ended by itself, within five seconds; else it was ended.
+    pub by_itself: bool,
+    /// Its exit code, if it ended by itself and not by a signal.
+    pub exit_code: Option<i32>,
+    /// The signal that it ended by itself with.
+    pub signal: Option<i32>,
+    /// Most memory that was resident at a time, of the largest process of those that ran when its input ended; `None`
+    /// where the system does not say, as systems other than Linux.
+    pub peak_memory_bytes: Option<u64>,
+}
+
+impl ProgramEnd {
+    fn of(status: Option<ExitStatus>, peak_memory_bytes: Option<u64>) -> ProgramEnd {
+        #[cfg(unix)]
+        let signal = status.and_then(|status| std::os::unix::process::ExitStatusExt::signal(&status));
+        #[cfg(not(unix))]
+        let signal = None;
+        let exit_code = status.and_then(|status| status.code());
+        ProgramEnd { by_itself: status.is_some(), exit_code, signal, peak_memory_bytes }
+    }
+
+    /// In words.
+    pub fn how(&self) -> String {
+        match (self.exit_code, self.signal) {
+            (Some(code), _) => format!("exit code {code}"),
+            (None, Some(signal)) => format!("ended by signal {signal}"),
+            (None, None) => "did not end with its input".to_string(),
+        }
+    }
+}
+
 /// A running program. Dropped, it is ended with all that it started.
 #[derive(Debug)]
 pub struct PipedProgram {
     child: Child,
-    to_child: Sender<String>,
+    /// Nothing once its input has ended.
+    to_child: Option<Sender<String>>,
     from_child: Receiver<Heard>,
     /// Its mark in the environment, see [`descendants`].
     mark: String,
@@ -136,7 +174,7 @@ impl PipedProgram {
         std::thread::spawn(move || write_lines(stdin, &lines_in));
         std::thread::spawn(move || read_lines(stdout, &lines_out));
         let stderr_reader = std::thread::spawn(move || keep_tail(errors, &kept));
-        Ok(PipedProgram { child, to_child, from_child, mark, stderr, stderr_reader })
+        Ok(PipedProgram { child, to_child: Some(to_child), from_child, mark, stderr, stderr_reader })
     }
 
     pub(super) fn ending(&self) -> Ending {
@@ -148,7 +186,8 @@ impl PipedProgram {
     /// # Errors
     /// The program reads no more.
     pub fn send(&mut self, line: String) -> Result<(), Silence> {
-        self.to_child.send(line).map_err(|_| self.ended())
+        let sent = self.to_child.as_ref().is_some_and(|to_child| to_child.send(line).is_ok());
+        if sent { Ok(()) } else { Err(self.ended()) }
     }
 
     /// The next line that is not empty, without white space around it.
@@ -163,6 +202,23 @@ impl PipedProgram {
             Err(RecvTimeoutError::Timeout) => Err(Silence::Late),
             Err(RecvTimeoutError::Disconnected) => Err(self.ended()),
         }
+    }
+
+    /// Ends the program's input and waits for it to end by itself; what it still writes is not read.
+    pub fn finish(mut self) -> ProgramEnd {
+        let peak = descendants::peak_memory_bytes(self.child.id(), &self.mark);
+        self.to_child = None;
+        let deadline = Instant::now() + AFTER_INPUT;
+        let status = loop {
+            // A program that writes to a full pipe would never end.
+            while self.from_child.try_recv().is_ok() {}
+            match self.child.try_wait() {
+                Ok(Some(status)) => break Some(status),
+                Ok(None) if Instant::now() < deadline => std::thread::sleep(MOMENT),
+                _ => break None,
+            }
+        };
+        ProgramEnd::of(status, peak)
     }
 
     /// How the program ended, and the end of what it wrote to standard error.

@@ -2,6 +2,7 @@
 //! the protocol too.
 
 use super::accept::Breakage;
+use super::program::ProgramEnd;
 use super::protocol::{Answer, Problem};
 use super::solver::{Given, Solver};
 use calibench::camera::Model;
@@ -50,6 +51,10 @@ impl Solver for Recorder<'_> {
         let answer = self.solver.ask(problem);
         self.keep(problem, &answer);
         answer
+    }
+
+    fn finish(&self) -> Vec<ProgramEnd> {
+        self.solver.finish()
     }
 
     fn give_all(&self, problems: &[Problem]) -> Vec<Given> {

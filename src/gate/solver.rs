@@ -2,12 +2,14 @@
 //! process.
 
 use super::accept::{Breakage, Outcome, accept, free_of};
+use super::program::ProgramEnd;
 use super::protocol::{Answer, AnswerCovariance, AnswerPose, Problem, Status};
 use calibench::board::{View, ViewError};
 use calibench::calibrate::{LensCalibration, Settings, Termination, Warning, calibrate_lens};
 use calibench::camera::{Camera, FreeParameters, Lens, Model};
 use calibench::geometry::{Pose, Vec2};
 use calibench::io::message;
+use nalgebra::Matrix6;
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -16,7 +18,7 @@ use std::time::Instant;
 pub struct Reply {
     /// What became of the problem.
     pub outcome: Outcome,
-    /// From question to answer, s.
+    /// From question to answer, s; NaN where it is not known, as of answers in files.
     pub seconds: f64,
 }
 
@@ -41,6 +43,11 @@ pub trait Solver: Sync {
         problems.par_iter().map(|problem| Given::taken(|| self.ask(problem))).collect()
     }
 
+    /// Ends the programs that were started to answer, and says how each ended: for the end of a run.
+    fn finish(&self) -> Vec<ProgramEnd> {
+        Vec::new()
+    }
+
     /// The answers to many, checked.
     fn ask_all(&self, problems: &[Problem]) -> Vec<Reply> {
         problems.iter().zip(self.give_all(problems)).map(|(problem, given)| given.checked(problem)).collect()
@@ -52,7 +59,7 @@ pub trait Solver: Sync {
 pub struct Given {
     /// The answer as it came.
     pub answer: Result<Answer, Breakage>,
-    /// From question to answer, s.
+    /// From question to answer, s; NaN where it is not known.
     pub seconds: f64,
 }
 
@@ -165,11 +172,17 @@ pub(super) fn answer(id: &str, calibration: &LensCalibration) -> Answer {
             parameters: names().collect(),
             matrix: covariance.intrinsics.row_iter().map(|row| row.iter().copied().collect()).collect(),
         }),
+        pose_covariances: Some(covariance.poses.iter().map(rows).collect()),
         rmse: Some(calibration.rmse_px),
         warnings: flags.map(ToString::to_string).collect(),
         message: (calibration.termination != Termination::Converged)
             .then(|| calibration.termination.name().to_string()),
     }
+}
+
+/// A pose covariance in the words of the protocol.
+pub(super) fn rows(covariance: &Matrix6<f64>) -> Vec<Vec<f64>> {
+    covariance.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 
 fn answer_pose(pose: &Pose) -> AnswerPose {

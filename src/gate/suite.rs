@@ -1,17 +1,19 @@
 //! On which scenes is a solver judged? Families of cameras and poses with known truth, as data.
 
 mod other_lenses;
+mod ragged;
 mod violations;
 
 use super::principal::Principal;
+use super::setup::{Setup, SetupError};
 use super::violation::Violation;
 use calibench::board::{Board, BoardError, Pattern};
-use calibench::calibrate::Covariance;
 use calibench::camera::{BrownConrady, Camera, FreeParameters, Lens, Model, Parameter};
-use calibench::evaluate::{BoundError, cramer_rao};
-use calibench::geometry::{Pose, Vec2};
+use calibench::geometry::Pose;
 use calibench::synth::scene::looking_at_centre;
-use calibench::synth::{Scene, SceneError, Truth};
+use calibench::synth::{Stream, StreamKey, Truth};
+use nalgebra::Vector6;
+use std::borrow::Cow;
 
 /// What can be asked of a solver on a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,6 +27,15 @@ pub enum Demand {
     Assumptions,
 }
 
+/// From which poses are the samples of a scene taken?
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Poses {
+    /// From the same.
+    Fixed,
+    /// From others for every sample, round those of the scene.
+    DrawnAnew,
+}
+
 /// A scene with its noise and the parameters to estimate.
 #[derive(Debug, Clone)]
 pub struct Scenario {
@@ -34,8 +45,11 @@ pub struct Scenario {
     pub about: &'static str,
     /// What is demanded.
     pub demand: Demand,
-    /// Truth and exact pixels.
-    pub scene: Scene<Lens>,
+    /// Truth, exact pixels and bound at `sigma_px`: of every sample where the poses are fixed, else see
+    /// [`Scenario::setup_of`].
+    pub setup: Setup,
+    /// Whether the poses are the same for every sample.
+    pub poses: Poses,
     /// What is estimated; the rest is held at the truth.
     pub free: FreeParameters,
     /// Standard deviation of a pixel coordinate.
@@ -52,35 +66,37 @@ pub struct Scenario {
     pub seen_in_residuals: f64,
     /// Most samples for which the second-order terms that the law neglects stay below its resolution.
     pub most: usize,
-    /// Cramer-Rao bound at `sigma_px`.
-    pub bound: Covariance,
-    /// Its uncorrelated combinations of parameters.
+    /// The bound's uncorrelated combinations of parameters.
     pub principal: Principal,
+    /// And those of every pose.
+    pub of_poses: Vec<Principal>,
 }
 
 /// A scene of the suite that cannot be built: a mistake in the suite.
 #[derive(Debug, thiserror::Error)]
 pub enum SuiteError {
-    /// The scene cannot be photographed.
+    /// The scene cannot be photographed, or determines nothing.
     #[error("{id}: {cause}")]
-    Scene {
+    Setup {
         /// Scenario.
         id: &'static str,
         /// Why.
-        cause: SceneError,
-    },
-    /// The scene determines nothing.
-    #[error("{id}: {cause}")]
-    Bound {
-        /// Scenario.
-        id: &'static str,
-        /// Why.
-        cause: BoundError,
+        cause: SetupError,
     },
     /// The board does not exist.
     #[error(transparent)]
     Board(#[from] BoardError),
 }
+
+impl SuiteError {
+    fn of(id: &'static str) -> impl Fn(SetupError) -> SuiteError {
+        move |cause| SuiteError::Setup { id, cause }
+    }
+}
+
+/// How far drawn poses lie from those of their scene: rotation about each axis, rad, then translation along each
+/// in units of the target.
+const DRAWN: [f64; 6] = [0.2, 0.2, 0.2, 6.0, 6.0, 10.0];
 
 /// Noise of the scenes that test the law. The bias of a least-squares estimate is of second order in the
 /// noise, so at a tenth of ordinary corner noise it is a tenth as large against the standard deviation: too
@@ -252,6 +268,7 @@ fn lawful() -> Vec<Draft> {
 pub fn suite() -> Result<Vec<Scenario>, SuiteError> {
     let mut scenarios: Vec<Scenario> =
         lawful().into_iter().map(|draft| build(draft, LAW_SIGMA_PX)).collect::<Result<_, _>>()?;
+    scenarios.extend(ragged::scenarios()?);
     let other_lenses = other_lenses::drafts()
         .into_iter()
         .map(|draft| Ok(Scenario { most: OTHER_LENSES, ..build(draft, LAW_SIGMA_PX)? }));
@@ -295,22 +312,26 @@ pub fn suite() -> Result<Vec<Scenario>, SuiteError> {
 }
 
 fn build(draft: Draft, sigma_px: f64) -> Result<Scenario, SuiteError> {
+    let setup = Setup::whole(truth_of(&draft)?, draft.free, sigma_px).map_err(SuiteError::of(draft.id))?;
+    Ok(scenario(&draft, sigma_px, setup))
+}
+
+fn truth_of(draft: &Draft) -> Result<Truth<Lens>, SuiteError> {
     let (columns, rows, spacing) = draft.board;
-    let cam_from_target = draft.poses.iter().map(pose).collect();
-    let truth = Truth {
+    Ok(Truth {
         camera: draft.camera,
         image_size: draft.image_size,
         points: Board::new(columns, rows, spacing, Pattern::Chessboard)?.points(),
-        cam_from_target,
-    };
-    let bound = cramer_rao(&truth, draft.free, sigma_px)
-        .map_err(|cause| SuiteError::Bound { id: draft.id, cause })?;
-    let scene = Scene::new(truth).map_err(|cause| SuiteError::Scene { id: draft.id, cause })?;
-    Ok(Scenario {
+        cam_from_target: draft.poses.iter().map(pose).collect(),
+    })
+}
+
+fn scenario(draft: &Draft, sigma_px: f64, setup: Setup) -> Scenario {
+    Scenario {
         id: draft.id,
         about: draft.about,
         demand: Demand::Law,
-        scene,
+        poses: Poses::Fixed,
         free: draft.free,
         sigma_px,
         outliers: 0.0,
@@ -318,9 +339,10 @@ fn build(draft: Draft, sigma_px: f64) -> Result<Scenario, SuiteError> {
         violation: None,
         seen_in_residuals: 0.0,
         most: usize::MAX,
-        principal: Principal::of(&bound.intrinsics, bound.free),
-        bound,
-    })
+        principal: Principal::of(&setup.bound.intrinsics, setup.bound.free),
+        of_poses: setup.bound.poses.iter().map(Principal::of_pose).collect(),
+        setup,
+    }
 }
 
 fn pose(&[x, y, z, across, down, distance]: &[f64; 6]) -> Pose {
@@ -333,22 +355,38 @@ fn pose(&[x, y, z, across, down, distance]: &[f64; 6]) -> Pose {
 impl Scenario {
     /// Its lens model.
     pub fn model(&self) -> Model {
-        self.scene.truth.camera.distortion.model()
+        self.setup.scene.truth.camera.distortion.model()
     }
 
-    /// Degrees of freedom of the residuals.
+    /// Degrees of freedom of the residuals; the same for every sample.
     pub fn degrees_of_freedom(&self) -> usize {
-        2 * self.scene.observations() - self.free.len() - 6 * self.scene.truth.cam_from_target.len()
+        self.setup.degrees_of_freedom()
     }
 
-    /// Largest distance of a pixel from the image, px; 0 if all lie inside.
-    pub fn outside_image_px(&self) -> f64 {
-        let (width, height) = self.scene.truth.image_size;
-        let beyond = |p: &Vec2| {
-            let over = |x: f64, size: usize| (-0.5 - x).max(x - (size as f64 - 0.5)).max(0.0);
-            over(p.x, width).max(over(p.y, height))
-        };
-        self.scene.pixels().iter().flatten().map(beyond).fold(0.0, f64::max)
+    /// What is photographed in a trial of a run with this seed.
+    pub fn setup_of(&self, seed: u64, trial: u64) -> Cow<'_, Setup> {
+        match self.poses {
+            Poses::Fixed => Cow::Borrowed(&self.setup),
+            Poses::DrawnAnew => {
+                let key = StreamKey { seed, scenario: self.id, trial, purpose: "poses" };
+                Cow::Owned(self.drawn(&mut Stream::open(key)))
+            }
+        }
+    }
+
+    /// The scene from other poses: the first that are drawn from which all marks are seen.
+    fn drawn(&self, stream: &mut Stream) -> Setup {
+        loop {
+            let mut moved = |pose: &Pose| {
+                pose.perturbed(&Vector6::from(DRAWN.map(|most| stream.uniform_in(-most, most))))
+            };
+            let truth = &self.setup.scene.truth;
+            let cam_from_target = truth.cam_from_target.iter().map(&mut moved).collect();
+            let drawn = Setup::whole(Truth { cam_from_target, ..truth.clone() }, self.free, self.sigma_px);
+            if let Some(setup) = drawn.ok().filter(|setup| setup.outside_image_px() == 0.0) {
+                return setup;
+            }
+        }
     }
 }
 
@@ -362,7 +400,8 @@ mod tests {
         for (i, scenario) in suite.iter().enumerate() {
             assert!(suite[..i].iter().all(|other| other.id != scenario.id));
         }
-        let outside = |s: &Scenario| (s.outside_image_px() > 0.0).then(|| (s.id, s.outside_image_px()));
+        let outside =
+            |s: &Scenario| (s.setup.outside_image_px() > 0.0).then(|| (s.id, s.setup.outside_image_px()));
         assert_eq!(suite.iter().filter_map(outside).collect::<Vec<_>>(), []);
     }
 
@@ -372,8 +411,8 @@ mod tests {
     fn the_noise_of_the_law_is_small_against_the_curvature() {
         for s in suite().unwrap().iter().filter(|s| s.demand == Demand::Law) {
             for parameter in s.free.iter() {
-                let scale = if parameter <= Parameter::Skew { s.scene.truth.camera.fx } else { 1.0 };
-                let sd = s.bound.standard_deviation(parameter).unwrap();
+                let scale = if parameter <= Parameter::Skew { s.setup.scene.truth.camera.fx } else { 1.0 };
+                let sd = s.setup.bound.standard_deviation(parameter).unwrap();
                 assert!(sd / scale < 0.02, "{} {parameter}: {sd}", s.id);
             }
         }

@@ -5,13 +5,14 @@ use super::accept::{Breakage, Estimate, Outcome};
 use super::covariance_form::CovarianceFault;
 use super::plan::{Case, Plan, Purpose};
 use super::protocol::Problem;
+use super::setup::Setup;
 use super::solver::{self, Reply};
 use super::suite::Scenario;
 use calibench::calibrate::calibrate_lens;
 use calibench::camera::{Camera, FreeParameters, Imaging, Lens, Parameter};
 use calibench::geometry::{Pose, Vec3};
 use calibench::synth::fnv1a;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector, Matrix6};
 
 /// What became of a case.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,10 +39,17 @@ pub struct Trial {
     pub camera: Camera<Lens>,
     /// Estimate - truth of the free parameters, in order.
     pub errors: Vec<f64>,
-    /// `e^T P^-1 e` under the bound: chi-squared with as many degrees of freedom as parameters.
+    /// The errors over the standard deviations of this trial's bound.
+    pub standardised: Vec<f64>,
+    /// `L^-1 e` with the bound `P = L L^T` of this trial: uncorrelated, of variance 1.
+    pub whitened: Vec<f64>,
+    /// `e^T P^-1 e` under the bound, the square of `whitened`: chi-squared with as many degrees of freedom as
+    /// parameters.
     pub nees: f64,
     /// Reported standard deviations.
     pub standard_deviations: Option<Vec<f64>>,
+    /// The same over those of the bound.
+    pub deviations_over_bound: Option<Vec<f64>>,
     /// What is wrong with the form of the reported covariance.
     pub covariance_fault: Option<CovarianceFault>,
     /// Variances of the reported covariance along the bound's principal directions, over the bound's
@@ -49,6 +57,10 @@ pub struct Trial {
     pub principal_variances: Option<Vec<f64>>,
     /// `e^T P^-1 e` under the reported covariance.
     pub own_nees: Option<f64>,
+    /// What is wrong with the form of a reported pose covariance.
+    pub pose_covariance_fault: Option<CovarianceFault>,
+    /// The reported covariance of one pose against the bound: of another view in every trial.
+    pub pose_spread: Option<Box<PoseSpread>>,
     /// Reported RMSE, px.
     pub rmse_px: Option<f64>,
     /// Sum of squared residuals at the reported camera and poses, px^2.
@@ -68,6 +80,17 @@ pub struct Trial {
     pub seconds: f64,
 }
 
+/// A reported pose covariance against the bound, both marginal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PoseSpread {
+    /// Variances of rotation about x, y, z and translation along them, over the bound's.
+    pub over_bound: Vec<f64>,
+    /// The same along the bound's uncorrelated combinations.
+    pub principal: Vec<f64>,
+    /// `e^T S^-1 e` of the reported pose under the reported covariance S, where both are stated.
+    pub own_nees: Option<f64>,
+}
+
 /// Trials whose poses are refitted, to learn how the solver defines its RMSE.
 pub const REFITTED: u64 = 8;
 /// A rotation matrix whose `R^T R` differs by more than this from the identity is none: single precision
@@ -83,13 +106,15 @@ pub fn reduce(plan: &Plan, case: &Case, problem: &Problem, reply: Reply) -> Seen
         Outcome::Unsupported(reason) => Seen::Unsupported(reason),
         Outcome::Estimate(estimate) => Seen::Estimate(Box::new(match case.purpose {
             Purpose::Bad(index) => measure_bad(&plan.bad[index].truth, problem, &estimate, seconds),
-            _ => measure(&plan.scenarios[case.scenario], case, problem, &estimate, seconds),
+            _ => measure(plan, case, problem, &estimate, seconds),
         })),
     }
 }
 
-fn measure(scenario: &Scenario, case: &Case, problem: &Problem, estimate: &Estimate, seconds: f64) -> Trial {
-    let truth = &scenario.scene.truth;
+fn measure(plan: &Plan, case: &Case, problem: &Problem, estimate: &Estimate, seconds: f64) -> Trial {
+    let scenario = &plan.scenarios[case.scenario];
+    let setup = scenario.setup_of(plan.seed, case.trial);
+    let truth = &setup.scene.truth;
     let camera = match case.purpose {
         Purpose::Variant(variant) => variant.undo(&estimate.camera),
         _ => estimate.camera,
@@ -97,19 +122,26 @@ fn measure(scenario: &Scenario, case: &Case, problem: &Problem, estimate: &Estim
     let errors = errors(&camera, &truth.camera, scenario.free);
     let plain = !matches!(case.purpose, Purpose::Variant(_));
     let poses = estimate.cam_from_target.as_ref().filter(|_| plain);
+    let whitened = whitened(&setup, &errors);
+    let sd: Vec<f64> = setup.bound.intrinsics.diagonal().iter().map(|variance| variance.sqrt()).collect();
+    let over_bound = |values: &[f64]| values.iter().zip(&sd).map(|(x, sd)| x / sd).collect();
     Trial {
-        nees: scenario.bound.normalised_error_squared(&errors).unwrap_or(f64::INFINITY),
+        standardised: over_bound(&errors),
+        nees: whitened.iter().map(|z| z * z).sum(),
+        whitened,
+        deviations_over_bound: estimate.standard_deviations.as_deref().map(over_bound),
         own_nees: own_nees(estimate, &errors),
         principal_variances: estimate
             .covariance
             .as_ref()
             .filter(|_| plain)
-            .map(|c| scenario.principal.variances(c)),
+            .map(|c| principal_variances(scenario, &setup, c)),
         square: poses.map(|poses| square(&estimate.camera, poses, problem)),
         refitted_square: (case.purpose == Purpose::Sample && case.trial < REFITTED)
             .then(|| refitted_square(&estimate.camera, problem))
             .flatten(),
-        pose_nees: poses.map(|poses| pose_nees(scenario, poses)),
+        pose_nees: poses.map(|poses| pose_nees(&setup, poses)),
+        pose_spread: plain.then(|| pose_spread(scenario, &setup, case.trial, estimate)).flatten(),
         camera,
         errors,
         ..unmeasured(estimate, seconds)
@@ -134,11 +166,16 @@ fn unmeasured(estimate: &Estimate, seconds: f64) -> Trial {
     Trial {
         camera: estimate.camera,
         errors: Vec::new(),
+        standardised: Vec::new(),
+        whitened: Vec::new(),
         nees: f64::NAN,
         standard_deviations: estimate.standard_deviations.clone(),
+        deviations_over_bound: None,
         covariance_fault: estimate.covariance_fault,
         principal_variances: None,
         own_nees: None,
+        pose_covariance_fault: estimate.pose_covariance_fault,
+        pose_spread: None,
         rmse_px: estimate.rmse_px,
         square: None,
         refitted_square: None,
@@ -148,6 +185,25 @@ fn unmeasured(estimate: &Estimate, seconds: f64) -> Trial {
         bits: fingerprint(estimate),
         seconds,
     }
+}
+
+/// Infinite where the bound is none.
+fn whitened(setup: &Setup, errors: &[f64]) -> Vec<f64> {
+    let factor = setup.bound.intrinsics.clone().cholesky();
+    let solved = factor.and_then(|f| f.l_dirty().solve_lower_triangular(&DVector::from_row_slice(errors)));
+    solved.map_or_else(|| vec![f64::INFINITY; errors.len()], |z| z.iter().copied().collect())
+}
+
+/// Variances along the principal directions of the scene's bound, over those of this trial's bound there.
+fn principal_variances(scenario: &Scenario, setup: &Setup, stated: &DMatrix<f64>) -> Vec<f64> {
+    let bound = scenario.principal.variances(&setup.bound.intrinsics);
+    scenario
+        .principal
+        .variances(stated)
+        .into_iter()
+        .zip(bound)
+        .map(|(stated, bound)| stated / bound)
+        .collect()
 }
 
 fn own_nees(estimate: &Estimate, errors: &[f64]) -> Option<f64> {
@@ -174,18 +230,47 @@ fn refitted_square(camera: &Camera<Lens>, problem: &Problem) -> Option<f64> {
     Some(fit.rmse_px * fit.rmse_px * fit.points() as f64)
 }
 
-fn pose_nees(scenario: &Scenario, poses: &[Pose]) -> Vec<f64> {
-    let truth = &scenario.scene.truth.cam_from_target;
-    let distance = |((estimate, truth), block): ((&Pose, &Pose), &nalgebra::SMatrix<f64, 6, 6>)| {
-        let r = &estimate.rotation;
-        let defect = (r.transpose() * r - nalgebra::Matrix3::identity()).amax();
-        if defect > NOT_A_ROTATION || r.determinant() < 0.0 {
-            return f64::INFINITY;
-        }
-        let e = truth.step_to(estimate);
-        block.cholesky().map_or(f64::INFINITY, |factor| e.dot(&factor.solve(&e)))
-    };
-    poses.iter().zip(truth).zip(&scenario.bound.poses).map(distance).collect()
+fn pose_nees(setup: &Setup, poses: &[Pose]) -> Vec<f64> {
+    let truth = &setup.scene.truth.cam_from_target;
+    let each = poses.iter().zip(truth).zip(&setup.bound.poses);
+    each.map(|((estimate, truth), bound)| pose_distance(truth, estimate, bound)).collect()
+}
+
+/// `e^T P^-1 e` of a pose; infinite where the matrix is no rotation or `P` no covariance.
+fn pose_distance(truth: &Pose, estimate: &Pose, covariance: &Matrix6<f64>) -> f64 {
+    let r = &estimate.rotation;
+    let defect = (r.transpose() * r - nalgebra::Matrix3::identity()).amax();
+    if defect > NOT_A_ROTATION || r.determinant() < 0.0 {
+        return f64::INFINITY;
+    }
+    let e = truth.step_to(estimate);
+    covariance.cholesky().map_or(f64::INFINITY, |factor| e.dot(&factor.solve(&e)))
+}
+
+/// All pose covariances have the estimated noise in common: one a trial says what all do, and the views take
+/// turns.
+fn pose_spread(
+    scenario: &Scenario,
+    setup: &Setup,
+    trial: u64,
+    estimate: &Estimate,
+) -> Option<Box<PoseSpread>> {
+    let stated = estimate.pose_covariances.as_ref()?;
+    let view = (trial % stated.len() as u64) as usize;
+    let (stated, bound) = (stated.get(view)?, setup.bound.poses.get(view)?);
+    let along =
+        |m: &Matrix6<f64>| scenario.of_poses[view].variances(&DMatrix::from_fn(6, 6, |i, j| m[(i, j)]));
+    let truth = &setup.scene.truth.cam_from_target[view];
+    let pose = estimate.cam_from_target.as_ref().map(|poses| &poses[view]);
+    Some(Box::new(PoseSpread {
+        over_bound: (0..6).map(|i| stated[(i, i)] / bound[(i, i)]).collect(),
+        principal: along(stated)
+            .into_iter()
+            .zip(along(bound))
+            .map(|(stated, bound)| stated / bound)
+            .collect(),
+        own_nees: pose.map(|pose| pose_distance(truth, pose, stated)),
+    }))
 }
 
 /// FNV-1a over the bits of every number.
@@ -195,5 +280,7 @@ fn fingerprint(estimate: &Estimate) -> u64 {
     let numbers = numbers.chain(poses.flat_map(|p| p.rotation.iter().chain(p.translation.iter()).copied()));
     let numbers = numbers.chain(estimate.standard_deviations.iter().flatten().copied());
     let numbers = numbers.chain(estimate.covariance.iter().flat_map(|c| c.iter().copied()));
+    let of_poses = estimate.pose_covariances.iter().flatten();
+    let numbers = numbers.chain(of_poses.flat_map(|c| c.iter().copied()));
     fnv1a(numbers.chain(estimate.rmse_px).flat_map(|x| x.to_bits().to_le_bytes()))
 }

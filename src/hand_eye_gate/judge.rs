@@ -6,7 +6,7 @@ use super::scene::{Demand, Scene};
 use calibench::distribution::{ChiSquare, fisher_tail};
 use calibench::geometry::Pose;
 use calibench::io::significant;
-use calibench_gate::judge::{Basis, Check, Property, Verdict};
+use calibench_gate::judge::{Basis, Check, Property};
 use calibench_gate::quoted::quoted;
 use nalgebra::{Matrix6, Vector6};
 
@@ -106,16 +106,7 @@ impl Answered {
     }
 
     fn check(&self, property: Property, basis: Basis, problems: usize, evidence: String) -> Check {
-        Check {
-            property,
-            scenario: self.scene.id,
-            basis,
-            grave: false,
-            evidence,
-            problems,
-            size_px: None,
-            verdict: Verdict::NotJudged,
-        }
+        Check::new(property, self.scene.id, basis, problems, evidence)
     }
 
     /// `sqrt(mean(e^T B^-1 e) / 6)` of the samples: 1 for errors as large as the bound.

@@ -1,10 +1,12 @@
-//! `calibench gate --against`: two solvers on the same problems.
+//! `calibench gate --against`: two solvers on the same problems, asked now or judged by the answers they gave
+//! before.
 
 use super::{Arguments, Stop, incomplete, of_files, plan_of, process, terms, usage};
 use crate::{Exit, print};
+use calibench::camera::Model;
 use calibench::io::{ShownPath, write_atomically};
 use calibench_gate::paired::{self, Paired};
-use calibench_gate::{Builtin, Plan, Report, Solver, files};
+use calibench_gate::{Asked, Builtin, Plan, Report, Solver, files};
 use calibench_harness::ProgressDisplay;
 use std::path::Path;
 
@@ -40,6 +42,7 @@ fn refuse_what_is_not_there(reference: &str) -> Result<(), Stop> {
     Ok(())
 }
 
+/// Compares a solver that is asked now.
 pub(super) fn run(
     arguments: &Arguments,
     solver: &dyn Solver,
@@ -48,7 +51,7 @@ pub(super) fn run(
 ) -> Result<Exit, Stop> {
     let (plan, other): (Plan, Box<dyn Solver>) = match reference {
         "builtin" => (plan_of(arguments, samples, || solver.models())?, Box::new(Builtin)),
-        folder if Path::new(folder).join("manifest.json").is_file() => {
+        folder if holds_a_run(folder) => {
             let (plan, answers) = files::recorded(Path::new(folder)).map_err(of_files)?;
             (plan, Box::new(answers))
         }
@@ -59,17 +62,92 @@ pub(super) fn run(
             (plan_of(arguments, samples, both)?, other)
         }
     };
+    compared(arguments, &plan, solver, other.as_ref())
+}
+
+/// Compares the answers in a folder, whose problems the reference is asked if it has not answered them before.
+pub(super) fn of_answers(arguments: &Arguments, folder: &Path, reference: &str) -> Result<Exit, Stop> {
+    let (plan, answers) = files::recorded(folder).map_err(of_files)?;
+    let (plan, other): (Plan, Box<dyn Solver>) = match reference {
+        "builtin" => (plan, Box::new(Builtin)),
+        before if holds_a_run(before) => {
+            let before = Path::new(before);
+            let (theirs, answers) = files::recorded(before).map_err(of_files)?;
+            (common((folder, &plan), (before, &theirs))?, Box::new(answers))
+        }
+        command => {
+            refuse_what_is_not_there(command)?;
+            let other = process(arguments, command)?;
+            let known = other.models();
+            let plan = of_models(&plan, &known)?.ok_or_else(|| {
+                usage(format!(
+                    "{command} knows none of the lens models whose problems {} answers",
+                    folder.shown()
+                ))
+            })?;
+            (plan, other)
+        }
+    };
+    compared(arguments, &plan, &answers, other.as_ref())
+}
+
+fn holds_a_run(reference: &str) -> bool {
+    Path::new(reference).join("manifest.json").is_file()
+}
+
+/// The problems that both folders answer: of the lens models that both have.
+fn common((ours, plan): (&Path, &Plan), (theirs, other): (&Path, &Plan)) -> Result<Plan, Stop> {
+    let asked = |plan: &Plan| (plan.seed, plan.samples, plan.asked.scenes.clone());
+    let common = if asked(plan) == asked(other) { of_models(plan, &other.asked.models)? } else { None };
+    common.ok_or_else(|| {
+        usage(format!(
+            "{} and {} answer other problems ({}; {}): record both with the same --seed, --samples, --scene and --models",
+            ours.shown(),
+            theirs.shown(),
+            in_words(plan),
+            in_words(other)
+        ))
+    })
+}
+
+/// The part of a plan that is of these lens models; `None` if it is empty.
+fn of_models(plan: &Plan, known: &[Model]) -> Result<Option<Plan>, Stop> {
+    let models: Vec<Model> =
+        plan.asked.models.iter().copied().filter(|model| known.contains(model)).collect();
+    if models.is_empty() {
+        return Ok(None);
+    }
+    let asked = Asked { models, scenes: plan.asked.scenes.clone() };
+    Plan::of(plan.seed, plan.samples, asked).map(Some).map_err(usage)
+}
+
+/// What a plan asks.
+fn in_words(plan: &Plan) -> String {
+    let models: Vec<&str> = plan.asked.models.iter().map(|model| model.name()).collect();
+    let scenes = match &plan.asked.scenes[..] {
+        [] => "all scenes".to_string(),
+        scenes => scenes.join(", "),
+    };
+    format!("seed {}, {} samples of {scenes} with {}", plan.seed, plan.samples, models.join(", "))
+}
+
+fn compared(
+    arguments: &Arguments,
+    plan: &Plan,
+    solver: &dyn Solver,
+    other: &dyn Solver,
+) -> Result<Exit, Stop> {
     let terms = terms(arguments)?;
     let ask = |solver: &dyn Solver| {
         let progress = ProgressDisplay::stderr().start("gate", plan.cases.len());
-        let seen = calibench_gate::run(&plan, solver, &|done| progress.advance(done));
-        let report = Report::new(&plan, "", &seen, &terms, 0.0);
+        let seen = calibench_gate::run(plan, solver, &|done| progress.advance(done));
+        let report = Report::new(plan, "", &seen, &terms, 0.0);
         (seen, report.checks)
     };
-    let (old, old_checks) = ask(other.as_ref());
+    let (old, old_checks) = ask(other);
     let (new, new_checks) = ask(solver);
     let paired: Paired = paired::compare(
-        &plan,
+        plan,
         (&solver.name(), &new, &new_checks),
         (&other.name(), &old, &old_checks),
         arguments.false_alarms,

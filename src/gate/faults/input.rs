@@ -28,6 +28,11 @@ pub(super) const FAULTS: &[Planted] = &[
         });
         correct(&changed)
     }),
+    gross(
+        "views-cut-to-the-shortest",
+        "marks beyond the number of the view with fewest are not used: a table of fixed width",
+        |p, _| cut_to_the_shortest(p),
+    ),
     gross("first-view-twice", "the first view counts twice", |p, _| {
         let mut changed = p.clone();
         // A hundredth of a pixel aside, as noise would put it: what is the same but for rounding the solver
@@ -38,6 +43,7 @@ pub(super) const FAULTS: &[Planted] = &[
         }));
         let mut given = correct(&changed);
         given.poses.iter_mut().for_each(|poses| poses.truncate(p.views.len()));
+        given.pose_covariances.iter_mut().for_each(|covariances| covariances.truncate(p.views.len()));
         given
     }),
     gross(
@@ -67,6 +73,20 @@ fn on_pixels(problem: &Problem, how: impl Fn(f64) -> f64) -> Answer {
     correct(&changed)
 }
 
+/// Points and pixels that do not pair are noticed all the same.
+fn cut_to_the_shortest(problem: &Problem) -> Answer {
+    if problem.views.iter().any(|view| view.target.len() != view.pixels.len()) {
+        return correct(problem);
+    }
+    let mut changed = problem.clone();
+    let fewest = problem.views.iter().map(|view| view.pixels.len()).min().unwrap_or(0);
+    changed.views.iter_mut().for_each(|view| {
+        view.target.truncate(fewest);
+        view.pixels.truncate(fewest);
+    });
+    correct(&changed)
+}
+
 fn last_view_unused(problem: &Problem) -> Answer {
     let whole = correct(problem);
     let (Status::Ok, Ok(mut all)) = (whole.status, views(problem)) else { return whole };
@@ -74,8 +94,11 @@ fn last_view_unused(problem: &Problem) -> Answer {
     let Ok(calibration) = calibrate_lens(&all, &settings(problem)) else { return whole };
     let mut given = answer(&problem.id, &calibration);
     let pose = last.and_then(|view| calibrate_lens(&[view], &only_poses(&calibration.camera)).ok());
-    if let (Some(poses), Some(found)) = (&mut given.poses, pose) {
-        poses.extend(answer("", &found).poses.into_iter().flatten());
+    if let Some(found) = pose {
+        let found = answer("", &found);
+        given.poses.iter_mut().for_each(|poses| poses.extend(found.poses.iter().flatten().cloned()));
+        let of_last = found.pose_covariances.iter().flatten();
+        given.pose_covariances.iter_mut().for_each(|all| all.extend(of_last.clone().cloned()));
     }
     given
 }
@@ -95,5 +118,6 @@ fn mended(problem: &Problem) -> Answer {
     {
         poses.resize(problem.views.len(), last);
     }
+    given.pose_covariances = None;
     given
 }

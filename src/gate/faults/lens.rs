@@ -57,6 +57,7 @@ fn another_lens(problem: &Problem) -> Answer {
         given.parameters.entry(name.clone()).or_insert(0.0);
     }
     given.covariance = right.covariance;
+    given.pose_covariances = right.pose_covariances;
     given.warnings = right.warnings;
     given
 }

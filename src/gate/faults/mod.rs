@@ -132,6 +132,7 @@ fn with_settings(problem: &Problem, adjust: impl FnOnce(Settings) -> Settings) -
             given.warnings = right.warnings;
             if given.covariance.as_ref().is_none_or(|c| c.parameters.len() < problem.free.len()) {
                 given.covariance = right.covariance;
+                given.pose_covariances = right.pose_covariances;
             }
             given
         }

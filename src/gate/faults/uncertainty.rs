@@ -3,10 +3,11 @@
 
 use super::{Planted, camera_of, freedom, gross, residuals, spoilt, subtle};
 use crate::accept::free_of;
-use crate::protocol::{Answer, Problem};
+use crate::protocol::{Answer, AnswerPose, Problem, ProblemView};
+use crate::solver::rows;
 use calibench::camera::{Parameter, project_with_jacobian};
-use calibench::geometry::{Vec2, Vec3};
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use calibench::geometry::{Pose, Vec2, Vec3};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SymmetricEigen};
 
 pub(super) const FAULTS: &[Planted] = &[
     gross("covariance-doubled", "covariance too large by 2", |p, _| spoilt(p, |a| scale_covariance(a, 2.0))),
@@ -36,6 +37,20 @@ pub(super) const FAULTS: &[Planted] = &[
         "covariance-of-the-median",
         "noise taken from the median residual: outliers do not widen it",
         |p, _| spoilt(p, |a| covariance_of_the_median(p, a)),
+    ),
+    gross(
+        "pose-covariance-of-a-known-camera",
+        "pose covariances conditional: without the uncertainty of the camera",
+        |p, _| spoilt(p, |a| pose_covariances_of_a_known_camera(p, a)),
+    ),
+    gross("pose-covariance-in-degrees", "rotations of the pose covariances in degrees", |p, _| {
+        let degrees = Matrix3::from_diagonal_element(1f64.to_degrees());
+        spoilt(p, |a| turn_pose_covariances(a, |_| degrees))
+    }),
+    gross(
+        "pose-covariance-about-the-target",
+        "pose covariances of rotations about the target's axes, not the camera's",
+        |p, _| spoilt(p, |a| turn_pose_covariances(a, |pose| pose.rotation.transpose())),
     ),
     subtle(
         "biased-fx-followed",
@@ -92,6 +107,34 @@ fn covariance_without_poses(problem: &Problem, answer: &mut Answer) {
     }
 }
 
+/// `s^2 (J_p^T J_p)^-1` with the columns of each pose only.
+fn pose_covariances_of_a_known_camera(problem: &Problem, answer: &mut Answer) {
+    let camera = camera_of(answer);
+    let rmse = answer.rmse.unwrap_or(0.0);
+    let variance = rmse * rmse * problem.points() as f64 / freedom(problem);
+    let of_view = |(pose, view): (&AnswerPose, &ProblemView)| {
+        let mut information = Matrix6::zeros();
+        for &[x, y] in &view.target {
+            let row = project_with_jacobian(&camera, &pose.pose(), &Vec3::new(x, y, 0.0)).ok()?;
+            information += row.pose.transpose() * row.pose;
+        }
+        Some(rows(&(information.try_inverse()? * variance)))
+    };
+    let views = answer.poses.iter().flatten().zip(&problem.views);
+    if let Some(known) = views.map(of_view).collect() {
+        answer.pose_covariances = Some(known);
+    }
+}
+
+/// Pose covariances whose rotations are multiplied by a matrix.
+fn turn_pose_covariances(answer: &mut Answer, by: impl Fn(&Pose) -> Matrix3<f64>) {
+    for (pose, stated) in answer.poses.iter().flatten().zip(answer.pose_covariances.iter_mut().flatten()) {
+        let mut turn = Matrix6::identity();
+        turn.fixed_view_mut::<3, 3>(0, 0).copy_from(&by(&pose.pose()));
+        *stated = rows(&(turn * Matrix6::from_fn(|i, j| stated[i][j]) * turn.transpose()));
+    }
+}
+
 /// The covariance with the noise that the median of `|r|` implies: on Gaussian noise the same but for chance.
 fn covariance_of_the_median(problem: &Problem, answer: &mut Answer) {
     /// Median of `|x|` for a standard normal variable.
@@ -118,7 +161,7 @@ fn biased_together(answer: &mut Answer, deviations: f64) {
             *value += deviations * row[fx] / stated.matrix[fx][fx].sqrt();
         }
     }
-    (answer.poses, answer.rmse) = (None, None);
+    (answer.poses, answer.pose_covariances, answer.rmse) = (None, None, None);
 }
 
 /// Adds noise with `share` of the stated covariance `D C D` (C the correlations): a step `sqrt(share) D C^1/2
@@ -128,7 +171,7 @@ fn biased_together(answer: &mut Answer, deviations: f64) {
 /// spread betrays it.
 fn add_noise(problem: &Problem, answer: &mut Answer, share: f64) {
     let residuals = residuals(problem, answer);
-    (answer.poses, answer.rmse) = (None, None);
+    (answer.poses, answer.pose_covariances, answer.rmse) = (None, None, None);
     let Some(stated) = &answer.covariance else { return };
     let n = stated.parameters.len();
     let sd: Vec<f64> = (0..n).map(|i| stated.matrix[i][i].sqrt()).collect();

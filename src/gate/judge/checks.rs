@@ -73,6 +73,8 @@ properties! {
     CovarianceForm = "covariance-form",
     /// The stated covariance is the true one.
     Covariance = "covariance",
+    /// Stated pose covariances are symmetric, positive definite, and the true ones.
+    PoseCovariance = "pose-covariance",
     /// The order of views does not matter.
     ViewOrder = "view-order",
     /// The order of points does not matter.
@@ -148,10 +150,14 @@ pub struct Check {
     pub size_px: Option<f64>,
     /// What was decided; `NotJudged` until then.
     pub verdict: Verdict,
+    /// The command that asks its scene again, where it fails.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub repeat: Option<String>,
 }
 
 impl Check {
-    pub(crate) fn new(
+    /// A check that is not decided yet.
+    pub fn new(
         property: Property,
         scenario: &'static str,
         basis: Basis,
@@ -168,6 +174,7 @@ impl Check {
             problems,
             size_px: None,
             verdict: Verdict::NotJudged,
+            repeat: None,
         }
     }
 

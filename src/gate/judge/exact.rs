@@ -97,6 +97,10 @@ fn time(scenario: &Scenario, answers: &Answers<'_>, limit_s: Option<f64>) -> Opt
             Seen::Unsupported(_) | Seen::Broken(_) => None,
         })
         .collect();
+    if !milliseconds.is_empty() && milliseconds.iter().all(|ms| ms.is_nan()) {
+        let evidence = "not known of answers in files";
+        return Some(Check::new(Property::Time, scenario.id, Basis::Told, 0, evidence));
+    }
     milliseconds.sort_by(f64::total_cmp);
     let last = milliseconds.len().checked_sub(1)?;
     let at = |share: f64| milliseconds[(share * last as f64) as usize];

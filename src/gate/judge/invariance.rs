@@ -37,12 +37,14 @@ fn compare(scenario: &Scenario, answers: &Answers<'_>, variant: Variant) -> Opti
         match (original, changed) {
             (Seen::Estimate(a), Seen::Estimate(b)) => {
                 compared += 1;
-                let moved: Vec<f64> = a.errors.iter().zip(&b.errors).map(|(a, b)| b - a).collect();
-                let square = scenario.bound.normalised_error_squared(&moved).unwrap_or(f64::INFINITY);
-                let px = equivalent_noise_px(scenario, square, moved.len());
+                let square = a.whitened.iter().zip(&b.whitened).map(|(a, b)| (b - a) * (b - a)).sum();
+                let px = equivalent_noise_px(scenario, square, a.whitened.len());
                 worst_px = Some(worst_px.map_or(px, |worst| worst.max(px)));
             }
-            (Seen::Refused { .. }, Seen::Refused { .. }) | (Seen::Broken(_), _) | (_, Seen::Broken(_)) => {}
+            (Seen::Refused { .. }, Seen::Refused { .. })
+            | (Seen::Unsupported(_), Seen::Unsupported(_))
+            | (Seen::Broken(_), _)
+            | (_, Seen::Broken(_)) => {}
             _ => one_sided += 1,
         }
     }

@@ -8,6 +8,7 @@ mod decide;
 mod exact;
 mod habits;
 mod invariance;
+mod pose_covariance;
 mod rmse;
 mod statistics;
 
@@ -31,27 +32,50 @@ pub fn judged(plan: &Plan, seen: &[Option<Seen>], terms: &Terms) -> Vec<Check> {
 pub fn check(plan: &Plan, seen: &[Option<Seen>], terms: &Terms) -> Vec<Check> {
     let habits = Habits::of(plan, seen);
     let mut checks = bad::check(plan, seen, habits);
-    for (index, scenario) in plan.scenarios.iter().enumerate() {
-        let answers = Answers::of(plan, seen, index, habits);
-        if let Some(reason) = answers.unsupported().filter(|_| habits.answers) {
-            let evidence = format!("not supported: {reason}");
-            checks.push(Check::new(Property::Convergence, scenario.id, Basis::Told, 0, evidence));
+    let all = all_answers(plan, seen);
+    let is_any_supported =
+        all.iter().any(|(_, answers)| !answers.cases.is_empty() && answers.unsupported().is_none());
+    for (scenario, answers) in &all {
+        if let Some(reason) = answers.unsupported() {
+            checks.push(unsupported_check(scenario, reason, is_any_supported, answers.cases.len()));
             continue;
         }
-        checks.extend(exact::protocol(scenario, &answers));
+        checks.extend(exact::protocol(scenario, answers));
         match scenario.demand {
-            Demand::Honesty => checks.push(bad::honesty(scenario, &answers)),
-            Demand::Assumptions => checks.push(assumptions::check(scenario, &answers)),
+            Demand::Honesty => checks.push(bad::honesty(scenario, answers)),
+            Demand::Assumptions => checks.push(assumptions::check(scenario, answers)),
             Demand::Law => {
-                checks.extend(exact::check(scenario, &answers, terms));
-                checks.push(habits::specificity(scenario, &answers));
-                checks.extend(statistics::check(scenario, &answers));
-                checks.extend(rmse::check(scenario, &answers));
-                checks.extend(invariance::check(scenario, &answers));
+                checks.extend(exact::check(scenario, answers, terms));
+                checks.push(habits::specificity(scenario, answers));
+                checks.extend(statistics::check(scenario, answers));
+                checks.extend(rmse::check(scenario, answers));
+                checks.extend(invariance::check(scenario, answers));
             }
         }
     }
     checks
+}
+
+/// The scenes of which every problem that was asked is unsupported, in the order of the plan.
+pub fn unsupported(plan: &Plan, seen: &[Option<Seen>]) -> Vec<&'static str> {
+    let all = all_answers(plan, seen).into_iter();
+    all.filter(|(_, answers)| answers.unsupported().is_some()).map(|(scenario, _)| scenario.id).collect()
+}
+
+fn all_answers<'a>(plan: &'a Plan, seen: &'a [Option<Seen>]) -> Vec<(&'a Scenario, Answers<'a>)> {
+    let habits = Habits::of(plan, seen);
+    let scenarios = plan.scenarios.iter().enumerate();
+    scenarios.map(|(index, scenario)| (scenario, Answers::of(plan, seen, index, habits))).collect()
+}
+
+/// A scene that is not supported is not judged. Where no scene is supported nothing was answered, and that
+/// does not hold.
+fn unsupported_check(scenario: &Scenario, reason: &str, is_any_supported: bool, problems: usize) -> Check {
+    let (basis, problems, what) = match is_any_supported {
+        true => (Basis::Told, 0, "not supported"),
+        false => (Basis::Certain(false), problems, "nothing that was asked is supported"),
+    };
+    Check::new(Property::Convergence, scenario.id, basis, problems, format!("{what}: {reason}"))
 }
 
 /// The answers of one scenario.
@@ -101,4 +125,104 @@ fn estimate(seen: &Seen) -> Option<&Trial> {
 /// An error of the camera as the noise that would cause it: `sigma sqrt(e^T P^-1 e / k)`, px.
 fn equivalent_noise_px(scenario: &Scenario, nees: f64, dimensions: usize) -> f64 {
     scenario.sigma_px * (nees / dimensions as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accept::Breakage;
+    use crate::plan::Asked;
+    use crate::protocol::{Answer, Problem, Status};
+    use crate::{Builtin, Report, Solver, run};
+
+    /// Answers some problems, and does what it is told with the others.
+    struct Partly {
+        answers: fn(&Problem) -> bool,
+        otherwise: fn(&Problem) -> Result<Answer, Breakage>,
+    }
+
+    impl Solver for Partly {
+        fn name(&self) -> String {
+            "a solver".into()
+        }
+
+        fn ask(&self, problem: &Problem) -> Result<Answer, Breakage> {
+            if (self.answers)(problem) { Builtin.ask(problem) } else { (self.otherwise)(problem) }
+        }
+    }
+
+    fn unsupported(problem: &Problem) -> Result<Answer, Breakage> {
+        Ok(Answer::without_estimate(&problem.id, Status::Unsupported, "no skew here"))
+    }
+
+    fn report(solver: &dyn Solver, scenes: &[&str]) -> Report {
+        let scenes = scenes.iter().map(|name| name.to_string()).collect();
+        let plan = Plan::of(1, 16, Asked { scenes, ..Asked::default() }).unwrap();
+        Report::new(&plan, "a solver", &run(&plan, solver, &|_| ()), &Terms::default(), 0.0)
+    }
+
+    /// The id of four-pose's problem without noise.
+    fn exact_id() -> String {
+        let plan = Plan::new(1, 1).unwrap();
+        plan.id(&Case { scenario: 0, purpose: Purpose::Exact, trial: 0 })
+    }
+
+    #[test]
+    fn a_scene_that_is_not_supported_is_not_judged_and_named_whatever_else_was_asked() {
+        let knows_no_skew = Partly {
+            answers: |problem| !problem.free.iter().any(|name| name == "skew"),
+            otherwise: unsupported,
+        };
+        let with_another = report(&knows_no_skew, &["skew-and-k3", "four-pose"]);
+        assert!(with_another.held(), "{}", with_another.details());
+        let alone = report(&knows_no_skew, &["skew-and-k3"]);
+        // Who answers nothing is not trusted, for that alone.
+        let failed: Vec<Property> = alone.failures().iter().map(|check| check.property).collect();
+        assert_eq!(failed, [Property::Convergence], "{}", alone.details());
+        for report in [with_another, alone] {
+            assert!(report.conclusion().contains("not supported: skew-and-k3"), "{}", report.conclusion());
+            let of_scene = report.checks.iter().filter(|check| check.scenario == "skew-and-k3");
+            assert!(of_scene.clone().count() > 0);
+            assert!(of_scene.clone().all(|check| !check.evidence.contains("one way round")));
+        }
+    }
+
+    #[test]
+    fn samples_that_are_unsupported_like_their_variants_are_not_answered_one_way_round() {
+        let exact_only = Partly { answers: |problem| problem.id == exact_id(), otherwise: unsupported };
+        let report = report(&exact_only, &["four-pose"]);
+        let variants = report.checks.iter().filter(|check| check.property == Property::ViewOrder);
+        let verdicts: Vec<Verdict> = variants.map(|check| check.verdict).collect();
+        assert_eq!(verdicts, [Verdict::NotJudged], "{}", report.to_text(200));
+    }
+
+    #[test]
+    fn a_program_that_never_answers_converges_nowhere() {
+        let silent = Partly { answers: |_| false, otherwise: |_| Err(Breakage::Timeout { seconds: 1.0 }) };
+        let report = report(&silent, &["four-pose"]);
+        let converges = report.checks.iter().filter(|check| check.property == Property::Convergence);
+        let verdicts: Vec<Verdict> = converges.map(|check| check.verdict).collect();
+        assert_eq!(verdicts, [Verdict::NotJudged], "{}", report.to_text(200));
+        assert!(!report.held());
+    }
+
+    #[test]
+    fn every_check_that_fails_has_in_json_the_command_that_the_text_has() {
+        let refuses = Partly {
+            answers: |_| false,
+            otherwise: |problem| Ok(Answer::without_estimate(&problem.id, Status::Refused, "no")),
+        };
+        let report = report(&refuses, &["four-pose", "metres"]).with_repeat("calibench gate --seed 1");
+        let details = report.details();
+        assert!(details.contains("again: calibench gate --seed 1 --scene four-pose\n"), "{details}");
+        let json: serde_json::Value = serde_json::from_str(&report.to_json()).unwrap();
+        assert_eq!(json["repeat"], "calibench gate --seed 1 --scene four-pose --scene metres");
+        let checks = json["checks"].as_array().unwrap();
+        for check in checks.iter().filter(|check| check["verdict"] == "failed") {
+            let scene = check["scenario"].as_str().unwrap();
+            assert_eq!(check["repeat"], format!("calibench gate --seed 1 --scene {scene}"));
+        }
+        assert!(checks.iter().any(|check| check["verdict"] == "failed"));
+        assert!(checks.iter().filter(|check| check["verdict"] != "failed").all(|c| c["repeat"].is_null()));
+    }
 }

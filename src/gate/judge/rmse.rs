@@ -28,7 +28,7 @@ pub(super) fn check(scenario: &Scenario, answers: &Answers<'_>) -> Vec<Check> {
         let silent = |property| Check::new(property, scenario.id, Basis::Told, 0, "no RMSE stated");
         return vec![silent(Property::RmseDefinition), silent(Property::Rmse)];
     }
-    let points = scenario.scene.observations() as f64;
+    let points = scenario.setup.observations() as f64;
     let freedom = scenario.degrees_of_freedom();
     let known = |ratios: &[f64]| {
         definitions(points, freedom as f64).into_iter().find(|(_, factor)| {

@@ -6,7 +6,7 @@
 
 use super::checks::{Basis, Check, Property};
 use super::habits::Habits;
-use super::{Answers, chance};
+use super::{Answers, chance, pose_covariance};
 use crate::plan::Purpose;
 use crate::suite::Scenario;
 use crate::trial::{Seen, Trial};
@@ -30,13 +30,16 @@ pub(super) fn check(scenario: &Scenario, answers: &Answers<'_>) -> Vec<Check> {
     checks.push(about.poses());
     checks.push(about.covariance_form());
     checks.push(about.covariance());
+    checks.push(pose_covariance::check(scenario, &samples));
     checks
 }
 
 fn convergence(scenario: &Scenario, answers: &Answers<'_>) -> Check {
     let mut first = None;
     let (mut asked, mut refused) = (0, 0);
-    for (_, seen) in answers.for_purpose(Purpose::Sample) {
+    // Where the protocol is broken nothing is known of the data.
+    let heard = answers.for_purpose(Purpose::Sample).filter(|(_, seen)| !matches!(seen, Seen::Broken(_)));
+    for (_, seen) in heard {
         asked += 1;
         if let Seen::Refused { reason, .. } | Seen::Unsupported(reason) = seen {
             refused += 1;
@@ -45,6 +48,7 @@ fn convergence(scenario: &Scenario, answers: &Answers<'_>) -> Check {
     }
     let p = chance::at_least(refused, asked, UNANSWERED);
     let evidence = match first {
+        None if asked == 0 => "nothing answered".to_string(),
         None => format!("no good problem of {asked} left unanswered"),
         Some(reason) => format!("{refused} of {asked} good problems left unanswered, first: {reason}"),
     };
@@ -83,16 +87,15 @@ impl About<'_> {
         self.scenario.free.len()
     }
 
-    /// Errors of one parameter in standard deviations of the bound.
-    fn standardised(&self, i: usize, parameter: Parameter) -> impl Iterator<Item = f64> {
-        let sd = self.scenario.bound.standard_deviation(parameter).unwrap_or(f64::NAN);
-        self.samples.iter().map(move |trial| trial.errors[i] / sd)
+    /// Errors of one parameter in standard deviations of the bound, each of its own sample's.
+    fn standardised(&self, i: usize) -> impl Iterator<Item = f64> {
+        self.samples.iter().map(move |trial| trial.standardised[i])
     }
 
     /// The parameter with the smallest p-value of `judge`, which gives the value to tell and its p-value.
-    fn worst(&self, judge: impl Fn(usize, Parameter) -> (f64, f64)) -> Option<Worst> {
+    fn worst(&self, judge: impl Fn(usize) -> (f64, f64)) -> Option<Worst> {
         let each = self.scenario.free.iter().enumerate().map(|(i, parameter)| {
-            let (value, p) = judge(i, parameter);
+            let (value, p) = judge(i);
             Worst { p, parameter, value }
         });
         // Where several are beyond doubt, that which is farthest off.
@@ -114,12 +117,11 @@ impl About<'_> {
     /// Each parameter's mean is normal, and all means together are chi-squared: a small error of one
     /// parameter that others should have followed shows in the second only.
     fn bias(&self) -> Check {
-        let mean = |i: usize| self.samples.iter().map(|t| t.errors[i]).sum::<f64>() / self.n();
-        let means: Vec<f64> = (0..self.dimensions()).map(mean).collect();
-        let square = self.n() * self.scenario.bound.normalised_error_squared(&means).unwrap_or(f64::INFINITY);
+        let mean = |i: usize| self.samples.iter().map(|t| t.whitened[i]).sum::<f64>() / self.n();
+        let square = self.n() * (0..self.dimensions()).map(|i| mean(i) * mean(i)).sum::<f64>();
         let joint = chance::above(square, self.dimensions());
-        let worst = self.worst(|i, parameter| {
-            let bias = self.standardised(i, parameter).sum::<f64>() / self.n();
+        let worst = self.worst(|i| {
+            let bias = self.standardised(i).sum::<f64>() / self.n();
             (bias, chance::normal(bias * self.n().sqrt()))
         });
         let Some(worst) = worst else { return self.check(Property::Bias, joint, "nothing is free".into()) };
@@ -136,9 +138,9 @@ impl About<'_> {
 
     fn variance(&self) -> Option<Check> {
         let freedom = self.samples.len().checked_sub(1).filter(|&f| f > 0)?;
-        let worst = self.worst(|i, parameter| {
-            let mean = self.standardised(i, parameter).sum::<f64>() / self.n();
-            let sum: f64 = self.standardised(i, parameter).map(|z| (z - mean) * (z - mean)).sum();
+        let worst = self.worst(|i| {
+            let mean = self.standardised(i).sum::<f64>() / self.n();
+            let sum: f64 = self.standardised(i).map(|z| (z - mean) * (z - mean)).sum();
             (sum / freedom as f64, chance::both_sides(sum, freedom))
         })?;
         let evidence =
@@ -179,16 +181,15 @@ impl About<'_> {
     /// units of the stated covariance follow an F distribution, whose normal scores have a mean of zero.
     fn covariance(&self) -> Check {
         let stated: Vec<&[f64]> =
-            self.samples.iter().filter_map(|t| t.standard_deviations.as_deref()).collect();
+            self.samples.iter().filter_map(|t| t.deviations_over_bound.as_deref()).collect();
         if stated.is_empty() {
             let evidence = "no standard deviations stated";
             return Check::new(Property::Covariance, self.scenario.id, Basis::Told, 0, evidence);
         }
         let freedom = self.scenario.degrees_of_freedom();
         let all = freedom * stated.len();
-        let worst = self.worst(|i, parameter| {
-            let sd = self.scenario.bound.standard_deviation(parameter).unwrap_or(f64::NAN);
-            let sum: f64 = stated.iter().map(|s| (s[i] / sd) * (s[i] / sd)).sum();
+        let worst = self.worst(|i| {
+            let sum: f64 = stated.iter().map(|s| s[i] * s[i]).sum();
             (sum / stated.len() as f64, chance::both_sides(sum * freedom as f64, all))
         });
         let Some(worst) = worst else {
@@ -282,6 +283,6 @@ impl About<'_> {
     }
 
     fn scene_points(&self) -> f64 {
-        self.scenario.scene.observations() as f64
+        self.scenario.setup.observations() as f64
     }
 }

@@ -22,7 +22,7 @@ impl Report {
         let mut page = format!(
             "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><meta name=\"viewport\" \
              content=\"width=device-width\"><title>calibench gate: {0}</title><style>{STYLE}</style>\n<h1>calibench gate</h1>\n\
-             <p class=\"sum{1}\"><b>{2}</b></p>\n<p>Solver <code>{0}</code>; {3} problems, {4} samples a scenario, seed {5}, {6} s; \
+             <p class=\"sum{1}\"><b>{2}</b></p>\n<p>Solver <code>{0}</code>; {3} problems, {4} samples a scenario, seed {5}, {6} s{8}; \
              gate at commit {7}.</p>\n",
             escape(&self.solver),
             if self.held() { "" } else { " bad" },
@@ -32,6 +32,7 @@ impl Report {
             self.seed,
             significant(self.seconds, 3),
             escape(self.commit.as_deref().unwrap_or("unknown")),
+            self.program_ended(),
         );
         page.push_str(
             "<p>Per property the worst check, or else the least probable. A p-value is the chance that a correct solver shows \

@@ -10,8 +10,9 @@ use super::allowances::Allowed;
 use super::bad_input::Fault;
 use super::judge::{self, Admission, Basis, Check, Property, Terms, Verdict};
 use super::plan::Plan;
+use super::program::ProgramEnd;
 use super::trial::Seen;
-use calibench::io::Commit;
+use calibench::io::{Commit, significant};
 use serde::Serialize;
 
 /// The outcome of a run.
@@ -27,7 +28,8 @@ pub struct Report {
     pub models: Vec<&'static str>,
     /// Names of the scenes that were asked; empty if none was left out.
     pub only: Vec<String>,
-    /// The command that repeats the run, if there is one.
+    /// The command that repeats the run, if there is one. Every check that fails has the command that asks its
+    /// scene again.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub repeat: Option<String>,
     /// Problems asked.
@@ -40,8 +42,13 @@ pub struct Report {
     pub verdict: Verdict,
     /// Wall-clock time, s.
     pub seconds: f64,
+    /// How each copy of the program ended when its input did, and its memory; empty where no program ran at the end.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub program_ends: Vec<ProgramEnd>,
     /// Commit of the gate.
     pub commit: Option<String>,
+    /// Scenes that were asked and that the solver says it is not made for.
+    pub unsupported: Vec<&'static str>,
     /// Every check.
     pub checks: Vec<Check>,
     /// What the solver says where the world is not the model.
@@ -93,12 +100,34 @@ impl Report {
             statistical_checks: statistical,
             verdict: checks.iter().map(|c| c.verdict).max().unwrap_or(Verdict::NotJudged),
             seconds,
+            program_ends: Vec::new(),
             commit: None,
             allowances: terms.allowances.iter().map(|allowance| allowance.applied(&checks)).collect(),
             checks,
+            unsupported: judge::unsupported(plan, seen),
             assumptions: judge::admissions(plan, seen),
             scenarios: described(plan),
         }
+    }
+
+    /// States how the program ended.
+    pub fn with_program_ends(self, program_ends: Vec<ProgramEnd>) -> Report {
+        Report { program_ends, ..self }
+    }
+
+    /// How the program ended and its memory, in words; nothing where none ran at the end.
+    fn program_ended(&self) -> String {
+        let mut how: Vec<String> = self.program_ends.iter().map(ProgramEnd::how).collect();
+        how.sort();
+        how.dedup();
+        if how.is_empty() {
+            return String::new();
+        }
+        let memory = match self.program_ends.iter().filter_map(|end| end.peak_memory_bytes).max() {
+            Some(bytes) => format!("peak memory {} MB", significant(bytes as f64 / 1e6, 3)),
+            None => "peak memory not known".to_string(),
+        };
+        format!("; {}, {memory}", how.join(" and "))
     }
 
     /// States the commit of the gate.
@@ -106,9 +135,15 @@ impl Report {
         Report { commit: commit.map(Commit::to_string), ..self }
     }
 
-    /// States the command that repeats the run.
-    pub fn with_repeat(self, command: String) -> Report {
-        Report { repeat: Some(command), ..self }
+    /// States the command that asks all scenes of the run, from which follow that of the run and that of every
+    /// check that fails.
+    pub fn with_repeat(mut self, command: &str) -> Report {
+        let of_scene = |scene: &str| format!(" --scene {scene}");
+        for check in self.checks.iter_mut().filter(|c| c.verdict >= Verdict::Failed) {
+            check.repeat = Some(format!("{command}{}", of_scene(check.scenario)));
+        }
+        let scenes: String = self.only.iter().map(|scene| of_scene(scene)).collect();
+        Report { repeat: Some(format!("{command}{scenes}")), ..self }
     }
 
     /// Whether nothing fails.

@@ -14,12 +14,13 @@ impl Report {
     /// One line a property, no longer than `columns`, then what follows.
     pub fn to_text(&self, columns: usize) -> String {
         let mut text = format!(
-            "gate: {} on {} problems, {} samples a scenario, seed {}, {} s\nlens models: {}{}\n\n",
+            "gate: {} on {} problems, {} samples a scenario, seed {}, {} s{}\nlens models: {}{}\n\n",
             self.solver,
             self.problems,
             self.samples,
             self.seed,
             significant(self.seconds, 3),
+            self.program_ended(),
             self.models.join(", "),
             if self.only.is_empty() { String::new() } else { format!("; only {}", self.only.join(", ")) },
         );
@@ -63,19 +64,30 @@ impl Report {
             self.statistical_checks
         );
         let accepted = self.accepted();
+        let unsupported = |before: &str| match &self.unsupported[..] {
+            [] => String::new(),
+            scenes => format!("{before}not supported: {}", scenes.join(", ")),
+        };
         match self.verdict {
             Verdict::Grave | Verdict::Failed => {
                 let grave = failures.iter().filter(|c| c.verdict == Verdict::Grave).count();
                 let fail = if failures.len() == 1 { "check fails" } else { "checks fail" };
-                format!("NOT TRUSTED: {} {fail}, {grave} gravely; {rate}", failures.len())
+                format!(
+                    "NOT TRUSTED: {} {fail}, {grave} gravely{}; {rate}",
+                    failures.len(),
+                    unsupported("; ")
+                )
             }
             _ if !self.only.is_empty() => {
-                format!("HELD on the scenes asked, which is no verdict on the whole{accepted}; {rate}")
+                let unsupported = unsupported(", but ");
+                format!(
+                    "HELD on the scenes asked, which is no verdict on the whole{accepted}{unsupported}; {rate}"
+                )
             }
-            _ => format!(
-                "TRUSTED: every check that could be judged holds{accepted}{}; {rate}",
-                self.unsupported()
-            ),
+            _ => {
+                let unsupported = unsupported(", but ");
+                format!("TRUSTED: every check that could be judged holds{accepted}{unsupported}; {rate}")
+            }
         }
     }
 
@@ -102,14 +114,6 @@ impl Report {
         told.collect()
     }
 
-    /// The scenes for which the solver is not made.
-    fn unsupported(&self) -> String {
-        let is_unsupported =
-            |c: &&Check| c.property == Property::Convergence && c.verdict == Verdict::NotJudged;
-        let scenes: Vec<&str> = self.checks.iter().filter(is_unsupported).map(|c| c.scenario).collect();
-        if scenes.is_empty() { String::new() } else { format!(", but not supported: {}", scenes.join(", ")) }
-    }
-
     /// The failing checks, property by property in the order in which one causes another: the first in full,
     /// the others by scenario.
     pub fn details(&self) -> String {
@@ -117,12 +121,12 @@ impl Report {
         for check in self.failures() {
             groups.entry((check.property, check.verdict)).or_default().push(check);
         }
-        groups.values().map(|checks| finding(checks, self.repeat.as_deref())).collect()
+        groups.values().map(|checks| finding(checks)).collect()
     }
 }
 
 /// What one property does wrong, and how its first scene is asked again.
-fn finding(checks: &[&Check], repeat: Option<&str>) -> String {
+fn finding(checks: &[&Check]) -> String {
     let first = checks[0];
     let p = match first.basis {
         Basis::Chance(p) => format!(" (p = {})", significant(p, 2)),
@@ -134,8 +138,8 @@ fn finding(checks: &[&Check], repeat: Option<&str>) -> String {
     if !others.is_empty() {
         text.push_str(&format!("    likewise {}\n", others.join(", ")));
     }
-    if let Some(repeat) = repeat {
-        text.push_str(&format!("    again: {repeat} --scene {}\n", first.scenario));
+    if let Some(repeat) = &first.repeat {
+        text.push_str(&format!("    again: {repeat}\n"));
     }
     text
 }
