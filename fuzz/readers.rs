@@ -7,6 +7,7 @@ use calibench::io::formats::{
 use calibench::io::image::{parse_extent, parse_image};
 use calibench::io::result::parse_camera;
 use calibench::io::robot::parse_robot;
+use calibench::io::scene_tables::{parse_target_marks, parse_target_poses};
 use calibench::io::{
     memory, parse_checks, parse_corners, parse_known, parse_marks, parse_pixel_ends, parse_point_pairs,
     parse_spatial, table,
@@ -44,13 +45,17 @@ pub fn corners(bytes: &[u8]) {
     let _ = parse_spatial("spatial", bytes);
 }
 
-/// Point pairs, marks of a part, pixels at both ends of lengths, poses of a robot, and checks of a reference.
+/// Point pairs, marks of a part, pixels at both ends of lengths, poses of a robot, checks of a reference, and marks and poses of a scene.
 pub fn pairs(bytes: &[u8]) {
     let _ = parse_point_pairs("pairs", bytes);
     let _ = parse_marks("marks", bytes);
     let _ = parse_pixel_ends("ends", bytes);
     let _ = parse_robot("robot", bytes);
     let _ = parse_checks("checks", bytes);
+    for cell in [None, Some(0)] {
+        let _ = parse_target_marks("marks", bytes, cell);
+        let _ = parse_target_poses("poses", bytes, cell);
+    }
 }
 
 /// Results and cameras.

@@ -82,6 +82,8 @@ fn what(name: &str) -> &'static str {
         "report.html" => "The report",
         "datapackage.json" => "The columns of the tables: types, units, descriptions",
         "trials.csv" | "trials.parquet" => "Every trial",
+        "marks.csv" => "The marks of each cell's target, mm",
+        "poses.csv" => "The poses of each cell's target, mm, for cells whose trials all meet the same",
         _ if name.starts_with("figures/") => "A figure of the report",
         _ => "A table of the report",
     }

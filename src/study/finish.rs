@@ -5,7 +5,7 @@ use super::engine::Engine;
 use super::folder::{Folder, FolderError};
 use super::manifest::Manifest;
 use super::summary::{Summary, summarise};
-use super::{described, figures, report};
+use super::{alone, described, figures, report};
 use calibench::io::hash::sha256_hex;
 
 /// Writes the results of a complete part into its folder.
@@ -20,6 +20,10 @@ pub fn finish(folder: &Folder, engine: &Engine) -> Result<Summary, FolderError> 
     let figures = figures::draw(engine, &summary);
     for figure in &figures {
         put(folder, &mut manifest, &format!("figures/{}", figure.file_name()), &figure.bytes)?;
+    }
+    put(folder, &mut manifest, alone::MARKS, alone::marks(engine).as_bytes())?;
+    if let Some(poses) = alone::poses(engine) {
+        put(folder, &mut manifest, alone::POSES, poses.as_bytes())?;
     }
     let trials = folder.put_trials(engine, &manifest)?;
     manifest.files.insert(manifest.trials.name().to_string(), trials);
