@@ -90,8 +90,8 @@ pub fn study(bytes: &[u8]) {
     let text = String::from_utf8_lossy(bytes);
     let Ok(spec) = Spec::parse(&text) else { return };
     let levels = spec.factor.iter().fold(1usize, |product, f| product.saturating_mul(f.count()));
-    let target = spec.scene.target;
-    let marks = target.columns.saturating_mul(target.rows);
+    let target = &spec.scene.target;
+    let marks = target.count();
     let draws = if spec.scene.poses.redraws() { DRAWS } else { 1 };
     let size = marks.saturating_mul(spec.scene.poses.views()).saturating_mul(levels).saturating_mul(draws);
     // Too large is refused before any work, as small is done at once; between them, poses that are drawn anew take long.

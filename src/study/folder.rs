@@ -274,6 +274,17 @@ impl Folder {
         Ok(Engine::with_inputs(&self.read("spec.toml")?, &self.inputs()?, shard)?)
     }
 
+    /// The study of the run with all trials that stand in the folder.
+    ///
+    /// # Errors
+    /// As [`Folder::engine`]; trials that are not those of the run.
+    pub fn replayed(&self) -> Result<Engine, RunError> {
+        let mut engine = self.engine(self.shard()?)?;
+        let mut trials = self.trials(&engine)?;
+        while trials.batch(&mut engine)? {}
+        Ok(engine)
+    }
+
     /// Which part of its study the run does.
     pub fn shard(&self) -> Result<Shard, FolderError> {
         self.manifest()?.shard.parse().map_err(|e: ShardError| self.damaged("manifest.json", e.to_string()))

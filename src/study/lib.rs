@@ -33,6 +33,7 @@ mod manifest;
 mod merge;
 mod moments;
 mod names;
+mod panels;
 #[cfg(feature = "parquet")]
 mod parquet;
 #[cfg(not(feature = "parquet"))]
@@ -68,7 +69,7 @@ pub use engine::{
     Engine, Interruption, Outcome, Pace, Worst, in_memory, in_memory_by, in_memory_seeing, in_memory_until,
 };
 pub use fingerprint::Fingerprint;
-pub use finish::finish;
+pub use finish::{finish, single_panels};
 pub use folder::{Folder, FolderError, Located};
 pub use frame::FrameQuantity;
 pub use inputs::Inputs;

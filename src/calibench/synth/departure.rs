@@ -52,7 +52,7 @@ impl Departure {
         }
         let truth = &scene.truth;
         let is_one_to_one = truth.camera.distortion.one_to_one();
-        let places: Vec<Vec3> = bowed(&truth.points, self.bow).collect();
+        let places: Vec<Vec3> = truth.points.iter().map(bowed(&truth.points, self.bow)).collect();
         let image = |point: Vec3| {
             is_one_to_one(&point).then(|| L::image(&truth.camera, &point)).flatten().filter(|pixel| {
                 // Right before the lens a pixel may be beyond all numbers.
@@ -65,14 +65,12 @@ impl Departure {
     }
 }
 
-/// Where the marks of a board are that bulges towards the camera by `height` in its middle, in the target's unit: a paraboloid
+/// Tells of the marks of a board where they are if it bulges towards the camera by `height` in its middle, in the target's unit: a paraboloid
 /// `Z = -h (1 - |p|^2 / r^2)`, `r` the distance of the farthest mark from the origin, so that the corner marks of a centred grid stay where
 /// they should be.
-pub fn bowed(points: &[Vec2], height: f64) -> impl Iterator<Item = Vec3> {
+pub fn bowed(points: &[Vec2], height: f64) -> impl Fn(&Vec2) -> Vec3 {
     let corner = points.iter().map(Vec2::norm_squared).fold(0.0, f64::max);
-    points
-        .iter()
-        .map(move |point| Vec3::new(point.x, point.y, -height * (1.0 - point.norm_squared() / corner)))
+    move |point| Vec3::new(point.x, point.y, -height * (1.0 - point.norm_squared() / corner))
 }
 
 /// Makes white noise on a grid, given row by row, a stationary field: each row, then each column, an autoregression of first order,
@@ -143,7 +141,7 @@ mod tests {
         // The first view faces the camera at 120 mm, the middle of the board on its axis: a mark beside it is magnified by
         // 120 / (120 - 2 (1 - 0.04)).
         let middle = scene.truth.points.iter().position(|p| p.norm() < 1e-9).unwrap();
-        let place = bowed(&scene.truth.points, 2.0).nth(middle + 1).unwrap();
+        let place = bowed(&scene.truth.points, 2.0)(&scene.truth.points[middle + 1]);
         assert!((place.z + 2.0 * (1.0 - 100.0 / 2500.0)).abs() < 1e-12, "{place}");
         let pixel = scene.truth.camera.project(&(place + Vec3::new(0.0, 0.0, 120.0))).unwrap();
         assert!((seen[0][middle + 1] - pixel).norm() < 1e-9);

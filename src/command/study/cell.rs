@@ -1,11 +1,10 @@
 //! `calibench study cell`: one cell of a run as a study of its own.
 
-use super::Failure;
+use super::{Failure, complete};
 use crate::calibrate::Format;
 use crate::said::written_by;
 use crate::{Exit, print};
 use calibench::io::ShownPath;
-use calibench_study::Folder;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -21,12 +20,7 @@ pub(crate) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
-    let folder = Folder::open(&arguments.run)?;
-    if !folder.manifest()?.complete {
-        let path = arguments.run.shown();
-        let message = format!("{path} is not complete: `calibench study resume {path}` first");
-        return Err(Failure { exit: Exit::Incomplete, message });
-    }
+    let folder = complete(&arguments.run)?;
     let engine = folder.engine(folder.shard()?)?;
     let place = arguments.run.canonicalize().unwrap_or_else(|_| arguments.run.clone());
     let Some(place) = place.to_str() else {
