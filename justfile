@@ -49,10 +49,12 @@ reproducible:
 python:
     .ci/python
 
-# Studies on a Slurm and a Dask of this machine alone
+# Studies on a Slurm, a Dask, a Ray and a Snakemake of this machine alone
 cluster:
     bash .ci/slurm
-    bash .ci/dask
+    bash .ci/engine dask
+    bash .ci/engine ray
+    bash .ci/engine snakemake
 
 # Every experiment, figure and table, and the reconciliation
 all:

@@ -7,6 +7,7 @@ use calibench::io::formats::{
 use calibench::io::image::{parse_extent, parse_image};
 use calibench::io::result::parse_camera;
 use calibench::io::robot::parse_robot;
+use calibench::io::scene_tables::{parse_target_marks, parse_target_poses};
 use calibench::io::{
     memory, parse_checks, parse_corners, parse_known, parse_marks, parse_pixel_ends, parse_point_pairs,
     parse_spatial, table,
@@ -44,13 +45,17 @@ pub fn corners(bytes: &[u8]) {
     let _ = parse_spatial("spatial", bytes);
 }
 
-/// Point pairs, marks of a part, pixels at both ends of lengths, poses of a robot, and checks of a reference.
+/// Point pairs, marks of a part, pixels at both ends of lengths, poses of a robot, checks of a reference, and marks and poses of a scene.
 pub fn pairs(bytes: &[u8]) {
     let _ = parse_point_pairs("pairs", bytes);
     let _ = parse_marks("marks", bytes);
     let _ = parse_pixel_ends("ends", bytes);
     let _ = parse_robot("robot", bytes);
     let _ = parse_checks("checks", bytes);
+    for cell in [None, Some(0)] {
+        let _ = parse_target_marks("marks", bytes, cell);
+        let _ = parse_target_poses("poses", bytes, cell);
+    }
 }
 
 /// Results and cameras.
@@ -85,8 +90,8 @@ pub fn study(bytes: &[u8]) {
     let text = String::from_utf8_lossy(bytes);
     let Ok(spec) = Spec::parse(&text) else { return };
     let levels = spec.factor.iter().fold(1usize, |product, f| product.saturating_mul(f.count()));
-    let target = spec.scene.target;
-    let marks = target.columns.saturating_mul(target.rows);
+    let target = &spec.scene.target;
+    let marks = target.count();
     let draws = if spec.scene.poses.redraws() { DRAWS } else { 1 };
     let size = marks.saturating_mul(spec.scene.poses.views()).saturating_mul(levels).saturating_mul(draws);
     // Too large is refused before any work, as small is done at once; between them, poses that are drawn anew take long.

@@ -53,6 +53,7 @@ mod shell;
 mod study;
 mod study_faults;
 mod study_folder;
+mod study_inputs;
 mod study_parquet;
 mod study_plan;
 mod study_solver;

@@ -101,6 +101,8 @@ const EXAMPLES: &[(&str, &[&str])] = &[
             "calibench study commands my-study.toml --shards 2 --out parts --merge",
         ],
     ),
+    ("study figure", &["calibench study figure my-study", "calibench study figure my-study --panel bias/fx"]),
+    ("study cell", &["calibench study cell my-study 0", "calibench study cell my-study 1 --format json"]),
     ("study merge", &["calibench study merge part0 part1 --out whole"]),
     (
         "study compare",

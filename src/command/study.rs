@@ -1,7 +1,9 @@
 //! `calibench study`: Monte Carlo studies from a file, one verb a file.
 
+mod cell;
 mod commands;
 mod compare;
+mod figure;
 mod finished;
 mod measure;
 mod plan;
@@ -11,10 +13,10 @@ mod solver;
 use super::Exit;
 use super::terminal::warn_lines;
 use calibench::io::input::{InputError, MOST_SPEC_BYTES};
-use calibench::io::read_regular_text;
 use calibench::io::shown::on_one_line;
+use calibench::io::{ShownPath, read_regular_text};
 use calibench_harness::Build;
-use calibench_study::{FolderError, MergeError, RunError};
+use calibench_study::{Folder, FolderError, Inputs, MergeError, RunError};
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -26,6 +28,11 @@ pub(super) enum Verb {
     Resume(run::ResumeArguments),
     /// Prints one command a shard, for GNU parallel, HyperQueue or whatever runs lines
     Commands(commands::Arguments),
+    /// Prints one cell of a run as a study of its own, with the marks and poses that the run used: its trials
+    /// are those of the cell, bit for bit
+    Cell(cell::Arguments),
+    /// Prints one panel of a run's figures as SVG, or the names of all panels
+    Figure(figure::Arguments),
     /// Joins the shards of a study into what an undivided run gives, bit for bit
     Merge(run::MergeArguments),
     /// Compares two runs trial by trial: effect with interval, and a verdict only where the interval clears
@@ -49,6 +56,8 @@ pub(super) fn run(arguments: &Arguments, build: &Build) -> Exit {
         Verb::Run(arguments) => run::run(arguments, build),
         Verb::Resume(arguments) => run::resume(arguments, build),
         Verb::Commands(arguments) => commands::run(arguments),
+        Verb::Cell(arguments) => cell::run(arguments),
+        Verb::Figure(arguments) => figure::run(arguments),
         Verb::Merge(arguments) => run::merge_parts(arguments, build),
         Verb::Compare(arguments) => compare::run(arguments),
         Verb::Plan(arguments) => plan::run(arguments),
@@ -117,6 +126,25 @@ impl From<MergeError> for Failure {
             other => Failure::usage(other.to_string()),
         }
     }
+}
+
+/// A study that the user named: its text, and the files that it names.
+fn read_study(path: &Path) -> Result<(String, Inputs), Failure> {
+    let text = read(path)?;
+    let inputs =
+        Inputs::beside(path, &text).map_err(|error| Failure::usage(format!("{}: {error}", path.shown())))?;
+    Ok((text, inputs))
+}
+
+/// The folder of a run that is complete.
+fn complete(path: &Path) -> Result<Folder, Failure> {
+    let folder = Folder::open(path)?;
+    if folder.manifest()?.complete {
+        return Ok(folder);
+    }
+    let path = path.shown();
+    let message = format!("{path} is not complete: `calibench study resume {path}` first");
+    Err(Failure { exit: Exit::Incomplete, message })
 }
 
 /// A file that the user named.

@@ -4,6 +4,7 @@
 use calibench::board::View;
 use calibench::camera::{Camera, Imaging, Lens, Model, Parameter};
 use calibench::geometry::{Vec2, Vec3};
+use calibench::synth::departure::{bowed, correlate};
 use calibench::synth::{Scene, Stream};
 
 /// Something that the model leaves out.
@@ -70,10 +71,7 @@ impl Violation {
         let at = match *self {
             Violation::BoardScale(factor) => Vec3::new(factor * point.x, factor * point.y, 0.0),
             Violation::BoardWidth(factor) => Vec3::new(factor * point.x, point.y, 0.0),
-            Violation::BowedBoard(height) => {
-                let corner = truth.points.iter().map(Vec2::norm_squared).fold(0.0, f64::max);
-                Vec3::new(point.x, point.y, -height * (1.0 - point.norm_squared() / corner))
-            }
+            Violation::BowedBoard(height) => bowed(&truth.points, height)(point),
             _ => Vec3::new(point.x, point.y, 0.0),
         };
         Lens::image(camera, &truth.cam_from_target[view].apply(&at))
@@ -84,7 +82,7 @@ impl Violation {
         let mut noise: Vec<Vec2> =
             points.iter().map(|_| Vec2::new(stream.normal(), stream.normal())).collect();
         match *self {
-            Violation::CorrelatedNoise(correlation) => shared(&mut noise, columns(points), correlation),
+            Violation::CorrelatedNoise(correlation) => correlate(&mut noise, columns(points), correlation),
             Violation::NoisePerAxis(ratio) => {
                 let v = (2.0 / (1.0 + ratio * ratio)).sqrt();
                 noise.iter_mut().for_each(|n| *n = Vec2::new(ratio * v * n.x, v * n.y));
@@ -101,24 +99,6 @@ impl Violation {
 /// Marks in a row of a grid that is given row by row.
 pub(super) fn columns(points: &[Vec2]) -> usize {
     points.iter().take_while(|p| p.y == points[0].y).count().max(1)
-}
-
-/// Makes white noise on a grid a stationary field: each row, then each column, an autoregression of first
-/// order, `x_i = c x_(i-1) + sqrt(1 - c^2) w_i`, which keeps the variance. Marks i columns and j rows apart
-/// have the correlation `c^(i + j)`.
-fn shared(noise: &mut [Vec2], columns: usize, correlation: f64) {
-    let innovation = (1.0 - correlation * correlation).sqrt();
-    let mark_before = |along_rows: bool, i: usize| match along_rows {
-        true => (!i.is_multiple_of(columns)).then(|| i - 1),
-        false => i.checked_sub(columns),
-    };
-    for along_rows in [true, false] {
-        for i in 0..noise.len() {
-            if let Some(before) = mark_before(along_rows, i) {
-                noise[i] = noise[before] * correlation + noise[i] * innovation;
-            }
-        }
-    }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::design::{Design, designs};
 use super::poses::Sight;
 use super::prediction::{DRAWS, Prediction};
 use super::quantity::Quantity;
-use super::spec::{Length, Spec};
+use super::spec::{Length, Measure, Spec};
 use super::spec_error::SpecError;
 use calibench::calibrate::{CalibrationError, Covariance, Loss, Settings};
 use calibench::camera::{Camera, FreeParameters, Lens, Model};
@@ -12,7 +12,7 @@ use calibench::evaluate::cramer_rao;
 use calibench::geometry::{Pose, Vec2};
 use calibench::io::result::LensFields;
 use calibench::io::shown::on_one_line;
-use calibench::synth::{Scene, Stream, StreamKey, Truth};
+use calibench::synth::{Departure, Scene, Stream, StreamKey, Truth};
 
 /// One combination of levels.
 #[derive(Debug, Clone)]
@@ -35,6 +35,8 @@ pub struct Cell {
     /// The scene, where every trial meets the same poses.
     pub(super) scene: Option<Scene<Lens>>,
     pub(super) length: Option<(Length, [Vec2; 2])>,
+    /// Whether the displacement of pixels over the frame is measured.
+    pub(super) measures_frame: bool,
     /// Seed and name of the streams.
     pub(super) seed: u64,
     pub(super) scenario: String,
@@ -44,7 +46,7 @@ impl Spec {
     /// The quantities of every trial.
     pub fn quantities(&self, cells: &[Cell]) -> Vec<Quantity> {
         let free = cells.iter().flat_map(|c| c.free.iter()).fold(FreeParameters::NONE, FreeParameters::with);
-        Quantity::list(free, cells.iter().any(|c| c.length.is_some()))
+        Quantity::list(free, cells.iter().any(|c| c.length.is_some()), self.measure.contains(&Measure::Frame))
     }
 
     /// The cells of the grid, the last factor varying fastest. `text` is the file, for errors that say where.
@@ -69,7 +71,7 @@ impl Spec {
 
     fn check_precision(&self, cell: &Cell) -> Result<(), SpecError> {
         let Some(precision) = &self.trials.precision else { return Ok(()) };
-        let own = Quantity::list(cell.free, cell.length.is_some());
+        let own = Quantity::list(cell.free, cell.length.is_some(), cell.measures_frame);
         if own.iter().any(|q| q.name() == precision.quantity) {
             return Ok(());
         }
@@ -109,6 +111,7 @@ impl Cell {
             points: design.scene.target.points()?,
             scene: None,
             length: design.scene.length.and_then(|length| Some((length, length.pixels(&camera)?))),
+            measures_frame: spec.measure.contains(&Measure::Frame),
             seed: spec.seed,
             scenario,
             design,
@@ -116,6 +119,11 @@ impl Cell {
         };
         // Every trial's poses are alike: what fails in the first would fail in most.
         let first = cell.draw_scene(0)?;
+        cell.departure().pixels(&first).ok_or(SpecError::Value {
+            field: "scene.bow_mm",
+            value: cell.design.scene.bow_mm,
+            need: "so small that every mark stays in front of the camera",
+        })?;
         cell.scene = (!cell.design.scene.poses.redraws()).then_some(first);
         Ok(cell)
     }
@@ -132,6 +140,11 @@ impl Cell {
             cam_from_target,
         };
         Ok(Scene::new(truth).expect("generated poses show every point in front of the camera"))
+    }
+
+    /// In what the scene differs from what is assumed of it.
+    pub(super) fn departure(&self) -> Departure {
+        self.design.scene.departure()
     }
 
     pub(super) fn stream(&self, trial: u64, purpose: &str) -> Stream {

@@ -2,6 +2,7 @@
 //! them, and the same stands in the head of a Parquet file.
 
 use super::engine::Engine;
+use super::folder::INPUTS;
 use super::manifest::Manifest;
 use super::tables;
 use super::trial_file::TrialFile;
@@ -49,8 +50,9 @@ pub(super) fn run_crate(engine: &Engine, manifest: &Manifest) -> String {
         what: what(name).to_string(),
         sha256: manifest.files.get(name).cloned(),
     };
-    let results =
-        manifest.files.keys().map(String::as_str).filter(|name| *name != SPEC).chain(["manifest.json"]);
+    let (given, made): (Vec<&str>, Vec<&str>) =
+        manifest.files.keys().map(String::as_str).partition(|name| [SPEC, INPUTS].contains(name));
+    let results = made.into_iter().chain(["manifest.json"]);
     let build = Build {
         commit: manifest
             .commit
@@ -65,7 +67,7 @@ pub(super) fn run_crate(engine: &Engine, manifest: &Manifest) -> String {
         description: &engine.spec.question,
         command: format!("calibench study run {SPEC}{shard}"),
         seed: manifest.seed,
-        inputs: vec![part(SPEC)],
+        inputs: given.into_iter().map(part).collect(),
         results: results.map(part).collect(),
         build: &build,
     };
@@ -78,10 +80,13 @@ const SPEC: &str = "spec.toml";
 fn what(name: &str) -> &'static str {
     match name {
         SPEC => "The study: its question, factors, scene and seed",
+        INPUTS => "The tables of marks and poses that the study names, by their names there",
         "manifest.json" => "The hash of every file, the specification with its defaults, and the code",
         "report.html" => "The report",
         "datapackage.json" => "The columns of the tables: types, units, descriptions",
         "trials.csv" | "trials.parquet" => "Every trial",
+        "marks.csv" => "The marks of each cell's target, mm",
+        "poses.csv" => "The poses of each cell's target, mm, for cells whose trials all meet the same",
         _ if name.starts_with("figures/") => "A figure of the report",
         _ => "A table of the report",
     }

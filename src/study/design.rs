@@ -39,7 +39,7 @@ pub(super) fn designs(spec: &Spec, text: &str) -> Result<Vec<(Vec<usize>, Design
     let mut count = |(levels, design): (Vec<usize>, Design)| {
         let scene = &design.scene;
         // The board was checked: its marks can be counted.
-        let marks = scene.target.columns * scene.target.rows;
+        let marks = scene.target.count();
         points.add(marks, scene.poses.views(), if scene.poses.redraws() { DRAWS } else { 1 })?;
         Ok((levels, design))
     };
@@ -81,6 +81,7 @@ fn design(
             spec.factor.iter().zip(&levels).next_back().expect("a tree without factors was read before");
         factor.error(text, Some(level), format!("with this level: {}", e.message().trim()))
     })?;
+    let design = Design { scene: design.scene.read(&spec.inputs)?, ..design };
     design.scene.check()?;
     design.estimator.check()?;
     Ok((levels, design))

@@ -4,6 +4,7 @@
 use super::accumulate::Tally;
 use super::calibrator::Calibrator;
 use super::cells::Cell;
+use super::inputs::Inputs;
 use super::quantity::Quantity;
 use super::shard::Shard;
 use super::spec::Spec;
@@ -83,6 +84,14 @@ impl Engine {
     /// The beginning of a study's part; `text` is its file.
     pub fn new(text: &str, shard: Shard) -> Result<Engine, SpecError> {
         Engine::of(Spec::parse(text)?, text, shard)
+    }
+
+    /// The same for a study that names files.
+    ///
+    /// # Errors
+    /// A study that cannot be run as written.
+    pub fn with_inputs(text: &str, inputs: &Inputs, shard: Shard) -> Result<Engine, SpecError> {
+        Engine::of(Spec::parse_with(text, inputs)?, text, shard)
     }
 
     /// The same for a study that was read already.

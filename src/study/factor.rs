@@ -1,6 +1,7 @@
 //! What varies, and how does a level change the study? A level takes the place of one field or of several
 //! together.
 
+use super::inputs::names_a_file;
 use super::spec_error::{SpecError, place};
 use serde::{Deserialize, Serialize};
 use toml::{Spanned, Table, Value};
@@ -64,6 +65,10 @@ impl Factor {
                 None,
                 "it needs at least one level, and a field to `set`".to_string(),
             ));
+        }
+        let names_a_file = |level: &Spanned<Value>| names_a_file(&self.set, level.get_ref());
+        if self.labels.is_empty() && self.levels.get_ref().iter().any(names_a_file) {
+            return Err(SpecError::Unlabelled(self.name.clone()));
         }
         if !self.labels.is_empty() && self.labels.len() != self.count() {
             let counts =

@@ -3,6 +3,7 @@
 
 use super::engine::Engine;
 use super::moments::Estimated;
+use super::panels::{Panel, Shows};
 use super::quantity::Quantity;
 use super::summary::{CellSummary, SHARES, Statistic, Summary};
 use calibench::evaluate::distribution::normal_quantile;
@@ -22,7 +23,11 @@ pub(super) fn draw(engine: &Engine, summary: &Summary) -> Vec<Figure> {
     match grid.x_factor() {
         _ if engine.spec.factor.is_empty() => figures.push(grid.distributions()),
         Some(x) if grid.series(x).len() <= MOST_SERIES => {
-            figures.push(grid.spread(x));
+            for (shows, panels) in grid.all_panels(x) {
+                let plots: Vec<Plot> = panels.into_iter().map(|panel| panel.plot).collect();
+                let columns = plots.len().min(3);
+                figures.push(Figure::panels(shows.figure(), &plots, columns, grid.caption_of(shows)));
+            }
             figures.extend(grid.endings(x));
         }
         _ => figures.extend(grid.by_cell()),
@@ -33,15 +38,35 @@ pub(super) fn draw(engine: &Engine, summary: &Summary) -> Vec<Figure> {
     figures
 }
 
-struct Grid<'a> {
+/// The figure that shows one quantity alone, by its name: `spread/fx`.
+pub(super) struct Alone {
+    pub name: String,
+    pub figure: Figure,
+}
+
+/// Every panel as a figure of its own; none where the study has no numeric factor, or too many series for one plot.
+pub(super) fn panels(engine: &Engine, summary: &Summary) -> Vec<Alone> {
+    let grid = Grid { engine, summary };
+    let Some(x) = grid.x_factor().filter(|&x| grid.series(x).len() <= MOST_SERIES) else { return Vec::new() };
+    let alone = |shows: Shows, panel: Panel| {
+        let figure = Figure::plot(panel.name.replace('/', "-"), &panel.plot, grid.caption_of(shows));
+        Alone { name: panel.name, figure }
+    };
+    let all = grid.all_panels(x).into_iter();
+    all.flat_map(|(shows, panels)| panels.into_iter().map(move |panel| (shows, panel)))
+        .map(|(shows, panel)| alone(shows, panel))
+        .collect()
+}
+
+pub(super) struct Grid<'a> {
     engine: &'a Engine,
     summary: &'a Summary,
 }
 
 /// Cells that differ in the level of the x factor only, in its order.
-struct Series {
-    label: String,
-    cells: Vec<usize>,
+pub(super) struct Series {
+    pub label: String,
+    pub cells: Vec<usize>,
 }
 
 impl Grid<'_> {
@@ -73,11 +98,11 @@ impl Grid<'_> {
         found
     }
 
-    fn x_of(&self, x: usize, cell: usize) -> f64 {
+    pub fn x_of(&self, x: usize, cell: usize) -> f64 {
         self.engine.spec.factor[x].number(self.engine.cells[cell].levels[x]).unwrap_or(f64::NAN)
     }
 
-    fn x_label(&self, x: usize) -> String {
+    pub fn x_label(&self, x: usize) -> String {
         let factor = &self.engine.spec.factor[x];
         if factor.unit.is_empty() {
             factor.name.clone()
@@ -86,11 +111,16 @@ impl Grid<'_> {
         }
     }
 
+    /// What is no error: RMSE, NEES, sizes of displacements.
+    fn others(&self) -> impl Iterator<Item = Quantity> {
+        self.engine.quantities.iter().copied().filter(|q| !q.is_error())
+    }
+
     fn errors(&self) -> impl Iterator<Item = Quantity> {
         self.engine.quantities.iter().copied().filter(|q| q.is_error())
     }
 
-    fn statistic(&self, cell: usize, quantity: Quantity) -> Option<&Statistic> {
+    pub fn statistic(&self, cell: usize, quantity: Quantity) -> Option<&Statistic> {
         self.summary.cells[cell].of(quantity.name())
     }
 
@@ -111,47 +141,57 @@ impl Grid<'_> {
         )
     }
 
-    /// Standard deviation with its interval, and the bound, against the x factor.
-    fn spread(&self, x: usize) -> Figure {
-        let series = self.series(x);
-        let panels: Vec<Plot> =
-            self.errors().map(|quantity| self.spread_panel(x, &series, quantity)).collect();
-        let caption = self.caption(&format!(
-            "Standard deviation of the error of each quantity (marks) and its Cramer-Rao bound (lines), which holds for Gaussian noise \
-             without gross errors. Notice where the marks leave the line. {}",
-            self.bars()
-        ));
-        Figure::panels("spread", &panels, panels.len().min(3), caption)
+    /// What is drawn of errors and of the others: where the noise varies, every number over what the bound expects, which is proportional to
+    /// the noise and spans as many decades.
+    fn shown(&self, x: usize) -> [Shows; 3] {
+        let is_noise = self.engine.spec.factor[x].set.iter().any(|path| path == "scene.noise_px");
+        match is_noise {
+            true => [Shows::SpreadOverBound, Shows::Bias, Shows::MeanOverExpected],
+            false => [Shows::Spread, Shows::Bias, Shows::Mean],
+        }
     }
 
-    fn spread_panel(&self, x: usize, series: &[Series], quantity: Quantity) -> Plot {
-        let mut all_x = Vec::new();
-        let mut all_y = Vec::new();
-        let unit = if quantity.unit().is_empty() { String::new() } else { format!(" ({})", quantity.unit()) };
-        let title = format!("{} error", quantity.name());
-        let mut plot = Plot::new(title, self.x_label(x), format!("sd{unit}")).size(400.0, 320.0);
-        for (i, s) in series.iter().enumerate() {
-            let at = |cell: &usize| Some((self.x_of(x, *cell), self.statistic(*cell, quantity)?));
-            let values: Vec<(f64, &Statistic)> = s.cells.iter().filter_map(at).collect();
-            let bound: Vec<(f64, f64)> =
-                values.iter().filter_map(|(x, v)| Some((*x, v.predicted?.sd))).collect();
-            let sds: Vec<(f64, Estimated)> = values.iter().filter_map(|(x, v)| Some((*x, v.sd?))).collect();
-            let look = Look::series(i);
-            let bars: Vec<(f64, f64, f64)> = sds.iter().map(|(x, sd)| (*x, sd.low, sd.high)).collect();
-            let points: Vec<(f64, f64)> = sds.iter().map(|(x, sd)| (*x, sd.value)).collect();
-            let label = if s.label.is_empty() { "measured".to_string() } else { s.label.clone() };
-            let bound_label = if i == 0 { "bound" } else { "" };
-            plot = plot
-                .line_as(bound_label, &bound, look)
-                .error_bars_as("", &bars, look)
-                .points_as(label, &points, look);
-            all_x.extend(values.iter().map(|v| v.0));
-            all_y.extend(points.iter().chain(&bound).map(|p| p.1));
-        }
-        if wide(&all_x) {
-            plot = plot.log_x();
-        }
-        if wide(&all_y) { plot.log_y() } else { plot }
+    /// Every panel, by figures.
+    fn all_panels(&self, x: usize) -> Vec<(Shows, Vec<Panel>)> {
+        let series = self.series(x);
+        let errors: Vec<Quantity> = self.errors().collect();
+        let others: Vec<Quantity> = self.others().collect();
+        let [spread, bias, means] = self.shown(x);
+        [(spread, &errors), (bias, &errors), (means, &others)]
+            .into_iter()
+            .map(|(shows, of)| (shows, self.panels(x, &series, shows, of)))
+            .filter(|(_, panels)| !panels.is_empty())
+            .collect()
+    }
+
+    fn caption_of(&self, shows: Shows) -> String {
+        let what = match shows {
+            Shows::Spread => {
+                "Standard deviation of the error of each quantity (marks) and its Cramer-Rao bound (lines), which holds for Gaussian noise \
+                 without gross errors. Notice where the marks leave the line."
+            }
+            Shows::SpreadOverBound => {
+                "Standard deviation of the error of each quantity over its Cramer-Rao bound, which is proportional to the noise. Notice where the \
+                 marks leave 1: from there first-order theory no longer holds."
+            }
+            Shows::Bias => {
+                "Mean error of each quantity in units of its Cramer-Rao bound. Notice the intervals that do not hold 0: there a mean over many \
+                 calibrations would keep an error."
+            }
+            Shows::Mean => {
+                "Means (marks) and what theory expects of them (lines). Notice NEES above its line: there the covariance that a calibration \
+                 reports is too small."
+            }
+            Shows::MeanOverExpected => {
+                "Means over what theory expects of them. Notice NEES above 1: there the covariance that a calibration reports is too small, so \
+                 many times."
+            }
+        };
+        let together = match self.engine.spec.common_random_numbers {
+            true if shows != Shows::Spread => " Cells share their draws, so that marks move together.",
+            _ => "",
+        };
+        self.caption(&format!("{what} {}{together}", self.bars()))
     }
 
     /// Shares of trials that converged, where not all did.
@@ -189,11 +229,16 @@ impl Grid<'_> {
     /// Every cell a column, every quantity a row.
     fn by_cell(&self) -> Vec<Figure> {
         let columns: Vec<String> = self.summary.cells.iter().map(|c| c.labels.join(", ")).collect();
-        let ratio = self.matrix(&columns, "sd / bound", |_, s| s.ratio.map(|r| r.value));
-        let bias =
-            self.matrix(&columns, "|bias| / bound", |_, s| Some(s.mean?.value.abs() / s.predicted?.sd));
+        let (errors, others): (Vec<Quantity>, Vec<Quantity>) =
+            (self.errors().collect(), self.others().collect());
+        let ratio = self.matrix(&errors, &columns, "sd / bound", |_, s| s.ratio.map(|r| r.value));
+        let bias = self
+            .matrix(&errors, &columns, "|bias| / bound", |_, s| Some(s.mean?.value.abs() / s.predicted?.sd));
+        let means =
+            self.matrix(&others, &columns, "mean / expected", |_, s| Some(s.mean?.value / s.predicted?.mean));
         [("ratio", "Spread over its Cramer-Rao bound: 1 is the best that is possible.", ratio),
-         ("bias", "Size of the bias in units of the Cramer-Rao bound: what is wrong with the model, not with the noise.", bias)]
+         ("bias", "Size of the bias in units of the Cramer-Rao bound: what is wrong with the model, not with the noise.", bias),
+         ("means", "Means over what theory expects of them. NEES above 1: the covariance that a calibration reports is too small, so many times.", means)]
             .into_iter()
             .filter_map(|(name, what, plot)| Some(Figure::plot(name, &plot?, self.caption(what))))
             .collect()
@@ -201,11 +246,11 @@ impl Grid<'_> {
 
     fn matrix(
         &self,
+        rows: &[Quantity],
         columns: &[String],
         label: &str,
         value: impl Fn(&CellSummary, &Statistic) -> Option<f64>,
     ) -> Option<Plot> {
-        let rows: Vec<Quantity> = self.errors().collect();
         let values: Vec<f64> = rows
             .iter()
             .flat_map(|q| self.summary.cells.iter().map(move |c| (q, c)))
@@ -284,7 +329,7 @@ impl Grid<'_> {
     }
 }
 
-fn wide(values: &[f64]) -> bool {
+pub(super) fn wide(values: &[f64]) -> bool {
     let (low, high) = values.iter().fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
     low > 0.0 && high > WIDE * low
 }

@@ -2,11 +2,12 @@
 //! their hashes, in words of our own and in those of others.
 
 use super::engine::Engine;
-use super::folder::{Folder, FolderError};
+use super::folder::{Folder, FolderError, INPUTS};
 use super::manifest::Manifest;
 use super::summary::{Summary, summarise};
-use super::{described, figures, report};
+use super::{alone, described, figures, report};
 use calibench::io::hash::sha256_hex;
+use calibench_harness::Figure;
 
 /// Writes the results of a complete part into its folder.
 pub fn finish(folder: &Folder, engine: &Engine) -> Result<Summary, FolderError> {
@@ -21,10 +22,18 @@ pub fn finish(folder: &Folder, engine: &Engine) -> Result<Summary, FolderError> 
     for figure in &figures {
         put(folder, &mut manifest, &format!("figures/{}", figure.file_name()), &figure.bytes)?;
     }
+    put(folder, &mut manifest, alone::MARKS, alone::marks(engine).as_bytes())?;
+    if let Some(poses) = alone::poses(engine) {
+        put(folder, &mut manifest, alone::POSES, poses.as_bytes())?;
+    }
     let trials = folder.put_trials(engine, &manifest)?;
     manifest.files.insert(manifest.trials.name().to_string(), trials);
     let spec = folder.read("spec.toml")?;
     manifest.files.insert("spec.toml".to_string(), sha256_hex(spec.as_bytes()));
+    if !manifest.inputs.is_empty() {
+        let inputs = folder.read(INPUTS)?;
+        manifest.files.insert(INPUTS.to_string(), sha256_hex(inputs.as_bytes()));
+    }
     let package = described::package(engine, &tables, &manifest);
     put(folder, &mut manifest, "datapackage.json", package.as_bytes())?;
     let page = report::page(engine, &summary, &figures, &manifest, &spec);
@@ -36,6 +45,13 @@ pub fn finish(folder: &Folder, engine: &Engine) -> Result<Summary, FolderError> 
     folder.write("manifest.json", manifest.to_text().as_bytes())?;
     folder.drop_log(&manifest)?;
     Ok(summary)
+}
+
+/// Every panel of the figures that show quantities against a factor, as a figure of its own under its name, such as `bias/fx`; none where a
+/// study has no such figures.
+pub fn single_panels(engine: &Engine) -> Vec<(String, Figure)> {
+    let panels = figures::panels(engine, &summarise(engine));
+    panels.into_iter().map(|panel| (panel.name, panel.figure)).collect()
 }
 
 /// Writes a file and notes its hash.

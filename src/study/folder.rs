@@ -1,7 +1,10 @@
 //! Whose folder is this? One run's: begun once, used by one process at a time, continued only by the same
 //! study and code.
 
+use super::engine::Engine;
+use super::inputs::Inputs;
 use super::manifest::{Difference, Manifest};
+use super::run_error::RunError;
 use super::shard::{Shard, ShardError};
 use super::trial_file::NoParquet;
 use calibench::io::ShownPath;
@@ -116,6 +119,9 @@ fn short(fingerprint: &str) -> &str {
 /// Files that hold trials of a run, or vouch for them.
 const OF_A_RUN: [&str; 3] = ["checkpoint.json", "trials.csv", "trials.parquet"];
 
+/// The files that the study names, where it names any.
+pub(super) const INPUTS: &str = "inputs.json";
+
 /// Times a lock is tried before the folder counts as in use.
 const TRIES: usize = 20;
 /// Pause between them: a second in all.
@@ -160,6 +166,9 @@ impl Folder {
     ) -> Result<Folder, FolderError> {
         let folder = Folder::claim(files, path)?;
         folder.write("spec.toml", spec_text.as_bytes())?;
+        if !manifest.contents.is_empty() {
+            folder.write(INPUTS, manifest.contents.to_text().as_bytes())?;
+        }
         // The manifest last: a folder without one holds no run.
         folder.write("manifest.json", manifest.to_text().as_bytes())?;
         Ok(folder)
@@ -240,6 +249,40 @@ impl Folder {
     pub fn manifest(&self) -> Result<Manifest, FolderError> {
         serde_json::from_str(&self.read("manifest.json")?)
             .map_err(|e| self.damaged("manifest.json", e.to_string()))
+    }
+
+    /// The files that the study named when the run was begun.
+    fn inputs(&self) -> Result<Inputs, FolderError> {
+        let hashes = self.manifest()?.inputs;
+        if hashes.is_empty() {
+            return Ok(Inputs::default());
+        }
+        let inputs = Inputs::parse(&self.read(INPUTS)?);
+        match inputs.filter(|inputs| inputs.hashes() == hashes) {
+            Some(inputs) => Ok(inputs),
+            None => {
+                Err(self.damaged(INPUTS, "its files are not those that the manifest names by their SHA-256"))
+            }
+        }
+    }
+
+    /// The study of the run at its beginning.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or a study that cannot be run as written.
+    pub fn engine(&self, shard: Shard) -> Result<Engine, RunError> {
+        Ok(Engine::with_inputs(&self.read("spec.toml")?, &self.inputs()?, shard)?)
+    }
+
+    /// The study of the run with all trials that stand in the folder.
+    ///
+    /// # Errors
+    /// As [`Folder::engine`]; trials that are not those of the run.
+    pub fn replayed(&self) -> Result<Engine, RunError> {
+        let mut engine = self.engine(self.shard()?)?;
+        let mut trials = self.trials(&engine)?;
+        while trials.batch(&mut engine)? {}
+        Ok(engine)
     }
 
     /// Which part of its study the run does.

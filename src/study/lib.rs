@@ -10,6 +10,7 @@
 //! neither the number of threads nor the split can move a bit of it.
 
 mod accumulate;
+mod alone;
 mod calibrator;
 mod cells;
 pub mod compare;
@@ -23,6 +24,8 @@ mod figures;
 mod fingerprint;
 mod finish;
 mod folder;
+mod frame;
+mod inputs;
 pub mod limits;
 mod lists;
 mod log;
@@ -30,6 +33,7 @@ mod manifest;
 mod merge;
 mod moments;
 mod names;
+mod panels;
 #[cfg(feature = "parquet")]
 mod parquet;
 #[cfg(not(feature = "parquet"))]
@@ -49,6 +53,7 @@ mod spec;
 mod spec_error;
 mod summary;
 mod tables;
+mod target;
 mod trial;
 mod trial_file;
 mod whole_log;
@@ -64,8 +69,10 @@ pub use engine::{
     Engine, Interruption, Outcome, Pace, Worst, in_memory, in_memory_by, in_memory_seeing, in_memory_until,
 };
 pub use fingerprint::Fingerprint;
-pub use finish::finish;
+pub use finish::{finish, single_panels};
 pub use folder::{Folder, FolderError, Located};
+pub use frame::FrameQuantity;
+pub use inputs::Inputs;
 pub use log::Checkpoint;
 pub use manifest::{Difference, Manifest};
 pub use merge::{MergeError, merge, merge_on};
@@ -76,10 +83,11 @@ pub use quantity::Quantity;
 pub use run_error::RunError;
 pub use shard::{Shard, ShardError};
 pub use sketch::Sketch;
-pub use spec::{Estimator, Length, LossChoice, Precision, SceneSpec, Spec, TargetSpec, Trials};
+pub use spec::{Estimator, Length, LossChoice, Measure, Precision, SceneSpec, Spec, Trials};
 pub use spec_error::SpecError;
 pub use summary::{CellSummary, Statistic, Summary, summarise};
 pub use tables::columns;
+pub use target::TargetSpec;
 pub use trial::{Trial, run_trial};
 pub use trial_file::{NoParquet, TrialFile, TrialFileError};
 pub use within::within;

@@ -1,6 +1,7 @@
 //! What made these results? Specification, part, seed, code and commit; and whether they may be continued.
 
 use super::fingerprint::Fingerprint;
+use super::inputs::Inputs;
 use super::shard::Shard;
 use super::spec::Spec;
 use super::trial_file::TrialFile;
@@ -43,6 +44,12 @@ pub struct Manifest {
     pub spec_sha256: String,
     /// The specification with its defaults.
     pub spec: Value,
+    /// SHA-256 of the files that the specification names, by their names there; they stand in `inputs.json`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub inputs: BTreeMap<String, String>,
+    /// Their contents, of a run that begins.
+    #[serde(skip)]
+    pub(super) contents: Inputs,
     /// SHA-256 of the result files; empty until complete.
     pub files: BTreeMap<String, String>,
 }
@@ -81,6 +88,8 @@ impl Manifest {
             code: Fingerprint::of(build),
             spec_sha256: sha256_hex(canonical.to_string().as_bytes()),
             spec: canonical,
+            inputs: spec.inputs.hashes(),
+            contents: spec.inputs.clone(),
             files: BTreeMap::new(),
         }
     }

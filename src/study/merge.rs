@@ -104,7 +104,7 @@ pub fn merge_on(
     let trials = trials.unwrap_or(first.manifest.trials);
     trials.check().map_err(FolderError::from)?;
     let text = first.folder.read("spec.toml")?;
-    let mut whole = Engine::new(&text, Shard::WHOLE).map_err(RunError::from)?;
+    let mut whole = first.folder.engine(Shard::WHOLE)?;
     let commit = commit(&parts);
     let date = first.manifest.day.clone().filter(|_| commit.is_some());
     let build = Build { commit, date, ..build.clone() };

@@ -1,9 +1,12 @@
 //! Where is the target held? Generators of poses, from a list to random draws, all with the target inside the
 //! image.
 
+use super::inputs::Inputs;
 use super::lists;
+use super::spec_error::SpecError;
 use calibench::camera::{Camera, Imaging, Lens};
 use calibench::geometry::{Mat3, Pose, Vec2, Vec3, rotation};
+use calibench::io::scene_tables::parse_target_poses;
 use calibench::synth::Stream;
 use calibench::synth::scene::looking_at_centre;
 use serde::{Deserialize, Serialize};
@@ -35,6 +38,17 @@ pub enum Poses {
     List {
         /// The poses.
         poses: Vec<PoseSpec>,
+    },
+    /// Those of a file, see [`parse_target_poses`].
+    File {
+        /// Its name, from the folder of the study's own file.
+        file: String,
+        /// Whose poses, where it holds those of several cells.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        cell: Option<usize>,
+        /// The poses; none until the file is read.
+        #[serde(skip)]
+        poses: Vec<Pose>,
     },
 }
 
@@ -90,6 +104,28 @@ pub enum PosesError {
         /// Index of the view.
         view: usize,
     },
+    /// A mark of the target that no view of a file shows.
+    #[error(
+        "mark {mark} lies outside of the image in every view: are marks and poses in millimetres, and do they belong together? Leave it out otherwise"
+    )]
+    OutsideEveryView {
+        /// Index of the mark.
+        mark: usize,
+    },
+    /// A view of a file that does not show every mark.
+    #[error(
+        "view {view}: mark {mark} lies outside of the image, {outside} of {marks} marks do: every view of a study shows all marks; leave the view or the marks out"
+    )]
+    OutsideView {
+        /// Index of the view.
+        view: usize,
+        /// The first mark that it does not show.
+        mark: usize,
+        /// How many it does not show.
+        outside: usize,
+        /// All marks.
+        marks: usize,
+    },
     /// A number outside its domain.
     #[error("{field} is {value}: it must be {need}")]
     Value {
@@ -128,8 +164,17 @@ impl Poses {
         match self {
             Poses::Chapter {} => 4,
             Poses::List { poses } => poses.len(),
+            Poses::File { poses, .. } => poses.len(),
             Poses::Spread { views, .. } | Poses::Random(RandomPoses { views, .. }) => *views,
         }
+    }
+
+    /// The same, with the poses of its file.
+    pub(super) fn read(self, inputs: &Inputs) -> Result<Poses, SpecError> {
+        let Poses::File { file, cell, .. } = self else { return Ok(self) };
+        let poses = parse_target_poses(&file, inputs.get(&file)?.as_bytes(), cell)
+            .map_err(|error| SpecError::Table(error.to_string()))?;
+        Ok(Poses::File { file, cell, poses })
     }
 
     /// The poses; `stream` feeds a random generator.
@@ -138,12 +183,14 @@ impl Poses {
         let poses: Vec<Pose> = match self {
             Poses::Chapter {} => calibench::synth::Truth::example_poses(),
             Poses::List { poses } => poses.iter().map(PoseSpec::pose).collect(),
+            Poses::File { poses, .. } => poses.clone(),
             Poses::Spread { views, tilt_deg, coverage, distance_mm } => {
                 (0..*views).map(|k| spread(k, *tilt_deg, *coverage, *distance_mm, sight)).collect()
             }
             Poses::Random(random) => (0..random.views).map(|_| random.draw(sight, stream)).collect(),
         };
         match poses.iter().position(|pose| !sight.holds(pose)) {
+            Some(view) if matches!(self, Poses::File { .. }) => Err(sight.unseen(&poses, view)),
             Some(view) => Err(PosesError::OutsideImage { view }),
             None => Ok(poses),
         }
@@ -153,6 +200,7 @@ impl Poses {
         let (views, tilt, share, distance, spread) = match self {
             Poses::Chapter {} => return Ok(()),
             Poses::List { poses } => (poses.len(), 0.0, 0.0, 1.0, 0.0),
+            Poses::File { poses, .. } => (poses.len(), 0.0, 0.0, 1.0, 0.0),
             Poses::Spread { views, tilt_deg, coverage, distance_mm } => {
                 (*views, *tilt_deg, *coverage, *distance_mm, 0.0)
             }
@@ -224,15 +272,37 @@ fn tilted(direction: f64, tilt: f64, roll: f64) -> Mat3 {
 impl Sight<'_> {
     /// Whether every point lies within the image, where the lens model is one-to-one.
     fn holds(&self, pose: &Pose) -> bool {
+        let shows = self.shows(pose);
+        self.points.iter().all(shows)
+    }
+
+    /// Tells of points whether they lie within the image, where the lens model is one-to-one.
+    fn shows(&self, pose: &Pose) -> impl Fn(&Vec2) -> bool {
         let is_one_to_one = self.camera.distortion.one_to_one();
         let (right, bottom) = (self.image.0 as f64 - 0.5, self.image.1 as f64 - 0.5);
-        self.points.iter().all(|p| {
+        move |p| {
             let c = pose.apply(&Vec3::new(p.x, p.y, 0.0));
             is_one_to_one(&c)
                 && Lens::image(self.camera, &c).is_some_and(|pixel| {
                     (-0.5..=right).contains(&pixel.x) && (-0.5..=bottom).contains(&pixel.y)
                 })
-        })
+        }
+    }
+
+    /// Which mark a view does not show, or no view.
+    fn unseen(&self, poses: &[Pose], view: usize) -> PosesError {
+        let outside = |pose: &Pose| -> Vec<bool> {
+            let shows = self.shows(pose);
+            self.points.iter().map(|point| !shows(point)).collect()
+        };
+        let views: Vec<Vec<bool>> = poses.iter().map(outside).collect();
+        let marks = self.points.len();
+        if let Some(mark) = (0..marks).find(|&mark| views.iter().all(|view| view[mark])) {
+            return PosesError::OutsideEveryView { mark };
+        }
+        let mark = views[view].iter().position(|outside| *outside).unwrap_or(0);
+        let outside = views[view].iter().filter(|outside| **outside).count();
+        PosesError::OutsideView { view, mark, outside, marks }
     }
 
     /// The centre moved off the axis in the given direction, by `share` of the way to the image's border.

@@ -1,6 +1,7 @@
 //! What does theory expect of a cell before anything is drawn? The Cramer-Rao bound and the distributions
 //! that follow from it.
 
+use super::frame;
 use super::quantity::Quantity;
 use super::spec::Length;
 use calibench::calibrate::Covariance;
@@ -55,6 +56,9 @@ impl Prediction {
             Quantity::Parameter(p) => error(bound.as_ref()?.standard_deviation(*p)?),
             Quantity::Depth => error(bound.as_ref()?.poses.first()?[(5, 5)].sqrt()),
             Quantity::Length => error(length_sd(&truth.camera, free, bound.as_ref()?, length?)?),
+            Quantity::Frame(of_frame) => {
+                frame::expected(*of_frame, &truth.camera, truth.image_size, free, bound.as_ref()?)
+            }
         };
         Prediction(quantities.iter().map(one).collect())
     }

@@ -1,5 +1,6 @@
 //! What is measured in a trial? Errors of what is estimated, and how well the data were fitted.
 
+use super::frame::FrameQuantity;
 use super::spec::Length;
 use calibench::camera::{Camera, FreeParameters, Imaging, Lens, Parameter};
 use calibench::geometry::{Vec2, Vec3};
@@ -17,17 +18,20 @@ pub enum Quantity {
     Depth,
     /// Measured - true length, mm.
     Length,
+    /// By how much the estimated camera misplaces pixels, over the frame.
+    Frame(FrameQuantity),
 }
 
 impl Quantity {
     /// What a study measures whose cells estimate `free` at most.
-    pub(super) fn list(free: FreeParameters, length: bool) -> Vec<Quantity> {
+    pub(super) fn list(free: FreeParameters, length: bool, frame: bool) -> Vec<Quantity> {
         let parameters = free.iter().map(Quantity::Parameter);
-        let last = [Quantity::Depth].into_iter().chain(length.then_some(Quantity::Length));
+        let of_frame = FrameQuantity::ALL.into_iter().filter(|_| frame).map(Quantity::Frame);
+        let last = [Quantity::Depth].into_iter().chain(length.then_some(Quantity::Length)).chain(of_frame);
         [Quantity::Rmse, Quantity::Nees].into_iter().chain(parameters).chain(last).collect()
     }
 
-    /// Name in files: `rmse`, `nees`, `fx`, ..., `depth`, `length`.
+    /// Name in files: `rmse`, `nees`, `fx`, ..., `depth`, `length`, `frame-rms`, ...
     pub fn name(self) -> &'static str {
         match self {
             Quantity::Rmse => "rmse",
@@ -35,13 +39,14 @@ impl Quantity {
             Quantity::Parameter(parameter) => parameter.name(),
             Quantity::Depth => "depth",
             Quantity::Length => "length",
+            Quantity::Frame(quantity) => quantity.name(),
         }
     }
 
     /// Unit, empty for a pure number.
     pub fn unit(self) -> &'static str {
         match self {
-            Quantity::Rmse => "px",
+            Quantity::Rmse | Quantity::Frame(_) => "px",
             Quantity::Nees => "",
             Quantity::Parameter(parameter) => parameter.unit(),
             Quantity::Depth | Quantity::Length => "mm",
@@ -50,7 +55,7 @@ impl Quantity {
 
     /// Whether it is an error, whose true value is 0.
     pub fn is_error(self) -> bool {
-        !matches!(self, Quantity::Rmse | Quantity::Nees)
+        !matches!(self, Quantity::Rmse | Quantity::Nees | Quantity::Frame(_))
     }
 }
 

@@ -21,7 +21,7 @@ impl Reading {
     /// The run in a folder, whatever its state.
     pub fn open(path: &Path) -> Result<Reading, RunError> {
         let folder = Folder::open(path)?;
-        let engine = Engine::new(&folder.read("spec.toml")?, folder.shard()?)?;
+        let engine = folder.engine(folder.shard()?)?;
         Ok(Reading::begin(folder, engine)?)
     }
 

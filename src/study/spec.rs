@@ -2,16 +2,17 @@
 //! named here.
 
 use super::factor::Factor;
+use super::inputs::Inputs;
 use super::limits;
 use super::lists;
 use super::names;
 use super::poses::Poses;
 use super::spec_error::SpecError;
-use calibench::board::Board;
+use super::target::TargetSpec;
 use calibench::calibrate::{Loss, Settings};
 use calibench::camera::{FreeParameters, Model, Parameter};
-use calibench::geometry::Vec2;
 use calibench::io::result::LensFields;
+use calibench::synth::Departure;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -42,6 +43,20 @@ pub struct Spec {
     /// What varies; every combination of levels is a cell.
     #[serde(default)]
     pub factor: Vec<Factor>,
+    /// What is measured in every trial besides the errors of what is estimated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub measure: Vec<Measure>,
+    /// The files that it names.
+    #[serde(skip)]
+    pub(super) inputs: Inputs,
+}
+
+/// What takes time to measure, and is measured where it is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Measure {
+    /// By how much the estimated camera misplaces pixels, over the frame.
+    Frame,
 }
 
 /// No image is as wide as such noise, px; far above it pixels are no finite numbers.
@@ -68,21 +83,15 @@ pub struct SceneSpec {
     /// A gross error is uniform in a square of this half-width about the point, px.
     #[serde(default = "ten")]
     pub outlier_px: f64,
+    /// Correlation of the noise from one mark of a grid to the next, see [`Departure`].
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub noise_correlation: f64,
+    /// By how much the board bulges towards the camera in its middle, see [`Departure`].
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub bow_mm: f64,
     /// A length measured with the calibrated camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub length: Option<Length>,
-}
-
-/// A grid of marks.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TargetSpec {
-    /// Marks along X.
-    pub columns: usize,
-    /// Marks along Y.
-    pub rows: usize,
-    /// Distance of neighbours.
-    pub spacing_mm: f64,
 }
 
 /// A length parallel to the image plane at a known distance: its ends are seen at their true pixels, and the
@@ -184,6 +193,10 @@ pub struct Precision {
     pub relative_half_width: f64,
 }
 
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
 fn yes() -> bool {
     true
 }
@@ -218,14 +231,25 @@ impl Spec {
     /// # Errors
     /// What is wrong, where (line and column), and what to do.
     pub fn parse(text: &str) -> Result<Spec, SpecError> {
+        Spec::parse_with(text, &Inputs::default())
+    }
+
+    /// The same for a study that names files.
+    ///
+    /// # Errors
+    /// As [`Spec::parse`].
+    pub fn parse_with(text: &str, inputs: &Inputs) -> Result<Spec, SpecError> {
         let spec: Spec = toml::from_str(text).map_err(|e| SpecError::toml(text, &e))?;
+        let spec = Spec { inputs: inputs.clone(), ..spec };
         spec.check()?;
         Ok(spec)
     }
 
-    /// The spec with its defaults, the same text however the file was laid out.
+    /// The spec with its defaults, the same text however the file was laid out and wherever the files lie that it names.
     pub fn canonical(&self) -> serde_json::Value {
-        serde_json::to_value(self).expect("a spec holds nothing that JSON cannot")
+        let mut tree = serde_json::to_value(self).expect("a spec holds nothing that JSON cannot");
+        self.inputs.put_contents(&mut tree);
+        tree
     }
 
     fn check(&self) -> Result<(), SpecError> {
@@ -271,10 +295,26 @@ impl SceneSpec {
         check("scene.outlier_share", share, "from 0 to below 1", (0.0..1.0).contains(&share))?;
         let spread = self.outlier_px;
         check("scene.outlier_px", spread, "a positive number", spread > 0.0 && spread.is_finite())?;
+        let shared = self.noise_correlation;
+        check("scene.noise_correlation", shared, "from 0 to below 1", (0.0..1.0).contains(&shared))?;
+        if shared != 0.0 && self.target.columns().is_none() {
+            return Err(SpecError::NoNeighbours);
+        }
+        check("scene.bow_mm", self.bow_mm, "a finite number", self.bow_mm.is_finite())?;
         if let Some(length) = &self.length {
             length.check()?;
         }
-        self.target.board().map(|_| ())
+        self.target.check()
+    }
+
+    /// In what the scene differs from what a calibration assumes.
+    pub(super) fn departure(&self) -> Departure {
+        Departure { noise_correlation: self.noise_correlation, bow: self.bow_mm }
+    }
+
+    /// The same, with what stands in the files that it names.
+    pub(super) fn read(self, inputs: &Inputs) -> Result<SceneSpec, SpecError> {
+        Ok(SceneSpec { target: self.target.read(inputs)?, poses: self.poses.read(inputs)?, ..self })
     }
 }
 
@@ -287,19 +327,6 @@ impl Length {
             check("scene.length.centre_mm", value, "a finite number", value.is_finite())?;
         }
         check("scene.length.direction_deg", direction_deg, "a finite number", direction_deg.is_finite())
-    }
-}
-
-impl TargetSpec {
-    /// The board.
-    pub fn board(&self) -> Result<Board, SpecError> {
-        Board::chessboard(self.columns, self.rows, self.spacing_mm)
-            .map_err(|e| SpecError::Target(e.to_string()))
-    }
-
-    /// Its points.
-    pub fn points(&self) -> Result<Vec<Vec2>, SpecError> {
-        Ok(self.board()?.points())
     }
 }
 

@@ -55,6 +55,17 @@ pub enum SpecError {
     /// No such board.
     #[error("scene.target: {0}")]
     Target(String),
+    /// A file that the study names and that cannot be read.
+    #[error("file `{name}`: {cause}")]
+    Input {
+        /// As the study names it.
+        name: String,
+        /// What is wrong with it.
+        cause: String,
+    },
+    /// A file that is read, and whose marks or poses cannot be used.
+    #[error("{0}")]
+    Table(String),
     /// A factor that cannot be applied.
     #[error("line {line}, column {column}: factor `{factor}`: {message}")]
     Factor {
@@ -82,6 +93,14 @@ pub enum SpecError {
         /// Factor that sets it again, or the table around it.
         by: String,
     },
+    /// A factor whose levels are files and have no names of their own.
+    #[error("factor `{0}` sets files: give it `labels`, so that no path becomes the name of a cell")]
+    Unlabelled(String),
+    /// Noise that neighbours share, on marks that have none.
+    #[error(
+        "scene.noise_correlation needs a target with columns and rows: marks of a file have no neighbours; set it to 0"
+    )]
+    NoNeighbours,
     /// A cell whose poses do not exist.
     #[error("cell {cell}: {cause}")]
     Poses {

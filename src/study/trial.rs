@@ -3,6 +3,7 @@
 
 use super::calibrator::{self, Calibrator, Estimate};
 use super::cells::Cell;
+use super::frame::Displacement;
 use super::quantity::Quantity;
 use calibench::board::View;
 use calibench::calibrate::Termination;
@@ -39,10 +40,10 @@ impl Trial {
 
 /// Runs trial `trial` of a cell with this library's solver. It depends on nothing but its arguments.
 pub fn run_trial(cell: &Cell, quantities: &[Quantity], trial: u64) -> Trial {
-    match scene_of(cell, trial) {
+    match seen_in(cell, trial) {
         Err(outcome) => failed(cell, quantities, trial, outcome),
-        Ok(scene) => {
-            let estimate = calibrator::builtin(cell, &observe(cell, &scene, trial));
+        Ok((scene, views)) => {
+            let estimate = calibrator::builtin(cell, &views);
             measured(cell, quantities, trial, &scene, estimate)
         }
     }
@@ -55,11 +56,15 @@ pub(super) fn run_trials_of(
     quantities: &[Quantity],
     trials: Range<u64>,
 ) -> Vec<Trial> {
-    let scenes: Vec<_> = trials.clone().map(|trial| scene_of(cell, trial)).collect();
-    let seen: Vec<Vec<View>> = trials
+    let mut seen: Vec<Vec<View>> = Vec::new();
+    let scenes: Vec<_> = trials
         .clone()
-        .zip(&scenes)
-        .filter_map(|(trial, scene)| Some(observe(cell, scene.as_ref().ok()?, trial)))
+        .map(|trial| {
+            seen_in(cell, trial).map(|(scene, views)| {
+                seen.push(views);
+                scene
+            })
+        })
         .collect();
     let mut estimates = calibrator.calibrate(cell, &seen).into_iter();
     let of_trial = |(trial, scene): (u64, Result<Cow<'_, Scene<Lens>>, String>)| match scene {
@@ -70,6 +75,16 @@ pub(super) fn run_trials_of(
         }
     };
     trials.zip(scenes).map(of_trial).collect()
+}
+
+/// What a trial photographs, and what is seen of it.
+type Seen<'a> = (Cow<'a, Scene<Lens>>, Vec<View>);
+
+/// What a trial photographs and sees; where it cannot, the name of its outcome.
+fn seen_in(cell: &Cell, trial: u64) -> Result<Seen<'_>, String> {
+    let scene = scene_of(cell, trial)?;
+    let views = observe(cell, &scene, trial).ok_or("refused-poses")?;
+    Ok((scene, views))
 }
 
 /// What a trial photographs; without poses the name of its outcome.
@@ -89,13 +104,19 @@ fn measured(
 ) -> Trial {
     match estimate {
         Err(outcome) => failed(cell, quantities, trial, outcome),
-        Ok(estimate) => Trial {
-            cell: cell.index,
-            trial,
-            iterations: estimate.iterations,
-            values: quantities.iter().map(|q| measure(*q, cell, scene, &estimate)).collect(),
-            outcome: estimate.outcome,
-        },
+        Ok(estimate) => {
+            let frame = match cell.measures_frame {
+                true => Displacement::of(&cell.camera, &estimate.camera, cell.image_size()),
+                false => Displacement::default(),
+            };
+            Trial {
+                cell: cell.index,
+                trial,
+                iterations: estimate.iterations,
+                values: quantities.iter().map(|q| measure(*q, cell, scene, &estimate, &frame)).collect(),
+                outcome: estimate.outcome,
+            }
+        }
     }
 }
 
@@ -105,15 +126,23 @@ fn failed(cell: &Cell, quantities: &[Quantity], trial: u64, outcome: String) -> 
 
 /// Gaussian noise from one stream and gross errors from another, both drawn point by point whatever their
 /// size: cells that differ in noise, outliers or model meet the same draws, and a longer series of views
-/// begins with those of a shorter one.
-fn observe(cell: &Cell, scene: &Scene<Lens>, trial: u64) -> Vec<View> {
-    let design = &cell.design.scene;
-    let exact = scene.observe(design.noise_px, &mut cell.stream(trial, "noise"));
+/// begins with those of a shorter one. `None` where a bowed board reaches behind the camera.
+fn observe(cell: &Cell, scene: &Scene<Lens>, trial: u64) -> Option<Vec<View>> {
+    let (design, departure) = (&cell.design.scene, cell.departure());
+    let mut noise = cell.stream(trial, "noise");
+    let seen = match departure.is_none() {
+        true => scene.observe(design.noise_px, &mut noise),
+        // Without columns no noise is shared.
+        false => {
+            departure.observe(scene, design.target.columns().unwrap_or(1), design.noise_px, &mut noise)?
+        }
+    };
     if design.outlier_share == 0.0 {
-        return exact;
+        return Some(seen);
     }
     let mut stream = cell.stream(trial, "outliers");
-    exact.iter().map(|view| spoil(view, design.outlier_share, design.outlier_px, &mut stream)).collect()
+    let spoilt = |view| spoil(view, design.outlier_share, design.outlier_px, &mut stream);
+    Some(seen.iter().map(spoilt).collect())
 }
 
 fn spoil(view: &View, share: f64, half_width_px: f64, stream: &mut Stream) -> View {
@@ -125,7 +154,13 @@ fn spoil(view: &View, share: f64, half_width_px: f64, stream: &mut Stream) -> Vi
     View::new(view.points().to_vec(), pixels.collect()).expect("finite pixels stay finite, one a point")
 }
 
-fn measure(quantity: Quantity, cell: &Cell, scene: &Scene<Lens>, estimate: &Estimate) -> Option<f64> {
+fn measure(
+    quantity: Quantity,
+    cell: &Cell,
+    scene: &Scene<Lens>,
+    estimate: &Estimate,
+    frame: &Displacement,
+) -> Option<f64> {
     let truth = cell.camera.distortion;
     let error = |p: Parameter| {
         let is_comparable = cell.knows_its_lens() || is_the_same_thing(p, [cell.model(), truth.model()]);
@@ -147,6 +182,7 @@ fn measure(quantity: Quantity, cell: &Cell, scene: &Scene<Lens>, estimate: &Esti
             let (length, pixels) = cell.length.as_ref()?;
             length.error_mm(&estimate.camera, pixels)?
         }
+        Quantity::Frame(of_frame) => frame.value(of_frame)?,
     };
     value.is_finite().then_some(value)
 }

@@ -1,7 +1,7 @@
 //! How do trials that are all done already come into a folder? All of them or none, with the files that vouch
 //! for them.
 
-use super::folder::{Folder, FolderError};
+use super::folder::{Folder, FolderError, INPUTS};
 use super::log::Checkpoint;
 use super::manifest::Manifest;
 use calibench::io::atomic::Beside;
@@ -38,8 +38,12 @@ impl<'a> WholeLog<'a> {
     pub(super) fn place(self, spec_text: &str, manifest: &Manifest, batches: u64) -> Result<(), FolderError> {
         let sha256 = hexadecimal(&self.hash);
         let checkpoint = Checkpoint { run: manifest.identity(), batches, bytes: self.bytes, sha256 };
+        let contents = &manifest.contents;
         let (spec, checkpoint, manifest) = (spec_text.to_string(), checkpoint.to_text(), manifest.to_text());
-        let files = [("spec.toml", spec), ("checkpoint.json", checkpoint), ("manifest.json", manifest)];
+        let inputs = (!contents.is_empty()).then(|| (INPUTS, contents.to_text()));
+        let mut files = vec![("spec.toml", spec)];
+        files.extend(inputs);
+        files.extend([("checkpoint.json", checkpoint), ("manifest.json", manifest)]);
         self.put(&files).map_err(FolderError::Unwritten)
     }
 

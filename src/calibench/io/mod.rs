@@ -27,6 +27,7 @@ pub mod pairs;
 pub mod provenance;
 pub mod result;
 pub mod robot;
+pub mod scene_tables;
 pub mod shown;
 pub mod spatial;
 pub mod table;

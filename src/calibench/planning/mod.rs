@@ -21,4 +21,4 @@ pub use gain::{Gain, GainError, Knowledge};
 pub use information::{Estimated, view_information};
 pub use same_marks::marks_against_covariance;
 pub use search::{Found, Ranked, best_repeated, next_pose};
-pub use wanted::{Wanted, WantedError, Wish};
+pub use wanted::{Wanted, WantedError, Wish, frame_form};

@@ -105,7 +105,7 @@ impl Wish {
     pub fn of(wanted: Wanted, camera: &Camera<Lens>, estimated: &Estimated) -> Result<Wish, WantedError> {
         let form = match wanted {
             Wanted::Parameter(parameter) => of_parameter(parameter, estimated)?,
-            Wanted::Pixel(size) => over_the_frame(size, camera, estimated)?,
+            Wanted::Pixel(size) => frame_form(size, camera, estimated, true)?,
             Wanted::Length { centre, length } => {
                 let gradient = length_gradient(&centre, length, camera, estimated)?;
                 &gradient * gradient.transpose()
@@ -134,12 +134,19 @@ fn of_parameter(parameter: Parameter, estimated: &Estimated) -> Result<DMatrix<f
     Ok(DMatrix::from_fn(n, n, |i, j| if (i, j) == (row, row) { factor * factor } else { 0.0 }))
 }
 
-/// `sum G^T G / N` over the nodes, with `G = D - R (sum R^T R)^-1 (sum R^T D)`: `D` the derivatives of the pixel by the
-/// parameters, `R` those by a rotation of the camera.
-fn over_the_frame(
+/// The mean square over the nodes of a frame of `size` px by which an error `e` of the estimated parameters moves a pixel is `e^T W e`, px^2:
+/// the matrix `W`.
+///
+/// `W = sum G^T G / N`, with `G = D - R (sum R^T R)^-1 (sum R^T D)` where the best rotation of the camera is taken out, else `G = D`: `D` the
+/// derivatives of the pixel by the parameters, `R` those by a rotation of the camera.
+///
+/// # Errors
+/// [`WantedError::TooFewNodes`].
+pub fn frame_form(
     size: (usize, usize),
     camera: &Camera<Lens>,
     estimated: &Estimated,
+    is_rotation_taken_out: bool,
 ) -> Result<DMatrix<f64>, WantedError> {
     let slopes = |pixel: &Vec2| -> Option<(Matrix2xX<f64>, nalgebra::Matrix2x3<f64>)> {
         let ray = camera.ray(pixel).ok()?;
@@ -157,7 +164,10 @@ fn over_the_frame(
         own += by_rotation.transpose() * by_rotation;
         with += by_rotation.transpose() * by_camera;
     }
-    let best = own.cholesky().ok_or_else(too_few)?.solve(&with);
+    let best = match is_rotation_taken_out {
+        true => own.cholesky().ok_or_else(too_few)?.solve(&with),
+        false => Matrix3xX::zeros(n),
+    };
     let mut form = DMatrix::zeros(n, n);
     for (by_camera, by_rotation) in &nodes {
         let left = by_camera - by_rotation * &best;

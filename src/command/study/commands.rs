@@ -1,6 +1,6 @@
 //! `calibench study commands`: one line a shard, for whatever runs lines.
 
-use super::{Failure, read};
+use super::{Failure, read_study};
 use crate::{Exit, print};
 use calibench::io::ShownPath;
 use calibench_study::{Engine, Shard};
@@ -27,7 +27,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
         return Err(Failure::usage(format!("--shards must be from 1 to {}", Shard::MOST)));
     }
     // What cannot be run is said here, not once a shard.
-    Engine::new(&read(&arguments.spec)?, Shard { index: 0, count })
+    let (text, inputs) = read_study(&arguments.spec)?;
+    Engine::with_inputs(&text, &inputs, Shard { index: 0, count })
         .map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.shown())))?;
     let part = |index: u64| quoted(&arguments.out.join(format!("part-{index}-of-{count}")));
     if arguments.merge {

@@ -1,6 +1,6 @@
 //! `calibench study measure`: how fast are trials, and how much memory do they take?
 
-use super::{Failure, read};
+use super::{Failure, read_study};
 use crate::calibrate::Format;
 use crate::said::written_by;
 use crate::{Exit, print};
@@ -36,9 +36,9 @@ struct Measured {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
-    let text = read(&arguments.spec)?;
-    let mut spec =
-        Spec::parse(&text).map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.shown())))?;
+    let (text, inputs) = read_study(&arguments.spec)?;
+    let mut spec = Spec::parse_with(&text, &inputs)
+        .map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.shown())))?;
     spec.trials.precision = None;
     let mut runs = Vec::new();
     for trials in [arguments.trials.max(2), arguments.trials.max(2).saturating_mul(4)] {

@@ -2,7 +2,7 @@
 //! smallest one that suffices, with more views until they confirm it.
 
 use super::finished::estimated_json;
-use super::{Failure, read};
+use super::{Failure, read_study};
 use crate::calibrate::Format;
 use crate::said::{print_as, written_by};
 use crate::{Exit, print, warn};
@@ -73,7 +73,8 @@ impl From<PlanError> for Failure {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
-    let mut spec = Spec::parse(&read(&arguments.spec)?)
+    let (text, inputs) = read_study(&arguments.spec)?;
+    let mut spec = Spec::parse_with(&text, &inputs)
         .map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.shown())))?;
     if let Some(length) = length(arguments)? {
         spec.scene.length = Some(length);

@@ -2,7 +2,7 @@
 
 use super::finished::{Finished, Ran};
 use super::solver::ProgramArguments;
-use super::{Failure, read};
+use super::{Failure, read_study};
 use crate::calibrate::Format;
 use crate::{Exit, warn};
 use calibench::io::ShownPath;
@@ -11,8 +11,8 @@ use calibench_harness::project::Project;
 use calibench_harness::stopwatch::Stopwatch;
 use calibench_harness::{Build, ProgressDisplay};
 use calibench_study::{
-    CellSummary, Engine, Folder, FolderError, Interruption, Manifest, Outcome, RunError, Shard, Summary,
-    TrialFile, Worst, finish, merge,
+    CellSummary, Engine, Folder, FolderError, Interruption, Manifest, Outcome, Shard, Summary, TrialFile,
+    Worst, finish, merge,
 };
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -68,8 +68,8 @@ pub(crate) struct MergeArguments {
 
 pub(super) fn run(arguments: &Arguments, build: &Build) -> Result<Exit, Failure> {
     arguments.trials.check().map_err(FolderError::from)?;
-    let text = read(&arguments.spec)?;
-    let engine = Engine::new(&text, arguments.shard)
+    let (text, inputs) = read_study(&arguments.spec)?;
+    let engine = Engine::with_inputs(&text, &inputs, arguments.shard)
         .map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.shown())))?;
     let out = arguments.out.clone().unwrap_or_else(|| default_folder(&engine));
     let manifest = Manifest::new(&engine.spec, arguments.shard, build);
@@ -83,7 +83,7 @@ pub(super) fn resume(arguments: &ResumeArguments, build: &Build) -> Result<Exit,
     let folder = Folder::open(&arguments.run)?;
     folder.manifest()?.trials.check().map_err(FolderError::from)?;
     let shard = folder.shard()?;
-    let engine = Engine::new(&folder.read("spec.toml")?, shard).map_err(RunError::from)?;
+    let engine = folder.engine(shard)?;
     // A command in a folder may be a stranger's: it is compared with the user's, and never run by itself.
     let manifest = Manifest::new(&engine.spec, shard, build).with_solver(arguments.program.solver.clone());
     folder.check(&manifest)?;
