@@ -111,7 +111,7 @@ impl Grid<'_> {
             let bars: Vec<(f64, f64, f64)> = found.iter().map(|(x, e)| (*x, e.low, e.high)).collect();
             let points: Vec<(f64, f64)> = found.iter().map(|(x, e)| (*x, e.value)).collect();
             let name = if s.label.is_empty() { "measured".to_string() } else { s.label.clone() };
-            if shows.everywhere().is_none() {
+            if !expected.is_empty() {
                 plot = plot.line_as(if i == 0 { label } else { "" }, &expected, look);
             }
             plot = plot.error_bars_as("", &bars, look).points_as(name, &points, look);
