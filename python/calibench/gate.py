@@ -72,6 +72,9 @@ class Answer:
     """An answer with a warning is flagged, not silent."""
     message: str | None = None
     """Why there is no estimate."""
+    pose_covariances: Iterable[Array] | None = None
+    """One (6, 6) a view, marginal: of the rotation vector of ``R_answered = exp([w]x) R_true``, rad, then of the translation in the target's unit,
+    both along the camera's axes; `Covariance.poses` is that."""
 
 
 Solver = Callable[[Problem], "Answer | Calibration | Mapping[str, Any]"]
@@ -283,6 +286,7 @@ def _of_calibration(result: Calibration) -> Answer:
         rmse=result.rmse_px,
         warnings=tuple(warning.message for warning in result.warnings if warning.kind not in unflagged),
         message=None if result.termination == "converged" else result.termination,
+        pose_covariances=result.covariance.poses,
     )
 
 
@@ -296,6 +300,8 @@ def _of_answer(answer: Answer, problem: Problem) -> dict[str, Any]:
         said["poses"] = [{"rotation": r, "translation": np.ravel(t)} for r, t in poses]
     if answer.covariance is not None:
         said["covariance"] = {"parameters": answer.covariance_of or problem.free, "matrix": answer.covariance}
+    if answer.pose_covariances is not None:
+        said["pose_covariances"] = list(answer.pose_covariances)
     return said
 
 

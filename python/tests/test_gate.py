@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import calibench
@@ -54,6 +55,23 @@ def test_this_librarys_solver_is_judged_alike_in_rust_and_in_python() -> None:
     assert verdicts(builtin) == verdicts(python)
     assert python.solver == "ours" and "ours" in python.to_text()
     assert python.to_json().startswith("{") and "<testsuite" in python.to_junit() and "<html" in python.to_html()
+
+
+def test_pose_covariances_in_degrees_are_found() -> None:
+    def degrees(problem: calibench.Problem) -> calibench.Answer:
+        result = ours(problem)
+        unit = np.diag([180.0 / np.pi] * 3 + [1.0] * 3)
+        covariances = [unit @ covariance @ unit for covariance in result.covariance.poses]
+        return calibench.Answer(
+            result.camera.parameters,
+            rotations=result.rotations,
+            translations=result.translations,
+            covariance=result.covariance.intrinsics,
+            pose_covariances=covariances,
+        )
+
+    report = calibench.run_gate(degrees, samples=4, scenes="four-pose")
+    assert {check.property for check in report.checks if check.verdict in ("FAILED", "GRAVE")} == {"pose-covariance"}
 
 
 def test_an_exception_of_a_solver_is_a_finding_and_a_refusal_is_none() -> None:
