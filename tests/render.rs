@@ -1,8 +1,8 @@
 //! The virtual camera's images against independent integration of the same scene.
 
 use calibench::board::Board;
-use calibench::camera::{BrownConrady, Camera};
-use calibench::geometry::{Pose, Vec2, Vec3};
+use calibench::camera::{BrownConrady, Camera, Lens, Model};
+use calibench::geometry::{Pose, Vec2, Vec3, rotation};
 use calibench::synth::render::{
     Appearance, Imaging, RenderError, SensorNoise, Shading, Surround, nine_dot_stand_in, photograph,
 };
@@ -10,10 +10,10 @@ use calibench::synth::scene::looking_at_centre;
 use calibench::synth::{Stream, StreamKey, Truth};
 
 /// The board point that a pixel sees: the camera model inverted, then the ray met with the plane Z = 0.
-fn board_point(camera: &Camera, cam_from_target: &Pose, pixel: &Vec2) -> Vec2 {
-    let ray = camera.normalised_ray(pixel).unwrap();
+fn board_point(camera: &Camera<Lens>, cam_from_target: &Pose, pixel: &Vec2) -> Vec2 {
+    let ray = camera.ray(pixel).unwrap();
     let target_from_cam = cam_from_target.inverse();
-    let direction = target_from_cam.rotation * Vec3::new(ray.x, ray.y, 1.0);
+    let direction = target_from_cam.rotation * ray;
     let origin = target_from_cam.translation;
     (origin - direction * (origin.z / direction.z)).xy()
 }
@@ -38,9 +38,17 @@ fn largest_difference(board: &Board, ink: &dyn Fn(&Vec2) -> bool) -> (f64, usize
         p2: -1e-3,
         k3: 0.01,
     });
-    let pose = looking_at_centre([-25.0, 30.0, 10.0], 150.0);
-    let photo = photograph(&camera, (640, 480), board, &pose, &Imaging::default()).unwrap();
-    let level = |pixel: &Vec2| if ink(&board_point(&camera, &pose, pixel)) { 0.1 } else { 0.85 };
+    largest_difference_of(&camera.into(), &looking_at_centre([-25.0, 30.0, 10.0], 150.0), board, ink)
+}
+
+fn largest_difference_of(
+    camera: &Camera<Lens>,
+    pose: &Pose,
+    board: &Board,
+    ink: &dyn Fn(&Vec2) -> bool,
+) -> (f64, usize) {
+    let photo = photograph(camera, (640, 480), board, pose, &Imaging::default()).unwrap();
+    let level = |pixel: &Vec2| if ink(&board_point(camera, pose, pixel)) { 0.1 } else { 0.85 };
     let (mut largest, mut tested) = (0.0f64, 0);
     for y in 0..480 {
         for x in 0..640 {
@@ -67,15 +75,74 @@ fn discs_cover_what_supersampling_finds() {
     assert!(tested > 50 && largest < SUPERSAMPLING_PX, "{largest} over {tested}");
 }
 
+/// Whether a point of a chessboard of 9 x 7 corners, 10 apart, is dark.
+fn is_dark(p: &Vec2) -> bool {
+    let (i, j) = ((p.x + 50.0) / 10.0, (p.y + 40.0) / 10.0);
+    (0.0..10.0).contains(&i) && (0.0..8.0).contains(&j) && (i.floor() + j.floor()) as i64 % 2 == 0
+}
+
 #[test]
 fn squares_cover_what_supersampling_finds() {
     let board = Board::chessboard(9, 7, 10.0).unwrap();
-    let ink = |p: &Vec2| {
-        let (i, j) = ((p.x + 50.0) / 10.0, (p.y + 40.0) / 10.0);
-        (0.0..10.0).contains(&i) && (0.0..8.0).contains(&j) && (i.floor() + j.floor()) as i64 % 2 == 0
-    };
-    let (largest, tested) = largest_difference(&board, &ink);
+    let (largest, tested) = largest_difference(&board, &is_dark);
     assert!(tested > 200 && largest < SUPERSAMPLING_PX, "{largest} over {tested}");
+}
+
+#[test]
+fn every_lens_shows_what_its_rays_meet() {
+    let board = Board::chessboard(9, 7, 10.0).unwrap();
+    let pose = looking_at_centre([-25.0, 30.0, 10.0], 150.0);
+    let coefficients: [(Model, &[f64]); 6] = [
+        (Model::Rational, &[-0.2, 0.05, 0.001, -0.001, 0.01, 0.02, 0.01, 0.003]),
+        (
+            Model::ThinPrism,
+            &[-0.2, 0.05, 0.001, -0.001, 0.01, 0.02, 0.01, 0.003, 0.002, -0.001, 0.001, 0.002],
+        ),
+        (
+            Model::Tilted,
+            &[-0.2, 0.05, 0.001, -0.001, 0.01, 0.02, 0.01, 0.003, 0.002, -0.001, 0.001, 0.002, 0.03, -0.02],
+        ),
+        (Model::KannalaBrandt, &[-0.03, 0.004, 0.001, -0.0005]),
+        (Model::Division, &[-0.2]),
+        (Model::DoubleSphere, &[-0.1, 0.55]),
+    ];
+    for (model, coefficients) in coefficients {
+        let lens = Lens::new(model, coefficients).unwrap();
+        let camera = Camera::with_lens(500.0, 505.0, 326.0, 243.0, lens);
+        let (largest, tested) = largest_difference_of(&camera, &pose, &board, &is_dark);
+        assert!(tested > 150 && largest < SUPERSAMPLING_PX, "{model}: {largest} over {tested}");
+    }
+}
+
+/// A board that stands beside the camera, from before it to behind it.
+#[test]
+fn a_fisheye_sees_a_board_beside_and_behind_it() {
+    let board = Board::chessboard(9, 7, 10.0).unwrap();
+    let lens = Lens::new(Model::KannalaBrandt, &[0.0; 4]).unwrap();
+    let camera = Camera::with_lens(130.0, 130.0, 320.0, 240.0, lens);
+    // Its normal points along X; its rows lie along the optical axis.
+    let rotation = rotation::exp(&Vec3::new(0.0, std::f64::consts::FRAC_PI_2, 0.0));
+    let pose = Pose { rotation, translation: Vec3::new(60.0, 0.0, 10.0) };
+    let photo = photograph(&camera, (640, 480), &board, &pose, &Imaging::default()).unwrap();
+    let depths = board.points().iter().map(|p| pose.apply(&Vec3::new(p.x, p.y, 0.0)).z).collect::<Vec<_>>();
+    assert!(depths.iter().any(|&z| z < -25.0) && depths.iter().any(|&z| z > 45.0), "{depths:?}");
+    for (point, centre) in board.points().iter().zip(&photo.centres_true) {
+        let seen = pose.apply(&Vec3::new(point.x, point.y, 0.0));
+        let angle = seen.xy().norm().atan2(seen.z);
+        let expected = Vec2::new(320.0, 240.0) + seen.xy().normalize() * (130.0 * angle);
+        assert!((centre - expected).norm() < 1e-9, "{point}");
+    }
+    let (largest, tested) = largest_difference_of(&camera, &pose, &board, &is_dark);
+    assert!(tested > 100 && largest < SUPERSAMPLING_PX, "{largest} over {tested}");
+    // A camera that sees what is before it does not see this.
+    let refused = photograph(
+        &Camera::with_lens(500.0, 500.0, 320.0, 240.0, Lens::ideal(Model::Rational)),
+        (640, 480),
+        &board,
+        &pose,
+        &Imaging::default(),
+    );
+    assert!(matches!(refused, Err(RenderError::BeyondMonotoneAngle { .. })), "{:?}", refused.err());
 }
 
 #[test]

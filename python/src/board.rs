@@ -101,13 +101,13 @@ impl Board {
     /// The image that a virtual camera takes of the board: intensity (black 0, white 1), float32, shape (height, width); exact area sampling.
     ///
     /// Args:
-    ///     camera: brown-conrady.
+    ///     camera: of any lens model.
     ///     image_size: width and height, px.
     ///     rotation, translation: camera from target.
     ///     blur_px: standard deviation of the Gaussian point spread function.
     ///
     /// Raises:
-    ///     SceneError: part of the board is behind the camera, or where the lens folds back; a pose that is not finite.
+    ///     SceneError: part of the board is behind a brown-conrady camera, or where the lens folds back; a pose that is not finite.
     ///     SettingsError: an image without pixels, or of more than 2^28.
     #[pyo3(signature = (camera, image_size, rotation, translation, *, blur_px = 0.0))]
     fn photograph<'py>(
@@ -120,7 +120,7 @@ impl Board {
         blur_px: f64,
     ) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let image_size = arguments::size_to_make(image_size, "image_size")?;
-        let (camera, pose) = (brown_conrady(camera, "camera")?, pose(rotation, translation)?);
+        let (camera, pose) = (camera.0, pose(rotation, translation)?);
         let (board, imaging) = (*self.0.board(), Imaging { blur_px, ..Imaging::default() });
         let photo = detached(py, true, move || photograph(&camera, image_size, &board, &pose, &imaging))?;
         of_intensity(py, photo.map_err(|e| errors::render(py, &e))?.image)

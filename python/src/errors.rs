@@ -145,6 +145,7 @@ pub(crate) fn render(py: Python<'_>, error: &RenderError) -> PyErr {
         RenderError::BehindCamera { x, y }
         RenderError::TooNear { x, y }
         RenderError::BeyondMonotoneRadius { x, y, radius, limit }
+        RenderError::BeyondMonotoneAngle { x, y, angle_deg, limit_deg }
         RenderError::Setting { name, value, need })
 }
 

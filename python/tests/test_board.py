@@ -121,3 +121,12 @@ def test_a_fisheye_is_shown_in_other_projections() -> None:
         assert image[240, 320] == 90 and (camera is not None) == has_camera
     with pytest.raises(ValueError, match="only the lens model brown-conrady"):
         fisheye.undistort_image(grey)
+
+
+def test_a_board_is_photographed_through_a_fisheye() -> None:
+    board = calibench.Board("chess:9x6:8mm")
+    camera = calibench.Camera(fx=300.0, fy=300.0, cx=320.0, cy=240.0, k1=-0.02, model="kannala-brandt")
+    image = board.photograph(camera, SIZE, np.eye(3), [0.0, 0.0, 100.0], blur_px=0.7)
+    seen = board.detect(image)
+    expected = camera.project(np.column_stack([board.points, np.full(len(board.points), 100.0)]))
+    assert np.abs(seen - expected).max() < 0.05

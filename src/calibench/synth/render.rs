@@ -17,7 +17,7 @@ mod window;
 pub use sensor::{SensorNoise, Shading};
 
 use crate::board::{Board, Pattern};
-use crate::camera::Camera;
+use crate::camera::{Camera, Lens};
 use crate::geometry::{Pose, Vec2, Vec3};
 use crate::raster::Raster;
 use coverage::Coverage;
@@ -101,6 +101,21 @@ pub enum RenderError {
         /// Radius up to which the model is one-to-one.
         limit: f64,
     },
+    /// Part of the board lies further from the optical axis than a lens of another model is one-to-one.
+    #[error(
+        "board point ({x:.3}, {y:.3}) is seen {angle_deg:.2} degrees from the optical axis, but the lens is one-to-one up to \
+         {limit_deg:.2}; move the board towards the image centre"
+    )]
+    BeyondMonotoneAngle {
+        /// Board X.
+        x: f64,
+        /// Board Y.
+        y: f64,
+        /// Its angle from the optical axis, degrees.
+        angle_deg: f64,
+        /// Angle up to which the model is one-to-one, degrees.
+        limit_deg: f64,
+    },
     /// Part of the board lies so close to the plane of the camera that its pixel is beyond all numbers, or is
     /// known to no part of a pixel.
     #[error(
@@ -126,51 +141,77 @@ pub enum RenderError {
 
 /// The board's points through the camera, with the reasons why some have no pixel.
 struct Projector<'a> {
-    camera: &'a Camera,
+    optics: Optics,
     cam_from_target: &'a Pose,
-    monotone_radius: f64,
+}
+
+/// A camera with how far from its axis it is one-to-one.
+enum Optics {
+    /// Brown-Conrady's, which sees what is before it.
+    Plain { camera: Camera, monotone_radius: f64 },
+    /// Any other; fisheyes see beside and behind themselves.
+    Any { camera: Camera<Lens>, monotone_angle: f64 },
+}
+
+impl Optics {
+    fn of(camera: Camera<Lens>) -> Optics {
+        match camera.brown_conrady() {
+            Some(camera) => Optics::Plain { camera, monotone_radius: camera.distortion.monotone_radius() },
+            None => Optics::Any { camera, monotone_angle: camera.distortion.monotone_angle() },
+        }
+    }
 }
 
 impl Projector<'_> {
     fn pixel(&self, point: &Vec2) -> Result<Vec2, RenderError> {
         let (x, y) = (point.x, point.y);
-        let point_cam = self.cam_from_target.apply(&Vec3::new(x, y, 0.0));
-        if point_cam.z.is_nan() || point_cam.z <= 0.0 {
-            return Err(RenderError::BehindCamera { x, y });
-        }
-        let ideal = point_cam.xy() / point_cam.z;
-        let radius = ideal.norm();
-        if radius >= self.monotone_radius {
-            return Err(RenderError::BeyondMonotoneRadius { x, y, radius, limit: self.monotone_radius });
-        }
-        let pixel = self.camera.pixel_from_normalised(&self.camera.distortion.distort(&ideal));
-        match pixel.x.is_finite() && pixel.y.is_finite() {
-            true => Ok(pixel),
-            false => Err(RenderError::TooNear { x, y }),
-        }
+        let seen = self.cam_from_target.apply(&Vec3::new(x, y, 0.0));
+        let pixel = match &self.optics {
+            Optics::Plain { camera, monotone_radius } => {
+                if seen.z.is_nan() || seen.z <= 0.0 {
+                    return Err(RenderError::BehindCamera { x, y });
+                }
+                let (ideal, limit) = (seen.xy() / seen.z, *monotone_radius);
+                let radius = ideal.norm();
+                if radius >= limit {
+                    return Err(RenderError::BeyondMonotoneRadius { x, y, radius, limit });
+                }
+                Some(camera.pixel_from_normalised(&camera.distortion.distort(&ideal)))
+            }
+            Optics::Any { camera, monotone_angle } => {
+                let angle = libm::atan2(seen.xy().norm(), seen.z);
+                if angle.is_nan() || angle >= *monotone_angle {
+                    let [angle_deg, limit_deg] = [angle, *monotone_angle].map(f64::to_degrees);
+                    return Err(RenderError::BeyondMonotoneAngle { x, y, angle_deg, limit_deg });
+                }
+                camera.pixel(&seen)
+            }
+        };
+        let is_finite = |pixel: &Vec2| pixel.x.is_finite() && pixel.y.is_finite();
+        pixel.filter(is_finite).ok_or(RenderError::TooNear { x, y })
     }
 }
 
-/// Photographs a board: the noise-free image of `image_size` (width, height) px and the true pixels of its
-/// marks.
+/// Photographs a board through a lens of any model: the noise-free image of `image_size` (width, height) px and the true
+/// pixels of its marks.
 ///
 /// Chessboards have `(columns + 1) x (rows + 1)` squares; the square towards the board's origin corner (least
 /// X, least Y) is dark.
 ///
 /// # Errors
-/// Any outline that reaches behind the camera or beyond the monotone radius of the lens, and settings out of
-/// domain.
-pub fn photograph(
-    camera: &Camera,
+/// Any outline that reaches further from the axis than the lens is one-to-one (behind a Brown-Conrady camera, or beyond its
+/// monotone radius), and settings out of domain.
+pub fn photograph<C: Copy + Into<Camera<Lens>>>(
+    camera: &C,
     image_size: (usize, usize),
     board: &Board,
     cam_from_target: &Pose,
     imaging: &Imaging,
 ) -> Result<Photograph, RenderError> {
-    check(camera, imaging)?;
+    let camera: Camera<Lens> = (*camera).into();
+    check(&camera, imaging)?;
     check_pose(cam_from_target)?;
-    let monotone_radius = camera.distortion.monotone_radius();
-    let projector = Projector { camera, cam_from_target, monotone_radius };
+    let projector = Projector { optics: Optics::of(camera), cam_from_target };
     let covered_by = |outlines: &[Outline]| -> Result<Coverage, RenderError> {
         let mut coverage = Coverage::new(image_size.0, image_size.1);
         for outline in outlines {
@@ -217,7 +258,7 @@ pub fn nine_dot_stand_in() -> Photograph {
         .expect("a fronto-parallel board at distance 1 is in front of the camera")
 }
 
-fn check(camera: &Camera, imaging: &Imaging) -> Result<(), RenderError> {
+fn check(camera: &Camera<Lens>, imaging: &Imaging) -> Result<(), RenderError> {
     let setting = |name, value, holds: bool, need| {
         if holds { Ok(()) } else { Err(RenderError::Setting { name, value, need }) }
     };
@@ -226,7 +267,7 @@ fn check(camera: &Camera, imaging: &Imaging) -> Result<(), RenderError> {
     setting(
         "focal length",
         focal_px,
-        camera.is_valid(),
+        camera.is_possible(),
         "a camera has finite parameters and positive focal lengths",
     )?;
     let blur_px = imaging.blur_px;
