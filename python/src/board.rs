@@ -4,7 +4,6 @@ use crate::arguments;
 use crate::arrays::{of_plane, pose};
 use crate::camera::Camera;
 use crate::errors;
-use crate::evaluate::brown_conrady;
 use crate::rectify::{grey, of_intensity};
 use crate::watch::detached;
 use calibench::board::Pattern;
