@@ -352,6 +352,51 @@ fn answers_from_files_get_the_verdict_of_the_same_answers_from_a_pipe() {
     assert_eq!(gate(&["--judge", &place]).status.code(), Some(2));
 }
 
+/// A scene without estimates has no check of its bias or its poses: the checks of the other run must not be compared with those
+/// that stand in their places.
+#[test]
+fn verdicts_are_compared_scene_by_scene_where_one_run_has_fewer_checks() {
+    let [silent, off] = ["gate-silent", "gate-off"].map(folder);
+    let place = |folder: &std::path::Path| folder.to_string_lossy().into_owned();
+    let scenes = ["--scene", "four-pose", "--scene", "metres"];
+    let record = |to: &std::path::Path, planted: &[&str]| {
+        let to = place(to);
+        let arguments = [&["--samples", "16", "--record", &to][..], &scenes, planted].concat();
+        assert!(gate(&arguments).status.code().is_some_and(|code| code < 2));
+    };
+    record(&silent, &[]);
+    record(&off, &["--planted", "pose-covariance-in-degrees"]);
+    let truth = std::fs::read_to_string(silent.join("problems.jsonl")).expect("written");
+    let of_metres = |line: &str| {
+        // Marks of a board in metres are less than 1 apart from the middle.
+        let problem: serde_json::Value = serde_json::from_str(line).expect("JSON");
+        let x = problem["views"][0]["target"][0][0].as_f64();
+        (problem["id"].clone(), x.is_some_and(|x| x.abs() < 1.0))
+    };
+    let in_metres: Vec<_> = truth.lines().map(of_metres).filter(|(_, is)| *is).map(|(id, _)| id).collect();
+    assert!(!in_metres.is_empty() && in_metres.len() < truth.lines().count());
+    let path = silent.join("answers.jsonl");
+    let answers = std::fs::read_to_string(&path).expect("written");
+    let without: String = answers
+        .lines()
+        .map(|line| {
+            let answer: serde_json::Value = serde_json::from_str(line).expect("JSON");
+            match in_metres.contains(&answer["id"]) {
+                true => format!("{{\"id\": {}, \"status\": \"unsupported\"}}\n", answer["id"]),
+                false => format!("{line}\n"),
+            }
+        })
+        .collect();
+    std::fs::write(&path, without).expect("written");
+    let output = gate(&["--judge", &place(&off), "--against", &place(&silent)]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    let verdicts: Vec<&str> = text.lines().filter(|line| line.contains(" -> ")).collect();
+    assert!(verdicts.contains(&"pose-covariance: held -> FAILED (four-pose)"), "{text}");
+    assert!(verdicts.contains(&"bias: not judged -> held (metres)"), "{text}");
+    assert!(!verdicts.iter().any(|line| line.starts_with("rmse: ") && line.contains("four-pose")), "{text}");
+}
+
 #[test]
 fn a_change_far_below_the_noise_shows_on_common_noise() {
     let same_law = gate(&["--samples", "64", "--against", "builtin", "--planted", "last-bits"]);

@@ -11,7 +11,8 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// Own marks against a grid, own poses against drawn ones, in six cells that draw noise of their own.
+/// Own marks against a grid, whose noise neighbours may share, own poses against drawn ones, in nine cells that draw noise of
+/// their own.
 const OWN: &str = r#"
 name = "own"
 question = "Do files give what they hold?"
@@ -29,9 +30,13 @@ noise_px = 0.1
 
 [[factor]]
 name = "target"
-set = ["scene.target", "scene.bow_mm"]
-levels = [[{ file = "data/marks.csv" }, 0.2], [{ columns = 7, rows = 5, spacing_mm = 10.0 }, 0.0]]
-labels = ["own", "grid"]
+set = ["scene.target", "scene.bow_mm", "scene.noise_correlation"]
+levels = [
+    [{ file = "data/marks.csv" }, 0.2, 0.0],
+    [{ columns = 7, rows = 5, spacing_mm = 10.0 }, 0.0, 0.0],
+    [{ columns = 7, rows = 5, spacing_mm = 10.0 }, 0.0, 0.6],
+]
+labels = ["own", "grid", "shared"]
 
 [[factor]]
 name = "poses"
@@ -79,8 +84,10 @@ fn a_cell_that_is_run_again_from_what_it_used_gives_the_same_bits() {
     write_own(&folder);
     done(&folder, "study run own.toml --out run");
     let poses = fs::read_to_string(folder.join("run/poses.csv")).unwrap();
-    assert!(!poses.contains("\n2,") && !poses.contains("\n5,"), "trials there draw poses of their own");
-    for cell in 0..6 {
+    for redrawn in ["\n2,", "\n5,", "\n8,"] {
+        assert!(!poses.contains(redrawn), "trials there draw poses of their own");
+    }
+    for cell in 0..9 {
         let spec = done(&folder, &format!("study cell run {cell}"));
         assert_eq!(spec.contains("redraw = true"), cell % 3 == 2, "{spec}");
         fs::write(folder.join("alone.toml"), spec).unwrap();
@@ -95,9 +102,12 @@ fn a_cell_that_is_run_again_from_what_it_used_gives_the_same_bits() {
         let again = summary(&format!("alone-{cell}"));
         assert_eq!(own.split_once(',').unwrap().1, again.lines().nth(1).unwrap().split_once(',').unwrap().1);
     }
-    let refused = calibench(&folder, "study cell run 6");
+    let refused = calibench(&folder, "study cell run 9");
     assert_eq!(refused.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&refused.stderr).contains("the run has cells 0 to 5"));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("the run has cells 0 to 8"));
+    fs::write(folder.join("run/poses.csv"), poses.replacen("170", "171", 1)).unwrap();
+    let refused = calibench(&folder, "study cell run 0");
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("poses.csv is damaged"));
     fs::remove_dir_all(folder).unwrap();
 }
 
@@ -166,6 +176,31 @@ fn files_that_cannot_be_used_are_refused_and_say_why() {
 }
 
 #[test]
+fn a_frame_that_the_lens_does_not_show_whole_is_told() {
+    let folder = scratch("frame-part");
+    write_own(&folder);
+    let study = |fx: &str, k1: &str| {
+        let text = OWN
+            .split("[[factor]]")
+            .next()
+            .unwrap()
+            .replace("fx = 600.0, fy = 600.0", &format!("fx = {fx}, fy = {fx}"));
+        fs::write(
+            folder.join("frame.toml"),
+            text.replace("k1 = -0.18, k2 = 0.05", &format!("k1 = {k1}, k2 = 0.0")),
+        )
+        .unwrap();
+        let output = calibench(&folder, &format!("study run frame.toml --out frame{k1}"));
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    let said = study("300.0", "-0.35");
+    assert!(said.contains("the lens shows 39 % of the frame"), "{said}");
+    let said = study("600.0", "-0.18");
+    assert!(!said.contains("of the frame"), "{said}");
+    fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
 fn targets_that_are_neither_grid_nor_file_are_refused() {
     let with = |target: &str| {
         let text = SPEC.replace("{ columns = 9, rows = 7, spacing_mm = 10.0 }", target);
@@ -180,7 +215,7 @@ fn targets_that_are_neither_grid_nor_file_are_refused() {
         let said = with(target).to_string();
         assert!(said.contains(what), "{said}");
     }
-    let text = OWN.replace("labels = [\"own\", \"grid\"]", "");
+    let text = OWN.replace("labels = [\"own\", \"grid\", \"shared\"]", "");
     let unlabelled = Spec::parse(&text).and_then(|spec| spec.cells(&text)).unwrap_err();
     assert_eq!(unlabelled, SpecError::Unlabelled("target".to_string()));
 }

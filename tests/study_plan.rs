@@ -94,6 +94,31 @@ fn a_design_that_is_not_answered_gives_way_to_others() {
     assert_eq!(found["chosen"]["tilt_deg"], last["tilt_deg"], "{found:#}");
 }
 
+/// A board that bulges by half a millimetre makes the focal length wrong by 8 px, however many views there are.
+#[test]
+fn a_mean_error_that_no_view_mends_is_refuted_at_once() {
+    let folder = folder("plan-bias");
+    fs::write(folder.join("spec.toml"), spec("bow_mm = 0.5")).expect("written");
+    let (code, found, said) = plan(&folder, &["--want", "fx=1"]);
+    assert_eq!((code, &found["outcome"]), (Some(1), &"refuted".into()), "{said}");
+    let attempts = found["attempts"].as_array().expect("attempts");
+    assert!(attempts.len() == 1 && attempts[0]["quantities"][0]["mean_error"]["high"].as_f64() < Some(-1.0));
+    assert!(said.contains("REFUTED: the mean error is larger") && said.contains(", mean error -"), "{said}");
+}
+
+#[test]
+fn another_lens_than_the_cameras_cannot_be_planned_for() {
+    let folder = folder("plan-model");
+    fs::write(folder.join("spec.toml"), spec("[estimator]\nmodel = \"division\"")).expect("written");
+    let output = run(&folder, &["study", "plan", "spec.toml", "--want", "fx=1"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        text(&output.stderr).contains("the estimator's lens model is not the camera's"),
+        "{}",
+        text(&output.stderr)
+    );
+}
+
 #[test]
 fn factors_are_left_out_with_a_word() {
     let folder = folder("plan-factors");
@@ -125,7 +150,7 @@ fn wishes_that_cannot_be_are_wrong_usage() {
     for (wishes, words) in [
         (&["--want", "fx=1", "--want", "fx=2"][..], "`fx` is wanted twice"),
         (&["--want", "fx=0"], "positive"),
-        (&["--want", "rmse=1"], "not measured in this study"),
+        (&["--want", "rmse=1"], "a plan cannot be made for `rmse`"),
         (&["--want", "fx"], "QUANTITY=SD"),
         (&["--want", "fx=1", "--distance", "16"], "no tilt and coverage shows the whole target"),
         (&["--want", "fx=1", "--at", "0,0,160", "--length", "20"], "are for --want length"),

@@ -11,9 +11,9 @@ use calibench::io::scene_tables::{target_marks, target_poses};
 use toml::{Spanned, Value};
 
 /// The marks of every cell.
-pub(super) const MARKS: &str = "marks.csv";
+pub const MARKS: &str = "marks.csv";
 /// The poses of every cell whose trials all meet the same.
-pub(super) const POSES: &str = "poses.csv";
+pub const POSES: &str = "poses.csv";
 
 /// The table of the marks that each cell's target had.
 pub(super) fn marks(engine: &Engine) -> String {
@@ -36,8 +36,11 @@ impl Engine {
         spec.name = format!("{}-cell-{index}", spec.name);
         (spec.scene, spec.estimator) = (cell.design.scene.clone(), cell.design.estimator.clone());
         let place = |name: &str| format!("{}/{name}", folder.trim_end_matches('/'));
-        spec.scene.target =
-            TargetSpec::File { file: place(MARKS), cell: Some(index), marks: cell.points.clone() };
+        // Noise that neighbours share needs the grid, whose marks are those of the table.
+        if spec.scene.noise_correlation == 0.0 {
+            spec.scene.target =
+                TargetSpec::File { file: place(MARKS), cell: Some(index), marks: cell.points.clone() };
+        }
         if let Some(poses) = cell.poses() {
             let poses = poses.to_vec();
             spec.scene.poses = Poses::File { file: place(POSES), cell: Some(index), poses };

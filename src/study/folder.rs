@@ -10,6 +10,7 @@ use super::trial_file::NoParquet;
 use calibench::io::ShownPath;
 use calibench::io::atomic::{remove_leftovers, write_atomically_to};
 use calibench::io::files::{Disk, Files};
+use calibench::io::hash::sha256_hex;
 use calibench::io::input::{InputError, MOST_SPEC_BYTES, regular_or_absent};
 use calibench::io::read_regular_text;
 use std::fs::{self, File, OpenOptions};
@@ -249,6 +250,16 @@ impl Folder {
     pub fn manifest(&self) -> Result<Manifest, FolderError> {
         serde_json::from_str(&self.read("manifest.json")?)
             .map_err(|e| self.damaged("manifest.json", e.to_string()))
+    }
+
+    /// Refuses a file that is not the one that a complete run left.
+    pub fn refuse_altered(&self, name: &str) -> Result<(), FolderError> {
+        match self.manifest()?.files.get(name) {
+            Some(hash) if *hash != sha256_hex(self.read(name)?.as_bytes()) => {
+                Err(self.damaged(name, "it is not the file that the manifest names by its SHA-256"))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The files that the study named when the run was begun.

@@ -10,6 +10,8 @@ use calibench::planning::{Estimated, frame_form};
 use calibench::validate::frame_difference;
 use nalgebra::{DMatrix, SymmetricEigen};
 
+use super::cells::Cell;
+use super::engine::Engine;
 use super::prediction::Expected;
 
 /// One number of the displacement.
@@ -59,6 +61,22 @@ impl Displacement {
             FrameQuantity::TurnedRms | FrameQuantity::TurnedMax => self.turned?,
         };
         Some(if matches!(quantity, FrameQuantity::Rms | FrameQuantity::TurnedRms) { rms } else { max })
+    }
+}
+
+/// The share of the frame's nodes that a camera shows; `None` where it shows them all.
+fn shown(camera: &Camera<Lens>, size: (usize, usize)) -> Option<f64> {
+    let nodes = frame_nodes(size).0;
+    let seen = nodes.iter().filter(|node| camera.ray(node).is_ok()).count();
+    (seen < nodes.len()).then(|| seen as f64 / nodes.len() as f64)
+}
+
+impl Engine {
+    /// The first cell whose camera does not show the whole frame over which displacements are measured, and the share that it
+    /// shows.
+    pub fn frame_in_part(&self) -> Option<(&Cell, f64)> {
+        let measured = self.cells.iter().filter(|cell| cell.measures_frame);
+        measured.into_iter().find_map(|cell| Some((cell, shown(&cell.camera, cell.design.scene.image)?)))
     }
 }
 

@@ -63,6 +63,7 @@ mod within;
 pub const PARQUET: bool = cfg!(feature = "parquet");
 
 pub use accumulate::Tally;
+pub use alone::{MARKS, POSES};
 pub use calibrator::{Calibrator, Estimate};
 pub use cells::Cell;
 pub use engine::{

@@ -50,7 +50,8 @@ pub struct Design {
 pub enum Outcome {
     /// The whole interval of the standard deviation lies at or below what is wanted.
     Confirmed,
-    /// The whole interval lies above what is wanted, or too few trials found a camera.
+    /// The whole interval lies above what is wanted, or that of the mean error lies further from 0 than it, or too few trials
+    /// found a camera.
     Refuted,
     /// The interval holds what is wanted.
     Undecided,
@@ -66,13 +67,18 @@ impl Outcome {
         }
     }
 
-    fn of(sd: &Estimated, wanted: f64) -> Outcome {
+    fn of(sd: &Estimated, mean: &Estimated, wanted: f64) -> Outcome {
         match () {
+            () if sd.low > wanted || is_off(mean, wanted) => Outcome::Refuted,
             () if sd.high <= wanted => Outcome::Confirmed,
-            () if sd.low > wanted => Outcome::Refuted,
             () => Outcome::Undecided,
         }
     }
+}
+
+/// Whether a mean error lies further from 0 than what is wanted.
+fn is_off(mean: &Estimated, wanted: f64) -> bool {
+    mean.low > wanted || mean.high < -wanted
 }
 
 /// What the trials of one attempt say of a goal.
@@ -86,6 +92,8 @@ pub struct Finding {
     pub sd: Estimated,
     /// Measured over predicted.
     pub ratio: Estimated,
+    /// Mean error: where it is not 0, more views do not help.
+    pub mean: Estimated,
     /// What follows.
     pub outcome: Outcome,
     /// Where nothing is decided: about how many trials would, if their standard deviation were the one measured; the
@@ -94,13 +102,13 @@ pub struct Finding {
 }
 
 impl Finding {
-    fn of(goal: &Goal, predicted_sd: f64, sd: Estimated, ratio: Estimated, trials: u64) -> Finding {
-        let outcome = Outcome::of(&sd, goal.sd);
+    fn of(goal: &Goal, predicted_sd: f64, [sd, ratio, mean]: [Estimated; 3], trials: u64) -> Finding {
+        let outcome = Outcome::of(&sd, &mean, goal.sd);
         let deciding_trials = match outcome {
             Outcome::Undecided => deciding_trials(&sd, goal.sd, trials),
             _ => None,
         };
-        Finding { goal: goal.clone(), predicted_sd, sd, ratio, outcome, deciding_trials }
+        Finding { goal: goal.clone(), predicted_sd, sd, ratio, mean, outcome, deciding_trials }
     }
 }
 
@@ -142,6 +150,11 @@ impl Attempt {
         }
     }
 
+    /// Whether a mean error is larger than what is wanted, which no number of views mends.
+    pub fn is_off(&self) -> bool {
+        self.findings.iter().any(|finding| is_off(&finding.mean, finding.goal.sd))
+    }
+
     /// About how many trials would decide every goal, where nothing is decided.
     pub fn deciding_trials(&self) -> Option<u64> {
         let undecided = || self.findings.iter().filter(|finding| finding.outcome == Outcome::Undecided);
@@ -162,7 +175,7 @@ pub enum PlanError {
     #[error(transparent)]
     Spec(#[from] SpecError),
     /// Nothing to plan for.
-    #[error("`{quantity}` is not measured in this study; there are: {known}")]
+    #[error("a plan cannot be made for `{quantity}`; there are: {known}")]
     Quantity {
         /// As asked.
         quantity: String,
@@ -172,6 +185,11 @@ pub enum PlanError {
     /// A wanted value that is none.
     #[error("a standard deviation of {0} cannot be wanted: give a positive number")]
     Wanted(f64),
+    /// Another lens model is estimated than the camera has.
+    #[error(
+        "the estimator's lens model is not the camera's: no bound says what that reaches, so that nothing can be planned; `study run` measures it"
+    )]
+    OtherModel,
     /// Two wishes for one quantity.
     #[error("`{0}` is wanted twice: give the smaller standard deviation alone")]
     Twice(String),
@@ -192,6 +210,9 @@ pub enum PlanError {
 /// [`PlanError`]: a scene that cannot be, a goal that is none.
 pub fn search(spec: &Spec, goals: &[Goal], search: &Search) -> Result<Vec<Design>, PlanError> {
     check(goals)?;
+    if spec.estimator.model != spec.scene.camera.0.distortion.model() {
+        return Err(PlanError::OtherModel);
+    }
     let mut designs = Vec::new();
     for &tilt_deg in &search.tilts_deg {
         for &coverage in &search.coverages {
@@ -326,12 +347,14 @@ pub fn attempt(
 
 fn finding(cell: &CellSummary, goal: &Goal) -> Option<Finding> {
     let statistic = cell.of(&goal.quantity)?;
-    Some(Finding::of(goal, statistic.predicted?.sd, statistic.sd?, statistic.ratio?, cell.trials))
+    let measured = [statistic.sd?, statistic.ratio?, statistic.mean?];
+    Some(Finding::of(goal, statistic.predicted?.sd, measured, cell.trials))
 }
 
 /// The number of views to try after an attempt that confirmed nothing: the fewest more whose bound, taken by as much as
 /// the trials exceeded it at most, meets every goal, so that as many trials are expected to confirm it. The most views
-/// where none does, and twice as many where too few trials converged; `None` beyond the most views.
+/// where none does, and twice as many where too few trials converged; `None` beyond the most views, and where the mean error is
+/// larger than what is wanted.
 ///
 /// # Errors
 /// [`PlanError`]: a scene that cannot be.
@@ -342,7 +365,7 @@ pub fn next_views(
     search: &Search,
 ) -> Result<Option<usize>, PlanError> {
     let most = search.most_views;
-    if after.views >= most {
+    if after.views >= most || after.is_off() {
         return Ok(None);
     }
     if after.findings.is_empty() {
@@ -366,7 +389,8 @@ mod tests {
 
     fn finding(value: f64, part: f64, wanted: f64) -> Finding {
         let goal = Goal { quantity: "fx".into(), sd: wanted };
-        Finding::of(&goal, value, estimated(value, part), estimated(1.0, part), 500)
+        let mean = Estimated { value: 0.0, low: -0.1, high: 0.1 };
+        Finding::of(&goal, value, [estimated(value, part), estimated(1.0, part), mean], 500)
     }
 
     fn attempt(findings: Vec<Finding>) -> Attempt {
@@ -391,6 +415,18 @@ mod tests {
             Outcome::Confirmed,
             "an interval that ends at the wish lies at or below it"
         );
+    }
+
+    #[test]
+    fn a_mean_error_beyond_the_wish_refutes_it_however_small_the_spread() {
+        let goal = Goal { quantity: "fx".into(), sd: 1.0 };
+        let off = |low: f64, high: f64| {
+            let mean = Estimated { value: 0.5 * (low + high), low, high };
+            Finding::of(&goal, 0.1, [estimated(0.1, 0.06), estimated(1.0, 0.06), mean], 500).outcome
+        };
+        assert_eq!(off(-8.1, -7.8), Outcome::Refuted);
+        assert_eq!(off(1.1, 1.2), Outcome::Refuted);
+        assert_eq!(off(0.8, 1.2), Outcome::Confirmed, "it is told, and not surely beyond the wish");
     }
 
     #[test]

@@ -5,6 +5,7 @@ use crate::calibrate::Format;
 use crate::said::written_by;
 use crate::{Exit, print};
 use calibench::io::ShownPath;
+use calibench_study::{MARKS, POSES};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -21,6 +22,9 @@ pub(crate) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
     let folder = complete(&arguments.run)?;
+    for table in [MARKS, POSES] {
+        folder.refuse_altered(table)?;
+    }
     let engine = folder.engine(folder.shard()?)?;
     let place = arguments.run.canonicalize().unwrap_or_else(|_| arguments.run.clone());
     let Some(place) = place.to_str() else {

@@ -201,6 +201,11 @@ impl Reached<'_> {
                 "REFUTED: too few trials converged with any of these designs, with up to {most} views: the bound promises what no \
                  calibration of these views keeps.\n"
             ),
+            Outcome::Refuted if last.is_off() => {
+                "REFUTED: the mean error is larger than what is wanted. Camera, board or noise are not what the estimator takes them for, \
+                 and more views do not help.\n"
+                    .into()
+            }
             Outcome::Refuted => format!(
                 "REFUTED with {most} views, the most: the estimator does not keep the bound here. Allow more views (--most-views), or \
                  reduce the noise.\n"
@@ -269,8 +274,9 @@ fn designs_text(designs: &[Design], arguments: &Arguments) -> String {
 
 fn attempt_text(tried: &Attempt) -> String {
     let head = format!(
-        "{} views, tilt {} deg, coverage {}: {} trials, {:.1} % converged",
+        "{} view{}, tilt {} deg, coverage {}: {} trials, {:.1} % converged",
         tried.views,
+        if tried.views == 1 { "" } else { "s" },
         tried.tilt_deg,
         tried.coverage,
         tried.trials,
@@ -293,8 +299,12 @@ fn finding_text(f: &Finding) -> String {
         (Outcome::Undecided, Some(trials)) => format!("undecided, about {trials} trials would decide"),
         (Outcome::Undecided, None) => "undecided".into(),
     };
+    let mean = match f.mean.low > 0.0 || f.mean.high < 0.0 {
+        true => format!(", mean error {}, which more views do not lower", interval(&f.mean)),
+        false => String::new(),
+    };
     format!(
-        "sd({}) = {}, {} of the prediction: {outcome}",
+        "sd({}) = {}, {} of the prediction{mean}: {outcome}",
         f.goal.quantity,
         interval(&f.sd),
         interval(&f.ratio)
@@ -309,6 +319,7 @@ fn attempt_json(tried: &Attempt) -> Value {
             "predicted_sd": f.predicted_sd,
             "sd": estimated_json(&f.sd),
             "ratio": estimated_json(&f.ratio),
+            "mean_error": estimated_json(&f.mean),
             "outcome": f.outcome.name(),
             "deciding_trials": f.deciding_trials,
         })

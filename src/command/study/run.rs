@@ -71,6 +71,7 @@ pub(super) fn run(arguments: &Arguments, build: &Build) -> Result<Exit, Failure>
     let (text, inputs) = read_study(&arguments.spec)?;
     let engine = Engine::with_inputs(&text, &inputs, arguments.shard)
         .map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.shown())))?;
+    warn_of_the_frame(&engine);
     let out = arguments.out.clone().unwrap_or_else(|| default_folder(&engine));
     let manifest = Manifest::new(&engine.spec, arguments.shard, build);
     let manifest = manifest.with_trials(arguments.trials).with_solver(arguments.program.solver.clone());
@@ -96,6 +97,17 @@ pub(super) fn merge_parts(arguments: &MergeArguments, build: &Build) -> Result<E
     let finished = Finished { folder: &folder, engine: &engine, summary: &summary, ran: None };
     finished.say(arguments.format)?;
     Ok(judged(&engine, &summary))
+}
+
+/// Displacements are measured where there is something to see.
+fn warn_of_the_frame(engine: &Engine) {
+    if let Some((cell, share)) = engine.frame_in_part() {
+        let of_cell = if cell.name == "-" { String::new() } else { format!(" of cell {}", cell.name) };
+        warn(&format!(
+            "warning: the lens{of_cell} shows {:.0} % of the frame: what is measured of the frame is of that part",
+            100.0 * share
+        ));
+    }
 }
 
 /// A study of which no trial converged has run to its end and measured nothing. One part may hold nothing but
