@@ -241,7 +241,7 @@ fn of_two_paired_runs_the_quieter_is_found_better_and_a_copy_is_not() {
     run(&paths[3], &SPEC.replace("seed = 11", "seed = 12"), Shard::WHOLE);
     let same = compare(&paths[0], &paths[1]).unwrap();
     assert_eq!(same.effects.len(), 14, "six parameters and the depth in two cells");
-    assert!(same.effects.iter().all(|e| e.verdict == Verdict::NotTold && e.ratio.value == 1.0));
+    assert!(same.effects.iter().all(|e| e.verdict == Verdict::Alike && e.ratio.value == 1.0));
     let quieter = compare(&paths[0], &paths[2]).unwrap();
     for e in &quieter.effects {
         // To first order half the noise halves every error, trial by trial; what is left is of second order,
@@ -269,9 +269,7 @@ fn levels_of_a_factor_are_paired_within_a_run() {
     }
     let losses = compare_levels(&path, "loss").unwrap();
     // Huber's loss beyond all residuals is least squares.
-    assert!(
-        losses.effects.iter().all(|e| e.verdict == Verdict::NotTold && (e.ratio.value - 1.0).abs() < 1e-6)
-    );
+    assert!(losses.effects.iter().all(|e| e.verdict == Verdict::Alike && (e.ratio.value - 1.0).abs() < 1e-6));
     let error = compare_levels(&path, "lens").unwrap_err();
     assert!(matches!(&error, CompareError::Factor { known, .. } if known == "noise, loss"), "{error}");
     run(&alone, &text.replace("seed = 11", "seed = 11\ncommon_random_numbers = false"), Shard::WHOLE);

@@ -63,9 +63,14 @@ pub enum Verdict {
     SecondBetter,
     /// The first run's errors are smaller.
     FirstBetter,
+    /// The whole interval lies within a thousandth of "no difference": what two programs that stop at other roundings leave.
+    Alike,
     /// The interval holds "no difference".
     NotTold,
 }
+
+/// A ratio that differs from 1 by less than this is no difference that matters, however certain.
+const RELEVANT: f64 = 1e-3;
 
 /// One cell and quantity.
 #[derive(Debug, Clone, PartialEq)]
@@ -254,6 +259,7 @@ fn conclude(
         for ((quantity, _, _), sum) in shared.iter().zip(sums) {
             let Some(ratio) = sum.ratio(each) else { continue };
             let verdict = match ratio {
+                r if r.low > 1.0 - RELEVANT && r.high < 1.0 + RELEVANT => Verdict::Alike,
                 r if r.high < 1.0 => Verdict::SecondBetter,
                 r if r.low > 1.0 => Verdict::FirstBetter,
                 _ => Verdict::NotTold,

@@ -59,7 +59,7 @@ fn comparison_json(comparison: &Comparison) -> Value {
             "better": match e.verdict {
                 Verdict::FirstBetter => Some("first"),
                 Verdict::SecondBetter => Some("second"),
-                Verdict::NotTold => None,
+                Verdict::Alike | Verdict::NotTold => None,
             },
         })
     });
@@ -94,6 +94,7 @@ fn comparison_text(comparison: &Comparison, [first, second]: [&str; 2]) -> Strin
             match e.verdict {
                 Verdict::SecondBetter => format!("{second} is better"),
                 Verdict::FirstBetter => format!("{first} is better"),
+                Verdict::Alike => "no difference that matters".to_string(),
                 Verdict::NotTold => "no difference shown".to_string(),
             },
         ]);
