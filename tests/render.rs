@@ -128,7 +128,7 @@ fn a_fisheye_sees_a_board_beside_and_behind_it() {
     assert!(depths.iter().any(|&z| z < -25.0) && depths.iter().any(|&z| z > 45.0), "{depths:?}");
     for (point, centre) in board.points().iter().zip(&photo.centres_true) {
         let seen = pose.apply(&Vec3::new(point.x, point.y, 0.0));
-        let angle = seen.xy().norm().atan2(seen.z);
+        let angle = libm::atan2(seen.xy().norm(), seen.z);
         let expected = Vec2::new(320.0, 240.0) + seen.xy().normalize() * (130.0 * angle);
         assert!((centre - expected).norm() < 1e-9, "{point}");
     }
