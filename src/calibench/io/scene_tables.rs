@@ -241,7 +241,7 @@ mod tests {
     #[test]
     fn both_forms_of_a_rotation_are_one_pose() {
         let vector = poses("z,y,x,rz,ry,rx\n3,2,1,0,0,0.3\n", None).unwrap()[0];
-        let (c, s) = (0.3_f64.cos(), 0.3_f64.sin());
+        let (c, s) = (libm::cos(0.3), libm::sin(0.3));
         let matrix =
             format!("x,y,z,r11,r12,r13,r21,r22,r23,r31,r32,r33\n1,2,3,1,0,0,0,{c},{},0,{s},{c}\n", -s);
         let matrix = poses(&matrix, None).unwrap()[0];
