@@ -162,7 +162,7 @@ fn a_full_disk_ends_with_three_and_the_run_goes_on_to_the_same_file() {
     let run = |out: &str| command(&["study", "run", "spec.toml", "--trials", "parquet", "--out", out]);
     assert_eq!(run("whole").status.code(), Some(0));
     let (mut refused, mut held) = (0, 0);
-    for kib in (12..=252).step_by(24) {
+    for kib in (12..=612).step_by(40) {
         let there = on_disk(&disk, &format!("size={kib}k"), || {
             let first = run("disk/run");
             let said = String::from_utf8_lossy(&first.stderr);
