@@ -96,14 +96,20 @@ fn a_design_that_is_not_answered_gives_way_to_others() {
 
 /// A board that bulges by half a millimetre makes the focal length wrong by 8 px, however many views there are.
 #[test]
-fn a_mean_error_that_no_view_mends_is_refuted_at_once() {
+fn a_mean_error_larger_than_the_wish_is_refuted_with_the_most_views() {
     let folder = folder("plan-bias");
     fs::write(folder.join("spec.toml"), spec("bow_mm = 0.5")).expect("written");
-    let (code, found, said) = plan(&folder, &["--want", "fx=1"]);
+    let (code, found, said) = plan(&folder, &["--want", "fx=1", "--most-views", "20"]);
     assert_eq!((code, &found["outcome"]), (Some(1), &"refuted".into()), "{said}");
     let attempts = found["attempts"].as_array().expect("attempts");
-    assert!(attempts.len() == 1 && attempts[0]["quantities"][0]["mean_error"]["high"].as_f64() < Some(-1.0));
-    assert!(said.contains("REFUTED: the mean error is larger") && said.contains(", mean error -"), "{said}");
+    let mean_error = |attempt: &serde_json::Value| attempt["quantities"][0]["mean_error"]["high"].as_f64();
+    assert!(attempts.len() == 2 && attempts.iter().all(|attempt| mean_error(attempt) < Some(-1.0)), "{said}");
+    assert_eq!(attempts[1]["views"], 20);
+    assert!(
+        said.contains("REFUTED with 20 views, the most: the mean error is larger")
+            && said.contains(", mean error -"),
+        "{said}"
+    );
 }
 
 #[test]

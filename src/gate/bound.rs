@@ -15,8 +15,9 @@
 
 use calibench::calibrate::Covariance;
 use calibench::camera::{Camera, FreeParameters, Lens};
-use calibench::geometry::{Pose, Vec2, Vec3, rotation};
-use nalgebra::{DMatrix, Matrix2xX, Matrix6, MatrixXx6, SMatrix};
+use calibench::geometry::{Pose, Vec2};
+use calibench::planning::{Estimated, ViewBlocks};
+use nalgebra::{DMatrix, Matrix6, MatrixXx6};
 
 /// The bound for noise of standard deviation `sigma_px` on every coordinate; `views` are poses with the points of
 /// the target that each sees. `None` where a point has no image or the views determine no camera.
@@ -26,8 +27,11 @@ pub fn bound(
     views: &[(Pose, Vec<Vec2>)],
     sigma_px: f64,
 ) -> Option<Covariance> {
-    let blocks: Vec<Blocks> =
-        views.iter().map(|(pose, points)| Blocks::of(camera, free, pose, points)).collect::<Option<_>>()?;
+    let estimated = Estimated { free, fy_per_fx: None };
+    let said = |(pose, points): &(Pose, Vec<Vec2>)| {
+        Eliminated::of(ViewBlocks::of(camera, &estimated, pose, points)?)
+    };
+    let blocks: Vec<Eliminated> = views.iter().map(said).collect::<Option<_>>()?;
     let mut information = DMatrix::zeros(free.len(), free.len());
     blocks.iter().for_each(|view| information += &view.of_parameters);
     let intrinsics = inverse(&information)?;
@@ -39,7 +43,7 @@ pub fn bound(
 }
 
 /// What a view says for unit noise.
-struct Blocks {
+struct Eliminated {
     /// `A - Y B^T`: of the parameters, its pose not known.
     of_parameters: DMatrix<f64>,
     /// `C^-1`: of the pose, the parameters known.
@@ -48,38 +52,12 @@ struct Blocks {
     follows: MatrixXx6<f64>,
 }
 
-impl Blocks {
-    fn of(camera: &Camera<Lens>, free: FreeParameters, pose: &Pose, points: &[Vec2]) -> Option<Blocks> {
-        let mut a = DMatrix::zeros(free.len(), free.len());
-        let mut b = MatrixXx6::zeros(free.len());
-        let mut c = Matrix6::zeros();
-        for point in points {
-            let (by_parameters, by_pose) = derivatives(camera, free, pose, point)?;
-            a += by_parameters.transpose() * &by_parameters;
-            b += by_parameters.transpose() * by_pose;
-            c += by_pose.transpose() * by_pose;
-        }
-        let of_pose = c.cholesky()?.inverse();
-        let follows = &b * of_pose;
-        Some(Blocks { of_parameters: a - &follows * b.transpose(), of_pose, follows })
+impl Eliminated {
+    fn of(view: ViewBlocks) -> Option<Eliminated> {
+        let of_pose = view.c.cholesky()?.inverse();
+        let follows = &view.b * of_pose;
+        Some(Eliminated { of_parameters: view.a - &follows * view.b.transpose(), of_pose, follows })
     }
-}
-
-/// Derivatives of a pixel by the free parameters, and by a step `R <- exp(delta) R`, `t <- t + step`.
-fn derivatives(
-    camera: &Camera<Lens>,
-    free: FreeParameters,
-    pose: &Pose,
-    point: &Vec2,
-) -> Option<(Matrix2xX<f64>, SMatrix<f64, 2, 6>)> {
-    let rotated = pose.rotation * Vec3::new(point.x, point.y, 0.0);
-    let slopes = camera.pixel_with_derivatives(&(rotated + pose.translation))?;
-    let columns = slopes.by_parameters.iter().filter(|(parameter, _)| free.contains(*parameter));
-    let by_parameters = Matrix2xX::from_columns(&columns.map(|(_, slope)| *slope).collect::<Vec<_>>());
-    let mut by_pose = SMatrix::<f64, 2, 6>::zeros();
-    by_pose.fixed_columns_mut::<3>(0).copy_from(&(-slopes.by_point * rotation::skew(&rotated)));
-    by_pose.fixed_columns_mut::<3>(3).copy_from(&slopes.by_point);
-    Some((by_parameters, by_pose))
 }
 
 /// The inverse of a positive definite matrix, whose rows are brought to one size first.

@@ -12,7 +12,7 @@ use calibench::evaluate::distribution::normal_cdf;
 use calibench::evaluate::interval::each_of;
 use calibench::io::significant;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A mean difference or an excess of spread below this part of a standard deviation is no change that
 /// matters, however certain.
@@ -59,6 +59,9 @@ pub struct Paired {
     pub tests: usize,
     /// Scenario by scenario.
     pub comparisons: Vec<Comparison>,
+    /// Problems of any kind, not the samples only, to which one said something else than the other: another number, a warning more, no
+    /// answer.
+    pub differing: usize,
     /// Checks whose verdict differs: property, scenario, reference's, new.
     pub verdicts: Vec<(Property, &'static str, Verdict, Verdict)>,
 }
@@ -84,15 +87,40 @@ pub fn compare(
         })
         .collect();
     let parameters: usize = plan.scenarios.iter().map(|s| s.free.len()).sum();
-    let differing = new_checks.iter().zip(old_checks).filter(|(n, o)| n.verdict != o.verdict);
+    let both = new.iter().zip(old).filter_map(|(n, o)| Some((n.as_ref()?, o.as_ref()?)));
     Paired {
         solver: solver.to_string(),
         reference: reference.to_string(),
         false_alarm_rate,
         tests: 4 * parameters,
         comparisons,
-        verdicts: differing.map(|(n, o)| (n.property, n.scenario, o.verdict, n.verdict)).collect(),
+        differing: both.filter(|(n, o)| !says_the_same(n, o)).count(),
+        verdicts: verdicts(new_checks, old_checks),
     }
+}
+
+fn says_the_same(new: &Seen, old: &Seen) -> bool {
+    match (new, old) {
+        (Seen::Estimate(n), Seen::Estimate(o)) => (n.bits, n.warnings) == (o.bits, o.warnings),
+        (Seen::Refused { .. }, Seen::Refused { .. })
+        | (Seen::Unsupported(_), Seen::Unsupported(_))
+        | (Seen::Broken(_), Seen::Broken(_)) => true,
+        _ => false,
+    }
+}
+
+/// Where the verdicts differ: property, scenario, reference's, new. A check that one run does not have, such as that of the bias in a scene
+/// without estimates, was not judged there.
+fn verdicts(new: &[Check], old: &[Check]) -> Vec<(Property, &'static str, Verdict, Verdict)> {
+    let by_name = |checks: &[Check]| -> BTreeMap<(Property, &'static str), Verdict> {
+        checks.iter().map(|check| ((check.property, check.scenario), check.verdict)).collect()
+    };
+    let (new_by_name, old_by_name) = (by_name(new), by_name(old));
+    let names: BTreeSet<_> = new_by_name.keys().chain(old_by_name.keys()).copied().collect();
+    let of = |checks: &BTreeMap<_, Verdict>, name| checks.get(&name).copied().unwrap_or(Verdict::NotJudged);
+    let pairs =
+        names.into_iter().map(|name| (name.0, name.1, of(&old_by_name, name), of(&new_by_name, name)));
+    pairs.filter(|(_, _, old, new)| old != new).collect()
 }
 
 /// A paired test: what is told, and its normal score. Scores rank what is beyond doubt, where all p-values
@@ -306,11 +334,10 @@ impl Paired {
                 new.word()
             ));
         }
-        let bits: usize = self.comparisons.iter().map(|c| c.bits).sum();
-        let conclusion = match (self.held(), bits) {
-            (true, 0) => "SAME: not a bit differs",
-            (true, _) => "SAME LAW: bits differ, nothing that matters does",
-            (false, _) => "CHANGED",
+        let conclusion = match (self.held(), self.differing) {
+            (true, 0) => "SAME: not a bit differs".to_string(),
+            (true, n) => format!("SAME LAW: {n} answers differ, in nothing that matters"),
+            (false, n) => format!("CHANGED: {n} answers differ"),
         };
         let time = median(self.comparisons.iter().map(|c| c.time).filter(|time| time.is_finite()));
         let time = match time.is_finite() {

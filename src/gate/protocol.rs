@@ -82,8 +82,9 @@ pub struct Answer {
     /// Covariance of the free parameters; takes the place of `standard_deviations`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covariance: Option<AnswerCovariance>,
-    /// Covariance of every pose, 6 x 6, row by row: of the small rotation vector `w`, rad, with which the true rotation `R`
-    /// is `exp([w]x) R`, about the camera's x, y, z, then of the translation along them in the target's unit; marginal.
+    /// Covariance of every pose, 6 x 6, row by row: of the small rotation vector `w`, rad, by which the answered
+    /// rotation is wrong, `R_answered = exp([w]x) R_true`, about the camera's x, y, z, then of the translation along them in the target's unit;
+    /// marginal.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pose_covariances: Option<Vec<Vec<Vec<f64>>>>,
     /// `sqrt(sum |r|^2 / N)` over all N points, px.

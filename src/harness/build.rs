@@ -41,7 +41,14 @@ const OTHER_SOLVERS: &[&str] = &[
 const MEASUREMENTS: &[(&str, &[&[&str]])] = &[
     ("global-minimum", &[SCENES, SOLVER, GLOBAL_MINIMUM, JUDGED]),
     ("global-minimum-scenes", &[SCENES, GLOBAL_MINIMUM]),
-    ("gate-power", &[SCENES, SOLVER, &["src/calibench/synth/departure.rs", "src/gate"]]),
+    (
+        "gate-power",
+        &[
+            SCENES,
+            SOLVER,
+            &["src/calibench/planning/information.rs", "src/calibench/synth/departure.rs", "src/gate"],
+        ],
+    ),
     ("other-solvers", &[SCENES, SOLVER, OTHER_SOLVERS]),
     ("other-solvers-scenes", &[SCENES, OTHER_SOLVERS]),
 ];

@@ -69,30 +69,44 @@ impl Inputs {
 
     /// Puts the content of every file in the place of its name in a study's canonical tree.
     pub(super) fn put_contents(&self, spec: &mut Json) {
-        if self.is_empty() {
-            return;
-        }
         let hashes = self.hashes();
-        put_in_fields(&mut spec["scene"], &hashes);
-        for factor in spec["factor"].as_array_mut().into_iter().flatten() {
-            let fields: Vec<bool> = factor["set"]
-                .as_array()
-                .into_iter()
-                .flatten()
-                .map(|p| p.as_str().is_some_and(is_name))
-                .collect();
-            for level in factor["levels"].as_array_mut().into_iter().flatten() {
-                put_in_fields(level, &hashes);
-                match (&fields[..], level) {
-                    ([true], name) => put(name, &hashes),
-                    ([_], _) => {}
-                    (_, parts) => {
-                        let parts = parts.as_array_mut().into_iter().flatten().zip(&fields);
-                        parts.filter(|(_, is_file)| **is_file).for_each(|(part, _)| put(part, &hashes));
-                    }
-                }
+        visit_names(spec, &mut |name| {
+            if let Some(hash) = name.as_str().and_then(|name| hashes.get(name)) {
+                *name = Json::String(format!("sha256:{hash}"));
             }
+        });
+    }
+}
+
+/// Visits every text of a study that names a file: in its scene, and in the levels of its factors.
+fn visit_names(spec: &mut Json, visit: &mut dyn FnMut(&mut Json)) {
+    if let Some(scene) = spec.get_mut("scene") {
+        visit_fields(scene, visit);
+    }
+    for factor in spec.get_mut("factor").and_then(Json::as_array_mut).into_iter().flatten() {
+        let set = factor.get("set").and_then(Json::as_array).into_iter().flatten();
+        let set: Vec<bool> = set.map(|path| path.as_str().is_some_and(is_name)).collect();
+        for level in factor.get_mut("levels").and_then(Json::as_array_mut).into_iter().flatten() {
+            visit_fields(level, visit);
+            // A factor of one field has its levels as they are, one of several a list for each.
+            let parts = match level {
+                Json::Array(parts) if set.len() > 1 => parts.as_mut_slice(),
+                one => std::slice::from_mut(one),
+            };
+            parts.iter_mut().zip(&set).filter(|(_, is_file)| **is_file).for_each(|(part, _)| visit(part));
         }
+    }
+}
+
+/// Visits every field `file` within a tree.
+fn visit_fields(tree: &mut Json, visit: &mut dyn FnMut(&mut Json)) {
+    match tree {
+        Json::Object(fields) => fields.iter_mut().for_each(|(field, value)| match field == FIELD {
+            true => visit(value),
+            false => visit_fields(value, visit),
+        }),
+        Json::Array(values) => values.iter_mut().for_each(|value| visit_fields(value, visit)),
+        _ => {}
     }
 }
 
@@ -101,60 +115,21 @@ fn is_name(path: &str) -> bool {
     path.rsplit('.').next() == Some(FIELD)
 }
 
-fn put(name: &mut Json, hashes: &BTreeMap<String, String>) {
-    if let Some(hash) = name.as_str().and_then(|name| hashes.get(name)) {
-        *name = Json::String(format!("sha256:{hash}"));
-    }
-}
-
-fn put_in_fields(tree: &mut Json, hashes: &BTreeMap<String, String>) {
-    match tree {
-        Json::Object(fields) => fields.iter_mut().for_each(|(field, value)| {
-            if field == FIELD { put(value, hashes) } else { put_in_fields(value, hashes) }
-        }),
-        Json::Array(values) => values.iter_mut().for_each(|value| put_in_fields(value, hashes)),
-        _ => {}
-    }
-}
-
 /// The names of files in a study's text; none where it is no TOML, of which its reader says why.
 fn named_in(text: &str) -> BTreeSet<String> {
+    let Ok(tree) = text.parse::<Table>() else { return BTreeSet::new() };
+    let mut spec = serde_json::to_value(tree).expect("a table of TOML is JSON");
     let mut names = BTreeSet::new();
-    let Ok(tree) = text.parse::<Table>() else { return names };
-    tree.get("scene").into_iter().for_each(|scene| collect(scene, &mut names));
-    for factor in tree.get("factor").and_then(Value::as_array).into_iter().flatten() {
-        for level in factor.get("levels").and_then(Value::as_array).into_iter().flatten() {
-            collect(level, &mut names);
-            let set = factor.get("set").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
-            let parts = match level.as_array() {
-                Some(parts) if set.len() > 1 => parts.as_slice(),
-                _ => std::slice::from_ref(level),
-            };
-            let named = set.iter().zip(parts).filter(|(path, _)| path.as_str().is_some_and(is_name));
-            names.extend(named.filter_map(|(_, part)| part.as_str().map(String::from)));
-        }
-    }
+    visit_names(&mut spec, &mut |name| names.extend(name.as_str().map(String::from)));
     names
-}
-
-fn collect(tree: &Value, names: &mut BTreeSet<String>) {
-    match tree {
-        Value::Table(fields) => fields.iter().for_each(|(field, value)| match value.as_str() {
-            Some(name) if field == FIELD => {
-                names.insert(name.to_string());
-            }
-            _ => collect(value, names),
-        }),
-        Value::Array(values) => values.iter().for_each(|value| collect(value, names)),
-        _ => {}
-    }
 }
 
 /// Whether a level of a factor that sets these fields names a file: its path must not become the name of a cell.
 pub(super) fn names_a_file(set: &[String], level: &Value) -> bool {
-    let mut names = BTreeSet::new();
-    collect(level, &mut names);
-    !names.is_empty() || set.iter().any(|path| is_name(path))
+    let mut level = serde_json::to_value(level).expect("a value of TOML is JSON");
+    let mut is_file = set.iter().any(|path| is_name(path));
+    visit_fields(&mut level, &mut |name| is_file |= name.is_string());
+    is_file
 }
 
 #[cfg(test)]

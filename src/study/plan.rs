@@ -92,7 +92,7 @@ pub struct Finding {
     pub sd: Estimated,
     /// Measured over predicted.
     pub ratio: Estimated,
-    /// Mean error: where it is not 0, more views do not help.
+    /// Mean error: where it is not 0, more views need not help.
     pub mean: Estimated,
     /// What follows.
     pub outcome: Outcome,
@@ -150,7 +150,7 @@ impl Attempt {
         }
     }
 
-    /// Whether a mean error is larger than what is wanted, which no number of views mends.
+    /// Whether a mean error is larger than what is wanted: no bound tells with how many views it will not be.
     pub fn is_off(&self) -> bool {
         self.findings.iter().any(|finding| is_off(&finding.mean, finding.goal.sd))
     }
@@ -353,8 +353,8 @@ fn finding(cell: &CellSummary, goal: &Goal) -> Option<Finding> {
 
 /// The number of views to try after an attempt that confirmed nothing: the fewest more whose bound, taken by as much as
 /// the trials exceeded it at most, meets every goal, so that as many trials are expected to confirm it. The most views
-/// where none does, and twice as many where too few trials converged; `None` beyond the most views, and where the mean error is
-/// larger than what is wanted.
+/// where none does or a mean error is larger than what is wanted, of which the bound says nothing, and twice as many where too few trials
+/// converged; `None` beyond the most views.
 ///
 /// # Errors
 /// [`PlanError`]: a scene that cannot be.
@@ -365,11 +365,14 @@ pub fn next_views(
     search: &Search,
 ) -> Result<Option<usize>, PlanError> {
     let most = search.most_views;
-    if after.views >= most || after.is_off() {
+    if after.views >= most {
         return Ok(None);
     }
     if after.findings.is_empty() {
         return Ok(Some((2 * after.views).min(most)));
+    }
+    if after.is_off() {
+        return Ok(Some(most));
     }
     let poses = |views| with_poses(spec, views, design.tilt_deg, design.coverage, search.distance_mm);
     let at = |views| predicted(&poses(views), goals);

@@ -60,7 +60,7 @@ pub fn view_information(
     points: &[Vec2],
     sigma_px: f64,
 ) -> Option<DMatrix<f64>> {
-    let Blocks { a, b, c } = Blocks::of(camera, estimated, cam_from_target, points)?;
+    let ViewBlocks { a, b, c } = ViewBlocks::of(camera, estimated, cam_from_target, points)?;
     // Radians and lengths are of different sizes: each unknown in units of its own information.
     let unit = SMatrix::<f64, 6, 1>::from_fn(|i, _| 1.0 / c[(i, i)].sqrt());
     let scaled = Matrix6::from_fn(|i, j| c[(i, j)] * unit[i] * unit[j]);
@@ -83,25 +83,32 @@ pub(super) fn pose_information(
     sigma_px: f64,
 ) -> Option<Matrix6<f64>> {
     let nothing = Estimated { free: FreeParameters::NONE, fy_per_fx: None };
-    Some(Blocks::of(camera, &nothing, cam_from_target, points)?.c / (sigma_px * sigma_px))
+    Some(ViewBlocks::of(camera, &nothing, cam_from_target, points)?.c / (sigma_px * sigma_px))
 }
 
-/// The sums of products of a view's derivatives: by the camera `a`, by camera and pose `b`, by the pose `c`.
-struct Blocks {
-    a: DMatrix<f64>,
-    b: MatrixXx6<f64>,
-    c: Matrix6<f64>,
+/// The sums `J^T J` of a view over its marks, for unit noise: what it says of the camera, of its own pose, and of both together. A step of the
+/// pose is `R <- exp(delta) R`, `t <- t + step`.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct ViewBlocks {
+    /// By the estimated parameters, n x n.
+    pub a: DMatrix<f64>,
+    /// By parameters and pose, n x 6.
+    pub b: MatrixXx6<f64>,
+    /// By the pose.
+    pub c: Matrix6<f64>,
 }
 
-impl Blocks {
-    fn of(
+impl ViewBlocks {
+    /// Of the marks `points` of the target, Z = 0; `None` where one has no image.
+    pub fn of(
         camera: &Camera<Lens>,
         estimated: &Estimated,
         cam_from_target: &Pose,
         points: &[Vec2],
-    ) -> Option<Blocks> {
+    ) -> Option<ViewBlocks> {
         let n = estimated.len();
-        let mut sum = Blocks { a: DMatrix::zeros(n, n), b: MatrixXx6::zeros(n), c: Matrix6::zeros() };
+        let mut sum = ViewBlocks { a: DMatrix::zeros(n, n), b: MatrixXx6::zeros(n), c: Matrix6::zeros() };
         for point in points {
             let rotated = cam_from_target.rotation * Vec3::new(point.x, point.y, 0.0);
             let at = camera.pixel_with_derivatives(&(rotated + cam_from_target.translation))?;

@@ -18,7 +18,7 @@ mod wanted;
 
 pub use candidates::{Candidate, Reach, ReachError};
 pub use gain::{Gain, GainError, Knowledge};
-pub use information::{Estimated, view_information};
+pub use information::{Estimated, ViewBlocks, view_information};
 pub use same_marks::marks_against_covariance;
 pub use search::{Found, Ranked, best_repeated, next_pose};
 pub use wanted::{Wanted, WantedError, Wish, frame_form};

@@ -6,7 +6,7 @@ use crate::{Exit, print};
 use calibench::camera::Model;
 use calibench::io::{ShownPath, write_atomically};
 use calibench_gate::paired::{self, Paired};
-use calibench_gate::{Asked, Builtin, Check, Plan, Report, Solver, Verdict, files};
+use calibench_gate::{Asked, Builtin, Plan, Report, Solver, files};
 use calibench_harness::ProgressDisplay;
 use std::path::Path;
 
@@ -131,27 +131,6 @@ fn in_words(plan: &Plan) -> String {
     format!("seed {}, {} samples of {scenes} with {}", plan.seed, plan.samples, models.join(", "))
 }
 
-/// The checks of two runs, each beside the same of the other. Where one has none, such as that of the bias in a scene without
-/// estimates, it was not judged there.
-fn in_pairs(new: Vec<Check>, mut old: Vec<Check>) -> (Vec<Check>, Vec<Check>) {
-    let not_judged = |check: &Check| {
-        let mut missing = check.clone();
-        missing.verdict = Verdict::NotJudged;
-        missing
-    };
-    let mut pairs: Vec<(Check, Check)> = Vec::with_capacity(new.len());
-    for check in new {
-        let is_same = |other: &Check| (other.property, other.scenario) == (check.property, check.scenario);
-        let other = match old.iter().position(is_same) {
-            Some(at) => old.remove(at),
-            None => not_judged(&check),
-        };
-        pairs.push((check, other));
-    }
-    pairs.extend(old.into_iter().map(|check| (not_judged(&check), check)));
-    pairs.into_iter().unzip()
-}
-
 fn compared(
     arguments: &Arguments,
     plan: &Plan,
@@ -167,7 +146,6 @@ fn compared(
     };
     let (old, old_checks) = ask(other);
     let (new, new_checks) = ask(solver);
-    let (new_checks, old_checks) = in_pairs(new_checks, old_checks);
     let paired: Paired = paired::compare(
         plan,
         (&solver.name(), &new, &new_checks),

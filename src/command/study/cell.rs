@@ -1,9 +1,9 @@
 //! `calibench study cell`: one cell of a run as a study of its own.
 
 use super::{Failure, complete};
+use crate::Exit;
 use crate::calibrate::Format;
-use crate::said::written_by;
-use crate::{Exit, print};
+use crate::said::{print_as, written_by};
 use calibench::io::ShownPath;
 use calibench_study::{MARKS, POSES};
 use serde_json::json;
@@ -38,15 +38,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
         Failure::usage(format!("there is no cell {}: the run has cells 0 to {}", arguments.cell, cells - 1))
     })?;
     let text = spec.to_text();
-    print(&match arguments.format {
-        Format::Text => text,
-        Format::Json => {
-            let name = &engine.cells[arguments.cell].name;
-            format!(
-                "{:#}\n",
-                json!({ "written_by": written_by(), "cell": arguments.cell, "levels": name, "spec": text })
-            )
-        }
-    });
+    let name = &engine.cells[arguments.cell].name;
+    print_as(
+        arguments.format,
+        || text.clone(),
+        || json!({ "written_by": written_by(), "cell": arguments.cell, "levels": name, "spec": text }),
+    );
     Ok(Exit::Held)
 }

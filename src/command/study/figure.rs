@@ -1,9 +1,9 @@
 //! `calibench study figure`: one panel of a run's figures as a figure of its own.
 
 use super::{Failure, complete};
+use crate::Exit;
 use crate::calibrate::Format;
 use crate::said::{print_as, written_by};
-use crate::{Exit, print};
 use calibench_study::single_panels;
 use serde_json::json;
 use std::path::PathBuf;
@@ -40,12 +40,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
         return Err(Failure::usage(format!("there is no panel `{wanted}`; there are: {}", names.join(", "))));
     };
     let svg = String::from_utf8_lossy(&figure.bytes);
-    match arguments.format {
-        Format::Text => print(&svg),
-        Format::Json => print(&format!(
-            "{:#}\n",
-            json!({ "written_by": written_by(), "panel": wanted, "caption": figure.caption, "svg": svg })
-        )),
-    }
+    print_as(
+        arguments.format,
+        || svg.to_string(),
+        || json!({ "written_by": written_by(), "panel": wanted, "caption": figure.caption, "svg": svg }),
+    );
     Ok(Exit::Held)
 }

@@ -201,11 +201,10 @@ impl Reached<'_> {
                 "REFUTED: too few trials converged with any of these designs, with up to {most} views: the bound promises what no \
                  calibration of these views keeps.\n"
             ),
-            Outcome::Refuted if last.is_off() => {
-                "REFUTED: the mean error is larger than what is wanted. Camera, board or noise are not what the estimator takes them for, \
-                 and more views do not help.\n"
-                    .into()
-            }
+            Outcome::Refuted if last.is_off() => format!(
+                "REFUTED with {most} views, the most: the mean error is larger than what is wanted. Camera, board or noise are not what the \
+                 estimator takes them for.\n"
+            ),
             Outcome::Refuted => format!(
                 "REFUTED with {most} views, the most: the estimator does not keep the bound here. Allow more views (--most-views), or \
                  reduce the noise.\n"
@@ -300,7 +299,7 @@ fn finding_text(f: &Finding) -> String {
         (Outcome::Undecided, None) => "undecided".into(),
     };
     let mean = match f.mean.low > 0.0 || f.mean.high < 0.0 {
-        true => format!(", mean error {}, which more views do not lower", interval(&f.mean)),
+        true => format!(", mean error {}", interval(&f.mean)),
         false => String::new(),
     };
     format!(

@@ -1,7 +1,7 @@
 //! Faults of what is said about the uncertainty, and estimates that spread or lie a little beside what the
 //! data allow.
 
-use super::{Planted, camera_of, freedom, gross, residuals, spoilt, subtle};
+use super::{Planted, camera_of, chosen, correct, freedom, gross, residuals, spoilt, subtle};
 use crate::accept::free_of;
 use crate::protocol::{Answer, AnswerPose, Problem, ProblemView};
 use crate::solver::rows;
@@ -10,6 +10,14 @@ use calibench::geometry::{Pose, Vec2, Vec3};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SymmetricEigen};
 
 pub(super) const FAULTS: &[Planted] = &[
+    gross(
+        "certain-now-and-then",
+        "one answer in fifty states a covariance a million times too small",
+        |p, _| match chosen(p, 50) {
+            true => spoilt(p, |a| scale_covariance(a, 1e-6)),
+            false => correct(p),
+        },
+    ),
     gross("covariance-doubled", "covariance too large by 2", |p, _| spoilt(p, |a| scale_covariance(a, 2.0))),
     gross("covariance-without-poses", "covariance as if the poses were known", |p, _| {
         spoilt(p, |a| covariance_without_poses(p, a))

@@ -51,6 +51,14 @@ pub fn normal_score_of_f(x: f64, above: usize, below: usize) -> f64 {
     if score.is_nan() { LARGEST } else { score.clamp(-LARGEST, LARGEST) }
 }
 
+/// Chance that an F-distributed value exceeds `x`.
+pub fn above_f(x: f64, above: usize, below: usize) -> f64 {
+    match FisherSnedecor::new(above as f64, below as f64) {
+        Ok(f) if x.is_finite() => f.sf(x.max(0.0)),
+        _ => 0.0,
+    }
+}
+
 /// Chance of at least `count` among `trials` where each happens with `rate`.
 pub fn at_least(count: usize, trials: usize, rate: f64) -> f64 {
     if count == 0 {

@@ -64,28 +64,22 @@ impl Report {
             self.statistical_checks
         );
         let accepted = self.accepted();
-        let unsupported = |before: &str| match &self.unsupported[..] {
+        let unsupported = match &self.unsupported[..] {
             [] => String::new(),
-            scenes => format!("{before}not supported: {}", scenes.join(", ")),
+            scenes => format!(", not supported: {}", scenes.join(", ")),
         };
         match self.verdict {
             Verdict::Grave | Verdict::Failed => {
                 let grave = failures.iter().filter(|c| c.verdict == Verdict::Grave).count();
                 let fail = if failures.len() == 1 { "check fails" } else { "checks fail" };
-                format!(
-                    "NOT TRUSTED: {} {fail}, {grave} gravely{}; {rate}",
-                    failures.len(),
-                    unsupported("; ")
-                )
+                format!("NOT TRUSTED: {} {fail}, {grave} gravely{unsupported}; {rate}", failures.len())
             }
             _ if !self.only.is_empty() => {
-                let unsupported = unsupported(", but ");
                 format!(
                     "HELD on the scenes asked, which is no verdict on the whole{accepted}{unsupported}; {rate}"
                 )
             }
             _ => {
-                let unsupported = unsupported(", but ");
                 format!("TRUSTED: every check that could be judged holds{accepted}{unsupported}; {rate}")
             }
         }
