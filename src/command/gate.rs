@@ -2,6 +2,7 @@
 
 mod certified;
 mod compare;
+mod detector;
 mod hand_eye;
 mod power;
 
@@ -55,10 +56,10 @@ pub(super) struct Arguments {
     seed: u64,
     /// Lens models whose scenes are asked, such as brown-conrady,rational [default: those that the solver says
     /// it knows; brown-conrady of a program that says nothing, and in files]
-    #[arg(long, value_name = "MODELS", value_delimiter = ',', conflicts_with_all = ["judge", "power", "certified", "hand_eye"])]
+    #[arg(long, value_name = "MODELS", value_delimiter = ',', conflicts_with_all = ["judge", "power", "certified", "hand_eye", "detector"])]
     models: Vec<Model>,
     /// The only scene or bad input to ask, by its name in reports; may be repeated
-    #[arg(long = "scene", value_name = "SCENE", conflicts_with_all = ["judge", "power", "certified", "hand_eye"])]
+    #[arg(long = "scene", value_name = "SCENE", conflicts_with_all = ["judge", "power", "certified", "hand_eye", "detector"])]
     scenes: Vec<String>,
     /// Chance that a correct solver fails the run
     #[arg(long, value_name = "RATE", default_value_t = EXPECTED_FALSE_ALARMS)]
@@ -70,7 +71,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "PROPERTY", value_parser = property)]
     accept: Vec<Property>,
     /// File of failures that are known, by property and scene, with a reason each (see adapters/PROTOCOL.md)
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["export", "power", "certified", "hand_eye"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["export", "power", "certified", "hand_eye", "detector"])]
     allow: Option<PathBuf>,
     /// The verdict as text for people, or the report as JSON for programs
     #[arg(long, value_enum, default_value_t = Format::Text, conflicts_with_all = [
@@ -122,6 +123,13 @@ pub(super) struct Arguments {
         "export", "judge", "power", "planted", "record", "against", "junit", "html", "accept", "median_time", "certified", "jobs",
     ])]
     hand_eye: bool,
+    /// Judges a detector of calibration boards, by photographs of known truth (see adapters/DETECTOR-PROTOCOL.md)
+    /// [default detector here: this library's]
+    #[arg(long, conflicts_with_all = [
+        "export", "judge", "power", "planted", "record", "against", "junit", "html", "accept", "allow", "median_time", "certified", "jobs",
+        "hand_eye",
+    ])]
+    detector: bool,
     /// Judges this library and the hand-eye methods of the programs in adapters/, and writes the table as
     /// Markdown
     #[arg(long, value_name = "FILE", requires = "hand_eye", conflicts_with_all = ["solver", "json"])]
@@ -249,6 +257,9 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
     }
     if arguments.hand_eye {
         return hand_eye::run(arguments);
+    }
+    if arguments.detector {
+        return detector::run(arguments);
     }
     if let Some(folder) = &arguments.power_table {
         return power::print_table(folder);

@@ -17,6 +17,7 @@ pub mod bound;
 pub mod certified;
 pub mod covariance_form;
 mod descendants;
+pub mod dialogue;
 pub mod faults;
 pub mod files;
 pub mod greeting;
@@ -42,6 +43,7 @@ pub mod variant;
 pub mod violation;
 
 pub use allowances::{AllowError, Allowance, Allowed};
+pub use dialogue::{Dialogue, Question, Reply};
 pub use judge::{Check, EXPECTED_FALSE_ALARMS, Property, Terms, Verdict};
 pub use plan::{Asked, Plan, PlanError};
 pub use process::Process;

@@ -86,11 +86,6 @@ pub fn rows_of(matrix: &Matrix6<f64>) -> Vec<Vec<f64>> {
 }
 
 impl Problem {
-    /// The line that is sent, without its end.
-    pub fn to_line(&self) -> String {
-        serde_json::to_string(self).expect("a problem has text keys only")
-    }
-
     /// The most likely X with this library.
     ///
     /// # Errors

@@ -3,6 +3,7 @@
 use super::blob::{Blob, semi_axes};
 use super::centre;
 use super::components::{Component, Polarity, components};
+use super::looks::in_image;
 use super::threshold::Thresholds;
 use crate::geometry::Vec2;
 use crate::raster::{Level, Raster};
@@ -52,12 +53,26 @@ const LARGEST_MISFIT: f64 = 0.2;
 /// assert!((found[0].semi_axes_px().0 - 8.0).abs() < 0.1);
 /// ```
 pub fn blobs<T: Level>(image: &Raster<T>, options: &BlobOptions) -> Vec<Blob> {
-    let Some(thresholds) = Thresholds::of(image) else { return Vec::new() };
-    components(image, &thresholds, options.polarity)
+    match Thresholds::of(image) {
+        Some(thresholds) => blobs_by(image, image, 1, &thresholds, options),
+        None => Vec::new(),
+    }
+}
+
+/// The discs that thresholds show in an image averaged over squares of so many pixels, refined in the image itself.
+pub(super) fn blobs_by<T: Level, A: Level>(
+    image: &Raster<T>,
+    averaged: &Raster<A>,
+    square: usize,
+    thresholds: &Thresholds<A>,
+    options: &BlobOptions,
+) -> Vec<Blob> {
+    let area = (square * square) as f64;
+    components(averaged, thresholds, options.polarity)
         .iter()
-        .filter(|component| is_inside(component, image))
+        .filter(|component| is_inside(component, averaged))
         .filter_map(|component| ellipse(component, options))
-        .filter_map(|(centre, covariance)| centre::refine(image, centre, covariance))
+        .filter_map(|(centre, covariance)| centre::refine(image, in_image(centre, square), covariance * area))
         .filter(|blob| blob.misfit <= LARGEST_MISFIT)
         .filter(|blob| (blob.contrast > 0.0) == (options.polarity == Polarity::Dark))
         .collect()

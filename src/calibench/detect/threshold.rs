@@ -17,6 +17,20 @@ pub const TILE_PX: usize = 16;
 /// edge. Noise of 2 % of the range spans 14 % in a neighbourhood of 2304 samples.
 const LEAST_CONTRAST: f64 = 0.15;
 
+/// How thresholds are chosen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Search {
+    /// Where a threshold lies between the extremes around it: 0 at the darkest.
+    pub part: f64,
+    /// Least contrast of a neighbourhood that can be a mark's edge, in levels.
+    pub least_contrast: f64,
+    /// The same as a fraction of the range of the whole image; the greater of the two counts.
+    pub least_share: f64,
+}
+
+/// The first look: half-way.
+const FIRST: Search = Search { part: 0.5, least_contrast: 0.0, least_share: LEAST_CONTRAST };
+
 /// What a tile shows against its threshold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
@@ -39,13 +53,18 @@ pub struct Thresholds<T> {
 impl<T: Level> Thresholds<T> {
     /// The thresholds of an image; `None` where the image is empty or has a single level.
     pub fn of(image: &Raster<T>) -> Option<Thresholds<T>> {
+        Thresholds::by(image, &FIRST)
+    }
+
+    /// The same, chosen otherwise.
+    pub fn by(image: &Raster<T>, search: &Search) -> Option<Thresholds<T>> {
         let tiles = Extremes::of(image)?;
         let (low, high) = tiles.range();
         if low.partial_cmp(&high) != Some(std::cmp::Ordering::Less) {
             return None;
         }
-        let least_contrast = LEAST_CONTRAST * (high.to_f64() - low.to_f64());
-        let seen = tiles.neighbourhood_levels(least_contrast);
+        let least_contrast = search.least_contrast.max(search.least_share * (high.to_f64() - low.to_f64()));
+        let seen = tiles.neighbourhood_levels(search.part, least_contrast);
         let levels: Vec<T> =
             inherited(seen, tiles.columns, tiles.rows).into_iter().map(T::at_least).collect();
         let sides = levels
@@ -110,13 +129,13 @@ impl<T: Level> Extremes<T> {
         (of(&self.low, lesser), of(&self.high, greater))
     }
 
-    /// Half-way between the extremes of the 3 x 3 tiles around each tile, where they differ enough.
-    fn neighbourhood_levels(&self, least_contrast: f64) -> Vec<Option<f64>> {
+    /// A part of the way between the extremes of the 3 x 3 tiles around each tile, where they differ enough.
+    fn neighbourhood_levels(&self, part: f64, least_contrast: f64) -> Vec<Option<f64>> {
         let low = over_neighbours(&self.low, self.columns, lesser);
         let high = over_neighbours(&self.high, self.columns, greater);
         let level = |(low, high): (&T, &T)| {
             let (low, high) = (low.to_f64(), high.to_f64());
-            (high - low >= least_contrast).then_some(0.5 * (low + high))
+            (high - low >= least_contrast).then_some((1.0 - part) * low + part * high)
         };
         low.iter().zip(&high).map(level).collect()
     }

@@ -1,7 +1,7 @@
 //! Where are a board's discs in a photograph, be they dark on bright ground or bright on dark?
 
 use super::DetectError;
-use crate::detect::{Blob, BlobOptions, GridError, Polarity, blobs};
+use crate::detect::{Blob, BlobOptions, GridError, Polarity, blobs, searched_blobs};
 use crate::geometry::Vec2;
 use crate::io::Grey;
 use crate::raster::{Level, Raster};
@@ -17,7 +17,7 @@ pub struct NotFound {
 }
 
 /// The discs of a photograph in the order that `order` gives them. Dark ones are tried first, then bright
-/// ones.
+/// ones; where neither makes the board, both are searched for once more, harder ([`searched_blobs`]).
 ///
 /// # Errors
 /// Neither makes the board: the reason of whichever kind has more discs.
@@ -36,16 +36,19 @@ fn of_either_polarity<T: Level, Ordered>(
     image: &Raster<T>,
     order: impl Fn(&[Blob]) -> Result<Ordered, GridError>,
 ) -> Result<Ordered, NotFound> {
-    let of = |polarity| {
-        let discs = blobs(image, &BlobOptions { polarity, ..BlobOptions::default() });
+    let of = |find: fn(&Raster<T>, &BlobOptions) -> Vec<Blob>, polarity| {
+        let discs = find(image, &BlobOptions { polarity, ..BlobOptions::default() });
         order(&discs).map_err(|reason| NotFound {
             reason: reason.into(),
             candidates_px: discs.iter().map(|disc| disc.centre_px).collect(),
         })
     };
-    of(Polarity::Dark).or_else(|dark| {
-        of(Polarity::Bright).map_err(|bright| {
-            if bright.candidates_px.len() > dark.candidates_px.len() { bright } else { dark }
+    let of_either = |find| {
+        of(find, Polarity::Dark).or_else(|dark| {
+            of(find, Polarity::Bright).map_err(|bright| {
+                if bright.candidates_px.len() > dark.candidates_px.len() { bright } else { dark }
+            })
         })
-    })
+    };
+    of_either(blobs).or_else(|first| of_either(searched_blobs).map_err(|_| first))
 }

@@ -37,23 +37,31 @@ impl Terms {
     }
 }
 
-/// Decides every check. Statistical ones by Holm's step-down procedure (1979): with `m` p-values in ascending
-/// order, the i-th is rejected while it is at most `overall / (m - i + 1)`; the chance of any false rejection
-/// is at most `overall`, however the checks depend on each other.
+/// Which of these p-values are rejected, by Holm's step-down procedure (1979): with `m` of them in ascending order, the i-th is rejected while it
+/// is at most `overall / (m - i + 1)`; the chance of any false rejection is at most `overall`, however they depend on each other.
+pub fn rejected(p_values: &[f64], overall: f64) -> Vec<bool> {
+    let count = p_values.len();
+    let mut order: Vec<usize> = (0..count).collect();
+    order.sort_by(|&a, &b| p_values[a].total_cmp(&p_values[b]));
+    let mut fails = vec![false; count];
+    let ranked = order.iter().enumerate();
+    ranked
+        .take_while(|&(rank, &i)| p_values[i] <= overall / (count - rank) as f64)
+        .for_each(|(_, &i)| fails[i] = true);
+    fails
+}
+
+/// Decides every check, those that rest on chance by [`rejected`].
 pub fn decide(mut checks: Vec<Check>, terms: &Terms) -> Vec<Check> {
-    let overall = terms.false_alarm_rate;
-    let p_value = |check: &Check| match check.basis {
-        Basis::Chance(p) => Some(p),
+    let chances = checks.iter().enumerate().filter_map(|(i, check)| match check.basis {
+        Basis::Chance(p) => Some((i, p)),
         _ => None,
-    };
-    let mut order: Vec<(usize, f64)> =
-        checks.iter().enumerate().filter_map(|(i, check)| Some((i, p_value(check)?))).collect();
-    order.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let count = order.len();
-    let rejected =
-        order.iter().enumerate().take_while(|(rank, (_, p))| *p <= overall / (count - rank) as f64).count();
+    });
+    let (at, p_values): (Vec<usize>, Vec<f64>) = chances.unzip();
     let mut fails: Vec<bool> = checks.iter().map(|c| c.basis == Basis::Certain(false)).collect();
-    order[..rejected].iter().for_each(|&(i, _)| fails[i] = true);
+    at.iter()
+        .zip(rejected(&p_values, terms.false_alarm_rate))
+        .for_each(|(&i, is_rejected)| fails[i] = is_rejected);
     for (check, fails) in checks.iter_mut().zip(fails) {
         check.verdict = match (check.basis, fails) {
             (Basis::Told, _) => Verdict::NotJudged,

@@ -16,7 +16,7 @@ pub use assumptions::{Admission, TOLERATED, TooSmall, VISIBLE, admissions};
 pub(super) use bad::misled;
 pub(super) use chance::at_least;
 pub use checks::{Basis, Check, Property, Verdict};
-pub use decide::{EXPECTED_FALSE_ALARMS, Terms, decide};
+pub use decide::{EXPECTED_FALSE_ALARMS, Terms, decide, rejected};
 
 use self::habits::Habits;
 use super::plan::{Case, Plan, Purpose};

@@ -1,0 +1,36 @@
+//! `calibench gate --detector`: is a detector of calibration boards to be trusted?
+
+use super::super::calibrate::Format;
+use super::super::program::timeout;
+use super::super::{Exit, print};
+use super::{Arguments, Size, Stop, incomplete, usage};
+use calibench::io::write_atomically;
+use calibench_detector_gate::{Builtin, Detector, MOST_PHOTOS, Program, QUICK, THOROUGH, run as judge};
+
+/// Judges one detector; without a program that is this library's.
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, Stop> {
+    let photos = arguments.samples.unwrap_or(match arguments.size {
+        Size::Quick => QUICK,
+        Size::Thorough => THOROUGH,
+    });
+    if photos > MOST_PHOTOS {
+        return Err(usage(format!("{photos} photographs a scene, and the limit is {MOST_PHOTOS}")));
+    }
+    let mut detector: Box<dyn Detector> = match &arguments.solver {
+        Some(command) => {
+            let timeout = timeout(arguments.timeout).map_err(usage)?;
+            Box::new(Program::new(command, timeout).map_err(incomplete)?)
+        }
+        None => Box::new(Builtin),
+    };
+    let report =
+        judge(detector.as_mut(), arguments.seed, photos, arguments.false_alarms).map_err(incomplete)?;
+    if let Some(path) = &arguments.json {
+        write_atomically(path, report.to_json().as_bytes()).map_err(incomplete)?;
+    }
+    match arguments.format {
+        Format::Text => print(&report.to_text()),
+        Format::Json => print(&report.to_json()),
+    }
+    Ok(if report.trusted { Exit::Held } else { Exit::Deviates })
+}

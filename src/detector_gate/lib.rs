@@ -1,0 +1,273 @@
+//! Is a detector of calibration boards to be trusted? The gate of calibrators, for those who find the marks in photographs.
+//!
+//! ```text
+//! Scene (a condition) -> Photo (exact render of known truth) -> Problem --Detector--> Answer
+//!   -> Found (marks beside their true places, in units of the bound that the pixels' noise implies)
+//!   -> Check (one a property, scene and kind of board) --decide (Holm)--> Report
+//! ```
+
+mod bound;
+mod check;
+mod detectors;
+mod judge;
+pub mod look;
+mod observed;
+pub mod protocol;
+mod report;
+mod scene;
+
+pub use bound::variance_px2;
+pub use check::{Check, Property};
+pub use detectors::{Asked, Builtin, Detector, Program};
+pub use judge::{Figures, MATTERS_PX};
+pub use look::{Look, Photo};
+pub use report::Report;
+pub use scene::{Demand, Scene, scenes};
+
+use calibench::geometry::Vec2;
+use calibench::raster::Raster;
+use judge::{Answered, Shown};
+use observed::Truth;
+use protocol::Status;
+use rayon::prelude::*;
+
+/// Photographs of a scene in a quick run.
+pub const QUICK: usize = 24;
+/// Photographs of a scene in a thorough run.
+pub const THOROUGH: usize = 512;
+/// Most photographs of a scene.
+pub const MOST_PHOTOS: usize = 20_000;
+/// Photographs of a scene that are asked twice, and turned.
+const REPEATED: usize = 4;
+/// Photographs that are in memory at once.
+const AT_ONCE: usize = 32;
+
+/// Asks a detector `photos` photographs of every scene and judges its answers.
+///
+/// # Errors
+/// Photographs that cannot be handed to it.
+pub fn run(
+    detector: &mut dyn Detector,
+    seed: u64,
+    photos: usize,
+    false_alarm_rate: f64,
+) -> std::io::Result<Report> {
+    let mut shown = Vec::new();
+    let mut unsupported = Vec::new();
+    for scene in scenes() {
+        if unsupported.contains(&scene.kind) {
+            continue;
+        }
+        match show(scene, detector, seed, photos)? {
+            Some(scene) => shown.push(scene),
+            None => {
+                unsupported.push(scene.kind);
+                shown.retain(|other: &Shown| other.scene.kind != scene.kind);
+            }
+        }
+    }
+    let checks = check::decide(shown.iter().flat_map(Shown::checks).collect(), false_alarm_rate);
+    Ok(Report {
+        detector: detector.name(),
+        seed,
+        photos,
+        false_alarm_rate,
+        scenes: shown.iter().map(Shown::figures).collect(),
+        trusted: !checks.is_empty() && !checks.iter().any(Check::fails),
+        unsupported,
+        checks,
+    })
+}
+
+/// A scene shown to a detector; `None` where it does not know such boards.
+fn show(
+    scene: Scene,
+    detector: &mut dyn Detector,
+    seed: u64,
+    photos: usize,
+) -> std::io::Result<Option<Shown>> {
+    let mut shown =
+        Shown { scene, truths: Vec::new(), answers: Vec::new(), again: Vec::new(), turned: Vec::new() };
+    let (board, name) = (scene.board(), scene.name());
+    let trials: Vec<u64> = (0..photos as u64).collect();
+    for some in trials.chunks(AT_ONCE) {
+        let drawn: Vec<(u64, Photo)> = some
+            .par_iter()
+            .filter_map(|&trial| Some((trial, scene.look.photo(&board, seed, &name, trial)?)))
+            .collect();
+        let questions: Vec<Asked> =
+            drawn.iter().map(|(trial, photo)| Asked::new(&scene, *trial, "", photo.image.clone())).collect();
+        let is_first = |trial: u64| (trial as usize) < REPEATED && scene.demand == Demand::Found;
+        let first: Vec<&(u64, Photo)> = drawn.iter().filter(|(trial, _)| is_first(*trial)).collect();
+        let again =
+            first.iter().map(|(trial, photo)| Asked::new(&scene, *trial, "-again", photo.image.clone()));
+        let turned =
+            first.iter().map(|(trial, photo)| Asked::new(&scene, *trial, "-turned", half_turn(&photo.image)));
+        let all: Vec<Asked> = questions.into_iter().chain(again).chain(turned).collect();
+        let Some(mut answers) = answered(detector, &all)? else { return Ok(None) };
+        let turned = answers.split_off(answers.len() - first.len());
+        let again = answers.split_off(answers.len() - first.len());
+        shown.answers.extend(answers);
+        shown.again.extend(again);
+        let turned_back = turned
+            .into_iter()
+            .map(|answer| answer.map(|marks| marks.map(|marks| back(&marks, scene.look.size))));
+        shown.turned.extend(turned_back);
+        let truths: Vec<Truth> = drawn.par_iter().map(|(_, photo)| truth(&scene, &board, photo)).collect();
+        shown.truths.extend(truths);
+    }
+    Ok(Some(shown))
+}
+
+fn truth(scene: &Scene, board: &calibench::board::Board, photo: &Photo) -> Truth {
+    Truth::of(photo, board, |place, reach_px| match scene.look.jpeg {
+        // What a codec adds is no noise of the pixels.
+        Some(_) => None,
+        None => variance_px2(&photo.clean, place, reach_px, scene.look.noise),
+    })
+}
+
+/// Answers by their marks; `None` where the first says that such boards are not known.
+fn answered(detector: &mut dyn Detector, asked: &[Asked]) -> std::io::Result<Option<Vec<Answered>>> {
+    let answers = detector.answer_all(asked)?;
+    if let Some(Ok(first)) = answers.first()
+        && first.status == Status::Unsupported
+    {
+        return Ok(None);
+    }
+    let marks = |(asked, answer): (&Asked, Result<protocol::Answer, String>)| answer?.places(&asked.wanted());
+    Ok(Some(asked.iter().zip(answers).map(marks).collect()))
+}
+
+fn half_turn(image: &Raster<u8>) -> Raster<u8> {
+    let (width, height) = (image.width(), image.height());
+    Raster::from_fn(width, height, |x, y| image.get(width - 1 - x, height - 1 - y))
+}
+
+/// Places in a turned photograph as places in the one that is not.
+fn back(marks: &[Option<Vec2>], (width, height): (usize, usize)) -> Vec<Option<Vec2>> {
+    let last = Vec2::new(width as f64 - 1.0, height as f64 - 1.0);
+    marks.iter().map(|mark| mark.map(|place| last - place)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol::Answer;
+    use std::time::Duration;
+
+    /// This library's detector with its answers changed.
+    struct Changed(fn(&Asked, Answer) -> Answer);
+
+    impl Detector for Changed {
+        fn name(&self) -> String {
+            "changed".to_string()
+        }
+
+        fn answer_all(&mut self, asked: &[Asked]) -> std::io::Result<Vec<Result<Answer, String>>> {
+            let answers = Builtin.answer_all(asked)?;
+            let each = asked.iter().zip(answers);
+            Ok(each.map(|(asked, answer)| answer.map(|answer| (self.0)(asked, answer))).collect())
+        }
+    }
+
+    fn marks(answer: Answer, change: impl Fn(Vec<Option<[f64; 2]>>) -> Vec<Option<[f64; 2]>>) -> Answer {
+        Answer { marks: answer.marks.map(change), ..answer }
+    }
+
+    /// The properties that fail with a changed detector, in some of the scenes.
+    fn failing(change: fn(&Asked, Answer) -> Answer, scenes: &[&str]) -> Vec<Property> {
+        let some: Vec<Scene> =
+            super::scenes().into_iter().filter(|scene| scenes.contains(&scene.id)).collect();
+        let shown = some.into_iter().map(|scene| show(scene, &mut Changed(change), 1, 12).unwrap().unwrap());
+        let checks = check::decide(shown.flat_map(|shown| shown.checks()).collect(), 1e-3);
+        let mut failing: Vec<Property> =
+            checks.iter().filter(|check| check.fails()).map(|check| check.property).collect();
+        failing.sort_unstable();
+        failing.dedup();
+        failing
+    }
+
+    fn moved(answer: Answer, step: impl Fn(f64, f64) -> [f64; 2]) -> Answer {
+        marks(answer, |list| list.iter().map(|mark| mark.map(|[u, v]| step(u, v))).collect())
+    }
+
+    #[test]
+    fn nothing_fails_where_nothing_is_changed() {
+        assert_eq!(failing(|_, answer| answer, &["clean", "facing", "noisy"]), []);
+    }
+
+    #[test]
+    fn half_a_pixel_too_many_is_a_bias_and_does_not_turn() {
+        let half = |_: &Asked, answer| moved(answer, |u, v| [u + 0.5, v + 0.5]);
+        assert_eq!(failing(half, &["clean"]), [Property::Bias, Property::Turned]);
+    }
+
+    #[test]
+    fn places_drawn_towards_the_middle_of_their_pixels_show() {
+        let drawn = |_: &Asked, answer| {
+            let towards = |x: f64| x - 0.05 * libm::sin(std::f64::consts::TAU * x);
+            moved(answer, |u, v| [towards(u), towards(v)])
+        };
+        assert_eq!(failing(drawn, &["facing"]), [Property::PixelPhase]);
+    }
+
+    #[test]
+    fn a_board_from_the_other_end_holds_and_one_in_a_mirror_does_not() {
+        let reversed = |_: &Asked, answer| marks(answer, |list| list.into_iter().rev().collect());
+        assert_eq!(failing(reversed, &["clean"]), []);
+        let mirrored = |asked: &Asked, answer| {
+            marks(answer, |list| {
+                list.chunks(asked.wanted().columns).flat_map(|row| row.iter().rev().copied()).collect()
+            })
+        };
+        assert_eq!(failing(mirrored, &["clean"]), [Property::Order]);
+    }
+
+    #[test]
+    fn a_board_that_is_a_column_off_is_grave() {
+        let shifted = |_: &Asked, answer| {
+            marks(answer, |mut list| {
+                list.rotate_left(1);
+                list
+            })
+        };
+        assert!(failing(shifted, &["clean"]).contains(&Property::Places));
+    }
+
+    #[test]
+    fn a_board_where_there_is_none_is_grave() {
+        let invented = |asked: &Asked, answer: Answer| {
+            let count = asked.wanted().columns * asked.wanted().rows;
+            let marks = (0..count).map(|i| Some([i as f64, 100.0])).collect();
+            Answer { status: Status::Ok, marks: Some(marks), ..answer }
+        };
+        assert_eq!(failing(invented, &["noise-only", "another-size"]), [Property::NothingInvented]);
+    }
+
+    #[test]
+    fn one_mark_a_pixel_off_is_astray() {
+        let stray = |_: &Asked, answer| {
+            marks(answer, |mut list| {
+                if let Some(Some([u, _])) = list.get_mut(7) {
+                    *u += 1.5;
+                }
+                list
+            })
+        };
+        assert_eq!(failing(stray, &["clean"]), [Property::Strays]);
+    }
+
+    #[test]
+    fn a_program_that_echoes_breaks_the_protocol_and_leaves_no_photograph() {
+        let mut program = Program::new("cat", Duration::from_secs(5)).unwrap();
+        let shown = show(scenes()[0], &mut program, 1, 2).unwrap().unwrap();
+        let checks = check::decide(shown.checks(), 1e-3);
+        let failing: Vec<Property> = checks.iter().filter(|c| c.fails()).map(|c| c.property).collect();
+        assert!(failing.contains(&Property::Protocol) && failing.contains(&Property::Found));
+        let folder = program.folder().to_path_buf();
+        assert!(folder.is_dir());
+        drop(program);
+        assert!(!folder.exists());
+    }
+}
