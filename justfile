@@ -68,9 +68,9 @@ peers *ARGUMENTS:
 digits:
     cargo run --release --locked -- gate --certified --digits reference/digits.csv --timeout 600
 
-# The certified problems: sums, observations, and one of them certified anew
-certified PROBLEM="nine-points":
-    .ci/certified {{PROBLEM}}
+# The certified problems: sums, observations, two of them certified anew, and steps from the values of all
+certified *PROBLEMS:
+    .ci/certified {{PROBLEMS}}
 
 # The pictures of the README, light and dark
 pictures:

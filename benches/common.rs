@@ -30,18 +30,37 @@ pub fn views(views: usize) -> Vec<View> {
 /// The same through a fisheye, with noise of 0.1 px.
 pub fn fisheye_views(views: usize) -> Vec<View> {
     let lens = Lens::new(Model::KannalaBrandt, &[-0.03, 0.004, 0.0, 0.0]).expect("four coefficients");
-    let camera = Camera::with_lens(600.0, 600.0, 320.0, 240.0, lens);
+    seen_through(&Camera::with_lens(600.0, 600.0, 320.0, 240.0, lens), poses(views))
+}
+
+/// Views through a wide lens of a model, with noise of 0.1 px: a fisheye, or the rational model with all its coefficients. The
+/// poses are those above at a third of their distance: marks lie up to 65 degrees from the axis and more, and tell k1 of the rational
+/// model to 0.15 from four views. At half the distance they tell it to 30, which is nothing.
+pub fn wide_views(model: Model, views: usize) -> Vec<View> {
+    let (focal, coefficients): (f64, &[f64]) = match model {
+        Model::KannalaBrandt => (230.0, &[0.02, -0.01, 0.004, -0.0015]),
+        _ => (250.0, &[0.2, 0.3, 0.0006, -0.0009, 0.02, 0.5, 0.4, 0.1]),
+    };
+    let lens = Lens::new(model, coefficients).expect("as many coefficients as the model has");
+    let near = |pose: Pose| Pose { translation: 0.35 * pose.translation, ..pose };
+    seen_through(
+        &Camera::with_lens(focal, focal, 326.0, 243.0, lens),
+        poses(views).into_iter().map(near).collect(),
+    )
+}
+
+fn seen_through(camera: &Camera<Lens>, poses: Vec<Pose>) -> Vec<View> {
     let points = Truth::example_board().points();
     let mut noise = Stream::open(KEY);
     let view = |pose: Pose| {
         let mut seen = |p: &Vec2| {
-            let pixel = camera.pixel(&pose.apply(&Vec3::new(p.x, p.y, 0.0))).expect("a fisheye sees it");
+            let pixel = camera.pixel(&pose.apply(&Vec3::new(p.x, p.y, 0.0))).expect("the lens sees it");
             pixel + 0.1 * Vec2::new(noise.normal(), noise.normal())
         };
         let pixels = points.iter().map(&mut seen).collect();
         View::new(points.clone(), pixels).expect("as many pixels as points")
     };
-    poses(views).into_iter().map(view).collect()
+    poses.into_iter().map(view).collect()
 }
 
 /// Three views of a target that faces the camera: they determine no focal length.

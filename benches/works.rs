@@ -4,7 +4,7 @@
 
 use crate::common;
 use calibench::board::{Board, View};
-use calibench::calibrate::{Calibration, Settings, calibrate, calibrate_lens, information};
+use calibench::calibrate::{Calibration, LensCalibration, Settings, calibrate, calibrate_lens, information};
 use calibench::camera::{BrownConrady, Camera, FreeParameters, Model};
 use calibench::detect::{chessboard, circle_grid, sparse_dots};
 use calibench::geometry::{Affine, Homography, Vec2};
@@ -17,6 +17,8 @@ use std::marker::PhantomData;
 
 /// Views of the calibrations.
 pub const VIEWS: [usize; 5] = [4, 20, 100, 500, 2000];
+/// Views of the calibrations through other lenses.
+pub const WIDE_VIEWS: [usize; 3] = [4, 20, 100];
 /// Width and height of the images that are rectified, px.
 pub const FRAMES: [(usize, usize); 2] = [(640, 480), (4000, 3000)];
 
@@ -66,6 +68,13 @@ pub fn named(row: &str) -> Option<Box<dyn Work>> {
             let settings = Settings::of_model(Model::KannalaBrandt);
             let run = move || calibrate_lens(&views, &settings).expect("it can be calibrated");
             job(run, |found| found.camera.values().map(|(_, value)| value).collect())
+        }
+        "wide" | "rational" => {
+            let model = wide_model(kind);
+            let views = common::wide_views(model, size.parse().ok()?);
+            let settings = Settings::of_model(model);
+            let run = move || calibrate_lens(&views, &settings).expect("it can be calibrated");
+            job(run, |found| free_values(&found))
         }
         "covariance" => {
             let poses = common::poses(size.parse().ok()?);
@@ -151,6 +160,16 @@ impl Work for Study {
     fn answer(&mut self) -> Vec<f64> {
         Vec::new()
     }
+}
+
+/// The lens model of the rows `wide` and `rational`.
+pub fn wide_model(kind: &str) -> Model {
+    if kind == "wide" { Model::KannalaBrandt } else { Model::Rational }
+}
+
+/// What was estimated of a camera, in order.
+pub fn free_values(found: &LensCalibration) -> Vec<f64> {
+    found.free.iter().filter_map(|p| found.camera.value(p)).collect()
 }
 
 /// The six free intrinsics.

@@ -3,6 +3,7 @@
     pip install mpmath gmpy2          (gmpy2 is optional: several times faster)
     python3 certify.py [NAME ...]     certifies problems and writes the values into their files
     python3 certify.py --check [NAME] certifies from scratch and compares every digit with the file
+    python3 certify.py --steps [NAME] takes Gauss-Newton steps from the file's values and compares every digit: a second or ten each
     ... --starts N                    so many starts drawn from far away, 12 unless said otherwise
     python3 certify.py --sums         writes SHA256SUMS
 
@@ -20,13 +21,17 @@ import sys
 
 import mpmath
 
-VERSION = 1
+from certify_lenses import COEFFICIENTS, MODELS
+
 HERE = pathlib.Path(__file__).resolve().parent
-NAMES = ["fx", "fy", "cx", "cy", "skew", "k1", "k2", "p1", "p2", "k3"]
-FX, FY, CX, CY, SKEW, K1, K2, P1, P2, K3 = range(10)
+LINEAR = ["fx", "fy", "cx", "cy", "skew"]
+FX, FY, CX, CY, SKEW = range(5)
+FISHEYES = ("kannala-brandt", "double-sphere")
 DIGITS = (40, 60)
 CERTIFIED_DIGITS = 20
 STARTS = 12
+# Steps of a search in double precision. Coefficients that make up for each other have long valleys.
+SEARCH, LONG_SEARCH = 300, 2000
 
 
 # --- numbers: the same code runs in double precision (mpmath.fp) and in any other (mpmath.mp) -----------------------------------
@@ -110,8 +115,11 @@ class Problem:
             return ctx.mpf(text)
 
         self.ctx, self.data = ctx, data
-        self.free = [NAMES.index(name) for name in data["free"]]
-        self.held = {NAMES.index(name): number(value) for name, value in data["held"].items()}
+        self.model = data.get("model", "brown-conrady")
+        self.lens = MODELS[self.model]
+        self.names = LINEAR + COEFFICIENTS[self.model]
+        self.free = [self.names.index(name) for name in data["free"]]
+        self.held = {self.names.index(name): number(value) for name, value in data["held"].items()}
         points = [p for view in data["views"] for p in view["target"]]
         self.centre = [sum(number(p[i]) for p in points) / len(points) for i in (0, 1)]
         self.views = [
@@ -127,8 +135,8 @@ class Problem:
     def start(self, kind):
         """A start of the file: camera and poses."""
         ctx, given = self.ctx, self.data["starts"][kind]
-        values = {NAMES.index(name): ctx.mpf(value) for name, value in given["parameters"].items()}
-        camera = [self.held.get(i, values.get(i)) for i in range(10)]
+        values = {self.names.index(name): ctx.mpf(value) for name, value in given["parameters"].items()}
+        camera = [self.held.get(i, values.get(i)) for i in range(len(self.names))]
         poses = []
         for pose in given["poses"]:
             r = exponential(ctx, [ctx.mpf(w) for w in pose["rotation_vector"]])
@@ -142,55 +150,34 @@ class Problem:
         return [t[i] - r[i][0] * self.centre[0] - r[i][1] * self.centre[1] for i in range(3)]
 
 
-def rows(ctx, camera, pose, view, free, with_jacobian=True):
+def rows(ctx, lens, camera, pose, view, free, with_jacobian=True):
     """Residuals of a view (u and v in turn), and the columns of its Jacobian: free intrinsics, rotation, translation.
 
-    None where a point is not in front of the camera.
+    None where the lens has no image of a point.
     """
-    fx, fy, cx, cy, skew, k1, k2, p1, p2, k3 = camera
+    fx, fy, cx, cy, skew = camera[:5]
+    coefficients = camera[5:]
     r, t = pose
     one, zero = ctx.mpf(1), ctx.mpf(0)
     residuals = []
     columns = [[] for _ in range(len(free) + 6)]
     for (X, Y), (u, v) in zip(*view):
-        q0, q1, q2 = (r[i][0] * X + r[i][1] * Y + t[i] for i in range(3))
-        if not q2 > 0:
+        seen = lens(ctx, coefficients, [r[i][0] * X + r[i][1] * Y + t[i] for i in range(3)])
+        if seen is None:
             return None
-        w = 1 / q2
-        x, y = q0 * w, q1 * w
-        xx, yy, xy = x * x, y * y, x * y
-        s = xx + yy
-        g = 1 + s * (k1 + s * (k2 + s * k3))
-        along_x, along_y = s + 2 * xx, s + 2 * yy
-        xd = x * g + 2 * p1 * xy + p2 * along_x
-        yd = y * g + p1 * along_y + 2 * p2 * xy
+        (xd, yd), (xd_q, yd_q), by_lens = seen
         residuals += [fx * xd + skew * yd + cx - u, fy * yd + cy - v]
         if not with_jacobian:
             continue
-        slope = k1 + s * (2 * k2 + s * 3 * k3)
-        xd_x = g + 2 * xx * slope + 2 * p1 * y + 6 * p2 * x
-        xd_y = 2 * xy * slope + 2 * p1 * x + 2 * p2 * y
-        yd_x = xd_y
-        yd_y = g + 2 * yy * slope + 6 * p1 * y + 2 * p2 * x
-        # Distorted coordinates by each lens coefficient.
-        lens = {
-            K1: (x * s, y * s),
-            K2: (x * s * s, y * s * s),
-            K3: (x * s * s * s, y * s * s * s),
-            P1: (2 * xy, along_y),
-            P2: (along_x, 2 * xy),
-        }
         for column, index in zip(columns, free):
-            if index in lens:
-                a, b = lens[index]
+            if index >= len(LINEAR):
+                a, b = by_lens[index - len(LINEAR)]
                 column += [fx * a + skew * b, fy * b]
             else:
                 column += {FX: [xd, zero], FY: [zero, yd], CX: [one, zero], CY: [zero, one], SKEW: [yd, zero]}[index]
         # Pixels by the point in the camera's frame.
-        u_x, u_y = fx * xd_x + skew * yd_x, fx * xd_y + skew * yd_y
-        v_x, v_y = fy * yd_x, fy * yd_y
-        u_q = (u_x * w, u_y * w, -(u_x * x + u_y * y) * w)
-        v_q = (v_x * w, v_y * w, -(v_x * x + v_y * y) * w)
+        u_q = [fx * a + skew * b for a, b in zip(xd_q, yd_q)]
+        v_q = [fy * b for b in yd_q]
         # R exp(w) P: dq = R (w x P), with P = (X, Y, 0).
         turned = [
             [Y * r[i][2] for i in range(3)],
@@ -213,7 +200,7 @@ def cost(problem, state):
     camera, poses = state
     parts = []
     for view, pose in zip(problem.views, poses):
-        seen = rows(problem.ctx, camera, pose, view, problem.free, False)
+        seen = rows(problem.ctx, problem.lens, camera, pose, view, problem.free, False)
         if seen is None:
             return None
         parts.append(dot(problem.ctx, seen[0], seen[0]))
@@ -231,7 +218,7 @@ class Normal:
         self.gradient = [ctx.mpf(0)] * n
         self.views, self.cost = [], ctx.mpf(0)
         for view, pose in zip(problem.views, poses):
-            seen = rows(ctx, camera, pose, view, problem.free)
+            seen = rows(ctx, problem.lens, camera, pose, view, problem.free)
             if seen is None:
                 self.cost = ctx.inf
                 return
@@ -300,8 +287,9 @@ def moved(problem, state, step, poses):
 # --- minima ---------------------------------------------------------------------------------------------------------------------
 
 
-def levenberg_marquardt(problem, state, iterations=300):
+def levenberg_marquardt(problem, state):
     """A minimum, or where the search ended: state, cost, whether it converged."""
+    iterations = SEARCH if problem.model == "brown-conrady" else LONG_SEARCH
     normal, damping = Normal(problem, state), 1e-3
     for _ in range(iterations):
         if not normal.cost < problem.ctx.inf:
@@ -363,7 +351,7 @@ def gauss_newton(problem, state, below):
 def pose_alone(problem, camera, view, pose, iterations=12):
     """A few damped steps of one pose with the camera held: pose and cost."""
     ctx, damping = problem.ctx, 1e-3
-    seen = rows(ctx, camera, pose, view, [])
+    seen = rows(ctx, problem.lens, camera, pose, view, [])
     best = dot(ctx, seen[0], seen[0]) if seen else ctx.inf
     for _ in range(iterations):
         if seen is None:
@@ -377,7 +365,7 @@ def pose_alone(problem, camera, view, pose, iterations=12):
             break
         d = backward(ctx, lower, forward(ctx, lower, [-dot(ctx, a, residuals) for a in columns]))
         trial = (product(ctx, pose[0], exponential(ctx, d[:3])), [a + b for a, b in zip(pose[1], d[3:])])
-        after = rows(ctx, camera, trial, view, [])
+        after = rows(ctx, problem.lens, camera, trial, view, [])
         value = dot(ctx, after[0], after[0]) if after else ctx.inf
         if value < best:
             pose, seen, best, damping = trial, after, value, damping / 10
@@ -390,23 +378,43 @@ def random_start(problem, stream):
     """A camera drawn over all that people have, and for each view the best of five poses: facing, and tilted four ways."""
     ctx = problem.ctx
     width, height = problem.data["image_size"]
-    focal = width * math.exp(stream.uniform(math.log(0.4), math.log(6)))
-    drawn = [0.0] * 10
-    drawn[FX], drawn[FY] = focal, focal * stream.uniform(0.8, 1.25)
-    drawn[CX], drawn[CY] = (side * (0.5 + stream.uniform(-0.2, 0.2)) for side in (width, height))
-    drawn[K1] = stream.uniform(-0.2, 0.2)
-    camera = [problem.held.get(i, drawn[i]) for i in range(10)]
-    facing = problem.start("far")[1]
-    distance_factor = camera[FX] / problem.start("far")[0][FX]
+    is_fisheye = problem.model in FISHEYES
+    shortest, longest = (0.15, 1) if is_fisheye else (0.4, 6)
+    focal = width * math.exp(stream.uniform(math.log(shortest), math.log(longest)))
+    drawn = dict.fromkeys(problem.names, 0.0)
+    drawn["fx"], drawn["fy"] = focal, focal * stream.uniform(0.8, 1.25)
+    drawn["cx"], drawn["cy"] = (side * (0.5 + stream.uniform(-0.2, 0.2)) for side in (width, height))
+    if problem.model == "double-sphere":
+        drawn["xi"], drawn["alpha"] = stream.uniform(-0.3, 0.3), stream.uniform(0.3, 0.7)
+    else:
+        drawn["k1"] = stream.uniform(-0.2, 0.2)
+    camera = [problem.held.get(i, drawn[name]) for i, name in enumerate(problem.names)]
+    far, facing = problem.start("far")
+    factor = camera[FX] / far[FX]
     poses = []
     for view, (r, t) in zip(problem.views, facing):
+        if is_fisheye:
+            r, t = swung(ctx, r, t, factor)
+        else:
+            t = [t[0], t[1], t[2] * factor]
         candidates = []
         for tilt in [(0, 0), (0.5, 0), (-0.5, 0), (0, 0.5), (0, -0.5)]:
             turn = exponential(ctx, [tilt[0], tilt[1], stream.uniform(-0.2, 0.2)])
-            start = (product(ctx, r, turn), [t[0], t[1], t[2] * distance_factor])
+            start = (product(ctx, r, turn), t)
             candidates.append(pose_alone(problem, camera, view, start))
         poses.append(min(candidates, key=lambda c: c[1])[0])
     return camera, poses
+
+
+def swung(ctx, r, t, factor):
+    """A pose of an equidistant fisheye for another whose focal length is `factor` times as long: so much farther, and nearer the axis."""
+    aside = ctx.sqrt(t[0] * t[0] + t[1] * t[1])
+    angle = ctx.atan2(aside, t[2])
+    if aside == 0:
+        return r, [factor * x for x in t]
+    swing = (min(angle / factor, ctx.pi * 0.6) - angle) / aside
+    turn = exponential(ctx, [-t[1] * swing, t[0] * swing, 0 * swing])
+    return product(ctx, turn, r), [factor * dot(ctx, row, t) for row in turn]
 
 
 # --- certification --------------------------------------------------------------------------------------------------------------
@@ -453,19 +461,46 @@ def certify(data, starts):
     same = lambda end: end[2] and end[1] < float(least) * (1 + 1e-7)
     higher = [end[1] / float(least) for end in drawn if end[2] and not same(end)]
 
+    if cost_by_differences(problem, state, normal) > ctx.mpf(10) ** -30 or normal.largest_cosine() > ctx.mpf(10) ** -30:
+        raise ArithmeticError("the gradient is not zero")
+
+    derivatives = jacobian_by_differences(problem, state)
+    if derivatives > ctx.mpf(10) ** -25:
+        raise ArithmeticError(f"the derivatives are not those of the equations: {mpmath.nstr(derivatives, 3)}")
+
+    chance = (least / ctx.mpf(data["noise_px"]) ** 2 - problem.freedom) / ctx.sqrt(2 * problem.freedom)
+    return values(problem, state, normal) | {
+        "evidence": {
+            "agreement_of_40_and_60_digits": mpmath.nstr(agree, 3),
+            "last_relative_step": mpmath.nstr(sizes[-1], 2),
+            "gradient": mpmath.nstr(normal.largest_cosine(), 2),
+            "gradient_by_differences": mpmath.nstr(cost_by_differences(problem, state, normal), 2),
+            # Certificates of version 1 do not state it.
+            **({} if data["version"] == "1" else {"derivatives_by_differences": mpmath.nstr(derivatives, 2)}),
+            "standard_deviations_of_cost_from_its_expectation": mpmath.nstr(chance, 3),
+            "near_start_ends_here": same(near),
+            "far_start_ends_here": same(far),
+            "drawn_starts": len(drawn),
+            "drawn_starts_that_end_here": sum(map(same, drawn)),
+            "drawn_starts_that_end_higher": len(higher),
+            "drawn_starts_without_convergence": sum(not end[2] for end in drawn),
+            "next_higher_cost": f"{min(higher):.6g}" if higher else None,
+        },
+    }
+
+
+def values(problem, state, normal):
+    """What is certified of a minimum."""
+    ctx, least = problem.ctx, normal.cost
     schur = normal.solve()[2]
     variance = least / problem.freedom
     lower = cholesky(ctx, schur)
     unit = lambda i: [ctx.mpf(i == j) for j in range(len(schur))]
     deviations = [ctx.sqrt(variance * sum(x * x for x in forward(ctx, lower, unit(i)))) for i in range(len(schur))]
-    if cost_by_differences(problem, state, normal) > ctx.mpf(10) ** -30 or normal.largest_cosine() > ctx.mpf(10) ** -30:
-        raise ArithmeticError("the gradient is not zero")
-
-    chance = (least / ctx.mpf(data["noise_px"]) ** 2 - problem.freedom) / ctx.sqrt(2 * problem.freedom)
     return {
-        "version": VERSION,
-        "parameters": dict(zip(data["free"], map(digits, parameters(problem, state)))),
-        "standard_deviations": dict(zip(data["free"], map(digits, deviations))),
+        "version": int(problem.data["version"]),
+        "parameters": dict(zip(problem.data["free"], map(digits, parameters(problem, state)))),
+        "standard_deviations": dict(zip(problem.data["free"], map(digits, deviations))),
         "rmse": digits(ctx.sqrt(least / problem.points)),
         "sigma": digits(ctx.sqrt(variance)),
         "sum_of_squares": digits(least),
@@ -477,21 +512,24 @@ def certify(data, starts):
             }
             for pose in state[1]
         ],
-        "evidence": {
-            "agreement_of_40_and_60_digits": mpmath.nstr(agree, 3),
-            "last_relative_step": mpmath.nstr(sizes[-1], 2),
-            "gradient": mpmath.nstr(normal.largest_cosine(), 2),
-            "gradient_by_differences": mpmath.nstr(cost_by_differences(problem, state, normal), 2),
-            "standard_deviations_of_cost_from_its_expectation": mpmath.nstr(chance, 3),
-            "near_start_ends_here": same(near),
-            "far_start_ends_here": same(far),
-            "drawn_starts": len(drawn),
-            "drawn_starts_that_end_here": sum(map(same, drawn)),
-            "drawn_starts_that_end_higher": len(higher),
-            "drawn_starts_without_convergence": sum(not end[2] for end in drawn),
-            "next_higher_cost": f"{min(higher):.6g}" if higher else None,
-        },
     }
+
+
+def after_steps(data):
+    """What is certified after Gauss-Newton steps in 60 digits from the file's values: the same, where they are those of a minimum."""
+    ctx = mpmath.mp
+    ctx.dps = DIGITS[1]
+    problem = Problem(ctx, data)
+    stated = {problem.names.index(name): ctx.mpf(value) for name, value in data["certified"]["parameters"].items()}
+    camera = [problem.held.get(i, stated.get(i)) for i in range(len(problem.names))]
+    poses = []
+    for pose in data["certified"]["poses"]:
+        r = orthonormal(ctx, [[ctx.mpf(x) for x in row] for row in pose["rotation"]])
+        t = [ctx.mpf(x) + r[i][0] * problem.centre[0] + r[i][1] * problem.centre[1] for i, x in enumerate(pose["translation"])]
+        poses.append((r, t))
+    # From 20 digits; a step more than it takes to have 30.
+    state, normal, _ = gauss_newton(problem, (camera, poses), ctx.mpf(10) ** -28)
+    return values(problem, state, normal)
 
 
 def cost_by_differences(problem, state, normal):
@@ -514,6 +552,30 @@ def cost_by_differences(problem, state, normal):
         for k in range(6):
             one = lambda h: [[h if (w, m) == (v, k) else ctx.mpf(0) for m in range(6)] for w in range(len(state[1]))]
             largest = max(largest, slope(normal.views[v][1][k][k], lambda h: ([ctx.mpf(0)] * n, one(h))))
+    return largest
+
+
+def jacobian_by_differences(problem, state):
+    """The Jacobian once more, from the residuals by central differences: the largest relative difference of a column of a view.
+
+    It shows what the gradient cannot: the standard deviations hang on the derivatives themselves.
+    """
+    ctx, n = problem.ctx, len(problem.free)
+    largest = ctx.mpf(0)
+    norm = lambda column: ctx.sqrt(dot(ctx, column, column))
+    for view, pose in zip(problem.views, state[1]):
+        columns = rows(ctx, problem.lens, state[0], pose, view, problem.free)[1]
+        for i, column in enumerate(columns):
+            # By a ten-quintillionth of a pixel or so.
+            h = ctx.mpf(10) ** -19 / norm(column)
+
+            def seen(step):
+                change = [step if k == i else ctx.mpf(0) for k in range(n + 6)]
+                camera, poses = moved(problem, (state[0], [pose]), change[:n], [change[n:]])
+                return rows(ctx, problem.lens, camera, poses[0], view, problem.free, False)[0]
+
+            slope = [(up - down) / (2 * h) for up, down in zip(seen(h), seen(-h))]
+            largest = max(largest, norm([a - b for a, b in zip(column, slope)]) / norm(column))
     return largest
 
 
@@ -562,6 +624,7 @@ def main(arguments):
         starts = int(arguments[at + 1])
         del arguments[at : at + 2]
     names = [a for a in arguments if not a.startswith("-")]
+    by_steps = "--steps" in arguments
     if "--sums" in arguments:
         files = sorted(p for p in HERE.iterdir() if p.suffix in (".json", ".py", ".md"))
         sums = [f"{hashlib.sha256(p.read_bytes()).hexdigest()}  {p.name}\n" for p in files]
@@ -574,6 +637,12 @@ def main(arguments):
         # Numbers are kept as their text: a decimal is what it says, not the double next to it.
         data = json.loads(before, parse_float=str, parse_int=lambda text: text)
         data["image_size"] = [int(side) for side in data["image_size"]]
+        if by_steps:
+            here = text_of(after_steps(data)).removesuffix("\n }")
+            same = before.partition(MARK)[2].startswith(here + ",\n")
+            different += not same
+            print(f"{path.stem}: {'steps stay at every digit' if same else 'STEPS LEAD ELSEWHERE'}", flush=True)
+            continue
         head = before.partition(MARK)[0].removesuffix("\n}\n")
         text = f"{head}{MARK}{text_of(certify(data, starts))}\n}}\n"
         if "--check" in arguments:

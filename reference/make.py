@@ -15,27 +15,29 @@ import pathlib
 import random
 import sys
 
-VERSION = 1
+from make_lenses import COEFFICIENTS, FISHEYES, image as lens_image
+
 HERE = pathlib.Path(__file__).resolve().parent
-NAMES = ["fx", "fy", "cx", "cy", "skew", "k1", "k2", "p1", "p2", "k3"]
 LINEAR = ["fx", "fy", "cx", "cy"]
 # Pixels are multiples of 1/256 px.
 PARTS_OF_PIXEL, DECIMALS = 256, 8
+
+
+def names_of(camera):
+    """Every parameter of a camera's model, in order."""
+    return LINEAR + ["skew"] + COEFFICIENTS[camera.get("model", "brown-conrady")]
 
 
 # --- the virtual camera -----------------------------------------------------------------------------------------------------
 
 
 def project(camera, rotation, translation, point):
-    """The pixel of a target point, or None behind the camera. The equations are those of adapters/PROTOCOL.md."""
+    """The pixel of a target point, or None where the lens has no image of it."""
     q = [rotation[i][0] * point[0] + rotation[i][1] * point[1] + translation[i] for i in range(3)]
-    if q[2] <= 0:
+    seen = lens_image(camera, q)
+    if seen is None:
         return None
-    x, y = q[0] / q[2], q[1] / q[2]
-    s = x * x + y * y
-    g = 1 + camera["k1"] * s + camera["k2"] * s**2 + camera["k3"] * s**3
-    xd = x * g + 2 * camera["p1"] * x * y + camera["p2"] * (s + 2 * x * x)
-    yd = y * g + camera["p1"] * (s + 2 * y * y) + 2 * camera["p2"] * x * y
+    xd, yd = seen
     return (
         camera["fx"] * xd + camera["skew"] * yd + camera["cx"],
         camera["fy"] * yd + camera["cy"],
@@ -134,19 +136,21 @@ def random_poses(normal, count, camera, image, points, *, tilt, coverage, roll=1
 
 
 def camera(fx, fy, cx, cy, **others):
-    return dict(zip(NAMES, [fx, fy, cx, cy] + [0.0] * 6)) | others
+    """`model` among the others is the lens's; what is not given is 0."""
+    values = dict(zip(LINEAR, [fx, fy, cx, cy])) | others
+    return dict.fromkeys(names_of(values), 0.0) | values
 
 
 CHAPTER = camera(600.0, 600.0, 326.0, 243.0, k1=-0.18, k2=0.05)
 PROBLEMS = []
 
 
-def problem(level, seed, about, *, image, noise, free, truth, held=None):
+def problem(level, seed, about, *, image, noise, free, truth, held=None, version=1):
     """Registers a function that returns the views: a list of (points, pose), given a stream of numbers."""
 
     def register(function):
         name = function.__name__.replace("_", "-")
-        PROBLEMS.append((name, level, seed, about, image, noise, free, truth, held or {}, function))
+        PROBLEMS.append((name, version, level, seed, about, image, noise, free, truth, held or {}, function))
         return function
 
     return register
@@ -337,7 +341,7 @@ TEN = camera(560.0, 552.0, 408.0, 289.0, skew=0.8, k1=-0.26, k2=0.11, p1=0.0012,
 
 
 @problem("higher", 1305, "all ten parameters free",
-         image=(800, 600), noise=0.1, free=NAMES,
+         image=(800, 600), noise=0.1, free=names_of(TEN),
          truth=TEN)
 def ten_parameters(normal):
     return drawn(normal, 9, TEN, (800, 600), grid(10, 7, 12.0), tilt=40, coverage=0.9)
@@ -356,6 +360,110 @@ def wrong_model(normal):
          image=(640, 480), noise=0.02, free=LINEAR + ["k1", "k2"], truth=CHAPTER)
 def one_axis(normal):
     return drawn(normal, 8, CHAPTER, (640, 480), grid(9, 7, 10.0), tilt=40, coverage=0.8, roll=0.0, axes=(1, 0))
+
+
+# --- problems of version 2: the other lens models --------------------------------------------------------------------------------
+
+
+def aimed(points, places):
+    """Views whose target is centred `off_axis` degrees from the axis, in the direction `around`, at a distance; it faces the camera
+    but for a turn of its own."""
+    views = []
+    for off_axis, around, distance, turn in places:
+        aim = product(rotation_xyz((0, 0, around)), product(rotation_xyz((0, off_axis, 0)), rotation_xyz((0, 0, -around))))
+        r, c = product(aim, rotation_xyz(turn)), centre(points)
+        position = [distance * aim[i][2] for i in range(3)]
+        views.append((points, (r, [position[i] - r[i][0] * c[0] - r[i][1] * c[1] for i in range(3)])))
+    return views
+
+
+def product(a, b):
+    return [[sum(a[i][k] * b[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
+
+
+QUOTIENT = camera(255.0, 256.0, 322.0, 238.0, model="rational",
+                  k1=0.35, k2=0.25, p1=0.0008, p2=-0.0006, k3=0.03, k4=0.65, k5=0.4, k6=0.09)
+
+
+@problem("higher", 1401, "the rational model, marks up to 67 degrees from the axis, all eight coefficients free: they make up for each other",
+         image=(640, 480), noise=0.02, free=LINEAR + COEFFICIENTS["rational"], truth=QUOTIENT, version=2)
+def rational(normal):
+    return aimed(grid(11, 8, 10.0), [
+        (3, 0, 52, (25, 8, 3)), (8, 80, 55, (-28, 10, -6)), (12, 160, 58, (6, 30, 12)), (10, 245, 54, (9, -27, 170)),
+        (13, 320, 64, (-20, -22, 85)), (16, 30, 60, (18, -25, -15)), (16, 150, 68, (-15, 24, 5)), (12, 210, 75, (28, 20, -75)),
+        (16, 335, 56, (-30, -5, 5)), (5, 120, 52, (2, -3, 0))])
+
+
+PRISMS = camera(520.0, 524.0, 409.0, 291.0, model="thin-prism",
+                k1=-0.21, k2=0.07, p1=0.0011, p2=-0.0008, s1=0.0025, s2=-0.0013, s3=-0.0031, s4=0.0009)
+
+
+@problem("higher", 1402, "thin prisms, which look like decentring: s1 to s4 beside p1 and p2",
+         image=(800, 600), noise=0.05, free=LINEAR + "k1 k2 p1 p2 s1 s2 s3 s4".split(), truth=PRISMS, version=2)
+def thin_prism(normal):
+    return drawn(normal, 10, PRISMS, (800, 600), grid(10, 7, 12.0), tilt=40, coverage=0.9)
+
+
+SCHEIMPFLUG = camera(980.0, 984.0, 505.0, 380.0, model="tilted", k1=-0.16, k2=0.08, tau_x=0.11, tau_y=-0.07)
+
+
+@problem("higher", 1403, "a sensor tilted by six and four degrees (Scheimpflug): the tilts look like another principal point",
+         image=(1024, 768), noise=0.05, free=LINEAR + "k1 k2 tau_x tau_y".split(), truth=SCHEIMPFLUG, version=2)
+def tilted_sensor(normal):
+    return drawn(normal, 8, SCHEIMPFLUG, (1024, 768), grid(9, 7, 20.0), tilt=40, coverage=0.85)
+
+
+FISHEYE = camera(228.0, 229.0, 317.0, 244.0, model="kannala-brandt", k1=0.021, k2=-0.012, k3=0.0045, k4=-0.0016)
+
+
+@problem("average", 1404, "a fisheye of Kannala and Brandt, all four coefficients free, marks up to 80 degrees from the axis",
+         image=(640, 480), noise=0.1, free=LINEAR + COEFFICIENTS["kannala-brandt"], truth=FISHEYE, version=2)
+def fisheye(normal):
+    return aimed(grid(9, 7, 10.0), [
+        (2, 0, 45, (22, 6, 4)), (10, 100, 48, (-25, 8, -10)), (25, 10, 52, (8, 25, 20)), (25, 190, 46, (5, -28, 165)),
+        (16, 275, 58, (24, 15, -10)), (38, 0, 58, (-12, 10, 8)), (38, 180, 60, (14, -9, -4)), (38, 35, 60, (10, -20, 60))])
+
+
+WHOLE = camera(146.0, 146.5, 323.0, 241.0, model="kannala-brandt", k1=0.012, k2=-0.0065, k3=0.0021, k4=-0.00032)
+
+
+@problem("higher", 1405, "a fisheye that sees behind itself: boards around the camera, marks up to 105 degrees from the axis",
+         image=(640, 480), noise=0.1, free=LINEAR + COEFFICIENTS["kannala-brandt"], truth=WHOLE, version=2)
+def fisheye_behind(normal):
+    return aimed(grid(9, 7, 10.0), [
+        (3, 0, 45, (25, 6, 4)), (12, 100, 48, (-27, 8, -10)), (28, 200, 46, (8, 28, 20)), (30, 300, 46, (5, -28, 95)),
+        (66, 0, 60, (8, 12, 5)), (66, 180, 60, (-8, -12, -5)), (58, 85, 64, (14, -6, 2)), (58, 270, 64, (-12, 9, -3)),
+        (68, 35, 64, (10, -15, 40)), (68, 215, 64, (-11, 14, 130))])
+
+
+BARREL = camera(292.0, 291.0, 325.0, 236.0, model="division", k1=-0.24)
+
+
+@problem("average", 1406, "the division model: one coefficient, marks up to 60 degrees from the axis",
+         image=(640, 480), noise=0.1, free=LINEAR + ["k1"], truth=BARREL, version=2)
+def division(normal):
+    return aimed(grid(9, 7, 10.0), [
+        (2, 0, 58, (22, 6, 4)), (12, 100, 62, (-28, 8, -10)), (13, 10, 72, (8, 27, 20)), (20, 190, 60, (5, -30, 165)),
+        (10, 320, 86, (24, 15, -30)), (20, 145, 78, (-20, -18, 10))])
+
+
+SPHERES = camera(152.0, 151.5, 318.0, 242.0, model="double-sphere", xi=-0.18, alpha=0.57)
+
+
+@problem("average", 1407, "the double sphere: a fisheye of two coefficients, marks up to 93 degrees from the axis",
+         image=(640, 480), noise=0.05, free=LINEAR + ["xi", "alpha"], truth=SPHERES, version=2)
+def double_sphere(normal):
+    return aimed(grid(9, 7, 10.0), [
+        (2, 0, 42, (22, 6, 4)), (12, 100, 45, (-28, 8, -10)), (28, 190, 48, (5, -30, 165)), (26, 275, 60, (24, 15, -10)),
+        (55, 20, 62, (-8, 10, 20)), (54, 165, 64, (9, -10, 15)), (46, 215, 72, (-10, 6, -50)), (46, 335, 72, (12, -6, 70))])
+
+
+@problem("higher", 1408, "two minima: the double sphere at another focal length explains marks up to 83 degrees nearly as well",
+         image=(640, 480), noise=0.1, free=LINEAR + ["xi", "alpha"], truth=SPHERES, version=2)
+def double_sphere_two_minima(normal):
+    return aimed(grid(9, 7, 10.0), [
+        (2, 0, 42, (22, 6, 4)), (12, 100, 45, (-28, 8, -10)), (28, 10, 48, (8, 22, 20)), (28, 190, 48, (5, -30, 165)),
+        (26, 275, 60, (24, 15, -10)), (40, 20, 60, (-12, 10, 70)), (40, 160, 58, (12, -14, 35))])
 
 
 # --- start values -----------------------------------------------------------------------------------------------------------
@@ -377,11 +485,19 @@ def near_start(free, truth, views):
     }
 
 
-def far_start(image, free, held, observed):
-    """What needs no calibration: a focal length of the image's width, the image's centre, no distortion, every target facing."""
+def far_start(image, free, held, observed, model):
+    """What needs no calibration: a focal length of the image's width, the image's centre, no distortion, every target facing.
+
+    Of a fisheye: the equidistant one that sees 180 degrees across the image, and targets that face it from their own directions.
+    """
     width, height = image
-    guess = camera(float(width), float(width), (width - 1) / 2, (height - 1) / 2)
-    values = {name: held.get(name, guess[name]) for name in NAMES}
+    is_fisheye = model in FISHEYES
+    focal = digits(width / math.pi, 3) if is_fisheye else float(width)
+    guess = camera(focal, focal, (width - 1) / 2, (height - 1) / 2, model=model)
+    if model == "double-sphere":
+        # Neither xi nor alpha: a lens between the pinhole (alpha = 0) and the stereographic image (alpha = 1/2).
+        guess["alpha"] = 0.5
+    values = {name: held.get(name, guess[name]) for name in names_of(guess)}
     poses = []
     for points, pixels in observed:
         n = len(points)
@@ -395,6 +511,11 @@ def far_start(image, free, held, observed):
         roll = math.degrees(math.atan2(ratio.imag, ratio.real))
         r = rotation_xyz((0, 0, roll))
         position = [(seen[0] - values["cx"]) * z / values["fx"], (seen[1] - values["cy"]) * z / values["fy"], z]
+        if is_fisheye:
+            around, off_axis = math.degrees(math.atan2(position[1], position[0])), math.hypot(position[0], position[1]) / z
+            aim = product(rotation_xyz((0, math.degrees(off_axis), 0)), rotation_xyz((0, 0, -around)))
+            aim = product(rotation_xyz((0, 0, around)), aim)
+            r, position = product(aim, r), [z * aim[i][2] for i in range(3)]
         t = [position[i] - r[i][0] * middle[0] - r[i][1] * middle[1] for i in range(3)]
         # A far origin needs nine digits, or the target would not lie before the camera.
         vector = [digits(w, 9) for w in rotation_vector(r)]
@@ -411,10 +532,13 @@ def in_parts(pixel):
 
 def made(entry):
     """The problem as it stands in its file, without certified values."""
-    name, level, seed, about, image, noise, free, truth, held, function = entry
+    name, version, level, seed, about, image, noise, free, truth, held, function = entry
     normal = Normal(seed)
     views = function(normal)
-    held = {n: held.get(n, 0.0) for n in NAMES if n not in free}
+    model = truth.get("model", "brown-conrady")
+    held = {n: held.get(n, 0.0) for n in names_of(truth) if n not in free}
+    if version > 1 and not all(seen_whole(truth, image, view_pose, points) for points, view_pose in views):
+        raise ValueError(f"{name}: a mark lies outside the image")
     observed = []
     for points, view_pose in views:
         exact = [project(truth, *view_pose, p) for p in points]
@@ -422,16 +546,18 @@ def made(entry):
         observed.append((points, pixels))
     return {
         "id": name,
-        "version": VERSION,
+        "version": version,
         "level": level,
         "about": about,
         "image_size": list(image),
+        # Version 1 has one model and does not name it.
+        **({"model": model} if version > 1 else {}),
         "free": free,
         "held": held,
         "noise_px": noise,
         "decimals": DECIMALS,
         "seed": seed,
-        "starts": {"far": far_start(image, free, held, observed), "near": near_start(free, truth, views)},
+        "starts": {"far": far_start(image, free, held, observed, model), "near": near_start(free, truth, views)},
         "views": [{"target": [list(p) for p in points], "pixels": pixels} for points, pixels in observed],
     }
 

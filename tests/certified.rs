@@ -1,14 +1,14 @@
 //! Are the certified problems what was certified, and does the polished solver reach their digits from every
-//! start?
+//! start? With the lens models that it cannot polish: does it end at the certified minimum?
 
 use calibench::board::View;
 use calibench::calibrate::{Calibration, Settings, calibrate};
-use calibench::camera::{Camera, FreeParameters, Parameter};
+use calibench::camera::{Camera, FreeParameters, Lens, Model, Parameter};
 use calibench::geometry::Vec2;
 use calibench_gate::certified::{
-    DigitsTable, Level, ReferenceError, ReferenceProblem, log_relative_error, measure, read,
+    DigitsTable, Level, NoDigits, ReferenceError, ReferenceProblem, log_relative_error, measure, read,
 };
-use calibench_gate::solver::Polished;
+use calibench_gate::solver::{Builtin, Polished};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -19,6 +19,15 @@ fn folder() -> PathBuf {
 
 fn problems() -> Vec<ReferenceProblem> {
     read(&folder()).expect("reference/ holds certified problems")
+}
+
+/// Those of Brown-Conrady's lens, which the solver can polish.
+fn of_brown() -> Vec<ReferenceProblem> {
+    problems().into_iter().filter(|p| p.problem.lens_model() == Model::BrownConrady).collect()
+}
+
+fn of_other_lenses() -> Vec<ReferenceProblem> {
+    problems().into_iter().filter(|p| p.problem.lens_model() != Model::BrownConrady).collect()
 }
 
 /// Digits that the polished solver must reach.
@@ -53,7 +62,11 @@ fn least_digits(problem: &ReferenceProblem, calibration: &Calibration) -> f64 {
 #[test]
 fn every_problem_is_well_formed() {
     let problems = problems();
-    assert!(problems.len() >= 16, "{} problems", problems.len());
+    assert_eq!(of_brown().len(), 22, "those of version 1");
+    assert!(of_brown().iter().all(|p| p.reference.version == 1), "they stay as they are");
+    for model in Model::ALL {
+        assert!(problems.iter().any(|p| p.problem.lens_model() == model), "a problem of {model}");
+    }
     for level in [Level::Lower, Level::Average, Level::Higher] {
         let count = problems.iter().filter(|p| p.reference.level == level).count();
         assert!(count >= 5, "{count} problems of level {}", level.name());
@@ -63,7 +76,11 @@ fn every_problem_is_well_formed() {
         assert!(folder().join(format!("{id}.json")).is_file(), "{id} stands in the file of its name");
         let free: BTreeSet<&String> = problem.free.iter().collect();
         assert!(free.is_disjoint(&problem.held.keys().collect()), "{id}");
-        assert_eq!(free.len() + problem.held.len(), Parameter::COUNT, "{id}: free or held");
+        assert!(problem.model.parse::<Model>().is_ok(), "{id}: {}", problem.model);
+        let named: BTreeSet<&str> =
+            problem.free.iter().chain(problem.held.keys()).map(String::as_str).collect();
+        let of_model: BTreeSet<&str> = problem.lens_model().parameters().map(Parameter::name).collect();
+        assert_eq!(named, of_model, "{id}: free or held");
         assert_eq!(certified.parameters.keys().collect::<BTreeSet<_>>(), free, "{id}");
         assert_eq!(certified.standard_deviations.keys().collect::<BTreeSet<_>>(), free, "{id}");
         for kind in ["far", "near"] {
@@ -98,12 +115,17 @@ fn certified_numbers_agree_with_each_other_and_with_the_data() {
                 .copied()
                 .unwrap_or(f64::NAN)
         };
-        let camera = Camera::from_parameters(Parameter::ALL.map(value));
+        let ideal = Camera::with_lens(0.0, 0.0, 0.0, 0.0, Lens::ideal(problem.problem.lens_model()));
+        let camera = problem
+            .problem
+            .lens_model()
+            .parameters()
+            .fold(ideal, |camera, p| camera.with_value(p, value(p)).expect("the model has it"));
         let mut square = 0.0;
         for (view, pose) in views(&problem).iter().zip(&certified.poses) {
             for (point, pixel) in view.pairs() {
                 let predicted =
-                    camera.project(&pose.pose().apply(&point.push(0.0))).expect("before the camera");
+                    camera.pixel(&pose.pose().apply(&point.push(0.0))).expect("the lens has an image of it");
                 square += (predicted - pixel).norm_squared();
             }
         }
@@ -115,7 +137,7 @@ fn certified_numbers_agree_with_each_other_and_with_the_data() {
 
 #[test]
 fn the_polished_solver_reaches_the_certified_digits() {
-    let problems = problems();
+    let problems = of_brown();
     for (problem, digits) in problems.iter().zip(measure(&problems, &Polished)) {
         let id = &problem.problem.id;
         let digits = digits.unwrap_or_else(|why| panic!("{id}: {why}"));
@@ -126,8 +148,29 @@ fn the_polished_solver_reaches_the_certified_digits() {
 }
 
 #[test]
+fn with_other_lenses_the_solver_ends_at_the_certified_minimum() {
+    let problems = of_other_lenses();
+    for (problem, digits) in problems.iter().zip(measure(&problems, &Builtin)) {
+        let id = &problem.problem.id;
+        let digits = digits.unwrap_or_else(|why| panic!("{id}: {why}"));
+        assert!(digits.least() >= 6.0, "{id}: {digits:?}");
+        // A cost is flat at its minimum: it has twice the digits of the parameters.
+        assert!(digits.rmse.is_some_and(|d| d >= 11.0), "{id}: {digits:?}");
+        assert!(digits.standard_deviations.is_some_and(|d| d >= 5.0), "{id}: {digits:?}");
+    }
+}
+
+#[test]
+fn a_solver_is_not_asked_what_it_does_not_know() {
+    let problems = of_other_lenses();
+    for (problem, found) in problems.iter().zip(measure(&problems, &Polished)) {
+        assert_eq!(found, Err(NoDigits::UnknownModel(problem.problem.lens_model())));
+    }
+}
+
+#[test]
 fn the_digits_are_reached_from_the_starts_of_the_files() {
-    for problem in problems() {
+    for problem in of_brown() {
         for (kind, start) in &problem.reference.starts {
             let value = |p: Parameter| {
                 start
@@ -150,7 +193,7 @@ fn the_digits_are_reached_from_the_starts_of_the_files() {
 
 #[test]
 fn polishing_moves_the_estimate_by_less_than_a_millionth_of_its_standard_deviation() {
-    for problem in problems() {
+    for problem in of_brown() {
         let (views, settings) = (views(&problem), settings(&problem));
         let plain = calibrate(&views, &settings).expect("the data determine a camera");
         let polished = calibrate(&views, &settings.clone().polished()).expect("the data determine a camera");
@@ -175,7 +218,7 @@ fn polishing_moves_the_estimate_by_less_than_a_millionth_of_its_standard_deviati
 
 #[test]
 fn polished_poses_belong_to_the_certified_minimum() {
-    for problem in problems() {
+    for problem in of_brown() {
         let calibration = calibrate(&views(&problem), &settings(&problem).polished()).expect("a camera");
         for (pose, certified) in calibration.cam_from_target.iter().zip(&problem.reference.certified.poses) {
             let certified = certified.pose();
@@ -227,6 +270,12 @@ fn the_committed_table_has_our_digits_and_its_page_shows_it() {
     ours.add("calibench, polished", &problems, &measure(&problems, &Polished));
     let committed: Vec<_> = table.rows.iter().filter(|row| row.solver == "calibench, polished").collect();
     assert_eq!(committed, ours.rows.iter().collect::<Vec<_>>(), "just digits");
+    let others = of_other_lenses();
+    let mut plain = DigitsTable::default();
+    plain.add("calibench", &others, &measure(&others, &Builtin));
+    for row in &plain.rows {
+        assert_eq!(table.row("calibench", &row.problem), Some(row), "just digits");
+    }
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("adapters/DIGITS.md");
     let page = std::fs::read_to_string(page).expect("the page");
     let shown = page
@@ -255,11 +304,19 @@ fn the_command_counts_digits_and_says_who_refused() {
     let (code, text) = gate(&["--certified", "--problem", "nine-points", "--least-digits", "11"]);
     assert_eq!(code, Some(0), "{text}");
     assert!(text.contains("nine-points") && text.contains("higher"), "{text}");
-    let refuses =
-        r#"while read line; do echo '{"id":"nine-points","status":"refused","message":"too few"}'; done"#;
+    let refuses = r#"while read -r line; do id=${line#*'"id":"'}; echo "{\"id\":\"${id%%'"'*}\",\"status\":\"refused\",\"message\":\"too few\"}"; done"#;
     let (code, text) = gate(&["--certified", "--problem", "nine-points", "--solver", refuses]);
     assert_eq!(code, Some(1), "{text}");
     assert!(text.contains("refused: too few"), "{text}");
+    // A program that does not say that it knows a lens model is not asked; of what it knows nothing is left here.
+    let (code, text) = gate(&["--certified", "--problem", "rational", "--solver", refuses]);
+    assert_eq!(code, Some(1), "{text}");
+    assert!(text.contains("unsupported: it does not know the lens model rational"), "{text}");
+    assert!(text.contains("nothing was asked"), "{text}");
+    // This library's own solver, as it is: there is no polishing.
+    let (code, text) = gate(&["--certified", "--problem", "fisheye", "--least-digits", "6"]);
+    assert_eq!(code, Some(0), "{text}");
+    assert!(!text.contains("polished") && text.contains("k4"), "{text}");
     let (code, text) = gate(&["--certified", "--problem", "no-such-problem"]);
     assert_eq!(code, Some(2), "{text}");
     assert!(text.contains("there are: "), "{text}");

@@ -11,7 +11,7 @@ mod common;
 mod works;
 
 use calibench::board::View;
-use calibench::calibrate::{Settings, calibrate, closed_form, pose_from_homography};
+use calibench::calibrate::{Settings, calibrate, calibrate_lens, closed_form, pose_from_homography};
 use calibench::camera::Camera;
 use calibench::geometry::{Homography, Vec2};
 use std::collections::BTreeMap;
@@ -84,6 +84,17 @@ fn export(folder: &Path) -> io::Result<()> {
         write_numbers(&folder.join(format!("start-{count}")), &start)?;
         write_numbers(&folder.join(format!("found-{count}")), &optimum)?;
     }
+    for kind in ["wide", "rational"] {
+        for count in works::WIDE_VIEWS {
+            let views = common::wide_views(works::wide_model(kind), count);
+            write_numbers(&folder.join(format!("{kind}-views-{count}")), &works::pairs(&views))?;
+            let settings = Settings::of_model(works::wide_model(kind));
+            let found = calibrate_lens(&views, &settings).expect("it can be calibrated");
+            let mut state = works::free_values(&found);
+            state.extend(numbers_of(found.cam_from_target.iter().copied()));
+            write_numbers(&folder.join(format!("{kind}-found-{count}")), &state)?;
+        }
+    }
     let view = common::views(4).remove(3);
     write_numbers(&folder.join("homography"), &works::pairs(&[view]))?;
     let (pixels, world) = works::nine_points();
@@ -122,6 +133,12 @@ fn optimum(views: &[View]) -> Vec<f64> {
 fn state(camera: &Camera, poses: impl Iterator<Item = calibench::geometry::Pose>) -> Vec<f64> {
     let lens = &camera.distortion;
     let mut numbers = vec![camera.fx, camera.fy, camera.cx, camera.cy, lens.k1, lens.k2];
+    numbers.extend(numbers_of(poses));
+    numbers
+}
+
+fn numbers_of(poses: impl Iterator<Item = calibench::geometry::Pose>) -> Vec<f64> {
+    let mut numbers = Vec::new();
     for pose in poses {
         numbers.extend(pose.rotation.transpose().iter());
         numbers.extend(pose.translation.iter());

@@ -32,6 +32,47 @@ def calibration(count, extended):
     return run, answer
 
 
+def fisheye(count):
+    """Its fisheye module, which takes double precision and ends after 100 steps or at machine precision, as it comes.
+
+    From its own start it raises an exception or not as a library's threads round (InitExtrinsics of 20 views): it is given a focal
+    length, which is the true one.
+    """
+    pairs = numbers(FOLDER, f"wide-views-{count}").reshape(int(count), -1, 4)
+    board = [np.c_[view[:, :2], np.zeros(len(view))][None] for view in pairs]
+    pixels = [np.ascontiguousarray(view[None, :, 2:]) for view in pairs]
+    # OpenCV 5 has the flags of its fisheye module among the others.
+    has = cv2 if hasattr(cv2, "CALIB_FIX_SKEW") else cv2.fisheye
+    flags = has.CALIB_RECOMPUTE_EXTRINSIC | has.CALIB_FIX_SKEW | has.CALIB_USE_INTRINSIC_GUESS
+    criteria = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 100, np.finfo(float).eps)
+
+    def run():
+        start = np.array([[230.0, 0, 319.5], [0, 230, 239.5], [0, 0, 1]])
+        return cv2.fisheye.calibrate(board, pixels, (640, 480), start, np.zeros(4), flags=flags, criteria=criteria)
+
+    def answer(result):
+        k, d = result[1], result[2].ravel()
+        return [k[0, 0], k[1, 1], k[0, 2], k[1, 2], *d]
+
+    return run, answer
+
+
+def rational(count):
+    """As it comes: at most 30 steps, or to machine precision."""
+    pairs = numbers(FOLDER, f"rational-views-{count}").reshape(int(count), -1, 4)
+    board = [np.c_[view[:, :2], np.zeros(len(view))].astype(np.float32) for view in pairs]
+    pixels = [np.ascontiguousarray(view[:, None, 2:], dtype=np.float32) for view in pairs]
+
+    def run():
+        return cv2.calibrateCamera(board, pixels, (640, 480), None, None, flags=cv2.CALIB_RATIONAL_MODEL)
+
+    def answer(result):
+        k, d = result[1], result[2].ravel()
+        return [k[0, 0], k[1, 1], k[0, 2], k[1, 2], *d[:8]]
+
+    return run, answer
+
+
 def homography():
     pairs = numbers(FOLDER, "homography").reshape(-1, 4)
     source, target = pairs[:, :2].copy(), pairs[:, 2:].copy()
@@ -115,6 +156,8 @@ def make(row):
     return {
         "calibrate": lambda: calibration(size, False),
         "deviations": lambda: calibration(size, True),
+        "wide": lambda: fisheye(size),
+        "rational": lambda: rational(size),
         "homography": homography,
         "affine": affine,
         "points": lambda: points(size == "iterated"),

@@ -2,6 +2,7 @@
 
     just peers                      # everything, with what installs: see benches/peers/run
     just peers --write benches/peers/README.md    # also puts the tables between the markers there
+    just peers --only "4 views" --write FILE      # puts the rows of this name among those that stand there
 
 One process a side, all held to one processor; in every round each side works on a row for a while in turn, and says the median time of one
 repetition. The table has the medians of those over the rounds, and of the ratios of a round their median and quartiles: what slows the
@@ -23,6 +24,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 OURS = ROOT / "target/release/peers"
 VIEWS = [4, 20, 100, 500, 2000]
+WIDE_VIEWS = [4, 20, 100]
 BEGIN, END = "<!-- peers: begin -->", "<!-- peers: end -->"
 
 
@@ -33,6 +35,9 @@ def rows(arguments):
         found.append((f"calibrate-{n}", "OpenCV", f"calibrate-{n}", f"calibrate, {n} views"))
     for n in [4, 20, 100] + ([500] if arguments.full else []):
         found.append((f"calibrate-{n}", "OpenCV", f"deviations-{n}", f"the same with deviations, {n} views"))
+    for kind, name in [("wide", "fisheye, k1 to k4"), ("rational", "rational, k1 to k6, p1, p2")]:
+        for n in WIDE_VIEWS:
+            found.append((f"{kind}-{n}", "OpenCV", f"{kind}-{n}", f"{name}, {n} views"))
     for peer in ["mrcal", "Ceres"]:
         for n in VIEWS:
             found.append((f"calibrate-{n}", peer, f"refine-{n}", f"its refinement alone, {n} views"))
@@ -164,7 +169,7 @@ def compare(arguments, folder, cpus):
             errors[1] = "estimates p1, p2 too"
         slow = side.time(theirs, 0) > 2.0
         rounds = 3 if slow else arguments.rounds
-        fresh = ours.renewed if own.startswith("calibrate") else lambda: ours
+        fresh = ours.renewed if own.startswith(("calibrate", "wide", "rational")) else lambda: ours
         times = alternate(
             lambda b: fresh().time(own, b), lambda b: side.time(theirs, b), arguments.seconds, rounds
         )
@@ -230,9 +235,29 @@ def write(path, text):
     Path(path).write_text(page[:begin] + "\n" + text + "\n" + page[end:])
 
 
+def merge(path, lines, order):
+    """Puts rows among those that stand in a file's first table, in the order of all; the others stay as they are."""
+    page = Path(path).read_text()
+    begin, end = page.index(BEGIN) + len(BEGIN), page.index(END)
+    standing = page[begin:end].strip("\n").split("\n")
+    first = next(k for k, line in enumerate(standing) if line.startswith("|---")) + 1
+    last = next(k for k in range(first, len(standing)) if not standing[k].startswith("|"))
+    by_name = {cells(line): line for line in standing[first:last] + lines}
+    places = {(name, peer): k for k, (_, peer, _, name) in enumerate(order)}
+    rows_of_all = sorted(by_name, key=lambda name: places.get(name, len(places)))
+    standing[first:last] = [by_name[name] for name in rows_of_all]
+    Path(path).write_text(page[:begin] + "\n" + "\n".join(standing) + "\n" + page[end:])
+
+
+def cells(line):
+    """What a row is called, and its peer."""
+    parts = [cell.strip() for cell in line.split("|")]
+    return parts[1], parts[3]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--write", metavar="FILE", help="put the tables between the markers of this file")
+    parser.add_argument("--write", metavar="FILE", help="put the tables between the markers of this file; with --only the rows")
     parser.add_argument("--rounds", type=int, default=15, help="rounds a row")
     parser.add_argument("--seconds", type=float, default=0.1, help="seconds of work a side and round")
     parser.add_argument("--only", default="", metavar="TEXT", help="only rows whose name has this")
@@ -243,6 +268,11 @@ def main():
     cpus = {max(os.sched_getaffinity(0))} if hasattr(os, "sched_getaffinity") else None
     table, versions = compare(arguments, folder, cpus)
     own = own_rows(arguments, folder, cpus)
+    if arguments.only:
+        print("\n".join([*table, "", *own]))
+        if arguments.write:
+            merge(arguments.write, table[2:], rows(arguments))
+        return
     named = ", ".join(f"{name} {version}" for name, version in versions.items())
     text = "\n".join(
         [

@@ -19,6 +19,8 @@ class Reference:
         kind, _, size = row.partition("-")
         return {
             "calibrate": lambda: self.calibration(size, answer),
+            "wide": lambda: self.wide_calibration(kind, size, answer),
+            "rational": lambda: self.wide_calibration(kind, size, answer),
             "homography": lambda: self.homography(answer),
             "affine": lambda: self.affine(answer),
             "points": lambda: self.points(answer),
@@ -31,26 +33,24 @@ class Reference:
     @lru_cache
     def optimum(self, size):
         """Least squares by Gauss-Newton steps, and the standard deviations of the six intrinsics for noise of 0.1 px."""
-        count = int(size)
-        pairs = numbers(self.folder, f"views-{count}").reshape(count, -1, 4)
-        state = numbers(self.folder, f"found-{count}")
-        camera, poses = state[:6].copy(), state[6:].reshape(count, 12)
-        rotations, translations = poses[:, :9].reshape(-1, 3, 3).copy(), poses[:, 9:].copy()
-        for _ in range(4):
-            ja, jc, r = normal_parts(camera, rotations, translations, pairs)
-            a = np.einsum("vpi,vpj->ij", ja, ja)
-            b = np.einsum("vpi,vpj->vij", ja, jc)
-            c = np.einsum("vpi,vpj->vij", jc, jc)
-            follow = np.linalg.solve(c, b.transpose(0, 2, 1))
-            schur = a - np.einsum("vij,vjk->ik", b, follow)
-            gc = np.einsum("vpi,vp->vi", jc, r)
-            ga = np.einsum("vpi,vp->i", ja, r) - np.einsum("vji,vj->i", follow, gc)
-            step = -np.linalg.solve(schur, ga)
-            turn = -np.linalg.solve(c, gc[..., None])[..., 0] - follow @ step
-            camera += step
-            rotations = np.array([rotation(w) for w in turn[:, :3]]) @ rotations
-            translations += turn[:, 3:]
-        return camera, 0.1 * np.sqrt(np.diag(np.linalg.inv(schur)))
+        return least_squares(normal_parts, 6, *self.problem("views", "found", size), 4)
+
+    @lru_cache
+    def wide_optimum(self, kind, size):
+        """The same of the cameras with other lenses; valleys of coefficients that make up for each other take more steps."""
+        parameters = {"wide": 8, "rational": 12}[kind]
+        problem = self.problem(f"{kind}-views", f"{kind}-found", size)
+        return least_squares(lambda *state: parts_by_complex_steps(IMAGES[kind], *state), parameters, *problem, 12)
+
+    def problem(self, views, found, size):
+        """Pairs of points and pixels view by view, and where to start."""
+        pairs = numbers(self.folder, f"{views}-{size}").reshape(int(size), -1, 4)
+        return pairs, numbers(self.folder, f"{found}-{size}")
+
+    def wide_calibration(self, kind, size, answer):
+        """Largest distance of a parameter from the optimum, in standard deviations."""
+        optimum, deviations = self.wide_optimum(kind, size)
+        return np.max(np.abs(answer - optimum) / deviations)
 
     def calibration(self, size, answer):
         """Largest distance of a parameter from the optimum, in standard deviations."""
@@ -124,6 +124,8 @@ class Reference:
 # What the number is, by kind of row.
 UNITS = {
     "calibrate": "sd",
+    "wide": "sd",
+    "rational": "sd",
     "homography": "px",
     "affine": "mm",
     "points": "px",
@@ -141,6 +143,76 @@ def distort(pixels, camera):
     s = x * x + y * y
     g = 1 + s * (k1 + s * k2)
     return np.c_[fx * x * g + cx, fy * y * g + cy]
+
+
+def least_squares(parts, parameters, pairs, start, steps):
+    """The intrinsics after Gauss-Newton steps from a start near by, and their standard deviations for noise of 0.1 px."""
+    camera, poses = start[:parameters].copy(), start[parameters:].reshape(-1, 12)
+    rotations, translations = poses[:, :9].reshape(-1, 3, 3).copy(), poses[:, 9:].copy()
+    for _ in range(steps):
+        ja, jc, r = parts(camera, rotations, translations, pairs)
+        a = np.einsum("vpi,vpj->ij", ja, ja)
+        b = np.einsum("vpi,vpj->vij", ja, jc)
+        c = np.einsum("vpi,vpj->vij", jc, jc)
+        follow = np.linalg.solve(c, b.transpose(0, 2, 1))
+        schur = a - np.einsum("vij,vjk->ik", b, follow)
+        gc = np.einsum("vpi,vp->vi", jc, r)
+        ga = np.einsum("vpi,vp->i", ja, r) - np.einsum("vji,vj->i", follow, gc)
+        # Scaled by its diagonal: the columns' units differ by powers of ten.
+        scale = 1 / np.sqrt(np.diag(schur))
+        scaled = schur * np.outer(scale, scale)
+        step = -scale * np.linalg.solve(scaled, scale * ga)
+        turn = -np.linalg.solve(c, gc[..., None])[..., 0] - follow @ step
+        camera += step
+        rotations = np.array([rotation(w) for w in turn[:, :3]]) @ rotations
+        translations += turn[:, 3:]
+    deviations = 0.1 * scale * np.sqrt(np.diag(np.linalg.inv(scaled)))
+    if np.max(np.abs(step) / deviations) > 1e-6:
+        raise RuntimeError("the reference has not converged")
+    return camera, deviations
+
+
+def fisheye_image(camera, x, y, z):
+    """u and v of points before a fisheye of Kannala and Brandt: fx, fy, cx, cy, k1 to k4."""
+    fx, fy, cx, cy, k1, k2, k3, k4 = camera
+    r = np.sqrt(x * x + y * y)
+    # On the axis the direction does not matter.
+    r = np.where(r == 0, 1e-150, r)
+    angle = np.arctan(r / z)
+    t = angle * angle
+    d = angle * (1 + t * (k1 + t * (k2 + t * (k3 + t * k4)))) / r
+    return fx * x * d + cx, fy * y * d + cy
+
+
+def rational_image(camera, x, y, z):
+    """The same of the rational model: fx, fy, cx, cy, k1, k2, p1, p2, k3 to k6."""
+    fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6 = camera
+    x, y = x / z, y / z
+    s = x * x + y * y
+    g = (1 + s * (k1 + s * (k2 + s * k3))) / (1 + s * (k4 + s * (k5 + s * k6)))
+    xd = x * g + 2 * p1 * x * y + p2 * (s + 2 * x * x)
+    yd = y * g + p1 * (s + 2 * y * y) + 2 * p2 * x * y
+    return fx * xd + cx, fy * yd + cy
+
+
+IMAGES = {"wide": fisheye_image, "rational": rational_image}
+
+
+def parts_by_complex_steps(image, camera, rotations, translations, pairs):
+    """As `normal_parts`, the derivatives by steps along the imaginary axis (Squire & Trapp 1998), exact to rounding."""
+    step = 1e-100
+    target = np.concatenate([pairs[..., :2], np.zeros((*pairs.shape[:2], 1))], axis=-1)
+    q = np.einsum("vij,vpj->vpi", rotations, target)
+    p = (q + translations[:, None]).astype(complex)
+    slope = lambda camera, p: np.stack([c.imag / step for c in image(camera, *np.moveaxis(p, -1, 0))], 2)
+    moved = [camera + 1j * step * row for row in np.eye(len(camera))]
+    ja = np.stack([slope(one, p) for one in moved], -1)
+    by_point = np.stack([slope(camera, p + 1j * step * row) for row in np.eye(3)], -1)
+    by_turn = np.cross(q[:, :, None, :], by_point)
+    jc = np.concatenate([by_turn, by_point], -1)
+    seen = np.stack(image(camera, *np.moveaxis(p.real, -1, 0)), 2)
+    flat = lambda a: a.reshape(len(pairs), -1, a.shape[-1])
+    return flat(ja), flat(jc), (seen - pairs[..., 2:]).reshape(len(pairs), -1)
 
 
 def rotation(w):

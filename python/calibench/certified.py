@@ -45,6 +45,7 @@ def _problem(fields: dict[str, Any]) -> CertifiedProblem:
         level=fields["level"],
         about=fields["about"],
         image_size=(fields["image_size"][0], fields["image_size"][1]),
+        model=fields.get("model", "brown-conrady"),
         points=tuple(np.array(view["target"], dtype=float) for view in fields["views"]),
         pixels=tuple(np.array(view["pixels"], dtype=float) for view in fields["views"]),
         free=tuple(fields["free"]),

@@ -5,36 +5,70 @@ use super::{Arguments, Stop, incomplete, process, usage};
 use calibench::io::ShownPath;
 use calibench::io::input::MOST_SPEC_BYTES;
 use calibench::io::{read_regular_text, write_atomically};
-use calibench_gate::certified::{DigitsTable, ReferenceProblem, measure, read_with};
+use calibench_gate::certified::{
+    DigitsTable, Measured, NoDigits, ReferenceProblem, measure, measure_in_turn, read_with,
+};
 use calibench_gate::solver::Polished;
 use calibench_gate::{Builtin, Solver};
 use calibench_harness::Build;
 use calibench_harness::project::Project;
 use std::path::Path;
 
-/// Programs of the table besides this library's two, by the names that the table has.
-const PEERS: [(&str, &str); 3] = [
-    ("OpenCV", "python3 adapters/opencv_solver.py"),
-    ("SciPy", "python3 adapters/scipy_solver.py"),
-    ("minimal solver", "python3 adapters/minimal_solver.py"),
+/// Programs of the table besides this library's two, by the names that the table has. Where there are several, each is
+/// asked the problems of lens models that those before it do not know.
+const PEERS: [(&str, &[&str]); 3] = [
+    ("OpenCV", &["python3 adapters/opencv_solver.py", "python3 adapters/opencv_lenses_solver.py"]),
+    ("SciPy", &["python3 adapters/scipy_solver.py"]),
+    ("minimal solver", &["python3 adapters/minimal_solver.py"]),
 ];
 
-/// Prints the digits of one solver; without a program that is this library's, polished.
+/// Prints the digits of one solver. Without a program that is this library's: polished, and as it is with the lens models
+/// that cannot be polished.
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Stop> {
     let problems = chosen(arguments)?;
-    let solver: Box<dyn Solver> = match &arguments.solver {
-        Some(command) => process(arguments, command)?,
-        None => Box::new(Polished),
-    };
     let mut table = DigitsTable::default();
-    table.add(&solver.name(), &problems, &measure(&problems, solver.as_ref()));
+    let measured = match &arguments.solver {
+        Some(command) => {
+            let solver = process(arguments, command)?;
+            let measured = measure(&problems, solver.as_ref());
+            table.add(&solver.name(), &problems, &measured);
+            measured
+        }
+        None => {
+            let known = Polished.models();
+            let is_polished = |p: &ReferenceProblem| known.contains(&p.problem.lens_model());
+            let (polished, others): (Vec<_>, Vec<_>) = problems.iter().cloned().partition(is_polished);
+            let each: [(&dyn Solver, _); 2] = [(&Polished, polished), (&Builtin, others)];
+            let mut all = Vec::new();
+            for (solver, problems) in each {
+                let measured = measure(&problems, solver);
+                table.add(&solver.name(), &problems, &measured);
+                all.extend(measured);
+            }
+            all
+        }
+    };
     print(&table.to_text());
-    let short = |least: Option<f64>| least.is_none_or(|digits| digits < arguments.least_digits);
+    verdict(arguments, &table, &measured)
+}
+
+/// Every problem of a lens model that the solver knows must be answered, with so many digits.
+fn verdict(arguments: &Arguments, table: &DigitsTable, measured: &[Measured]) -> Result<Exit, Stop> {
+    let is_known = |found: &Measured| !matches!(found, Err(NoDigits::UnknownModel(_)));
+    if !measured.iter().any(is_known) {
+        warn("nothing was asked: the solver knows none of these lens models");
+        return Ok(Exit::Deviates);
+    }
+    let is_short = |found: &Measured| match found {
+        Ok(digits) => digits.least() < arguments.least_digits,
+        Err(why) => !matches!(why, NoDigits::UnknownModel(_)),
+    };
     let failed: Vec<String> = table
         .rows
         .iter()
-        .filter(|row| short(row.least))
-        .map(|row| format!("{} ({})", row.problem, row.result()))
+        .zip(measured)
+        .filter(|(_, found)| is_short(found))
+        .map(|(row, _)| format!("{} ({})", row.problem, row.result()))
         .collect();
     if failed.is_empty() {
         return Ok(Exit::Held);
@@ -55,10 +89,14 @@ pub(super) fn write_table(arguments: &Arguments, path: &Path, build: &Build) -> 
     let mut table = DigitsTable::default();
     table.add("calibench, polished", &problems, &measure(&problems, &Polished));
     table.add("calibench", &problems, &measure(&problems, &Builtin));
-    for (name, command) in PEERS {
-        let measured = measure(&problems, process(arguments, command)?.as_ref());
+    for (name, commands) in PEERS {
+        let programs =
+            commands.iter().map(|command| process(arguments, command)).collect::<Result<Vec<_>, _>>()?;
+        let programs: Vec<&dyn Solver> = programs.iter().map(AsRef::as_ref).collect();
+        let measured = measure_in_turn(&problems, &programs);
         if measured.iter().all(Result::is_err) {
-            let why = measured.first().and_then(|m| m.as_ref().err()).cloned().unwrap_or_default();
+            let why = measured.first().and_then(|m| m.as_ref().err()).map(ToString::to_string);
+            let why = why.unwrap_or_default();
             return Err(incomplete(format!(
                 "{name} answered nothing ({why}): adapters/requirements.txt names what it needs"
             )));

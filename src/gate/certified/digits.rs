@@ -2,9 +2,9 @@
 //! statistical programs.
 
 use super::{Certified, ReferenceProblem};
-use crate::accept::{Estimate, Outcome};
-use crate::solver::Solver;
-use calibench::camera::Parameter;
+use crate::accept::{Breakage, Estimate, Outcome};
+use crate::solver::{Reply, Solver};
+use calibench::camera::{Model, Parameter};
 
 /// More than a double can say of a number: where the digits stop counting.
 pub const DIGITS_OF_DOUBLES: f64 = 15.0;
@@ -29,7 +29,8 @@ pub struct Digits {
 
 impl Digits {
     fn of(estimate: &Estimate, certified: &Certified) -> Digits {
-        let free = || Parameter::ALL.into_iter().filter(|p| certified.parameters.contains_key(p.name()));
+        let free =
+            || Parameter::OF_ALL_MODELS.into_iter().filter(|p| certified.parameters.contains_key(p.name()));
         let parameters = free()
             .map(|p| {
                 (
@@ -63,21 +64,77 @@ impl Digits {
     }
 }
 
-/// Puts the problems to a solver: the digits of every answer, or why there are none.
-pub fn measure(problems: &[ReferenceProblem], solver: &dyn Solver) -> Vec<Result<Digits, String>> {
-    let asked: Vec<_> = problems.iter().map(|p| p.problem.clone()).collect();
-    let of_reply = |(reply, problem): (crate::solver::Reply, &ReferenceProblem)| match reply.outcome {
+/// Why a problem has no digits.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NoDigits {
+    /// The solver says which lens models it knows, and this is none of them: it was not asked.
+    #[error("unsupported: it does not know the lens model {0}")]
+    UnknownModel(Model),
+    /// It said that it is not made for the problem.
+    #[error("not supported: {0}")]
+    NotSupported(String),
+    /// It gave no estimate and said so.
+    #[error("refused: {0}")]
+    Refused(String),
+    /// No answer, or one that breaks the protocol.
+    #[error("no answer: {0}")]
+    Broken(Breakage),
+    /// It changed what is held.
+    #[error("changed {parameter}, which is held at {wanted}, to {got}")]
+    HeldChanged {
+        /// Which.
+        parameter: Parameter,
+        /// As the problem says.
+        wanted: f64,
+        /// As the answer says.
+        got: f64,
+    },
+}
+
+/// What a solver reached on a problem.
+pub type Measured = Result<Digits, NoDigits>;
+
+/// Puts the problems to a solver that are of a lens model it knows: the digits of every answer, or why there are none.
+pub fn measure(problems: &[ReferenceProblem], solver: &dyn Solver) -> Vec<Measured> {
+    let models = solver.models();
+    let is_known = |p: &&ReferenceProblem| models.contains(&p.problem.lens_model());
+    let asked: Vec<_> = problems.iter().filter(is_known).map(|p| p.problem.clone()).collect();
+    let mut replies = solver.ask_all(&asked).into_iter();
+    let of_problem = |problem: &ReferenceProblem| {
+        let unknown = || Err(NoDigits::UnknownModel(problem.problem.lens_model()));
+        match is_known(&problem).then(|| replies.next()).flatten() {
+            Some(reply) => of_reply(reply, problem),
+            None => unknown(),
+        }
+    };
+    problems.iter().map(of_problem).collect()
+}
+
+/// The same of several programs of one name: each is asked what those before it do not know.
+pub fn measure_in_turn(problems: &[ReferenceProblem], solvers: &[&dyn Solver]) -> Vec<Measured> {
+    let unknown = |p: &ReferenceProblem| Err(NoDigits::UnknownModel(p.problem.lens_model()));
+    let mut measured: Vec<Measured> = problems.iter().map(unknown).collect();
+    for solver in solvers {
+        let left: Vec<usize> =
+            (0..problems.len()).filter(|&i| matches!(measured[i], Err(NoDigits::UnknownModel(_)))).collect();
+        let asked: Vec<ReferenceProblem> = left.iter().map(|&i| problems[i].clone()).collect();
+        for (i, found) in left.into_iter().zip(measure(&asked, *solver)) {
+            measured[i] = found;
+        }
+    }
+    measured
+}
+
+fn of_reply(reply: Reply, problem: &ReferenceProblem) -> Measured {
+    match reply.outcome {
         Outcome::Estimate(estimate) => match estimate.held_changed {
-            Some((parameter, wanted, got)) => {
-                Err(format!("changed {parameter}, which is held at {wanted}, to {got}"))
-            }
+            Some((parameter, wanted, got)) => Err(NoDigits::HeldChanged { parameter, wanted, got }),
             None => Ok(Digits::of(&estimate, &problem.reference.certified)),
         },
-        Outcome::Refused(why) => Err(format!("refused: {why}")),
-        Outcome::Unsupported(why) => Err(format!("not supported: {why}")),
-        Outcome::Broken(why) => Err(format!("no answer: {why}")),
-    };
-    solver.ask_all(&asked).into_iter().zip(problems).map(of_reply).collect()
+        Outcome::Refused(why) => Err(NoDigits::Refused(why)),
+        Outcome::Unsupported(why) => Err(NoDigits::NotSupported(why)),
+        Outcome::Broken(why) => Err(NoDigits::Broken(why)),
+    }
 }
 
 #[cfg(test)]

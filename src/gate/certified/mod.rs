@@ -8,7 +8,9 @@
 mod digits;
 mod table;
 
-pub use digits::{DIGITS_OF_DOUBLES, Digits, log_relative_error, measure};
+pub use digits::{
+    DIGITS_OF_DOUBLES, Digits, Measured, NoDigits, log_relative_error, measure, measure_in_turn,
+};
 pub use table::{DigitsTable, Row, TableError};
 
 use super::protocol::{AnswerPose, Problem};
@@ -31,6 +33,9 @@ pub enum Level {
 }
 
 impl Level {
+    /// From easy to hard.
+    pub const ALL: [Level; 3] = [Level::Lower, Level::Average, Level::Higher];
+
     /// `lower`, `average` or `higher`.
     pub const fn name(self) -> &'static str {
         match self {
@@ -53,7 +58,7 @@ pub struct ReferenceProblem {
 /// What a file of `reference/` says besides the problem.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Reference {
-    /// Version of the data.
+    /// Version of the data in which the file came; it stays as it is in all that follow.
     pub version: u32,
     /// Level of difficulty.
     pub level: Level,
