@@ -10,7 +10,7 @@ use calibench::io::robot::parse_robot;
 use calibench::io::scene_tables::{parse_target_marks, parse_target_poses};
 use calibench::io::{
     memory, parse_checks, parse_corners, parse_known, parse_marks, parse_pixel_ends, parse_point_pairs,
-    parse_spatial, table,
+    parse_seen, parse_spatial, parse_target, table,
 };
 use calibench::photos::{BoardSpec, parse_board_file};
 use calibench_gate::accept::{accept, id_in, read_line};
@@ -43,6 +43,8 @@ pub fn corners(bytes: &[u8]) {
     let _ = table::columns(bytes);
     let _ = parse_corners("corners", bytes);
     let _ = parse_spatial("spatial", bytes);
+    let _ = parse_seen("seen", bytes);
+    let _ = parse_target("target", bytes);
 }
 
 /// Point pairs, marks of a part, pixels at both ends of lengths, poses of a robot, checks of a reference, and marks and poses of a scene.
