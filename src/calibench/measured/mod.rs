@@ -21,6 +21,9 @@
 //! repeated until it agrees with the `sigma` in `P`. It is the variance component of the pixels beside that of the
 //! measurements, which stays as stated (Foerstner 1979). Whether what is stated can be believed is tested: see [`SumTest`].
 //!
+//! The cost is not walked along its profiles, as `calibrate_lens` does where it is no parabola: of a double sphere seen over a
+//! narrow angle, whose parameters hang together, standard deviations may mislead, and nothing says so.
+//!
 //! The folder lies outside of `calibrate`, whose solver knows planes and up to three numbers of a board's shape, and
 //! builds on it: a target near a plane starts from [`crate::calibrate::calibrate_lens`].
 

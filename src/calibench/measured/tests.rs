@@ -424,28 +424,6 @@ fn one_view_of_a_target_in_space_tells_a_camera() {
 }
 
 #[test]
-fn the_better_of_two_double_spheres_is_found_and_the_other_is_told() {
-    // Two minima with the same picture: the marks' errors decide which is lower where they are taken for exact.
-    let lens = Lens::new(Model::DoubleSphere, &[-0.2, 0.6]).unwrap();
-    let scene = Scene {
-        camera: Camera::with_lens(350.0, 351.0, 640.0, 480.0, lens),
-        cam_from_target: poses(6, 90.0),
-        ..Scene::cube()
-    };
-    let known = Noise::Known { sigma_px: SIGMA_PX };
-    let mut at_truth = 0;
-    for trial in 0..10 {
-        let (target, views) = scene.drawn(0.03, &mut stream("spheres", trial));
-        let found = calibrate_measured(&target, &views, &scene.settings(), known).unwrap();
-        let is_told = found.calibration.warnings.iter().any(|w| matches!(w, Warning::Ambiguous { .. }));
-        let is_near = nees(&found, &scene.camera) < ChiSquare::new(6).quantile(1.0 - RATE);
-        assert!(is_told || is_near, "trial {trial}: {:?}", found.calibration.camera);
-        at_truth += u32::from(is_near);
-    }
-    assert!(at_truth >= 5, "{at_truth}");
-}
-
-#[test]
 fn data_that_determine_nothing_are_refused_by_name() {
     let refused = |target: &MeasuredTarget, views: &[MeasuredView], settings: &Settings| {
         calibrate_measured(target, views, settings, Noise::default())
