@@ -5,12 +5,13 @@ use calibench::io::formats::{
     FORMATS, VnlBoard, Wishes, detect, parse_target, parse_vnl, read_camera_file, write_camera_file,
 };
 use calibench::io::image::{parse_extent, parse_image};
+use calibench::io::measured::parse_target as parse_measured_target;
 use calibench::io::result::parse_camera;
 use calibench::io::robot::parse_robot;
 use calibench::io::scene_tables::{parse_target_marks, parse_target_poses};
 use calibench::io::{
     memory, parse_checks, parse_corners, parse_known, parse_marks, parse_pixel_ends, parse_point_pairs,
-    parse_spatial, table,
+    parse_seen, parse_spatial, table,
 };
 use calibench::photos::{BoardSpec, parse_board_file};
 use calibench_gate::accept::{accept, id_in, read_line};
@@ -43,6 +44,8 @@ pub fn corners(bytes: &[u8]) {
     let _ = table::columns(bytes);
     let _ = parse_corners("corners", bytes);
     let _ = parse_spatial("spatial", bytes);
+    let _ = parse_seen("seen", bytes);
+    let _ = parse_measured_target("target", bytes);
 }
 
 /// Point pairs, marks of a part, pixels at both ends of lengths, poses of a robot, checks of a reference, and marks and poses of a scene.

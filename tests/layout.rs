@@ -97,7 +97,7 @@ const LAYERS: [&[&str]; 8] = [
     &["camera", "board", "raster"],
     &["synth", "detect", "calibrate", "tsai", "planar", "rectify"],
     &["evaluate"],
-    &["downstream", "planning", "validate"],
+    &["downstream", "measured", "planning", "validate"],
     &["noise"],
     &["io"],
     &["photos"],

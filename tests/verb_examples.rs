@@ -91,6 +91,7 @@ fn folder() -> PathBuf {
     let scene = Scene::example();
     let mut corners = "view,point,X,Y,u,v\n".to_string();
     let mut solid = "view,point,X,Y,Z,u,v\n".to_string();
+    let mut target = "point,X,Y,Z,sd\n".to_string();
     let mut robot = "view,x,y,z,rx,ry,rz\n".to_string();
     for (view, (seen, pose)) in scene.exact().iter().zip(&scene.truth.cam_from_target).enumerate() {
         for (point, (at, pixel)) in seen.pairs().enumerate() {
@@ -100,6 +101,9 @@ fn folder() -> PathBuf {
             let place = Vec3::new(at.x.min(0.0), at.y, at.x.max(0.0));
             let pose = Pose { translation: 1.5 * pose.translation, ..*pose };
             let pixel = scene.truth.camera.project(&pose.apply(&place)).expect("it is before the camera");
+            if view == 0 {
+                writeln!(target, "{point},{},{},{},0.01", place.x, place.y, place.z).expect("text grows");
+            }
             writeln!(solid, "{view},{point},{},{},{},{},{}", place.x, place.y, place.z, pixel.x, pixel.y)
                 .expect("text grows");
         }
@@ -123,6 +127,7 @@ fn folder() -> PathBuf {
         ("corners.csv", corners.as_str()),
         ("new.csv", renamed.as_str()),
         ("solid.csv", solid.as_str()),
+        ("target.csv", target.as_str()),
         ("again.json", again.as_str()),
         ("still.csv", still.as_str()),
         ("robot.csv", robot.as_str()),

@@ -25,11 +25,15 @@ struct Verb {
     arguments: &'static [&'static str],
 }
 
-const VERBS: [Verb; 22] = [
+const VERBS: [Verb; 23] = [
     Verb { name: "board", arguments: &["board", "circles:9x7:10mm:3mm", "--out", "out"] },
     Verb {
         name: "camera",
         arguments: &["calibrate", "../corners.csv", "--image-size", "640x480", "--out", "out"],
+    },
+    Verb {
+        name: "target",
+        arguments: &["calibrate", "../corners.csv", "--target", "../target.csv", "--out", "out"],
     },
     Verb { name: "plane", arguments: &["calibrate", "../pairs.csv", "--out", "out"] },
     Verb { name: "ninepoint", arguments: &["ninepoint", "../dots.png", "--out", "out"] },
@@ -125,6 +129,15 @@ const VERBS: [Verb; 22] = [
     Verb { name: "book", arguments: &["book"] },
 ];
 
+/// Where the marks of the corner files are, as if they had been measured.
+fn target() -> String {
+    let mut text = "point,X,Y,Z,sd\n".to_string();
+    for (point, at) in Scene::example().exact()[0].points().iter().enumerate() {
+        writeln!(text, "{point},{},{},0,0.01", at.x, at.y).expect("text grows");
+    }
+    text
+}
+
 /// The input of all verbs, in an empty folder of this test's own.
 fn with_input(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
@@ -139,6 +152,7 @@ fn with_input(name: &str) -> PathBuf {
     for (name, text) in [("corners.csv", corners.as_str()), ("camera.json", camera), ("pairs.csv", pairs)] {
         fs::write(folder.join(name), text).expect("written");
     }
+    fs::write(folder.join("target.csv"), target()).expect("written");
     fs::write(folder.join("marks.csv"), "point,X,Y\na,0,0\nb,10,0\nc,0,10\n").expect("written");
     fs::write(folder.join("history.csv"), "when,value\n1,25.01\n2,24.99\n").expect("written");
     fs::write(folder.join("still.csv"), still()).expect("written");

@@ -45,6 +45,7 @@ pub mod evaluate;
 pub mod geometry;
 #[cfg(feature = "io")]
 pub mod io;
+pub mod measured;
 pub mod noise;
 #[cfg(feature = "photo")]
 pub mod photos;

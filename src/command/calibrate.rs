@@ -24,6 +24,7 @@ mod camera;
 mod contradictions;
 mod finished;
 mod maps;
+mod measured;
 mod models;
 mod page;
 mod photographs;
@@ -53,6 +54,14 @@ pub(super) struct Arguments {
     /// or dots:3x3:1; or the board.toml beside a page that `calibench board` drew
     #[arg(long, value_name = "BOARD", value_parser = board_or_file)]
     board: Option<BoardSpec>,
+    /// Where the marks of a corner file are, measured in space: a file with the columns point,X,Y,Z and their standard deviation
+    /// sd, or sdX,sdY,sdZ; without them marks are exact. The corner file then needs view,point,u,v only
+    #[arg(long, value_name = "FILE")]
+    target: Option<PathBuf>,
+    /// With --target: the noise of a pixel coordinate, px, where it is known (of a mark of weight 1; 1 takes a column
+    /// sigma_px at its word) [default: estimated from the residuals]
+    #[arg(long, value_name = "PX", value_parser = super::said::positive)]
+    sigma: Option<f64>,
     /// Lens model: brown-conrady, rational, thin-prism, tilted, kannala-brandt, division or double-sphere; auto
     /// compares eight by how they predict views that were left out [default: brown-conrady]
     #[arg(long, value_name = "MODEL")]
@@ -284,6 +293,10 @@ impl Failure {
 
 /// Corners or point pairs, told apart by the names of their columns.
 fn from_table(arguments: &Arguments, file: &Path) -> Result<Exit, Failure> {
+    if let Some(target) = &arguments.target {
+        contradictions::refuse(arguments, Input::Measured)?;
+        return measured::run(arguments, file, target);
+    }
     let bytes = read_named(file, MOST_TABLE_BYTES).map_err(|error| error.to_string())?;
     let name = if file.as_os_str() == "-" { "standard input".into() } else { file.shown() };
     let columns = columns(&bytes);

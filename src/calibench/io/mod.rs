@@ -19,6 +19,7 @@ pub mod input;
 mod jpeg_end;
 pub mod known;
 pub mod marks;
+pub mod measured;
 pub mod memory;
 pub mod message;
 #[cfg(feature = "photo")]
@@ -47,6 +48,7 @@ pub use image::{Extent, Grey, ImageError, image_extent, read_image, write_png, w
 pub use input::{InputError, MOST_SIDE_PX, read_regular, read_regular_text};
 pub use known::{Known, KnownCalibration, KnownError, parse_known, read_known};
 pub use marks::{MarkFile, parse_marks, read_marks};
+pub use measured::{MeasuredFields, SeenFile, TargetFileError, parse_seen, parse_target, refusal_by_names};
 pub use memory::Memory;
 pub use message::message;
 #[cfg(feature = "photo")]

@@ -56,28 +56,35 @@ fn within(pixel: &Vec2, (width, height): (usize, usize)) -> bool {
     on_side(pixel.x, width) && on_side(pixel.y, height)
 }
 
+/// Marks outside of the image are those of another camera or another size, most often of one whose sides were
+/// swapped. `marks` are the view's name and the pixel of each.
+pub(super) fn refuse_marks_outside(
+    source: &str,
+    image_size: Option<(usize, usize)>,
+    marks: &[(&str, Vec2)],
+) -> Result<(), String> {
+    let Some(size) = image_size else { return Ok(()) };
+    let outside = marks.iter().filter(|(_, pixel)| !within(pixel, size)).count();
+    let Some((name, first)) = marks.iter().find(|(_, pixel)| !within(pixel, size)) else { return Ok(()) };
+    let (width, height) = size;
+    let swapped = width != height && marks.iter().all(|(_, pixel)| within(pixel, (height, width)));
+    let help = match swapped {
+        true => format!("all lie in {height}x{width}: were the sides swapped?"),
+        false => "check --image-size and the columns u and v".to_string(),
+    };
+    Err(format!(
+        "{source}: {outside} of {} marks lie outside of the image of {width} x {height} px, the first, of view {name}, at ({}, {}): {help}",
+        marks.len(),
+        significant(first.x, 6),
+        significant(first.y, 6),
+    ))
+}
+
 impl Observed {
-    /// Marks outside of the image are those of another camera or another size, most often of one whose sides
-    /// were swapped.
     fn refuse_marks_outside(&self) -> Result<(), String> {
-        let Some(size) = self.image_size else { return Ok(()) };
-        let marks =
-            || self.views.iter().zip(&self.names).flat_map(|(v, n)| v.pixels().iter().map(move |p| (p, n)));
-        let outside = marks().filter(|(pixel, _)| !within(pixel, size)).count();
-        let Some((first, name)) = marks().find(|(pixel, _)| !within(pixel, size)) else { return Ok(()) };
-        let (width, height) = size;
-        let swapped = width != height && marks().all(|(pixel, _)| within(pixel, (height, width)));
-        let help = match swapped {
-            true => format!("all lie in {height}x{width}: were the sides swapped?"),
-            false => "check --image-size and the columns u and v".to_string(),
-        };
-        Err(format!(
-            "{}: {outside} of {} marks lie outside of the image of {width} x {height} px, the first, of view {name}, at ({}, {}): {help}",
-            self.source,
-            marks().count(),
-            significant(first.x, 6),
-            significant(first.y, 6),
-        ))
+        let views = self.views.iter().zip(&self.names);
+        let marks = views.flat_map(|(v, n)| v.pixels().iter().map(move |p| (n.as_str(), *p)));
+        refuse_marks_outside(&self.source, self.image_size, &marks.collect::<Vec<_>>())
     }
 }
 

@@ -11,15 +11,18 @@ pub(super) enum Input {
     Photographs,
     /// A corner file.
     Corners,
+    /// A corner file with the measured places of its marks.
+    Measured,
     /// Point pairs of a plane.
     PointPairs,
 }
 
 /// Refuses options that contradict each other or the input.
 pub(super) fn refuse(arguments: &Arguments, input: Input) -> Result<(), String> {
+    target(arguments, input)?;
     parameters(arguments)?;
     let without_use: &[(&str, bool)] = match input {
-        Input::Photographs | Input::Corners => &[("--mode", arguments.mode.is_some())],
+        Input::Photographs | Input::Corners | Input::Measured => &[("--mode", arguments.mode.is_some())],
         Input::PointPairs => &[
             ("--model", arguments.model.is_some()),
             ("--board-shape", arguments.bow.is_some()),
@@ -36,12 +39,55 @@ pub(super) fn refuse(arguments: &Arguments, input: Input) -> Result<(), String> 
     let (holds, is_for) = match input {
         Input::Photographs => ("--board was given", "point pairs (point,px,py,X,Y)"),
         Input::Corners => ("the file holds corners (view,point,X,Y,u,v)", "point pairs (point,px,py,X,Y)"),
+        Input::Measured => ("--target was given", "point pairs (point,px,py,X,Y)"),
         Input::PointPairs => ("the file holds point pairs (point,px,py,X,Y)", "a camera's calibration"),
     };
     match without_use.iter().find(|(_, given)| *given) {
         Some((option, _)) => Err(format!("{option} is for {is_for}, but {holds}: leave it out")),
         None => Ok(()),
     }
+}
+
+/// What goes with a measured target, and what does not.
+fn target(arguments: &Arguments, input: Input) -> Result<(), String> {
+    if arguments.sigma.is_some() && arguments.target.is_none() {
+        return Err(
+            "--sigma goes with --target: without one the noise is estimated; leave it out".to_string()
+        );
+    }
+    if arguments.target.is_none() {
+        return Ok(());
+    }
+    let is_dash = |path: &std::path::Path| path.as_os_str() == "-";
+    let instead = match input {
+        Input::Photographs => {
+            "--target takes marks from a corner file and not from photographs: calibrate with --board and --out DIR first, and then \
+             DIR/corners.csv with --target, its names being the board's"
+        }
+        Input::PointPairs => {
+            "--target is for a camera's calibration, but the file holds point pairs (point,px,py,X,Y): leave it out"
+        }
+        _ if arguments.files.first().is_some_and(|f| is_dash(f))
+            && arguments.target.as_deref().is_some_and(is_dash) =>
+        {
+            "standard input cannot be both files: give one of them by its name"
+        }
+        _ if arguments.model == Some(ModelChoice::Auto) => {
+            "--model auto compares lenses before a flat board: with --target name one"
+        }
+        _ if arguments.bow.is_some() => {
+            "--board-shape estimates how a flat board is bent, and --target says where its marks are: leave one of them out"
+        }
+        _ if arguments.loss.is_some_and(|loss| loss != calibench::calibrate::Loss::Squares) => {
+            "--loss resists strays, which --target names instead: leave it out, and mend or remove those that are named"
+        }
+        _ if arguments.intervals.is_some() => "--intervals is not known with --target: leave it out",
+        _ if arguments.reject_views.is_some() => {
+            "--reject-views is not known with --target: leave the views out of the file"
+        }
+        _ => return Ok(()),
+    };
+    Err(instead.to_string())
 }
 
 /// A parameter has one value, or is estimated, or follows another.

@@ -1,0 +1,209 @@
+//! A camera from a corner file and the measured places of its marks: `calibrate CORNERS.csv --target TARGET.csv`.
+
+use super::{Arguments, Exit, Failure, Format, ModelChoice, print, table, unended};
+use calibench::calibrate::{Loss, Prior, Settings, in_words};
+use calibench::camera::{Model, Parameter};
+use calibench::geometry::{Vec2, Vec3};
+use calibench::io::input::{MOST_TABLE_BYTES, read_named};
+use calibench::io::{
+    MeasuredFields, SeenFile, ShownPath, parse_seen, parse_target, refusal_by_names, significant,
+    write_together,
+};
+use calibench::measured::{
+    CorrectedMark, FALSE_ALARM, MeasuredCalibration, Noise, SumTest, calibrate_measured,
+};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// Marks that a table for people has.
+const MARKS_SHOWN: usize = 10;
+
+pub(super) fn run(arguments: &Arguments, corners: &Path, target: &Path) -> Result<Exit, Failure> {
+    let (target_name, target_bytes) = read(target)?;
+    let (name, bytes) = read(corners)?;
+    let measured = parse_target(&target_name, &target_bytes).map_err(|error| error.to_string())?;
+    let seen = parse_seen(&name, &bytes).map_err(|error| error.to_string())?;
+    super::camera::refuse_marks_outside(&name, arguments.image_size, &pixels(&seen))?;
+    let noise = arguments.sigma.map_or(Noise::Estimated, |sigma_px| Noise::Known { sigma_px });
+    let found = calibrate_measured(&measured, &seen.views, &settings(arguments), noise)
+        .map_err(|error| format!("{name}: {}", refusal_by_names(&error, &seen.view_names)))?;
+    let mut notes: Vec<String> = [(&target_name, &target_bytes), (&name, &bytes)]
+        .into_iter()
+        .filter_map(|(name, bytes)| unended(name, bytes))
+        .collect();
+    if !seen.unread.is_empty() {
+        notes.push(format!(
+            "{name}: columns {} were not read: {target_name} says where the marks are",
+            seen.unread.join(",")
+        ));
+    }
+    let mut fields = MeasuredFields::of(&found, &seen.view_names, arguments.image_size);
+    fields.calibration.warnings.extend(notes.iter().cloned());
+    if let Some(folder) = &arguments.out {
+        write_together(&files(folder, &found, &fields)).map_err(Failure::unwritten)?;
+    }
+    match arguments.format {
+        Format::Json => print(&fields.to_json()),
+        Format::Text => print(&text(&found, &seen.view_names, &notes)),
+    }
+    Ok(if found.calibration.is_usable() { Exit::Held } else { Exit::Incomplete })
+}
+
+fn read(file: &Path) -> Result<(String, Vec<u8>), String> {
+    let bytes = read_named(file, MOST_TABLE_BYTES).map_err(|error| error.to_string())?;
+    let name = if file.as_os_str() == "-" { "standard input".into() } else { file.shown() };
+    Ok((name, bytes))
+}
+
+/// Name of the view and pixel of every mark.
+fn pixels(seen: &SeenFile) -> Vec<(&str, Vec2)> {
+    let views = seen.view_names.iter().zip(&seen.views);
+    views.flat_map(|(name, view)| view.marks().iter().map(move |m| (name.as_str(), m.pixel))).collect()
+}
+
+fn settings(arguments: &Arguments) -> Settings {
+    let model = match arguments.model {
+        Some(ModelChoice::Of(model)) => model,
+        Some(ModelChoice::Auto) | None => Model::default(),
+    };
+    let free = arguments.free.unwrap_or(model.standard_free());
+    let mut settings =
+        Settings::new(free).with_model(model).with_loss(arguments.loss.unwrap_or(Loss::Squares));
+    settings.image_size = arguments.image_size;
+    for &(parameter, value) in &arguments.fix {
+        settings = settings.hold(parameter, value);
+    }
+    for &Prior { parameter, mean, standard_deviation } in &arguments.prior {
+        settings = settings.with_prior(parameter, mean, standard_deviation);
+    }
+    arguments.tie.map_or(settings.clone(), |ratio| settings.tie_focal_lengths(ratio))
+}
+
+/// All or none, `result.json` last.
+fn files(folder: &Path, found: &MeasuredCalibration, fields: &MeasuredFields) -> Vec<(PathBuf, Vec<u8>)> {
+    let marks = (folder.join("marks.csv"), marks(found).into_bytes());
+    vec![marks, (folder.join("result.json"), fields.to_json().into_bytes())]
+}
+
+/// The marks as a table: where they are now, how well that is known, and how far they were corrected.
+fn marks(found: &MeasuredCalibration) -> String {
+    let mut text = "point,views,X,Y,Z,sdX,sdY,sdZ,dX,dY,dZ,wX,wY,wZ,p_value\n".to_string();
+    for mark in &found.marks {
+        let _ = write!(text, "{},{}", quoted(&mark.id), mark.views);
+        let groups = [mark.position, mark.standard_deviation(), mark.correction, mark.normalised];
+        for x in groups.iter().flat_map(Vec3::iter) {
+            let _ = write!(text, ",{x}");
+        }
+        let _ = writeln!(text, ",{}", mark.p_value);
+    }
+    text
+}
+
+/// A name as a field of a table.
+fn quoted(name: &str) -> String {
+    let is_plain = !name.contains([',', '"']);
+    if is_plain { name.to_string() } else { format!("\"{}\"", name.replace('"', "\"\"")) }
+}
+
+fn text(found: &MeasuredCalibration, names: &[String], notes: &[String]) -> String {
+    let calibration = &found.calibration;
+    let mut parameters = table(&["parameter", "value", "standard deviation", "unit"]);
+    for (parameter, value) in calibration.camera.values() {
+        let deviation = match calibration.standard_deviation(parameter) {
+            Some(sd) => significant(sd, 3),
+            None if value == 0.0 => continue,
+            None => "held".to_string(),
+        };
+        let unit = Parameter::unit(parameter).to_string();
+        parameters.add_row([parameter.name().to_string(), significant(value, 10), deviation, unit]);
+    }
+    let mut views = table(&["view", "points", "RMSE (px)", "distance"]);
+    for (i, name) in names.iter().enumerate() {
+        let rmse = calibration.view_rmse_px(i).unwrap_or(f64::NAN);
+        let distance = calibration.cam_from_target[i].translation.z;
+        let points = calibration.residuals[i].len().to_string();
+        views.add_row([name.clone(), points, significant(rmse, 4), significant(distance, 5)]);
+    }
+    let mut text = format!("{}\n\n{}\n\n", parameters.trim_fmt(), views.trim_fmt());
+    text += &corrections(found);
+    text += &summary(found);
+    for warning in
+        in_words(&calibration.warnings).into_iter().chain(found.doubts()).chain(notes.iter().cloned())
+    {
+        let _ = writeln!(text, "warning: {warning}");
+    }
+    text
+}
+
+/// The least probable corrections; nothing where all marks are exact.
+fn corrections(found: &MeasuredCalibration) -> String {
+    let mut uncertain: Vec<&CorrectedMark> = found.marks.iter().filter(|m| m.expected.norm() > 0.0).collect();
+    uncertain.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
+    if uncertain.is_empty() {
+        return String::new();
+    }
+    let mut rows = table(&["mark", "views", "dX", "dY", "dZ", "in deviations", "by chance"]);
+    for mark in uncertain.iter().take(MARKS_SHOWN) {
+        let length = |k: usize| significant(mark.correction[k], 3);
+        let normalised: Vec<String> = mark.normalised.iter().map(|w| format!("{w:+.1}")).collect();
+        rows.add_row([
+            mark.id.clone(),
+            mark.views.to_string(),
+            length(0),
+            length(1),
+            length(2),
+            normalised.join(" "),
+            significant(mark.p_value, 2),
+        ]);
+    }
+    let more = uncertain.len().saturating_sub(MARKS_SHOWN);
+    let more = if more > 0 {
+        format!("and {more} marks whose corrections are more probable\n")
+    } else {
+        String::new()
+    };
+    format!("{}\n{more}\n", rows.trim_fmt())
+}
+
+fn summary(found: &MeasuredCalibration) -> String {
+    let calibration = &found.calibration;
+    let noise = match found.noise {
+        Noise::Estimated => "estimated",
+        Noise::Known { .. } => "given",
+    };
+    let mut text = format!(
+        "RMSE {} px over {} points; noise of a coordinate {} px ({noise}) on {} degrees of freedom\n{} after {} steps, lens model {}, starts refined: {}, \
+         not certified\n",
+        significant(calibration.rmse_px, 7),
+        calibration.points(),
+        significant(calibration.sigma_px, 4),
+        calibration.degrees_of_freedom,
+        calibration.termination.name(),
+        calibration.iterations,
+        calibration.camera.distortion.model(),
+        calibration.starts,
+    );
+    let tested = |what: &str, test: &SumTest| {
+        format!(
+            "{what} {}: {} times what was expected, sum of squares {} for {}, by chance with probability {} (asked at {FALSE_ALARM})\n",
+            if test.holds() { "can be believed" } else { "cannot be believed" },
+            significant(test.factor(), 3),
+            significant(test.sum, 4),
+            significant(test.expected, 4),
+            significant(test.p_value, 2),
+        )
+    };
+    text += &found
+        .credibility
+        .map_or(String::new(), |t| tested("corrections: the marks' standard deviations", &t));
+    text += &found.noise_test.map_or(String::new(), |t| tested("residuals: the noise that was given", &t));
+    if let Some(conditioning) = &calibration.conditioning {
+        let members: Vec<String> =
+            conditioning.weakest.iter().map(|m| format!("{} {:+.2}", m.unknown, m.weight)).collect();
+        let _ = writeln!(text, "weakest direction: {}", members.join(", "));
+    }
+    if !found.unseen.is_empty() {
+        let _ = writeln!(text, "marks of the target that no view shows: {}", found.unseen.len());
+    }
+    text
+}
