@@ -31,6 +31,7 @@ mod json_forms;
 mod laboratory;
 mod layout;
 mod lens_models;
+mod model_choice;
 mod new;
 mod next_pose;
 mod noise;
