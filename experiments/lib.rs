@@ -20,6 +20,7 @@ pub mod interval_coverage;
 pub mod k2_observability;
 pub mod line_bending;
 pub mod millimetres;
+pub mod model_choice;
 pub mod next_pose;
 pub mod nine_point;
 pub mod noise_floor;
@@ -51,6 +52,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     millimetres::EXPERIMENT,
     distortion_model::EXPERIMENT,
     board_warp::EXPERIMENT,
+    model_choice::EXPERIMENT,
     hand_eye::EXPERIMENT,
     position_correction::EXPERIMENT,
     nine_point::EXPERIMENT,

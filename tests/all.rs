@@ -32,6 +32,7 @@ mod laboratory;
 mod layout;
 mod lens_models;
 mod measured;
+mod model_choice;
 mod new;
 mod next_pose;
 mod noise;

@@ -37,6 +37,16 @@ const OTHER_SOLVERS: &[&str] = &[
     "studies/pose-count.toml",
 ];
 
+/// What draws the trials of the experiment model-choice, fits every candidate and rounds what is found.
+const MODEL_CHOICE: &[&str] = &[
+    "experiments/model_choice/layout.rs",
+    "experiments/model_choice/row.rs",
+    "experiments/model_choice/trial.rs",
+    "experiments/model_choice/truths.rs",
+    "src/calibench/validate/frame.rs",
+    "src/calibench/validate/slopes.rs",
+];
+
 /// Measurements by name: the folders and files whose lines change them.
 const MEASUREMENTS: &[(&str, &[&[&str]])] = &[
     ("global-minimum", &[SCENES, SOLVER, GLOBAL_MINIMUM, JUDGED]),
@@ -49,6 +59,7 @@ const MEASUREMENTS: &[(&str, &[&[&str]])] = &[
             &["src/calibench/planning/information.rs", "src/calibench/synth/departure.rs", "src/gate"],
         ],
     ),
+    ("model-choice", &[SCENES, SOLVER, MODEL_CHOICE]),
     ("other-solvers", &[SCENES, SOLVER, OTHER_SOLVERS]),
     ("other-solvers-scenes", &[SCENES, OTHER_SOLVERS]),
 ];

@@ -31,6 +31,11 @@ impl Fingerprint {
         Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/global-minimum-scenes.code")))
     }
 
+    /// The trials of the experiment model-choice, the solver, and the difference over the frame.
+    pub fn of_model_choice() -> Fingerprint {
+        Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/model-choice.code")))
+    }
+
     /// The trials of the experiment other-solvers, and this library's solver.
     pub fn of_other_solvers() -> Fingerprint {
         Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/other-solvers.code")))
@@ -93,6 +98,7 @@ mod tests {
             Fingerprint::of_gate_power(),
             Fingerprint::of_global_minimum(),
             Fingerprint::of_global_minimum_scenes(),
+            Fingerprint::of_model_choice(),
             Fingerprint::of_other_solvers(),
             Fingerprint::of_other_solvers_scenes(),
         ];
