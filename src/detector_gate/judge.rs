@@ -192,10 +192,11 @@ impl Shown {
         }
         let bias = means.iter().sum::<Vec2>() / n as f64;
         let p = (0..2).map(|axis| {
-            let square: f64 = means.iter().map(|mean| (mean[axis] - bias[axis]).powi(2)).sum();
+            let deviations = means.iter().map(|mean| mean[axis] - bias[axis]);
+            let square: f64 = deviations.map(|deviation| deviation * deviation).sum();
             let sd = (square / (n - 1) as f64 / n as f64).sqrt();
             let beyond = bias[axis].abs() - MATTERS_PX;
-            if beyond <= 0.0 { 1.0 } else { 0.5 * fisher_tail((beyond / sd).powi(2), 1, n - 1) }
+            if beyond <= 0.0 { 1.0 } else { 0.5 * fisher_tail(beyond * beyond / (sd * sd), 1, n - 1) }
         });
         let p = (2.0 * p.fold(1.0, f64::min)).min(1.0);
         let evidence =
@@ -281,5 +282,5 @@ fn pixel_phase(boards: &[&Found]) -> Option<(f64, f64)> {
         b += 2.0 / n * error * cosine;
         square += error * error;
     }
-    Some((a.hypot(b), (2.0 * square / (n * n)).sqrt()))
+    Some((libm::hypot(a, b), (2.0 * square / (n * n)).sqrt()))
 }
