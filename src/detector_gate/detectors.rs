@@ -24,6 +24,11 @@ impl Asked {
         Asked { id, image, wanted: scene.wanted(trial) }
     }
 
+    /// Its name.
+    pub fn id(&self) -> &str {
+        &self.id
+    }
+
     /// The board that is looked for.
     pub fn wanted(&self) -> Wanted {
         self.wanted

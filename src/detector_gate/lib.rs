@@ -200,7 +200,7 @@ mod tests {
     #[test]
     fn half_a_pixel_too_many_is_a_bias_and_does_not_turn() {
         let half = |_: &Asked, answer| moved(answer, |u, v| [u + 0.5, v + 0.5]);
-        assert_eq!(failing(half, &["clean"]), [Property::Bias, Property::Turned]);
+        assert_eq!(failing(half, &["clean"]), [Property::Strays, Property::Bias, Property::Turned]);
     }
 
     #[test]
@@ -247,13 +247,15 @@ mod tests {
 
     #[test]
     fn one_mark_a_pixel_off_is_astray() {
-        let stray = |_: &Asked, answer| {
-            marks(answer, |mut list| {
+        // In one photograph of twelve: no bias that matters.
+        let stray = |asked: &Asked, answer| match asked.id().ends_with("-7") {
+            true => marks(answer, |mut list| {
                 if let Some(Some([u, _])) = list.get_mut(7) {
                     *u += 1.5;
                 }
                 list
-            })
+            }),
+            false => answer,
         };
         assert_eq!(failing(stray, &["clean"]), [Property::Strays]);
     }
