@@ -47,7 +47,7 @@ impl Truth {
     }
 }
 
-/// How marks are numbered. Half a turn maps a board to itself, a mirror does not: a camera of a mirrored board does not exist.
+/// How marks are numbered. Half a turn maps a board to itself; a mirror shows it from behind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Order {
     Own,
