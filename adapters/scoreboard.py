@@ -105,7 +105,7 @@ class Score:
             "the gate says": "trusted" if self.report.held else f"not trusted: {', '.join(failed)}",
             "scenes not supported": str(unsupported),
             "certified digits, median": f"{median(self.digits.values()):.1f}" if self.digits else "-",
-            "certified problems answered": f"{len(self.digits)} of {len(asked())}",
+            "certified problems answered": f"{len(self.digits)} of {len(certified_problems())}",
             "right minimum": f"{self.endings['right']} of {asked}" if asked else "-",
             "processor ms a problem": two_digits(self.timed.milliseconds) if self.timed else "-",
             "timed on": self.timed.problem if self.timed else "-",
@@ -168,14 +168,14 @@ def endings_of(entry, command, most, scenes):
     return Counter(row["ending"] for row in rows if float(row["bound"]) < DETERMINED)
 
 
-def asked():
+def certified_problems():
     """The certified problems of Brown-Conrady's lens, which every calibrator of the table knows."""
     return [problem for problem in calibench.certified_problems() if problem.model == "brown-conrady"]
 
 
 def digits_reached(command):
     """The least digits over the parameters of every certified problem that the program answers."""
-    problems = {problem.name: problem for problem in asked()}
+    problems = {problem.name: problem for problem in certified_problems()}
     lines = "".join(line_of(problem) + "\n" for problem in problems.values())
     said = subprocess.run(shlex.split(command), input=lines, capture_output=True, text=True, timeout=1800).stdout
     # A greeting has no number of a problem.
@@ -198,7 +198,7 @@ def line_of(problem):
 
 def timed(command, answered):
     """The processor time of a problem: of the one that all rows are timed on, or of the first that is answered where that is not."""
-    problems = {problem.name: problem for problem in asked()}
+    problems = {problem.name: problem for problem in certified_problems()}
     name = next((name for name in (TIMED_ON, *problems) if name in answered), None)
     if name is None:
         return None
