@@ -109,6 +109,38 @@ fn with_copies(mut calibration: Calibration, distinct: &Distinct) -> Calibration
 
 /// The calibration, and the variance of a pixel coordinate that weighed the priors.
 fn estimate(views: &[View], settings: &Settings) -> Result<(Calibration, f64), CalibrationError> {
+    searched(views, settings, |judged, problem, frames| {
+        let variance = problem.priors.variance;
+        Ok((report(judged, problem, frames, settings.profile_coverage)?, variance))
+    })
+}
+
+/// The state of [`calibrate`] in the targets' own frames, and whether it is certified: where a search with another
+/// lens starts, which needs neither covariance nor warnings.
+///
+/// # Errors
+/// As [`calibrate`].
+pub(super) fn state_alone(views: &[View], settings: &Settings) -> Result<(State, bool), CalibrationError> {
+    check_counts(views, settings)?;
+    searched(views, settings, |judged, problem, _| {
+        let Judged { minimum, reduction, certificate, .. } = judged;
+        let conditioning = reduction.as_ref().and_then(|r| Conditioning::of(&minimum.system, r));
+        if !problem.free.is_empty() {
+            let why = || "the normal equations are singular".into();
+            identifiability::refuse_if_singular(conditioning.as_ref(), why)?;
+        }
+        let is_certified = minimum.termination.is_minimum()
+            && certificate.is_some_and(|certificate| certificate.is_possible() && certificate.holds());
+        Ok((minimum.state, is_certified))
+    })
+}
+
+/// What `then` makes of the best minimum; the problem's priors are weighed with the noise that was found.
+fn searched<T>(
+    views: &[View],
+    settings: &Settings,
+    then: impl FnOnce(Judged, &Problem<'_>, &TargetFrames) -> Result<T, CalibrationError>,
+) -> Result<T, CalibrationError> {
     let frames = TargetFrames::of(views);
     let (observations, homographies) = homographies(views, &frames)?;
     let pixel_frame = pixel_frame(&observations);
@@ -134,8 +166,7 @@ fn estimate(views: &[View], settings: &Settings) -> Result<(Calibration, f64), C
     } else {
         prior::best_minimum(&problem, starts, &evidence)?
     };
-    let problem = Problem { priors: Priors { variance, ..problem.priors }, ..problem };
-    Ok((report(judged, &problem, &frames, settings.profile_coverage)?, variance))
+    then(judged, &Problem { priors: Priors { variance, ..problem.priors }, ..problem }, &frames)
 }
 
 fn check_counts(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {

@@ -48,11 +48,63 @@ pub(super) struct Share {
     pub square: Intrinsics<WIDTH>,
     pub gradient: SVector<f64, WIDTH>,
     pub cost: f64,
+    products: Products,
 }
 
 impl Share {
     pub fn zero() -> Share {
-        Share { square: Intrinsics::zeros(), gradient: SVector::zeros(), cost: 0.0 }
+        Share {
+            square: Intrinsics::zeros(),
+            gradient: SVector::zeros(),
+            cost: 0.0,
+            products: Products::default(),
+        }
+    }
+}
+
+/// Products of a view's columns, upper triangle, row by row: as large as the view needs, for it is cleared for each.
+#[derive(Default)]
+struct Products {
+    /// Length of a row, in whole lanes.
+    stride: usize,
+    lanes: Vec<[f64; LANES]>,
+    sums: Vec<f64>,
+}
+
+impl Products {
+    fn clear(&mut self, columns: usize) {
+        self.stride = columns.next_multiple_of(LANES);
+        let entries = columns * self.stride;
+        self.lanes.clear();
+        self.lanes.resize(entries, [0.0; LANES]);
+        self.sums.resize(entries, 0.0);
+    }
+
+    /// Adds the products of four marks' columns of u and v.
+    #[inline(always)]
+    fn add<L: Lanes>(&mut self, u: &[L], v: &[L]) {
+        for (i, row) in self.lanes.chunks_exact_mut(self.stride).enumerate() {
+            let (ui, vi) = (u[i], v[i]);
+            for ((sum, &uj), &vj) in row[i..].iter_mut().zip(&u[i..]).zip(&v[i..]) {
+                *sum = (L::load(sum) + (ui * uj + vi * vj)).store();
+            }
+        }
+    }
+
+    /// Adds up the lanes.
+    #[inline(always)]
+    fn add_up<L: Lanes>(&mut self) {
+        let rows = self.lanes.chunks_exact(self.stride).zip(self.sums.chunks_exact_mut(self.stride));
+        for (i, (lanes, sums)) in rows.enumerate() {
+            let from = i / LANES * LANES;
+            for (four, sums) in lanes[from..].chunks_exact(LANES).zip(sums[from..].chunks_exact_mut(LANES)) {
+                sums.copy_from_slice(&L::sums(std::array::from_fn(|k| L::load(&four[k]))));
+            }
+        }
+    }
+
+    fn at(&self, i: usize, j: usize) -> f64 {
+        self.sums[i * self.stride + j]
     }
 }
 
@@ -82,65 +134,74 @@ impl LensVisitor for OfModel<'_, '_> {
 
     fn run<M: LensModel<P>, const P: usize>(self, coefficients: [f64; P]) -> Option<()> {
         let OfModel { view, share, block } = self;
-        let sums = dispatch(Sums::<M, P> { view, coefficients, model: std::marker::PhantomData })?;
-        spread(&sums, view.columns.places.len(), share, block);
+        let Share { products, .. } = share;
+        let sums = Sums::<M, P> { view, coefficients, products, model: std::marker::PhantomData };
+        share.cost += dispatch(sums)?;
+        spread(view.columns.places.len(), share, block);
         Some(())
     }
 }
 
 /// Hands the sums to the blocks.
-fn spread(
-    (squares, cost): &([[f64; COLUMNS]; COLUMNS], f64),
-    shared: usize,
-    share: &mut Share,
-    block: &mut ViewBlock<WIDTH>,
-) {
+fn spread(shared: usize, share: &mut Share, block: &mut ViewBlock<WIDTH>) {
+    let Share { square, gradient, products, .. } = share;
     let residual = 6 + shared;
     for i in 0..6 {
         for j in i..6 {
-            block.pose[(i, j)] = squares[i][j];
-            block.pose[(j, i)] = squares[i][j];
+            block.pose[(i, j)] = products.at(i, j);
+            block.pose[(j, i)] = products.at(i, j);
         }
         for k in 0..shared {
-            block.coupling[(k, i)] = squares[i][6 + k];
+            block.coupling[(k, i)] = products.at(i, 6 + k);
         }
-        block.gradient[i] = squares[i][residual];
+        block.gradient[i] = products.at(i, residual);
     }
     for k in 0..shared {
         for l in k..shared {
-            share.square[(k, l)] += squares[6 + k][6 + l];
+            square[(k, l)] += products.at(6 + k, 6 + l);
         }
-        share.gradient[k] += squares[6 + k][residual];
+        gradient[k] += products.at(6 + k, residual);
     }
-    share.cost += cost;
 }
 
 struct Sums<'a, 'b, M, const P: usize> {
     view: &'a View<'b>,
     coefficients: [f64; P],
+    products: &'a mut Products,
     model: std::marker::PhantomData<M>,
 }
 
 /// The rows of four marks' Jacobian, and their residual.
 struct Rows<L> {
     columns: [[L; COLUMNS]; 2],
+    /// All derivatives of u and of v by what views share; those that the model does not have stay 0.
+    all: [[L; MOST]; 2],
     residual: [L; 2],
     inside: L,
 }
 
+impl<L: Lanes> Rows<L> {
+    #[inline(always)]
+    fn zero() -> Rows<L> {
+        let zero = L::zero();
+        Rows { columns: [[zero; COLUMNS]; 2], all: [[zero; MOST]; 2], residual: [zero; 2], inside: zero }
+    }
+}
+
 impl<M: LensModel<P>, const P: usize> Kernel for Sums<'_, '_, M, P> {
-    /// Products of columns, upper triangle, and the cost.
-    type Output = Option<([[f64; COLUMNS]; COLUMNS], f64)>;
+    /// The cost.
+    type Output = Option<f64>;
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
         let View { marks, loss, columns, .. } = *self.view;
         let constants = M::constants(self.coefficients.map(L::splat));
         let count = 6 + columns.places.len() + 1;
-        let mut squares = [[L::zero(); COLUMNS]; COLUMNS];
+        let mut rows = Rows::zero();
         let mut cost = L::zero();
+        self.products.clear(count);
         for block in &marks.blocks {
-            let mut rows = rows::<L, M, P>(self.view, &constants, block);
+            fill_rows::<L, M, P>(self.view, &constants, block, &mut rows);
             if !rows.inside.all_positive() {
                 return None;
             }
@@ -160,34 +221,22 @@ impl<M: LensModel<P>, const P: usize> Kernel for Sums<'_, '_, M, P> {
                 }
             }
             let [u, v] = &rows.columns;
-            for i in 0..count {
-                let (ui, vi) = (u[i], v[i]);
-                for j in i..count {
-                    squares[i][j] = squares[i][j] + (ui * u[j] + vi * v[j]);
-                }
-            }
+            self.products.add(&u[..count], &v[..count]);
         }
-        let mut sums = [[0.0; COLUMNS]; COLUMNS];
-        for i in 0..count {
-            let mut j = i / LANES * LANES;
-            while j < count {
-                let four = L::sums([squares[i][j], squares[i][j + 1], squares[i][j + 2], squares[i][j + 3]]);
-                sums[i][j..j + LANES].copy_from_slice(&four);
-                j += LANES;
-            }
-        }
+        self.products.add_up::<L>();
         let [cost, ..] = L::sums([cost; 4]);
-        Some((sums, cost))
+        Some(cost)
     }
 }
 
 /// The Jacobian of four marks: `d X_c / d delta = -[q]x` with `q = R X`, `d X_c / d t = I`, `d X_c / d height = r3`.
 #[inline(always)]
-fn rows<L: Lanes, M: LensModel<P>, const P: usize>(
+fn fill_rows<L: Lanes, M: LensModel<P>, const P: usize>(
     view: &View<'_>,
     constants: &M::Constants<L>,
     block: &Block,
-) -> Rows<L> {
+    rows: &mut Rows<L>,
+) {
     let (camera, r, t) = (view.camera, &view.cam_from_target.rotation, &view.cam_from_target.translation);
     let heights = block.height.map(|h| L::load(&h));
     let mut z = L::zero();
@@ -204,13 +253,13 @@ fn rows<L: Lanes, M: LensModel<P>, const P: usize>(
     let at = M::project(constants, point);
     let [fx, fy, skew] = [camera.fx, camera.fy, camera.skew].map(L::splat);
     let [xd, yd] = at.at;
-    let residual = [
+    rows.inside = at.inside;
+    rows.residual = [
         fx * xd + skew * yd + L::splat(camera.cx) - L::load(&block.u),
         fy * yd + L::splat(camera.cy) - L::load(&block.v),
     ];
     let (zero, one) = (L::zero(), L::splat(1.0));
-    // All derivatives of u and of v by what views share.
-    let mut all = [[zero; MOST]; 2];
+    let Rows { columns, all, residual, .. } = rows;
     (all[0][Parameter::Fx as usize], all[0][Parameter::Cx as usize]) = (xd, one);
     all[0][Parameter::Skew as usize] = yd;
     (all[1][Parameter::Fy as usize], all[1][Parameter::Cy as usize]) = (yd, one);
@@ -225,7 +274,6 @@ fn rows<L: Lanes, M: LensModel<P>, const P: usize>(
         by_point[0][i] = fx * dx + skew * dy;
         by_point[1][i] = fy * dy;
     }
-    let mut columns = [[zero; COLUMNS]; 2];
     for row in 0..2 {
         let p = by_point[row];
         columns[row][0] = q[1] * p[2] - q[2] * p[1];
@@ -244,5 +292,4 @@ fn rows<L: Lanes, M: LensModel<P>, const P: usize>(
         }
         columns[row][6 + view.columns.places.len()] = residual[row];
     }
-    Rows { columns, residual, inside: at.inside }
 }

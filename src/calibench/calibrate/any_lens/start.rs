@@ -6,11 +6,11 @@
 //! with a polynomial of the angle (Kannala & Brandt 2006), which follows any lens, and the wanted model is
 //! fitted to the rays that this one sees.
 
+use super::super::Settings;
+use super::super::estimate::state_alone;
 use super::super::minimise::descend;
-use super::super::target_frame::TargetFrames;
 use super::super::tie::tied;
 use super::super::tilt::mirrored;
-use super::super::{Settings, calibrate};
 use super::marks::{Mark, Marks};
 use super::problem::{Problem, State};
 use super::radial;
@@ -46,16 +46,10 @@ fn pinhole(problem: &Problem<'_>, views: &[View], settings: &Settings) -> Option
     (plain.image_size, plain.loss, plain.search) = (settings.image_size, settings.loss, false);
     let unweighted = |v: &View| View::new(v.points().to_vec(), v.pixels().to_vec()).ok();
     let unweighted: Vec<View> = views.iter().map(unweighted).collect::<Option<_>>()?;
-    let found = calibrate(&unweighted, &plain).ok()?;
-    let frames = TargetFrames::of(views);
-    let poses = found.cam_from_target.iter().enumerate();
-    let state = State {
-        camera: found.camera.into(),
-        cam_from_target: poses.map(|(view, pose)| frames.at(view).of_pose(pose)).collect(),
-        shape: [0.0; 3],
-    };
-    let certified = found.certificate.as_ref().is_some_and(|c| c.is_possible() && c.holds());
-    is_seen(problem.views, &state).then_some((state, certified && found.termination.is_minimum()))
+    let (found, is_certified) = state_alone(&unweighted, &plain).ok()?;
+    let state =
+        State { camera: found.camera.into(), cam_from_target: found.cam_from_target, shape: [0.0; 3] };
+    is_seen(problem.views, &state).then_some((state, is_certified))
 }
 
 /// States with lenses of the wanted model like an angle polynomial of two terms.
