@@ -48,7 +48,7 @@ pub(super) struct Minimum<S = State, const W: usize = N> {
 
 /// A step that gains less than this part of the cost moves no parameter by more than `1e-7 sqrt(degrees of
 /// freedom)` of its standard deviation.
-const RELATIVE_GAIN: f64 = 1e-14;
+pub(super) const RELATIVE_GAIN: f64 = 1e-14;
 /// Residuals of pixels near `p` cannot be known better than this many roundings of `p`.
 const ROUNDINGS: f64 = 8.0;
 /// Small enough not to slow a good start, large enough to tame a singular first matrix.
@@ -179,6 +179,11 @@ pub(super) trait Descent<const W: usize> {
 
     fn max_iterations(&self) -> usize;
 
+    /// A step that promises less than this part of the cost is the last.
+    fn relative_gain(&self) -> f64 {
+        RELATIVE_GAIN
+    }
+
     /// Below this a cost is rounding.
     fn rounding_cost(&self) -> f64;
 }
@@ -186,7 +191,7 @@ pub(super) trait Descent<const W: usize> {
 /// Levenberg-Marquardt (Levenberg 1944; Marquardt 1963) with damping `lambda diag(J^T J)`.
 pub(super) fn descend<D: Descent<W>, const W: usize>(problem: &D, start: D::State) -> Minimum<D::State, W> {
     let rounding_cost = problem.rounding_cost();
-    let max_iterations = problem.max_iterations();
+    let (max_iterations, relative_gain) = (problem.max_iterations(), problem.relative_gain());
     let mut state = start;
     let mut system = problem.system();
     let mut trial_system = problem.system();
@@ -209,7 +214,7 @@ pub(super) fn descend<D: Descent<W>, const W: usize>(problem: &D, start: D::Stat
         }
         problem.step(&state, &step, &mut trial);
         let undamped = damping <= FIRST_DAMPING;
-        if undamped && step.predicted_gain <= RELATIVE_GAIN * system.cost + rounding_cost {
+        if undamped && step.predicted_gain <= relative_gain * system.cost + rounding_cost {
             std::mem::swap(&mut state, &mut trial);
             break Termination::Converged;
         }

@@ -1,7 +1,7 @@
 //! From marks to a camera with a lens of any model and its uncertainty.
 
 use super::super::estimate::{check_loss_and_priors, check_model};
-use super::super::minimise::{Minimum, descend};
+use super::super::minimise::{Minimum, RELATIVE_GAIN, descend};
 use super::super::settings::Bend;
 use super::super::target_frame::TargetFrames;
 use super::super::{Board, CalibrationError, Prior, Settings, Termination, calibrate, chunks};
@@ -118,6 +118,7 @@ fn estimate(views: &[View], settings: &Settings) -> Result<LensCalibration, Cali
         bend: None,
         loss: settings.loss,
         max_iterations: settings.max_iterations,
+        relative_gain: RELATIVE_GAIN,
         rounding_cost: rounding_cost(&marks),
     };
     let walked = walk::walk(&flat, views, settings)?;

@@ -1,7 +1,7 @@
 //! What do marks say of a camera with any lens at a given state, before any estimate? Fisher's information.
 
 use super::super::conditioning::Conditioning;
-use super::super::minimise::Descent;
+use super::super::minimise::{Descent, RELATIVE_GAIN};
 use super::super::target_frame::TargetFrames;
 use super::super::{Covariance, Loss};
 use super::problem::{Problem, State};
@@ -36,6 +36,7 @@ pub fn lens_information(
         bend: None,
         loss: Loss::Squares,
         max_iterations: 0,
+        relative_gain: RELATIVE_GAIN,
         rounding_cost: 0.0,
     };
     let own = cam_from_target.iter().enumerate().map(|(view, pose)| frames.at(view).of_pose(pose)).collect();

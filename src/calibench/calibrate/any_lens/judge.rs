@@ -6,7 +6,7 @@ use super::super::rival::{Met, Rival};
 use super::super::system::Reduction;
 use super::super::tie::tied;
 use super::super::{CalibrationError, Unknown};
-use super::problem::{Problem, State};
+use super::problem::{Problem, ROUGH_GAIN, State};
 use super::{WIDTH, report, start, walk};
 use crate::camera::{Camera, FreeParameters, Lens, Parameter};
 use nalgebra::SVector;
@@ -31,6 +31,8 @@ const BETTER_BY_PROFILE: usize = 5;
 const CHECKED_AT: f64 = 2.0;
 /// Iterations of a refit with one parameter held: where it takes more, its cost so far is an upper bound.
 const MOST_REFIT: usize = 40;
+/// A refit's cost is known to this part of itself: to a ten-thousandth of a variance with a thousand degrees of freedom.
+const REFIT_GAIN: f64 = 1e-7;
 /// A cost that rises by another factor than linear theory says is worth the profiles.
 const TOLERATED: f64 = 0.1;
 
@@ -44,14 +46,16 @@ pub(super) fn judge(
     mut met: Vec<Met<Lens>>,
 ) -> Result<Judged, CalibrationError> {
     let mut skewed = Vec::new();
-    if !is_parabola(problem, &minimum)? {
+    let mut reduction = reduction_of(&minimum)?;
+    let mut variance = report::variance(problem, &minimum);
+    if !is_parabola(problem, &minimum, &reduction, variance.sqrt()) {
         for state in start::alternatives(problem, &minimum.state) {
-            take_better(problem, &mut minimum, descend(problem, state), &mut met);
+            take_better(problem, &mut minimum, state, &mut met);
         }
         skewed = profiles(problem, &mut minimum, &mut met)?;
+        reduction = reduction_of(&minimum)?;
+        variance = report::variance(problem, &minimum);
     }
-    let reduction = reduction(&minimum)?;
-    let variance = report::variance(problem, &minimum);
     let covariance = reduction.intrinsics_covariance();
     let value = |camera: &Camera<Lens>, parameter| camera.value(parameter).unwrap_or(0.0);
     let rival = covariance
@@ -59,18 +63,20 @@ pub(super) fn judge(
     Ok(Judged { minimum, reduction, variance, starts: met.len(), skewed, rival })
 }
 
-/// Notes a minimum, and takes it where it is better.
+/// Notes the minimum that a start leads to, and takes it where it is better.
 fn take_better(
     problem: &Problem<'_>,
     minimum: &mut Minimum<State, WIDTH>,
-    next: Minimum<State, WIDTH>,
+    start: State,
     met: &mut Vec<Met<Lens>>,
 ) -> bool {
-    let is_better = walk::is_better(problem, &next, minimum);
-    met.push(walk::met(&next));
+    let rough = descend(&Problem { relative_gain: ROUGH_GAIN, ..*problem }, start);
+    let is_better = walk::is_better(problem, &rough, minimum);
+    met.push(walk::met(&rough));
     if is_better {
-        let iterations = minimum.iterations + next.iterations;
-        *minimum = Minimum { iterations, ..next };
+        let before = minimum.iterations + rough.iterations;
+        let next = descend(problem, rough.state);
+        *minimum = Minimum { iterations: before + next.iterations, ..next };
     }
     is_better
 }
@@ -82,7 +88,7 @@ fn profiles(
     met: &mut Vec<Met<Lens>>,
 ) -> Result<Vec<Skewed>, CalibrationError> {
     for _ in 0..BETTER_BY_PROFILE {
-        let reduction = reduction(minimum)?;
+        let reduction = reduction_of(minimum)?;
         let noise_px = report::variance(problem, minimum).sqrt();
         let Some(profile) = Profile::new(problem, minimum, &reduction, noise_px) else { break };
         let lower = match profile.skewed() {
@@ -91,14 +97,14 @@ fn profiles(
         };
         // What is lower at the end of a valley without end is no camera, but the deviations are worth little.
         let open = profile.skewed_or_open();
-        if !take_better(problem, minimum, descend(problem, *lower), met) {
+        if !take_better(problem, minimum, *lower, met) {
             return Ok(open);
         }
     }
     Ok(Vec::new())
 }
 
-fn reduction(minimum: &Minimum<State, WIDTH>) -> Result<Reduction<WIDTH>, CalibrationError> {
+fn reduction_of(minimum: &Minimum<State, WIDTH>) -> Result<Reduction<WIDTH>, CalibrationError> {
     minimum.system.reduction().ok_or_else(singular)
 }
 
@@ -113,20 +119,23 @@ pub(super) fn singular() -> CalibrationError {
 /// Whether the cost rises as linear theory says on the straight way to where it says least: two standard
 /// deviations of the worst-known combination of shared unknowns, both ways. Two evaluations say that the
 /// profiles need not be walked. Nor need they where exact data leave no cost but rounding, which has any shape.
-fn is_parabola(problem: &Problem<'_>, minimum: &Minimum<State, WIDTH>) -> Result<bool, CalibrationError> {
+fn is_parabola(
+    problem: &Problem<'_>,
+    minimum: &Minimum<State, WIDTH>,
+    reduction: &Reduction<WIDTH>,
+    noise_px: f64,
+) -> bool {
     if minimum.system.cost <= problem.rounding_cost {
-        return Ok(true);
+        return true;
     }
-    let reduction = &reduction(minimum)?;
-    let noise_px = report::variance(problem, minimum).sqrt();
-    let Some(weakest) = weakest(reduction) else { return Ok(true) };
+    let Some(weakest) = weakest(reduction) else { return true };
     let mut system = problem.system();
-    Ok([-CHECKED_AT, CHECKED_AT].into_iter().all(|deviations| {
+    [-CHECKED_AT, CHECKED_AT].into_iter().all(|deviations| {
         let step = reduction.following(deviations * noise_px * weakest);
         problem.linearise_into(&problem.stepped(&minimum.state, step), &mut system);
         let rise = (system.cost - minimum.system.cost) / (noise_px * noise_px);
         (CHECKED_AT / rise.max(0.0).sqrt() - 1.0).abs() <= TOLERATED
-    }))
+    })
 }
 
 /// One standard deviation, for unit noise, along the worst-known combination in units in which each unknown alone
@@ -152,7 +161,8 @@ impl Profiled<WIDTH> for Problem<'_> {
 
     fn holding(&self, parameter: Parameter) -> Self {
         let max_iterations = self.max_iterations.min(MOST_REFIT);
-        Problem { free: self.free.without(parameter), max_iterations, ..*self }
+        let free = self.free.without(parameter);
+        Problem { free, max_iterations, relative_gain: REFIT_GAIN, ..*self }
     }
 
     fn value(state: &State, parameter: Parameter) -> f64 {

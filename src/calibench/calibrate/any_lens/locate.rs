@@ -1,6 +1,6 @@
 //! Where was the board in one view, for a camera that is known?
 
-use super::super::minimise::descend;
+use super::super::minimise::{RELATIVE_GAIN, descend};
 use super::super::target_frame::TargetFrames;
 use super::super::{Loss, Settings};
 use super::marks::Marks;
@@ -47,6 +47,7 @@ pub fn locate(camera: &Camera<Lens>, view: &View) -> Option<Located> {
         bend: None,
         loss: Loss::Squares,
         max_iterations: Settings::standard().max_iterations,
+        relative_gain: RELATIVE_GAIN,
         rounding_cost: rounding_cost(&marks),
     };
     let state = start::with_poses(&marks, *camera)?;

@@ -44,8 +44,14 @@ pub(super) struct Problem<'a> {
     pub bend: Option<Bend>,
     pub loss: Loss,
     pub max_iterations: usize,
+    /// A step that promises less than this part of the cost is the last.
+    pub relative_gain: f64,
     pub rounding_cost: f64,
 }
+
+/// Where minima are compared or left for another model, a cost that is known to this part of itself is known well
+/// enough: to a thousandth of a variance with a thousand degrees of freedom.
+pub(super) const ROUGH_GAIN: f64 = 1e-6;
 
 /// A good start takes fewer iterations.
 const PATIENCE: usize = 12;
@@ -190,6 +196,10 @@ impl Descent<WIDTH> for Problem<'_> {
 
     fn max_iterations(&self) -> usize {
         self.max_iterations
+    }
+
+    fn relative_gain(&self) -> f64 {
+        self.relative_gain
     }
 
     fn rounding_cost(&self) -> f64 {

@@ -101,7 +101,16 @@ fn least_squares(lens: Lens, free: FreeParameters, radii: &[[f64; 2]]) -> Option
             }
         }
     }
-    let decomposed = a.svd(true, true);
+    // The triangle of A = Q R has A's singular values, and few rows.
+    let triangle = if a.nrows() > a.ncols() {
+        let factors = a.qr();
+        factors.q_tr_mul(&mut b);
+        b = b.rows(0, unknown.len()).into_owned();
+        factors.r()
+    } else {
+        a
+    };
+    let decomposed = triangle.svd(true, true);
     let solved = decomposed.solve(&b, UNTOLD * decomposed.singular_values.max()).ok()?;
     unknown.iter().zip(solved.iter()).try_fold(lens, |lens, (&p, &value)| lens.with(p, value))
 }

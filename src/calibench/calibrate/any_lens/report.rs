@@ -7,10 +7,11 @@ use super::super::minimise::Minimum;
 use super::super::target_frame::TargetFrames;
 use super::super::{Calibration, CalibrationError, Settings, identifiability, structure, warnings};
 use super::judge::{Judged, singular};
+use super::marks::{Mark, Marks};
 use super::problem::{Problem, State};
 use super::{BoardShape, WIDTH};
 use crate::camera::{Camera, Lens};
-use crate::geometry::Vec2;
+use crate::geometry::{Pose, Vec2};
 
 /// A calibration with a lens of any model.
 pub type LensCalibration = Calibration<Lens>;
@@ -63,14 +64,11 @@ struct Residuals {
     /// Sum of the weighted squares.
     square: f64,
     marks: usize,
-    /// Largest angle from the axis, rad.
-    largest_angle: f64,
 }
 
 impl Residuals {
     fn of(problem: &Problem<'_>, state: &State) -> Residuals {
-        let mut all =
-            Residuals { plain: Vec::new(), weighted: Vec::new(), square: 0.0, marks: 0, largest_angle: 0.0 };
+        let mut all = Residuals { plain: Vec::new(), weighted: Vec::new(), square: 0.0, marks: 0 };
         for (view, marks) in problem.views.iter().enumerate() {
             let residual = |mark| match state.pixel(view, mark) {
                 Some(pixel) => pixel - mark.pixel,
@@ -81,10 +79,6 @@ impl Residuals {
                 plain.iter().zip(&marks.list).map(|(r, mark)| r * mark.weight).collect();
             all.square += weighted.iter().map(Vec2::norm_squared).sum::<f64>();
             all.marks += marks.len();
-            for mark in &marks.list {
-                let point = state.cam_from_target[view].apply(&mark.on_board(&state.shape));
-                all.largest_angle = all.largest_angle.max(libm::atan2(point.xy().norm(), point.z));
-            }
             all.plain.push(plain);
             all.weighted.push(weighted);
         }
@@ -95,6 +89,18 @@ impl Residuals {
     fn freedom(&self, minimum: &Minimum<State, WIDTH>, settled: f64) -> f64 {
         (2.0 * self.marks as f64 + settled - minimum.system.unknowns() as f64).max(1.0)
     }
+}
+
+/// The largest angle from the axis at which a mark is seen, rad.
+fn largest_angle(problem: &Problem<'_>, state: &State) -> f64 {
+    let of_view = |(marks, pose): (&Marks, &Pose)| {
+        let angle = |mark: &Mark| {
+            let point = pose.apply(&mark.on_board(&state.shape));
+            libm::atan2(point.xy().norm(), point.z)
+        };
+        marks.list.iter().map(angle).fold(0.0, f64::max)
+    };
+    problem.views.iter().zip(&state.cam_from_target).map(of_view).fold(0.0, f64::max)
 }
 
 /// The variance of a coordinate of weight 1 that the residuals of a minimum show, at the scale at which the
@@ -166,7 +172,7 @@ pub(super) fn report(
         board,
         residuals: residuals.plain,
     };
-    calibration.warnings =
-        warnings::of_lens(&calibration, residuals.largest_angle, neighbours, &skewed, rival);
+    let largest_angle = largest_angle(problem, state);
+    calibration.warnings = warnings::of_lens(&calibration, largest_angle, neighbours, &skewed, rival);
     Ok(calibration)
 }

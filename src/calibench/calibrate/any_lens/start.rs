@@ -8,11 +8,12 @@
 
 use super::super::Settings;
 use super::super::estimate::state_alone;
-use super::super::minimise::descend;
+use super::super::minimise::{Minimum, descend};
 use super::super::tie::tied;
 use super::super::tilt::mirrored;
+use super::WIDTH;
 use super::marks::{Mark, Marks};
-use super::problem::{Problem, State};
+use super::problem::{Problem, ROUGH_GAIN, State};
 use super::radial;
 use crate::board::View;
 use crate::camera::{Camera, FreeParameters, Lens, Model, Parameter};
@@ -88,9 +89,9 @@ fn polynomial(problem: &Problem<'_>, settings: &Settings) -> Option<State> {
     Some(descend(&whole, state).state)
 }
 
-/// The problem with an angle polynomial, square pixels, and nothing known beforehand.
+/// The problem with an angle polynomial, square pixels, and nothing known beforehand, whose answer is a start.
 fn fisheye<'a>(problem: &Problem<'a>) -> Problem<'a> {
-    Problem { fy_per_fx: Some(1.0), priors: &[], bend: None, ..*problem }
+    Problem { fy_per_fx: Some(1.0), priors: &[], bend: None, relative_gain: ROUGH_GAIN, ..*problem }
 }
 
 /// Where the axis may meet the image, and the distance of the farthest pixel from there.
@@ -162,17 +163,38 @@ pub(super) fn with_better_tilts(problem: &Problem<'_>, mut state: State) -> Stat
             priors: &[],
             bend: None,
             max_iterations: LENS_STEPS,
+            relative_gain: ROUGH_GAIN,
             ..*problem
         };
         let at = |pose: Pose| State { cam_from_target: vec![pose], ..state };
         let as_it_is = descend(&alone, at(state.cam_from_target[view]));
-        let turned = descend(&alone, at(mirrored(&as_it_is.state.cam_from_target[0])));
-        let better = if turned.system.cost < as_it_is.system.cost { turned } else { as_it_is };
+        let other = at(mirrored(&as_it_is.state.cam_from_target[0]));
+        let turned = descend_unless_dear(&alone, other, as_it_is.system.cost);
+        let better = match turned {
+            Some(turned) if turned.system.cost < as_it_is.system.cost => turned,
+            _ => as_it_is,
+        };
         if better.system.cost.is_finite() {
             state.cam_from_target[view] = better.state.cam_from_target[0];
         }
     }
     state
+}
+
+/// Steps after which a pose costs less than so many times the other tilt, or is not followed: three steps lead close
+/// to the minimum of six unknowns, and as many again into it.
+const DEAR: [(usize, f64); 2] = [(3, 100.0), (3, 4.0)];
+
+/// The minimum near a pose; `None` where it is seen early to cost far more than `cost`.
+fn descend_unless_dear(alone: &Problem<'_>, mut state: State, cost: f64) -> Option<Minimum<State, WIDTH>> {
+    for (max_iterations, factor) in DEAR {
+        let found = descend(&Problem { max_iterations, ..*alone }, state);
+        if found.system.cost > factor * cost {
+            return None;
+        }
+        state = found.state;
+    }
+    Some(descend(alone, state))
 }
 
 /// Whether the lens has an image of every mark.

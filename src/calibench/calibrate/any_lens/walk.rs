@@ -3,12 +3,12 @@
 use super::super::minimise::{Minimum, descend};
 use super::super::rival::{Met, RIVALS};
 use super::super::{CalibrationError, Settings, Termination};
-use super::problem::{Problem, State};
+use super::problem::{Problem, ROUGH_GAIN, State};
 use super::{WIDTH, report, start};
 use crate::board::View;
 use crate::camera::Lens;
 
-/// The best of the minima, and all that were met.
+/// The best of the minima, and all that were met, to [`ROUGH_GAIN`].
 pub(super) struct Walked {
     pub best: Minimum<State, WIDTH>,
     pub met: Vec<Met<Lens>>,
@@ -38,7 +38,8 @@ pub(super) fn walk(
 }
 
 fn refined(problem: &Problem<'_>, starts: Vec<State>) -> Vec<Minimum<State, WIDTH>> {
-    let minima = starts.into_iter().map(|state| descend(problem, state));
+    let rough = Problem { relative_gain: ROUGH_GAIN, ..*problem };
+    let minima = starts.into_iter().map(|state| descend(&rough, state));
     minima.filter(|minimum| minimum.system.cost.is_finite()).collect()
 }
 
