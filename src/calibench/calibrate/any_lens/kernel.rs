@@ -80,13 +80,25 @@ impl Products {
         self.sums.resize(entries, 0.0);
     }
 
-    /// Adds the products of four marks' columns of u and v.
+    /// Adds the products of four marks' columns of u and v: two rows at a time, which read a column once.
     #[inline(always)]
     fn add<L: Lanes>(&mut self, u: &[L], v: &[L]) {
-        for (i, row) in self.lanes.chunks_exact_mut(self.stride).enumerate() {
-            let (ui, vi) = (u[i], v[i]);
-            for ((sum, &uj), &vj) in row[i..].iter_mut().zip(&u[i..]).zip(&v[i..]) {
-                *sum = (L::load(sum) + (ui * uj + vi * vj)).store();
+        for (pair, rows) in self.lanes.chunks_mut(2 * self.stride).enumerate() {
+            let i = 2 * pair;
+            let (first, second) = rows.split_at_mut(self.stride);
+            let length = u.len() - i;
+            let (u, v, first) = (&u[i..][..length], &v[i..][..length], &mut first[i..][..length]);
+            if second.is_empty() {
+                for k in 0..length {
+                    first[k] = (L::load(&first[k]) + (u[0] * u[k] + v[0] * v[k])).store();
+                }
+                continue;
+            }
+            let second = &mut second[i..][..length];
+            let ([u0, u1], [v0, v1]) = ([u[0], u[1]], [v[0], v[1]]);
+            for k in 0..length {
+                first[k] = (L::load(&first[k]) + (u0 * u[k] + v0 * v[k])).store();
+                second[k] = (L::load(&second[k]) + (u1 * u[k] + v1 * v[k])).store();
             }
         }
     }

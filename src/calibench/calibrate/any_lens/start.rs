@@ -185,11 +185,15 @@ pub(super) fn with_better_tilts(problem: &Problem<'_>, mut state: State) -> Stat
 /// to the minimum of six unknowns, and as many again into it.
 const DEAR: [(usize, f64); 2] = [(3, 100.0), (3, 4.0)];
 
-/// The minimum near a pose; `None` where it is seen early to cost far more than `cost`.
+/// A pose that costs the same up to this part is the one that was there: close views have one tilt.
+const SAME: f64 = 1e-3;
+
+/// The minimum near a pose; `None` where it is seen early to cost far more than `cost`, or the same.
 fn descend_unless_dear(alone: &Problem<'_>, mut state: State, cost: f64) -> Option<Minimum<State, WIDTH>> {
     for (max_iterations, factor) in DEAR {
         let found = descend(&Problem { max_iterations, ..*alone }, state);
-        if found.system.cost > factor * cost {
+        let is_the_same = (found.system.cost - cost).abs() <= SAME * cost;
+        if is_the_same || found.system.cost > factor * cost {
             return None;
         }
         state = found.state;
