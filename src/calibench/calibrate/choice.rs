@@ -186,13 +186,17 @@ pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibr
         .into_iter()
         .filter(|&other| other != model)
         .map(|other| (other, FreeParameters::of(other.coefficients())));
-    let free = f64::INFINITY;
-    let bowed = Candidate { model, coefficients: own, board: Board::Bowed { standard_deviation: free } };
+    let standard_deviation = f64::INFINITY;
+    let boards = match settings.board {
+        Board::Flat => vec![Board::Bowed { standard_deviation }, Board::Bent { standard_deviation }],
+        Board::Bowed { .. } => vec![Board::Bent { standard_deviation }],
+        Board::Bent { .. } => Vec::new(),
+    };
     let candidates = of_brown
         .chain(others)
         .map(|(model, coefficients)| Candidate { model, coefficients, board: settings.board })
-        .chain((settings.board == Board::Flat).then_some(bowed))
-        .filter(|candidate| candidate.coefficients != own || *candidate == bowed);
+        .filter(|candidate| candidate.coefficients != own)
+        .chain(boards.into_iter().map(|board| Candidate { model, coefficients: own, board }));
     let mut found: Vec<Freedom> = candidates
         .filter_map(|candidate| {
             let calibration = calibrate_lens(views, &candidate.settings(settings)).ok()?;

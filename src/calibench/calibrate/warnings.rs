@@ -22,11 +22,7 @@ pub(super) fn of(
     let mut warnings = Vec::new();
     warnings.extend(ending(calibration));
     warnings.extend(of_residuals);
-    if calibration.degrees_of_freedom == 0 {
-        warnings.push(Warning::NoDegreesOfFreedom);
-    } else {
-        warnings.extend(few_degrees_of_freedom(calibration.degrees_of_freedom));
-    }
+    warnings.extend(few_degrees_of_freedom(calibration.degrees_of_freedom));
     if calibration.termination.is_minimum()
         && !calibration.certificate.as_ref().is_some_and(Certificate::is_possible)
     {
@@ -136,6 +132,9 @@ const WIDER: f64 = 1.1;
 const ENOUGH: usize = 14;
 
 fn few_degrees_of_freedom(degrees_of_freedom: usize) -> Option<Warning> {
+    if degrees_of_freedom == 0 {
+        return Some(Warning::NoDegreesOfFreedom);
+    }
     if degrees_of_freedom >= ENOUGH {
         return None;
     }

@@ -23,6 +23,8 @@ use nalgebra::{SMatrix, SVector};
 const NARROWEST: f64 = 0.05;
 const ANGLES: usize = 14;
 const ANGLE_FACTOR: f64 = 1.3;
+/// Heights of a pixel over its width that are tried, where it is not known.
+const ASPECTS: [f64; 3] = [1.0, 0.6, 1.7];
 /// So many of them are refined.
 const REFINED: usize = 3;
 /// Views that choose the focal length; all of them follow.
@@ -70,20 +72,30 @@ fn polynomial(problem: &Problem<'_>, settings: &Settings) -> Option<State> {
         chosen_views(problem.views).into_iter().map(|view| problem.views[view].clone()).collect();
     let few = Problem { views: &chosen, ..fisheye(problem) };
     let poses_alone = Problem { free: FreeParameters::NONE, max_iterations: POSE_STEPS, ..few };
-    let mut tried = Vec::with_capacity(ANGLES);
+    let aspects = match few.fy_per_fx {
+        Some(known) => vec![known],
+        None => ASPECTS.to_vec(),
+    };
+    let mut tried = Vec::with_capacity(ANGLES * aspects.len());
     let mut angle = NARROWEST;
     for _ in 0..ANGLES {
-        let lens = Lens::ideal(Model::KannalaBrandt);
-        let camera = Camera::with_lens(reach / angle, reach / angle, centre.x, centre.y, lens);
-        if let Some(state) = with_poses(&chosen, camera) {
-            tried.push(descend(&poses_alone, state));
+        for aspect in &aspects {
+            let lens = Lens::ideal(Model::KannalaBrandt);
+            let camera = Camera::with_lens(reach / angle, aspect * reach / angle, centre.x, centre.y, lens);
+            if let Some(state) = with_poses(&chosen, camera) {
+                tried.push(descend(&poses_alone, state));
+            }
         }
         angle *= ANGLE_FACTOR;
     }
     tried.sort_by(|a, b| a.system.cost.total_cmp(&b.system.cost));
-    use Parameter::{Cx, Cy, Fx, K1, K2};
-    let first = Problem { free: FreeParameters::of(&[Fx, K1]), max_iterations: FIRST_STEPS, ..few };
-    let lens = FreeParameters::of(&[Fx, Cx, Cy, K1, K2]);
+    use Parameter::{Cx, Cy, Fx, Fy, K1, K2};
+    let kept = |list: &[Parameter]| {
+        let free = FreeParameters::of(list);
+        if few.fy_per_fx.is_some() { free.without(Fy) } else { free }
+    };
+    let first = Problem { free: kept(&[Fx, Fy, K1]), max_iterations: FIRST_STEPS, ..few };
+    let lens = kept(&[Fx, Fy, Cx, Cy, K1, K2]);
     let better = Problem { free: lens, max_iterations: LENS_STEPS, ..few };
     let refined = tried.into_iter().take(REFINED).map(|m| descend(&better, descend(&first, m.state).state));
     let best = refined
@@ -94,9 +106,10 @@ fn polynomial(problem: &Problem<'_>, settings: &Settings) -> Option<State> {
     Some(descend(&whole, state).state)
 }
 
-/// The problem with an angle polynomial, square pixels, and nothing known beforehand.
+/// The problem with an angle polynomial and nothing known beforehand; pixels keep their shape where that is tied, and are square where fy is held.
 fn fisheye<'a>(problem: &Problem<'a>) -> Problem<'a> {
-    Problem { fy_per_fx: Some(1.0), priors: &[], bend: None, ..*problem }
+    let square = || (!problem.free.contains(Parameter::Fy)).then_some(1.0);
+    Problem { fy_per_fx: problem.fy_per_fx.or_else(square), priors: &[], bend: None, ..*problem }
 }
 
 /// Where the axis may meet the image, and the distance of the farthest pixel from there.
