@@ -41,8 +41,13 @@ impl Comparison {
 
     /// A table, the chosen model first, and how sure the choice is.
     pub(super) fn text(&self) -> String {
-        let columns =
-            ["lens model", "RMSE (px)", "views left out (px a coordinate)", "BIC over the least", "neighbours"];
+        let columns = [
+            "lens model",
+            "RMSE (px a point)",
+            "views left out (px a coordinate)",
+            "BIC over the least",
+            "neighbours",
+        ];
         let mut rows = table(&columns);
         let least = self.compared.iter().map(|c| c.bic).fold(f64::INFINITY, f64::min);
         for compared in &self.compared {

@@ -98,9 +98,10 @@ fn check(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
     })
 }
 
-/// Marks on a line tell no pose, and four of which three are on one hardly more: such a view is refused, as [`calibrate`] does. A homography of the
-/// marks to themselves says it of the board's side; of pixels it is no question beyond a pinhole.
-fn spans_a_plane(view: &View) -> Result<(), HomographyError> {
+/// Whether a view tells its pose. Marks on a line do not, and with but one beside the line they tell it as badly: such a
+/// view is refused, as [`calibrate`] does. The homography of the marks to themselves says it of the board's side; of
+/// pixels it is no question beyond a pinhole.
+pub(in super::super) fn spans_a_plane(view: &View) -> Result<(), HomographyError> {
     Homography::fit(view.points(), view.points()).map(drop)
 }
 
