@@ -227,6 +227,13 @@ pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibr
             })
         })
         .collect();
+    // A twist besides two bows explains something only where bows alone do not explain it.
+    let is_bowed = |f: &&Freedom| matches!(f.candidate.board, Board::Bowed { .. });
+    let bowed_px = found.iter().find(is_bowed).map_or(f64::INFINITY, |bowed| bowed.rmse_px);
+    let is_idle = |f: &Freedom| {
+        matches!(f.candidate.board, Board::Bent { .. }) && f.rmse_px >= (1.0 - WORTH) * bowed_px
+    };
+    found.retain(|freedom| !is_idle(freedom));
     found.sort_by(|a, b| a.rmse_px.total_cmp(&b.rmse_px));
     found
 }

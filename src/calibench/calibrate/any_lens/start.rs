@@ -23,8 +23,8 @@ use nalgebra::{SMatrix, SVector};
 const NARROWEST: f64 = 0.05;
 const ANGLES: usize = 14;
 const ANGLE_FACTOR: f64 = 1.3;
-/// Heights of a pixel over its width that are tried, where it is not known.
-const ASPECTS: [f64; 3] = [1.0, 0.6, 1.7];
+/// Heights of a pixel over its width that are tried beside 1, where it is not known.
+const ASPECTS: [f64; 2] = [0.6, 1.7];
 /// So many of them are refined.
 const REFINED: usize = 3;
 /// Views that choose the focal length; all of them follow.
@@ -60,17 +60,19 @@ fn pinhole(problem: &Problem<'_>, views: &[View], settings: &Settings) -> Option
     is_seen(problem.views, &state).then_some((state, certified && found.termination.is_minimum()))
 }
 
-/// States with lenses of the wanted model like an angle polynomial of two terms.
+/// States with lenses of the wanted model like angle polynomials of two terms.
 pub(super) fn by_rays(problem: &Problem<'_>, settings: &Settings) -> Vec<State> {
-    polynomial(problem, settings).map_or(Vec::new(), |state| with_model(problem, &state, settings))
+    let fisheyes = fisheyes(problem).into_iter();
+    let states = fisheyes.filter_map(|fisheye| polynomial(&fisheye, settings));
+    states.flat_map(|state| with_model(problem, &state, settings)).collect()
 }
 
 /// The best state with an angle polynomial of two terms.
-fn polynomial(problem: &Problem<'_>, settings: &Settings) -> Option<State> {
-    let (centre, reach) = frame(problem.views, settings);
+fn polynomial(fisheye: &Problem<'_>, settings: &Settings) -> Option<State> {
+    let (centre, reach) = frame(fisheye.views, settings);
     let chosen: Vec<Marks> =
-        chosen_views(problem.views).into_iter().map(|view| problem.views[view].clone()).collect();
-    let few = Problem { views: &chosen, ..fisheye(problem) };
+        chosen_views(fisheye.views).into_iter().map(|view| fisheye.views[view].clone()).collect();
+    let few = Problem { views: &chosen, ..*fisheye };
     let poses_alone = Problem { free: FreeParameters::NONE, max_iterations: POSE_STEPS, ..few };
     let aspects = match few.fy_per_fx {
         Some(known) => vec![known],
@@ -101,15 +103,19 @@ fn polynomial(problem: &Problem<'_>, settings: &Settings) -> Option<State> {
     let best = refined
         .filter(|m| m.system.cost.is_finite())
         .min_by(|a, b| a.system.cost.total_cmp(&b.system.cost))?;
-    let whole = Problem { free: lens, max_iterations: LENS_STEPS, ..fisheye(problem) };
-    let state = with_better_tilts(&whole, with_poses(problem.views, best.state.camera)?);
+    let whole = Problem { free: lens, max_iterations: LENS_STEPS, ..*fisheye };
+    let state = with_better_tilts(&whole, with_poses(fisheye.views, best.state.camera)?);
     Some(descend(&whole, state).state)
 }
 
-/// The problem with an angle polynomial and nothing known beforehand; pixels keep their shape where that is tied, and are square where fy is held.
-fn fisheye<'a>(problem: &Problem<'a>) -> Problem<'a> {
-    let square = || (!problem.free.contains(Parameter::Fy)).then_some(1.0);
-    Problem { fy_per_fx: problem.fy_per_fx.or_else(square), priors: &[], bend: None, ..*problem }
+/// The problem with an angle polynomial and nothing known beforehand: with pixels of the shape that is tied, otherwise with
+/// square ones, and where they may be far from it with pixels of any shape. Few marks lead astray whom square ones do not.
+fn fisheyes<'a>(problem: &Problem<'a>) -> Vec<Problem<'a>> {
+    let shaped = |fy_per_fx| Problem { fy_per_fx, priors: &[], bend: None, ..*problem };
+    match problem.fy_per_fx {
+        None if problem.free.contains(Parameter::Fy) => vec![shaped(Some(1.0)), shaped(None)],
+        known => vec![shaped(known.or(Some(1.0)))],
+    }
 }
 
 /// Where the axis may meet the image, and the distance of the farthest pixel from there.
