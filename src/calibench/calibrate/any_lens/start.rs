@@ -25,6 +25,8 @@ const ANGLES: usize = 14;
 const ANGLE_FACTOR: f64 = 1.3;
 /// Heights of a pixel over its width that are tried beside 1, where it is not known.
 const ASPECTS: [f64; 2] = [0.6, 1.7];
+/// Pixels whose height over width comes out within this part of 1 are taken for square ones.
+const NEARLY_SQUARE: f64 = 0.1;
 /// So many of them are refined.
 const REFINED: usize = 3;
 /// Views that choose the focal length; all of them follow.
@@ -60,11 +62,28 @@ fn pinhole(problem: &Problem<'_>, views: &[View], settings: &Settings) -> Option
     is_seen(problem.views, &state).then_some((state, certified && found.termination.is_minimum()))
 }
 
-/// States with lenses of the wanted model like angle polynomials of two terms.
+/// States with lenses of the wanted model like angle polynomials of two terms: with pixels of the shape that is tied,
+/// otherwise with square ones, and where they come out far from it once fy is free, with pixels of any shape besides. Few
+/// marks lead these astray where square ones are right.
 pub(super) fn by_rays(problem: &Problem<'_>, settings: &Settings) -> Vec<State> {
-    let fisheyes = fisheyes(problem).into_iter();
-    let states = fisheyes.filter_map(|fisheye| polynomial(&fisheye, settings));
-    states.flat_map(|state| with_model(problem, &state, settings)).collect()
+    let shaped = |fy_per_fx| Problem { fy_per_fx, priors: &[], bend: None, ..*problem };
+    let square = polynomial(&shaped(problem.fy_per_fx.or(Some(1.0))), settings);
+    let is_known = problem.fy_per_fx.is_some() || !problem.free.contains(Parameter::Fy);
+    let any = match &square {
+        _ if is_known => None,
+        Some(state) if is_nearly_square(&shaped(None), state) => None,
+        _ => polynomial(&shaped(None), settings),
+    };
+    [square, any].into_iter().flatten().flat_map(|state| with_model(problem, &state, settings)).collect()
+}
+
+/// Whether pixels stay nearly square where an angle polynomial that takes them for it is refined with fy free.
+fn is_nearly_square(fisheye: &Problem<'_>, state: &State) -> bool {
+    use Parameter::{Cx, Cy, Fx, Fy, K1, K2};
+    let free = FreeParameters::of(&[Fx, Fy, Cx, Cy, K1, K2]);
+    let refined = descend(&Problem { free, max_iterations: LENS_STEPS, ..*fisheye }, state.clone());
+    let camera = refined.state.camera;
+    (camera.fy / camera.fx - 1.0).abs() <= NEARLY_SQUARE
 }
 
 /// The best state with an angle polynomial of two terms.
@@ -106,16 +125,6 @@ fn polynomial(fisheye: &Problem<'_>, settings: &Settings) -> Option<State> {
     let whole = Problem { free: lens, max_iterations: LENS_STEPS, ..*fisheye };
     let state = with_better_tilts(&whole, with_poses(fisheye.views, best.state.camera)?);
     Some(descend(&whole, state).state)
-}
-
-/// The problem with an angle polynomial and nothing known beforehand: with pixels of the shape that is tied, otherwise with
-/// square ones, and where they may be far from it with pixels of any shape. Few marks lead astray whom square ones do not.
-fn fisheyes<'a>(problem: &Problem<'a>) -> Vec<Problem<'a>> {
-    let shaped = |fy_per_fx| Problem { fy_per_fx, priors: &[], bend: None, ..*problem };
-    match problem.fy_per_fx {
-        None if problem.free.contains(Parameter::Fy) => vec![shaped(Some(1.0)), shaped(None)],
-        known => vec![shaped(known.or(Some(1.0)))],
-    }
 }
 
 /// Where the axis may meet the image, and the distance of the farthest pixel from there.
