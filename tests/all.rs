@@ -30,6 +30,7 @@ mod hostile;
 mod json_forms;
 mod laboratory;
 mod layout;
+mod lens_hard_cases;
 mod lens_models;
 mod measured;
 mod model_choice;

@@ -15,7 +15,7 @@ pub enum Criterion {
     HoldOut,
     /// The choice of `compare_models`.
     Auto,
-    /// Of those that predict as well as the best within this part, the least of Schwarz's criterion.
+    /// Of those whose Schwarz criterion exceeds the least by no more than this, the least error on views left out.
     Within(f64),
     /// No choice: Brown-Conrady's five coefficients, whatever the marks say.
     Five,
@@ -111,9 +111,14 @@ impl<'a> Trial<'a> {
             Criterion::Bic => least(&|f| f.bic),
             Criterion::HoldOut => least(&predicted),
             Criterion::Auto => least(&|f| f.place as f64),
-            Criterion::Within(part) => {
-                let best = self.fitted.iter().flatten().map(|f| predicted(f)).fold(f64::INFINITY, f64::min);
-                least(&|f| if predicted(f) <= (1.0 + part) * best { f.bic } else { f64::INFINITY })
+            Criterion::Within(difference) => {
+                let least_bic = self.fitted.iter().flatten().map(|f| f.bic).fold(f64::INFINITY, f64::min);
+                let is_near = |f: &Fitted| f.bic - least_bic <= difference;
+                // Where no part of the views can be left out, the criterion is alone.
+                let is_predicted =
+                    self.fitted.iter().flatten().any(|f| is_near(f) && f.hold_out_px.is_some());
+                let error = |f: &Fitted| if is_near(f) { predicted(f) } else { f64::INFINITY };
+                if is_predicted { least(&error) } else { least(&|f| f.bic) }
             }
             Criterion::Five => Some(FIVE).filter(|&i| self.fitted[i].is_some()),
             Criterion::Known => self.truth.right().filter(|&i| self.fitted[i].is_some()),
@@ -184,8 +189,8 @@ mod tests {
         let taken = |criterion| trials[0].chosen(criterion);
         assert_eq!(Criterion::JUDGED.map(taken), [Some(3), Some(7), Some(1), Some(0)]);
         assert_eq!(
-            [0.001, 0.005, 0.01].map(|part| taken(Criterion::Within(part))),
-            [Some(1), Some(0), Some(7)]
+            [0.0, 10.0, 20.0].map(|difference| taken(Criterion::Within(difference))),
+            [Some(7), Some(0), Some(1)]
         );
         assert_eq!((taken(Criterion::Five), taken(Criterion::Known)), (Some(3), Some(0)));
         assert_eq!(trials[0].ratio(Criterion::Rmse), Some(2.0));

@@ -4,7 +4,7 @@ use super::chosen::{Criterion, Trial};
 use super::layout::LAYOUTS;
 use super::trial::NOISE_PX;
 use super::truths::{CANDIDATES, TRUTHS, Truth};
-use super::{FAR, PARTS, far, middle, of, ratios, right};
+use super::{DIFFERENCES, FAR, far, middle, of, ratios, right};
 use calibench::geometry::Vec2;
 use calibench_harness::{Cell, Table, stats};
 
@@ -108,23 +108,25 @@ pub fn costs(trials: &[Trial<'_>]) -> Table {
     table
 }
 
-/// Other parts within which a prediction counts as the best.
-pub fn parts(trials: &[Trial<'_>]) -> Table {
+/// Other differences of the criterion that count as none.
+pub fn differences(trials: &[Trial<'_>]) -> Table {
     let caption = format!(
-        "`--model auto` with other parts within which a prediction counts as the best: the share that it picks right, mean of the truths \
-         that are among the candidates, and the share of all trials whose camera is over {FAR} times as far from the truth as the best \
-         candidate's"
+        "`--model auto` with other differences of BIC that count as no evidence, so that views left out decide: the share that it picks \
+         right, mean of the truths that are among the candidates, and the share of all trials whose camera is over {FAR} times as far from \
+         the truth as the best candidate's"
     );
     let marks = LAYOUTS.map(|layout| layout.marks());
     let names: Vec<String> = ["right", "far"]
         .iter()
         .flat_map(|what| marks.iter().map(move |marks| format!("{what}_{marks}")))
         .collect();
-    let mut columns = vec![("part", "")];
+    let mut columns = vec![("difference", "")];
     columns.extend(names.iter().map(|name| (name.as_str(), "")));
-    let mut table = Table::new("parts", caption, &columns);
-    let rows = PARTS.into_iter().map(|part| (format!("{part}"), Criterion::Within(part)));
-    for (name, criterion) in rows.chain([("BIC alone".to_string(), Criterion::Bic)]) {
+    let mut table = Table::new("differences", caption, &columns);
+    let alone = ("BIC alone".to_string(), Criterion::Bic);
+    let within = DIFFERENCES.map(|difference| (format!("{difference}"), Criterion::Within(difference)));
+    let none = ("views left out alone".to_string(), Criterion::HoldOut);
+    for (name, criterion) in [alone].into_iter().chain(within).chain([none]) {
         let mut row: Vec<Cell> = vec![name.into()];
         row.extend(marks.map(|marks| Cell::from(right(trials, marks, criterion).value)));
         row.extend(marks.map(|marks| Cell::from(far(trials, marks, criterion).value)));

@@ -37,10 +37,11 @@ pub(super) use plots::round_down;
 /// What the exit codes mean here.
 const EXIT_CODES: &str = "\
 Exit codes:
-  0  calibrated: a minimum whose RMSE lies at most a quarter above that of free homographies; read the warnings
+  0  calibrated: a minimum whose RMSE lies at most a quarter above that of free homographies; with another lens
+     model than brown-conrady any minimum, which nothing certifies; read the warnings
   2  wrong usage, or data that do not determine the camera: there is no result
-  3  do not use the result, if one is printed: no minimum, or one far above free homographies, or files or
-     standard output that could not be written, or interrupted
+  3  do not use the result, if one is printed: no minimum, or with brown-conrady one far above free homographies;
+     or files or standard output that could not be written, or interrupted
 Code 1 is of other verbs.";
 
 #[derive(Debug, Args)]
@@ -63,7 +64,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "PX", value_parser = super::said::positive)]
     sigma: Option<f64>,
     /// Lens model: brown-conrady, rational, thin-prism, tilted, kannala-brandt, division or double-sphere; auto
-    /// compares eight by how they predict views that were left out [default: brown-conrady]
+    /// compares eight by Schwarz's criterion, and by how they predict views that were left out where it is undecided [default: brown-conrady]
     #[arg(long, value_name = "MODEL")]
     model: Option<ModelChoice>,
     /// Estimates how the board is bent, each number known beforehand to be 0 with a standard deviation in the

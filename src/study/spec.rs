@@ -286,7 +286,15 @@ fn check(field: &'static str, value: f64, need: &'static str, held: bool) -> Res
 impl SceneSpec {
     pub(super) fn check(&self) -> Result<(), SpecError> {
         let LensFields(camera) = self.camera;
-        check("scene.camera.fx", camera.fx, "positive, and every parameter finite", camera.is_possible())?;
+        let odd = camera.values().find(|(_, value)| !value.is_finite());
+        check(
+            "scene.camera",
+            odd.map_or(0.0, |(_, value)| value),
+            "finite in every parameter",
+            odd.is_none(),
+        )?;
+        check("scene.camera.fx", camera.fx, "positive", camera.fx > 0.0)?;
+        check("scene.camera.fy", camera.fy, "positive", camera.fy > 0.0)?;
         let side = self.image.0.max(self.image.1);
         check("scene.image", side as f64, "at most 1048576 px a side", side <= limits::MOST_SIDE)?;
         let noise = self.noise_px;

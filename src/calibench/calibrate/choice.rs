@@ -1,13 +1,18 @@
-//! Which lens model do the marks ask for? Models compared by what they predict of views that they have not seen.
+//! Which lens model do the marks ask for? Models compared by Schwarz's criterion, and by what they predict of views
+//! that they have not seen.
 //!
-//! The residuals of the fit always fall with more coefficients. Two measures do not: the error on views that were
-//! left out, and Schwarz's criterion (1978), which charges every unknown `ln n`:
+//! The residuals of the fit always fall with more coefficients. Two measures do not: Schwarz's criterion (1978), which
+//! charges every unknown `ln n`, and the error on views that were left out:
 //!
 //! ```text
-//! hold-out = sqrt(sum |r|^2 / sum (2 N - 6)) over views that the camera was not fitted to
 //! BIC = n ln(sum |r|^2 / n) + p ln n,   n = 2 N coordinates, p unknowns
+//! hold-out = sqrt(sum |r|^2 / sum (2 N - 6)) over views that the camera was not fitted to
 //! ```
+//!
+//! The criterion looks at all views at once; a fifth of few views is little to predict, and from four fifths of them a
+//! rich model is known poorly. So the criterion decides, and predictions only where it says nothing.
 
+use super::any_lens::spans_a_plane;
 use super::structure::neighbours;
 use super::{Board, CalibrationError, LensCalibration, Role, Settings, calibrate_lens, locate};
 use crate::board::View;
@@ -84,19 +89,20 @@ impl Compared {
 /// Parts into which the views are divided; each is left out once.
 const FOLDS: usize = 5;
 
-/// Predictions that differ by less than this part are equally good: five coefficients follow noise by about as
-/// much where two would do.
-const ALIKE: f64 = 0.005;
+/// A difference of the criterion below this one is "not worth more than a bare mention" (Kass & Raftery 1995): odds of
+/// less than e to one.
+const NO_EVIDENCE: f64 = 2.0;
 
-/// Fits every candidate. The first of the result is the choice: of those that predict views that were left out (in
-/// five parts of the views in turn) as well as the best does, within half a percent, the one with the least of
-/// Schwarz's criterion. The others follow by their predictions. Candidates that the views do not determine come
-/// with their reason.
+/// Fits every candidate. The first of the result is the choice: of those whose criterion of Schwarz lies within 2 of the
+/// least, the one that best predicts views that were left out (in five parts of the views in turn). The others follow by
+/// their criterion. Candidates that the views do not determine come with their reason. Views whose marks do not span a
+/// plane tell nothing and take no part, as long as half of the views do.
 pub fn compare_models(
     views: &[View],
     settings: &Settings,
     candidates: &[Candidate],
 ) -> (Vec<Compared>, Vec<(Candidate, CalibrationError)>) {
+    let views = &telling(views);
     let (mut compared, mut refused) = (Vec::new(), Vec::new());
     for &candidate in candidates {
         match calibrate_lens(views, &candidate.settings(settings)) {
@@ -104,14 +110,25 @@ pub fn compare_models(
             Err(error) => refused.push((candidate, error)),
         }
     }
-    compared.sort_by(|a, b| a.predicted().total_cmp(&b.predicted()).then(a.bic.total_cmp(&b.bic)));
-    let best = compared.first().map_or(f64::INFINITY, Compared::predicted);
-    let is_alike = |c: &Compared| c.predicted() <= (1.0 + ALIKE) * best;
-    let alike = compared.iter().enumerate().filter(|(_, c)| is_alike(c));
-    if let Some((chosen, _)) = alike.min_by(|(_, a), (_, b)| a.bic.total_cmp(&b.bic)) {
-        compared[..=chosen].rotate_right(1);
+    compared.sort_by(|a, b| a.bic.total_cmp(&b.bic));
+    let measures: Vec<(f64, f64)> = compared.iter().map(|c| (c.bic, c.predicted())).collect();
+    if let Some(place) = chosen(&measures) {
+        compared[..=place].rotate_right(1);
     }
     (compared, refused)
+}
+
+/// Which of some candidates is taken, by their criteria, in ascending order, and their errors on views left out.
+fn chosen(measures: &[(f64, f64)]) -> Option<usize> {
+    let (least, _) = *measures.first()?;
+    let no_worse = measures.iter().take_while(|(bic, _)| bic - least <= NO_EVIDENCE);
+    no_worse.enumerate().min_by(|(_, (_, a)), (_, (_, b))| a.total_cmp(b)).map(|(place, _)| place)
+}
+
+/// The views whose marks span a plane; all of them where they are less than half.
+fn telling(views: &[View]) -> Vec<View> {
+    let telling: Vec<View> = views.iter().filter(|view| spans_a_plane(view).is_ok()).cloned().collect();
+    if 2 * telling.len() >= views.len() { telling } else { views.to_vec() }
 }
 
 fn judged(
@@ -186,13 +203,17 @@ pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibr
         .into_iter()
         .filter(|&other| other != model)
         .map(|other| (other, FreeParameters::of(other.coefficients())));
-    let free = f64::INFINITY;
-    let bowed = Candidate { model, coefficients: own, board: Board::Bowed { standard_deviation: free } };
+    let standard_deviation = f64::INFINITY;
+    let boards = match settings.board {
+        Board::Flat => vec![Board::Bowed { standard_deviation }, Board::Bent { standard_deviation }],
+        Board::Bowed { .. } => vec![Board::Bent { standard_deviation }],
+        Board::Bent { .. } => Vec::new(),
+    };
     let candidates = of_brown
         .chain(others)
         .map(|(model, coefficients)| Candidate { model, coefficients, board: settings.board })
-        .chain((settings.board == Board::Flat).then_some(bowed))
-        .filter(|candidate| candidate.coefficients != own || *candidate == bowed);
+        .filter(|candidate| candidate.coefficients != own)
+        .chain(boards.into_iter().map(|board| Candidate { model, coefficients: own, board }));
     let mut found: Vec<Freedom> = candidates
         .filter_map(|candidate| {
             let calibration = calibrate_lens(views, &candidate.settings(settings)).ok()?;
@@ -206,6 +227,30 @@ pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibr
             })
         })
         .collect();
+    // A twist besides two bows explains something only where bows alone do not explain it.
+    let is_bowed = |f: &&Freedom| matches!(f.candidate.board, Board::Bowed { .. });
+    let bowed_px = found.iter().find(is_bowed).map_or(f64::INFINITY, |bowed| bowed.rmse_px);
+    let is_idle = |f: &Freedom| {
+        matches!(f.candidate.board, Board::Bent { .. }) && f.rmse_px >= (1.0 - WORTH) * bowed_px
+    };
+    found.retain(|freedom| !is_idle(freedom));
     found.sort_by(|a, b| a.rmse_px.total_cmp(&b.rmse_px));
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_criterion_decides_and_predictions_where_it_says_nothing() {
+        let none = f64::INFINITY;
+        assert_eq!(chosen(&[]), None);
+        // A prediction that is far better by chance does not shut out the candidate with evidence for it.
+        assert_eq!(chosen(&[(-350.0, 0.13), (-347.9, 0.11)]), Some(0));
+        assert_eq!(chosen(&[(-350.0, 0.13), (-348.1, 0.12), (-349.0 + 5.0, 0.11)]), Some(1));
+        // Where no part of the views can be left out the criterion is alone.
+        assert_eq!(chosen(&[(-350.0, none), (-349.0, none)]), Some(0));
+        assert_eq!(chosen(&[(-350.0, none), (-349.0, 0.2)]), Some(1));
+    }
 }

@@ -289,8 +289,7 @@ fn report(
     let points = fit.marks();
     let settled = problem.priors.settled(&minimum);
     let freedom = fit.freedom(system, settled);
-    let degrees_of_freedom =
-        ((2 * points) as f64 + settled - system.unknowns() as f64 + WHOLE).max(0.0) as usize;
+    let degrees_of_freedom = whole((2 * points) as f64 + settled - system.unknowns() as f64);
     strays::refuse_narrow_loss(problem.loss, &fit)?;
     let of_residuals = warnings_of_residuals(problem, &minimum.state, &fit, freedom);
     let variance = if problem.priors.list.is_empty() {
@@ -376,6 +375,11 @@ fn judged_termination(termination: Termination, certificate: Option<&Certificate
 
 /// A sum of shares that is a whole number but for rounding counts as one.
 const WHOLE: f64 = 1e-6;
+
+/// Degrees of freedom as they are told.
+pub(super) fn whole(freedom: f64) -> usize {
+    (freedom + WHOLE).max(0.0) as usize
+}
 
 /// How the minimum fits the observations.
 pub(super) struct Fit {

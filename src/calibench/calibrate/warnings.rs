@@ -6,7 +6,7 @@ use super::report::{STRONG_CORRELATION, UNCERTAIN_FOCAL};
 use super::rival::Rival;
 use super::search::Twin;
 use super::{Calibration, Certificate, Covariance, LensCalibration, Prior, Termination, Warning};
-use crate::camera::{Camera, FreeParameters, Parameter};
+use crate::camera::{Camera, FreeParameters, Model, Parameter};
 use crate::geometry::Pose;
 
 /// The warnings of a calibration: `of_residuals` are those of its outliers and of what residuals have in
@@ -22,11 +22,7 @@ pub(super) fn of(
     let mut warnings = Vec::new();
     warnings.extend(ending(calibration));
     warnings.extend(of_residuals);
-    if calibration.degrees_of_freedom == 0 {
-        warnings.push(Warning::NoDegreesOfFreedom);
-    } else {
-        warnings.extend(few_degrees_of_freedom(calibration.degrees_of_freedom));
-    }
+    warnings.extend(few_degrees_of_freedom(calibration.degrees_of_freedom));
     if calibration.termination.is_minimum()
         && !calibration.certificate.as_ref().is_some_and(Certificate::is_possible)
     {
@@ -62,7 +58,10 @@ pub(super) fn of_lens(
     let value = |parameter| calibration.camera.value(parameter).unwrap_or(0.0);
     warnings.extend(calibration.priors.iter().filter_map(|prior| contradicted(calibration, prior, value)));
     warnings.extend(from_behind(&calibration.cam_from_target));
-    warnings.extend(correlated(&calibration.covariance, calibration.free));
+    let model = calibration.camera.distortion.model();
+    let pairs = correlated(&calibration.covariance, calibration.free);
+    warnings
+        .extend(pairs.into_iter().filter(|pair| model == Model::BrownConrady || !is_by_construction(pair)));
     warnings.extend(focal_length_uncertain(calibration, value));
     let limit = calibration.camera.distortion.monotone_angle();
     if limit < largest_angle {
@@ -136,6 +135,9 @@ const WIDER: f64 = 1.1;
 const ENOUGH: usize = 14;
 
 fn few_degrees_of_freedom(degrees_of_freedom: usize) -> Option<Warning> {
+    if degrees_of_freedom == 0 {
+        return Some(Warning::NoDegreesOfFreedom);
+    }
     if degrees_of_freedom >= ENOUGH {
         return None;
     }
@@ -192,6 +194,21 @@ fn correlated(covariance: &Covariance, free: FreeParameters) -> Vec<Warning> {
         }
     }
     found
+}
+
+/// Whether a pair of parameters makes up for each other in every calibration, so that its correlation tells nothing of
+/// this one: radial coefficients of one lens, whose terms grow with the same angle, and the focal length with those of
+/// the double sphere, which change the scale on the axis. Nothing is to be held there: pixels are known well, however
+/// poorly each of the numbers is. Of a Brown-Conrady lens coefficients are left out as a matter of course, and the pair
+/// says which may be.
+fn is_by_construction(warning: &Warning) -> bool {
+    use Parameter::{Alpha, Fx, Fy, K1, K2, K3, K4, K5, K6, Xi};
+    let is_radial = |p: &Parameter| matches!(p, K1 | K2 | K3 | K4 | K5 | K6 | Xi | Alpha);
+    match warning {
+        Warning::Correlated { a: Fx | Fy, b: Xi | Alpha, .. } => true,
+        Warning::Correlated { a, b, .. } => is_radial(a) && is_radial(b),
+        _ => false,
+    }
 }
 
 /// Warns if the model folds within 1.2 times the largest radius seen.

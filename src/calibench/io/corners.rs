@@ -60,8 +60,8 @@ pub fn parse_corners(file: &str, mut input: impl Read) -> Result<CornerFile, Tab
         (true, true) => {
             Err(unreadable("columns 'weight' and 'sigma_px' say the same twice: keep one of them".into()))
         }
-        (true, false) => weighted(file, &bytes, Column::length("weight"), |weight| weight),
-        (false, true) => weighted(file, &bytes, Column::pixels("sigma_px"), |sigma| 1.0 / sigma),
+        (true, false) => weighted(file, &bytes),
+        (false, true) => spread(file, &bytes),
         (false, false) => {
             let rows = read_table(file, bytes.as_slice(), ["view", "point"], COLUMNS)?;
             grouped(file, rows, |_| None)
@@ -69,15 +69,25 @@ pub fn parse_corners(file: &str, mut input: impl Read) -> Result<CornerFile, Tab
     }
 }
 
-fn weighted(
-    file: &str,
-    bytes: &[u8],
-    column: Column,
-    weight: impl Fn(f64) -> f64,
-) -> Result<CornerFile, TableError> {
+fn weighted(file: &str, bytes: &[u8]) -> Result<CornerFile, TableError> {
+    grouped(file, with_column(file, bytes, Column::length("weight"))?, |numbers| Some(numbers[4]))
+}
+
+/// The corners of a table with standard deviations, which are told here as what they are: as weights nobody wrote them.
+fn spread(file: &str, bytes: &[u8]) -> Result<CornerFile, TableError> {
+    let rows = with_column(file, bytes, Column::pixels("sigma_px"))?;
+    let is_none = |sigma: f64| !(sigma > 0.0 && (1.0 / sigma).is_finite());
+    if let Some(Row { numbers, line, .. }) = rows.iter().find(|row| is_none(row.numbers[4])) {
+        let message =
+            format!("column 'sigma_px': {} is no standard deviation: give a positive number", numbers[4]);
+        return Err(TableError::Unreadable { file: file.into(), line: *line, message });
+    }
+    grouped(file, rows, |numbers| Some(1.0 / numbers[4]))
+}
+
+fn with_column(file: &str, bytes: &[u8], column: Column) -> Result<Vec<Row<2, 5>>, TableError> {
     let [x, y, u, v] = COLUMNS;
-    let rows = read_table(file, bytes, ["view", "point"], [x, y, u, v, column])?;
-    grouped(file, rows, |numbers| Some(weight(numbers[4])))
+    read_table(file, bytes, ["view", "point"], [x, y, u, v, column])
 }
 
 /// The view of rows of points and pixels, weighted if `weight` tells any.
@@ -173,6 +183,14 @@ mod tests {
             nothing,
             "c.csv: view '7': point 0 has weight 0: a weight is positive; leave the mark out instead"
         );
+        for none in ["0", "-0.1"] {
+            assert_eq!(
+                complaint(&format!("view,point,X,Y,u,v,sigma_px\n7,0,0,0,1,2,1\n7,1,1,0,1,2,{none}\n")),
+                format!(
+                    "c.csv:3: column 'sigma_px': {none} is no standard deviation: give a positive number"
+                )
+            );
+        }
         assert!(
             complaint("view,point,X,Y,u,v,weight,sigma_px\n0,0,0,0,1,2,1,1\n").contains("keep one of them")
         );

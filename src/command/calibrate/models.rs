@@ -41,8 +41,13 @@ impl Comparison {
 
     /// A table, the chosen model first, and how sure the choice is.
     pub(super) fn text(&self) -> String {
-        let columns =
-            ["lens model", "RMSE (px)", "on views left out (px)", "BIC over the least", "neighbours"];
+        let columns = [
+            "lens model",
+            "RMSE (px a point)",
+            "views left out (px a coordinate)",
+            "BIC over the least",
+            "neighbours",
+        ];
         let mut rows = table(&columns);
         let least = self.compared.iter().map(|c| c.bic).fold(f64::INFINITY, f64::min);
         for compared in &self.compared {
@@ -64,11 +69,16 @@ impl Comparison {
         let Some(next) = self.compared.get(1) else {
             return format!("chosen: {}, the only one that the views determine", name(&chosen.candidate));
         };
-        let (wins, folds) = chosen.wins_against(next);
+        let predicts = match chosen.wins_against(next) {
+            (_, 0) => "no part of the views can be left out".to_string(),
+            (wins, folds) => format!(
+                "it predicts views that were left out better than {} in {wins} of {folds} parts of the views",
+                name(&next.candidate)
+            ),
+        };
         format!(
-            "chosen: {}; it predicts views that were left out better than {} in {wins} of {folds} parts of the views, and its BIC is {} by {:.1}",
+            "chosen: {}; {predicts}, and its BIC is {} by {:.1}",
             name(&chosen.candidate),
-            name(&next.candidate),
             if chosen.bic < next.bic { "lower" } else { "higher" },
             (chosen.bic - next.bic).abs(),
         )
@@ -85,7 +95,7 @@ pub(super) fn freedoms(fit: &Fit, settings: &Settings) -> Vec<String> {
     let found = explaining_freedoms(&fit.views, settings, &fit.calibration);
     if found.is_empty() {
         return vec![
-            "no lens model and no bow of the board explains these residuals: they may come from the marks themselves"
+            "none of the lens models and shapes of the board that were tried explains these residuals: they may come from the marks themselves"
                 .to_string(),
         ];
     }
@@ -94,8 +104,11 @@ pub(super) fn freedoms(fit: &Fit, settings: &Settings) -> Vec<String> {
 
 fn in_words(freedom: &Freedom, settings: &Settings, before: f64) -> String {
     let Freedom { candidate, rmse_px, correlation, .. } = freedom;
-    let what = if candidate.board != settings.board && candidate.board != Board::Flat {
-        "a bowed board (--board-shape bow:free)".to_string()
+    let what = if candidate.board != settings.board {
+        match candidate.board {
+            Board::Bent { .. } => "a bowed and twisted board (--board-shape bent:free)".to_string(),
+            _ => "a bowed board (--board-shape bow:free)".to_string(),
+        }
     } else if candidate.model == settings.model() {
         format!("coefficients {} free (--free)", candidate.coefficients)
     } else {

@@ -10,7 +10,7 @@ use super::report::{self, LensCalibration};
 use super::{WIDTH, judge, marks, shape, start, walk};
 use crate::board::View;
 use crate::camera::{Model, Parameter};
-use crate::geometry::HomographyError;
+use crate::geometry::{Homography, HomographyError};
 
 /// Where nothing else tells the noise of a coordinate, priors are first weighed with this one, px.
 const USUAL_PX: f64 = 0.1;
@@ -20,8 +20,6 @@ const LEAST_PX: f64 = 1e-4;
 const SETTLED: f64 = 2e-6;
 /// Refinements until it is.
 const MOST_REFITS: usize = 60;
-/// Marks that a pose needs.
-const LEAST_MARKS: usize = 4;
 
 /// [`calibrate`] with a lens of any model ([`Settings::of_model`]), marks of unequal weight
 /// ([`View::with_weights`]) and a board that need not be flat ([`Board`]).
@@ -95,13 +93,16 @@ fn check(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
     }
     // What is neither free nor given a value is refused here.
     settings.model().parameters().try_for_each(|parameter| settings.held(parameter).map(drop))?;
-    match views.iter().position(|view| view.len() < LEAST_MARKS) {
-        Some(view) => {
-            let source = HomographyError::TooFewPoints { need: LEAST_MARKS, got: views[view].len() };
-            Err(CalibrationError::View { view, source })
-        }
-        None => Ok(()),
-    }
+    views.iter().enumerate().try_for_each(|(view, marks)| {
+        spans_a_plane(marks).map_err(|source| CalibrationError::View { view, source })
+    })
+}
+
+/// Whether a view tells its pose. Marks on a line do not, and with but one beside the line they tell it as badly: such a
+/// view is refused, as [`calibrate`] does. The homography of the marks to themselves says it of the board's side; of
+/// pixels it is no question beyond a pinhole.
+pub(in super::super) fn spans_a_plane(view: &View) -> Result<(), HomographyError> {
+    Homography::fit(view.points(), view.points()).map(drop)
 }
 
 fn estimate(views: &[View], settings: &Settings) -> Result<LensCalibration, CalibrationError> {

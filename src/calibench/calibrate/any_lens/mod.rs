@@ -21,6 +21,7 @@ mod start;
 mod walk;
 
 pub use estimate::calibrate_lens;
+pub(super) use estimate::spans_a_plane;
 pub use information::lens_information;
 pub use locate::{Located, locate};
 pub use report::LensCalibration;

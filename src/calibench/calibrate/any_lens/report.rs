@@ -1,7 +1,7 @@
 //! What does a calibration with a lens of any model say? The minimum as a [`Calibration`].
 
 use super::super::conditioning::Conditioning;
-use super::super::estimate::noise_variance;
+use super::super::estimate::{noise_variance, whole};
 use super::super::intervals::Profile;
 use super::super::minimise::Minimum;
 use super::super::target_frame::TargetFrames;
@@ -85,9 +85,9 @@ impl Residuals {
         all
     }
 
-    /// Degrees of freedom, 1 at the least; `settled` unknowns are known from elsewhere.
+    /// Degrees of freedom; `settled` unknowns are known from elsewhere.
     fn freedom(&self, minimum: &Minimum<State, WIDTH>, settled: f64) -> f64 {
-        (2.0 * self.marks as f64 + settled - minimum.system.unknowns() as f64).max(1.0)
+        2.0 * self.marks as f64 + settled - minimum.system.unknowns() as f64
     }
 }
 
@@ -107,7 +107,7 @@ fn largest_angle(problem: &Problem<'_>, state: &State) -> f64 {
 /// covariance is stated.
 pub(super) fn variance(problem: &Problem<'_>, minimum: &Minimum<State, WIDTH>) -> f64 {
     let residuals = Residuals::of(problem, &minimum.state);
-    let freedom = residuals.freedom(minimum, problem.settled(&minimum.system));
+    let freedom = residuals.freedom(minimum, problem.settled(&minimum.system)).max(1.0);
     noise_variance(&residuals.weighted, residuals.square, problem.loss, freedom)
 }
 
@@ -126,6 +126,7 @@ pub(super) fn report(
     let Minimum { state, system, termination, iterations } = &minimum;
     let residuals = Residuals::of(problem, state);
     let freedom = residuals.freedom(&minimum, problem.settled(system));
+    let degrees_of_freedom = whole(freedom);
     let conditioning = Conditioning::of(system, &reduction);
     if !problem.free.is_empty() {
         let why = || "the normal equations are singular".into();
@@ -134,7 +135,7 @@ pub(super) fn report(
     let unit = reduction.covariance().ok_or_else(singular)?;
     let profile = Profile::new(problem, &minimum, &reduction, variance.sqrt());
     let intervals = settings.profile_coverage.zip(profile);
-    let intervals = intervals.map_or(Vec::new(), |(coverage, p)| p.intervals(coverage, freedom as usize));
+    let intervals = intervals.map_or(Vec::new(), |(coverage, p)| p.intervals(coverage, degrees_of_freedom));
     let mut covariance = frames.covariance(unit, &state.cam_from_target, variance);
     covariance.fy_per_fx = problem.fy_per_fx;
     // The board's shape stands behind the camera's parameters.
@@ -159,8 +160,8 @@ pub(super) fn report(
         priors: problem.priors.to_vec(),
         cam_from_target: poses.map(|(view, pose)| frames.at(view).cam_from_target(pose)).collect(),
         rmse_px: (residuals.square / residuals.marks as f64).sqrt(),
-        sigma_px: (residuals.square / freedom).sqrt(),
-        degrees_of_freedom: freedom as usize,
+        sigma_px: (residuals.square / freedom.max(1.0)).sqrt(),
+        degrees_of_freedom,
         covariance,
         conditioning,
         termination: *termination,

@@ -24,6 +24,10 @@ use nalgebra::{SMatrix, SVector};
 const NARROWEST: f64 = 0.05;
 const ANGLES: usize = 14;
 const ANGLE_FACTOR: f64 = 1.3;
+/// Heights of a pixel over its width that are tried beside 1, where it is not known.
+const ASPECTS: [f64; 2] = [0.6, 1.7];
+/// Pixels whose height over width comes out within this part of 1 are taken for square ones.
+const NEARLY_SQUARE: f64 = 0.1;
 /// So many of them are refined.
 const REFINED: usize = 3;
 /// Views that choose the focal length; all of them follow.
@@ -53,45 +57,70 @@ fn pinhole(problem: &Problem<'_>, views: &[View], settings: &Settings) -> Option
     is_seen(problem.views, &state).then_some((state, is_certified))
 }
 
-/// States with lenses of the wanted model like an angle polynomial of two terms.
+/// States with lenses of the wanted model like angle polynomials of two terms: with pixels of the shape that is tied,
+/// otherwise with square ones, and where they come out far from it once fy is free, with pixels of any shape besides. Few
+/// marks lead these astray where square ones are right.
 pub(super) fn by_rays(problem: &Problem<'_>, settings: &Settings) -> Vec<State> {
-    polynomial(problem, settings).map_or(Vec::new(), |state| with_model(problem, &state, settings))
+    let rough = Problem { priors: &[], bend: None, relative_gain: ROUGH_GAIN, ..*problem };
+    let shaped = |fy_per_fx| Problem { fy_per_fx, ..rough };
+    let square = polynomial(&shaped(problem.fy_per_fx.or(Some(1.0))), settings);
+    let is_known = problem.fy_per_fx.is_some() || !problem.free.contains(Parameter::Fy);
+    let any = match &square {
+        _ if is_known => None,
+        Some(state) if is_nearly_square(&shaped(None), state) => None,
+        _ => polynomial(&shaped(None), settings),
+    };
+    [square, any].into_iter().flatten().flat_map(|state| with_model(problem, &state, settings)).collect()
+}
+
+/// Whether pixels stay nearly square where an angle polynomial that takes them for it is refined with fy free.
+fn is_nearly_square(fisheye: &Problem<'_>, state: &State) -> bool {
+    use Parameter::{Cx, Cy, Fx, Fy, K1, K2};
+    let free = FreeParameters::of(&[Fx, Fy, Cx, Cy, K1, K2]);
+    let refined = descend(&Problem { free, max_iterations: LENS_STEPS, ..*fisheye }, state.clone());
+    let camera = refined.state.camera;
+    (camera.fy / camera.fx - 1.0).abs() <= NEARLY_SQUARE
 }
 
 /// The best state with an angle polynomial of two terms.
-fn polynomial(problem: &Problem<'_>, settings: &Settings) -> Option<State> {
-    let (centre, reach) = frame(problem.views, settings);
+fn polynomial(fisheye: &Problem<'_>, settings: &Settings) -> Option<State> {
+    let (centre, reach) = frame(fisheye.views, settings);
     let chosen: Vec<Marks> =
-        chosen_views(problem.views).into_iter().map(|view| problem.views[view].clone()).collect();
-    let few = Problem { views: &chosen, ..fisheye(problem) };
+        chosen_views(fisheye.views).into_iter().map(|view| fisheye.views[view].clone()).collect();
+    let few = Problem { views: &chosen, ..*fisheye };
     let poses_alone = Problem { free: FreeParameters::NONE, max_iterations: POSE_STEPS, ..few };
-    let mut tried = Vec::with_capacity(ANGLES);
+    let aspects = match few.fy_per_fx {
+        Some(known) => vec![known],
+        None => ASPECTS.to_vec(),
+    };
+    let mut tried = Vec::with_capacity(ANGLES * aspects.len());
     let mut angle = NARROWEST;
     for _ in 0..ANGLES {
-        let lens = Lens::ideal(Model::KannalaBrandt);
-        let camera = Camera::with_lens(reach / angle, reach / angle, centre.x, centre.y, lens);
-        if let Some(state) = with_poses(&chosen, camera) {
-            tried.push(descend(&poses_alone, state));
+        for aspect in &aspects {
+            let lens = Lens::ideal(Model::KannalaBrandt);
+            let camera = Camera::with_lens(reach / angle, aspect * reach / angle, centre.x, centre.y, lens);
+            if let Some(state) = with_poses(&chosen, camera) {
+                tried.push(descend(&poses_alone, state));
+            }
         }
         angle *= ANGLE_FACTOR;
     }
     tried.sort_by(|a, b| a.system.cost.total_cmp(&b.system.cost));
-    use Parameter::{Cx, Cy, Fx, K1, K2};
-    let first = Problem { free: FreeParameters::of(&[Fx, K1]), max_iterations: FIRST_STEPS, ..few };
-    let lens = FreeParameters::of(&[Fx, Cx, Cy, K1, K2]);
+    use Parameter::{Cx, Cy, Fx, Fy, K1, K2};
+    let kept = |list: &[Parameter]| {
+        let free = FreeParameters::of(list);
+        if few.fy_per_fx.is_some() { free.without(Fy) } else { free }
+    };
+    let first = Problem { free: kept(&[Fx, Fy, K1]), max_iterations: FIRST_STEPS, ..few };
+    let lens = kept(&[Fx, Fy, Cx, Cy, K1, K2]);
     let better = Problem { free: lens, max_iterations: LENS_STEPS, ..few };
     let refined = tried.into_iter().take(REFINED).map(|m| descend(&better, descend(&first, m.state).state));
     let best = refined
         .filter(|m| m.system.cost.is_finite())
         .min_by(|a, b| a.system.cost.total_cmp(&b.system.cost))?;
-    let whole = Problem { free: lens, max_iterations: LENS_STEPS, ..fisheye(problem) };
-    let state = with_better_tilts(&whole, with_poses(problem.views, best.state.camera)?);
+    let whole = Problem { free: lens, max_iterations: LENS_STEPS, ..*fisheye };
+    let state = with_better_tilts(&whole, with_poses(fisheye.views, best.state.camera)?);
     Some(descend(&whole, state).state)
-}
-
-/// The problem with an angle polynomial, square pixels, and nothing known beforehand, whose answer is a start.
-fn fisheye<'a>(problem: &Problem<'a>) -> Problem<'a> {
-    Problem { fy_per_fx: Some(1.0), priors: &[], bend: None, relative_gain: ROUGH_GAIN, ..*problem }
 }
 
 /// Where the axis may meet the image, and the distance of the farthest pixel from there.
