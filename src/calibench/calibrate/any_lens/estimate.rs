@@ -1,8 +1,9 @@
 //! From marks to a camera with a lens of any model and its uncertainty.
 
 use super::super::estimate::{check_loss_and_priors, check_model};
-use super::super::minimise::{Minimum, RELATIVE_GAIN, descend};
+use super::super::minimise::{Descent, Minimum, RELATIVE_GAIN, descend};
 use super::super::settings::Bend;
+use super::super::system::Step;
 use super::super::target_frame::TargetFrames;
 use super::super::{Board, CalibrationError, Prior, Settings, Termination, calibrate, chunks};
 use super::problem::{Problem, State, rounding_cost};
@@ -18,6 +19,10 @@ const USUAL_PX: f64 = 0.1;
 const LEAST_PX: f64 = 1e-4;
 /// The noise that weighs priors is settled when its variance changes by less than this part.
 const SETTLED: f64 = 2e-6;
+/// Steps that sharpen a minimum.
+const LAST_STEPS: usize = 2;
+/// A cost that rises by less than this part has not risen.
+const NO_RISE: f64 = 1e-12;
 /// Refinements until it is.
 const MOST_REFITS: usize = 60;
 
@@ -150,5 +155,30 @@ fn settled(
         iterations += minimum.iterations;
     }
     minimum.iterations = iterations;
+    if minimum.termination == Termination::Converged {
+        sharpen(&problem, &mut minimum);
+    }
     (problem, minimum)
+}
+
+/// Takes a minimum a few undamped Gauss-Newton steps further: they give digits of the parameters that the sum of squares
+/// does not show, and that damping hides where a combination of them is hardly known.
+fn sharpen(problem: &Problem<'_>, minimum: &mut Minimum<State, WIDTH>) {
+    let mut system = problem.system();
+    let mut step = Step::default();
+    problem.linearise_into(&minimum.state, &mut system);
+    for _ in 0..LAST_STEPS {
+        if system.solve_into(0.0, &mut step).is_none() {
+            return;
+        }
+        let mut next = minimum.state.clone();
+        problem.step(&minimum.state, &step, &mut next);
+        let cost = system.cost;
+        problem.linearise_into(&next, &mut system);
+        if system.cost.is_nan() || system.cost > (1.0 + NO_RISE) * cost {
+            return;
+        }
+        minimum.state = next;
+        minimum.system.clone_from(&system);
+    }
 }
