@@ -198,6 +198,19 @@ mod tests {
     }
 
     #[test]
+    fn this_librarys_detectors_hold_beside_the_end_of_a_sheet() {
+        assert_eq!(failing(|_, answer| answer, &["uneven-light", "dark-surround", "blurred", "tilted"]), []);
+    }
+
+    #[test]
+    fn faint_boards_before_something_bright_are_found() {
+        for scene in super::scenes().into_iter().filter(|scene| scene.id == "faint") {
+            let figures = show(scene, &mut Builtin, 1, 12).unwrap().unwrap().figures();
+            assert_eq!((figures.found, figures.wrong), (12, 0), "{}", scene.kind.name());
+        }
+    }
+
+    #[test]
     fn half_a_pixel_too_many_is_a_bias_and_does_not_turn() {
         let half = |_: &Asked, answer| moved(answer, |u, v| [u + 0.5, v + 0.5]);
         assert_eq!(failing(half, &["clean"]), [Property::Strays, Property::Bias, Property::Turned]);

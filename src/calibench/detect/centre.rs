@@ -1,7 +1,8 @@
 //! Where exactly is the centre of an imaged disc? The ellipse whose edge explains the pixels best.
 //!
 //! 1. Levels: a plane is fitted to the ground around the disc and one to the inside, so that smooth shading
-//!    cancels; the pixels near the edge become coverage `c = (ground - level) / (ground - inside)`.
+//!    cancels; the pixels near the edge become coverage `c = (ground - level) / (ground - inside)`. Where the ring around the disc is not all
+//!    ground, because the sheet ends there, the disc is fitted to the part of its edge that is clear ([`super::beside`]).
 //! 2. Moments of the coverage give the ellipse and a grey-weighted centroid. Pixels clear of the edge count
 //!    as 1 or 0, so only the noise of a narrow ring enters.
 //! 3. One Gauss-Newton step on the centre against the model `c = S(d)`, `d` the distance to the ellipse. It
@@ -9,63 +10,21 @@
 //!    bound of the centre: by symmetry the centre's derivatives are orthogonal to those of axes, levels and
 //!    edge width, whose errors then do not matter.
 
-use super::blob::{Blob, semi_axes};
+use super::beside;
+use super::blob::Blob;
 use super::edge::{Edge, SHARPEST_EDGE_PX, SPREAD_PER_WIDTH};
+use super::ellipse::Ellipse;
 use super::levels::{Levels, PlaneFit};
 use super::region::{Region, around};
 use crate::geometry::Vec2;
 use crate::raster::{Level, Raster};
 use nalgebra::Matrix2;
 
-/// An ellipse as a quadratic form: `rho^2 = (p - centre)^T form (p - centre)`, 1 on the ellipse.
-#[derive(Debug, Clone, Copy)]
-struct Ellipse {
-    centre: Vec2,
-    covariance: Matrix2<f64>,
-    form: Matrix2<f64>,
-    short_px: f64,
-    long_px: f64,
-}
-
-impl Ellipse {
-    fn new(centre: Vec2, covariance: Matrix2<f64>) -> Option<Ellipse> {
-        let (short_px, long_px) = semi_axes(&covariance);
-        let form = (covariance * 4.0).try_inverse()?;
-        let is_finite = centre.iter().chain(form.iter()).all(|x| x.is_finite());
-        (is_finite && short_px >= 1.0).then_some(Ellipse { centre, covariance, form, short_px, long_px })
-    }
-
-    /// The ellipse with its outline moved by a distance.
-    fn grown(&self, by_px: f64) -> Option<Region> {
-        Region::new(self.centre, &self.covariance, by_px)
-    }
-
-    /// Distance to the ellipse (positive outside) to first order, and its gradient.
-    fn distance(&self, offset: &Vec2) -> (f64, Vec2) {
-        let half_gradient = self.form * offset;
-        let rho_sq = offset.dot(&half_gradient);
-        let norm_sq = half_gradient.dot(&half_gradient);
-        // At the centre itself: far inside, no direction.
-        if norm_sq == 0.0 {
-            return (-self.short_px, Vec2::zeros());
-        }
-        let inverse_norm = 1.0 / norm_sq.sqrt();
-        ((rho_sq - rho_sq.sqrt()) * inverse_norm, half_gradient * inverse_norm)
-    }
-
-    /// Circumference, by Ramanujan's first approximation (relative error below 1e-4 for axis ratios above
-    /// 1/4).
-    fn circumference_px(&self) -> f64 {
-        let (a, b) = (self.long_px, self.short_px);
-        std::f64::consts::PI * (3.0 * (a + b) - ((3.0 * a + b) * (a + 3.0 * b)).sqrt())
-    }
-
-    /// Levels inside of the edge by `clear_px`, and outside of it from there to a few pixels on.
-    fn levels<T: Level>(&self, image: &Raster<T>, clear_px: f64) -> Option<Levels> {
-        let (inner, clear) = (self.grown(-clear_px)?, self.grown(clear_px)?);
-        let outer = self.grown(outer_px(self, clear_px))?;
-        Levels::fit(image, &self.centre, &inner, &clear, &outer)
-    }
+/// Levels inside of an ellipse's edge by `clear_px`, and outside of it from there to a few pixels on.
+fn levels<T: Level>(image: &Raster<T>, ellipse: &Ellipse, clear_px: f64) -> Option<Levels> {
+    let (inner, clear) = (ellipse.grown(-clear_px)?, ellipse.grown(clear_px)?);
+    let outer = ellipse.grown(outer_px(ellipse, clear_px))?;
+    Levels::fit(image, &ellipse.centre, &inner, &clear, &outer)
 }
 
 /// The pixels of `outer` that are not in `inner`, if there is one.
@@ -159,26 +118,69 @@ pub(super) fn refine<T: Level>(image: &Raster<T>, centre: Vec2, covariance: Matr
     let rough = Ellipse::new(centre, covariance)?;
     // First look: the edge may be soft, the blob small.
     let clear_px = 2.5f64.min(0.5 * rough.short_px);
-    let levels = rough.levels(image, clear_px)?;
-    let (ellipse, edge_px) = moments(image, &rough, &levels, clear_px)?;
-    // Second look, with the edge's own width.
-    let edge_px = edge_px.clamp(SHARPEST_EDGE_PX, clear_px.max(SHARPEST_EDGE_PX));
-    let edge = Edge::new(edge_px);
-    let levels = ellipse.levels(image, 0.1 + edge.reach_px())?;
-    let (moved, misfit) = step(image, &ellipse, &levels, &edge)?;
-    let blob = Blob {
-        centre_px: ellipse.centre + moved,
-        covariance_px2: ellipse.covariance,
-        edge_px,
-        contrast: levels.contrast(),
-        misfit,
-    };
-    let is_finite = blob.centre_px.iter().chain(blob.covariance_px2.iter()).all(|x| x.is_finite());
-    (is_finite && moved.norm() < 0.5 * ellipse.short_px).then_some(blob)
+    let narrow = Look::new(image, &rough, clear_px)?;
+    let wide = wider(clear_px, narrow.edge_px, &rough).and_then(|px| Look::new(image, &rough, px));
+    let is_even = |look: &Look| look.levels.unevenness() <= EVEN;
+    let is_wide_even = wide.as_ref().is_some_and(is_even);
+    let is_ground = is_even(&narrow) && wide.iter().all(is_even);
+    if !is_ground && let Some(blob) = beside::refine(image, &rough, clear_px) {
+        return Some(blob);
+    }
+    let widest = wide.filter(|_| is_wide_even).and_then(|wide| wide.refined(image));
+    widest.or_else(|| narrow.refined(image))
 }
+
+/// A first look at a disc.
+struct Look {
+    levels: Levels,
+    ellipse: Ellipse,
+    edge_px: f64,
+    clear_px: f64,
+}
+
+impl Look {
+    /// With levels taken `clear_px` from the edge.
+    fn new<T: Level>(image: &Raster<T>, rough: &Ellipse, clear_px: f64) -> Option<Look> {
+        let levels = levels(image, rough, clear_px)?;
+        let (ellipse, edge_px) = moments(image, rough, &levels, clear_px)?;
+        Some(Look { levels, ellipse, edge_px, clear_px })
+    }
+
+    /// Second look, with the edge's own width.
+    fn refined<T: Level>(&self, image: &Raster<T>) -> Option<Blob> {
+        let Look { ellipse, clear_px, .. } = self;
+        let edge_px = self.edge_px.clamp(SHARPEST_EDGE_PX, clear_px.max(SHARPEST_EDGE_PX));
+        let edge = Edge::new(edge_px);
+        let levels = levels(image, ellipse, 0.1 + edge.reach_px())?;
+        let (moved, misfit) = step(image, ellipse, &levels, &edge)?;
+        let blob = Blob {
+            centre_px: ellipse.centre + moved,
+            covariance_px2: ellipse.covariance,
+            edge_px,
+            contrast: levels.contrast(),
+            misfit,
+        };
+        let is_finite = blob.centre_px.iter().chain(blob.covariance_px2.iter()).all(|x| x.is_finite());
+        (is_finite && moved.norm() < 0.5 * ellipse.short_px).then_some(blob)
+    }
+}
+
+/// Means of the parts of a ring that differ from a plane by less, as a fraction of the contrast, are of one ground. What may lie beside it
+/// is looked at closely only where they differ by more.
+const EVEN: f64 = 0.005;
+
+/// Where to look for levels instead if an edge of this half-width fills what was looked at; `None` where it does not, or the mark has no
+/// room for more.
+pub(super) fn wider(clear_px: f64, edge_px: f64, ellipse: &Ellipse) -> Option<f64> {
+    let most_px = LARGEST_CLEAR * ellipse.short_px;
+    (edge_px >= clear_px && clear_px < most_px).then(|| (2.0 * clear_px).min(most_px))
+}
+
+/// Part of the smaller semi-axis that an edge may fill: the middle shows the mark's level.
+pub(super) const LARGEST_CLEAR: f64 = 0.75;
 
 /// How far around the mark its ground is looked at: a few pixels, more for larger marks, but less than half
 /// of the gap to a neighbour that is as far away as the mark is wide.
-fn outer_px(ellipse: &Ellipse, clear_px: f64) -> f64 {
+pub(super) fn outer_px(ellipse: &Ellipse, clear_px: f64) -> f64 {
     clear_px + (0.5 * ellipse.short_px).clamp(1.0, 8.0)
 }

@@ -10,6 +10,9 @@ use std::ops::Range;
 /// Fewest pixels that fix a plane; with fewer the level is taken as constant.
 const PLANE_PIXELS: f64 = 40.0;
 
+/// Parts of the ring around a mark whose mean levels are compared: above, below, and three on either side.
+const PARTS: usize = 8;
+
 /// Sums over pixels, for a plane `level = a + b x + c y`.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PlaneFit {
@@ -37,34 +40,79 @@ impl PlaneFit {
         self.yy += n * y * y;
     }
 
-    /// Adds the pixels of a row, the first at `(x, y)`.
-    fn add<T: Level>(&mut self, x: f64, y: f64, samples: &[T]) {
+    /// Adds the pixels of a row, the first at `(x, y)`; the sum of their levels.
+    fn add<T: Level>(&mut self, x: f64, y: f64, samples: &[T]) -> f64 {
         if samples.is_empty() {
-            return;
+            return 0.0;
         }
         self.add_places(x, y, samples.len());
         let (sum, weighted) = T::sums(samples);
         self.level += Vector3::new(sum, x * sum + weighted, y * sum);
+        sum
     }
 
-    fn solve(&self) -> Option<Plane> {
+    /// Adds a pixel.
+    pub fn add_pixel(&mut self, place: &Vec2, level: f64) {
+        self.add_weighted(place, level, 1.0);
+    }
+
+    /// Adds as many pixels as `weight` says, all at one place.
+    pub fn add_weighted(&mut self, place: &Vec2, level: f64, weight: f64) {
+        let (x, y) = (weight * place.x, weight * place.y);
+        self.n += weight;
+        self.x += x;
+        self.y += y;
+        self.xx += x * place.x;
+        self.xy += x * place.y;
+        self.yy += y * place.y;
+        self.level += Vector3::new(weight, x, y) * level;
+    }
+
+    /// What the pixels of a region add up to, places counted from `centre`.
+    pub fn within<T: Level>(image: &Raster<T>, centre: &Vec2, region: &Region) -> PlaneFit {
+        let mut sums = PlaneFit::default();
+        for y in region.rows(image.height()) {
+            let run = region.columns(y, image.width());
+            sums.add(run.start as f64 - centre.x, y as f64 - centre.y, &image.row(y)[run]);
+        }
+        sums
+    }
+
+    fn normal(&self) -> Matrix3<f64> {
+        Matrix3::new(self.n, self.x, self.y, self.x, self.xx, self.xy, self.y, self.xy, self.yy)
+    }
+
+    /// Variance of the plane's level at a place, where a pixel's is 1.
+    pub fn variance_at(&self, place: &Vec2) -> Option<f64> {
+        let row = Vector3::new(1.0, place.x, place.y);
+        Some(row.dot(&self.normal().cholesky()?.solve(&row)))
+    }
+
+    /// The plane of least squares.
+    pub fn solve(&self) -> Option<Plane> {
         if self.n == 0.0 {
             return None;
         }
-        let constant = Plane(Vector3::new(self.level[0] / self.n, 0.0, 0.0));
+        let constant = Plane::constant(self.level[0] / self.n);
         if self.n < PLANE_PIXELS {
             return Some(constant);
         }
-        let normal = Matrix3::new(self.n, self.x, self.y, self.x, self.xx, self.xy, self.y, self.xy, self.yy);
-        Some(normal.cholesky().map_or(constant, |factor| Plane(factor.solve(&self.level))))
+        Some(self.normal().cholesky().map_or(constant, |factor| Plane(factor.solve(&self.level))))
     }
 }
 
+/// A level that changes evenly from place to place.
 #[derive(Debug, Clone, Copy)]
-struct Plane(Vector3<f64>);
+pub struct Plane(Vector3<f64>);
 
 impl Plane {
-    fn at(&self, p: &Vec2) -> f64 {
+    /// The same level everywhere.
+    pub fn constant(level: f64) -> Plane {
+        Plane(Vector3::new(level, 0.0, 0.0))
+    }
+
+    /// Its level at an offset from the centre.
+    pub fn at(&self, p: &Vec2) -> f64 {
         self.0[0] + self.0[1] * p.x + self.0[2] * p.y
     }
 }
@@ -74,6 +122,34 @@ impl Plane {
 pub struct Levels {
     ground: Plane,
     mark: Plane,
+    /// Farthest mean of a part of the ring from the ground's plane.
+    uneven: f64,
+}
+
+/// A part of the ring.
+#[derive(Debug, Clone, Copy, Default)]
+struct Part {
+    count: f64,
+    place: Vec2,
+    level: f64,
+}
+
+impl Part {
+    /// Adds a run of a row with the sum of its levels, `start` the place of its first pixel.
+    fn add(&mut self, start: Vec2, length: usize, sum: f64) {
+        let n = length as f64;
+        self.count += n;
+        self.place += Vec2::new(n * (start.x + 0.5 * (n - 1.0)), n * start.y);
+        self.level += sum;
+    }
+
+    /// How far its mean is from a plane.
+    fn beside(&self, plane: &Plane) -> f64 {
+        if self.count == 0.0 {
+            return 0.0;
+        }
+        (self.level / self.count - plane.at(&(self.place / self.count))).abs()
+    }
 }
 
 impl Levels {
@@ -87,29 +163,37 @@ impl Levels {
         outer: &Region,
     ) -> Option<Levels> {
         let (mut ground, mut mark) = (PlaneFit::default(), PlaneFit::default());
+        let mut parts = [Part::default(); PARTS];
         let width = image.width();
         let (inner_rows, clear_rows) = (inner.rows(image.height()), clear.rows(image.height()));
         for y in outer.rows(image.height()) {
             let (row, dy) = (image.row(y), y as f64 - centre.y);
-            let add = |fit: &mut PlaneFit, run: Range<usize>| {
-                fit.add(run.start as f64 - centre.x, dy, &row[run]);
+            let mut add_ground = |part: usize, run: Range<usize>| {
+                let (start, length) = (Vec2::new(run.start as f64 - centre.x, dy), run.len());
+                let sum = ground.add(start.x, dy, &row[run]);
+                parts[part].add(start, length, sum);
             };
             let whole = outer.columns(y, width);
             if clear_rows.contains(&y) {
                 let [left, right] = around(&whole, &clear.columns(y, width));
-                add(&mut ground, left);
-                add(&mut ground, right);
+                let third = 3 * (y - clear_rows.start) / clear_rows.len();
+                add_ground(2 + third, left);
+                add_ground(5 + third, right);
             } else {
-                add(&mut ground, whole);
+                add_ground(usize::from(y >= clear_rows.end), whole);
             }
             if inner_rows.contains(&y) {
-                add(&mut mark, inner.columns(y, width));
+                let run = inner.columns(y, width);
+                mark.add(run.start as f64 - centre.x, dy, &row[run]);
             }
         }
-        Levels::of(&ground, &mark)
+        let levels = Levels::of(&ground, &mark)?;
+        let uneven = parts.iter().map(|part| part.beside(&levels.ground)).fold(0.0, f64::max);
+        Some(Levels { uneven, ..levels })
     }
 
-    fn of(ground: &PlaneFit, mark: &PlaneFit) -> Option<Levels> {
+    /// The levels of a ground and of a mark, by what their pixels add up to.
+    pub fn of(ground: &PlaneFit, mark: &PlaneFit) -> Option<Levels> {
         let (own, middle) = (mark.solve()?, Vec2::new(mark.x, mark.y) / mark.n);
         let ground = ground.solve()?;
         // Light falls on mark and ground alike, and the ground, being wider, shows its slope with less noise.
@@ -120,7 +204,12 @@ impl Levels {
         } else {
             own
         };
-        Some(Levels { ground, mark })
+        Some(Levels { ground, mark, uneven: 0.0 })
+    }
+
+    /// Farthest mean of a part of the ring from the ground's plane, as a fraction of the contrast: something else may lie there.
+    pub fn unevenness(&self) -> f64 {
+        self.uneven / self.contrast().abs()
     }
 
     /// Ground minus mark at the centre.

@@ -1,5 +1,6 @@
 //! Where are the marks in a photograph? Discs, ordered grids of discs, chessboard corners.
 
+mod beside;
 mod bias;
 mod blob;
 mod centre;
@@ -8,6 +9,7 @@ mod components;
 mod corner;
 mod discs;
 mod edge;
+mod ellipse;
 mod grid;
 mod lattice;
 mod levels;
@@ -18,6 +20,7 @@ mod orientation;
 mod rectangle;
 mod region;
 mod saddle;
+mod sectors;
 mod seen;
 mod smoothness;
 mod threshold;

@@ -26,10 +26,15 @@ pub struct Search {
     pub least_contrast: f64,
     /// The same as a fraction of the range of the whole image; the greater of the two counts.
     pub least_share: f64,
+    /// Levels beyond these count as these: what is far brighter or darker than marks and ground.
+    pub within: (f64, f64),
 }
 
 /// The first look: half-way.
-const FIRST: Search = Search { part: 0.5, least_contrast: 0.0, least_share: LEAST_CONTRAST };
+const FIRST: Search = Search { part: 0.5, least_contrast: 0.0, least_share: LEAST_CONTRAST, within: ALL };
+
+/// Every level.
+pub const ALL: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 
 /// What a tile shows against its threshold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,8 +68,10 @@ impl<T: Level> Thresholds<T> {
         if low.partial_cmp(&high) != Some(std::cmp::Ordering::Less) {
             return None;
         }
-        let least_contrast = search.least_contrast.max(search.least_share * (high.to_f64() - low.to_f64()));
-        let seen = tiles.neighbourhood_levels(search.part, least_contrast);
+        let (darkest, brightest) = search.within;
+        let range = high.to_f64().min(brightest) - low.to_f64().max(darkest);
+        let least_contrast = search.least_contrast.max(search.least_share * range);
+        let seen = tiles.neighbourhood_levels(search.part, least_contrast, search.within);
         let levels: Vec<T> =
             inherited(seen, tiles.columns, tiles.rows).into_iter().map(T::at_least).collect();
         let sides = levels
@@ -130,11 +137,16 @@ impl<T: Level> Extremes<T> {
     }
 
     /// A part of the way between the extremes of the 3 x 3 tiles around each tile, where they differ enough.
-    fn neighbourhood_levels(&self, part: f64, least_contrast: f64) -> Vec<Option<f64>> {
+    fn neighbourhood_levels(
+        &self,
+        part: f64,
+        least_contrast: f64,
+        (darkest, brightest): (f64, f64),
+    ) -> Vec<Option<f64>> {
         let low = over_neighbours(&self.low, self.columns, lesser);
         let high = over_neighbours(&self.high, self.columns, greater);
         let level = |(low, high): (&T, &T)| {
-            let (low, high) = (low.to_f64(), high.to_f64());
+            let (low, high) = (low.to_f64().max(darkest), high.to_f64().min(brightest));
             (high - low >= least_contrast).then_some((1.0 - part) * low + part * high)
         };
         low.iter().zip(&high).map(level).collect()
