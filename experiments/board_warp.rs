@@ -8,7 +8,11 @@
 //! looks wrong, and the stated covariance is a lie; residuals that agree with their neighbours' tell of it where the
 //! RMSE does not. With the bows estimated bias and lie are gone, at the price of a little spread.
 //!
-//! What it cannot show: boards that bend otherwise, or differently in every view.
+//! A board that bends otherwise is calibrated with its marks measured in space besides.
+//!
+//! What it cannot show: boards that bend differently in every view.
+
+mod wave;
 
 use calibench::board::View;
 use calibench::calibrate::{Board, LensCalibration, Settings, Warning, calibrate_lens};
@@ -63,6 +67,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     claim_repaired(&mut record, &levels);
     record.table(table(&levels));
     record.figure(figure(&levels, context.seed));
+    wave::report(&mut record, context)?;
     Ok(record)
 }
 
@@ -76,11 +81,13 @@ fn poses() -> Vec<Pose> {
     (0..VIEWS).map(pose).collect()
 }
 
-/// What the camera sees of a board whose middle lies `bow_mm` over its ends, with noise from `noise`.
-fn photograph(bow_mm: f64, mut noise: impl FnMut() -> f64) -> Result<Vec<View>, ExperimentError> {
+/// What the camera sees of a board: `height_mm` of every mark over the plane, `noise` of every coordinate.
+fn photograph(
+    height_mm: impl Fn(&Vec2) -> f64,
+    mut noise: impl FnMut() -> f64,
+) -> Result<Vec<View>, ExperimentError> {
     let (camera, points) = (Truth::example_camera(), Truth::example_board().points());
-    let length = points.iter().map(|p| p.x.abs()).fold(0.0, f64::max);
-    let on_board = |p: &Vec2| Vec3::new(p.x, p.y, bow_mm * (1.0 - (p.x / length) * (p.x / length)));
+    let on_board = |p: &Vec2| Vec3::new(p.x, p.y, height_mm(p));
     let mut view = |pose: &Pose| {
         let pixel = |p: &Vec2| camera.project(&pose.apply(&on_board(p)));
         let exact: Option<Vec<Vec2>> = points.iter().map(pixel).collect();
@@ -89,6 +96,25 @@ fn photograph(bow_mm: f64, mut noise: impl FnMut() -> f64) -> Result<Vec<View>, 
         View::new(points.clone(), noisy).map_err(ExperimentError::at("scene"))
     };
     poses().iter().map(&mut view).collect()
+}
+
+/// Half of the board's length, mm.
+fn half_length_mm() -> f64 {
+    Truth::example_board().points().iter().map(|p| p.x.abs()).fold(0.0, f64::max)
+}
+
+/// The same of a board whose middle lies `bow_mm` over its ends.
+fn photograph_bowed(bow_mm: f64, noise: impl FnMut() -> f64) -> Result<Vec<View>, ExperimentError> {
+    let half = half_length_mm();
+    photograph(|p| bow_mm * (1.0 - (p.x / half) * (p.x / half)), noise)
+}
+
+/// The views calibrated as of a flat board, and with two bows estimated.
+fn calibrated(views: &[View]) -> Result<[LensCalibration; 2], ExperimentError> {
+    let flat = Settings::new(FREE).with_image_size(Truth::EXAMPLE_IMAGE);
+    let bowed = flat.clone().with_board(Board::Bowed { standard_deviation: f64::INFINITY });
+    let calibrate = |settings| calibrate_lens(views, settings).map_err(ExperimentError::at("calibration"));
+    Ok([calibrate(&flat)?, calibrate(&bowed)?])
 }
 
 /// One set of photographs, calibrated both ways.
@@ -100,15 +126,12 @@ struct Trial {
 impl Trial {
     fn new(bow_mm: f64, seed: u64, trial: u64) -> Result<Trial, ExperimentError> {
         let mut stream = Stream::open(StreamKey { seed, scenario: "board-warp", trial, purpose: "noise" });
-        Trial::of(&photograph(bow_mm, || SIGMA_PX * stream.normal())?)
+        Trial::of(&photograph_bowed(bow_mm, || SIGMA_PX * stream.normal())?)
     }
 
     fn of(views: &[View]) -> Result<Trial, ExperimentError> {
-        let settings = Settings::new(FREE).with_image_size(Truth::EXAMPLE_IMAGE);
-        let bowed = settings.clone().with_board(Board::Bowed { standard_deviation: f64::INFINITY });
-        let calibrate =
-            |settings| calibrate_lens(views, settings).map_err(ExperimentError::at("calibration"));
-        Ok(Trial { flat: calibrate(&settings)?, bowed: calibrate(&bowed)? })
+        let [flat, bowed] = calibrated(views)?;
+        Ok(Trial { flat, bowed })
     }
 }
 
@@ -186,8 +209,9 @@ fn report(record: &mut Record, levels: &[Level]) {
 
 /// Without noise, the bias of fx of twice the bow is twice as large.
 fn claim_flat_is_biased(record: &mut Record) -> Result<(), ExperimentError> {
-    let bias =
-        |bow_mm: f64| Trial::of(&photograph(bow_mm, || 0.0)?).map(|trial| error(&trial.flat, Parameter::Fx));
+    let bias = |bow_mm: f64| {
+        Trial::of(&photograph_bowed(bow_mm, || 0.0)?).map(|trial| error(&trial.flat, Parameter::Fx))
+    };
     let (one, two) = (bias(0.1)?, bias(0.2)?);
     record
         .group("px", band())
