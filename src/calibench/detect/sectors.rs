@@ -240,7 +240,7 @@ mod tests {
 
     #[test]
     fn a_ring_without_a_ground_has_none() {
-        let striped = ring(|p| if (p.x + 40.0) as usize / 4 % 2 == 0 { 0.2 } else { 0.8 });
+        let striped = ring(|p| if ((p.x + 40.0) as usize / 4).is_multiple_of(2) { 0.2 } else { 0.8 });
         let found = ground(&striped, 0.6);
         // Stripes are noise of half the contrast: nothing disagrees with their mean.
         assert!(found.is_none_or(|ground| ground.fills == [true; SECTORS]));
