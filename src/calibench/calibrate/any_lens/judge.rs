@@ -63,7 +63,8 @@ pub(super) fn judge(
     Ok(Judged { minimum, reduction, variance, starts: met.len(), skewed, rival })
 }
 
-/// Notes the minimum that a start leads to, and takes it where it is better.
+/// Notes the minimum that a start leads to, and takes it where it is better: also once it is refined to the end, which
+/// a valley may turn out not to have.
 fn take_better(
     problem: &Problem<'_>,
     minimum: &mut Minimum<State, WIDTH>,
@@ -71,11 +72,15 @@ fn take_better(
     met: &mut Vec<Met<Lens>>,
 ) -> bool {
     let rough = descend(&Problem { relative_gain: ROUGH_GAIN, ..*problem }, start);
-    let is_better = walk::is_better(problem, &rough, minimum);
-    met.push(walk::met(&rough));
+    if !walk::is_better(problem, &rough, minimum) {
+        met.push(walk::met(&rough));
+        return false;
+    }
+    let before = minimum.iterations + rough.iterations;
+    let next = descend(problem, rough.state);
+    met.push(walk::met(&next));
+    let is_better = walk::is_better(problem, &next, minimum);
     if is_better {
-        let before = minimum.iterations + rough.iterations;
-        let next = descend(problem, rough.state);
         *minimum = Minimum { iterations: before + next.iterations, ..next };
     }
     is_better

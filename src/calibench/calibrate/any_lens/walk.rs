@@ -8,7 +8,7 @@ use super::{WIDTH, report, start};
 use crate::board::View;
 use crate::camera::Lens;
 
-/// The best of the minima, and all that were met, to [`ROUGH_GAIN`].
+/// The best of the minima, and all that were met, most of them to [`ROUGH_GAIN`].
 pub(super) struct Walked {
     pub best: Minimum<State, WIDTH>,
     pub met: Vec<Met<Lens>>,
@@ -30,11 +30,27 @@ pub(super) fn walk(
     if !(is_certified && is_found) {
         minima.extend(refined(problem, start::by_rays(problem, settings)));
     }
+    let rough = best(problem, &minima).ok_or(CalibrationError::NoImage { model: settings.model() })?;
+    follow(problem, &mut minima[rough]);
+    if minima[rough].termination != Termination::Converged {
+        // Its valley goes on and on, and another start may lead to a minimum that is as good.
+        minima.iter_mut().for_each(|minimum| follow(problem, minimum));
+    }
     let met = minima.iter().map(met).collect();
-    let better = |best, next| if is_better(problem, &next, &best) { next } else { best };
-    let best = minima.into_iter().reduce(better);
-    let best = best.ok_or(CalibrationError::NoImage { model: settings.model() })?;
-    Ok(Walked { best, met })
+    let best = best(problem, &minima).unwrap_or(rough);
+    Ok(Walked { best: minima.swap_remove(best), met })
+}
+
+/// Refines a minimum to the end.
+fn follow(problem: &Problem<'_>, minimum: &mut Minimum<State, WIDTH>) {
+    let end = descend(problem, minimum.state.clone());
+    *minimum = Minimum { iterations: minimum.iterations + end.iterations, ..end };
+}
+
+/// Which of the minima is the best.
+fn best(problem: &Problem<'_>, minima: &[Minimum<State, WIDTH>]) -> Option<usize> {
+    let better = |best, next| if is_better(problem, &minima[next], &minima[best]) { next } else { best };
+    (0..minima.len()).reduce(better)
 }
 
 fn refined(problem: &Problem<'_>, starts: Vec<State>) -> Vec<Minimum<State, WIDTH>> {
