@@ -116,6 +116,35 @@ fn a_double_sphere_is_found_behind_pixels_far_from_square() {
     }
 }
 
+/// Five marks a view may lead a pinhole's first minimum astray, and with it all that starts there.
+#[test]
+fn a_fisheye_behind_tall_pixels_is_found_from_five_marks_a_view() {
+    let truth = camera(Model::KannalaBrandt, 900.0, 1800.0, &[-0.02, 0.004, 0.0, 0.0]);
+    let mut found_sets = 0;
+    for set in 0..16 {
+        let marks = |view: usize| five_marks(100 * set + view as u64);
+        let views = seen(&truth, &poses(16, 90.0), marks, 0.0);
+        let found = match calibrate_lens(&views, &settings(Model::KannalaBrandt)) {
+            Err(CalibrationError::View { .. }) => continue, // Four of a view's five marks lie on a line.
+            found => found.unwrap(),
+        };
+        assert_eq!(found.degrees_of_freedom, 56);
+        let square = 56.0 * (found.sigma_px / 0.1) * (found.sigma_px / 0.1);
+        // Chi-squared with 56 degrees of freedom: 104.1 is exceeded once in ten thousand.
+        assert!(square < 104.1, "{set}: {square} {:?}", found.camera);
+        found_sets += 1;
+    }
+    assert!(found_sets >= 14, "{found_sets}");
+}
+
+/// Five marks of the board, drawn without replacement.
+fn five_marks(trial: u64) -> Vec<Vec2> {
+    let mut stream = Stream::open(StreamKey { seed: 12, scenario: "five-marks", trial, purpose: "marks" });
+    let mut drawn: Vec<(f64, Vec2)> = board().into_iter().map(|p| (stream.normal(), p)).collect();
+    drawn.sort_by(|a, b| a.0.total_cmp(&b.0));
+    drawn.into_iter().take(5).map(|(_, p)| p).collect()
+}
+
 #[test]
 fn coefficients_of_one_polynomial_are_correlated_without_a_word() {
     let views = seen(&fisheye(), &poses(15, 60.0), |_| board(), 0.0);
