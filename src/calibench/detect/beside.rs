@@ -9,7 +9,7 @@
 //! ```
 
 use super::blob::Blob;
-use super::centre::{LARGEST_CLEAR, outer_px, wider};
+use super::centre::{LARGEST_CLEAR, for_each_between, outer_px, wider};
 use super::edge::{Edge, SHARPEST_EDGE_PX, SPREAD_PER_WIDTH};
 use super::ellipse::Ellipse;
 use super::levels::{Levels, PlaneFit};
@@ -88,7 +88,7 @@ fn levels_of<T: Level>(image: &Raster<T>, ellipse: &Ellipse, clear_px: f64) -> O
     let mark = PlaneFit::within(image, &ellipse.centre, &ellipse.grown(-inner_px)?);
     let outer_px = outer_px(ellipse, clear_px);
     let mut ring = Vec::new();
-    for_each_near(image, ellipse, outer_px, |place, level| {
+    for_each_near(image, ellipse, outer_px, |&place, level| {
         let (d, _) = ellipse.distance(&place);
         if (clear_px..outer_px).contains(&d) {
             ring.push(RingPixel { place, level, sector: sector_of(&place), is_near: d < clear_px + NEAR_PX });
@@ -110,7 +110,7 @@ fn edge_pixels<T: Level>(
     reach_px: f64,
 ) -> Option<Vec<EdgePixel>> {
     let mut pixels = Vec::new();
-    for_each_near(image, ellipse, reach_px, |place, level| {
+    for_each_near(image, ellipse, reach_px, |&place, level| {
         let (d, _) = ellipse.distance(&place);
         let is_clear = ground.is_near[sector_of(&place)];
         if d.abs() < reach_px && (is_clear || d < 0.0) {
@@ -146,7 +146,7 @@ fn fit(start: &Ellipse, pixels: &[EdgePixel], edge: &Edge) -> Option<(Ellipse, f
             let (model, slope) = edge.coverage(d, &direction);
             let residual = pixel.coverage - model;
             let half = 0.5 / (ellipse.form * q).norm();
-            // dS/dd = -slope; the form in units of itself, so that all unknowns are of the size of a pixel.
+            // dS/dd = -slope, and the form's two equal entries are one unknown.
             let by_form = Vec2::new(q.x, q.y) * (-slope * half);
             let by = SVector::<f64, PARAMETERS>::from([
                 slope * direction.x,
@@ -177,15 +177,9 @@ fn for_each_near<T: Level>(
     image: &Raster<T>,
     ellipse: &Ellipse,
     reach_px: f64,
-    mut visit: impl FnMut(Vec2, f64),
+    visit: impl FnMut(&Vec2, f64),
 ) -> Option<()> {
-    let region = ellipse.grown(reach_px)?;
-    for y in region.rows(image.height()) {
-        let columns = region.columns(y, image.width());
-        for (x, sample) in columns.clone().zip(&image.row(y)[columns]) {
-            visit(Vec2::new(x as f64, y as f64) - ellipse.centre, sample.to_f64());
-        }
-    }
+    for_each_between(image, &ellipse.centre, None, &ellipse.grown(reach_px)?, visit);
     Some(())
 }
 

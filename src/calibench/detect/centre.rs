@@ -28,7 +28,7 @@ fn levels<T: Level>(image: &Raster<T>, ellipse: &Ellipse, clear_px: f64) -> Opti
 }
 
 /// The pixels of `outer` that are not in `inner`, if there is one.
-fn for_each_between<T: Level>(
+pub(super) fn for_each_between<T: Level>(
     image: &Raster<T>,
     centre: &Vec2,
     inner: Option<&Region>,

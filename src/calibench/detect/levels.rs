@@ -1,6 +1,7 @@
 //! How bright are ground and mark here? A plane through each, clear of the edge, so that smooth shading
 //! cancels.
 
+use super::mean::Mean;
 use super::region::{Region, around};
 use crate::geometry::Vec2;
 use crate::raster::{Level, Raster};
@@ -126,32 +127,6 @@ pub struct Levels {
     uneven: f64,
 }
 
-/// A part of the ring.
-#[derive(Debug, Clone, Copy, Default)]
-struct Part {
-    count: f64,
-    place: Vec2,
-    level: f64,
-}
-
-impl Part {
-    /// Adds a run of a row with the sum of its levels, `start` the place of its first pixel.
-    fn add(&mut self, start: Vec2, length: usize, sum: f64) {
-        let n = length as f64;
-        self.count += n;
-        self.place += Vec2::new(n * (start.x + 0.5 * (n - 1.0)), n * start.y);
-        self.level += sum;
-    }
-
-    /// How far its mean is from a plane.
-    fn beside(&self, plane: &Plane) -> f64 {
-        if self.count == 0.0 {
-            return 0.0;
-        }
-        (self.level / self.count - plane.at(&(self.place / self.count))).abs()
-    }
-}
-
 impl Levels {
     /// Fits the ground between `clear` and `outer` and the mark within `inner`, places counted from `centre`;
     /// `None` where either has no pixel.
@@ -163,7 +138,7 @@ impl Levels {
         outer: &Region,
     ) -> Option<Levels> {
         let (mut ground, mut mark) = (PlaneFit::default(), PlaneFit::default());
-        let mut parts = [Part::default(); PARTS];
+        let mut parts = [Mean::default(); PARTS];
         let width = image.width();
         let (inner_rows, clear_rows) = (inner.rows(image.height()), clear.rows(image.height()));
         for y in outer.rows(image.height()) {
@@ -171,7 +146,7 @@ impl Levels {
             let mut add_ground = |part: usize, run: Range<usize>| {
                 let (start, length) = (Vec2::new(run.start as f64 - centre.x, dy), run.len());
                 let sum = ground.add(start.x, dy, &row[run]);
-                parts[part].add(start, length, sum);
+                parts[part].add_run(&start, length, sum);
             };
             let whole = outer.columns(y, width);
             if clear_rows.contains(&y) {
@@ -188,7 +163,7 @@ impl Levels {
             }
         }
         let levels = Levels::of(&ground, &mark)?;
-        let uneven = parts.iter().map(|part| part.beside(&levels.ground)).fold(0.0, f64::max);
+        let uneven = parts.iter().map(|part| part.beside(&levels.ground).abs()).fold(0.0, f64::max);
         Some(Levels { uneven, ..levels })
     }
 

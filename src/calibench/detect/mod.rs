@@ -14,6 +14,7 @@ mod grid;
 mod lattice;
 mod levels;
 mod looks;
+mod mean;
 mod neighbours;
 mod order;
 mod orientation;

@@ -4,6 +4,7 @@
 //! show that are most alike is taken for the ground, and every sector that agrees with it is added, as a region is grown from a seed.
 
 use super::levels::{Plane, PlaneFit};
+use super::mean::Mean;
 use crate::geometry::Vec2;
 
 /// Sectors of the ring: of fifteen degrees.
@@ -52,41 +53,15 @@ pub fn sector_of(offset: &Vec2) -> usize {
     ((turn * SECTORS as f64) as usize).min(SECTORS - 1)
 }
 
-/// The mean of some pixels.
-#[derive(Debug, Clone, Copy, Default)]
-struct Mean {
-    count: f64,
-    place: Vec2,
-    level: f64,
-}
-
-impl Mean {
-    fn of(pixels: impl Iterator<Item = RingPixel>) -> Mean {
-        let mut sum = Mean::default();
-        for pixel in pixels {
-            sum.count += 1.0;
-            sum.place += pixel.place;
-            sum.level += pixel.level;
-        }
-        let n = sum.count.max(1.0);
-        Mean { count: sum.count, place: sum.place / n, level: sum.level / n }
-    }
-
-    /// How far the mean lies from a plane.
-    fn beside(&self, plane: &Plane) -> f64 {
-        self.level - plane.at(&self.place)
-    }
-}
-
 /// The means of a sector, next to the disc's edge and farther out.
 type Means = [Mean; 2];
 
 /// The ground around a disc of this contrast; `None` where too few sectors agree on one.
 pub fn ground(pixels: &[RingPixel], contrast: f64) -> Option<Ground> {
-    let of = |sector: usize, near: bool| {
-        Mean::of(pixels.iter().filter(move |p| p.sector == sector && p.is_near == near).copied())
-    };
-    let means: [Means; SECTORS] = std::array::from_fn(|sector| [of(sector, true), of(sector, false)]);
+    let mut means = [Means::default(); SECTORS];
+    for pixel in pixels {
+        means[pixel.sector][usize::from(!pixel.is_near)].add_pixel(&pixel.place, pixel.level);
+    }
     let agreed = Agreed::grown(&means, pixels, contrast)?;
     let fills = means.map(|means| agreed.with_all(&means));
     let is_beside = |s: usize| fills[(s + 1) % SECTORS] || fills[(s + SECTORS - 1) % SECTORS];
@@ -154,9 +129,12 @@ impl Agreed {
 
     /// Whether a mean agrees, within its noise and that of the plane there.
     fn with(&self, mean: &Mean) -> bool {
-        let variance = self.sums.variance_at(&mean.place).unwrap_or(0.0);
+        if mean.count == 0.0 {
+            return false;
+        }
+        let variance = self.sums.variance_at(&mean.place()).unwrap_or(0.0);
         let sd = self.noise * (variance + 1.0 / mean.count).sqrt();
-        mean.count > 0.0 && mean.beside(&self.plane).abs() <= (NOISE_SDS * sd).max(self.harmless)
+        mean.beside(&self.plane).abs() <= (NOISE_SDS * sd).max(self.harmless)
     }
 
     /// Whether all of a sector agrees.
@@ -174,7 +152,7 @@ fn some<'a>(means: &'a [Means; SECTORS], chosen: &'a [bool; SECTORS]) -> impl It
 
 fn sums_of(means: &[Means; SECTORS], chosen: &[bool; SECTORS]) -> PlaneFit {
     let mut sums = PlaneFit::default();
-    some(means, chosen).for_each(|mean| sums.add_weighted(&mean.place, mean.level, mean.count));
+    some(means, chosen).for_each(|mean| sums.add_weighted(&mean.place(), mean.level(), mean.count));
     sums
 }
 
@@ -239,11 +217,17 @@ mod tests {
     }
 
     #[test]
-    fn a_ring_without_a_ground_has_none() {
-        let striped = ring(|p| if ((p.x + 40.0) as usize / 4).is_multiple_of(2) { 0.2 } else { 0.8 });
-        let found = ground(&striped, 0.6);
-        // Stripes are noise of half the contrast: nothing disagrees with their mean.
-        assert!(found.is_none_or(|ground| ground.fills == [true; SECTORS]));
+    fn levels_that_agree_nowhere_and_no_pixels_are_no_ground() {
+        // Every sector has a level of its own, none of them on a plane with its neighbours.
+        let quarrelling = ring(|p| 0.2 + 0.6 * ((sector_of(p) * 7) % 10) as f64 / 10.0);
+        assert!(ground(&quarrelling, 0.6).is_none());
         assert!(ground(&[], 0.6).is_none());
+    }
+
+    #[test]
+    fn stripes_are_noise_and_their_mean_is_the_ground() {
+        let striped = ring(|p| if ((p.x + 40.0) as usize / 4).is_multiple_of(2) { 0.2 } else { 0.8 });
+        let ground = ground(&striped, 0.6).unwrap();
+        assert_eq!(ground.fills, [true; SECTORS]);
     }
 }
