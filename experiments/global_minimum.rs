@@ -21,7 +21,7 @@ pub mod campaign;
 mod committed;
 mod families;
 mod intervals;
-mod judged;
+pub(crate) mod judged;
 mod listing;
 mod map;
 pub mod oracle;

@@ -20,6 +20,7 @@ pub mod interval_coverage;
 pub mod k2_observability;
 pub mod line_bending;
 pub mod millimetres;
+pub mod lens_minimum;
 pub mod model_choice;
 pub mod next_pose;
 pub mod nine_point;

@@ -47,6 +47,14 @@ const MODEL_CHOICE: &[&str] = &[
     "src/calibench/validate/slopes.rs",
 ];
 
+/// What draws the scenes of the experiment lens-minimum, searches from their truth, judges and rounds.
+const LENS_MINIMUM: &[&str] = &[
+    "experiments/lens_minimum/families.rs",
+    "experiments/lens_minimum/judged.rs",
+    "experiments/lens_minimum/reference.rs",
+    "experiments/lens_minimum/scenes.rs",
+];
+
 /// Measurements by name: the folders and files whose lines change them.
 const MEASUREMENTS: &[(&str, &[&[&str]])] = &[
     ("global-minimum", &[SCENES, SOLVER, GLOBAL_MINIMUM, JUDGED]),
@@ -59,6 +67,7 @@ const MEASUREMENTS: &[(&str, &[&[&str]])] = &[
             &["src/calibench/planning/information.rs", "src/calibench/synth/departure.rs", "src/gate"],
         ],
     ),
+    ("lens-minimum", &[SCENES, SOLVER, LENS_MINIMUM]),
     ("model-choice", &[SCENES, SOLVER, MODEL_CHOICE]),
     ("other-solvers", &[SCENES, SOLVER, OTHER_SOLVERS]),
     ("other-solvers-scenes", &[SCENES, OTHER_SOLVERS]),

@@ -31,6 +31,11 @@ impl Fingerprint {
         Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/global-minimum-scenes.code")))
     }
 
+    /// The solver, and the scenes and reference of the experiment lens-minimum.
+    pub fn of_lens_minimum() -> Fingerprint {
+        Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/lens-minimum.code")))
+    }
+
     /// The trials of the experiment model-choice, the solver, and the difference over the frame.
     pub fn of_model_choice() -> Fingerprint {
         Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/model-choice.code")))
@@ -98,6 +103,7 @@ mod tests {
             Fingerprint::of_gate_power(),
             Fingerprint::of_global_minimum(),
             Fingerprint::of_global_minimum_scenes(),
+            Fingerprint::of_lens_minimum(),
             Fingerprint::of_model_choice(),
             Fingerprint::of_other_solvers(),
             Fingerprint::of_other_solvers_scenes(),
