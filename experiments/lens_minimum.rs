@@ -83,7 +83,8 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
 fn read() -> Result<Vec<Measured>, ExperimentError> {
     let one = |(family, text): (&'static Family, &'static str)| {
         let mut rows = text.lines().skip(1);
-        let lines = (rows.next() == Some(HEADER)).then(|| rows.map(Line::read).collect::<Option<Vec<_>>>()).flatten();
+        let lines =
+            (rows.next() == Some(HEADER)).then(|| rows.map(Line::read).collect::<Option<Vec<_>>>()).flatten();
         let broken = || format!("golden/lens-minimum/{}.csv is broken: run {COMMAND}", family.name());
         lines.map(|lines| Measured { family, text, lines }).ok_or_else(|| ExperimentError::Input(broken()))
     };
@@ -134,6 +135,12 @@ fn claim_share(record: &mut Record, measured: &[Measured], context: &Context) {
 fn report_counts(_: &mut Record, _: &[Measured]) {}
 fn claim_minima(_: &mut Record, _: &[Measured]) {}
 fn claim_deviations(_: &mut Record, _: &[Measured]) {}
-fn families_table() -> Table { todo!() }
-fn models_table(_: &[Measured]) -> Table { todo!() }
-fn wrong_table(_: &[Measured]) -> Table { todo!() }
+fn families_table() -> Table {
+    todo!()
+}
+fn models_table(_: &[Measured]) -> Table {
+    todo!()
+}
+fn wrong_table(_: &[Measured]) -> Table {
+    todo!()
+}

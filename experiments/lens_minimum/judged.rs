@@ -20,7 +20,8 @@ const BITS: usize = 8;
 /// bound of sd(fx) over fx; `end` whether the reference is a minimum; `excess` the cost above the reference's in noise variances; `z` the
 /// error of fx over its stated deviation, `square` the squared error of all parameters under the stated covariance; `bits` a fingerprint
 /// of all digits.
-pub const HEADER: &str = "index,views,marks,field,aspect,noise,bound,end,class,asks,excess,z,square,note,bits";
+pub const HEADER: &str =
+    "index,views,marks,field,aspect,noise,bound,end,class,asks,excess,z,square,note,bits";
 
 /// A scene in short.
 #[derive(Debug, Clone, PartialEq)]
@@ -147,8 +148,10 @@ impl Line {
 
     /// The line as CSV, rounded to what the claims need; `bits` keeps the rest.
     pub fn text(&self) -> String {
-        let excess = if self.class == Class::Refused { String::new() } else { format!("{:.2e}", self.excess) };
-        let [z, square] = self.errors.map_or([String::new(), String::new()], |e| e.map(|x| format!("{x:.3}")));
+        let excess =
+            if self.class == Class::Refused { String::new() } else { format!("{:.2e}", self.excess) };
+        let [z, square] =
+            self.errors.map_or([String::new(), String::new()], |e| e.map(|x| format!("{x:.3}")));
         format!(
             "{},{},{},{:.1},{:.3},{:.3},{:.2e},{},{},{},{excess},{z},{square},{},{}",
             self.index,
@@ -169,8 +172,23 @@ impl Line {
     /// Reads [`Line::text`].
     pub fn read(text: &str) -> Option<Line> {
         let cells: Vec<&str> = text.split(',').collect();
-        let [index, views, marks, field, aspect, noise, bound, end, class, asks, excess, z, square, note, bits] =
-            cells.as_slice()
+        let [
+            index,
+            views,
+            marks,
+            field,
+            aspect,
+            noise,
+            bound,
+            end,
+            class,
+            asks,
+            excess,
+            z,
+            square,
+            note,
+            bits,
+        ] = cells.as_slice()
         else {
             return None;
         };
@@ -217,7 +235,8 @@ mod tests {
             note: String::new(),
             bits: "0123abcd".into(),
         };
-        let refused = Line { class: Class::Refused, excess: 0.0, errors: None, note: "View".into(), ..right.clone() };
+        let refused =
+            Line { class: Class::Refused, excess: 0.0, errors: None, note: "View".into(), ..right.clone() };
         let nothing = Line { bound: f64::INFINITY, reference_ends: false, ..refused.clone() };
         for line in [right, refused, nothing] {
             assert_eq!(Line::read(&line.text()).as_ref(), Some(&line), "{}", line.text());

@@ -44,7 +44,9 @@ pub fn from_truth(drawn: &Drawn) -> Option<Reference> {
     let (mut damping, mut converged) = (FIRST_DAMPING, false);
     for _ in 0..STEPS {
         let step = equations.step(damping);
-        if damping <= FIRST_DAMPING && step.as_ref().is_some_and(|(_, promise)| *promise <= GAIN * equations.cost) {
+        if damping <= FIRST_DAMPING
+            && step.as_ref().is_some_and(|(_, promise)| *promise <= GAIN * equations.cost)
+        {
             converged = true;
             break;
         }
@@ -57,7 +59,9 @@ pub fn from_truth(drawn: &Drawn) -> Option<Reference> {
             (state, equations) = (next, there);
             damping = (damping / 10.0).max(LEAST_DAMPING);
         } else if damping > MOST_DAMPING {
-            converged = equations.step(LEAST_DAMPING).is_some_and(|(_, promise)| promise <= ROUNDING * equations.cost);
+            converged = equations
+                .step(LEAST_DAMPING)
+                .is_some_and(|(_, promise)| promise <= ROUNDING * equations.cost);
             break;
         } else {
             damping *= 10.0;
@@ -79,7 +83,8 @@ impl State {
             camera = camera.with_value(parameter, camera.value(parameter)? + change)?;
         }
         let of_view = |view: usize| Vector6::from_fn(|i, _| step[free.len() + 6 * view + i]);
-        let poses = self.poses.iter().enumerate().map(|(view, pose)| pose.perturbed(&of_view(view))).collect();
+        let poses =
+            self.poses.iter().enumerate().map(|(view, pose)| pose.perturbed(&of_view(view))).collect();
         (camera.fx > 0.0 && camera.fy > 0.0).then_some(State { camera, poses })
     }
 }
@@ -95,8 +100,11 @@ impl Equations {
     fn of(state: &State, views: &[View], free: FreeParameters) -> Option<Equations> {
         let n = free.len();
         let unknowns = n + 6 * views.len();
-        let mut all =
-            Equations { normal: DMatrix::zeros(unknowns, unknowns), gradient: DVector::zeros(unknowns), cost: 0.0 };
+        let mut all = Equations {
+            normal: DMatrix::zeros(unknowns, unknowns),
+            gradient: DVector::zeros(unknowns),
+            cost: 0.0,
+        };
         for (view, (marks, pose)) in views.iter().zip(&state.poses).enumerate() {
             let place = |i: usize| if i < n { i } else { i + 6 * view };
             for (point, pixel) in marks.pairs() {
@@ -108,7 +116,9 @@ impl Equations {
                     jacobian.set_column(column, slope);
                 }
                 // A turn by w moves the point by w x (R X).
-                let by_turn = -Matrix3::new(0.0, -turned.z, turned.y, turned.z, 0.0, -turned.x, -turned.y, turned.x, 0.0);
+                let by_turn = -Matrix3::new(
+                    0.0, -turned.z, turned.y, turned.z, 0.0, -turned.x, -turned.y, turned.x, 0.0,
+                );
                 jacobian.fixed_columns_mut::<3>(n).copy_from(&(seen.by_point * by_turn));
                 jacobian.fixed_columns_mut::<3>(n + 3).copy_from(&seen.by_point);
                 let residual = seen.pixel - pixel;

@@ -125,7 +125,9 @@ fn camera(
         let half_field_deg = stream.uniform_in(family.half_field_deg.0, family.half_field_deg.1);
         let far = stream.uniform() < FAR_SHARE;
         let shape = log_uniform(if far { FAR_FROM_SQUARE } else { NEARLY_SQUARE }, stream);
-        let mut off = |size: usize| 0.5 * (size as f64 - 1.0) + size as f64 * stream.uniform_in(-OFF_CENTRE, OFF_CENTRE);
+        let mut off = |size: usize| {
+            0.5 * (size as f64 - 1.0) + size as f64 * stream.uniform_in(-OFF_CENTRE, OFF_CENTRE)
+        };
         let (cx, cy) = (off(width), off(height));
         let drawn: Vec<f64> =
             family.coefficients.iter().map(|&(_, low, high)| stream.uniform_in(low, high)).collect();
@@ -152,12 +154,18 @@ fn board(stream: &mut Stream) -> Vec<Vec2> {
     let (columns, rows) = (count(COLUMNS, stream), count(ROWS, stream));
     let spacing = WIDTH_MM / (columns - 1) as f64;
     let middle = 0.5 * Vec2::new((columns - 1) as f64, (rows - 1) as f64);
-    let cells = (0..rows).flat_map(|row| (0..columns).map(move |column| Vec2::new(column as f64, row as f64)));
+    let cells =
+        (0..rows).flat_map(|row| (0..columns).map(move |column| Vec2::new(column as f64, row as f64)));
     cells.map(|cell| (cell - middle) * spacing).collect()
 }
 
 /// The board's middle on the ray of some pixel, its normal tilted from that ray in any direction, rolled by any angle.
-fn pose(camera: &Camera<Lens>, (width, height): (usize, usize), tilt_deg: f64, stream: &mut Stream) -> Option<Pose> {
+fn pose(
+    camera: &Camera<Lens>,
+    (width, height): (usize, usize),
+    tilt_deg: f64,
+    stream: &mut Stream,
+) -> Option<Pose> {
     let [x, y, extent, direction, tilt, roll] = std::array::from_fn(|_| stream.uniform());
     let ray = camera.ray(&Vec2::new(x * width as f64 - 0.5, y * height as f64 - 0.5)).ok()?;
     let extent = EXTENT.0 + (EXTENT.1 - EXTENT.0) * extent;
@@ -216,7 +224,11 @@ mod tests {
                 };
                 let farthest = corners.iter().map(angle).fold(0.0, f64::max);
                 // Thin prisms, decentring and a tilted sensor make the field not quite round.
-                assert!((farthest / drawn.half_field_deg - 1.0).abs() < 0.2, "{} {index}: {farthest}", family.name());
+                assert!(
+                    (farthest / drawn.half_field_deg - 1.0).abs() < 0.2,
+                    "{} {index}: {farthest}",
+                    family.name()
+                );
             }
         }
     }

@@ -59,6 +59,24 @@ pub(super) fn alternatives(lens: Lens, free: FreeParameters, radii: &[[f64; 2]])
     subsets.iter().filter_map(without).collect()
 }
 
+/// Ranges of xi in which a double sphere may have a minimum of its own.
+const XI_RANGES: [[f64; 2]; 4] = [[-0.6, -0.2], [-0.2, 0.1], [0.1, 0.5], [0.5, 1.1]];
+
+/// Double spheres with nearly the same radii, one in each range of `xi` but for the range of `lens` itself, with the factor of the focal length:
+/// spheres that are farther apart behind a longer lens make nearly the same picture. None where xi is not free or the model another.
+pub(super) fn other_spheres(lens: Lens, free: FreeParameters, radii: &[[f64; 2]]) -> Vec<(Lens, f64)> {
+    let Some(own) = lens.get(Parameter::Xi).filter(|_| free.contains(Parameter::Xi)) else {
+        return Vec::new();
+    };
+    let sloped: Vec<[f64; 2]> = radii.iter().map(|[angle, radius]| [*angle, (1.0 + own) * radius]).collect();
+    XI_RANGES
+        .into_iter()
+        .filter(|[from, to]| !(*from..*to).contains(&own))
+        .filter_map(|[from, to]| best_sphere(lens, free, &steps(from, to), &sloped))
+        .map(|(lens, factor)| (lens, factor / (1.0 + own)))
+        .collect()
+}
+
 /// A model's equation multiplied out, linear in its radial coefficients: their factors and the right-hand side.
 fn equation(model: Model, &[angle, radius]: &[f64; 2]) -> (Vec<(Parameter, f64)>, f64) {
     use Parameter::{K1, K2, K3, K4, K5, K6};

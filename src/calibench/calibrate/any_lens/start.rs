@@ -248,8 +248,13 @@ fn is_seen(views: &[Marks], state: &State) -> bool {
 fn with_model(problem: &Problem<'_>, state: &State, settings: &Settings) -> Vec<State> {
     let Some(told) = with_values(problem, &state.camera, settings) else { return Vec::new() };
     let lenses = radial::fitted(told.distortion, problem.free, &radii(problem.views, state));
+    with_lenses(problem, &State { camera: told, ..state.clone() }, lenses)
+}
+
+/// The state with other lenses, each with its factor of the focal length, where they see every mark.
+fn with_lenses(problem: &Problem<'_>, state: &State, lenses: Vec<(Lens, f64)>) -> Vec<State> {
     let with_lens = |(lens, factor): (Lens, f64)| {
-        let mut camera = Camera { distortion: lens, ..told };
+        let mut camera = Camera { distortion: lens, ..state.camera };
         if problem.free.contains(Parameter::Fx) {
             (camera.fx, camera.fy) = (factor * camera.fx, factor * camera.fy);
         }
@@ -284,6 +289,13 @@ pub(super) fn alternatives(problem: &Problem<'_>, state: &State) -> Vec<State> {
     }
     let with_lens = |lens| State { camera: Camera { distortion: lens, ..state.camera }, ..state.clone() };
     lenses.into_iter().map(with_lens).filter(|state| is_seen(problem.views, state)).collect()
+}
+
+/// Starts at the double spheres that make nearly the same picture as the one of a minimum: a first lens that fits badly leads to any of them.
+/// None with another model.
+pub(super) fn other_spheres(problem: &Problem<'_>, state: &State) -> Vec<State> {
+    let lenses = radial::other_spheres(state.camera.distortion, problem.free, &radii(problem.views, state));
+    with_lenses(problem, state, lenses)
 }
 
 /// Angles from the axis and distorted radii, of some marks.

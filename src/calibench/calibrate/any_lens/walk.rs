@@ -30,6 +30,9 @@ pub(super) fn walk(
     if !(is_certified && is_found) {
         minima.extend(refined(problem, start::by_rays(problem, settings)));
     }
+    if let Some(first) = best(problem, &minima) {
+        minima.extend(refined(problem, start::other_spheres(problem, &minima[first].state)));
+    }
     let rough = best(problem, &minima).ok_or(CalibrationError::NoImage { model: settings.model() })?;
     follow(problem, &mut minima[rough]);
     if minima[rough].termination != Termination::Converged {
