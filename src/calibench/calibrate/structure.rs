@@ -14,6 +14,8 @@ use crate::geometry::Vec2;
 
 /// A normal number exceeds this with a probability of one in a million.
 const CHANCE: f64 = 4.75;
+/// And this once in seven hundred times: enough to look again, not to warn.
+const SUSPECT: f64 = 3.0;
 /// Weaker correlations, which large sets of real photographs show all the time, widen no standard deviation
 /// by more than a fifth.
 const MATERIAL: f64 = 0.2;
@@ -24,6 +26,13 @@ pub(super) struct Neighbours {
     pub correlation: f64,
     /// The sum in its standard deviations.
     z: f64,
+}
+
+impl Neighbours {
+    /// Whether they agree so much that the residuals may be more than noise.
+    pub fn may_agree(&self) -> bool {
+        self.z > SUSPECT
+    }
 }
 
 /// Of residuals of one size; a set without neighbours has none.

@@ -111,6 +111,12 @@ pub(super) fn variance(problem: &Problem<'_>, minimum: &Minimum<State, WIDTH>) -
     noise_variance(&residuals.weighted, residuals.square, problem.loss, freedom)
 }
 
+/// Whether the residuals of a state may be more than noise.
+pub(super) fn may_have_structure(problem: &Problem<'_>, state: &State) -> bool {
+    let residuals = Residuals::of(problem, state);
+    residuals.square > problem.rounding_cost && structure::neighbours(&residuals.weighted).may_agree()
+}
+
 /// The result at a minimum.
 ///
 /// # Errors

@@ -15,7 +15,8 @@ pub(super) struct Walked {
 }
 
 /// Refines the starts: those that the pinhole's solver gives, and, unless that is certified to have found no
-/// minimum beside the right one and one of them converges, those that an angle polynomial gives.
+/// minimum beside the right one and one of them converges to residuals that look like noise, those that an angle polynomial gives. A
+/// certificate counts for the lens of the pinhole, and where that does not hold it may be one of a wrong camera.
 ///
 /// # Errors
 /// No lens of the model sees every mark.
@@ -26,7 +27,10 @@ pub(super) fn walk(
 ) -> Result<Walked, CalibrationError> {
     let (from_pinhole, is_certified) = start::by_pinhole(problem, views, settings);
     let mut minima = refined(problem, from_pinhole);
-    let is_found = minima.iter().any(|m| m.termination == Termination::Converged);
+    let is_right = |m: &Minimum<State, WIDTH>| {
+        m.termination == Termination::Converged && !report::may_have_structure(problem, &m.state)
+    };
+    let is_found = minima.iter().any(is_right);
     if !(is_certified && is_found) {
         minima.extend(refined(problem, start::by_rays(problem, settings)));
     }
