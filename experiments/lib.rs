@@ -65,6 +65,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     scoreboard::EXPERIMENT,
     other_solvers::EXPERIMENT,
     global_minimum::EXPERIMENT,
+    lens_minimum::EXPERIMENT,
 ];
 
 /// What this program was built from, as `build.rs` found it.

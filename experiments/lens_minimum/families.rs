@@ -18,7 +18,7 @@ pub struct Family {
 }
 
 /// Scenes of every family.
-pub const SCENES: u64 = 400;
+pub const SCENES: u64 = 2000;
 
 /// All families.
 pub const FAMILIES: [Family; 6] = [
