@@ -29,6 +29,8 @@ pub(super) struct Judged {
 const BETTER_BY_PROFILE: usize = 5;
 /// Where the check of linearity looks, in standard deviations.
 const CHECKED_AT: f64 = 2.0;
+/// So many of the worst-known combinations are looked along.
+const LOOKED_ALONG: usize = 3;
 /// Iterations of a refit with one parameter held: where it takes more, its cost so far is an upper bound.
 const MOST_REFIT: usize = 40;
 /// A refit's cost is known to this part of itself: to a ten-thousandth of a variance with a thousand degrees of freedom.
@@ -122,7 +124,7 @@ pub(super) fn singular() -> CalibrationError {
 }
 
 /// Whether the cost rises as linear theory says on the straight way to where it says least: two standard
-/// deviations of the worst-known combination of shared unknowns, both ways. Two evaluations say that the
+/// deviations of the worst-known combinations of shared unknowns, both ways. A few evaluations say that the
 /// profiles need not be walked. Nor need they where exact data leave no cost but rounding, which has any shape.
 fn is_parabola(
     problem: &Problem<'_>,
@@ -133,30 +135,38 @@ fn is_parabola(
     if minimum.system.cost <= problem.rounding_cost {
         return true;
     }
-    let Some(weakest) = weakest(reduction) else { return true };
     let mut system = problem.system();
-    [-CHECKED_AT, CHECKED_AT].into_iter().all(|deviations| {
-        let step = reduction.following(deviations * noise_px * weakest);
+    let mut rises_as_said = |direction: SVector<f64, WIDTH>| {
+        let step = reduction.following(noise_px * direction);
         problem.linearise_into(&problem.stepped(&minimum.state, step), &mut system);
         let rise = (system.cost - minimum.system.cost) / (noise_px * noise_px);
         (CHECKED_AT / rise.max(0.0).sqrt() - 1.0).abs() <= TOLERATED
-    })
+    };
+    weakest(reduction)
+        .into_iter()
+        .all(|weak| [-CHECKED_AT, CHECKED_AT].into_iter().all(|deviations| rises_as_said(deviations * weak)))
 }
 
-/// One standard deviation, for unit noise, along the worst-known combination in units in which each unknown alone
-/// is known equally well; `None` where nothing is shared or free.
-fn weakest(reduction: &Reduction<WIDTH>) -> Option<SVector<f64, WIDTH>> {
+/// One standard deviation, for unit noise, along each of the worst-known combinations in units in which each unknown
+/// alone is known equally well; none where nothing is shared or free.
+fn weakest(reduction: &Reduction<WIDTH>) -> Vec<SVector<f64, WIDTH>> {
     let shared = reduction.schur.nrows();
-    let covariance = reduction.intrinsics_covariance().filter(|_| shared > 0)?;
+    let Some(covariance) = reduction.intrinsics_covariance().filter(|_| shared > 0) else {
+        return Vec::new();
+    };
     let scale = reduction.schur.diagonal().map(f64::sqrt);
     let scaled = covariance.map_with_location(|i, j, c| c * scale[i] * scale[j]).symmetric_eigen();
-    let worst = scaled.eigenvalues.imax();
-    let deviation = scaled.eigenvalues[worst].max(0.0).sqrt();
-    let mut direction = SVector::zeros();
-    for i in 0..shared {
-        direction[i] = deviation * scaled.eigenvectors[(i, worst)] / scale[i];
-    }
-    Some(direction)
+    let mut order: Vec<usize> = (0..shared).collect();
+    order.sort_by(|&a, &b| scaled.eigenvalues[b].total_cmp(&scaled.eigenvalues[a]));
+    let direction = |&worst: &usize| {
+        let deviation = scaled.eigenvalues[worst].max(0.0).sqrt();
+        let mut direction = SVector::zeros();
+        for i in 0..shared {
+            direction[i] = deviation * scaled.eigenvectors[(i, worst)] / scale[i];
+        }
+        direction
+    };
+    order.iter().take(LOOKED_ALONG).map(direction).collect()
 }
 
 impl Profiled<WIDTH> for Problem<'_> {
