@@ -32,6 +32,7 @@ mod laboratory;
 mod layout;
 mod lens_hard_cases;
 mod lens_models;
+mod lens_views;
 mod measured;
 mod model_choice;
 mod new;

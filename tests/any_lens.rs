@@ -7,29 +7,14 @@ use calibench::calibrate::{
     compare_models,
 };
 use calibench::camera::{BrownConrady, Camera, Lens, Model, Parameter};
-use calibench::geometry::{Pose, Vec2, Vec3, rotation};
+use calibench::geometry::{Pose, Vec2, Vec3};
 use calibench::synth::{Scene, Stream, StreamKey, Truth};
 
-/// Views of a 9 x 7 board from many sides, close enough for the wanted half field of view.
-fn poses(distance: f64) -> Vec<Pose> {
-    (0..12)
-        .map(|k| {
-            let turn = f64::from(k);
-            let tilt = 0.25 + 0.1 * f64::from(k % 4);
-            Pose {
-                rotation: rotation::from_xyz_rad(tilt * libm::sin(turn), tilt * libm::cos(turn), 0.4 * turn),
-                translation: Vec3::new(
-                    0.35 * distance * libm::cos(2.4 * turn) - 30.0,
-                    0.3 * distance * libm::sin(2.4 * turn) - 25.0,
-                    distance * (1.0 + 0.1 * f64::from(k % 3)),
-                ),
-            }
-        })
-        .collect()
-}
+use crate::lens_views::{self, board};
 
-fn board() -> Vec<Vec2> {
-    (0..63).map(|i| Vec2::new(10.0 * f64::from(i % 9), 10.0 * f64::from(i / 9))).collect()
+/// Twelve views, close enough for the wanted half field of view.
+fn poses(distance: f64) -> Vec<Pose> {
+    lens_views::poses(12, distance, [0.35, 0.3])
 }
 
 /// What the camera sees with noise of `sigma` px; marks that it does not see are left out.

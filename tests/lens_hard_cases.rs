@@ -7,31 +7,16 @@ use calibench::calibrate::{
     explaining_freedoms,
 };
 use calibench::camera::{Camera, Lens, Model, Parameter};
-use calibench::geometry::{Pose, Vec2, Vec3, rotation};
+use calibench::geometry::{Pose, Vec2, Vec3};
 use calibench::synth::{Stream, StreamKey};
+
+use crate::lens_views::{self, board};
 
 const SIZE: (usize, usize) = (1280, 960);
 
-/// Views of a board that fills a part of the image, from many sides.
+/// Views of a board that fills a part of the image.
 fn poses(count: u32, distance: f64) -> Vec<Pose> {
-    (0..count)
-        .map(|k| {
-            let turn = f64::from(k);
-            let tilt = 0.25 + 0.1 * f64::from(k % 4);
-            Pose {
-                rotation: rotation::from_xyz_rad(tilt * libm::sin(turn), tilt * libm::cos(turn), 0.4 * turn),
-                translation: Vec3::new(
-                    0.5 * distance * libm::cos(2.4 * turn) - 30.0,
-                    0.5 * distance * libm::sin(2.4 * turn) - 25.0,
-                    distance * (1.0 + 0.1 * f64::from(k % 3)),
-                ),
-            }
-        })
-        .collect()
-}
-
-fn board() -> Vec<Vec2> {
-    (0..63).map(|i| Vec2::new(10.0 * f64::from(i % 9), 10.0 * f64::from(i / 9))).collect()
+    lens_views::poses(count, distance, [0.5, 0.5])
 }
 
 /// What the camera sees of some marks in each view, with noise of 0.1 px; the board is twisted by `twist` at its corners.

@@ -55,7 +55,7 @@ pub fn right(trials: &[Trial<'_>]) -> Figure {
     let caption = format!(
         "Share of trials in which each criterion picks the true model with its coefficients, against the marks of all views; noise 0.1 px, \
          seed {SEED}, intervals of 95 %. Notice that the RMSE is hardly ever right where another candidate follows the marks as well, and that with few marks \
-         division is taken for Brown-Conrady: {:.0} % of the choices of `auto` are right on the mean with {fewest} marks and {:.0} % with \
+         division is taken for Brown-Conrady: {:.0} % of the choices of auto are right on the mean with {fewest} marks and {:.0} % with \
          {most}, {:.0} % and {:.0} % of those of BIC.",
         at(Criterion::Auto, fewest),
         at(Criterion::Auto, most),
@@ -154,7 +154,7 @@ pub fn cost(trials: &[Trial<'_>]) -> Figure {
     let caption = format!(
         "Difference from the truth over the frame of what a criterion takes, over that of the trial's best candidate, of all nine truths: median, \
          and share of trials in which it is over {FAR} times as large, with intervals of 95 %; noise 0.1 px, seed {SEED}. Notice that knowing \
-         the true model brings {:.2} with {} marks, where `auto` brings {:.2}: the best candidate of a trial is known afterwards only.",
+         the true model brings {:.2} with {} marks, where auto brings {:.2}: the best candidate of a trial is known afterwards only.",
         median_ratio(trials, marks()[0], Criterion::Known),
         marks()[0],
         of_auto[0],

@@ -23,7 +23,7 @@ const SETTLED: f64 = 2e-6;
 const LAST_STEPS: usize = 2;
 /// A cost that rises by less than this part has not risen.
 const NO_RISE: f64 = 1e-12;
-/// Refinements until it is.
+/// Refinements until that noise is settled.
 const MOST_REFITS: usize = 60;
 
 /// [`calibrate`] with a lens of any model ([`Settings::of_model`]), marks of unequal weight

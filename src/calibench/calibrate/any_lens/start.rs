@@ -30,9 +30,9 @@ const ASPECTS: [f64; 2] = [0.6, 1.7];
 const NEARLY_SQUARE: f64 = 0.1;
 /// So many of them are refined.
 const REFINED: usize = 3;
-/// With fewer marks a view than this, the pinhole is searched for beyond its first minima: with 5 they led astray in 3 of 48
-/// sets of three models, with 8 to 30 in none of 144. The search costs little then; with many marks it costs more than all
-/// the rest, as it goes on for long where no pinhole fits.
+/// With fewer marks a view than this, the pinhole is searched for beyond its first minima, as those of five marks a view can
+/// lead astray (`lens_hard_cases::a_fisheye_behind_tall_pixels_is_found_from_five_marks_a_view`). The search costs little
+/// then; with many marks it costs more than all the rest, as it goes on for long where no pinhole fits.
 const FEW_MARKS: usize = 16;
 /// Views that choose the focal length; all of them follow.
 const CHOOSERS: usize = 40;
