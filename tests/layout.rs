@@ -121,6 +121,22 @@ fn imports(source: &str) -> BTreeSet<String> {
     code.split("crate::").skip(1).map(name).filter(|n| !n.is_empty()).collect()
 }
 
+/// Measurements that know Brown-Conrady's lens alone are not stale when the estimator for others changes
+/// (src/harness/build.rs): who leads to it is therefore listed here.
+#[test]
+fn the_estimator_of_other_lenses_is_reached_in_three_places() {
+    let reached: Vec<String> = files("src/calibench/calibrate", &["rs"])
+        .into_iter()
+        .filter(|path| !path.to_string_lossy().contains("/any_lens/"))
+        .filter(|path| fs::read_to_string(path).expect("the file is read").contains("any_lens"))
+        .map(|path| path.file_name().expect("a file has a name").to_string_lossy().into_owned())
+        .collect();
+    assert_eq!(
+        BTreeSet::from_iter(reached.iter().map(String::as_str)),
+        ["choice.rs", "lens.rs", "mod.rs"].into()
+    );
+}
+
 #[test]
 fn layers_import_only_from_the_layers_below() {
     let mut wrong = Vec::new();

@@ -13,7 +13,7 @@ use super::start::Held;
 use super::system::System;
 use super::target_frame::TargetFrames;
 use super::{
-    Board, Calibration, CalibrationError, Loss, Prior, Role, Settings, Termination, Unknown, Warning, chunks,
+    Board, Calibration, CalibrationError, Loss, Prior, Role, Settings, Termination, Warning, chunks,
     identifiability, kernel, polish, start, strays, structure, warnings,
 };
 use crate::board::View;
@@ -125,10 +125,7 @@ pub(super) fn state_alone(views: &[View], settings: &Settings) -> Result<(State,
     searched(views, settings, |judged, problem, _| {
         let Judged { minimum, reduction, certificate, .. } = judged;
         let conditioning = reduction.as_ref().and_then(|r| Conditioning::of(&minimum.system, r));
-        if !problem.free.is_empty() {
-            let why = || "the normal equations are singular".into();
-            identifiability::refuse_if_singular(conditioning.as_ref(), why)?;
-        }
+        identifiability::refuse_singular_minimum(problem.free, conditioning.as_ref())?;
         let is_certified = minimum.termination.is_minimum()
             && certificate.is_some_and(|certificate| certificate.is_possible() && certificate.holds());
         Ok((minimum.state, is_certified))
@@ -300,11 +297,7 @@ fn report(
     let Fit { residuals, square, largest_radius, .. } = fit;
     let sigma_px = (square / freedom).sqrt();
     let conditioning = reduction.as_ref().and_then(|reduction| Conditioning::of(system, reduction));
-    if !problem.free.is_empty() {
-        identifiability::refuse_if_singular(conditioning.as_ref(), || {
-            "the normal equations are singular".into()
-        })?;
-    }
+    identifiability::refuse_singular_minimum(problem.free, conditioning.as_ref())?;
     let intervals = profile_coverage
         .zip(reduction.as_ref())
         .and_then(|(coverage, reduction)| {
@@ -313,12 +306,8 @@ fn report(
             Some(profile.intervals(coverage, degrees_of_freedom))
         })
         .unwrap_or_default();
-    let unit = reduction.and_then(|reduction| reduction.covariance()).ok_or_else(|| {
-        CalibrationError::NotIdentifiable {
-            inseparable: vec![Unknown::Camera, Unknown::Poses],
-            why: "the normal equations are singular".into(),
-        }
-    })?;
+    let unit =
+        reduction.and_then(|reduction| reduction.covariance()).ok_or_else(identifiability::singular)?;
     let mut covariance = frames.covariance(unit, cam_from_target, variance);
     covariance.fy_per_fx = problem.fy_per_fx;
     let mut calibration = Calibration {

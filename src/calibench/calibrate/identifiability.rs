@@ -19,10 +19,12 @@ use super::prior::Priors;
 use super::system::System;
 use super::walk::{Far, Walked};
 use super::{CalibrationError, Unknown};
-use crate::camera::Parameter;
+use crate::camera::{FreeParameters, Parameter};
 use crate::distribution::ChiSquare;
 use crate::geometry::{Pose, Vec2, Vec3, rotation};
 
+/// Why singular equations are refused.
+const SINGULAR: &str = "the normal equations are singular";
 /// With this probability at most data that determine nothing pass.
 const FALSE_ACCEPTANCE: f64 = 1e-6;
 /// Planes whose difference of tilt moves the edge of the target's image by more than this many standard
@@ -169,8 +171,22 @@ pub(super) fn variance(problem: &Problem<'_>, noise_px: f64) -> f64 {
     (noise_px * noise_px).max(problem.rounding_cost)
 }
 
+/// Refuses the normal equations of a minimum with these free parameters if they are singular.
+pub(super) fn refuse_singular_minimum(
+    free: FreeParameters,
+    conditioning: Option<&Conditioning>,
+) -> Result<(), CalibrationError> {
+    if free.is_empty() { Ok(()) } else { refuse_if_singular(conditioning, || SINGULAR.into()) }
+}
+
+/// Normal equations that say nothing about some combination.
+pub(super) fn singular() -> CalibrationError {
+    let inseparable = vec![Unknown::Camera, Unknown::Poses];
+    CalibrationError::NotIdentifiable { inseparable, why: SINGULAR.into() }
+}
+
 /// Refuses normal equations that are singular.
-pub(super) fn refuse_if_singular(
+fn refuse_if_singular(
     conditioning: Option<&Conditioning>,
     why: impl FnOnce() -> String,
 ) -> Result<(), CalibrationError> {

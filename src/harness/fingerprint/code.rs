@@ -16,14 +16,15 @@ pub fn lines(source: &str) -> String {
 }
 
 /// The code lines of these files of `root`, and of every `.rs` file but `tests.rs` in these folders and
-/// below, in the order of their paths, each file under its path.
+/// below, in the order of their paths, each file under its path; but for what lies in the folders `without`.
 ///
 /// # Errors
 /// A folder or file that cannot be read.
-pub fn of_paths(root: &Path, paths: &[&str]) -> io::Result<String> {
+pub fn of_paths(root: &Path, paths: &[&str], without: &[&str]) -> io::Result<String> {
     let mut text = String::new();
     for start in paths {
-        for path in rust_files(&root.join(start))? {
+        let is_left_out = |path: &PathBuf| without.iter().any(|folder| path.starts_with(root.join(folder)));
+        for path in rust_files(&root.join(start))?.into_iter().filter(|path| !is_left_out(path)) {
             let inside = path.strip_prefix(root).unwrap_or(&path);
             let name: Vec<_> = inside.iter().map(|part| part.to_string_lossy()).collect();
             let source = fs::read_to_string(&path)?;
@@ -86,9 +87,11 @@ mod tests {
     #[test]
     fn every_file_below_counts_with_its_path() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let text = of_paths(root, &["figure/axis.rs", "fingerprint"]).unwrap();
+        let text = of_paths(root, &["figure/axis.rs", "fingerprint"], &[]).unwrap();
         let place = |name: &str| text.find(&format!("{name}\n")).unwrap();
         assert!(place("figure/axis.rs") < place("fingerprint/code.rs"));
-        assert!(of_paths(root, &["nowhere"]).is_err());
+        let without = of_paths(root, &["figure", "fingerprint"], &["figure"]).unwrap();
+        assert!(!without.contains("figure/axis.rs\n") && without.contains("fingerprint/code.rs\n"));
+        assert!(of_paths(root, &["nowhere"], &[]).is_err());
     }
 }

@@ -5,12 +5,11 @@ use super::super::minimise::{Descent, Minimum, RELATIVE_GAIN, descend};
 use super::super::settings::Bend;
 use super::super::system::Step;
 use super::super::target_frame::TargetFrames;
-use super::super::{Board, CalibrationError, Prior, Settings, Termination, calibrate, chunks};
+use super::super::{CalibrationError, LensCalibration, Prior, Settings, Termination, chunks};
 use super::problem::{Problem, State, rounding_cost};
-use super::report::{self, LensCalibration};
-use super::{WIDTH, judge, marks, shape, start, walk};
+use super::{WIDTH, judge, marks, report, shape, start, walk};
 use crate::board::View;
-use crate::camera::{Model, Parameter};
+use crate::camera::Parameter;
 use crate::geometry::{Homography, HomographyError};
 
 /// Where nothing else tells the noise of a coordinate, priors are first weighed with this one, px.
@@ -26,43 +25,15 @@ const NO_RISE: f64 = 1e-12;
 /// Refinements until that noise is settled.
 const MOST_REFITS: usize = 60;
 
-/// [`calibrate`] with a lens of any model ([`Settings::of_model`]), marks of unequal weight
-/// ([`View::with_weights`]) and a board that need not be flat ([`Board`]).
-///
-/// The cost is `sum w^2 |r|^2` under the loss, with the priors' share; see [`Prior`]. The covariance is that of
-/// [`calibrate`], the noise that of a coordinate of weight 1. A camera with Brown-Conrady's lens, marks of
-/// weight 1 and a flat board is handed to [`calibrate`], with all that it checks. For all else the best of a few
-/// starts is refined, by the rays of a fisheye and by a pinhole, and the profiles of the parameters are walked
-/// where the cost is no parabola; nothing certifies that minimum, and views given twice count twice.
+/// What [`super::super::calibrate_lens`] does with other lenses than Brown-Conrady's, marks of unequal weight, and boards
+/// that need not be flat.
 ///
 /// # Errors
-/// As [`calibrate`]; a parameter that the model does not have; a model that cannot see every mark.
-///
-/// ```
-/// use calibench::board::View;
-/// use calibench::calibrate::{Settings, calibrate_lens};
-/// use calibench::camera::{Camera, Lens, Model};
-/// use calibench::geometry::{Pose, Vec2, Vec3};
-/// use calibench::synth::Truth;
-///
-/// // The example's board and poses, seen through a fisheye.
-/// let lens = Lens::new(Model::KannalaBrandt, &[-0.03, 0.004, 0.0, 0.0])?;
-/// let camera = Camera::with_lens(600.0, 600.0, 320.0, 240.0, lens);
-/// let truth = Truth::example();
-/// let seen = |pose: &Pose| {
-///     let pixel = |p: &Vec2| camera.pixel(&pose.apply(&Vec3::new(p.x, p.y, 0.0)));
-///     View::new(truth.points.clone(), truth.points.iter().filter_map(pixel).collect())
-/// };
-/// let views: Vec<View> = truth.cam_from_target.iter().map(seen).collect::<Result<_, _>>()?;
-/// let found = calibrate_lens(&views, &Settings::of_model(Model::KannalaBrandt))?;
-/// assert!((found.camera.fx - 600.0).abs() < 1e-3 && found.rmse_px < 1e-6);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn calibrate_lens(views: &[View], settings: &Settings) -> Result<LensCalibration, CalibrationError> {
-    let is_plain = views.iter().all(|view| view.weights().is_none()) && settings.board == Board::Flat;
-    if settings.model() == Model::BrownConrady && is_plain {
-        return calibrate(views, settings).map(LensCalibration::from);
-    }
+/// As there.
+pub(in super::super) fn calibrate(
+    views: &[View],
+    settings: &Settings,
+) -> Result<LensCalibration, CalibrationError> {
     check(views, settings)?;
     chunks::in_pool(views.len(), || estimate(views, settings))
 }

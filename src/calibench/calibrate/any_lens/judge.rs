@@ -5,7 +5,7 @@ use super::super::minimise::{Descent, Minimum, descend};
 use super::super::rival::{Met, Rival};
 use super::super::system::Reduction;
 use super::super::tie::tied;
-use super::super::{CalibrationError, Unknown};
+use super::super::{CalibrationError, identifiability};
 use super::problem::{Problem, ROUGH_GAIN, State};
 use super::{WIDTH, report, start, walk};
 use crate::camera::{Camera, FreeParameters, Lens, Parameter};
@@ -112,15 +112,7 @@ fn profiles(
 }
 
 fn reduction_of(minimum: &Minimum<State, WIDTH>) -> Result<Reduction<WIDTH>, CalibrationError> {
-    minimum.system.reduction().ok_or_else(singular)
-}
-
-/// The normal equations say nothing about some combination.
-pub(super) fn singular() -> CalibrationError {
-    CalibrationError::NotIdentifiable {
-        inseparable: vec![Unknown::Camera, Unknown::Poses],
-        why: "the normal equations are singular".into(),
-    }
+    minimum.system.reduction().ok_or_else(identifiability::singular)
 }
 
 /// Whether the cost rises as linear theory says on the straight way to where it says least: two standard

@@ -20,11 +20,9 @@ mod shape;
 mod start;
 mod walk;
 
-pub use estimate::calibrate_lens;
-pub(super) use estimate::spans_a_plane;
+pub(super) use estimate::{calibrate, spans_a_plane};
 pub use information::lens_information;
 pub use locate::{Located, locate};
-pub use report::LensCalibration;
 pub use shape::BoardShape;
 
 /// Room for the free parameters of any lens, the board's shape and the gradient, in whole lanes.

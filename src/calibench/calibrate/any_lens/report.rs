@@ -1,59 +1,16 @@
-//! What does a calibration with a lens of any model say? The minimum as a [`Calibration`].
+//! What does a calibration with a lens of any model say? The minimum as a [`LensCalibration`].
 
 use super::super::conditioning::Conditioning;
 use super::super::estimate::{noise_variance, whole};
 use super::super::intervals::Profile;
 use super::super::minimise::Minimum;
 use super::super::target_frame::TargetFrames;
-use super::super::{Calibration, CalibrationError, Settings, identifiability, structure, warnings};
-use super::judge::{Judged, singular};
+use super::super::{CalibrationError, LensCalibration, Settings, identifiability, structure, warnings};
+use super::judge::Judged;
 use super::marks::{Mark, Marks};
 use super::problem::{Problem, State};
 use super::{BoardShape, WIDTH};
-use crate::camera::{Camera, Lens};
 use crate::geometry::{Pose, Vec2};
-
-/// A calibration with a lens of any model.
-pub type LensCalibration = Calibration<Lens>;
-
-impl<L> Calibration<L> {
-    /// The same with the camera written another way.
-    fn with_camera<M>(self, camera: Camera<M>) -> Calibration<M> {
-        Calibration {
-            camera,
-            free: self.free,
-            priors: self.priors,
-            cam_from_target: self.cam_from_target,
-            residuals: self.residuals,
-            rmse_px: self.rmse_px,
-            sigma_px: self.sigma_px,
-            degrees_of_freedom: self.degrees_of_freedom,
-            covariance: self.covariance,
-            conditioning: self.conditioning,
-            termination: self.termination,
-            certificate: self.certificate,
-            intervals: self.intervals,
-            starts: self.starts,
-            iterations: self.iterations,
-            warnings: self.warnings,
-            board: self.board,
-        }
-    }
-}
-
-impl From<Calibration> for LensCalibration {
-    fn from(plain: Calibration) -> LensCalibration {
-        let camera = plain.camera.into();
-        plain.with_camera(camera)
-    }
-}
-
-impl LensCalibration {
-    /// The same with a camera whose lens model is known to be Brown-Conrady's; `None` if it is another.
-    pub fn brown_conrady(&self) -> Option<Calibration> {
-        self.camera.brown_conrady().map(|camera| self.clone().with_camera(camera))
-    }
-}
 
 /// Residuals of a state.
 struct Residuals {
@@ -134,11 +91,8 @@ pub(super) fn report(
     let freedom = residuals.freedom(&minimum, problem.settled(system));
     let degrees_of_freedom = whole(freedom);
     let conditioning = Conditioning::of(system, &reduction);
-    if !problem.free.is_empty() {
-        let why = || "the normal equations are singular".into();
-        identifiability::refuse_if_singular(conditioning.as_ref(), why)?;
-    }
-    let unit = reduction.covariance().ok_or_else(singular)?;
+    identifiability::refuse_singular_minimum(problem.free, conditioning.as_ref())?;
+    let unit = reduction.covariance().ok_or_else(identifiability::singular)?;
     let profile = Profile::new(problem, &minimum, &reduction, variance.sqrt());
     let intervals = settings.profile_coverage.zip(profile);
     let intervals = intervals.map_or(Vec::new(), |(coverage, p)| p.intervals(coverage, degrees_of_freedom));

@@ -41,7 +41,8 @@ pub(super) fn walk(
     follow(problem, &mut minima[rough]);
     if minima[rough].termination != Termination::Converged {
         // Its valley goes on and on, and another start may lead to a minimum that is as good.
-        minima.iter_mut().for_each(|minimum| follow(problem, minimum));
+        let others = minima.iter_mut().enumerate().filter(|(place, _)| *place != rough);
+        others.for_each(|(_, minimum)| follow(problem, minimum));
     }
     let met = minima.iter().map(met).collect();
     let best = best(problem, &minima).unwrap_or(rough);
