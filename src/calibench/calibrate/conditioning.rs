@@ -12,7 +12,8 @@ use nalgebra::{DMatrix, DVector, SVector};
 pub struct Conditioning {
     /// Smallest eigenvalue of the intrinsics' information after the poses are eliminated, scaled to unit
     /// diagonal before the elimination: the part of the information about the weakest combination that is
-    /// left when the poses and the other intrinsics are unknown too. 1 is perfect, 0 is not identifiable.
+    /// left when the poses and the other intrinsics are unknown too. 1 is perfect; 0 is not identifiable, also
+    /// where rounding alone keeps it from 0.
     pub smallest_eigenvalue: f64,
     /// Largest over smallest eigenvalue of the same matrix.
     pub condition_number: f64,
@@ -34,7 +35,9 @@ pub struct WeakComponent {
 
 /// Smallest eigenvalue of the scaled information below which it is rounding: the elimination subtracts
 /// numbers of size 1, so its error is some hundred roundings.
-const SINGULAR: f64 = 1e-12;
+const ROUNDING: f64 = 1e-12;
+/// The same where it is the square of a singular value of the Jacobian, which has such an error itself.
+const ROUNDING_OF_ROOT: f64 = ROUNDING * ROUNDING;
 /// Members of the weakest combination below this share of the largest one are not worth a name.
 const NAMED_SHARE: f64 = 0.2;
 
@@ -43,36 +46,74 @@ impl<const W: usize> System<W> {
     pub fn conditioning(&self) -> Option<Conditioning> {
         Conditioning::of(self, &self.reduction()?)
     }
+
+    /// Units of the shared unknowns in which each has unit information before the poses are eliminated.
+    pub(super) fn scale(&self) -> DVector<f64> {
+        DVector::from_fn(self.shared, |i, _| 1.0 / self.intrinsics[(i, i)].sqrt())
+    }
 }
 
 impl Conditioning {
     /// Whether the weakest combination is known by nothing but rounding.
     pub fn is_singular(&self) -> bool {
-        self.smallest_eigenvalue.is_nan() || self.smallest_eigenvalue <= SINGULAR
+        self.smallest_eigenvalue.is_nan() || self.smallest_eigenvalue <= 0.0
+    }
+
+    /// An eigenvalue of information scaled to unit diagonal; 0 where it is rounding.
+    pub(crate) fn above_rounding(eigenvalue: f64) -> f64 {
+        known(eigenvalue, ROUNDING)
     }
 
     /// Analyses normal equations and their reduction; `None` if nothing is free.
     pub(super) fn of<const W: usize>(system: &System<W>, reduction: &Reduction<W>) -> Option<Conditioning> {
-        let n = system.shared;
+        let scale = system.scale();
+        let spectrum = Spectrum::of(reduction, &scale)?;
+        let weakest = spectrum.values.imin();
+        let direction = spectrum.directions.column(weakest).into_owned();
+        let smallest = known(spectrum.values[weakest], spectrum.rounding);
+        Some(Conditioning {
+            smallest_eigenvalue: smallest,
+            condition_number: spectrum.values.max() / smallest,
+            weakest: named(system, &reduction.eliminated, &direction, &scale),
+        })
+    }
+}
+
+/// The scaled information's eigenvalues, in no order.
+pub(super) struct Spectrum {
+    pub values: DVector<f64>,
+    /// In columns.
+    pub directions: DMatrix<f64>,
+    /// What is less is rounding.
+    rounding: f64,
+}
+
+impl Spectrum {
+    /// `None` where the information is not finite, or of nothing.
+    pub fn of<const W: usize>(reduction: &Reduction<W>, scale: &DVector<f64>) -> Option<Spectrum> {
+        let n = scale.len();
         if n == 0 {
             return None;
         }
-        let Reduction { eliminated, schur, .. } = reduction;
-        let scale = DVector::from_fn(n, |i, _| 1.0 / system.intrinsics[(i, i)].sqrt());
-        let scaled = DMatrix::from_fn(n, n, |i, j| schur[(i, j)] * scale[i] * scale[j]);
-        if !scaled.iter().all(|x| x.is_finite()) {
-            return None;
-        }
-        let eigen = scaled.symmetric_eigen();
-        let weakest = eigen.eigenvalues.imin();
-        let direction = eigen.eigenvectors.column(weakest).into_owned();
-        let (smallest, largest) = (eigen.eigenvalues[weakest], eigen.eigenvalues.max());
-        Some(Conditioning {
-            smallest_eigenvalue: smallest,
-            condition_number: largest / smallest,
-            weakest: named(system, eliminated, &direction, &scale),
-        })
+        let Some(root) = &reduction.root else {
+            let scaled = DMatrix::from_fn(n, n, |i, j| reduction.schur[(i, j)] * scale[i] * scale[j]);
+            let eigen = is_finite(&scaled).then(|| scaled.symmetric_eigen())?;
+            let (values, directions) = (eigen.eigenvalues, eigen.eigenvectors);
+            return Some(Spectrum { values, directions, rounding: ROUNDING });
+        };
+        let scaled = DMatrix::from_fn(n, n, |i, j| root[(i, j)] * scale[j]);
+        let singular = is_finite(&scaled).then(|| scaled.svd(false, true))?;
+        let values = singular.singular_values.map(|s| s * s);
+        Some(Spectrum { values, directions: singular.v_t?.transpose(), rounding: ROUNDING_OF_ROOT })
     }
+}
+
+fn is_finite(matrix: &DMatrix<f64>) -> bool {
+    matrix.iter().all(|x| x.is_finite())
+}
+
+fn known(eigenvalue: f64, rounding: f64) -> f64 {
+    if eigenvalue > rounding { eigenvalue } else { 0.0 }
 }
 
 fn named<const W: usize>(

@@ -190,6 +190,17 @@ pub enum Warning {
         /// Largest angle of an observed point, degrees.
         largest_observed: f64,
     },
+    /// A coefficient came out at a value for which its model is not defined.
+    OutsideRange {
+        /// Which.
+        parameter: Parameter,
+        /// Its value.
+        value: f64,
+        /// The least value of the model's definition.
+        low: f64,
+        /// The largest one.
+        high: f64,
+    },
     /// The pixels and what was known beforehand do not go together: one of the two is wrong.
     Contradicted {
         /// Of which parameter.
@@ -317,6 +328,11 @@ impl fmt::Display for Warning {
                 f,
                 "the lens model folds back at normalised radius {monotone_radius:.3}, and points were seen out to \
                  {largest_observed:.3}: it must not be used beyond them"
+            ),
+            Warning::OutsideRange { parameter, value, low, high } => write!(
+                f,
+                "{parameter} is {value:.4}, and its model is defined from {low} to {high}: other programs may refuse the camera; take \
+                 another model"
             ),
             Warning::Contradicted { parameter, mean, standard_deviation, estimate, deviations } => write!(
                 f,

@@ -37,6 +37,8 @@ pub(super) struct Reduction<const W: usize = N> {
     pub eliminated: Vec<Eliminated<W>>,
     /// `S`, the intrinsics' information when the poses are unknown too.
     pub schur: DMatrix<f64>,
+    /// `R` with `R^T R = S`, upper triangle, where it comes from the Jacobian and so has digits that `S` has lost.
+    pub root: Option<DMatrix<f64>>,
 }
 
 /// An acceleration beyond this part of its step is not trusted (Transtrum & Sethna 2012).
@@ -164,7 +166,7 @@ impl<const W: usize> System<W> {
     pub(super) fn reduction(&self) -> Option<Reduction<W>> {
         let mut eliminated = Vec::new();
         let schur = self.eliminate(0.0, &mut eliminated)?.matrix(self.shared);
-        Some(Reduction { free: self.free, shared: self.shared, eliminated, schur })
+        Some(Reduction { free: self.free, shared: self.shared, eliminated, schur, root: None })
     }
 
     /// The inverse of the normal matrix, block by block, for unit noise; `None` if it is singular.
@@ -184,7 +186,10 @@ impl<const W: usize> Reduction<W> {
         if self.shared == 0 {
             return Some(DMatrix::zeros(0, 0));
         }
-        Some(self.schur.clone().cholesky()?.inverse())
+        match &self.root {
+            Some(root) => inverse_of_square(root),
+            None => Some(self.schur.clone().cholesky()?.inverse()),
+        }
     }
 
     /// The step of what views share with that of every pose which lowers the cost most.
@@ -203,6 +208,15 @@ impl<const W: usize> Reduction<W> {
         let (poses, cross) = blocks.into_iter().unzip();
         Some(Covariance { free: self.free, fy_per_fx: None, intrinsics, poses, cross })
     }
+}
+
+/// `(R^T R)^-1` of an upper triangle; `None` if that is singular. Every sum is written out: a library's product of
+/// matrices may round otherwise on another processor.
+fn inverse_of_square(root: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = root.nrows();
+    let inverse = root.solve_upper_triangular(&DMatrix::identity(n, n))?;
+    let entry = |i: usize, j: usize| (i.max(j)..n).map(|k| inverse[(i, k)] * inverse[(j, k)]).sum();
+    Some(DMatrix::from_fn(n, n, entry))
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use super::report::{STRONG_CORRELATION, UNCERTAIN_FOCAL};
 use super::rival::Rival;
 use super::search::Twin;
 use super::{Calibration, Certificate, Covariance, LensCalibration, Prior, Termination, Warning};
-use crate::camera::{Camera, FreeParameters, Model, Parameter};
+use crate::camera::{Camera, FreeParameters, Lens, Model, Parameter};
 use crate::geometry::Pose;
 
 /// The warnings of a calibration: `of_residuals` are those of its outliers and of what residuals have in
@@ -70,9 +70,24 @@ pub(super) fn of_lens(
             largest_observed: largest_angle.to_degrees(),
         });
     }
+    warnings.extend(Warning::outside_range(&calibration.camera));
     warnings.extend(not_linear(skewed));
     warnings.extend(rival.map(|rival| ambiguous(&rival, value)));
     warnings
+}
+
+/// Values for which the double sphere is defined (Usenko, Demmel & Cremers 2018).
+const DEFINED: [(Parameter, f64, f64); 2] = [(Parameter::Xi, -1.0, 1.0), (Parameter::Alpha, 0.0, 1.0)];
+
+impl Warning {
+    /// Those of coefficients outside of the range for which their model is defined.
+    pub(crate) fn outside_range(camera: &Camera<Lens>) -> impl Iterator<Item = Warning> {
+        DEFINED.into_iter().filter_map(|(parameter, low, high)| {
+            let value = camera.value(parameter)?;
+            let is_outside = !(low..=high).contains(&value);
+            is_outside.then_some(Warning::OutsideRange { parameter, value, low, high })
+        })
+    }
 }
 
 fn not_linear(skewed: &[Skewed]) -> impl Iterator<Item = Warning> {

@@ -56,7 +56,8 @@ pub(super) fn conditioning(
     let eigen = scaled.symmetric_eigen();
     let weakest = eigen.eigenvalues.imin();
     let direction = eigen.eigenvectors.column(weakest).into_owned();
-    let (smallest, largest) = (eigen.eigenvalues[weakest], eigen.eigenvalues.max());
+    let (smallest, largest) =
+        (Conditioning::above_rounding(eigen.eigenvalues[weakest]), eigen.eigenvalues.max());
     let of_camera = direction.component_mul(&scale);
     let mut step = DVector::zeros(n + marks);
     step.rows_mut(0, n).copy_from(&of_camera);

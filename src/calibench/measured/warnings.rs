@@ -38,6 +38,7 @@ pub(super) fn of(
             largest_observed: largest_angle.to_degrees(),
         });
     }
+    warnings.extend(Warning::outside_range(&calibration.camera));
     warnings
 }
 

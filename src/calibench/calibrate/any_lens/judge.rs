@@ -1,5 +1,6 @@
 //! Is the cost a parabola around the minimum, and is there another camera that is as good?
 
+use super::super::conditioning::Spectrum;
 use super::super::intervals::{Profile, Profiled, Skewed};
 use super::super::minimise::{Descent, Minimum, descend};
 use super::super::rival::{Met, Rival};
@@ -7,7 +8,7 @@ use super::super::system::Reduction;
 use super::super::tie::tied;
 use super::super::{CalibrationError, identifiability};
 use super::problem::{Problem, ROUGH_GAIN, State};
-use super::{WIDTH, report, start, walk};
+use super::{WIDTH, report, root, start, walk};
 use crate::camera::{Camera, FreeParameters, Lens, Parameter};
 use nalgebra::SVector;
 
@@ -48,14 +49,14 @@ pub(super) fn judge(
     mut met: Vec<Met<Lens>>,
 ) -> Result<Judged, CalibrationError> {
     let mut skewed = Vec::new();
-    let mut reduction = reduction_of(&minimum)?;
+    let mut reduction = reduction_of(problem, &minimum)?;
     let mut variance = report::variance(problem, &minimum);
     if !is_parabola(problem, &minimum, &reduction, variance.sqrt()) {
         for state in start::alternatives(problem, &minimum.state) {
             take_better(problem, &mut minimum, state, &mut met);
         }
         skewed = profiles(problem, &mut minimum, &mut met)?;
-        reduction = reduction_of(&minimum)?;
+        reduction = reduction_of(problem, &minimum)?;
         variance = report::variance(problem, &minimum);
     }
     let covariance = reduction.intrinsics_covariance();
@@ -95,7 +96,7 @@ fn profiles(
     met: &mut Vec<Met<Lens>>,
 ) -> Result<Vec<Skewed>, CalibrationError> {
     for _ in 0..BETTER_BY_PROFILE {
-        let reduction = reduction_of(minimum)?;
+        let reduction = reduction_of(problem, minimum)?;
         let noise_px = report::variance(problem, minimum).sqrt();
         let Some(profile) = Profile::new(problem, minimum, &reduction, noise_px) else { break };
         let lower = match profile.skewed() {
@@ -111,8 +112,13 @@ fn profiles(
     Ok(Vec::new())
 }
 
-fn reduction_of(minimum: &Minimum<State, WIDTH>) -> Result<Reduction<WIDTH>, CalibrationError> {
-    minimum.system.reduction().ok_or_else(identifiability::singular)
+fn reduction_of(
+    problem: &Problem<'_>,
+    minimum: &Minimum<State, WIDTH>,
+) -> Result<Reduction<WIDTH>, CalibrationError> {
+    let mut reduction = minimum.system.reduction().ok_or_else(identifiability::singular)?;
+    root::add_root(problem, &minimum.state, &minimum.system, &mut reduction);
+    Ok(reduction)
 }
 
 /// Whether the cost rises as linear theory says on the straight way to where it says least: two standard
@@ -143,18 +149,16 @@ fn is_parabola(
 /// alone is known equally well; none where nothing is shared or free.
 fn weakest(reduction: &Reduction<WIDTH>) -> Vec<SVector<f64, WIDTH>> {
     let shared = reduction.schur.nrows();
-    let Some(covariance) = reduction.intrinsics_covariance().filter(|_| shared > 0) else {
+    let scale = reduction.schur.diagonal().map(|information| 1.0 / information.sqrt());
+    let Some(Spectrum { values, directions, .. }) = Spectrum::of(reduction, &scale) else {
         return Vec::new();
     };
-    let scale = reduction.schur.diagonal().map(f64::sqrt);
-    let scaled = covariance.map_with_location(|i, j, c| c * scale[i] * scale[j]).symmetric_eigen();
-    let mut order: Vec<usize> = (0..shared).collect();
-    order.sort_by(|&a, &b| scaled.eigenvalues[b].total_cmp(&scaled.eigenvalues[a]));
+    let mut order: Vec<usize> = (0..shared).filter(|&i| values[i] > 0.0).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     let direction = |&worst: &usize| {
-        let deviation = scaled.eigenvalues[worst].max(0.0).sqrt();
         let mut direction = SVector::zeros();
         for i in 0..shared {
-            direction[i] = deviation * scaled.eigenvectors[(i, worst)] / scale[i];
+            direction[i] = directions[(i, worst)] * scale[i] / values[worst].sqrt();
         }
         direction
     };

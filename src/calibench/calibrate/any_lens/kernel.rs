@@ -11,7 +11,7 @@ use super::marks::{Block, Marks};
 use crate::camera::{Camera, FreeParameters, Lens, LensModel, LensVisitor, Parameter, visit};
 use crate::geometry::Pose;
 use crate::geometry::lanes::{Kernel, LANES, Lanes, dispatch};
-use nalgebra::SVector;
+use nalgebra::{DMatrix, SVector};
 
 /// Pose, shared unknowns, residual, in whole lanes.
 const COLUMNS: usize = 32;
@@ -130,6 +130,53 @@ pub(super) struct View<'a> {
     pub columns: &'a Columns,
 }
 
+/// The weighted rows of a view's Jacobian: pose, then what views share. `None` where the lens has no image of a mark.
+pub(super) fn rows_of_view(view: &View<'_>) -> Option<DMatrix<f64>> {
+    visit(&view.camera.distortion, RowsOfModel { view })
+}
+
+struct RowsOfModel<'a, 'b> {
+    view: &'a View<'b>,
+}
+
+impl LensVisitor for RowsOfModel<'_, '_> {
+    type Output = Option<DMatrix<f64>>;
+
+    fn run<M: LensModel<P>, const P: usize>(self, coefficients: [f64; P]) -> Self::Output {
+        dispatch(Jacobian::<M, P> { view: self.view, coefficients, model: std::marker::PhantomData })
+    }
+}
+
+struct Jacobian<'a, 'b, M, const P: usize> {
+    view: &'a View<'b>,
+    coefficients: [f64; P],
+    model: std::marker::PhantomData<M>,
+}
+
+impl<M: LensModel<P>, const P: usize> Kernel for Jacobian<'_, '_, M, P> {
+    type Output = Option<DMatrix<f64>>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Self::Output {
+        let View { marks, columns, .. } = *self.view;
+        let constants = M::constants(self.coefficients.map(L::splat));
+        let count = 6 + columns.places.len();
+        let mut jacobian = DMatrix::zeros(2 * LANES * marks.blocks.len(), count);
+        let mut rows = Rows::zero();
+        for (place, block) in marks.blocks.iter().enumerate() {
+            fill_rows::<L, M, P>(self.view, &constants, block, &mut rows);
+            weigh(self.view, block, &mut rows, count)?;
+            for (half, row) in rows.columns.iter().enumerate() {
+                for (column, lanes) in row[..count].iter().enumerate() {
+                    let first = LANES * (2 * place + half);
+                    jacobian.view_mut((first, column), (LANES, 1)).copy_from_slice(&lanes.store());
+                }
+            }
+        }
+        Some(jacobian)
+    }
+}
+
 /// Adds the sums of a view. `None` where the lens has no image of a mark.
 pub(super) fn add_view(view: &View<'_>, share: &mut Share, block: &mut ViewBlock<WIDTH>) -> Option<()> {
     visit(&view.camera.distortion, OfModel { view, share, block })
@@ -206,7 +253,7 @@ impl<M: LensModel<P>, const P: usize> Kernel for Sums<'_, '_, M, P> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
-        let View { marks, loss, columns, .. } = *self.view;
+        let View { marks, columns, .. } = *self.view;
         let constants = M::constants(self.coefficients.map(L::splat));
         let count = 6 + columns.places.len() + 1;
         let mut rows = Rows::zero();
@@ -214,24 +261,7 @@ impl<M: LensModel<P>, const P: usize> Kernel for Sums<'_, '_, M, P> {
         self.products.clear(count);
         for block in &marks.blocks {
             fill_rows::<L, M, P>(self.view, &constants, block, &mut rows);
-            if !rows.inside.all_positive() {
-                return None;
-            }
-            let mut root = L::load(&block.weight);
-            let [ru, rv] = rows.residual;
-            let square = (ru * ru + rv * rv) * root * root;
-            if loss == Loss::Squares {
-                cost = cost + square;
-            } else {
-                let at = square.store().map(|s| loss.at(s));
-                cost = cost + L::load(&at.map(|(rho, _)| rho));
-                root = root * L::load(&at.map(|(_, weight)| weight)).sqrt();
-            }
-            for row in &mut rows.columns {
-                for column in &mut row[..count] {
-                    *column = *column * root;
-                }
-            }
+            cost = cost + weigh(self.view, block, &mut rows, count)?;
             let [u, v] = &rows.columns;
             self.products.add(&u[..count], &v[..count]);
         }
@@ -239,6 +269,29 @@ impl<M: LensModel<P>, const P: usize> Kernel for Sums<'_, '_, M, P> {
         let [cost, ..] = L::sums([cost; 4]);
         Some(cost)
     }
+}
+
+/// Multiplies the first `count` columns with the roots of the marks' weights, those of the loss among them: their cost.
+/// `None` where the lens has no image of a mark.
+#[inline(always)]
+fn weigh<L: Lanes>(view: &View<'_>, block: &Block, rows: &mut Rows<L>, count: usize) -> Option<L> {
+    if !rows.inside.all_positive() {
+        return None;
+    }
+    let mut root = L::load(&block.weight);
+    let [ru, rv] = rows.residual;
+    let mut cost = (ru * ru + rv * rv) * root * root;
+    if view.loss != Loss::Squares {
+        let at = cost.store().map(|square| view.loss.at(square));
+        cost = L::load(&at.map(|(rho, _)| rho));
+        root = root * L::load(&at.map(|(_, weight)| weight)).sqrt();
+    }
+    for row in &mut rows.columns {
+        for column in &mut row[..count] {
+            *column = *column * root;
+        }
+    }
+    Some(cost)
 }
 
 /// The Jacobian of four marks: `d X_c / d delta = -[q]x` with `q = R X`, `d X_c / d t = I`, `d X_c / d height = r3`.

@@ -16,6 +16,7 @@ mod marks;
 mod problem;
 mod radial;
 mod report;
+mod root;
 mod shape;
 mod start;
 mod walk;

@@ -49,6 +49,14 @@ pub(super) struct Problem<'a> {
     pub rounding_cost: f64,
 }
 
+/// A shared unknown of which something is known beforehand.
+pub(super) struct Known {
+    pub row: usize,
+    /// Distance from the value that is expected.
+    pub off: f64,
+    pub weight: f64,
+}
+
 /// Where minima are compared or left for another model, a cost that is known to this part of itself is known well
 /// enough: to a thousandth of a variance with a thousand degrees of freedom.
 pub(super) const ROUGH_GAIN: f64 = 1e-6;
@@ -72,26 +80,42 @@ impl Problem<'_> {
         self.bend.map_or(0, |bend| bend.deformations)
     }
 
-    /// Weights of the priors: parameters first, then the board's deformations.
     fn add_priors(&self, state: &State, system: &mut System<WIDTH>) {
-        let mut add = |row: usize, off: f64, sd: f64| {
-            let weight = self.variance / (sd * sd);
+        for Known { row, off, weight } in self.known(state) {
             system.cost += weight * off * off;
             system.intrinsics[(row, row)] += weight;
             system.gradient[row] += weight * off;
+        }
+    }
+
+    /// What is known beforehand: of parameters first, then of the board's deformations.
+    pub fn known(&self, state: &State) -> Vec<Known> {
+        let known = |row: usize, off: f64, sd: f64| Known { row, off, weight: self.variance / (sd * sd) };
+        let of_prior = |prior: &Prior| {
+            let row = self.free.position(prior.parameter)?;
+            Some(known(row, state.camera.value(prior.parameter)? - prior.mean, prior.standard_deviation))
         };
-        for prior in self.priors {
-            if let (Some(row), Some(value)) =
-                (self.free.position(prior.parameter), state.camera.value(prior.parameter))
-            {
-                add(row, value - prior.mean, prior.standard_deviation);
-            }
+        let bend = self.known_bend();
+        let deformations = (0..bend.map_or(0, |bend| bend.deformations)).zip(state.shape);
+        let of_board = |(k, value)| Some(known(self.free.len() + k, value, bend?.standard_deviation));
+        self.priors.iter().filter_map(of_prior).chain(deformations.filter_map(of_board)).collect()
+    }
+
+    /// What the kernel is asked of view `at`.
+    pub fn view<'b>(&'b self, state: &'b State, columns: &'b Columns, at: usize) -> kernel::View<'b> {
+        kernel::View {
+            camera: &state.camera,
+            cam_from_target: &state.cam_from_target[at],
+            shape: &state.shape,
+            marks: &self.views[at],
+            loss: self.loss,
+            columns,
         }
-        if let Some(bend) = self.known_bend() {
-            for (k, value) in state.shape.iter().enumerate().take(bend.deformations) {
-                add(self.free.len() + k, *value, bend.standard_deviation);
-            }
-        }
+    }
+
+    /// Columns of the shared unknowns.
+    pub fn columns(&self, state: &State) -> Columns {
+        Columns::of(&state.camera.distortion, self.free, self.fy_per_fx, self.deformations())
     }
 
     /// How many unknowns are settled by what is known beforehand: `sum (posterior sd / prior sd)^2`.
@@ -117,22 +141,13 @@ impl Problem<'_> {
     }
 
     fn fill(&self, state: &State, system: &mut System<WIDTH>) -> Option<()> {
-        let columns = Columns::of(&state.camera.distortion, self.free, self.fy_per_fx, self.deformations());
+        let columns = self.columns(state);
         system.views.resize_with(self.views.len(), ViewBlock::zero);
         let mut total = Some(Share::zero());
         let chunk = |index: usize, blocks: &mut [ViewBlock<WIDTH>]| {
             let mut share = Share::zero();
             for (k, block) in blocks.iter_mut().enumerate() {
-                let at = index * CHUNK + k;
-                let view = kernel::View {
-                    camera: &state.camera,
-                    cam_from_target: &state.cam_from_target[at],
-                    shape: &state.shape,
-                    marks: &self.views[at],
-                    loss: self.loss,
-                    columns: &columns,
-                };
-                kernel::add_view(&view, &mut share, block)?;
+                kernel::add_view(&self.view(state, &columns, index * CHUNK + k), &mut share, block)?;
             }
             Some(share)
         };

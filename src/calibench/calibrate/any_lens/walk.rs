@@ -2,7 +2,7 @@
 
 use super::super::minimise::{Minimum, descend};
 use super::super::rival::{Met, RIVALS};
-use super::super::{CalibrationError, Settings, Termination};
+use super::super::{CalibrationError, Settings, Termination, Warning};
 use super::problem::{Problem, ROUGH_GAIN, State};
 use super::{WIDTH, report, start};
 use crate::board::View;
@@ -68,20 +68,27 @@ fn refined(problem: &Problem<'_>, starts: Vec<State>) -> Vec<Minimum<State, WIDT
 }
 
 /// Whether one minimum is to be preferred to another: it costs less, and if it is none, because the search went on
-/// and on, so much less that chance does not explain it. Where numerator and denominator of a fraction nearly
-/// cancel, a valley goes on to coefficients without end, at a fraction of a variance.
+/// and on, or has coefficients for which the model is not defined, so much less that chance does not explain it. Where
+/// numerator and denominator of a fraction nearly cancel, a valley goes on to coefficients without end, at a fraction of a
+/// variance; two spheres make nearly the same picture in and out of their range.
 pub(super) fn is_better(
     problem: &Problem<'_>,
     next: &Minimum<State, WIDTH>,
     best: &Minimum<State, WIDTH>,
 ) -> bool {
-    let [next_ends, best_ends] = [next, best].map(|m| m.termination == Termination::Converged);
-    let margin = match (next_ends, best_ends) {
+    let [next_is_sound, best_is_sound] = [next, best].map(is_sound);
+    let margin = match (next_is_sound, best_is_sound) {
         (true, false) => -RIVALS * report::variance(problem, next),
         (false, true) => RIVALS * report::variance(problem, best),
         _ => 0.0,
     };
     next.system.cost + margin < best.system.cost
+}
+
+/// Whether a search ended, and with a camera for which its model is defined.
+fn is_sound(minimum: &Minimum<State, WIDTH>) -> bool {
+    let is_defined = Warning::outside_range(&minimum.state.camera).next().is_none();
+    minimum.termination == Termination::Converged && is_defined
 }
 
 /// A minimum among those that were met.
