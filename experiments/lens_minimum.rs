@@ -154,6 +154,11 @@ impl Measured {
         self.count(|line| line.class == Class::Wrong && line.is_determined())
     }
 
+    /// And by more than a noise variance: chance alone moves a minimum so far.
+    fn far_where_determined(&self) -> usize {
+        self.count(|line| line.class == Class::Wrong && line.is_determined() && line.excess > 1.0)
+    }
+
     /// Results that are right, determined and that no warning questions.
     fn unquestioned(&self) -> impl Iterator<Item = &Line> {
         self.lines
@@ -186,6 +191,7 @@ fn report_counts(record: &mut Record, measured: &[Measured]) {
         );
         number("wrong", m.count(|l| l.class == Class::Wrong), "scenes accepted at a higher cost");
         number("wrong-of-determined", m.wrong_where_determined(), "of these, determined");
+        number("far-of-determined", m.far_where_determined(), "and higher by more than a noise variance");
         number("refused", m.count(|l| l.class == Class::Refused), "scenes refused");
         number(
             "refused-of-determined",
@@ -299,11 +305,12 @@ fn models_table(measured: &[Measured]) -> Table {
         ("refused", ""),
         ("determined", ""),
         ("wrong_determined", ""),
+        ("by_a_variance", ""),
         ("refused_determined", ""),
         ("lower", ""),
     ];
     let caption = format!(
-        "how the scenes of every model ended; determined: bound of sd(fx)/fx below {DETERMINED}; lower: accepted at a cost lower than the \
+        "how the scenes of every model ended; determined: bound of sd(fx)/fx below {DETERMINED}; by_a_variance: of these, at a cost higher by more than a noise variance; lower: accepted at a cost lower than the \
          reference's by a thousandth of a variance"
     );
     let mut table = Table::new("models", caption, &columns);
@@ -317,6 +324,7 @@ fn models_table(measured: &[Measured]) -> Table {
             refused,
             m.count(Line::is_determined),
             m.wrong_where_determined(),
+            m.far_where_determined(),
             m.count(|line| line.class == Class::Refused && line.is_determined()),
             m.count(|line| line.class == Class::Right && line.excess < -1e-3),
         ];
