@@ -36,8 +36,8 @@ pub struct WeakComponent {
 /// Smallest eigenvalue of the scaled information below which it is rounding: the elimination subtracts
 /// numbers of size 1, so its error is some hundred roundings.
 const ROUNDING: f64 = 1e-12;
-/// The same where it is the square of a singular value of the Jacobian, which has such an error itself.
-const ROUNDING_OF_ROOT: f64 = ROUNDING * ROUNDING;
+/// The same where it is the square of a singular value of the Jacobian, which has an error of some ten roundings.
+const ROUNDING_OF_ROOT: f64 = 1e-28;
 /// Members of the weakest combination below this share of the largest one are not worth a name.
 const NAMED_SHARE: f64 = 0.2;
 

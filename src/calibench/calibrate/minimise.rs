@@ -53,6 +53,8 @@ pub(super) const RELATIVE_GAIN: f64 = 1e-14;
 const ROUNDINGS: f64 = 8.0;
 /// Small enough not to slow a good start, large enough to tame a singular first matrix.
 const FIRST_DAMPING: f64 = 1e-6;
+/// What damping falls to at most.
+const LEAST_DAMPING: f64 = 1e-6 * FIRST_DAMPING;
 /// Damping grows by this on failure and falls by it on success.
 const DAMPING_FACTOR: f64 = 10.0;
 /// With this damping a step is a short way down the gradient; if that fails, nothing helps.
@@ -167,6 +169,12 @@ pub(super) trait Descent<const W: usize> {
         false
     }
 
+    /// Whether a step that gains next to nothing may lead far away, along a combination that is hardly known, and is to
+    /// be looked at.
+    fn may_leap(&self) -> bool {
+        false
+    }
+
     /// Iterations after which a search creeps: its steps then follow the bend of their path.
     fn patience(&self) -> usize {
         usize::MAX
@@ -215,7 +223,21 @@ pub(super) fn descend<D: Descent<W>, const W: usize>(problem: &D, start: D::Stat
         problem.step(&state, &step, &mut trial);
         let undamped = damping <= FIRST_DAMPING;
         if undamped && step.predicted_gain <= relative_gain * system.cost + rounding_cost {
-            std::mem::swap(&mut state, &mut trial);
+            if !problem.may_leap() {
+                std::mem::swap(&mut state, &mut trial);
+                break Termination::Converged;
+            }
+            if damping > LEAST_DAMPING {
+                // Damping hides what a combination that is hardly known would gain.
+                damping = LEAST_DAMPING;
+                iterations += 1;
+                continue;
+            }
+            problem.linearise_into(&trial, &mut trial_system);
+            if trial_system.cost <= system.cost {
+                std::mem::swap(&mut state, &mut trial);
+                std::mem::swap(&mut system, &mut trial_system);
+            }
             break Termination::Converged;
         }
         iterations += 1;

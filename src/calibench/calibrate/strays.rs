@@ -3,6 +3,7 @@
 use super::estimate::Fit;
 use super::minimise::{Problem, State};
 use super::{CalibrationError, Loss, Warning};
+use crate::geometry::Vec2;
 
 /// Noise makes one set in this many look as if it had a stray, before a robust fit has been asked: `exp(-7)`.
 const LOG_LOOK: f64 = 7.0;
@@ -46,7 +47,7 @@ pub(super) fn refuse_narrow_loss(loss: Loss, fit: &Fit) -> Result<(), Calibratio
         Loss::Squares => return Ok(()),
         Loss::Huber { delta_px: scale } | Loss::Cauchy { scale_px: scale } => scale,
     };
-    let median_px = median(fit).sqrt();
+    let median_px = median(&fit.residuals).sqrt();
     if scale_px < NARROW * median_px {
         return Err(CalibrationError::NarrowLoss { scale_px, median_px });
     }
@@ -69,34 +70,62 @@ pub(super) fn or_blamed<T>(
     }
 }
 
-/// The strays of a least-squares fit with residuals of variance `variance`, if there are a few: the fit is
-/// repeated with Cauchy's loss at the scale of the median, which strays do not move.
+/// The strays of a least-squares fit with residuals of variance `variance`, if there are a few.
 pub(super) fn strays(problem: &Problem<'_>, state: &State, fit: &Fit, variance: f64) -> Option<Strays> {
-    if problem.loss != Loss::Squares || !is_suspicious(fit, variance) {
+    let is_suspicious = is_suspicious(fit.marks(), fit.largest_square, fit.tails(), variance);
+    if problem.loss != Loss::Squares || !is_suspicious {
         return None;
     }
     let mut state = state.clone();
-    let mut fit = Fit::of(&state, problem.observations);
+    let unknowns = problem.free.len() + 6 * problem.observations.len();
+    named(Fit::of(&state, problem.observations).residuals, unknowns, |loss| {
+        state = Problem { loss, ..*problem }.minimise(state.clone()).state;
+        Fit::of(&state, problem.observations).residuals
+    })
+}
+
+/// Those of any fit with these residuals, of so many unknowns: `refit` gives the residuals under another loss, and starts where
+/// the fit before ended.
+pub(super) fn of_residuals(
+    residuals: &[Vec<Vec2>],
+    unknowns: usize,
+    variance: f64,
+    refit: impl FnMut(Loss) -> Vec<Vec<Vec2>>,
+) -> Option<Strays> {
+    let squares = || residuals.iter().flatten().map(Vec2::norm_squared);
+    let (square, fourth) = squares().fold((0.0, 0.0), |(s, f), square| (s + square, f + square * square));
+    let marks = squares().count();
+    let tails = fourth * marks as f64 / (square * square);
+    is_suspicious(marks, squares().fold(0.0, f64::max), tails, variance)
+        .then(|| named(residuals.to_vec(), unknowns, refit))?
+}
+
+/// Strays by name: the fit is repeated with Cauchy's loss at the scale of the median, which strays do not move.
+fn named(
+    mut residuals: Vec<Vec<Vec2>>,
+    unknowns: usize,
+    mut refit: impl FnMut(Loss) -> Vec<Vec<Vec2>>,
+) -> Option<Strays> {
     for _ in 0..FITS {
-        let scale = median(&fit).sqrt();
-        let robust = Problem { loss: Loss::Cauchy { scale_px: scale }, ..*problem };
-        if !robust.loss.is_valid() {
+        let loss = Loss::Cauchy { scale_px: median(&residuals).sqrt() };
+        if !loss.is_valid() {
             return None;
         }
-        state = robust.minimise(state).state;
-        fit = Fit::of(&state, problem.observations);
+        residuals = refit(loss);
     }
-    let median = median(&fit);
-    let limit = largest_of_noise(problem, &fit)? * median;
-    let marks = fit.squares().filter(|&square| square > limit).count();
-    if marks == 0 || marks as f64 > (MOST * fit.marks() as f64).max(1.0) {
+    let median = median(&residuals);
+    let squares = || residuals.iter().flatten().map(Vec2::norm_squared);
+    let all = squares().count();
+    let limit = largest_of_noise(all, unknowns)? * median;
+    let marks = squares().filter(|&square| square > limit).count();
+    if marks == 0 || marks as f64 > (MOST * all as f64).max(1.0) {
         return None;
     }
-    let numbered = fit.residuals.iter().enumerate().flat_map(|(view, list)| {
+    let numbered = residuals.iter().enumerate().flat_map(|(view, list)| {
         list.iter().enumerate().map(move |(point, residual)| (view, point, residual.norm()))
     });
     let (view, point, residual_px) = numbered.max_by(|a, b| a.2.total_cmp(&b.2))?;
-    let share = marks as f64 / fit.marks() as f64;
+    let share = marks as f64 / all as f64;
     Some(Strays { marks, share, view, point, residual_px, median_px: median.sqrt() })
 }
 
@@ -105,23 +134,22 @@ pub(super) fn strays(problem: &Problem<'_>, state: &State, fit: &Fit, variance: 
 /// `2 (ln N + L) sigma^2` with probability `exp(-L)` at most. A fit of few degrees of freedom follows some
 /// marks and leaves others: by how much more is bounded by the square of coordinates over degrees of freedom.
 /// `None` where these are fewer than the marks: a robust fit then passes through half of them.
-fn largest_of_noise(problem: &Problem<'_>, fit: &Fit) -> Option<f64> {
-    let marks = fit.marks();
-    let freedom = (2 * marks).checked_sub(problem.free.len() + 6 * problem.observations.len())?;
+fn largest_of_noise(marks: usize, unknowns: usize) -> Option<f64> {
+    let freedom = (2 * marks).checked_sub(unknowns)?;
     let followed = 2.0 * marks as f64 / freedom as f64;
     let largest = 2.0 * (libm::log(marks as f64) + LOG_STRAY);
     (freedom >= marks).then(|| largest * followed * followed / (2.0 * std::f64::consts::LN_2))
 }
 
 /// Whether some residuals are much larger than the rest: one alone stands out, and many make the tails heavy.
-fn is_suspicious(fit: &Fit, variance: f64) -> bool {
-    let noise = 2.0 * (libm::log(fit.marks() as f64) + LOG_LOOK) * variance;
-    fit.largest_square > noise || fit.tails() > HEAVY
+fn is_suspicious(marks: usize, largest_square: f64, tails: f64, variance: f64) -> bool {
+    let noise = 2.0 * (libm::log(marks as f64) + LOG_LOOK) * variance;
+    largest_square > noise || tails > HEAVY
 }
 
 /// The median squared residual.
-fn median(fit: &Fit) -> f64 {
-    let mut squares: Vec<f64> = fit.squares().collect();
+fn median(residuals: &[Vec<Vec2>]) -> f64 {
+    let mut squares: Vec<f64> = residuals.iter().flatten().map(Vec2::norm_squared).collect();
     let middle = squares.len() / 2;
     *squares.select_nth_unstable_by(middle, f64::total_cmp).1
 }

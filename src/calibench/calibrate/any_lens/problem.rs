@@ -201,6 +201,10 @@ impl Descent<WIDTH> for Problem<'_> {
         true
     }
 
+    fn may_leap(&self) -> bool {
+        true
+    }
+
     fn patience(&self) -> usize {
         PATIENCE
     }

@@ -91,6 +91,26 @@ pub(super) fn report(
     let freedom = residuals.freedom(&minimum, problem.settled(system));
     let degrees_of_freedom = whole(freedom);
     let conditioning = Conditioning::of(system, &reduction);
+    if identifiability::refuse_singular_minimum(problem.free, conditioning.as_ref()).is_err() {
+        eprintln!(
+            "DBGR rmse {:.7} {:?} n {} {:?} root {} sv {:?}",
+            (residuals.square / residuals.marks as f64).sqrt(),
+            termination,
+            residuals.marks,
+            state.camera,
+            reduction.root.is_some(),
+            reduction.root.as_ref().map(|r| {
+                let d = system.scale();
+                format!(
+                    "{:.1e}",
+                    nalgebra::DMatrix::from_fn(r.nrows(), r.ncols(), |i, j| r[(i, j)] * d[j])
+                        .svd(false, false)
+                        .singular_values
+                        .transpose()
+                )
+            })
+        );
+    }
     identifiability::refuse_singular_minimum(problem.free, conditioning.as_ref())?;
     let unit = reduction.covariance().ok_or_else(identifiability::singular)?;
     let profile = Profile::new(problem, &minimum, &reduction, variance.sqrt());
