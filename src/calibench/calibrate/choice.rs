@@ -192,17 +192,22 @@ const WORTH: f64 = 0.05;
 /// Where residuals of neighbouring marks agree: which one freedom more, of the lens or of the board, lowers the
 /// RMSE of `fit` by a twentieth or more, the best first.
 pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibration) -> Vec<Freedom> {
-    use Parameter::{K1, K2, K3, P1, P2};
+    use Parameter::{K1, K2, K3, P1, P2, S1, S2, S3, S4, TauX, TauY};
     let model = settings.model();
     let is_coefficient = |p: &Parameter| !Parameter::LINEAR.contains(p);
     let own = fit.free.iter().filter(is_coefficient).fold(FreeParameters::NONE, FreeParameters::with);
     let with = |more: &[Parameter]| more.iter().fold(own, |set, &p| set.with(p));
     let richer = [with(&[K3]), with(&[P1, P2]), with(&[K1, K2, K3, P1, P2])];
     let of_brown = richer.into_iter().filter(|_| model == Model::BrownConrady).map(|set| (model, set));
-    let others = [Model::Rational, Model::KannalaBrandt]
-        .into_iter()
-        .filter(|&other| other != model)
-        .map(|other| (other, FreeParameters::of(other.coefficients())));
+    let others = [
+        (Model::Rational, Model::Rational.coefficients()),
+        (Model::KannalaBrandt, Model::KannalaBrandt.coefficients()),
+        (Model::ThinPrism, &[K1, K2, K3, P1, P2, S1, S2, S3, S4]),
+        (Model::Tilted, &[K1, K2, K3, P1, P2, TauX, TauY]),
+    ]
+    .into_iter()
+    .filter(|(other, _)| *other != model)
+    .map(|(other, coefficients)| (other, FreeParameters::of(coefficients)));
     let standard_deviation = f64::INFINITY;
     let boards = match settings.board {
         Board::Flat => vec![Board::Bowed { standard_deviation }, Board::Bent { standard_deviation }],

@@ -59,6 +59,11 @@ impl Conditioning {
         self.smallest_eigenvalue.is_nan() || self.smallest_eigenvalue <= 0.0
     }
 
+    /// Whether the weakest combination is known worse than each of its members alone by a factor of a million or more.
+    pub fn is_hardly_separable(&self) -> bool {
+        self.smallest_eigenvalue <= ROUNDING
+    }
+
     /// An eigenvalue of information scaled to unit diagonal; 0 where it is rounding.
     pub(crate) fn above_rounding(eigenvalue: f64) -> f64 {
         known(eigenvalue, ROUNDING)

@@ -2,7 +2,6 @@
 
 use super::certificate::Certificate;
 use super::conditioning::Conditioning;
-use super::duplicates::Distinct;
 use super::intervals::Profile;
 use super::minimise::{Problem, State, rounding_cost};
 use super::normal::Observations;
@@ -13,7 +12,7 @@ use super::start::Held;
 use super::system::System;
 use super::target_frame::TargetFrames;
 use super::{
-    Board, Calibration, CalibrationError, Loss, Prior, Role, Settings, Termination, Warning, chunks,
+    Board, Calibration, CalibrationError, Loss, Prior, Role, Settings, Termination, Warning, chunks, copies,
     identifiability, kernel, polish, start, strays, structure, warnings,
 };
 use crate::board::View;
@@ -50,21 +49,7 @@ const START_GAIN: f64 = 1e-3;
 /// # Ok::<(), CalibrationError>(())
 /// ```
 pub fn calibrate(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
-    let Some(distinct) = Distinct::of(views) else { return calibrate_different(views, settings) };
-    match calibrate_different(&distinct.views(views), settings) {
-        Ok(calibration) => Ok(with_copies(calibration, &distinct)),
-        Err(CalibrationError::View { view, source }) => {
-            Err(CalibrationError::View { view: distinct.kept[view], source })
-        }
-        Err(CalibrationError::TooFewViews { need, got, linear, .. }) => {
-            Err(CalibrationError::TooFewViews { need, got, linear, copies: views.len() - got })
-        }
-        Err(CalibrationError::Strays { marks, view, point, residual_px, median_px }) => {
-            let (view, point) = distinct.given_mark(view, point);
-            Err(CalibrationError::Strays { marks, view, point, residual_px, median_px })
-        }
-        Err(error) => Err(error),
-    }
+    copies::without(views, |views| calibrate_different(views, settings))
 }
 
 fn calibrate_different(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
@@ -75,36 +60,6 @@ fn calibrate_different(views: &[View], settings: &Settings) -> Result<Calibratio
     } else {
         calibration
     })
-}
-
-/// The result for all that was given: a copy has the pose and the residuals of what it is a copy of, and
-/// counts in no statistic.
-fn with_copies(mut calibration: Calibration, distinct: &Distinct) -> Calibration {
-    fn at<T: Clone>(list: &[T], place: &[usize]) -> Vec<T> {
-        place.iter().map(|&i| list[i].clone()).collect()
-    }
-    let place = &distinct.place;
-    calibration.cam_from_target = at(&calibration.cam_from_target, place);
-    calibration.residuals =
-        (0..place.len()).map(|view| distinct.spread(view, &calibration.residuals)).collect();
-    calibration.covariance.poses = at(&calibration.covariance.poses, place);
-    calibration.covariance.cross = at(&calibration.covariance.cross, place);
-    for warning in &mut calibration.warnings {
-        match warning {
-            Warning::Outliers { view, point, .. } => (*view, *point) = distinct.given_mark(*view, *point),
-            Warning::TwinPose { view, .. } | Warning::FromBehind { view, .. } => *view = distinct.kept[*view],
-            _ => {}
-        }
-    }
-    let copies = place.len() - distinct.kept.len();
-    if let Some(view) = (0..place.len()).find(|&view| distinct.kept[place[view]] != view) {
-        let copy_of = distinct.kept[place[view]];
-        calibration.warnings.push(Warning::Duplicates { view, copy_of, copies });
-    }
-    if let Some((marks, view, point)) = distinct.repeated {
-        calibration.warnings.push(Warning::RepeatedMarks { marks, view, point });
-    }
-    calibration
 }
 
 /// The calibration, and the variance of a pixel coordinate that weighed the priors.
@@ -384,11 +339,6 @@ pub(super) struct Fit {
 }
 
 impl Fit {
-    /// The squared residuals, mark by mark.
-    pub fn squares(&self) -> impl Iterator<Item = f64> {
-        self.residuals.iter().flatten().map(|r| r.norm_squared())
-    }
-
     /// Degrees of freedom that the residuals have, 1 at the least; `settled` unknowns are known from
     /// elsewhere.
     pub fn freedom(&self, system: &System, settled: f64) -> f64 {

@@ -42,9 +42,11 @@ const CHECKED_AT: f64 = 2.0;
 /// The intervals differ where a half-width does by more than this part.
 const TOLERATED: f64 = 0.1;
 /// Refits of an end.
-const REFITS: usize = 12;
+const REFITS: usize = 24;
 /// An end is found when `tau` is this close to `t`.
 const CLOSE: f64 = 1e-4;
+/// A `tau` so many times the wanted one is far off.
+const FAR_OFF: f64 = 10.0;
 /// An end farther away than this many linear half-widths counts as open.
 const FARTHEST: f64 = 50.0;
 
@@ -173,7 +175,8 @@ impl<'a, P: Profiled<W>, const W: usize> Profile<'a, P, W> {
             if (tau - t).abs() <= CLOSE * t {
                 return Some(offset);
             }
-            offset *= (t / tau).clamp(0.4, 2.5);
+            // A linear end that is absurdly far off has a cost without bound.
+            offset *= if tau > FAR_OFF * t { 1.0 / FAR_OFF } else { (t / tau).clamp(0.4, 2.5) };
             if offset.abs() > FARTHEST * linear.abs() {
                 return None;
             }

@@ -1,7 +1,7 @@
 //! Which of the two estimators calibrates? That of [`calibrate`] knows one lens, and much about it; that of
 //! [`super::any_lens`] knows all.
 
-use super::{Board, Calibration, CalibrationError, Settings, any_lens, calibrate};
+use super::{Board, Calibration, CalibrationError, Settings, any_lens, calibrate, copies};
 use crate::board::View;
 use crate::camera::{Camera, Lens, Model};
 
@@ -54,7 +54,7 @@ impl LensCalibration {
 /// [`calibrate`], the noise that of a coordinate of weight 1. A camera with Brown-Conrady's lens, marks of
 /// weight 1 and a flat board is handed to [`calibrate`], with all that it checks. For all else the best of a few
 /// starts is refined, by the rays of a fisheye and by a pinhole, and the profiles of the parameters are walked
-/// where the cost is no parabola; nothing certifies that minimum, and views given twice count twice.
+/// where the cost is no parabola; nothing certifies that minimum. Views given twice count once, but where marks have weights.
 ///
 /// # Errors
 /// As [`calibrate`]; a parameter that the model does not have; a model that cannot see every mark.
@@ -84,5 +84,9 @@ pub fn calibrate_lens(views: &[View], settings: &Settings) -> Result<LensCalibra
     if settings.model() == Model::BrownConrady && is_plain {
         return calibrate(views, settings).map(LensCalibration::from);
     }
-    any_lens::calibrate(views, settings)
+    // A mark that was given twice with weights may be meant so.
+    if views.iter().any(|view| view.weights().is_some()) {
+        return any_lens::calibrate(views, settings);
+    }
+    copies::without(views, |views| any_lens::calibrate(views, settings))
 }

@@ -38,6 +38,7 @@ pub(super) struct Problem<'a> {
 }
 
 /// A minimum, or where the search ended.
+#[derive(Clone)]
 pub(super) struct Minimum<S = State, const W: usize = N> {
     pub state: S,
     /// Normal equations one last negligible step before `state`.

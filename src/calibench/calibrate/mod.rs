@@ -12,6 +12,7 @@ mod chunks;
 mod closed_form;
 mod condensed;
 mod conditioning;
+mod copies;
 mod covariance;
 mod duplicates;
 mod elimination;

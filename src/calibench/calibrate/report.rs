@@ -169,6 +169,12 @@ pub enum Warning {
         /// Correlation coefficient.
         correlation: f64,
     },
+    /// A combination of parameters that hardly changes the picture: known worse than each of them alone by a factor of a
+    /// million or more.
+    HardlySeparable {
+        /// Those that take part, the strongest first.
+        parameters: Vec<Parameter>,
+    },
     /// A focal length known only roughly; its standard deviation, being first-order, is itself rough.
     FocalLengthUncertain {
         /// Which.
@@ -314,6 +320,15 @@ impl fmt::Display for Warning {
                 "{a} and {b} are correlated {correlation:+.4}: the data hardly tell them apart; cover the image corners, or \
                  hold one of them"
             ),
+            Warning::HardlySeparable { parameters } => {
+                let names: Vec<&str> = parameters.iter().map(|parameter| parameter.name()).collect();
+                write!(
+                    f,
+                    "together {} hardly change the picture: their standard deviations mean little; hold one of them, estimate fewer \
+                     coefficients, or take the intervals of the profile",
+                    names.join(", ")
+                )
+            }
             Warning::FocalLengthUncertain { parameter, relative } => write!(
                 f,
                 "{parameter} is known to {:.0} % only: tilt the target more, about different axes",

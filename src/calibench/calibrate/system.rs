@@ -169,12 +169,6 @@ impl<const W: usize> System<W> {
         Some(Reduction { free: self.free, shared: self.shared, eliminated, schur, root: None })
     }
 
-    /// The step of what views share, with every pose at its least cost then.
-    pub(super) fn with_poses(&self, reduction: &Reduction<W>, intrinsics: SVector<f64, W>) -> Step<W> {
-        let pose = |factors: &Eliminated<W>| factors.pose_step(&intrinsics, self.shared);
-        Step::along(intrinsics, reduction.eliminated.iter().map(pose).collect())
-    }
-
     /// The inverse of the normal matrix, block by block, for unit noise; `None` if it is singular.
     pub fn covariance(&self) -> Option<Covariance> {
         self.reduction()?.covariance()

@@ -5,7 +5,10 @@ use super::intervals::student_quantile;
 use super::report::{STRONG_CORRELATION, UNCERTAIN_FOCAL};
 use super::rival::Rival;
 use super::search::Twin;
-use super::{Calibration, Certificate, Covariance, LensCalibration, Prior, Termination, Warning};
+use super::{
+    Calibration, Certificate, Covariance, LensCalibration, Prior, Termination, Unknown, Warning,
+    WeakComponent,
+};
 use crate::camera::{Camera, FreeParameters, Lens, Model, Parameter};
 use crate::geometry::Pose;
 
@@ -44,7 +47,7 @@ pub(super) fn of(
 pub(super) fn of_lens(
     calibration: &LensCalibration,
     largest_angle: f64,
-    neighbours: Option<Warning>,
+    of_residuals: Vec<Warning>,
     skewed: &[Skewed],
     rival: Option<Rival>,
 ) -> Vec<Warning> {
@@ -53,7 +56,7 @@ pub(super) fn of_lens(
         let LensCalibration { termination, iterations, .. } = *calibration;
         warnings.push(Warning::NotConverged { termination, iterations });
     }
-    warnings.extend(neighbours);
+    warnings.extend(of_residuals);
     warnings.extend(few_degrees_of_freedom(calibration.degrees_of_freedom));
     let value = |parameter| calibration.camera.value(parameter).unwrap_or(0.0);
     warnings.extend(calibration.priors.iter().filter_map(|prior| contradicted(calibration, prior, value)));
@@ -62,7 +65,15 @@ pub(super) fn of_lens(
     let pairs = correlated(&calibration.covariance, calibration.free);
     warnings
         .extend(pairs.into_iter().filter(|pair| model == Model::BrownConrady || !is_by_construction(pair)));
-    warnings.extend(focal_length_uncertain(calibration, value));
+    warnings.extend(hardly_separable(calibration));
+    let is_misled = |parameter| {
+        skewed.iter().any(|s| s.parameter == parameter && s.ratios.iter().all(|&ratio| ratio < MISLED))
+    };
+    let uncertain = focal_length_uncertain(calibration, value);
+    warnings.extend(uncertain.filter(|warning| match warning {
+        Warning::FocalLengthUncertain { parameter, .. } => !is_misled(*parameter),
+        _ => true,
+    }));
     let limit = calibration.camera.distortion.monotone_angle();
     if limit < largest_angle {
         warnings.push(Warning::FoldsInsideView {
@@ -74,6 +85,18 @@ pub(super) fn of_lens(
     warnings.extend(not_linear(skewed));
     warnings.extend(rival.map(|rival| ambiguous(&rival, value)));
     warnings
+}
+
+/// Where the profile says that a parameter is known better than its standard deviation by this factor, that tells nothing of it.
+const MISLED: f64 = 0.5;
+
+fn hardly_separable(calibration: &LensCalibration) -> Option<Warning> {
+    let conditioning = calibration.conditioning.as_ref().filter(|c| c.is_hardly_separable())?;
+    let parameter = |member: &WeakComponent| match member.unknown {
+        Unknown::Intrinsic(parameter) => Some(parameter),
+        _ => None,
+    };
+    Some(Warning::HardlySeparable { parameters: conditioning.weakest.iter().filter_map(parameter).collect() })
 }
 
 /// Values for which the double sphere is defined (Usenko, Demmel & Cremers 2018).

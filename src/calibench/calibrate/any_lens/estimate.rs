@@ -102,8 +102,10 @@ fn estimate(views: &[View], settings: &Settings) -> Result<LensCalibration, Cali
     let state = start::with_better_tilts(&flat, walked.best.state);
     let bent = Problem { bend: settings.board.bend(), ..flat };
     let (problem, minimum) = settled(bent, state, walked.best.iterations);
-    let judged = judge::judge(&problem, minimum, walked.met)?;
-    report::report(judged, &problem, &frames, region, settings)
+    let found = minimum.clone();
+    let calibration = judge::judge(&problem, minimum, walked.met)
+        .and_then(|judged| report::report(judged, &problem, &frames, region, settings));
+    report::or_blamed(&problem, &found, calibration)
 }
 
 /// The minimum at which the noise that weighs what is known beforehand is the noise that the residuals show.

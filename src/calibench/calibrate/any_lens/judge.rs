@@ -39,11 +39,6 @@ const REFIT_GAIN: f64 = 1e-7;
 /// A cost that rises by another factor than linear theory says is worth the profiles.
 const TOLERATED: f64 = 0.1;
 
-/// Coefficients less than this are taken for as large where a part of them is meant.
-const SMALL: f64 = 0.1;
-/// How far to look beside a minimum, in parts of a coefficient.
-const BESIDE: [f64; 4] = [-0.1, 0.1, -1.0, 1.0];
-
 /// Judges a minimum, and replaces it by a lower one that lies on a profile; `met` are those that the search met.
 ///
 /// # Errors
@@ -54,12 +49,10 @@ pub(super) fn judge(
     mut met: Vec<Met<Lens>>,
 ) -> Result<Judged, CalibrationError> {
     let mut skewed = Vec::new();
-    root::refine(problem, &mut minimum);
     let mut reduction = reduction_of(problem, &minimum)?;
     let mut variance = report::variance(problem, &minimum);
     if !is_parabola(problem, &minimum, &reduction, variance.sqrt()) {
-        let others = start::alternatives(problem, &minimum.state);
-        for state in others.into_iter().chain(beside(problem, &minimum, &reduction)) {
+        for state in start::alternatives(problem, &minimum.state) {
             take_better(problem, &mut minimum, state, &mut met);
         }
         skewed = profiles(problem, &mut minimum, &mut met)?;
@@ -87,8 +80,7 @@ fn take_better(
         return false;
     }
     let before = minimum.iterations + rough.iterations;
-    let mut next = descend(problem, rough.state);
-    root::refine(problem, &mut next);
+    let next = descend(problem, rough.state);
     met.push(walk::met(&next));
     let is_better = walk::is_better(problem, &next, minimum);
     if is_better {
@@ -124,14 +116,6 @@ fn reduction_of(
     problem: &Problem<'_>,
     minimum: &Minimum<State, WIDTH>,
 ) -> Result<Reduction<WIDTH>, CalibrationError> {
-    if minimum.system.reduction().is_none() {
-        eprintln!(
-            "DBG none {:?} cost {:e} {:?}",
-            minimum.state.camera,
-            minimum.system.cost,
-            minimum.state.cam_from_target.iter().map(|p| p.translation.z).collect::<Vec<_>>()
-        );
-    }
     let mut reduction = minimum.system.reduction().ok_or_else(identifiability::singular)?;
     root::add_root(problem, &minimum.state, &minimum.system, &mut reduction);
     Ok(reduction)
@@ -159,29 +143,6 @@ fn is_parabola(
     weakest(reduction)
         .into_iter()
         .all(|weak| [-CHECKED_AT, CHECKED_AT].into_iter().all(|deviations| rises_as_said(deviations * weak)))
-}
-
-/// States beside a minimum in the direction that is known worst, by a tenth of a coefficient and by a whole one. Where a combination
-/// tells nothing to first order the descent may have ended on a saddle.
-fn beside(
-    problem: &Problem<'_>,
-    minimum: &Minimum<State, WIDTH>,
-    reduction: &Reduction<WIDTH>,
-) -> Vec<State> {
-    let Some(worst) = weakest(reduction).into_iter().next() else { return Vec::new() };
-    let part = |(row, parameter): (usize, Parameter)| {
-        let size = minimum.state.camera.value(parameter).unwrap_or(0.0).abs().max(SMALL);
-        if Parameter::LINEAR.contains(&parameter) { 0.0 } else { worst[row].abs() / size }
-    };
-    let largest = problem.free.iter().enumerate().map(part).fold(0.0, f64::max);
-    if !(largest > 0.0 && largest.is_finite()) {
-        return Vec::new();
-    }
-    BESIDE
-        .into_iter()
-        .map(|part| problem.stepped(&minimum.state, reduction.following(part / largest * worst)))
-        .filter(|state| start::is_seen(problem.views, state))
-        .collect()
 }
 
 /// One standard deviation, for unit noise, along each of the worst-known combinations in units in which each unknown

@@ -130,7 +130,7 @@ pub(super) struct View<'a> {
     pub columns: &'a Columns,
 }
 
-/// The weighted rows of a view's Jacobian: pose, then what views share, then the residual. `None` where the lens has no image of a mark.
+/// The weighted rows of a view's Jacobian: pose, then what views share. `None` where the lens has no image of a mark.
 pub(super) fn rows_of_view(view: &View<'_>) -> Option<DMatrix<f64>> {
     visit(&view.camera.distortion, RowsOfModel { view })
 }
@@ -160,7 +160,7 @@ impl<M: LensModel<P>, const P: usize> Kernel for Jacobian<'_, '_, M, P> {
     fn run<L: Lanes>(self) -> Self::Output {
         let View { marks, columns, .. } = *self.view;
         let constants = M::constants(self.coefficients.map(L::splat));
-        let count = 6 + columns.places.len() + 1;
+        let count = 6 + columns.places.len();
         let mut jacobian = DMatrix::zeros(2 * LANES * marks.blocks.len(), count);
         let mut rows = Rows::zero();
         for (place, block) in marks.blocks.iter().enumerate() {

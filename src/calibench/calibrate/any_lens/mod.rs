@@ -8,6 +8,7 @@
 
 mod curvature;
 mod estimate;
+mod focal;
 mod information;
 mod judge;
 mod kernel;

@@ -3,13 +3,17 @@
 use super::super::conditioning::Conditioning;
 use super::super::estimate::{noise_variance, whole};
 use super::super::intervals::Profile;
-use super::super::minimise::Minimum;
+use super::super::minimise::{Minimum, descend};
+use super::super::strays::{self, Strays};
 use super::super::target_frame::TargetFrames;
-use super::super::{CalibrationError, LensCalibration, Settings, identifiability, structure, warnings};
+use super::super::{
+    CalibrationError, LensCalibration, Loss, Settings, Warning, identifiability, structure, warnings,
+};
 use super::judge::Judged;
 use super::marks::{Mark, Marks};
-use super::problem::{Problem, State};
-use super::{BoardShape, WIDTH};
+use super::problem::{Problem, ROUGH_GAIN, State};
+use super::{BoardShape, WIDTH, focal};
+use crate::camera::Parameter;
 use crate::geometry::{Pose, Vec2};
 
 /// Residuals of a state.
@@ -74,6 +78,39 @@ pub(super) fn may_have_structure(problem: &Problem<'_>, state: &State) -> bool {
     residuals.square > problem.rounding_cost && structure::neighbours(&residuals.weighted).may_agree()
 }
 
+/// Gross errors among the marks of a minimum of least squares.
+fn strays(
+    problem: &Problem<'_>,
+    minimum: &Minimum<State, WIDTH>,
+    residuals: &Residuals,
+    freedom: f64,
+) -> Option<Strays> {
+    if problem.loss != Loss::Squares {
+        return None;
+    }
+    let mut state = minimum.state.clone();
+    let variance = residuals.square / freedom.max(1.0);
+    strays::of_residuals(&residuals.weighted, minimum.system.unknowns(), variance, |loss| {
+        state = descend(&Problem { loss, relative_gain: ROUGH_GAIN, ..*problem }, state.clone()).state;
+        Residuals::of(problem, &state).weighted
+    })
+}
+
+/// A refusal for want of information, or for the strays that hide it if there are any.
+pub(super) fn or_blamed<T>(
+    problem: &Problem<'_>,
+    minimum: &Minimum<State, WIDTH>,
+    outcome: Result<T, CalibrationError>,
+) -> Result<T, CalibrationError> {
+    let Err(CalibrationError::NotIdentifiable { .. }) = outcome else { return outcome };
+    let residuals = Residuals::of(problem, &minimum.state);
+    let freedom = residuals.freedom(minimum, 0.0);
+    match strays(problem, minimum, &residuals, freedom) {
+        Some(found) => Err(found.into()),
+        None => outcome,
+    }
+}
+
 /// The result at a minimum.
 ///
 /// # Errors
@@ -91,28 +128,11 @@ pub(super) fn report(
     let freedom = residuals.freedom(&minimum, problem.settled(system));
     let degrees_of_freedom = whole(freedom);
     let conditioning = Conditioning::of(system, &reduction);
-    if identifiability::refuse_singular_minimum(problem.free, conditioning.as_ref()).is_err() {
-        eprintln!(
-            "DBGR rmse {:.7} {:?} n {} {:?} root {} sv {:?}",
-            (residuals.square / residuals.marks as f64).sqrt(),
-            termination,
-            residuals.marks,
-            state.camera,
-            reduction.root.is_some(),
-            reduction.root.as_ref().map(|r| {
-                let d = system.scale();
-                format!(
-                    "{:.1e}",
-                    nalgebra::DMatrix::from_fn(r.nrows(), r.ncols(), |i, j| r[(i, j)] * d[j])
-                        .svd(false, false)
-                        .singular_values
-                        .transpose()
-                )
-            })
-        );
-    }
     identifiability::refuse_singular_minimum(problem.free, conditioning.as_ref())?;
     let unit = reduction.covariance().ok_or_else(identifiability::singular)?;
+    let fx = problem.free.position(Parameter::Fx);
+    let relative = fx.map_or(0.0, |row| (unit.intrinsics[(row, row)] * variance).sqrt() / state.camera.fx);
+    focal::refuse_if_open(problem, &minimum, variance, relative)?;
     let profile = Profile::new(problem, &minimum, &reduction, variance.sqrt());
     let intervals = settings.profile_coverage.zip(profile);
     let intervals = intervals.map_or(Vec::new(), |(coverage, p)| p.intervals(coverage, degrees_of_freedom));
@@ -130,9 +150,17 @@ pub(super) fn report(
     });
     covariance.intrinsics = covariance.intrinsics.view((0, 0), (n, n)).into_owned();
     covariance.cross = covariance.cross.iter().map(|cross| cross.rows(0, n).into_owned()).collect();
-    let neighbours = (residuals.square > problem.rounding_cost)
-        .then(|| structure::structure(&residuals.weighted, 0.5 * residuals.square / residuals.marks as f64))
-        .flatten();
+    let of_residuals: Vec<Warning> = if residuals.square > problem.rounding_cost {
+        let per_coordinate = 0.5 * residuals.square / residuals.marks as f64;
+        let structure = structure::structure(&residuals.weighted, per_coordinate);
+        strays(problem, &minimum, &residuals, freedom)
+            .map(Warning::from)
+            .into_iter()
+            .chain(structure)
+            .collect()
+    } else {
+        Vec::new()
+    };
     let poses = state.cam_from_target.iter().enumerate();
     let mut calibration = LensCalibration {
         camera: state.camera,
@@ -154,6 +182,6 @@ pub(super) fn report(
         residuals: residuals.plain,
     };
     let largest_angle = largest_angle(problem, state);
-    calibration.warnings = warnings::of_lens(&calibration, largest_angle, neighbours, &skewed, rival);
+    calibration.warnings = warnings::of_lens(&calibration, largest_angle, of_residuals, &skewed, rival);
     Ok(calibration)
 }

@@ -8,28 +8,14 @@
 //! (Golub & Van Loan 2013, section 5.3).
 
 use super::super::conditioning::Spectrum;
-use super::super::minimise::{Descent, Minimum};
 use super::super::system::{Reduction, System};
 use super::WIDTH;
 use super::kernel;
 use super::problem::{Problem, State};
-use nalgebra::{DMatrix, DVector, SVector};
+use nalgebra::DMatrix;
 
 /// Smallest eigenvalue, scaled, of information that has half of its digits.
 const HALF_OF_THE_DIGITS: f64 = 1e-8;
-/// Damping of the first step, in scaled units, its factor after a step that fails or succeeds, and the range.
-const FIRST_DAMPING: f64 = 1e-12;
-const FACTOR: f64 = 10.0;
-const LEAST_DAMPING: f64 = 1e-26;
-const LARGEST_DAMPING: f64 = 1.0;
-/// Steps at most.
-const STEPS: usize = 60;
-
-/// Whether the reduced equations of a state have lost half of their digits.
-pub(super) fn is_worth_it(system: &System<WIDTH>, reduction: &Reduction<WIDTH>) -> bool {
-    let is_half_lost = |spectrum: Spectrum| spectrum.values.iter().any(|&value| value < HALF_OF_THE_DIGITS);
-    Spectrum::of(reduction, &system.scale()).is_some_and(is_half_lost)
-}
 
 /// Gives the reduced equations of a state their root, where half of their digits are lost without.
 pub(super) fn add_root(
@@ -38,127 +24,46 @@ pub(super) fn add_root(
     system: &System<WIDTH>,
     reduction: &mut Reduction<WIDTH>,
 ) {
-    if is_worth_it(system, reduction) {
-        reduction.root = Root::of(problem, state).map(|root| root.triangle);
+    let is_half_lost = |spectrum: Spectrum| spectrum.values.iter().any(|&value| value < HALF_OF_THE_DIGITS);
+    if Spectrum::of(reduction, &system.scale()).is_some_and(is_half_lost) {
+        reduction.root = root(problem, state);
     }
 }
 
-/// Refines a minimum along what the normal equations lose, where half of their digits are lost: Levenberg and Marquardt's
-/// steps by the singular values of the root.
-pub(super) fn refine(problem: &Problem<'_>, minimum: &mut Minimum<State, WIDTH>) {
-    let mut damping = FIRST_DAMPING;
-    let mut trial = problem.system();
-    for _ in 0..STEPS {
-        let Some(reduction) = minimum.system.reduction().filter(|r| is_worth_it(&minimum.system, r)) else {
-            return;
-        };
-        let Some(solver) =
-            Root::of(problem, &minimum.state).and_then(|root| Steps::of(root, &minimum.system))
-        else {
-            return;
-        };
-        let enough = problem.relative_gain * minimum.system.cost + problem.rounding_cost;
-        loop {
-            let (step, gain) = solver.step(damping);
-            if gain <= enough || damping > LARGEST_DAMPING {
-                return;
-            }
-            let state = problem.stepped(&minimum.state, minimum.system.with_poses(&reduction, step));
-            problem.linearise_into(&state, &mut trial);
-            if trial.cost < minimum.system.cost {
-                minimum.state = state;
-                std::mem::swap(&mut minimum.system, &mut trial);
-                damping = (damping / FACTOR).max(LEAST_DAMPING);
-                break;
-            }
-            damping *= FACTOR;
-        }
-        minimum.iterations += 1;
+/// `R`; `None` where the lens has no image of a mark, or there are fewer rows than unknowns.
+fn root(problem: &Problem<'_>, state: &State) -> Option<DMatrix<f64>> {
+    let columns = problem.columns(state);
+    let shared = problem.free.len() + problem.deformations();
+    let mut rest: Vec<DMatrix<f64>> = (0..problem.views.len())
+        .map(|at| {
+            kernel::rows_of_view(&problem.view(state, &columns, at)).map(|rows| without_pose(rows, shared))
+        })
+        .collect::<Option<_>>()?;
+    rest.extend(problem.known(state).iter().map(|known| {
+        let mut row = DMatrix::zeros(1, shared);
+        row[(0, known.row)] = known.weight.sqrt();
+        row
+    }));
+    let height = rest.iter().map(DMatrix::nrows).sum();
+    let mut stacked = DMatrix::zeros(height, shared);
+    let mut at = 0;
+    for rows in &rest {
+        stacked.rows_mut(at, rows.nrows()).copy_from(rows);
+        at += rows.nrows();
     }
+    (height >= shared).then(|| stacked.qr().unpack_r())
 }
 
-/// The least-squares problem of what the views share, with the poses eliminated: `|R d + z|` is to be least.
-struct Root {
-    triangle: DMatrix<f64>,
-    right: DVector<f64>,
-}
-
-impl Root {
-    /// `None` where the lens has no image of a mark, or there are fewer rows than unknowns.
-    fn of(problem: &Problem<'_>, state: &State) -> Option<Root> {
-        let columns = problem.columns(state);
-        let shared = problem.free.len() + problem.deformations();
-        let mut rest: Vec<DMatrix<f64>> = (0..problem.views.len())
-            .map(|at| {
-                let rows = kernel::rows_of_view(&problem.view(state, &columns, at))?;
-                Some(without_pose(rows, shared + 1))
-            })
-            .collect::<Option<_>>()?;
-        rest.extend(problem.known(state).iter().map(|known| {
-            let mut row = DMatrix::zeros(1, shared + 1);
-            row[(0, known.row)] = known.weight.sqrt();
-            row[(0, shared)] = known.weight.sqrt() * known.off;
-            row
-        }));
-        let height: usize = rest.iter().map(DMatrix::nrows).sum();
-        let mut stacked = DMatrix::zeros(height, shared + 1);
-        let mut at = 0;
-        for rows in &rest {
-            stacked.rows_mut(at, rows.nrows()).copy_from(rows);
-            at += rows.nrows();
-        }
-        let whole = (height > shared).then(|| stacked.qr().unpack_r())?;
-        let triangle = whole.view((0, 0), (shared, shared)).into_owned();
-        Some(Root { triangle, right: whole.view((0, shared), (shared, 1)).column(0).into_owned() })
-    }
-}
-
-/// What is left of a view's rows without its pose: `T_v` and the residual's part.
-fn without_pose(rows: DMatrix<f64>, columns: usize) -> DMatrix<f64> {
+/// `T_v` of a view's rows.
+fn without_pose(rows: DMatrix<f64>, shared: usize) -> DMatrix<f64> {
     let triangle = rows.qr().unpack_r();
     let left = triangle.nrows().saturating_sub(6);
-    triangle.view((triangle.nrows() - left, 6), (left, columns)).into_owned()
-}
-
-/// Damped steps of one linearisation.
-struct Steps {
-    scale: DVector<f64>,
-    values: DVector<f64>,
-    directions: DMatrix<f64>,
-    /// `U^T z`.
-    right: DVector<f64>,
-}
-
-impl Steps {
-    fn of(root: Root, system: &System<WIDTH>) -> Option<Steps> {
-        let scale = system.scale();
-        let scaled = DMatrix::from_fn(scale.len(), scale.len(), |i, j| root.triangle[(i, j)] * scale[j]);
-        let is_finite = scaled.iter().chain(root.right.iter()).all(|x| x.is_finite());
-        let svd = is_finite.then(|| scaled.svd(true, true))?;
-        let (left, directions) = (svd.u?, svd.v_t?);
-        let right = DVector::from_fn(scale.len(), |i, _| left.column(i).dot(&root.right));
-        Some(Steps { scale, values: svd.singular_values, directions, right })
-    }
-
-    /// The step of what views share, and how much the cost falls by it in linear theory.
-    fn step(&self, damping: f64) -> (SVector<f64, WIDTH>, f64) {
-        let mut step = SVector::zeros();
-        let mut gain = 0.0;
-        for (i, (&value, &right)) in self.values.iter().zip(self.right.iter()).enumerate() {
-            let part = value / (value * value + damping);
-            let left = 1.0 - value * part;
-            gain += right * right * (1.0 - left * left);
-            for j in 0..self.scale.len() {
-                step[j] -= part * right * self.directions[(i, j)] * self.scale[j];
-            }
-        }
-        (step, gain)
-    }
+    triangle.view((triangle.nrows() - left, 6), (left, shared)).into_owned()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::minimise::RELATIVE_GAIN;
+    use super::super::super::minimise::{Descent, RELATIVE_GAIN};
     use super::super::super::target_frame::TargetFrames;
     use super::super::super::{Loss, Prior};
     use super::super::{marks, shape};
@@ -204,7 +109,7 @@ mod tests {
         let mut system = problem.system();
         problem.linearise_into(&state, &mut system);
         let schur = system.reduction().unwrap().schur;
-        let root = Root::of(&problem, &state).unwrap().triangle;
+        let root = root(&problem, &state).unwrap();
         let square = root.transpose() * &root;
         for i in 0..6 {
             for j in 0..6 {

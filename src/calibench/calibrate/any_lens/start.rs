@@ -237,7 +237,7 @@ fn descend_unless_dear(alone: &Problem<'_>, mut state: State, cost: f64) -> Opti
 }
 
 /// Whether the lens has an image of every mark.
-pub(super) fn is_seen(views: &[Marks], state: &State) -> bool {
+fn is_seen(views: &[Marks], state: &State) -> bool {
     let mut marks =
         views.iter().enumerate().flat_map(|(view, marks)| marks.list.iter().map(move |mark| (view, mark)));
     marks.all(|(view, mark)| state.pixel(view, mark).is_some())
