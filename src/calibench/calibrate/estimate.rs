@@ -13,7 +13,7 @@ use super::system::System;
 use super::target_frame::TargetFrames;
 use super::{
     Board, Calibration, CalibrationError, Loss, Prior, Role, Settings, Termination, Warning, chunks, copies,
-    identifiability, kernel, polish, start, strays, structure, warnings,
+    identifiability, kernel, left_out, polish, start, strays, structure, warnings,
 };
 use crate::board::View;
 use crate::camera::{Model, Parameter};
@@ -66,7 +66,7 @@ fn calibrate_different(views: &[View], settings: &Settings) -> Result<Calibratio
 fn estimate(views: &[View], settings: &Settings) -> Result<(Calibration, f64), CalibrationError> {
     searched(views, settings, |judged, problem, frames| {
         let variance = problem.priors.variance;
-        Ok((report(judged, problem, frames, settings.profile_coverage)?, variance))
+        Ok((report(judged, problem, frames, settings)?, variance))
     })
 }
 
@@ -231,7 +231,7 @@ fn report(
     judged: Judged,
     problem: &Problem<'_>,
     frames: &TargetFrames,
-    profile_coverage: Option<f64>,
+    settings: &Settings,
 ) -> Result<Calibration, CalibrationError> {
     let observations = problem.observations;
     let Judged { minimum, reduction, certificate, starts, skewed, rival, twins } = judged;
@@ -243,7 +243,9 @@ fn report(
     let freedom = fit.freedom(system, settled);
     let degrees_of_freedom = whole((2 * points) as f64 + settled - system.unknowns() as f64);
     strays::refuse_narrow_loss(problem.loss, &fit)?;
-    let of_residuals = warnings_of_residuals(problem, &minimum.state, &fit, freedom);
+    let undecided = left_out::undecided(settings);
+    let left_out = left_out::asked_for(problem, &minimum, &undecided, fit.square / freedom, freedom);
+    let of_residuals = warnings_of_residuals(problem, &minimum.state, &fit, freedom).chain(left_out);
     let variance = if problem.priors.list.is_empty() {
         fit.variance(problem.loss, freedom)
     } else {
@@ -253,7 +255,8 @@ fn report(
     let sigma_px = (square / freedom).sqrt();
     let conditioning = reduction.as_ref().and_then(|reduction| Conditioning::of(system, reduction));
     identifiability::refuse_singular_minimum(problem.free, conditioning.as_ref())?;
-    let intervals = profile_coverage
+    let intervals = settings
+        .profile_coverage
         .zip(reduction.as_ref())
         .and_then(|(coverage, reduction)| {
             let curved = Problem { retraction: Retraction::Curved, ..*problem };

@@ -22,6 +22,7 @@ mod identifiability;
 mod in_words;
 mod intervals;
 mod kernel;
+mod left_out;
 mod lens;
 mod loss;
 mod minimise;

@@ -160,6 +160,15 @@ pub enum Warning {
         /// Correlation coefficient of a mark's residual with the next one's.
         correlation: f64,
     },
+    /// Coefficients that are held at 0 because nobody asked for them, and that the marks ask for.
+    LeftOut {
+        /// Which.
+        parameters: Vec<Parameter>,
+        /// By how many variances the cost would fall with them.
+        fall: f64,
+        /// How likely chance makes so much for a lens without them.
+        probability: f64,
+    },
     /// Two parameters cannot be told apart well: an error of one is made up by the other.
     Correlated {
         /// One.
@@ -315,6 +324,15 @@ impl fmt::Display for Warning {
                 "residuals of neighbouring marks agree (correlation {correlation:+.2}), which noise does not: the model leaves something out (a richer \
                  lens, a board that is not flat or not as given, noise that marks share), and the standard deviations are too small"
             ),
+            Warning::LeftOut { parameters, fall, probability } => {
+                let names: Vec<&str> = parameters.iter().map(|parameter| parameter.name()).collect();
+                write!(
+                    f,
+                    "the marks ask for {}, which are held at 0: the cost would fall by {fall:.0} variances, by chance \
+                     with probability {probability:.1e}; estimate them too, as the other parameters make up for them",
+                    names.join(" and ")
+                )
+            }
             Warning::Correlated { a, b, correlation } => write!(
                 f,
                 "{a} and {b} are correlated {correlation:+.4}: the data hardly tell them apart; cover the image corners, or \
