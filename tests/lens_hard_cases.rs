@@ -7,7 +7,7 @@ use calibench::calibrate::{
     explaining_freedoms,
 };
 use calibench::camera::{Camera, Lens, Model, Parameter};
-use calibench::geometry::{Pose, Vec2, Vec3};
+use calibench::geometry::{Pose, Vec2, Vec3, rotation};
 use calibench::synth::{Stream, StreamKey};
 
 use crate::lens_views::{self, board};
@@ -166,4 +166,84 @@ fn a_twisted_board_is_one_of_the_explanations() {
     assert!(bent.rmse_px < 0.16 && flat.rmse_px > 2.0 * bent.rmse_px, "{} {}", flat.rmse_px, bent.rmse_px);
     // Two bows do not make a twist.
     assert!(found.iter().all(|f| !matches!(f.candidate.board, Board::Bowed { .. })), "{found:?}");
+}
+
+/// Views that face the camera leave the focal length to the distance, with any lens.
+#[test]
+fn views_that_face_the_camera_are_refused_with_any_lens() {
+    let facing: Vec<Pose> = (0..3)
+        .map(|k| {
+            let turn = 0.3 * f64::from(k);
+            let translation = Vec3::new(-40.0, -30.0, 150.0 + 20.0 * f64::from(k));
+            Pose { rotation: rotation::from_xyz_rad(0.0, 0.0, turn), translation }
+        })
+        .collect();
+    let truth = camera(Model::KannalaBrandt, 900.0, 900.0, &[0.02, -0.01, 0.0, 0.0]);
+    let views = seen(&truth, &facing, |_| board(), 0.0);
+    for model in [Model::KannalaBrandt, Model::Division, Model::Rational] {
+        let refused = calibrate_lens(&views, &settings(model));
+        assert!(matches!(refused, Err(CalibrationError::NotIdentifiable { .. })), "{model}: {refused:?}");
+    }
+}
+
+#[test]
+fn a_stray_mark_is_named_with_any_lens() {
+    for model in [Model::KannalaBrandt, Model::Division, Model::Rational] {
+        let coefficients =
+            if model == Model::Division { vec![-0.2] } else { vec![0.02; model.coefficients().len()] };
+        let truth = camera(model, 800.0, 805.0, &coefficients);
+        let mut views = seen(&truth, &poses(8, 100.0), |_| board(), 0.0);
+        let mut pixels = views[3].pixels().to_vec();
+        pixels[17].x += 10.0;
+        views[3] = View::new(views[3].points().to_vec(), pixels).unwrap();
+        let found = calibrate_lens(&views, &settings(model)).unwrap();
+        let is_named = |w: &Warning| matches!(w, Warning::Outliers { marks: 1, view: 3, point: 17, .. });
+        assert!(found.warnings.iter().any(is_named), "{model}: {:?}", found.warnings);
+    }
+}
+
+#[test]
+fn a_view_given_twice_counts_once_with_any_lens() {
+    let views = seen(&fisheye(), &poses(8, 60.0), |_| board(), 0.0);
+    let once = calibrate_lens(&views, &settings(Model::KannalaBrandt)).unwrap();
+    let twice =
+        calibrate_lens(&[&views[..], &views[2..3]].concat(), &settings(Model::KannalaBrandt)).unwrap();
+    assert_eq!(once.camera, twice.camera);
+    assert_eq!(once.covariance.intrinsics, twice.covariance.intrinsics);
+    assert_eq!(twice.cam_from_target[8], once.cam_from_target[2]);
+    let told = Warning::Duplicates { view: 8, copy_of: 2, copies: 1 };
+    assert!(twice.warnings.contains(&told), "{:?}", twice.warnings);
+}
+
+/// Where the spheres coincide, focal length, xi and alpha move the picture alike, and a minimum may lie just there.
+#[test]
+fn spheres_that_coincide_are_told_and_not_blamed_on_the_tilt() {
+    let mut coincide = 0;
+    for count in 4..12 {
+        let truth = camera(Model::DoubleSphere, 330.0, 330.0, &[0.0, 0.6]);
+        let views = seen(&truth, &poses(count, 8.0 * f64::from(count)), |_| board(), 0.0);
+        let found = calibrate_lens(&views, &settings(Model::DoubleSphere)).unwrap();
+        if found.camera.value(Parameter::Xi).unwrap().abs() < 1e-5 {
+            let told = |w: &Warning| matches!(w, Warning::HardlySeparable { parameters } if parameters.contains(&Parameter::Xi));
+            assert!(found.warnings.iter().any(told), "{:?}", found.warnings);
+            let blamed = |w: &Warning| matches!(w, Warning::FocalLengthUncertain { .. });
+            assert!(!found.warnings.iter().any(blamed), "{:?}", found.warnings);
+            coincide += 1;
+        }
+    }
+    assert!(coincide > 0);
+}
+
+#[test]
+fn tangential_terms_that_are_left_out_are_told_and_none_where_there_are_none() {
+    for (p1, told) in [(0.002, true), (0.0, false)] {
+        let truth = camera(Model::BrownConrady, 800.0, 805.0, &[-0.2, 0.05, p1, 0.0, 0.0]);
+        let views = seen(&truth, &poses(8, 150.0), |_| board(), 0.0);
+        let found = calibrate_lens(&views, &Settings::standard().with_image_size(SIZE)).unwrap();
+        let asks = |w: &Warning| matches!(w, Warning::LeftOut { parameters, .. } if parameters == &[Parameter::P1, Parameter::P2]);
+        assert_eq!(found.warnings.iter().any(asks), told, "{:?}", found.warnings);
+        let all = Settings::standard().estimate(Parameter::P1).estimate(Parameter::P2).with_image_size(SIZE);
+        let whole = calibrate_lens(&views, &all).unwrap();
+        assert!(!whole.warnings.iter().any(|w| matches!(w, Warning::LeftOut { .. })), "{:?}", whole.warnings);
+    }
 }
