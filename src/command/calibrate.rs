@@ -47,7 +47,7 @@ Code 1 is of other verbs.";
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_CODES)]
 pub(super) struct Arguments {
-    /// Corner file with the columns view,point,X,Y,u,v (and weight or sigma_px, if marks differ), or point pairs with point,px,py,X,Y, or - for one of
+    /// Corner file with the columns view,point,X,Y,u,v (and weight, by which a mark's residual is multiplied, or its sigma_px, if marks differ), or point pairs with point,px,py,X,Y, or - for one of
     /// them on standard input; with --board, photographs
     #[arg(required = true)]
     files: Vec<PathBuf>,
@@ -64,7 +64,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "PX", value_parser = super::said::positive)]
     sigma: Option<f64>,
     /// Lens model: brown-conrady, rational, thin-prism, tilted, kannala-brandt, division or double-sphere; auto
-    /// compares eight by Schwarz's criterion, and by how they predict views that were left out where it is undecided [default: brown-conrady]
+    /// compares eight (tilted and thin-prism are not among them) by Schwarz's criterion, and by how they predict views that were left out where it is undecided [default: brown-conrady]
     #[arg(long, value_name = "MODEL")]
     model: Option<ModelChoice>,
     /// Estimates how the board is bent, each number known beforehand to be 0 with a standard deviation in the

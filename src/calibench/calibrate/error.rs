@@ -5,6 +5,16 @@ use crate::camera::{Model, Parameter};
 use crate::geometry::HomographyError;
 use std::borrow::Cow;
 
+/// Why a lens may not see every mark.
+fn unseen(model: Model) -> &'static str {
+    if model.sees_behind() {
+        "; is a coefficient held, or known beforehand, at a value that no such lens has?"
+    } else {
+        "; a lens beyond 90 degrees from the axis needs a fisheye model (kannala-brandt, division, double-sphere), and a coefficient may \
+         be held at a value that no lens has"
+    }
+}
+
 fn coefficients(model: Model) -> String {
     model.coefficients().iter().map(|p| p.name()).collect::<Vec<_>>().join(" ")
 }
@@ -153,10 +163,7 @@ pub enum CalibrationError {
         why: String,
     },
     /// No start lets the lens see every mark.
-    #[error(
-        "no starting values: no {model} lens was found that sees every mark; a lens beyond 90 degrees from the axis needs a fisheye model \
-         (kannala-brandt, division, double-sphere)"
-    )]
+    #[error("no starting values: no {model} lens was found that sees every mark{}", unseen(*model))]
     NoImage {
         /// The model.
         model: Model,
