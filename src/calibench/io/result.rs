@@ -144,7 +144,7 @@ pub struct ViewFields {
     pub name: String,
     /// Number of points.
     pub points: usize,
-    /// RMSE per point, px.
+    /// RMSE per point, px; of marks with weights that of a mark of weight 1, so that it is a multiple of `sigma_px` where the file has it.
     pub rmse_px: f64,
     /// Rotation vector of `cam_from_target`, rad.
     pub rotation_vector_rad: [f64; 3],
@@ -297,7 +297,7 @@ pub struct CalibrationFields {
     pub standard_deviations: BTreeMap<&'static str, f64>,
     /// Covariance of the estimated parameters.
     pub covariance: Vec<Vec<f64>>,
-    /// `sqrt(sum |r|^2 / N)`, px.
+    /// `sqrt(sum |w r|^2 / N)`, px, with the weights `w` of the marks, 1 where the file has none.
     pub rmse_px: f64,
     /// Estimated noise of one pixel coordinate, px.
     pub sigma_px: f64,

@@ -49,6 +49,9 @@ pub(super) fn weakest(finished: &Finished) -> Option<String> {
     Some(members.join(", "))
 }
 
+/// What the pixels of a weighted fit are.
+const OF_WEIGHTS: &str = "marks have weights: RMSE and noise are those of a mark of weight 1; with sigma_px they are multiples of it\n";
+
 /// The fit in a sentence.
 pub(super) fn summary(finished: &Finished) -> String {
     let calibration = &finished.fit.calibration;
@@ -64,6 +67,9 @@ pub(super) fn summary(finished: &Finished) -> String {
         calibration.termination.name(),
         calibration.iterations,
     );
+    if finished.fit.views.iter().any(|view| view.weights().is_some()) {
+        text.push_str(OF_WEIGHTS);
+    }
     if let Some(sentence) = calibration.certificate.as_ref().and_then(certificate) {
         text.push_str(&sentence);
     }

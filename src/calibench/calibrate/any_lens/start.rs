@@ -34,8 +34,9 @@ const REFINED: usize = 3;
 /// lead astray (`lens_hard_cases::a_fisheye_behind_tall_pixels_is_found_from_five_marks_a_view`). The search costs little
 /// then; with many marks it costs more than all the rest, as it goes on for long where no pinhole fits.
 const FEW_MARKS: usize = 16;
-/// Views that choose the focal length; all of them follow.
-const CHOOSERS: usize = 40;
+/// The focal length is chosen by so many marks of evenly taken views, of [`CHOOSERS`] at the least; all of them follow.
+const CHOOSING_MARKS: usize = 500;
+const CHOOSERS: usize = 6;
 /// Steps of the poses alone, of a first lens, of a better one.
 const POSE_STEPS: usize = 6;
 const FIRST_STEPS: usize = 15;
@@ -146,9 +147,11 @@ fn frame(views: &[Marks], settings: &Settings) -> (Vec2, f64) {
     (centre, pixels().map(|p| (p - centre).norm()).fold(1.0, f64::max))
 }
 
-/// Views evenly taken from all.
+/// Views evenly taken from all, with enough marks.
 fn chosen_views(views: &[Marks]) -> Vec<usize> {
-    let count = views.len().min(CHOOSERS);
+    let marks: usize = views.iter().map(Marks::len).sum();
+    let enough = (CHOOSING_MARKS * views.len()).div_ceil(marks.max(1));
+    let count = views.len().min(enough.max(CHOOSERS));
     (0..count).map(|k| k * views.len() / count).collect()
 }
 
