@@ -115,7 +115,9 @@ fn questions(warning: &Warning) -> bool {
         warning,
         Warning::NotLinear { .. }
             | Warning::Ambiguous { .. }
+            | Warning::HardlySeparable { .. }
             | Warning::FocalLengthUncertain { .. }
+            | Warning::OutsideRange { .. }
             | Warning::AboveFloor { .. }
             | Warning::FewDegreesOfFreedom { .. }
             | Warning::NoDegreesOfFreedom
