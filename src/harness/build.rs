@@ -55,12 +55,38 @@ const LENS_MINIMUM: &[&str] = &[
     "experiments/lens_minimum/scenes.rs",
 ];
 
+/// What draws the photographs of the experiment detector-gate, judges what is found in them, and writes it down.
+const PHOTOGRAPHS: &[&str] = &[
+    "src/calibench/board",
+    "src/calibench/camera",
+    "src/calibench/detect/bias.rs",
+    "src/calibench/geometry",
+    "src/calibench/raster",
+    "src/calibench/synth/render",
+    "src/calibench/synth/render.rs",
+    "src/calibench/synth/stream.rs",
+    "src/detector_gate/bound.rs",
+    "src/detector_gate/detectors.rs",
+    "src/detector_gate/draw.rs",
+    "src/detector_gate/look.rs",
+    "src/detector_gate/observed.rs",
+    "src/detector_gate/outcome.rs",
+    "src/detector_gate/protocol.rs",
+    "src/detector_gate/scene.rs",
+    "experiments/detector_gate/row.rs",
+];
+/// This library's detectors, as they are asked there.
+const DETECTORS: &[&str] =
+    &["src/calibench/detect", "src/calibench/photos/board.rs", "src/calibench/photos/discs.rs"];
+
 /// What no calibration of Brown-Conrady's lens from marks of one weight on a flat board comes to.
 const OTHER_LENSES: &[&str] = &["src/calibench/calibrate/any_lens"];
 const NOTHING: &[&str] = &[];
 
 /// Measurements by name: the folders and files whose lines change them, but for those of the last list.
 const MEASUREMENTS: &[(&str, &[&[&str]], &[&str])] = &[
+    ("detector-gate", &[PHOTOGRAPHS, DETECTORS], NOTHING),
+    ("detector-gate-scenes", &[PHOTOGRAPHS], NOTHING),
     ("global-minimum", &[SCENES, SOLVER, GLOBAL_MINIMUM, JUDGED], OTHER_LENSES),
     ("global-minimum-scenes", &[SCENES, GLOBAL_MINIMUM], NOTHING),
     (
@@ -89,7 +115,11 @@ fn main() {
     };
     write("published.toml", &published(&root));
     for (name, lists, without) in MEASUREMENTS {
-        write(&format!("{name}.code"), &lines_of(&root, &lists.concat(), without));
+        let mut crates = code::NUMERIC_CRATES.to_vec();
+        if lists.contains(&PHOTOGRAPHS) {
+            crates.extend(code::CODEC_CRATES);
+        }
+        write(&format!("{name}.code"), &lines_of(&root, &lists.concat(), without, &crates));
     }
 }
 
@@ -100,8 +130,8 @@ fn published(root: &Path) -> String {
     std::fs::read_to_string(file).unwrap_or_else(|_| "value = []".to_string())
 }
 
-/// The code lines below these paths, but for those in the folders `without`.
-fn lines_of(root: &Path, paths: &[&str], without: &[&str]) -> String {
+/// The code lines below these paths, but for those in the folders `without`, and the versions of some crates.
+fn lines_of(root: &Path, paths: &[&str], without: &[&str], crates: &[&str]) -> String {
     if !root.join("golden/published.toml").is_file() {
         return String::new();
     }
@@ -111,5 +141,6 @@ fn lines_of(root: &Path, paths: &[&str], without: &[&str]) -> String {
     let lines = code::of_paths(root, paths, without)
         .unwrap_or_else(|error| panic!("a path of src/harness/build.rs: {error}"));
     println!("cargo:rerun-if-changed={}", root.join("Cargo.lock").display());
-    lines + &code::versions(&std::fs::read_to_string(root.join("Cargo.lock")).unwrap_or_default())
+    let lock = std::fs::read_to_string(root.join("Cargo.lock")).unwrap_or_default();
+    lines + &code::versions(&lock, crates)
 }
