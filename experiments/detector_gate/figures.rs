@@ -181,7 +181,7 @@ const BETWEEN: usize = 4;
 /// The middle of a photograph of every scene.
 pub fn photographs() -> Result<Figure, ExperimentError> {
     let ids = rows();
-    let kind = |k: usize| if (k + k / COLUMNS) % 2 == 0 { Kind::Chessboard } else { Kind::Circles };
+    let kind = |k: usize| if (k + k / COLUMNS).is_multiple_of(2) { Kind::Chessboard } else { Kind::Circles };
     let tile = |(k, &id): (usize, &&str)| {
         let scene = scenes().into_iter().find(|scene| scene.kind == kind(k) && scene.id == id)?;
         Some(scene.look.photo(&scene.board(), SEED, &scene.name(), 0)?.image)

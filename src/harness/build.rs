@@ -81,27 +81,38 @@ const DETECTORS: &[&str] =
 
 /// What no calibration of Brown-Conrady's lens from marks of one weight on a flat board comes to.
 const OTHER_LENSES: &[&str] = &["src/calibench/calibrate/any_lens"];
-const NOTHING: &[&str] = &[];
 
-/// Measurements by name: the folders and files whose lines change them, but for those of the last list.
-const MEASUREMENTS: &[(&str, &[&[&str]], &[&str])] = &[
-    ("detector-gate", &[PHOTOGRAPHS, DETECTORS], NOTHING),
-    ("detector-gate-scenes", &[PHOTOGRAPHS], NOTHING),
-    ("global-minimum", &[SCENES, SOLVER, GLOBAL_MINIMUM, JUDGED], OTHER_LENSES),
-    ("global-minimum-scenes", &[SCENES, GLOBAL_MINIMUM], NOTHING),
-    (
-        "gate-power",
-        &[
-            SCENES,
-            SOLVER,
-            &["src/calibench/planning/information.rs", "src/calibench/synth/departure.rs", "src/gate"],
-        ],
-        NOTHING,
-    ),
-    ("lens-minimum", &[SCENES, SOLVER, LENS_MINIMUM], NOTHING),
-    ("model-choice", &[SCENES, SOLVER, MODEL_CHOICE], NOTHING),
-    ("other-solvers", &[SCENES, SOLVER, OTHER_SOLVERS], OTHER_LENSES),
-    ("other-solvers-scenes", &[SCENES, OTHER_SOLVERS], NOTHING),
+/// The gate, and what it plants and bounds with.
+const GATE: &[&str] =
+    &["src/calibench/planning/information.rs", "src/calibench/synth/departure.rs", "src/gate"];
+
+/// A measurement, and the folders and files whose lines change it.
+struct Measurement {
+    name: &'static str,
+    of: &'static [&'static [&'static str]],
+    /// Folders below these whose lines do not.
+    without: &'static [&'static str],
+}
+
+const fn measurement(name: &'static str, of: &'static [&'static [&'static str]]) -> Measurement {
+    Measurement { name, of, without: &[] }
+}
+
+/// One that knows Brown-Conrady's lens alone.
+const fn of_one_lens(name: &'static str, of: &'static [&'static [&'static str]]) -> Measurement {
+    Measurement { name, of, without: OTHER_LENSES }
+}
+
+const MEASUREMENTS: &[Measurement] = &[
+    measurement("detector-gate", &[PHOTOGRAPHS, DETECTORS]),
+    measurement("detector-gate-scenes", &[PHOTOGRAPHS]),
+    of_one_lens("global-minimum", &[SCENES, SOLVER, GLOBAL_MINIMUM, JUDGED]),
+    measurement("global-minimum-scenes", &[SCENES, GLOBAL_MINIMUM]),
+    measurement("gate-power", &[SCENES, SOLVER, GATE]),
+    measurement("lens-minimum", &[SCENES, SOLVER, LENS_MINIMUM]),
+    measurement("model-choice", &[SCENES, SOLVER, MODEL_CHOICE]),
+    of_one_lens("other-solvers", &[SCENES, SOLVER, OTHER_SOLVERS]),
+    measurement("other-solvers-scenes", &[SCENES, OTHER_SOLVERS]),
 ];
 
 fn main() {
@@ -114,12 +125,12 @@ fn main() {
         std::fs::write(&file, text).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
     };
     write("published.toml", &published(&root));
-    for (name, lists, without) in MEASUREMENTS {
+    for Measurement { name, of, without } in MEASUREMENTS {
         let mut crates = code::NUMERIC_CRATES.to_vec();
-        if lists.contains(&PHOTOGRAPHS) {
+        if of.contains(&PHOTOGRAPHS) {
             crates.extend(code::CODEC_CRATES);
         }
-        write(&format!("{name}.code"), &lines_of(&root, &lists.concat(), without, &crates));
+        write(&format!("{name}.code"), &lines_of(&root, &of.concat(), without, &crates));
     }
 }
 
