@@ -75,6 +75,8 @@ const PHOTOGRAPHS: &[&str] = &[
     "src/detector_gate/scene.rs",
     "experiments/detector_gate/row.rs",
 ];
+/// Crates that pack those photographs as JPEG and read them again.
+const CODEC_CRATES: &[&str] = &["image", "zune-core", "zune-jpeg"];
 /// This library's detectors, as they are asked there.
 const DETECTORS: &[&str] =
     &["src/calibench/detect", "src/calibench/photos/board.rs", "src/calibench/photos/discs.rs"];
@@ -126,11 +128,8 @@ fn main() {
     };
     write("published.toml", &published(&root));
     for Measurement { name, of, without } in MEASUREMENTS {
-        let mut crates = code::NUMERIC_CRATES.to_vec();
-        if of.contains(&PHOTOGRAPHS) {
-            crates.extend(code::CODEC_CRATES);
-        }
-        write(&format!("{name}.code"), &lines_of(&root, &of.concat(), without, &crates));
+        let more = if of.contains(&PHOTOGRAPHS) { CODEC_CRATES } else { &[] };
+        write(&format!("{name}.code"), &lines_of(&root, &of.concat(), without, more));
     }
 }
 
@@ -141,8 +140,8 @@ fn published(root: &Path) -> String {
     std::fs::read_to_string(file).unwrap_or_else(|_| "value = []".to_string())
 }
 
-/// The code lines below these paths, but for those in the folders `without`, and the versions of some crates.
-fn lines_of(root: &Path, paths: &[&str], without: &[&str], crates: &[&str]) -> String {
+/// The code lines below these paths, but for those in the folders `without`, and the versions of the numeric crates and of some more.
+fn lines_of(root: &Path, paths: &[&str], without: &[&str], more: &[&str]) -> String {
     if !root.join("golden/published.toml").is_file() {
         return String::new();
     }
@@ -153,5 +152,9 @@ fn lines_of(root: &Path, paths: &[&str], without: &[&str], crates: &[&str]) -> S
         .unwrap_or_else(|error| panic!("a path of src/harness/build.rs: {error}"));
     println!("cargo:rerun-if-changed={}", root.join("Cargo.lock").display());
     let lock = std::fs::read_to_string(root.join("Cargo.lock")).unwrap_or_default();
-    lines + &code::versions(&lock, crates)
+    lines
+        + &match more {
+            [] => code::versions(&lock),
+            more => code::versions_of(&lock, &[code::NUMERIC_CRATES, more].concat()),
+        }
 }
