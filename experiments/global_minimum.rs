@@ -202,7 +202,7 @@ fn report_counts(record: &mut Record, any: &Measured) {
 }
 
 /// Chance of more than `most` in `trials` at `rate`.
-fn more_than(most: usize, trials: usize, rate: f64) -> f64 {
+pub(crate) fn more_than(most: usize, trials: usize, rate: f64) -> f64 {
     Binomial::new(rate, trials as u64).map_or(1.0, |b| b.sf(most as u64))
 }
 

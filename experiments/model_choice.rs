@@ -302,19 +302,21 @@ fn report(record: &mut Record, trials: &[Trial<'_>]) {
                 "share of trials over twice the best candidate's frame error",
             );
         for criterion in Criterion::ALL {
-            let all = ratios(trials, marks, criterion);
-            record
-                .exact("")
-                .suffix(
-                    format!("-{}-{marks}", criterion.name()),
-                    format!(", {}, {marks} marks", criterion.label()),
-                )
-                .number("ratio", stats::median(&all), "median of the frame error over the best candidate's")
-                .number(
-                    "far",
-                    far(trials, marks, criterion).value,
-                    "share of trials in which it is over twice that",
-                );
+            let mut group = record.exact("");
+            group.suffix(
+                format!("-{}-{marks}", criterion.name()),
+                format!(", {}, {marks} marks", criterion.label()),
+            );
+            let median = stats::median(&ratios(trials, marks, criterion));
+            // There is none where more than half of the choices do not show the frame.
+            if median.is_finite() {
+                group.number("ratio", median, "median of the frame error over the best candidate's");
+            }
+            group.number(
+                "far",
+                far(trials, marks, criterion).value,
+                "share of trials in which it is over twice that",
+            );
         }
         for (name, truth) in [("division", &TRUTHS[0]), ("division-of-tangential", &TRUTHS[1])] {
             let taken = of(trials, truth, marks);

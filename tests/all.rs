@@ -32,6 +32,7 @@ mod json_forms;
 mod laboratory;
 mod layout;
 mod lens_hard_cases;
+mod lens_minimum;
 mod lens_models;
 mod lens_views;
 mod measured;

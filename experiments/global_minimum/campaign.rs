@@ -8,8 +8,8 @@ use super::peers;
 use super::scenes::Drawn;
 use super::{COMMAND, SEED};
 use calibench::io::write_atomically;
-use calibench_harness::ProgressDisplay;
 use calibench_harness::fingerprint::Fingerprint;
+use calibench_harness::{ProgressDisplay, campaign};
 use clap::Parser;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -72,13 +72,7 @@ pub fn main() -> ExitCode {
         _ if arguments.write => write(Path::new(FOLDER)),
         _ => show(&arguments),
     };
-    match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(message) => {
-            eprintln!("{message}");
-            ExitCode::FAILURE
-        }
-    }
+    campaign::exit_code(outcome)
 }
 
 fn run(family: &Family, seed: u64, from: u64, to: u64) -> Vec<Judged> {

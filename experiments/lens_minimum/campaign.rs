@@ -4,9 +4,8 @@ use super::families::{FAMILIES, Family, SCENES};
 use super::judged::{HEADER, Line, judged};
 use super::{COMMAND, SEED};
 use crate::global_minimum::judged::Class;
-use calibench::io::write_atomically;
-use calibench_harness::ProgressDisplay;
 use calibench_harness::fingerprint::Fingerprint;
+use calibench_harness::{ProgressDisplay, campaign};
 use clap::Parser;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -32,13 +31,7 @@ struct Arguments {
 
 /// The command.
 pub fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(message) => {
-            eprintln!("{message}");
-            ExitCode::FAILURE
-        }
-    }
+    campaign::exit_code(run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), String> {
@@ -51,14 +44,14 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     families.into_iter().try_for_each(|family| write(family, arguments.seed, &arguments.out))
 }
 
-#[allow(clippy::print_stdout, reason = "the command's answer")]
 fn write(family: &'static Family, seed: u64, folder: &Path) -> Result<(), String> {
     let path = folder.join(format!("{}.csv", family.name()));
     let head = Fingerprint::of_lens_minimum().head(&format!("{COMMAND}; seed {seed}"));
-    let before = std::fs::read_to_string(&path).unwrap_or_default();
-    if before.lines().next() == Some(head.as_str()) {
-        return Ok(());
-    }
+    campaign::write_unless_current(&path, &head, || measured(family, seed))
+}
+
+#[allow(clippy::print_stdout, reason = "the command's answer")]
+fn measured(family: &'static Family, seed: u64) -> Result<String, String> {
     let progress = ProgressDisplay::stderr().start(family.name(), SCENES as usize);
     let line = |index: u64| {
         let line = judged(family, seed, index);
@@ -67,9 +60,7 @@ fn write(family: &'static Family, seed: u64, folder: &Path) -> Result<(), String
     };
     let lines: Vec<Line> = (0..SCENES).into_par_iter().map(line).collect::<Result<_, _>>()?;
     let rows: Vec<String> = lines.iter().map(|line| line.text() + "\n").collect();
-    let text = format!("{head}\n{HEADER}\n{}", rows.concat());
-    write_atomically(&path, text.as_bytes()).map_err(|error| error.to_string())?;
     let of = |class: Class| format!("{class} {}", lines.iter().filter(|line| line.class == class).count());
     println!("{}: {}", family.name(), Class::ALL.map(of).join(", "));
-    Ok(())
+    Ok(format!("{HEADER}\n{}", rows.concat()))
 }

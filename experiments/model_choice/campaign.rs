@@ -5,9 +5,8 @@ use super::row::{HEADER, Row};
 use super::trial::Photographs;
 use super::truths::{TRUTHS, Truth};
 use super::{COMMAND, SEED};
-use calibench::io::write_atomically;
-use calibench_harness::ProgressDisplay;
 use calibench_harness::fingerprint::Fingerprint;
+use calibench_harness::{ProgressDisplay, campaign};
 use clap::Parser;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -30,13 +29,7 @@ struct Arguments {
 
 /// The command.
 pub fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(message) => {
-            eprintln!("{message}");
-            ExitCode::FAILURE
-        }
-    }
+    campaign::exit_code(run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), String> {
@@ -52,13 +45,10 @@ fn run(arguments: &Arguments) -> Result<(), String> {
 fn write(truth: &Truth, folder: &Path) -> Result<(), String> {
     let path = folder.join(format!("{}.csv", truth.name));
     let head = Fingerprint::of_model_choice().head(&format!("{COMMAND}; seed {SEED}"));
-    let before = std::fs::read_to_string(&path).unwrap_or_default();
-    if before.lines().next() == Some(head.as_str()) {
-        return Ok(());
-    }
-    let lines: Vec<String> = measured(truth)?.iter().map(|row| row.text() + "\n").collect();
-    let text = format!("{head}\n{HEADER}\n{}", lines.concat());
-    write_atomically(&path, text.as_bytes()).map_err(|error| error.to_string())
+    campaign::write_unless_current(&path, &head, || {
+        let lines: Vec<String> = measured(truth)?.iter().map(|row| row.text() + "\n").collect();
+        Ok(format!("{HEADER}\n{}", lines.concat()))
+    })
 }
 
 /// All trials of a truth, the longest first so that no processor is left with one of them at the end; rows in order.

@@ -5,6 +5,7 @@ use super::row::HEADER;
 use super::trials::{Asked, ask};
 use calibench::io::write_atomically;
 use calibench_gate::{Builtin, Process};
+use calibench_harness::campaign;
 use calibench_harness::fingerprint::Fingerprint;
 use clap::Parser;
 use std::path::{Path, PathBuf};
@@ -34,13 +35,7 @@ struct Arguments {
 
 /// The command.
 pub fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(message) => {
-            eprintln!("{message}");
-            ExitCode::FAILURE
-        }
-    }
+    campaign::exit_code(run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), String> {

@@ -111,13 +111,14 @@ def test_every_lens_model_is_calibrated(model: str) -> None:
 
 
 def test_models_are_compared_by_views_that_were_left_out() -> None:
-    # Marks to 0.1 px would not do: in four views they fit one coefficient of the division model as well.
-    noise = 0.01
+    # Marks to 0.1 px would not do: in four views they fit one coefficient of the division model as well, and at 0.01 px a
+    # double sphere.
+    noise = 0.001
     pixels = SCENE.observe(noise, calibench.Stream(seed=2, scenario="python", trial=0))
     compared = calibench.compare_models(SCENE.points, pixels)
     best = compared[0]
     assert (best.model, best.coefficients) == ("brown-conrady", "k1,k2")
-    assert best.hold_out_px is not None and abs(best.hold_out_px - noise) < 0.002
+    assert best.hold_out_px is not None and abs(best.hold_out_px - noise) < 0.0002
     assert len({(one.model, one.coefficients) for one in compared}) == len(compared) > 5
 
 

@@ -19,6 +19,7 @@
 //! The layout test names whatever was forgotten.
 
 mod band;
+pub mod campaign;
 mod claim;
 mod data_package;
 mod emit;

@@ -50,7 +50,7 @@ impl LensCalibration {
 /// [`calibrate`] with a lens of any model ([`Settings::of_model`]), marks of unequal weight
 /// ([`View::with_weights`]) and a board that need not be flat ([`Board`]).
 ///
-/// The cost is `sum w^2 |r|^2` under the loss, with the priors' share; see [`Prior`]. The covariance is that of
+/// The cost is `sum w^2 |r|^2` under the loss, with the priors' share; see [`Prior`](super::Prior). The covariance is that of
 /// [`calibrate`], the noise that of a coordinate of weight 1. A camera with Brown-Conrady's lens, marks of
 /// weight 1 and a flat board is handed to [`calibrate`], with all that it checks. For all else the best of a few
 /// starts is refined, by the rays of a fisheye and by a pinhole, and the profiles of the parameters are walked

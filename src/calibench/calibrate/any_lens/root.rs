@@ -70,19 +70,23 @@ mod tests {
     use super::*;
     use crate::board::View;
     use crate::camera::{Camera, FreeParameters, Lens, Model, Parameter};
-    use crate::geometry::{Pose, Vec2, Vec3};
-    use crate::synth::Truth;
+    use crate::geometry::{Pose, Vec2, Vec3, rotation};
 
     #[test]
     fn the_square_of_the_root_is_the_information() {
-        let truth = Truth::example();
         let lens = Lens::new(Model::KannalaBrandt, &[-0.03, 0.004, 0.0, 0.0]).unwrap();
         let camera = Camera::with_lens(600.0, 610.0, 320.0, 240.0, lens);
+        let points: Vec<Vec2> =
+            (0..35).map(|i| Vec2::new(f64::from(i % 7) - 3.0, f64::from(i / 7) - 2.0) * 12.0).collect();
+        let cam_from_target = [[0.3, 0.0, 0.1], [0.0, -0.3, 0.0], [-0.2, 0.25, 0.4]].map(|[x, y, z]| Pose {
+            rotation: rotation::from_xyz_rad(x, y, z),
+            translation: Vec3::new(2.0, -3.0, 120.0),
+        });
         let seen = |pose: &Pose| {
             let pixel = |p: &Vec2| camera.pixel(&pose.apply(&Vec3::new(p.x, p.y, 0.0)));
-            View::new(truth.points.clone(), truth.points.iter().filter_map(pixel).collect()).unwrap()
+            View::new(points.clone(), points.iter().filter_map(pixel).collect()).unwrap()
         };
-        let views: Vec<View> = truth.cam_from_target.iter().map(seen).collect();
+        let views: Vec<View> = cam_from_target.iter().map(seen).collect();
         let frames = TargetFrames::of(&views);
         let listed = marks::of_views(&views, &frames, &shape::region(&views));
         let problem = Problem {
@@ -97,7 +101,7 @@ mod tests {
             relative_gain: RELATIVE_GAIN,
             rounding_cost: 0.0,
         };
-        let poses = truth.cam_from_target.iter().enumerate();
+        let poses = cam_from_target.iter().enumerate();
         let cam_from_target = poses.map(|(view, pose)| frames.at(view).of_pose(pose)).collect();
         // Another camera than the true one, so that the loss weighs.
         let camera = Camera { fx: 601.0, ..camera };
