@@ -7,6 +7,7 @@ pub mod board_warp;
 pub mod certified_digits;
 pub mod closed_form;
 pub mod collinearity;
+pub mod detector_gate;
 pub mod distortion_model;
 pub mod expiry;
 pub mod focal_depth;
@@ -61,6 +62,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     interface::EXPERIMENT,
     expiry::EXPERIMENT,
     gate_power::EXPERIMENT,
+    detector_gate::EXPERIMENT,
     certified_digits::EXPERIMENT,
     scoreboard::EXPERIMENT,
     other_solvers::EXPERIMENT,

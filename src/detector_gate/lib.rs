@@ -9,9 +9,11 @@
 mod bound;
 mod check;
 mod detectors;
+mod draw;
 mod judge;
 pub mod look;
 mod observed;
+mod outcome;
 pub mod protocol;
 mod report;
 mod scene;
@@ -21,15 +23,14 @@ pub use check::{Check, Property};
 pub use detectors::{Asked, Builtin, Detector, Program};
 pub use judge::{Figures, MATTERS_PX};
 pub use look::{Look, Photo};
+pub use outcome::{Marks, Outcome, outcomes};
 pub use report::Report;
 pub use scene::{Demand, Scene, scenes};
 
 use calibench::geometry::Vec2;
 use calibench::raster::Raster;
 use judge::{Answered, Shown};
-use observed::Truth;
 use protocol::Status;
-use rayon::prelude::*;
 
 /// Photographs of a scene in a quick run.
 pub const QUICK: usize = 24;
@@ -88,13 +89,9 @@ fn show(
 ) -> std::io::Result<Option<Shown>> {
     let mut shown =
         Shown { scene, truths: Vec::new(), answers: Vec::new(), again: Vec::new(), turned: Vec::new() };
-    let (board, name) = (scene.board(), scene.name());
     let trials: Vec<u64> = (0..photos as u64).collect();
     for some in trials.chunks(AT_ONCE) {
-        let drawn: Vec<(u64, Photo)> = some
-            .par_iter()
-            .filter_map(|&trial| Some((trial, scene.look.photo(&board, seed, &name, trial)?)))
-            .collect();
+        let drawn = draw::photographs(&scene, seed, some);
         let questions: Vec<Asked> =
             drawn.iter().map(|(trial, photo)| Asked::new(&scene, *trial, "", photo.image.clone())).collect();
         let is_first = |trial: u64| (trial as usize) < REPEATED && scene.demand == Demand::Found;
@@ -113,18 +110,9 @@ fn show(
             .into_iter()
             .map(|answer| answer.map(|marks| marks.map(|marks| back(&marks, scene.look.size))));
         shown.turned.extend(turned_back);
-        let truths: Vec<Truth> = drawn.par_iter().map(|(_, photo)| truth(&scene, &board, photo)).collect();
-        shown.truths.extend(truths);
+        shown.truths.extend(draw::truths(&scene, &drawn));
     }
     Ok(Some(shown))
-}
-
-fn truth(scene: &Scene, board: &calibench::board::Board, photo: &Photo) -> Truth {
-    Truth::of(photo, board, |place, reach_px| match scene.look.jpeg {
-        // What a codec adds is no noise of the pixels.
-        Some(_) => None,
-        None => variance_px2(&photo.clean, place, reach_px, scene.look.noise),
-    })
 }
 
 /// Answers by their marks; `None` where the first says that such boards are not known.

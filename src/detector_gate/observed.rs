@@ -19,18 +19,18 @@ pub(super) struct Truth {
 }
 
 impl Truth {
-    pub fn of(photo: &Photo, board: &Board, variance: impl Fn(&Vec2, f64) -> Option<f64>) -> Truth {
+    /// `variance` is told a place, and what leads from it to a next mark of its row and of its column.
+    pub fn of(photo: &Photo, board: &Board, variance: impl Fn(&Vec2, [Vec2; 2]) -> Option<f64>) -> Truth {
         let columns = board.columns();
         let places = &photo.places_px;
-        let distance = |i: usize, j: usize| (places[i] - places[j]).norm();
-        let next = |i: usize| {
+        let to_next = |i: usize| {
             let across = if i % columns + 1 < columns { i + 1 } else { i - 1 };
             let down = if i + columns < places.len() { i + columns } else { i - columns };
-            distance(i, across).min(distance(i, down))
+            [places[across] - places[i], places[down] - places[i]]
         };
-        let spacings_px: Vec<f64> = (0..places.len()).map(next).collect();
-        let each = places.iter().zip(&spacings_px);
-        let variances_px2 = each.map(|(place, spacing)| variance(place, 0.5 * spacing)).collect();
+        let spacing = |[across, down]: [Vec2; 2]| across.norm().min(down.norm());
+        let spacings_px: Vec<f64> = (0..places.len()).map(|i| spacing(to_next(i))).collect();
+        let variances_px2 = (0..places.len()).map(|i| variance(&places[i], to_next(i))).collect();
         Truth { places_px: places.clone(), spacings_px, variances_px2, columns }
     }
 

@@ -55,6 +55,32 @@ const LENS_MINIMUM: &[&str] = &[
     "experiments/lens_minimum/scenes.rs",
 ];
 
+/// What draws the photographs of the experiment detector-gate, judges what is found in them, and writes it down.
+const PHOTOGRAPHS: &[&str] = &[
+    "src/calibench/board",
+    "src/calibench/camera",
+    "src/calibench/detect/bias.rs",
+    "src/calibench/geometry",
+    "src/calibench/raster",
+    "src/calibench/synth/render",
+    "src/calibench/synth/render.rs",
+    "src/calibench/synth/stream.rs",
+    "src/detector_gate/bound.rs",
+    "src/detector_gate/detectors.rs",
+    "src/detector_gate/draw.rs",
+    "src/detector_gate/look.rs",
+    "src/detector_gate/observed.rs",
+    "src/detector_gate/outcome.rs",
+    "src/detector_gate/protocol.rs",
+    "src/detector_gate/scene.rs",
+    "experiments/detector_gate/row.rs",
+];
+/// Crates that pack those photographs as JPEG and read them again.
+const CODEC_CRATES: &[&str] = &["image", "zune-core", "zune-jpeg"];
+/// This library's detectors, as they are asked there.
+const DETECTORS: &[&str] =
+    &["src/calibench/detect", "src/calibench/photos/board.rs", "src/calibench/photos/discs.rs"];
+
 /// What no calibration of Brown-Conrady's lens from marks of one weight on a flat board comes to.
 const OTHER_LENSES: &[&str] = &["src/calibench/calibrate/any_lens"];
 
@@ -80,6 +106,8 @@ const fn of_one_lens(name: &'static str, of: &'static [&'static [&'static str]])
 }
 
 const MEASUREMENTS: &[Measurement] = &[
+    measurement("detector-gate", &[PHOTOGRAPHS, DETECTORS]),
+    measurement("detector-gate-scenes", &[PHOTOGRAPHS]),
     of_one_lens("global-minimum", &[SCENES, SOLVER, GLOBAL_MINIMUM, JUDGED]),
     measurement("global-minimum-scenes", &[SCENES, GLOBAL_MINIMUM]),
     measurement("gate-power", &[SCENES, SOLVER, GATE]),
@@ -100,7 +128,8 @@ fn main() {
     };
     write("published.toml", &published(&root));
     for Measurement { name, of, without } in MEASUREMENTS {
-        write(&format!("{name}.code"), &lines_of(&root, &of.concat(), without));
+        let more = if of.contains(&PHOTOGRAPHS) { CODEC_CRATES } else { &[] };
+        write(&format!("{name}.code"), &lines_of(&root, &of.concat(), without, more));
     }
 }
 
@@ -111,8 +140,8 @@ fn published(root: &Path) -> String {
     std::fs::read_to_string(file).unwrap_or_else(|_| "value = []".to_string())
 }
 
-/// The code lines below these paths, but for those in the folders `without`.
-fn lines_of(root: &Path, paths: &[&str], without: &[&str]) -> String {
+/// The code lines below these paths, but for those in the folders `without`, and the versions of the numeric crates and of some more.
+fn lines_of(root: &Path, paths: &[&str], without: &[&str], more: &[&str]) -> String {
     if !root.join("golden/published.toml").is_file() {
         return String::new();
     }
@@ -122,5 +151,10 @@ fn lines_of(root: &Path, paths: &[&str], without: &[&str]) -> String {
     let lines = code::of_paths(root, paths, without)
         .unwrap_or_else(|error| panic!("a path of src/harness/build.rs: {error}"));
     println!("cargo:rerun-if-changed={}", root.join("Cargo.lock").display());
-    lines + &code::versions(&std::fs::read_to_string(root.join("Cargo.lock")).unwrap_or_default())
+    let lock = std::fs::read_to_string(root.join("Cargo.lock")).unwrap_or_default();
+    lines
+        + &match more {
+            [] => code::versions(&lock),
+            more => code::versions_of(&lock, &[code::NUMERIC_CRATES, more].concat()),
+        }
 }

@@ -16,6 +16,16 @@ const DIGITS: usize = 16;
 pub struct Fingerprint(Option<String>);
 
 impl Fingerprint {
+    /// The photographs of the experiment detector-gate, how they are judged, and this library's detectors.
+    pub fn of_detector_gate() -> Fingerprint {
+        Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/detector-gate.code")))
+    }
+
+    /// Those photographs and that judgement alone.
+    pub fn of_detector_gate_scenes() -> Fingerprint {
+        Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/detector-gate-scenes.code")))
+    }
+
     /// The gate, and the solver that its planted faults are tried on.
     pub fn of_gate_power() -> Fingerprint {
         Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/gate-power.code")))
@@ -100,6 +110,8 @@ mod tests {
     #[test]
     fn every_measurement_has_its_own_code() {
         let all = [
+            Fingerprint::of_detector_gate(),
+            Fingerprint::of_detector_gate_scenes(),
             Fingerprint::of_gate_power(),
             Fingerprint::of_global_minimum(),
             Fingerprint::of_global_minimum_scenes(),

@@ -52,16 +52,21 @@ fn rust_files(start: &Path) -> io::Result<Vec<PathBuf>> {
 }
 
 /// Crates whose arithmetic stands in the path of a number.
-const NUMERIC_CRATES: [&str; 6] = ["libm", "nalgebra", "rand", "rand_chacha", "rand_distr", "statrs"];
+pub const NUMERIC_CRATES: &[&str] = &["libm", "nalgebra", "rand", "rand_chacha", "rand_distr", "statrs"];
 
 /// `name version` of the numeric crates, a line each, of a lock file.
 pub fn versions(lock: &str) -> String {
+    versions_of(lock, NUMERIC_CRATES)
+}
+
+/// The same of some crates.
+pub fn versions_of(lock: &str, crates: &[&str]) -> String {
     let field =
         |line: &str, key: &str| line.strip_prefix(key).map(|value| value.trim_matches('"').to_string());
     let mut found = String::new();
     let mut lines = lock.lines();
     while let Some(line) = lines.next() {
-        let Some(name) = field(line, "name = ").filter(|name| NUMERIC_CRATES.contains(&name.as_str())) else {
+        let Some(name) = field(line, "name = ").filter(|name| crates.contains(&name.as_str())) else {
             continue;
         };
         if let Some(version) = lines.next().and_then(|line| field(line, "version = ")) {
@@ -93,5 +98,12 @@ mod tests {
         let without = of_paths(root, &["figure", "fingerprint"], &["figure"]).unwrap();
         assert!(!without.contains("figure/axis.rs\n") && without.contains("fingerprint/code.rs\n"));
         assert!(of_paths(root, &["nowhere"], &[]).is_err());
+    }
+
+    #[test]
+    fn versions_are_those_of_the_crates_that_are_asked() {
+        let lock = "name = \"image\"\nversion = \"0.25.9\"\n\nname = \"libm\"\nversion = \"0.2.15\"\n";
+        assert_eq!(versions_of(lock, &["image"]), "image 0.25.9\n");
+        assert_eq!(versions(lock), "libm 0.2.15\n");
     }
 }

@@ -1,0 +1,125 @@
+//! The whole measurement of a program: shows it all photographs, and writes what is committed.
+
+use super::programs::{PROGRAMS, Program};
+use super::row::{HEADER, Row};
+use super::{PHOTOS, SEED};
+use calibench::io::write_atomically;
+use calibench_detector_gate::{Builtin, Detector, Scene, outcomes, scenes};
+use calibench_harness::ProgressDisplay;
+use calibench_harness::fingerprint::Fingerprint;
+use clap::Parser;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+use std::time::Duration;
+
+/// Where the committed lines stand, from the root of the project.
+pub const FOLDER: &str = "golden/detector-gate";
+/// Longest time for one photograph.
+const TIMEOUT: Duration = Duration::from_secs(120);
+
+/// Shows a program the photographs of the experiment detector-gate, and writes what it found to golden/detector-gate/NAME.csv.
+#[derive(Debug, Parser)]
+struct Arguments {
+    /// calibench, opencv or opencv-sb
+    name: String,
+    /// The Python that has OpenCV
+    #[arg(long, default_value = "python3")]
+    python: String,
+    /// First photographs of each scene alone
+    #[arg(long, requires = "out")]
+    photos: Option<u64>,
+    /// Writes there instead
+    #[arg(long)]
+    out: Option<PathBuf>,
+}
+
+/// The command.
+pub fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("{message}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), String> {
+    let known = || PROGRAMS.iter().map(|program| program.name).collect::<Vec<_>>().join(", ");
+    let program = Program::named(&arguments.name)
+        .ok_or_else(|| format!("no program {}; there are: {}", arguments.name, known()))?;
+    let photos = arguments.photos.unwrap_or(PHOTOS);
+    let (mut detector, versions, fingerprint): (Box<dyn Detector>, String, Fingerprint) = match program.method
+    {
+        None => {
+            let versions = format!("calibench {}", env!("CARGO_PKG_VERSION"));
+            (Box::new(Builtin), versions, Fingerprint::of_detector_gate())
+        }
+        Some(method) => {
+            let versions = versions(&arguments.python)?;
+            let command = format!("{} adapters/detector_opencv.py {method}", arguments.python);
+            let asked = calibench_detector_gate::Program::new(&command, TIMEOUT);
+            let asked = asked.map_err(|error| error.to_string())?;
+            (Box::new(asked), versions, Fingerprint::of_detector_gate_scenes())
+        }
+    };
+    let rows = rows(program, detector.as_mut(), photos)?;
+    let what = format!(
+        "detector-gate-trials {}; seed {SEED}; versions {versions}; adapter {}",
+        program.name,
+        program.adapter_hash()
+    );
+    let lines: Vec<String> = rows.iter().map(|row| row.text() + "\n").collect();
+    let text = format!("{}\n{HEADER}\n{}", fingerprint.head(&what), lines.concat());
+    let file = || Path::new(FOLDER).join(format!("{}.csv", program.name));
+    write_atomically(&arguments.out.clone().unwrap_or_else(file), text.as_bytes()).map_err(|e| e.to_string())
+}
+
+/// The scenes that a program is shown.
+pub fn scenes_of(program: &Program) -> Vec<Scene> {
+    scenes().into_iter().filter(|scene| program.knows(scene.kind)).collect()
+}
+
+/// The first photographs of every scene, scene after scene.
+fn rows(program: &Program, detector: &mut dyn Detector, photos: u64) -> Result<Vec<Row>, String> {
+    let scenes = scenes_of(program);
+    let progress = ProgressDisplay::stderr().start(program.name, scenes.len());
+    let mut rows = Vec::new();
+    for scene in scenes {
+        rows.extend(rows_of(&scene, detector, 0..photos).map_err(|error| error.to_string())?);
+        progress.step();
+    }
+    Ok(rows)
+}
+
+/// These photographs of a scene.
+///
+/// # Errors
+/// Photographs that cannot be handed over, and a program that does not know the board.
+pub fn rows_of(
+    scene: &Scene,
+    detector: &mut dyn Detector,
+    trials: std::ops::Range<u64>,
+) -> std::io::Result<Vec<Row>> {
+    let found = outcomes(scene, detector, SEED, trials)?;
+    let found = found.ok_or_else(|| {
+        std::io::Error::other(format!("{} does not know {}", detector.name(), scene.name()))
+    })?;
+    let row = |(trial, outcome)| Row { kind: scene.kind, scene: scene.id.to_string(), trial, outcome };
+    Ok(found.into_iter().map(row).collect())
+}
+
+/// The versions of what the adapter imports, which must be there.
+fn versions(python: &str) -> Result<String, String> {
+    let asks =
+        "import cv2, numpy\nprint(', '.join(['cv2 ' + cv2.__version__, 'numpy ' + numpy.__version__]))";
+    let done = Command::new(python).args(["-c", asks]).output().map_err(|e| format!("{python}: {e}"))?;
+    if !done.status.success() {
+        let lines = String::from_utf8_lossy(&done.stderr).into_owned();
+        return Err(format!(
+            "{python} lacks cv2 or numpy: {}; name a Python that has them with --python",
+            lines.lines().last().unwrap_or_default()
+        ));
+    }
+    Ok(String::from_utf8_lossy(&done.stdout).trim().to_string())
+}
