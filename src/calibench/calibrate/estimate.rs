@@ -3,6 +3,7 @@
 use super::certificate::Certificate;
 use super::conditioning::Conditioning;
 use super::intervals::Profile;
+use super::left_out::{self, LeftOut};
 use super::minimise::{Problem, State, rounding_cost};
 use super::normal::Observations;
 use super::prior::{self, Priors};
@@ -13,7 +14,7 @@ use super::system::System;
 use super::target_frame::TargetFrames;
 use super::{
     Board, Calibration, CalibrationError, Loss, Prior, Role, Settings, Termination, Warning, chunks, copies,
-    identifiability, kernel, left_out, polish, start, strays, structure, warnings,
+    identifiability, kernel, polish, start, strays, structure, warnings,
 };
 use crate::board::View;
 use crate::camera::{Model, Parameter};
@@ -49,12 +50,22 @@ const START_GAIN: f64 = 1e-3;
 /// # Ok::<(), CalibrationError>(())
 /// ```
 pub fn calibrate(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
-    copies::without(views, |views| calibrate_different(views, settings))
+    copies::without(views, |views| calibrate_different(views, settings, &[]))
 }
 
-fn calibrate_different(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
+/// [`calibrate`], and whether the marks ask for coefficients that are left out, which takes half as long again.
+pub(super) fn calibrate_asking(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
+    let undecided = left_out::undecided(settings);
+    copies::without(views, |views| calibrate_different(views, settings, &undecided))
+}
+
+fn calibrate_different(
+    views: &[View],
+    settings: &Settings,
+    undecided: &[LeftOut],
+) -> Result<Calibration, CalibrationError> {
     check_counts(views, settings)?;
-    let (calibration, variance) = chunks::in_pool(views.len(), || estimate(views, settings))?;
+    let (calibration, variance) = chunks::in_pool(views.len(), || estimate(views, settings, undecided))?;
     Ok(if settings.polish {
         polish::polish(views, settings.loss, variance, calibration)
     } else {
@@ -63,10 +74,14 @@ fn calibrate_different(views: &[View], settings: &Settings) -> Result<Calibratio
 }
 
 /// The calibration, and the variance of a pixel coordinate that weighed the priors.
-fn estimate(views: &[View], settings: &Settings) -> Result<(Calibration, f64), CalibrationError> {
+fn estimate(
+    views: &[View],
+    settings: &Settings,
+    undecided: &[LeftOut],
+) -> Result<(Calibration, f64), CalibrationError> {
     searched(views, settings, |judged, problem, frames| {
         let variance = problem.priors.variance;
-        Ok((report(judged, problem, frames, settings)?, variance))
+        Ok((report(judged, problem, frames, settings, undecided)?, variance))
     })
 }
 
@@ -232,6 +247,7 @@ fn report(
     problem: &Problem<'_>,
     frames: &TargetFrames,
     settings: &Settings,
+    undecided: &[LeftOut],
 ) -> Result<Calibration, CalibrationError> {
     let observations = problem.observations;
     let Judged { minimum, reduction, certificate, starts, skewed, rival, twins } = judged;
@@ -243,8 +259,7 @@ fn report(
     let freedom = fit.freedom(system, settled);
     let degrees_of_freedom = whole((2 * points) as f64 + settled - system.unknowns() as f64);
     strays::refuse_narrow_loss(problem.loss, &fit)?;
-    let undecided = left_out::undecided(settings);
-    let left_out = left_out::asked_for(problem, &minimum, &undecided, fit.square / freedom, freedom);
+    let left_out = left_out::asked_for(problem, &minimum, undecided, fit.square / freedom, freedom);
     let of_residuals = warnings_of_residuals(problem, &minimum.state, &fit, freedom).chain(left_out);
     let variance = if problem.priors.list.is_empty() {
         fit.variance(problem.loss, freedom)

@@ -11,14 +11,17 @@ use super::system::{Step, System};
 use super::{Loss, Role, Settings, Warning};
 use crate::camera::Parameter;
 
+/// Coefficients that come together.
+pub(super) type LeftOut = &'static [Parameter];
+
 /// What are looked for, each by itself: what most lenses have and the standard choice leaves out.
-const ASKED: [&[Parameter]; 2] = [&[Parameter::P1, Parameter::P2], &[Parameter::K3]];
+const ASKED: [LeftOut; 2] = [&[Parameter::P1, Parameter::P2], &[Parameter::K3]];
 /// A set whose lens has none of them is told that it has with this probability, for each.
 const CHANCE: f64 = 1e-5;
 
 /// The coefficients that nobody has decided on.
-pub(super) fn undecided(settings: &Settings) -> Vec<&'static [Parameter]> {
-    let is_left_out = |list: &&[Parameter]| list.iter().all(|&p| settings.role(p) == Role::Default);
+pub(super) fn undecided(settings: &Settings) -> Vec<LeftOut> {
+    let is_left_out = |list: &LeftOut| list.iter().all(|&p| settings.role(p) == Role::Default);
     ASKED.into_iter().filter(is_left_out).collect()
 }
 
@@ -26,7 +29,7 @@ pub(super) fn undecided(settings: &Settings) -> Vec<&'static [Parameter]> {
 pub(super) fn asked_for(
     problem: &Problem<'_>,
     minimum: &Minimum,
-    undecided: &[&'static [Parameter]],
+    undecided: &[LeftOut],
     variance: f64,
     freedom: f64,
 ) -> Vec<Warning> {
@@ -36,7 +39,7 @@ pub(super) fn asked_for(
     {
         return Vec::new();
     }
-    let asked = |parameters: &&'static [Parameter]| {
+    let asked = |parameters: &LeftOut| {
         let k = parameters.len();
         let fall = fall(problem, minimum, parameters)? / variance;
         let below = (freedom as usize).checked_sub(k).filter(|&below| below > 0)?;
