@@ -167,7 +167,10 @@ fn drawn(photo: &Raster<u8>, lines: &[[Vec2; 2]], camera: &Camera<Lens>, pose: &
     let mut overlay = Overlay::new(photo, 1);
     for ends in lines {
         if let [Some(from), Some(to)] = ends.map(|p| camera.pixel(&pose.apply(&p.push(0.0)))) {
-            overlay.line(from, to, STRAIGHT);
+            // Two pixels wide, to be seen where the picture is shown smaller.
+            for shift in [Vec2::zeros(), Vec2::new(1.0, 0.0), Vec2::new(0.0, 1.0)] {
+                overlay.line(from + shift, to + shift, STRAIGHT);
+            }
         }
     }
     overlay

@@ -276,10 +276,11 @@ fn text(finished: &Finished) -> String {
         views.add_row(&row[first..]);
     }
     let mut text = format!(
-        "{comparison}{}\n\n{intervals}{}\n\n{}",
+        "{comparison}{}\n\n{intervals}{}\n\n{}{}",
         parameters.trim_fmt(),
         views.trim_fmt(),
-        summary(finished)
+        summary(finished),
+        finished.optics.text()
     );
     // Writing to a string cannot fail, here and below.
     if let Some(weakest) = weakest(finished) {

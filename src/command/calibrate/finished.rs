@@ -110,7 +110,6 @@ pub(super) fn summary(finished: &Finished) -> String {
         text.push_str(&sentence);
     }
     text.push_str(&model(calibration));
-    text.push_str(&finished.optics.text());
     text.push_str(&beforehand(calibration));
     text.push_str(first_mark(finished.orientation));
     if let Some(bias) = &finished.fit.bias {

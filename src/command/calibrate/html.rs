@@ -80,6 +80,13 @@ pub(super) fn number(x: f64, digits: usize) -> String {
     if x.is_finite() { significant(x, digits).replace('-', "\u{2212}") } else { String::new() }
 }
 
+/// A number that was given: with its own digits if those are few.
+pub(super) fn given(x: f64) -> String {
+    const FEW: usize = 10;
+    let own = x.to_string();
+    if own.len() <= FEW { own.replace('-', "\u{2212}") } else { number(x, FEW - 1) }
+}
+
 /// Plots side by side, as many as the window takes.
 pub(super) fn figures(page: &mut String, figures: &[Figure]) {
     page.push_str("<div class=\"figures\">\n");
@@ -123,6 +130,7 @@ mod tests {
             page.contains("<h1>a &lt;b&gt; &amp; &quot;c&quot;</h1>") && page.contains("<th>x&lt;y</th>")
         );
         assert_eq!(page.matches(&format!("<td>{DASH}</td>")).count(), 2);
-        assert!(page.contains("<td>\u{2212}1.5</td>"), "{page}");
+        assert!(page.contains("<td>\u{2212}1.50</td>"), "{page}");
+        assert_eq!((given(-62.5), given(400000.25)), ("\u{2212}62.5".to_string(), "400000.25".to_string()));
     }
 }

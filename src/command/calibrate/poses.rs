@@ -290,9 +290,9 @@ fn axes(
 ) -> Drawing {
     // X along the lower left edge, Z along the lower right one, Y along the left one.
     let edges = [
-        (0, "X", Vec3::new(0.0, high.y, low.z), (-5.0, 12.0), (-30.0, 34.0), Align::End),
+        (0, "X", Vec3::new(0.0, high.y, low.z), (-5.0, 15.0), (-32.0, 36.0), Align::End),
         (1, "Y", Vec3::new(low.x, 0.0, low.z), (-7.0, 0.0), (0.0, -18.0), Align::End),
-        (2, "Z", Vec3::new(high.x, high.y, 0.0), (5.0, 12.0), (22.0, 34.0), Align::Start),
+        (2, "Z", Vec3::new(high.x, high.y, 0.0), (5.0, 15.0), (24.0, 36.0), Align::Start),
     ];
     edges.into_iter().fold(drawing, |drawing, (axis, name, edge, (right, down), shift, align)| {
         let at = |value: f64| {

@@ -1,7 +1,7 @@
 //! Which marks fit worst?
 
 use super::finished::Finished;
-use super::html::number;
+use super::html::{given, number};
 use calibench::geometry::Vec2;
 
 /// Marks that the table has.
@@ -47,13 +47,13 @@ pub(super) fn rows(finished: &Finished) -> Vec<Vec<String>> {
     let row = |mark: Mark| {
         let Mark { view, point, residual } = mark;
         let (at, seen) = (finished.fit.views[view].points()[point], finished.fit.views[view].pixels()[point]);
-        let digits = [(at.x, 6), (at.y, 6), (seen.x, 6), (seen.y, 6), (residual.x, 3), (residual.y, 3)];
+        let digits = [(seen.x, 6), (seen.y, 6), (residual.x, 3), (residual.y, 3)];
         let place = finished.names.place(view);
         let names = [finished.names.number(view).to_string(), finished.linked(place), point.to_string()];
         let names = names.into_iter().skip(usize::from(finished.names.are_numbers()));
         let lengths = [(residual.norm(), 3), (residual.norm() / calibration.sigma_px, 2)];
         let numbers = digits.into_iter().chain(lengths).map(|(x, digits)| number(x, digits));
-        names.chain(numbers).collect()
+        names.chain([given(at.x), given(at.y)]).chain(numbers).collect()
     };
     worst(&calibration.residuals).into_iter().map(row).collect()
 }
