@@ -1,11 +1,12 @@
 //! The report of a plane's map as a page: the map, what each point leaves over, and how well the map is known there.
 
-use super::html::{self, escaped, heading, note, number, paragraph, picture, table};
+use super::html::{self, escaped, given, heading, note, number, paragraph, picture, table};
 use super::plots::{round_down, whole_ticks};
+use super::view_names::ViewNames;
 use calibench::geometry::{Handedness, Vec2};
 use calibench::io::significant;
 use calibench::planar::{PlaneCalibration, PlaneModel};
-use calibench_harness::{Figure, Plot};
+use calibench_harness::{Figure, Look, Plot};
 
 /// A calibrated plane with all that is said of it.
 pub(crate) struct PlaneReport<'a> {
@@ -114,14 +115,13 @@ impl PlaneReport<'_> {
     fn points(&self, page: &mut String) {
         heading(page, "Points");
         let per_px = 0.5 * (self.plane.scale_x + self.plane.scale_y);
+        let counted = self.counted();
+        // Names that are numbers need no others.
+        let first = usize::from(counted.are_numbers());
         let row = |(k, name): (usize, &String)| {
             let (pixel, world, residual) = (self.pixels[k], self.world[k], self.plane.residuals[k]);
             let [sd_x, sd_y] = self.deviations(&pixel);
             let numbers = [
-                (pixel.x, 7),
-                (pixel.y, 7),
-                (world.x, 9),
-                (world.y, 9),
                 (residual.x, 3),
                 (residual.y, 3),
                 (residual.norm(), 3),
@@ -130,10 +130,13 @@ impl PlaneReport<'_> {
                 (sd_y, 3),
             ];
             let numbers = numbers.into_iter().map(|(x, digits)| number(x, digits));
-            std::iter::once(escaped(name)).chain(numbers).collect()
+            let as_given = [pixel.x, pixel.y, world.x, world.y].map(given);
+            let names = [counted.number_at(k).to_string(), escaped(name)].into_iter().skip(first);
+            names.chain(as_given).chain(numbers).collect()
         };
         let rows: Vec<Vec<String>> = self.names.iter().enumerate().map(row).collect();
         let header = [
+            "no.",
             "point",
             "u (px)",
             "v (px)",
@@ -146,7 +149,7 @@ impl PlaneReport<'_> {
             "sd of X",
             "sd of Y",
         ];
-        table(page, 1, &header, &rows);
+        table(page, 2 - first, &header[first..], &rows);
         let sd = match self.plane.spread {
             Some(_) => {
                 "sd: standard deviation of the world point that the map gives for this pixel, the map's error alone."
@@ -157,6 +160,11 @@ impl PlaneReport<'_> {
             page,
             &format!("dX, dY: predicted \u{2212} given, world units; length (px): at the mean scale. {sd}"),
         );
+    }
+
+    /// The points' numbers.
+    fn counted(&self) -> ViewNames {
+        ViewNames::new(self.names.to_vec(), Vec::new())
     }
 
     /// Standard deviations of the world coordinates that the map gives for a pixel; NaN where they are not known.
@@ -181,16 +189,18 @@ impl PlaneReport<'_> {
         let title = format!("Residuals, predicted \u{2212} given, {factor} times enlarged");
         let on_plane = Plot::new(title, "X (world units)", "Y (world units)")
             .equal_aspect()
-            .arrows("", &arrows)
-            .points("a point", &at);
-        let lengths: Vec<(f64, f64)> =
-            (1..).zip(&plane.residuals).map(|(k, r)| (f64::from(k), r.norm())).collect();
-        let by_point =
-            Plot::new("Residual of each point", "row in the table of points", "length (world units)")
-                .points("a point", &lengths)
-                .hline("RMS", plane.rms_point)
-                .x_range(0.5, whole_ticks(1.0, lengths.len() as f64))
-                .y_range(0.0, 1.15 * plane.max_point);
+            .points_as("a point", &at, Look::series(1).size(2.0))
+            .arrows("", &arrows);
+        let counted = self.counted();
+        let length = |(k, residual): (usize, &Vec2)| (counted.number_at(k) as f64, residual.norm());
+        let lengths: Vec<(f64, f64)> = plane.residuals.iter().enumerate().map(length).collect();
+        let first = lengths.iter().map(|at| at.0).fold(f64::INFINITY, f64::min);
+        let last = lengths.iter().map(|at| at.0).fold(f64::NEG_INFINITY, f64::max);
+        let by_point = Plot::new("Residual of each point", "number of the point", "length (world units)")
+            .points("a point", &lengths)
+            .hline("RMS", plane.rms_point)
+            .x_range(first - 0.5, whole_ticks(first, last))
+            .y_range(0.0, 1.15 * plane.max_point);
         vec![
             Figure::plot(
                 "residuals",
