@@ -54,6 +54,7 @@ mod real_data;
 mod real_ninepoint;
 mod rectify;
 mod render;
+mod report_page;
 mod right_minimum;
 mod shell;
 mod study;

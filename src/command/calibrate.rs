@@ -20,18 +20,28 @@ use contradictions::Input;
 use std::path::{Path, PathBuf};
 
 mod advice;
+mod before_after;
 mod camera;
 mod contradictions;
 mod finished;
+mod gallery;
+mod html;
 mod maps;
 mod measured;
 mod models;
+mod optics;
 mod page;
 mod photographs;
 mod plane;
+mod plane_page;
 mod plots;
+mod poses;
+mod scatter;
+mod view_names;
+mod worst;
 
 pub(super) use plane::plane_text;
+pub(super) use plane_page::PlaneReport;
 pub(super) use plots::round_down;
 
 /// What the exit codes mean here.
@@ -89,6 +99,9 @@ pub(super) struct Arguments {
     /// Image size, such as 640x480: where a held principal point lies by default, and the frame of the plots
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     image_size: Option<(usize, usize)>,
+    /// Distance of the sensor's pixels, micrometres: says the focal length in mm too
+    #[arg(long, value_name = "UM", value_parser = super::said::positive)]
+    pixel_pitch: Option<f64>,
     /// Loss of a residual: squares, huber:PX or cauchy:PX [default: squares]
     #[arg(long, value_name = "LOSS", value_parser = parse_loss)]
     loss: Option<Loss>,
@@ -107,7 +120,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "BYTES", value_parser = parse_bytes, default_value_t = DEFAULT_MEMORY, hide_default_value = true)]
     memory: u64,
     /// Folder for result.json, the page report.html, plots, and of photographs corners.csv, with the marks as they were
-    /// fitted, and pictures with the marks drawn in
+    /// fitted, pictures with the marks drawn in, and one photograph before and after undistortion
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Text for people or JSON for programs
@@ -311,7 +324,11 @@ fn from_table(arguments: &Arguments, file: &Path) -> Result<Exit, Failure> {
     let corners = parse_corners(&name, bytes.as_slice()).map_err(|error| error.to_string())?;
     let notes = unended(&name, &bytes).into_iter().collect();
     let observed = Observed {
+        title: if file.as_os_str() == "-" { name.clone() } else { last_part(file) },
+        unit: "target units".to_string(),
         source: name,
+        given: corners.view_names.clone(),
+        places: (0..corners.views.len()).collect(),
         names: corners.view_names,
         views: corners.views,
         image_size: arguments.image_size,
@@ -319,6 +336,11 @@ fn from_table(arguments: &Arguments, file: &Path) -> Result<Exit, Failure> {
         ..Observed::default()
     };
     camera::run(arguments, observed)
+}
+
+/// The name of a file without the folders that it lies in.
+pub(super) fn last_part(file: &Path) -> String {
+    file.file_name().map_or_else(|| file.shown(), |name| Path::new(name).shown())
 }
 
 /// Views of a board, for verbs that judge a camera: from a corner file, or with a board from photographs.

@@ -1,6 +1,6 @@
 //! `calibench ninepoint IMAGE`: the dots of a photograph, and the map from its pixels to the unit grid.
 
-use super::calibrate::{Format, Mode, plane_text};
+use super::calibrate::{Format, Mode, PlaneReport, last_part, plane_text};
 use super::said::written_by;
 use super::{Exit, print, warn};
 use calibench::board::Board;
@@ -8,7 +8,7 @@ use calibench::detect::{DotGrid, sparse_dots_of};
 use calibench::geometry::Vec2;
 use calibench::io::ShownPath;
 use calibench::io::memory::{DEFAULT_MEMORY, parse_bytes};
-use calibench::io::{Memory, Overlay, image_extent, read_image, write_atomically};
+use calibench::io::{Memory, Overlay, image_extent, read_image, write_together};
 use calibench::photos::ordered_discs;
 use calibench::planar::{PlaneCalibration, calibrate_plane};
 use clap::Args;
@@ -31,7 +31,7 @@ pub(super) struct Arguments {
     /// Memory that the photograph may take, such as 500MB or 2GiB [default: 2GiB]
     #[arg(long, value_name = "BYTES", value_parser = parse_bytes, default_value_t = DEFAULT_MEMORY, hide_default_value = true)]
     memory: u64,
-    /// Folder for result.json and overlay.png
+    /// Folder for result.json, overlay.png with the dots drawn in, and the page report.html with its plots
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Text for people or JSON for programs
@@ -69,7 +69,7 @@ fn ninepoint(arguments: &Arguments) -> Result<Exit, String> {
     let found = Found { centres_px, world, plane };
     let json = format!("{:#}\n", result_json(arguments, &found));
     if let Some(folder) = &arguments.out
-        && let Err(message) = write(folder, &json, &overlay(&image.to_u8(), &grid))
+        && let Err(message) = write(folder, arguments, &found, &json, &overlay(&image.to_u8(), &grid))
     {
         warn(&message);
         return Ok(Exit::Incomplete);
@@ -140,10 +140,29 @@ fn overlay(image: &calibench::raster::Raster<u8>, grid: &DotGrid) -> Overlay {
     overlay
 }
 
-fn write(folder: &Path, json: &str, overlay: &Overlay) -> Result<(), String> {
-    let result = folder.join("result.json");
-    write_atomically(&result, json.as_bytes()).map_err(|error| error.to_string())?;
-    overlay.write_png(&folder.join("overlay.png")).map_err(|error| error.to_string())
+/// All files or none, `result.json` last.
+fn write(
+    folder: &Path,
+    arguments: &Arguments,
+    found: &Found,
+    json: &str,
+    overlay: &Overlay,
+) -> Result<(), String> {
+    const OVERLAY: &str = "overlay.png";
+    let names: Vec<String> = (1..=found.centres_px.len()).map(|dot| dot.to_string()).collect();
+    let report = PlaneReport {
+        title: format!("the dots of {}", last_part(&arguments.image)),
+        names: &names,
+        pixels: &found.centres_px,
+        world: &found.world,
+        plane: &found.plane,
+        overlay: Some(OVERLAY),
+    };
+    let mut files: Vec<(PathBuf, Vec<u8>)> =
+        vec![(folder.join(OVERLAY), overlay.png().map_err(|error| error.to_string())?)];
+    files.extend(report.files().into_iter().map(|(name, bytes)| (folder.join(name), bytes)));
+    files.push((folder.join("result.json"), json.as_bytes().to_vec()));
+    write_together(&files).map_err(|error| error.to_string())
 }
 
 #[cfg(test)]

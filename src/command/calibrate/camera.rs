@@ -1,12 +1,16 @@
 //! A camera from views, wherever they come from: the fit, how it is printed, and the files it leaves.
 
-use super::finished::{Finished, parameter_rows, summary, weakest};
+use super::before_after::BeforeAfter;
+use super::finished::{Finished, parameter_rows, summary, warnings, weakest};
 use super::models::{self, Comparison};
+use super::optics::Optics;
+use super::view_names::ViewNames;
 use super::{
-    Arguments, Exit, Failure, Format, Intervals, ModelChoice, advice, maps, page, plots, print, table,
+    Arguments, Exit, Failure, Format, Intervals, ModelChoice, advice, maps, page, plots, poses, print,
+    scatter, table,
 };
 use calibench::board::{Board, View};
-use calibench::calibrate::{Loss, Prior, ProfileInterval, Settings, in_words};
+use calibench::calibrate::{Loss, Prior, ProfileInterval, Settings};
 use calibench::camera::Model;
 use calibench::detect::Orientation;
 use calibench::geometry::Vec2;
@@ -21,10 +25,20 @@ use std::path::{Path, PathBuf};
 /// Views and where they come from.
 #[derive(Debug, Default)]
 pub(super) struct Observed {
-    /// What errors and the page call the input.
+    /// What errors call the input.
     pub(super) source: String,
+    /// What the page calls it.
+    pub(super) title: String,
+    /// Unit of lengths on the board.
+    pub(super) unit: String,
+    /// Names of all that was given, the views and what was left out.
+    pub(super) given: Vec<String>,
+    /// The photographs, if those were given.
+    pub(super) photos: Vec<PathBuf>,
     /// One name a view.
     pub(super) names: Vec<String>,
+    /// The place of each view in what was given.
+    pub(super) places: Vec<usize>,
     pub(super) views: Vec<View>,
     pub(super) image_size: Option<(usize, usize)>,
     /// How far photographs tell which mark is the board's first.
@@ -35,8 +49,10 @@ pub(super) struct Observed {
     pub(super) discs: Option<Board>,
     /// Input that gave no view.
     pub(super) left_out: Vec<LeftOut>,
-    /// Pictures of views, by the views' names: paths relative to the output folder.
-    pub(super) overlays: BTreeMap<String, String>,
+    /// Its places in what was given.
+    pub(super) left_out_places: Vec<usize>,
+    /// Pictures by their photographs' places: paths relative to the output folder.
+    pub(super) overlays: BTreeMap<usize, String>,
     /// What a reader must know about the input.
     pub(super) notes: Vec<String>,
 }
@@ -119,42 +135,52 @@ pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, Fai
         Fitter { settings: &settings, discs: observed.discs.as_ref(), reject_factor: arguments.reject_views };
     let fit =
         fitter.fit(&observed.views).map_err(|error| format!("{}: {}", observed.source, message(&error)))?;
-    let mut finished = finish(observed, fit);
+    let mut finished = finish(observed, fit, arguments.pixel_pitch);
     finished.advice.extend(models::freedoms(&finished.fit, &settings));
     finished.comparison = comparison;
-    let mut fields = CalibrationFields::of(&finished.fit.calibration, &finished.names, finished.image_size);
+    let mut fields =
+        CalibrationFields::of(&finished.fit.calibration, &finished.whole_names, finished.image_size);
     fields.left_out = finished.left_out.clone();
     fields.orientation = finished.orientation.map(Orientation::name);
     fields.models = finished.comparison.iter().flat_map(|c| c.fields()).collect();
-    fields.warnings.extend(finished.notes.iter().chain(&finished.advice).cloned());
+    fields.warnings = warnings(&finished);
+    let json = finished.optics.with(&fields);
     if let Some(folder) = &arguments.out {
-        write_files(folder, &fields, &finished).map_err(Failure::unwritten)?;
+        write_files(folder, &json, &finished, arguments.memory).map_err(Failure::unwritten)?;
     }
     match arguments.format {
-        Format::Json => print(&fields.to_json()),
+        Format::Json => print(&json),
         Format::Text => print(&text(&finished)),
     }
     Ok(if finished.fit.calibration.is_usable() { Exit::Held } else { Exit::Incomplete })
 }
 
-fn finish(observed: Observed, fit: Fit) -> Finished {
-    let mut left_out = observed.left_out;
-    left_out.extend(fit.rejected.iter().map(|rejected| LeftOut {
-        name: observed.names[rejected.view].clone(),
-        reason: rejected.reason.clone(),
-    }));
-    let names: Vec<String> = fit.kept.iter().map(|&view| observed.names[view].clone()).collect();
+fn finish(observed: Observed, fit: Fit, pixel_pitch_um: Option<f64>) -> Finished {
+    let (mut left_out, mut left_out_places) = (observed.left_out, observed.left_out_places);
+    for rejected in &fit.rejected {
+        let name = observed.names[rejected.view].clone();
+        left_out.push(LeftOut { name, reason: rejected.reason.clone() });
+        left_out_places.push(observed.places[rejected.view]);
+    }
+    let whole_names: Vec<String> = fit.kept.iter().map(|&view| observed.names[view].clone()).collect();
+    let names = ViewNames::new(observed.given, fit.kept.iter().map(|&view| observed.places[view]).collect());
     let mut notes = observed.notes;
     notes.extend(bias_note(&fit));
-    let advice = advice::of(&fit, &names, observed.image_size);
-    let Observed { image_size, overlays, source, orientation, .. } = observed;
+    let advice = advice::of(&fit, &whole_names, observed.image_size);
+    let optics = Optics::of(&fit.calibration, observed.image_size, pixel_pitch_um);
+    let Observed { title, unit, photos, image_size, overlays, orientation, .. } = observed;
     Finished {
-        source,
+        title,
+        unit,
         fit,
+        whole_names,
         names,
+        photos,
         image_size,
         left_out,
+        left_out_places,
         overlays,
+        optics,
         notes,
         advice,
         orientation,
@@ -173,16 +199,19 @@ fn bias_note(fit: &Fit) -> Option<String> {
 }
 
 /// All files or none, `result.json` last: where it is new, all that belongs to it is.
-fn write_files(folder: &Path, fields: &CalibrationFields, finished: &Finished) -> std::io::Result<()> {
+fn write_files(folder: &Path, json: &str, finished: &Finished, memory: u64) -> std::io::Result<()> {
     let figures = figures(finished);
-    let page = page::html(finished, &figures).into_bytes();
+    let before_after = BeforeAfter::of(finished, memory);
+    let page = page::html(finished, &figures, before_after.as_ref()).into_bytes();
     let mut files: Vec<(PathBuf, Vec<u8>)> =
         figures.into_iter().map(|figure| (folder.join(figure.file_name()), figure.bytes)).collect();
+    let pictures = before_after.iter().flat_map(BeforeAfter::files);
+    files.extend(pictures.map(|(name, bytes)| (folder.join(name), bytes)));
     files.push((folder.join("report.html"), page));
     if finished.orientation.is_some() {
         files.push((folder.join("corners.csv"), corners(finished).into_bytes()));
     }
-    files.push((folder.join("result.json"), fields.to_json().into_bytes()));
+    files.push((folder.join("result.json"), json.as_bytes().to_vec()));
     write_together(&files)
 }
 
@@ -193,19 +222,18 @@ fn corners(finished: &Finished) -> String {
         let times = seen.entry(name.clone()).and_modify(|times| *times += 1).or_insert(1);
         if *times == 1 { name.clone() } else { format!("{name} ({times})") }
     };
-    let view_names = finished.names.iter().map(&mut name).collect();
+    let view_names = finished.whole_names.iter().map(&mut name).collect();
     corner_text(&CornerFile { view_names, views: finished.fit.views.clone() })
 }
 
 fn figures(finished: &Finished) -> Vec<Figure> {
     let calibration = &finished.fit.calibration;
-    let mut figures = plots::figures(calibration, &finished.fit.views, finished.image_size);
-    figures.extend(
-        finished
-            .image_size
-            .into_iter()
-            .flat_map(|size| maps::figures(calibration, &finished.fit.views, size)),
-    );
+    let numbers: Vec<usize> = (0..finished.fit.views.len()).map(|view| finished.names.number(view)).collect();
+    let mut figures = plots::figures(calibration, &finished.fit.views, &numbers, finished.image_size);
+    figures.extend(scatter::figures(calibration));
+    figures.extend(poses::figures(finished));
+    let maps = |size| maps::figures(calibration, &finished.fit.views, size);
+    figures.extend(finished.image_size.into_iter().flat_map(maps));
     figures
 }
 
@@ -235,18 +263,24 @@ fn text(finished: &Finished) -> String {
     });
     let comparison = finished.comparison.as_ref().map(Comparison::text).unwrap_or_default();
     let intervals = interval_table(&calibration.intervals);
-    let mut views = table(&["view", "points", "RMSE (px)", "distance"]);
-    for (i, name) in finished.names.iter().enumerate() {
+    let columns = ["no.", "view", "points", "RMSE (px)", "distance"];
+    // Names that are numbers need no others.
+    let first = usize::from(finished.names.are_numbers());
+    let mut views = table(&columns[first..]);
+    for (i, name) in finished.whole_names.iter().enumerate() {
         let rmse = calibration.view_rmse_px(i).unwrap_or(f64::NAN);
         let distance = calibration.cam_from_target[i].translation.z;
         let points = calibration.residuals[i].len().to_string();
-        views.add_row([name.clone(), points, significant(rmse, 4), significant(distance, 5)]);
+        let number = finished.names.number(i).to_string();
+        let row = [number, name.clone(), points, significant(rmse, 4), significant(distance, 5)];
+        views.add_row(&row[first..]);
     }
     let mut text = format!(
-        "{comparison}{}\n\n{intervals}{}\n\n{}",
+        "{comparison}{}\n\n{intervals}{}\n\n{}{}",
         parameters.trim_fmt(),
         views.trim_fmt(),
-        summary(finished)
+        summary(finished),
+        finished.optics.text()
     );
     // Writing to a string cannot fail, here and below.
     if let Some(weakest) = weakest(finished) {
@@ -255,8 +289,7 @@ fn text(finished: &Finished) -> String {
     for LeftOut { name, reason } in &finished.left_out {
         let _ = writeln!(text, "left out: {name}: {reason}");
     }
-    let warnings = in_words(&calibration.warnings).into_iter();
-    for warning in warnings.chain(finished.notes.iter().chain(&finished.advice).cloned()) {
+    for warning in warnings(finished) {
         let _ = writeln!(text, "warning: {warning}");
     }
     text

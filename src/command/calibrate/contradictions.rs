@@ -31,6 +31,7 @@ pub(super) fn refuse(arguments: &Arguments, input: Input) -> Result<(), String> 
             ("--tie", arguments.tie.is_some()),
             ("--prior", !arguments.prior.is_empty()),
             ("--image-size", arguments.image_size.is_some()),
+            ("--pixel-pitch", arguments.pixel_pitch.is_some()),
             ("--loss", arguments.loss.is_some()),
             ("--intervals", arguments.intervals.is_some()),
             ("--reject-views", arguments.reject_views.is_some()),

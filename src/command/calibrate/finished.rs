@@ -1,29 +1,71 @@
 //! What is said of a finished calibration, in the terminal and on the page?
 
+use super::html::escaped;
 use super::models::Comparison;
-use calibench::calibrate::{BoardShape, Certificate, LensCalibration};
+use super::optics::Optics;
+use super::view_names::ViewNames;
+use calibench::calibrate::{BoardShape, Certificate, LensCalibration, in_words};
 use calibench::camera::Parameter;
 use calibench::detect::Orientation;
 use calibench::io::{LeftOut, significant};
 use calibench::photos::Fit;
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use std::path::PathBuf;
 
 /// A finished calibration with all that is said of it.
 pub(super) struct Finished {
-    pub(super) source: String,
+    /// What the page calls the input.
+    pub(super) title: String,
+    /// Unit of lengths on the board.
+    pub(super) unit: String,
     pub(super) fit: Fit,
-    /// Names of the views that were fitted.
-    pub(super) names: Vec<String>,
+    /// Whole names of the views that were fitted.
+    pub(super) whole_names: Vec<String>,
+    /// Numbers and short names of all that were given.
+    pub(super) names: ViewNames,
+    /// The photographs that were given, if the input is photographs.
+    pub(super) photos: Vec<PathBuf>,
     pub(super) image_size: Option<(usize, usize)>,
     pub(super) left_out: Vec<LeftOut>,
-    pub(super) overlays: BTreeMap<String, String>,
+    /// The place of each that was left out among those given.
+    pub(super) left_out_places: Vec<usize>,
+    /// Pictures by the views' places: paths relative to the output folder.
+    pub(super) overlays: BTreeMap<usize, String>,
+    pub(super) optics: Optics,
     pub(super) notes: Vec<String>,
     pub(super) advice: Vec<String>,
     /// How far photographs tell which mark is the board's first.
     pub(super) orientation: Option<Orientation>,
     /// Of lens models, if one was to be chosen.
     pub(super) comparison: Option<Comparison>,
+}
+
+impl Finished {
+    /// The name at a place as HTML, which leads to its picture if there is one.
+    pub(super) fn linked(&self, place: usize) -> String {
+        let name = escaped(self.names.label_at(place));
+        match self.overlays.get(&place) {
+            Some(overlay) => format!("<a href=\"{}\">{name}</a>", escaped(overlay)),
+            None => name,
+        }
+    }
+
+    /// How a view is called in running text: its number, and its name where that says more.
+    pub(super) fn called(&self, place: usize) -> String {
+        let number = self.names.number_at(place);
+        if self.names.are_numbers() {
+            number.to_string()
+        } else {
+            format!("{number} \u{b7} {}", self.linked(place))
+        }
+    }
+}
+
+/// What to be careful about: the fit's own warnings, what concerns the input, and advice.
+pub(super) fn warnings(finished: &Finished) -> Vec<String> {
+    let own = in_words(&finished.names.numbered(&finished.fit.calibration.warnings));
+    own.into_iter().chain(finished.notes.iter().chain(&finished.advice).cloned()).collect()
 }
 
 /// Parameters worth a line: name, value, standard deviation or `held`, unit.

@@ -1,5 +1,6 @@
 //! A camera from a corner file and the measured places of its marks: `calibrate CORNERS.csv --target TARGET.csv`.
 
+use super::optics::Optics;
 use super::{Arguments, Exit, Failure, Format, ModelChoice, print, table, unended};
 use calibench::calibrate::{Loss, Prior, Settings, in_words};
 use calibench::camera::{Model, Parameter};
@@ -38,13 +39,15 @@ pub(super) fn run(arguments: &Arguments, corners: &Path, target: &Path) -> Resul
         ));
     }
     let mut fields = MeasuredFields::of(&found, &seen.view_names, arguments.image_size);
+    let optics = Optics::of(&found.calibration, arguments.image_size, arguments.pixel_pitch);
     fields.calibration.warnings.extend(notes.iter().cloned());
+    let json = optics.with(&fields);
     if let Some(folder) = &arguments.out {
-        write_together(&files(folder, &found, &fields)).map_err(Failure::unwritten)?;
+        write_together(&files(folder, &found, &json)).map_err(Failure::unwritten)?;
     }
     match arguments.format {
-        Format::Json => print(&fields.to_json()),
-        Format::Text => print(&text(&found, &seen.view_names, &notes)),
+        Format::Json => print(&json),
+        Format::Text => print(&text(&found, &seen.view_names, &optics, &notes)),
     }
     Ok(if found.calibration.is_usable() { Exit::Held } else { Exit::Incomplete })
 }
@@ -80,9 +83,9 @@ fn settings(arguments: &Arguments) -> Settings {
 }
 
 /// All or none, `result.json` last.
-fn files(folder: &Path, found: &MeasuredCalibration, fields: &MeasuredFields) -> Vec<(PathBuf, Vec<u8>)> {
+fn files(folder: &Path, found: &MeasuredCalibration, json: &str) -> Vec<(PathBuf, Vec<u8>)> {
     let marks = (folder.join("marks.csv"), marks(found).into_bytes());
-    vec![marks, (folder.join("result.json"), fields.to_json().into_bytes())]
+    vec![marks, (folder.join("result.json"), json.as_bytes().to_vec())]
 }
 
 /// The marks as a table: where they are now, how well that is known, and how far they were corrected.
@@ -105,7 +108,7 @@ fn quoted(name: &str) -> String {
     if is_plain { name.to_string() } else { format!("\"{}\"", name.replace('"', "\"\"")) }
 }
 
-fn text(found: &MeasuredCalibration, names: &[String], notes: &[String]) -> String {
+fn text(found: &MeasuredCalibration, names: &[String], optics: &Optics, notes: &[String]) -> String {
     let calibration = &found.calibration;
     let mut parameters = table(&["parameter", "value", "standard deviation", "unit"]);
     for (parameter, value) in calibration.camera.values() {
@@ -127,6 +130,7 @@ fn text(found: &MeasuredCalibration, names: &[String], notes: &[String]) -> Stri
     let mut text = format!("{}\n\n{}\n\n", parameters.trim_fmt(), views.trim_fmt());
     text += &corrections(found);
     text += &summary(found);
+    text += &optics.text();
     for warning in
         in_words(&calibration.warnings).into_iter().chain(found.doubts()).chain(notes.iter().cloned())
     {

@@ -1,141 +1,188 @@
-//! The report as a page: one HTML file that needs nothing else, light or dark as the reader's system is.
+//! The report as a page: one HTML file with its plots in it; of photographs with pictures beside it.
 
-use super::finished::{Finished, parameter_rows, summary, weakest};
-use calibench::calibrate::in_words;
-use calibench::io::significant;
+use super::before_after::BeforeAfter;
+use super::finished::{Finished, parameter_rows, summary, warnings, weakest};
+use super::html::{self, escaped, heading, note, number, paragraph, table};
+use super::{gallery, worst};
 use calibench_harness::Figure;
 use std::fmt::Write;
 
-const STYLE: &str = "\
-:root{color-scheme:light dark;--ink:#1c1c1e;--paper:#fff;--rule:#d5d5da;--soft:#66666c;--warn:#8a4b00;--card:#fff8ec}
-@media(prefers-color-scheme:dark){:root{--ink:#ececf0;--paper:#17171a;--rule:#3b3b42;--soft:#a0a0a8;--warn:#ffc66b;--card:#2a2418}
-figure svg{filter:invert(.91) hue-rotate(180deg)}}
-body{margin:2rem auto;max-width:74rem;padding:0 1.2rem;font:16px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper)}
-h1{font-size:1.5rem}h2{font-size:1.15rem;margin-top:2rem}
-table{border-collapse:collapse;font-variant-numeric:tabular-nums}
-th,td{padding:.25rem .9rem .25rem 0;border-bottom:1px solid var(--rule);text-align:right}
-th:first-child,td:first-child{text-align:left}th{color:var(--soft);font-weight:600}
-.scroll{overflow-x:auto}.warn{background:var(--card);border-left:4px solid var(--warn);padding:.6rem 1rem;margin:.5rem 0}
-.figures{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(30rem,100%),1fr));gap:1.5rem}
-figure{margin:0}figure svg{max-width:100%;height:auto}figcaption{color:var(--soft);font-size:.9rem}
-a{color:inherit}";
-
 /// The page.
-pub(super) fn html(finished: &Finished, figures: &[Figure]) -> String {
-    let title = format!("Calibration from {}", finished.source);
-    let mut page = format!(
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
-         content=\"width=device-width,initial-scale=1\">\n<title>{0}</title>\n<style>\n{STYLE}\n</style>\n</head>\n<body>\n\
-         <h1>{0}</h1>\n",
-        escaped(&title)
-    );
+pub(super) fn html(finished: &Finished, figures: &[Figure], before_after: Option<&BeforeAfter>) -> String {
+    let mut page = html::begin(&format!("Calibration from {}", finished.title));
+    paragraph(&mut page, &used(finished));
     for line in summary(finished).lines() {
-        paragraph(&mut page, "", line);
+        paragraph(&mut page, line);
     }
-    warnings(&mut page, finished);
-    page.push_str("<h2>Parameters</h2>\n");
+    for line in warnings(finished) {
+        html::warning(&mut page, &finished.names.shortened(&line));
+    }
+    parameters(&mut page, finished);
+    optics(&mut page, finished);
+    views(&mut page, finished);
+    left_out(&mut page, finished);
+    worst_marks(&mut page, finished);
+    heading(&mut page, "Figures");
+    html::figures(&mut page, figures);
+    if let Some(before_after) = before_after {
+        before_after.section(&mut page, finished);
+    }
+    gallery::section(&mut page, finished);
+    html::end(&mut page);
+    page
+}
+
+/// How much of what was given was used.
+fn used(finished: &Finished) -> String {
+    let (given, used) = (finished.names.given(), finished.fit.views.len());
+    let what = if finished.photos.is_empty() { "views" } else { "photographs" };
+    match given - used.min(given) {
+        0 => format!("All {given} {what} were used."),
+        1 => format!("{used} of {given} {what} were used; 1 was left out, see below."),
+        left => format!("{used} of {given} {what} were used; {left} were left out, see below."),
+    }
+}
+
+fn parameters(page: &mut String, finished: &Finished) {
+    heading(page, "Parameters");
     let rows: Vec<Vec<String>> = parameter_rows(finished)
         .into_iter()
         .map(|row| row.iter().map(|cell| escaped(cell)).collect())
         .collect();
-    table(&mut page, &["parameter", "value", "standard deviation", "unit"], &rows);
+    table(page, 1, &["parameter", "value", "standard deviation", "unit"], &rows);
+    let mut notes = Vec::new();
+    if rows.iter().any(|row| row[3].is_empty()) {
+        notes.push("A dash as unit: a pure number.");
+    }
+    if rows.iter().any(|row| row[2] == "held") {
+        notes.push("Held: not estimated, so without standard deviation.");
+    }
+    note(page, &notes.join(" "));
     if let Some(weakest) = weakest(finished) {
         let line = format!("Weakest direction, the combination that the data say least about: {weakest}.");
-        paragraph(&mut page, "", &line);
-    }
-    page.push_str("<h2>Views</h2>\n");
-    table(
-        &mut page,
-        &["view", "points", "RMSE (px)", "largest (px)", "distance", "tilt (deg)"],
-        &views(finished),
-    );
-    left_out(&mut page, finished);
-    page.push_str("<h2>Figures</h2>\n<div class=\"figures\">\n");
-    figures.iter().for_each(|figure| inlined(&mut page, figure));
-    let version = env!("CARGO_PKG_VERSION");
-    // Writing to a string cannot fail, here and below.
-    let _ = write!(page, "</div>\n<p><small>calibench {version}</small></p>\n</body>\n</html>\n");
-    page
-}
-
-fn warnings(page: &mut String, finished: &Finished) {
-    let own = in_words(&finished.fit.calibration.warnings).into_iter();
-    for warning in own.chain(finished.notes.iter().chain(&finished.advice).cloned()) {
-        paragraph(page, " class=\"warn\"", &warning);
+        paragraph(page, &line);
     }
 }
 
-fn views(finished: &Finished) -> Vec<Vec<String>> {
-    let calibration = &finished.fit.calibration;
-    let row = |(i, name): (usize, &String)| {
-        let residuals = &calibration.residuals[i];
-        let largest = residuals.iter().map(|r| r.norm()).fold(0.0, f64::max);
-        let pose = &calibration.cam_from_target[i];
-        // Angle between the board's normal and the optical axis, whichever side of the board is called its
-        // front.
-        let normal = pose.rotation.column(2);
-        let tilt = libm::atan2(libm::hypot(normal.x, normal.y), normal.z.abs()).to_degrees();
-        vec![
-            linked(finished, name),
-            residuals.len().to_string(),
-            significant(calibration.view_rmse_px(i).unwrap_or(f64::NAN), 4),
-            significant(largest, 3),
-            significant(pose.translation.z, 5),
-            format!("{tilt:.1}"),
-        ]
+/// Field of view and focal length in mm, where they are known.
+fn optics(page: &mut String, finished: &Finished) {
+    let optics = &finished.optics;
+    heading(page, "Field of view and focal length");
+    let mut rows = Vec::new();
+    let row = |name: &str, value: f64, digits: usize, sd: Option<f64>, unit: &str| {
+        let sd = sd.map_or(String::new(), |sd| number(sd, 2));
+        vec![name.to_string(), number(value, digits), sd, unit.to_string()]
     };
-    finished.names.iter().enumerate().map(row).collect()
+    let mut notes = Vec::new();
+    match &optics.field_of_view {
+        Some(view) => {
+            let angles = [
+                ("horizontal field of view", view.horizontal),
+                ("vertical field of view", view.vertical),
+                ("diagonal field of view", view.diagonal),
+            ];
+            rows.extend(angles.map(|(name, angle)| row(name, angle.unwrap_or(f64::NAN), 5, None, "degrees")));
+            notes.push(
+                "Field of view: between the rays at opposite edges of the image, in the row and the column of the principal point \
+                 and along the wider diagonal; no standard deviation is computed for it.",
+            );
+            if angles.iter().any(|(_, angle)| angle.is_none()) {
+                notes.push(
+                    "An angle without value: the lens model is not one-to-one up to that edge of the image.",
+                );
+            }
+        }
+        None => notes.push("The field of view needs the image's size: give --image-size."),
+    }
+    match &optics.focal_length {
+        Some(focal) => {
+            let [x, y] = focal.standard_deviations;
+            rows.push(row("focal length along u", focal.x, 6, x, "mm"));
+            rows.push(row("focal length along v", focal.y, 6, y, "mm"));
+            if x.is_none() || y.is_none() {
+                notes.push("A focal length without standard deviation was held.");
+            }
+        }
+        None => notes
+            .push("The focal length in mm needs the distance of the sensor's pixels: give --pixel-pitch."),
+    }
+    let pitch = optics.focal_length.as_ref().map(|focal| {
+        format!("Focal length: for pixels of {} \u{b5}m, taken as exact.", focal.pixel_pitch_um)
+    });
+    if !rows.is_empty() {
+        table(page, 1, &["quantity", "value", "standard deviation", "unit"], &rows);
+    }
+    notes.extend(pitch.as_deref());
+    note(page, &notes.join(" "));
+}
+
+fn views(page: &mut String, finished: &Finished) {
+    heading(page, "Views");
+    let distance = format!("distance ({})", finished.unit);
+    let header = ["no.", "view", "points", "RMSE (px)", "largest (px)", &distance, "tilt (deg)"];
+    let rows: Vec<Vec<String>> = (0..finished.fit.views.len()).map(|view| view_row(finished, view)).collect();
+    // Names that are numbers need no others.
+    let first = usize::from(finished.names.are_numbers());
+    let rows: Vec<Vec<String>> = rows.iter().map(|row| row[first..].to_vec()).collect();
+    table(page, 2 - first, &header[first..], &rows);
+    let counted = match first {
+        0 => "The number of a view is its place in what was given, here, in the plots and in the warnings. ",
+        _ => "",
+    };
+    note(
+        page,
+        &format!(
+            "{counted}Distance: of the board's origin, along the optical axis. Tilt: between the board's normal and the optical axis."
+        ),
+    );
+}
+
+fn view_row(finished: &Finished, view: usize) -> Vec<String> {
+    let calibration = &finished.fit.calibration;
+    let residuals = &calibration.residuals[view];
+    let largest = residuals.iter().map(|r| r.norm()).fold(0.0, f64::max);
+    let pose = &calibration.cam_from_target[view];
+    // Angle between the board's normal and the optical axis, whichever side of the board is called its
+    // front.
+    let normal = pose.rotation.column(2);
+    let tilt = libm::atan2(libm::hypot(normal.x, normal.y), normal.z.abs()).to_degrees();
+    vec![
+        finished.names.number(view).to_string(),
+        finished.linked(finished.names.place(view)),
+        residuals.len().to_string(),
+        number(calibration.view_rmse_px(view).unwrap_or(f64::NAN), 4),
+        number(largest, 3),
+        number(pose.translation.z, 5),
+        format!("{tilt:.1}"),
+    ]
 }
 
 fn left_out(page: &mut String, finished: &Finished) {
     if finished.left_out.is_empty() {
         return;
     }
-    page.push_str("<h2>Left out</h2>\n");
-    paragraph(
+    heading(page, "Left out");
+    let mut left: Vec<_> = finished.left_out.iter().zip(&finished.left_out_places).collect();
+    left.sort_by_key(|(_, place)| **place);
+    let row = |(left, &place): (&calibench::io::LeftOut, &usize)| {
+        let reason = escaped(&finished.names.shortened(&left.reason));
+        format!("<li>{}: {reason}</li>\n", finished.called(place))
+    };
+    let rows: String = left.into_iter().map(row).collect();
+    // Writing to a string cannot fail.
+    let _ = write!(page, "<ul>\n{rows}</ul>\n");
+}
+
+fn worst_marks(page: &mut String, finished: &Finished) {
+    let header = worst::header(finished);
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    let rows = worst::rows(finished);
+    heading(page, &format!("The {} marks that fit worst", rows.len()));
+    table(page, if finished.names.are_numbers() { 1 } else { 2 }, &header, &rows);
+    note(
         page,
-        "",
-        "In the picture of a photograph without the board, a red cross stands on each disc that was seen.",
+        "Point: the mark's place in its view, from 0. X, Y: on the board. u, v: where it was seen. du, dv: predicted \u{2212} \
+         observed. In sigma: the length over the estimated noise of a coordinate; of normal noise one mark in 100 exceeds 3, one in \
+         3000 exceeds 4.",
     );
-    page.push_str("<ul>\n");
-    for left in &finished.left_out {
-        let _ = writeln!(page, "<li>{}: {}</li>", linked(finished, &left.name), escaped(&left.reason));
-    }
-    page.push_str("</ul>\n");
-}
-
-/// A view's name, which leads to its picture if there is one.
-fn linked(finished: &Finished, name: &str) -> String {
-    match finished.overlays.get(name) {
-        Some(overlay) => format!("<a href=\"{}\">{}</a>", escaped(overlay), escaped(name)),
-        None => escaped(name),
-    }
-}
-
-fn paragraph(page: &mut String, attributes: &str, text: &str) {
-    let _ = writeln!(page, "<p{attributes}>{}</p>", escaped(text));
-}
-
-/// A table; the cells are HTML already.
-fn table(page: &mut String, header: &[&str], rows: &[Vec<String>]) {
-    page.push_str("<div class=\"scroll\"><table>\n<tr>");
-    header.iter().for_each(|cell| {
-        let _ = write!(page, "<th>{}</th>", escaped(cell));
-    });
-    page.push_str("</tr>\n");
-    for row in rows {
-        let cells: String = row.iter().map(|cell| format!("<td>{cell}</td>")).collect();
-        let _ = writeln!(page, "<tr>{cells}</tr>");
-    }
-    page.push_str("</table></div>\n");
-}
-
-fn inlined(page: &mut String, figure: &Figure) {
-    let svg = String::from_utf8_lossy(&figure.bytes);
-    let _ =
-        writeln!(page, "<figure>\n{svg}\n<figcaption>{}</figcaption>\n</figure>", escaped(&figure.caption));
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

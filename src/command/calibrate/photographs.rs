@@ -185,6 +185,10 @@ fn observed(
     let points = board.board().points();
     let mut observed = Observed {
         source: format!("{} photographs of a {board}", photos.len()),
+        title: format!("photographs of a {board}"),
+        unit: if board.unit.is_empty() { "board units".to_string() } else { board.unit.clone() },
+        given: photos.iter().map(|path| path.shown()).collect(),
+        photos: photos.to_vec(),
         image_size: expected.as_ref().map(|(size, _)| *size),
         discs: board.diameter_known.then(|| *board.board()),
         ..Observed::default()
@@ -197,10 +201,10 @@ fn observed(
         );
     }
     let mut parts = Vec::new();
-    for (path, seen) in photos.iter().zip(seen) {
+    for (place, (path, seen)) in photos.iter().zip(seen).enumerate() {
         let name = path.shown();
         if let Some(overlay) = seen.as_ref().ok().and_then(|seen| seen.overlay.clone()) {
-            observed.overlays.insert(name.clone(), overlay.map_err(Failure::unwritten)?);
+            observed.overlays.insert(place, overlay.map_err(Failure::unwritten)?);
         }
         let light = seen.as_ref().map_or(0.0, |seen| seen.light);
         let board = seen.as_ref().ok().and_then(|seen| seen.marks.as_ref().ok());
@@ -213,9 +217,13 @@ fn observed(
                     parts.push(format!("{name} ({missing})"));
                 }
                 observed.names.push(name);
+                observed.places.push(place);
                 observed.views.push(view);
             }
-            Err(error) => observed.left_out.push(LeftOut { reason: reason(&error, &name), name }),
+            Err(error) => {
+                observed.left_out.push(LeftOut { reason: reason(&error, &name), name });
+                observed.left_out_places.push(place);
+            }
         }
     }
     if !parts.is_empty() {

@@ -1,18 +1,32 @@
 //! A map of a plane from a file of point pairs.
 
-use super::{Arguments, Exit, Failure, Format, Mode, print, table};
+use super::plane_page::PlaneReport;
+use super::{Arguments, Exit, Failure, Format, Mode, last_part, print, table};
 use calibench::geometry::Vec2;
-use calibench::io::{PointPairs, parse_point_pairs, significant, write_atomically};
+use calibench::io::{PointPairs, parse_point_pairs, significant, write_together};
 use calibench::planar::{PlaneCalibration, calibrate_plane};
+use std::path::{Path, PathBuf};
 
 pub(super) fn run(arguments: &Arguments, file: &str, bytes: &[u8]) -> Result<Exit, Failure> {
-    let PointPairs { pixels, world, .. } =
+    let PointPairs { names, pixels, world } =
         parse_point_pairs(file, bytes).map_err(|error| error.to_string())?;
     let mode = arguments.mode.unwrap_or(Mode::Planar);
     let result = calibrate_plane(mode.into(), &pixels, &world).map_err(|error| format!("{file}: {error}"))?;
     let json = plane_json(mode, &pixels, &world, &result);
     if let Some(folder) = &arguments.out {
-        write_atomically(&folder.join("result.json"), json.as_bytes()).map_err(Failure::unwritten)?;
+        let title = last_part(Path::new(file));
+        let report = PlaneReport {
+            title,
+            names: &names,
+            pixels: &pixels,
+            world: &world,
+            plane: &result,
+            overlay: None,
+        };
+        let mut files: Vec<(PathBuf, Vec<u8>)> =
+            report.files().into_iter().map(|(name, bytes)| (folder.join(name), bytes)).collect();
+        files.push((folder.join("result.json"), json.clone().into_bytes()));
+        write_together(&files).map_err(Failure::unwritten)?;
     }
     match arguments.format {
         Format::Json => print(&json),

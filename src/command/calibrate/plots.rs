@@ -11,9 +11,14 @@ use calibench_harness::{Figure, Look, Plot};
 pub(super) fn figures(
     calibration: &LensCalibration,
     views: &[View],
+    numbers: &[usize],
     image_size: Option<(usize, usize)>,
 ) -> Vec<Figure> {
-    vec![residuals(calibration, views, image_size), view_errors(calibration), lens(calibration, views)]
+    vec![
+        residuals(calibration, views, image_size),
+        view_errors(calibration, numbers),
+        lens(calibration, views),
+    ]
 }
 
 /// Residuals as arrows where they were seen.
@@ -44,21 +49,30 @@ pub(crate) fn round_down(x: f64) -> f64 {
     [5.0, 2.0, 1.0].map(|m| m * power).into_iter().find(|&m| m <= x).unwrap_or(power)
 }
 
-/// RMSE of each view against that of all.
-fn view_errors(calibration: &LensCalibration) -> Figure {
-    let points: Vec<(f64, f64)> = (0..calibration.residuals.len())
-        .filter_map(|i| Some((i as f64 + 1.0, calibration.view_rmse_px(i)?)))
-        .collect();
+/// An axis shorter than this has ticks between whole numbers.
+const WHOLE_TICKS_FROM: f64 = 6.5;
+
+/// The end of an axis that counts from one number to another: so long that its ticks are whole numbers.
+pub(super) fn whole_ticks(first: f64, last: f64) -> f64 {
+    (last + 0.5).max(first - 0.5 + WHOLE_TICKS_FROM)
+}
+
+/// RMSE of each view, by its number, against that of all.
+fn view_errors(calibration: &LensCalibration, numbers: &[usize]) -> Figure {
+    let error = |(i, &number): (usize, &usize)| Some((number as f64, calibration.view_rmse_px(i)?));
+    let points: Vec<(f64, f64)> = numbers.iter().enumerate().filter_map(error).collect();
+    let ends = |start: f64, end: fn(f64, f64) -> f64| points.iter().map(|p| p.0).fold(start, end);
+    let (first, last) = (ends(f64::INFINITY, f64::min), ends(f64::NEG_INFINITY, f64::max));
     let top = 1.15 * points.iter().map(|p| p.1).fold(calibration.rmse_px, f64::max);
-    let plot = Plot::new("Reprojection error of each view", "view", "RMSE per point (px)")
+    let plot = Plot::new("Reprojection error of each view", "number of the view", "RMSE per point (px)")
         .points("view", &points)
         .hline("all views", calibration.rmse_px)
-        .x_range(0.5, points.len() as f64 + 0.5)
+        .x_range(first - 0.5, whole_ticks(first, last))
         .y_range(0.0, top);
     Figure::plot(
         "views",
         &plot,
-        "RMSE per point of each view, px. A view far above the rest deserves a look.",
+        "RMSE per point of each view, px, by its number in the table of views. A view far above the rest deserves a look.",
     )
 }
 
@@ -84,16 +98,16 @@ fn lens(calibration: &LensCalibration, views: &[View]) -> Figure {
         nodes.iter().map(|&(r, shift, sd)| (r, shift - sd, shift + sd)).collect();
     let radial = radial_names(calibration).join(", ");
     let x = match is_wide {
-        true => "angle from the axis \u{d7} focal length (px)",
-        false => "distance from the principal point (px)",
+        true => "undistorted radius, angle from the axis \u{d7} focal length (px)",
+        false => "undistorted radius (px)",
     };
     let plot = Plot::new("Displacement by the lens", x, "outward (px)")
         .band(format!("\u{b1}2 standard deviations ({radial})"), &band)
         .line("radial displacement", &curve)
         .hline("", 0.0);
     let caption = format!(
-        "Radial displacement against an {name} lens out to the farthest point seen, px, tangential terms left out. Beyond that \
-         radius the model is extrapolated."
+        "Radial displacement against an {name} lens out to the farthest point seen, px, tangential terms left out. Undistorted radius: \
+         where the {name} lens shows the point, from the principal point. Beyond the curve's end the model is extrapolated."
     );
     Figure::plot("lens", &plot, caption)
 }
