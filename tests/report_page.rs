@@ -233,3 +233,45 @@ fn a_plane_has_a_page_with_residual_and_standard_deviation_of_every_point() {
     );
     assert_eq!(rows(section(&page, "Points")).len(), 9);
 }
+
+#[test]
+fn a_stray_mark_is_told_by_where_it_is() {
+    let folder = folder("report-stray");
+    corner_file(&folder.join("c.csv"), &["a", "b", "c", "d"]);
+    let right = fs::read_to_string(folder.join("c.csv")).expect("read");
+    let mut moved = None;
+    // The file numbers its points backwards, and the tenth mark of the third view is off by 20 px.
+    let line = |(k, line): (usize, &str)| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_string).collect();
+        if k > 0 {
+            cells[1] = (1000 - k).to_string();
+        }
+        if cells[0] == "c" && moved.is_none() && k % 63 == 10 {
+            cells[4] = (cells[4].parse::<f64>().expect("a number") + 20.0).to_string();
+            moved = Some((cells[2].clone(), cells[3].clone()));
+        }
+        cells.join(",") + "\n"
+    };
+    let wrong: String = right.lines().enumerate().map(line).collect();
+    let (x, y) = moved.expect("it is moved");
+    fs::write(folder.join("wrong.csv"), wrong).expect("written");
+    let run = calibench(&folder, &["calibrate", "wrong.csv", "--format", "json"]);
+    let result: Value = serde_json::from_str(&text(&run.stdout)).expect("JSON");
+    let warnings = result["warnings"].to_string();
+    assert!(
+        warnings.contains(&format!("that mark is the one at X {x}, Y {y} in view c, seen at u ")),
+        "{warnings}"
+    );
+}
+
+#[test]
+fn heights_that_are_not_read_are_told() {
+    let folder = folder("report-heights");
+    corner_file(&folder.join("c.csv"), &["0", "1", "2", "3"]);
+    let flat = fs::read_to_string(folder.join("c.csv")).expect("read");
+    let line = |(k, line): (usize, &str)| format!("{line},{}\n", if k == 0 { "Z" } else { "5" });
+    fs::write(folder.join("z.csv"), flat.lines().enumerate().map(line).collect::<String>()).expect("written");
+    let run = calibench(&folder, &["calibrate", "z.csv"]);
+    let printed = text(&run.stdout);
+    assert!(printed.contains("warning: z.csv: its column Z is not read"), "{printed}");
+}

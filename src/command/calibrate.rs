@@ -322,7 +322,10 @@ fn from_table(arguments: &Arguments, file: &Path) -> Result<Exit, Failure> {
     }
     contradictions::refuse(arguments, Input::Corners)?;
     let corners = parse_corners(&name, bytes.as_slice()).map_err(|error| error.to_string())?;
-    let notes = unended(&name, &bytes).into_iter().collect();
+    let flat = has(&["Z"]).then(|| {
+        format!("{name}: its column Z is not read, and every mark taken for one of a plane: --target takes marks in space, `calibench tsai` one view of them")
+    });
+    let notes = unended(&name, &bytes).into_iter().chain(flat).collect();
     let observed = Observed {
         title: if file.as_os_str() == "-" { name.clone() } else { last_part(file) },
         unit: "target units".to_string(),

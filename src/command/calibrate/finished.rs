@@ -4,7 +4,7 @@ use super::html::escaped;
 use super::models::Comparison;
 use super::optics::Optics;
 use super::view_names::ViewNames;
-use calibench::calibrate::{BoardShape, Certificate, LensCalibration, in_words};
+use calibench::calibrate::{BoardShape, Certificate, LensCalibration, Warning, in_words};
 use calibench::camera::Parameter;
 use calibench::detect::Orientation;
 use calibench::io::{LeftOut, significant};
@@ -65,7 +65,25 @@ impl Finished {
 /// What to be careful about: the fit's own warnings, what concerns the input, and advice.
 pub(super) fn warnings(finished: &Finished) -> Vec<String> {
     let own = in_words(&finished.names.numbered(&finished.fit.calibration.warnings));
-    own.into_iter().chain(finished.notes.iter().chain(&finished.advice).cloned()).collect()
+    let own = own.into_iter().chain(stray(finished));
+    own.chain(finished.notes.iter().chain(&finished.advice).cloned()).collect()
+}
+
+/// Where the worst of the marks is that are too far off to be noise: by its number in the fit nobody finds it in a file that
+/// numbers its points otherwise.
+fn stray(finished: &Finished) -> Option<String> {
+    let found = finished.fit.calibration.warnings.iter().find_map(|warning| match warning {
+        Warning::Outliers { view, point, .. } => Some((*view, *point)),
+        _ => None,
+    });
+    let (view, point) = found?;
+    let seen = finished.fit.views.get(view)?;
+    let (at, pixel) = (seen.points().get(point)?, seen.pixels().get(point)?);
+    let [x, y, u, v] = [at.x, at.y, pixel.x, pixel.y].map(|number| significant(number, 6));
+    let view = finished.names.label_at(finished.names.place(view));
+    Some(format!(
+        "that mark is the one at X {x}, Y {y} in view {view}, seen at u {u}, v {v}: points are counted from 0 in each view"
+    ))
 }
 
 /// Parameters worth a line: name, value, standard deviation or `held`, unit.
