@@ -79,7 +79,8 @@ fn stray(finished: &Finished) -> Option<String> {
     let (view, point) = found?;
     let seen = finished.fit.views.get(view)?;
     let (at, pixel) = (seen.points().get(point)?, seen.pixels().get(point)?);
-    let [x, y, u, v] = [at.x, at.y, pixel.x, pixel.y].map(|number| significant(number, 6));
+    // As the file has them, so that they can be searched for.
+    let [x, y, u, v] = [at.x, at.y, pixel.x, pixel.y];
     let view = finished.names.label_at(finished.names.place(view));
     Some(format!(
         "that mark is the one at X {x}, Y {y} in view {view}, seen at u {u}, v {v}: points are counted from 0 in each view"
