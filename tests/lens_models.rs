@@ -185,3 +185,31 @@ fn what_a_model_does_not_have_is_refused_by_name() {
     let converted = run(&folder, &["convert", "r/result.json", "camera.yaml", "--to", "opencv-yaml"]);
     assert_eq!(converted.status.code(), Some(0), "{}", text(&converted.stderr));
 }
+
+#[test]
+fn a_wrong_model_of_few_marks_is_told_by_one_that_fits() {
+    let folder = folder("lens-few-marks");
+    let (_, whole) = fisheye_corners(None);
+    // Every fifth mark: 12 or 13 a view.
+    let few = |line: &&str| {
+        line.split(',')
+            .nth(1)
+            .is_none_or(|point| point == "point" || point.parse::<usize>().unwrap() % 5 == 0)
+    };
+    let text_of_few: Vec<&str> = whole.lines().filter(few).collect();
+    fs::write(folder.join("few.csv"), text_of_few.join("\n") + "\n").unwrap();
+    let told = |model: &str| -> Vec<String> {
+        let done = run(&folder, &["calibrate", "few.csv", "--model", model, "--format", "json"]);
+        let result: Value = serde_json::from_str(&text(&done.stdout)).expect("JSON");
+        let all =
+            result["warnings"].as_array().expect("a list").iter().map(|w| w.as_str().unwrap().to_string());
+        all.filter(|warning| warning.contains("explains the marks better")).collect()
+    };
+    let division = told("division");
+    // Both models of a fisheye explain so few marks.
+    let is_fisheye = |said: &String| {
+        ["a kannala-brandt lens", "a double-sphere lens"].iter().any(|name| said.starts_with(name))
+    };
+    assert!(division.len() == 1 && is_fisheye(&division[0]), "{division:?}");
+    assert_eq!(told("kannala-brandt"), Vec::<String>::new());
+}

@@ -4,8 +4,10 @@ use super::Failure;
 use super::camera::Observed;
 use super::table;
 use calibench::calibrate::{
-    Board, Candidate, Compared, Freedom, Settings, Warning, compare_models, explaining_freedoms,
+    Board, Candidate, Compared, Freedom, LensCalibration, Settings, Warning, calibrate_lens, compare_models,
+    explaining_freedoms,
 };
+use calibench::camera::Model;
 use calibench::io::result::ModelFields;
 use calibench::io::{message, significant};
 use calibench::photos::Fit;
@@ -89,7 +91,7 @@ impl Comparison {
 pub(super) fn freedoms(fit: &Fit, settings: &Settings) -> Vec<String> {
     let is_structured = |w: &Warning| matches!(w, Warning::Structured { .. } | Warning::AboveFloor { .. });
     if !fit.calibration.warnings.iter().any(is_structured) {
-        return Vec::new();
+        return better_model(fit, settings).into_iter().collect();
     }
     let before = fit.calibration.rmse_px;
     let found = explaining_freedoms(&fit.views, settings, &fit.calibration);
@@ -100,6 +102,47 @@ pub(super) fn freedoms(fit: &Fit, settings: &Settings) -> Vec<String> {
         ];
     }
     found.iter().map(|freedom| in_words(freedom, settings, before)).collect()
+}
+
+/// With fewer marks a view than this, poses take up what residuals of neighbours would share.
+const FEW_MARKS: usize = 20;
+/// What the criterion below must fall by: 10 is very strong evidence (Kass & Raftery 1995), and of eight models one falls by as much
+/// by chance now and then.
+const STRONG: f64 = 20.0;
+
+/// A lens model that explains few marks a view far better than the one that was asked for: their residuals do not tell that it is
+/// wrong, and other models are fitted in no time. Brown-Conrady's lens has its certificate.
+fn better_model(fit: &Fit, settings: &Settings) -> Option<String> {
+    let marks = fit.calibration.points();
+    if settings.model() == Model::BrownConrady || marks >= FEW_MARKS * fit.views.len() {
+        return None;
+    }
+    let own = criterion(&fit.calibration);
+    let fitted = Candidate::usual().into_iter().filter_map(|candidate| {
+        let other = calibrate_lens(&fit.views, &candidate.settings(settings)).ok()?;
+        let gain = own - criterion(&other);
+        (gain > STRONG && other.rmse_px < fit.calibration.rmse_px).then_some((gain, candidate, other))
+    });
+    let (gain, candidate, other) = fitted.max_by(|(a, ..), (b, ..)| a.total_cmp(b))?;
+    let coefficients: Vec<&str> = candidate.coefficients.iter().map(|parameter| parameter.name()).collect();
+    Some(format!(
+        "a {} lens with {} explains the marks better than this model: the noise of a coordinate is {} px with it in place of {} px \
+         (Schwarz's criterion falls by {gain:.0}, where 10 is very strong evidence); views of so few marks do not show a wrong model \
+         otherwise: compare models (--model auto)",
+        candidate.model,
+        coefficients.join(", "),
+        significant(other.sigma_px, 3),
+        significant(fit.calibration.sigma_px, 3),
+    ))
+}
+
+/// Schwarz's criterion (1978), up to what all models share: `f ln(sum |r|^2) + p ln f`, for the `f` degrees of freedom that the poses
+/// leave and `p` parameters of the camera. With few marks a view half of the coordinates tell of the poses alone, and would count twice.
+fn criterion(calibration: &LensCalibration) -> f64 {
+    let coordinates = 2.0 * calibration.points() as f64;
+    let freedom = (coordinates - 6.0 * calibration.cam_from_target.len() as f64).max(1.0);
+    let square = calibration.rmse_px * calibration.rmse_px;
+    freedom * libm::log(square) + calibration.free.len() as f64 * libm::log(freedom)
 }
 
 fn in_words(freedom: &Freedom, settings: &Settings, before: f64) -> String {
