@@ -67,7 +67,7 @@ fn what_a_python_lacks_is_named() {
         .output()
         .expect("it runs");
     assert_eq!(done.status.code(), Some(1));
-    assert!(text(&done.stderr).contains("false lacks cv2 or numpy"), "{}", text(&done.stderr));
+    assert!(text(&done.stderr).contains("false lacks cv2, numpy"), "{}", text(&done.stderr));
     assert!(!out.exists());
     let done =
         Command::new(env!("CARGO_BIN_EXE_detector-gate-trials")).arg("nobody").output().expect("it runs");

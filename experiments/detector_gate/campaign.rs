@@ -5,17 +5,19 @@ use super::row::{HEADER, Row};
 use super::{PHOTOS, SEED};
 use calibench::io::write_atomically;
 use calibench_detector_gate::{Builtin, Detector, Scene, outcomes, scenes};
-use calibench_harness::ProgressDisplay;
 use calibench_harness::fingerprint::Fingerprint;
+use calibench_harness::{ProgressDisplay, campaign};
 use clap::Parser;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::process::ExitCode;
 use std::time::Duration;
 
 /// Where the committed lines stand, from the root of the project.
 pub const FOLDER: &str = "golden/detector-gate";
 /// Longest time for one photograph.
 const TIMEOUT: Duration = Duration::from_secs(120);
+/// What the adapter imports.
+const MODULES: [&str; 2] = ["cv2", "numpy"];
 
 /// Shows a program the photographs of the experiment detector-gate, and writes what it found to golden/detector-gate/NAME.csv.
 #[derive(Debug, Parser)]
@@ -35,13 +37,7 @@ struct Arguments {
 
 /// The command.
 pub fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(message) => {
-            eprintln!("{message}");
-            ExitCode::FAILURE
-        }
-    }
+    campaign::exit_code(run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), String> {
@@ -56,7 +52,7 @@ fn run(arguments: &Arguments) -> Result<(), String> {
             (Box::new(Builtin), versions, Fingerprint::of_detector_gate())
         }
         Some(method) => {
-            let versions = versions(&arguments.python)?;
+            let versions = campaign::python_versions(&arguments.python, &MODULES)?;
             let command = format!("{} adapters/detector_opencv.py {method}", arguments.python);
             let asked = calibench_detector_gate::Program::new(&command, TIMEOUT);
             let asked = asked.map_err(|error| error.to_string())?;
@@ -107,19 +103,4 @@ pub fn rows_of(
     })?;
     let row = |(trial, outcome)| Row { kind: scene.kind, scene: scene.id.to_string(), trial, outcome };
     Ok(found.into_iter().map(row).collect())
-}
-
-/// The versions of what the adapter imports, which must be there.
-fn versions(python: &str) -> Result<String, String> {
-    let asks =
-        "import cv2, numpy\nprint(', '.join(['cv2 ' + cv2.__version__, 'numpy ' + numpy.__version__]))";
-    let done = Command::new(python).args(["-c", asks]).output().map_err(|e| format!("{python}: {e}"))?;
-    if !done.status.success() {
-        let lines = String::from_utf8_lossy(&done.stderr).into_owned();
-        return Err(format!(
-            "{python} lacks cv2 or numpy: {}; name a Python that has them with --python",
-            lines.lines().last().unwrap_or_default()
-        ));
-    }
-    Ok(String::from_utf8_lossy(&done.stdout).trim().to_string())
 }

@@ -9,7 +9,7 @@ use calibench_harness::campaign;
 use calibench_harness::fingerprint::Fingerprint;
 use clap::Parser;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::process::ExitCode;
 use std::time::Duration;
 
 /// Where the committed lines stand, from the root of the project.
@@ -58,7 +58,7 @@ fn measured(program: &Program, python: &str, trials: u64) -> Result<String, Stri
             (ask(Builtin, trials), versions, Fingerprint::of_other_solvers())
         }
         Some((adapter, _)) => {
-            let versions = versions(python, program.modules)?;
+            let versions = campaign::python_versions(python, program.modules)?;
             let process = Process::new(&format!("{python} adapters/{adapter}"), TIMEOUT, 1);
             (ask(process, trials), versions, Fingerprint::of_other_solvers_scenes())
         }
@@ -71,24 +71,4 @@ fn measured(program: &Program, python: &str, trials: u64) -> Result<String, Stri
     );
     let lines: Vec<String> = rows.iter().map(|row| row.text() + "\n").collect();
     Ok(format!("{}\n{HEADER}\n{}", fingerprint.head(&what), lines.concat()))
-}
-
-/// The versions of modules of Python, which must be there.
-fn versions(python: &str, modules: &[&str]) -> Result<String, String> {
-    let names = modules.join(", ");
-    let told = modules
-        .iter()
-        .map(|module| format!("'{module} ' + {module}.__version__"))
-        .collect::<Vec<_>>()
-        .join(", ");
-    let asks = format!("import {names}\nprint(', '.join([{told}]))");
-    let done = Command::new(python).args(["-c", &asks]).output().map_err(|e| format!("{python}: {e}"))?;
-    if !done.status.success() {
-        let lines = String::from_utf8_lossy(&done.stderr).into_owned();
-        return Err(format!(
-            "{python} lacks {names}: {}; name a Python that has them with --python",
-            lines.lines().last().unwrap_or_default()
-        ));
-    }
-    Ok(String::from_utf8_lossy(&done.stdout).trim().to_string())
 }

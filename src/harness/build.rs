@@ -94,20 +94,27 @@ struct Measurement {
     of: &'static [&'static [&'static str]],
     /// Folders below these whose lines do not.
     without: &'static [&'static str],
+    /// Crates whose versions change it, beside the numeric ones.
+    crates: &'static [&'static str],
 }
 
 const fn measurement(name: &'static str, of: &'static [&'static [&'static str]]) -> Measurement {
-    Measurement { name, of, without: &[] }
+    Measurement { name, of, without: &[], crates: &[] }
 }
 
 /// One that knows Brown-Conrady's lens alone.
 const fn of_one_lens(name: &'static str, of: &'static [&'static [&'static str]]) -> Measurement {
-    Measurement { name, of, without: OTHER_LENSES }
+    Measurement { without: OTHER_LENSES, ..measurement(name, of) }
+}
+
+/// One that photographs are drawn for.
+const fn of_photographs(name: &'static str, of: &'static [&'static [&'static str]]) -> Measurement {
+    Measurement { crates: CODEC_CRATES, ..measurement(name, of) }
 }
 
 const MEASUREMENTS: &[Measurement] = &[
-    measurement("detector-gate", &[PHOTOGRAPHS, DETECTORS]),
-    measurement("detector-gate-scenes", &[PHOTOGRAPHS]),
+    of_photographs("detector-gate", &[PHOTOGRAPHS, DETECTORS]),
+    of_photographs("detector-gate-scenes", &[PHOTOGRAPHS]),
     of_one_lens("global-minimum", &[SCENES, SOLVER, GLOBAL_MINIMUM, JUDGED]),
     measurement("global-minimum-scenes", &[SCENES, GLOBAL_MINIMUM]),
     measurement("gate-power", &[SCENES, SOLVER, GATE]),
@@ -127,9 +134,8 @@ fn main() {
         std::fs::write(&file, text).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
     };
     write("published.toml", &published(&root));
-    for Measurement { name, of, without } in MEASUREMENTS {
-        let more = if of.contains(&PHOTOGRAPHS) { CODEC_CRATES } else { &[] };
-        write(&format!("{name}.code"), &lines_of(&root, &of.concat(), without, more));
+    for measurement in MEASUREMENTS {
+        write(&format!("{}.code", measurement.name), &lines_of(&root, measurement));
     }
 }
 
@@ -140,21 +146,18 @@ fn published(root: &Path) -> String {
     std::fs::read_to_string(file).unwrap_or_else(|_| "value = []".to_string())
 }
 
-/// The code lines below these paths, but for those in the folders `without`, and the versions of the numeric crates and of some more.
-fn lines_of(root: &Path, paths: &[&str], without: &[&str], more: &[&str]) -> String {
+/// The code lines that a measurement depends on, and the versions of the crates.
+fn lines_of(root: &Path, measurement: &Measurement) -> String {
     if !root.join("golden/published.toml").is_file() {
         return String::new();
     }
-    for path in paths {
+    let paths = measurement.of.concat();
+    for path in &paths {
         println!("cargo:rerun-if-changed={}", root.join(path).display());
     }
-    let lines = code::of_paths(root, paths, without)
+    let lines = code::of_paths(root, &paths, measurement.without)
         .unwrap_or_else(|error| panic!("a path of src/harness/build.rs: {error}"));
     println!("cargo:rerun-if-changed={}", root.join("Cargo.lock").display());
     let lock = std::fs::read_to_string(root.join("Cargo.lock")).unwrap_or_default();
-    lines
-        + &match more {
-            [] => code::versions(&lock),
-            more => code::versions_of(&lock, &[code::NUMERIC_CRATES, more].concat()),
-        }
+    lines + &code::versions_of(&lock, &[code::NUMERIC_CRATES, measurement.crates].concat())
 }

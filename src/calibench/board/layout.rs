@@ -15,7 +15,45 @@ pub enum Pattern {
     Chessboard,
 }
 
-/// A planar board: `columns x rows` marks on a square grid.
+/// How the marks of a board lie to each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Arrangement {
+    /// On a square grid: neighbours in a row and in a column are the board's spacing apart.
+    Square,
+    /// Rows one spacing apart, the marks of a row two, every second row moved by one: what OpenCV calls an asymmetric grid.
+    /// The nearest neighbours lie on the diagonals, `sqrt(2)` spacings away.
+    Asymmetric,
+    /// The marks of a row one spacing apart, every second row moved by half of it, rows `sqrt(3) / 2` spacings apart: each
+    /// mark has six neighbours at one spacing.
+    Hexagonal,
+}
+
+impl Arrangement {
+    /// Distance of the marks of a row, and of the rows, in spacings.
+    fn steps(self) -> Vec2 {
+        match self {
+            Arrangement::Square => Vec2::new(1.0, 1.0),
+            Arrangement::Asymmetric => Vec2::new(2.0, 1.0),
+            Arrangement::Hexagonal => Vec2::new(1.0, 0.5 * libm::sqrt(3.0)),
+        }
+    }
+
+    /// Distance of nearest neighbours, in spacings.
+    fn nearest(self) -> f64 {
+        match self {
+            Arrangement::Square | Arrangement::Hexagonal => 1.0,
+            Arrangement::Asymmetric => core::f64::consts::SQRT_2,
+        }
+    }
+
+    /// Whether every second row is moved by half the distance of its marks.
+    pub fn is_staggered(self) -> bool {
+        self != Arrangement::Square
+    }
+}
+
+/// A planar board: `columns x rows` marks in rows, on a square grid if not said otherwise.
 ///
 /// ```
 /// use calibench::board::Board;
@@ -33,6 +71,7 @@ pub struct Board {
     rows: usize,
     spacing: f64,
     pattern: Pattern,
+    arrangement: Arrangement,
 }
 
 /// Why a board cannot exist.
@@ -59,7 +98,7 @@ pub enum BoardError {
     },
     /// The spacing or the diameter is not a positive number, or the discs would touch.
     #[error(
-        "spacing {spacing} and disc diameter {diameter} do not make a board: need 0 < diameter < spacing"
+        "spacing {spacing} and disc diameter {diameter} do not make a board: need 0 < diameter < distance of neighbours"
     )]
     Geometry {
         /// Distance of neighbouring marks.
@@ -74,8 +113,33 @@ impl Board {
     /// places take 16 MB.
     pub const MOST_MARKS: usize = 1_000_000;
 
-    /// A board of `columns x rows` marks, `spacing` apart.
+    /// A board of `columns x rows` marks on a square grid, `spacing` apart.
     pub fn new(columns: usize, rows: usize, spacing: f64, pattern: Pattern) -> Result<Board, BoardError> {
+        Board::arranged(columns, rows, spacing, pattern, Arrangement::Square)
+    }
+
+    /// A board of `rows` rows of `columns` marks in some arrangement, which says what `spacing` is.
+    ///
+    /// ```
+    /// use calibench::board::{Arrangement, Board, Pattern};
+    ///
+    /// let board = Board::arranged(4, 11, 20.0, Pattern::Circles { diameter: 15.0 }, Arrangement::Asymmetric)?;
+    /// let points = board.points();
+    /// // Neighbours in a row, and the first of the next row.
+    /// assert_eq!((points[1] - points[0]).norm(), 40.0);
+    /// assert_eq!((points[4] - points[0]).as_slice(), [20.0, 20.0]);
+    /// # Ok::<(), calibench::board::BoardError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// See [`BoardError`].
+    pub fn arranged(
+        columns: usize,
+        rows: usize,
+        spacing: f64,
+        pattern: Pattern,
+        arrangement: Arrangement,
+    ) -> Result<Board, BoardError> {
         if columns < 2 || rows < 2 {
             return Err(BoardError::TooSmall { columns, rows });
         }
@@ -87,13 +151,13 @@ impl Board {
             Pattern::Chessboard => 0.0,
         };
         let discs_fit = match pattern {
-            Pattern::Circles { .. } => diameter > 0.0 && diameter < spacing,
+            Pattern::Circles { .. } => diameter > 0.0 && diameter < arrangement.nearest() * spacing,
             Pattern::Chessboard => true,
         };
         if !(spacing > 0.0 && spacing.is_finite() && discs_fit) {
             return Err(BoardError::Geometry { spacing, diameter });
         }
-        Ok(Board { columns, rows, spacing, pattern })
+        Ok(Board { columns, rows, spacing, pattern, arrangement })
     }
 
     /// A circle grid.
@@ -126,13 +190,26 @@ impl Board {
         self.pattern
     }
 
-    /// The marks, row by row, X growing along a row, Y from row to row; the grid's centre is the origin.
+    /// How the marks lie to each other.
+    pub fn arrangement(&self) -> Arrangement {
+        self.arrangement
+    }
+
+    /// The marks, row by row, X growing along a row, Y from row to row; the origin is half-way between the outermost in X and
+    /// in Y. Of staggered rows the first, third and so on begin farther to the left.
     pub fn points(&self) -> Vec<Vec2> {
-        let coordinate =
-            |index: usize, count: usize| (index as f64 - 0.5 * (count - 1) as f64) * self.spacing;
+        let step = self.arrangement.steps() * self.spacing;
+        let staggered = if self.arrangement.is_staggered() { 0.5 } else { 0.0 };
+        let coordinate = |place: f64, last: f64, step: f64| (place - 0.5 * last) * step;
+        let at = |column: usize, row: usize| {
+            let moved = if row % 2 == 1 { staggered } else { 0.0 };
+            let last = (self.columns - 1) as f64 + staggered;
+            let x = coordinate(column as f64 + moved, last, step.x);
+            Vec2::new(x, coordinate(row as f64, (self.rows - 1) as f64, step.y))
+        };
         (0..self.rows)
             .flat_map(|row| (0..self.columns).map(move |column| (column, row)))
-            .map(|(column, row)| Vec2::new(coordinate(column, self.columns), coordinate(row, self.rows)))
+            .map(|(column, row)| at(column, row))
             .collect()
     }
 }
@@ -148,6 +225,32 @@ mod tests {
         assert_eq!(points[0], Vec2::new(-40.0, -30.0));
         assert_eq!(points[8], Vec2::new(40.0, -30.0));
         assert_eq!(points.iter().sum::<Vec2>(), Vec2::zeros());
+    }
+
+    #[test]
+    fn staggered_rows_lie_between_their_neighbours() {
+        let discs = Pattern::Circles { diameter: 2.0 };
+        let board = |arrangement| Board::arranged(4, 3, 10.0, discs, arrangement).unwrap().points();
+        let distances = |points: &[Vec2], of: usize| {
+            let mut all: Vec<f64> = points.iter().map(|point| (point - points[of]).norm()).collect();
+            all.sort_by(f64::total_cmp);
+            all[1..7].to_vec()
+        };
+        let hexagonal = board(Arrangement::Hexagonal);
+        assert!(distances(&hexagonal, 5).iter().all(|d| (d - 10.0).abs() < 1e-12));
+        let asymmetric = board(Arrangement::Asymmetric);
+        assert!(distances(&asymmetric, 5)[..4].iter().all(|d| (d - 200_f64.sqrt()).abs() < 1e-12));
+        for points in [hexagonal, asymmetric] {
+            let xs = || points.iter().map(|p| p.x);
+            assert_eq!(xs().fold(0.0, f64::max), -xs().fold(0.0, f64::min));
+            assert!(points[4].x > points[0].x && points[8].x == points[0].x);
+        }
+        // Discs may be wider than the spacing where neighbours lie on the diagonals, but may not touch.
+        let wide =
+            |diameter, arrangement| Board::arranged(4, 3, 10.0, Pattern::Circles { diameter }, arrangement);
+        assert!(wide(14.0, Arrangement::Asymmetric).is_ok());
+        assert!(wide(14.2, Arrangement::Asymmetric).is_err());
+        assert!(wide(14.0, Arrangement::Hexagonal).is_err());
     }
 
     #[test]

@@ -3,5 +3,5 @@
 pub mod layout;
 pub mod view;
 
-pub use layout::{Board, BoardError, Pattern};
+pub use layout::{Arrangement, Board, BoardError, Pattern};
 pub use view::{View, ViewError};

@@ -230,7 +230,7 @@ fn figures(finished: &Finished) -> Vec<Figure> {
     let calibration = &finished.fit.calibration;
     let numbers: Vec<usize> = (0..finished.fit.views.len()).map(|view| finished.names.number(view)).collect();
     let mut figures = plots::figures(calibration, &finished.fit.views, &numbers, finished.image_size);
-    figures.extend(scatter::figures(calibration));
+    figures.extend(scatter::figures(finished));
     figures.extend(poses::figures(finished));
     let maps = |size| maps::figures(calibration, &finished.fit.views, size);
     figures.extend(finished.image_size.into_iter().flat_map(maps));

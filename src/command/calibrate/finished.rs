@@ -4,9 +4,11 @@ use super::html::escaped;
 use super::models::Comparison;
 use super::optics::Optics;
 use super::view_names::ViewNames;
+use calibench::board::View;
 use calibench::calibrate::{BoardShape, Certificate, LensCalibration, Warning, in_words};
 use calibench::camera::Parameter;
 use calibench::detect::Orientation;
+use calibench::geometry::Vec2;
 use calibench::io::{LeftOut, significant};
 use calibench::photos::Fit;
 use std::collections::BTreeMap;
@@ -49,6 +51,20 @@ impl Finished {
             Some(overlay) => format!("<a href=\"{}\">{name}</a>", escaped(overlay)),
             None => name,
         }
+    }
+
+    /// Whether marks have weights.
+    pub(super) fn is_weighted(&self) -> bool {
+        self.fit.views.iter().any(|view| view.weights().is_some())
+    }
+
+    /// The residuals, each times its mark's weight: the noise is that of a coordinate of these, px.
+    pub(super) fn weighted_residuals(&self) -> Vec<Vec<Vec2>> {
+        let of_view = |(view, residuals): (&View, &Vec<Vec2>)| match view.weights() {
+            Some(weights) => residuals.iter().zip(weights).map(|(r, w)| r * *w).collect(),
+            None => residuals.clone(),
+        };
+        self.fit.views.iter().zip(&self.fit.calibration.residuals).map(of_view).collect()
     }
 
     /// How a view is called in running text: its number, and its name where that says more.
@@ -128,7 +144,7 @@ pub(super) fn summary(finished: &Finished) -> String {
         calibration.termination.name(),
         calibration.iterations,
     );
-    if finished.fit.views.iter().any(|view| view.weights().is_some()) {
+    if finished.is_weighted() {
         text.push_str(OF_WEIGHTS);
     }
     if let Some(sentence) = calibration.certificate.as_ref().and_then(certificate) {

@@ -179,10 +179,13 @@ fn worst_marks(page: &mut String, finished: &Finished) {
     let rows = worst::rows(finished);
     heading(page, &format!("The {} marks that fit worst", rows.len()));
     table(page, if finished.names.are_numbers() { 1 } else { 2 }, &header, &rows);
+    let weight = if finished.is_weighted() { " times the mark's weight" } else { "" };
     note(
         page,
-        "Point: the mark's place in its view, from 0. X, Y: on the board. u, v: where it was seen. du, dv: predicted \u{2212} \
-         observed. In sigma: the length over the estimated noise of a coordinate; of normal noise one mark in 100 exceeds 3, one in \
-         3000 exceeds 4.",
+        &format!(
+            "Point: the mark's place in its view, from 0. X, Y: on the board. u, v: where it was seen. du, dv: predicted \u{2212} \
+             observed. In sigma: the length{weight} over the estimated noise of a coordinate; of normal noise one mark in 100 \
+             exceeds 3, one in 3000 exceeds 4."
+        ),
     );
 }

@@ -57,16 +57,17 @@ pub(super) fn whole_ticks(first: f64, last: f64) -> f64 {
     (last + 0.5).max(first - 0.5 + WHOLE_TICKS_FROM)
 }
 
-/// RMSE of each view, by its number, against that of all.
+/// RMSE of each view, by its number, against that of all; without the marks' weights, as in the table.
 fn view_errors(calibration: &LensCalibration, numbers: &[usize]) -> Figure {
     let error = |(i, &number): (usize, &usize)| Some((number as f64, calibration.view_rmse_px(i)?));
     let points: Vec<(f64, f64)> = numbers.iter().enumerate().filter_map(error).collect();
     let ends = |start: f64, end: fn(f64, f64) -> f64| points.iter().map(|p| p.0).fold(start, end);
     let (first, last) = (ends(f64::INFINITY, f64::min), ends(f64::NEG_INFINITY, f64::max));
-    let top = 1.15 * points.iter().map(|p| p.1).fold(calibration.rmse_px, f64::max);
+    let of_all = calibration.rms_per_axis_px().norm();
+    let top = 1.15 * points.iter().map(|p| p.1).fold(of_all, f64::max);
     let plot = Plot::new("Reprojection error of each view", "number of the view", "RMSE per point (px)")
         .points("view", &points)
-        .hline("all views", calibration.rmse_px)
+        .hline("all views", of_all)
         .x_range(first - 0.5, whole_ticks(first, last))
         .y_range(0.0, top);
     Figure::plot(

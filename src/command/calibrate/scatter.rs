@@ -1,6 +1,6 @@
 //! How are the residuals distributed? Against each other, and by their length.
 
-use calibench::calibrate::LensCalibration;
+use super::finished::Finished;
 use calibench_harness::figure::density;
 use calibench_harness::{Figure, Look, Plot};
 use nalgebra::Matrix2;
@@ -15,48 +15,76 @@ const BINS: usize = 24;
 /// `sqrt(-2 ln 0.05)`.
 const HOLDS_95: f64 = 2.447_746_830_680_816;
 
+/// Residuals, each times its mark's weight, and the noise of a coordinate of them.
+struct Residuals {
+    all: Vec<(f64, f64)>,
+    sigma_px: f64,
+    is_weighted: bool,
+}
+
+impl Residuals {
+    fn unit(&self) -> &'static str {
+        if self.is_weighted { "px times weight" } else { "px" }
+    }
+}
+
 /// Both figures.
-pub(super) fn figures(calibration: &LensCalibration) -> Vec<Figure> {
-    let all: Vec<(f64, f64)> = calibration.residuals.iter().flatten().map(|r| (r.x, r.y)).collect();
-    let lengths: Vec<f64> = all.iter().map(|r| libm::hypot(r.0, r.1)).collect();
+pub(super) fn figures(finished: &Finished) -> Vec<Figure> {
+    let all = finished.weighted_residuals().iter().flatten().map(|r| (r.x, r.y)).collect();
+    let sigma_px = finished.fit.calibration.sigma_px;
+    drawn(&Residuals { all, sigma_px, is_weighted: finished.is_weighted() })
+}
+
+fn drawn(residuals: &Residuals) -> Vec<Figure> {
+    let lengths: Vec<f64> = residuals.all.iter().map(|r| libm::hypot(r.0, r.1)).collect();
     let longest = lengths.iter().copied().fold(0.0, f64::max);
     // An exact fit has nothing to show.
-    let shown = longest > 0.0 && calibration.sigma_px > 0.0 && calibration.sigma_px.is_finite();
+    let shown = longest > 0.0 && residuals.sigma_px > 0.0 && residuals.sigma_px.is_finite();
     if !shown {
         return Vec::new();
     }
-    vec![scatter(&all, calibration.sigma_px), histogram(&lengths, longest, calibration.sigma_px)]
+    vec![scatter(residuals), histogram(residuals, &lengths, longest)]
 }
 
-fn scatter(all: &[(f64, f64)], sigma: f64) -> Figure {
+fn scatter(residuals: &Residuals) -> Figure {
+    let (all, sigma, unit) = (&residuals.all, residuals.sigma_px, residuals.unit());
     let every = all.len().div_ceil(MOST_POINTS).max(1);
     let points: Vec<(f64, f64)> = all.iter().step_by(every).copied().collect();
     let circle = Matrix2::identity() * (sigma * sigma);
-    let plot = Plot::new("Residuals, u against v", "u, predicted \u{2212} observed (px)", "v (px)")
-        .equal_aspect()
-        .y_down()
-        .hline_as("", 0.0, Look::ink().width(0.6))
-        .vline_as("", 0.0, Look::ink().width(0.6))
-        .cloud("a mark", &points, Look::series(0))
-        .ellipse_as("95 % of normal noise", nalgebra::Vector2::zeros(), &circle, HOLDS_95, Look::series(1));
+    let plot = Plot::new(
+        "Residuals, u against v",
+        format!("u, predicted \u{2212} observed ({unit})"),
+        format!("v ({unit})"),
+    )
+    .equal_aspect()
+    .y_down()
+    .hline_as("", 0.0, Look::ink().width(0.6))
+    .vline_as("", 0.0, Look::ink().width(0.6))
+    .cloud("a mark", &points, Look::series(0))
+    .ellipse_as("95 % of normal noise", nalgebra::Vector2::zeros(), &circle, HOLDS_95, Look::series(1));
     let some = if every > 1 { format!(" Every {every}th mark is shown.") } else { String::new() };
     let caption = format!(
-        "Residual of every mark, px. Noise alone gives a round cloud about zero, 95 % of it in the circle; a cloud that is long, \
+        "Residual of every mark, {unit}. Noise alone gives a round cloud about zero, 95 % of it in the circle; a cloud that is long, \
          split or off the middle tells of something else.{some}"
     );
     Figure::plot("scatter", &plot, caption)
 }
 
-fn histogram(lengths: &[f64], longest: f64, sigma: f64) -> Figure {
+fn histogram(residuals: &Residuals, lengths: &[f64], longest: f64) -> Figure {
+    let (sigma, unit) = (residuals.sigma_px, residuals.unit());
     // The longest belongs to the last bar.
     let high = longest * (1.0 + 1e-9);
     let bars = density(lengths, (0.0, high), BINS);
     let rayleigh = |r: f64| r / (sigma * sigma) * libm::exp(-0.5 * r * r / (sigma * sigma));
     let curve: Vec<(f64, f64)> =
         (0..=200).map(|i| high * f64::from(i) / 200.0).map(|r| (r, rayleigh(r))).collect();
-    let plot = Plot::new("Lengths of the residuals", "length of a residual (px)", "share of marks per px")
-        .histogram("marks", &bars)
-        .line("normal noise", &curve);
+    let plot = Plot::new(
+        "Lengths of the residuals",
+        format!("length of a residual ({unit})"),
+        format!("share of marks per {unit}"),
+    )
+    .histogram("marks", &bars)
+    .line("normal noise", &curve);
     let caption = "Lengths of all residuals, and what normal noise of the estimated size would give (Rayleigh's distribution). Bars \
                    far to the right are strays: the table of the worst marks names them.";
     Figure::plot("histogram", &plot, caption)
@@ -72,10 +100,12 @@ mod tests {
     fn noise_is_shown_and_an_exact_fit_is_not() {
         let key = StreamKey { seed: 1, scenario: "scatter", trial: 0, purpose: "noise" };
         let views = Scene::example().observe(0.1, &mut Stream::open(key));
-        let mut calibration = calibrate_lens(&views, &Settings::standard()).unwrap();
-        assert_eq!(figures(&calibration).len(), 2);
-        calibration.residuals.iter_mut().flatten().for_each(|r| *r *= 0.0);
-        assert!(figures(&calibration).is_empty());
+        let calibration = calibrate_lens(&views, &Settings::standard()).unwrap();
+        let all = calibration.residuals.iter().flatten().map(|r| (r.x, r.y)).collect();
+        let mut residuals = Residuals { all, sigma_px: calibration.sigma_px, is_weighted: false };
+        assert_eq!(drawn(&residuals).len(), 2);
+        residuals.all.fill((0.0, 0.0));
+        assert!(drawn(&residuals).is_empty());
     }
 
     #[test]

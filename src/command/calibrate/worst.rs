@@ -12,20 +12,18 @@ pub(super) const SHOWN: usize = 10;
 struct Mark {
     view: usize,
     point: usize,
-    residual: Vec2,
+    /// Length of its residual times its weight, px.
+    length: f64,
 }
 
-/// The marks with the longest residuals, the longest first.
+/// The marks with the longest residuals, each times its weight, the longest first.
 fn worst(residuals: &[Vec<Vec2>]) -> Vec<Mark> {
     let of_view = |(view, residuals): (usize, &Vec<Vec2>)| {
-        residuals
-            .iter()
-            .enumerate()
-            .map(move |(point, &residual)| Mark { view, point, residual })
-            .collect::<Vec<_>>()
+        let lengths = residuals.iter().map(|residual| residual.norm()).enumerate();
+        lengths.map(move |(point, length)| Mark { view, point, length }).collect::<Vec<_>>()
     };
     let mut marks: Vec<Mark> = residuals.iter().enumerate().flat_map(of_view).collect();
-    marks.sort_by(|a, b| b.residual.norm().total_cmp(&a.residual.norm()));
+    marks.sort_by(|a, b| b.length.total_cmp(&a.length));
     marks.truncate(SHOWN);
     marks
 }
@@ -45,17 +43,18 @@ pub(super) fn header(finished: &Finished) -> Vec<String> {
 pub(super) fn rows(finished: &Finished) -> Vec<Vec<String>> {
     let calibration = &finished.fit.calibration;
     let row = |mark: Mark| {
-        let Mark { view, point, residual } = mark;
+        let Mark { view, point, length } = mark;
+        let residual = calibration.residuals[view][point];
         let (at, seen) = (finished.fit.views[view].points()[point], finished.fit.views[view].pixels()[point]);
         let digits = [(seen.x, 6), (seen.y, 6), (residual.x, 3), (residual.y, 3)];
         let place = finished.names.place(view);
         let names = [finished.names.number(view).to_string(), finished.linked(place), point.to_string()];
         let names = names.into_iter().skip(usize::from(finished.names.are_numbers()));
-        let lengths = [(residual.norm(), 3), (residual.norm() / calibration.sigma_px, 2)];
+        let lengths = [(residual.norm(), 3), (length / calibration.sigma_px, 2)];
         let numbers = digits.into_iter().chain(lengths).map(|(x, digits)| number(x, digits));
         names.chain([given(at.x), given(at.y)]).chain(numbers).collect()
     };
-    worst(&calibration.residuals).into_iter().map(row).collect()
+    worst(&finished.weighted_residuals()).into_iter().map(row).collect()
 }
 
 #[cfg(test)]

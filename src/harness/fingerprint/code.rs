@@ -54,12 +54,7 @@ fn rust_files(start: &Path) -> io::Result<Vec<PathBuf>> {
 /// Crates whose arithmetic stands in the path of a number.
 pub const NUMERIC_CRATES: &[&str] = &["libm", "nalgebra", "rand", "rand_chacha", "rand_distr", "statrs"];
 
-/// `name version` of the numeric crates, a line each, of a lock file.
-pub fn versions(lock: &str) -> String {
-    versions_of(lock, NUMERIC_CRATES)
-}
-
-/// The same of some crates.
+/// `name version` of some crates, a line each, of a lock file.
 pub fn versions_of(lock: &str, crates: &[&str]) -> String {
     let field =
         |line: &str, key: &str| line.strip_prefix(key).map(|value| value.trim_matches('"').to_string());
@@ -104,6 +99,6 @@ mod tests {
     fn versions_are_those_of_the_crates_that_are_asked() {
         let lock = "name = \"image\"\nversion = \"0.25.9\"\n\nname = \"libm\"\nversion = \"0.2.15\"\n";
         assert_eq!(versions_of(lock, &["image"]), "image 0.25.9\n");
-        assert_eq!(versions(lock), "libm 0.2.15\n");
+        assert_eq!(versions_of(lock, NUMERIC_CRATES), "libm 0.2.15\n");
     }
 }
