@@ -247,3 +247,24 @@ fn tangential_terms_that_are_left_out_are_told_and_none_where_there_are_none() {
         assert!(!whole.warnings.iter().any(|w| matches!(w, Warning::LeftOut { .. })), "{:?}", whole.warnings);
     }
 }
+
+#[test]
+fn a_second_double_sphere_with_the_same_picture_is_told() {
+    // At xi = 0 it has a counterpart with alpha = 0 and a focal length of f / (1 - alpha).
+    let truth = camera(Model::DoubleSphere, 400.0, 400.0, &[0.0, 0.35]);
+    for count in 6..12 {
+        let views = seen(&truth, &poses(count, 60.0), |_| board(), 0.0);
+        let found = calibrate_lens(&views, &settings(Model::DoubleSphere)).unwrap();
+        let [here, there] = [found.camera.fx, 400.0];
+        let is_told = found.warnings.iter().any(|warning| match warning {
+            Warning::Ambiguous { parameter: _, value, other, .. } => value != other,
+            _ => false,
+        });
+        assert!(is_told, "{count} views: fx {here} for {there}: {:?}", found.warnings);
+    }
+    // Far from both there is none.
+    let truth = camera(Model::DoubleSphere, 400.0, 400.0, &[-0.2, 0.6]);
+    let views = seen(&truth, &poses(10, 60.0), |_| board(), 0.0);
+    let found = calibrate_lens(&views, &settings(Model::DoubleSphere)).unwrap();
+    assert!(!found.warnings.iter().any(|w| matches!(w, Warning::Ambiguous { .. })), "{:?}", found.warnings);
+}

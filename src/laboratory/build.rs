@@ -13,8 +13,9 @@ fn main() {
     for path in sources::SOURCES.iter().map(|path| root.join(path)).chain([lock.clone()]) {
         println!("cargo:rerun-if-changed={}", path.display());
     }
-    let lines = code::of_paths(&root, sources::SOURCES, &[])
-        .and_then(|lines| Ok(lines + &code::versions(&std::fs::read_to_string(lock)?)));
+    let lines = code::of_paths(&root, sources::SOURCES, &[]).and_then(|lines| {
+        Ok(lines + &code::versions_of(&std::fs::read_to_string(lock)?, code::NUMERIC_CRATES))
+    });
     let lines = lines.unwrap_or_else(|error| panic!("a path of src/laboratory/sources.rs: {error}"));
     println!("cargo:rustc-env=LABORATORY_FINGERPRINT={:016x}", fnv1a(lines.as_bytes()));
 }

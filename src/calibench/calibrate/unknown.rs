@@ -48,6 +48,16 @@ impl Unknown {
         }
     }
 
+    /// Whether it is a coefficient of the lens, or a group of them.
+    fn is_of_lens(self) -> bool {
+        use Parameter::{Cx, Cy, Fx, Fy, Skew};
+        match self {
+            Unknown::RadialDistortion | Unknown::TangentialDistortion => true,
+            Unknown::Intrinsic(parameter) => !matches!(parameter, Fx | Fy | Cx | Cy | Skew),
+            _ => false,
+        }
+    }
+
     /// `fx`, ..., `k3`, `focal length`, `lateral position` and so on.
     pub fn name(self) -> &'static str {
         match self {
@@ -77,11 +87,14 @@ pub(super) fn joined(unknowns: &[Unknown]) -> String {
     unknowns.iter().map(|unknown| unknown.name()).collect::<Vec<_>>().join(" and ")
 }
 
-/// What to do where they cannot be told apart: coefficients of the lens alone are too many, all else needs tilts.
+/// What to do where they cannot be told apart: coefficients of the lens alone are too many, the camera's frame alone needs tilts,
+/// and where both take part it may be either.
 pub(super) fn advice(unknowns: &[Unknown]) -> &'static str {
-    let is_radial = |unknown: &Unknown| unknown.group() == Unknown::RadialDistortion;
-    if unknowns.iter().all(is_radial) {
+    if unknowns.iter().all(|unknown| unknown.is_of_lens()) {
         "Take a lens model with fewer coefficients, or give one of them a value to be held at"
+    } else if unknowns.iter().any(|unknown| unknown.is_of_lens() || *unknown == Unknown::Camera) {
+        "Tilt the target by 20 degrees or more, about different axes, in some views; where it is tilted already, take a lens model with \
+         fewer coefficients, or give one of them a value to be held at"
     } else {
         "Tilt the target by 20 degrees or more, about different axes, in some views, or give one of them a value to be held at"
     }

@@ -13,6 +13,8 @@ use crate::camera::Parameter;
 /// Where a focal length is known worse than this part of itself, it is asked whether it is known at all.
 const DOUBTFUL: f64 = 0.03;
 const FACTORS: [f64; 2] = [3.0, 1.0 / 3.0];
+/// A coefficient that changes by less than this, and less than this part of itself, did not move along.
+const MOVED: f64 = 0.1;
 
 /// Refuses a focal length that may as well be three times as long or as short; `relative` is its standard deviation over
 /// itself, `variance` that of a coordinate.
@@ -44,11 +46,24 @@ pub(super) fn refuse_if_open(
                 "fx {:.5} fits as {fx:.5} does: the cost rises by {rise:.1} variances only, and {least:.0} are needed to rule chance out",
                 factor * fx,
             );
-            let inseparable = vec![Unknown::FocalLength, Unknown::Distance];
+            let mut inseparable = vec![Unknown::FocalLength, Unknown::Distance];
+            if lens_moves(&minimum.state, &other.state) {
+                inseparable.push(Unknown::RadialDistortion);
+            }
             return Err(CalibrationError::NotIdentifiable { inseparable, why });
         }
     }
     Ok(())
+}
+
+/// Whether a radial coefficient makes up for the focal length too.
+fn lens_moves(near: &State, far: &State) -> bool {
+    let is_radial = |p: &Parameter| Unknown::Intrinsic(*p).group() == Unknown::RadialDistortion;
+    let moves = |p: Parameter| {
+        let (here, there) = (near.camera.value(p).unwrap_or(0.0), far.camera.value(p).unwrap_or(0.0));
+        (here - there).abs() > MOVED * here.abs().max(1.0)
+    };
+    near.camera.distortion.model().parameters().filter(is_radial).any(moves)
 }
 
 /// The same picture of a small, facing target: focal length and distances times a factor.

@@ -7,6 +7,7 @@ use super::super::rival::{Met, Rival};
 use super::super::system::Reduction;
 use super::super::tie::tied;
 use super::super::{CalibrationError, identifiability};
+use super::counterpart::counterpart;
 use super::problem::{Problem, ROUGH_GAIN, State};
 use super::{WIDTH, report, root, start, walk};
 use crate::camera::{Camera, FreeParameters, Lens, Parameter};
@@ -59,11 +60,14 @@ pub(super) fn judge(
         reduction = reduction_of(problem, &minimum)?;
         variance = report::variance(problem, &minimum);
     }
-    let covariance = reduction.intrinsics_covariance();
+    let starts = met.len();
     let value = |camera: &Camera<Lens>, parameter| camera.value(parameter).unwrap_or(0.0);
-    let rival = covariance
-        .and_then(|unit| walk::met(&minimum).rival(&met, problem.free, &(unit * variance), variance, value));
-    Ok(Judged { minimum, reduction, variance, starts: met.len(), skewed, rival })
+    let rival = reduction.intrinsics_covariance().and_then(|unit| {
+        let covariance = unit * variance;
+        met.extend(counterpart(problem, &minimum, &covariance));
+        walk::met(&minimum).rival(&met, problem.free, &covariance, variance, value)
+    });
+    Ok(Judged { minimum, reduction, variance, starts, skewed, rival })
 }
 
 /// Notes the minimum that a start leads to, and takes it where it is better: also once it is refined to the end, which

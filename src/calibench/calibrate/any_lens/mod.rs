@@ -6,6 +6,7 @@
 //!
 //! [`Model`]: crate::camera::Model
 
+mod counterpart;
 mod curvature;
 mod estimate;
 mod focal;

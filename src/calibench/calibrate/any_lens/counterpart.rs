@@ -1,0 +1,94 @@
+//! Is there a second double sphere that makes the same picture?
+//!
+//! With `alpha = 0` the radius of a ray is `f |(X, Y)| / (xi d + Z)`, with `xi = 0` it is
+//! `f |(X, Y)| / (alpha d + (1 - alpha) Z)`, `d` being the distance: the first is the second at `alpha' = xi / (1 + xi)` and
+//! `f' = f / (1 + xi)`, ray by ray. Beside one of the two a search ends in a minimum whose deviations know nothing of the other,
+//! and to that one no descent leads: at `xi = 0` the derivatives by `f`, `xi` and `alpha` span two directions.
+
+use super::super::intervals::Profiled;
+use super::super::minimise::{Descent, Minimum, descend};
+use super::super::rival::Met;
+use super::WIDTH;
+use super::problem::{Problem, State};
+use crate::calibrate::Warning;
+use crate::camera::{Camera, Lens, Parameter};
+use nalgebra::DMatrix;
+
+/// A coefficient within this many standard deviations of 0 may be 0: at so many the cost rises by as many variances as a rival's
+/// may.
+const MAY_BE_ZERO: f64 = 4.0;
+
+/// The second camera as a minimum that was met, if alpha or xi of a minimum may be 0 and both are free, as the focal length
+/// is. `covariance` is that of the free parameters.
+pub(super) fn counterpart(
+    problem: &Problem<'_>,
+    minimum: &Minimum<State, WIDTH>,
+    covariance: &DMatrix<f64>,
+) -> Option<Met<Lens>> {
+    use Parameter::{Alpha, Fx, Xi};
+    if ![Fx, Xi, Alpha].into_iter().all(|parameter| problem.free.contains(parameter)) {
+        return None;
+    }
+    let distance_from_zero = |parameter| {
+        let row = problem.free.position(parameter)?;
+        Some(minimum.state.camera.value(parameter)?.abs() / covariance[(row, row)].sqrt())
+    };
+    let nearest = [Alpha, Xi]
+        .into_iter()
+        .filter_map(|parameter| Some((parameter, distance_from_zero(parameter)?)))
+        .min_by(|a, b| a.1.total_cmp(&b.1));
+    let (zero, _) = nearest.filter(|(_, deviations)| *deviations < MAY_BE_ZERO)?;
+    let held = problem.holding(zero);
+    let there = descend(&held, held.with_value(minimum.state.clone(), zero, 0.0));
+    let state = State { camera: same_picture(&there.state.camera)?, ..there.state };
+    // Priors tell the two apart, pixels do not.
+    let mut system = problem.system();
+    problem.linearise_into(&state, &mut system);
+    Some(Met { camera: state.camera, cost: system.cost, converged: true })
+}
+
+/// The other double sphere with the picture of one whose alpha or xi is 0; none where it lies out of the range for which the model is
+/// defined.
+fn same_picture(camera: &Camera<Lens>) -> Option<Camera<Lens>> {
+    use Parameter::{Alpha, Xi};
+    let (xi, alpha) = (camera.value(Xi)?, camera.value(Alpha)?);
+    let (xi, alpha, factor) = match (xi == 0.0, alpha == 0.0) {
+        (false, true) => (0.0, xi / (1.0 + xi), 1.0 / (1.0 + xi)),
+        (true, false) => (alpha / (1.0 - alpha), 0.0, 1.0 / (1.0 - alpha)),
+        _ => return None,
+    };
+    let mut other = camera.with_value(Xi, xi)?.with_value(Alpha, alpha)?;
+    (other.fx, other.fy, other.skew) = (factor * camera.fx, factor * camera.fy, factor * camera.skew);
+    Warning::outside_range(&other).next().is_none().then_some(other)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Model;
+    use crate::geometry::Vec3;
+
+    #[test]
+    fn both_cameras_make_the_same_picture() {
+        let camera = |f: f64, xi, alpha| {
+            Camera::with_lens(f, 1.1 * f, 320.0, 240.0, Lens::ideal(Model::DoubleSphere))
+                .with_value(Parameter::Xi, xi)
+                .and_then(|camera| camera.with_value(Parameter::Alpha, alpha))
+                .unwrap()
+        };
+        for first in [camera(400.0, 0.6, 0.0), camera(300.0, 0.0, 0.3)] {
+            let second = same_picture(&first).unwrap();
+            assert!((second.fx / first.fx - 1.0).abs() > 0.3);
+            for point in [Vec3::new(0.3, -0.2, 1.0), Vec3::new(-2.0, 1.0, 0.5), Vec3::new(0.0, 0.0, 3.0)] {
+                let pixels = [first, second].map(|camera| camera.project(&point).unwrap());
+                assert!((pixels[1] - pixels[0]).norm() < 1e-10, "{pixels:?}");
+            }
+            let back = same_picture(&second).unwrap();
+            assert!((back.fx / first.fx - 1.0).abs() < 1e-14);
+        }
+        // alpha above 1/2 would need an xi above 1, and an xi below 0 a negative alpha.
+        assert!(same_picture(&camera(300.0, 0.0, 0.6)).is_none());
+        assert!(same_picture(&camera(300.0, -0.2, 0.0)).is_none());
+        assert!(same_picture(&camera(300.0, -0.2, 0.5)).is_none());
+    }
+}
