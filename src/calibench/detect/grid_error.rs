@@ -148,3 +148,18 @@ pub enum GridError {
         limit: f64,
     },
 }
+
+impl GridError {
+    /// Whether a complete board was seen that is another one than was asked for and has as many marks or more.
+    pub(crate) fn is_other_board(&self) -> bool {
+        match *self {
+            GridError::WrongSize { columns, rows, found_columns, found_rows }
+            | GridError::Staggered { columns, rows, found_columns, found_rows }
+            | GridError::InLine { columns, rows, found_columns, found_rows }
+            | GridError::Mirrored { columns, rows, found_columns, found_rows } => {
+                found_columns.saturating_mul(found_rows) >= columns.saturating_mul(rows)
+            }
+            _ => false,
+        }
+    }
+}
