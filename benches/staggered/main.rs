@@ -235,8 +235,18 @@ impl Scene {
             false => seen_circle_grid_of(discs, columns, rows),
         };
         let options = BlobOptions::default();
-        order(&blobs(&self.image, &options))
-            .or_else(|first| order(&searched_blobs(&self.image, &options)).map_err(|_| first))
+        order(&blobs(&self.image, &options)).or_else(|first| match first {
+            // Another complete board of as many marks: nothing more is looked for.
+            GridError::WrongSize { found_columns: c, found_rows: r, .. }
+            | GridError::Staggered { found_columns: c, found_rows: r, .. }
+            | GridError::InLine { found_columns: c, found_rows: r, .. }
+            | GridError::Mirrored { found_columns: c, found_rows: r, .. }
+                if c * r >= columns * rows =>
+            {
+                Err(first)
+            }
+            _ => order(&searched_blobs(&self.image, &options)).map_err(|_| first),
+        })
     }
 
     /// Distance of the nearest two marks, px.
