@@ -236,15 +236,7 @@ impl Scene {
         };
         let options = BlobOptions::default();
         order(&blobs(&self.image, &options)).or_else(|first| match first {
-            // Another complete board of as many marks: nothing more is looked for.
-            GridError::WrongSize { found_columns: c, found_rows: r, .. }
-            | GridError::Staggered { found_columns: c, found_rows: r, .. }
-            | GridError::InLine { found_columns: c, found_rows: r, .. }
-            | GridError::Mirrored { found_columns: c, found_rows: r, .. }
-                if c * r >= columns * rows =>
-            {
-                Err(first)
-            }
+            other if other.is_other_board() => Err(other),
             _ => order(&searched_blobs(&self.image, &options)).map_err(|_| first),
         })
     }

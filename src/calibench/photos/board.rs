@@ -174,7 +174,7 @@ impl fmt::Display for BoardSpec {
         let (name, marks) = match self.kind {
             MarkKind::Chess => ("chessboard", "inner corners"),
             MarkKind::Circles => ("circle grid", "discs"),
-            MarkKind::Asymmetric => ("asymmetric grid", "discs, rows"),
+            MarkKind::Asymmetric => ("staggered grid", "discs, rows"),
             MarkKind::Hexagonal => ("hexagonal grid", "discs"),
             MarkKind::Dots => ("dots", "marks"),
         };
@@ -305,6 +305,8 @@ mod tests {
             "dots:3x3:2mm".parse::<BoardSpec>().unwrap().to_string(),
             "dots of 3 x 3 marks, 2 mm apart"
         );
+        let spec: BoardSpec = "asymmetric:4x11:20mm:15mm".parse().unwrap();
+        assert_eq!(spec.to_string(), "staggered grid of 4 x 11 discs, rows 20 mm apart");
     }
 
     #[test]
