@@ -17,6 +17,7 @@ mod detect_circles;
 mod detect_corners;
 mod detect_hidden;
 mod detect_photos;
+mod detect_staggered;
 mod detector_gate;
 mod downstream;
 mod errors;

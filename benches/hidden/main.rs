@@ -1,14 +1,15 @@
-//! What becomes of boards of which marks are hidden? Exact renders of chessboards and grids of discs, covered in part,
-//! cut by the frame, or in glare: boards found, marks kept, marks out of place, boards of another size.
+//! What becomes of boards of which marks are hidden? Exact renders of chessboards and grids of discs, in line and
+//! staggered, covered in part, cut by the frame, or in glare: boards found, marks kept, marks out of place, boards of another size.
 //!
 //! `cargo run --release --bin hidden -- [--trials N]`; every trial asks for the board that is there and for three that are
 //! not.
 #![allow(clippy::print_stdout, reason = "a program whose output is its result")]
 
-use calibench::board::{Board, Pattern};
+use calibench::board::{Arrangement, Board, Pattern};
 use calibench::camera::{BrownConrady, Camera};
 use calibench::detect::{
     BlobOptions, Orientation, SeenBoard, blobs, disc_biases, seen_chessboard, seen_circle_grid_of,
+    seen_staggered_grid_of,
 };
 use calibench::geometry::{Pose, Vec2, Vec3, rotation};
 use calibench::raster::Raster;
@@ -21,6 +22,8 @@ const SPACING: f64 = 10.0;
 const MISPLACED: f64 = 0.4;
 /// A mark farther than this from its place, px, would spoil a calibration.
 const BAD_PX: f64 = 0.5;
+/// Boards by their words.
+const BOARDS: [&str; 4] = ["chess", "discs", "asymmetric", "hexagonal"];
 /// How marks are hidden.
 const WAYS: [&str; 5] = ["nothing", "covered", "frame", "glare", "all three"];
 
@@ -32,7 +35,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         _ => return Err("--trials N is the only option".into()),
     };
     println!(
-        "{:<8} {:<10} {:>6} {:>6} {:>6} {:>6} {:>8} {:>8} {:>5} {:>8} {:>8} {:>6}",
+        "{:<10} {:<10} {:>6} {:>6} {:>6} {:>6} {:>8} {:>8} {:>5} {:>8} {:>8} {:>6}",
         "board",
         "hidden by",
         "photos",
@@ -47,15 +50,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "other"
     );
     let mut total = Tally::default();
-    for discs in [false, true] {
+    for kind in BOARDS {
         for way in WAYS {
             let mut tally = Tally::default();
-            (0..trials).for_each(|trial| tally.add(discs, way, trial));
-            println!("{:<8} {way:<10} {}", if discs { "discs" } else { "chess" }, tally.row());
+            (0..trials).for_each(|trial| tally.add(kind, way, trial));
+            println!("{kind:<10} {way:<10} {}", tally.row());
             total.join(&tally);
         }
     }
-    println!("{:<19} {}", "all", total.row());
+    println!("{:<21} {}", "all", total.row());
     let most = 3.0 / total.photos as f64;
     println!("0 of {} photographs: at most {most:.5} at 95 %", total.photos);
     Ok(())
@@ -109,14 +112,14 @@ impl Tally {
         self.other += other.other;
     }
 
-    fn add(&mut self, discs: bool, way: &str, trial: u64) {
-        let Some(scene) = Scene::draw(discs, way, trial) else { return };
+    fn add(&mut self, kind: &str, way: &str, trial: u64) {
+        let Some(scene) = Scene::draw(kind, way, trial) else { return };
         self.photos += 1;
         let (columns, rows) = (scene.board.columns(), scene.board.rows());
         for (columns, rows) in [(columns - 1, rows), (columns, rows - 1), (columns + 1, rows + 1)] {
             if scene.see(columns, rows).is_some() {
                 self.other += 1;
-                println!("OTHER {} {way} {trial}: {columns} x {rows}", if discs { "discs" } else { "chess" });
+                println!("OTHER {kind} {way} {trial}: {columns} x {rows}");
             }
         }
         let Some(seen) = scene.see(columns, rows) else { return };
@@ -124,7 +127,7 @@ impl Tally {
         let worst = errors.iter().copied().fold(0.0, f64::max);
         if worst > MISPLACED * scene.spacing_px {
             self.wrong += 1;
-            println!("WRONG {} {way} {trial}: {worst:.1} px", if discs { "discs" } else { "chess" });
+            println!("WRONG {kind} {way} {trial}: {worst:.1} px");
             return;
         }
         if seen.missing() == 0 {
@@ -152,12 +155,16 @@ struct Scene {
 }
 
 impl Scene {
-    fn draw(discs: bool, way: &str, trial: u64) -> Option<Scene> {
-        let scenario = format!("{} {way}", if discs { "discs" } else { "chess" });
+    fn draw(kind: &str, way: &str, trial: u64) -> Option<Scene> {
+        let scenario = format!("{kind} {way}");
         let mut random = Stream::open(StreamKey { seed: 17, scenario: &scenario, trial, purpose: "hidden" });
-        let board = match discs {
-            true => Board::circles(9, 7, SPACING, random.uniform_in(3.0, 6.0)).ok()?,
-            false => Board::chessboard(9, 6, SPACING).ok()?,
+        let mut discs = || Pattern::Circles { diameter: random.uniform_in(3.0, 6.0) };
+        // Boards of about one size.
+        let board = match kind {
+            "discs" => Board::new(9, 7, SPACING, discs()).ok()?,
+            "asymmetric" => Board::arranged(4, 11, 0.75 * SPACING, discs(), Arrangement::Asymmetric).ok()?,
+            "hexagonal" => Board::arranged(8, 7, SPACING, discs(), Arrangement::Hexagonal).ok()?,
+            _ => Board::chessboard(9, 6, SPACING).ok()?,
         };
         let camera =
             Camera::pinhole(600.0, 600.0, 326.0, 243.0).with_distortion(BrownConrady::radial(-0.18, 0.05));
@@ -170,7 +177,8 @@ impl Scene {
         };
         let photo = photograph(&camera, SIZE, &board, &pose, &imaging).ok()?;
         let mut places_px = photo.centres_true;
-        let spacing_px = (places_px[1] - places_px[0]).norm();
+        let next = if board.arrangement().is_staggered() { board.columns() } else { 1 };
+        let spacing_px = (places_px[next] - places_px[0]).norm();
         if matches!(board.pattern(), Pattern::Circles { .. }) {
             let biases = disc_biases(&camera, &pose, &board).ok()?;
             places_px.iter_mut().zip(biases).for_each(|(place, bias)| *place += bias);
@@ -193,6 +201,9 @@ impl Scene {
 
     fn see(&self, columns: usize, rows: usize) -> Option<SeenBoard> {
         match self.board.pattern() {
+            Pattern::Circles { .. } if self.board.arrangement().is_staggered() => {
+                seen_staggered_grid_of(&blobs(&self.image, &BlobOptions::default()), columns, rows).ok()
+            }
             Pattern::Circles { .. } => {
                 seen_circle_grid_of(&blobs(&self.image, &BlobOptions::default()), columns, rows).ok()
             }

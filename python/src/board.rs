@@ -7,7 +7,7 @@ use crate::errors;
 use crate::rectify::{grey, of_intensity};
 use crate::watch::detached;
 use calibench::board::Pattern;
-use calibench::photos::{BoardSpec, MarkKind};
+use calibench::photos::BoardSpec;
 use calibench::synth::fnv1a;
 use calibench::synth::render::{Imaging, photograph};
 use numpy::PyArray2;
@@ -16,8 +16,9 @@ use pyo3::prelude::*;
 /// A board, as on the command line.
 ///
 /// Args:
-///     board: ``chess:9x6:25mm`` (inner corners and side of a square), ``circles:9x7:10mm:3mm`` (pitch and diameter of the discs), or
-///         ``dots:3x3:1`` (a few dots); the diameter may be left out.
+///     board: ``chess:9x6:25mm`` (inner corners and side of a square), ``circles:9x7:10mm:3mm`` (pitch and diameter of the discs),
+///         ``asymmetric:4x11:20mm:15mm`` (OpenCV's asymmetric grid: distance of rows, half that of a row's discs, and diameter),
+///         ``hexagonal:9x9:10mm:5mm`` (distance of neighbours, diameter), or ``dots:3x3:1`` (a few dots); the diameter may be left out.
 ///
 /// Raises:
 ///     BoardError: a text that is no board, or a board that cannot exist.
@@ -44,14 +45,10 @@ impl Board {
         board.parse().map(Board).map_err(|e| errors::board(py, &e))
     }
 
-    /// ``chess``, ``circles`` or ``dots``.
+    /// ``chess``, ``circles``, ``asymmetric``, ``hexagonal`` or ``dots``.
     #[getter]
     fn kind(&self) -> &'static str {
-        match self.0.kind {
-            MarkKind::Chess => "chess",
-            MarkKind::Circles => "circles",
-            MarkKind::Dots => "dots",
-        }
+        self.0.kind.name()
     }
 
     /// Marks along a row.

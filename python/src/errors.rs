@@ -184,6 +184,10 @@ pub(crate) fn not_found(py: Python<'_>, error: &NotFound) -> PyErr {
             GridError::Partial { columns, rows, found, expected, seen }
             GridError::WrongSize { columns, rows, found_columns, found_rows }
             GridError::NotRectangular { columns, rows, found }
+            GridError::Staggered { columns, rows, found_columns, found_rows }
+            GridError::InLine { columns, rows, found_columns, found_rows }
+            GridError::Mirrored { columns, rows, found_columns, found_rows }
+            GridError::TooFewStaggered { columns, rows, need_columns, need_rows }
             GridError::Irregular { column, row, deviation, limit }),
         DetectError::Chessboard(error) => exception_of!(py, "DetectError", error;
             ChessboardError::TooSmall { columns, rows }

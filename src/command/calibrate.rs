@@ -61,7 +61,8 @@ pub(super) struct Arguments {
     /// them on standard input; with --board, photographs
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// The board in the photographs: chess:9x6:25mm (inner corners), circles:9x7:10mm:3mm (spacing, diameter)
+    /// The board in the photographs: chess:9x6:25mm (inner corners), circles:9x7:10mm:3mm (spacing, diameter),
+    /// asymmetric:4x11:20mm:15mm (distance of rows, half that of a row's discs; OpenCV's asymmetric grid), hexagonal:9x9:10mm:5mm
     /// or dots:3x3:1; or the board.toml beside a page that `calibench board` drew
     #[arg(long, value_name = "BOARD", value_parser = board_or_file)]
     board: Option<BoardSpec>,

@@ -259,6 +259,12 @@ fn board_of(arguments: &Arguments) -> Result<VnlBoard, String> {
         .board
         .as_ref()
         .ok_or("corners.vnl has no board in it: give --board, such as chess:9x6:25mm")?;
+    if board.kind.arrangement().is_staggered() {
+        return Err(format!(
+            "corners.vnl numbers marks by row and column of rows in line, and the rows of {} are staggered",
+            board.words()
+        ));
+    }
     let board = board.board();
     Ok(VnlBoard { columns: board.columns(), rows: board.rows(), spacing: board.spacing() })
 }

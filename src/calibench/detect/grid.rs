@@ -1,10 +1,10 @@
-//! Which disc is which mark of the board? Grids of discs, dense or sparse, complete and ordered.
+//! Which disc is which mark of the board? Grids of discs in line, dense or sparse, complete and ordered.
 
 use super::blob::Blob;
 use super::discs::{BlobOptions, blobs};
+use super::grid_error::GridError;
 use super::lattice::largest;
-use super::order::is_certain;
-use super::order::{GridError, ordered_part, ordered_rectangle};
+use super::order::{is_certain, ordered_part, ordered_rectangle};
 use super::orientation::Orientation;
 use super::seen::SeenBoard;
 use super::smoothness::out_of_line;
@@ -17,10 +17,15 @@ use nalgebra::Matrix3;
 pub struct DotGrid {
     columns: usize,
     rows: usize,
+    orientation: Orientation,
     blobs: Vec<Blob>,
 }
 
 impl DotGrid {
+    pub(super) fn new(columns: usize, rows: usize, orientation: Orientation, blobs: Vec<Blob>) -> DotGrid {
+        DotGrid { columns, rows, orientation, blobs }
+    }
+
     /// Marks along a row.
     pub fn columns(&self) -> usize {
         self.columns
@@ -36,9 +41,10 @@ impl DotGrid {
         &self.blobs
     }
 
-    /// How far the image tells which disc is the board's first: discs look alike, so that half a turn cannot be seen.
+    /// How far the image tells which disc is the board's first: discs look alike, so that half a turn cannot be seen where it
+    /// maps the board on itself.
     pub fn orientation(&self) -> Orientation {
-        Orientation::of_discs(self.columns, self.rows)
+        self.orientation
     }
 
     /// Their centres, px, row by row.
@@ -102,7 +108,10 @@ pub fn seen_circle_grid_of(discs: &[Blob], columns: usize, rows: usize) -> Resul
     circle_grid_of(discs, columns, rows).map(SeenBoard::from).or_else(|error| {
         let may_be_part = matches!(
             error,
-            GridError::Partial { .. } | GridError::NotRectangular { .. } | GridError::Irregular { .. }
+            GridError::Partial { .. }
+                | GridError::NotRectangular { .. }
+                | GridError::Irregular { .. }
+                | GridError::Staggered { .. }
         );
         let part = may_be_part.then(|| grid_in_part(discs, columns, rows)).flatten();
         part.ok_or(error)
@@ -110,19 +119,24 @@ pub fn seen_circle_grid_of(discs: &[Blob], columns: usize, rows: usize) -> Resul
 }
 
 fn grid_in_part(discs: &[Blob], columns: usize, rows: usize) -> Option<SeenBoard> {
-    let mut misfits: Vec<f64> = discs.iter().map(|disc| disc.misfit).collect();
-    misfits.sort_by(f64::total_cmp);
-    let middle = *misfits.get(misfits.len() / 2)?;
-    let is_alike = |disc: &&Blob| disc.misfit <= LARGEST_MISFIT * middle + MISFIT_ALLOWED;
-    let alike: Vec<Blob> = discs.iter().filter(is_alike).copied().collect();
-    let on_board: Vec<Blob> = largest(&alike).values().map(|&mark| alike[mark]).collect();
-    let alike = evenly_lit(on_board);
+    let alike = alike_on_board(discs)?;
     let centres: Vec<Vec2> = alike.iter().map(|disc| disc.centre_px).collect();
     let marks = ordered_part(&largest(&alike), &centres, columns, rows)?;
     let mut places_px: Vec<Option<Vec2>> = marks.into_iter().map(|mark| Some(centres[mark?])).collect();
     out_of_line(&mut places_px, columns);
     is_certain(&places_px, columns, rows)
         .then(|| SeenBoard::new(columns, rows, places_px, Orientation::of_discs(columns, rows)))
+}
+
+/// The discs of the largest lattice whose outlines and contrasts are as the others': nothing covers them in part.
+pub(super) fn alike_on_board(discs: &[Blob]) -> Option<Vec<Blob>> {
+    let mut misfits: Vec<f64> = discs.iter().map(|disc| disc.misfit).collect();
+    misfits.sort_by(f64::total_cmp);
+    let middle = *misfits.get(misfits.len() / 2)?;
+    let is_alike = |disc: &&Blob| disc.misfit <= LARGEST_MISFIT * middle + MISFIT_ALLOWED;
+    let alike: Vec<Blob> = discs.iter().filter(is_alike).copied().collect();
+    let on_board: Vec<Blob> = largest(&alike).values().map(|&mark| alike[mark]).collect();
+    Some(evenly_lit(on_board))
 }
 
 /// Largest difference of a disc's contrast from the plane through those of the others, as part of their middle, round by
@@ -173,5 +187,6 @@ pub fn sparse_dots_of(discs: &[Blob], columns: usize, rows: usize) -> Result<Dot
 fn order(discs: &[Blob], columns: usize, rows: usize) -> Result<DotGrid, GridError> {
     let centres: Vec<Vec2> = discs.iter().map(|disc| disc.centre_px).collect();
     let marks = ordered_rectangle(&largest(discs), &centres, columns, rows)?;
-    Ok(DotGrid { columns, rows, blobs: marks.into_iter().map(|mark| discs[mark]).collect() })
+    let blobs = marks.into_iter().map(|mark| discs[mark]).collect();
+    Ok(DotGrid::new(columns, rows, Orientation::of_discs(columns, rows), blobs))
 }

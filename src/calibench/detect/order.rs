@@ -8,103 +8,16 @@
 //! the least `u + v`, the corner nearest to the image's top left. A calibration is indifferent to the choice:
 //! it only turns the board's frame by half a turn about its normal.
 
+use super::grid_error::GridError;
 use super::lattice::{Lattice, Place};
 use super::rectangle::Rectangle;
+use super::staggered;
 use crate::geometry::{Homography, Vec2};
-
-/// Why there is no complete, unambiguous grid in an image.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum GridError {
-    /// Grids with fewer marks than this on a side, or fewer in the image, cannot be told from chance by their
-    /// regularity.
-    #[error(
-        "a dense grid needs at least {need} x {need} marks, asked for {columns} x {rows}, found {found}: use the detector \
-         for sparse dots"
-    )]
-    TooFewForGrid {
-        /// Asked marks along a row.
-        columns: usize,
-        /// Asked rows.
-        rows: usize,
-        /// Marks in the image.
-        found: usize,
-        /// Least marks on a side.
-        need: usize,
-    },
-    /// A board needs two marks on each side.
-    #[error("a grid needs at least 2 x 2 marks, asked for {columns} x {rows}")]
-    TooSmall {
-        /// Asked marks along a row.
-        columns: usize,
-        /// Asked rows.
-        rows: usize,
-    },
-    /// Some marks are missing: outside the image, covered, in glare, too small or too blurred.
-    #[error(
-        "found {found} of the {expected} marks of a {columns} x {rows} grid ({seen} in the image): the whole board \
-         must be visible"
-    )]
-    Partial {
-        /// Asked marks along a row.
-        columns: usize,
-        /// Asked rows.
-        rows: usize,
-        /// Marks of the largest lattice.
-        found: usize,
-        /// Asked number of marks.
-        expected: usize,
-        /// Marks in the image.
-        seen: usize,
-    },
-    /// A complete grid of another size.
-    #[error(
-        "a grid of {columns} x {rows} was asked, a complete {found_columns} x {found_rows} was seen: count the discs of a row, and the \
-         rows; or a row of the board is covered or outside"
-    )]
-    WrongSize {
-        /// Asked marks along a row.
-        columns: usize,
-        /// Asked rows.
-        rows: usize,
-        /// Larger side of the grid that is there.
-        found_columns: usize,
-        /// Its smaller side.
-        found_rows: usize,
-    },
-    /// Enough marks, but they do not form a rectangle.
-    #[error(
-        "found a lattice of {found} marks that is not a {columns} x {rows} rectangle: other marks near the board, or \
-         another board"
-    )]
-    NotRectangular {
-        /// Asked marks along a row.
-        columns: usize,
-        /// Asked rows.
-        rows: usize,
-        /// Marks of the lattice.
-        found: usize,
-    },
-    /// A mark is out of line with its neighbours.
-    #[error(
-        "the mark in column {column}, row {row} is out of line by {deviation:.2} steps (at most {limit:.2}): not a plane grid"
-    )]
-    Irregular {
-        /// Column of the mark, from 0.
-        column: usize,
-        /// Row of the mark, from 0.
-        row: usize,
-        /// Distance from the middle of its neighbours, in steps.
-        deviation: f64,
-        /// Largest distance accepted.
-        limit: f64,
-    },
-}
 
 /// Largest distance of a mark from the middle of its neighbours in a row or column, in steps: 45 deg of tilt
 /// at close range gives 0.1, a lens that bends a line by a tenth of its length less; a mark skipped or taken
 /// from a neighbouring lattice 0.5.
-const LARGEST_DEVIATION: f64 = 0.3;
+pub const LARGEST_DEVIATION: f64 = 0.3;
 
 /// The marks of a lattice in the order of a `columns x rows` board. `centres[mark]` is a mark's place in the
 /// image.
@@ -117,11 +30,34 @@ pub fn ordered_rectangle(
     columns: usize,
     rows: usize,
 ) -> Result<Vec<usize>, GridError> {
-    let marks =
-        rectangle(lattice, centres.len(), columns, rows)?.first_nearest_top_left(centres, columns, rows);
+    let full = rectangle(lattice, centres.len(), columns, rows)
+        .map_err(|error| staggered_instead(error, lattice, centres, columns, rows))?;
+    let marks = full.first_nearest_top_left(centres, columns, rows);
     let ordered: Vec<Vec2> = marks.iter().map(|&mark| centres[mark]).collect();
     check_regular(&ordered, columns, rows)?;
     Ok(marks)
+}
+
+/// The error that says what was seen, where that is a complete grid of staggered rows.
+fn staggered_instead(
+    error: GridError,
+    lattice: &Lattice,
+    centres: &[Vec2],
+    columns: usize,
+    rows: usize,
+) -> GridError {
+    match staggered::complete_size(lattice, centres) {
+        Some((found_columns, found_rows)) => {
+            GridError::Staggered { columns, rows, found_columns, found_rows }
+        }
+        None => error,
+    }
+}
+
+/// The larger and the smaller side of a lattice that is a complete rectangle.
+pub fn complete_sides(lattice: &Lattice) -> Option<(usize, usize)> {
+    let full = STRAIGHTENINGS.iter().find_map(|straightening| full_rectangle(lattice, straightening))?;
+    Some((full.width.max(full.height), full.width.min(full.height)))
 }
 
 /// The marks of a lattice in the order of a `columns x rows` board of which marks are hidden; `None` where it is not
@@ -194,7 +130,7 @@ struct FullRectangle {
 }
 
 /// Least side of a complete grid that is told to be another board than the one asked for.
-const LEAST_NAMED_SIDE: usize = 3;
+pub const LEAST_NAMED_SIDE: usize = 3;
 
 /// The steps that a seed may have taken for rows and columns, undone: none, or a diagonal for one of them.
 const STRAIGHTENINGS: [[i32; 4]; 5] =

@@ -2,10 +2,10 @@
 //! `circles:9x7:10mm:3mm`.
 
 use super::discs::{NotFound, ordered_discs};
-use crate::board::{Board, BoardError, Pattern};
+use crate::board::{Arrangement, Board, BoardError, Pattern};
 use crate::detect::{
     ChessboardError, GridError, SeenBoard, chessboard, circle_grid_of, seen_chessboard, seen_circle_grid_of,
-    sparse_dots_of,
+    seen_staggered_grid_of, sparse_dots_of, staggered_grid_of,
 };
 use crate::geometry::Vec2;
 use crate::io::Grey;
@@ -19,8 +19,37 @@ pub enum MarkKind {
     Chess,
     /// A dense grid of discs, at least 4 on a side.
     Circles,
+    /// Discs in staggered rows, as OpenCV's asymmetric grid has them: the marks of a row two spacings apart, rows one.
+    Asymmetric,
+    /// Discs in staggered rows, each with six neighbours at one spacing.
+    Hexagonal,
     /// A few dots, such as 3 x 3.
     Dots,
+}
+
+impl MarkKind {
+    const ALL: [MarkKind; 5] =
+        [MarkKind::Chess, MarkKind::Circles, MarkKind::Asymmetric, MarkKind::Hexagonal, MarkKind::Dots];
+
+    /// Its word on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            MarkKind::Chess => "chess",
+            MarkKind::Circles => "circles",
+            MarkKind::Asymmetric => "asymmetric",
+            MarkKind::Hexagonal => "hexagonal",
+            MarkKind::Dots => "dots",
+        }
+    }
+
+    /// How its marks lie to each other.
+    pub fn arrangement(self) -> Arrangement {
+        match self {
+            MarkKind::Asymmetric => Arrangement::Asymmetric,
+            MarkKind::Hexagonal => Arrangement::Hexagonal,
+            MarkKind::Chess | MarkKind::Circles | MarkKind::Dots => Arrangement::Square,
+        }
+    }
 }
 
 /// A board as it stands on the command line: `KIND:COLUMNSxROWS:SPACING[:DIAMETER]`.
@@ -41,7 +70,8 @@ pub struct BoardSpec {
 pub enum BoardSpecError {
     /// The text has another form.
     #[error(
-        "expected KIND:COLUMNSxROWS:SPACING[:DIAMETER], such as chess:9x6:25mm, circles:9x7:10mm:3mm or dots:3x3:1, got `{0}`"
+        "expected KIND:COLUMNSxROWS:SPACING[:DIAMETER], such as chess:9x6:25mm, circles:9x7:10mm:3mm, \
+         asymmetric:4x11:20mm:15mm, hexagonal:9x9:10mm:5mm or dots:3x3:1, got `{0}`"
     )]
     Form(String),
     /// A length is not a number with a known unit.
@@ -121,12 +151,7 @@ impl FromStr for BoardSpec {
             [kind, size, spacing, diameter] => (kind, size, spacing, Some(diameter)),
             _ => return Err(form()),
         };
-        let kind = match kind {
-            "chess" => MarkKind::Chess,
-            "circles" => MarkKind::Circles,
-            "dots" => MarkKind::Dots,
-            _ => return Err(form()),
-        };
+        let kind = MarkKind::ALL.into_iter().find(|known| known.name() == kind).ok_or_else(form)?;
         let (columns, rows) = size.split_once('x').ok_or_else(form)?;
         let columns = columns.parse().map_err(|_| form())?;
         let rows = rows.parse().map_err(|_| form())?;
@@ -139,7 +164,7 @@ impl FromStr for BoardSpec {
             // A disc of unknown size is taken for a point, as a corner is: its bias cannot be told.
             (_, None) => Pattern::Chessboard,
         };
-        let board = Board::new(columns, rows, spacing.value, pattern)?;
+        let board = Board::arranged(columns, rows, spacing.value, pattern, kind.arrangement())?;
         Ok(BoardSpec { kind, unit: spacing.unit.to_string(), diameter_known: diameter.is_some(), board })
     }
 }
@@ -149,10 +174,13 @@ impl fmt::Display for BoardSpec {
         let (name, marks) = match self.kind {
             MarkKind::Chess => ("chessboard", "inner corners"),
             MarkKind::Circles => ("circle grid", "discs"),
+            MarkKind::Asymmetric => ("staggered grid", "discs, rows"),
+            MarkKind::Hexagonal => ("hexagonal grid", "discs"),
             MarkKind::Dots => ("dots", "marks"),
         };
         let (board, unit) = (&self.board, &self.unit);
-        write!(f, "{name} of {} x {} {marks}, {}", board.columns(), board.rows(), board.spacing())?;
+        let comma = if marks.contains(',') { "" } else { "," };
+        write!(f, "{name} of {} x {} {marks}{comma} {}", board.columns(), board.rows(), board.spacing())?;
         if !unit.is_empty() {
             write!(f, " {unit}")?;
         }
@@ -176,18 +204,15 @@ impl BoardSpec {
             Pattern::Chessboard => Pattern::Chessboard,
         };
         let (columns, rows) = (self.board.columns(), self.board.rows());
-        let board = Board::new(columns, rows, factor * self.board.spacing(), pattern)?;
+        let spacing = factor * self.board.spacing();
+        let board = Board::arranged(columns, rows, spacing, pattern, self.board.arrangement())?;
         Ok(BoardSpec { board, ..self.clone() })
     }
 
     /// The board as it stands on the command line: what is read from it is this board again.
     pub fn words(&self) -> String {
         let (board, unit) = (&self.board, &self.unit);
-        let kind = match self.kind {
-            MarkKind::Chess => "chess",
-            MarkKind::Circles => "circles",
-            MarkKind::Dots => "dots",
-        };
+        let kind = self.kind.name();
         let words = format!("{kind}:{}x{}:{}{unit}", board.columns(), board.rows(), board.spacing());
         match board.pattern() {
             Pattern::Circles { diameter } => format!("{words}:{diameter}{unit}"),
@@ -213,13 +238,16 @@ impl BoardSpec {
             }
             MarkKind::Dots => ordered_discs(photo, |discs| sparse_dots_of(discs, columns, rows)),
             MarkKind::Circles => ordered_discs(photo, |discs| circle_grid_of(discs, columns, rows)),
+            MarkKind::Asymmetric | MarkKind::Hexagonal => {
+                ordered_discs(photo, |discs| staggered_grid_of(discs, columns, rows))
+            }
         };
         Ok(grid?.centres_px())
     }
 
     /// The marks that are seen in a photograph. Of a chessboard or a dense grid of discs some may be hidden, outside of the
-    /// image or in glare, where it is certain which ([`seen_chessboard`], [`seen_circle_grid_of`]); a few dots must all be
-    /// there.
+    /// image or in glare, where it is certain which ([`seen_chessboard`], [`seen_circle_grid_of`],
+    /// [`seen_staggered_grid_of`]); a few dots must all be there.
     ///
     /// # Errors
     /// See [`DetectError`].
@@ -241,6 +269,11 @@ impl BoardSpec {
             MarkKind::Circles => ordered_discs(photo, |discs| circle_grid_of(discs, columns, rows))
                 .map(SeenBoard::from)
                 .or_else(|_| ordered_discs(photo, |discs| seen_circle_grid_of(discs, columns, rows))),
+            MarkKind::Asymmetric | MarkKind::Hexagonal => {
+                ordered_discs(photo, |discs| staggered_grid_of(discs, columns, rows))
+                    .map(SeenBoard::from)
+                    .or_else(|_| ordered_discs(photo, |discs| seen_staggered_grid_of(discs, columns, rows)))
+            }
         }
     }
 
@@ -272,14 +305,25 @@ mod tests {
             "dots:3x3:2mm".parse::<BoardSpec>().unwrap().to_string(),
             "dots of 3 x 3 marks, 2 mm apart"
         );
+        let spec: BoardSpec = "asymmetric:4x11:20mm:15mm".parse().unwrap();
+        assert_eq!(spec.to_string(), "staggered grid of 4 x 11 discs, rows 20 mm apart");
     }
 
     #[test]
     fn the_words_of_a_board_make_it_again() {
-        for text in ["circles:9x7:10mm:3mm", "chess:9x6:2.5cm", "dots:3x3:1", "circles:4x4:0.3:0.1"] {
+        for text in [
+            "circles:9x7:10mm:3mm",
+            "chess:9x6:2.5cm",
+            "dots:3x3:1",
+            "circles:4x4:0.3:0.1",
+            "asymmetric:4x11:20mm:15mm",
+            "hexagonal:9x9:1cm:0.5cm",
+            "asymmetric:4x11:20mm",
+        ] {
             let spec: BoardSpec = text.parse().unwrap();
             assert_eq!(spec.words(), text);
             assert_eq!(spec.scaled(1.0).unwrap(), spec);
+            assert_eq!(spec.scaled(2.0).unwrap().board().arrangement(), spec.board().arrangement());
         }
     }
 

@@ -17,7 +17,8 @@ pub struct NotFound {
 }
 
 /// The discs of a photograph in the order that `order` gives them. Dark ones are tried first, then bright
-/// ones; where neither makes the board, both are searched for once more, harder ([`searched_blobs`]).
+/// ones; where neither makes the board, both are searched for once more, harder ([`searched_blobs`]), unless another complete
+/// board of as many discs was seen: a harder look that then finds the board has lost a row of the other.
 ///
 /// # Errors
 /// Neither makes the board: the reason of whichever kind has more discs.
@@ -50,5 +51,8 @@ fn of_either_polarity<T: Level, Ordered>(
             })
         })
     };
-    of_either(blobs).or_else(|first| of_either(searched_blobs).map_err(|_| first))
+    of_either(blobs).or_else(|first| match &first.reason {
+        DetectError::Grid(reason) if reason.is_other_board() => Err(first),
+        _ => of_either(searched_blobs).map_err(|_| first),
+    })
 }

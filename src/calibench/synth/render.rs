@@ -358,7 +358,10 @@ fn sheet_outline(board: &Board, margin: f64) -> Outline {
     };
     let points = board.points();
     let reach = Vec2::new(beyond_mark, beyond_mark);
-    Outline::rectangle(points[0] - reach, points[points.len() - 1] + reach)
+    // The last mark is not the outermost one in X where rows are staggered.
+    let (low, high) =
+        points.iter().fold((points[0], points[0]), |(l, h), point| (l.inf(point), h.sup(point)));
+    Outline::rectangle(low - reach, high + reach)
 }
 
 #[cfg(test)]

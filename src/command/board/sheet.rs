@@ -162,13 +162,14 @@ fn room(paper: &Paper) -> Vec2 {
 /// Width and height of a board's ink.
 pub(super) fn extent(board: &BoardSpec, unit: f64) -> Vec2 {
     let board = board.board();
-    let steps = Vec2::new((board.columns() - 1) as f64, (board.rows() - 1) as f64);
+    // The outermost marks lie as far on both sides of the origin.
+    let reach = board.points().iter().fold(Vec2::zeros(), |reach, point| reach.sup(&point.abs()));
     let around = match board.pattern() {
         Pattern::Circles { diameter } => diameter,
         // The outermost corners have squares on both sides.
         _ => 2.0 * board.spacing(),
     };
-    unit * (board.spacing() * steps + Vec2::new(around, around))
+    unit * (2.0 * reach + Vec2::new(around, around))
 }
 
 /// The ink of the board's marks around their middle.
@@ -248,10 +249,30 @@ mod tests {
     }
 
     #[test]
+    fn staggered_rows_are_drawn_as_the_board_is_laid_out() {
+        for (board, next_row) in [
+            ("asymmetric:4x8:20mm:14mm", Vec2::new(20.0, 20.0)),
+            ("hexagonal:16x11:15mm:7mm", Vec2::new(7.5, 15.0 * 0.75f64.sqrt())),
+        ] {
+            let columns = board.parse::<BoardSpec>().unwrap().board().columns();
+            let sheet = sheet(board, "A4").unwrap();
+            let centre = |k: usize| match sheet.ink[k] {
+                Ink::Disc { centre, .. } => centre,
+                _ => panic!("{board}: no disc"),
+            };
+            assert!((centre(columns) - centre(0) - next_row).norm() < 1e-12, "{board}");
+        }
+    }
+
+    #[test]
     fn everything_lies_on_the_page_and_no_ruler_on_the_board() {
-        for (board, paper) in
-            [("chess:9x6:25mm", "A4"), ("circles:30x20:5mm:2mm", "letter"), ("dots:3x3:20mm:8mm", "A5")]
-        {
+        for (board, paper) in [
+            ("chess:9x6:25mm", "A4"),
+            ("circles:30x20:5mm:2mm", "letter"),
+            ("dots:3x3:20mm:8mm", "A5"),
+            ("asymmetric:4x8:20mm:14mm", "A4"),
+            ("hexagonal:16x11:15mm:7mm", "A4"),
+        ] {
             let sheet = sheet(board, paper).unwrap();
             let spec: BoardSpec = board.parse().unwrap();
             let board_ink = marks(&spec, 1.0, Vec2::zeros()).len();

@@ -171,7 +171,7 @@ pub fn parse_target(file: &str, text: &str) -> Result<ChessTarget, FormatError> 
     let kind = root.need("target_type")?;
     if kind.text()? != "checkerboard" {
         let message = format!(
-            "{} is no chessboard: calibench has chess, circles and dots (write circles:COLUMNSxROWS:SPACING:DIAMETER yourself, \
+            "{} is no chessboard: calibench has chess, circles, asymmetric, hexagonal and dots (write circles:COLUMNSxROWS:SPACING:DIAMETER yourself, \
              since Kalibr's file has no diameter), and no tags",
             shortened(kind.text()?)
         );
