@@ -329,7 +329,14 @@ fn finished<T: Level>(
     rows: usize,
 ) -> Option<(Chessboard, Fitted)> {
     let ordered = board::ordered(&seen.lattice, &seen.rectangle, &seen.places, (columns, rows));
-    let fitted = refine::refined(pyramid, level, &seen.found(&ordered.marks), columns, ordered.starts_dark, &Look::PLAIN);
+    let fitted = refine::refined(
+        pyramid,
+        level,
+        &seen.found(&ordered.marks),
+        columns,
+        ordered.starts_dark,
+        &Look::PLAIN,
+    );
     let corners_px = fitted.corners.iter().copied().collect::<Option<Vec<Vec2>>>()?;
     Some((Chessboard { columns, rows, corners_px, orientation: ordered.orientation }, fitted))
 }
@@ -343,7 +350,14 @@ fn in_part<T: Level>(
     rows: usize,
 ) -> Option<SeenBoard> {
     let ordered = board::ordered(&seen.lattice, &seen.rectangle, &seen.places, (columns, rows));
-    let fitted = refine::refined(pyramid, level, &seen.found(&ordered.marks), columns, ordered.starts_dark, &Look::PLAIN);
+    let fitted = refine::refined(
+        pyramid,
+        level,
+        &seen.found(&ordered.marks),
+        columns,
+        ordered.starts_dark,
+        &Look::PLAIN,
+    );
     certain(fitted.alike(pyramid.photo(), columns), columns, rows, ordered.orientation)
 }
 

@@ -5,8 +5,8 @@ use super::coded::{self, Coded};
 use super::discs::{NotFound, ordered_discs};
 use crate::board::{Board, BoardError, Pattern};
 use crate::detect::{
-    AprilGrid, ChessboardError, CodedError, GridError, LayoutError, SeenBoard, UnknownDictionary, chessboard, circle_grid_of, seen_chessboard, seen_circle_grid_of,
-    sparse_dots_of,
+    AprilGrid, ChessboardError, CodedError, GridError, LayoutError, SeenBoard, UnknownDictionary, chessboard,
+    circle_grid_of, seen_chessboard, seen_circle_grid_of, sparse_dots_of,
 };
 use crate::geometry::Vec2;
 use crate::io::Grey;
@@ -409,7 +409,8 @@ mod tests {
         assert!(matches!(refused("chess:9x6:25mm:3mm"), BoardSpecError::CornerDiameter { .. }));
         assert!(matches!(refused("circles:9x7:10mm:2cm"), BoardSpecError::Board(_)));
         assert!(matches!(refused("chess:1x6:25mm"), BoardSpecError::Board(_)));
-        for text in ["charuco:7x5:30mm", "charuco:7:30mm:22mm:DICT_4X4_50", "charuco:7x5:30mm:22mm:DICT_4X4_50:old"]
+        for text in
+            ["charuco:7x5:30mm", "charuco:7:30mm:22mm:DICT_4X4_50", "charuco:7x5:30mm:22mm:DICT_4X4_50:old"]
         {
             assert!(matches!(refused(text), BoardSpecError::Charuco(_)), "{text}");
         }

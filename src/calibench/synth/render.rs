@@ -210,7 +210,15 @@ pub fn photograph<C: Copy + Into<Camera<Lens>>>(
 ) -> Result<Photograph, RenderError> {
     let marks = board.points();
     let sheet = imaging.appearance.surround.map(|surround| sheet_outline(board, surround.margin));
-    photographed(&(*camera).into(), image_size, cam_from_target, imaging, &mark_outlines(board), sheet, &marks)
+    photographed(
+        &(*camera).into(),
+        image_size,
+        cam_from_target,
+        imaging,
+        &mark_outlines(board),
+        sheet,
+        &marks,
+    )
 }
 
 /// Photographs a board of upright black rectangles, such as one with markers ([`Charuco::dark`](crate::detect::Charuco::dark)): no

@@ -287,7 +287,9 @@ impl Growth<'_> {
             }
             *tried += 1;
             let Some((at, steps)) = self.prediction(place) else { continue };
-            let Some(corner) = probe(self.level, self.look, &at, &steps, axes_at(place) == (0, 1)) else { continue };
+            let Some(corner) = probe(self.level, self.look, &at, &steps, axes_at(place) == (0, 1)) else {
+                continue;
+            };
             let shortest = steps.column(0).norm().min(steps.column(1).norm());
             let is_new = self
                 .lattice
@@ -322,14 +324,7 @@ const SIDE_PX: f64 = 2.0;
 
 /// Whether the way from one corner to the other has a dark side and a bright one that differ by `least`, compared
 /// `beside` lengths of the way beside it at most; `dark_after`: the dark side is where the way turns to as u turns to v.
-pub fn is_edge(
-    level: &Smoothed,
-    beside: f64,
-    from: &Vec2,
-    to: &Vec2,
-    dark_after: bool,
-    least: f64,
-) -> bool {
+pub fn is_edge(level: &Smoothed, beside: f64, from: &Vec2, to: &Vec2, dark_after: bool, least: f64) -> bool {
     let way = to - from;
     let length = way.norm();
     let side = Vec2::new(-way.y, way.x) * (SIDE_PX.min(beside * length) / length);

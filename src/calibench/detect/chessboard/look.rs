@@ -44,4 +44,9 @@ impl Look {
             between_tags: None,
         }
     }
+
+    /// Of a grid of tags `between` of their sides apart, with small squares at their corners.
+    pub fn of_tags(between: f64) -> Look {
+        Look { between_tags: Some(between), ..Look::PLAIN }
+    }
 }

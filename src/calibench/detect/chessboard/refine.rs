@@ -4,8 +4,8 @@
 //! image is fitted there first, where it is sharp and its place is near enough, then in the photograph
 //! itself.
 
-use super::look::Look;
 use super::level::{Pyramid, level_from_photo, photo_from_level, scale};
+use super::look::Look;
 use crate::detect::edge::SHARPEST_EDGE_PX;
 use crate::detect::saddle::{Crossing, Window, fit_near_edges, misfit};
 use crate::detect::smoothness::{expected, out_of_line};
@@ -143,7 +143,8 @@ pub fn refined<T: Level>(
         found.iter().map(|place| place.map(|place| photo_from_level(&place, level))).collect();
     let mut edges_px = vec![start_edge_px; found.len()];
     if let Some(reduced) = pyramid.reduced(level) {
-        let fitting = Fitting { image: reduced, is_dark: &is_dark, columns, look, largest_px: LARGEST_START_PX };
+        let fitting =
+            Fitting { image: reduced, is_dark: &is_dark, columns, look, largest_px: LARGEST_START_PX };
         for (index, crossing) in fitting.all(found, &edges_px).into_iter().enumerate() {
             let Some(crossing) = crossing else { continue };
             places[index] = Some(photo_from_level(&crossing.corner, level));
@@ -167,7 +168,9 @@ pub fn refined<T: Level>(
         let fit = fitting.one(&places, index, edges_px[index]).filter(|fit| is_near(&fit.corner));
         crossings[index] = fit;
         good[index] = fit.map(|fit| fit.corner).or_else(|| {
-            let in_level = |level| fit_in_level(pyramid, level, &is_dark, &Corners { places: &places, columns, look }, index);
+            let in_level = |level| {
+                fit_in_level(pyramid, level, &is_dark, &Corners { places: &places, columns, look }, index)
+            };
             (1..=BLURRED_LEVELS).find_map(|level| in_level(level).filter(is_near))
         });
     }

@@ -134,8 +134,7 @@ impl<T: Level> Search<'_, T> {
     fn among(&self, level: usize, strength: Strength) -> Result<Placed, Failure> {
         let smoothed = self.pyramid.smoothed(level);
         let candidates = candidates(&smoothed, strength);
-        let mut failure =
-            Failure { error: CodedError::NoCorners { seen: candidates.len() }, part: None };
+        let mut failure = Failure { error: CodedError::NoCorners { seen: candidates.len() }, part: None };
         let count = self.columns() * (self.board.rows() - 1);
         let grown = lattices(&smoothed, &self.look, candidates, count);
         let mut placed = Placed { level, corners: vec![None; count] };
@@ -165,7 +164,8 @@ impl<T: Level> Search<'_, T> {
             (_, [(_, marker)]) => return Err(CodedError::OneMarker { id: marker.id }),
             (vote, _) => return Err(self.disagree(vote, &read)),
         };
-        let beyond = part.corners.iter().filter(|(place, _)| self.index(&vote.placement, *place).is_none()).count();
+        let beyond =
+            part.corners.iter().filter(|(place, _)| self.index(&vote.placement, *place).is_none()).count();
         if beyond as f64 > MOST_BEYOND * part.corners.len() as f64 {
             return Err(CodedError::GoesOn { columns: self.board.columns(), rows: self.board.rows() });
         }
@@ -175,7 +175,13 @@ impl<T: Level> Search<'_, T> {
     fn disagree(&self, vote: Option<Vote>, read: &[(Place, Recognised)]) -> CodedError {
         let (columns, rows) = (self.board.columns(), self.board.rows());
         let agree = vote.map_or(0, |vote| vote.agree);
-        CodedError::Disagree { agree, read: read.len(), columns, rows, other: other_width(read, columns, agree) }
+        CodedError::Disagree {
+            agree,
+            read: read.len(),
+            columns,
+            rows,
+            other: other_width(read, columns, agree),
+        }
     }
 
     /// The index of the board's corner at a place of a lattice.
@@ -235,7 +241,8 @@ impl<T: Level> Search<'_, T> {
         let asked = self.board.dictionary();
         let count_in = |dictionary: &Dictionary| {
             let squares = self.squares(part, *dictionary);
-            let read = squares.iter().filter_map(|square| dictionary.recognise(square.cells, dictionary.len()));
+            let read =
+                squares.iter().filter_map(|square| dictionary.recognise(square.cells, dictionary.len()));
             read.filter(|marker| marker.wrong == 0).count()
         };
         let mut others: Vec<(usize, Dictionary)> =
@@ -280,7 +287,8 @@ fn other_width(read: &[(Place, Recognised)], asked: usize, agree: usize) -> Opti
 
 impl Part {
     fn of(lattice: Lattice, corners: &[Candidate], level: usize) -> Part {
-        let places = lattice.iter().map(|(&place, &mark)| (place, photo_from_level(&corners[mark].at, level)));
+        let places =
+            lattice.iter().map(|(&place, &mark)| (place, photo_from_level(&corners[mark].at, level)));
         let mut contrasts: Vec<f64> = lattice.values().map(|&mark| corners[mark].contrast).collect();
         contrasts.sort_by(f64::total_cmp);
         let contrast = contrasts.get(contrasts.len() / 2).copied().unwrap_or(0.0);

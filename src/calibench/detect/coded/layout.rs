@@ -205,7 +205,9 @@ impl AprilGrid {
     pub fn points(&self) -> Vec<Vec2> {
         let at = |k: usize| (k / 2) as f64 * (1.0 + self.spacing) + (k % 2) as f64;
         let columns = 2 * self.columns;
-        (0..2 * self.rows).flat_map(|row| (0..columns).map(move |column| Vec2::new(at(column), at(row)))).collect()
+        (0..2 * self.rows)
+            .flat_map(|row| (0..columns).map(move |column| Vec2::new(at(column), at(row))))
+            .collect()
     }
 
     /// What is black on the board, in sides of a tag from the lower left corner of the first, y upwards, as Kalibr draws

@@ -8,6 +8,7 @@ mod charuco;
 mod dictionary;
 mod layout;
 mod placement;
+mod quads;
 
 pub use april::seen_april_grid;
 pub use charuco::seen_charuco;
@@ -73,7 +74,9 @@ pub enum CodedError {
         other: Option<usize>,
     },
     /// Marks beyond the board's edge.
-    #[error("the board goes on beyond the {columns} x {rows} that were asked: give the size of the whole board")]
+    #[error(
+        "the board goes on beyond the {columns} x {rows} that were asked: give the size of the whole board"
+    )]
     GoesOn {
         /// Asked squares or tags along a row.
         columns: usize,

@@ -85,7 +85,8 @@ mod tests {
     fn one_marker_is_no_vote_and_one_of_four_may_be_wrong() {
         let right = Some(Placement::of_square((0, 0), (1, 0), 0));
         let wrong = Some(Placement::of_square((0, 0), (1, 2), 0));
-        let certain = |opinions: &[Option<Placement>]| Vote::of(opinions).is_some_and(|vote| vote.is_certain());
+        let certain =
+            |opinions: &[Option<Placement>]| Vote::of(opinions).is_some_and(|vote| vote.is_certain());
         assert!(!certain(&[]) && !certain(&[right]) && certain(&[right, right]));
         assert!(!certain(&[right, right, wrong]) && !certain(&[right, wrong]));
         assert!(certain(&[right, wrong, right, right, right]) && !certain(&[None, right, right]));
