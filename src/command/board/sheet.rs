@@ -4,7 +4,7 @@
 use super::paper::Paper;
 use calibench::board::Pattern;
 use calibench::geometry::Vec2;
-use calibench::photos::{BoardSpec, MarkKind};
+use calibench::photos::BoardSpec;
 
 /// Something black on the white page.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,6 +13,8 @@ pub(super) enum Ink {
     Disc { centre: Vec2, diameter: f64 },
     /// An upright rectangle by its top left corner.
     Rectangle { corner: Vec2, size: Vec2 },
+    /// Upright rectangles by their top left and bottom right corners, filled as one: where two touch, no line shows.
+    Cells(Vec<[Vec2; 2]>),
     /// Words, by the left end of their base line and the height of the type.
     Words { at: Vec2, height: f64, text: String },
 }
@@ -65,7 +67,7 @@ impl Sheet {
     /// Draws a board on a sheet of paper, which lies wide.
     pub fn of(board: &BoardSpec, paper: &Paper) -> Result<Sheet, SheetError> {
         let unit = board.unit_mm().ok_or(SheetError::NoUnit)?;
-        if board.kind != MarkKind::Chess && !board.diameter_known {
+        if board.lacks_diameter() {
             return Err(SheetError::NoDiameter);
         }
         let (size, extent, room): (Vec2, Vec2, Vec2) =
@@ -161,6 +163,10 @@ fn room(paper: &Paper) -> Vec2 {
 
 /// Width and height of a board's ink.
 pub(super) fn extent(board: &BoardSpec, unit: f64) -> Vec2 {
+    if let Some(dark) = board.dark() {
+        // About the board's middle.
+        return dark.iter().fold(Vec2::zeros(), |extent, [_, high]| extent.sup(&(2.0 * unit * high)));
+    }
     let board = board.board();
     let steps = Vec2::new((board.columns() - 1) as f64, (board.rows() - 1) as f64);
     let around = match board.pattern() {
@@ -174,6 +180,10 @@ pub(super) fn extent(board: &BoardSpec, unit: f64) -> Vec2 {
 /// The ink of the board's marks around their middle.
 fn marks(board: &BoardSpec, unit: f64, middle: Vec2) -> Vec<Ink> {
     let spec = board;
+    if let Some(dark) = spec.dark() {
+        let place = |corners: [Vec2; 2]| corners.map(|corner| middle + unit * corner);
+        return vec![Ink::Cells(dark.into_iter().map(place).collect())];
+    }
     let board = spec.board();
     match board.pattern() {
         Pattern::Circles { diameter } => {
@@ -249,9 +259,13 @@ mod tests {
 
     #[test]
     fn everything_lies_on_the_page_and_no_ruler_on_the_board() {
-        for (board, paper) in
-            [("chess:9x6:25mm", "A4"), ("circles:30x20:5mm:2mm", "letter"), ("dots:3x3:20mm:8mm", "A5")]
-        {
+        for (board, paper) in [
+            ("chess:9x6:25mm", "A4"),
+            ("circles:30x20:5mm:2mm", "letter"),
+            ("dots:3x3:20mm:8mm", "A5"),
+            ("charuco:7x5:35mm:26mm:DICT_4X4_50", "A4"),
+            ("aprilgrid:6x4:30mm:0.3", "A4"),
+        ] {
             let sheet = sheet(board, paper).unwrap();
             let spec: BoardSpec = board.parse().unwrap();
             let board_ink = marks(&spec, 1.0, Vec2::zeros()).len();
@@ -261,6 +275,11 @@ mod tests {
                     (centre - radius, centre + radius)
                 }
                 Ink::Rectangle { corner, size } => (*corner, corner + size),
+                Ink::Cells(cells) => {
+                    let corners = || cells.iter().flatten().copied();
+                    let low = corners().reduce(|a, b| a.inf(&b)).unwrap();
+                    (low, corners().reduce(|a, b| a.sup(&b)).unwrap())
+                }
                 Ink::Words { at, height, text } => (
                     at - Vec2::new(0.0, *height),
                     at + Vec2::new(LETTER_WIDTH * height * text.len() as f64, 0.0),
@@ -300,6 +319,17 @@ mod tests {
             |ink| matches!(ink, Ink::Rectangle { size, .. } if (size - Vec2::new(20.0, 20.0)).norm() < 1e-12),
         );
         assert_eq!(squares.count(), 6);
+    }
+
+    #[test]
+    fn a_board_with_markers_is_as_large_as_it_says() {
+        for (board, width, height) in [
+            ("charuco:7x5:3cm:22mm:DICT_4X4_50", 210.0, 150.0),
+            ("aprilgrid:6x4:30mm:0.3", 6.0 * 39.0 + 9.0, 4.0 * 39.0 + 9.0),
+        ] {
+            let size = extent(&board.parse().unwrap(), if board.contains("cm") { 10.0 } else { 1.0 });
+            assert!((size - Vec2::new(width, height)).norm() < 1e-9, "{size}");
+        }
     }
 
     #[test]
