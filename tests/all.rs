@@ -9,6 +9,7 @@ mod book;
 mod camera_files;
 mod certified;
 mod chapter_scene;
+mod coded_boards;
 mod command;
 mod data;
 mod dependencies;

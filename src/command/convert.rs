@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 /// What can be converted.
 const FORMATS: &str = "\
 Cameras: calibench (.json), opencv-yaml, opencv-xml (.xml), opencv-json, ros, kalibr, mrcal (.cameramodel), colmap (.txt), matlab (JSON of \
-toStruct), halcon (.dat). Corners: this program's .csv to mrcal's .vnl and back, with --board. Boards: chess:9x6:25mm to Kalibr's target.yaml \
+toStruct), halcon (.dat). Corners: this program's .csv to mrcal's .vnl and back, with --board. Boards: chess:9x6:25mm or aprilgrid:6x6:88mm:0.3 to Kalibr's target.yaml \
 and back. The format of IN is told by its contents, that of OUT by its ending. Every lens goes where the format has its equal; where it has none, the \
 refusal says which lenses it has.";
 

@@ -1,6 +1,6 @@
 //! Where exactly are the board's corners? Each fitted in a window that has the shape of its squares.
 //!
-//! Directions, window and curvature of the edges come from the corners beside. A corner found in a reduced
+//! Directions, window and curvature of the edges come from the corners beside; markers in the squares are left out of it. A corner found in a reduced
 //! image is fitted there first, where it is sharp and its place is near enough, then in the photograph
 //! itself.
 
