@@ -3,6 +3,7 @@
 
 use crate::program::{calibench, folder};
 use calibench::detect::Orientation;
+use calibench::geometry::Vec2;
 use calibench::io::{read_image, write_png};
 use calibench::photos::BoardSpec;
 use calibench::synth::Truth;
@@ -33,7 +34,7 @@ fn boards_that_opencv_drew_have_their_corners_where_opencv_projects_them() {
         let truth = truth(photo);
         assert_eq!(truth.len(), spec.points().len());
         for (mark, place) in seen.seen() {
-            let off = (place.x - truth[mark][0]).hypot(place.y - truth[mark][1]);
+            let off = (place - Vec2::from(truth[mark])).norm();
             // Eight samples along a pixel leave an edge some hundredths of a pixel uncertain.
             assert!(off < 0.05, "{photo}: corner {mark} is off by {off} px");
         }
