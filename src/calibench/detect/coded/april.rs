@@ -108,18 +108,15 @@ fn in_level<T: Level>(
         return Err(CodedError::GoesOn { columns, rows });
     }
     let agreeing = agreeing(tags, grid);
-    if !agreeing.is_empty() && FOR_EACH_AGAINST * (read - agreeing.len()) <= agreeing.len() {
+    if !agreeing.is_empty() {
         return Ok(agreeing);
     }
     Err(match read {
         0 => CodedError::NoMarker { corners: 4 * seen.len(), dictionary: Dictionary::april_36h11() },
         1 => CodedError::OneMarker { id: only },
-        _ => CodedError::Disagree { agree: agreeing.len(), read, columns, rows, other: None },
+        _ => CodedError::Disagree { agree: 0, read, columns, rows, other: None },
     })
 }
-
-/// Tags that agree for each that does not: a tag by itself at the edge of the image may have none to agree with.
-const FOR_EACH_AGAINST: usize = 2;
 
 /// The tag in a quadrangle.
 fn tag<T: Level>(pyramid: &Pyramid<'_, T>, level: usize, quad: &Quad, grid: &AprilGrid) -> Option<Tag> {
@@ -142,17 +139,30 @@ fn tag<T: Level>(pyramid: &Pyramid<'_, T>, level: usize, quad: &Quad, grid: &Apr
     Some(Tag { id: recognised.id, at, corners_px: upright })
 }
 
-/// The tags of a grid that others confirm, each number once.
+/// Pairs of tags that agree for each that does not. Of a grid of another width those of a row agree, and those above each
+/// other do not.
+const FOR_EACH_AGAINST: usize = 10;
+
+/// The tags of a grid that others confirm, each number once; none where too many contradict each other.
 fn agreeing(tags: Vec<Tag>, grid: &AprilGrid) -> Vec<Tag> {
     let is_on_board = |tag: &Tag| tag.at.1 < grid.rows();
-    let friends = |tag: &Tag| {
-        let others = tags.iter().filter(|other| other.id != tag.id && is_on_board(other));
-        others.filter(|other| agree(tag, other, grid) && agree(other, tag, grid)).count()
+    // Those near a tag that agree, and those that do not.
+    let votes = |tag: &Tag| {
+        let near = |other: &&Tag| other.id != tag.id && is_on_board(other) && apart(tag, other) <= FARTHEST;
+        let near = || tags.iter().filter(near);
+        let agree = near().filter(|other| agree(tag, other, grid) && agree(other, tag, grid)).count();
+        (agree, near().count() - agree)
     };
-    let counts: Vec<usize> = tags.iter().map(friends).collect();
+    let votes: Vec<(usize, usize)> =
+        tags.iter().map(|tag| if is_on_board(tag) { votes(tag) } else { (0, 0) }).collect();
+    let total = votes.iter().fold((0, 0), |sum, vote| (sum.0 + vote.0, sum.1 + vote.1));
+    if total.0 < FOR_EACH_AGAINST * total.1 {
+        return Vec::new();
+    }
     let mut best: Vec<Option<usize>> = vec![None; grid.columns() * grid.rows()];
     for (index, tag) in tags.iter().enumerate() {
-        if is_on_board(tag) && counts[index] > best[tag.id].map_or(0, |other| counts[other]) {
+        let (agree, against) = votes[index];
+        if agree > against && agree > best[tag.id].map_or(0, |other| votes[other].0) {
             best[tag.id] = Some(index);
         }
     }
@@ -160,9 +170,13 @@ fn agreeing(tags: Vec<Tag>, grid: &AprilGrid) -> Vec<Tag> {
     tags.into_iter().zip(kept).filter(|(_, kept)| *kept).map(|(tag, _)| tag).collect()
 }
 
+/// How many places of the grid lie between two tags.
+fn apart(tag: &Tag, other: &Tag) -> usize {
+    tag.at.0.abs_diff(other.at.0).max(tag.at.1.abs_diff(other.at.1))
+}
+
 /// Whether a tag lies where another puts it.
 fn agree(tag: &Tag, other: &Tag, grid: &AprilGrid) -> bool {
-    let apart = tag.at.0.abs_diff(other.at.0).max(tag.at.1.abs_diff(other.at.1));
     let pitch = 1.0 + grid.spacing();
     let step = |a: usize, b: usize| (a as f64 - b as f64) * pitch;
     // Rows are counted upwards, and y points down.
@@ -172,7 +186,7 @@ fn agree(tag: &Tag, other: &Tag, grid: &AprilGrid) -> bool {
     let Some(expected) = fit.homography.apply(&way) else { return false };
     let middle = other.corners_px.iter().sum::<Vec2>() / 4.0;
     let side = (other.corners_px[0] - other.corners_px[2]).norm() / std::f64::consts::SQRT_2;
-    apart <= FARTHEST && (expected - middle).norm() < MOST_OFF * side * apart as f64
+    (expected - middle).norm() < MOST_OFF * side * apart(tag, other) as f64
 }
 
 /// The corners of the tags, fitted in the photograph.

@@ -34,11 +34,16 @@ const MOST_LATTICES: usize = 12;
 /// Least difference of a marker's white and black, as part of the corners' contrast.
 const LEAST_CONTRAST: f64 = 0.3;
 
-/// Corners that lie beyond the board's edge, as part of those on it, that may be chance.
-const MOST_BEYOND: f64 = 0.2;
+/// Corners that lie beyond the board's edge, as part of all, that may be chance; one always may. A row or a column of
+/// them is a board that goes on.
+const MOST_BEYOND: f64 = 0.05;
+
+/// How far a corner may lie from where the plane through all has it, in squares: pieces of a lattice that are placed
+/// differently are a whole square apart, and no lens bends a board by so much.
+const MOST_BENT: f64 = 0.6;
 
 /// Finds the inner corners of a ChArUco board that are seen, row by row from the board's first square: `columns - 1` along
-/// a row. Which they are is certain: at least two markers agree on it, and four for each that does not.
+/// a row. Which they are is certain: at least two markers agree on it, and ten for each that does not.
 ///
 /// # Errors
 /// See [`CodedError`].
@@ -141,7 +146,15 @@ impl<T: Level> Search<'_, T> {
         for lattice in grown.lattices.into_iter().take(MOST_LATTICES) {
             let part = Part::of(lattice, &grown.corners, level);
             match self.placement(&part) {
-                Ok(placement) => self.place(&mut placed, &part, &placement, &grown.corners),
+                Ok(placement) => {
+                    // The largest piece comes first, and others must lie in its plane.
+                    let with = self.with(&placed, &part, &placement, &grown.corners);
+                    if placed.count() == 0 || with.is_flat(self.columns()) {
+                        placed = with;
+                    }
+                }
+                // A piece whose markers contradict each other puts all in doubt: the board may be another.
+                Err(error) if error.is_grave() => return Err(Failure { error, part: Some(part) }),
                 Err(error) => failure = Failure { error, part: Some(part) }.or(Some(failure)),
             }
         }
@@ -166,7 +179,7 @@ impl<T: Level> Search<'_, T> {
         };
         let beyond =
             part.corners.iter().filter(|(place, _)| self.index(&vote.placement, *place).is_none()).count();
-        if beyond as f64 > MOST_BEYOND * part.corners.len() as f64 {
+        if beyond as f64 > (MOST_BEYOND * part.corners.len() as f64).max(1.0) {
             return Err(CodedError::GoesOn { columns: self.board.columns(), rows: self.board.rows() });
         }
         Ok(vote.placement)
@@ -175,13 +188,8 @@ impl<T: Level> Search<'_, T> {
     fn disagree(&self, vote: Option<Vote>, read: &[(Place, Recognised)]) -> CodedError {
         let (columns, rows) = (self.board.columns(), self.board.rows());
         let agree = vote.map_or(0, |vote| vote.agree);
-        CodedError::Disagree {
-            agree,
-            read: read.len(),
-            columns,
-            rows,
-            other: other_width(read, columns, agree),
-        }
+        let other = other_board(read, (columns, !self.board.starts_dark()), agree);
+        CodedError::Disagree { agree, read: read.len(), columns, rows, other }
     }
 
     /// The index of the board's corner at a place of a lattice.
@@ -192,12 +200,15 @@ impl<T: Level> Search<'_, T> {
         inside.then(|| ((row - 1) * columns + column - 1) as usize)
     }
 
-    fn place(&self, placed: &mut Placed, part: &Part, placement: &Placement, corners: &[Candidate]) {
+    /// The corners with those of another piece.
+    fn with(&self, placed: &Placed, part: &Part, placement: &Placement, corners: &[Candidate]) -> Placed {
+        let mut with = Placed { level: placed.level, corners: placed.corners.clone() };
         for (&place, &mark) in &part.lattice {
             if let Some(index) = self.index(placement, place) {
-                placed.corners[index].get_or_insert(corners[mark].at);
+                with.corners[index].get_or_insert(corners[mark].at);
             }
         }
+        with
     }
 
     /// The white squares of a lattice in which something like a marker can be read.
@@ -235,7 +246,8 @@ impl<T: Level> Search<'_, T> {
 
     /// The error, or that there are markers of another dictionary.
     fn explained(&self, failure: Failure) -> CodedError {
-        let (CodedError::NoMarker { .. }, Some(part)) = (&failure.error, &failure.part) else {
+        // Of a few markers by chance.
+        let (Some(part), Some(of_asked)) = (&failure.part, failure.error.by_chance()) else {
             return failure.error;
         };
         let asked = self.board.dictionary();
@@ -250,7 +262,7 @@ impl<T: Level> Search<'_, T> {
         // Of equal counts the first stays the first: the smallest.
         others.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
         match others[..] {
-            [(count, seen), ..] if count >= FEWEST_OF_ANOTHER => {
+            [(count, seen), ..] if count >= FEWEST_OF_ANOTHER.max(of_asked + 1) && seen != asked => {
                 CodedError::OtherDictionary { asked, seen, count }
             }
             _ => failure.error,
@@ -270,19 +282,21 @@ fn opinion((low, marker): &(Place, Recognised), markers: &[(usize, usize)]) -> O
 /// Widest board that is tried where markers do not stand as on the one that was asked.
 const WIDEST: usize = 40;
 
-/// The width of a board on which more markers agree than on that asked.
-fn other_width(read: &[(Place, Recognised)], asked: usize, agree: usize) -> Option<usize> {
+/// The board on which more markers agree than on that asked: its width, and whether it begins with a white square.
+fn other_board(read: &[(Place, Recognised)], asked: (usize, bool), agree: usize) -> Option<(usize, bool)> {
     let last = read.iter().map(|(_, marker)| marker.id).max()?;
-    let agree_on = |width: usize| {
+    let agree_on = |(width, white): (usize, bool)| {
         let squares = (0..).flat_map(|row| (0..width).map(move |column| (column, row)));
-        let white = squares.filter(|(column, row)| (column + row) % 2 == 1);
+        let white = squares.filter(|(column, row)| ((column + row) % 2 == 0) == white);
         let markers: Vec<(usize, usize)> = white.take(last + 1).collect();
         let opinions: Vec<Option<Placement>> = read.iter().map(|read| opinion(read, &markers)).collect();
         Vote::of(&opinions).filter(Vote::is_certain).map_or(0, |vote| vote.agree)
     };
-    let widths = (3..=WIDEST).filter(|&width| width != asked).map(|width| (agree_on(width), width));
-    let (most, width) = widths.rev().max_by_key(|(count, _)| *count)?;
-    (most > agree).then_some(width)
+    let boards = (3..=WIDEST).flat_map(|width| [(width, true), (width, false)]);
+    let others = boards.filter(|&board| board != asked).map(|board| (agree_on(board), board));
+    // Of equal ones the last: black comes first on most boards.
+    let (most, board) = others.max_by_key(|(count, _)| *count)?;
+    (most > agree).then_some(board)
 }
 
 impl Part {
@@ -321,19 +335,43 @@ impl Placed {
         self.corners.iter().flatten().count()
     }
 
+    /// From the board's corners, counted along rows and down columns, to the photograph.
+    fn plane(&self, columns: usize) -> Option<Homography> {
+        let seen = || self.corners.iter().enumerate().filter_map(|(index, at)| Some((index, (*at)?)));
+        let from: Vec<Vec2> = seen().map(|(index, _)| on_board(index, columns)).collect();
+        let to: Vec<Vec2> = seen().map(|(_, at)| photo_from_level(&at, self.level)).collect();
+        Homography::fit(&from, &to).ok().map(|fit| fit.homography)
+    }
+
+    /// Whether all corners lie about where the plane through them has them.
+    fn is_flat(&self, columns: usize) -> bool {
+        let Some(plane) = self.plane(columns) else { return false };
+        (0..self.corners.len()).all(|index| {
+            let Some(at) = self.corners[index] else { return true };
+            let at_offset = |x: f64, y: f64| plane.apply(&(on_board(index, columns) + Vec2::new(x, y)));
+            let (Some(expected), Some(right), Some(below)) =
+                (at_offset(0.0, 0.0), at_offset(1.0, 0.0), at_offset(0.0, 1.0))
+            else {
+                return false;
+            };
+            let square_px = (right - expected).norm().min((below - expected).norm());
+            (photo_from_level(&at, self.level) - expected).norm() < MOST_BENT * square_px
+        })
+    }
+
     /// Whether no corner of the board is missing that should be in the image.
     fn is_all<T: Level>(&self, search: &Search<'_, T>) -> bool {
         let columns = search.columns();
-        let on_board = |index: usize| Vec2::new((index % columns) as f64, (index / columns) as f64);
-        let seen = || self.corners.iter().enumerate().filter_map(|(index, at)| Some((index, (*at)?)));
-        let from: Vec<Vec2> = seen().map(|(index, _)| on_board(index)).collect();
-        let to: Vec<Vec2> = seen().map(|(_, at)| photo_from_level(&at, self.level)).collect();
-        let Ok(fit) = Homography::fit(&from, &to) else { return false };
+        let Some(plane) = self.plane(columns) else { return false };
         let (width, height) = (search.pyramid.photo().width() as f64, search.pyramid.photo().height() as f64);
         let is_outside = |index: usize| {
             let inside = |p: &Vec2| (0.0..width).contains(&p.x) && (0.0..height).contains(&p.y);
-            !fit.homography.apply(&on_board(index)).is_some_and(|p| inside(&p))
+            !plane.apply(&on_board(index, columns)).is_some_and(|p| inside(&p))
         };
         (0..self.corners.len()).all(|index| self.corners[index].is_some() || is_outside(index))
     }
+}
+
+fn on_board(index: usize, columns: usize) -> Vec2 {
+    Vec2::new((index % columns) as f64, (index / columns) as f64)
 }

@@ -60,8 +60,8 @@ pub enum CodedError {
     },
     /// The markers do not stand as on the board.
     #[error(
-        "{agree} of {read} markers agree on where the board is, and the others do not: is it {columns} squares wide and {rows} high{}?",
-        other_hint(*.other)
+        "{agree} of {read} markers agree on where the board is, and the others do not: is it {columns} wide and {rows} high?{}",
+        other_hint(*.other, *.columns)
     )]
     Disagree {
         /// Markers that agree.
@@ -72,8 +72,8 @@ pub enum CodedError {
         columns: usize,
         /// Asked rows.
         rows: usize,
-        /// Width on which most markers agree.
-        other: Option<usize>,
+        /// Width on which most markers agree, and whether such a board begins with a white square.
+        other: Option<(usize, bool)>,
     },
     /// Marks beyond the board's edge.
     #[error(
@@ -96,6 +96,41 @@ pub enum CodedError {
     },
 }
 
-fn other_hint(other: Option<usize>) -> String {
-    other.map_or(String::new(), |width| format!(" (they would agree on one {width} wide)"))
+impl CodedError {
+    /// Whether markers contradict that this is the board, more than chance explains.
+    fn is_grave(&self) -> bool {
+        match self {
+            CodedError::Disagree { read, .. } => *read > BY_CHANCE,
+            CodedError::GoesOn { .. } => true,
+            _ => false,
+        }
+    }
+
+    /// How many markers of the asked dictionary were read, where that may be chance: cells of others look like some.
+    fn by_chance(&self) -> Option<usize> {
+        match self {
+            CodedError::NoMarker { .. } => Some(0),
+            CodedError::OneMarker { .. } => Some(1),
+            CodedError::Disagree { read, other: None, .. } => Some(*read),
+            _ => None,
+        }
+    }
+}
+
+/// Markers that a piece of something else may seem to have.
+const BY_CHANCE: usize = 2;
+
+fn other_hint(other: Option<(usize, bool)>, columns: usize) -> String {
+    match other {
+        None => String::new(),
+        Some((width, white)) if width == columns => {
+            let which = if white {
+                "the legacy pattern: write :legacy behind it"
+            } else {
+                "the present pattern: leave :legacy out"
+            };
+            format!(" They would agree on OpenCV's other pattern, {which}")
+        }
+        Some((width, _)) => format!(" They would agree on one {width} wide"),
+    }
 }

@@ -42,8 +42,8 @@ pub struct Vote {
 const FEWEST: usize = 2;
 
 /// Markers that agree for each that does not. One that is read wrongly is rare; where the board is another than was said, each
-/// row of markers has its own opinion.
-const FOR_EACH_AGAINST: usize = 4;
+/// row of markers has its own opinion, or (of OpenCV's two patterns) one of nine stands elsewhere.
+const FOR_EACH_AGAINST: usize = 10;
 
 impl Vote {
     /// The vote of markers' opinions; a marker that the board does not have puts it nowhere. `None` without any.
@@ -82,13 +82,15 @@ mod tests {
     }
 
     #[test]
-    fn one_marker_is_no_vote_and_one_of_four_may_be_wrong() {
+    fn one_marker_is_no_vote_and_one_of_eleven_may_be_wrong() {
         let right = Some(Placement::of_square((0, 0), (1, 0), 0));
         let wrong = Some(Placement::of_square((0, 0), (1, 2), 0));
         let certain =
             |opinions: &[Option<Placement>]| Vote::of(opinions).is_some_and(|vote| vote.is_certain());
         assert!(!certain(&[]) && !certain(&[right]) && certain(&[right, right]));
         assert!(!certain(&[right, right, wrong]) && !certain(&[right, wrong]));
-        assert!(certain(&[right, wrong, right, right, right]) && !certain(&[None, right, right]));
+        assert!(!certain(&[None, right, right]));
+        let with_wrong = |count: usize| [vec![right; count], vec![wrong]].concat();
+        assert!(certain(&with_wrong(10)) && !certain(&with_wrong(9)));
     }
 }

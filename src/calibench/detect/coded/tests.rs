@@ -108,7 +108,9 @@ fn what_is_covered_costs_only_itself() {
     });
     let seen = seen_charuco(&covered, &board).unwrap();
     let (found, worst_px) = judged(&seen, &photo.centres_true);
-    assert!(worst_px < 0.1 && found >= 20, "{found} corners, {worst_px} px");
+    let open = photo.centres_true.iter().filter(|p| !is_covered(p.x, p.y)).count();
+    // A corner beside the cover has squares that the cover cuts.
+    assert!(worst_px < 0.1 && 3 * found >= 2 * open, "{found} of {open} corners, {worst_px} px");
     assert!(seen.seen().all(|(_, place)| !is_covered(place.x, place.y)));
 }
 
@@ -124,7 +126,14 @@ fn another_board_is_named_and_one_marker_is_not_enough() {
     let dictionary = error(8, 6, "DICT_4X4_50");
     assert!(dictionary.to_string().contains("DICT_5X5_50"), "{dictionary}");
     let size = error(7, 6, "DICT_5X5_50");
-    assert!(matches!(size, CodedError::Disagree { other: Some(8), .. }), "{size}");
+    assert!(matches!(size, CodedError::Disagree { other: Some((8, false)), .. }), "{size}");
+    // As wide, but OpenCV's other pattern: one marker of nine stands elsewhere, the others one square beside.
+    let legacy = Charuco::new(9, 6, 0.74, "DICT_5X5_50".parse().unwrap(), true).unwrap();
+    let (dark, marks) = charuco_scene(&legacy);
+    let of_legacy = self::photo(&dark, &marks, 11.0, &poses(0.0)[0], 0.6);
+    let present = Charuco::new(9, 6, 0.74, "DICT_5X5_50".parse().unwrap(), false).unwrap();
+    let refused = seen_charuco(&of_legacy.image, &present).unwrap_err();
+    assert!(refused.to_string().contains(":legacy"), "{refused}");
     // As wide, but fewer rows.
     assert!(matches!(error(8, 4, "DICT_5X5_50"), CodedError::GoesOn { .. } | CodedError::Disagree { .. }));
     // All but the first marker out of sight.
@@ -149,8 +158,13 @@ fn corners_of_tags_are_found_in_kalibrs_order() {
             let (found, worst_px) = judged(&seen, &photo.centres_true);
             assert!(worst_px < most_px, "{trial}: {worst_px} px with noise of {sigma}");
             // A tag counts whole, or not at all.
-            let visible = visible(&photo.centres_true);
-            assert!(found as f64 >= 0.85 * visible as f64, "{trial}: {found} of {visible}");
+            let truth = &photo.centres_true;
+            let corners = |tag: usize| {
+                let first = tag / 5 * 20 + tag % 5 * 2;
+                [first, first + 1, first + 10, first + 11].map(|corner| truth[corner])
+            };
+            let whole = 4 * (0..20).filter(|&tag| visible(&corners(tag)) == 4).count();
+            assert!(found + 4 >= whole, "{trial}: {found} of {whole}");
         }
     }
 }
