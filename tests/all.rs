@@ -15,6 +15,7 @@ mod data;
 mod dependencies;
 mod detect_chessboard;
 mod detect_circles;
+mod detect_coded;
 mod detect_corners;
 mod detect_hidden;
 mod detect_photos;

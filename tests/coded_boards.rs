@@ -1,4 +1,4 @@
-//! Boards with markers, from files to a camera: photographs that OpenCV drew (`tests/coded/draw.py`), Kalibr's targets, and the
+//! Boards with markers, from files to a camera: photographs that OpenCV drew (`tests/coded_boards/draw.py`), Kalibr's targets, and the
 //! command that a user types.
 
 use crate::program::{calibench, folder};
@@ -14,7 +14,7 @@ use std::path::Path;
 
 /// Where OpenCV's `projectPoints` has the corners of a photograph, px.
 fn truth(photo: &str) -> Vec<[f64; 2]> {
-    let table = include_str!("coded/marks.csv");
+    let table = include_str!("coded_boards/marks.csv");
     let rows = table.lines().filter_map(|line| line.strip_prefix(photo)?.strip_prefix(','));
     let numbers = |row: &str| row.split(',').map(|n| n.parse().expect("a number")).collect::<Vec<f64>>();
     rows.map(numbers).map(|row| [row[1], row[2]]).collect()
@@ -27,7 +27,7 @@ fn boards_that_opencv_drew_have_their_corners_where_opencv_projects_them() {
         ("part", "charuco:7x5:30mm:22mm:DICT_4X4_50", 15),
         ("legacy", "charuco:5x6:20mm:15mm:DICT_6X6_250:legacy", 20),
     ] {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/coded/{photo}.png"));
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/coded_boards/{photo}.png"));
         let spec: BoardSpec = board.parse().expect("a board");
         let seen = spec.see(&read_image(&path).expect("an image")).unwrap_or_else(|e| panic!("{photo}: {e}"));
         assert_eq!(seen.orientation(), Orientation::Fixed);
@@ -44,7 +44,7 @@ fn boards_that_opencv_drew_have_their_corners_where_opencv_projects_them() {
 
 #[test]
 fn a_board_without_its_markers_place_is_refused_with_what_was_seen() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/coded/whole.png");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/coded_boards/whole.png");
     let photo = read_image(&path).expect("an image");
     let refused =
         |board: &str| board.parse::<BoardSpec>().expect("a board").see(&photo).unwrap_err().to_string();

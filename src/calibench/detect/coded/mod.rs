@@ -9,8 +9,6 @@ mod dictionary;
 mod layout;
 mod placement;
 mod quads;
-#[cfg(test)]
-mod tests;
 
 pub use april::seen_april_grid;
 pub use charuco::seen_charuco;

@@ -1,18 +1,19 @@
 //! Boards with markers in rendered photographs, of which every mark's place is known.
 
-use super::*;
-use crate::board::Board;
-use crate::camera::{BrownConrady, Camera};
-use crate::detect::{Orientation, SeenBoard};
-use crate::geometry::{Pose, Vec2, Vec3};
-use crate::raster::Raster;
-use crate::synth::render::{Appearance, Imaging, Photograph, SensorNoise, Surround, photograph_dark};
-use crate::synth::{Stream, StreamKey};
+use calibench::board::Board;
+use calibench::camera::{BrownConrady, Camera};
+use calibench::detect::{
+    AprilGrid, Charuco, CodedError, Orientation, SeenBoard, seen_april_grid, seen_charuco,
+};
+use calibench::geometry::{Pose, Vec2, Vec3};
+use calibench::raster::Raster;
+use calibench::synth::render::{Appearance, Imaging, Photograph, SensorNoise, Surround, photograph_dark};
+use calibench::synth::{Stream, StreamKey};
 
 const SIZE: (usize, usize) = (640, 480);
 
 /// Squares, or sides of a tag, per width of the image.
-fn photo(dark: &[[Vec2; 2]], marks: &[Vec2], across: f64, pose: &Pose, blur_px: f64) -> Photograph {
+fn photo_of(dark: &[[Vec2; 2]], marks: &[Vec2], across: f64, pose: &Pose, blur_px: f64) -> Photograph {
     let camera =
         Camera::pinhole(600.0, 600.0, 320.0, 240.0).with_distortion(BrownConrady::radial(-0.12, 0.03));
     let surround = Some(Surround { level: 0.4, margin: 0.4 });
@@ -86,7 +87,7 @@ fn corners_of_charuco_boards_are_found_in_any_turn_and_in_part() {
         let (dark, marks) = charuco_scene(&board);
         for (pose, trial) in poses(3.6).iter().zip(0..) {
             for (blur_px, sigma, most_px) in [(0.6, 0.0, 0.02), (0.7, 0.02, 0.1), (1.2, 0.01, 0.1)] {
-                let photo = noisy(photo(&dark, &marks, 10.0, pose, blur_px), sigma, trial);
+                let photo = noisy(photo_of(&dark, &marks, 10.0, pose, blur_px), sigma, trial);
                 let seen = seen_charuco(&photo.image, &board).unwrap();
                 let (found, worst_px) = judged(&seen, &photo.centres_true);
                 let visible = visible(&photo.centres_true);
@@ -101,7 +102,7 @@ fn corners_of_charuco_boards_are_found_in_any_turn_and_in_part() {
 fn what_is_covered_costs_only_itself() {
     let board = Charuco::new(8, 6, 0.74, "DICT_4X4_50".parse().unwrap(), false).unwrap();
     let (dark, marks) = charuco_scene(&board);
-    let photo = noisy(photo(&dark, &marks, 10.0, &poses(0.0)[0], 0.6), 0.01, 9);
+    let photo = noisy(photo_of(&dark, &marks, 10.0, &poses(0.0)[0], 0.6), 0.01, 9);
     let is_covered = |x: f64, y: f64| (250.0..430.0).contains(&x) && (150.0..330.0).contains(&y);
     let covered = Raster::from_fn(SIZE.0, SIZE.1, |x, y| {
         if is_covered(x as f64, y as f64) { 0.5 } else { photo.image.get(x, y) }
@@ -118,7 +119,7 @@ fn what_is_covered_costs_only_itself() {
 fn another_board_is_named_and_one_marker_is_not_enough() {
     let board = Charuco::new(8, 6, 0.74, "DICT_5X5_50".parse().unwrap(), false).unwrap();
     let (dark, marks) = charuco_scene(&board);
-    let photo = photo(&dark, &marks, 10.0, &poses(0.0)[0], 0.6);
+    let photo = photo_of(&dark, &marks, 10.0, &poses(0.0)[0], 0.6);
     let error = |columns, rows, name: &str| {
         let asked = Charuco::new(columns, rows, 0.74, name.parse().unwrap(), false).unwrap();
         seen_charuco(&photo.image, &asked).unwrap_err()
@@ -130,7 +131,7 @@ fn another_board_is_named_and_one_marker_is_not_enough() {
     // As wide, but OpenCV's other pattern: one marker of nine stands elsewhere, the others one square beside.
     let legacy = Charuco::new(9, 6, 0.74, "DICT_5X5_50".parse().unwrap(), true).unwrap();
     let (dark, marks) = charuco_scene(&legacy);
-    let of_legacy = self::photo(&dark, &marks, 11.0, &poses(0.0)[0], 0.6);
+    let of_legacy = photo_of(&dark, &marks, 11.0, &poses(0.0)[0], 0.6);
     let present = Charuco::new(9, 6, 0.74, "DICT_5X5_50".parse().unwrap(), false).unwrap();
     let refused = seen_charuco(&of_legacy.image, &present).unwrap_err();
     assert!(refused.to_string().contains(":legacy"), "{refused}");
@@ -153,7 +154,7 @@ fn corners_of_tags_are_found_in_kalibrs_order() {
     let (dark, marks) = april_scene(&grid);
     for (pose, trial) in poses(2.4).iter().zip(0..) {
         for (blur_px, sigma, most_px) in [(0.6, 0.0, 0.02), (0.7, 0.02, 0.15)] {
-            let photo = noisy(photo(&dark, &marks, 8.2, pose, blur_px), sigma, trial);
+            let photo = noisy(photo_of(&dark, &marks, 8.2, pose, blur_px), sigma, trial);
             let seen = seen_april_grid(&photo.image, &grid).unwrap();
             let (found, worst_px) = judged(&seen, &photo.centres_true);
             assert!(worst_px < most_px, "{trial}: {worst_px} px with noise of {sigma}");
@@ -173,7 +174,7 @@ fn corners_of_tags_are_found_in_kalibrs_order() {
 fn another_grid_of_tags_is_refused() {
     let grid = AprilGrid::new(5, 4, 0.3).unwrap();
     let (dark, marks) = april_scene(&grid);
-    let photo = photo(&dark, &marks, 8.2, &poses(0.0)[0], 0.6);
+    let photo = photo_of(&dark, &marks, 8.2, &poses(0.0)[0], 0.6);
     let error = |columns, rows| seen_april_grid(&photo.image, &AprilGrid::new(columns, rows, 0.3).unwrap());
     assert!(matches!(error(4, 5), Err(CodedError::Disagree { .. })), "{:?}", error(4, 5));
     assert!(matches!(error(3, 2), Err(CodedError::GoesOn { .. } | CodedError::Disagree { .. })));
