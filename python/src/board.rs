@@ -9,7 +9,7 @@ use crate::watch::detached;
 use calibench::board::Pattern;
 use calibench::photos::BoardSpec;
 use calibench::synth::fnv1a;
-use calibench::synth::render::{Imaging, photograph};
+use calibench::synth::render::{Imaging, photograph, photograph_dark};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
@@ -17,8 +17,10 @@ use pyo3::prelude::*;
 ///
 /// Args:
 ///     board: ``chess:9x6:25mm`` (inner corners and side of a square), ``circles:9x7:10mm:3mm`` (pitch and diameter of the discs),
-///         ``asymmetric:4x11:20mm:15mm`` (OpenCV's asymmetric grid: distance of rows, half that of a row's discs, and diameter),
-///         ``hexagonal:9x9:10mm:5mm`` (distance of neighbours, diameter), or ``dots:3x3:1`` (a few dots); the diameter may be left out.
+    ///         ``asymmetric:4x11:20mm:15mm`` (OpenCV's asymmetric grid: distance of rows, half that of a row's discs, and diameter),
+    ///         ``hexagonal:9x9:10mm:5mm`` (distance of neighbours, diameter), or ``dots:3x3:1`` (a few dots); the diameter may be left out.
+    ///         ``charuco:7x5:30mm:22mm:DICT_4X4_50`` (squares, their side, that of a marker, OpenCV's dictionary; ``:legacy`` for OpenCV's
+    ///         legacy pattern) or ``aprilgrid:6x6:88mm:0.3`` (Kalibr's tags, their side, the space between two in sides).
 ///
 /// Raises:
 ///     BoardError: a text that is no board, or a board that cannot exist.
@@ -29,6 +31,9 @@ pub(crate) struct Board(pub(crate) BoardSpec);
 impl Board {
     /// The text of which it is made.
     fn text(&self) -> String {
+        if self.0.dark().is_some() {
+            return self.0.words();
+        }
         let (kind, unit) = (self.kind(), self.unit());
         let plain = format!("{kind}:{}x{}:{}{unit}", self.columns(), self.rows(), self.spacing());
         match self.0.board().pattern() {
@@ -45,7 +50,7 @@ impl Board {
         board.parse().map(Board).map_err(|e| errors::board(py, &e))
     }
 
-    /// ``chess``, ``circles``, ``asymmetric``, ``hexagonal`` or ``dots``.
+    /// ``chess``, ``circles``, ``asymmetric``, ``hexagonal``, ``dots``, ``charuco`` or ``aprilgrid``.
     #[getter]
     fn kind(&self) -> &'static str {
         self.0.kind.name()
@@ -63,7 +68,7 @@ impl Board {
         self.0.board().rows()
     }
 
-    /// Distance of neighbouring marks, in `unit`.
+    /// Distance of neighbouring marks, in `unit`; of tags' corners the mean one.
     #[getter]
     fn spacing(&self) -> f64 {
         self.0.board().spacing()
@@ -75,10 +80,10 @@ impl Board {
         &self.0.unit
     }
 
-    /// The marks, row by row, about the board's centre, shape (N, 2).
+    /// The marks, row by row (those of tags from below, as Kalibr counts them), about the board's centre, shape (N, 2).
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        of_plane(py, &self.0.board().points())
+        of_plane(py, &self.0.points())
     }
 
     /// The marks in an image, px, in the order of `points`, shape (N, 2): all of them, or an error.
@@ -117,8 +122,11 @@ impl Board {
     ) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let image_size = arguments::size_to_make(image_size, "image_size")?;
         let (camera, pose) = (camera.0, pose(rotation, translation)?);
-        let (board, imaging) = (*self.0.board(), Imaging { blur_px, ..Imaging::default() });
-        let photo = detached(py, true, move || photograph(&camera, image_size, &board, &pose, &imaging))?;
+        let (spec, imaging) = (self.0.clone(), Imaging { blur_px, ..Imaging::default() });
+        let photo = detached(py, true, move || match spec.dark() {
+            Some(dark) => photograph_dark(&camera, image_size, &dark, &spec.points(), &pose, &imaging),
+            None => photograph(&camera, image_size, spec.board(), &pose, &imaging),
+        })?;
         of_intensity(py, photo.map_err(|e| errors::render(py, &e))?.image)
     }
 

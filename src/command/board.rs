@@ -22,8 +22,9 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// chess:9x6:25mm (inner corners, side of a square), circles:9x7:20mm:8mm (spacing, diameter),
-    /// asymmetric:4x9:19mm:14mm (distance of rows, half that of a row's discs; OpenCV's asymmetric grid), hexagonal:9x9:10mm:5mm or
-    /// dots:3x3:40mm:10mm
+    /// asymmetric:4x9:19mm:14mm (distance of rows, half that of a row's discs; OpenCV's asymmetric grid), hexagonal:9x9:10mm:5mm,
+    /// dots:3x3:40mm:10mm, charuco:7x5:35mm:26mm:DICT_4X4_50 (squares, their side, that of a marker) or aprilgrid:6x4:30mm:0.3 (tags,
+    /// their side, space between them in sides)
     board: BoardSpec,
     /// Draws a PDF for this paper: A5 to A0, letter, legal, tabloid, or WIDTHxHEIGHT in mm [default: A4]
     #[arg(long, value_name = "PAPER")]

@@ -62,8 +62,9 @@ pub(super) struct Arguments {
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// The board in the photographs: chess:9x6:25mm (inner corners), circles:9x7:10mm:3mm (spacing, diameter),
-    /// asymmetric:4x11:20mm:15mm (distance of rows, half that of a row's discs; OpenCV's asymmetric grid), hexagonal:9x9:10mm:5mm
-    /// or dots:3x3:1; or the board.toml beside a page that `calibench board` drew
+    /// asymmetric:4x11:20mm:15mm (distance of rows, half that of a row's discs; OpenCV's asymmetric grid), hexagonal:9x9:10mm:5mm,
+    /// dots:3x3:1, charuco:7x5:30mm:22mm:DICT_4X4_50 (squares, their side, that of a marker; OpenCV's dictionaries) or
+    /// aprilgrid:6x6:88mm:0.3 (Kalibr's tagCols, tagRows, tagSize, tagSpacing); or the board.toml beside a page that `calibench board` drew
     #[arg(long, value_name = "BOARD", value_parser = board_or_file)]
     board: Option<BoardSpec>,
     /// Where the marks of a corner file are, measured in space: a file with the columns point,X,Y,Z and their standard deviation

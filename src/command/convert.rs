@@ -5,7 +5,8 @@ use super::said::written_by;
 use super::{Exit, print, warn};
 use calibench::io::ShownPath;
 use calibench::io::formats::{
-    self, CameraFile, ChessTarget, Format, VnlBoard, Wishes, format_names, format_of_name, read_camera_file,
+    self, AprilTarget, CameraFile, ChessTarget, Format, KalibrTarget, VnlBoard, Wishes, format_names,
+    format_of_name, read_camera_file,
 };
 use calibench::io::input::{read_regular, regular_or_absent};
 use calibench::io::{parse_corners, significant, table, write_atomically};
@@ -18,7 +19,7 @@ use std::path::{Path, PathBuf};
 /// What can be converted.
 const FORMATS: &str = "\
 Cameras: calibench (.json), opencv-yaml, opencv-xml (.xml), opencv-json, ros, kalibr, mrcal (.cameramodel), colmap (.txt), matlab (JSON of \
-toStruct), halcon (.dat). Corners: this program's .csv to mrcal's .vnl and back, with --board. Boards: chess:9x6:25mm to Kalibr's target.yaml \
+toStruct), halcon (.dat). Corners: this program's .csv to mrcal's .vnl and back, with --board. Boards: chess:9x6:25mm or aprilgrid:6x6:88mm:0.3 to Kalibr's target.yaml \
 and back. The format of IN is told by its contents, that of OUT by its ending. Every lens goes where the format has its equal; where it has none, the \
 refusal says which lenses it has.";
 
@@ -283,8 +284,14 @@ fn vnl_to_corners(arguments: &Arguments, name: &str, text: &str) -> Result<Conve
 }
 
 fn target_to_board(name: &str, text: &str) -> Result<Converted, String> {
-    let ChessTarget { columns, rows, square_m } = formats::parse_target(name, text).map_err(said)?;
-    let text = format!("chess:{columns}x{rows}:{square_m}m");
+    let text = match formats::parse_target(name, text).map_err(said)? {
+        KalibrTarget::Chess(ChessTarget { columns, rows, square_m }) => {
+            format!("chess:{columns}x{rows}:{square_m}m")
+        }
+        KalibrTarget::AprilGrid(AprilTarget { columns, rows, tag_m, spacing }) => {
+            format!("aprilgrid:{columns}x{rows}:{tag_m}m:{spacing}")
+        }
+    };
     // What is written must be a board here.
     text.parse::<BoardSpec>().map_err(said)?;
     let converted = vec![format!("the target is --board {text}")];
@@ -308,12 +315,26 @@ fn board_to_target(spec: &BoardSpec) -> Result<Converted, String> {
             );
         }
     };
-    if spec.kind != MarkKind::Chess {
-        return Err("of this program's boards only chess has an equal among Kalibr's targets".into());
-    }
     let board = spec.board();
-    let target =
-        ChessTarget { columns: board.columns(), rows: board.rows(), square_m: board.spacing() / per_metre };
+    let target = match (spec.kind, spec.april_grid()) {
+        (MarkKind::Chess, _) => KalibrTarget::Chess(ChessTarget {
+            columns: board.columns(),
+            rows: board.rows(),
+            square_m: board.spacing() / per_metre,
+        }),
+        (_, Some((grid, tag))) => KalibrTarget::AprilGrid(AprilTarget {
+            columns: grid.columns(),
+            rows: grid.rows(),
+            tag_m: tag / per_metre,
+            spacing: grid.spacing(),
+        }),
+        _ => {
+            return Err(
+                "of this program's boards only chess and aprilgrid have an equal among Kalibr's targets"
+                    .into(),
+            );
+        }
+    };
     let text = formats::target_text(&target);
     Ok(Converted { text, from: "board".into(), to: "kalibr-target".into(), ..Converted::default() })
 }

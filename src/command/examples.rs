@@ -25,7 +25,11 @@ const EXAMPLES: &[(&str, &[&str])] = &[
     ("new board", &["calibench new board my-board"]),
     (
         "board",
-        &["calibench board chess:9x6:25mm", "calibench board circles:9x7:20mm:8mm --pdf letter --out page"],
+        &[
+            "calibench board chess:9x6:25mm",
+            "calibench board circles:9x7:20mm:8mm --pdf letter --out page",
+            "calibench board charuco:7x5:35mm:26mm:DICT_4X4_50 --out coded",
+        ],
     ),
     (
         "calibrate",
@@ -51,6 +55,7 @@ const EXAMPLES: &[(&str, &[&str])] = &[
             "calibench convert result/result.json camera.yaml --to opencv-yaml",
             "calibench convert fisheye.json fisheye.yaml --to kalibr",
             "calibench convert chess:9x6:25mm target.yaml",
+            "calibench convert aprilgrid:6x6:88mm:0.3 tags.yaml",
         ],
     ),
     (

@@ -226,7 +226,7 @@ fn known(arguments: &Arguments) -> Result<KnownCalibration, String> {
 /// The marks of the target, and its unit.
 fn marks(arguments: &Arguments) -> Result<(Vec<Vec2>, String), String> {
     if let Some(board) = &arguments.board {
-        return Ok((board.board().points(), board.unit.clone()));
+        return Ok((board.points(), board.unit.clone()));
     }
     let path = arguments.corners.as_ref().ok_or("give the board: --board BOARD, or --corners FILE")?;
     let corners = read_corners(path).map_err(|error| error.to_string())?;

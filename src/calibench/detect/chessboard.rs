@@ -13,12 +13,13 @@
 //! corners are hidden, where it is certain which.
 
 mod board;
-mod candidates;
-mod growth;
-mod level;
+pub(super) mod candidates;
+pub(super) mod growth;
+pub(super) mod level;
+pub(super) mod look;
 mod places;
 mod probe;
-mod refine;
+pub(super) mod refine;
 
 use super::lattice::Lattice;
 use super::order::is_certain;
@@ -30,6 +31,7 @@ use crate::raster::{Level, Raster};
 use board::Found;
 use candidates::Strength;
 use level::{Pyramid, Smoothed};
+use look::Look;
 use refine::Fitted;
 
 /// A complete chessboard in a photograph.
@@ -208,7 +210,7 @@ fn complete<T: Level>(
 }
 
 /// The level of about a megapixel, finer ones, coarser ones.
-fn search_order<T: Level>(image: &Raster<T>, levels: usize) -> impl Iterator<Item = usize> {
+pub(super) fn search_order<T: Level>(image: &Raster<T>, levels: usize) -> impl Iterator<Item = usize> {
     let pixels = image.width().saturating_mul(image.height());
     let first = (0..levels).find(|level| pixels >> (2 * level) <= FIRST_LEVEL_PIXELS).unwrap_or(levels - 1);
     (0..=first).rev().chain(first + 1..levels)
@@ -293,7 +295,7 @@ fn search_among(
 ) -> Result<Seen, Failure<Box<Seen>>> {
     let candidates = candidates::candidates(smoothed, strength);
     let seen = candidates.len();
-    let grown = growth::lattices(smoothed, candidates, columns * rows);
+    let grown = growth::lattices(smoothed, &Look::PLAIN, candidates, columns * rows);
     let places: Vec<Vec2> = grown.corners.iter().map(|corner| corner.at).collect();
     let mut failure: Option<Failure<Box<Seen>>> = None;
     for lattice in grown.lattices {
@@ -327,7 +329,14 @@ fn finished<T: Level>(
     rows: usize,
 ) -> Option<(Chessboard, Fitted)> {
     let ordered = board::ordered(&seen.lattice, &seen.rectangle, &seen.places, (columns, rows));
-    let fitted = refine::refined(pyramid, level, &seen.found(&ordered.marks), columns, ordered.starts_dark);
+    let fitted = refine::refined(
+        pyramid,
+        level,
+        &seen.found(&ordered.marks),
+        columns,
+        ordered.starts_dark,
+        &Look::PLAIN,
+    );
     let corners_px = fitted.corners.iter().copied().collect::<Option<Vec<Vec2>>>()?;
     Some((Chessboard { columns, rows, corners_px, orientation: ordered.orientation }, fitted))
 }
@@ -341,7 +350,14 @@ fn in_part<T: Level>(
     rows: usize,
 ) -> Option<SeenBoard> {
     let ordered = board::ordered(&seen.lattice, &seen.rectangle, &seen.places, (columns, rows));
-    let fitted = refine::refined(pyramid, level, &seen.found(&ordered.marks), columns, ordered.starts_dark);
+    let fitted = refine::refined(
+        pyramid,
+        level,
+        &seen.found(&ordered.marks),
+        columns,
+        ordered.starts_dark,
+        &Look::PLAIN,
+    );
     certain(fitted.alike(pyramid.photo(), columns), columns, rows, ordered.orientation)
 }
 

@@ -1,10 +1,11 @@
-//! Where are the marks in a photograph? Discs, ordered grids of discs, chessboard corners.
+//! Where are the marks in a photograph? Discs, ordered grids of discs, chessboard corners, boards with markers.
 
 mod beside;
 mod bias;
 mod blob;
 mod centre;
 mod chessboard;
+mod coded;
 mod components;
 mod corner;
 mod discs;
@@ -32,6 +33,9 @@ mod threshold;
 pub use bias::{Imaging, disc_bias, disc_biases};
 pub use blob::Blob;
 pub use chessboard::{Chessboard, ChessboardError, chessboard, seen_chessboard};
+pub use coded::{
+    AprilGrid, Charuco, CodedError, Dictionary, LayoutError, UnknownDictionary, seen_april_grid, seen_charuco,
+};
 pub use components::Polarity;
 pub use corner::{RefineError, refine_corner};
 pub use discs::{BlobOptions, blobs};

@@ -64,8 +64,30 @@ pub(super) struct Crossing {
 pub(super) enum Window {
     /// A disc of this radius, px.
     Disc(usize),
-    /// A parallelogram: half its sides, along the first edge and along the second, px.
-    Along([Vec2; 2]),
+    /// A parallelogram about squares.
+    Along {
+        /// Half its sides, along the first edge and along the second, px.
+        sides: [Vec2; 2],
+        /// How far from the second edge and from the first the squares are plain, in sides; `None`: all over.
+        plain: Option<[f64; 2]>,
+    },
+}
+
+/// What is left of a plain strip for the fit, however far the blur of what follows reaches into it.
+const LEAST_OF_PLAIN: f64 = 0.5;
+
+impl Window {
+    /// Whether a pixel shows nothing but the crossing: what lies in the squares' middle, and its blur, is left out in all
+    /// four alike, so that the window stays symmetric under half a turn.
+    fn is_plain(&self, offset: &Vec2, edges_px: [f64; 2]) -> bool {
+        let Window::Along { sides: [first, second], plain: Some(plain) } = self else { return true };
+        let area = first.perp(second);
+        let reach_px = Edge::new(edges_px[0].max(edges_px[1])).reach_px();
+        let along = [offset.perp(second) / area, first.perp(offset) / area];
+        // How many pixels from edge to edge a side is high.
+        let height_px = [area.abs() / second.norm(), area.abs() / first.norm()];
+        (0..2).any(|i| along[i].abs() < (plain[i] - reach_px / height_px[i]).max(LEAST_OF_PLAIN * plain[i]))
+    }
 }
 
 /// A pixel: its offset from the window's centre, and its level.
@@ -93,13 +115,15 @@ pub(super) fn fit_near_edges<T: Level>(
     let normals = directions(start).map(|along| Vec2::new(-along.y, along.x));
     let widest_px = match window {
         Window::Disc(half_px) => *half_px as f64,
-        Window::Along(sides) => sides[0].norm().max(sides[1].norm()),
+        Window::Along { sides, .. } => sides[0].norm().max(sides[1].norm()),
     };
     let mut begin = *start;
     for _ in 0..MAX_BANDS {
         let thought_px = begin.edges_px.map(|edge_px| WIDER * edge_px);
         let bands = thought_px.map(|edge_px| Edge::new(edge_px).reach_px() + PLATEAU_PX);
-        let near = |(offset, _): &&Pixel| (0..2).any(|i| normals[i].dot(offset).abs() < bands[i]);
+        let near = |(offset, _): &&Pixel| {
+            (0..2).any(|i| normals[i].dot(offset).abs() < bands[i]) && window.is_plain(offset, thought_px)
+        };
         let pixels: Vec<Pixel> = all.iter().filter(near).copied().collect();
         let found = fit(&pixels, begin, curvatures, widest_px, most_px)?;
         if pixels.len() == all.len() || (0..2).all(|i| found.edges_px[i] <= thought_px[i]) {
@@ -117,7 +141,8 @@ pub(super) fn misfit<T: Level>(
     window: &Window,
     curvatures: [f64; 2],
 ) -> Option<f64> {
-    let pixels = pixels_in(image, crossing.corner, window)?;
+    let mut pixels = pixels_in(image, crossing.corner, window)?;
+    pixels.retain(|(offset, _)| window.is_plain(offset, crossing.edges_px));
     let along = directions(crossing);
     let side = |i: usize, offset: &Vec2| {
         let normal = Vec2::new(-along[i].y, along[i].x);
@@ -171,7 +196,7 @@ fn fit(
 fn pixels_in<T: Level>(image: &Raster<T>, centre: Vec2, window: &Window) -> Option<Vec<Pixel>> {
     let (reach, inverse) = match window {
         Window::Disc(half_px) => (Vec2::repeat(*half_px as f64), None),
-        Window::Along([first, second]) => {
+        Window::Along { sides: [first, second], .. } => {
             let sides = Matrix2::from_columns(&[*first, *second]);
             let inverse = sides.try_inverse()?;
             ((first.abs() + second.abs()).map(libm::ceil), Some(inverse))

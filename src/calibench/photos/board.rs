@@ -1,11 +1,13 @@
 //! What does the user say of a board, and where are its marks in a photograph? `chess:9x6:25mm`,
-//! `circles:9x7:10mm:3mm`.
+//! `circles:9x7:10mm:3mm`, `charuco:7x5:30mm:22mm:DICT_4X4_50`.
 
+use super::coded::{self, Coded};
 use super::discs::{NotFound, ordered_discs};
 use crate::board::{Arrangement, Board, BoardError, Pattern};
 use crate::detect::{
-    ChessboardError, GridError, SeenBoard, chessboard, circle_grid_of, seen_chessboard, seen_circle_grid_of,
-    seen_staggered_grid_of, sparse_dots_of, staggered_grid_of,
+    AprilGrid, ChessboardError, CodedError, GridError, LayoutError, SeenBoard, UnknownDictionary, chessboard,
+    circle_grid_of, seen_chessboard, seen_circle_grid_of, seen_staggered_grid_of, sparse_dots_of,
+    staggered_grid_of,
 };
 use crate::geometry::Vec2;
 use crate::io::Grey;
@@ -25,10 +27,15 @@ pub enum MarkKind {
     Hexagonal,
     /// A few dots, such as 3 x 3.
     Dots,
+    /// Inner corners of a chessboard with markers in its white squares, OpenCV's ChArUco board.
+    Charuco,
+    /// Corners of AprilTags with small squares between them, Kalibr's `aprilgrid`.
+    AprilGrid,
 }
 
 impl MarkKind {
-    const ALL: [MarkKind; 5] =
+    /// Those whose words are `KIND:COLUMNSxROWS:SPACING[:DIAMETER]`.
+    const PLAIN: [MarkKind; 5] =
         [MarkKind::Chess, MarkKind::Circles, MarkKind::Asymmetric, MarkKind::Hexagonal, MarkKind::Dots];
 
     /// Its word on the command line.
@@ -39,7 +46,15 @@ impl MarkKind {
             MarkKind::Asymmetric => "asymmetric",
             MarkKind::Hexagonal => "hexagonal",
             MarkKind::Dots => "dots",
+            MarkKind::Charuco => "charuco",
+            MarkKind::AprilGrid => "aprilgrid",
         }
+    }
+
+    /// Whether its marks are discs.
+    pub fn is_of_discs(self) -> bool {
+        use MarkKind::{Asymmetric, Circles, Dots, Hexagonal};
+        matches!(self, Circles | Asymmetric | Hexagonal | Dots)
     }
 
     /// How its marks lie to each other.
@@ -47,12 +62,13 @@ impl MarkKind {
         match self {
             MarkKind::Asymmetric => Arrangement::Asymmetric,
             MarkKind::Hexagonal => Arrangement::Hexagonal,
-            MarkKind::Chess | MarkKind::Circles | MarkKind::Dots => Arrangement::Square,
+            _ => Arrangement::Square,
         }
     }
 }
 
-/// A board as it stands on the command line: `KIND:COLUMNSxROWS:SPACING[:DIAMETER]`.
+/// A board as it stands on the command line: `KIND:COLUMNSxROWS:SPACING[:DIAMETER]`,
+/// `charuco:SQUARESXxSQUARESY:SQUARE:MARKER:DICTIONARY[:legacy]` or `aprilgrid:COLUMNSxROWS:TAG:SPACING`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoardSpec {
     /// Look of the marks.
@@ -62,6 +78,7 @@ pub struct BoardSpec {
     /// Whether the discs' diameter is known, without which their bias cannot be corrected.
     pub diameter_known: bool,
     board: Board,
+    coded: Option<Coded>,
 }
 
 /// Why a text is no board.
@@ -71,9 +88,28 @@ pub enum BoardSpecError {
     /// The text has another form.
     #[error(
         "expected KIND:COLUMNSxROWS:SPACING[:DIAMETER], such as chess:9x6:25mm, circles:9x7:10mm:3mm, \
-         asymmetric:4x11:20mm:15mm, hexagonal:9x9:10mm:5mm or dots:3x3:1, got `{0}`"
+         asymmetric:4x11:20mm:15mm, hexagonal:9x9:10mm:5mm or dots:3x3:1, or charuco:7x5:30mm:22mm:DICT_4X4_50 or \
+         aprilgrid:6x6:88mm:0.3, got `{0}`"
     )]
     Form(String),
+    /// A ChArUco board in another form.
+    #[error(
+        "expected charuco:SQUARESXxSQUARESY:SQUARE:MARKER:DICTIONARY, such as charuco:7x5:30mm:22mm:DICT_4X4_50, with :legacy behind it \
+         for OpenCV's legacy pattern, got `charuco:{0}`"
+    )]
+    Charuco(String),
+    /// A grid of AprilTags in another form.
+    #[error(
+        "expected aprilgrid:COLUMNSxROWS:TAG:SPACING, Kalibr's tagCols, tagRows, tagSize and tagSpacing, such as aprilgrid:6x6:88mm:0.3, \
+         got `aprilgrid:{0}`"
+    )]
+    AprilGrid(String),
+    /// No such board with markers exists.
+    #[error(transparent)]
+    Layout(LayoutError),
+    /// No such markers exist.
+    #[error(transparent)]
+    Dictionary(#[from] UnknownDictionary),
     /// A length is not a number with a known unit.
     #[error("`{0}` is not a length: give a number, with mm, cm, m or no unit behind it")]
     Length(String),
@@ -103,12 +139,23 @@ pub enum DetectError {
     /// The chessboard is not seen whole and clearly.
     #[error(transparent)]
     Chessboard(#[from] ChessboardError),
+    /// The board with markers is not seen, or it is not certain which part of it is.
+    #[error(transparent)]
+    Coded(#[from] CodedError),
+    /// Some marks are not seen, and all were asked for.
+    #[error("{missing} of {marks} marks are not seen")]
+    Hidden {
+        /// Marks that are not seen.
+        missing: usize,
+        /// Marks of the board.
+        marks: usize,
+    },
 }
 
 /// A length in a unit: its value in millimetres a unit, if the unit is known.
-struct Length {
-    value: f64,
-    unit: &'static str,
+pub(super) struct Length {
+    pub(super) value: f64,
+    pub(super) unit: &'static str,
 }
 
 /// Units and their length, mm.
@@ -131,7 +178,7 @@ impl FromStr for Length {
 
 impl Length {
     /// The value in another unit; a length without a unit is in any.
-    fn in_unit(&self, unit: &str) -> Result<f64, BoardSpecError> {
+    pub(super) fn in_unit(&self, unit: &str) -> Result<f64, BoardSpecError> {
         match (millimetres(self.unit), millimetres(unit)) {
             (Some(own), Some(other)) => Ok(self.value * own / other),
             (Some(_), None) => Err(BoardSpecError::Unit(self.unit.to_string())),
@@ -146,12 +193,21 @@ impl FromStr for BoardSpec {
     fn from_str(text: &str) -> Result<BoardSpec, BoardSpecError> {
         let form = || BoardSpecError::Form(text.to_string());
         let parts: Vec<&str> = text.split(':').map(str::trim).collect();
+        if let Some(parsed) = coded::parse(&parts) {
+            let (coded, board, unit) = parsed?;
+            let kind = match coded {
+                Coded::Charuco(..) => MarkKind::Charuco,
+                Coded::AprilGrid(..) => MarkKind::AprilGrid,
+            };
+            let (unit, coded) = (unit.to_string(), Some(coded));
+            return Ok(BoardSpec { kind, unit, diameter_known: false, board, coded });
+        }
         let (kind, size, spacing, diameter) = match parts[..] {
             [kind, size, spacing] => (kind, size, spacing, None),
             [kind, size, spacing, diameter] => (kind, size, spacing, Some(diameter)),
             _ => return Err(form()),
         };
-        let kind = MarkKind::ALL.into_iter().find(|known| known.name() == kind).ok_or_else(form)?;
+        let kind = MarkKind::PLAIN.into_iter().find(|known| known.name() == kind).ok_or_else(form)?;
         let (columns, rows) = size.split_once('x').ok_or_else(form)?;
         let columns = columns.parse().map_err(|_| form())?;
         let rows = rows.parse().map_err(|_| form())?;
@@ -165,18 +221,22 @@ impl FromStr for BoardSpec {
             (_, None) => Pattern::Chessboard,
         };
         let board = Board::arranged(columns, rows, spacing.value, pattern, kind.arrangement())?;
-        Ok(BoardSpec { kind, unit: spacing.unit.to_string(), diameter_known: diameter.is_some(), board })
+        let unit = spacing.unit.to_string();
+        Ok(BoardSpec { kind, unit, diameter_known: diameter.is_some(), board, coded: None })
     }
 }
 
 impl fmt::Display for BoardSpec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(coded) = &self.coded {
+            return f.write_str(&coded.described(&self.board, &self.unit));
+        }
         let (name, marks) = match self.kind {
-            MarkKind::Chess => ("chessboard", "inner corners"),
             MarkKind::Circles => ("circle grid", "discs"),
             MarkKind::Asymmetric => ("staggered grid", "discs, rows"),
             MarkKind::Hexagonal => ("hexagonal grid", "discs"),
             MarkKind::Dots => ("dots", "marks"),
+            MarkKind::Chess | MarkKind::Charuco | MarkKind::AprilGrid => ("chessboard", "inner corners"),
         };
         let (board, unit) = (&self.board, &self.unit);
         let comma = if marks.contains(',') { "" } else { "," };
@@ -189,9 +249,34 @@ impl fmt::Display for BoardSpec {
 }
 
 impl BoardSpec {
-    /// The board; discs of unknown diameter count as points.
+    /// The board; discs of unknown diameter count as points. Of tags it has as many marks, all at their mean distance:
+    /// where they are, [`BoardSpec::points`] says.
     pub fn board(&self) -> &Board {
         &self.board
+    }
+
+    /// The marks in their order, in the board's unit, about its middle.
+    pub fn points(&self) -> Vec<Vec2> {
+        self.coded.map_or_else(|| self.board.points(), |coded| coded.points(&self.board))
+    }
+
+    /// What is black on a board with markers, as upright rectangles of which no two overlap, each by its corners of least
+    /// and of greatest coordinates; `None` for other boards.
+    pub fn dark(&self) -> Option<Vec<[Vec2; 2]>> {
+        self.coded.map(|coded| coded.dark(&self.board))
+    }
+
+    /// The grid of a board of AprilTags, and the side of a tag in the board's unit.
+    pub fn april_grid(&self) -> Option<(AprilGrid, f64)> {
+        match self.coded {
+            Some(Coded::AprilGrid(grid, tag)) => Some((grid, tag)),
+            _ => None,
+        }
+    }
+
+    /// Whether the marks are discs whose bias cannot be told, since their diameter is not known.
+    pub fn lacks_diameter(&self) -> bool {
+        self.kind.is_of_discs() && !self.diameter_known
     }
 
     /// The same board `factor` times as large, as a printer may make it.
@@ -199,6 +284,10 @@ impl BoardSpec {
     /// # Errors
     /// No such board exists.
     pub fn scaled(&self, factor: f64) -> Result<BoardSpec, BoardSpecError> {
+        if let Some(coded) = &self.coded {
+            let (coded, board) = coded.scaled(&self.board, factor)?;
+            return Ok(BoardSpec { board, coded: Some(coded), ..self.clone() });
+        }
         let pattern = match self.board.pattern() {
             Pattern::Circles { diameter } => Pattern::Circles { diameter: factor * diameter },
             Pattern::Chessboard => Pattern::Chessboard,
@@ -212,6 +301,9 @@ impl BoardSpec {
     /// The board as it stands on the command line: what is read from it is this board again.
     pub fn words(&self) -> String {
         let (board, unit) = (&self.board, &self.unit);
+        if let Some(coded) = &self.coded {
+            return coded.words(board, unit);
+        }
         let kind = self.kind.name();
         let words = format!("{kind}:{}x{}:{}{unit}", board.columns(), board.rows(), board.spacing());
         match board.pattern() {
@@ -231,10 +323,14 @@ impl BoardSpec {
     /// See [`DetectError`].
     pub fn detect(&self, photo: &Grey) -> Result<Vec<Vec2>, NotFound> {
         let (columns, rows) = (self.board.columns(), self.board.rows());
+        let no_candidates = |reason| NotFound { reason, candidates_px: Vec::new() };
         let grid = match self.kind {
-            MarkKind::Chess => {
-                let no_candidates = |reason| NotFound { reason, candidates_px: Vec::new() };
-                return self.corners(photo).map_err(no_candidates);
+            MarkKind::Chess => return self.corners(photo).map_err(no_candidates),
+            MarkKind::Charuco | MarkKind::AprilGrid => {
+                let seen = self.see(photo)?;
+                let (missing, marks) = (seen.missing(), seen.places_px().len());
+                let all = seen.places_px().iter().copied().collect::<Option<Vec<Vec2>>>();
+                return all.ok_or_else(|| no_candidates(DetectError::Hidden { missing, marks }));
             }
             MarkKind::Dots => ordered_discs(photo, |discs| sparse_dots_of(discs, columns, rows)),
             MarkKind::Circles => ordered_discs(photo, |discs| circle_grid_of(discs, columns, rows)),
@@ -245,16 +341,22 @@ impl BoardSpec {
         Ok(grid?.centres_px())
     }
 
-    /// The marks that are seen in a photograph. Of a chessboard or a dense grid of discs some may be hidden, outside of the
-    /// image or in glare, where it is certain which ([`seen_chessboard`], [`seen_circle_grid_of`],
-    /// [`seen_staggered_grid_of`]); a few dots must all be there.
+    /// The marks that are seen in a photograph. Of a board with markers they are those that are seen, wherever on the board
+    /// ([`seen_charuco`](crate::detect::seen_charuco)). Of a chessboard or a dense grid of discs some may be hidden, outside of the
+    /// image or in glare, where it is certain which ([`seen_chessboard`], [`seen_circle_grid_of`], [`seen_staggered_grid_of`]); a
+    /// few dots must all be there.
     ///
     /// # Errors
     /// See [`DetectError`].
     pub fn see(&self, photo: &Grey) -> Result<SeenBoard, NotFound> {
         let (columns, rows) = (self.board.columns(), self.board.rows());
+        if let Some(coded) = &self.coded {
+            let no_candidates =
+                |reason: CodedError| NotFound { reason: reason.into(), candidates_px: Vec::new() };
+            return coded.see(photo).map_err(no_candidates);
+        }
         match self.kind {
-            MarkKind::Chess => {
+            MarkKind::Chess | MarkKind::Charuco | MarkKind::AprilGrid => {
                 let seen = match photo {
                     Grey::U8(image) => seen_chessboard(image, columns, rows),
                     Grey::U16(image) => seen_chessboard(image, columns, rows),
@@ -319,12 +421,30 @@ mod tests {
             "asymmetric:4x11:20mm:15mm",
             "hexagonal:9x9:1cm:0.5cm",
             "asymmetric:4x11:20mm",
+            "charuco:7x5:30mm:22mm:DICT_4X4_50",
+            "charuco:5x8:3cm:2cm:DICT_APRILTAG_36h11:legacy",
+            "aprilgrid:6x6:88mm:0.3",
         ] {
             let spec: BoardSpec = text.parse().unwrap();
             assert_eq!(spec.words(), text);
             assert_eq!(spec.scaled(1.0).unwrap(), spec);
             assert_eq!(spec.scaled(2.0).unwrap().board().arrangement(), spec.board().arrangement());
         }
+    }
+
+    #[test]
+    fn a_board_with_markers_is_counted_in_opencvs_and_kalibrs_way() {
+        let spec: BoardSpec = "charuco:7x5:3cm:22mm:4x4_50".parse().unwrap();
+        assert_eq!((spec.board().columns(), spec.board().rows(), spec.points().len()), (6, 4, 24));
+        assert_eq!(spec.words(), "charuco:7x5:3cm:2.2cm:DICT_4X4_50");
+        let spec: BoardSpec = "aprilgrid:6x7:88mm:0.3".parse().unwrap();
+        let points = spec.points();
+        assert_eq!(points.len(), 12 * 14);
+        // The first tag stands at the lower left; y points downwards, and rows go upwards.
+        assert!((points[1] - points[0] - Vec2::new(88.0, 0.0)).norm() < 1e-9);
+        assert!((points[12] - points[0] - Vec2::new(0.0, -88.0)).norm() < 1e-9);
+        assert!((points[2] - points[0] - Vec2::new(114.4, 0.0)).norm() < 1e-9);
+        assert!(points.iter().sum::<Vec2>().norm() < 1e-9);
     }
 
     #[test]
@@ -338,5 +458,14 @@ mod tests {
         assert!(matches!(refused("chess:9x6:25mm:3mm"), BoardSpecError::CornerDiameter { .. }));
         assert!(matches!(refused("circles:9x7:10mm:2cm"), BoardSpecError::Board(_)));
         assert!(matches!(refused("chess:1x6:25mm"), BoardSpecError::Board(_)));
+        for text in
+            ["charuco:7x5:30mm", "charuco:7:30mm:22mm:DICT_4X4_50", "charuco:7x5:30mm:22mm:DICT_4X4_50:old"]
+        {
+            assert!(matches!(refused(text), BoardSpecError::Charuco(_)), "{text}");
+        }
+        assert!(matches!(refused("charuco:7x5:30mm:22mm:DICT_9X9_50"), BoardSpecError::Dictionary(_)));
+        assert!(matches!(refused("charuco:7x5:22mm:30mm:DICT_4X4_50"), BoardSpecError::Layout(_)));
+        assert!(matches!(refused("aprilgrid:6x6:88mm"), BoardSpecError::AprilGrid(_)));
+        assert!(matches!(refused("aprilgrid:6x6:88mm:26mm"), BoardSpecError::AprilGrid(_)));
     }
 }

@@ -7,6 +7,7 @@
 
 mod board;
 mod board_file;
+mod coded;
 mod discs;
 mod fit;
 

@@ -208,10 +208,74 @@ pub fn photograph<C: Copy + Into<Camera<Lens>>>(
     cam_from_target: &Pose,
     imaging: &Imaging,
 ) -> Result<Photograph, RenderError> {
-    let camera: Camera<Lens> = (*camera).into();
-    check(&camera, imaging)?;
+    let marks = board.points();
+    let sheet = imaging.appearance.surround.map(|surround| sheet_outline(board, surround.margin));
+    photographed(
+        &(*camera).into(),
+        image_size,
+        cam_from_target,
+        imaging,
+        &mark_outlines(board),
+        sheet,
+        &marks,
+    )
+}
+
+/// Photographs a board of upright black rectangles, such as one with markers ([`Charuco::dark`](crate::detect::Charuco::dark)): no
+/// two may overlap, and each is given by its corners of least and of greatest coordinates. Its sheet reaches `margin` beyond the
+/// outermost.
+///
+/// # Errors
+/// As for [`photograph`].
+///
+/// ```
+/// use calibench::board::Board;
+/// use calibench::detect::{Charuco, Orientation, seen_charuco};
+/// use calibench::geometry::Vec2;
+/// use calibench::synth::Truth;
+/// use calibench::synth::render::{Imaging, photograph_dark};
+///
+/// let board = Charuco::new(8, 6, 0.72, "DICT_4X4_50".parse()?, false)?;
+/// // Squares of 9 mm about the board's middle.
+/// let dark: Vec<[Vec2; 2]> =
+///     board.dark().into_iter().map(|square| square.map(|p| 9.0 * (p - Vec2::new(4.0, 3.0)))).collect();
+/// let marks = Board::chessboard(7, 5, 9.0)?.points();
+/// let (camera, pose) = (Truth::example_camera(), Truth::example_poses()[1]);
+/// let photo = photograph_dark(&camera, Truth::EXAMPLE_IMAGE, &dark, &marks, &pose, &Imaging::default())?;
+/// let seen = seen_charuco(&photo.image, &board)?;
+/// assert_eq!((seen.places_px().len(), seen.missing(), seen.orientation()), (35, 0, Orientation::Fixed));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn photograph_dark<C: Copy + Into<Camera<Lens>>>(
+    camera: &C,
+    image_size: (usize, usize),
+    dark: &[[Vec2; 2]],
+    marks: &[Vec2],
+    cam_from_target: &Pose,
+    imaging: &Imaging,
+) -> Result<Photograph, RenderError> {
+    let outlines: Vec<Outline> = dark.iter().map(|[low, high]| Outline::rectangle(*low, *high)).collect();
+    let sheet = imaging.appearance.surround.map(|surround| {
+        let corners = || dark.iter().flatten().copied();
+        let (low, high) = (corners().reduce(|a, b| a.inf(&b)), corners().reduce(|a, b| a.sup(&b)));
+        let margin = Vec2::repeat(surround.margin);
+        Outline::rectangle(low.unwrap_or_default() - margin, high.unwrap_or_default() + margin)
+    });
+    photographed(&(*camera).into(), image_size, cam_from_target, imaging, &outlines, sheet, marks)
+}
+
+fn photographed(
+    camera: &Camera<Lens>,
+    image_size: (usize, usize),
+    cam_from_target: &Pose,
+    imaging: &Imaging,
+    dark: &[Outline],
+    sheet: Option<Outline>,
+    marks: &[Vec2],
+) -> Result<Photograph, RenderError> {
+    check(camera, imaging)?;
     check_pose(cam_from_target)?;
-    let projector = Projector { optics: Optics::of(camera), cam_from_target };
+    let projector = Projector { optics: Optics::of(*camera), cam_from_target };
     let covered_by = |outlines: &[Outline]| -> Result<Coverage, RenderError> {
         let mut coverage = Coverage::new(image_size.0, image_size.1);
         for outline in outlines {
@@ -223,10 +287,9 @@ pub fn photograph<C: Copy + Into<Camera<Lens>>>(
         Ok(coverage)
     };
     let appearance = &imaging.appearance;
-    let ink = covered_by(&mark_outlines(board))?;
-    let sheet = appearance
-        .surround
-        .map(|surround| Ok((surround, covered_by(&[sheet_outline(board, surround.margin)])?)))
+    let ink = covered_by(dark)?;
+    let sheet = (appearance.surround.zip(sheet))
+        .map(|(surround, sheet)| Ok((surround, covered_by(&[sheet])?)))
         .transpose()?;
     let image = Raster::from_fn(image_size.0, image_size.1, |x, y| {
         let ground = sheet.as_ref().map_or(appearance.paper, |(surround, sheet)| {
@@ -235,7 +298,7 @@ pub fn photograph<C: Copy + Into<Camera<Lens>>>(
         let level = ground + (appearance.ink - appearance.paper) * ink.at(x, y);
         (level * imaging.shading.gain(x, y, image_size)) as f32
     });
-    let centres_true = board.points().iter().map(|point| projector.pixel(point)).collect::<Result<_, _>>()?;
+    let centres_true = marks.iter().map(|point| projector.pixel(point)).collect::<Result<_, _>>()?;
     Ok(Photograph { image, centres_true })
 }
 

@@ -53,6 +53,13 @@ fn content(sheet: &Sheet) -> String {
             Ink::Rectangle { corner, size } => {
                 writeln!(text, "{} {} {} {} re f", mm(corner.x), mm(corner.y), mm(size.x), mm(size.y))
             }
+            Ink::Cells(cells) => {
+                for [low, high] in cells {
+                    let size = high - low;
+                    let _ = writeln!(text, "{} {} {} {} re", mm(low.x), mm(low.y), mm(size.x), mm(size.y));
+                }
+                writeln!(text, "f")
+            }
             // The matrix turns the letters upright again.
             Ink::Words { at, height, text: words } => {
                 writeln!(

@@ -4,7 +4,7 @@
 use super::paper::Paper;
 use calibench::board::Pattern;
 use calibench::geometry::Vec2;
-use calibench::photos::{BoardSpec, MarkKind};
+use calibench::photos::BoardSpec;
 
 /// Something black on the white page.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,6 +13,8 @@ pub(super) enum Ink {
     Disc { centre: Vec2, diameter: f64 },
     /// An upright rectangle by its top left corner.
     Rectangle { corner: Vec2, size: Vec2 },
+    /// Upright rectangles by their top left and bottom right corners, filled as one: where two touch, no line shows.
+    Cells(Vec<[Vec2; 2]>),
     /// Words, by the left end of their base line and the height of the type.
     Words { at: Vec2, height: f64, text: String },
 }
@@ -65,7 +67,7 @@ impl Sheet {
     /// Draws a board on a sheet of paper, which lies wide.
     pub fn of(board: &BoardSpec, paper: &Paper) -> Result<Sheet, SheetError> {
         let unit = board.unit_mm().ok_or(SheetError::NoUnit)?;
-        if board.kind != MarkKind::Chess && !board.diameter_known {
+        if board.lacks_diameter() {
             return Err(SheetError::NoDiameter);
         }
         let (size, extent, room): (Vec2, Vec2, Vec2) =
@@ -161,6 +163,10 @@ fn room(paper: &Paper) -> Vec2 {
 
 /// Width and height of a board's ink.
 pub(super) fn extent(board: &BoardSpec, unit: f64) -> Vec2 {
+    if let Some(dark) = board.dark() {
+        // About the board's middle.
+        return dark.iter().fold(Vec2::zeros(), |extent, [_, high]| extent.sup(&(2.0 * unit * high)));
+    }
     let board = board.board();
     // The outermost marks lie as far on both sides of the origin.
     let reach = board.points().iter().fold(Vec2::zeros(), |reach, point| reach.sup(&point.abs()));
@@ -175,6 +181,10 @@ pub(super) fn extent(board: &BoardSpec, unit: f64) -> Vec2 {
 /// The ink of the board's marks around their middle.
 fn marks(board: &BoardSpec, unit: f64, middle: Vec2) -> Vec<Ink> {
     let spec = board;
+    if let Some(dark) = spec.dark() {
+        let place = |corners: [Vec2; 2]| corners.map(|corner| middle + unit * corner);
+        return vec![Ink::Cells(dark.into_iter().map(place).collect())];
+    }
     let board = spec.board();
     match board.pattern() {
         Pattern::Circles { diameter } => {
@@ -272,6 +282,8 @@ mod tests {
             ("dots:3x3:20mm:8mm", "A5"),
             ("asymmetric:4x8:20mm:14mm", "A4"),
             ("hexagonal:16x11:15mm:7mm", "A4"),
+            ("charuco:7x5:35mm:26mm:DICT_4X4_50", "A4"),
+            ("aprilgrid:6x4:30mm:0.3", "A4"),
         ] {
             let sheet = sheet(board, paper).unwrap();
             let spec: BoardSpec = board.parse().unwrap();
@@ -282,6 +294,11 @@ mod tests {
                     (centre - radius, centre + radius)
                 }
                 Ink::Rectangle { corner, size } => (*corner, corner + size),
+                Ink::Cells(cells) => {
+                    let corners = || cells.iter().flatten().copied();
+                    let low = corners().reduce(|a, b| a.inf(&b)).unwrap();
+                    (low, corners().reduce(|a, b| a.sup(&b)).unwrap())
+                }
                 Ink::Words { at, height, text } => (
                     at - Vec2::new(0.0, *height),
                     at + Vec2::new(LETTER_WIDTH * height * text.len() as f64, 0.0),
@@ -321,6 +338,17 @@ mod tests {
             |ink| matches!(ink, Ink::Rectangle { size, .. } if (size - Vec2::new(20.0, 20.0)).norm() < 1e-12),
         );
         assert_eq!(squares.count(), 6);
+    }
+
+    #[test]
+    fn a_board_with_markers_is_as_large_as_it_says() {
+        for (board, width, height) in [
+            ("charuco:7x5:3cm:22mm:DICT_4X4_50", 210.0, 150.0),
+            ("aprilgrid:6x4:30mm:0.3", 6.0 * 39.0 + 9.0, 4.0 * 39.0 + 9.0),
+        ] {
+            let size = extent(&board.parse().unwrap(), if board.contains("cm") { 10.0 } else { 1.0 });
+            assert!((size - Vec2::new(width, height)).norm() < 1e-9, "{size}");
+        }
     }
 
     #[test]

@@ -30,6 +30,14 @@ pub(super) fn svg(sheet: &Sheet) -> String {
                 mm(size.x),
                 mm(size.y)
             ),
+            Ink::Cells(cells) => {
+                text.push_str("<path d=\"");
+                for [low, high] in cells {
+                    let (left, top, right, bottom) = (mm(low.x), mm(low.y), mm(high.x), mm(high.y));
+                    let _ = write!(text, "M{left} {top}H{right}V{bottom}H{left}Z");
+                }
+                writeln!(text, "\"/>")
+            }
             Ink::Words { at, height, text: words } => {
                 writeln!(
                     text,

@@ -187,7 +187,7 @@ fn first_mark(orientation: Option<Orientation>) -> &'static str {
     match orientation {
         None => "",
         Some(Orientation::Fixed) => {
-            "first mark: the same one of the board in every view, by the colours of its squares or where its rows begin\n"
+            "first mark: the same one of the board in every view, by the colours of its squares, its markers or where its rows begin\n"
         }
         Some(Orientation::HalfTurn) => {
             "first mark: not fixed by this board, which looks the same after half a turn; in each view that nearer to the top left\n"

@@ -8,7 +8,7 @@ use calibench::detect::SeenBoard;
 use calibench::geometry::Vec2;
 use calibench::io::ShownPath;
 use calibench::io::{Grey, ImageError, LeftOut, Memory, Overlay, image_extent, read_image};
-use calibench::photos::{BoardSpec, MarkKind, NotFound};
+use calibench::photos::{BoardSpec, NotFound};
 use calibench::raster::{Level, Raster};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -182,7 +182,7 @@ fn observed(
         Some(size) => Some((size, "--image-size has".to_string())),
         None => ruling_size(&seen)?,
     };
-    let points = board.board().points();
+    let points = board.points();
     let mut observed = Observed {
         source: format!("{} photographs of a {board}", photos.len()),
         title: format!("photographs of a {board}"),
@@ -193,7 +193,7 @@ fn observed(
         discs: board.diameter_known.then(|| *board.board()),
         ..Observed::default()
     };
-    if board.kind != MarkKind::Chess && !board.diameter_known {
+    if board.lacks_diameter() {
         observed.notes.push(
             "the centres of the imaged discs are not corrected for their bias, because the discs' diameter is not known: add \
              it to --board, as in circles:9x7:10mm:3mm"

@@ -11,6 +11,7 @@
 
 use super::candidates::Candidate;
 use super::level::Smoothed;
+use super::look::Look;
 use super::places::Places;
 use super::probe::probe;
 use crate::detect::lattice::{Lattice, Place};
@@ -35,10 +36,6 @@ const SEARCH: f64 = 0.3;
 /// on a circle of 3.5 px.
 const LEAST_COSINE: f64 = 0.9;
 
-/// Nearest candidates among which a corner looks for its first neighbours: noise and texture may stand
-/// between.
-const NEAREST: usize = 20;
-
 /// A larger lattice is no board but a tiled wall, which need not be followed to its end.
 const MOST: usize = 4000;
 
@@ -50,13 +47,14 @@ const LEAST_PART_TO_PROBE: f64 = 0.2;
 const MOST_TRIES: u8 = 2;
 
 /// The lattices of a level; a board has the expected number of corners.
-pub fn lattices(level: &Smoothed, candidates: Vec<Candidate>, expected: usize) -> Grown {
+pub fn lattices(level: &Smoothed, look: &Look, candidates: Vec<Candidate>, expected: usize) -> Grown {
     let places: Vec<Vec2> = candidates.iter().map(|c| c.at).collect();
     let neighbours = Neighbours::new(&places);
     let taken = vec![false; candidates.len()];
     let fewest_to_probe = ((LEAST_PART_TO_PROBE * expected as f64) as usize).max(4);
     let mut growth = Growth {
         level,
+        look,
         neighbours: &neighbours,
         corners: candidates,
         taken,
@@ -79,6 +77,7 @@ pub fn lattices(level: &Smoothed, candidates: Vec<Candidate>, expected: usize) -
 
 struct Growth<'a> {
     level: &'a Smoothed,
+    look: &'a Look,
     neighbours: &'a Neighbours<'a>,
     corners: Vec<Candidate>,
     /// Corners of this lattice or of an earlier one.
@@ -101,7 +100,7 @@ impl Growth<'_> {
     /// The seed and its first neighbours along both edges; `false` if it lacks one.
     fn start(&mut self, seed: usize) -> bool {
         let here = self.corners[seed];
-        let near = self.neighbours.nearest_of(seed, NEAREST);
+        let near = self.neighbours.nearest_of(seed, self.look.nearest);
         let mut nearest = [None; 2];
         for (axis, nearest) in nearest.iter_mut().enumerate() {
             *nearest = near.iter().copied().find(|&other| self.is_neighbour(&here, axis, other));
@@ -153,7 +152,8 @@ impl Growth<'_> {
 
     /// Whether the edge runs from one corner to the other.
     fn joined(&self, here: &Candidate, axis: usize, there: &Candidate) -> bool {
-        is_edge(self.level, &here.at, &there.at, axis == 0, LEAST_EDGE * here.contrast.min(there.contrast))
+        let least = LEAST_EDGE * here.contrast.min(there.contrast);
+        is_edge(self.level, self.look.beside, &here.at, &there.at, axis == 0, least)
     }
 
     /// Adds corners to the lattice until no place beside it takes one.
@@ -287,7 +287,9 @@ impl Growth<'_> {
             }
             *tried += 1;
             let Some((at, steps)) = self.prediction(place) else { continue };
-            let Some(corner) = probe(self.level, &at, &steps, axes_at(place) == (0, 1)) else { continue };
+            let Some(corner) = probe(self.level, self.look, &at, &steps, axes_at(place) == (0, 1)) else {
+                continue;
+            };
             let shortest = steps.column(0).norm().min(steps.column(1).norm());
             let is_new = self
                 .lattice
@@ -315,17 +317,17 @@ fn next_step(last: Vec2, before: Option<Vec2>) -> Vec2 {
 }
 
 /// Least difference across an edge as part of the corners' contrast.
-const LEAST_EDGE: f64 = 0.3;
+pub const LEAST_EDGE: f64 = 0.3;
 
 /// Distance from an edge at which its two sides are compared, px of the level.
 const SIDE_PX: f64 = 2.0;
 
-/// Whether the way from one corner to the other has a dark side and a bright one that differ by `least`;
-/// `dark_after`: the dark side is where the way turns to as u turns to v.
-fn is_edge(level: &Smoothed, from: &Vec2, to: &Vec2, dark_after: bool, least: f64) -> bool {
+/// Whether the way from one corner to the other has a dark side and a bright one that differ by `least`, compared
+/// `beside` lengths of the way beside it at most; `dark_after`: the dark side is where the way turns to as u turns to v.
+pub fn is_edge(level: &Smoothed, beside: f64, from: &Vec2, to: &Vec2, dark_after: bool, least: f64) -> bool {
     let way = to - from;
     let length = way.norm();
-    let side = Vec2::new(-way.y, way.x) * (SIDE_PX.min(0.3 * length) / length);
+    let side = Vec2::new(-way.y, way.x) * (SIDE_PX.min(beside * length) / length);
     let mut differences = 0.0;
     for part in [0.35, 0.5, 0.65] {
         let at = from + way * part;

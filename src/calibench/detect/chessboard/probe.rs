@@ -8,11 +8,9 @@
 
 use super::candidates::{Candidate, saddle_offset};
 use super::level::Smoothed;
+use super::look::Look;
 use crate::geometry::Vec2;
 use nalgebra::Matrix2;
-
-/// Places of a quadrant's samples, in steps from the corner.
-const SAMPLES: [f64; 2] = [0.16, 0.34];
 
 /// Offsets that are tried along each step, in steps.
 const OFFSETS: [f64; 5] = [-0.2, -0.1, 0.0, 0.1, 0.2];
@@ -28,30 +26,35 @@ const LEAST_IN_NOISE: f64 = 6.0;
 const LEAST_IN_RANGE: f64 = 0.01;
 
 /// The levels of the four quadrants, each the mean of four samples: between +i and +j, then turning on.
-fn quadrants(level: &Smoothed, at: &Vec2, steps: &Matrix2<f64>) -> Option<[f64; 4]> {
-    let reach = SAMPLES[1] * (steps.column(0).abs() + steps.column(1).abs());
+fn quadrants(level: &Smoothed, look: &Look, at: &Vec2, steps: &Matrix2<f64>) -> Option<[f64; 4]> {
+    let farthest = look.samples[3].0.max(look.samples[3].1);
+    let reach = farthest * (steps.column(0).abs() + steps.column(1).abs());
     if !level.holds(at, reach.amax() + 1.0) {
         return None;
     }
     Some([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].map(|(a, b)| {
         let mut sum = 0.0;
-        for i in SAMPLES {
-            for j in SAMPLES {
-                sum += level.nearest(&(at + steps * Vec2::new(a * i, b * j)));
-            }
+        for (i, j) in look.samples {
+            sum += level.nearest(&(at + steps * Vec2::new(a * i, b * j)));
         }
         0.25 * sum
     }))
 }
 
 /// The corner near a place, if one is there. `dark_between`: the quadrant between both steps is dark.
-pub fn probe(level: &Smoothed, at: &Vec2, steps: &Matrix2<f64>, dark_between: bool) -> Option<Candidate> {
+pub fn probe(
+    level: &Smoothed,
+    look: &Look,
+    at: &Vec2,
+    steps: &Matrix2<f64>,
+    dark_between: bool,
+) -> Option<Candidate> {
     let sign = if dark_between { 1.0 } else { -1.0 };
     let mut best: Option<(f64, Vec2, [f64; 4])> = None;
     for j in OFFSETS {
         for i in OFFSETS {
             let place = at + steps * Vec2::new(i, j);
-            let Some(q) = quadrants(level, &place, steps) else { continue };
+            let Some(q) = quadrants(level, look, &place, steps) else { continue };
             let contrast = sign * 0.5 * ((q[1] + q[3]) - (q[0] + q[2]));
             if best.is_none_or(|(most, ..)| contrast > most) {
                 best = Some((contrast, place, q));

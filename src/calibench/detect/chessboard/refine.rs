@@ -1,10 +1,11 @@
 //! Where exactly are the board's corners? Each fitted in a window that has the shape of its squares.
 //!
-//! Directions, window and curvature of the edges come from the corners beside. A corner found in a reduced
+//! Directions, window and curvature of the edges come from the corners beside; markers in the squares are left out of it. A corner found in a reduced
 //! image is fitted there first, where it is sharp and its place is near enough, then in the photograph
 //! itself.
 
 use super::level::{Pyramid, level_from_photo, photo_from_level, scale};
+use super::look::Look;
 use crate::detect::edge::SHARPEST_EDGE_PX;
 use crate::detect::saddle::{Crossing, Window, fit_near_edges, misfit};
 use crate::detect::smoothness::{expected, out_of_line};
@@ -30,10 +31,14 @@ const LARGEST_MOVE_PX: f64 = 2.0;
 const LARGEST_MISFIT: f64 = 2.0;
 const MISFIT_ALLOWED: f64 = 0.05;
 
+/// Longest step of a grid of tags, in sides of a tag: a window then stays within a border of an eighth of a side.
+const LONGEST_STEP_OF_TAGS: f64 = 0.29;
+
 /// Corners of a board, row by row, px; `None` for those that are hidden.
-pub struct Corners<'a> {
-    pub places: &'a [Option<Vec2>],
-    pub columns: usize,
+struct Corners<'a> {
+    places: &'a [Option<Vec2>],
+    columns: usize,
+    look: &'a Look,
 }
 
 /// What the corners beside tell of a corner.
@@ -57,6 +62,16 @@ impl Corners<'_> {
         [at_place(at > 0, index.wrapping_sub(stride)), at_place(at + 1 < count, index + stride)]
     }
 
+    /// Steps to the corners before and behind a corner. Of tags a step is the shorter of the way between two and what
+    /// their borders leave plain.
+    fn steps_to(&self, index: usize, axis: usize) -> [f64; 2] {
+        let Some(between) = self.look.between_tags else { return [1.0; 2] };
+        let at = if axis == 0 { index % self.columns } else { index / self.columns };
+        let step = between.min(LONGEST_STEP_OF_TAGS);
+        let (tag, between) = (1.0 / step, between / step);
+        if at.is_multiple_of(2) { [between, tag] } else { [tag, between] }
+    }
+
     /// `None` for a corner that is hidden or alone in its row or column.
     fn around(&self, index: usize) -> Option<Around> {
         let (mut steps, mut curvatures) = ([Vec2::zeros(); 2], [0.0; 2]);
@@ -64,13 +79,19 @@ impl Corners<'_> {
         for axis in 0..2 {
             let [before, behind] = self.beside(index, axis);
             let stride = if axis == 0 { 1 } else { self.columns };
+            let [to_before, to_behind] = self.steps_to(index, axis);
             (steps[axis], curvatures[axis]) = match (before, behind) {
-                (Some(before), Some(behind)) => ((behind - before) * 0.5, curvature(&before, &here, &behind)),
-                (None, Some(behind)) => end_of_line(here, behind, self.beside(index + stride, axis)[1]),
+                (Some(before), Some(behind)) => {
+                    ((behind - before) / (to_before + to_behind), curvature(&before, &here, &behind))
+                }
+                (None, Some(behind)) => {
+                    let (step, bent) = end_of_line(here, behind, self.beside(index + stride, axis)[1]);
+                    (step / to_behind, bent)
+                }
                 (Some(before), None) => {
                     let (step, bent) = end_of_line(here, before, self.beside(index - stride, axis)[0]);
                     // Walked backwards, the line turns the other way.
-                    (-step, -bent)
+                    (-step / to_before, -bent)
                 }
                 (None, None) => return None,
             };
@@ -103,6 +124,7 @@ pub struct Fitted {
     pub corners: Vec<Option<Vec2>>,
     /// Their fits in the photograph; `None` also where a reduced image gave the corner.
     crossings: Vec<Option<Crossing>>,
+    look: Look,
 }
 
 /// The corners of a board that were found in a level, fitted in the photograph. `starts_dark`: the square between the
@@ -113,6 +135,7 @@ pub fn refined<T: Level>(
     found: &[Option<Vec2>],
     columns: usize,
     starts_dark: bool,
+    look: &Look,
 ) -> Fitted {
     let is_dark = |index: usize| (index % columns + index / columns).is_multiple_of(2) == starts_dark;
     let start_edge_px = [1.5 * SHARPEST_EDGE_PX; 2];
@@ -120,7 +143,8 @@ pub fn refined<T: Level>(
         found.iter().map(|place| place.map(|place| photo_from_level(&place, level))).collect();
     let mut edges_px = vec![start_edge_px; found.len()];
     if let Some(reduced) = pyramid.reduced(level) {
-        let fitting = Fitting { image: reduced, is_dark: &is_dark, columns, largest_px: LARGEST_START_PX };
+        let fitting =
+            Fitting { image: reduced, is_dark: &is_dark, columns, look, largest_px: LARGEST_START_PX };
         for (index, crossing) in fitting.all(found, &edges_px).into_iter().enumerate() {
             let Some(crossing) = crossing else { continue };
             places[index] = Some(photo_from_level(&crossing.corner, level));
@@ -128,10 +152,12 @@ pub fn refined<T: Level>(
         }
     }
     let fitting =
-        Fitting { image: pyramid.photo(), is_dark: &is_dark, columns, largest_px: LARGEST_REACH_PX };
+        Fitting { image: pyramid.photo(), is_dark: &is_dark, columns, look, largest_px: LARGEST_REACH_PX };
     let mut crossings = fitting.all(&places, &edges_px);
     let mut good: Vec<Option<Vec2>> = crossings.iter().map(|fit| fit.map(|fit| fit.corner)).collect();
-    for index in out_of_line(&mut good, columns) {
+    // Corners of tags have unequal steps, and the tags vouch for them.
+    let out = if look.between_tags.is_some() { Vec::new() } else { out_of_line(&mut good, columns) };
+    for index in out {
         crossings[index] = None;
         let Some((place, tolerance_px)) = expected(&good, columns, index).filter(|_| found[index].is_some())
         else {
@@ -142,11 +168,13 @@ pub fn refined<T: Level>(
         let fit = fitting.one(&places, index, edges_px[index]).filter(|fit| is_near(&fit.corner));
         crossings[index] = fit;
         good[index] = fit.map(|fit| fit.corner).or_else(|| {
-            let in_level = |level| fit_in_level(pyramid, level, &is_dark, &places, columns, index);
+            let in_level = |level| {
+                fit_in_level(pyramid, level, &is_dark, &Corners { places: &places, columns, look }, index)
+            };
             (1..=BLURRED_LEVELS).find_map(|level| in_level(level).filter(is_near))
         });
     }
-    Fitted { corners: good, crossings }
+    Fitted { corners: good, crossings, look: *look }
 }
 
 impl Fitted {
@@ -154,10 +182,10 @@ impl Fitted {
     /// leaves of the levels around it more than noise. A corner that only a reduced image shows is one of a blurred
     /// photograph where most are, and else is covered.
     pub fn alike<T: Level>(&self, photo: &Raster<T>, columns: usize) -> Vec<Option<Vec2>> {
-        let neighbours = Corners { places: &self.corners, columns };
+        let neighbours = Corners { places: &self.corners, columns, look: &self.look };
         let misfit_of = |index: usize| {
             let (crossing, around) = (self.crossings[index]?, neighbours.around(index)?);
-            let window = Window::Along(sides(&around, LARGEST_REACH_PX));
+            let window = window(&around, LARGEST_REACH_PX, &self.look);
             misfit(photo, &crossing, &window, around.curvatures)
         };
         let misfits: Vec<Option<f64>> = (0..self.corners.len()).map(misfit_of).collect();
@@ -184,14 +212,14 @@ fn fit_in_level<T: Level>(
     pyramid: &Pyramid<'_, T>,
     level: usize,
     is_dark: &dyn Fn(usize) -> bool,
-    places: &[Option<Vec2>],
-    columns: usize,
+    corners: &Corners<'_>,
     index: usize,
 ) -> Option<Vec2> {
     let image = pyramid.reduced(level)?;
     let in_level: Vec<Option<Vec2>> =
-        places.iter().map(|place| place.map(|place| level_from_photo(&place, level))).collect();
-    let fitting = Fitting { image, is_dark, columns, largest_px: LARGEST_REACH_PX };
+        corners.places.iter().map(|place| place.map(|place| level_from_photo(&place, level))).collect();
+    let Corners { columns, look, .. } = *corners;
+    let fitting = Fitting { image, is_dark, columns, look, largest_px: LARGEST_REACH_PX };
     let fit = fitting.one(&in_level, index, [1.5 * SHARPEST_EDGE_PX; 2])?;
     Some(photo_from_level(&fit.corner, level))
 }
@@ -205,6 +233,7 @@ struct Fitting<'a, T> {
     image: &'a Raster<T>,
     is_dark: &'a dyn Fn(usize) -> bool,
     columns: usize,
+    look: &'a Look,
     largest_px: f64,
 }
 
@@ -222,9 +251,11 @@ impl<T: Level> Fitting<'_, T> {
     }
 
     fn one(&self, places: &[Option<Vec2>], index: usize, edges_px: [f64; 2]) -> Option<Crossing> {
-        let around = Corners { places, columns: self.columns }.around(index)?;
-        let start = start(self.image, places[index]?, &around, (self.is_dark)(index), edges_px)?;
-        fitted(self.image, &start, &around, self.largest_px)
+        let around = Corners { places, columns: self.columns, look: self.look }.around(index)?;
+        let squares = Squares { around: &around, look: self.look, is_dark: (self.is_dark)(index) };
+        let start = start(self.image, places[index]?, &squares, edges_px)?;
+        let window = window(&around, self.largest_px, self.look);
+        fitted(self.image, &start, &around, &window)
     }
 }
 
@@ -236,28 +267,46 @@ fn sides(around: &Around, largest_px: f64) -> [Vec2; 2] {
     })
 }
 
+fn window(around: &Around, largest_px: f64, look: &Look) -> Window {
+    let sides = sides(around, largest_px);
+    // The sides are parts of the steps, and what is plain is told in steps.
+    let plain = look.plain.map(|plain| [0, 1].map(|i| plain * around.steps[i].norm() / sides[i].norm()));
+    Window::Along { sides, plain }
+}
+
 fn fitted<T: Level>(
     image: &Raster<T>,
     start: &Crossing,
     around: &Around,
-    largest_px: f64,
+    window: &Window,
 ) -> Option<Crossing> {
-    let window = Window::Along(sides(around, largest_px));
     let shortest = around.steps[0].norm().min(around.steps[1].norm());
-    fit_near_edges(image, start, &window, around.curvatures, LARGEST_MOVE_PX.min(0.3 * shortest))
+    fit_near_edges(image, start, window, around.curvatures, LARGEST_MOVE_PX.min(0.3 * shortest))
 }
 
-/// Directions from the corners beside, levels from the pixels in the middle of the quadrants.
+/// The squares about a corner.
+struct Squares<'a> {
+    around: &'a Around,
+    look: &'a Look,
+    /// Whether the square between both steps is dark.
+    is_dark: bool,
+}
+
+/// Directions from the corners beside, levels from the pixels in the middle of the quadrants, or of what is plain of
+/// them.
 fn start<T: Level>(
     image: &Raster<T>,
     corner: Vec2,
-    around: &Around,
-    is_dark: bool,
+    squares: &Squares<'_>,
     edges_px: [f64; 2],
 ) -> Option<Crossing> {
-    let [a, b] = sides(around, LARGEST_REACH_PX);
+    let Squares { around, look, is_dark } = *squares;
+    let [a, b] = match look.plain {
+        None => sides(around, LARGEST_REACH_PX).map(|side| side * 0.6),
+        Some(plain) => around.steps.map(|step| step * (0.5 * plain)),
+    };
     let level = |s: f64, t: f64| {
-        let place = corner + a * (0.6 * s) + b * (0.6 * t);
+        let place = corner + a * s + b * t;
         let (x, y) = (libm::round(place.x), libm::round(place.y));
         let inside = x >= 0.0 && y >= 0.0 && x < image.width() as f64 && y < image.height() as f64;
         inside.then(|| image.get(x as usize, y as usize).to_f64())

@@ -160,19 +160,54 @@ pub struct ChessTarget {
     pub square_m: f64,
 }
 
+/// A grid of AprilTags of the family 36h11 as Kalibr describes it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AprilTarget {
+    /// Tags along a row.
+    pub columns: usize,
+    /// Rows of tags.
+    pub rows: usize,
+    /// Side of a tag, m.
+    pub tag_m: f64,
+    /// Space between two tags, in sides of a tag.
+    pub spacing: f64,
+}
+
+/// A target of Kalibr's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum KalibrTarget {
+    /// `checkerboard`.
+    Chess(ChessTarget),
+    /// `aprilgrid`.
+    AprilGrid(AprilTarget),
+}
+
 /// Reads the target of a `target.yaml`.
 ///
 /// # Errors
-/// See [`FormatError`]; a target that is no chessboard of squares is refused by name.
-pub fn parse_target(file: &str, text: &str) -> Result<ChessTarget, FormatError> {
+/// See [`FormatError`]; a target that is neither a chessboard of squares nor a grid of tags is refused by name.
+pub fn parse_target(file: &str, text: &str) -> Result<KalibrTarget, FormatError> {
     let source = Source { file, text };
     let node = yaml::document(&source)?;
     let root = Field::root(source, &node);
     let kind = root.need("target_type")?;
+    if kind.text()? == "aprilgrid" {
+        let positive = |key: &str| {
+            let field = root.need(key)?;
+            let number = field.number()?;
+            if number > 0.0 { Ok(number) } else { Err(field.wrong(format!("{number} is not positive"))) }
+        };
+        return Ok(KalibrTarget::AprilGrid(AprilTarget {
+            columns: root.need("tagCols")?.side()?,
+            rows: root.need("tagRows")?.side()?,
+            tag_m: positive("tagSize")?,
+            spacing: positive("tagSpacing")?,
+        }));
+    }
     if kind.text()? != "checkerboard" {
         let message = format!(
-            "{} is no chessboard: calibench has chess, circles, asymmetric, hexagonal and dots (write circles:COLUMNSxROWS:SPACING:DIAMETER yourself, \
-             since Kalibr's file has no diameter), and no tags",
+            "{} is neither checkerboard nor aprilgrid: calibench has circles, asymmetric, hexagonal and dots too (write circles:COLUMNSxROWS:SPACING:DIAMETER \
+             yourself, since Kalibr's file has no diameter)",
             shortened(kind.text()?)
         );
         return Err(kind.wrong(message));
@@ -183,12 +218,22 @@ pub fn parse_target(file: &str, text: &str) -> Result<ChessTarget, FormatError> 
         return Err(row.wrong(format!("squares are expected, and these are {columns_m} x {rows_m} m")));
     }
     let columns = root.need("targetCols")?.side()?;
-    Ok(ChessTarget { columns, rows: root.need("targetRows")?.side()?, square_m: rows_m })
+    let rows = root.need("targetRows")?.side()?;
+    Ok(KalibrTarget::Chess(ChessTarget { columns, rows, square_m: rows_m }))
 }
 
-/// The `target.yaml` of a chessboard.
-pub fn target_text(target: &ChessTarget) -> String {
-    let ChessTarget { columns, rows, square_m } = *target;
+/// The `target.yaml` of a target.
+pub fn target_text(target: &KalibrTarget) -> String {
+    let ChessTarget { columns, rows, square_m } = match *target {
+        KalibrTarget::Chess(target) => target,
+        KalibrTarget::AprilGrid(AprilTarget { columns, rows, tag_m, spacing }) => {
+            return format!(
+                "target_type: 'aprilgrid'\ntagCols: {columns}\ntagRows: {rows}\ntagSize: {}\ntagSpacing: {}\n",
+                decimal(tag_m),
+                decimal(spacing)
+            );
+        }
+    };
     let square = decimal(square_m);
     format!(
         "target_type: 'checkerboard'\ntargetCols: {columns}\ntargetRows: {rows}\nrowSpacingMeters: {square}\ncolSpacingMeters: {square}\n"

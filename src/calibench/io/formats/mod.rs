@@ -29,7 +29,7 @@ mod yaml;
 pub use calibench::SCHEMA;
 pub use camera_file::{CameraFile, Estimated};
 pub use error::FormatError;
-pub use kalibr::{ChessTarget, parse_target, target_text};
+pub use kalibr::{AprilTarget, ChessTarget, KalibrTarget, parse_target, target_text};
 pub use vnl::{VnlBoard, corner_text, looks_like_vnl, parse_vnl, vnl_text};
 
 use crate::camera::Model;
