@@ -80,7 +80,7 @@ mod tests {
             let second = same_picture(&first).unwrap();
             assert!((second.fx / first.fx - 1.0).abs() > 0.3);
             for point in [Vec3::new(0.3, -0.2, 1.0), Vec3::new(-2.0, 1.0, 0.5), Vec3::new(0.0, 0.0, 3.0)] {
-                let pixels = [first, second].map(|camera| camera.project(&point).unwrap());
+                let pixels = [first, second].map(|camera| camera.pixel(&point).unwrap());
                 assert!((pixels[1] - pixels[0]).norm() < 1e-10, "{pixels:?}");
             }
             let back = same_picture(&second).unwrap();
