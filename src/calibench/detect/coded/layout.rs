@@ -262,7 +262,7 @@ fn dark_cells(
     };
     let inner = border..border + side;
     let is_dark = |row: usize, column: usize| {
-        !(inner.contains(&row) && inner.contains(&column)) || !is_white(row - border, column - border)
+        !(inner.contains(&row) && inner.contains(&column) && is_white(row - border, column - border))
     };
     let mut runs = Vec::new();
     for row in 0..count {
