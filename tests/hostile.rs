@@ -166,6 +166,14 @@ fn corner_file() -> String {
     text
 }
 
+/// Its marks, measured.
+fn target_file() -> String {
+    let scene = calibench::synth::Scene::example();
+    let marks =
+        scene.exact()[0].pairs().enumerate().map(|(i, (at, _))| format!("{i},{},{},0,0.01\n", at.x, at.y));
+    "point,X,Y,Z,sd\n".to_string() + &marks.collect::<String>()
+}
+
 const PAIRS: &str = "point,px,py,X,Y\n0,0,0,0,0\n1,100,0,1,0\n2,0,100,0,1\n3,100,101,1,1\n";
 
 #[test]
@@ -530,6 +538,53 @@ fn a_camera_is_not_overwritten_by_that_of_the_output() {
     .expect("written");
     let arguments = ["undistort", "--camera", "camera-8x8.json", "--out", ".", "photo.png"];
     refused(&folder, &arguments, &["camera-8x8.json", "choose another folder"]);
+}
+
+/// Whatever a verb is given to read, under the very name of something that it writes, is as it was.
+#[test]
+fn no_verb_replaces_what_it_was_given_to_read() {
+    let folder = folder("given");
+    fs::write(folder.join("c.csv"), corner_file()).expect("written");
+    assert_eq!(limited(&folder, &["calibrate", "c.csv", "--out", "run"]).status.code(), Some(0));
+    let result = fs::read_to_string(folder.join("run/result.json")).expect("a result");
+    let of_target = target_file();
+    let history = "when,value\n1,10\n2,10.1\n3,9.9\n";
+    let cases: [(&str, &str, &str, &[&str]); 8] = [
+        ("calibrate", "result.json", &corner_file(), &["calibrate", "calibrate/result.json"]),
+        ("target", "marks.csv", &of_target, &["calibrate", "c.csv", "--target", "target/marks.csv"]),
+        ("validate", "validation.json", &result, &["validate", "validate/validation.json", "c.csv"]),
+        ("diff", "difference.json", &result, &["diff", "run/result.json", "diff/difference.json"]),
+        ("tsai", "tsai.json", &corner_file(), &["tsai", "tsai/tsai.json", "--image-size", "640x480"]),
+        (
+            "register",
+            "registration.json",
+            "point,X,Y\n1,0,0\n2,10,0\n3,0,10\n4,10,10\n",
+            &["register", "register/registration.json", "register/registration.json"],
+        ),
+        (
+            "check",
+            "check.json",
+            history,
+            &["check-reference", "check/check.json", "--reference", "10", "--sd", "0.1"],
+        ),
+        (
+            "add",
+            "check.json",
+            history,
+            &["check-reference", "add/check.json", "--reference", "10", "--sd", "0.1", "--add", "10"],
+        ),
+    ];
+    for (name, file, text_of_it, arguments) in cases {
+        let own = folder.join(name);
+        fs::create_dir_all(&own).expect("made");
+        fs::write(own.join(file), text_of_it).expect("written");
+        let output = limited(&folder, &[arguments, &["--out", name]].concat());
+        let left = fs::read_to_string(own.join(file)).expect("it is still there");
+        // The verb that adds to a history does that, and no more.
+        assert!(left.starts_with(text_of_it), "{name}: {left}");
+        assert_ne!(output.status.code(), Some(0), "{name}: {}", text(&output.stdout));
+        println!("{name}: {}", text(&output.stderr));
+    }
 }
 
 #[test]

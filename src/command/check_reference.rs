@@ -6,7 +6,7 @@ use super::said::{number_that, positive, written_by};
 use super::{Exit, print, warn};
 use calibench::downstream::control::{Ewma, Rule, Shewhart};
 use calibench::io::input::{MOST_TABLE_BYTES, read_regular};
-use calibench::io::{Check, parse_checks, significant, write_atomically, write_together};
+use calibench::io::{Check, keep_files, parse_checks, significant, write_atomically, write_together};
 use calibench_harness::{Figure, Look, Plot};
 use clap::Args;
 use serde_json::{Value, json};
@@ -133,6 +133,7 @@ fn write_files(arguments: &Arguments, history: &str, json: &str, judged: &Judged
     if arguments.add.is_some() {
         write_atomically(&arguments.history, history.as_bytes())?;
     }
+    keep_files([arguments.history.as_path()]);
     let Some(folder) = &arguments.out else { return Ok(()) };
     let trend = judged.trend(arguments);
     let trend = (folder.join(trend.file_name()), trend.bytes);

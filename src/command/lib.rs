@@ -16,6 +16,7 @@ mod exit;
 mod exit_codes;
 mod explain;
 mod gate;
+mod given;
 mod hand_eye;
 mod list;
 mod manual;
@@ -128,7 +129,7 @@ enum Verb {
 pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCode {
     startup::take_large_files_for_errors();
     calibench_harness::project::carry(carried);
-    let parsed = examples::command().try_get_matches();
+    let parsed = examples::command().try_get_matches().inspect(given::keep);
     let arguments = match parsed.and_then(|matches| Arguments::from_arg_matches(&matches)) {
         Ok(arguments) => arguments,
         Err(error) => return terminal::ended(terminal::usage(&error)).into(),

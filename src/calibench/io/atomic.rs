@@ -1,6 +1,7 @@
 //! How is a file replaced so that nobody ever sees half of it? Written beside its place, then renamed.
 
 use super::files::{Disk, Files};
+use super::kept::refuse_kept;
 use super::shown::ShownPath;
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, DirEntry, File, OpenOptions};
@@ -66,7 +67,7 @@ impl<'a> Beside<'a> {
     /// As [`write_atomically`]; of every function here.
     pub fn begin(files: &'a dyn Files, path: &Path) -> io::Result<Beside<'a>> {
         let folder = folder_of(path);
-        refuse_what_is_no_file(path).map_err(with_path(path))?;
+        refuse_what_is_no_file(path).and_then(|()| refuse_kept(path)).map_err(with_path(path))?;
         files.make_folder(folder).map_err(with_path(path))?;
         // What cannot be removed is in nobody's way.
         let _ = remove_leftovers_of(files, folder, path.file_name());
