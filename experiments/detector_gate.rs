@@ -31,7 +31,7 @@ use row::{HEADER, Row};
 pub const EXPERIMENT: Experiment = Experiment {
     id: "detector-gate",
     title: "Who finds the marks, and how well",
-    question: "Chessboards and boards of discs are photographed by the virtual camera: sharp, noisy, blurred, tilted, unevenly lit, \
+    question: "Chessboards, boards of discs and boards with markers are photographed by the virtual camera: sharp, noisy, blurred, tilted, unevenly lit, \
                faint, moved, packed as JPEG, or not at all. This library's detectors and OpenCV's look for them. How many boards are \
                found, how many that are not there, and how far are marks from their places, in px and in units of the bound that the \
                pixels' noise implies? Expected: sharp boards are found, none is invented, no error is below the bound.",
@@ -113,12 +113,15 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     claim_boards(&mut record, &seen[0]);
     claim_errors(&mut record, &seen);
     claim_rim(&mut record)?;
-    record.table(tables::chessboards(&seen));
-    record.table(tables::circles(&seen));
+    for table in tables::each_kind(&seen) {
+        record.table(table);
+    }
     record.table(tables::invented(&seen));
     record.table(tables::scenes(&seen));
     record.table(tables::fairness(&seen));
-    record.figure(figures::errors(&seen));
+    for figure in figures::errors(&seen) {
+        record.figure(figure);
+    }
     record.figure(figures::photographs()?);
     Ok(record)
 }
@@ -199,7 +202,7 @@ fn claim_repeated(record: &mut Record, context: &Context, ours: &Seen) -> Result
 }
 
 fn report(record: &mut Record, seen: &[Seen]) {
-    record.exact("").count("scenes", scenes().len(), "scenes, of both kinds of boards").count(
+    record.exact("").count("scenes", scenes().len(), "scenes, of all kinds of boards").count(
         "photographs",
         PHOTOS as usize,
         "photographs of a scene",

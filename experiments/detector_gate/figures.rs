@@ -1,6 +1,7 @@
 //! Errors over the bound with the boards found, scene by scene; and what the scenes look like.
 
 use super::judged::{Judged, Measured};
+use super::tables::heading;
 use super::{DRAWN, PHOTOS, SEED, Seen, shows_board};
 use calibench::raster::Raster;
 use calibench_detector_gate::protocol::Kind;
@@ -61,26 +62,62 @@ fn rows() -> Vec<&'static str> {
     scenes().iter().filter(|scene| of_one(scene)).map(|scene| scene.id).collect()
 }
 
-/// Errors over the bound, and boards found, of every scene and program.
-pub fn errors(seen: &[Seen]) -> Figure {
+/// Errors over the bound, and boards found, of every scene and program: two kinds of boards a figure.
+pub fn errors(seen: &[Seen]) -> Vec<Figure> {
+    let ours = |kind: Kind, id: &str| {
+        let judged = seen[0].with_board().into_iter().find(|j| j.scene.kind == kind && j.scene.id == id);
+        judged.and_then(|j| j.over_bound(DRAWN)).map_or(f64::NAN, |over| over.value)
+    };
+    let of_blur = |kind: Kind| {
+        let [blurred, very, moved] = ["blurred", "very-blurred", "moved"].map(|id| ours(kind, id));
+        format!(
+            "{blurred:.1} times in blurred photographs, {very:.1} in very blurred ones and {moved:.1} in moved ones"
+        )
+    };
+    let [discs, asymmetric, hexagonal] = [Kind::Circles, Kind::Asymmetric, Kind::Hexagonal].map(of_blur);
+    let [sharp, tags] = [Kind::Charuco, Kind::AprilGrid].map(|kind| ours(kind, "clean"));
+    vec![
+        of_kinds(
+            "errors",
+            [Kind::Chessboard, Kind::Circles],
+            seen,
+            &format!(
+                "how far discs are from it where blur is wider than their edge: {discs}, for this library's"
+            ),
+        ),
+        of_kinds(
+            "errors-of-staggered-discs",
+            [Kind::Asymmetric, Kind::Hexagonal],
+            seen,
+            &format!(
+                "the same where blur is wide: {asymmetric} on asymmetric grids, {hexagonal} on hexagonal ones, for this library's"
+            ),
+        ),
+        of_kinds(
+            "errors-of-coded-boards",
+            [Kind::Charuco, Kind::AprilGrid],
+            seen,
+            &format!("clean photographs: {sharp:.2} and {tags:.2} times the bound, for this library's"),
+        ),
+    ]
+}
+
+fn of_kinds(name: &'static str, kinds: [Kind; 2], seen: &[Seen], notice: &str) -> Figure {
     let rows = rows();
     let bounds: Vec<Measured> = seen
         .iter()
-        .flat_map(|one| one.with_board().iter().filter_map(|j| j.over_bound(DRAWN)).collect::<Vec<_>>())
+        .flat_map(Seen::with_board)
+        .filter(|judged| kinds.contains(&judged.scene.kind))
+        .filter_map(|judged| judged.over_bound(DRAWN))
         .collect();
     let least = stats::smallest(bounds.iter().map(|over| over.interval.low));
     let most = stats::largest(bounds.iter().map(|over| over.interval.high));
     let range = (0.9 * least.min(1.0), 1.1 * most.max(2.0));
     let known = |kind: Kind| seen.iter().enumerate().filter(|(_, one)| one.program.knows(kind)).collect();
-    let first = Panel {
-        kind: Kind::Chessboard,
-        heading: "chessboards",
-        left: NAMES,
-        seen: known(Kind::Chessboard),
-        range,
-    };
-    let left = first.right() + GAP;
-    let second = Panel { kind: Kind::Circles, heading: "discs", left, seen: known(Kind::Circles), range };
+    let panel =
+        |kind: Kind, left: f64| Panel { kind, heading: heading(kind), left, seen: known(kind), range };
+    let first = panel(kinds[0], NAMES);
+    let second = panel(kinds[1], first.right() + GAP);
     let bottom = TOP + ROW * rows.len() as f64;
     let mut sheet = Drawing::new(second.right() + 6.0, bottom + 48.0);
     for k in (0..rows.len()).step_by(2) {
@@ -91,35 +128,31 @@ pub fn errors(seen: &[Seen]) -> Figure {
     for (k, name) in rows.iter().enumerate() {
         sheet = sheet.words(*name, (NAMES - 12.0, TOP + ROW * (k as f64 + 0.5)), Align::End);
     }
-    sheet = legend(sheet, seen);
+    sheet = legend(sheet, [&first, &second], seen);
     for panel in [&first, &second] {
         sheet = axis(sheet, panel, bottom);
         for (k, name) in rows.iter().enumerate() {
             sheet = scene(sheet, panel, name, TOP + ROW * (k as f64 + 0.5));
         }
     }
-    let ours = |kind: Kind, id: &str| {
-        let judged = seen[0].with_board().into_iter().find(|j| j.scene.kind == kind && j.scene.id == id);
-        judged.and_then(|j| j.over_bound(DRAWN)).map_or(f64::NAN, |over| over.value)
-    };
     let caption = format!(
         "Root mean squared error of the marks over that of the Cramer-Rao bound, scene by scene: a point a program, with its interval (95 %, independent \
-         photographs); beside it the boards found of {PHOTOS}, seed {SEED}. Where a codec stands between there is no bound. Notice how far discs are \
-         from it where blur is wider than their edge: {:.1} times in blurred photographs, {:.1} in very blurred ones and {:.1} in moved ones, \
-         for this library's.",
-        ours(Kind::Circles, "blurred"),
-        ours(Kind::Circles, "very-blurred"),
-        ours(Kind::Circles, "moved"),
+         photographs); beside it the boards found of {PHOTOS}, seed {SEED}. Where a codec stands between there is no bound. Notice {notice}."
     );
-    Figure::drawing("errors", &sheet, caption)
+    Figure::drawing(name, &sheet, caption)
 }
 
-fn legend(sheet: Drawing, seen: &[Seen]) -> Drawing {
+/// The programs of either panel, and what finds the marks for each.
+fn legend(sheet: Drawing, panels: [&Panel<'_>; 2], seen: &[Seen]) -> Drawing {
     let mut at = NAMES;
-    seen.iter().enumerate().fold(sheet, |sheet, (k, one)| {
-        let finders: Vec<&str> = one.program.finders.iter().flatten().copied().collect();
-        let text = match one.program.method {
-            None => one.program.name.to_string(),
+    let is_shown = |k: &usize| panels.iter().any(|panel| panel.seen.iter().any(|(other, _)| other == k));
+    (0..seen.len()).filter(is_shown).fold(sheet, |sheet, k| {
+        let program = seen[k].program;
+        let mut finders: Vec<&str> =
+            panels.iter().filter_map(|panel| program.finders[panel.kind as usize]).collect();
+        finders.dedup();
+        let text = match program.method {
+            None => program.name.to_string(),
             Some(_) => finders.join("; "),
         };
         let place = (at, 16.0);
@@ -181,7 +214,7 @@ const BETWEEN: usize = 4;
 /// The middle of a photograph of every scene.
 pub fn photographs() -> Result<Figure, ExperimentError> {
     let ids = rows();
-    let kind = |k: usize| if (k + k / COLUMNS).is_multiple_of(2) { Kind::Chessboard } else { Kind::Circles };
+    let kind = |k: usize| Kind::ALL[k % Kind::ALL.len()];
     let tile = |(k, &id): (usize, &&str)| {
         let scene = scenes().into_iter().find(|scene| scene.kind == kind(k) && scene.id == id)?;
         Some(scene.look.photo(&scene.board(), SEED, &scene.name(), 0)?.image)
@@ -200,7 +233,7 @@ pub fn photographs() -> Result<Figure, ExperimentError> {
     });
     let names: Vec<String> = ids.chunks(COLUMNS).map(|names| names.join(", ")).collect();
     let caption = format!(
-        "The middle of the first photograph of every scene, at half its size, chessboards and discs in turn. Row by row: {}. Seed {SEED}. Notice \
+        "The middle of the first photograph of every scene, at half its size, the kinds of boards in turn. Row by row: {}. Seed {SEED}. Notice \
          that faint boards are hardly seen.",
         names.join("; ")
     );

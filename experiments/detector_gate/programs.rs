@@ -7,8 +7,8 @@ use calibench_detector_gate::protocol::Kind;
 pub struct Program {
     /// Its name, and that of its file in golden/detector-gate/.
     pub name: &'static str,
-    /// What finds chessboards, and discs; `None` where it is not asked for them.
-    pub finders: [Option<&'static str>; 2],
+    /// What finds each kind of board, in the order of [`Kind::ALL`]; `None` where it is not asked for them.
+    pub finders: [Option<&'static str>; Kind::ALL.len()],
     /// The argument of the adapter; none for this library's detectors.
     pub method: Option<&'static str>,
     /// What is fair to say of it.
@@ -22,19 +22,34 @@ const ADAPTER: &str = include_str!("../../adapters/detector_opencv.py");
 pub const PROGRAMS: [Program; 3] = [
     Program {
         name: "calibench",
-        finders: [Some("saddles and an edge model"), Some("edges of discs")],
+        finders: [
+            Some("saddles and an edge model"),
+            Some("edges of discs"),
+            Some("edges of discs"),
+            Some("edges of discs"),
+            Some("markers, and the edge model"),
+            Some("markers, and the edge model"),
+        ],
         method: None,
         note: "whose scenes these are: they were written beside its detectors, which were mended where a scene showed a fault",
     },
     Program {
         name: "opencv",
-        finders: [Some("findChessboardCorners, cornerSubPix"), Some("findCirclesGrid")],
+        finders: [
+            Some("findChessboardCorners, cornerSubPix"),
+            Some("findCirclesGrid"),
+            Some("findCirclesGrid"),
+            None,
+            Some("CharucoDetector"),
+            Some("ArucoDetector, cornerSubPix"),
+        ],
         method: Some("classic"),
-        note: "as in its tutorial: a window of 11 x 11 px for cornerSubPix, the usual blob detector for discs; other windows and thresholds may suit a scene better",
+        note: "as in its tutorial: a window of 11 x 11 px for cornerSubPix, the usual blob detector for discs; other windows and thresholds may suit a scene better; its detector of tags knows no board, and its marks are \
+               taken by their numbers",
     },
     Program {
         name: "opencv-sb",
-        finders: [Some("findChessboardCornersSB"), None],
+        finders: [Some("findChessboardCornersSB"), None, None, None, None, None],
         method: Some("sb"),
         note: "no flags; it knows chessboards alone, and refines by itself",
     },

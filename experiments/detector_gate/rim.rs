@@ -4,7 +4,7 @@ use super::SEED;
 use calibench::geometry::Vec2;
 use calibench::io::Grey;
 use calibench_detector_gate::protocol::Kind;
-use calibench_detector_gate::{Photo, Scene, scenes, variance_px2};
+use calibench_detector_gate::{Cell, Photo, Scene, scenes, variance_px2};
 use rayon::prelude::*;
 
 /// Scenes in which it is asked: those where discs are far from the bound.
@@ -58,7 +58,7 @@ pub fn inner_and_outer(id: &str) -> Option<[Errors; 2]> {
 fn in_photo(scene: &Scene, trial: u64, photo: &Photo) -> Option<[Errors; 2]> {
     let seen = scene.wanted(trial).spec().see(&Grey::U8(photo.image.clone())).ok()?;
     let (board, places) = (scene.board(), &photo.places_px);
-    let (columns, rows) = (board.columns(), board.rows());
+    let (columns, rows) = (board.board().columns(), board.board().rows());
     let mut both = [Errors::default(); 2];
     for found in seen.places_px().iter().flatten() {
         // Whatever the order: a disc is nearest to its own place.
@@ -66,10 +66,8 @@ fn in_photo(scene: &Scene, trial: u64, photo: &Photo) -> Option<[Errors; 2]> {
         let nearest = places.iter().enumerate().map(|(i, place)| (i, distance(place)));
         let (i, error_px) = nearest.min_by(|(_, a), (_, b)| a.total_cmp(b))?;
         let (column, row) = (i % columns, i / columns);
-        let across = if column + 1 < columns { i + 1 } else { i - 1 };
-        let down = if row + 1 < rows { i + columns } else { i - columns };
-        let to_next = [places[across] - places[i], places[down] - places[i]];
-        let variance = variance_px2(&photo.clean, &places[i], to_next, scene.look.noise)?;
+        let cell = Cell::of(&board, places, i);
+        let variance = variance_px2(&photo.clean, &places[i], &cell, scene.look.noise)?;
         let is_outer = column == 0 || column + 1 == columns || row == 0 || row + 1 == rows;
         both[usize::from(is_outer)].add(&Errors {
             squares_px2: error_px * error_px,

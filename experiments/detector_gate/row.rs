@@ -67,7 +67,7 @@ impl Row {
             }),
             _ => return None,
         };
-        let kind = [Kind::Chessboard, Kind::Circles].into_iter().find(|known| known.name() == *kind)?;
+        let kind = Kind::ALL.into_iter().find(|known| known.name() == *kind)?;
         Some(Row { kind, scene: (*scene).to_string(), trial: trial.parse().ok()?, outcome })
     }
 }

@@ -29,10 +29,7 @@ fn beside(name: &str, kind: Kind, seen: &[&Seen]) -> Table {
     let caption = format!(
         "{}: boards found of {PHOTOS}, root mean squared error of a coordinate, the same over that of the bound, and the largest distance of a mark from \
          its place, of boards whose marks are at their places",
-        match kind {
-            Kind::Chessboard => "Chessboards",
-            Kind::Circles => "Boards of discs",
-        }
+        heading(kind)
     );
     let mut table = Table::new(name, caption, &columns);
     for scene in of_kind(kind) {
@@ -47,18 +44,36 @@ fn beside(name: &str, kind: Kind, seen: &[&Seen]) -> Table {
     table
 }
 
-/// Chessboards, of all programs.
-pub fn chessboards(seen: &[Seen]) -> Table {
-    beside("chessboards", Kind::Chessboard, &seen.iter().collect::<Vec<_>>())
+/// Each kind of board, of the programs that know it.
+pub fn each_kind(seen: &[Seen]) -> Vec<Table> {
+    let of = |kind: Kind| {
+        let known: Vec<&Seen> = seen.iter().filter(|one| one.program.knows(kind)).collect();
+        beside(table_name(kind), kind, &known)
+    };
+    Kind::ALL.map(of).into()
 }
 
-/// Boards of discs, of those that know them.
-pub fn circles(seen: &[Seen]) -> Table {
-    beside(
-        "discs",
-        Kind::Circles,
-        &seen.iter().filter(|one| one.program.knows(Kind::Circles)).collect::<Vec<_>>(),
-    )
+fn table_name(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Chessboard => "chessboards",
+        Kind::Circles => "discs",
+        Kind::Asymmetric => "asymmetric-grids",
+        Kind::Hexagonal => "hexagonal-grids",
+        Kind::Charuco => "charuco-boards",
+        Kind::AprilGrid => "april-grids",
+    }
+}
+
+/// A kind of board, for readers.
+pub fn heading(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Chessboard => "Chessboards",
+        Kind::Circles => "Discs in rows and columns",
+        Kind::Asymmetric => "Discs in staggered rows (asymmetric)",
+        Kind::Hexagonal => "Discs in staggered rows (hexagonal)",
+        Kind::Charuco => "ChArUco boards",
+        Kind::AprilGrid => "Grids of AprilTags",
+    }
 }
 
 /// Boards that are not there, a program and scene a row.
@@ -150,17 +165,18 @@ pub fn fairness(seen: &[Seen]) -> Table {
         let head = one.committed.lines().next().unwrap_or_default();
         head.split("; ").find_map(|part| part.strip_prefix("versions ")).unwrap_or("-").to_string()
     };
-    let rows: Vec<[String; 5]> = seen
-        .iter()
-        .map(|one| {
-            let [chessboards, discs] = one.program.finders.map(|finder| finder.unwrap_or("-").to_string());
-            [one.program.name.to_string(), versions(one), chessboards, discs, one.program.note.to_string()]
-        })
-        .collect();
+    let mut rows: Vec<[String; 5]> = Vec::new();
+    for one in seen {
+        for (kind, finder) in Kind::ALL.into_iter().zip(one.program.finders) {
+            let Some(finder) = finder else { continue };
+            let (name, note) = (one.program.name.to_string(), one.program.note.to_string());
+            rows.push([name, versions(one), heading(kind).to_string(), finder.to_string(), note]);
+        }
+    }
     Table::of_arrays(
         "fairness",
-        "What was asked, and what is fair to say of each",
-        [("program", ""), ("versions", ""), ("chessboards", ""), ("discs", ""), ("fairness", "")],
+        "What was asked for which boards, and what is fair to say of each program",
+        [("program", ""), ("versions", ""), ("boards", ""), ("finder", ""), ("fairness", "")],
         &rows,
     )
 }

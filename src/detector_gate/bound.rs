@@ -11,6 +11,7 @@
 //! Half the difference of a pixel's two neighbours is flatter than an edge is: the bound's standard deviation would be 16 % too large with a blur
 //! of 0.6 px and 25 % with 0.4 px, where it is now 0.4 % and 1.6 % (mean over all places of a straight edge within a pixel).
 
+use super::cell::Cell;
 use calibench::geometry::Vec2;
 use calibench::raster::Raster;
 use nalgebra::{Matrix2, Vector2};
@@ -18,10 +19,9 @@ use nalgebra::{Matrix2, Vector2};
 /// Neighbours on either side that a slope is taken from.
 const NEIGHBOURS: usize = 6;
 
-/// Variance of a coordinate of a place, px^2: half the trace of the bound. `to_next` leads to a next mark of the row and to one of the column.
-/// `None` where nothing is seen.
-pub fn variance_px2(clean: &Raster<f32>, place: &Vec2, to_next: [Vec2; 2], noise: f64) -> Option<f64> {
-    let [across, down] = to_next;
+/// Variance of a coordinate of a place, px^2: half the trace of the bound, of what is seen in the mark's cell. `None` where nothing is seen.
+pub fn variance_px2(clean: &Raster<f32>, place: &Vec2, cell: &Cell, noise: f64) -> Option<f64> {
+    let [across, down] = cell.to_next;
     let part_of_cell = Matrix2::from_columns(&[across, down]).try_inverse()?;
     let reach = 0.5 * (across.abs() + down.abs());
     let pixels = |at: f64, reach: f64, size: usize| {
@@ -32,7 +32,7 @@ pub fn variance_px2(clean: &Raster<f32>, place: &Vec2, to_next: [Vec2; 2], noise
     for y in pixels(place.y, reach.y, clean.height()) {
         for x in pixels(place.x, reach.x, clean.width()) {
             let part = part_of_cell * (Vec2::new(x as f64, y as f64) - place);
-            if part.amax() <= 0.5 {
+            if cell.holds(&part) {
                 let slope = slope(clean, x, y);
                 sum += slope * slope.transpose();
             }
@@ -114,7 +114,8 @@ mod tests {
                 // A mark in the middle: its next ones are the sixth's.
                 let (i, columns) = (6, 5);
                 let to_next = [places[i + 1] - places[i], places[i + columns] - places[i]];
-                let found = variance_px2(&image, &places[i], to_next, NOISE).unwrap();
+                let cell = Cell { to_next, back: 0.5 };
+                let found = variance_px2(&image, &places[i], &cell, NOISE).unwrap();
                 let wanted = by_displacement(is_chess, blur_px, &places[i], to_next);
                 let ratio = (found / wanted).sqrt();
                 assert!((ratio - 1.0).abs() < 0.03, "chess {is_chess}, blur {blur_px} px: {ratio}");
@@ -124,18 +125,18 @@ mod tests {
 
     #[test]
     fn an_edge_tells_of_one_coordinate_only() {
-        let cell = [Vec2::new(16.0, 0.0), Vec2::new(0.0, 16.0)];
+        let cell = Cell { to_next: [Vec2::new(16.0, 0.0), Vec2::new(0.0, 16.0)], back: 0.5 };
         let edge = Raster::from_fn(40, 40, |x, _| if x < 20 { 0.0 } else { 1.0 });
-        assert_eq!(variance_px2(&edge, &Vec2::new(20.0, 20.0), cell, 0.01), None);
+        assert_eq!(variance_px2(&edge, &Vec2::new(20.0, 20.0), &cell, 0.01), None);
     }
 
     #[test]
     fn what_lies_beyond_the_image_tells_nothing() {
         let (image, places) = rendered(true, 0.6, Vec2::zeros());
-        let to_next = [places[7] - places[6], places[11] - places[6]];
-        let variance = |place: Vec2| variance_px2(&image, &place, to_next, NOISE);
+        let cell = Cell { to_next: [places[7] - places[6], places[11] - places[6]], back: 0.5 };
+        let variance = |place: Vec2| variance_px2(&image, &place, &cell, NOISE);
         let half = Raster::from_fn(image.width(), places[6].y as usize, |x, y| image.get(x, y));
-        let cut = variance_px2(&half, &places[6], to_next, NOISE).unwrap();
+        let cut = variance_px2(&half, &places[6], &cell, NOISE).unwrap();
         assert!(cut > 1.2 * variance(places[6]).unwrap(), "{cut}");
     }
 }

@@ -17,10 +17,10 @@ pub(super) fn photographs(scene: &Scene, seed: u64, trials: &[u64]) -> Vec<(u64,
 pub(super) fn truths(scene: &Scene, drawn: &[(u64, Photo)]) -> Vec<Truth> {
     let board = scene.board();
     let truth = |(_, photo): &(u64, Photo)| {
-        Truth::of(photo, &board, |place, to_next| match scene.look.jpeg {
+        Truth::of(photo, &board, |place, cell| match scene.look.jpeg {
             // What a codec adds is no noise of the pixels.
             Some(_) => None,
-            None => variance_px2(&photo.clean, place, to_next, scene.look.noise),
+            None => variance_px2(&photo.clean, place, cell, scene.look.noise),
         })
     };
     drawn.par_iter().map(truth).collect()

@@ -7,6 +7,7 @@
 //! ```
 
 mod bound;
+mod cell;
 mod check;
 mod detectors;
 mod draw;
@@ -19,6 +20,7 @@ mod report;
 mod scene;
 
 pub use bound::variance_px2;
+pub use cell::Cell;
 pub use check::{Check, Property};
 pub use detectors::{Asked, Builtin, Detector, Program};
 pub use judge::{Figures, MATTERS_PX};
@@ -141,7 +143,7 @@ fn back(marks: &[Option<Vec2>], (width, height): (usize, usize)) -> Vec<Option<V
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protocol::Answer;
+    use protocol::{Answer, Kind};
     use std::time::Duration;
 
     /// This library's detector with its answers changed.
@@ -163,10 +165,17 @@ mod tests {
         Answer { marks: answer.marks.map(change), ..answer }
     }
 
+    /// Boards that are numbered from either end.
+    const EITHER_END: [Kind; 2] = [Kind::Chessboard, Kind::Circles];
+
     /// The properties that fail with a changed detector, in some of the scenes.
     fn failing(change: fn(&Asked, Answer) -> Answer, scenes: &[&str]) -> Vec<Property> {
-        let some: Vec<Scene> =
-            super::scenes().into_iter().filter(|scene| scenes.contains(&scene.id)).collect();
+        failing_of(&EITHER_END, change, scenes)
+    }
+
+    fn failing_of(kinds: &[Kind], change: fn(&Asked, Answer) -> Answer, scenes: &[&str]) -> Vec<Property> {
+        let is_asked = |scene: &Scene| kinds.contains(&scene.kind) && scenes.contains(&scene.id);
+        let some: Vec<Scene> = super::scenes().into_iter().filter(is_asked).collect();
         let shown = some.into_iter().map(|scene| show(scene, &mut Changed(change), 1, 12).unwrap().unwrap());
         let checks = check::decide(shown.flat_map(|shown| shown.checks()).collect(), 1e-3);
         let mut failing: Vec<Property> =
@@ -182,7 +191,21 @@ mod tests {
 
     #[test]
     fn nothing_fails_where_nothing_is_changed() {
-        assert_eq!(failing(|_, answer| answer, &["clean", "facing", "noisy"]), []);
+        assert_eq!(failing_of(&Kind::ALL, |_, answer| answer, &["clean", "facing", "noisy"]), []);
+    }
+
+    #[test]
+    fn the_marks_of_a_board_with_markers_have_one_order() {
+        let reversed = |_: &Asked, answer| marks(answer, |list| list.into_iter().rev().collect());
+        for kind in [Kind::Charuco, Kind::AprilGrid] {
+            assert!(failing_of(&[kind], reversed, &["clean"]).contains(&Property::Places), "{}", kind.name());
+        }
+    }
+
+    #[test]
+    fn a_board_of_another_kind_or_size_is_not_found() {
+        let scenes = ["another-size", "another-kind", "noise-only"];
+        assert_eq!(failing_of(&Kind::ALL, |_, answer| answer, &scenes), []);
     }
 
     #[test]
@@ -192,7 +215,8 @@ mod tests {
 
     #[test]
     fn faint_boards_before_something_bright_are_found() {
-        for scene in super::scenes().into_iter().filter(|scene| scene.id == "faint") {
+        let is_asked = |scene: &Scene| scene.id == "faint" && EITHER_END.contains(&scene.kind);
+        for scene in super::scenes().into_iter().filter(is_asked) {
             let figures = show(scene, &mut Builtin, 1, 12).unwrap().unwrap().figures();
             assert_eq!((figures.found, figures.wrong), (12, 0), "{}", scene.kind.name());
         }

@@ -1,12 +1,15 @@
 //! How does a photograph of known truth arise? A random pose that keeps the whole board in the image, rendered, moved, made noisy, rounded
 //! to grey levels, and packed by a codec where that is asked.
 
-use calibench::board::{Board, Pattern};
+use calibench::board::Pattern;
 use calibench::camera::{BrownConrady, Camera};
 use calibench::detect::disc_biases;
 use calibench::geometry::{Pose, Vec2, Vec3, rotation};
+use calibench::photos::BoardSpec;
 use calibench::raster::Raster;
-use calibench::synth::render::{Appearance, Imaging, SensorNoise, Shading, Surround, photograph};
+use calibench::synth::render::{
+    Appearance, Imaging, Photograph, SensorNoise, Shading, Surround, photograph, photograph_dark,
+};
 use calibench::synth::{Stream, StreamKey};
 use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageFormat};
@@ -68,7 +71,7 @@ pub struct Photo {
     pub image: Raster<u8>,
     /// The same before noise and rounding, as intensity.
     pub clean: Raster<f32>,
-    /// Where the marks are, in the order of [`Board::points`]: of a disc the centroid of its image.
+    /// Where the marks are, in the order of [`BoardSpec::points`]: of a disc the centroid of its image.
     pub places_px: Vec<Vec2>,
 }
 
@@ -79,13 +82,13 @@ const POSES: usize = 50;
 
 impl Look {
     /// The photograph of a trial; `None` where no pose fits the image.
-    pub fn photo(&self, board: &Board, seed: u64, scenario: &str, trial: u64) -> Option<Photo> {
+    pub fn photo(&self, board: &BoardSpec, seed: u64, scenario: &str, trial: u64) -> Option<Photo> {
         let stream = |purpose: &'static str| Stream::open(StreamKey { seed, scenario, trial, purpose });
         let camera = self.camera();
         let mut random = stream("pose");
         let pose = (0..POSES).find_map(|_| self.pose(board, &camera, &mut random))?;
         let [ink, paper, level] = self.levels;
-        let margin = beyond_marks(board) + board.spacing() * random.uniform_in(0.1, 0.8);
+        let margin = beyond_marks(board) + board.board().spacing() * random.uniform_in(0.1, 0.8);
         let turn = random.uniform_in(0.0, std::f64::consts::TAU);
         let imaging = Imaging {
             appearance: Appearance { paper, ink, surround: Some(Surround { level, margin }) },
@@ -96,9 +99,9 @@ impl Look {
                 falloff: 0.0,
             },
         };
-        let photo = photograph(&camera, self.size, board, &pose, &imaging).ok()?;
+        let photo = self.rendered(board, &camera, &pose, &imaging)?;
         let mut places_px = photo.centres_true;
-        let biases = disc_biases(&camera, &pose, board).ok()?;
+        let biases = disc_biases(&camera, &pose, board.board()).ok()?;
         places_px.iter_mut().zip(biases).for_each(|(place, bias)| *place += bias);
         let clean = moved(&photo.image, self.motion_px, random.uniform_in(0.0, std::f64::consts::PI));
         let mut noisy = clean.clone();
@@ -110,6 +113,20 @@ impl Look {
         Some(Photo { image, clean, places_px })
     }
 
+    fn rendered(
+        &self,
+        board: &BoardSpec,
+        camera: &Camera,
+        pose: &Pose,
+        imaging: &Imaging,
+    ) -> Option<Photograph> {
+        let photo = match board.dark() {
+            None => photograph(camera, self.size, board.board(), pose, imaging),
+            Some(dark) => photograph_dark(camera, self.size, &dark, &board.points(), pose, imaging),
+        };
+        photo.ok()
+    }
+
     fn camera(&self) -> Camera {
         let (width, height) = (self.size.0 as f64, self.size.1 as f64);
         let focal_px = self.focal * width;
@@ -119,7 +136,7 @@ impl Look {
 
     /// A random tilt about a random axis, as near as the image allows or up to `far` times farther; `None` where
     /// it sees the board's edge.
-    fn pose(&self, board: &Board, camera: &Camera, random: &mut Stream) -> Option<Pose> {
+    fn pose(&self, board: &BoardSpec, camera: &Camera, random: &mut Stream) -> Option<Pose> {
         let tilt = random.uniform_in(self.tilt.0, self.tilt.1).to_radians();
         let axis = random.uniform_in(0.0, std::f64::consts::TAU);
         let roll = random.uniform_in(0.0, std::f64::consts::TAU) * self.roll / 180.0;
@@ -145,7 +162,7 @@ impl Look {
     }
 
     /// Whether all that is printed lies in the image.
-    fn fits(&self, board: &Board, camera: &Camera, pose: &Pose) -> bool {
+    fn fits(&self, board: &BoardSpec, camera: &Camera, pose: &Pose) -> bool {
         let (half_x, half_y) = half_extents(board);
         let steps = || (0..=10).map(|i| f64::from(i) / 5.0 - 1.0);
         let outline = steps().flat_map(|t| {
@@ -171,19 +188,25 @@ impl Look {
     }
 }
 
-/// Half the sides of what is printed: the outer squares, or the outermost discs.
-fn half_extents(board: &Board) -> (f64, f64) {
-    let beyond = match board.pattern() {
-        Pattern::Circles { diameter } => diameter - board.spacing(),
-        _ => board.spacing(),
+/// Half the sides of what is printed: the outer squares or tags, or the outermost discs.
+fn half_extents(board: &BoardSpec) -> (f64, f64) {
+    let beyond = match board.board().pattern() {
+        Pattern::Circles { diameter } => 0.5 * diameter,
+        _ => board.board().spacing(),
     };
-    let half = |marks: usize| 0.5 * (board.spacing() * marks as f64 + beyond);
-    (half(board.columns()), half(board.rows()))
+    let half = match board.dark() {
+        Some(dark) => dark.iter().flatten().fold(Vec2::zeros(), |most, corner| most.sup(&corner.abs())),
+        None => {
+            let marks = board.points();
+            marks.iter().fold(Vec2::zeros(), |most, mark| most.sup(&mark.abs())) + Vec2::repeat(beyond)
+        }
+    };
+    (half.x, half.y)
 }
 
 /// From where paper is seen all around, counted as [`Surround::margin`] is.
-fn beyond_marks(board: &Board) -> f64 {
-    match board.pattern() {
+fn beyond_marks(board: &BoardSpec) -> f64 {
+    match board.board().pattern() {
         Pattern::Circles { diameter } => 0.5 * diameter,
         _ => 0.0,
     }

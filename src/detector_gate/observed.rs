@@ -1,11 +1,14 @@
 //! What was answered to a photograph, beside the truth?
 
+use super::cell::Cell;
 use super::look::Photo;
-use calibench::board::Board;
 use calibench::geometry::Vec2;
+use calibench::photos::BoardSpec;
 
 /// A mark nearer to another's place than this part of the way to it is confused with it.
 const CONFUSED: f64 = 0.4;
+/// Marks of a board nearer to each other than this, in its unit, are one.
+const SAME: f64 = 1e-6;
 
 /// What is known of a photograph when its image is gone.
 #[derive(Debug, Clone)]
@@ -15,36 +18,34 @@ pub(super) struct Truth {
     pub spacings_px: Vec<f64>,
     /// Variance of a coordinate at the bound, px^2.
     pub variances_px2: Vec<Option<f64>>,
-    columns: usize,
+    /// The orders in which its marks may be numbered, and which mark stands where in each.
+    orders: Vec<(Order, Vec<usize>)>,
 }
 
 impl Truth {
-    /// `variance` is told a place, and what leads from it to a next mark of its row and of its column.
-    pub fn of(photo: &Photo, board: &Board, variance: impl Fn(&Vec2, [Vec2; 2]) -> Option<f64>) -> Truth {
-        let columns = board.columns();
+    /// `variance` is told a place, and its cell.
+    pub fn of(photo: &Photo, board: &BoardSpec, variance: impl Fn(&Vec2, &Cell) -> Option<f64>) -> Truth {
         let places = &photo.places_px;
-        let to_next = |i: usize| {
-            let across = if i % columns + 1 < columns { i + 1 } else { i - 1 };
-            let down = if i + columns < places.len() { i + columns } else { i - columns };
-            [places[across] - places[i], places[down] - places[i]]
-        };
-        let spacing = |[across, down]: [Vec2; 2]| across.norm().min(down.norm());
-        let spacings_px: Vec<f64> = (0..places.len()).map(|i| spacing(to_next(i))).collect();
-        let variances_px2 = (0..places.len()).map(|i| variance(&places[i], to_next(i))).collect();
-        Truth { places_px: places.clone(), spacings_px, variances_px2, columns }
+        let cells: Vec<Cell> = (0..places.len()).map(|i| Cell::of(board, places, i)).collect();
+        let variances_px2 = places.iter().zip(&cells).map(|(place, cell)| variance(place, cell)).collect();
+        let spacings_px = cells.iter().map(Cell::spacing_px).collect();
+        Truth { places_px: places.clone(), spacings_px, variances_px2, orders: orders(board) }
     }
+}
 
-    /// Number of the mark that stands at `i` when the board is numbered in another order.
-    fn in_order(&self, order: Order, i: usize) -> usize {
-        let (columns, last) = (self.columns, self.places_px.len() - 1);
-        let mirrored = |i: usize| i / columns * columns + columns - 1 - i % columns;
-        match order {
-            Order::Own => i,
-            Order::Turned => last - i,
-            Order::Mirrored => mirrored(i),
-            Order::MirroredAndTurned => mirrored(last - i),
-        }
-    }
+/// The orders of a board: markers tell its marks apart; other boards may map to themselves.
+fn orders(board: &BoardSpec) -> Vec<(Order, Vec<usize>)> {
+    let marks = board.points();
+    let is_coded = board.dark().is_some();
+    let orders = Order::ALL.into_iter().filter(|order| *order == Order::Own || !is_coded);
+    let numbered = |order: Order| {
+        let number = |mark: &Vec2| {
+            let wanted = order.place(mark);
+            marks.iter().position(|other| (other - wanted).amax() < SAME)
+        };
+        Some((order, marks.iter().map(number).collect::<Option<Vec<usize>>>()?))
+    };
+    orders.filter_map(numbered).collect()
 }
 
 /// How marks are numbered. Half a turn maps a board to itself; a mirror shows it from behind.
@@ -58,6 +59,16 @@ pub(super) enum Order {
 
 impl Order {
     const ALL: [Order; 4] = [Order::Own, Order::Turned, Order::Mirrored, Order::MirroredAndTurned];
+
+    /// The place of the mark that stands where `mark` does in the board's own order.
+    fn place(self, mark: &Vec2) -> Vec2 {
+        match self {
+            Order::Own => *mark,
+            Order::Turned => -mark,
+            Order::Mirrored => Vec2::new(-mark.x, mark.y),
+            Order::MirroredAndTurned => Vec2::new(mark.x, -mark.y),
+        }
+    }
 
     pub fn is_mirrored(self) -> bool {
         matches!(self, Order::Mirrored | Order::MirroredAndTurned)
@@ -87,9 +98,8 @@ pub(super) struct Found {
 impl Found {
     /// Marks in the order of the board that is nearest to them.
     pub fn of(truth: &Truth, marks: &[Option<Vec2>]) -> Found {
-        let errors = |order: Order| -> Vec<Error> {
-            let seen =
-                marks.iter().enumerate().filter_map(|(i, mark)| Some((truth.in_order(order, i), (*mark)?)));
+        let errors = |numbers: &[usize]| -> Vec<Error> {
+            let seen = numbers.iter().zip(marks).filter_map(|(i, mark)| Some((*i, (*mark)?)));
             let error = |(i, mark): (usize, Vec2)| {
                 let px = mark - truth.places_px[i];
                 let is_confused = px.norm() > CONFUSED * truth.spacings_px[i];
@@ -98,9 +108,9 @@ impl Found {
             seen.map(error).collect()
         };
         let distance = |errors: &[Error]| errors.iter().map(|e| e.px.norm()).sum::<f64>();
-        let each = Order::ALL.map(|order| (order, errors(order)));
-        let nearest = each.into_iter().min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)));
-        let (order, errors) = nearest.expect("four orders");
+        let each = truth.orders.iter().map(|(order, numbers)| (*order, errors(numbers)));
+        let nearest = each.min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)));
+        let (order, errors) = nearest.expect("a board's own order is one");
         Found { order, missing: marks.iter().filter(|mark| mark.is_none()).count(), errors }
     }
 
@@ -116,7 +126,7 @@ mod tests {
     use crate::look::Look;
 
     fn truth() -> (Truth, Vec<Vec2>) {
-        let board = Board::chessboard(5, 4, 10.0).unwrap();
+        let board = "chess:5x4:10".parse().unwrap();
         let photo = Look::default().photo(&board, 1, "observed", 0).unwrap();
         (Truth::of(&photo, &board, |_, _| None), photo.places_px)
     }
@@ -137,6 +147,24 @@ mod tests {
         assert_eq!(order(places.iter().rev().copied().collect()), Order::Turned);
         let rows: Vec<Vec2> = places.chunks(5).rev().flatten().copied().collect();
         assert!(order(rows).is_mirrored());
+    }
+
+    #[test]
+    fn only_boards_that_map_to_themselves_have_other_orders() {
+        let count = |words: &str| orders(&words.parse().unwrap()).len();
+        assert_eq!([count("chess:5x4:10"), count("circles:4x4:10")], [4, 4]);
+        // Of an odd number of staggered rows the mirror image is the board upside down, of an even one half a turn is.
+        for kind in ["asymmetric", "hexagonal"] {
+            let named = |rows: usize| -> Vec<Order> {
+                orders(&format!("{kind}:4x{rows}:10").parse().unwrap())
+                    .iter()
+                    .map(|(order, _)| *order)
+                    .collect()
+            };
+            assert_eq!(named(7), [Order::Own, Order::MirroredAndTurned]);
+            assert_eq!(named(6), [Order::Own, Order::Turned]);
+        }
+        assert_eq!([count("charuco:5x4:10:7:DICT_4X4_50"), count("aprilgrid:4x3:10:0.3")], [1, 1]);
     }
 
     #[test]

@@ -40,7 +40,7 @@ impl Report {
             self.photos
         );
         // Writing to a string cannot fail, here and below.
-        for kind in [Kind::Chessboard, Kind::Circles] {
+        for kind in Kind::ALL {
             let _ = match self.unsupported.contains(&kind) {
                 true => writeln!(text, "\n{}: not supported, and not judged", kind.name()),
                 false => writeln!(text, "\n{}", self.table(kind)),

@@ -1,8 +1,8 @@
 //! Under which conditions is a detector tried? Every scene is a condition of photographs, for a kind of board.
 
 use super::look::Look;
-use super::protocol::{Kind, Wanted};
-use calibench::board::Board;
+use super::protocol::{Kind, Markers, Wanted};
+use calibench::photos::BoardSpec;
 
 /// What is asked of the answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,14 +30,17 @@ pub struct Scene {
     pub look: Look,
 }
 
-/// Spacing of the marks; the unit does not matter.
+/// Spacing of the marks, and side of a tag; the unit does not matter.
 const SPACING: f64 = 10.0;
-/// Diameter of a disc.
-const DIAMETER: f64 = 5.0;
 /// Boards of other sizes that are asked for: marks in a row, and rows, more or less than there are.
 const OTHERS: [(isize, isize); 4] = [(-1, 0), (0, -1), (1, 0), (1, 1)];
+/// The same of boards with markers. They may be seen in part: with rows added at the end they have the markers that are seen.
+const OTHER_WIDTHS: [isize; 4] = [-1, 1, -2, 2];
+/// Markers of a ChArUco board, and those of another.
+const MARKERS: &str = "DICT_4X4_50";
+const OTHER_MARKERS: &str = "DICT_5X5_50";
 
-/// All scenes, of either kind of board.
+/// All scenes, of every kind of board.
 pub fn scenes() -> Vec<Scene> {
     let good = Look { noise: 0.005, ..Look::default() };
     let looks = [
@@ -83,7 +86,12 @@ pub fn scenes() -> Vec<Scene> {
             Look { levels: [0.24, 0.30, 0.97], noise: 0.003, ..good },
         ),
         ("another-size", "a board of another size is asked for", Demand::Nothing, good),
-        ("another-kind", "a board of the other kind is asked for", Demand::Nothing, good),
+        (
+            "another-kind",
+            "a board of another kind, or with other markers, is asked for",
+            Demand::Nothing,
+            good,
+        ),
         (
             "noise-only",
             "no board: levels drawn at random",
@@ -91,7 +99,7 @@ pub fn scenes() -> Vec<Scene> {
             Look { levels: [0.5; 3], noise: 0.2, ..good },
         ),
     ];
-    [Kind::Chessboard, Kind::Circles]
+    Kind::ALL
         .into_iter()
         .flat_map(|kind| looks.map(|(id, about, demand, look)| Scene { id, about, kind, demand, look }))
         .collect()
@@ -99,25 +107,22 @@ pub fn scenes() -> Vec<Scene> {
 
 impl Scene {
     /// The board that is photographed.
-    pub fn board(&self) -> Board {
-        let Wanted { columns, rows, .. } = wanted_of(self.kind, (0, 0));
-        let board = match self.kind {
-            Kind::Chessboard => Board::chessboard(columns, rows, SPACING),
-            Kind::Circles => Board::circles(columns, rows, SPACING, DIAMETER),
+    pub fn board(&self) -> BoardSpec {
+        let diameter = match self.kind {
+            Kind::Circles | Kind::Hexagonal => Some(5.0),
+            // The nearest neighbours are sqrt(2) spacings away.
+            Kind::Asymmetric => Some(7.0),
+            Kind::Chessboard | Kind::Charuco | Kind::AprilGrid => None,
         };
-        board.expect("a board of six rows or more")
+        wanted_of(self.kind).board(SPACING, diameter)
     }
 
     /// What is asked for in a trial.
     pub fn wanted(&self, trial: u64) -> Wanted {
-        let other = match self.kind {
-            Kind::Chessboard => Kind::Circles,
-            Kind::Circles => Kind::Chessboard,
-        };
         match self.id {
-            "another-size" => wanted_of(self.kind, OTHERS[trial as usize % OTHERS.len()]),
-            "another-kind" => wanted_of(other, (0, 0)),
-            _ => wanted_of(self.kind, (0, 0)),
+            "another-size" => of_another_size(self.kind, trial),
+            "another-kind" => of_another_kind(self.kind),
+            _ => wanted_of(self.kind),
         }
     }
 
@@ -127,11 +132,48 @@ impl Scene {
     }
 }
 
-/// A board of a kind with so many more marks in a row, and rows, than the one that is photographed.
-fn wanted_of(kind: Kind, more: (isize, isize)) -> Wanted {
-    let (columns, rows): (usize, usize) = match kind {
+/// The board of a kind that is photographed.
+fn wanted_of(kind: Kind) -> Wanted {
+    let (columns, rows) = match kind {
         Kind::Chessboard => (9, 6),
         Kind::Circles => (9, 7),
+        Kind::Asymmetric => (4, 11),
+        Kind::Hexagonal => (8, 7),
+        Kind::Charuco => (7, 5),
+        // 6 x 4 tags.
+        Kind::AprilGrid => (12, 8),
     };
-    Wanted { kind, columns: columns.saturating_add_signed(more.0), rows: rows.saturating_add_signed(more.1) }
+    let markers = match kind {
+        Kind::Charuco => Some(Markers { dictionary: MARKERS, marker: Some(0.72), gap: None }),
+        Kind::AprilGrid => Some(Markers { dictionary: "DICT_APRILTAG_36h11", marker: None, gap: Some(0.3) }),
+        _ => None,
+    };
+    Wanted { kind, columns, rows, markers }
+}
+
+fn of_another_size(kind: Kind, trial: u64) -> Wanted {
+    let wanted = wanted_of(kind);
+    let of_four = trial as usize % OTHERS.len();
+    let (columns, rows) = match kind {
+        Kind::Charuco => (OTHER_WIDTHS[of_four], 0),
+        Kind::AprilGrid => (2 * OTHER_WIDTHS[of_four], 0),
+        _ => OTHERS[of_four],
+    };
+    let changed = |marks: usize, by: isize| marks.saturating_add_signed(by);
+    Wanted { columns: changed(wanted.columns, columns), rows: changed(wanted.rows, rows), ..wanted }
+}
+
+fn of_another_kind(kind: Kind) -> Wanted {
+    match kind {
+        Kind::Chessboard => wanted_of(Kind::Circles),
+        Kind::Circles => wanted_of(Kind::Chessboard),
+        Kind::Asymmetric => wanted_of(Kind::Hexagonal),
+        Kind::Hexagonal => wanted_of(Kind::Circles),
+        Kind::AprilGrid => wanted_of(Kind::Charuco),
+        Kind::Charuco => {
+            let wanted = wanted_of(kind);
+            let markers = wanted.markers.map(|markers| Markers { dictionary: OTHER_MARKERS, ..markers });
+            Wanted { markers, ..wanted }
+        }
+    }
 }
