@@ -179,3 +179,41 @@ fn another_grid_of_tags_is_refused() {
     assert!(matches!(error(4, 5), Err(CodedError::Disagree { .. })), "{:?}", error(4, 5));
     assert!(matches!(error(3, 2), Err(CodedError::GoesOn { .. } | CodedError::Disagree { .. })));
 }
+
+/// Blurred and noisy, so that some levels of the image show two or three tags only: what the others show counts too.
+#[test]
+fn another_grid_of_tags_is_refused_however_few_tags_a_level_of_the_image_shows() {
+    let grid = AprilGrid::new(5, 4, 0.3).unwrap();
+    let (dark, marks) = april_scene(&grid);
+    for (pose, trial) in poses(2.4).iter().zip(0..) {
+        for (blur_px, sigma) in [(0.6, 0.0), (1.2, 0.02), (1.5, 0.05)] {
+            for away in [8.2, 14.0] {
+                let photo = noisy(photo_of(&dark, &marks, away, pose, blur_px), sigma, trial);
+                for (columns, rows) in [(4, 4), (6, 4), (4, 5), (10, 2), (2, 10), (3, 7), (5, 3), (5, 2)] {
+                    let other = AprilGrid::new(columns, rows, 0.3).unwrap();
+                    let seen = seen_april_grid(&photo.image, &other);
+                    let what =
+                        format!("{columns} x {rows}, pose {trial}, {away}, blur {blur_px} px, noise {sigma}");
+                    assert!(seen.is_err(), "{what}: {} marks", seen.map_or(0, |seen| seen.seen().count()));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_grid_of_tags_that_goes_on_or_has_another_spacing_is_named() {
+    let grid = AprilGrid::new(5, 4, 0.3).unwrap();
+    let (dark, marks) = april_scene(&grid);
+    for pose in &poses(0.0)[..3] {
+        let photo = photo_of(&dark, &marks, 8.2, pose, 0.6);
+        let error = |rows, spacing| {
+            seen_april_grid(&photo.image, &AprilGrid::new(5, rows, spacing).unwrap()).unwrap_err()
+        };
+        assert_eq!(error(3, 0.3), CodedError::GoesOn { columns: 5, rows: 3 });
+        for asked in [0.2, 0.25, 0.4] {
+            let CodedError::Spacing { seen, .. } = error(4, asked) else { panic!("{}", error(4, asked)) };
+            assert!(seen.abs_diff(300) <= 10, "{seen} thousandths");
+        }
+    }
+}

@@ -64,19 +64,19 @@ const TYPE: f64 = 2.6;
 const TICK: f64 = 0.2;
 
 impl Sheet {
-    /// Draws a board on a sheet of paper, which lies wide.
+    /// Draws a board on a sheet of paper, turned by a quarter where the board fits so alone.
     pub fn of(board: &BoardSpec, paper: &Paper) -> Result<Sheet, SheetError> {
         let unit = board.unit_mm().ok_or(SheetError::NoUnit)?;
         if board.lacks_diameter() {
             return Err(SheetError::NoDiameter);
         }
-        let (size, extent, room): (Vec2, Vec2, Vec2) =
-            (Vec2::new(paper.long_mm, paper.short_mm), extent(board, unit), room(paper));
-        if extent.x > room.x || extent.y > room.y {
-            let larger = Paper::smallest(|paper| {
-                let room = self::room(paper);
-                extent.x <= room.x && extent.y <= room.y
-            });
+        let extent = extent(board, unit);
+        let fits = |paper: &Paper| {
+            let room = room(paper);
+            extent.x <= room.x && extent.y <= room.y
+        };
+        let Some(lying) = paper.either_way().into_iter().find(fits) else {
+            let (room, larger) = (room(paper), Paper::smallest(fits));
             let advice = match larger {
                 Some(larger) => format!("take {larger}, or less of a spacing"),
                 None => "take less of a spacing".to_string(),
@@ -89,7 +89,8 @@ impl Sheet {
                 room_height: room.y,
                 advice,
             });
-        }
+        };
+        let size = Vec2::new(lying.width_mm, lying.height_mm);
         let middle =
             Vec2::new(0.5 * (EDGE + STRIP_LEFT + size.x - EDGE), 0.5 * (EDGE + size.y - STRIP_BELOW - EDGE));
         let mut sheet = Sheet { size, ink: marks(board, unit, middle), rulers: [0.0; 2] };
@@ -149,15 +150,19 @@ impl Sheet {
 
 /// By how much a board could grow on a sheet of paper: the largest factor for its lengths.
 pub(super) fn growth(board: &BoardSpec, paper: &Paper) -> Option<f64> {
-    let (extent, room) = (extent(board, board.unit_mm()?), room(paper));
-    Some((room.x / extent.x).min(room.y / extent.y))
+    let extent = extent(board, board.unit_mm()?);
+    let growth = |paper: Paper| {
+        let room = room(&paper);
+        (room.x / extent.x).min(room.y / extent.y)
+    };
+    Some(paper.either_way().map(growth).into_iter().fold(0.0, f64::max))
 }
 
 /// What is left for the board.
 fn room(paper: &Paper) -> Vec2 {
     Vec2::new(
-        paper.long_mm - 2.0 * EDGE - STRIP_LEFT - 2.0 * QUIET,
-        paper.short_mm - 2.0 * EDGE - STRIP_BELOW - 2.0 * QUIET,
+        paper.width_mm - 2.0 * EDGE - STRIP_LEFT - 2.0 * QUIET,
+        paper.height_mm - 2.0 * EDGE - STRIP_BELOW - 2.0 * QUIET,
     )
 }
 
@@ -281,6 +286,8 @@ mod tests {
             ("circles:30x20:5mm:2mm", "letter"),
             ("dots:3x3:20mm:8mm", "A5"),
             ("asymmetric:4x8:20mm:14mm", "A4"),
+            // Upright.
+            ("asymmetric:4x11:20mm:15mm", "A4"),
             ("hexagonal:16x11:15mm:7mm", "A4"),
             ("charuco:7x5:35mm:26mm:DICT_4X4_50", "A4"),
             ("aprilgrid:6x4:30mm:0.3", "A4"),

@@ -36,41 +36,61 @@ const FARTHEST: usize = 2;
 /// Fewest corners whose places make a view.
 const FEWEST_MARKS: usize = 4;
 
+/// Side neighbours whose distance tells the spacing of the tags, and by how much it may differ from what was said, in sides.
+const FEWEST_NEIGHBOURS: usize = 8;
+const MOST_WIDER: f64 = 0.04;
+
+/// Tags beyond the board that others confirm: one may be read wrongly.
+const FEWEST_BEYOND: usize = 2;
+
 /// Finds the corners of a grid of AprilTags that are seen, in Kalibr's order: row by row of corners from the lower left
 /// one of the first tag upwards, twice as many along a row as tags. A tag counts if one near it agrees.
 ///
 /// # Errors
-/// See [`CodedError`].
+/// See [`CodedError`]; a grid of another size or spacing too, where enough of it is seen to tell.
 pub fn seen_april_grid<T: Level>(image: &Raster<T>, grid: &AprilGrid) -> Result<SeenBoard, CodedError> {
     let pyramid = Pyramid::new(image);
     let mut best: Option<(usize, Vec<Tag>)> = None;
     let mut failure = CodedError::NoCorners { seen: 0 };
     for level in search_order(image, pyramid.levels()) {
-        let strong = in_level(&pyramid, level, Strength::Strong, grid);
-        match strong.or_else(|strong| {
-            in_level(&pyramid, level, Strength::Any, grid).map_err(|any| telling(strong, any))
-        }) {
-            Ok(tags) if best.as_ref().is_none_or(|(_, best)| tags.len() > best.len()) => {
-                best = Some((level, tags));
+        for strength in [Strength::Strong, Strength::Any] {
+            match in_level(&pyramid, level, strength, grid) {
+                Ok(tags) => {
+                    if best.as_ref().is_none_or(|(_, best)| tags.len() > best.len()) {
+                        best = Some((level, tags));
+                    }
+                    break;
+                }
+                Err(failed) => failure = telling(failure, failed),
             }
-            Ok(_) => {}
-            Err(failed) => failure = telling(failure, failed),
         }
         if best.as_ref().is_some_and(|(_, tags)| tags.len() == grid.columns() * grid.rows()) {
             break;
         }
     }
-    let (level, tags) = best.ok_or(failure)?;
-    fitted(&pyramid, level, &tags, grid)
+    match best {
+        Some((level, tags)) if !contradicts(&failure, tags.len()) => fitted(&pyramid, level, &tags, grid),
+        _ => Err(failure),
+    }
+}
+
+/// Whether what one level showed speaks against so many tags that agree in another.
+fn contradicts(failure: &CodedError, agreeing: usize) -> bool {
+    match failure {
+        CodedError::GoesOn { .. } | CodedError::Spacing { .. } => true,
+        CodedError::Disagree { read, .. } => *read > agreeing,
+        _ => false,
+    }
 }
 
 /// The error that tells more, the first of equal ones.
 fn telling(first: CodedError, other: CodedError) -> CodedError {
     let rank = |error: &CodedError| match error {
-        CodedError::NoCorners { seen } => (*seen > 0).into(),
-        CodedError::NoMarker { corners, .. } => 1 + corners,
-        CodedError::OneMarker { .. } => usize::MAX - 1,
-        _ => usize::MAX,
+        CodedError::NoCorners { seen } => (0, usize::from(*seen > 0)),
+        CodedError::NoMarker { corners, .. } => (1, *corners),
+        CodedError::OneMarker { .. } => (2, 0),
+        CodedError::Disagree { read, .. } => (3, *read),
+        _ => (4, 0),
     };
     if rank(&other) > rank(&first) { other } else { first }
 }
@@ -82,6 +102,18 @@ struct Tag {
     at: (usize, usize),
     /// Its corners as it stands on the board, px of the photograph: top left, top right, bottom right, bottom left.
     corners_px: [Vec2; 4],
+}
+
+impl Tag {
+    /// From its own plane, in its sides about its middle with y down, to the photograph.
+    fn unit(&self) -> Option<Homography> {
+        let unit = CORNERS.map(|(x, y)| 0.5 * Vec2::new(f64::from(x), f64::from(y)));
+        Homography::fit(&unit, &self.corners_px).ok().map(|fit| fit.homography)
+    }
+
+    fn middle_px(&self) -> Vec2 {
+        self.corners_px.iter().sum::<Vec2>() / 4.0
+    }
 }
 
 /// A tag's corners about its middle, y down, in halves of its side.
@@ -100,14 +132,19 @@ fn in_level<T: Level>(
         return Err(CodedError::NoCorners { seen: candidates.len() });
     }
     let tags: Vec<Tag> = seen.iter().filter_map(|quad| tag(pyramid, level, quad, grid)).collect();
-    let on_board = |tag: &&Tag| tag.id < grid.columns() * grid.rows();
-    let beyond = tags.iter().filter(|tag| !on_board(tag)).count();
     let (columns, rows) = (grid.columns(), grid.rows());
     let (read, only) = (tags.len(), tags.first().map_or(0, |tag| tag.id));
-    if 2 * beyond > read {
+    if goes_on(&tags, grid) {
         return Err(CodedError::GoesOn { columns, rows });
     }
     let agreeing = agreeing(tags, grid);
+    if let Some(seen) = pitch(&agreeing).filter(|pitch| (pitch - 1.0 - grid.spacing()).abs() > MOST_WIDER) {
+        let thousandths = |spacing: f64| libm::round(1000.0 * spacing.max(0.0)) as usize;
+        return Err(CodedError::Spacing {
+            asked: thousandths(grid.spacing()),
+            seen: thousandths(seen - 1.0),
+        });
+    }
     if !agreeing.is_empty() {
         return Ok(agreeing);
     }
@@ -116,6 +153,42 @@ fn in_level<T: Level>(
         1 => CodedError::OneMarker { id: only },
         _ => CodedError::Disagree { agree: 0, read, columns, rows, other: None },
     })
+}
+
+/// Whether tags are seen that follow the board's last, where they would stand on one with more rows.
+fn goes_on(tags: &[Tag], grid: &AprilGrid) -> bool {
+    let is_beyond = |tag: &&Tag| tag.at.1 >= grid.rows();
+    let is_confirmed = |tag: &&Tag| {
+        let confirms = |other: &Tag| {
+            other.id != tag.id
+                && apart(tag, other) <= FARTHEST
+                && agree(tag, other, grid)
+                && agree(other, tag, grid)
+        };
+        tags.iter().any(confirms)
+    };
+    tags.iter().filter(is_beyond).filter(is_confirmed).count() >= FEWEST_BEYOND
+}
+
+/// The median distance of side neighbours' middles, in sides of a tag; `None` of too few.
+fn pitch(tags: &[Tag]) -> Option<f64> {
+    let beside = |tag: &Tag, other: &Tag| {
+        let (dx, dy) = (tag.at.0.abs_diff(other.at.0), tag.at.1.abs_diff(other.at.1));
+        dx + dy == 1
+    };
+    // From a tag as near as from its neighbour: what perspective adds to one it takes from the other.
+    let seen_from = |tag: &Tag, other: &Tag| {
+        let middle_px = other.unit()?.apply(&Vec2::zeros())?;
+        Some(tag.unit()?.inverse()?.apply(&middle_px)?.norm())
+    };
+    let mut distances: Vec<f64> = Vec::new();
+    for (i, tag) in tags.iter().enumerate() {
+        for other in tags[i + 1..].iter().filter(|other| beside(tag, other)) {
+            distances.push(0.5 * (seen_from(tag, other)? + seen_from(other, tag)?));
+        }
+    }
+    distances.sort_by(f64::total_cmp);
+    (distances.len() >= FEWEST_NEIGHBOURS).then(|| distances[distances.len() / 2])
 }
 
 /// The tag in a quadrangle.
@@ -181,12 +254,11 @@ fn agree(tag: &Tag, other: &Tag, grid: &AprilGrid) -> bool {
     let step = |a: usize, b: usize| (a as f64 - b as f64) * pitch;
     // Rows are counted upwards, and y points down.
     let way = Vec2::new(step(other.at.0, tag.at.0), -step(other.at.1, tag.at.1));
-    let unit = CORNERS.map(|(x, y)| 0.5 * Vec2::new(f64::from(x), f64::from(y)));
-    let Ok(fit) = Homography::fit(&unit, &tag.corners_px) else { return false };
-    let Some(expected) = fit.homography.apply(&way) else { return false };
-    let middle = other.corners_px.iter().sum::<Vec2>() / 4.0;
+    let Some(expected) = tag.unit().and_then(|photo_from_tag| photo_from_tag.apply(&way)) else {
+        return false;
+    };
     let side = (other.corners_px[0] - other.corners_px[2]).norm() / std::f64::consts::SQRT_2;
-    (expected - middle).norm() < MOST_OFF * side * apart(tag, other) as f64
+    (expected - other.middle_px()).norm() < MOST_OFF * side * apart(tag, other) as f64
 }
 
 /// The corners of the tags, fitted in the photograph.

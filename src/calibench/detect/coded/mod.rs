@@ -83,6 +83,17 @@ pub enum CodedError {
         /// Asked rows.
         rows: usize,
     },
+    /// Tags stand farther from each other, or nearer, than was said.
+    #[error(
+        "the tags stand {}.{:03} of their side apart, and not {}.{:03}: give the spacing of the printed board, measured",
+        .seen / 1000, .seen % 1000, .asked / 1000, .asked % 1000
+    )]
+    Spacing {
+        /// Asked distance of two tags, in thousandths of a tag's side.
+        asked: usize,
+        /// What it is in the photograph.
+        seen: usize,
+    },
     /// Too few corners have a place better than a pixel.
     #[error(
         "{found} marks were found whose edges are clear enough for exact places, and four are needed: hold the board still, or use \
@@ -99,7 +110,7 @@ impl CodedError {
     fn is_grave(&self) -> bool {
         match self {
             CodedError::Disagree { read, .. } => *read > BY_CHANCE,
-            CodedError::GoesOn { .. } => true,
+            CodedError::GoesOn { .. } | CodedError::Spacing { .. } => true,
             _ => false,
         }
     }
