@@ -88,7 +88,7 @@ pub fn outcomes(
         let drawn = draw::photographs(scene, seed, some);
         let asked: Vec<Asked> =
             drawn.iter().map(|(trial, photo)| Asked::new(scene, *trial, "", photo.image.clone())).collect();
-        let Some(answers) = answered(detector, &asked)? else { return Ok(None) };
+        let Some(answers) = answered(detector, scene, &asked)? else { return Ok(None) };
         let truths = draw::truths(scene, &drawn);
         for (((trial, _), truth), answer) in drawn.iter().zip(&truths).zip(answers) {
             found.push((*trial, outcome(scene, truth, answer)));

@@ -167,8 +167,7 @@ fn of_another_kind(kind: Kind) -> Wanted {
     match kind {
         Kind::Chessboard => wanted_of(Kind::Circles),
         Kind::Circles => wanted_of(Kind::Chessboard),
-        Kind::Asymmetric => wanted_of(Kind::Hexagonal),
-        Kind::Hexagonal => wanted_of(Kind::Circles),
+        Kind::Asymmetric | Kind::Hexagonal => wanted_of(Kind::Circles),
         Kind::AprilGrid => wanted_of(Kind::Charuco),
         Kind::Charuco => {
             let wanted = wanted_of(kind);
