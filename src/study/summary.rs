@@ -297,7 +297,7 @@ mod tests {
             }
             correlations(&engine.quantities, &tally, 0.05)
         };
-        assert_eq!(found(false), []);
+        assert!(found(false).is_empty());
         assert!(found(true).iter().any(|(_, _, r)| r.value.abs() < 1e-12 && r.contains(0.0)));
     }
 
