@@ -292,6 +292,17 @@ mod tests {
     }
 
     #[test]
+    fn the_interval_of_a_ratio_is_that_of_its_logarithm() {
+        // a^2 = 1 and b^2 = 0.5, 1.5, ...: the pairs' differences have variance 0.25, the logarithm 0.25 / (4 n).
+        let mut pairs = Pairs::default();
+        (0..100).for_each(|i| pairs.add(1.0, [0.5f64, 1.5][i % 2].sqrt()));
+        let ratio = pairs.ratio(0.05).unwrap();
+        let factor = libm::exp(1.959_964 * 0.025);
+        assert!((ratio.value - 1.0).abs() < 1e-12);
+        assert!((ratio.high - factor).abs() < 1e-7 && (ratio.low * factor - 1.0).abs() < 1e-7, "{ratio:?}");
+    }
+
+    #[test]
     fn a_common_factor_is_found_exactly() {
         let mut pairs = Pairs::default();
         [0.3, -1.2, 0.8, 2.0, -0.1].iter().for_each(|x| pairs.add(*x, 3.0 * x));

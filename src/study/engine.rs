@@ -362,6 +362,18 @@ mod tests {
     use crate::example::STUDY;
 
     #[test]
+    fn every_cell_takes_every_batch_once_round_by_round() {
+        let text = STUDY.replace("per_cell = 3\nbatch = 2", "per_cell = 5\nbatch = 2");
+        let mut engine = Engine::new(&text, Shard::WHOLE).unwrap();
+        let mut units = Vec::new();
+        while let Some(unit) = engine.next() {
+            units.push(unit);
+            engine.absorb(unit, &[]);
+        }
+        assert_eq!(units, [(0, 0), (1, 0), (0, 1), (1, 1), (0, 2), (1, 2)]);
+    }
+
+    #[test]
     fn the_worst_cell_is_one_that_has_begun_and_is_known_least() {
         let mut engine =
             Engine::new(&STUDY.replace("per_cell = 3\nbatch = 2", "per_cell = 60\nbatch = 20"), Shard::WHOLE)

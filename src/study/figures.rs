@@ -333,3 +333,39 @@ pub(super) fn wide(values: &[f64]) -> bool {
     let (low, high) = values.iter().fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
     low > 0.0 && high > WIDE * low
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::example::STUDY;
+    use crate::{Spec, in_memory, summarise};
+
+    #[test]
+    fn few_series_are_drawn_over_the_factor_and_many_cell_by_cell() {
+        let drawn = |text: &str| -> Vec<String> {
+            let engine = in_memory(Spec::parse(text).unwrap(), text, |_| {}).unwrap();
+            draw(&engine, &summarise(&engine)).into_iter().map(|figure| figure.name).collect()
+        };
+        let one = STUDY.replace("per_cell = 3", "per_cell = 8");
+        let names = drawn(&one);
+        assert!(
+            names.iter().any(|name| name == "spread") && names.iter().all(|name| name != "ratio"),
+            "{names:?}"
+        );
+        // Of four factors of two levels one is the axis, and the others make eight series.
+        let factor = |name: &str, levels: &str| {
+            format!("\n[[factor]]\nname = \"{name}\"\nset = [\"scene.{name}\"]\nlevels = {levels}\n")
+        };
+        let more = [
+            ("camera.fx", "[600.0, 610.0]"),
+            ("camera.cx", "[320.0, 321.0]"),
+            ("poses.distance_mm", "[150.0, 160.0]"),
+        ];
+        let four = more.iter().fold(one, |text, (name, levels)| text + &factor(name, levels));
+        let names = drawn(&four);
+        assert!(
+            names.iter().any(|name| name == "ratio") && names.iter().all(|name| name != "spread"),
+            "{names:?}"
+        );
+    }
+}

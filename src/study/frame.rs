@@ -153,6 +153,19 @@ mod tests {
     use calibench::synth::Truth;
 
     #[test]
+    fn a_lens_that_folds_back_within_the_frame_shows_a_part_of_it() {
+        let ideal: Camera<Lens> = Camera::pinhole(600.0, 600.0, 319.5, 239.5).into();
+        assert_eq!(shown(&ideal, (640, 480)), None);
+        // r (1 - r^2) grows as far as r = 1 / sqrt(3), where it is 2 / sqrt(27): a circle of 231 px in the frame. Nodes stand
+        // 21 px apart, and the ring of cells that it cuts is a tenth of the frame.
+        let folding = ideal.with_value(Parameter::K1, -1.0).unwrap();
+        let radius = 600.0 * 2.0 / 27.0f64.sqrt();
+        let expected = std::f64::consts::PI * radius * radius / (640.0 * 480.0);
+        let share = shown(&folding, (640, 480)).unwrap();
+        assert!((share - expected).abs() < 0.03, "{share} for {expected}");
+    }
+
+    #[test]
     fn the_root_of_a_sum_of_squares_has_the_moments_of_a_chi_distribution() {
         // Of one, two and three equal squares: half-normal, Rayleigh and Maxwell, means sqrt(2 / pi), sqrt(pi / 2), sqrt(8 / pi).
         let pi = std::f64::consts::PI;

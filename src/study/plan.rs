@@ -401,6 +401,21 @@ mod tests {
     }
 
     #[test]
+    fn each_goal_is_held_against_the_bound_of_its_own_quantity() {
+        let spec = Spec::parse(crate::example::STUDY).unwrap();
+        let goal = |quantity: &str| Goal { quantity: quantity.into(), sd: 1.0 };
+        let sds = predicted(&spec, &[goal("fx"), goal("k1")]).unwrap().unwrap();
+        let cells = spec.cells("").unwrap();
+        let quantities = spec.quantities(&cells);
+        for (sd, name) in sds.iter().zip(["fx", "k1"]) {
+            let at = quantities.iter().position(|q| q.name() == name).unwrap();
+            assert_eq!(Some(*sd), cells[0].prediction.0[at].map(|p| p.sd), "{name}");
+        }
+        // The RMSE is measured, but is no error of which less could be wished.
+        assert!(matches!(predicted(&spec, &[goal("rmse")]), Err(PlanError::Quantity { .. })));
+    }
+
+    #[test]
     fn only_an_interval_that_lies_at_or_below_the_wish_as_a_whole_confirms_it() {
         // An interval of 0.94 to 1.06 of the value.
         for (value, outcome) in [

@@ -117,6 +117,15 @@ mod tests {
     use super::*;
 
     #[test]
+    fn over_several_sets_of_poses_means_and_variances_are_averaged() {
+        let set = |mean, sd| Prediction(vec![Some(Expected { mean, sd }), None]);
+        let Prediction(both) = Prediction::mean_of(&[set(1.0, 3.0), set(3.0, 4.0)]);
+        let Expected { mean, sd } = both[0].unwrap();
+        assert!((mean - 2.0).abs() < 1e-15 && (sd - 12.5f64.sqrt()).abs() < 1e-15);
+        assert_eq!(both[1], None);
+    }
+
+    #[test]
     fn the_nees_has_the_moments_of_a_ratio_of_chi_squares() {
         for (n, d) in [(1.0, 5.0), (6.0, 20.0), (10.0, 480.0)] {
             let Expected { mean, sd } = nees(n, d).unwrap();

@@ -382,3 +382,16 @@ impl LossChoice {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::example::STUDY;
+
+    #[test]
+    fn what_a_study_leaves_out_has_the_stated_default() {
+        let spec = Spec::parse(&STUDY.replace("batch = 2\n", "")).unwrap();
+        assert_eq!((spec.trials.batch, spec.trials.precision), (500, None));
+        assert_eq!((spec.confidence, spec.common_random_numbers), (0.95, true));
+    }
+}

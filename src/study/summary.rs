@@ -281,6 +281,25 @@ fn ends(estimated: Option<Estimated>) -> [Entry; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::example::STUDY;
+    use crate::{Shard, Trial};
+
+    #[test]
+    fn errors_that_move_as_one_have_no_interval_of_their_correlation() {
+        let engine = Engine::new(STUDY, Shard::WHOLE).unwrap();
+        let found = |turned: bool| {
+            let mut tally = engine.tallies[0].clone();
+            // Variance and covariance are 1, without rounding.
+            for x in [-1.0, 1.0, -1.0, 1.0, 0.0] {
+                let value = |q: usize| Some(if turned && q % 2 == 1 { x * x - 0.8 } else { x });
+                let values = (0..engine.quantities.len()).map(value).collect();
+                tally.add(&Trial { cell: 0, trial: 0, outcome: "converged".into(), iterations: 1, values });
+            }
+            correlations(&engine.quantities, &tally, 0.05)
+        };
+        assert!(found(false).is_empty());
+        assert!(found(true).iter().any(|(_, _, r)| r.value.abs() < 1e-12 && r.contains(0.0)));
+    }
 
     #[test]
     fn a_quantiles_interval_reaches_to_the_ranks_of_the_binomial() {

@@ -84,11 +84,14 @@ mod tests {
     #[test]
     fn moments_are_those_of_the_definition() {
         let data = [[1.0, 2.0, 0.0], [2.0, 1.0, 1.0], [4.0, 3.0, -2.0], [5.0, 7.0, 0.5]];
-        let mut sample = Sample::about(&[3.0, 3.0, 0.0]);
+        let origin = [3.0, 3.0, 0.0];
+        let mut sample = Sample::about(&origin);
         data.iter().for_each(|row| sample.add(row));
         for i in 0..3 {
             let mean = data.iter().map(|r| r[i]).sum::<f64>() / 4.0;
             assert!((sample.mean(i) - mean).abs() < 1e-14);
+            let square = data.iter().map(|r| (r[i] - origin[i]) * (r[i] - origin[i])).sum::<f64>() / 4.0;
+            assert!((sample.root_mean_square(i) - square.sqrt()).abs() < 1e-14);
             for j in 0..3 {
                 let mean_j = data.iter().map(|r| r[j]).sum::<f64>() / 4.0;
                 let covariance = data.iter().map(|r| (r[i] - mean) * (r[j] - mean_j)).sum::<f64>() / 3.0;

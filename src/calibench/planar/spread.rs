@@ -57,3 +57,44 @@ impl PlaneSpread {
         Some(PlaneSpread { sigma, covariance, map: *map, local_covariance })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::geometry::Vec2;
+    use crate::planar::{PlaneModel, calibrate_plane};
+    use nalgebra::Matrix2;
+
+    #[test]
+    fn a_point_is_as_uncertain_as_a_regression_on_a_grid_says() {
+        // Nine marks 200 px apart. A slope rests on the squares of one coordinate in an affine map, 6 * 200^2 about
+        // the centroid, and of both in a similarity; at an offset d the variance of X and of Y is sigma^2 (1 / 9 +
+        // |d|^2 / sum of squares), and the two are not correlated.
+        let pixels: Vec<Vec2> =
+            (0..9).map(|i| Vec2::new(f64::from(i % 3), f64::from(i / 3)) * 200.0).collect();
+        let error = |i: usize| ((i * 7919) % 211) as f64 / 1e5;
+        let world: Vec<Vec2> =
+            (0..9).map(|i| pixels[i] * 0.01 + Vec2::new(error(i), error(i + 40))).collect();
+        let centre = Vec2::new(200.0, 200.0);
+        let (a, b) = (Vec2::new(-50.0, 130.0), Vec2::new(410.0, 20.0));
+        for (model, freedom, squares) in
+            [(PlaneModel::Affine, 12.0, 6.0 * 4e4), (PlaneModel::Similarity, 14.0, 12.0 * 4e4)]
+        {
+            let fit = calibrate_plane(model, &pixels, &world).unwrap();
+            let spread = fit.spread.as_ref().unwrap();
+            let variance = fit.residuals.iter().map(Vec2::norm_squared).sum::<f64>() / freedom;
+            assert!((spread.sigma - variance.sqrt()).abs() < 1e-12 * spread.sigma);
+            let agree = |found: Matrix2<f64>, expected: f64| {
+                let expected = Matrix2::identity() * (variance * expected);
+                assert!(
+                    (found - expected).norm() < 1e-9 * expected.norm(),
+                    "{model:?}: {found} for {expected}"
+                );
+            };
+            for pixel in [centre, a, b] {
+                let share = 1.0 / 9.0 + (pixel - centre).norm_squared() / squares;
+                agree(spread.world_covariance(&pixel).unwrap(), share);
+            }
+            agree(spread.difference_covariance(&a, &b).unwrap(), (b - a).norm_squared() / squares);
+        }
+    }
+}

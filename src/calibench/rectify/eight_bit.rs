@@ -292,7 +292,6 @@ mod wide {
 
 #[cfg(test)]
 mod tests {
-    use super::super::source_row::PIECE;
     use super::*;
     use crate::geometry::Vec2;
 
@@ -311,7 +310,7 @@ mod tests {
     /// edge.
     fn row(stretch: f64, slope: f64, start: Vec2) -> Sources {
         let mut sources = Sources::new();
-        for i in 0..PIECE {
+        for i in 0..COUNT.next_multiple_of(PIXELS) {
             let t = i as f64;
             sources.set(i, Some(start + Vec2::new(stretch * t, slope * t + 1e-4 * t * t)));
         }

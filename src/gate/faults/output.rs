@@ -96,3 +96,24 @@ fn deviation(answer: &Answer, name: &str) -> f64 {
         })
         .unwrap_or(0.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Faulty, planted};
+    use super::*;
+    use crate::plan::{Asked, Plan};
+    use crate::solver::{Builtin, Solver};
+
+    #[test]
+    fn the_silent_failure_makes_fx_a_tenth_too_large_where_it_strikes_and_changes_nothing_elsewhere() {
+        let faulty = Faulty::new(planted().into_iter().find(|fault| fault.id == "silent-failure").unwrap());
+        let asked = Asked { scenes: vec!["four-pose".into()], ..Asked::default() };
+        let plan = Plan::of(1, 1000, asked).unwrap();
+        for (is_struck, factor) in [(true, 1.1), (false, 1.0)] {
+            let mut problems = plan.cases.iter().map(|case| plan.problem(case));
+            let problem = problems.find(|problem| chosen(problem, 100) == is_struck).unwrap();
+            let fx = |solver: &dyn Solver| solver.ask(&problem).unwrap().parameters["fx"];
+            assert_eq!(fx(&faulty), factor * fx(&Builtin));
+        }
+    }
+}

@@ -207,6 +207,24 @@ mod tests {
     }
 
     #[test]
+    fn a_propertys_row_counts_its_own_checks_in_every_form_of_the_report() {
+        let report = report(&Builtin, &["four-pose", "metres"]);
+        let page = report.to_html();
+        let rows = report.rows();
+        assert!(rows.iter().any(|row| row.held.1 > 1), "{}", report.to_text(200));
+        for row in rows {
+            let of_property = || report.checks.iter().filter(|check| check.property == row.property);
+            let judged = of_property().filter(|check| check.verdict != Verdict::NotJudged).count();
+            let held = of_property().filter(|check| check.verdict == Verdict::Held).count();
+            assert_eq!((row.telling.property, row.held), (row.property, (held, judged)));
+            let name = row.property.name();
+            let line = page.lines().find(|line| line.contains(&format!("<a href=\"#{name}\">"))).unwrap();
+            let count = if judged == 0 { "&ndash;".to_string() } else { format!("{held} / {judged}") };
+            assert!(line.contains(&format!("<td class=n>{count}<td>")), "{line}");
+        }
+    }
+
+    #[test]
     fn every_check_that_fails_has_in_json_the_command_that_the_text_has() {
         let refuses = Partly {
             answers: |_| false,

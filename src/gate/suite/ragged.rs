@@ -73,6 +73,9 @@ mod tests {
     fn every_ragged_view_sees_a_part_and_no_two_scenes_the_same() {
         for (id, whole) in [("over-the-edge", 143), ("marks-missing", 63)] {
             let marks = marks(id);
+            let of_suite = suite().unwrap();
+            let setup = &of_suite.iter().find(|s| s.id == id).unwrap().setup;
+            assert_eq!(setup.observations(), marks.iter().sum::<usize>());
             // No view sees the whole board, or less than determines a pose well, and most see other numbers.
             assert!(marks.iter().all(|count| (15..whole).contains(count)), "{id}: {marks:?}");
             let mut different = marks.clone();
