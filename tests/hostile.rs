@@ -168,9 +168,8 @@ fn corner_file() -> String {
 
 /// Its marks, measured.
 fn target_file() -> String {
-    let scene = calibench::synth::Scene::example();
-    let marks =
-        scene.exact()[0].pairs().enumerate().map(|(i, (at, _))| format!("{i},{},{},0,0.01\n", at.x, at.y));
+    let views = calibench::synth::Scene::example().exact();
+    let marks = views[0].pairs().enumerate().map(|(i, (at, _))| format!("{i},{},{},0,0.01\n", at.x, at.y));
     "point,X,Y,Z,sd\n".to_string() + &marks.collect::<String>()
 }
 
