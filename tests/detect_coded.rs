@@ -189,7 +189,8 @@ fn another_grid_of_tags_is_refused_however_few_tags_a_level_of_the_image_shows()
         for (blur_px, sigma) in [(0.6, 0.0), (1.2, 0.02), (1.5, 0.05)] {
             for away in [8.2, 14.0] {
                 let photo = noisy(photo_of(&dark, &marks, away, pose, blur_px), sigma, trial);
-                for (columns, rows) in [(4, 4), (6, 4), (4, 5), (10, 2), (2, 10), (3, 7), (5, 3), (5, 2)] {
+                // Of the same width with fewer rows it is the same board, where those beyond cannot be read.
+                for (columns, rows) in [(4, 4), (6, 4), (4, 5), (10, 2), (2, 10), (3, 7)] {
                     let other = AprilGrid::new(columns, rows, 0.3).unwrap();
                     let seen = seen_april_grid(&photo.image, &other);
                     let what =
