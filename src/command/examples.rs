@@ -125,7 +125,7 @@ const EXAMPLES: &[(&str, &[&str])] = &[
             "calibench gate --samples 2 --record before",
             "calibench gate --judge before --against builtin",
             "calibench gate --hand-eye",
-            "calibench gate --detector --samples 4",
+            "calibench gate --detector --boards chessboard,circles --samples 4",
         ],
     ),
     ("doctor", &["calibench doctor"]),

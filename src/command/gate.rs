@@ -130,6 +130,9 @@ pub(super) struct Arguments {
         "hand_eye",
     ])]
     detector: bool,
+    /// Kinds of boards that the detector is asked for: chessboard, circles, asymmetric, hexagonal, charuco, aprilgrid [default: all]
+    #[arg(long, value_name = "KINDS", value_delimiter = ',', requires = "detector", value_parser = detector::kind)]
+    boards: Vec<calibench_detector_gate::protocol::Kind>,
     /// Judges this library and the hand-eye methods of the programs in adapters/, and writes the table as
     /// Markdown
     #[arg(long, value_name = "FILE", requires = "hand_eye", conflicts_with_all = ["solver", "json"])]

@@ -13,6 +13,8 @@ use std::fmt::Write;
 pub struct Report {
     /// The detector.
     pub detector: String,
+    /// Kinds of boards that it was asked for.
+    pub boards: Vec<Kind>,
     /// Seed of the photographs.
     pub seed: u64,
     /// Photographs of a scene.
@@ -40,7 +42,7 @@ impl Report {
             self.photos
         );
         // Writing to a string cannot fail, here and below.
-        for kind in Kind::ALL {
+        for &kind in &self.boards {
             let _ = match self.unsupported.contains(&kind) {
                 true => writeln!(text, "\n{}: not supported, and not judged", kind.name()),
                 false => writeln!(text, "\n{}", self.table(kind)),

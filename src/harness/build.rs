@@ -66,6 +66,7 @@ const PHOTOGRAPHS: &[&str] = &[
     "src/calibench/synth/render.rs",
     "src/calibench/synth/stream.rs",
     "src/detector_gate/bound.rs",
+    "src/detector_gate/cell.rs",
     "src/detector_gate/detectors.rs",
     "src/detector_gate/draw.rs",
     "src/detector_gate/look.rs",

@@ -5,6 +5,7 @@ use super::super::program::timeout;
 use super::super::{Exit, print};
 use super::{Arguments, Size, Stop, incomplete, usage};
 use calibench::io::write_atomically;
+use calibench_detector_gate::protocol::Kind;
 use calibench_detector_gate::{Builtin, Detector, MOST_PHOTOS, Program, QUICK, THOROUGH, run as judge};
 
 /// Judges one detector; without a program that is this library's.
@@ -23,8 +24,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Stop> {
         }
         None => Box::new(Builtin),
     };
-    let report =
-        judge(detector.as_mut(), arguments.seed, photos, arguments.false_alarms).map_err(incomplete)?;
+    let kinds = if arguments.boards.is_empty() { &Kind::ALL[..] } else { &arguments.boards };
+    let report = judge(detector.as_mut(), kinds, arguments.seed, photos, arguments.false_alarms)
+        .map_err(incomplete)?;
     if let Some(path) = &arguments.json {
         write_atomically(path, report.to_json().as_bytes()).map_err(incomplete)?;
     }
@@ -33,4 +35,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Stop> {
         Format::Json => print(&report.to_json()),
     }
     Ok(if report.trusted { Exit::Held } else { Exit::Deviates })
+}
+
+/// A kind of board by its name.
+pub(super) fn kind(text: &str) -> Result<Kind, String> {
+    let names = || Kind::ALL.map(Kind::name).join(", ");
+    Kind::ALL.into_iter().find(|kind| kind.name() == text).ok_or_else(|| format!("expected {}", names()))
 }
