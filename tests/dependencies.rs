@@ -50,6 +50,14 @@ fn threads_are_all_that_the_library_adds_by_default() {
     assert!(added.contains(&"rayon") && added.iter().all(|name| RAYON.contains(name)), "{added:?}");
 }
 
+#[test]
+fn the_readme_counts_them() {
+    let [solver, library] = [&SOLVER[..], &SOLVER[..2]]
+        .map(|arguments| tree("{p}", arguments).lines().collect::<BTreeSet<_>>().len());
+    let said = format!("{library} crates, itself counted, {solver} with `default-features = false`");
+    assert!(include_str!("../README.md").contains(&said), "README.md does not say: {said}");
+}
+
 /// rayon and what it needs.
 const RAYON: [&str; 6] =
     ["rayon", "rayon_core", "either", "crossbeam_deque", "crossbeam_epoch", "crossbeam_utils"];
