@@ -306,9 +306,10 @@ fn claim_errors(record: &mut Record, seen: &[Seen]) {
     record
         .claim_that(
             "below-the-noise-of-the-studies",
-            "in every scene the error of a coordinate of this library's marks is below the 0.1 px that the book's studies assume",
+            "in every scene, but of grids of tags, the error of a coordinate of this library's marks is below the 0.1 px that the \
+             book's studies assume",
         )
-        .every("scenes", ours.iter().map(below))
+        .every("scenes", ours.iter().filter(|judged| judged.scene.kind != Kind::AprilGrid).map(below))
         .because("upper end of the 95 % interval of independent photographs, in each scene");
     let all: Vec<(&Program, Judged<'_>)> = seen
         .iter()
