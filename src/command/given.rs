@@ -4,7 +4,7 @@ use clap::ArgMatches;
 use std::path::Path;
 
 /// Arguments that name files to be written. A history is both: the verb that adds to it keeps it itself.
-const WRITTEN: [&str; 7] = ["json", "junit", "html", "methods", "digits", "to_file", "history"];
+const WRITTEN: [&str; 8] = ["out", "json", "junit", "html", "methods", "digits", "to_file", "history"];
 
 /// Keeps the files of a command line from being replaced.
 pub(super) fn keep(matches: &ArgMatches) {
