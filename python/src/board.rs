@@ -17,10 +17,10 @@ use pyo3::prelude::*;
 ///
 /// Args:
 ///     board: ``chess:9x6:25mm`` (inner corners and side of a square), ``circles:9x7:10mm:3mm`` (pitch and diameter of the discs),
-    ///         ``asymmetric:4x11:20mm:15mm`` (OpenCV's asymmetric grid: distance of rows, half that of a row's discs, and diameter),
-    ///         ``hexagonal:9x9:10mm:5mm`` (distance of neighbours, diameter), or ``dots:3x3:1`` (a few dots); the diameter may be left out.
-    ///         ``charuco:7x5:30mm:22mm:DICT_4X4_50`` (squares, their side, that of a marker, OpenCV's dictionary; ``:legacy`` for OpenCV's
-    ///         legacy pattern) or ``aprilgrid:6x6:88mm:0.3`` (Kalibr's tags, their side, the space between two in sides).
+///         ``asymmetric:4x11:20mm:15mm`` (OpenCV's asymmetric grid: distance of rows, half that of a row's discs, and diameter),
+///         ``hexagonal:9x9:10mm:5mm`` (distance of neighbours, diameter), or ``dots:3x3:1`` (a few dots); the diameter may be left out.
+///         ``charuco:7x5:30mm:22mm:DICT_4X4_50`` (squares, their side, that of a marker, OpenCV's dictionary; ``:legacy`` for OpenCV's
+///         legacy pattern) or ``aprilgrid:6x6:88mm:0.3`` (Kalibr's tags, their side, the space between two in sides).
 ///
 /// Raises:
 ///     BoardError: a text that is no board, or a board that cannot exist.
