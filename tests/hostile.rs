@@ -205,6 +205,24 @@ fn marks_outside_of_the_image_are_refused_and_swapped_sides_are_named() {
 }
 
 #[test]
+fn marks_and_pictures_of_an_earlier_run_beside_a_result_are_named() {
+    let folder = folder("earlier-run");
+    fs::write(folder.join("c.csv"), corner_file()).expect("written");
+    fs::create_dir_all(folder.join("o/overlay")).expect("made");
+    let run = || limited(&folder, &["calibrate", "c.csv", "--out", "o"]);
+    let alone = run();
+    assert_eq!(alone.status.code(), Some(0), "{}", text(&alone.stderr));
+    assert!(!text(&alone.stderr).contains("earlier run"), "{}", text(&alone.stderr));
+    for file in ["o/corners.csv", "o/overlay/001-a.png"] {
+        fs::write(folder.join(file), "").expect("written");
+    }
+    let said = text(&run().stderr);
+    for file in ["corners.csv", "001-a.png"] {
+        assert!(said.contains(&format!("{file} is of an earlier run")), "{said}");
+    }
+}
+
+#[test]
 fn options_that_contradict_each_other_or_the_input_are_refused() {
     let folder = folder("contradictions");
     fs::write(folder.join("c.csv"), corner_file()).expect("written");
@@ -220,7 +238,7 @@ fn options_that_contradict_each_other_or_the_input_are_refused() {
         let output = limited(&folder, &calibrate(rest));
         assert_eq!(output.status.code(), Some(0), "{rest:?}: {}", text(&output.stderr));
     }
-    let wrong: [(&[&str], &str); 17] = [
+    let wrong: [(&[&str], &str); 20] = [
         (&["c.csv", "--free", "fx,fy", "--fix", "fx=600"], "fx is in --free and in --fix"),
         (&["c.csv", "--fix", "fx=600", "--fix", "fx=700"], "--fix gives fx more than once"),
         (&["c.csv", "--mode", "tilted"], "--mode is for point pairs"),
@@ -235,6 +253,9 @@ fn options_that_contradict_each_other_or_the_input_are_refused() {
         (&["c.csv", "--free", "fx,fy", "--tie", "fy=fx"], "fy is in --free and in --tie"),
         (&["c.csv", "--fix", "fy=600", "--tie", "fy=fx"], "fy is in --fix and in --tie"),
         (&["c.csv", "--prior", "k1=0+-0"], "is no prior"),
+        (&["c.csv", "--free", "fx,fy,fx"], "fx is named twice"),
+        (&["c.csv", "--model", "double-sphere", "--fix", "alpha=7"], "alpha lies between 0 and 1"),
+        (&["c.csv", "--loss", "cauchy:1e300"], "from 1e-9 to 1e9 px"),
         (&["p.csv", "--image-size", "640x480"], "--image-size is for a camera"),
         (&["p.csv", "--loss", "huber:1"], "--loss is for a camera"),
         (&["p.csv", "--reject-views", "3"], "--reject-views is for a camera"),
@@ -243,6 +264,12 @@ fn options_that_contradict_each_other_or_the_input_are_refused() {
         refused(&folder, &calibrate(rest), &[word]);
     }
     refused(&folder, &["gate", "--record", "r", "--against", "builtin"], &["cannot be used with"]);
+    refused(&folder, &["gate", "--models", "division,division"], &["names division twice"]);
+    let scenes = ["gate", "--scene", "four-pose", "--scene", "four-pose"];
+    refused(&folder, &scenes, &["names four-pose twice"]);
+    let levels = crate::study::SPEC.replace("levels = [0.1, 0.3]", "levels = [0.1, 0.3, 0.1]");
+    fs::write(folder.join("levels.toml"), levels).expect("written");
+    refused(&folder, &["study", "plan", "levels.toml"], &["level 0.1 is named twice"]);
 }
 
 #[test]
@@ -430,6 +457,9 @@ fn a_recorded_run_is_judged_like_any_other_and_keeps_answers_that_failed() {
         checks.map(|c| serde_json::json!([c["property"], c["scenario"], c["verdict"]])).collect()
     };
     assert_eq!(verdicts("recorded.json"), verdicts("judged.json"));
+    for verb in ["--record", "--export"] {
+        refused(&folder, &["gate", "--samples", "1", verb, "r"], &["r holds answers already"]);
+    }
 }
 
 #[test]

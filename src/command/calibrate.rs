@@ -5,7 +5,7 @@ use super::board::board_or_file;
 use super::report::table;
 use super::{Exit, print, warn};
 use calibench::board::View;
-use calibench::calibrate::{Board, Loss, Prior};
+use calibench::calibrate::{Board, CalibrationError, Loss, Prior};
 use calibench::camera::{FreeParameters, Model, Parameter, UnknownModel};
 use calibench::io::ShownPath;
 use calibench::io::input::{MOST_SIDE_PX, MOST_TABLE_BYTES, read_named};
@@ -259,7 +259,7 @@ fn parse_loss(text: &str) -> Result<Loss, String> {
         Some(("cauchy", px)) => Loss::Cauchy { scale_px: px.parse().map_err(|_| wanted())? },
         _ => return Err(wanted()),
     };
-    if loss.is_valid() { Ok(loss) } else { Err(wanted()) }
+    if loss.is_valid() { Ok(loss) } else { Err(CalibrationError::BadLoss.to_string()) }
 }
 
 fn parse_factor(text: &str) -> Result<f64, String> {

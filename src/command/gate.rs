@@ -318,11 +318,22 @@ fn plan_of(arguments: &Arguments, samples: usize, known: impl FnOnce() -> Vec<Mo
             ),
         ));
     }
+    if let Some(twice) = named_twice(&models) {
+        return Err(usage(format!("--models names {twice} twice: name each model once")));
+    }
+    if let Some(twice) = named_twice(&arguments.scenes) {
+        return Err(usage(format!("--scene names {twice} twice: name each scene once")));
+    }
     let asked = Asked { models, scenes: arguments.scenes.clone() };
     Plan::of(arguments.seed, samples, asked).map_err(|error| match error {
         PlanError::UnknownScene { .. } | PlanError::TooManySamples { .. } => usage(error),
         _ => incomplete(error),
     })
+}
+
+/// The first of a list that was there before.
+fn named_twice<T: PartialEq>(list: &[T]) -> Option<&T> {
+    list.iter().enumerate().find(|(i, item)| list[..*i].contains(item)).map(|(_, item)| item)
 }
 
 /// The command that asks all scenes again, to which some may be added; none for answers in files.

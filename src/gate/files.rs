@@ -69,6 +69,12 @@ pub enum FilesError {
         /// Of the problems made now.
         now: String,
     },
+    /// Answers that took somebody's time are not joined with other problems, nor replaced.
+    #[error("{folder} holds answers already: name another folder, or move them away", folder = folder.display())]
+    Answered {
+        /// The folder.
+        folder: PathBuf,
+    },
     /// A lens model that there is not.
     #[error(transparent)]
     Model(#[from] UnknownModel),
@@ -80,8 +86,11 @@ pub enum FilesError {
 /// Writes `problems.jsonl`, `manifest.json` and `truth/truth.jsonl` to a folder.
 ///
 /// # Errors
-/// A file that cannot be written.
+/// A folder that holds answers; a file that cannot be written.
 pub fn export(plan: &Plan, folder: &Path) -> Result<(), FilesError> {
+    if answer_files(folder)?.iter().any(|file| file.exists()) {
+        return Err(FilesError::Answered { folder: folder.to_path_buf() });
+    }
     let problems = problem_lines(plan);
     let manifest = Manifest {
         seed: plan.seed,

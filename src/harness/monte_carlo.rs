@@ -138,6 +138,9 @@ fn refusal(error: &CalibrationError) -> String {
         | CalibrationError::BadHeldValue { .. }
         | CalibrationError::BadRatio { .. }
         | CalibrationError::BadPrior { .. }
+        | CalibrationError::BadCoverage { .. }
+        | CalibrationError::BadStart { .. }
+        | CalibrationError::BadImageSize { .. }
         | CalibrationError::NarrowLoss { .. }
         | CalibrationError::BadLoss => "refused: impossible settings".to_string(),
         _ => "refused: another reason".to_string(),

@@ -4,6 +4,7 @@
 use super::inputs::names_a_file;
 use super::spec_error::{SpecError, place};
 use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
 use toml::{Spanned, Table, Value};
 
 /// One factor of a study.
@@ -75,7 +76,22 @@ impl Factor {
                 format!("{} labels for {} levels: give one a level", self.labels.len(), self.count());
             return Err(self.error(text, None, counts));
         }
-        Ok(())
+        self.refuse_same_levels(text)
+    }
+
+    /// Levels that are called the same cannot be told apart in any table.
+    fn refuse_same_levels(&self, text: &str) -> Result<(), SpecError> {
+        let mut seen = HashSet::with_capacity(self.count());
+        match (0..self.count()).find(|&level| !seen.insert(self.label(level))) {
+            Some(level) => {
+                let message = format!(
+                    "level {} is named twice: give each a value or a label of its own",
+                    self.label(level)
+                );
+                Err(self.error(text, Some(level), message))
+            }
+            None => Ok(()),
+        }
     }
 
     /// Puts a level into the study's tree.

@@ -67,7 +67,7 @@ pub enum CalibrationError {
         parameter: Parameter,
     },
     /// A value that no camera has.
-    #[error("{parameter} cannot be held at {value}")]
+    #[error("{parameter} cannot be held at {value}: {}", parameter.range_in_words())]
     BadHeldValue {
         /// Which.
         parameter: Parameter,
@@ -108,7 +108,7 @@ pub enum CalibrationError {
     },
     /// A prior that no camera has, or that says nothing.
     #[error(
-        "{parameter} = {mean} +- {standard_deviation} is no prior: a standard deviation is positive, and a focal length too"
+        "{parameter} = {mean} +- {standard_deviation} is no prior: a standard deviation is positive, and {}", parameter.range_in_words()
     )]
     BadPrior {
         /// Which.
@@ -118,8 +118,32 @@ pub enum CalibrationError {
         /// Its standard deviation.
         standard_deviation: f64,
     },
-    /// The loss has no positive scale.
-    #[error("a robust loss needs a positive scale in px")]
+    /// A coverage that is no probability.
+    #[error(
+        "an interval cannot cover the true value with probability {coverage}: choose one between 0 and 1, such as 0.95"
+    )]
+    BadCoverage {
+        /// The probability.
+        coverage: f64,
+    },
+    /// A start that is no camera.
+    #[error("no search can start from {parameter} = {value}")]
+    BadStart {
+        /// Which.
+        parameter: Parameter,
+        /// Its value.
+        value: f64,
+    },
+    /// An image without pixels.
+    #[error("an image of {width} x {height} px has no pixels")]
+    BadImageSize {
+        /// Width, px.
+        width: usize,
+        /// Height, px.
+        height: usize,
+    },
+    /// The loss has no scale, or one whose square is lost in rounding.
+    #[error("a robust loss needs a scale from 1e-9 to 1e9 px")]
     BadLoss,
     /// A robust loss under which nearly every mark counts as a stray.
     #[error(

@@ -2,19 +2,21 @@
 
 use super::certificate::Certificate;
 use super::conditioning::Conditioning;
+use super::from_relaxed::Evidence;
 use super::intervals::Profile;
+use super::judged::Judged;
 use super::left_out::{self, LeftOut};
 use super::minimise::{Problem, State, rounding_cost};
 use super::normal::Observations;
 use super::prior::{self, Priors};
 use super::retraction::Retraction;
-use super::search::{self, Evidence, Judged};
+use super::search;
 use super::start::Held;
 use super::system::System;
 use super::target_frame::TargetFrames;
 use super::{
-    Board, Calibration, CalibrationError, Loss, Prior, Role, Settings, Termination, Warning, chunks, copies,
-    identifiability, kernel, polish, start, strays, structure, warnings,
+    Board, Calibration, CalibrationError, Loss, Prior, Settings, Termination, Warning, chunks, copies,
+    domain, identifiability, kernel, polish, start, strays, structure, warnings,
 };
 use crate::board::View;
 use crate::camera::{Model, Parameter};
@@ -138,9 +140,8 @@ fn searched<T>(
 
 fn check_counts(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
     use Parameter::*;
-    check_loss_and_priors(settings)?;
     refuse_other_lenses(views, settings)?;
-    check_model(settings)?;
+    domain::check(settings)?;
     let free = settings.free();
     let is_known = |p| settings.priors().any(|prior| prior.parameter == p);
     let linear = [Fx, Fy, Cx, Cy, Skew].into_iter().filter(|&p| free.contains(p) && !is_known(p)).count();
@@ -169,35 +170,6 @@ fn refuse_other_lenses(views: &[View], settings: &Settings) -> Result<(), Calibr
         return Ok(());
     };
     Err(CalibrationError::OfAnyLens { what: what.into() })
-}
-
-/// Refuses a role for a parameter that the model does not have.
-pub(super) fn check_model(settings: &Settings) -> Result<(), CalibrationError> {
-    let model = settings.model();
-    let is_foreign = |p: &Parameter| !model.parameters().any(|own| own == *p);
-    let mut told = Parameter::OF_ALL_MODELS.into_iter().filter(|&p| settings.role(p) != Role::Default);
-    match told.find(is_foreign) {
-        Some(parameter) => Err(CalibrationError::NotOfModel { parameter, model }),
-        None => Ok(()),
-    }
-}
-
-/// A loss with a scale, priors that a camera may have.
-pub(super) fn check_loss_and_priors(settings: &Settings) -> Result<(), CalibrationError> {
-    if !settings.loss.is_valid() {
-        return Err(CalibrationError::BadLoss);
-    }
-    let is_possible = |prior: &Prior| {
-        let is_focal = matches!(prior.parameter, Parameter::Fx | Parameter::Fy);
-        let (mean, sd) = (prior.mean, prior.standard_deviation);
-        mean.is_finite() && sd > 0.0 && sd.is_finite() && (mean > 0.0 || !is_focal)
-    };
-    match settings.priors().find(|prior| !is_possible(prior)) {
-        Some(Prior { parameter, mean, standard_deviation }) => {
-            Err(CalibrationError::BadPrior { parameter, mean, standard_deviation })
-        }
-        None => Ok(()),
-    }
 }
 
 /// Whether the lens may distort: homographies give two constraints a view, and a distortion tells its centre

@@ -53,16 +53,6 @@ impl Loss {
             Loss::Cauchy { .. } => weight * weight,
         }
     }
-
-    /// Whether the scale is a positive number.
-    pub fn is_valid(&self) -> bool {
-        match *self {
-            Loss::Squares => true,
-            Loss::Huber { delta_px: scale } | Loss::Cauchy { scale_px: scale } => {
-                scale > 0.0 && scale.is_finite()
-            }
-        }
-    }
 }
 
 #[cfg(test)]

@@ -19,8 +19,10 @@
 //! minimum keeps the weights.
 
 use super::estimate::Fit;
+use super::from_relaxed::{Evidence, relax};
+use super::judged::Judged;
 use super::minimise::{Minimum, Problem, State};
-use super::search::{self, Evidence, Judged};
+use super::search;
 use super::system::System;
 use super::{CalibrationError, relaxed};
 use crate::camera::{Camera, Parameter};
@@ -173,7 +175,7 @@ fn is_settled(next: f64, last: f64) -> bool {
 /// Before any camera is known: what homographies behind a common lens leave over.
 fn first_variance(problem: &Problem<'_>, evidence: &Evidence<'_>) -> f64 {
     let marks: usize = problem.observations.iter().map(|o| o.len()).sum();
-    let least = search::relax(problem, evidence, true).first().map_or(f64::NAN, |relaxed| relaxed.cost);
+    let least = relax(problem, evidence, true).first().map_or(f64::NAN, |relaxed| relaxed.cost);
     let lens =
         relaxed::parameters(problem, |p| evidence.held.value(p).is_some_and(|value| value != 0.0)).len();
     let freedom = (2 * marks).saturating_sub(8 * problem.observations.len() + lens);

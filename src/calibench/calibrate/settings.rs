@@ -240,7 +240,7 @@ impl Settings {
     }
 
     /// Asks for intervals by the profile of the cost, each to contain its true value with probability
-    /// `coverage`.
+    /// `coverage`, between 0 and 1.
     pub fn with_profile_intervals(mut self, coverage: f64) -> Settings {
         self.profile_coverage = Some(coverage);
         self
@@ -300,7 +300,7 @@ impl Settings {
             Role::Default => self.default_of(parameter),
         };
         match value {
-            Some(value) if value.is_finite() && !(is_focal(parameter) && value <= 0.0) => Ok(Some(value)),
+            Some(value) if parameter.is_defined_at(value) => Ok(Some(value)),
             Some(value) => Err(CalibrationError::BadHeldValue { parameter, value }),
             None => Err(CalibrationError::HeldWithoutValue { parameter }),
         }
@@ -314,10 +314,6 @@ impl Settings {
             _ => Some(Lens::ideal(self.model).get(parameter).unwrap_or(0.0)),
         }
     }
-}
-
-fn is_focal(parameter: Parameter) -> bool {
-    matches!(parameter, Parameter::Fx | Parameter::Fy)
 }
 
 /// Roles as data: by the parameters' names, those at their default left out.

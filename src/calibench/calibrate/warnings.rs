@@ -2,9 +2,9 @@
 
 use super::intervals::Skewed;
 use super::intervals::student_quantile;
+use super::judged::Twin;
 use super::report::{STRONG_CORRELATION, UNCERTAIN_FOCAL};
 use super::rival::Rival;
-use super::search::Twin;
 use super::{
     Calibration, Certificate, Covariance, LensCalibration, Prior, Termination, Unknown, Warning,
     WeakComponent,
@@ -99,16 +99,13 @@ fn hardly_separable(calibration: &LensCalibration) -> Option<Warning> {
     Some(Warning::HardlySeparable { parameters: conditioning.weakest.iter().filter_map(parameter).collect() })
 }
 
-/// Values for which the double sphere is defined (Usenko, Demmel & Cremers 2018).
-const DEFINED: [(Parameter, f64, f64); 2] = [(Parameter::Xi, -1.0, 1.0), (Parameter::Alpha, 0.0, 1.0)];
-
 impl Warning {
     /// Those of coefficients outside of the range for which their model is defined.
     pub(crate) fn outside_range(camera: &Camera<Lens>) -> impl Iterator<Item = Warning> {
-        DEFINED.into_iter().filter_map(|(parameter, low, high)| {
-            let value = camera.value(parameter)?;
-            let is_outside = !(low..=high).contains(&value);
-            is_outside.then_some(Warning::OutsideRange { parameter, value, low, high })
+        let is_outside = |&(parameter, value): &(Parameter, f64)| !parameter.is_defined_at(value);
+        camera.values().filter(is_outside).map(|(parameter, value)| {
+            let (low, high) = parameter.defined_range();
+            Warning::OutsideRange { parameter, value, low, high }
         })
     }
 }

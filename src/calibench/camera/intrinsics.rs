@@ -65,22 +65,31 @@ impl Camera<BrownConrady> {
     }
 
     /// One parameter's value.
+    ///
+    /// # Panics
+    /// If it is a coefficient of another lens: ask `Camera<Lens>` by [`Camera::value`].
     pub fn get(&self, parameter: Parameter) -> f64 {
-        self.parameters()[parameter as usize]
+        self.parameters()[place(parameter)]
     }
 
     /// This camera with one parameter changed.
+    ///
+    /// # Panics
+    /// If it is a coefficient of another lens: ask `Camera<Lens>` by [`Camera::with_value`].
     pub fn with(self, parameter: Parameter, value: f64) -> Camera {
         let mut parameters = self.parameters();
-        parameters[parameter as usize] = value;
+        parameters[place(parameter)] = value;
         Camera::from_parameters(parameters)
     }
 
     /// The free parameters changed by `step`, one entry per free parameter in order.
+    ///
+    /// # Panics
+    /// If a coefficient of another lens is free.
     pub fn stepped(&self, free: FreeParameters, step: &[f64]) -> Camera {
         let mut parameters = self.parameters();
         for (parameter, delta) in free.iter().zip(step) {
-            parameters[parameter as usize] += delta;
+            parameters[place(parameter)] += delta;
         }
         Camera::from_parameters(parameters)
     }
@@ -135,6 +144,13 @@ impl Camera<BrownConrady> {
     pub fn normalised_ray(&self, pixel: &Vec2) -> Result<Vec2, UndistortError> {
         self.distortion.undistort(&self.normalised_from_pixel(pixel))
     }
+}
+
+/// The place of a parameter in the vector of a camera with Brown-Conrady's lens.
+fn place(parameter: Parameter) -> usize {
+    let place = parameter as usize;
+    assert!(place < Parameter::COUNT, "Brown-Conrady's lens has no {parameter}");
+    place
 }
 
 #[cfg(test)]

@@ -15,6 +15,6 @@ pub use imaging::Imaging;
 pub use intrinsics::Camera;
 pub use lens::{Lens, Model, UnknownModel, WrongCoefficients};
 pub(crate) use lens::{LensModel, LensVisitor, visit};
-pub use parameter::{FreeParameters, Parameter, UnknownParameter};
+pub use parameter::{BadParameters, FreeParameters, Parameter, UnknownParameter};
 pub(crate) use projection::intrinsics_columns;
 pub use projection::{BehindCamera, ProjectionJacobian, project_with_jacobian};

@@ -95,6 +95,35 @@ impl Parameter {
             _ => "",
         }
     }
+
+    /// The lowest and the highest value for which a camera is defined: a focal length above 0, a sensor tilted by less
+    /// than a right angle, a double sphere's `xi` from -1 to 1 and `alpha` from 0 to 1 (Usenko, Demmel & Cremers 2018).
+    pub fn defined_range(self) -> (f64, f64) {
+        match self {
+            Parameter::Fx | Parameter::Fy => (f64::MIN_POSITIVE, f64::MAX),
+            Parameter::TauX | Parameter::TauY => (-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2),
+            Parameter::Xi => (-1.0, 1.0),
+            Parameter::Alpha => (0.0, 1.0),
+            _ => (f64::MIN, f64::MAX),
+        }
+    }
+
+    /// Whether a camera may have this value.
+    pub fn is_defined_at(self, value: f64) -> bool {
+        let (low, high) = self.defined_range();
+        (low..=high).contains(&value)
+    }
+
+    /// What [`Parameter::defined_range`] says, as part of a sentence.
+    pub(crate) fn range_in_words(self) -> &'static str {
+        match self {
+            Parameter::Fx | Parameter::Fy => "a focal length is a positive number",
+            Parameter::TauX | Parameter::TauY => "a sensor is tilted by less than a right angle",
+            Parameter::Xi => "xi lies between -1 and 1",
+            Parameter::Alpha => "alpha lies between 0 and 1",
+            _ => "it is a finite number",
+        }
+    }
 }
 
 impl fmt::Display for Parameter {
@@ -207,22 +236,37 @@ impl From<FreeParameters> for String {
 
 #[cfg(feature = "serde")]
 impl TryFrom<String> for FreeParameters {
-    type Error = UnknownParameter;
+    type Error = BadParameters;
 
-    fn try_from(list: String) -> Result<FreeParameters, UnknownParameter> {
+    fn try_from(list: String) -> Result<FreeParameters, BadParameters> {
         list.parse()
     }
 }
 
+/// A list that is no set of parameters.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BadParameters {
+    /// A name that is not a parameter's.
+    #[error(transparent)]
+    Unknown(#[from] UnknownParameter),
+    /// A name that comes again: another may have been meant.
+    #[error("{0} is named twice: was another parameter meant?")]
+    Twice(Parameter),
+}
+
 impl FromStr for FreeParameters {
-    type Err = UnknownParameter;
+    type Err = BadParameters;
 
     /// Reads a comma-separated list, such as `fx,fy,cx,cy,k1`.
-    fn from_str(list: &str) -> Result<FreeParameters, UnknownParameter> {
-        list.split(',')
-            .map(str::trim)
-            .filter(|name| !name.is_empty())
-            .try_fold(FreeParameters::NONE, |set, name| Ok(set.with(name.parse()?)))
+    fn from_str(list: &str) -> Result<FreeParameters, BadParameters> {
+        list.split(',').map(str::trim).filter(|name| !name.is_empty()).try_fold(
+            FreeParameters::NONE,
+            |set, name| match name.parse()? {
+                parameter if set.contains(parameter) => Err(BadParameters::Twice(parameter)),
+                parameter => Ok(set.with(parameter)),
+            },
+        )
     }
 }
 
@@ -236,7 +280,9 @@ mod tests {
         assert_eq!(set.to_string(), "fx,fy,k1");
         assert_eq!(set.position(Parameter::K1), Some(2));
         assert_eq!(set.position(Parameter::Cx), None);
-        assert_eq!("fx,focal".parse::<FreeParameters>(), Err(UnknownParameter("focal".into())));
+        let unknown = BadParameters::Unknown(UnknownParameter("focal".into()));
+        assert_eq!("fx,focal".parse::<FreeParameters>(), Err(unknown));
+        assert_eq!("fx,fy,fx".parse::<FreeParameters>(), Err(BadParameters::Twice(Parameter::Fx)));
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::report::{MeasuredCalibration, report};
 use super::resection::{IN_PLANE, IN_SPACE};
 use super::shape::{FLAT, NEARLY_FLAT, Shape};
 use super::{MeasuredError, MeasuredTarget, MeasuredView, plane, rivals, space};
-use crate::calibrate::{Board, CalibrationError, Loss, Prior, Role, Settings, Termination, Warning};
+use crate::calibrate::{Board, CalibrationError, Loss, Prior, Settings, Termination, Warning, domain};
 use crate::camera::Parameter;
 
 /// Most marks with a standard deviation that may be seen: 1500 coordinates, equations of 18 MB, a factorisation of some
@@ -158,26 +158,7 @@ fn check_settings(settings: &Settings, noise: Noise) -> Result<(), MeasuredError
     {
         return Err(MeasuredError::BadNoise { sigma_px });
     }
-    let model = settings.model();
-    let is_told = |p: &Parameter| settings.role(*p) != Role::Default;
-    let is_foreign = |p: &Parameter| !model.parameters().any(|own| own == *p);
-    if let Some(parameter) = Parameter::OF_ALL_MODELS.into_iter().filter(is_told).find(is_foreign) {
-        return Err(CalibrationError::NotOfModel { parameter, model }.into());
-    }
-    if let Some(ratio) = settings.fy_per_fx().filter(|ratio| !(*ratio > 0.0 && ratio.is_finite())) {
-        return Err(CalibrationError::BadRatio { ratio }.into());
-    }
-    let is_possible = |prior: &Prior| {
-        let is_focal = matches!(prior.parameter, Parameter::Fx | Parameter::Fy);
-        let (mean, sd) = (prior.mean, prior.standard_deviation);
-        mean.is_finite() && sd > 0.0 && sd.is_finite() && (mean > 0.0 || !is_focal)
-    };
-    if let Some(Prior { parameter, mean, standard_deviation }) = settings.priors().find(|p| !is_possible(p)) {
-        return Err(CalibrationError::BadPrior { parameter, mean, standard_deviation }.into());
-    }
-    // What is neither free nor given a value is refused here.
-    model.parameters().try_for_each(|parameter| settings.held(parameter).map(drop))?;
-    Ok(())
+    Ok(domain::check(settings)?)
 }
 
 /// Every view has marks enough, not on one line, and is no copy.

@@ -147,6 +147,9 @@ pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, Fai
     let json = finished.optics.with(&fields);
     if let Some(folder) = &arguments.out {
         write_files(folder, &json, &finished, arguments.memory).map_err(Failure::unwritten)?;
+        of_earlier_runs(folder, &finished).iter().for_each(|file| {
+            warn(&format!("{} is of an earlier run, not of this result", folder.join(file).shown()));
+        });
     }
     match arguments.format {
         Format::Json => print(&json),
@@ -213,6 +216,18 @@ fn write_files(folder: &Path, json: &str, finished: &Finished, memory: u64) -> s
     }
     files.push((folder.join("result.json"), json.as_bytes().to_vec()));
     write_together(&files)
+}
+
+/// Files in the folder that photographs left there, and that are not of this result.
+fn of_earlier_runs(folder: &Path, finished: &Finished) -> Vec<String> {
+    let pictures = std::fs::read_dir(folder.join("overlay")).into_iter().flatten().flatten();
+    let names = pictures.map(|file| format!("overlay/{}", file.file_name().to_string_lossy()));
+    let corners = finished.orientation.is_none() && folder.join("corners.csv").exists();
+    let is_of_this = |name: &String| finished.overlays.values().any(|own| own == name);
+    let mut files: Vec<String> = names.filter(|name| !is_of_this(name)).collect();
+    files.sort();
+    files.extend(corners.then(|| "corners.csv".to_string()));
+    files
 }
 
 /// The marks of photographs as they were fitted, without the bias of discs: calibrated again they give the same camera.

@@ -1,11 +1,10 @@
 //! From marks to a camera with a lens of any model and its uncertainty.
 
-use super::super::estimate::{check_loss_and_priors, check_model};
 use super::super::minimise::{Descent, Minimum, RELATIVE_GAIN, descend};
 use super::super::settings::Bend;
 use super::super::system::Step;
 use super::super::target_frame::TargetFrames;
-use super::super::{CalibrationError, LensCalibration, Prior, Settings, Termination, chunks};
+use super::super::{CalibrationError, LensCalibration, Prior, Settings, Termination, chunks, domain};
 use super::problem::{Problem, State, rounding_cost};
 use super::{WIDTH, judge, marks, report, shape, start, walk};
 use crate::board::View;
@@ -40,8 +39,7 @@ pub(in super::super) fn calibrate(
 
 fn check(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
     use Parameter::{Cx, Cy, Fx, Fy, Skew};
-    check_loss_and_priors(settings)?;
-    check_model(settings)?;
+    domain::check(settings)?;
     let only_plain = [
         (settings.polish, "the last digits of a minimum"),
         (settings.start.is_some(), "a start for the intrinsics"),
@@ -67,8 +65,6 @@ fn check(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
     if coordinates < unknowns {
         return Err(CalibrationError::TooFewPoints { coordinates, unknowns });
     }
-    // What is neither free nor given a value is refused here.
-    settings.model().parameters().try_for_each(|parameter| settings.held(parameter).map(drop))?;
     views.iter().enumerate().try_for_each(|(view, marks)| {
         spans_a_plane(marks).map_err(|source| CalibrationError::View { view, source })
     })

@@ -200,6 +200,22 @@ impl<'a> Field<'a> {
         }
     }
 
+    /// The numbers of a matrix, row by row: the `data` that OpenCV and ROS write, as many as `rows` and `cols` say, or
+    /// a list of numbers or rows.
+    pub fn matrix(&self) -> Result<Vec<f64>, FormatError> {
+        let data = self.get("data").unwrap_or_else(|| self.clone());
+        let numbers =
+            data.numbers().or_else(|error| data.rows().map(|rows| rows.concat()).map_err(|_| error))?;
+        let count = |key: &str| self.get(key).map(|count| count.number()).transpose();
+        if let (Some(rows), Some(columns)) = (count("rows")?, count("cols")?)
+            && rows * columns != numbers.len() as f64
+        {
+            let got = numbers.len();
+            return Err(self.wrong(format!("{rows} rows of {columns} are said, and {got} numbers are there")));
+        }
+        Ok(numbers)
+    }
+
     /// A matrix of three rows of three.
     pub fn square3(&self) -> Result<Mat3, FormatError> {
         let rows = self.rows()?;

@@ -80,12 +80,12 @@ const NAMES_OF_LENS: [&str; 7] = [
 fn read(source: &Source, node: &Node) -> Result<Vec<Found>, FormatError> {
     let root = Field::root(*source, node);
     let matrix = root.get_any(&NAMES_OF_K).ok_or_else(|| root.missing("camera_matrix"))?;
-    let linear = linear_of(&matrix, &numbers(&matrix)?)?;
+    let linear = linear_of(&matrix, &matrix.matrix()?)?;
     let mut notes = Vec::new();
     let distortion = match (is_fisheye(&root)?, root.get_any(&NAMES_OF_LENS)) {
-        (true, Some(field)) => fisheye_of(&field, &numbers(&field)?)?,
+        (true, Some(field)) => fisheye_of(&field, &field.matrix()?)?,
         (true, None) => return Err(root.missing("distortion_coefficients")),
-        (false, Some(field)) => lens::from_opencv_order(source, field.node.offset, &numbers(&field)?)?,
+        (false, Some(field)) => lens::from_opencv_order(source, field.node.offset, &field.matrix()?)?,
         (false, None) => {
             notes.push("no distortion coefficients stand in the file: an ideal lens".to_string());
             lens::ideal()
@@ -107,12 +107,6 @@ pub(super) fn fisheye_of(field: &Field, numbers: &[f64]) -> Result<Lens, FormatE
     lens.ok_or_else(|| {
         field.wrong(format!("a fisheye has 4 coefficients, k1 k2 k3 k4, got {}", numbers.len()))
     })
-}
-
-/// The numbers of a matrix, row by row: the `data` of OpenCV's, or a list of numbers or rows.
-fn numbers(field: &Field) -> Result<Vec<f64>, FormatError> {
-    let data = field.get("data").unwrap_or_else(|| field.clone());
-    data.numbers().or_else(|error| data.rows().map(|rows| rows.concat()).map_err(|_| error))
 }
 
 /// fx, fy, cx, cy of `K`, nine numbers row by row.

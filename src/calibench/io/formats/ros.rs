@@ -47,15 +47,15 @@ fn read(source: &Source) -> Result<Vec<Found>, FormatError> {
     let height =
         root.get_any(&["image_height", "height"]).ok_or_else(|| root.missing("image_height"))?.side()?;
     let k = root.get_any(&["camera_matrix", "K", "k"]).ok_or_else(|| root.missing("camera_matrix"))?;
-    let linear = linear_of(&k, &numbers(&k)?)?;
+    let linear = linear_of(&k, &k.matrix()?)?;
     let d = root
         .get_any(&["distortion_coefficients", "D", "d"])
         .ok_or_else(|| root.missing("distortion_coefficients"))?;
     let model = root.get_any(&["distortion_model", "camera_model"]);
     let model = model.map_or(Ok("plumb_bob"), |model| model.text())?;
     let distortion = match model {
-        "plumb_bob" | "rational_polynomial" => lens::from_opencv_order(source, d.node.offset, &numbers(&d)?)?,
-        "equidistant" => fisheye_of(&d, &numbers(&d)?)?,
+        "plumb_bob" | "rational_polynomial" => lens::from_opencv_order(source, d.node.offset, &d.matrix()?)?,
+        "equidistant" => fisheye_of(&d, &d.matrix()?)?,
         other => {
             return Err(
                 source.lens(format!("the distortion model {}", shortened(other)), lens::CALIBRATE_AGAIN)
@@ -68,14 +68,10 @@ fn read(source: &Source) -> Result<Vec<Found>, FormatError> {
     Ok(vec![CameraFile { name, image_size: Some((width, height)), notes, ..CameraFile::of(camera) }.into()])
 }
 
-fn numbers(field: &Field) -> Result<Vec<f64>, FormatError> {
-    field.get("data").unwrap_or_else(|| field.clone()).numbers()
-}
-
 /// What is said of the matrices for rectified images, unless they say nothing.
 fn rectified_note(root: &Field, raw: &[f64; 4]) -> Result<Vec<String>, FormatError> {
-    let r = root.get_any(&["rectification_matrix", "R", "r"]).map(|r| numbers(&r)).transpose()?;
-    let p = root.get_any(&["projection_matrix", "P", "p"]).map(|p| numbers(&p)).transpose()?;
+    let r = root.get_any(&["rectification_matrix", "R", "r"]).map(|r| r.matrix()).transpose()?;
+    let p = root.get_any(&["projection_matrix", "P", "p"]).map(|p| p.matrix()).transpose()?;
     let identity = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
     let [fx, fy, cx, cy] = *raw;
     let of_raw = [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0];

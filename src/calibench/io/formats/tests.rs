@@ -374,6 +374,10 @@ fn complaints_name_file_line_and_value() {
             "f:5:16: camera_matrix.data: `x` is not a number",
         ),
         ("%YAML:1.0\n---\nimage_width: 640\nK: 3\n", "f:4:4: K: 9 numbers are expected, got 1"),
+        (
+            "%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 4\n   data: [ 1., 0., 0., 0., 1., 0., 0., 0., 1. ]\n",
+            "3 rows of 4 are said, and 9 numbers are there",
+        ),
         ("%YAML:1.0\n---\ncamera_matrix: [1., 2., 0., 0., 1., 0., 0., 0., 1.]\n", "skew 2"),
         ("{\"RadialDistortion\": [0, 0], \"FocalLength\": [1, 1]}", "f:1: PrincipalPoint is missing"),
         (

@@ -1,0 +1,139 @@
+//! Which settings can no camera meet? Told before any mark is looked at, and alike by every estimator.
+
+use super::{CalibrationError, Loss, Prior, Role, Settings};
+use crate::camera::Parameter;
+
+/// Scales of a robust loss, px: with any other their squares are lost in rounding.
+const SCALES_PX: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
+
+impl Loss {
+    /// Whether a robust loss has a scale from 1e-9 to 1e9 px.
+    pub fn is_valid(&self) -> bool {
+        match *self {
+            Loss::Squares => true,
+            Loss::Huber { delta_px: scale } | Loss::Cauchy { scale_px: scale } => SCALES_PX.contains(&scale),
+        }
+    }
+}
+
+impl Prior {
+    /// Whether a camera may have the value, and the standard deviation says something of it.
+    fn is_possible(&self) -> bool {
+        let sd = self.standard_deviation;
+        self.parameter.is_defined_at(self.mean) && sd > 0.0 && sd.is_finite()
+    }
+}
+
+/// The loss, priors, start, image size and coverage are possible, each parameter belongs to the model and is free or
+/// has a value.
+///
+/// # Errors
+/// The first that is not.
+pub(crate) fn check(settings: &Settings) -> Result<(), CalibrationError> {
+    if !settings.loss.is_valid() {
+        return Err(CalibrationError::BadLoss);
+    }
+    if let Some(Prior { parameter, mean, standard_deviation }) = settings.priors().find(|p| !p.is_possible())
+    {
+        return Err(CalibrationError::BadPrior { parameter, mean, standard_deviation });
+    }
+    if let Some(coverage) = settings.profile_coverage.filter(|coverage| !(*coverage > 0.0 && *coverage < 1.0))
+    {
+        return Err(CalibrationError::BadCoverage { coverage });
+    }
+    if let Some((width, height)) = settings.image_size.filter(|(width, height)| width.min(height) == &0) {
+        return Err(CalibrationError::BadImageSize { width, height });
+    }
+    check_start(settings)?;
+    settings.tie()?;
+    check_parameters(settings)
+}
+
+/// Values that a camera may have.
+fn check_start(settings: &Settings) -> Result<(), CalibrationError> {
+    let Some(start) = settings.start else { return Ok(()) };
+    let values = Parameter::ALL.into_iter().zip(start.parameters());
+    match values.into_iter().find(|(parameter, value)| !parameter.is_defined_at(*value)) {
+        Some((parameter, value)) => Err(CalibrationError::BadStart { parameter, value }),
+        None => Ok(()),
+    }
+}
+
+/// Roles are given to parameters of the model only, and what is not estimated has a value.
+fn check_parameters(settings: &Settings) -> Result<(), CalibrationError> {
+    let model = settings.model();
+    let is_foreign = |p: &Parameter| !model.parameters().any(|own| own == *p);
+    let mut told = Parameter::OF_ALL_MODELS.into_iter().filter(|&p| settings.role(p) != Role::Default);
+    if let Some(parameter) = told.find(is_foreign) {
+        return Err(CalibrationError::NotOfModel { parameter, model });
+    }
+    model.parameters().try_for_each(|parameter| settings.held(parameter).map(drop))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Camera, Model};
+
+    #[track_caller]
+    fn is_refused(settings: Settings, is_meant: fn(&CalibrationError) -> bool) {
+        let error = check(&settings).expect_err("an impossible setting");
+        assert!(is_meant(&error), "{error:?}");
+    }
+
+    fn square_pixels() -> Settings {
+        Settings::standard()
+    }
+
+    #[test]
+    fn a_coverage_is_a_probability() {
+        for coverage in [2.0, 1.0, 0.0, -3.0, f64::NAN] {
+            let settings = square_pixels().with_profile_intervals(coverage);
+            is_refused(settings, |e| matches!(e, CalibrationError::BadCoverage { .. }));
+        }
+        assert_eq!(check(&square_pixels().with_profile_intervals(0.999)), Ok(()));
+    }
+
+    #[test]
+    fn a_start_is_a_camera() {
+        let camera = Camera::pinhole(600.0, 600.0, 320.0, 240.0);
+        for start in [
+            Camera { fx: f64::NAN, ..camera },
+            Camera { fy: -1.0, ..camera },
+            Camera { cx: 1.0 / 0.0, ..camera },
+        ] {
+            is_refused(square_pixels().starting_at(start), |e| {
+                matches!(e, CalibrationError::BadStart { .. })
+            });
+        }
+        assert_eq!(check(&square_pixels().starting_at(camera)), Ok(()));
+    }
+
+    #[test]
+    fn an_image_has_pixels() {
+        for size in [(0, 480), (640, 0), (0, 0)] {
+            let settings = square_pixels().with_image_size(size);
+            is_refused(settings, |e| matches!(e, CalibrationError::BadImageSize { .. }));
+        }
+    }
+
+    #[test]
+    fn a_robust_loss_has_a_scale_that_can_be_squared() {
+        for scale_px in [1e300, 1e-300, 0.0, -1.0, f64::INFINITY, f64::NAN] {
+            let settings = square_pixels().with_loss(Loss::Cauchy { scale_px });
+            is_refused(settings, |e| matches!(e, CalibrationError::BadLoss));
+        }
+    }
+
+    #[test]
+    fn values_lie_where_the_model_is_defined() {
+        let sphere = Settings::of_model(Model::DoubleSphere);
+        is_refused(sphere.clone().hold(Parameter::Alpha, 7.0), |e| {
+            matches!(e, CalibrationError::BadHeldValue { .. })
+        });
+        is_refused(sphere.clone().with_prior(Parameter::Xi, 1.5, 0.1), |e| {
+            matches!(e, CalibrationError::BadPrior { .. })
+        });
+        assert_eq!(check(&sphere.hold(Parameter::Alpha, 1.0)), Ok(()));
+    }
+}
