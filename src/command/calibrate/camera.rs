@@ -7,7 +7,7 @@ use super::optics::Optics;
 use super::view_names::ViewNames;
 use super::{
     Arguments, Exit, Failure, Format, Intervals, ModelChoice, advice, maps, page, plots, poses, print,
-    scatter, table,
+    scatter, table, warn,
 };
 use calibench::board::{Board, View};
 use calibench::calibrate::{Loss, Prior, ProfileInterval, Settings};
@@ -15,7 +15,9 @@ use calibench::camera::Model;
 use calibench::detect::Orientation;
 use calibench::geometry::Vec2;
 use calibench::io::formats::corner_text;
-use calibench::io::{CalibrationFields, CornerFile, LeftOut, message, significant, write_together};
+use calibench::io::{
+    CalibrationFields, CornerFile, LeftOut, ShownPath, message, significant, write_together,
+};
 use calibench::photos::{Fit, Fitter};
 use calibench_harness::Figure;
 use std::collections::BTreeMap;
