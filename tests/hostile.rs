@@ -123,11 +123,11 @@ fn a_study_of_a_million_million_trials_begins_at_once_and_hears_an_interrupt() {
     // A part of many: batches of other parts are passed over without being looked at.
     for shard in ["0/1", "999999/1000000"] {
         let _ = fs::remove_dir_all(folder.join("out"));
-        let mut child = Command::new(CALIBENCH)
+        let child = Command::new(CALIBENCH)
             .args(["study", "run", "spec.toml", "--out", "out", "--shard", shard])
             .current_dir(&folder)
             .stdout(Stdio::null())
-            .stderr(Stdio::null())
+            .stderr(Stdio::piped())
             .spawn()
             .expect("the program starts");
         let started = Instant::now();
@@ -137,8 +137,10 @@ fn a_study_of_a_million_million_trials_begins_at_once_and_hears_an_interrupt() {
         }
         let killed = Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill");
         assert!(killed.success() && trials() >= 8, "no trials after {:?}", started.elapsed());
-        let status = child.wait().expect("it ends");
-        assert_eq!(status.code(), Some(3), "{shard}");
+        let ended = child.wait_with_output().expect("it ends");
+        let said = text(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(3), "{shard}: {said}");
+        assert_eq!(said.contains("take one core"), shard == "0/1", "{shard}: {said}");
     }
 }
 

@@ -72,6 +72,7 @@ pub(super) fn run(arguments: &Arguments, build: &Build) -> Result<Exit, Failure>
     let engine = Engine::with_inputs(&text, &inputs, arguments.shard)
         .map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.shown())))?;
     warn_of_the_frame(&engine);
+    warn_of_the_time(&engine);
     let out = arguments.out.clone().unwrap_or_else(|| default_folder(&engine));
     let manifest = Manifest::new(&engine.spec, arguments.shard, build);
     let manifest = manifest.with_trials(arguments.trials).with_solver(arguments.program.solver.clone());
@@ -106,6 +107,22 @@ fn warn_of_the_frame(engine: &Engine) {
         warn(&format!(
             "warning: the lens{of_cell} shows {:.0} % of the frame: what is measured of the frame is of that part",
             100.0 * share
+        ));
+    }
+}
+
+/// Trials a second of one core, about, with four views; and the days from which a study is told to be long.
+const TRIALS_A_SECOND: f64 = 20_000.0;
+const LONG_DAYS: f64 = 1.0;
+
+/// A slip in a number of trials shows before the days are spent.
+fn warn_of_the_time(engine: &Engine) {
+    let trials = engine.most_trials();
+    let days = trials as f64 / TRIALS_A_SECOND / 86_400.0;
+    if days > LONG_DAYS {
+        warn(&format!(
+            "warning: {trials} trials at {TRIALS_A_SECOND} a second take one core {} days; `calibench study plan` measures how fast these are",
+            significant(days, 2)
         ));
     }
 }
