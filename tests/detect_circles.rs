@@ -253,7 +253,10 @@ fn nine_dots_are_too_few_for_a_dense_grid_and_enough_for_sparse_dots() {
     let image = photo.image.to_u8();
     let refused = circle_grid(&image, 3, 3).unwrap_err();
     assert_eq!(refused, GridError::TooFewForGrid { columns: 3, rows: 3, found: 9, need: 4 });
-    assert!(matches!(circle_grid(&image, 9, 7), Err(GridError::TooFewForGrid { found: 9, .. })));
+    // Of a board that is large enough they are a part.
+    assert!(matches!(circle_grid(&image, 9, 7), Err(GridError::Partial { found: 9, seen: 9, .. })));
+    let blank = Raster::from_fn(64, 48, |_, _| 200u8);
+    assert!(matches!(circle_grid(&blank, 9, 7), Err(GridError::Partial { found: 0, seen: 0, .. })));
     let grid = sparse_dots(&image, 3, 3).unwrap();
     for (seen, truth) in grid.centres_px().iter().zip(&photo.centres_true) {
         assert!((seen - truth).norm() < 0.01, "{seen} {truth}");

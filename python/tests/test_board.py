@@ -59,7 +59,7 @@ def test_a_board_that_is_not_whole_is_refused_with_what_was_seen() -> None:
     assert of_columns.value.kind == "WrongSize"
     image = whole.copy()
     image[:200, :200] = 0.85
-    with pytest.raises(calibench.DetectError, match="the whole board must be visible") as error:
+    with pytest.raises(calibench.DetectError, match="show the whole board") as error:
         board.detect(image)
     numbers = error.value.numbers
     assert error.value.kind == "Partial" and numbers["expected"] == 63 and 0 < numbers["found"] < 63

@@ -95,7 +95,7 @@ pub enum ChessboardError {
     /// Some corners are missing: outside the image, covered, in glare, too small or too blurred.
     #[error(
         "found {found} of the {expected} inner corners of a {columns} x {rows} chessboard ({seen} places in the image look like \
-         corners): the whole board must be visible"
+         corners): show the whole board, or half of its corners with a part of each outer row and column"
     )]
     Partial {
         /// Asked corners along a row.
@@ -328,17 +328,9 @@ fn finished<T: Level>(
     columns: usize,
     rows: usize,
 ) -> Option<(Chessboard, Fitted)> {
-    let ordered = board::ordered(&seen.lattice, &seen.rectangle, &seen.places, (columns, rows));
-    let fitted = refine::refined(
-        pyramid,
-        level,
-        &seen.found(&ordered.marks),
-        columns,
-        ordered.starts_dark,
-        &Look::PLAIN,
-    );
+    let (fitted, orientation) = seen.fitted(pyramid, level, columns, rows);
     let corners_px = fitted.corners.iter().copied().collect::<Option<Vec<Vec2>>>()?;
-    Some((Chessboard { columns, rows, corners_px, orientation: ordered.orientation }, fitted))
+    Some((Chessboard { columns, rows, corners_px, orientation }, fitted))
 }
 
 /// The board with the corners that are seen, if after their fit it is still certain which they are.
@@ -349,16 +341,8 @@ fn in_part<T: Level>(
     columns: usize,
     rows: usize,
 ) -> Option<SeenBoard> {
-    let ordered = board::ordered(&seen.lattice, &seen.rectangle, &seen.places, (columns, rows));
-    let fitted = refine::refined(
-        pyramid,
-        level,
-        &seen.found(&ordered.marks),
-        columns,
-        ordered.starts_dark,
-        &Look::PLAIN,
-    );
-    certain(fitted.alike(pyramid.photo(), columns), columns, rows, ordered.orientation)
+    let (fitted, orientation) = seen.fitted(pyramid, level, columns, rows);
+    certain(fitted.alike(pyramid.photo(), columns), columns, rows, orientation)
 }
 
 /// A board of these corners, if it is certain which they are.
@@ -372,8 +356,18 @@ fn certain(
 }
 
 impl Seen {
-    /// The places of marks.
-    fn found(&self, marks: &[Option<usize>]) -> Vec<Option<Vec2>> {
-        marks.iter().map(|mark| mark.map(|mark| self.places[mark])).collect()
+    /// Its corners in the board's order, fitted in the photograph.
+    fn fitted<T: Level>(
+        &self,
+        pyramid: &Pyramid<'_, T>,
+        level: usize,
+        columns: usize,
+        rows: usize,
+    ) -> (Fitted, Orientation) {
+        let ordered = board::ordered(&self.lattice, &self.rectangle, &self.places, (columns, rows));
+        let found: Vec<Option<Vec2>> =
+            ordered.marks.iter().map(|mark| mark.map(|mark| self.places[mark])).collect();
+        let fitted = refine::refined(pyramid, level, &found, columns, ordered.starts_dark, &Look::PLAIN);
+        (fitted, ordered.orientation)
     }
 }

@@ -84,9 +84,13 @@ pub fn circle_grid<T: Level>(image: &Raster<T>, columns: usize, rows: usize) -> 
 /// # Errors
 /// See [`GridError`].
 pub fn circle_grid_of(discs: &[Blob], columns: usize, rows: usize) -> Result<DotGrid, GridError> {
-    let too_few = columns.min(rows) < DENSE_SIDE || discs.len() < DENSE_SIDE * DENSE_SIDE;
-    if too_few {
-        return Err(GridError::TooFewForGrid { columns, rows, found: discs.len(), need: DENSE_SIDE });
+    let seen = discs.len();
+    if columns.min(rows) < DENSE_SIDE {
+        return Err(GridError::TooFewForGrid { columns, rows, found: seen, need: DENSE_SIDE });
+    }
+    if seen < DENSE_SIDE * DENSE_SIDE {
+        let (found, expected) = (largest(discs).len(), columns.saturating_mul(rows));
+        return Err(GridError::Partial { columns, rows, found, expected, seen });
     }
     order(discs, columns, rows)
 }

@@ -4,8 +4,7 @@
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GridError {
-    /// Grids with fewer marks than this on a side, or fewer in the image, cannot be told from chance by their
-    /// regularity.
+    /// Grids with fewer marks than this on a side cannot be told from chance by their regularity.
     #[error(
         "a dense grid needs at least {need} x {need} marks, asked for {columns} x {rows}, found {found}: use the detector \
          for sparse dots"
@@ -30,8 +29,8 @@ pub enum GridError {
     },
     /// Some marks are missing: outside the image, covered, in glare, too small or too blurred.
     #[error(
-        "found {found} of the {expected} marks of a {columns} x {rows} grid ({seen} in the image): the whole board \
-         must be visible"
+        "found {found} of the {expected} marks of a {columns} x {rows} grid ({seen} in the image): show the whole \
+         board, or half of its marks with a part of each outer row and column"
     )]
     Partial {
         /// Asked marks along a row.

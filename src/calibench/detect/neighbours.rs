@@ -68,6 +68,11 @@ impl<'a> Neighbours<'a> {
         }
     }
 
+    /// The points.
+    pub fn points(&self) -> &'a [Vec2] {
+        self.points
+    }
+
     /// Indices of the points within `radius_px` of a place, with their squared distances, in a fixed order.
     pub fn within(&self, place: &Vec2, radius_px: f64) -> impl Iterator<Item = (usize, f64)> {
         let reach = Vec2::new(radius_px, radius_px);

@@ -12,6 +12,12 @@ use std::cell::OnceCell;
 /// Least side of a level, px: a board of 3 x 3 squares of 8 px, with its surroundings.
 const LEAST_SIDE: usize = 40;
 
+/// Largest size at which a photograph is searched at twice its own, px.
+const MOST_TWICE: usize = 4_000_000;
+
+/// Side of a pixel of [`Pyramid::twice`], px of the photograph.
+pub const TWICE_PX: f64 = 0.5;
+
 /// The levels of a photograph. Level 0 is the photograph; the others are made when they are first asked for.
 pub struct Pyramid<'a, T> {
     photo: &'a Raster<T>,
@@ -48,6 +54,13 @@ impl<'a, T: Level> Pyramid<'a, T> {
         }))
     }
 
+    /// The photograph at twice its size, smoothed for the search of small marks: marks of a few pixels are a few more apart there.
+    /// `None` where it would have more than [`MOST_TWICE`] pixels.
+    pub fn twice(&self) -> Option<Smoothed> {
+        let pixels = self.photo.width().saturating_mul(self.photo.height()).saturating_mul(4);
+        (pixels <= MOST_TWICE).then(|| Smoothed::of(&doubled(self.photo)))
+    }
+
     /// A level smoothed for the search.
     pub fn smoothed(&self, level: usize) -> Smoothed {
         match self.reduced(level) {
@@ -59,7 +72,11 @@ impl<'a, T: Level> Pyramid<'a, T> {
 
 /// The place in the photograph of a place of a level.
 pub fn photo_from_level(place: &Vec2, level: usize) -> Vec2 {
-    let scale = scale(level);
+    photo_from_scale(place, scale(level))
+}
+
+/// The place in the photograph of a place of an image whose pixels are so large, px of the photograph.
+pub fn photo_from_scale(place: &Vec2, scale: f64) -> Vec2 {
     place * scale + Vec2::repeat(0.5 * (scale - 1.0))
 }
 
@@ -85,6 +102,34 @@ fn half<T: Level>(image: &Raster<T>) -> Raster<f32> {
         );
     }
     Raster::from_samples(width, height, samples).expect("a sample for every pixel was made")
+}
+
+/// Weights of the four samples about a place a quarter of a pixel behind the second: the cubic through them that keeps edges
+/// sharp (Keys 1981, a = -1/2).
+const QUARTER: [f32; 4] = [-0.070_312_5, 0.867_187_5, 0.226_562_5, -0.023_437_5];
+
+/// The image at twice its size; pixel `(x, y)` is centred on `(x / 2 - 1/4, y / 2 - 1/4)`.
+fn doubled<T: Level>(image: &Raster<T>) -> Raster<f32> {
+    let (width, height) = (image.width(), image.height());
+    // Sample k of the result lies a quarter before or behind sample k / 2.
+    let about = |k: usize, count: usize| {
+        let (middle, way) = ((k / 2) as isize, if k.is_multiple_of(2) { -1 } else { 1 });
+        [-1, 0, 1, 2].map(|d| (middle + way * d).clamp(0, count as isize - 1) as usize)
+    };
+    let mut samples = Vec::with_capacity(4 * width * height);
+    let mut across = Vec::with_capacity(width);
+    for y in 0..2 * height {
+        let rows = about(y, height).map(|row| image.row(row));
+        across.clear();
+        across.extend((0..width).map(|x| mixed(rows.map(|row| row[x].to_f32()))));
+        samples.extend((0..2 * width).map(|x| mixed(about(x, width).map(|column| across[column]))));
+    }
+    Raster::from_samples(2 * width, 2 * height, samples).expect("a sample for every pixel was made")
+}
+
+fn mixed(samples: [f32; 4]) -> f32 {
+    let [a, b, c, d] = [0, 1, 2, 3].map(|k| QUARTER[k] * samples[k]);
+    (a + b) + (c + d)
 }
 
 /// An image convolved with the binomial `(1 4 6 4 1) / 16` along both axes: variance 1 px^2 each.
@@ -212,4 +257,28 @@ fn noise<T: Level>(image: &Raster<T>) -> f64 {
     let quarter = differences.len() / 4;
     let (_, quartile, _) = differences.select_nth_unstable_by(quarter, f64::total_cmp);
     *quartile / (0.3186 * 6.0f64.sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn at_twice_the_size_a_plane_and_a_parabola_are_where_they_were() {
+        let of = |x: f64, y: f64| 0.3 + 0.01 * x - 0.02 * y + 0.001 * x * x;
+        let image = Raster::from_fn(40, 50, |x, y| of(x as f64, y as f64) as f32);
+        let twice = doubled(&image);
+        assert_eq!((twice.width(), twice.height()), (80, 100));
+        for (x, y) in [(8, 9), (21, 30), (40, 71)] {
+            let place = photo_from_scale(&Vec2::new(x as f64, y as f64), TWICE_PX);
+            assert!((f64::from(twice.get(x, y)) - of(place.x, place.y)).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn large_photographs_are_not_doubled() {
+        let of = |width, height| Raster::from_fn(width, height, |_, _| 0.5f32);
+        assert!(Pyramid::new(&of(1000, 1000)).twice().is_some());
+        assert!(Pyramid::new(&of(1001, 1000)).twice().is_none());
+    }
 }

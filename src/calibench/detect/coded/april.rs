@@ -3,35 +3,33 @@
 //!
 //! 1. From corner to corner along the edges, the dark side always on the same hand: four edges that lead back to the
 //!    first corner are a dark quadrangle ([`quads`](super::quads)).
-//! 2. Those with a tag inside tell their place on the board.
-//! 3. A tag counts if one beside it lies where the two numbers say.
-//! 4. Corners are fitted to the photograph's pixels.
+//! 2. Those with a tag inside tell their place on the board. A tag counts if one beside it lies where the two numbers say;
+//!    where hardly one can be read, all are told together ([`together`](super::together)).
+//! 3. Tags that were not seen by themselves are looked for where the others put them ([`filled`](super::filled)).
+//! 4. Corners are fitted to the photograph's pixels; those that lie elsewhere than the corners about them say are left out
+//!    ([`neighbourhood`](super::neighbourhood)).
 
 use super::CodedError;
-use super::cells::{Patch, read};
-use super::dictionary::{Dictionary, turned};
+use super::dictionary::Dictionary;
+use super::filled::filled;
 use super::layout::AprilGrid;
-use super::quads::{Quad, quads};
+use super::neighbourhood::take_out_outlying;
+use super::quads::quads;
+use super::tag::{FARTHEST, Reading, Tag};
+use super::together::together;
 use crate::detect::chessboard::candidates::{Strength, candidates};
-use crate::detect::chessboard::level::{Pyramid, level_from_photo, photo_from_level};
+use crate::detect::chessboard::level::{
+    Pyramid, Smoothed, TWICE_PX, level_from_photo, photo_from_scale, scale,
+};
 use crate::detect::chessboard::look::Look;
 use crate::detect::chessboard::refine::refined;
 use crate::detect::chessboard::search_order;
 use crate::detect::{Orientation, SeenBoard};
-use crate::geometry::{Homography, Vec2};
+use crate::geometry::Vec2;
 use crate::raster::{Level, Raster};
-
-/// Cells of a tag's border: Kalibr's two, and one of AprilTag's own.
-const BORDERS: [usize; 2] = [2, 1];
-
-/// Least difference of a tag's white and black, as part of the corners' contrast.
-const LEAST_CONTRAST: f64 = 0.3;
 
 /// How far from where another tag puts it a tag's middle may lie, in its sides, for each tag between the two.
 const MOST_OFF: f64 = 0.25;
-
-/// How far apart tags vouch for each other, in places of the grid: farther, the lens bends what a homography says.
-const FARTHEST: usize = 2;
 
 /// Fewest corners whose places make a view.
 const FEWEST_MARKS: usize = 4;
@@ -44,33 +42,157 @@ const MOST_WIDER: f64 = 0.04;
 const FEWEST_BEYOND: usize = 2;
 
 /// Finds the corners of a grid of AprilTags that are seen, in Kalibr's order: row by row of corners from the lower left
-/// one of the first tag upwards, twice as many along a row as tags. A tag counts if one near it agrees.
+/// one of the first tag upwards, twice as many along a row as tags. A tag counts if one near it agrees, and the tags of more
+/// than one row are needed: one row of them looks alike on grids of any width.
 ///
 /// # Errors
 /// See [`CodedError`]; a grid of another size or spacing too, where enough of it is seen to tell.
 pub fn seen_april_grid<T: Level>(image: &Raster<T>, grid: &AprilGrid) -> Result<SeenBoard, CodedError> {
-    let pyramid = Pyramid::new(image);
-    let mut best: Option<(usize, Vec<Tag>)> = None;
-    let mut failure = CodedError::NoCorners { seen: 0 };
-    for level in search_order(image, pyramid.levels()) {
-        for strength in [Strength::Strong, Strength::Any] {
-            match in_level(&pyramid, level, strength, grid) {
-                Ok(tags) => {
-                    if best.as_ref().is_none_or(|(_, best)| tags.len() > best.len()) {
-                        best = Some((level, tags));
-                    }
-                    break;
-                }
-                Err(failed) => failure = telling(failure, failed),
-            }
-        }
-        if best.as_ref().is_some_and(|(_, tags)| tags.len() == grid.columns() * grid.rows()) {
+    let search = Search { pyramid: Pyramid::new(image), grid };
+    let mut found = Found { best: None, failure: CodedError::NoCorners { seen: 0 } };
+    for level in search_order(image, search.pyramid.levels()) {
+        let scaled = Scaled { smoothed: search.pyramid.smoothed(level), pixel_px: scale(level) };
+        found.add(level, search.among_all(&scaled));
+        if found.is_all(grid) {
             break;
         }
     }
-    match best {
-        Some((level, tags)) if !contradicts(&failure, tags.len()) => fitted(&pyramid, level, &tags, grid),
-        _ => Err(failure),
+    if !found.is_all(grid)
+        && let Some(smoothed) = search.pyramid.twice()
+    {
+        found.add(0, search.among_all(&Scaled { smoothed, pixel_px: TWICE_PX }));
+    }
+    let (level, tags) = found.certain(grid)?;
+    search.fitted(level, &tags)
+}
+
+/// An image in which tags are searched, smoothed.
+struct Scaled {
+    smoothed: Smoothed,
+    /// Side of its pixels, px of the photograph.
+    pixel_px: f64,
+}
+
+/// What the sizes of an image showed.
+struct Found {
+    /// The most tags, and their level.
+    best: Option<(usize, Vec<Tag>)>,
+    failure: CodedError,
+}
+
+impl Found {
+    fn add(&mut self, level: usize, found: Result<Vec<Tag>, CodedError>) {
+        match found {
+            Ok(tags) if self.best.as_ref().is_none_or(|(_, best)| tags.len() > best.len()) => {
+                self.best = Some((level, tags));
+            }
+            Ok(_) => {}
+            Err(failed) => {
+                let failure = std::mem::replace(&mut self.failure, CodedError::NoCorners { seen: 0 });
+                self.failure = telling(failure, failed);
+            }
+        }
+    }
+
+    fn is_all(&self, grid: &AprilGrid) -> bool {
+        self.best.as_ref().is_some_and(|(_, tags)| tags.len() == grid.columns() * grid.rows())
+    }
+
+    /// The tags of the best level, if nothing speaks against them.
+    fn certain(self, grid: &AprilGrid) -> Result<(usize, Vec<Tag>), CodedError> {
+        let Some((level, tags)) = self.best else { return Err(self.failure) };
+        if contradicts(&self.failure, tags.len()) {
+            return Err(self.failure);
+        }
+        let row = tags[0].at.1;
+        if grid.rows() > 1 && tags.iter().all(|tag| tag.at.1 == row) {
+            return Err(CodedError::OneRow { tags: tags.len() });
+        }
+        Ok((level, tags))
+    }
+}
+
+struct Search<'a, T> {
+    pyramid: Pyramid<'a, T>,
+    grid: &'a AprilGrid,
+}
+
+impl<T: Level> Search<'_, T> {
+    /// Strong corners first; where they do not make the board, all.
+    fn among_all(&self, scaled: &Scaled) -> Result<Vec<Tag>, CodedError> {
+        self.among(scaled, Strength::Strong)
+            .or_else(|strong| self.among(scaled, Strength::Any).map_err(|any| telling(strong, any)))
+    }
+
+    /// The tags of the board that are seen.
+    fn among(&self, scaled: &Scaled, strength: Strength) -> Result<Vec<Tag>, CodedError> {
+        let candidates = candidates(&scaled.smoothed, strength);
+        let seen = quads(&scaled.smoothed, &candidates);
+        if seen.is_empty() {
+            return Err(CodedError::NoCorners { seen: candidates.len() });
+        }
+        let in_photo = |place: &Vec2| photo_from_scale(place, scaled.pixel_px);
+        let reading = |quad: &super::quads::Quad| {
+            Reading::of(&self.pyramid, quad.corners.map(|corner| in_photo(&corner)), quad.contrast, self.grid)
+        };
+        let readings: Vec<Reading> = seen.iter().filter_map(reading).collect();
+        let read: Vec<Tag> = readings.iter().filter_map(|reading| reading.tag(self.grid)).collect();
+        let tags = self.told(&readings, read).map_err(|error| error.of_corners(4 * seen.len()))?;
+        let corners_px: Vec<Vec2> = candidates.iter().map(|candidate| in_photo(&candidate.at)).collect();
+        Ok(filled(&self.pyramid, &corners_px, tags, self.grid))
+    }
+
+    /// The tags of which it is certain which they are.
+    fn told(&self, readings: &[Reading], read: Vec<Tag>) -> Result<Vec<Tag>, CodedError> {
+        let grid = self.grid;
+        let (columns, rows) = (grid.columns(), grid.rows());
+        let (count, only) = (read.len(), read.first().map_or(0, |tag| tag.id));
+        if goes_on(&read, grid) {
+            return Err(CodedError::GoesOn { columns, rows });
+        }
+        let mut tags = agreeing(read, grid);
+        if tags.is_empty() {
+            tags = together(readings, grid);
+        }
+        if let Some(seen) = pitch(&tags).filter(|pitch| (pitch - 1.0 - grid.spacing()).abs() > MOST_WIDER) {
+            let thousandths = |spacing: f64| libm::round(1000.0 * spacing.max(0.0)) as usize;
+            return Err(CodedError::Spacing {
+                asked: thousandths(grid.spacing()),
+                seen: thousandths(seen - 1.0),
+            });
+        }
+        if !tags.is_empty() {
+            return Ok(tags);
+        }
+        Err(match count {
+            0 => CodedError::NoMarker { corners: 0, dictionary: Dictionary::april_36h11() },
+            1 => CodedError::OneMarker { id: only },
+            _ => CodedError::Disagree { agree: 0, read: count, columns, rows, other: None },
+        })
+    }
+
+    /// The corners of the tags, fitted in the photograph.
+    fn fitted(&self, level: usize, tags: &[Tag]) -> Result<SeenBoard, CodedError> {
+        let grid = self.grid;
+        let (columns, rows) = (2 * grid.columns(), 2 * grid.rows());
+        // From above downwards, as the fit takes them.
+        let mut places = vec![None; columns * rows];
+        for tag in tags {
+            let row = grid.rows() - 1 - tag.at.1;
+            for (corner, (x, y)) in tag.corners_px.iter().zip([(0, 0), (1, 0), (1, 1), (0, 1)]) {
+                places[(2 * row + y) * columns + 2 * tag.at.0 + x] = Some(level_from_photo(corner, level));
+            }
+        }
+        let look = Look::of_tags(grid.spacing());
+        let fitted = refined(&self.pyramid, level, &places, columns, true, &look);
+        let mut corners_px = fitted.alike(self.pyramid.photo(), columns);
+        take_out_outlying(&mut corners_px, grid);
+        let found = corners_px.iter().flatten().count();
+        if found < FEWEST_MARKS {
+            return Err(CodedError::Unclear { found });
+        }
+        let upwards = corners_px.chunks(columns).rev().flatten().copied().collect();
+        Ok(SeenBoard::new(columns, rows, upwards, Orientation::Fixed))
     }
 }
 
@@ -95,73 +217,13 @@ fn telling(first: CodedError, other: CodedError) -> CodedError {
     if rank(&other) > rank(&first) { other } else { first }
 }
 
-/// A tag that was read.
-struct Tag {
-    id: usize,
-    /// Its place on the grid: column, and row from below.
-    at: (usize, usize),
-    /// Its corners as it stands on the board, px of the photograph: top left, top right, bottom right, bottom left.
-    corners_px: [Vec2; 4],
-}
-
-impl Tag {
-    /// From its own plane, in its sides about its middle with y down, to the photograph.
-    fn unit(&self) -> Option<Homography> {
-        let unit = CORNERS.map(|(x, y)| 0.5 * Vec2::new(f64::from(x), f64::from(y)));
-        Homography::fit(&unit, &self.corners_px).ok().map(|fit| fit.homography)
-    }
-
-    fn middle_px(&self) -> Vec2 {
-        self.corners_px.iter().sum::<Vec2>() / 4.0
-    }
-}
-
-/// A tag's corners about its middle, y down, in halves of its side.
-const CORNERS: [(i32, i32); 4] = [(-1, -1), (1, -1), (1, 1), (-1, 1)];
-
-fn in_level<T: Level>(
-    pyramid: &Pyramid<'_, T>,
-    level: usize,
-    strength: Strength,
-    grid: &AprilGrid,
-) -> Result<Vec<Tag>, CodedError> {
-    let smoothed = pyramid.smoothed(level);
-    let candidates = candidates(&smoothed, strength);
-    let seen = quads(&smoothed, &candidates);
-    if seen.is_empty() {
-        return Err(CodedError::NoCorners { seen: candidates.len() });
-    }
-    let tags: Vec<Tag> = seen.iter().filter_map(|quad| tag(pyramid, level, quad, grid)).collect();
-    let (columns, rows) = (grid.columns(), grid.rows());
-    let (read, only) = (tags.len(), tags.first().map_or(0, |tag| tag.id));
-    if goes_on(&tags, grid) {
-        return Err(CodedError::GoesOn { columns, rows });
-    }
-    let agreeing = agreeing(tags, grid);
-    if let Some(seen) = pitch(&agreeing).filter(|pitch| (pitch - 1.0 - grid.spacing()).abs() > MOST_WIDER) {
-        let thousandths = |spacing: f64| libm::round(1000.0 * spacing.max(0.0)) as usize;
-        return Err(CodedError::Spacing {
-            asked: thousandths(grid.spacing()),
-            seen: thousandths(seen - 1.0),
-        });
-    }
-    if !agreeing.is_empty() {
-        return Ok(agreeing);
-    }
-    Err(match read {
-        0 => CodedError::NoMarker { corners: 4 * seen.len(), dictionary: Dictionary::april_36h11() },
-        1 => CodedError::OneMarker { id: only },
-        _ => CodedError::Disagree { agree: 0, read, columns, rows, other: None },
-    })
-}
-
 /// Whether tags are seen that follow the board's last, where they would stand on one with more rows.
 fn goes_on(tags: &[Tag], grid: &AprilGrid) -> bool {
     let is_beyond = |tag: &&Tag| tag.at.1 >= grid.rows();
     let is_confirmed = |tag: &&Tag| {
         let confirms = |other: &Tag| {
             other.id != tag.id
-                && apart(tag, other) <= FARTHEST
+                && other.apart(tag.at) <= FARTHEST
                 && agree(tag, other, grid)
                 && agree(other, tag, grid)
         };
@@ -191,27 +253,6 @@ fn pitch(tags: &[Tag]) -> Option<f64> {
     (distances.len() >= FEWEST_NEIGHBOURS).then(|| distances[distances.len() / 2])
 }
 
-/// The tag in a quadrangle.
-fn tag<T: Level>(pyramid: &Pyramid<'_, T>, level: usize, quad: &Quad, grid: &AprilGrid) -> Option<Tag> {
-    let corners_px = quad.corners.map(|corner| photo_from_level(&corner, level));
-    let unit = [Vec2::zeros(), Vec2::new(1.0, 0.0), Vec2::new(1.0, 1.0), Vec2::new(0.0, 1.0)];
-    let photo_from_marker = Homography::fit(&unit, &corners_px).ok()?.homography;
-    let dictionary = Dictionary::april_36h11();
-    let recognised = BORDERS.iter().find_map(|&border| {
-        let patch = Patch { photo_from_marker, border, white: grid.spacing() };
-        let cells = read(pyramid, &patch, dictionary.side(), LEAST_CONTRAST * quad.contrast)?;
-        dictionary.recognise(cells, dictionary.len())
-    })?;
-    let mut upright = corners_px;
-    for (corner, at) in corners_px.iter().zip(CORNERS) {
-        // OpenCV's table has the tags turned by half.
-        let stands_at = turned(at, recognised.turns + 2);
-        upright[CORNERS.iter().position(|&corner| corner == stands_at)?] = *corner;
-    }
-    let at = (recognised.id % grid.columns(), recognised.id / grid.columns());
-    Some(Tag { id: recognised.id, at, corners_px: upright })
-}
-
 /// Pairs of tags that agree for each that does not. Of a grid of another width those of a row agree, and those above each
 /// other do not.
 const FOR_EACH_AGAINST: usize = 10;
@@ -221,7 +262,7 @@ fn agreeing(tags: Vec<Tag>, grid: &AprilGrid) -> Vec<Tag> {
     let is_on_board = |tag: &Tag| tag.at.1 < grid.rows();
     // Those near a tag that agree, and those that do not.
     let votes = |tag: &Tag| {
-        let near = |other: &&Tag| other.id != tag.id && is_on_board(other) && apart(tag, other) <= FARTHEST;
+        let near = |other: &&Tag| other.id != tag.id && is_on_board(other) && other.apart(tag.at) <= FARTHEST;
         let near = || tags.iter().filter(near);
         let agree = near().filter(|other| agree(tag, other, grid) && agree(other, tag, grid)).count();
         (agree, near().count() - agree)
@@ -243,46 +284,11 @@ fn agreeing(tags: Vec<Tag>, grid: &AprilGrid) -> Vec<Tag> {
     tags.into_iter().zip(kept).filter(|(_, kept)| *kept).map(|(tag, _)| tag).collect()
 }
 
-/// How many places of the grid lie between two tags.
-fn apart(tag: &Tag, other: &Tag) -> usize {
-    tag.at.0.abs_diff(other.at.0).max(tag.at.1.abs_diff(other.at.1))
-}
-
 /// Whether a tag lies where another puts it.
 fn agree(tag: &Tag, other: &Tag, grid: &AprilGrid) -> bool {
-    let pitch = 1.0 + grid.spacing();
-    let step = |a: usize, b: usize| (a as f64 - b as f64) * pitch;
-    // Rows are counted upwards, and y points down.
-    let way = Vec2::new(step(other.at.0, tag.at.0), -step(other.at.1, tag.at.1));
+    let way = other.way_from(tag.at, grid);
     let Some(expected) = tag.unit().and_then(|photo_from_tag| photo_from_tag.apply(&way)) else {
         return false;
     };
-    let side = (other.corners_px[0] - other.corners_px[2]).norm() / std::f64::consts::SQRT_2;
-    (expected - other.middle_px()).norm() < MOST_OFF * side * apart(tag, other) as f64
-}
-
-/// The corners of the tags, fitted in the photograph.
-fn fitted<T: Level>(
-    pyramid: &Pyramid<'_, T>,
-    level: usize,
-    tags: &[Tag],
-    grid: &AprilGrid,
-) -> Result<SeenBoard, CodedError> {
-    let (columns, rows) = (2 * grid.columns(), 2 * grid.rows());
-    // From above downwards, as the fit takes them.
-    let mut places = vec![None; columns * rows];
-    for tag in tags {
-        let row = grid.rows() - 1 - tag.at.1;
-        for (corner, (x, y)) in tag.corners_px.iter().zip([(0, 0), (1, 0), (1, 1), (0, 1)]) {
-            places[(2 * row + y) * columns + 2 * tag.at.0 + x] = Some(level_from_photo(corner, level));
-        }
-    }
-    let look = Look::of_tags(grid.spacing());
-    let fitted = refined(pyramid, level, &places, columns, true, &look).alike(pyramid.photo(), columns);
-    let found = fitted.iter().flatten().count();
-    if found < FEWEST_MARKS {
-        return Err(CodedError::Unclear { found });
-    }
-    let upwards = fitted.chunks(columns).rev().flatten().copied().collect();
-    Ok(SeenBoard::new(columns, rows, upwards, Orientation::Fixed))
+    (expected - other.middle_px()).norm() < MOST_OFF * other.side_px() * other.apart(tag.at) as f64
 }

@@ -14,6 +14,8 @@ pub struct Patch {
     pub border: usize,
     /// Width of the white about the marker, in its sides.
     pub white: f64,
+    /// Least part of the cells that must lie inside of the image; those outside are taken as black.
+    pub inside: f64,
 }
 
 /// Places of a cell that are sampled, along each axis, in cells from its middle.
@@ -25,9 +27,21 @@ const CELL_PX: f64 = 4.0;
 /// Largest part of a border's cells that may look white: a shadow, dirt.
 const MOST_OF_BORDER: f64 = 0.2;
 
+/// How much of the difference between a cell and those beside it sharpening adds: what a blur of half a cell takes.
+const SHARPENED: f64 = 1.0;
+
+/// What a marker's inside looks like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Inside {
+    /// The inner cells as they are.
+    pub plain: Cells,
+    /// The same after each is compared with those beside it: a blurred white cell between black ones is grey.
+    pub sharpened: Cells,
+}
+
 /// The inner cells of a marker, `side` along each side, if it has a black border on white ground whose levels differ by
 /// `least`.
-pub fn read<T: Level>(pyramid: &Pyramid<'_, T>, patch: &Patch, side: usize, least: f64) -> Option<Cells> {
+pub fn read<T: Level>(pyramid: &Pyramid<'_, T>, patch: &Patch, side: usize, least: f64) -> Option<Inside> {
     let count = side + 2 * patch.border;
     let cell = 1.0 / count as f64;
     let at = |x: f64, y: f64| patch.photo_from_marker.apply(&Vec2::new(x, y));
@@ -45,35 +59,75 @@ pub fn read<T: Level>(pyramid: &Pyramid<'_, T>, patch: &Patch, side: usize, leas
     let places = || (0..count).map(|k| k as f64 + 0.5);
     // The white strip about the marker, a sample beside each outer cell, in its middle.
     let (beside, thin) = (0.5 * patch.white * count as f64, (patch.white * count as f64).min(1.0));
-    let (mut white, mut black) = (0.0, 0.0);
+    let (mut white, mut black) = (Mean::default(), Mean::default());
     for k in places() {
         for (x, y) in [(k, -beside), (k, last + 0.5 + beside), (-beside, k), (last + 0.5 + beside, k)] {
-            white += mean(x, y, thin)?;
+            white.add(mean(x, y, thin));
         }
         for (x, y) in [(k, 0.5), (k, last), (0.5, k), (last, k)] {
-            black += mean(x, y, 1.0)?;
+            black.add(mean(x, y, 1.0));
         }
     }
-    let outer = 4.0 * count as f64;
-    (white, black) = (white / outer, black / outer);
+    let (white, black) = (white.of(patch.inside)?, black.of(patch.inside)?);
     if white - black < least {
         return None;
     }
-    let middle = 0.5 * (white + black);
-    let (mut cells, mut wrong) = (0, 0);
-    let inner = patch.border..patch.border + side;
+    let (mut means, mut all) = (Vec::with_capacity(count * count), Mean::default());
+    for row in places() {
+        for column in places() {
+            let level = mean(column, row, 1.0);
+            all.add(level);
+            means.push(level.unwrap_or(black));
+        }
+    }
+    all.of(patch.inside)?;
+    inside(&means, count, patch.border, 0.5 * (white + black))
+}
+
+/// The mean of the levels inside of the image.
+#[derive(Default)]
+struct Mean {
+    sum: f64,
+    inside: usize,
+    count: usize,
+}
+
+impl Mean {
+    fn add(&mut self, level: Option<f64>) {
+        self.sum += level.unwrap_or(0.0);
+        self.inside += usize::from(level.is_some());
+        self.count += 1;
+    }
+
+    /// If at least such a part was inside.
+    fn of(&self, least: f64) -> Option<f64> {
+        (self.inside > 0 && self.inside as f64 >= least * self.count as f64)
+            .then(|| self.sum / self.inside as f64)
+    }
+}
+
+/// The inner cells by the levels of all, `count` along each side; `middle`: between white and black.
+fn inside(means: &[f64], count: usize, border: usize, middle: f64) -> Option<Inside> {
+    let inner = border..count - border;
+    let is_inner = |row: usize, column: usize| inner.contains(&row) && inner.contains(&column);
+    let (mut plain, mut sharpened, mut wrong) = (0, 0, 0);
     for row in 0..count {
         for column in 0..count {
-            let is_white = mean(column as f64 + 0.5, row as f64 + 0.5, 1.0)? > middle;
-            if inner.contains(&row) && inner.contains(&column) {
-                cells = cells << 1 | Cells::from(is_white);
+            let here = means[row * count + column];
+            if is_inner(row, column) {
+                // An inner cell has one beside it on each side: the border is around.
+                let k = row * count + column;
+                let beside = 0.25 * (means[k - 1] + means[k + 1] + means[k - count] + means[k + count]);
+                let sharp = here + SHARPENED * (here - beside);
+                plain = plain << 1 | Cells::from(here > middle);
+                sharpened = sharpened << 1 | Cells::from(sharp > middle);
             } else {
-                wrong += usize::from(is_white);
+                wrong += usize::from(here > middle);
             }
         }
     }
-    let of_border = (count * count - side * side) as f64;
-    (wrong as f64 <= MOST_OF_BORDER * of_border).then_some(cells)
+    let of_border = (count * count - inner.len() * inner.len()) as f64;
+    (wrong as f64 <= MOST_OF_BORDER * of_border).then_some(Inside { plain, sharpened })
 }
 
 /// The coarsest level in which a cell has enough pixels.

@@ -224,8 +224,8 @@ impl<T: Level> Search<'_, T> {
             let marker = self.board.marker();
             let white = 0.5 * (1.0 - marker);
             let photo_from_marker = part.homography(low, white, marker)?;
-            let patch = Patch { photo_from_marker, border: 1, white: white / marker };
-            let cells = read(&self.pyramid, &patch, dictionary.side(), LEAST_CONTRAST * part.contrast)?;
+            let patch = Patch { photo_from_marker, border: 1, white: white / marker, inside: 1.0 };
+            let cells = read(&self.pyramid, &patch, dictionary.side(), LEAST_CONTRAST * part.contrast)?.plain;
             Some(Square { low, cells })
         };
         with_corner.into_iter().filter_map(read_one).collect()

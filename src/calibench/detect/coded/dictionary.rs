@@ -171,6 +171,12 @@ impl Dictionary {
         &all[..self.len().min(all.len())]
     }
 
+    /// How many cells differ from a marker's, if what was seen is turned by so many quarters.
+    pub(super) fn wrong(&self, seen: Cells, marker: usize, turns: u8) -> Option<u32> {
+        let cells = self.cells().get(marker)?;
+        Some((turned_back(seen, self.side(), turns % 4) ^ cells).count_ones())
+    }
+
     /// The marker among the first `count` that is nearest to what was seen, if so near that no other can be meant.
     pub(super) fn recognise(&self, seen: Cells, count: usize) -> Option<Recognised> {
         let turned: Vec<Cells> = (0..4).map(|turns| turned_back(seen, self.side(), turns)).collect();

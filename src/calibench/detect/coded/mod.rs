@@ -6,9 +6,13 @@ mod april;
 mod cells;
 mod charuco;
 mod dictionary;
+mod filled;
 mod layout;
+mod neighbourhood;
 mod placement;
 mod quads;
+mod tag;
+mod together;
 
 pub use april::seen_april_grid;
 pub use charuco::seen_charuco;
@@ -55,6 +59,14 @@ pub enum CodedError {
     OneMarker {
         /// Its number.
         id: usize,
+    },
+    /// Tags of one row, which grids of any width have.
+    #[error(
+        "{tags} tags agree, but all are of one row, which looks alike on grids of any width: show tags of two rows at least"
+    )]
+    OneRow {
+        /// Tags that agree.
+        tags: usize,
     },
     /// The markers do not stand as on the board.
     #[error(
@@ -112,6 +124,14 @@ impl CodedError {
             CodedError::Disagree { read, .. } => *read > BY_CHANCE,
             CodedError::GoesOn { .. } | CodedError::Spacing { .. } => true,
             _ => false,
+        }
+    }
+
+    /// The same, of a lattice of so many corners.
+    fn of_corners(self, corners: usize) -> CodedError {
+        match self {
+            CodedError::NoMarker { dictionary, .. } => CodedError::NoMarker { corners, dictionary },
+            other => other,
         }
     }
 
