@@ -34,6 +34,9 @@ const MOST_OFF: f64 = 0.25;
 /// Fewest corners whose places make a view.
 const FEWEST_MARKS: usize = 4;
 
+/// Least part of the tags' corners that must have exact places: where motion leaves edges to a few by chance, these are wrong.
+const LEAST_CLEAR: f64 = 1.0 / 3.0;
+
 /// Side neighbours whose distance tells the spacing of the tags, and by how much it may differ from what was said, in sides.
 const FEWEST_NEIGHBOURS: usize = 8;
 const MOST_WIDER: f64 = 0.04;
@@ -188,7 +191,8 @@ impl<T: Level> Search<'_, T> {
         let mut corners_px = fitted.alike(self.pyramid.photo(), columns);
         take_out_outlying(&mut corners_px, grid);
         let found = corners_px.iter().flatten().count();
-        if found < FEWEST_MARKS {
+        let looked_for = places.iter().flatten().count();
+        if found < FEWEST_MARKS || (found as f64) < LEAST_CLEAR * looked_for as f64 {
             return Err(CodedError::Unclear { found });
         }
         let upwards = corners_px.chunks(columns).rev().flatten().copied().collect();

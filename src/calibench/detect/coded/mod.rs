@@ -106,10 +106,9 @@ pub enum CodedError {
         /// What it is in the photograph.
         seen: usize,
     },
-    /// Too few corners have a place better than a pixel.
+    /// Too few corners have a place better than a pixel: fewer than four, or of tags fewer than a third.
     #[error(
-        "{found} marks were found whose edges are clear enough for exact places, and four are needed: hold the board still, or use \
-         more light"
+        "{found} of the board's marks have edges clear enough for exact places, too few: hold the board still, or use more light"
     )]
     Unclear {
         /// Marks with exact places.
