@@ -111,8 +111,6 @@ const VERBS: [Verb; 23] = [
             "gate",
             "--samples",
             "1",
-            "--record",
-            "out",
             "--json",
             "out/report.json",
             "--junit",
