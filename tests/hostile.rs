@@ -271,7 +271,7 @@ fn options_that_contradict_each_other_or_the_input_are_refused() {
     refused(&folder, &scenes, &["names four-pose twice"]);
     let levels = crate::study::SPEC.replace("levels = [0.1, 0.3]", "levels = [0.1, 0.3, 0.1]");
     fs::write(folder.join("levels.toml"), levels).expect("written");
-    refused(&folder, &["study", "plan", "--want", "fx=1", "levels.toml"], &["level 0.1 is named twice"]);
+    refused(&folder, &["study", "run", "levels.toml"], &["level 0.1 is named twice"]);
 }
 
 #[test]
