@@ -111,6 +111,8 @@ const VERBS: [Verb; 23] = [
             "gate",
             "--samples",
             "1",
+            "--record",
+            "out",
             "--json",
             "out/report.json",
             "--junit",
@@ -235,6 +237,11 @@ fn fill(disk: &Path, whole: &Tree) {
         fs::create_dir_all(path.parent().expect("it lies in a folder")).expect("a folder is made");
         fs::write(path, "old").expect("written");
     }
+}
+
+/// A folder with answers takes no others: who records again moves them away.
+fn move_answers_away(disk: &Path) {
+    let _ = fs::remove_file(disk.join("out/answers.jsonl"));
 }
 
 fn read(folder: &Path) -> Tree {
@@ -472,6 +479,7 @@ fn a_full_disk_ends_with_three_and_leaves_old_files_or_whole_ones() {
             let size = least + (most - least) * step / (SIZES - 1);
             let there = on_disk(&disk, &format!("size={size}"), || {
                 fill(&disk, &whole);
+                move_answers_away(&disk);
                 let old = read(&disk);
                 let output = run(verb, &disk);
                 assert_old_or_whole(verb, &read(&disk), &old, &whole, false);
@@ -519,6 +527,7 @@ fn a_read_only_disk_ends_with_three_and_changes_nothing() {
         let whole = undisturbed(verb, &folder).0;
         let there = on_disk(&disk, "size=16m", || {
             fill(&disk, &whole);
+            move_answers_away(&disk);
             let old = read(&disk);
             assert!(mount(&disk, "remount,ro"));
             let output = run(verb, &disk);
@@ -546,8 +555,10 @@ fn a_verb_that_is_killed_at_any_moment_leaves_old_files_or_whole_ones_and_the_ne
         let (whole, took) = undisturbed(verb, &folder);
         fs::remove_dir_all(&disk).expect("removed");
         fill(&disk, &whole);
+        move_answers_away(&disk);
         let old = read(&disk);
         for _ in 0..KILLS {
+            move_answers_away(&disk);
             let mut child = command(verb, &disk).spawn().expect("the program starts");
             std::thread::sleep(took.mul_f64(moments.uniform()));
             // SIGKILL: no handler runs. It fails where the run has ended.
@@ -558,6 +569,7 @@ fn a_verb_that_is_killed_at_any_moment_leaves_old_files_or_whole_ones_and_the_ne
             assert_old_or_whole(verb, &found, &old, &whole, true);
             assert_result_is_last(verb, &found, &whole);
         }
+        move_answers_away(&disk);
         assert!(run(verb, &disk).status.code().is_some_and(|code| code < 2), "{}", verb.name);
         // Also what the killed runs had left is gone.
         assert_same(verb, &read(&disk), &whole);

@@ -15,7 +15,7 @@ use super::filled::filled;
 use super::layout::AprilGrid;
 use super::neighbourhood::take_out_outlying;
 use super::quads::quads;
-use super::tag::{FARTHEST, Reading, Tag};
+use super::tag::{FARTHEST, Reading, Tag, middle_px, side_px};
 use super::together::together;
 use crate::detect::chessboard::candidates::{Strength, candidates};
 use crate::detect::chessboard::level::{
@@ -294,5 +294,6 @@ fn agree(tag: &Tag, other: &Tag, grid: &AprilGrid) -> bool {
     let Some(expected) = tag.unit().and_then(|photo_from_tag| photo_from_tag.apply(&way)) else {
         return false;
     };
-    (expected - other.middle_px()).norm() < MOST_OFF * other.side_px() * other.apart(tag.at) as f64
+    (expected - middle_px(&other.corners_px)).norm()
+        < MOST_OFF * side_px(&other.corners_px) * other.apart(tag.at) as f64
 }

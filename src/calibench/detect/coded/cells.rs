@@ -27,7 +27,7 @@ const CELL_PX: f64 = 4.0;
 /// Largest part of a border's cells that may look white: a shadow, dirt.
 const MOST_OF_BORDER: f64 = 0.2;
 
-/// How much of the difference between a cell and those beside it sharpening adds: what a blur of half a cell takes.
+/// How much of the difference between a cell and those beside it sharpening adds.
 const SHARPENED: f64 = 1.0;
 
 /// What a marker's inside looks like.

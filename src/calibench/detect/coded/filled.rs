@@ -2,7 +2,7 @@
 //! which cells it must have: far fewer of them need be right than to tell one tag of 587.
 
 use super::layout::AprilGrid;
-use super::tag::{FARTHEST, Reading, Tag, unit_corners};
+use super::tag::{FARTHEST, Reading, Tag, side_px, unit_corners};
 use crate::detect::chessboard::level::Pyramid;
 use crate::detect::neighbours::Neighbours;
 use crate::geometry::{Homography, Vec2};
@@ -58,9 +58,9 @@ fn expected<T: Level>(
     for (corner_px, corner) in corners_px.iter_mut().zip(unit_corners()) {
         *corner_px = photo_from_board.apply(&corner)?;
     }
-    let side_px = (corners_px[0] - corners_px[2]).norm() / std::f64::consts::SQRT_2;
+    let reach_px = REACH * side_px(&corners_px);
     for corner_px in &mut corners_px {
-        if let Some(found) = near.nearest(corner_px, REACH * side_px) {
+        if let Some(found) = near.nearest(corner_px, reach_px) {
             *corner_px = near.points()[found];
         }
     }

@@ -113,16 +113,6 @@ impl Tag {
         Homography::fit(&unit_corners(), &self.corners_px).ok().map(|fit| fit.homography)
     }
 
-    /// Mean of its corners, px.
-    pub fn middle_px(&self) -> Vec2 {
-        self.corners_px.iter().sum::<Vec2>() / 4.0
-    }
-
-    /// Its side, px, about.
-    pub fn side_px(&self) -> f64 {
-        (self.corners_px[0] - self.corners_px[2]).norm() / std::f64::consts::SQRT_2
-    }
-
     /// The way from the middle of the tag at a place to this one's, in sides of a tag, y down.
     pub fn way_from(&self, (column, row): (usize, usize), grid: &AprilGrid) -> Vec2 {
         let step = |to: usize, from: usize| (to as f64 - from as f64) * (1.0 + grid.spacing());
@@ -134,6 +124,16 @@ impl Tag {
     pub fn apart(&self, at: (usize, usize)) -> usize {
         self.at.0.abs_diff(at.0).max(self.at.1.abs_diff(at.1))
     }
+}
+
+/// Mean of a tag's corners.
+pub fn middle_px(corners_px: &[Vec2; 4]) -> Vec2 {
+    corners_px.iter().sum::<Vec2>() / 4.0
+}
+
+/// Side of a tag by a diagonal, as if it were seen from the front.
+pub fn side_px(corners_px: &[Vec2; 4]) -> f64 {
+    (corners_px[0] - corners_px[2]).norm() / std::f64::consts::SQRT_2
 }
 
 /// The corners of a tag about its middle, in its sides, y down, in the order of [`Tag::corners_px`].
