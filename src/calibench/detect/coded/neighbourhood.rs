@@ -31,10 +31,8 @@ pub fn take_out_outlying(corners_px: &mut [Option<Vec2>], grid: &AprilGrid) {
             return;
         };
         corners_px[worst] = None;
-        for index in 0..corners_px.len() {
-            if is_near(index, worst, columns) {
-                off[index] = off_px(corners_px, &on_board, columns, index);
-            }
+        for (index, off) in off.iter_mut().enumerate().filter(|(index, _)| is_near(*index, worst, columns)) {
+            *off = off_px(corners_px, &on_board, columns, index);
         }
     }
 }

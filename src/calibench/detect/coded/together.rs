@@ -45,26 +45,13 @@ pub fn together(readings: &[Reading], grid: &AprilGrid) -> Vec<Tag> {
     if lattice.len() < FEWEST {
         return Vec::new();
     }
-    let mut best: Option<(f64, Vec<(usize, u32)>, u8)> = None;
-    for turns in 0..4 {
-        for row in 0..grid.rows() {
-            for column in 0..grid.columns() {
-                let Some(taken) = taken_as(&lattice, (column, row), turns, grid) else { continue };
-                let wrong = part_wrong(&taken);
-                if best.as_ref().is_none_or(|(least, ..)| wrong < *least) {
-                    best = Some((wrong, taken, turns));
-                }
-            }
-        }
-    }
-    match best {
-        Some((_, taken, turns)) if is_certain(&taken, grid) => lattice
-            .iter()
-            .zip(&taken)
-            .map(|(placed, (id, _))| placed.reading.taken_as(*id, turned_by(turns, placed.turns), grid))
-            .collect(),
-        _ => Vec::new(),
-    }
+    let places = (0..grid.rows()).flat_map(|row| (0..grid.columns()).map(move |column| (column, row)));
+    let stands = (0..4).flat_map(|turns| places.clone().map(move |at| (turns, at)));
+    let taken = stands.filter_map(|(turns, at)| Some((turns, taken_as(&lattice, at, turns, grid)?)));
+    let best = taken.min_by(|(_, a), (_, b)| part_wrong(a).total_cmp(&part_wrong(b)));
+    let Some((turns, taken)) = best.filter(|(_, taken)| is_certain(taken, grid)) else { return Vec::new() };
+    let tags = lattice.iter().zip(taken);
+    tags.map(|(placed, (id, _))| placed.reading.taken_as(id, turned_by(turns, placed.turns), grid)).collect()
 }
 
 /// The turns of a quadrangle whose first corner lies `behind` that of one with `turns`.
