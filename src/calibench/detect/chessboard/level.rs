@@ -150,7 +150,7 @@ impl Smoothed {
         let (width, height) = (image.width(), image.height());
         let mut across = vec![0.0f32; width * height];
         let mut row: Vec<f32> = Vec::with_capacity(width + 4);
-        for (y, out) in across.chunks_exact_mut(width).enumerate() {
+        for (y, out) in across.chunks_exact_mut(width.max(1)).enumerate() {
             row.clear();
             let samples = image.row(y);
             let (first, last) = (samples[0].to_f32(), samples[width - 1].to_f32());
@@ -164,7 +164,7 @@ impl Smoothed {
             &across[y * width..][..width]
         };
         let mut samples = vec![0.0f32; width * height];
-        for (y, out) in samples.chunks_exact_mut(width).enumerate() {
+        for (y, out) in samples.chunks_exact_mut(width.max(1)).enumerate() {
             dispatch(Binomial { rows: [-2, -1, 0, 1, 2].map(|k| line(y as isize + k)), out });
         }
         let range = dispatch(Range(&samples));
