@@ -22,6 +22,7 @@ pub mod programs;
 mod rim;
 pub mod row;
 mod tables;
+mod wrong;
 
 use judged::{Judged, clopper_pearson};
 use programs::{PROGRAMS, Program};
@@ -113,6 +114,7 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     claim_boards(&mut record, &seen[0]);
     claim_errors(&mut record, &seen);
     claim_rim(&mut record)?;
+    wrong::report(&mut record, &wrong::read().map_err(ExperimentError::Input)?);
     for table in tables::each_kind(&seen) {
         record.table(table);
     }

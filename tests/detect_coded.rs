@@ -285,9 +285,52 @@ fn a_grid_of_tags_that_goes_on_or_has_another_spacing_is_named() {
             seen_april_grid(&photo.image, &AprilGrid::new(5, rows, spacing).unwrap()).unwrap_err()
         };
         assert_eq!(error(3, 0.3), CodedError::GoesOn { columns: 5, rows: 3 });
-        for asked in [0.2, 0.25, 0.4] {
+        for asked in [0.2, 0.25, 0.28, 0.285, 0.32, 0.4] {
             let CodedError::Spacing { seen, .. } = error(4, asked) else { panic!("{}", error(4, asked)) };
             assert!(seen.abs_diff(300) <= 10, "{seen} thousandths");
         }
     }
+}
+
+#[test]
+fn the_spacing_of_tags_is_not_taken_for_another_behind_a_strong_lens() {
+    // Tags of a seventh of the image's width, and a barrel that draws its corners in by a fifth.
+    let grid = AprilGrid::new(4, 3, 0.3).unwrap();
+    let (dark, marks) = april_scene(&grid);
+    let camera =
+        Camera::pinhole(320.0, 320.0, 320.0, 240.0).with_distortion(BrownConrady::radial(-0.22, 0.04));
+    for pose in &poses(0.0)[..3] {
+        let pose = Pose { translation: pose.translation + Vec3::new(0.0, 0.0, 3.6), ..*pose };
+        let photo = photograph_dark(
+            &camera,
+            SIZE,
+            &dark,
+            &marks,
+            &pose,
+            &Imaging { blur_px: 0.6, ..Imaging::default() },
+        )
+        .unwrap();
+        let seen = seen_april_grid(&photo.image, &grid).unwrap();
+        let (found, worst_px) = judged(&seen, &photo.centres_true);
+        assert!(found + 2 >= visible(&photo.centres_true) && worst_px < 0.1, "{found} marks, {worst_px} px");
+    }
+}
+
+#[test]
+fn a_mirrored_photograph_is_named() {
+    let mirrored = |image: &Raster<f32>| Raster::from_fn(SIZE.0, SIZE.1, |x, y| image.get(SIZE.0 - 1 - x, y));
+    for name in ["DICT_4X4_50", "DICT_5X5_50", "DICT_6X6_250"] {
+        let board = Charuco::new(8, 6, 0.74, name.parse().unwrap(), false).unwrap();
+        let (dark, marks) = charuco_scene(&board);
+        for pose in &poses(0.0)[..3] {
+            let photo = photo_of(&dark, &marks, 10.0, pose, 0.6);
+            let error = seen_charuco(&mirrored(&photo.image), &board).unwrap_err();
+            assert!(matches!(error, CodedError::Mirrored { count: 12.. }), "{name}: {error}");
+        }
+    }
+    let grid = AprilGrid::new(5, 4, 0.3).unwrap();
+    let (dark, marks) = april_scene(&grid);
+    let photo = photo_of(&dark, &marks, 8.2, &poses(0.0)[0], 0.6);
+    let error = seen_april_grid(&mirrored(&photo.image), &grid).unwrap_err();
+    assert_eq!(error, CodedError::Mirrored { count: 20 });
 }

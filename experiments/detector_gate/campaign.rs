@@ -2,7 +2,7 @@
 
 use super::programs::{PROGRAMS, Program};
 use super::row::{HEADER, Row};
-use super::{PHOTOS, SEED};
+use super::{PHOTOS, SEED, wrong};
 use calibench::io::write_atomically;
 use calibench_detector_gate::{Builtin, Detector, Scene, outcomes, scenes};
 use calibench_harness::fingerprint::Fingerprint;
@@ -30,6 +30,9 @@ struct Arguments {
     /// First photographs of each scene alone
     #[arg(long, requires = "out")]
     photos: Option<u64>,
+    /// Counts wrong boards instead, in ten thousand photographs of these scenes and others
+    #[arg(long)]
+    wrong: bool,
     /// Writes there instead
     #[arg(long)]
     out: Option<PathBuf>,
@@ -44,6 +47,15 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     let known = || PROGRAMS.iter().map(|program| program.name).collect::<Vec<_>>().join(", ");
     let program = Program::named(&arguments.name)
         .ok_or_else(|| format!("no program {}; there are: {}", arguments.name, known()))?;
+    if arguments.wrong {
+        if program.method.is_some() {
+            return Err(format!(
+                "wrong boards are counted of this library's detectors, not of {}",
+                program.name
+            ));
+        }
+        return wrong::write(arguments.photos.unwrap_or(wrong::PHOTOS), arguments.out.clone());
+    }
     let photos = arguments.photos.unwrap_or(PHOTOS);
     let (mut detector, versions, fingerprint): (Box<dyn Detector>, String, Fingerprint) = match program.method
     {

@@ -18,6 +18,8 @@ mod outcome;
 pub mod protocol;
 mod report;
 mod scene;
+mod sight;
+mod tally;
 
 pub use bound::variance_px2;
 pub use cell::Cell;
@@ -28,6 +30,8 @@ pub use look::{Look, Photo};
 pub use outcome::{Marks, Outcome, outcomes};
 pub use report::Report;
 pub use scene::{Demand, Scene, scenes};
+pub use sight::{Sight, sights};
+pub use tally::{Tally, tally};
 
 use calibench::geometry::Vec2;
 use calibench::raster::Raster;

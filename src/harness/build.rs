@@ -78,6 +78,8 @@ const PHOTOGRAPHS: &[&str] = &[
 ];
 /// Crates that pack those photographs as JPEG and read them again.
 const CODEC_CRATES: &[&str] = &["image", "zune-core", "zune-jpeg"];
+/// What draws the photographs in which wrong boards are looked for besides, and counts them.
+const WRONG_BOARDS: &[&str] = &["src/detector_gate/sight.rs", "src/detector_gate/tally.rs"];
 /// This library's detectors, as they are asked there.
 const DETECTORS: &[&str] =
     &["src/calibench/detect", "src/calibench/photos/board.rs", "src/calibench/photos/discs.rs"];
@@ -116,6 +118,7 @@ const fn of_photographs(name: &'static str, of: &'static [&'static [&'static str
 const MEASUREMENTS: &[Measurement] = &[
     of_photographs("detector-gate", &[PHOTOGRAPHS, DETECTORS]),
     of_photographs("detector-gate-scenes", &[PHOTOGRAPHS]),
+    of_photographs("wrong-boards", &[PHOTOGRAPHS, WRONG_BOARDS, DETECTORS]),
     of_one_lens("global-minimum", &[SCENES, SOLVER, GLOBAL_MINIMUM, JUDGED]),
     measurement("global-minimum-scenes", &[SCENES, GLOBAL_MINIMUM]),
     measurement("gate-power", &[SCENES, SOLVER, GATE]),

@@ -26,6 +26,11 @@ impl Fingerprint {
         Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/detector-gate-scenes.code")))
     }
 
+    /// The photographs in which wrong boards are looked for, how they are judged, and this library's detectors.
+    pub fn of_wrong_boards() -> Fingerprint {
+        Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/wrong-boards.code")))
+    }
+
     /// The gate, and the solver that its planted faults are tried on.
     pub fn of_gate_power() -> Fingerprint {
         Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/gate-power.code")))
@@ -112,6 +117,7 @@ mod tests {
         let all = [
             Fingerprint::of_detector_gate(),
             Fingerprint::of_detector_gate_scenes(),
+            Fingerprint::of_wrong_boards(),
             Fingerprint::of_gate_power(),
             Fingerprint::of_global_minimum(),
             Fingerprint::of_global_minimum_scenes(),

@@ -1,6 +1,10 @@
 //! Which mark is nearest to this place? Points sorted into the cells of a square raster.
 
 use crate::geometry::Vec2;
+use std::cmp::Ordering;
+
+/// Radius of the circle that is searched first for so many points, against that of one which holds as many cells.
+const SURELY: f64 = 1.2;
 
 /// Points in cells about as many as points.
 #[derive(Debug)]
@@ -95,20 +99,34 @@ impl<'a> Neighbours<'a> {
 
     /// The `count` nearest other points of a point, nearest first.
     pub fn nearest_of(&self, index: usize, count: usize) -> Vec<usize> {
+        let mut found = self.nearest_unsorted(index, count);
+        found.sort_unstable_by(nearer);
+        found.into_iter().map(|(other, _)| other).collect()
+    }
+
+    /// The same in any order, with their squared distances, for who sorts but a few of them by [`nearer`].
+    pub fn nearest_unsorted(&self, index: usize, count: usize) -> Vec<(usize, f64)> {
         let place = self.points[index];
         let everything = self.cell_px * (self.columns + self.rows) as f64;
-        let mut radius = 2.0 * self.cell_px;
+        let mut radius = SURELY * self.cell_px * (count as f64 / std::f64::consts::PI).sqrt();
         loop {
-            let mut found: Vec<(usize, f64)> =
-                self.within(&place, radius).filter(|(other, _)| *other != index).collect();
+            let mut found: Vec<(usize, f64)> = Vec::with_capacity(4 * count);
+            found.extend(self.within(&place, radius).filter(|(other, _)| *other != index));
             if found.len() >= count || radius > everything {
-                found.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+                if found.len() > count && count > 0 {
+                    found.select_nth_unstable_by(count - 1, nearer);
+                }
                 found.truncate(count);
-                return found.into_iter().map(|(other, _)| other).collect();
+                return found;
             }
             radius *= 2.0;
         }
     }
+}
+
+/// By distance, and of equal ones by number.
+pub fn nearer(a: &(usize, f64), b: &(usize, f64)) -> Ordering {
+    a.1.total_cmp(&b.1).then(a.0.cmp(&b.0))
 }
 
 #[cfg(test)]

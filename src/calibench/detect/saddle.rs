@@ -14,7 +14,7 @@
 
 use super::edge::{Edge, LaneEdge, SHARPEST_EDGE_PX};
 use crate::geometry::Vec2;
-use crate::geometry::lanes::{Kernel, LANES, Lanes, dispatch};
+use crate::geometry::lanes::{Arithmetic, Kernel, LANES, Lanes, Portable, dispatch};
 use crate::raster::{Level, Raster};
 use nalgebra::{Matrix2, SMatrix, SVector};
 
@@ -143,20 +143,8 @@ pub(super) fn misfit<T: Level>(
 ) -> Option<f64> {
     let mut pixels = pixels_in(image, crossing.corner, window)?;
     pixels.retain(|(offset, _)| window.is_plain(offset, crossing.edges_px));
-    let along = directions(crossing);
-    let side = |i: usize, offset: &Vec2| {
-        let normal = Vec2::new(-along[i].y, along[i].x);
-        let (t, edge) = (along[i].dot(offset), Edge::new(crossing.edges_px[i]));
-        let reach_px = edge.reach_px();
-        let d = (normal.dot(offset) - 0.5 * curvatures[i] * t * t).clamp(-reach_px, reach_px);
-        1.0 - 2.0 * edge.coverage(d, &normal).0
-    };
-    let left = |(offset, level): &Pixel| {
-        let product = crossing.amplitude * side(0, offset) * side(1, offset);
-        let left = level - (crossing.mean + crossing.slope.dot(offset) + product);
-        left * left
-    };
-    let mean = pixels.iter().map(left).sum::<f64>() / pixels.len() as f64;
+    let left = Left { blocks: &blocks(&pixels), sides: sides(crossing, curvatures), crossing };
+    let mean = dispatch(left) / pixels.len() as f64;
     Some(mean.sqrt() / crossing.amplitude.abs())
 }
 
@@ -207,19 +195,21 @@ fn pixels_in<T: Level>(image: &Raster<T>, centre: Vec2, window: &Window) -> Opti
     if !(fits(x, reach.x, image.width()) && fits(y, reach.y, image.height())) {
         return None;
     }
-    let is_inside = |offset: &Vec2| match inverse {
-        Some(inverse) => (inverse * offset).amax() <= 1.0,
-        None => offset.norm() <= reach.x + 0.5,
-    };
     let (left, right) = (x as usize - reach.x as usize, x as usize + reach.x as usize);
     let (top, bottom) = (y as usize - reach.y as usize, y as usize + reach.y as usize);
     let mut pixels = Vec::with_capacity((right - left + 1) * (bottom - top + 1));
     for y in top..=bottom {
-        for (x, sample) in (left..=right).zip(&image.row(y)[left..=right]) {
-            let offset = Vec2::new(x as f64, y as f64) - centre;
-            if is_inside(&offset) {
-                pixels.push((offset, sample.to_f64()));
+        let down = y as f64 - centre.y;
+        let all = (left..=right).zip(&image.row(y)[left..=right]);
+        let offsets = all.map(|(x, sample)| (Vec2::new(x as f64 - centre.x, down), sample.to_f64()));
+        match inverse {
+            Some(inverse) => {
+                let of_row = inverse.column(1) * down;
+                let part = |i: usize, along: f64| inverse[(i, 0)] * along + of_row[i];
+                let is_inside = |along: f64| part(0, along).abs() <= 1.0 && part(1, along).abs() <= 1.0;
+                pixels.extend(offsets.filter(|(offset, _)| is_inside(offset.x)));
             }
+            None => pixels.extend(offsets.filter(|(offset, _)| offset.norm() <= reach.x + 0.5)),
         }
     }
     Some(pixels)
@@ -291,7 +281,14 @@ struct Side {
     curvature: f64,
     edge: LaneEdge,
     edge_px: f64,
+    /// Distance beyond which an edge's coverage changes no more, px.
+    far_px: f64,
+    /// `f` and its slope there: on the side of negative distances, and of positive ones.
+    far: [(f64, f64); 2],
 }
+
+/// Beyond the reach by so much, rounding does not bring a distance back within it.
+const BEYOND: f64 = 1.000_001;
 
 /// What a side adds to four pixels: `f`, its slope `df/dd`, the distance `d`, and `t . (p - q)`.
 struct Seen<L> {
@@ -301,14 +298,27 @@ struct Seen<L> {
     along: L,
 }
 
+/// `f` and its slope at a distance from an edge.
+#[inline(always)]
+fn across<L: Lanes>(edge: &LaneEdge, d: L) -> (L, L) {
+    let (coverage, slope) = edge.coverage(d);
+    (L::splat(1.0) - L::splat(2.0) * coverage, L::splat(2.0) * slope)
+}
+
 impl Side {
     #[inline(always)]
     fn at<L: Lanes>(&self, x: L, y: L) -> Seen<L> {
         let along = L::splat(self.along.x) * x + L::splat(self.along.y) * y;
         let straight = L::splat(self.normal.x) * x + L::splat(self.normal.y) * y;
         let d = straight - L::splat(0.5 * self.curvature) * along * along;
-        let (coverage, slope) = self.edge.coverage(d);
-        Seen { f: L::splat(1.0) - L::splat(2.0) * coverage, slope: L::splat(2.0) * slope, d, along }
+        // Most pixels lie far from one edge or the other, and what is known of these need not be computed again.
+        let (f, slope) = if (d.max(-d) - L::splat(self.far_px)).all_positive() {
+            let far = d.store().map(|d| self.far[usize::from(d > 0.0)]);
+            (L::load(&far.map(|(f, _)| f)), L::load(&far.map(|(_, slope)| slope)))
+        } else {
+            across(&self.edge, d)
+        };
+        Seen { f, slope, d, along }
     }
 }
 
@@ -379,6 +389,49 @@ impl Kernel for Normal<'_> {
     }
 }
 
+/// The sum of the squares of what a crossing leaves of the levels about its corner.
+struct Left<'a> {
+    blocks: &'a [Block],
+    sides: [Side; 2],
+    crossing: &'a Crossing,
+}
+
+impl Kernel for Left<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> f64 {
+        let Crossing { mean, amplitude, slope, .. } = self.crossing;
+        let mut sum = L::zero();
+        for block in self.blocks {
+            let (x, y) = (L::load(&block.x), L::load(&block.y));
+            let [first, second] = [self.sides[0].at(x, y), self.sides[1].at(x, y)];
+            let ground = L::splat(*mean) + (L::splat(slope.x) * x + L::splat(slope.y) * y);
+            let predicted = ground + L::splat(*amplitude) * (first.f * second.f);
+            let left = (L::load(&block.level) - predicted) * L::load(&block.weight);
+            sum = sum + left * left;
+        }
+        L::sums([sum, L::zero(), L::zero(), L::zero()])[0]
+    }
+}
+
+/// The edges of a crossing.
+fn sides(crossing: &Crossing, curvatures: [f64; 2]) -> [Side; 2] {
+    let along = directions(crossing);
+    [0, 1].map(|i| {
+        let normal = Vec2::new(-along[i].y, along[i].x);
+        let edge_px = crossing.edges_px[i];
+        let model = Edge::new(edge_px);
+        let edge = LaneEdge::new(&model, &normal);
+        let far_px = BEYOND * model.reach_px();
+        let far = [-far_px, far_px].map(|d| {
+            let (f, slope) = across(&edge, Portable::splat(d));
+            (f.store()[0], slope.store()[0])
+        });
+        Side { along: along[i], normal, curvature: curvatures[i], edge, edge_px, far_px, far }
+    })
+}
+
 /// One Gauss-Newton step; returns how far the corner moved.
 fn step(
     blocks: &[Block],
@@ -387,13 +440,7 @@ fn step(
     curvatures: [f64; 2],
     widest_px: f64,
 ) -> Option<f64> {
-    let along = directions(crossing);
-    let sides = [0, 1].map(|i| {
-        let normal = Vec2::new(-along[i].y, along[i].x);
-        let edge_px = crossing.edges_px[i];
-        let edge = LaneEdge::new(&Edge::new(edge_px), &normal);
-        Side { along: along[i], normal, curvature: curvatures[i], edge, edge_px }
-    });
+    let sides = sides(crossing, curvatures);
     let sums = dispatch(Normal { blocks, sides, crossing, corner: crossing.corner - centre });
     let mut normal = SMatrix::<f64, PARAMETERS, PARAMETERS>::from_fn(|i, j| {
         let (i, j) = (i.max(j), i.min(j));

@@ -15,6 +15,7 @@
 
 use super::level::Smoothed;
 use crate::geometry::Vec2;
+use crate::geometry::lanes::{Kernel, Lanes, dispatch};
 use crate::raster::Raster;
 
 /// A place where two edges seem to cross.
@@ -43,6 +44,9 @@ const LEAST_IN_RANGE: f64 = 0.005;
 /// 0.15.
 const STRONG_IN_RANGE: f64 = 0.15;
 
+/// Responses that are looked at together.
+const AT_ONCE: usize = 16;
+
 /// How much a corner must stand out to be a candidate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Strength {
@@ -68,37 +72,54 @@ pub fn candidates(level: &Smoothed, strength: Strength) -> Vec<Candidate> {
     // Responses of five rows: a pixel is compared with those two rows above and below.
     let mut rows = vec![vec![0.0f32; width]; 5];
     for y in CIRCLE_PX..height - CIRCLE_PX {
-        responses(image, y, &mut rows[y % 5]);
+        dispatch(Responses { image, y, out: &mut rows[y % 5] });
         if y < margin + CIRCLE_PX - 1 {
             continue;
         }
         let middle = y - 2;
         let around = [-2isize, -1, 0, 1, 2].map(|d| &rows[(middle as isize + d) as usize % 5][..]);
-        let peaks = (margin..width - margin).filter(|&x| around[2][x] > least && is_peak(&around, x));
-        found.extend(peaks.filter_map(|x| candidate(level, &circle, (x, middle))));
+        for from in (margin..width - margin).step_by(AT_ONCE) {
+            let part = &around[2][from..(from + AT_ONCE).min(width - margin)];
+            // Hardly a place stands out: many at once are passed over sooner than one by one.
+            if !part.iter().fold(false, |any, response| any | (*response > least)) {
+                continue;
+            }
+            let peaks = (from..from + part.len()).filter(|&x| around[2][x] > least && is_peak(&around, x));
+            found.extend(peaks.filter_map(|x| candidate(level, &circle, (x, middle))));
+        }
     }
     found
 }
 
-/// `R` of a row.
-#[inline]
-fn responses(image: &Raster<f32>, y: usize, out: &mut [f32]) {
-    let width = image.width();
-    let n = width - 2 * CIRCLE_PX;
-    let part = |row: usize, from: usize| &image.row(row)[from..from + n];
-    let (here, east, west) = (part(y, 3), part(y, 6), part(y, 0));
-    let (north, south) = (part(y - 3, 3), part(y + 3, 3));
-    let (north_east, north_west) = (part(y - 2, 5), part(y - 2, 1));
-    let (south_east, south_west) = (part(y + 2, 5), part(y + 2, 1));
-    let out = &mut out[CIRCLE_PX..CIRCLE_PX + n];
-    for x in 0..n {
-        let (e, w, above, below) = (east[x], west[x], north[x], south[x]);
-        let (ne, nw, se, sw) = (north_east[x], north_west[x], south_east[x], south_west[x]);
-        let (c, d) = ((e + w) - (above + below), (se + nw) - (sw + ne));
-        let (p, q, r, t) = (e - w, above - below, se - nw, sw - ne);
-        let mean = 0.125 * (((e + w) + (above + below)) + ((se + nw) + (sw + ne)));
-        let spot = mean - here[x];
-        out[x] = ((c * c + d * d) - ((p * p + q * q) + (r * r + t * t))) - 8.0 * (spot * spot);
+/// `R` of a row. A kernel, so that it is compiled for wide registers too.
+struct Responses<'a> {
+    image: &'a Raster<f32>,
+    y: usize,
+    out: &'a mut [f32],
+}
+
+impl Kernel for Responses<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Responses { image, y, out } = self;
+        let n = image.width() - 2 * CIRCLE_PX;
+        let part = |row: usize, from: usize| &image.row(row)[from..from + n];
+        let (here, east, west) = (part(y, 3), part(y, 6), part(y, 0));
+        let (north, south) = (part(y - 3, 3), part(y + 3, 3));
+        let (north_east, north_west) = (part(y - 2, 5), part(y - 2, 1));
+        let (south_east, south_west) = (part(y + 2, 5), part(y + 2, 1));
+        let out = &mut out[CIRCLE_PX..CIRCLE_PX + n];
+        for x in 0..n {
+            let (e, w, above, below) = (east[x], west[x], north[x], south[x]);
+            let (ne, nw, se, sw) = (north_east[x], north_west[x], south_east[x], south_west[x]);
+            let (c, d) = ((e + w) - (above + below), (se + nw) - (sw + ne));
+            let (p, q, r, t) = (e - w, above - below, se - nw, sw - ne);
+            let mean = 0.125 * (((e + w) + (above + below)) + ((se + nw) + (sw + ne)));
+            let spot = mean - here[x];
+            out[x] = ((c * c + d * d) - ((p * p + q * q) + (r * r + t * t))) - 8.0 * (spot * spot);
+        }
     }
 }
 

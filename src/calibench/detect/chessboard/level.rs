@@ -6,6 +6,7 @@
 //! level `k` is centred on `(x + 1/2) 2^k - 1/2` of the photograph.
 
 use crate::geometry::Vec2;
+use crate::geometry::lanes::{Kernel, Lanes, dispatch};
 use crate::raster::{Level, Raster};
 use std::cell::OnceCell;
 
@@ -147,30 +148,28 @@ const NOISE_LEFT: f64 = 70.0 / 256.0;
 impl Smoothed {
     fn of<T: Level>(image: &Raster<T>) -> Smoothed {
         let (width, height) = (image.width(), image.height());
-        let mut across: Vec<f32> = Vec::with_capacity(width * height);
+        let mut across = vec![0.0f32; width * height];
         let mut row: Vec<f32> = Vec::with_capacity(width + 4);
-        for y in 0..height {
+        for (y, out) in across.chunks_exact_mut(width.max(1)).enumerate() {
             row.clear();
             let samples = image.row(y);
             let (first, last) = (samples[0].to_f32(), samples[width - 1].to_f32());
             row.extend([first; 2]);
             row.extend(samples.iter().map(|sample| sample.to_f32()));
             row.extend([last; 2]);
-            add_binomial([0, 1, 2, 3, 4].map(|k| &row[k..k + width]), &mut across);
+            dispatch(Binomial { rows: [0, 1, 2, 3, 4].map(|k| &row[k..k + width]), out });
         }
         let line = |y: isize| {
             let y = y.clamp(0, height as isize - 1) as usize;
             &across[y * width..][..width]
         };
-        let mut samples: Vec<f32> = Vec::with_capacity(width * height);
-        for y in 0..height as isize {
-            add_binomial([-2, -1, 0, 1, 2].map(|k| line(y + k)), &mut samples);
+        let mut samples = vec![0.0f32; width * height];
+        for (y, out) in samples.chunks_exact_mut(width.max(1)).enumerate() {
+            dispatch(Binomial { rows: [-2, -1, 0, 1, 2].map(|k| line(y as isize + k)), out });
         }
-        let low = samples.iter().copied().fold(f32::INFINITY, lesser);
-        let high = samples.iter().copied().fold(f32::NEG_INFINITY, greater);
+        let range = dispatch(Range(&samples));
         let image_smoothed =
             Raster::from_samples(width, height, samples).expect("a sample for every pixel was made");
-        let range = f64::from(high) - f64::from(low);
         Smoothed {
             image: image_smoothed,
             noise: noise(image),
@@ -213,21 +212,57 @@ impl Smoothed {
     }
 }
 
-/// Appends the binomial mean of five rows.
-fn add_binomial(rows: [&[f32]; 5], out: &mut Vec<f32>) {
-    let start = out.len();
-    out.resize(start + rows[2].len(), 0.0);
-    let out = &mut out[start..];
-    let [a, b, c, d, e] = rows.map(|row| &row[..out.len()]);
-    for x in 0..out.len() {
-        out[x] = ((a[x] + e[x]) + 4.0 * (b[x] + d[x]) + 6.0 * c[x]) * 0.0625;
+/// The binomial mean of five rows, written over a sixth. A kernel, so that it is compiled for wide registers too.
+struct Binomial<'a> {
+    rows: [&'a [f32]; 5],
+    out: &'a mut [f32],
+}
+
+impl Kernel for Binomial<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Binomial { rows, out } = self;
+        let [a, b, c, d, e] = rows.map(|row| &row[..out.len()]);
+        for x in 0..out.len() {
+            out[x] = ((a[x] + e[x]) + 4.0 * (b[x] + d[x]) + 6.0 * c[x]) * 0.0625;
+        }
     }
 }
 
+/// Samples that are compared at once; the greatest and the least do not depend on the order.
+const AT_ONCE: usize = 16;
+
+/// The greatest sample minus the least.
+struct Range<'a>(&'a [f32]);
+
+impl Kernel for Range<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> f64 {
+        let (mut low, mut high) = ([f32::INFINITY; AT_ONCE], [f32::NEG_INFINITY; AT_ONCE]);
+        let (whole, left) = self.0.as_chunks::<AT_ONCE>();
+        for part in whole {
+            for k in 0..AT_ONCE {
+                low[k] = lesser(low[k], part[k]);
+                high[k] = greater(high[k], part[k]);
+            }
+        }
+        let (mut least, mut most) = (f32::INFINITY, f32::NEG_INFINITY);
+        low.iter().chain(left).for_each(|sample| least = lesser(least, *sample));
+        high.iter().chain(left).for_each(|sample| most = greater(most, *sample));
+        f64::from(most) - f64::from(least)
+    }
+}
+
+#[inline(always)]
 fn lesser(a: f32, b: f32) -> f32 {
     if b < a { b } else { a }
 }
 
+#[inline(always)]
 fn greater(a: f32, b: f32) -> f32 {
     if b > a { b } else { a }
 }

@@ -25,20 +25,35 @@ const LEAST_IN_NOISE: f64 = 6.0;
 /// Least contrast as a fraction of the level's range: half of what a candidate needs.
 const LEAST_IN_RANGE: f64 = 0.01;
 
-/// The levels of the four quadrants, each the mean of four samples: between +i and +j, then turning on.
-fn quadrants(level: &Smoothed, look: &Look, at: &Vec2, steps: &Matrix2<f64>) -> Option<[f64; 4]> {
-    let farthest = look.samples[3].0.max(look.samples[3].1);
-    let reach = farthest * (steps.column(0).abs() + steps.column(1).abs());
-    if !level.holds(at, reach.amax() + 1.0) {
-        return None;
+/// Where the four quadrants are sampled: between +i and +j, then turning on.
+struct Quadrants {
+    /// From the corner, px.
+    offsets: [[Vec2; 4]; 4],
+    /// How far from the image's end the corner must be, px.
+    margin: f64,
+}
+
+impl Quadrants {
+    fn new(look: &Look, steps: &Matrix2<f64>) -> Quadrants {
+        let farthest = look.samples[3].0.max(look.samples[3].1);
+        let reach = farthest * (steps.column(0).abs() + steps.column(1).abs());
+        let offsets = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]
+            .map(|(a, b)| look.samples.map(|(i, j)| steps * Vec2::new(a * i, b * j)));
+        Quadrants { offsets, margin: reach.amax() + 1.0 }
     }
-    Some([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].map(|(a, b)| {
-        let mut sum = 0.0;
-        for (i, j) in look.samples {
-            sum += level.nearest(&(at + steps * Vec2::new(a * i, b * j)));
+
+    /// Their levels, each the mean of four samples.
+    fn levels(&self, level: &Smoothed, at: &Vec2) -> Option<[f64; 4]> {
+        if !level.holds(at, self.margin) {
+            return None;
         }
-        0.25 * sum
-    }))
+        let of = |[a, b, c, d]: &[Vec2; 4]| {
+            let sample = |offset: &Vec2| level.nearest(&(at + offset));
+            0.25 * (sample(a) + sample(b) + sample(c) + sample(d))
+        };
+        let [a, b, c, d] = &self.offsets;
+        Some([of(a), of(b), of(c), of(d)])
+    }
 }
 
 /// The corner near a place, if one is there. `dark_between`: the quadrant between both steps is dark.
@@ -50,11 +65,12 @@ pub fn probe(
     dark_between: bool,
 ) -> Option<Candidate> {
     let sign = if dark_between { 1.0 } else { -1.0 };
+    let quadrants = Quadrants::new(look, steps);
     let mut best: Option<(f64, Vec2, [f64; 4])> = None;
     for j in OFFSETS {
         for i in OFFSETS {
             let place = at + steps * Vec2::new(i, j);
-            let Some(q) = quadrants(level, look, &place, steps) else { continue };
+            let Some(q) = quadrants.levels(level, &place) else { continue };
             let contrast = sign * 0.5 * ((q[1] + q[3]) - (q[0] + q[2]));
             if best.is_none_or(|(most, ..)| contrast > most) {
                 best = Some((contrast, place, q));

@@ -9,7 +9,6 @@
 //! 4. Corners are fitted to the photograph's pixels; those that lie elsewhere than the corners about them say are left out
 //!    ([`neighbourhood`](super::neighbourhood)).
 
-use super::CodedError;
 use super::dictionary::Dictionary;
 use super::filled::filled;
 use super::layout::AprilGrid;
@@ -17,6 +16,7 @@ use super::neighbourhood::take_out_outlying;
 use super::quads::quads;
 use super::tag::{FARTHEST, Reading, Tag, middle_px, side_px};
 use super::together::together;
+use super::{CodedError, FEWEST_OF_ANOTHER};
 use crate::detect::chessboard::candidates::{Strength, candidates};
 use crate::detect::chessboard::level::{
     Pyramid, Smoothed, TWICE_PX, level_from_photo, photo_from_scale, scale,
@@ -40,6 +40,10 @@ const LEAST_CLEAR: f64 = 1.0 / 3.0;
 /// Side neighbours whose distance tells the spacing of the tags, and by how much it may differ from what was said, in sides.
 const FEWEST_NEIGHBOURS: usize = 8;
 const MOST_WIDER: f64 = 0.04;
+
+/// By how much the spacing may differ where corners have exact places, in sides of a tag, beside the middle deviation of what single
+/// pairs of tags tell: that of corners that err by a tenth of a pixel, or that a strong lens bends.
+const MOST_WIDER_EXACTLY: f64 = 0.01;
 
 /// Tags beyond the board that others confirm: one may be read wrongly.
 const FEWEST_BEYOND: usize = 2;
@@ -158,16 +162,14 @@ impl<T: Level> Search<'_, T> {
             tags = together(readings, grid);
         }
         if let Some(seen) = pitch(&tags).filter(|pitch| (pitch - 1.0 - grid.spacing()).abs() > MOST_WIDER) {
-            let thousandths = |spacing: f64| libm::round(1000.0 * spacing.max(0.0)) as usize;
-            return Err(CodedError::Spacing {
-                asked: thousandths(grid.spacing()),
-                seen: thousandths(seen - 1.0),
-            });
+            return Err(of_spacing(grid, seen - 1.0));
         }
         if !tags.is_empty() {
             return Ok(tags);
         }
+        let in_mirror = readings.iter().filter(|reading| reading.is_mirrored()).count();
         Err(match count {
+            _ if in_mirror >= FEWEST_OF_ANOTHER.max(count + 1) => CodedError::Mirrored { count: in_mirror },
             0 => CodedError::NoMarker { corners: 0, dictionary: Dictionary::april_36h11() },
             1 => CodedError::OneMarker { id: only },
             _ => CodedError::Disagree { agree: 0, read: count, columns, rows, other: None },
@@ -192,6 +194,9 @@ impl<T: Level> Search<'_, T> {
         take_out_outlying(&mut corners_px, grid);
         let found = corners_px.iter().flatten().count();
         let looked_for = places.iter().flatten().count();
+        if let Some(seen) = another_spacing(&corners_px, columns, grid) {
+            return Err(of_spacing(grid, seen));
+        }
         if found < FEWEST_MARKS || (found as f64) < LEAST_CLEAR * looked_for as f64 {
             return Err(CodedError::Unclear { found });
         }
@@ -255,6 +260,49 @@ fn pitch(tags: &[Tag]) -> Option<f64> {
     }
     distances.sort_by(f64::total_cmp);
     (distances.len() >= FEWEST_NEIGHBOURS).then(|| distances[distances.len() / 2])
+}
+
+fn of_spacing(grid: &AprilGrid, seen: f64) -> CodedError {
+    let thousandths = |spacing: f64| libm::round(1000.0 * spacing.max(0.0)) as usize;
+    CodedError::Spacing { asked: thousandths(grid.spacing()), seen: thousandths(seen) }
+}
+
+/// The spacing of the tags by their corners, if it is another than was asked. Four corners of two tags on a line, at 0, 1, 1 + s and
+/// 2 + s, have a cross ratio that perspective leaves as it is:
+///
+/// ```text
+/// c = (x3 - x1) (x4 - x2) / ((x3 - x2) (x4 - x1)) = (1 + s)^2 / (s (2 + s)),      1 + s = sqrt(c / (c - 1))
+/// ```
+fn another_spacing(corners_px: &[Option<Vec2>], columns: usize, grid: &AprilGrid) -> Option<f64> {
+    let rows = corners_px.len() / columns;
+    let at = |column: usize, row: usize| {
+        if column < columns && row < rows { corners_px[row * columns + column] } else { None }
+    };
+    let of_four = |step: &dyn Fn(usize) -> (usize, usize)| {
+        let place = |k: usize| {
+            let (column, row) = step(k);
+            at(column, row)
+        };
+        let [a, b, c, d] = [place(0)?, place(1)?, place(2)?, place(3)?];
+        let ratio = (c - a).norm() * (d - b).norm() / ((c - b).norm() * (d - a).norm());
+        Some((ratio / (ratio - 1.0)).sqrt() - 1.0).filter(|spacing| spacing.is_finite())
+    };
+    let along_row = (0..rows).flat_map(|row| (0..columns).step_by(2).map(move |column| (column, row)));
+    let down_column = (0..columns).flat_map(|column| (0..rows).step_by(2).map(move |row| (column, row)));
+    let mut told: Vec<f64> = along_row
+        .filter_map(|(column, row)| of_four(&|k| (column + k, row)))
+        .chain(down_column.filter_map(|(column, row)| of_four(&|k| (column, row + k))))
+        .collect();
+    let spacing = median(&mut told).filter(|_| told.len() >= 2 * FEWEST_NEIGHBOURS)?;
+    let mut off: Vec<f64> = told.iter().map(|one| (one - spacing).abs()).collect();
+    let most = MOST_WIDER_EXACTLY + median(&mut off)?;
+    ((spacing - grid.spacing()).abs() > most).then_some(spacing)
+}
+
+/// The middle one.
+fn median(values: &mut [f64]) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
 }
 
 /// Pairs of tags that agree for each that does not. Of a grid of another width those of a row agree, and those above each

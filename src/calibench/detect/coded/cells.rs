@@ -57,6 +57,10 @@ pub fn read<T: Level>(pyramid: &Pyramid<'_, T>, patch: &Patch, side: usize, leas
     };
     let last = count as f64 - 0.5;
     let places = || (0..count).map(|k| k as f64 + 0.5);
+    let centre = |column: f64, row: f64| sample(pyramid, level, &at(column * cell, row * cell)?);
+    if !has_white(&centre, count, patch) {
+        return None;
+    }
     // The white strip about the marker, a sample beside each outer cell, in its middle.
     let (beside, thin) = (0.5 * patch.white * count as f64, (patch.white * count as f64).min(1.0));
     let (mut white, mut black) = (Mean::default(), Mean::default());
@@ -82,6 +86,29 @@ pub fn read<T: Level>(pyramid: &Pyramid<'_, T>, patch: &Patch, side: usize, leas
     }
     all.of(patch.inside)?;
     inside(&means, count, patch.border, 0.5 * (white + black))
+}
+
+/// How far above its border's level the brightest inner cell of a marker is at least, as part of the difference of white and
+/// black. Cells that are white all around one another reach the white, however blurred.
+const LEAST_WHITE: f64 = 0.25;
+
+/// Whether any inner cell stands out of the border, by a sample of each: a tile of a floor is as dark in its middle as at its
+/// edge, and there may be thousands. `centre` gives the level in the middle of a cell.
+fn has_white(centre: &dyn Fn(f64, f64) -> Option<f64>, count: usize, patch: &Patch) -> bool {
+    let (beside, last) = (0.5 * patch.white * count as f64, count as f64 - 0.5);
+    let (mut white, mut black) = (Mean::default(), Mean::default());
+    for k in (0..count).map(|k| k as f64 + 0.5) {
+        for (x, y) in [(k, -beside), (k, last + 0.5 + beside), (-beside, k), (last + 0.5 + beside, k)] {
+            white.add(centre(x, y));
+        }
+        for (x, y) in [(k, 0.5), (k, last), (0.5, k), (last, k)] {
+            black.add(centre(x, y));
+        }
+    }
+    let (Some(white), Some(black)) = (white.of(patch.inside), black.of(patch.inside)) else { return false };
+    let inner = || (patch.border..count - patch.border).map(|k| k as f64 + 0.5);
+    let least = black + LEAST_WHITE * (white - black);
+    inner().any(|row| inner().any(|column| centre(column, row).is_some_and(|level| level > least)))
 }
 
 /// The mean of the levels inside of the image.

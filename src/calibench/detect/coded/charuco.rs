@@ -7,11 +7,11 @@
 //!    lattice on the board.
 //! 3. Corners are fitted to the photograph's pixels, those of markers left out.
 
-use super::CodedError;
 use super::cells::{Patch, read};
-use super::dictionary::{Cells, Dictionary, Recognised};
+use super::dictionary::{Cells, Dictionary, Recognised, mirrored};
 use super::layout::Charuco;
 use super::placement::{Placement, Vote};
+use super::{CodedError, FEWEST_OF_ANOTHER};
 use crate::detect::chessboard::candidates::{Candidate, Strength, candidates};
 use crate::detect::chessboard::growth::lattices;
 use crate::detect::chessboard::level::{Pyramid, photo_from_level};
@@ -165,7 +165,7 @@ impl<T: Level> Search<'_, T> {
     fn placement(&self, part: &Part) -> Result<Placement, CodedError> {
         let dictionary = self.board.dictionary();
         let read: Vec<(Place, Recognised)> = self
-            .squares(part, dictionary)
+            .squares(part, dictionary.side())
             .into_iter()
             .filter_map(|square| Some((square.low, dictionary.recognise(square.cells, dictionary.len())?)))
             .collect();
@@ -211,8 +211,8 @@ impl<T: Level> Search<'_, T> {
         with
     }
 
-    /// The white squares of a lattice in which something like a marker can be read.
-    fn squares(&self, part: &Part, dictionary: Dictionary) -> Vec<Square> {
+    /// The white squares of a lattice in which something like a marker of `side` cells a side can be read.
+    fn squares(&self, part: &Part, side: usize) -> Vec<Square> {
         let with_corner: BTreeSet<Place> = part
             .lattice
             .keys()
@@ -225,10 +225,16 @@ impl<T: Level> Search<'_, T> {
             let white = 0.5 * (1.0 - marker);
             let photo_from_marker = part.homography(low, white, marker)?;
             let patch = Patch { photo_from_marker, border: 1, white: white / marker, inside: 1.0 };
-            let cells = read(&self.pyramid, &patch, dictionary.side(), LEAST_CONTRAST * part.contrast)?.plain;
+            let cells = read(&self.pyramid, &patch, side, LEAST_CONTRAST * part.contrast)?.plain;
             Some(Square { low, cells })
         };
         with_corner.into_iter().filter_map(read_one).collect()
+    }
+
+    /// The same of every dictionary whose markers have such a side; none of a side that no dictionary has.
+    fn squares_of(&self, part: &Part, side: usize) -> Vec<Square> {
+        let is_known = Dictionary::all().any(|dictionary| dictionary.side() == side);
+        if is_known { self.squares(part, side) } else { Vec::new() }
     }
 
     /// The corners, fitted in the photograph.
@@ -244,23 +250,27 @@ impl<T: Level> Search<'_, T> {
         Ok(SeenBoard::new(columns, rows, corners, Orientation::Fixed))
     }
 
-    /// The error, or that there are markers of another dictionary.
+    /// The error, or that the markers are seen as in a mirror or are of another dictionary.
     fn explained(&self, failure: Failure) -> CodedError {
         // Of a few markers by chance.
         let (Some(part), Some(of_asked)) = (&failure.part, failure.error.by_chance()) else {
             return failure.error;
         };
         let asked = self.board.dictionary();
-        let count_in = |dictionary: &Dictionary| {
-            let squares = self.squares(part, *dictionary);
-            let read =
-                squares.iter().filter_map(|square| dictionary.recognise(square.cells, dictionary.len()));
+        let read: Vec<Vec<Square>> = (0..=MOST_CELLS).map(|side| self.squares_of(part, side)).collect();
+        let count_in = |dictionary: &Dictionary, as_seen: &dyn Fn(Cells) -> Cells| {
+            let cells = read[dictionary.side()].iter().map(|square| as_seen(square.cells));
+            let read = cells.filter_map(|cells| dictionary.recognise(cells, dictionary.len()));
             read.filter(|marker| marker.wrong == 0).count()
         };
         let mut others: Vec<(usize, Dictionary)> =
-            Dictionary::all().map(|dictionary| (count_in(&dictionary), dictionary)).collect();
+            Dictionary::all().map(|dictionary| (count_in(&dictionary, &|cells| cells), dictionary)).collect();
         // Of equal counts the first stays the first: the smallest.
         others.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
+        let in_mirror = count_in(&asked, &|cells| mirrored(cells, asked.side()));
+        if in_mirror >= FEWEST_OF_ANOTHER.max(others[0].0).max(of_asked + 1) {
+            return CodedError::Mirrored { count: in_mirror };
+        }
         match others[..] {
             [(count, seen), ..] if count >= FEWEST_OF_ANOTHER.max(of_asked + 1) && seen != asked => {
                 CodedError::OtherDictionary { asked, seen, count }
@@ -270,8 +280,8 @@ impl<T: Level> Search<'_, T> {
     }
 }
 
-/// Fewest markers that name another dictionary.
-const FEWEST_OF_ANOTHER: usize = 3;
+/// Most cells along a side of any dictionary's markers.
+const MOST_CELLS: usize = 7;
 
 /// Where a marker puts its square on a board.
 fn opinion((low, marker): &(Place, Recognised), markers: &[(usize, usize)]) -> Option<Placement> {

@@ -212,6 +212,13 @@ pub(super) fn turned((x, y): (i32, i32), turns: u8) -> (i32, i32) {
     }
 }
 
+/// What was seen, as a mirror shows it: every row from its other end.
+pub(super) fn mirrored(seen: Cells, side: usize) -> Cells {
+    let row = |row: usize| seen >> (side * row) & ((1 << side) - 1);
+    let reversed = |cells: Cells| cells.reverse_bits() >> (Cells::BITS as usize - side);
+    (0..side).fold(0, |all, k| all | reversed(row(k)) << (side * k))
+}
+
 /// What was seen, as it would be upright: the cell at `turned(p)` is the seen one at `p`.
 fn turned_back(seen: Cells, side: usize, turns: u8) -> Cells {
     let last = side as i32 - 1;

@@ -52,6 +52,15 @@ pub enum CodedError {
         /// Markers that were read in it.
         count: usize,
     },
+    /// A photograph that was mirrored.
+    #[error(
+        "{count} markers are seen as in a mirror: the photograph is mirrored, which a camera's software may do to show people \
+         themselves; turn that off, for no pose of the board explains it"
+    )]
+    Mirrored {
+        /// Markers of the asked dictionary that are seen so.
+        count: usize,
+    },
     /// One marker alone may be read wrongly.
     #[error(
         "only one marker can be read (number {id}): two that agree are needed to be certain where on the board they are"
@@ -144,6 +153,9 @@ impl CodedError {
         }
     }
 }
+
+/// Fewest markers that tell of another dictionary, or of a mirror.
+const FEWEST_OF_ANOTHER: usize = 3;
 
 /// Markers that a piece of something else may seem to have.
 const BY_CHANCE: usize = 2;

@@ -3,7 +3,7 @@
 use crate::detect::chessboard::candidates::Candidate;
 use crate::detect::chessboard::growth::{LEAST_EDGE, is_edge};
 use crate::detect::chessboard::level::Smoothed;
-use crate::detect::neighbours::Neighbours;
+use crate::detect::neighbours::{Neighbours, nearer};
 use crate::geometry::Vec2;
 
 /// Four corners with dark between them.
@@ -47,10 +47,13 @@ pub fn quads(level: &Smoothed, candidates: &[Candidate]) -> Vec<Quad> {
     let neighbours = Neighbours::new(&places);
     let mut next: Vec<Option<Turn>> = Vec::with_capacity(2 * candidates.len());
     for corner in 0..candidates.len() {
-        let near = neighbours.nearest_of(corner, NEAREST);
+        let near = neighbours.nearest_unsorted(corner, NEAREST);
         for ahead in [true, false] {
             let turn = Turn { corner, ahead };
-            next.push(near.iter().find_map(|&other| along(level, candidates, turn, other)));
+            let mut on_edge: Vec<(usize, f64)> =
+                near.iter().copied().filter(|(other, _)| is_on_edge(candidates, turn, *other)).collect();
+            on_edge.sort_unstable_by(nearer);
+            next.push(on_edge.iter().find_map(|&(other, _)| along(level, candidates, turn, other)));
         }
     }
     let step = |turn: Turn| next[turn.index()];
@@ -71,13 +74,16 @@ pub fn quads(level: &Smoothed, candidates: &[Candidate]) -> Vec<Quad> {
     turns.filter_map(walk).map(quad).collect()
 }
 
-/// The other corner's quadrant, if the edge on which this one's begins leads there.
+/// Whether the edge on which a corner's quadrant begins has the direction of the way to another.
+fn is_on_edge(candidates: &[Candidate], turn: Turn, other: usize) -> bool {
+    let (here, there) = (&candidates[turn.corner], &candidates[other]);
+    (there.at - here.at).normalize().dot(&here.axes[0]) * turn.sign() > LEAST_COSINE
+}
+
+/// The quadrant of another corner [on that edge](is_on_edge), if the edge leads there.
 fn along(level: &Smoothed, candidates: &[Candidate], turn: Turn, other: usize) -> Option<Turn> {
     let (here, there) = (&candidates[turn.corner], &candidates[other]);
     let way = (there.at - here.at).normalize();
-    if way.dot(&here.axes[0]) * turn.sign() <= LEAST_COSINE {
-        return None;
-    }
     // There the edge comes in on the second axis, from its far end.
     let cosine = -way.dot(&there.axes[1]);
     if cosine.abs() <= LEAST_COSINE {

@@ -1,7 +1,7 @@
 //! What is in a dark quadrangle, and which tag of a grid is that?
 
 use super::cells::{Patch, read};
-use super::dictionary::{Cells, Dictionary, turned};
+use super::dictionary::{Cells, Dictionary, mirrored, turned};
 use super::layout::AprilGrid;
 use crate::detect::chessboard::level::Pyramid;
 use crate::geometry::{Homography, Vec2};
@@ -62,6 +62,13 @@ impl Reading {
         let dictionary = Dictionary::april_36h11();
         let read = self.cells.iter().find_map(|&cells| dictionary.recognise(cells, dictionary.len()))?;
         Some(self.taken_as(read.id, read.turns, grid))
+    }
+
+    /// Whether it is a tag as a mirror shows it.
+    pub fn is_mirrored(&self) -> bool {
+        let dictionary = Dictionary::april_36h11();
+        let as_printed = |cells: &Cells| mirrored(*cells, dictionary.side());
+        self.cells.iter().any(|cells| dictionary.recognise(as_printed(cells), dictionary.len()).is_some())
     }
 
     /// The least number of cells that differ from those of a tag, turned by so many quarters.
