@@ -18,9 +18,9 @@ use crate::geometry::Vec2;
 ///
 /// # A layout of your own
 ///
-/// The points may lie anywhere in the plane: a view needs no [`Board`](super::Board), which is a lattice, and each view may show
-/// other points. Detection is then yours too. Marks that do not lie in a plane, or whose places are not exact, are for
-/// [`crate::measured`].
+/// The points may lie anywhere in the plane: a view needs no [`Board`](super::Board), which is a lattice, and each
+/// view may show other points. You then detect the marks yourself. Marks that do not lie in a plane, or whose places
+/// are not exact, are for [`crate::measured`].
 ///
 /// ```
 /// use calibench::board::View;
@@ -35,7 +35,7 @@ use crate::geometry::Vec2;
 /// };
 /// let points: Vec<Vec2> = std::iter::once(Vec2::zeros()).chain((1..4).flat_map(ring)).collect();
 ///
-/// // Four views without noise by a virtual camera; yours come from your detector. In each the last three marks are hidden.
+/// // Four views without noise by a virtual camera; yours come from your detector. The last three marks are hidden.
 /// let scene = Scene::new(Truth { points: points.clone(), ..Truth::example() })?;
 /// let see = |pixels: &Vec<Vec2>| View::new(points[..46].to_vec(), pixels[..46].to_vec());
 /// let views: Vec<View> = scene.pixels().iter().map(see).collect::<Result<_, _>>()?;
