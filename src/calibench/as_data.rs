@@ -1,7 +1,8 @@
-//! Boards, views, lenses and intervals as data of serde. What cannot be, such as a view with more points than pixels, is refused when
-//! it is read.
+//! Boards, views, lenses and intervals as data of serde. What cannot be, such as a view with more points than
+//! pixels, is refused when it is read.
 //!
-//! The other types say it where they stand. These stand in files whose every line of code a measurement of many minutes rests on.
+//! Other types derive it where they are defined. The files of these are ones of which a changed line makes
+//! committed measurements stale.
 
 use crate::board::{Arrangement, Board, Pattern, View};
 use crate::camera::{Lens, Model, Parameter};

@@ -32,8 +32,9 @@ const OUTLINE_POINTS: usize = 64;
 /// use calibench::synth::scene::looking_at_centre;
 ///
 /// let camera = Truth::example_camera();
-/// let bias = |diameter| disc_bias(&camera, &looking_at_centre([40.0, 0.0, 0.0], 120.0), &Vec2::new(0.0, 20.0), diameter);
-/// // Some hundredths of a pixel for a disc of 3 mm before this camera, four times as much for one twice as wide.
+/// let (pose, centre) = (looking_at_centre([40.0, 0.0, 0.0], 120.0), Vec2::new(0.0, 20.0));
+/// let bias = |diameter| disc_bias(&camera, &pose, &centre, diameter);
+/// // Some hundredths of a pixel for a disc of 3 mm, four times as much for one twice as wide.
 /// let (small, large) = (bias(3.0)?.norm(), bias(6.0)?.norm());
 /// assert!(small > 0.01 && (large / small - 4.0).abs() < 0.05);
 /// # Ok::<(), calibench::camera::BehindCamera>(())

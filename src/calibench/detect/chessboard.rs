@@ -196,7 +196,8 @@ pub fn chessboard<T: Level>(
 /// let seen = seen_chessboard(&image, 8, 6)?;
 /// assert!(seen.missing() > 0 && seen.places_px()[20].is_none());
 /// // What is seen is known by its place on the board: a view of these points.
-/// let (points, pixels): (Vec<_>, Vec<_>) = seen.seen().map(|(mark, place)| (board.points()[mark], place)).unzip();
+/// let places = seen.seen().map(|(mark, place)| (board.points()[mark], place));
+/// let (points, pixels): (Vec<Vec2>, Vec<Vec2>) = places.unzip();
 /// let view = calibench::board::View::new(points, pixels)?;
 /// assert_eq!(view.len() + seen.missing(), 48);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

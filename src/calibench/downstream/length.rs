@@ -246,7 +246,8 @@ pub fn length_in_view(
 /// let pixels: Vec<Vec2> = world.iter().enumerate().map(|(i, w)| 5.0 * w + off(i)).collect();
 /// let map = calibrate_plane(PlaneModel::Affine, &pixels, &world)?;
 /// // The map's unit is one millimetre.
-/// let length = length_on_map(&map, 1.0, &[Vec2::new(10.0, 10.0), Vec2::new(160.0, 10.0)], &Conditions::marks(0.05))?;
+/// let ends = [Vec2::new(10.0, 10.0), Vec2::new(160.0, 10.0)];
+/// let length = length_on_map(&map, 1.0, &ends, &Conditions::marks(0.05))?;
 /// assert!((length.value - 30.0).abs() < 4.0 * length.standard_uncertainty());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

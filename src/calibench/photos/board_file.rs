@@ -75,7 +75,7 @@ struct File {
 /// ```
 /// use calibench::photos::parse_board_file;
 ///
-/// // As `calibench board` leaves it, with what a steel ruler said of the printed rulers: the page came out 3 % smaller.
+/// // As `calibench board` leaves it, with the lengths of the printed rulers: the page came out 3 % smaller.
 /// let text = r#"
 /// board = "circles:9x7:20mm:8mm"
 /// drawn_mm = [160.0, 120.0]

@@ -211,7 +211,8 @@ impl Projector<'_> {
 /// // The board 20 degrees tilted, 150 mm before the camera, through a slightly blurred lens.
 /// let board = Board::circles(9, 7, 10.0, 3.0)?;
 /// let imaging = Imaging { blur_px: 0.7, ..Imaging::default() };
-/// let photo = photograph(&Truth::example_camera(), (640, 480), &board, &looking_at_centre([20.0, 0.0, 0.0], 150.0), &imaging)?;
+/// let (camera, pose) = (Truth::example_camera(), looking_at_centre([20.0, 0.0, 0.0], 150.0));
+/// let photo = photograph(&camera, (640, 480), &board, &pose, &imaging)?;
 /// assert_eq!((photo.image.width(), photo.centres_true.len()), (640, 63));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

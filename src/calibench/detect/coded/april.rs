@@ -58,7 +58,7 @@ const FEWEST_BEYOND: usize = 2;
 /// use calibench::synth::render::{Imaging, photograph_dark};
 /// use calibench::synth::scene::looking_at_centre;
 ///
-/// // Tags of 9 mm and spaces of 2.7 mm between them, about the board's middle; Kalibr's y points up, the camera's down.
+/// // Tags of 9 mm, 2.7 mm apart, about the board's middle; Kalibr's y points up, the camera's down.
 /// let grid = AprilGrid::new(5, 3, 0.3)?;
 /// let middle = 0.5 * Vec2::new(5.0 + 4.0 * 0.3, 3.0 + 2.0 * 0.3);
 /// let on_board = |p: Vec2| 9.0 * Vec2::new(p.x - middle.x, middle.y - p.y);
