@@ -8,7 +8,7 @@ use crate::board::{Arrangement, Board, Pattern, View};
 use crate::camera::{Lens, Model, Parameter};
 use crate::evaluate::difference::PixelDifference;
 use crate::evaluate::{FrameDifference, Interval};
-use crate::geometry::{Handedness, Pose, Vec2};
+use crate::geometry::{Pose, Vec2};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -144,7 +144,6 @@ macro_rules! as_told {
 as_told!(
     Pattern: PatternTold,
     Arrangement: ArrangementTold,
-    Handedness: HandednessTold,
     Interval: IntervalTold,
     PixelDifference: PixelDifferenceTold,
     FrameDifference: FrameDifferenceTold
@@ -163,13 +162,6 @@ enum ArrangementTold {
     Square,
     Asymmetric,
     Hexagonal,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(remote = "Handedness", rename_all = "kebab-case")]
-enum HandednessTold {
-    Proper,
-    Mirrored,
 }
 
 #[derive(Serialize, Deserialize)]

@@ -10,7 +10,6 @@ use crate::evaluate::cramer_rao;
 use crate::geometry::{Pose, Vec2, Vec3, rotation};
 use crate::measured::{MeasuredMark, MeasuredTarget, MeasuredView, Noise, SeenMark, calibrate_measured};
 use crate::noise::extraction_noise;
-use crate::planar::{PlaneModel, calibrate_plane};
 use crate::planning::{Estimated, Knowledge, Reach, Wanted, Wish, next_pose};
 use crate::synth::{Scene, Stream, StreamKey, Truth};
 use crate::tsai::{Assumed, SpatialView, refine_view, two_stage};
@@ -76,14 +75,9 @@ fn what_cannot_be_is_refused_with_its_reason() {
 }
 
 #[test]
-fn planes_and_what_is_measured_on_them() {
+fn lengths_and_parts() {
     let world: Vec<Vec2> = (0..9).map(|i| 20.0 * Vec2::new(f64::from(i % 3), -f64::from(i / 3))).collect();
     let off = |i: usize| 0.03 * Vec2::new((i * 7 % 5) as f64 - 2.0, (i * 3 % 5) as f64 - 2.0);
-    let pixels: Vec<Vec2> =
-        world.iter().enumerate().map(|(i, w)| 5.0 * Vec2::new(w.x, -w.y) + off(i)).collect();
-    for model in [PlaneModel::Affine, PlaneModel::Projective, PlaneModel::Similarity] {
-        comes_back(&calibrate_plane(model, &pixels, &world).unwrap());
-    }
     let found = calibrated(0);
     let camera = found.camera.brown_conrady().unwrap();
     let plane = PlaneView::of_view(&camera, &found.cam_from_target, &found.covariance, 0).unwrap();

@@ -7,8 +7,6 @@ use nalgebra::DMatrix;
 
 /// The family of maps to fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum PlaneModel {
     /// Six parameters: the camera looks straight at the plane, pixels may be oblong or skewed (mode 0,
     /// planar).
@@ -32,7 +30,6 @@ impl PlaneModel {
 
 /// A calibrated plane.
 #[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PlaneCalibration {
     /// The family that was fitted.
     pub model: PlaneModel,

@@ -9,7 +9,6 @@ use nalgebra::{DMatrix, Matrix2};
 /// Uncertainty of a plane map, to first order, under independent errors of equal size in both world
 /// coordinates.
 #[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PlaneSpread {
     /// Standard deviation of a world coordinate, estimated: `sqrt(sum |r|^2 / degrees of freedom)`.
     pub sigma: f64,
