@@ -112,19 +112,15 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
 fn table(committed: &DigitsTable) -> Table {
     let name = |solver: &str| solver.to_lowercase().replace([',', ' '], "_").replace("__", "_");
     let solvers = committed.solvers();
-    let names: Vec<String> =
-        ["problem", "level"].into_iter().map(String::from).chain(solvers.iter().map(|s| name(s))).collect();
-    let columns: Vec<(&str, &str)> = names.iter().map(|name| (name.as_str(), "")).collect();
-    let mut table = Table::new(
-        "digits",
-        "digits that agree with the certified parameters, the least of each problem",
-        &columns,
-    );
     let first = solvers.first().copied().unwrap_or_default();
-    for row in committed.rows.iter().filter(|row| row.solver == first) {
-        let cell = |solver: &&str| committed.row(solver, &row.problem).map_or("-".into(), |r| r.result());
-        let ends = [row.problem.clone(), row.level.name().to_string()];
-        table.push(ends.into_iter().chain(solvers.iter().map(cell)));
-    }
-    table
+    let digits =
+        |solver: &str, problem: &str| committed.row(solver, problem).map_or("-".into(), |row| row.result());
+    let caption = "digits that agree with the certified parameters, the least of each problem";
+    Table::of("digits", caption, committed.rows.iter().filter(|row| row.solver == first))
+        .column("problem", "", |row| row.problem.clone())
+        .column("level", "", |row| row.level.name())
+        .columns(solvers.iter().map(|solver| name(solver)), "", |row| {
+            solvers.iter().map(|solver| digits(solver, &row.problem)).collect::<Vec<String>>()
+        })
+        .into()
 }

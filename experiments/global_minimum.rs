@@ -13,7 +13,7 @@
 
 use calibench::camera::Parameter;
 use calibench_harness::fingerprint::Fingerprint;
-use calibench_harness::{Band, Cell, Context, Experiment, ExperimentError, Record, Table};
+use calibench_harness::{Band, Context, Experiment, ExperimentError, Record, Table};
 use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
@@ -277,30 +277,30 @@ fn claim_named(record: &mut Record, measured: &[Measured]) {
 /// The stated standard deviations against the errors, over accepted scenes without a warning that questions
 /// them.
 fn report_errors(record: &mut Record, any: &Measured) {
-    let columns = [("parameter", ""), ("scenes", ""), ("mean_z_squared", ""), ("largest_z", "")];
-    let mut table = Table::new(
-        "errors",
-        "error over stated standard deviation, right results without a warning that questions it",
-        &columns,
+    let z_of = |parameter: Parameter| {
+        let right = any.lines.iter().filter(|l| l.class == Class::Right && l.warnings.is_empty());
+        let z = right.filter_map(|l| any.family.model(l.index).free.position(parameter).map(|i| l.z[i]));
+        (parameter, z.collect::<Vec<f64>>())
+    };
+    let errors = Parameter::ALL.map(z_of);
+    let mean_square = |z: &[f64]| z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64;
+    record.table(
+        Table::of(
+            "errors",
+            "error over stated standard deviation, right results without a warning that questions it",
+            &errors,
+        )
+        .column("parameter", "", |(parameter, _)| parameter.name())
+        .column("scenes", "", |(_, z)| z.len())
+        .column("mean_z_squared", "", |(_, z)| mean_square(z))
+        .column("largest_z", "", |(_, z)| z.iter().fold(0.0f64, |most, z| most.max(z.abs()))),
     );
-    let mut cases = Vec::new();
-    for parameter in Parameter::ALL {
-        let z: Vec<f64> = any
-            .lines
-            .iter()
-            .filter(|l| l.class == Class::Right && l.warnings.is_empty())
-            .filter_map(|l| any.family.model(l.index).free.position(parameter).map(|i| l.z[i]))
-            .collect();
-        let mean = z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64;
-        let largest = z.iter().fold(0.0f64, |most, z| most.max(z.abs()));
-        table.push([parameter.name().into(), z.len().into(), mean.into(), Cell::from(largest)]);
+    let case = |(parameter, z): &(Parameter, Vec<f64>)| {
+        let mean = mean_square(z);
         let chance = MEAN_DEVIATIONS * (2.0 / z.len() as f64).sqrt();
-        cases.push((
-            format!("{parameter}: {mean:.3} of {}", z.len()),
-            (mean - 1.0).abs() <= MEAN_OFF + chance,
-        ));
-    }
-    record.table(table);
+        (format!("{parameter}: {mean:.3} of {}", z.len()), (mean - 1.0).abs() <= MEAN_OFF + chance)
+    };
+    let cases: Vec<(String, bool)> = errors.iter().map(case).collect();
     let rate = cases.len() as f64 * MEAN_CHANCE;
     record
         .claim_that(
@@ -320,41 +320,27 @@ const MEAN_DEVIATIONS: f64 = 3.3;
 const MEAN_CHANCE: f64 = 9.7e-4;
 
 fn families_table(measured: &[Measured]) -> Table {
-    let columns = [
-        ("family", ""),
-        ("what", ""),
-        ("scenes", ""),
-        ("right", ""),
-        ("wrong", ""),
-        ("not_converged", ""),
-        ("refused", ""),
-        ("determined", ""),
-        ("wrong_determined", ""),
-        ("worst", ""),
-    ];
     let caption = format!(
         "every family of scenes: what the solver made of it; determined: bound of sd(fx)/fx below {DETERMINED}"
     );
-    let mut table = Table::new("families", caption, &columns);
-    for m in measured {
-        let worst =
-            m.lines.iter().filter(|l| l.class == Class::Wrong).max_by(|a, b| a.excess.total_cmp(&b.excess));
-        let [right, wrong, open, refused] = Class::ALL.map(|class| count(&m.lines, class, false).to_string());
-        table.push([
-            m.family.name.to_string(),
-            m.family.about.to_string(),
-            m.lines.len().to_string(),
-            right,
-            wrong,
-            open,
-            refused,
-            m.lines.iter().filter(|l| l.is_determined()).count().to_string(),
-            count(&m.lines, Class::Wrong, true).to_string(),
-            worst.map_or("-".to_string(), |l| l.note.clone()),
-        ]);
-    }
-    table
+    let worst = |m: &Measured| {
+        let wrong = m.lines.iter().filter(|l| l.class == Class::Wrong);
+        let worst = wrong.max_by(|a, b| a.excess.total_cmp(&b.excess));
+        worst.map_or("-".to_string(), |l| l.note.clone())
+    };
+    Table::of("families", caption, measured)
+        .column("family", "", |m| m.family.name)
+        .column("what", "", |m| m.family.about)
+        .column("scenes", "", |m| m.lines.len())
+        .columns(ENDINGS, "", |m| Class::ALL.map(|class| count(&m.lines, class, false)))
+        .column("determined", "", |m| m.lines.iter().filter(|l| l.is_determined()).count())
+        .column("wrong_determined", "", |m| count(&m.lines, Class::Wrong, true))
+        .column("worst", "", |m| worst(m))
+        .into()
 }
+
+/// The columns of how scenes ended, in the order of [`Class::ALL`].
+pub(crate) const ENDINGS: [&str; 4] = ["right", "wrong", "not_converged", "refused"];
 
 /// OpenCV and this library on the same scenes.
 fn report_opencv(record: &mut Record, measured: &[Measured]) -> Result<(), ExperimentError> {
@@ -364,47 +350,22 @@ fn report_opencv(record: &mut Record, measured: &[Measured]) -> Result<(), Exper
     })?;
     record.input("golden/global-minimum/opencv.csv", OPENCV.as_bytes());
     claim_opencv_current(record);
-    let columns = [
-        ("family", ""),
-        ("scenes", ""),
-        ("opencv_right", ""),
-        ("opencv_wrong", ""),
-        ("opencv_without", ""),
-        ("right", ""),
-        ("wrong", ""),
-        ("without", ""),
-        ("determined", ""),
-        ("opencv_wrong_determined", ""),
-        ("wrong_determined", ""),
-    ];
     let caption = "the same scenes through OpenCV's calibrateCamera and through this library; without: \
                    refused, not converged, or no answer";
-    let mut table = Table::new("opencv", caption, &columns);
-    for m in measured {
-        let theirs: Vec<&peers::Line> = lines.iter().filter(|l| l.family == m.family.name).collect();
-        let ours: Vec<&Line> = theirs.iter().filter_map(|l| m.lines.get(l.index as usize)).collect();
-        let they = |ending, known: bool| {
-            theirs.iter().filter(|l| l.ending == ending && (!known || l.is_determined())).count()
-        };
-        let we = |class, known: bool| {
-            ours.iter().filter(|l| l.class == class && (!known || l.is_determined())).count()
-        };
-        let determined = theirs.iter().filter(|l| l.is_determined()).count();
-        let row = [
-            theirs.len(),
-            they(Ending::Right, false),
-            they(Ending::Wrong, false),
-            they(Ending::Refused, false) + they(Ending::Broken, false),
-            we(Class::Right, false),
-            we(Class::Wrong, false),
-            we(Class::NotConverged, false) + we(Class::Refused, false),
-            determined,
-            they(Ending::Wrong, true),
-            we(Class::Wrong, true),
-        ];
-        table.push(std::iter::once(m.family.name.into()).chain(row.map(Cell::from)));
-    }
-    record.table(table);
+    record.table(
+        Table::of("opencv", caption, measured.iter().map(|m| Beside::of(m, &lines)))
+            .column("family", "", |b| b.family)
+            .column("scenes", "", |b| b.theirs.len())
+            .column("opencv_right", "", |b| b.they(&[Ending::Right]))
+            .column("opencv_wrong", "", |b| b.they(&[Ending::Wrong]))
+            .column("opencv_without", "", |b| b.they(&[Ending::Refused, Ending::Broken]))
+            .column("right", "", |b| b.we(&[Class::Right]))
+            .column("wrong", "", |b| b.we(&[Class::Wrong]))
+            .column("without", "", |b| b.we(&[Class::NotConverged, Class::Refused]))
+            .column("determined", "", |b| b.determined().theirs.len())
+            .column("opencv_wrong_determined", "", |b| b.determined().they(&[Ending::Wrong]))
+            .column("wrong_determined", "", |b| b.determined().we(&[Class::Wrong])),
+    );
     let any: Vec<&peers::Line> = lines.iter().filter(|l| l.family == FAMILIES[0].name).collect();
     let determined = any.iter().filter(|l| l.is_determined()).count();
     let wrong = any.iter().filter(|l| l.is_determined() && l.ending == Ending::Wrong).count();
@@ -419,6 +380,36 @@ fn report_opencv(record: &mut Record, measured: &[Measured]) -> Result<(), Exper
             "of these answered at a higher cost than the reference",
         );
     Ok(())
+}
+
+/// The scenes of a family that OpenCV was asked, as it answered and as this library did.
+struct Beside<'a> {
+    family: &'static str,
+    theirs: Vec<&'a peers::Line>,
+    ours: Vec<&'a Line>,
+}
+
+impl<'a> Beside<'a> {
+    fn of(m: &'a Measured, lines: &'a [peers::Line]) -> Beside<'a> {
+        let theirs: Vec<_> = lines.iter().filter(|l| l.family == m.family.name).collect();
+        let ours = theirs.iter().filter_map(|l| m.lines.get(l.index as usize)).collect();
+        Beside { family: m.family.name, theirs, ours }
+    }
+
+    /// Those whose marks determine the camera.
+    fn determined(&self) -> Beside<'a> {
+        let theirs = self.theirs.iter().copied().filter(|l| l.is_determined()).collect();
+        let ours = self.ours.iter().copied().filter(|l| l.is_determined()).collect();
+        Beside { family: self.family, theirs, ours }
+    }
+
+    fn they(&self, endings: &[Ending]) -> usize {
+        self.theirs.iter().filter(|l| endings.contains(&l.ending)).count()
+    }
+
+    fn we(&self, classes: &[Class]) -> usize {
+        self.ours.iter().filter(|l| classes.contains(&l.class)).count()
+    }
 }
 
 /// OpenCV's answers do not depend on this library's solver; the scenes they are to do.

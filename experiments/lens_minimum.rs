@@ -11,10 +11,10 @@
 //! The run judges the first scenes of every model; all of them take minutes, stand in golden/lens-minimum/, and are read here. They are
 //! refused as stale when a line of the solver, of the scenes or of the reference has changed.
 
-use crate::global_minimum::{judged::Class, more_than};
+use crate::global_minimum::{ENDINGS, judged::Class, more_than};
 use calibench::camera::Model;
 use calibench_harness::fingerprint::Fingerprint;
-use calibench_harness::{Band, Cell, Context, Experiment, ExperimentError, Record, Table};
+use calibench_harness::{Band, Context, Experiment, ExperimentError, Record, Table};
 use rayon::prelude::*;
 
 pub mod campaign;
@@ -240,43 +240,21 @@ fn claim_minima(record: &mut Record, measured: &[Measured]) {
 
 /// Errors of the whole camera under the stated covariance: their mean is the number of parameters.
 fn claim_deviations(record: &mut Record, measured: &[Measured]) {
-    let columns = [
-        ("model", ""),
-        ("results", ""),
-        ("mean_z_squared", ""),
-        ("mean_square", ""),
-        ("largest_square", ""),
-        ("questioned", ""),
-        ("their_mean_z_squared", ""),
-    ];
     let caption = "error of fx over its stated deviation, and squared error of all parameters over their number, under the stated covariance: \
                    right results of determined scenes without a warning that questions them, and the first of these for those with one";
-    let mut table = Table::new("errors", caption, &columns);
-    let mut cases = Vec::new();
-    for m in measured {
-        let errors: Vec<[f64; 2]> = m.unquestioned().filter_map(|line| line.errors).collect();
-        let parameters = m.family.free().len() as f64;
-        let count = errors.len() as f64;
-        let z = mean_square_of_fx(&errors);
-        let questioned: Vec<[f64; 2]> = m.questioned().filter_map(|line| line.errors).collect();
-        let square = errors.iter().map(|[_, square]| square / parameters).sum::<f64>() / count;
-        let largest = errors.iter().map(|[_, square]| square / parameters).fold(0.0, f64::max);
-        table.push([
-            m.family.name().into(),
-            errors.len().into(),
-            z.into(),
-            square.into(),
-            Cell::from(largest),
-            questioned.len().into(),
-            mean_square_of_fx(&questioned).into(),
-        ]);
-        if errors.len() >= FEWEST {
-            let chance = MEAN_DEVIATIONS * (2.0 / (count * parameters)).sqrt();
-            let what = format!("{}: {square:.3} of {count}", m.family.name());
-            cases.push((what, (square - 1.0).abs() <= MEAN_OFF + chance));
-        }
-    }
-    record.table(table);
+    let stated: Vec<Stated> = measured.iter().map(Stated::of).collect();
+    record.table(
+        Table::of("errors", caption, &stated)
+            .column("model", "", |s| s.model)
+            .column("results", "", |s| s.errors.len())
+            .column("mean_z_squared", "", |s| mean_square_of_fx(&s.errors))
+            .column("mean_square", "", |s| s.mean_square())
+            .column("largest_square", "", |s| s.squares().fold(0.0, f64::max))
+            .column("questioned", "", |s| s.questioned.len())
+            .column("their_mean_z_squared", "", |s| mean_square_of_fx(&s.questioned)),
+    );
+    let enough = stated.iter().filter(|s| s.errors.len() >= FEWEST);
+    let cases: Vec<(String, bool)> = enough.map(Stated::case).collect();
     let rate = cases.len() as f64 * MEAN_CHANCE;
     record
         .claim_that(
@@ -288,97 +266,92 @@ fn claim_deviations(record: &mut Record, measured: &[Measured]) {
         .because("a mean of n chi-squared numbers of k degrees of freedom has a relative standard deviation of sqrt(2 / (n k)), and 3.3 of them are allowed besides");
 }
 
+/// Errors of the right results of a model whose scenes are determined, in units of what is stated of them: of fx, and the
+/// square of all parameters under their covariance.
+struct Stated {
+    model: &'static str,
+    parameters: f64,
+    /// Without a warning that questions them.
+    errors: Vec<[f64; 2]>,
+    /// With one.
+    questioned: Vec<[f64; 2]>,
+}
+
+impl Stated {
+    fn of(m: &Measured) -> Stated {
+        Stated {
+            model: m.family.name(),
+            parameters: m.family.free().len() as f64,
+            errors: m.unquestioned().filter_map(|line| line.errors).collect(),
+            questioned: m.questioned().filter_map(|line| line.errors).collect(),
+        }
+    }
+
+    /// Over the number of parameters: 1 is expected.
+    fn squares(&self) -> impl Iterator<Item = f64> {
+        self.errors.iter().map(|[_, square]| square / self.parameters)
+    }
+
+    fn mean_square(&self) -> f64 {
+        self.squares().sum::<f64>() / self.errors.len() as f64
+    }
+
+    /// Whether the mean is 1 within what is allowed.
+    fn case(&self) -> (String, bool) {
+        let (count, square) = (self.errors.len() as f64, self.mean_square());
+        let chance = MEAN_DEVIATIONS * (2.0 / (count * self.parameters)).sqrt();
+        (format!("{}: {square:.3} of {count}", self.model), (square - 1.0).abs() <= MEAN_OFF + chance)
+    }
+}
+
 /// Mean squared error of fx over its stated variance.
 fn mean_square_of_fx(errors: &[[f64; 2]]) -> f64 {
     errors.iter().map(|[z, _]| z * z).sum::<f64>() / errors.len() as f64
 }
 
 fn families_table() -> Table {
-    let columns =
-        [("model", ""), ("what", ""), ("half_field_from", "deg"), ("half_field_to", "deg"), ("unknowns", "")];
-    let mut table =
-        Table::new("families", "the lenses that are drawn, and how many parameters are estimated", &columns);
-    for family in &FAMILIES {
-        let (from, to) = family.half_field_deg;
-        table.push([
-            family.name().into(),
-            family.about.into(),
-            from.into(),
-            to.into(),
-            Cell::from(family.free().len()),
-        ]);
-    }
-    table
+    Table::of("families", "the lenses that are drawn, and how many parameters are estimated", &FAMILIES)
+        .column("model", "", |family| family.name())
+        .column("what", "", |family| family.about)
+        .column("half_field_from", "deg", |family| family.half_field_deg.0)
+        .column("half_field_to", "deg", |family| family.half_field_deg.1)
+        .column("unknowns", "", |family| family.free().len())
+        .into()
 }
 
 fn models_table(measured: &[Measured]) -> Table {
-    let columns = [
-        ("model", ""),
-        ("scenes", ""),
-        ("right", ""),
-        ("wrong", ""),
-        ("not_converged", ""),
-        ("refused", ""),
-        ("determined", ""),
-        ("wrong_determined", ""),
-        ("by_a_variance", ""),
-        ("refused_determined", ""),
-        ("lower", ""),
-    ];
     let caption = format!(
         "how the scenes of every model ended; determined: bound of sd(fx)/fx below {DETERMINED}; by_a_variance: of these, at a cost higher by more than a noise variance; lower: accepted at a cost lower than the \
          reference's by a thousandth of a variance"
     );
-    let mut table = Table::new("models", caption, &columns);
-    for m in measured {
-        let [right, wrong, open, refused] = Class::ALL.map(|class| m.count(|line| line.class == class));
-        let row = [
-            m.lines.len(),
-            right,
-            wrong,
-            open,
-            refused,
-            m.count(Line::is_determined),
-            m.wrong_where_determined(),
-            m.far_where_determined(),
-            m.count(|line| line.class == Class::Refused && line.is_determined()),
-            m.count(|line| line.class == Class::Right && line.excess < -1e-3),
-        ];
-        table.push(std::iter::once(m.family.name().into()).chain(row.map(Cell::from)));
-    }
-    table
+    Table::of("models", caption, measured)
+        .column("model", "", |m| m.family.name())
+        .column("scenes", "", |m| m.lines.len())
+        .columns(ENDINGS, "", |m| Class::ALL.map(|class| m.count(|line| line.class == class)))
+        .column("determined", "", |m| m.count(Line::is_determined))
+        .column("wrong_determined", "", |m| m.wrong_where_determined())
+        .column("by_a_variance", "", |m| m.far_where_determined())
+        .column("refused_determined", "", |m| m.count(|l| l.class == Class::Refused && l.is_determined()))
+        .column("lower", "", |m| m.count(|line| line.class == Class::Right && line.excess < -1e-3))
+        .into()
 }
 
 /// Every scene that was accepted at a higher cost.
 fn wrong_table(measured: &[Measured]) -> Table {
-    let columns = [
-        ("model", ""),
-        ("index", ""),
-        ("views", ""),
-        ("marks", ""),
-        ("half_field", "deg"),
-        ("bound", ""),
-        ("excess", ""),
-        ("warned", ""),
-        ("what", ""),
-    ];
     let caption =
         "scenes accepted at a higher cost than the reference's, which exceeds it by so many noise variances";
-    let mut table = Table::new("wrong", caption, &columns);
-    for m in measured {
-        for line in m.lines.iter().filter(|line| line.class == Class::Wrong) {
-            table.push([
-                m.family.name().into(),
-                (line.index as usize).into(),
-                line.views.into(),
-                line.marks.into(),
-                line.field_deg.into(),
-                line.bound.into(),
-                line.excess.into(),
-                if line.is_questioned { "yes".into() } else { "no".into() },
-                Cell::from(line.note.clone()),
-            ]);
-        }
-    }
-    table
+    let wrong = measured.iter().flat_map(|m| {
+        m.lines.iter().filter(|line| line.class == Class::Wrong).map(move |line| (m.family.name(), line))
+    });
+    Table::of("wrong", caption, wrong)
+        .column("model", "", |(model, _)| *model)
+        .column("index", "", |(_, line)| line.index as usize)
+        .column("views", "", |(_, line)| line.views)
+        .column("marks", "", |(_, line)| line.marks)
+        .column("half_field", "deg", |(_, line)| line.field_deg)
+        .column("bound", "", |(_, line)| line.bound)
+        .column("excess", "", |(_, line)| line.excess)
+        .column("warned", "", |(_, line)| if line.is_questioned { "yes" } else { "no" })
+        .column("what", "", |(_, line)| line.note.clone())
+        .into()
 }

@@ -12,6 +12,9 @@ mod noise_study;
 #[path = "../examples/own_gate.rs"]
 #[allow(dead_code, reason = "its `main` is for the command line")]
 mod own_gate;
+#[path = "../examples/own_layout.rs"]
+#[allow(dead_code, reason = "its `main` is for the command line")]
+pub mod own_layout;
 #[path = "../examples/own_loss.rs"]
 #[allow(dead_code, reason = "its `main` is for the command line")]
 mod own_loss;
@@ -22,6 +25,12 @@ fn points_and_photographs_give_a_camera() {
     let fx = from_photographs::run(&from_photographs::rendered().unwrap()).unwrap();
     // Noise-free photographs: a detector's error of some thousandths of a pixel, and the bias of discs.
     assert!((fx - 600.0).abs() < 1.0, "{fx}");
+}
+
+#[test]
+fn marks_in_any_layout_give_a_camera() {
+    let far = own_layout::run().unwrap();
+    assert!(far < 4.0, "{far}");
 }
 
 #[test]

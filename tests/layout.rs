@@ -92,8 +92,8 @@ fn every_file_of_tests_is_run() {
 
 /// The library's folders from the ground up. Those of one inner list do not know each other: `calibrate`
 /// never sees the truth that `synth` makes.
-const LAYERS: [&[&str]; 8] = [
-    &["distribution", "geometry"],
+const LAYERS: [&[&str]; 9] = [
+    &["distribution", "geometry", "rows"],
     &["camera", "board", "raster"],
     &["synth", "detect", "calibrate", "tsai", "planar", "rectify"],
     &["evaluate"],
@@ -101,6 +101,7 @@ const LAYERS: [&[&str]; 8] = [
     &["noise"],
     &["io"],
     &["photos"],
+    &["as_data"],
 ];
 
 /// What `layer` may import; `None` if it is none. The crate's root imports nothing.
@@ -127,7 +128,7 @@ fn imports(source: &str) -> BTreeSet<String> {
 fn the_estimator_of_other_lenses_is_reached_in_three_places() {
     let reached: Vec<String> = files("src/calibench/calibrate", &["rs"])
         .into_iter()
-        .filter(|path| !path.to_string_lossy().contains("/any_lens/"))
+        .filter(|path| !path.components().any(|part| part.as_os_str() == "any_lens"))
         .filter(|path| fs::read_to_string(path).expect("the file is read").contains("any_lens"))
         .map(|path| path.file_name().expect("a file has a name").to_string_lossy().into_owned())
         .collect();

@@ -125,6 +125,7 @@ fn folder() -> PathBuf {
     let renamed = renamed.replace("\n2,", "\nnew2,").replace("\n3,", "\nnew3,");
     for (name, text) in [
         ("corners.csv", corners.as_str()),
+        ("rings.csv", crate::examples::own_layout::corner_file().expect("they are seen").as_str()),
         ("new.csv", renamed.as_str()),
         ("solid.csv", solid.as_str()),
         ("target.csv", target.as_str()),

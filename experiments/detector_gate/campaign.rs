@@ -3,12 +3,11 @@
 use super::programs::{PROGRAMS, Program};
 use super::row::{HEADER, Row};
 use super::{PHOTOS, SEED, wrong};
-use calibench::io::write_atomically;
 use calibench_detector_gate::{Builtin, Detector, Scene, outcomes, scenes};
 use calibench_harness::fingerprint::Fingerprint;
 use calibench_harness::{ProgressDisplay, campaign};
 use clap::Parser;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -44,9 +43,7 @@ pub fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), String> {
-    let known = || PROGRAMS.iter().map(|program| program.name).collect::<Vec<_>>().join(", ");
-    let program = Program::named(&arguments.name)
-        .ok_or_else(|| format!("no program {}; there are: {}", arguments.name, known()))?;
+    let program = campaign::named(&PROGRAMS, |program| program.name, &arguments.name)?;
     if arguments.wrong {
         if program.method.is_some() {
             return Err(format!(
@@ -77,10 +74,9 @@ fn run(arguments: &Arguments) -> Result<(), String> {
         program.name,
         program.adapter_hash()
     );
-    let lines: Vec<String> = rows.iter().map(|row| row.text() + "\n").collect();
-    let text = format!("{}\n{HEADER}\n{}", fingerprint.head(&what), lines.concat());
-    let file = || Path::new(FOLDER).join(format!("{}.csv", program.name));
-    write_atomically(&arguments.out.clone().unwrap_or_else(file), text.as_bytes()).map_err(|e| e.to_string())
+    let table = campaign::table(HEADER, rows.iter().map(Row::text));
+    let text = format!("{}\n{table}", fingerprint.head(&what));
+    campaign::write(arguments.out.as_deref(), FOLDER, program.name, &text)
 }
 
 /// The scenes that a program is shown.

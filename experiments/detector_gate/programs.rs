@@ -59,11 +59,6 @@ pub const PROGRAMS: [Program; 3] = [
 const DIGITS: usize = 16;
 
 impl Program {
-    /// The program of a name.
-    pub fn named(name: &str) -> Option<&'static Program> {
-        PROGRAMS.iter().find(|program| program.name == name)
-    }
-
     /// Whether it is shown such boards.
     pub fn knows(&self, kind: Kind) -> bool {
         self.finders[kind as usize].is_some()

@@ -1,6 +1,6 @@
 //! What was found, as tables.
 
-use super::judged::{Judged, clopper_pearson};
+use super::judged::{Judged, Measured, clopper_pearson};
 use super::{DRAWN, PHOTOS, Seen, shows_board};
 use calibench_detector_gate::protocol::Kind;
 use calibench_detector_gate::{Scene, scenes as all_scenes};
@@ -16,32 +16,32 @@ fn told(value: Option<f64>) -> Cell {
 
 /// A scene a row, found, error over the bound and worst mark of each program in its columns.
 fn beside(name: &str, kind: Kind, seen: &[&Seen]) -> Table {
-    let label = |one: &Seen| one.program.name.replace('-', "_");
-    let of = |what: &str| seen.iter().map(|one| format!("{what}_{}", label(one))).collect::<Vec<_>>();
-    let columns: Vec<(String, &str)> = [("scene".to_string(), "")]
-        .into_iter()
-        .chain(of("found").into_iter().map(|name| (name, "")))
-        .chain(of("rms").into_iter().map(|name| (name, "px")))
-        .chain(of("over_bound").into_iter().map(|name| (name, "")))
-        .chain(of("worst").into_iter().map(|name| (name, "px")))
-        .collect();
-    let columns: Vec<(&str, &str)> = columns.iter().map(|(name, unit)| (name.as_str(), *unit)).collect();
+    let named = |what: &'static str| {
+        seen.iter().map(move |one| format!("{what}_{}", one.program.name.replace('-', "_")))
+    };
     let caption = format!(
         "{}: boards found of {PHOTOS}, root mean squared error of a coordinate, the same over that of the bound, and the largest distance of a mark from \
          its place, of boards whose marks are at their places",
         heading(kind)
     );
-    let mut table = Table::new(name, caption, &columns);
-    for scene in of_kind(kind) {
+    let rows = of_kind(kind).into_iter().map(|scene| {
         let judged: Vec<Judged<'_>> = seen.iter().map(|one| one.in_scene(scene)).collect();
-        let mut row: Vec<Cell> = vec![scene.id.into()];
-        row.extend(judged.iter().map(|j| Cell::from(j.boards())));
-        row.extend(judged.iter().map(|j| told(j.rms_px(DRAWN).map(|rms| rms.value))));
-        row.extend(judged.iter().map(|j| told(j.over_bound(DRAWN).map(|over| over.value))));
-        row.extend(judged.iter().map(|j| told(j.worst_px())));
-        table.push(row);
-    }
-    table
+        (scene.id, judged)
+    });
+    let each = |judged: &[Judged<'_>], cell: &dyn Fn(&Judged<'_>) -> Cell| {
+        judged.iter().map(cell).collect::<Vec<_>>()
+    };
+    Table::of(name, caption, rows)
+        .column("scene", "", |(scene, _)| *scene)
+        .columns(named("found"), "", |(_, judged)| each(judged, &|j| j.boards().into()))
+        .columns(named("rms"), "px", |(_, judged)| {
+            each(judged, &|j| told(j.rms_px(DRAWN).map(|rms| rms.value)))
+        })
+        .columns(named("over_bound"), "", |(_, judged)| {
+            each(judged, &|j| told(j.over_bound(DRAWN).map(|over| over.value)))
+        })
+        .columns(named("worst"), "px", |(_, judged)| each(judged, &|j| told(j.worst_px())))
+        .into()
 }
 
 /// Each kind of board, of the programs that know it.
@@ -78,85 +78,52 @@ pub fn heading(kind: Kind) -> &'static str {
 
 /// Boards that are not there, a program and scene a row.
 pub fn invented(seen: &[Seen]) -> Table {
-    let columns =
-        [("program", ""), ("board", ""), ("scene", ""), ("photographs", ""), ("found", ""), ("at_most", "%")];
     let caption = "Photographs without the board that is asked for: boards found nevertheless, and the most that their share can be (95 %, \
                    Clopper and Pearson)";
-    let mut table = Table::new("invented", caption, &columns);
-    for one in seen {
-        for judged in one.without_board() {
-            let most = clopper_pearson(judged.boards(), judged.photos(), DRAWN).high;
-            table.push::<Cell>([
-                one.program.name.into(),
-                judged.scene.kind.name().into(),
-                judged.scene.id.into(),
-                judged.photos().into(),
-                judged.boards().into(),
-                (100.0 * most).into(),
-            ]);
-        }
-    }
-    table
+    let rows = seen.iter().flat_map(|one| one.without_board().into_iter().map(move |judged| (one, judged)));
+    Table::of("invented", caption, rows)
+        .column("program", "", |(one, _)| one.program.name)
+        .column("board", "", |(_, judged)| judged.scene.kind.name())
+        .column("scene", "", |(_, judged)| judged.scene.id)
+        .column("photographs", "", |(_, judged)| judged.photos())
+        .column("found", "", |(_, judged)| judged.boards())
+        .column("at_most", "%", |(_, judged)| {
+            100.0 * clopper_pearson(judged.boards(), judged.photos(), DRAWN).high
+        })
+        .into()
 }
 
 /// Everything, a program and scene a row.
 pub fn scenes(seen: &[Seen]) -> Table {
-    let columns = [
-        ("program", ""),
-        ("board", ""),
-        ("scene", ""),
-        ("what", ""),
-        ("photographs", ""),
-        ("found", ""),
-        ("share_low", "%"),
-        ("share_high", "%"),
-        ("wrong", ""),
-        ("mirrored", ""),
-        ("marks_missing", ""),
-        ("broken", ""),
-        ("rms", "px"),
-        ("rms_low", "px"),
-        ("rms_high", "px"),
-        ("over_bound", ""),
-        ("over_low", ""),
-        ("over_high", ""),
-        ("over_median", ""),
-        ("worst", "px"),
-    ];
     let caption = "Every program and scene that shows the board: boards found with the interval of their share (95 %, Clopper and Pearson), boards with a \
                    mark at another's place, boards numbered as in a mirror, marks not seen, broken answers; of the other boards the root mean squared \
                    error of a coordinate, the same over that of the bound (95 %, independent photographs), the median of a photograph's, and the \
                    largest distance of a mark from its place";
-    let mut table = Table::new("scenes", caption, &columns);
-    for one in seen {
-        for judged in one.with_board() {
-            let share = judged.share(DRAWN).interval;
-            let (rms, over) = (judged.rms_px(DRAWN), judged.over_bound(DRAWN));
-            table.push::<Cell>([
-                one.program.name.into(),
-                judged.scene.kind.name().into(),
-                judged.scene.id.into(),
-                judged.scene.about.into(),
-                judged.photos().into(),
-                judged.boards().into(),
-                (100.0 * share.low).into(),
-                (100.0 * share.high).into(),
-                judged.wrong().into(),
-                judged.mirrored().into(),
-                judged.missing().into(),
-                judged.broken().into(),
-                told(rms.map(|rms| rms.value)),
-                told(rms.map(|rms| rms.interval.low)),
-                told(rms.map(|rms| rms.interval.high)),
-                told(over.map(|over| over.value)),
-                told(over.map(|over| over.interval.low)),
-                told(over.map(|over| over.interval.high)),
-                told(judged.over_bound_median()),
-                told(judged.worst_px()),
-            ]);
-        }
-    }
-    table
+    let rows = seen.iter().flat_map(|one| one.with_board().into_iter().map(move |judged| (one, judged)));
+    let with_interval = |measured: Option<Measured>| match measured {
+        Some(m) => [m.value, m.interval.low, m.interval.high].map(Cell::from),
+        None => ["-", "-", "-"].map(Cell::from),
+    };
+    Table::of("scenes", caption, rows)
+        .column("program", "", |(one, _)| one.program.name)
+        .column("board", "", |(_, judged)| judged.scene.kind.name())
+        .column("scene", "", |(_, judged)| judged.scene.id)
+        .column("what", "", |(_, judged)| judged.scene.about)
+        .column("photographs", "", |(_, judged)| judged.photos())
+        .column("found", "", |(_, judged)| judged.boards())
+        .column("share_low", "%", |(_, judged)| 100.0 * judged.share(DRAWN).interval.low)
+        .column("share_high", "%", |(_, judged)| 100.0 * judged.share(DRAWN).interval.high)
+        .column("wrong", "", |(_, judged)| judged.wrong())
+        .column("mirrored", "", |(_, judged)| judged.mirrored())
+        .column("marks_missing", "", |(_, judged)| judged.missing())
+        .column("broken", "", |(_, judged)| judged.broken())
+        .columns(["rms", "rms_low", "rms_high"], "px", |(_, judged)| with_interval(judged.rms_px(DRAWN)))
+        .columns(["over_bound", "over_low", "over_high"], "", |(_, judged)| {
+            with_interval(judged.over_bound(DRAWN))
+        })
+        .column("over_median", "", |(_, judged)| told(judged.over_bound_median()))
+        .column("worst", "px", |(_, judged)| told(judged.worst_px()))
+        .into()
 }
 
 /// How each was asked.
@@ -165,18 +132,16 @@ pub fn fairness(seen: &[Seen]) -> Table {
         let head = one.committed.lines().next().unwrap_or_default();
         head.split("; ").find_map(|part| part.strip_prefix("versions ")).unwrap_or("-").to_string()
     };
-    let mut rows: Vec<[String; 5]> = Vec::new();
-    for one in seen {
-        for (kind, finder) in Kind::ALL.into_iter().zip(one.program.finders) {
-            let Some(finder) = finder else { continue };
-            let (name, note) = (one.program.name.to_string(), one.program.note.to_string());
-            rows.push([name, versions(one), heading(kind).to_string(), finder.to_string(), note]);
-        }
-    }
-    Table::of_arrays(
-        "fairness",
-        "What was asked for which boards, and what is fair to say of each program",
-        [("program", ""), ("versions", ""), ("boards", ""), ("finder", ""), ("fairness", "")],
-        &rows,
-    )
+    let rows = seen.iter().flat_map(|one| {
+        let finders = Kind::ALL.into_iter().zip(one.program.finders);
+        finders.filter_map(move |(kind, finder)| Some((one, kind, finder?)))
+    });
+    let caption = "What was asked for which boards, and what is fair to say of each program";
+    Table::of("fairness", caption, rows)
+        .column("program", "", |(one, ..)| one.program.name)
+        .column("versions", "", |(one, ..)| versions(one))
+        .column("boards", "", |(_, kind, _)| heading(*kind))
+        .column("finder", "", |(.., finder)| *finder)
+        .column("fairness", "", |(one, ..)| one.program.note)
+        .into()
 }

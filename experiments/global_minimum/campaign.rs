@@ -124,9 +124,9 @@ fn write(folder: &Path) -> Result<(), String> {
     for family in FAMILIES {
         let rows = run(family, SEED, 0, family.scenes);
         println!("{}", listing::summary(family, &rows));
-        let lines: Vec<String> = rows.iter().map(|row| Line::of(row).text() + "\n").collect();
+        let table = campaign::table(HEADER, rows.iter().map(|row| Line::of(row).text()));
         let head = Fingerprint::of_global_minimum().head(&format!("{COMMAND}; seed {SEED}"));
-        let text = format!("{head}\n{HEADER}\n{}", lines.concat());
+        let text = format!("{head}\n{table}");
         write_atomically(&folder.join(format!("{}.csv", family.name)), text.as_bytes())
             .map_err(|e| e.to_string())?;
     }

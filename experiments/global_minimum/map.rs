@@ -1,5 +1,6 @@
 //! Where is the solver refused or hard? Shares over the bound, the tilt and the number of views.
 
+use super::ENDINGS;
 use super::committed::Line;
 use super::judged::Class;
 use calibench_harness::{ExperimentError, Figure, HeatMap, Plot, Record, Table};
@@ -26,26 +27,18 @@ pub fn report(record: &mut Record, lines: &[Line]) -> Result<(), ExperimentError
 }
 
 fn by_bound(lines: &[Line]) -> Table {
-    let columns = [
-        ("bound_percent", ""),
-        ("scenes", ""),
-        ("right", ""),
-        ("wrong", ""),
-        ("not_converged", ""),
-        ("refused", ""),
-    ];
-    let mut table = Table::new(
+    let inside = |class: usize| lines.iter().filter(move |l| place(&BOUNDS, l.bound) == class);
+    Table::of(
         "by-bound",
         "random scenes by their bound of sd(fx)/fx in per cent: how they ended",
-        &columns,
-    );
-    for (class, name) in BOUND_NAMES.into_iter().enumerate() {
-        let inside: Vec<&Line> = lines.iter().filter(|l| place(&BOUNDS, l.bound) == class).collect();
-        let count = |class| inside.iter().filter(|l| l.class == class).count().to_string();
-        let [right, wrong, open, refused] = Class::ALL.map(count);
-        table.push([name.to_string(), inside.len().to_string(), right, wrong, open, refused]);
-    }
-    table
+        BOUND_NAMES.into_iter().enumerate(),
+    )
+    .column("bound_percent", "", |(_, name)| *name)
+    .column("scenes", "", |(class, _)| inside(*class).count())
+    .columns(ENDINGS, "", |(class, _)| {
+        Class::ALL.map(|end| inside(*class).filter(|l| l.class == end).count())
+    })
+    .into()
 }
 
 /// Per cent of the scenes in each cell of bound (across) and another quantity (up); NaN where there is none.

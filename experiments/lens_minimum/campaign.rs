@@ -59,8 +59,7 @@ fn measured(family: &'static Family, seed: u64) -> Result<String, String> {
         line.ok_or_else(|| format!("{}: no scene {index} can be drawn", family.name()))
     };
     let lines: Vec<Line> = (0..SCENES).into_par_iter().map(line).collect::<Result<_, _>>()?;
-    let rows: Vec<String> = lines.iter().map(|line| line.text() + "\n").collect();
     let of = |class: Class| format!("{class} {}", lines.iter().filter(|line| line.class == class).count());
     println!("{}: {}", family.name(), Class::ALL.map(of).join(", "));
-    Ok(format!("{HEADER}\n{}", rows.concat()))
+    Ok(campaign::table(HEADER, lines.iter().map(Line::text)))
 }

@@ -45,10 +45,8 @@ fn run(arguments: &Arguments) -> Result<(), String> {
 fn write(truth: &Truth, folder: &Path) -> Result<(), String> {
     let path = folder.join(format!("{}.csv", truth.name));
     let head = Fingerprint::of_model_choice().head(&format!("{COMMAND}; seed {SEED}"));
-    campaign::write_unless_current(&path, &head, || {
-        let lines: Vec<String> = measured(truth)?.iter().map(|row| row.text() + "\n").collect();
-        Ok(format!("{HEADER}\n{}", lines.concat()))
-    })
+    let table = || Ok(campaign::table(HEADER, measured(truth)?.iter().map(Row::text)));
+    campaign::write_unless_current(&path, &head, table)
 }
 
 /// All trials of a truth, the longest first so that no processor is left with one of them at the end; rows in order.

@@ -2,6 +2,7 @@
 
 use super::chosen::{Criterion, Trial};
 use super::layout::LAYOUTS;
+use super::row::Fitted;
 use super::trial::NOISE_PX;
 use super::truths::{CANDIDATES, TRUTHS, Truth};
 use super::{DIFFERENCES, FAR, far, middle, of, ratios, right};
@@ -57,55 +58,53 @@ pub fn layouts() -> Table {
 
 /// What each criterion takes most often.
 pub fn taken(trials: &[Trial<'_>]) -> Table {
-    let columns = [
-        ("truth", ""),
-        ("marks", ""),
-        ("trials", ""),
-        ("rmse", ""),
-        ("bic", ""),
-        ("hold_out", ""),
-        ("auto", ""),
-    ];
     let caption = "What each criterion takes most often, and in how many trials";
-    let mut table = Table::new("taken", caption, &columns);
-    for truth in &TRUTHS {
-        for marks in LAYOUTS.map(|layout| layout.marks()) {
-            let all = of(trials, truth, marks);
-            let most = |criterion: Criterion| -> Cell {
-                let times = |i: usize| all.iter().filter(|t| t.chosen(criterion) == Some(i)).count();
-                // Of equals the first, which has fewer coefficients.
-                let first = (0..CANDIDATES.len()).rev().max_by_key(|&i| times(i)).unwrap_or(0);
-                format!("{} ({})", CANDIDATES[first], times(first)).into()
-            };
-            let mut row: Vec<Cell> = vec![truth.name.into(), marks.into(), all.len().into()];
-            row.extend(Criterion::JUDGED.map(most));
-            table.push(row);
-        }
-    }
-    table
+    let most = |all: &[&Trial<'_>], criterion: Criterion| {
+        let times = |i: usize| all.iter().filter(|t| t.chosen(criterion) == Some(i)).count();
+        // Of equals the first, which has fewer coefficients.
+        let first = (0..CANDIDATES.len()).rev().max_by_key(|&i| times(i)).unwrap_or(0);
+        format!("{} ({})", CANDIDATES[first], times(first))
+    };
+    Table::of(
+        "taken",
+        caption,
+        of_each_layout().map(|(truth, marks)| (truth, marks, of(trials, truth, marks))),
+    )
+    .column("truth", "", |(truth, ..)| truth.name)
+    .column("marks", "", |(_, marks, _)| *marks)
+    .column("trials", "", |(.., all)| all.len())
+    .columns(Criterion::JUDGED.map(column_name), "", |(.., all)| {
+        Criterion::JUDGED.map(|criterion| most(all, criterion))
+    })
+    .into()
+}
+
+/// Every truth with the marks of every layout.
+fn of_each_layout() -> impl Iterator<Item = (&'static Truth, usize)> {
+    TRUTHS.iter().flat_map(|truth| LAYOUTS.map(|layout| (truth, layout.marks())))
+}
+
+fn column_name(criterion: Criterion) -> String {
+    criterion.name().replace('-', "_")
 }
 
 /// What each criterion costs, truth by truth.
 pub fn costs(trials: &[Trial<'_>]) -> Table {
-    let names = Criterion::ALL.map(|criterion| criterion.name().replace('-', "_"));
-    let mut columns = vec![("truth", ""), ("marks", ""), ("best", "px")];
-    columns.extend(names.iter().map(|name| (name.as_str(), "")));
     let caption = "Median difference from the truth over the frame of the best candidate of each trial, and how many times as far what a \
                    criterion takes is, median";
-    let mut table = Table::new("costs", caption, &columns);
-    for truth in &TRUTHS {
-        for marks in LAYOUTS.map(|layout| layout.marks()) {
-            let best = |t: &Trial<'_>| stats::smallest((0..CANDIDATES.len()).map(|i| t.frame_px(i)));
-            let mut row: Vec<Cell> =
-                vec![truth.name.into(), marks.into(), finite(middle(trials, truth, marks, best))];
-            row.extend(Criterion::ALL.map(|criterion| {
-                let ratio = |t: &&Trial<'_>| t.ratio(criterion);
-                finite(stats::median(&of(trials, truth, marks).iter().filter_map(ratio).collect::<Vec<_>>()))
-            }));
-            table.push(row);
-        }
-    }
-    table
+    let best = |t: &Trial<'_>| stats::smallest((0..CANDIDATES.len()).map(|i| t.frame_px(i)));
+    let cost = |truth, marks, criterion| {
+        let ratios = of(trials, truth, marks).into_iter().filter_map(|t| t.ratio(criterion));
+        finite(stats::median(&ratios.collect::<Vec<_>>()))
+    };
+    Table::of("costs", caption, of_each_layout())
+        .column("truth", "", |(truth, _)| truth.name)
+        .column("marks", "", |(_, marks)| *marks)
+        .column("best", "px", |(truth, marks)| finite(middle(trials, truth, *marks, best)))
+        .columns(Criterion::ALL.map(column_name), "", |&(truth, marks)| {
+            Criterion::ALL.map(|criterion| cost(truth, marks, criterion))
+        })
+        .into()
 }
 
 /// Other differences of the criterion that count as none.
@@ -116,70 +115,71 @@ pub fn differences(trials: &[Trial<'_>]) -> Table {
          the truth as the best candidate's"
     );
     let marks = LAYOUTS.map(|layout| layout.marks());
-    let names: Vec<String> = ["right", "far"]
-        .iter()
-        .flat_map(|what| marks.iter().map(move |marks| format!("{what}_{marks}")))
-        .collect();
-    let mut columns = vec![("difference", "")];
-    columns.extend(names.iter().map(|name| (name.as_str(), "")));
-    let mut table = Table::new("differences", caption, &columns);
     let alone = ("BIC alone".to_string(), Criterion::Bic);
     let within = DIFFERENCES.map(|difference| (format!("{difference}"), Criterion::Within(difference)));
     let none = ("views left out alone".to_string(), Criterion::HoldOut);
-    for (name, criterion) in [alone].into_iter().chain(within).chain([none]) {
-        let mut row: Vec<Cell> = vec![name.into()];
-        row.extend(marks.map(|marks| Cell::from(right(trials, marks, criterion).value)));
-        row.extend(marks.map(|marks| Cell::from(far(trials, marks, criterion).value)));
-        table.push(row);
-    }
-    table
+    let named = |what: &str| marks.map(|marks| format!("{what}_{marks}"));
+    Table::of("differences", caption, [alone].into_iter().chain(within).chain([none]))
+        .column("difference", "", |(name, _)| name.clone())
+        .columns(named("right"), "", |&(_, criterion)| {
+            marks.map(|marks| right(trials, marks, criterion).value)
+        })
+        .columns(named("far"), "", |&(_, criterion)| marks.map(|marks| far(trials, marks, criterion).value))
+        .into()
 }
 
 /// Every candidate's camera against every truth.
 pub fn fitted(trials: &[Trial<'_>]) -> Table {
-    let columns = [
-        ("truth", ""),
-        ("candidate", ""),
-        ("marks", ""),
-        ("trials", ""),
-        ("fitted", ""),
-        ("frame", "px"),
-        ("worst", "px"),
-        ("fx_bias", "px"),
-        ("fx_sd", "px"),
-        ("cx_bias", "px"),
-        ("cx_sd", "px"),
-        ("cy_bias", "px"),
-        ("cy_sd", "px"),
-    ];
     let caption = "Every candidate fitted to every truth: how many trials determine it, median of the root mean square and of the largest \
                    difference from the truth over the frame, mean and standard deviation of the errors of focal length and principal point";
-    let mut table = Table::new("fitted", caption, &columns);
-    for truth in &TRUTHS {
-        for (candidate, name) in CANDIDATES.iter().enumerate() {
-            for marks in LAYOUTS.map(|layout| layout.marks()) {
-                let all = of(trials, truth, marks);
-                let found: Vec<_> = all.iter().filter_map(|t| t.fitted(candidate)).collect();
-                let moments = |k: usize| {
-                    let errors: Vec<f64> = found.iter().map(|f| f.errors_px[k]).collect();
-                    let mean = stats::mean(&errors);
-                    [finite(mean), finite(stats::root_mean_square(errors.iter().map(|e| e - mean)))]
-                };
-                let worst = stats::median(&found.iter().map(|f| f.worst_px).collect::<Vec<_>>());
-                let mut row: Vec<Cell> = vec![
-                    truth.name.into(),
-                    (*name).into(),
-                    marks.into(),
-                    all.len().into(),
-                    found.len().into(),
-                ];
-                row.extend([finite(middle(trials, truth, marks, |t| t.frame_px(candidate))), finite(worst)]);
-                row.extend([0, 2, 3].into_iter().flat_map(moments));
-                table.push(row);
-            }
-        }
+    let rows = TRUTHS.iter().flat_map(|truth| {
+        (0..CANDIDATES.len()).flat_map(move |candidate| {
+            LAYOUTS.map(|layout| Fits {
+                truth,
+                candidate,
+                all: of(trials, truth, layout.marks()),
+                marks: layout.marks(),
+            })
+        })
+    });
+    Table::of("fitted", caption, rows)
+        .column("truth", "", |fits| fits.truth.name)
+        .column("candidate", "", |fits| CANDIDATES[fits.candidate])
+        .column("marks", "", |fits| fits.marks)
+        .column("trials", "", |fits| fits.all.len())
+        .column("fitted", "", |fits| fits.found().count())
+        .column("frame", "px", |fits| {
+            finite(middle(trials, fits.truth, fits.marks, |t| t.frame_px(fits.candidate)))
+        })
+        .column("worst", "px", |fits| {
+            finite(stats::median(&fits.found().map(|f| f.worst_px).collect::<Vec<_>>()))
+        })
+        .columns(["fx_bias", "fx_sd"], "px", |fits| fits.moments(0))
+        .columns(["cx_bias", "cx_sd"], "px", |fits| fits.moments(2))
+        .columns(["cy_bias", "cy_sd"], "px", |fits| fits.moments(3))
+        .into()
+}
+
+/// A candidate fitted to the trials of a truth with so many marks.
+struct Fits<'a> {
+    truth: &'static Truth,
+    candidate: usize,
+    marks: usize,
+    all: Vec<&'a Trial<'a>>,
+}
+
+impl Fits<'_> {
+    /// The trials that determine it.
+    fn found(&self) -> impl Iterator<Item = &Fitted> {
+        self.all.iter().filter_map(|t| t.fitted(self.candidate))
     }
-    table
+
+    /// Mean and standard deviation of the error of a linear parameter.
+    fn moments(&self, parameter: usize) -> [Cell; 2] {
+        let errors: Vec<f64> = self.found().map(|f| f.errors_px[parameter]).collect();
+        let mean = stats::mean(&errors);
+        [mean, stats::root_mean_square(errors.iter().map(|e| e - mean))].map(finite)
+    }
 }
 
 /// A number, or a dash where most cameras do not show the frame.

@@ -1,14 +1,13 @@
 //! The whole measurement of a program: asks it all trials, and writes what is committed.
 
 use super::programs::{PROGRAMS, Program};
-use super::row::HEADER;
+use super::row::{HEADER, Row};
 use super::trials::{Asked, ask};
-use calibench::io::write_atomically;
 use calibench_gate::{Builtin, Process};
 use calibench_harness::campaign;
 use calibench_harness::fingerprint::Fingerprint;
 use clap::Parser;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -39,15 +38,10 @@ pub fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), String> {
-    let known = || PROGRAMS.iter().map(|program| program.name).collect::<Vec<_>>().join(", ");
-    let program = PROGRAMS
-        .iter()
-        .find(|program| program.name == arguments.name)
-        .ok_or_else(|| format!("no program {}; there are: {}", arguments.name, known()))?;
+    let program = campaign::named(&PROGRAMS, |program| program.name, &arguments.name)?;
     let trials = arguments.trials.unwrap_or(program.trials);
     let text = measured(program, &arguments.python, trials)?;
-    let file = || Path::new(FOLDER).join(format!("{}.csv", program.name));
-    write_atomically(&arguments.out.clone().unwrap_or_else(file), text.as_bytes()).map_err(|e| e.to_string())
+    campaign::write(arguments.out.as_deref(), FOLDER, program.name, &text)
 }
 
 /// The first `trials` trials of every cell, as they are committed.
@@ -69,6 +63,5 @@ fn measured(program: &Program, python: &str, trials: u64) -> Result<String, Stri
         program.name,
         program.adapter_hash()
     );
-    let lines: Vec<String> = rows.iter().map(|row| row.text() + "\n").collect();
-    Ok(format!("{}\n{HEADER}\n{}", fingerprint.head(&what), lines.concat()))
+    Ok(format!("{}\n{}", fingerprint.head(&what), campaign::table(HEADER, rows.iter().map(Row::text))))
 }

@@ -72,6 +72,15 @@ pub fn wilson_hilferty(chi_squared: f64, degrees_of_freedom: f64) -> f64 {
 }
 
 /// A chi-squared distribution.
+///
+/// ```
+/// use calibench::distribution::ChiSquare;
+///
+/// let of_six = ChiSquare::new(6);
+/// // What one of a hundred sums of six squared standard normal numbers exceeds.
+/// let limit = of_six.quantile(0.99);
+/// assert!((limit - 16.812).abs() < 1e-3 && (of_six.survival(limit) - 0.01).abs() < 1e-9);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChiSquare {
     degrees_of_freedom: f64,

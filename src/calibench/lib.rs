@@ -35,6 +35,8 @@
 /// The linear algebra of this library's types, for programs that must name the same version.
 pub use nalgebra;
 
+#[cfg(feature = "serde")]
+mod as_data;
 pub mod board;
 pub mod calibrate;
 pub mod camera;
@@ -53,6 +55,8 @@ pub mod planar;
 pub mod planning;
 pub mod raster;
 pub mod rectify;
+#[cfg(feature = "serde")]
+mod rows;
 pub mod synth;
 pub mod tsai;
 pub mod validate;

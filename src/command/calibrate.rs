@@ -5,7 +5,7 @@ use super::board::board_or_file;
 use super::report::table;
 use super::{Exit, print, warn};
 use calibench::board::View;
-use calibench::calibrate::{Board, CalibrationError, Loss, Prior};
+use calibench::calibrate::{Board, CalibrationError, Loss, Prior, Settings};
 use calibench::camera::{FreeParameters, Model, Parameter, UnknownModel};
 use calibench::io::ShownPath;
 use calibench::io::input::{MOST_SIDE_PX, MOST_TABLE_BYTES, read_named};
@@ -128,6 +128,37 @@ pub(super) struct Arguments {
     /// Text for people or JSON for programs
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
+}
+
+/// Coverage of the intervals: what a certificate of measurement states.
+const COVERAGE: f64 = 0.95;
+
+impl Arguments {
+    /// What is estimated and how; with `--model auto` before a model is chosen.
+    fn settings(&self, image_size: Option<(usize, usize)>) -> Settings {
+        let model = match self.model {
+            Some(ModelChoice::Of(model)) => model,
+            Some(ModelChoice::Auto) | None => Model::default(),
+        };
+        let free = self.free.unwrap_or(model.standard_free());
+        let mut settings =
+            Settings::new(free).with_model(model).with_loss(self.loss.unwrap_or(Loss::Squares));
+        settings.board = self.bow.unwrap_or_default();
+        settings.image_size = image_size;
+        if self.intervals == Some(Intervals::Profile) {
+            settings = settings.with_profile_intervals(COVERAGE);
+        }
+        for &(parameter, value) in &self.fix {
+            settings = settings.hold(parameter, value);
+        }
+        for &Prior { parameter, mean, standard_deviation } in &self.prior {
+            settings = settings.with_prior(parameter, mean, standard_deviation);
+        }
+        match self.tie {
+            Some(ratio) => settings.tie_focal_lengths(ratio),
+            None => settings,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -36,6 +36,7 @@ const EXAMPLES: &[(&str, &[&str])] = &[
         &[
             "calibench calibrate --board circles:9x7:10mm:3mm --out result photo0.png photo1.png photo2.png photo3.png",
             "calibench calibrate corners.csv --image-size 640x480 --fix k2=0 --out result",
+            "calibench calibrate rings.csv --image-size 640x480",
             "calibench calibrate solid.csv --target target.csv --image-size 640x480 --out measured",
             "calibench calibrate pairs.csv --mode tilted",
         ],

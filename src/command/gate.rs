@@ -422,6 +422,18 @@ fn judge(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build)
     Ok(if report.held() { Exit::Held } else { Exit::Deviates })
 }
 
+/// Tells what a gate of its own kind found: JSON where it is wanted, and the answer in the form that is asked for.
+fn tell(arguments: &Arguments, json: &str, text: &str, trusted: bool) -> Result<Exit, Stop> {
+    if let Some(path) = &arguments.json {
+        write_atomically(path, json.as_bytes()).map_err(incomplete)?;
+    }
+    print(match arguments.format {
+        Format::Text => text,
+        Format::Json => json,
+    });
+    Ok(if trusted { Exit::Held } else { Exit::Deviates })
+}
+
 /// Characters in a line: what the shell says, else what most terminals have; a file gets the whole.
 fn columns() -> usize {
     let asked = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());

@@ -118,7 +118,7 @@ fn found(arguments: &Arguments) -> Result<Found, String> {
         found.doubts = doubts_of(files.zip(all.iter().map(|known| known.doubts.clone())));
         let size = arguments.image_size.or(known.image_size);
         let size = size.ok_or("the frame is not known: give --image-size WxH")?;
-        let estimates: Vec<Estimate> = all.iter().map(|known| estimate(known)).collect();
+        let estimates: Vec<Estimate> = all.iter().copied().map(Estimate::from).collect();
         found.agreement =
             Some(repeated(&estimates, size, arguments.rate).map_err(|error| error.to_string())?);
         found.repetitions =
@@ -181,15 +181,6 @@ fn refuse_bent_board(arguments: &Arguments, known: &KnownCalibration) -> Result<
     }
 }
 
-fn estimate(known: &KnownCalibration) -> Estimate<'_> {
-    Estimate {
-        camera: &known.camera,
-        covariance: &known.covariance,
-        sigma_px: known.sigma_px,
-        degrees_of_freedom: Some(known.degrees_of_freedom),
-    }
-}
-
 fn on_new(arguments: &Arguments, known: &KnownCalibration, views: &Views) -> Result<HoldOut, String> {
     let seen: Vec<&String> = views.names.iter().filter(|name| known.views.contains(name)).collect();
     if !seen.is_empty() {
@@ -199,7 +190,7 @@ fn on_new(arguments: &Arguments, known: &KnownCalibration, views: &Views) -> Res
         ));
     }
     let corrected = without_bias(known, views);
-    hold_out(&estimate(known), &corrected, arguments.rate)
+    hold_out(&Estimate::from(known), &corrected, arguments.rate)
         .map_err(|error| format!("{}: {error}", views.source))
 }
 

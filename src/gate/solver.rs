@@ -23,6 +23,35 @@ pub struct Reply {
 }
 
 /// A calibrator as the gate sees it.
+///
+/// ```
+/// use calibench_gate::accept::Breakage;
+/// use calibench_gate::protocol::{Answer, Problem};
+/// use calibench_gate::{Builtin, Plan, Report, Solver, Terms, run};
+///
+/// /// Yours; this one spoils the answer of another.
+/// struct Mine;
+///
+/// impl Solver for Mine {
+///     fn name(&self) -> String {
+///         "mine".to_string()
+///     }
+///
+///     fn ask(&self, problem: &Problem) -> Result<Answer, Breakage> {
+///         let mut answer = Builtin.ask(problem)?;
+///         if let Some(fx) = answer.parameters.get_mut("fx") {
+///             *fx *= 1.001;
+///         }
+///         Ok(answer)
+///     }
+/// }
+///
+/// // Seed, and samples of every scenario.
+/// let plan = Plan::new(1, 2)?;
+/// let report = Report::new(&plan, &Mine.name(), &run(&plan, &Mine, &|_| ()), &Terms::default(), 0.0);
+/// assert!(!report.held(), "a focal length too large by a thousandth is no answer to exact marks");
+/// # Ok::<(), calibench_gate::PlanError>(())
+/// ```
 pub trait Solver: Sync {
     /// What it is called in reports.
     fn name(&self) -> String;

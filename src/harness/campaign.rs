@@ -1,7 +1,7 @@
 //! What do commands that measure for minutes share: how they end, go on where they were, and name what they asked?
 
 use calibench::io::write_atomically;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 /// The exit code of a command; what went wrong goes to standard error.
@@ -13,6 +13,30 @@ pub fn exit_code(outcome: Result<(), String>) -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// The one of these programs, or whatever else is measured, that has this name.
+///
+/// # Errors
+/// There is none: the names that there are, in words.
+pub fn named<'a, T>(all: &'a [T], name_of: impl Fn(&T) -> &str, name: &str) -> Result<&'a T, String> {
+    let names = || all.iter().map(&name_of).collect::<Vec<_>>().join(", ");
+    let found = all.iter().find(|one| name_of(one) == name);
+    found.ok_or_else(|| format!("no program {name}; there are: {}", names()))
+}
+
+/// A table as it is committed below its head: the names of the columns, and a line a row.
+pub fn table(header: &str, rows: impl IntoIterator<Item = String>) -> String {
+    std::iter::once(header.to_string()).chain(rows).map(|line| line + "\n").collect()
+}
+
+/// Writes what was measured to `out`, without that to `NAME.csv` in the folder where it is committed.
+///
+/// # Errors
+/// What could not be written, in words.
+pub fn write(out: Option<&Path>, folder: &str, name: &str, text: &str) -> Result<(), String> {
+    let path = out.map_or_else(|| Path::new(folder).join(format!("{name}.csv")), PathBuf::from);
+    write_atomically(&path, text.as_bytes()).map_err(|error| error.to_string())
 }
 
 /// Writes `head` and what `measured` gives below it, unless the table begins with `head` already: then the present code wrote it.
@@ -53,4 +77,20 @@ pub fn python_versions(python: &str, modules: &[&str]) -> Result<String, String>
         ));
     }
     Ok(String::from_utf8_lossy(&done.stdout).trim().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_has_a_line_a_row_and_a_name_that_is_not_there_names_the_others() {
+        assert_eq!(table("a,b", ["1,2".to_string(), "3,4".to_string()]), "a,b\n1,2\n3,4\n");
+        let all = ["one".to_string(), "two".to_string()];
+        assert_eq!(named(&all, String::as_str, "two"), Ok(&all[1]));
+        assert_eq!(
+            named(&all, String::as_str, "six"),
+            Err("no program six; there are: one, two".to_string())
+        );
+    }
 }

@@ -161,7 +161,11 @@ mod tests {
 
     #[test]
     fn a_file_that_cannot_be_written_is_named() {
-        let error = write_atomically(Path::new("/dev/null/x.csv"), b"").unwrap_err();
-        assert!(error.to_string().contains("/dev/null/x.csv"));
+        // In the place of its folder lies a file.
+        let folder = std::env::temp_dir().join(format!("calibench-emit-{}", std::process::id()));
+        std::fs::write(&folder, "").unwrap();
+        let error = write_atomically(&folder.join("x.csv"), b"").unwrap_err();
+        assert!(error.to_string().contains(&folder.join("x.csv").display().to_string()), "{error}");
+        std::fs::remove_file(&folder).unwrap();
     }
 }

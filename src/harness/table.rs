@@ -187,6 +187,22 @@ impl<R> Rows<R> {
         }
         self
     }
+
+    /// Adds columns of one unit that belong together, such as a value and the ends of its interval: each row has a
+    /// cell for every one of them.
+    pub fn columns<C: Into<Cell>, I: IntoIterator<Item = C>>(
+        mut self,
+        names: impl IntoIterator<Item = impl Into<String>>,
+        unit: &str,
+        cells: impl Fn(&R) -> I,
+    ) -> Rows<R> {
+        let named = names.into_iter().map(|name| Column { name: name.into(), unit: unit.to_string() });
+        self.table.columns.extend(named);
+        for (row, own) in self.rows.iter().zip(&mut self.table.rows) {
+            own.extend(cells(row).into_iter().map(Into::into));
+        }
+        self
+    }
 }
 
 impl<R> From<Rows<R>> for Table {
@@ -213,6 +229,20 @@ mod tests {
         let rows = [(0.1, "a, b"), (1.0 / 3.0, "c")];
         let table = Table::of("t", "two rows", rows).column("u", "px", |r| r.0).column("label", "", |r| r.1);
         assert_eq!(Table::from(table).to_csv(), "u [px],label\n0.1,\"a, b\"\n0.3333333333333333,c\n");
+    }
+
+    #[test]
+    fn columns_that_belong_together_are_said_together() {
+        let table = Table::of("t", "a row", [(7usize, [0.1, 0.2])])
+            .columns(["low", "high"], "px", |row| row.1)
+            .column("count", "", |row| row.0);
+        assert_eq!(Table::from(table).to_csv(), "low [px],high [px],count\n0.1,0.2,7\n");
+        // As many cells as names, or the record says so when it is closed.
+        let table = Table::of("t", "a row", [[0.1, 0.2]]).columns(["low"], "px", |row| *row);
+        assert!(matches!(
+            Table::from(table).validate(),
+            Err(RecordError::RaggedTable { need: 1, got: 2, .. })
+        ));
     }
 
     #[test]

@@ -15,6 +15,34 @@ use crate::geometry::Vec2;
 /// assert!(View::new(points, vec![]).is_err());
 /// # Ok::<(), calibench::board::ViewError>(())
 /// ```
+///
+/// # A layout of your own
+///
+/// The points may lie anywhere in the plane: a view needs no [`Board`](super::Board), which is a lattice, and each
+/// view may show other points. You then detect the marks yourself. Marks that do not lie in a plane, or whose places
+/// are not exact, are for [`crate::measured`].
+///
+/// ```
+/// use calibench::board::View;
+/// use calibench::calibrate::{Settings, calibrate};
+/// use calibench::geometry::Vec2;
+/// use calibench::synth::{Scene, Truth};
+///
+/// // A mark in the middle and rings of 8, 16 and 24 about it, 10 mm apart.
+/// let ring = |k: usize| {
+///     let angle = move |i: usize| std::f64::consts::TAU * i as f64 / (8 * k) as f64;
+///     (0..8 * k).map(move |i| 10.0 * k as f64 * Vec2::new(angle(i).cos(), angle(i).sin()))
+/// };
+/// let points: Vec<Vec2> = std::iter::once(Vec2::zeros()).chain((1..4).flat_map(ring)).collect();
+///
+/// // Four views without noise by a virtual camera; yours come from your detector. The last three marks are hidden.
+/// let scene = Scene::new(Truth { points: points.clone(), ..Truth::example() })?;
+/// let see = |pixels: &Vec<Vec2>| View::new(points[..46].to_vec(), pixels[..46].to_vec());
+/// let views: Vec<View> = scene.pixels().iter().map(see).collect::<Result<_, _>>()?;
+/// let result = calibrate(&views, &Settings::standard())?;
+/// assert!((result.camera.fx - scene.truth.camera.fx).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
     points: Vec<Vec2>,

@@ -97,6 +97,21 @@ const NO_EVIDENCE: f64 = 2.0;
 /// least, the one that best predicts views that were left out (in five parts of the views in turn). The others follow by
 /// their criterion. Candidates that the views do not determine come with their reason. Views whose marks do not span a
 /// plane tell nothing and take no part, as long as half of the views do.
+///
+/// ```
+/// use calibench::calibrate::{Candidate, Settings, compare_models};
+/// use calibench::camera::Model;
+/// use calibench::synth::{Scene, Stream, StreamKey};
+///
+/// let mut stream = Stream::open(StreamKey { seed: 1, scenario: "choice", trial: 0, purpose: "noise" });
+/// let views = Scene::example().observe(0.1, &mut stream);
+/// // Brown-Conrady's lens with two coefficients, the true one, and with more; the others take longer.
+/// let candidates: Vec<Candidate> =
+///     Candidate::usual().into_iter().filter(|candidate| candidate.model == Model::BrownConrady).collect();
+/// let (compared, refused) = compare_models(&views, &Settings::standard(), &candidates);
+/// assert!(refused.is_empty());
+/// assert_eq!(compared[0].candidate.coefficients.to_string(), "k1,k2");
+/// ```
 pub fn compare_models(
     views: &[View],
     settings: &Settings,

@@ -37,6 +37,24 @@ pub enum ClosedFormError {
 ///
 /// # Errors
 /// Fewer than 3 views with skew or 2 without; a `B` that is not definite.
+///
+/// ```
+/// use calibench::calibrate::{closed_form, pose_from_homography};
+/// use calibench::camera::{BrownConrady, Camera};
+/// use calibench::geometry::Homography;
+/// use calibench::synth::{Scene, Truth};
+///
+/// // Without noise and distortion it is exact.
+/// let camera = Truth::example_camera().with_distortion(BrownConrady::default());
+/// let scene = Scene::new(Truth { camera, ..Truth::example() })?;
+/// let of_view = |pixels: &Vec<_>| Homography::fit(&scene.truth.points, pixels).map(|fit| fit.homography);
+/// let homographies: Vec<Homography> = scene.pixels().iter().map(of_view).collect::<Result<_, _>>()?;
+/// let found: Camera = closed_form(&homographies, false)?;
+/// assert!((found.fx - camera.fx).abs() < 1e-6);
+/// let pose = pose_from_homography(&found, &homographies[0]).expect("the target is in front of the camera");
+/// assert!((pose.translation - scene.truth.cam_from_target[0].translation).norm() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn closed_form(homographies: &[Homography], skew: bool) -> Result<Camera, ClosedFormError> {
     let need = if skew { 3 } else { 2 };
     if homographies.len() < need {

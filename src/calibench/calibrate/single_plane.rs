@@ -167,6 +167,20 @@ pub fn predicted_rms_px(sigma_px: f64, points: usize, parameters: usize) -> (f64
 ///
 /// # Errors
 /// Too few points, no homography, or parameters that the points do not fix.
+///
+/// ```
+/// use calibench::calibrate::single_plane::{SinglePlaneOptions, calibrate_single_plane};
+/// use calibench::synth::Scene;
+///
+/// let scene = Scene::example();
+/// let camera = &scene.truth.camera;
+/// let centre_px = calibench::geometry::Vec2::new(camera.cx, camera.cy);
+/// let options = SinglePlaneOptions { focal_px: camera.fx, centre_px, centre_free: false };
+/// let lens = calibrate_single_plane(&scene.exact()[1], &options)?;
+/// // With the camera's own focal length and centre the coefficients are the camera's own.
+/// assert!((lens.distortion.k1 - camera.distortion.k1).abs() < 1e-6);
+/// # Ok::<(), calibench::calibrate::single_plane::SinglePlaneError>(())
+/// ```
 pub fn calibrate_single_plane(
     view: &View,
     options: &SinglePlaneOptions,

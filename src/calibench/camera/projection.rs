@@ -28,6 +28,19 @@ pub struct BehindCamera {
 /// With `X_c = R X + t`, `(x, y) = (X_c, Y_c) / Z_c` and `D` the distortion's Jacobian: `d pixel / d X_c =
 /// [[fx, skew], [0, fy]] D [[1, 0, -x], [0, 1, -y]] / Z_c`, and `d X_c / d delta = -[R X]x`, `d X_c / d t =
 /// I`.
+///
+/// ```
+/// use calibench::camera::{Camera, Parameter, project_with_jacobian};
+/// use calibench::geometry::{Pose, Vec2, Vec3};
+///
+/// let camera = Camera::pinhole(600.0, 600.0, 320.0, 240.0);
+/// let ahead = Pose { translation: Vec3::new(0.0, 0.0, 100.0), ..Pose::identity() };
+/// let seen = project_with_jacobian(&camera, &ahead, &Vec3::new(10.0, -5.0, 0.0))?;
+/// assert_eq!(seen.pixel, Vec2::new(380.0, 210.0));
+/// // A focal length that is 1 px larger moves this pixel by a tenth of a pixel.
+/// assert!((seen.intrinsics[(0, Parameter::Fx as usize)] - 0.1).abs() < 1e-15);
+/// # Ok::<(), calibench::camera::BehindCamera>(())
+/// ```
 pub fn project_with_jacobian(
     camera: &Camera,
     cam_from_target: &Pose,

@@ -24,6 +24,21 @@ const OUTLINE_POINTS: usize = 64;
 ///
 /// # Errors
 /// A disc that is not wholly in front of the camera.
+///
+/// ```
+/// use calibench::detect::disc_bias;
+/// use calibench::geometry::Vec2;
+/// use calibench::synth::Truth;
+/// use calibench::synth::scene::looking_at_centre;
+///
+/// let camera = Truth::example_camera();
+/// let (pose, centre) = (looking_at_centre([40.0, 0.0, 0.0], 120.0), Vec2::new(0.0, 20.0));
+/// let bias = |diameter| disc_bias(&camera, &pose, &centre, diameter);
+/// // Some hundredths of a pixel for a disc of 3 mm, four times as much for one twice as wide.
+/// let (small, large) = (bias(3.0)?.norm(), bias(6.0)?.norm());
+/// assert!(small > 0.01 && (large / small - 4.0).abs() < 0.05);
+/// # Ok::<(), calibench::camera::BehindCamera>(())
+/// ```
 pub fn disc_bias(
     camera: &impl Imaging,
     cam_from_target: &Pose,

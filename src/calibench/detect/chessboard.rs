@@ -172,6 +172,36 @@ pub fn chessboard<T: Level>(
 ///
 /// # Errors
 /// See [`ChessboardError`]: no such board, or none that is certain.
+///
+/// ```
+/// use calibench::board::Board;
+/// use calibench::detect::{chessboard, seen_chessboard};
+/// use calibench::geometry::Vec2;
+/// use calibench::synth::Truth;
+/// use calibench::synth::render::{Imaging, photograph};
+///
+/// let board = Board::chessboard(8, 6, 9.0)?;
+/// let (camera, pose) = (Truth::example_camera(), Truth::example_poses()[1]);
+/// let photo = photograph(&camera, Truth::EXAMPLE_IMAGE, &board, &pose, &Imaging::default())?;
+/// // Something grey covers a corner and what is about it.
+/// let (mut image, hidden) = (photo.image, photo.centres_true[20]);
+/// for y in 0..480 {
+///     for x in 0..640 {
+///         if (Vec2::new(x as f64, y as f64) - hidden).amax() < 16.0 {
+///             image.set(x, y, 0.5);
+///         }
+///     }
+/// }
+/// assert!(chessboard(&image, 8, 6).is_err());
+/// let seen = seen_chessboard(&image, 8, 6)?;
+/// assert!(seen.missing() > 0 && seen.places_px()[20].is_none());
+/// // What is seen is known by its place on the board: a view of these points.
+/// let places = seen.seen().map(|(mark, place)| (board.points()[mark], place));
+/// let (points, pixels): (Vec<Vec2>, Vec<Vec2>) = places.unzip();
+/// let view = calibench::board::View::new(points, pixels)?;
+/// assert_eq!(view.len() + seen.missing(), 48);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn seen_chessboard<T: Level>(
     image: &Raster<T>,
     columns: usize,

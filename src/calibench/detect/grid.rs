@@ -173,6 +173,17 @@ fn evenly_lit(discs: Vec<Blob>) -> Vec<Blob> {
 ///
 /// # Errors
 /// See [`GridError`]; a grid is returned complete and ordered, or not at all.
+///
+/// ```
+/// use calibench::detect::sparse_dots;
+/// use calibench::synth::render::nine_dot_stand_in;
+///
+/// let photo = nine_dot_stand_in();
+/// let dots = sparse_dots(&photo.image, 3, 3)?;
+/// let worst = dots.centres_px().into_iter().zip(&photo.centres_true).map(|(found, truth)| (found - truth).norm());
+/// assert!(worst.fold(0.0, f64::max) < 0.01);
+/// # Ok::<(), calibench::detect::GridError>(())
+/// ```
 pub fn sparse_dots<T: Level>(image: &Raster<T>, columns: usize, rows: usize) -> Result<DotGrid, GridError> {
     sparse_dots_of(&blobs(image, &BlobOptions::default()), columns, rows)
 }

@@ -4,6 +4,17 @@
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 /// A rule over checks in units of their standard deviation.
+///
+/// ```
+/// use calibench::downstream::control::{Ewma, Rule, Shewhart};
+///
+/// // A check a day for a hundred days: both rules give a false alarm in one of a hundred such series.
+/// let threshold = Shewhart::with_false_alarm(0.01, 100);
+/// let average = Ewma::with_false_alarm(0.2, 0.01, 100);
+/// // A drift of a twentieth of a standard deviation a day.
+/// let drift: Vec<f64> = (0..100).map(|day| 0.05 * f64::from(day)).collect();
+/// assert!(average.first_alarm(&drift) < threshold.first_alarm(&drift));
+/// ```
 pub trait Rule {
     /// The first check that gives an alarm.
     fn first_alarm(&self, checks: &[f64]) -> Option<usize>;

@@ -27,6 +27,8 @@ use nalgebra::{DMatrix, SMatrix};
 
 /// Which of the two moves with the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum SetUp {
     /// The camera is on the gripper, the target fixed.
     EyeInHand,
@@ -36,6 +38,7 @@ pub enum SetUp {
 
 /// What the robot's poses are known to: standard deviations of what it repeats.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Repeatability {
     /// Of each coordinate of the position, in the unit of the robot's poses.
     pub position: f64,
@@ -150,6 +153,7 @@ pub enum HandEyeError {
 
 /// A hand-eye calibration.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct HandEye {
     /// `X`: gripper_from_cam, or base_from_cam for a fixed camera.
     pub x: Pose,
@@ -202,6 +206,39 @@ impl HandEye {
 ///
 /// # Errors
 /// See [`HandEyeError`].
+///
+/// ```
+/// use calibench::calibrate::{Settings, calibrate};
+/// use calibench::downstream::{Repeatability, SetUp, Stations, hand_eye};
+/// use calibench::geometry::{Pose, Vec3, rotation};
+/// use calibench::synth::{Scene, Stream, StreamKey};
+///
+/// // Four stations: what the camera saw, and where the robot said that it was.
+/// let scene = Scene::example();
+/// let mut stream = Stream::open(StreamKey { seed: 1, scenario: "hand-eye", trial: 0, purpose: "noise" });
+/// let calibration = calibrate(&scene.observe(0.1, &mut stream), &Settings::standard())?;
+/// let pose = |turn: Vec3, translation: Vec3| Pose { rotation: rotation::exp(&turn), translation };
+/// let gripper_from_cam = pose(Vec3::new(0.1, -0.2, 1.5), Vec3::new(20.0, -30.0, 60.0));
+/// let base_from_target = pose(Vec3::new(0.0, 0.0, 0.4), Vec3::new(500.0, 100.0, 0.0));
+/// // base_from_target = base_from_gripper gripper_from_cam cam_from_target in every station.
+/// let of_station = |cam_from_target: &Pose| {
+///     base_from_target.compose(&gripper_from_cam.compose(cam_from_target).inverse())
+/// };
+/// let base_from_gripper: Vec<Pose> = scene.truth.cam_from_target.iter().map(of_station).collect();
+///
+/// let found = hand_eye(&Stations {
+///     set_up: SetUp::EyeInHand,
+///     base_from_gripper: &base_from_gripper,
+///     cam_from_target: &calibration.cam_from_target,
+///     covariance: &calibration.covariance,
+///     robot: Repeatability { position: 0.02, rotation_rad: 1e-4 },
+/// })?;
+/// let error = found.x.translation - gripper_from_cam.translation;
+/// // Within four standard deviations on each axis.
+/// let deviation = |axis: usize| found.x_covariance()[(3 + axis, 3 + axis)].sqrt();
+/// assert!((0..3).all(|axis| error[axis].abs() < 4.0 * deviation(axis)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn hand_eye(stations: &Stations<'_>) -> Result<HandEye, HandEyeError> {
     checked(stations)?;
     let motions = motions::motions(stations);

@@ -12,6 +12,8 @@ use nalgebra::Matrix2;
 
 /// What makes a length uncertain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum Cause {
     /// Where the marks were found.
     Marks,
@@ -52,6 +54,7 @@ impl Cause {
 
 /// How well everything but camera and pose is known: standard deviations, 0 where nothing is uncertain.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Conditions {
     /// Of a coordinate of a mark, px.
     pub mark_px: f64,
@@ -136,6 +139,7 @@ pub enum LengthError {
 
 /// A cause's share.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Contribution {
     /// The cause.
     pub cause: Cause,
@@ -148,6 +152,7 @@ pub struct Contribution {
 
 /// A measured length with its budget.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Length {
     /// The length, in the target's unit.
     pub value: f64,
@@ -187,6 +192,26 @@ impl Length {
 ///
 /// # Errors
 /// See [`LengthError`].
+///
+/// ```
+/// use calibench::calibrate::{Settings, calibrate};
+/// use calibench::downstream::{Cause, Conditions, PlaneView, length_in_view};
+/// use calibench::synth::{Scene, Stream, StreamKey};
+///
+/// let scene = Scene::example();
+/// let mut stream = Stream::open(StreamKey { seed: 1, scenario: "length", trial: 0, purpose: "noise" });
+/// let result = calibrate(&scene.observe(0.1, &mut stream), &Settings::standard())?;
+/// // From the first to the last mark of the first row: eight spacings of the target.
+/// let true_length = (scene.truth.points[8] - scene.truth.points[0]).norm();
+/// let plane = PlaneView::of_view(&result.camera, &result.cam_from_target, &result.covariance, 0)?;
+/// let ends = [scene.pixels()[0][0], scene.pixels()[0][8]];
+/// let length = length_in_view(&plane, &ends, &Conditions::marks(0.1))?;
+/// assert!((length.value - true_length).abs() < 4.0 * length.standard_uncertainty());
+/// // Which cause makes how much of it?
+/// let of_marks = length.budget.iter().find(|share| share.cause == Cause::Marks).expect("it is listed");
+/// assert!(of_marks.variance > 0.0 && of_marks.variance < length.standard_uncertainty().powi(2));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn length_in_view(
     plane: &PlaneView,
     pixels: &[Vec2; 2],
@@ -209,6 +234,23 @@ pub fn length_in_view(
 ///
 /// # Errors
 /// See [`LengthError`].
+///
+/// ```
+/// use calibench::downstream::{Conditions, length_on_map};
+/// use calibench::geometry::Vec2;
+/// use calibench::planar::{PlaneModel, calibrate_plane};
+///
+/// // Nine marks 20 mm apart, seen 100 px apart, each some hundredths of a pixel off.
+/// let world: Vec<Vec2> = (0..9).map(|i| 20.0 * Vec2::new(f64::from(i % 3), f64::from(i / 3))).collect();
+/// let off = |i: usize| 0.03 * Vec2::new((i * 7 % 5) as f64 - 2.0, (i * 3 % 5) as f64 - 2.0);
+/// let pixels: Vec<Vec2> = world.iter().enumerate().map(|(i, w)| 5.0 * w + off(i)).collect();
+/// let map = calibrate_plane(PlaneModel::Affine, &pixels, &world)?;
+/// // The map's unit is one millimetre.
+/// let ends = [Vec2::new(10.0, 10.0), Vec2::new(160.0, 10.0)];
+/// let length = length_on_map(&map, 1.0, &ends, &Conditions::marks(0.05))?;
+/// assert!((length.value - 30.0).abs() < 4.0 * length.standard_uncertainty());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn length_on_map(
     map: &PlaneCalibration,
     unit: f64,

@@ -19,6 +19,8 @@ use nalgebra::{DMatrix, DVector, Matrix2};
 
 /// The family of maps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum MapModel {
     /// Turned and shifted: three parameters.
     Rigid,
@@ -49,6 +51,7 @@ impl MapModel {
 
 /// A mark of the part: where it is, and how well that is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Mark {
     /// Its place, in any unit.
     pub at: Vec2,
@@ -155,6 +158,7 @@ pub enum RegistrationError {
 
 /// The map from taught to found marks.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Registration {
     /// The family that was fitted.
     pub model: MapModel,
@@ -185,6 +189,7 @@ pub struct Registration {
     /// their mean.
     radius: f64,
     /// Covariance of the parameters, p x p; `None` where nothing tells the noise.
+    #[cfg_attr(feature = "serde", serde(with = "crate::rows::if_any"))]
     covariance: Option<DMatrix<f64>>,
 }
 

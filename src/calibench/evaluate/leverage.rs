@@ -16,6 +16,21 @@ use nalgebra::{DVector, SMatrix};
 ///
 /// `None` if `views` are not those of the calibration, or if it has no residual degrees of freedom. Under a
 /// robust loss the matrix is another; then the result is only indicative.
+///
+/// ```
+/// use calibench::calibrate::{Settings, calibrate};
+/// use calibench::evaluate::leverages;
+/// use calibench::synth::{Scene, Stream, StreamKey};
+///
+/// let mut stream = Stream::open(StreamKey { seed: 1, scenario: "leverage", trial: 0, purpose: "noise" });
+/// let views = Scene::example().observe(0.1, &mut stream);
+/// let result = calibrate(&views, &Settings::standard())?;
+/// let all = leverages(&result, &views).expect("these are its views");
+/// // They sum to the number of unknowns: six of the camera, six of each view.
+/// let sum: f64 = all.iter().flatten().map(|h| h.x + h.y).sum();
+/// assert!((sum - 30.0).abs() < 1e-6);
+/// # Ok::<(), calibench::calibrate::CalibrationError>(())
+/// ```
 pub fn leverages(calibration: &Calibration, views: &[View]) -> Option<Vec<Vec<Vec2>>> {
     let covariance = &calibration.covariance;
     let variance = calibration.sigma_px * calibration.sigma_px;

@@ -17,6 +17,16 @@ use std::sync::atomic::{AtomicU64, Ordering};
 ///
 /// # Errors
 /// Whatever the file system says, with the path.
+///
+/// ```
+/// use calibench::io::write_atomically;
+///
+/// let file = std::env::temp_dir().join("calibench-example-folder").join("result.txt");
+/// write_atomically(&file, b"first")?;
+/// write_atomically(&file, b"second")?;
+/// assert_eq!(std::fs::read(&file)?, b"second");
+/// # Ok::<(), std::io::Error>(())
+/// ```
 pub fn write_atomically(path: &Path, contents: &[u8]) -> io::Result<()> {
     write_atomically_to(&Disk, path, contents)
 }

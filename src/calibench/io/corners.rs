@@ -26,6 +26,16 @@ const COLUMNS: [Column; 4] =
 ///
 /// # Errors
 /// See [`TableError`].
+///
+/// ```
+/// use calibench::io::{read_corners, write_atomically};
+///
+/// let file = std::env::temp_dir().join("calibench-example-corners.csv");
+/// write_atomically(&file, b"view,point,X,Y,u,v\nleft,0,0,0,320.5,240\nleft,1,10,0,371.2,239.4\n")?;
+/// let corners = read_corners(&file)?;
+/// assert_eq!((corners.view_names[0].as_str(), corners.views[0].len()), ("left", 2));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read_corners(path: &Path) -> Result<CornerFile, TableError> {
     let (file, input) = open(path)?;
     parse_corners(&file, input.as_slice())

@@ -126,6 +126,18 @@ impl Grey {
 ///
 /// # Errors
 /// See [`ImageError`]; a damaged file is an error, never a panic, and a forged size allocates nothing.
+///
+/// ```
+/// use calibench::io::{read_image, write_png};
+/// use calibench::raster::Raster;
+///
+/// let file = std::env::temp_dir().join("calibench-example-image.png");
+/// write_png(&file, &Raster::from_fn(64, 48, |x, _| x as u8))?;
+/// // Detectors take any kind of level; `to_f32` is linear intensity, black 0 and white 1.
+/// let image = read_image(&file)?.to_f32();
+/// assert_eq!((image.width(), image.height(), image.get(51, 0)), (64, 48, 0.2));
+/// # Ok::<(), calibench::io::ImageError>(())
+/// ```
 pub fn read_image(path: &Path) -> Result<Grey, ImageError> {
     Ok(grey(decoded(opened(path)?, &path.shown())?))
 }

@@ -4,10 +4,12 @@
 use super::doubts::doubts;
 use super::input::{InputError, MOST_TABLE_BYTES, read_regular_text};
 use super::result::{ResultError, parse_lens_camera};
+use super::shown::ShownPath;
 use crate::calibrate::Covariance;
 use crate::camera::{Camera, FreeParameters, Lens, Model, Parameter, UnknownParameter};
 use crate::geometry::{Pose, Vec2, Vec3, rotation};
 use crate::planar::{PlaneCalibration, PlaneError, PlaneModel, calibrate_plane};
+use crate::validate::Estimate;
 use nalgebra::{DMatrix, MatrixXx6, SMatrix};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -46,6 +48,14 @@ impl KnownCalibration {
     pub fn brown_conrady(&self, file: &str) -> Result<Camera, ResultError> {
         let model = self.camera.distortion.model();
         self.camera.brown_conrady().ok_or(ResultError::OtherModel { file: file.into(), model })
+    }
+}
+
+impl<'a> From<&'a KnownCalibration> for Estimate<'a> {
+    fn from(known: &'a KnownCalibration) -> Estimate<'a> {
+        let KnownCalibration { camera, covariance, sigma_px, degrees_of_freedom, .. } = known;
+        let degrees_of_freedom = Some(*degrees_of_freedom);
+        Estimate { camera, covariance, sigma_px: *sigma_px, degrees_of_freedom }
     }
 }
 
@@ -168,8 +178,25 @@ struct Kind {
 ///
 /// # Errors
 /// See [`KnownError`].
+///
+/// ```
+/// use calibench::calibrate::{Settings, calibrate};
+/// use calibench::io::{CalibrationFields, Known, read_known, write_atomically};
+/// use calibench::synth::{Scene, Stream, StreamKey};
+///
+/// let mut stream = Stream::open(StreamKey { seed: 1, scenario: "known", trial: 0, purpose: "noise" });
+/// let result = calibrate(&Scene::example().observe(0.1, &mut stream), &Settings::standard())?;
+/// let names: Vec<String> = (1..=4).map(|view| format!("view {view}")).collect();
+/// let file = std::env::temp_dir().join("calibench-example-known.json");
+/// write_atomically(&file, CalibrationFields::of(&result.clone().into(), &names, None).to_json().as_bytes())?;
+/// // All that tests of the calibration need comes back: poses and their joint covariance too.
+/// let Known::Camera(known) = read_known(&file)? else { panic!("it is the result of a camera") };
+/// assert_eq!(known.cam_from_target.len(), 4);
+/// assert_eq!(known.covariance.intrinsics, result.covariance.intrinsics);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read_known(path: &Path) -> Result<Known, KnownError> {
-    parse_known(&path.display().to_string(), &read_regular_text(path, MOST_TABLE_BYTES)?)
+    parse_known(&path.shown(), &read_regular_text(path, MOST_TABLE_BYTES)?)
 }
 
 /// As [`read_known`], from text; `file` names it in errors.

@@ -11,6 +11,18 @@ pub type Colour = [u8; 3];
 
 /// A colour picture over a grey image, each pixel shown as `scale x scale`. Drawing takes image pixels, so
 /// sub-pixel places are seen.
+///
+/// ```
+/// use calibench::geometry::Vec2;
+/// use calibench::io::Overlay;
+/// use calibench::raster::Raster;
+///
+/// let mut picture = Overlay::new(&Raster::filled(64, 48, 200u8), 2);
+/// picture.cross(Vec2::new(20.5, 30.25), 3.0, [255, 60, 60]);
+/// assert_eq!(picture.size(), (128, 96));
+/// picture.write_png(&std::env::temp_dir().join("calibench-example-overlay.png"))?;
+/// # Ok::<(), calibench::io::ImageError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Overlay {
     width: usize,

@@ -17,6 +17,8 @@ pub const MOST_UNCERTAIN_MARKS: usize = 500;
 
 /// How the noise of a pixel coordinate of weight 1 is known.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum Noise {
     /// From the residuals, with the rest.
     #[default]

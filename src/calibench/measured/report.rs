@@ -16,6 +16,7 @@ use nalgebra::{DMatrix, Matrix6, MatrixXx6};
 
 /// A camera from a measured target.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct MeasuredCalibration {
     /// Camera, poses, residuals and their covariance, which counts what is not known of the marks. Residuals stand in the
@@ -37,6 +38,7 @@ pub struct MeasuredCalibration {
 
 /// A mark after the calibration.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct CorrectedMark {
     /// Its name.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 /// A mark as it was measured.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MeasuredMark {
     /// Its name.
     pub id: String,
@@ -34,6 +35,8 @@ impl MeasuredMark {
 /// # Ok::<(), TargetError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Vec<MeasuredMark>", into = "Vec<MeasuredMark>"))]
 pub struct MeasuredTarget {
     marks: Vec<MeasuredMark>,
     places: BTreeMap<String, usize>,
@@ -114,6 +117,20 @@ impl MeasuredTarget {
     /// The place of a mark in that order; `None` if there is none of this name.
     pub fn position(&self, id: &str) -> Option<usize> {
         self.places.get(id).copied()
+    }
+}
+
+impl TryFrom<Vec<MeasuredMark>> for MeasuredTarget {
+    type Error = TargetError;
+
+    fn try_from(marks: Vec<MeasuredMark>) -> Result<MeasuredTarget, TargetError> {
+        MeasuredTarget::new(marks)
+    }
+}
+
+impl From<MeasuredTarget> for Vec<MeasuredMark> {
+    fn from(target: MeasuredTarget) -> Vec<MeasuredMark> {
+        target.marks
     }
 }
 

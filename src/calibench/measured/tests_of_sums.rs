@@ -19,6 +19,7 @@ pub(super) struct Moments {
 /// covariance, and a chi-squared variable with `E^2 / sum lambda^2` degrees of freedom, scaled to the same mean, has both
 /// (Satterthwaite 1946). The test looks at both ends: sums may be too small as well.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct SumTest {
     /// The sum.

@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 
 /// A mark in a photograph.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SeenMark {
     /// The mark's name in the target.
     pub id: String,
@@ -24,6 +25,8 @@ impl SeenMark {
 
 /// The marks of one photograph: any part of the target's, in any order.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Vec<SeenMark>", into = "Vec<SeenMark>"))]
 pub struct MeasuredView {
     marks: Vec<SeenMark>,
 }
@@ -62,5 +65,19 @@ impl MeasuredView {
     /// Whether none was seen.
     pub fn is_empty(&self) -> bool {
         self.marks.is_empty()
+    }
+}
+
+impl TryFrom<Vec<SeenMark>> for MeasuredView {
+    type Error = MeasuredError;
+
+    fn try_from(marks: Vec<SeenMark>) -> Result<MeasuredView, MeasuredError> {
+        MeasuredView::new(marks)
+    }
+}
+
+impl From<MeasuredView> for Vec<SeenMark> {
+    fn from(view: MeasuredView) -> Vec<SeenMark> {
+        view.marks
     }
 }

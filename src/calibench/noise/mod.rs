@@ -95,6 +95,7 @@ pub enum NoiseError {
 
 /// What one mark does, within the frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct MarkNoise {
     /// Its place on the target.
@@ -111,6 +112,7 @@ pub struct MarkNoise {
 
 /// How a frame lies against the mean of all.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct FrameMotion {
     /// Mean shift of the marks, px.
@@ -121,6 +123,7 @@ pub struct FrameMotion {
 
 /// The noise of extraction.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct ExtractionNoise {
     /// Scatter with all that moved.

@@ -10,6 +10,7 @@ use crate::geometry::Vec2;
 
 /// A standard deviation with its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Deviation {
     /// Of one coordinate, px.
@@ -22,6 +23,7 @@ pub struct Deviation {
 
 /// A correlation with its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Correlation {
     /// The estimate; white noise has 0 on average.
@@ -32,6 +34,7 @@ pub struct Correlation {
 
 /// The scatter of all marks together.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Scatter {
     /// Of a coordinate, u and v together.

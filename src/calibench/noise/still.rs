@@ -12,6 +12,7 @@ use crate::geometry::Vec2;
 
 /// A ratio of mean squares that is 1 on average where there is nothing but noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Test {
     /// The ratio.
@@ -24,6 +25,7 @@ pub struct Test {
 
 /// Whether the frames are of a still board in steady light.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Stillness {
     /// Do the marks move together from frame to frame?

@@ -69,6 +69,23 @@ impl MarkKind {
 
 /// A board as it stands on the command line: `KIND:COLUMNSxROWS:SPACING[:DIAMETER]`,
 /// `charuco:SQUARESXxSQUARESY:SQUARE:MARKER:DICTIONARY[:legacy]` or `aprilgrid:COLUMNSxROWS:TAG:SPACING`.
+///
+/// ```
+/// use calibench::board::View;
+/// use calibench::io::Grey;
+/// use calibench::photos::BoardSpec;
+/// use calibench::synth::Truth;
+/// use calibench::synth::render::{Imaging, photograph};
+///
+/// let spec: BoardSpec = "circles:9x7:10mm:3mm".parse()?;
+/// // A photograph of that board; yours comes from `calibench::io::read_image`.
+/// let pose = Truth::example_poses()[0];
+/// let photo = photograph(&Truth::example_camera(), Truth::EXAMPLE_IMAGE, spec.board(), &pose, &Imaging::default())?;
+/// let pixels = spec.detect(&Grey::F32(photo.image))?;
+/// let view = View::new(spec.points(), pixels)?;
+/// assert_eq!((view.len(), spec.to_string().as_str()), (63, "circle grid of 9 x 7 discs, 10 mm apart"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoardSpec {
     /// Look of the marks.

@@ -71,6 +71,20 @@ struct File {
 ///
 /// # Errors
 /// See [`BoardFileError`].
+///
+/// ```
+/// use calibench::photos::parse_board_file;
+///
+/// // As `calibench board` leaves it, with the lengths of the printed rulers: the page came out 3 % smaller.
+/// let text = r#"
+/// board = "circles:9x7:20mm:8mm"
+/// drawn_mm = [160.0, 120.0]
+/// measured_mm = [155.2, 116.4]
+/// "#;
+/// let board = parse_board_file("board.toml", text)?;
+/// assert!((board.board().spacing() - 19.4).abs() < 1e-9);
+/// # Ok::<(), calibench::photos::BoardFileError>(())
+/// ```
 pub fn parse_board_file(name: &str, text: &str) -> Result<BoardSpec, BoardFileError> {
     let file = || name.to_string();
     let read: File = toml::from_str(text)

@@ -25,6 +25,8 @@ const MOST_ROUNDS: usize = 20;
 const LEAST_STRAY_PX: f64 = 0.01;
 
 /// How views are fitted.
+///
+/// [`Fitter::fit`] has an example.
 #[derive(Debug, Clone)]
 pub struct Fitter<'a> {
     /// What is estimated, and the loss.
@@ -233,6 +235,23 @@ fn of_marks(view: &View, board: &Board, all: Vec<Vec2>) -> Option<Vec<Vec2>> {
 
 /// A view of discs without the bias that a known camera predicts for them at the pose that it finds, in turns until
 /// that settles; `None` where the camera does not find the board.
+///
+/// ```
+/// use calibench::board::View;
+/// use calibench::detect::disc_biases;
+/// use calibench::photos::without_disc_bias;
+/// use calibench::synth::{Scene, Truth};
+///
+/// // What a detector finds: the middles of the discs' images, not the images of their middles.
+/// let (truth, board, scene) = (Truth::example(), Truth::example_board(), Scene::example());
+/// let biases = disc_biases(&truth.camera, &truth.cam_from_target[0], &board)?;
+/// let found = scene.pixels()[0].iter().zip(&biases).map(|(pixel, bias)| pixel + bias).collect();
+/// let view = View::new(board.points(), found)?;
+/// let corrected = without_disc_bias(&truth.camera.into(), &view, &board).expect("the camera sees the board");
+/// let left = corrected.pixels().iter().zip(&scene.pixels()[0]).map(|(a, b)| (a - b).norm());
+/// assert!(left.fold(0.0, f64::max) < 1e-4);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn without_disc_bias(camera: &Camera<Lens>, view: &View, board: &Board) -> Option<View> {
     let mut corrected = view.clone();
     let mut last: Option<Vec<Vec2>> = None;

@@ -77,6 +77,7 @@ const FOLD_MARGIN: f64 = 1.1;
 
 /// A pose of the board that can be reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Candidate {
     /// The pose.
     pub cam_from_target: Pose,

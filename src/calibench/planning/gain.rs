@@ -80,6 +80,7 @@ impl Knowledge {
 
 /// What a view does for one wish.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Gain {
     /// Standard deviation so far.
     pub before: f64,

@@ -9,6 +9,7 @@ use crate::geometry::{Pose, Vec2};
 
 /// A pose with what its photograph would do.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Ranked {
     /// The pose.
     pub candidate: Candidate,
@@ -18,6 +19,7 @@ pub struct Ranked {
 
 /// What a search found.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Found {
     /// The best pose, then those that come after it, no two of them neighbours in the grid.
     pub ranked: Vec<Ranked>,
@@ -118,6 +120,8 @@ pub fn next_pose(
 
 /// The best of views that exist, taken once more: its place among the poses, and what it does; `None` where none shows
 /// these marks.
+///
+/// [`next_pose`] has an example of all but the last argument: the poses of the views that exist.
 pub fn best_repeated(
     camera: &Camera<Lens>,
     knowledge: &Knowledge,

@@ -47,6 +47,23 @@ pub enum OutputCameraError {
 ///
 /// # Errors
 /// A border that the lens model does not reach, or no valid rectangle; never for `SameK`.
+///
+/// ```
+/// use calibench::camera::{BrownConrady, Camera};
+/// use calibench::geometry::Vec2;
+/// use calibench::rectify::{OutputView, output_camera, source_pixel};
+///
+/// let camera = Camera::pinhole(600.0, 600.0, 320.0, 240.0).with_distortion(BrownConrady::radial(-0.18, 0.05));
+/// let all = output_camera(&camera, (640, 480), OutputView::AllPixels)?;
+/// let valid = output_camera(&camera, (640, 480), OutputView::OnlyValid)?;
+/// // What shows more has the shorter focal length.
+/// assert!(all.fx < camera.fx && valid.fx > all.fx);
+/// // Its left side shows in its middle what the photograph has no pixel of; the crop is full to its corners.
+/// let inside = |p: Vec2| p.x > -0.5 && p.x < 639.5 && p.y > -0.5 && p.y < 479.5;
+/// assert!(!source_pixel(&camera, &all, &Vec2::new(0.0, 239.5)).is_some_and(inside));
+/// assert!(source_pixel(&camera, &valid, &Vec2::zeros()).is_some_and(inside));
+/// # Ok::<(), calibench::rectify::OutputCameraError>(())
+/// ```
 pub fn output_camera(
     camera: &Camera,
     size: (usize, usize),

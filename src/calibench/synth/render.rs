@@ -201,6 +201,21 @@ impl Projector<'_> {
 /// # Errors
 /// Any outline that reaches further from the axis than the lens is one-to-one (behind a Brown-Conrady camera, or beyond its
 /// monotone radius), and settings out of domain.
+///
+/// ```
+/// use calibench::board::Board;
+/// use calibench::synth::Truth;
+/// use calibench::synth::render::{Imaging, photograph};
+/// use calibench::synth::scene::looking_at_centre;
+///
+/// // The board 20 degrees tilted, 150 mm before the camera, through a slightly blurred lens.
+/// let board = Board::circles(9, 7, 10.0, 3.0)?;
+/// let imaging = Imaging { blur_px: 0.7, ..Imaging::default() };
+/// let (camera, pose) = (Truth::example_camera(), looking_at_centre([20.0, 0.0, 0.0], 150.0));
+/// let photo = photograph(&camera, (640, 480), &board, &pose, &imaging)?;
+/// assert_eq!((photo.image.width(), photo.centres_true.len()), (640, 63));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn photograph<C: Copy + Into<Camera<Lens>>>(
     camera: &C,
     image_size: (usize, usize),

@@ -39,6 +39,7 @@ use frame::TargetFrame;
 
 /// What Tsai's method is told.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Assumed {
     /// The principal point, px: where it is wrong, so is the answer.
     pub principal_point_px: Vec2,
@@ -65,6 +66,7 @@ impl Assumed {
 
 /// What one view says by Tsai's method.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct TwoStage {
     /// The camera, its lens in this library's form: `kappa` converted to k1, k2 and k3.

@@ -13,6 +13,7 @@ use nalgebra::{DMatrix, DVector, Vector6};
 
 /// The most likely camera and pose.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Refined {
     /// The camera.
@@ -25,6 +26,7 @@ pub struct Refined {
     pub fy_per_fx: Option<f64>,
     /// Covariance of the free parameters, then of the pose: rotation `delta` (rad), translation; scaled by the noise
     /// that the residuals show.
+    #[cfg_attr(feature = "serde", serde(with = "crate::rows"))]
     pub covariance: DMatrix<f64>,
     /// That noise: standard deviation of a pixel coordinate, px.
     pub sigma_px: f64,

@@ -20,7 +20,7 @@ use super::Ratio;
 use super::root::root;
 use super::slopes::{Estimated, Slopes};
 use crate::board::View;
-use crate::calibrate::{Covariance, locate};
+use crate::calibrate::{Covariance, LensCalibration, locate};
 use crate::camera::{Camera, Lens};
 use crate::distribution::{ChiSquare, fisher_tail};
 use crate::evaluate::Interval;
@@ -40,8 +40,17 @@ pub struct Estimate<'a> {
     pub degrees_of_freedom: Option<usize>,
 }
 
+impl<'a> From<&'a LensCalibration> for Estimate<'a> {
+    fn from(calibration: &'a LensCalibration) -> Estimate<'a> {
+        let LensCalibration { camera, covariance, sigma_px, degrees_of_freedom, .. } = calibration;
+        let degrees_of_freedom = Some(*degrees_of_freedom);
+        Estimate { camera, covariance, sigma_px: *sigma_px, degrees_of_freedom }
+    }
+}
+
 /// An error with its prediction.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Outcome {
     /// Points.
@@ -60,6 +69,7 @@ pub struct Outcome {
 
 /// A view that the calibration had not seen.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Unseen {
     /// Its pose, the camera held.
@@ -72,6 +82,7 @@ pub struct Unseen {
 
 /// Whether the new views ask for another camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct CameraTest {
     /// Squared length of `(G + G^2)^(-1/2) b`.
@@ -84,6 +95,7 @@ pub struct CameraTest {
 
 /// What new views say of a calibration.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct HoldOut {
     /// View by view.
@@ -156,18 +168,13 @@ pub enum HoldOutError {
 ///     scene.observe(0.1, &mut Stream::open(StreamKey { seed: 1, scenario: "hold-out", trial, purpose: "noise" }))
 /// };
 /// let result = calibrate_lens(&photographs(0), &Settings::standard())?;
-/// let estimate = |camera| Estimate {
-///     camera,
-///     covariance: &result.covariance,
-///     sigma_px: result.sigma_px,
-///     degrees_of_freedom: Some(result.degrees_of_freedom),
-/// };
+/// let estimate = Estimate::from(&result);
 /// let new = photographs(1);
-/// let right = hold_out(&estimate(&result.camera), &new, 0.01)?;
+/// let right = hold_out(&estimate, &new, 0.01)?;
 /// assert!(right.holds() && right.together.predicted_px > right.together.noise_alone_px);
 /// // The same camera after its lens was turned by two percent.
 /// let turned = calibench::camera::Camera { fx: 1.02 * result.camera.fx, fy: 1.02 * result.camera.fy, ..result.camera };
-/// assert!(!hold_out(&estimate(&turned), &new, 0.01)?.holds());
+/// assert!(!hold_out(&Estimate { camera: &turned, ..estimate }, &new, 0.01)?.holds());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn hold_out(estimate: &Estimate, views: &[View], false_alarm: f64) -> Result<HoldOut, HoldOutError> {

@@ -52,6 +52,7 @@ impl Calibrated<'_> {
 
 /// A test of whether two calibrations are of one camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct OneCamera {
     /// Squared Mahalanobis distance of the difference that is left.
     pub chi_squared: f64,

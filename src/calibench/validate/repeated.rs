@@ -20,6 +20,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// What repeated calibrations say together.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Agreement {
     /// Scatter of the parameters about their weighted mean.
@@ -128,15 +129,7 @@ pub enum RepeatedError {
 ///     calibrate_lens(&scene.observe(0.1, &mut Stream::open(key)), &Settings::standard())
 /// };
 /// let results: Vec<LensCalibration> = (0..3).map(again).collect::<Result<_, _>>()?;
-/// let estimates: Vec<Estimate> = results
-///     .iter()
-///     .map(|r| Estimate {
-///         camera: &r.camera,
-///         covariance: &r.covariance,
-///         sigma_px: r.sigma_px,
-///         degrees_of_freedom: Some(r.degrees_of_freedom),
-///     })
-///     .collect();
+/// let estimates: Vec<Estimate> = results.iter().map(Estimate::from).collect();
 /// let agreement = repeated(&estimates, (640, 480), 0.01)?;
 /// assert!(agreement.holds() && agreement.degrees_of_freedom == 12);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -6,12 +6,11 @@ use super::models::{self, Comparison};
 use super::optics::Optics;
 use super::view_names::ViewNames;
 use super::{
-    Arguments, Exit, Failure, Format, Intervals, ModelChoice, advice, maps, page, plots, poses, print,
-    scatter, table, warn,
+    Arguments, Exit, Failure, Format, ModelChoice, advice, maps, page, plots, poses, print, scatter, table,
+    warn,
 };
 use calibench::board::{Board, View};
-use calibench::calibrate::{Loss, Prior, ProfileInterval, Settings};
-use calibench::camera::Model;
+use calibench::calibrate::ProfileInterval;
 use calibench::detect::Orientation;
 use calibench::geometry::Vec2;
 use calibench::io::formats::corner_text;
@@ -59,9 +58,6 @@ pub(super) struct Observed {
     pub(super) notes: Vec<String>,
 }
 
-/// Coverage of the intervals: what a certificate of measurement states.
-const COVERAGE: f64 = 0.95;
-
 /// A mark may lie this part of the image's longer side beyond the centres of the outermost pixels, one pixel
 /// at least: its border is half a pixel away, files that count pixels from 1 add half a pixel, and what noise
 /// adds to marks at the border is no other image's size.
@@ -108,27 +104,7 @@ impl Observed {
 
 pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, Failure> {
     observed.refuse_marks_outside()?;
-    let model = match arguments.model {
-        Some(ModelChoice::Of(model)) => model,
-        Some(ModelChoice::Auto) | None => Model::default(),
-    };
-    let free = arguments.free.unwrap_or(model.standard_free());
-    let mut settings =
-        Settings::new(free).with_model(model).with_loss(arguments.loss.unwrap_or(Loss::Squares));
-    settings.board = arguments.bow.unwrap_or_default();
-    settings.image_size = observed.image_size;
-    if arguments.intervals == Some(Intervals::Profile) {
-        settings = settings.with_profile_intervals(COVERAGE);
-    }
-    for &(parameter, value) in &arguments.fix {
-        settings = settings.hold(parameter, value);
-    }
-    for &Prior { parameter, mean, standard_deviation } in &arguments.prior {
-        settings = settings.with_prior(parameter, mean, standard_deviation);
-    }
-    if let Some(ratio) = arguments.tie {
-        settings = settings.tie_focal_lengths(ratio);
-    }
+    let mut settings = arguments.settings(observed.image_size);
     let comparison = match arguments.model {
         Some(ModelChoice::Auto) => Some(models::compare(&observed, &mut settings)?),
         _ => None,

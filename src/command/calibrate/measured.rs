@@ -1,9 +1,9 @@
 //! A camera from a corner file and the measured places of its marks: `calibrate CORNERS.csv --target TARGET.csv`.
 
 use super::optics::Optics;
-use super::{Arguments, Exit, Failure, Format, ModelChoice, print, table, unended};
-use calibench::calibrate::{Loss, Prior, Settings, in_words};
-use calibench::camera::{Model, Parameter};
+use super::{Arguments, Exit, Failure, Format, print, table, unended};
+use calibench::calibrate::in_words;
+use calibench::camera::Parameter;
 use calibench::geometry::{Vec2, Vec3};
 use calibench::io::input::{MOST_TABLE_BYTES, read_named};
 use calibench::io::{
@@ -26,7 +26,7 @@ pub(super) fn run(arguments: &Arguments, corners: &Path, target: &Path) -> Resul
     let seen = parse_seen(&name, &bytes).map_err(|error| error.to_string())?;
     super::camera::refuse_marks_outside(&name, arguments.image_size, &pixels(&seen))?;
     let noise = arguments.sigma.map_or(Noise::Estimated, |sigma_px| Noise::Known { sigma_px });
-    let found = calibrate_measured(&measured, &seen.views, &settings(arguments), noise)
+    let found = calibrate_measured(&measured, &seen.views, &arguments.settings(arguments.image_size), noise)
         .map_err(|error| format!("{name}: {}", refusal_by_names(&error, &seen.view_names)))?;
     let mut notes: Vec<String> = [(&target_name, &target_bytes), (&name, &bytes)]
         .into_iter()
@@ -62,24 +62,6 @@ fn read(file: &Path) -> Result<(String, Vec<u8>), String> {
 fn pixels(seen: &SeenFile) -> Vec<(&str, Vec2)> {
     let views = seen.view_names.iter().zip(&seen.views);
     views.flat_map(|(name, view)| view.marks().iter().map(move |m| (name.as_str(), m.pixel))).collect()
-}
-
-fn settings(arguments: &Arguments) -> Settings {
-    let model = match arguments.model {
-        Some(ModelChoice::Of(model)) => model,
-        Some(ModelChoice::Auto) | None => Model::default(),
-    };
-    let free = arguments.free.unwrap_or(model.standard_free());
-    let mut settings =
-        Settings::new(free).with_model(model).with_loss(arguments.loss.unwrap_or(Loss::Squares));
-    settings.image_size = arguments.image_size;
-    for &(parameter, value) in &arguments.fix {
-        settings = settings.hold(parameter, value);
-    }
-    for &Prior { parameter, mean, standard_deviation } in &arguments.prior {
-        settings = settings.with_prior(parameter, mean, standard_deviation);
-    }
-    arguments.tie.map_or(settings.clone(), |ratio| settings.tie_focal_lengths(ratio))
 }
 
 /// All or none, `result.json` last.

@@ -31,7 +31,8 @@ fn refuse_what_is_not_there(reference: &str) -> Result<(), Stop> {
             || std::env::var_os("PATH")
                 .is_some_and(|all| std::env::split_paths(&all).any(|f| by_the_shell(&f)))
     };
-    let there = path.exists() || (!reference.contains('/') && on_path());
+    let is_bare = path.components().count() == 1;
+    let there = path.exists() || (is_bare && on_path());
     if is_a_name && !there {
         return Err(usage(format!(
             "{} is neither there as a folder nor as a program: a reference is a folder that `calibench gate --record` wrote, a \

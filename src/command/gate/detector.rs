@@ -1,10 +1,8 @@
 //! `calibench gate --detector`: is a detector of calibration boards to be trusted?
 
-use super::super::calibrate::Format;
+use super::super::Exit;
 use super::super::program::timeout;
-use super::super::{Exit, print};
-use super::{Arguments, Size, Stop, incomplete, usage};
-use calibench::io::write_atomically;
+use super::{Arguments, Size, Stop, incomplete, tell, usage};
 use calibench_detector_gate::protocol::Kind;
 use calibench_detector_gate::{Builtin, Detector, MOST_PHOTOS, Program, QUICK, THOROUGH, run as judge};
 
@@ -27,14 +25,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Stop> {
     let kinds = if arguments.boards.is_empty() { &Kind::ALL[..] } else { &arguments.boards };
     let report = judge(detector.as_mut(), kinds, arguments.seed, photos, arguments.false_alarms)
         .map_err(incomplete)?;
-    if let Some(path) = &arguments.json {
-        write_atomically(path, report.to_json().as_bytes()).map_err(incomplete)?;
-    }
-    match arguments.format {
-        Format::Text => print(&report.to_text()),
-        Format::Json => print(&report.to_json()),
-    }
-    Ok(if report.trusted { Exit::Held } else { Exit::Deviates })
+    tell(arguments, &report.to_json(), &report.to_text(), report.trusted)
 }
 
 /// A kind of board by its name.

@@ -1,9 +1,8 @@
 //! `calibench gate --hand-eye`: is a solver to be trusted that finds where a camera sits on a robot?
 
-use super::super::calibrate::Format;
 use super::super::program::timeout;
 use super::super::{Exit, print, warn};
-use super::{Arguments, Size, Stop, incomplete, terms, usage};
+use super::{Arguments, Size, Stop, incomplete, tell, terms, usage};
 use calibench::io::write_atomically;
 use calibench_gate::THOROUGH;
 use calibench_hand_eye_gate::{Builtin, MOST_SAMPLES, Program, QUICK, Report, Solver, run as judge};
@@ -39,14 +38,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Stop> {
         None => Box::new(Builtin),
     };
     let report = judged(arguments, solver.as_mut())?;
-    if let Some(path) = &arguments.json {
-        write_atomically(path, report.to_json().as_bytes()).map_err(incomplete)?;
-    }
-    match arguments.format {
-        Format::Text => print(&report.to_text()),
-        Format::Json => print(&report.to_json()),
-    }
-    Ok(if report.trusted { Exit::Held } else { Exit::Deviates })
+    tell(arguments, &report.to_json(), &report.to_text(), report.trusted)
 }
 
 fn judged(arguments: &Arguments, solver: &mut dyn Solver) -> Result<Report, Stop> {

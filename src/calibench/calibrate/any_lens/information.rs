@@ -13,6 +13,21 @@ use crate::geometry::{Pose, Vec2, Vec3};
 /// How well the marks `points` of a flat board, seen in these poses, separate the free parameters of a camera, and
 /// `(J^T J)^-1`, the covariance of camera and poses for noise of 1 px a coordinate: see [`super::super::information`].
 /// The covariance is `None` where `J^T J` is singular; all is `None` where the lens has no image of a mark.
+///
+/// ```
+/// use calibench::calibrate::lens_information;
+/// use calibench::camera::{FreeParameters, Parameter};
+/// use calibench::synth::Truth;
+///
+/// // Before any photograph is taken: how well would four views tell the focal length, with noise of 0.1 px?
+/// let truth = Truth::example();
+/// let (_, unit) =
+///     lens_information(&truth.camera.into(), FreeParameters::STANDARD, &truth.cam_from_target, &truth.points)
+///         .expect("every mark has an image");
+/// let covariance = unit.expect("the views determine the camera").scaled(0.1 * 0.1);
+/// let deviation = covariance.standard_deviation(Parameter::Fx).expect("fx is free");
+/// assert!((0.5..0.9).contains(&deviation));
+/// ```
 pub fn lens_information(
     camera: &Camera<Lens>,
     free: FreeParameters,

@@ -54,6 +54,28 @@ const FEWEST_BEYOND: usize = 2;
 ///
 /// # Errors
 /// See [`CodedError`]; a grid of another size or spacing too, where enough of it is seen to tell.
+///
+/// ```
+/// use calibench::detect::{AprilGrid, seen_april_grid};
+/// use calibench::geometry::Vec2;
+/// use calibench::synth::Truth;
+/// use calibench::synth::render::{Imaging, photograph_dark};
+/// use calibench::synth::scene::looking_at_centre;
+///
+/// // Tags of 9 mm, 2.7 mm apart, about the board's middle; Kalibr's y points up, the camera's down.
+/// let grid = AprilGrid::new(5, 3, 0.3)?;
+/// let middle = 0.5 * Vec2::new(5.0 + 4.0 * 0.3, 3.0 + 2.0 * 0.3);
+/// let on_board = |p: Vec2| 9.0 * Vec2::new(p.x - middle.x, middle.y - p.y);
+/// let sorted = |[a, b]: [Vec2; 2]| [a.inf(&b), a.sup(&b)];
+/// let dark: Vec<[Vec2; 2]> = grid.dark().into_iter().map(|square| sorted(square.map(on_board))).collect();
+/// let marks: Vec<Vec2> = grid.points().into_iter().map(on_board).collect();
+/// let (camera, pose) = (Truth::example_camera(), looking_at_centre([20.0, -10.0, 5.0], 150.0));
+/// let imaging = Imaging { blur_px: 0.6, ..Imaging::default() };
+/// let photo = photograph_dark(&camera, Truth::EXAMPLE_IMAGE, &dark, &marks, &pose, &imaging)?;
+/// let seen = seen_april_grid(&photo.image, &grid)?;
+/// assert_eq!((seen.places_px().len(), seen.missing()), (60, 0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn seen_april_grid<T: Level>(image: &Raster<T>, grid: &AprilGrid) -> Result<SeenBoard, CodedError> {
     let search = Search { pyramid: Pyramid::new(image), grid };
     let mut found = Found { best: None, failure: CodedError::NoCorners { seen: 0 } };
