@@ -1,39 +1,55 @@
 //! Which readers meet untrusted bytes? Each as a function of bytes that must end, and must not panic, whatever they are.
 
+use calibench::calibrate::{Loss, Settings, calibrate};
 use calibench::camera::FreeParameters;
+use calibench::downstream::{MapModel, register};
+use calibench::geometry::Vec2;
 use calibench::io::formats::{
     FORMATS, VnlBoard, Wishes, detect, parse_target, parse_vnl, read_camera_file, write_camera_file,
 };
 use calibench::io::image::{parse_extent, parse_image};
 use calibench::io::measured::parse_target as parse_measured_target;
-use calibench::io::result::parse_camera;
+use calibench::io::result::{parse_camera, parse_lens_camera};
 use calibench::io::robot::parse_robot;
 use calibench::io::scene_tables::{parse_target_marks, parse_target_poses};
 use calibench::io::{
-    memory, parse_checks, parse_corners, parse_known, parse_marks, parse_pixel_ends, parse_point_pairs,
-    parse_seen, parse_spatial, table,
+    Grey, memory, misplaced_marks, parse_checks, parse_corners, parse_known, parse_marks, parse_pixel_ends,
+    parse_point_pairs, parse_seen, parse_spatial, table,
 };
 use calibench::photos::{BoardSpec, parse_board_file};
+use calibench::planar::{PlaneModel, calibrate_plane};
+use calibench::raster::Raster;
+use calibench::rectify::{Projection, RectifyMap};
+use calibench::tsai::{Assumed, two_stage};
+use calibench_detector_gate::protocol as detector;
+use calibench_gate::Allowance;
 use calibench_gate::accept::{accept, id_in, read_line};
+use calibench_gate::certified::{DigitsTable, read_with};
 use calibench_gate::greeting::Greeting;
+use calibench_gate::power::Measured;
 use calibench_gate::protocol::{Problem, ProblemView};
-use calibench_harness::golden;
-use calibench_study::{Checkpoint, Manifest, Shard, Spec};
+use calibench_hand_eye_gate::protocol as hand_eye;
+use calibench_harness::{golden, published};
+use calibench_study::{Checkpoint, Inputs, Manifest, Shard, Spec, trial_of_line};
 
 /// A reader under its name: it is given bytes, and must return.
 pub type Reader = (&'static str, fn(&[u8]));
 
 /// The readers by name; the seeds of each stand in `fuzz/seeds/<name>/`.
-pub const READERS: [Reader; 12] = [
+pub const READERS: [Reader; 16] = [
     ("corners", corners),
     ("pairs", pairs),
+    ("solved", solved),
     ("camera", camera),
     ("formats", formats),
     ("study", study),
     ("manifest", manifest),
     ("checkpoint", checkpoint),
+    ("trials", trials),
     ("answer", answer),
+    ("tables", tables),
     ("image", image),
+    ("photograph", photograph),
     ("words", words),
     ("snapshot", snapshot),
     ("page", page),
@@ -43,6 +59,7 @@ pub const READERS: [Reader; 12] = [
 pub fn corners(bytes: &[u8]) {
     let _ = table::columns(bytes);
     let _ = parse_corners("corners", bytes);
+    let _ = misplaced_marks("corners", bytes);
     let _ = parse_spatial("spatial", bytes);
     let _ = parse_seen("seen", bytes);
     let _ = parse_measured_target("target", bytes);
@@ -61,11 +78,49 @@ pub fn pairs(bytes: &[u8]) {
     }
 }
 
-/// Results and cameras.
+/// Most points of a table that these tests calibrate from.
+const FEW_MARKS: usize = 60;
+
+/// What is computed from tables that can be read: a camera, Tsai's camera, the map of a plane, where a part lies.
+pub fn solved(bytes: &[u8]) {
+    if let Ok(corners) = parse_corners("corners", bytes)
+        && corners.views.iter().map(|view| view.len()).sum::<usize>() <= FEW_MARKS
+    {
+        let _ = calibrate(&corners.views, &Settings::standard());
+    }
+    if let Ok(spatial) = parse_spatial("spatial", bytes) {
+        for view in spatial.views.iter().filter(|view| view.len() <= FEW_MARKS).take(2) {
+            let _ = two_stage(view, &Assumed::centre_of((640, 480)));
+            let _ = two_stage(view, &Assumed { principal_point_px: Vec2::zeros(), fy_per_fx: None });
+        }
+    }
+    if let Ok(pairs) = parse_point_pairs("pairs", bytes)
+        && pairs.pixels.len() <= FEW_MARKS
+    {
+        for model in [PlaneModel::Affine, PlaneModel::Projective, PlaneModel::Similarity] {
+            let _ = calibrate_plane(model, &pairs.pixels, &pairs.world);
+        }
+    }
+    if let Ok(marks) = parse_marks("marks", bytes)
+        && marks.marks.len() <= FEW_MARKS
+    {
+        let turned: Vec<_> = marks.marks.iter().rev().copied().collect();
+        for loss in [Loss::Squares, Loss::Huber { delta_px: 1.0 }] {
+            let _ = register(MapModel::Rigid, &marks.marks, &turned, loss);
+            let _ = register(MapModel::Affine, &marks.marks, &turned, loss);
+        }
+    }
+}
+
+/// Results and cameras, and where the pixels of a small image lie through those.
 pub fn camera(bytes: &[u8]) {
     let text = String::from_utf8_lossy(bytes);
     let _ = parse_camera("camera", &text);
     let _ = parse_known("known", &text);
+    let Ok((camera, _)) = parse_lens_camera("camera", &text) else { return };
+    for projection in [Projection::Pinhole, Projection::Equidistant, Projection::Equirectangular] {
+        let _ = RectifyMap::through_lens(&camera, (16, 12), projection);
+    }
 }
 
 /// Cameras, corners and boards in the files of other programs: the same bytes as every format, and what is read written as every one.
@@ -113,7 +168,16 @@ pub fn checkpoint(bytes: &[u8]) {
     let _ = serde_json::from_slice::<Checkpoint>(bytes);
 }
 
-/// Answers of a solver, read and checked.
+/// Lines of trials, and the files that a study named, as they stand in a run's folder.
+pub fn trials(bytes: &[u8]) {
+    let text = String::from_utf8_lossy(bytes);
+    for quantities in [0, 3] {
+        text.lines().for_each(|line| _ = trial_of_line(line, quantities));
+    }
+    let _ = Inputs::parse(&text);
+}
+
+/// Answers of a solver, a detector or a hand-eye solver, read and checked.
 pub fn answer(bytes: &[u8]) {
     let line = String::from_utf8_lossy(bytes);
     let _ = id_in(&line);
@@ -131,6 +195,33 @@ pub fn answer(bytes: &[u8]) {
     if let Ok(answer) = read_line(&line) {
         let _ = accept(&problem, answer);
     }
+    if let Ok(answer) = serde_json::from_str::<detector::Answer>(&line) {
+        let (kind, markers) = (detector::Kind::Circles, None);
+        let _ = answer.places(&detector::Wanted { kind, columns: 2, rows: 2, markers });
+    }
+    if let Ok(answer) = serde_json::from_str::<hand_eye::Answer>(&line) {
+        let _ = (answer.pose(), answer.covariance());
+    }
+}
+
+/// What the gate reads beside answers: failures that are known, measurements of itself, digits, certified problems, and the numbers of the chapter.
+pub fn tables(bytes: &[u8]) {
+    let text = String::from_utf8_lossy(bytes);
+    let _ = Allowance::of_toml(&text);
+    // Three tables in one seed.
+    let mut parts = text.splitn(3, "---\n");
+    let mut part = || parts.next().unwrap_or_default();
+    if let Ok(measured) = Measured::of_csv([part(), part(), part()]) {
+        let _ = (measured.wrong(), measured.to_markdown());
+    }
+    if let Ok(table) = DigitsTable::of_csv(&text) {
+        let _ = (table.to_markdown(), table.to_text());
+    }
+    let sums = format!("{}  a.json\n", calibench::io::sha256_hex(text.as_bytes()));
+    let _ = read_with(|name| Ok(if name == "SHA256SUMS" { sums.clone() } else { text.to_string() }));
+    for value in published::parse(&text).unwrap_or_default() {
+        let _ = (value.rounding(), value.rounds_from(0.5));
+    }
 }
 
 /// Memory for an image in these tests.
@@ -141,6 +232,33 @@ pub fn image(bytes: &[u8]) {
     if parse_extent(bytes, "image").is_ok_and(|extent| extent.memory_to_detect() <= MEMORY) {
         let _ = parse_image(bytes, "image");
     }
+}
+
+/// A board of every kind.
+const BOARDS: [&str; 7] = [
+    "chess:4x3:1",
+    "circles:4x3:1",
+    "asymmetric:3x4:1",
+    "hexagonal:4x4:1",
+    "dots:2x2:1",
+    "charuco:5x4:30mm:22mm:DICT_4X4_50",
+    "aprilgrid:2x2:30mm:0.3",
+];
+/// Most rows of a photograph of these tests.
+const FEW_ROWS: usize = 128;
+
+/// A photograph in which a board is looked for: the first byte says which, the second how wide it is, the others are its levels.
+pub fn photograph(bytes: &[u8]) {
+    let [board, width, levels @ ..] = bytes else { return };
+    let width = usize::from(*width).max(1);
+    let height = (levels.len() / width).min(FEW_ROWS);
+    // No file gives an image without pixels.
+    if height == 0 {
+        return;
+    }
+    let Ok(image) = Raster::from_samples(width, height, levels[..width * height].to_vec()) else { return };
+    let board = BOARDS[usize::from(*board) % BOARDS.len()].parse::<BoardSpec>().expect("it is a board");
+    let _ = board.see(&Grey::U8(image));
 }
 
 /// Boards, parameters, shards and sizes as they stand on the command line.

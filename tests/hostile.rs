@@ -195,6 +195,74 @@ fn a_photograph_that_needs_more_memory_than_there_is_is_refused_before_it_is_dec
 }
 
 #[test]
+fn a_photograph_of_another_size_than_the_cameras_is_refused_before_it_is_decoded() {
+    let folder = folder("other-size");
+    // The file has none of its pixels: whoever decodes it finds it broken.
+    fs::write(folder.join("photo.pgm"), "P5\n64 48\n255\n").expect("written");
+    let camera = r#"{"camera": {"fx": 600, "fy": 600, "cx": 320, "cy": 240}, "image_size": [640, 480]}"#;
+    fs::write(folder.join("camera.json"), camera).expect("written");
+    refused(
+        &folder,
+        &["undistort", "--camera", "camera.json", "--out", "o", "photo.pgm"],
+        &["photo.pgm: 64 x 48 px, but camera.json is of 640 x 480 px images"],
+    );
+}
+
+#[test]
+fn a_length_comes_where_the_noise_has_hardly_a_part_and_numbers_without_end_are_refused() {
+    let folder = folder("numbers-without-end");
+    fs::write(folder.join("c.csv"), corner_file()).expect("written");
+    let made = limited(&folder, &["calibrate", "c.csv", "--image-size", "640x480", "--out", "run"]);
+    assert_eq!(made.status.code(), Some(0), "{}", text(&made.stderr));
+    let measure = ["measure", "run/result.json", "--view", "0", "--pixels", "200,200,300,250", "--mark-sd"];
+    // Effective degrees of freedom without end, of which Student's quantile never came.
+    for deviation in ["1e-9", "0.1", "1e30"] {
+        let output = within(PATIENCE, &folder, &[&measure[..], &[deviation]].concat());
+        assert_eq!(output.status.code(), Some(0), "{deviation}: {}", text(&output.stderr));
+        assert!(text(&output.stdout).contains("interval of 95 %"), "{}", text(&output.stdout));
+    }
+    fs::write(folder.join("m.csv"), "point,X,Y\n1,0,0\n2,10,0\n3,0,10\n4,10,10\n").expect("written");
+    fs::write(folder.join("h.csv"), "when,value\n1,10\n2,10.1\n").expect("written");
+    let check = ["check-reference", "h.csv", "--reference", "10", "--sd"];
+    refused(&folder, &["register", "m.csv", "m.csv", "--at", "1e308,0"], &["1e30"]);
+    refused(&folder, &[&check[..], &["1e308"]].concat(), &["1e30"]);
+    refused(&folder, &["check-reference", "h.csv", "--sd", "1", "--reference", "-1e308"], &["1e30"]);
+}
+
+/// A slip in one line of a file that says where each mark is again and again.
+#[test]
+fn a_mark_that_one_view_has_at_another_place_than_all_others_is_named() {
+    let folder = folder("misplaced");
+    let corners = corner_file();
+    let (number, line) = corners.lines().enumerate().nth(200).expect("a line");
+    let fields: Vec<&str> = line.split(',').collect();
+    let x: f64 = fields[2].parse().expect("a number");
+    let with = |x: f64| {
+        let moved = [fields[0], fields[1], &x.to_string(), fields[3], fields[4], fields[5]].join(",");
+        fs::write(folder.join("c.csv"), corners.replace(line, &moved)).expect("written");
+        let output = limited(&folder, &["calibrate", "c.csv"]);
+        assert_eq!(output.status.code().map(|code| code == 2), Some(false), "{}", text(&output.stderr));
+        text(&output.stdout) + &text(&output.stderr)
+    };
+    let place = format!("c.csv:{}: point", number + 1);
+    let said = with(x + 2.5);
+    let sentence = format!("{place} '{}' of view '{}' is at ({}, ", fields[1], fields[0], x + 2.5);
+    assert!(said.contains(&sentence) && said.contains("in all 3 other views"), "{said}");
+    assert!(!with(x).contains(&place), "{}", with(x));
+}
+
+#[test]
+fn names_of_many_marks_are_compared_in_their_order_and_not_each_with_all() {
+    let folder = folder("many-names");
+    let marks: String = (0..150_000).map(|i| format!("mark{i},{},{}\n", i % 400, i / 400)).collect();
+    fs::write(folder.join("m.csv"), format!("point,X,Y\n{marks}")).expect("written");
+    let started = Instant::now();
+    let output = limited(&folder, &["register", "m.csv", "m.csv", "--format", "json", "--out", "o"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert!(started.elapsed() < PATIENCE, "{:?}", started.elapsed());
+}
+
+#[test]
 fn marks_outside_of_the_image_are_refused_and_swapped_sides_are_named() {
     let folder = folder("image-size");
     fs::write(folder.join("c.csv"), corner_file()).expect("written");

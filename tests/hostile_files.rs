@@ -69,6 +69,47 @@ fn a_pipe_blocks_nobody_and_headers_are_read_as_csv_has_them() {
     assert!(text(&output.stdout).contains("world from pixel"), "{output:?}");
 }
 
+/// Linux calls it a regular file, and reading it waits for the next message of the system, where this user may read it at all.
+#[test]
+fn a_file_of_the_system_that_waits_for_its_next_line_blocks_nobody() {
+    let folder = folder("waiting");
+    let name = "/proc/kmsg";
+    fs::write(folder.join("camera.json"), r#"{"camera": {"fx": 600, "fy": 600, "cx": 320, "cy": 240}}"#)
+        .expect("written");
+    for arguments in [
+        &["calibrate", name][..],
+        &["calibrate", "--board", "dots:3x3:1", name],
+        &["undistort", "--camera", name, "--out", "o", "a.png"],
+        &["convert", name, "o.xml"],
+        &["study", "run", name],
+        &["gate", "--allow", name],
+    ] {
+        refused(&folder, arguments, &[name]);
+    }
+}
+
+#[test]
+fn a_pipe_in_the_place_of_a_boards_file_blocks_nobody_and_is_left_as_it_is() {
+    let folder = folder("board-pipe");
+    assert!(Command::new("mkfifo").arg(folder.join("board.toml")).status().expect("mkfifo").success());
+    let output = within(PATIENCE, &folder, &["board", "circles:9x7:10mm:3mm", "--out", "."]);
+    let said = text(&output.stderr);
+    assert!(output.status.code() == Some(3) && said.contains("board.toml"), "{:?} {said}", output.status);
+    assert!(!folder.join("board.pdf").exists(), "half of what belongs together");
+}
+
+#[test]
+fn nothing_is_written_to_a_file_of_the_name_of_standard_output() {
+    let folder = folder("standard-output");
+    fs::write(folder.join("camera.json"), r#"{"camera": {"fx": 600, "fy": 600, "cx": 320, "cy": 240}}"#)
+        .expect("written");
+    let output = "- is no file to write";
+    refused(&folder, &["convert", "camera.json", "-", "--to", "opencv-yaml"], &[output]);
+    refused(&folder, &["convert", "chess:9x6:25mm", "-"], &[output]);
+    refused(&folder, &["gate", "--samples", "1", "--json", "-"], &[output]);
+    assert!(!folder.join("-").exists());
+}
+
 #[test]
 fn a_pipe_in_the_place_of_a_table_or_of_a_record_blocks_nobody() {
     let folder = folder("pipes-for-tables");
@@ -351,6 +392,7 @@ fn a_line_break_in_a_name_begins_no_line_of_a_message() {
         &["study", "run", name],
         &["study", "resume", name],
         &["study", "merge", name, "--out", "w"],
+        &["explain", name],
         &["gate", "--judge", name],
         &["gate", "--power-table", name],
         &["run", "nine-point", "--image", name],

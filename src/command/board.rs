@@ -12,7 +12,8 @@ pub(super) use named::board_or_file;
 use super::calibrate::Format;
 use super::said::say_written;
 use super::{Exit, warn};
-use calibench::io::{ShownPath, write_together};
+use calibench::io::input::MOST_SPEC_BYTES;
+use calibench::io::{ShownPath, read_regular_text, write_together};
 use calibench::photos::BoardSpec;
 use clap::Args;
 use paper::Paper;
@@ -61,7 +62,7 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
         files.push((place("board.svg"), svg::svg(&sheet).into_bytes()));
     }
     let named = place("board.toml");
-    if std::fs::read_to_string(&named).is_ok_and(|text| named::is_measured(&text)) {
+    if read_regular_text(&named, MOST_SPEC_BYTES).is_ok_and(|text| named::is_measured(&text)) {
         warn(&format!(
             "{}: somebody has measured the rulers of this page; draw the other into a folder of its own (--out DIR), or remove this file first",
             named.shown()

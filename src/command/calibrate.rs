@@ -10,8 +10,8 @@ use calibench::camera::{FreeParameters, Model, Parameter, UnknownModel};
 use calibench::io::ShownPath;
 use calibench::io::input::{MOST_SIDE_PX, MOST_TABLE_BYTES, read_named};
 use calibench::io::memory::{DEFAULT_MEMORY, parse_bytes};
-use calibench::io::parse_corners;
 use calibench::io::table::{columns, unended_line};
+use calibench::io::{misplaced_marks, parse_corners};
 use calibench::photos::BoardSpec;
 use calibench::planar::PlaneModel;
 use camera::Observed;
@@ -358,7 +358,8 @@ fn from_table(arguments: &Arguments, file: &Path) -> Result<Exit, Failure> {
     let flat = has(&["Z"]).then(|| {
         format!("{name}: its column Z is not read, and every mark taken for one of a plane: --target takes marks in space, `calibench tsai` one view of them")
     });
-    let notes = unended(&name, &bytes).into_iter().chain(flat).collect();
+    let misplaced = misplaced_marks(&name, &bytes).map_err(|error| error.to_string())?;
+    let notes = unended(&name, &bytes).into_iter().chain(flat).chain(misplaced).collect();
     let observed = Observed {
         title: if file.as_os_str() == "-" { name.clone() } else { last_part(file) },
         unit: "target units".to_string(),
@@ -415,6 +416,8 @@ pub(super) fn views_of(
     let source = file.shown();
     unended(&source, &bytes).iter().for_each(|said| warn(&format!("warning: {said}")));
     let corners = parse_corners(&source, bytes.as_slice()).map_err(|error| error.to_string())?;
+    let misplaced = misplaced_marks(&source, &bytes).map_err(|error| error.to_string())?;
+    misplaced.iter().for_each(|said| warn(&format!("warning: {said}")));
     Ok(Views { source, names: corners.view_names, views: corners.views, discs: None, light: Vec::new() })
 }
 

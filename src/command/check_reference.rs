@@ -2,7 +2,7 @@
 //! again and again.
 
 use super::calibrate::Format;
-use super::said::{number_that, positive, written_by};
+use super::said::{MOST, number_that, positive, written_by};
 use super::{Exit, print, warn};
 use calibench::downstream::control::{Ewma, Rule, Shewhart};
 use calibench::io::input::{MOST_TABLE_BYTES, read_regular};
@@ -52,7 +52,7 @@ pub(super) struct Arguments {
 }
 
 fn parse_finite(text: &str) -> Result<f64, String> {
-    number_that(text, |_| true, "a number")
+    number_that(text, |x| x.abs() <= MOST, "a number of at most 1e30")
 }
 
 fn parse_rate(text: &str) -> Result<f64, String> {

@@ -1,7 +1,7 @@
 //! `calibench convert IN OUT`: a camera, corners or a board from the file of one program to that of another.
 
 use super::calibrate::{Format as Shown, parse_size, unended};
-use super::said::written_by;
+use super::said::{refuse_standard_output, written_by};
 use super::{Exit, print, warn};
 use calibench::io::ShownPath;
 use calibench::io::formats::{
@@ -159,6 +159,7 @@ impl Converted {
 
 /// The kind of IN decides what OUT can be.
 fn converted(arguments: &Arguments, from: &Path, to: &Path) -> Result<Converted, String> {
+    refuse_standard_output(to)?;
     if let Some(Ok(board)) = from.to_str().map(str::parse::<BoardSpec>) {
         return board_to_target(&board);
     }

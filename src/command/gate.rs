@@ -7,7 +7,7 @@ mod hand_eye;
 mod power;
 
 use super::calibrate::Format;
-use super::said::say_written;
+use super::said::{refuse_standard_output, say_written};
 use super::terminal::warn_lines;
 use super::{Exit, print, program, warn};
 use calibench::camera::Model;
@@ -198,6 +198,9 @@ fn refuse_one_file_for_two(arguments: &Arguments) -> Result<(), Stop> {
     let reports = [("--json", &arguments.json), ("--junit", &arguments.junit), ("--html", &arguments.html)];
     let named: Vec<(&str, PathBuf)> =
         reports.into_iter().filter_map(|(option, path)| Some((option, place_of(path.as_ref()?)))).collect();
+    for report in [&arguments.json, &arguments.junit, &arguments.html].into_iter().flatten() {
+        refuse_standard_output(report).map_err(usage)?;
+    }
     for (i, (option, place)) in named.iter().enumerate() {
         if let Some((other, _)) = named[..i].iter().find(|(_, other)| other == place) {
             return Err(usage(format!(

@@ -9,9 +9,11 @@ use calibench::calibrate::Covariance;
 use calibench::downstream::{HandEye, Repeatability, SetUp, Stations, hand_eye};
 use calibench::geometry::{Pose, Vec3, rotation};
 use calibench::io::robot::{RobotFile, read_robot};
-use calibench::io::{Known, KnownCalibration, read_known, significant};
+use calibench::io::shown::on_one_line;
+use calibench::io::{Known, KnownCalibration, ShownPath, read_known, significant};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -95,9 +97,10 @@ fn found(arguments: &Arguments) -> Result<Found, String> {
     let of_robot: Vec<Pose> = stations.iter().map(|s| robot.base_from_gripper[s.in_robot]).collect();
     let of_camera: Vec<Pose> = stations.iter().map(|s| known.cam_from_target[s.in_result]).collect();
     let names: Vec<String> = stations.iter().map(|s| robot.views[s.in_robot].clone()).collect();
+    let both: BTreeSet<&String> = names.iter().collect();
     let missing = |views: &[String], file: &PathBuf| -> Vec<String> {
-        let only = views.iter().filter(|view| !names.contains(view));
-        only.map(|view| format!("{view} of {}", file.display())).collect()
+        let only = views.iter().filter(|view| !both.contains(view));
+        only.map(|view| format!("{} of {}", on_one_line(view), file.shown())).collect()
     };
     let alone = [missing(&robot.views, &arguments.robot), missing(&known.views, &arguments.result)].concat();
     let result = hand_eye(&Stations {

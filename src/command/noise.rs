@@ -99,7 +99,9 @@ fn deviation_cell(deviation: &Deviation) -> String {
 }
 
 fn correlation_cell(correlation: Option<Correlation>) -> String {
-    let Some(Correlation { value, interval: Interval { low, high }, .. }) = correlation else {
+    let Some(Correlation { value, interval: Interval { low, high }, .. }) =
+        correlation.filter(|c| c.value.is_finite())
+    else {
         return "-".into();
     };
     format!("{value:+.3} ({low:+.3} to {high:+.3})")
@@ -159,7 +161,12 @@ impl Found {
                 significant(mark.mean_px.y, 7),
                 significant(mark.sigma_px.x, 3),
                 significant(mark.sigma_px.y, 3),
-                format!("{:+.2}", mark.correlation_uv),
+                // Where a coordinate does not scatter there is none.
+                if mark.correlation_uv.is_finite() {
+                    format!("{:+.2}", mark.correlation_uv)
+                } else {
+                    "-".into()
+                },
                 significant(mark.p_value, 2),
             ]);
         }

@@ -4,13 +4,15 @@
 use super::Exit;
 use super::calibrate::Format;
 use super::report::table;
-use super::said::{Said, say, written_by};
+use super::said::{MOST, Said, say, written_by};
 use calibench::calibrate::Loss;
 use calibench::downstream::{MapModel, Mark, Registration, coverage_factor, register};
 use calibench::geometry::Vec2;
-use calibench::io::{MarkFile, read_marks, significant};
+use calibench::io::shown::on_one_line;
+use calibench::io::{MarkFile, ShownPath, read_marks, significant};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -66,11 +68,11 @@ impl From<Model> for MapModel {
 }
 
 fn parse_point(text: &str) -> Result<Vec2, String> {
-    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.abs() <= MOST);
     let (x, y) = text.split_once(',').ok_or("expected X,Y, such as 12.5,40")?;
     match (number(x), number(y)) {
         (Some(x), Some(y)) => Ok(Vec2::new(x, y)),
-        _ => Err("expected two numbers, such as 12.5,40".into()),
+        _ => Err("expected two numbers of at most 1e30, such as 12.5,40".into()),
     }
 }
 
@@ -103,9 +105,10 @@ fn registered(arguments: &Arguments) -> Result<Registered, String> {
     let read = |path: &Path| read_marks(path).map_err(|error| error.to_string());
     let (taught, found) = (read(&arguments.taught)?, read(&arguments.found)?);
     let (names, [taught_marks, found_marks]) = paired(&taught, &found);
+    let shared: BTreeSet<&String> = names.iter().collect();
     let missing = |of: &MarkFile, path: &Path| -> Vec<String> {
-        let only = of.names.iter().filter(|name| !names.contains(name));
-        only.map(|name| format!("{name} of {}", path.display())).collect()
+        let only = of.names.iter().filter(|name| !shared.contains(name));
+        only.map(|name| format!("{} of {}", on_one_line(name), path.shown())).collect()
     };
     let alone = [missing(&taught, &arguments.taught), missing(&found, &arguments.found)].concat();
     let map =
@@ -115,7 +118,7 @@ fn registered(arguments: &Arguments) -> Result<Registered, String> {
             } else {
                 format!("; without a partner: {}", alone.join(", "))
             };
-            format!("{} and {}: {error}{hint}", arguments.taught.display(), arguments.found.display())
+            format!("{} and {}: {error}{hint}", arguments.taught.shown(), arguments.found.shown())
         })?;
     Ok(Registered { names, alone, map })
 }

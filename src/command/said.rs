@@ -41,6 +41,14 @@ pub(super) fn written_by() -> String {
     format!("calibench {}", env!("CARGO_PKG_VERSION"))
 }
 
+/// Refuses `-` as the name of a file that is written: a file of that name would be, which nobody means.
+pub(super) fn refuse_standard_output(file: &Path) -> Result<(), String> {
+    match file.as_os_str() == "-" {
+        true => Err("- is no file to write, and what is said of it goes to standard output: name a file, or ./- for one of that name".into()),
+        false => Ok(()),
+    }
+}
+
 /// Prints one of both forms, JSON as one object on lines of its own.
 pub(super) fn print_as(format: Format, text: impl FnOnce() -> String, json: impl FnOnce() -> Value) {
     match format {
@@ -65,6 +73,9 @@ pub(super) fn number_that(
     number.ok_or_else(|| format!("expected {wanted}"))
 }
 
+/// Most that a number may be with which something is computed, as in a table: its square is a number too.
+pub(super) const MOST: f64 = 1e30;
+
 pub(super) fn positive(text: &str) -> Result<f64, String> {
-    number_that(text, |x| x > 0.0, "a number above 0")
+    number_that(text, |x| x > 0.0 && x <= MOST, "a number above 0, of at most 1e30")
 }

@@ -190,20 +190,12 @@ type Failure = (Exit, String);
 impl Work<'_> {
     fn undistort(&mut self, photo: &Path) -> Result<(), Failure> {
         let wrong = |message: String| (Exit::Usage, message);
-        let needed = image_extent(photo).map_err(|error| wrong(error.to_string()))?.memory_to_correct();
+        // All that a header can tell is asked of it, before anything is decoded.
+        let extent = image_extent(photo).map_err(|error| wrong(error.to_string()))?;
+        self.refuse_other_size(photo, extent.size).map_err(wrong)?;
         let memory = Memory::new(self.arguments.memory);
-        let _taken = memory.take(photo, needed).map_err(|error| wrong(error.to_string()))?;
+        let _taken = memory.take(photo, extent.memory_to_correct()).map_err(|e| wrong(e.to_string()))?;
         let image = read_channels(photo).map_err(|error| wrong(error.to_string()))?;
-        if let Some(expected) = self.image_size
-            && expected != image.size()
-        {
-            let ((width, height), (w, h)) = (image.size(), expected);
-            let camera = self.arguments.camera.shown();
-            return Err(wrong(format!(
-                "{}: {width} x {height} px, but {camera} is of {w} x {h} px images",
-                photo.shown()
-            )));
-        }
         self.prepare(image.size())?;
         let map = &self.maps[&image.size()];
         let output = output_path(&self.arguments.out, photo);
@@ -224,6 +216,20 @@ impl Work<'_> {
         }
         self.written.push(output);
         Ok(())
+    }
+
+    /// A camera is one of images of its size.
+    fn refuse_other_size(&self, photo: &Path, (width, height): Size) -> Result<(), String> {
+        match self.image_size {
+            Some((w, h)) if (w, h) != (width, height) => {
+                let camera = self.arguments.camera.shown();
+                Err(format!(
+                    "{}: {width} x {height} px, but {camera} is of {w} x {h} px images",
+                    photo.shown()
+                ))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Makes the table for a size, and writes the camera of its output.

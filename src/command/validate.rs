@@ -20,6 +20,7 @@ use calibench::validate::{
 };
 use clap::Args;
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -182,7 +183,8 @@ fn refuse_bent_board(arguments: &Arguments, known: &KnownCalibration) -> Result<
 }
 
 fn on_new(arguments: &Arguments, known: &KnownCalibration, views: &Views) -> Result<HoldOut, String> {
-    let seen: Vec<&String> = views.names.iter().filter(|name| known.views.contains(name)).collect();
+    let of_calibration: BTreeSet<&String> = known.views.iter().collect();
+    let seen: Vec<&String> = views.names.iter().filter(|name| of_calibration.contains(name)).collect();
     if !seen.is_empty() {
         let names = seen.iter().map(|name| name.as_str()).collect::<Vec<_>>().join(", ");
         warn(&format!(

@@ -1,6 +1,7 @@
 //! What do commands that measure for minutes share: how they end, go on where they were, and name what they asked?
 
-use calibench::io::write_atomically;
+use calibench::io::input::MOST_TABLE_BYTES;
+use calibench::io::{read_regular_text, write_atomically};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
@@ -48,7 +49,7 @@ pub fn write_unless_current(
     head: &str,
     measured: impl FnOnce() -> Result<String, String>,
 ) -> Result<(), String> {
-    let before = std::fs::read_to_string(path).unwrap_or_default();
+    let before = read_regular_text(path, MOST_TABLE_BYTES).unwrap_or_default();
     if before.lines().next() == Some(head) {
         return Ok(());
     }

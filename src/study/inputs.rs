@@ -39,7 +39,7 @@ impl Inputs {
     }
 
     /// Those that stand in `inputs.json` of a run; `None` if the text is none of that.
-    pub(super) fn parse(text: &str) -> Option<Inputs> {
+    pub fn parse(text: &str) -> Option<Inputs> {
         Some(Inputs(Arc::new(serde_json::from_str(text).ok()?)))
     }
 

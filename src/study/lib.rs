@@ -87,7 +87,7 @@ pub use sketch::Sketch;
 pub use spec::{Estimator, Length, LossChoice, Measure, Precision, SceneSpec, Spec, Trials};
 pub use spec_error::SpecError;
 pub use summary::{CellSummary, Statistic, Summary, summarise};
-pub use tables::columns;
+pub use tables::{columns, trial_of_line};
 pub use target::TargetSpec;
 pub use trial::{Trial, run_trial};
 pub use trial_file::{NoParquet, TrialFile, TrialFileError};

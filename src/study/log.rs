@@ -11,6 +11,7 @@ use super::trial::Trial;
 use super::trial_file::TrialFile;
 use calibench::io::files::Files;
 use calibench::io::hash::hexadecimal;
+use calibench::io::input::open_without_waiting;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fs::{File, OpenOptions};
@@ -148,7 +149,7 @@ impl Folder {
         if hexadecimal(&hash) != checkpoint.sha256 {
             return Err(changed(&path));
         }
-        let file = File::open(&path).map_err(|cause| Located { path: path.clone(), cause })?;
+        let file = open_without_waiting(&path).map_err(|cause| Located { path: path.clone(), cause })?;
         let header = tables::header(&engine.quantities);
         let lines = Lines::open(file, checkpoint.bytes, path, &header, engine.quantities.len())?;
         Ok((Box::new(lines), hash))
@@ -231,7 +232,7 @@ fn changed(path: &Path) -> FolderError {
 /// Hash of the first `bytes` bytes of a file, and how many there were.
 pub(super) fn hash_of(path: &Path, bytes: u64) -> Result<(Sha256, u64), FolderError> {
     let located = |cause: io::Error| Located { path: path.to_path_buf(), cause };
-    let mut file = File::open(path).map_err(located)?.take(bytes);
+    let mut file = open_without_waiting(path).map_err(located)?.take(bytes);
     let (mut hash, mut length, mut buffer) = (Sha256::new(), 0, vec![0; 1 << 16]);
     loop {
         match file.read(&mut buffer) {

@@ -21,6 +21,7 @@ use ::parquet::file::properties::{EnabledStatistics, WriterProperties};
 use ::parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
 use ::parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use ::parquet::schema::types::{Type, TypePtr};
+use calibench::io::input::open_without_waiting;
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -129,7 +130,7 @@ fn counter(trial: &Trial, column: usize) -> i64 {
 
 /// Opens a file for reading; its columns must be those of the study.
 pub(super) fn open(path: &Path, engine: &Engine) -> Result<Box<dyn Source>, FolderError> {
-    let file = File::open(path).map_err(|cause| Located { path: path.to_path_buf(), cause })?;
+    let file = open_without_waiting(path).map_err(|cause| Located { path: path.to_path_buf(), cause })?;
     let reader = SerializedFileReader::new(file).map_err(|error| damaged(path, error.to_string()))?;
     let found = reader.metadata().file_metadata().schema_descr().columns();
     let found: Vec<&str> = found.iter().map(|c| c.name()).collect();

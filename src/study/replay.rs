@@ -62,6 +62,9 @@ impl Replay {
     }
 }
 
+/// Bytes of a line of trials: a thousand times what a study with every quantity has. A file without line ends would be read whole.
+const MOST_LINE_BYTES: u64 = 1 << 20;
+
 /// `trials.csv`, as far as the checkpoint counts it.
 pub(super) struct Lines {
     reader: BufReader<Take<File>>,
@@ -91,9 +94,12 @@ impl Lines {
     /// The next line, without its end; `None` after the last.
     fn next_line(&mut self) -> Result<Option<&str>, FolderError> {
         self.line.clear();
-        let read = self.reader.read_line(&mut self.line);
+        let read = self.reader.by_ref().take(MOST_LINE_BYTES).read_line(&mut self.line);
         let count = read.map_err(|cause| Located { path: self.path.clone(), cause })?;
         self.number += 1;
+        if count as u64 == MOST_LINE_BYTES {
+            return Err(self.damaged("it is longer than any line of trials"));
+        }
         Ok((count > 0).then(|| self.line.trim_end()))
     }
 
@@ -106,7 +112,7 @@ impl Source for Lines {
     fn next(&mut self) -> Result<Option<Trial>, FolderError> {
         let quantities = self.quantities;
         let Some(line) = self.next_line()? else { return Ok(None) };
-        match tables::parse_row(line, quantities) {
+        match tables::trial_of_line(line, quantities) {
             Some(trial) => Ok(Some(trial)),
             None => Err(self.damaged("it is not a trial of this study")),
         }
@@ -184,6 +190,20 @@ mod tests {
         refused(&[(0, 0), (0, 1), (1, 0), (1, 1), (0, 3)], "trial 5", "not trial 2 of cell 0");
         refused(&ORDER[..3], "trial 4", "it ends within a batch");
         refused(&[&ORDER[..], &[(1, 3)]].concat(), "trial 7", "more trials than the study has");
+    }
+
+    #[test]
+    fn a_line_that_does_not_end_is_not_read_to_the_end_of_the_file() {
+        let header = tables::header(&engine().quantities);
+        let long = |bytes: usize| {
+            let mut lines = lines(&(header.clone() + &"1".repeat(bytes)), "long").unwrap();
+            let said = lines.next().unwrap_err().to_string();
+            (said, lines.line.len() as u64)
+        };
+        let (said, kept) = long(3 << 20);
+        assert!(said.ends_with("line 2: it is longer than any line of trials"), "{said}");
+        assert_eq!(kept, MOST_LINE_BYTES);
+        assert!(long(9).0.ends_with("line 2: it is not a trial of this study"));
     }
 
     /// The lines of a file that its checkpoint vouches for.

@@ -41,7 +41,7 @@ pub(super) fn rows(trials: &[Trial]) -> String {
 }
 
 /// A line of `trials.csv`; `None` if it is not one of a study with `quantities` quantities.
-pub(super) fn parse_row(line: &str, quantities: usize) -> Option<Trial> {
+pub fn trial_of_line(line: &str, quantities: usize) -> Option<Trial> {
     let mut fields = line.split(',');
     let cell = fields.next()?.parse().ok()?;
     let trial = fields.next()?.parse().ok()?;
@@ -67,10 +67,10 @@ mod tests {
             values: vec![Some(1.0 / 3.0), None, Some(-5e-324), Some(1e300), Some(-0.0)],
         };
         let text = rows(std::slice::from_ref(&trial));
-        let back = parse_row(text.trim_end(), 5).unwrap();
+        let back = trial_of_line(text.trim_end(), 5).unwrap();
         assert_eq!(back, trial);
         assert_eq!(back.values[4].map(f64::to_bits), Some((-0.0f64).to_bits()));
-        assert_eq!(parse_row(text.trim_end(), 4), None);
-        assert_eq!(parse_row("1,2,converged", 0), None);
+        assert_eq!(trial_of_line(text.trim_end(), 4), None);
+        assert_eq!(trial_of_line("1,2,converged", 0), None);
     }
 }

@@ -5,6 +5,10 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Digits that do not depend on the platform's mathematics.
 const DIGITS: i32 = 10;
+/// Degrees of freedom from which the quantile is that of an expansion, whose error is there below 1e-14 of it. The
+/// inverse of the incomplete beta function ends short of the quantile by 4e-6 of it at a hundred thousand, by 7 % at ten
+/// million, and not at all at some more.
+const MANY: f64 = 1000.0;
 
 /// The factor `k` by which a standard uncertainty is multiplied for an interval that contains the value with
 /// probability `coverage`, 0 < coverage < 1: the two-sided quantile of Student's distribution, of the normal
@@ -18,11 +22,27 @@ const DIGITS: i32 = 10;
 /// assert!((coverage_factor(0.9545, None) - 2.00).abs() < 0.005);
 /// ```
 pub fn coverage_factor(coverage: f64, degrees_of_freedom: Option<f64>) -> f64 {
+    if let Some(freedom) = degrees_of_freedom.filter(|freedom| *freedom >= MANY) {
+        return round_significant(expanded(normal_two_sided(1.0 - coverage), freedom), DIGITS);
+    }
     let student = degrees_of_freedom.and_then(|freedom| StudentsT::new(0.0, 1.0, freedom).ok());
     match student {
         Some(student) => round_significant(-student.inverse_cdf(0.5 * (1.0 - coverage)), DIGITS),
         None => normal_two_sided(1.0 - coverage),
     }
+}
+
+/// The quantile of Student's distribution at the probability of the normal quantile `z`, by the inverse powers of its degrees of
+/// freedom (Abramowitz & Stegun 1964, 26.7.5).
+fn expanded(z: f64, freedom: f64) -> f64 {
+    let s = z * z;
+    let terms = [
+        (s + 1.0) * z / 4.0,
+        ((5.0 * s + 16.0) * s + 3.0) * z / 96.0,
+        (((3.0 * s + 19.0) * s + 17.0) * s - 15.0) * z / 384.0,
+        ((((79.0 * s + 776.0) * s + 1482.0) * s - 1920.0) * s - 945.0) * z / 92160.0,
+    ];
+    z + terms.iter().rev().fold(0.0, |sum, term| (sum + term) / freedom)
 }
 
 /// Effective degrees of freedom of a sum of independent contributions, each a variance with the degrees of
@@ -48,6 +68,24 @@ mod tests {
             assert!((coverage_factor(0.95, Some(freedom)) - factor).abs() < 0.005, "{freedom}");
         }
         assert!((coverage_factor(0.95, None) - 1.960).abs() < 0.0005);
+    }
+
+    #[test]
+    fn with_many_degrees_of_freedom_the_factor_comes_and_is_students() {
+        // By `scipy.stats.t.ppf`, of 95 % and 99 %.
+        for (freedom, factors) in [
+            (300.0, [1.967_903_011_261, 2.592_316_410_848]),
+            (1e3, [1.962_339_080_826, 2.580_754_698_066]),
+            (1e5, [1.959_987_707_535, 2.575_878_469_908]),
+            (1e7, [1.959_964_221_767, 2.575_829_795_204]),
+            (1e12, [1.959_963_984_54, 2.575_829_303_55]),
+        ] {
+            for (coverage, factor) in [0.95, 0.99].into_iter().zip(factors) {
+                let ours = coverage_factor(coverage, Some(freedom));
+                assert!((ours / factor - 1.0).abs() < 1e-9, "{freedom}: {ours}");
+            }
+        }
+        assert_eq!(coverage_factor(0.95, Some(f64::INFINITY)), coverage_factor(0.95, None));
     }
 
     #[test]

@@ -103,6 +103,10 @@ impl Conditions {
     }
 }
 
+/// Part of the variance of camera and pose by which that of both may lie below nought: they can make up for each other, and
+/// what is left is rounding.
+const ROUNDING: f64 = 1e-6;
+
 /// Why a length cannot be measured.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -127,6 +131,12 @@ pub enum LengthError {
     /// Heights need a viewing direction, which a map has not.
     #[error("a map of a plane knows no viewing direction: flatness cannot be taken into account")]
     FlatnessOfMap,
+    /// Camera and pose together have a variance below nought.
+    #[error("the calibration's covariance is none: it gives the length a variance of {variance}")]
+    NoCovariance {
+        /// What they have.
+        variance: f64,
+    },
     /// A standard deviation is negative or not finite.
     #[error("the {what} must be 0 or more and finite, got {value}")]
     Condition {
@@ -220,6 +230,10 @@ pub fn length_in_view(
     let (a, b) = (plane.foot(&pixels[0])?, plane.foot(&pixels[1])?);
     let (value, along) = checked([a.at, b.at], conditions)?;
     let [camera, pose, both] = plane.variances(&(along.transpose() * (&b.by_unknowns - &a.by_unknowns)));
+    let variance = camera + pose + both;
+    if variance.is_nan() || variance < -ROUNDING * (camera + pose) {
+        return Err(LengthError::NoCovariance { variance });
+    }
     let height = libm::hypot(along.dot(&a.by_height), along.dot(&b.by_height)) * conditions.flatness;
     let mut budget = at_the_ends(&along, [&a.by_pixel, &b.by_pixel], conditions);
     for (cause, variance) in [(Cause::Camera, camera), (Cause::Pose, pose), (Cause::CameraWithPose, both)] {
@@ -380,6 +394,13 @@ mod tests {
         let length = length_in_view(&facing(0.3, 1.0), &ENDS, &Conditions::marks(0.0)).unwrap();
         assert!(variance(&length, Cause::CameraWithPose) < -0.019);
         assert!(length.standard_uncertainty() < 1e-7);
+    }
+
+    #[test]
+    fn what_is_no_covariance_gives_no_length_of_certain_size() {
+        // They would make up for each other twice over.
+        let refused = length_in_view(&facing(0.3, 2.0), &ENDS, &Conditions::marks(0.0)).unwrap_err();
+        assert!(matches!(refused, LengthError::NoCovariance { variance } if variance < -0.019), "{refused}");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! How is a file replaced so that nobody ever sees half of it? Written beside its place, then renamed.
 
 use super::files::{Disk, Files};
+use super::input::open_without_waiting;
 use super::kept::refuse_kept;
 use super::shown::ShownPath;
 use std::ffi::{OsStr, OsString};
@@ -221,7 +222,7 @@ fn remove_abandoned(files: &dyn Files, entry: &DirEntry) -> io::Result<()> {
         return Ok(());
     }
     // It may just have got its name; or it is another user's.
-    let Ok(file) = File::open(entry.path()) else { return Ok(()) };
+    let Ok(file) = open_without_waiting(&entry.path()) else { return Ok(()) };
     if file.try_lock().is_err() {
         return Ok(());
     }

@@ -18,9 +18,10 @@ pub struct CornerFile {
     pub views: Vec<View>,
 }
 
+/// Where on the target a line's mark is.
+pub(super) const PLACES: [Column; 2] = [Column::length("X"), Column::length("Y")];
 /// The numbers of a line.
-const COLUMNS: [Column; 4] =
-    [Column::length("X"), Column::length("Y"), Column::pixels("u"), Column::pixels("v")];
+const COLUMNS: [Column; 4] = [PLACES[0], PLACES[1], Column::pixels("u"), Column::pixels("v")];
 
 /// Reads a corner file.
 ///

@@ -192,6 +192,8 @@ fn refuse_cut_jpeg(source: &mut (impl std::io::BufRead + Seek), name: &str) -> R
 /// The size of an image, known before it is decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Extent {
+    /// Width and height, px.
+    pub size: (usize, usize),
     /// Pixels.
     pub pixels: u64,
     /// Bytes of all samples of the file, once they are decoded.
@@ -199,6 +201,12 @@ pub struct Extent {
 }
 
 impl Extent {
+    fn of(decoder: &dyn ImageDecoder) -> Extent {
+        let (width, height) = decoder.dimensions();
+        let (size, pixels) = ((width as usize, height as usize), u64::from(width) * u64::from(height));
+        Extent { size, pixels, bytes: decoder.total_bytes() }
+    }
+
     /// Memory that reading the photograph as grey, finding its marks and drawing them in takes at most: the
     /// samples, the grey levels, and for each pixel eight bytes of detection or four of the overlay and its
     /// file.
@@ -218,9 +226,7 @@ impl Extent {
 /// # Errors
 /// See [`ImageError`].
 pub fn image_extent(path: &Path) -> Result<Extent, ImageError> {
-    let decoder = decoder(opened(path)?, &path.shown())?;
-    let (width, height) = decoder.dimensions();
-    Ok(Extent { pixels: u64::from(width) * u64::from(height), bytes: decoder.total_bytes() })
+    Ok(Extent::of(&*decoder(opened(path)?, &path.shown())?))
 }
 
 /// As [`image_extent`], from the bytes of a file; `name` stands in errors.
@@ -228,9 +234,7 @@ pub fn image_extent(path: &Path) -> Result<Extent, ImageError> {
 /// # Errors
 /// See [`ImageError`].
 pub fn parse_extent(bytes: &[u8], name: &str) -> Result<Extent, ImageError> {
-    let decoder = decoder(Cursor::new(bytes), name)?;
-    let (width, height) = decoder.dimensions();
-    Ok(Extent { pixels: u64::from(width) * u64::from(height), bytes: decoder.total_bytes() })
+    Ok(Extent::of(&*decoder(Cursor::new(bytes), name)?))
 }
 
 fn of_decoder(error: image::ImageError, name: &str) -> ImageError {

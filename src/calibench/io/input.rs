@@ -1,7 +1,7 @@
 //! How much may come in? Regular files of a known length only: nothing blocks, and nothing grows without end.
 
 use super::shown::ShownPath;
-use std::fs::{File, Metadata};
+use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Read};
 use std::path::Path;
 
@@ -27,7 +27,8 @@ pub enum InputError {
         /// What the system said.
         cause: io::Error,
     },
-    /// A pipe may block for ever, a device never end, and a folder has no bytes.
+    /// A pipe may block for ever, a device never end, and a folder has no bytes; nor is one a regular file that
+    /// does not give at once what it holds.
     #[error("{path}: {kind}, not a regular file: copy what it gives into a file{hint}")]
     NotRegular {
         /// The path.
@@ -99,7 +100,31 @@ pub fn open_regular(path: &Path, most: u64) -> Result<(File, u64), InputError> {
     if seen.len() > most {
         return Err(InputError::TooLong { path: name(), bytes: seen.len(), most });
     }
-    Ok((File::open(path).map_err(failed)?, seen.len()))
+    Ok((open_without_waiting(path).map_err(|cause| unopened(path.shown(), cause))?, seen.len()))
+}
+
+/// Opens a file for reading that nobody has to wait for: not for the other end of a pipe that was put in the
+/// place of a file, nor for the next line of one of those that Linux calls regular and that wait for it
+/// (`/proc/kmsg`). Where there is nothing to read yet, reading fails ([`io::ErrorKind::WouldBlock`]).
+///
+/// # Errors
+/// What the system says.
+pub fn open_without_waiting(path: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.read(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::custom_flags(&mut options, libc::O_NONBLOCK);
+    options.open(path)
+}
+
+/// What the system said of a file, where it would have to be waited for in words of ours.
+fn unopened(path: String, cause: io::Error) -> InputError {
+    match cause.kind() {
+        io::ErrorKind::WouldBlock => {
+            InputError::NotRegular { path, kind: "a file that has to be waited for", hint: "" }
+        }
+        _ => InputError::Open { path, cause },
+    }
 }
 
 /// The bytes of a regular file.
@@ -141,7 +166,7 @@ pub fn read_named(path: &Path, most: u64) -> Result<Vec<u8>, InputError> {
 fn read_at_most(input: impl Read, name: &str, expected: usize, most: u64) -> Result<Vec<u8>, InputError> {
     let mut bytes = Vec::with_capacity(expected);
     let read = input.take(most + 1).read_to_end(&mut bytes);
-    read.map_err(|cause| InputError::Open { path: name.to_string(), cause })?;
+    read.map_err(|cause| unopened(name.to_string(), cause))?;
     if bytes.len() as u64 > most {
         return Err(InputError::TooLong { path: name.to_string(), bytes: bytes.len() as u64, most });
     }
@@ -175,5 +200,21 @@ mod tests {
         ));
         #[cfg(unix)]
         assert!(matches!(read_regular(Path::new("/dev/zero"), 9), Err(InputError::NotRegular { .. })));
+    }
+
+    /// A pipe stands for whatever has to be waited for: it may take the place of a file after that was looked at.
+    #[test]
+    #[cfg(unix)]
+    fn nothing_is_waited_for() {
+        let pipe = std::env::temp_dir().join(format!("calibench-input-{}.pipe", std::process::id()));
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        // With another end that says nothing, as a file of the system does; without one there would be nothing to wait for.
+        let other_end = OpenOptions::new().read(true).write(true).open(&pipe).unwrap();
+        let waiting = open_without_waiting(&pipe).unwrap();
+        let refused = read_at_most(waiting, "x", 0, 9).unwrap_err().to_string();
+        drop(other_end);
+        assert!(open_without_waiting(&pipe).is_ok(), "opened without another end");
+        std::fs::remove_file(&pipe).unwrap();
+        assert!(refused.starts_with("x: a file that has to be waited for, not a regular file"), "{refused}");
     }
 }

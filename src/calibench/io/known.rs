@@ -4,7 +4,7 @@
 use super::doubts::doubts;
 use super::input::{InputError, MOST_TABLE_BYTES, read_regular_text};
 use super::result::{ResultError, parse_lens_camera};
-use super::shown::ShownPath;
+use super::shown::{ShownPath, on_one_line};
 use crate::calibrate::Covariance;
 use crate::camera::{Camera, FreeParameters, Lens, Model, Parameter, UnknownParameter};
 use crate::geometry::{Pose, Vec2, Vec3, rotation};
@@ -214,12 +214,14 @@ pub fn parse_known(file: &str, text: &str) -> Result<Known, KnownError> {
     let fields: CameraFields = serde_json::from_str(text).map_err(format)?;
     let free = free_of(file, &fields.free, camera.distortion.model())?;
     let no_covariance = || KnownError::NoCovariance { file: file.into() };
+    let covariance = covariance(free, &fields).ok_or_else(no_covariance)?;
+    refuse_impossible(file, &covariance, &fields.views)?;
     Ok(Known::Camera(Box::new(KnownCalibration {
         camera,
         image_size,
         views: fields.views.iter().map(|view| view.name.clone()).collect(),
         cam_from_target: fields.views.iter().map(|view| pose(file, view)).collect::<Result<_, _>>()?,
-        covariance: covariance(free, &fields).ok_or_else(no_covariance)?,
+        covariance,
         sigma_px: fields.sigma_px.filter(|sigma| *sigma >= 0.0).ok_or_else(no_covariance)?,
         degrees_of_freedom: fields.degrees_of_freedom,
         has_priors: !fields.priors.is_empty(),
@@ -285,6 +287,48 @@ fn covariance(free: FreeParameters, fields: &CameraFields) -> Option<Covariance>
     })
 }
 
+/// Part by which numbers of a covariance may contradict each other: far above what is lost in computing one.
+const CONTRADICTION: f64 = 1e-3;
+
+/// Refuses what is no covariance of anything, as after a damage of the file: a variance below nought, a half that is not the other,
+/// and what varies together more than each does alone.
+fn refuse_impossible(file: &str, covariance: &Covariance, views: &[ViewFields]) -> Result<(), KnownError> {
+    let n = covariance.intrinsics.nrows();
+    let refused = |of: String| {
+        let what = format!(
+            "the covariance {of} is none: variances of 0 or more, and correlations from -1 to 1, both ways the same"
+        );
+        Err(KnownError::Shape { file: file.into(), what })
+    };
+    let camera = |i: usize, j: usize| covariance.intrinsics[(i, j)];
+    if !is_possible(n, &camera) {
+        return refused("of the camera".into());
+    }
+    for ((view, pose), cross) in views.iter().zip(&covariance.poses).zip(&covariance.cross) {
+        let joint = |i: usize, j: usize| match (i < n, j < n) {
+            (true, true) => camera(i, j),
+            (true, false) => cross[(i, j - n)],
+            (false, true) => cross[(j, i - n)],
+            (false, false) => pose[(i - n, j - n)],
+        };
+        if !is_possible(n + 6, &joint) {
+            return refused(format!("of view '{}'", on_one_line(&view.name)));
+        }
+    }
+    Ok(())
+}
+
+fn is_possible(size: usize, entry: &dyn Fn(usize, usize) -> f64) -> bool {
+    let most = |i: usize, j: usize| entry(i, i).sqrt() * entry(j, j).sqrt();
+    // A comparison with the root of a number below nought does not hold.
+    (0..size).all(|i| {
+        (0..=i).all(|j| {
+            let (most, differ) = (most(i, j), (entry(i, j) - entry(j, i)).abs());
+            entry(i, j).abs() <= (1.0 + CONTRADICTION) * most && differ <= CONTRADICTION * most
+        })
+    })
+}
+
 /// The map of a plane, from its points anew: a file keeps no covariance of it.
 fn plane(file: &str, fields: &PlaneFields) -> Result<PlaneCalibration, KnownError> {
     let model = match fields.mode.as_str() {
@@ -333,6 +377,29 @@ mod tests {
                 assert!((a.rotation - b.rotation).norm() < 1e-14 && a.translation == b.translation);
             }
         }
+    }
+
+    #[test]
+    fn what_is_no_covariance_is_refused_by_the_view_it_is_of() {
+        let of = calibration(&Settings::standard());
+        let whole = CalibrationFields::of(&of.into(), &[], None);
+        let said = |damage: &dyn Fn(&mut serde_json::Value)| {
+            let mut value = serde_json::to_value(&whole).unwrap();
+            damage(&mut value);
+            parse_known("r.json", &value.to_string()).map(|_| ()).map_err(|error| error.to_string())
+        };
+        assert_eq!(said(&|_| ()), Ok(()));
+        let refused = |of: &str| {
+            Err(format!(
+                "r.json: the covariance of {of} is none: variances of 0 or more, and correlations from -1 to 1, both ways the same"
+            ))
+        };
+        let name = serde_json::to_value(&whole).unwrap()["views"][1]["name"].as_str().unwrap().to_string();
+        let (camera, view) = (refused("the camera"), refused(&format!("view '{name}'")));
+        assert_eq!(said(&|r| r["covariance"][0][0] = (-1.0).into()), camera);
+        assert_eq!(said(&|r| r["covariance"][0][1] = 1e9.into()), camera);
+        assert_eq!(said(&|r| r["views"][1]["covariance_with_camera"][1][2] = 2e9.into()), view);
+        assert_eq!(said(&|r| r["views"][1]["covariance"][4][3] = 0.0.into()), view);
     }
 
     #[test]

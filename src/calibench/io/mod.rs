@@ -23,6 +23,7 @@ pub mod marks;
 pub mod measured;
 pub mod memory;
 pub mod message;
+pub mod misplaced;
 #[cfg(feature = "photo")]
 pub mod overlay;
 pub mod pairs;
@@ -53,6 +54,7 @@ pub use marks::{MarkFile, parse_marks, read_marks};
 pub use measured::{MeasuredFields, SeenFile, TargetFileError, parse_seen, parse_target, refusal_by_names};
 pub use memory::Memory;
 pub use message::message;
+pub use misplaced::misplaced_marks;
 #[cfg(feature = "photo")]
 pub use overlay::{Colour, Overlay};
 pub use pairs::{PointPairs, parse_point_pairs, read_point_pairs};

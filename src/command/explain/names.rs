@@ -1,6 +1,7 @@
 //! What names are there, and which one is meant?
 
 use super::Known;
+use calibench::io::shown::on_one_line;
 use calibench_harness::{Experiment, golden};
 use std::collections::BTreeSet;
 
@@ -67,7 +68,7 @@ impl<'a> Names<'a> {
 
     /// That there is no such name, with those that are nearest to it.
     pub fn not_found(&self, name: &str) -> String {
-        let offered = self.nearest(name).join("\n  ");
+        let (offered, name) = (self.nearest(name).join("\n  "), on_one_line(name));
         format!(
             "nothing is called `{name}`; the nearest names:\n  {offered}\n`calibench explain four-pose` lists the names of an experiment"
         )

@@ -1,7 +1,8 @@
 //! A new experiment: its file, its binary, and its registrations in experiments/lib.rs and Cargo.toml.
 
 use super::Started;
-use std::fs;
+use calibench::io::input::MOST_SPEC_BYTES;
+use calibench::io::read_regular_text;
 use std::path::{Path, PathBuf};
 
 const TEMPLATE: &str = include_str!("experiment_template.rs");
@@ -16,7 +17,7 @@ pub(super) fn started(root: &Path, name: &str) -> Result<Started, String> {
     let module = name.replace('-', "_");
     let file = format!("experiments/{module}.rs");
     let binary = format!("experiments/bin/{module}.rs");
-    let read = |path: &str| fs::read_to_string(root.join(path)).map_err(|error| format!("{path}: {error}"));
+    let read = |path: &str| read_regular_text(&root.join(path), MOST_SPEC_BYTES).map_err(|e| e.to_string());
     let list = put_before(&read("experiments/lib.rs")?, BEFORE_MODULE, &format!("pub mod {module};\n"))
         .and_then(|list| put_before(&list, BEFORE_ENTRY, &format!("    {module}::EXPERIMENT,\n")))
         .ok_or("experiments/lib.rs has no list of experiments as this program knows it")?;
