@@ -204,11 +204,7 @@ mod tests {
     #[test]
     fn nothing_fails_where_nothing_is_changed() {
         let scenes = ["clean", "facing", "noisy"];
-        let kinds = [Kind::Chessboard, Kind::Circles, Kind::Hexagonal, Kind::Charuco, Kind::AprilGrid];
-        assert_eq!(failing_of(&kinds, |_, answer| answer, &scenes), []);
-        // Asymmetric grids in noise: a disc moves by 0.03 px when its photograph is turned.
-        assert_eq!(failing_of(&[Kind::Asymmetric], |_, answer| answer, &scenes), [Property::Turned]);
-        assert_eq!(failing_of(&[Kind::Asymmetric], |_, answer| answer, &scenes[..2]), []);
+        assert_eq!(failing_of(&Kind::ALL, |_, answer| answer, &scenes), []);
     }
 
     #[test]

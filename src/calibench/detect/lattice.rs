@@ -7,6 +7,7 @@
 
 use super::Blob;
 use super::neighbours::Neighbours;
+use super::order::LARGEST_DEVIATION;
 use crate::geometry::Vec2;
 use std::collections::{BTreeMap, VecDeque};
 
@@ -27,6 +28,10 @@ const LARGEST_AREA_RATIO: f64 = 2.5;
 /// Least sine of the angle between the two steps of a seed.
 const LEAST_SINE: f64 = 0.35;
 
+/// A lattice of which marks are out of line may have slipped by a mark where perspective is strong and its seed's steps are diagonals. It is
+/// grown again from so many of its marks at most: of those of a tilted board half or more find it.
+const MOST_SEEDS: usize = 12;
+
 /// The four directions, as steps of a place.
 const DIRECTIONS: [Place; 4] = [(1, 0), (-1, 0), (0, 1), (0, -1)];
 
@@ -35,19 +40,22 @@ pub fn largest(blobs: &[Blob]) -> Lattice {
     let centres: Vec<Vec2> = blobs.iter().map(|blob| blob.centre_px).collect();
     let areas: Vec<f64> = blobs.iter().map(Blob::area_px2).collect();
     let marks = Marks { centres: &centres, areas: &areas, neighbours: Neighbours::new(&centres) };
-    let mut belongs = vec![false; blobs.len()];
-    let mut largest = Lattice::new();
+    // How often each was a mark of a lattice, and of one out of line only so much.
+    let mut tried = vec![0; blobs.len()];
+    let (mut largest, mut most) = (Lattice::new(), 0);
     for seed in 0..blobs.len() {
-        if belongs[seed] {
+        if tried[seed] >= MOST_SEEDS {
             continue;
         }
         let lattice = marks.grow(seed);
+        let in_line = marks.in_line(&lattice);
         // A seed that finds no lattice may still be part of one that another seed finds.
         if lattice.len() >= 4 {
-            lattice.values().for_each(|&mark| belongs[mark] = true);
+            let by = if in_line == lattice.len() { MOST_SEEDS } else { 1 };
+            lattice.values().for_each(|&mark| tried[mark] += by);
         }
-        if lattice.len() > largest.len() {
-            largest = lattice;
+        if in_line > most {
+            (largest, most) = (lattice, in_line);
         }
     }
     largest
@@ -109,6 +117,22 @@ impl Marks<'_> {
         lattice
     }
 
+    /// How many marks of a lattice lie near the middle of their neighbours, along both steps.
+    fn in_line(&self, lattice: &Lattice) -> usize {
+        let at = |i: i32, j: i32| lattice.get(&(i, j)).map(|&mark| self.centres[mark]);
+        let is_out = |here: Vec2, behind: Option<Vec2>, ahead: Option<Vec2>| match (behind, ahead) {
+            (Some(behind), Some(ahead)) => {
+                ((behind + ahead) * 0.5 - here).norm() > LARGEST_DEVIATION * 0.5 * (ahead - behind).norm()
+            }
+            _ => false,
+        };
+        let is_in_line = |(&(i, j), &mark): (&Place, &usize)| {
+            let here = self.centres[mark];
+            !is_out(here, at(i - 1, j), at(i + 1, j)) && !is_out(here, at(i, j - 1), at(i, j + 1))
+        };
+        lattice.iter().filter(|entry| is_in_line(*entry)).count()
+    }
+
     /// The steps around a place: between the marks on either side where they are known, else the inherited
     /// ones.
     fn steps_at(&self, lattice: &Lattice, place: Place, inherited: [Vec2; 2]) -> [Vec2; 2] {
@@ -122,5 +146,45 @@ impl Marks<'_> {
             (None, None) => inherited,
         };
         [along(at(-1, 0), at(1, 0), inherited[0]), along(at(0, -1), at(0, 1), inherited[1])]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::order::complete_sides;
+    use super::*;
+    use crate::geometry::{Homography, Mat3};
+    use nalgebra::Matrix2;
+
+    /// The discs of a 9 x 7 grid that is tilted by 60 degrees, in the order of their rows in the image.
+    fn tilted() -> Vec<Blob> {
+        let plane = Mat3::new(-7.8, -26.6, 371.2, -33.5, -20.4, 456.0, -0.0518, 0.0097, 1.0);
+        let disc = |index: usize| {
+            let place = Vec2::new((index % 9) as f64, (index / 9) as f64);
+            let depth = plane[(2, 0)] * place.x + plane[(2, 1)] * place.y + 1.0;
+            Blob {
+                centre_px: Homography(plane).apply(&place).unwrap(),
+                covariance_px2: Matrix2::identity() * (10.0 / depth.powi(3)),
+                edge_px: 0.7,
+                contrast: 0.7,
+                misfit: 0.05,
+            }
+        };
+        let mut discs: Vec<Blob> = (0..63).map(disc).collect();
+        discs.sort_by(|a, b| a.centre_px.y.total_cmp(&b.centre_px.y));
+        discs
+    }
+
+    #[test]
+    fn a_lattice_that_slips_by_a_mark_is_grown_again_from_another() {
+        let discs = tilted();
+        let centres: Vec<Vec2> = discs.iter().map(|disc| disc.centre_px).collect();
+        let areas: Vec<f64> = discs.iter().map(Blob::area_px2).collect();
+        let marks = Marks { centres: &centres, areas: &areas, neighbours: Neighbours::new(&centres) };
+        let first = marks.grow(0);
+        assert!(marks.in_line(&first) < first.len() && complete_sides(&first).is_none());
+        let found = largest(&discs);
+        assert_eq!(complete_sides(&found), Some((9, 7)));
+        assert_eq!(marks.in_line(&found), 63);
     }
 }

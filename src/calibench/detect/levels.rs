@@ -151,7 +151,8 @@ impl Levels {
             let whole = outer.columns(y, width);
             if clear_rows.contains(&y) {
                 let [left, right] = around(&whole, &clear.columns(y, width));
-                let third = 3 * (y - clear_rows.start) / clear_rows.len();
+                // By the middles of the rows, so that thirds stay thirds upside down.
+                let third = 3 * (2 * (y - clear_rows.start) + 1) / (2 * clear_rows.len());
                 add_ground(2 + third, left);
                 add_ground(5 + third, right);
             } else {

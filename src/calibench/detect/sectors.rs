@@ -47,10 +47,10 @@ pub struct Ground {
     pub is_near: [bool; SECTORS],
 }
 
-/// The sector of an offset from the centre.
+/// The sector of an offset from the centre. What lies between two belongs to the same one of them however the image is turned.
 pub fn sector_of(offset: &Vec2) -> usize {
     let turn = libm::atan2(offset.y, offset.x) / std::f64::consts::TAU + 0.5;
-    ((turn * SECTORS as f64) as usize).min(SECTORS - 1)
+    (turn * SECTORS as f64) as usize % SECTORS
 }
 
 /// The means of a sector, next to the disc's edge and farther out.
@@ -213,6 +213,16 @@ mod tests {
                 // The slope is known by half of the ring only.
                 assert!(deviation(&ground) < 3e-3, "{level}: {}", deviation(&ground));
             }
+        }
+    }
+
+    #[test]
+    fn sectors_turn_with_the_image() {
+        for (x, y) in [(3.0, 0.0), (3.0, 3.0), (0.0, 3.0), (5.0, 2.0), (-4.0, 0.0), (-2.0, -2.0), (-1.5, 7.0)]
+        {
+            let sector = sector_of(&Vec2::new(x, y));
+            assert_eq!(sector_of(&Vec2::new(-x, -y)), (sector + SECTORS / 2) % SECTORS, "{x}, {y}");
+            assert_eq!(sector_of(&Vec2::new(-y, x)), (sector + SECTORS / 4) % SECTORS, "{x}, {y}");
         }
     }
 
