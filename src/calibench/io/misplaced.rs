@@ -188,7 +188,7 @@ mod tests {
         let found = said(&[&WHOLE, &WHOLE, &twice]);
         assert_eq!(found.len(), 1, "{found:?}");
         assert!(found[0].starts_with("c:10: points 'b' and 'c' of view 'v2' are at one place"), "{found:?}");
-        let found = said(&[&twice; 8]);
+        let found = said(&[&twice[..]; 8]);
         assert_eq!(found.len(), MOST_SAID + 1, "{found:?}");
         assert_eq!(found[MOST_SAID], "c: 3 more marks are at a place where they are not expected");
     }
