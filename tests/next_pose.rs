@@ -233,7 +233,7 @@ fn what_cannot_be_planned_is_wrong_usage_with_what_to_do() {
         (of(whole, &["fx", "--image-size", "320x240"]), "its image has 640 x 480 px"),
         (of(whole, &["fx", "--at", "0,0,150", "--length", "20"]), "are for --want length"),
         (of("no-covariance.json", &["fx"]), "no joint covariance"),
-        (of("negative.json", &["fx"]), "not positive definite"),
+        (of("negative.json", &["fx"]), "the covariance of the camera is none"),
         (of("silent.json", &["fx"]), "--mark-sd"),
         (of("bent.json", &["fx"]), "the board's shape was estimated"),
         (of("no-views.json", &["fx"]), "--distance NEAR,FAR"),

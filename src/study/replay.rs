@@ -201,9 +201,9 @@ mod tests {
             (said, lines.line.len() as u64)
         };
         let (said, kept) = long(3 << 20);
-        assert!(said.ends_with("line 2: it is longer than any line of trials"), "{said}");
+        assert!(said.contains("line 2: it is longer than any line of trials"), "{said}");
         assert_eq!(kept, MOST_LINE_BYTES);
-        assert!(long(9).0.ends_with("line 2: it is not a trial of this study"));
+        assert!(long(9).0.contains("line 2: it is not a trial of this study"));
     }
 
     /// The lines of a file that its checkpoint vouches for.
