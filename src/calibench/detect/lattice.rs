@@ -164,7 +164,7 @@ mod tests {
             let depth = plane[(2, 0)] * place.x + plane[(2, 1)] * place.y + 1.0;
             Blob {
                 centre_px: Homography(plane).apply(&place).unwrap(),
-                covariance_px2: Matrix2::identity() * (10.0 / depth.powi(3)),
+                covariance_px2: Matrix2::identity() * (10.0 / (depth * depth * depth)),
                 edge_px: 0.7,
                 contrast: 0.7,
                 misfit: 0.05,
