@@ -51,7 +51,7 @@ fn run(arguments: &Arguments) -> Result<(), String> {
                 program.name
             ));
         }
-        return wrong::write(arguments.photos.unwrap_or(wrong::PHOTOS), arguments.out.clone());
+        return wrong::write(arguments.photos.unwrap_or(wrong::PHOTOS), arguments.out.as_deref());
     }
     let photos = arguments.photos.unwrap_or(PHOTOS);
     let (mut detector, versions, fingerprint): (Box<dyn Detector>, String, Fingerprint) = match program.method

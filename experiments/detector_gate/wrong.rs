@@ -1,54 +1,50 @@
 //! How often is a board wrong? Ten thousand photographs, of the gate's scenes and of what else may stand before a camera: other boards beside
 //! it, its own end outside of the image, a tiled floor, a keyboard. Counted by scene, as it is committed in golden/detector-gate/.
 
+use super::campaign::FOLDER;
 use super::judged::clopper_pearson;
-use super::{DRAWN, SEED, campaign};
-use calibench::io::write_atomically;
+use super::{DRAWN, SEED};
 use calibench_detector_gate::{Builtin, Tally, sights, tally};
 use calibench_harness::fingerprint::Fingerprint;
-use calibench_harness::{ProgressDisplay, Record, Table};
-use std::path::{Path, PathBuf};
+use calibench_harness::{ProgressDisplay, Record, Table, campaign};
+use std::path::Path;
 
 /// Photographs of a scene: of 163 scenes ten thousand in all.
 pub const PHOTOS: u64 = 62;
 /// The command that writes what is committed.
 const COMMAND: &str = "cargo run --release --bin detector-gate-trials -- calibench --wrong";
-/// Name of the file.
-const FILE: &str = "wrong-boards.csv";
+/// Name of the file, without its ending, and of the table.
+const NAME: &str = "wrong-boards";
 /// The columns of a line; `trials` are those of wrong boards, with spaces between.
 const HEADER: &str = "board,scene,photographs,found,refused,wrong,broken,trials";
 
 /// What is committed.
-pub const COMMITTED: &str = include_str!("../../golden/detector-gate/wrong-boards.csv");
+const COMMITTED: &str = include_str!("../../golden/detector-gate/wrong-boards.csv");
 
 /// Shows this library's detectors the photographs, and writes what became of them.
-pub fn write(photos: u64, out: Option<PathBuf>) -> Result<(), String> {
+pub fn write(photos: u64, out: Option<&Path>) -> Result<(), String> {
     let sights = sights();
     let progress = ProgressDisplay::stderr().start("wrong boards", sights.len());
-    let mut text = format!(
-        "{}\n{HEADER}\n",
-        Fingerprint::of_wrong_boards().head(&format!("detector-gate-trials --wrong; seed {SEED}"))
-    );
+    let mut lines = Vec::new();
     for sight in &sights {
         let counts = tally(sight, &mut Builtin, SEED, photos).map_err(|error| error.to_string())?;
-        let counts = counts.ok_or("this library does not know a board of its gate")?;
-        text.push_str(&line(&counts));
+        lines.push(line(&counts.ok_or("this library does not know a board of its gate")?));
         progress.step();
     }
-    let file = out.unwrap_or_else(|| Path::new(campaign::FOLDER).join(FILE));
-    write_atomically(&file, text.as_bytes()).map_err(|error| error.to_string())
+    let head = Fingerprint::of_wrong_boards().head(&format!("detector-gate-trials --wrong; seed {SEED}"));
+    campaign::write(out, FOLDER, NAME, &format!("{head}\n{}", campaign::table(HEADER, lines)))
 }
 
 fn line(counts: &Tally) -> String {
     let trials: Vec<String> = counts.wrong.iter().map(u64::to_string).collect();
     let Tally { scene, found, refused, broken, wrong } = counts;
     let (kind, id, photos) = (scene.kind.name(), scene.id, counts.photographs());
-    format!("{kind},{id},{photos},{found},{refused},{},{broken},{}\n", wrong.len(), trials.join(" "))
+    format!("{kind},{id},{photos},{found},{refused},{},{broken},{}", wrong.len(), trials.join(" "))
 }
 
 /// A line of the file.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
+pub(super) struct Row {
     board: String,
     scene: String,
     photographs: usize,
@@ -83,12 +79,12 @@ impl Row {
 pub fn read() -> Result<Vec<Row>, String> {
     let mut lines = COMMITTED.lines().skip(1);
     let rows = (lines.next() == Some(HEADER)).then(|| lines.map(Row::read).collect::<Option<Vec<Row>>>());
-    rows.flatten().ok_or_else(|| format!("golden/detector-gate/{FILE} is broken: run {COMMAND}"))
+    rows.flatten().ok_or_else(|| format!("{FOLDER}/{NAME}.csv is broken: run {COMMAND}"))
 }
 
 /// What was counted, and that it is of this code.
 pub fn report(record: &mut Record, rows: &[Row]) {
-    record.input(format!("golden/detector-gate/{FILE}"), COMMITTED.as_bytes());
+    record.input(format!("{FOLDER}/{NAME}.csv"), COMMITTED.as_bytes());
     let sum = |of: fn(&Row) -> usize| rows.iter().map(of).sum::<usize>();
     let (photos, wrong) = (sum(|row| row.photographs), sum(|row| row.wrong));
     record
@@ -107,16 +103,18 @@ pub fn report(record: &mut Record, rows: &[Row]) {
         );
     record
         .claim_that("wrong-boards-are-current", "every photograph in which wrong boards were looked for was drawn, judged and answered by the present code")
-        .every("files", [Fingerprint::of_wrong_boards().case(FILE, COMMITTED, COMMAND)])
+        .every("files", [Fingerprint::of_wrong_boards().case(&format!("{NAME}.csv"), COMMITTED, COMMAND)])
         .because("SHA-256 of the code lines that draw and judge and of this library's detectors, and the versions of the numeric crates and of the codec");
     record.table(table(rows));
 }
 
+/// The scenes with a wrong board; the committed file has all.
 fn table(rows: &[Row]) -> Table {
-    let rows = Table::of(
-        "wrong-boards",
-        "The search for wrong boards: what became of the photographs of each scene",
-        rows,
+    let wrong = rows.iter().filter(|row| row.wrong > 0);
+    Table::of(
+        NAME,
+        "The search for wrong boards: the scenes in which there are any, and the trials that show them",
+        wrong,
     )
     .column("board", "", |row| row.board.clone())
     .column("scene", "", |row| row.scene.clone())
@@ -125,8 +123,7 @@ fn table(rows: &[Row]) -> Table {
     .column("refused", "", |row| row.refused)
     .column("wrong", "", |row| row.wrong)
     .column("trials", "", |row| row.trials.clone())
-    .column("at_most", "%", |row| 100.0 * clopper_pearson(row.wrong, row.photographs, DRAWN).high);
-    rows.into()
+    .into()
 }
 
 #[cfg(test)]
@@ -137,7 +134,7 @@ mod tests {
     fn a_line_is_read_as_it_was_written() {
         let scene = *sights()[0].scene();
         let counts = Tally { scene, found: 5, refused: 2, wrong: vec![3, 17], broken: 1 };
-        let row = Row::read(line(&counts).trim_end()).unwrap();
+        let row = Row::read(&line(&counts)).unwrap();
         assert_eq!((row.photographs, row.found, row.refused, row.wrong, row.broken), (10, 5, 2, 2, 1));
         assert_eq!(
             (row.board.as_str(), row.scene.as_str(), row.trials.as_str()),
