@@ -90,4 +90,13 @@ mod tests {
         assert!(predicted.interval_px(0.01).contains(0.1384));
         assert!((predicted.cdf(predicted.quantile_px(0.2)) - 0.2).abs() < 1e-8);
     }
+
+    #[test]
+    fn both_tails_count() {
+        let distribution = RmseDistribution { sigma_px: 0.1, points: 20, parameters: 10 };
+        for (quantile, both) in [(0.05, 0.1), (0.3, 0.6), (0.5, 1.0), (0.8, 0.4), (0.995, 0.01)] {
+            let p = distribution.p_value(distribution.quantile_px(quantile));
+            assert!((p - both).abs() < 1e-8, "{quantile}: {p} instead of {both}");
+        }
+    }
 }

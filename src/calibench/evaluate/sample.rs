@@ -96,6 +96,11 @@ mod tests {
                 let mean_j = data.iter().map(|r| r[j]).sum::<f64>() / 4.0;
                 let covariance = data.iter().map(|r| (r[i] - mean) * (r[j] - mean_j)).sum::<f64>() / 3.0;
                 assert!((sample.covariance(i, j) - covariance).abs() < 1e-14, "{i} {j}");
+                let variance =
+                    |k: usize, m: f64| data.iter().map(|r| (r[k] - m) * (r[k] - m)).sum::<f64>() / 3.0;
+                let correlation = covariance / (variance(i, mean) * variance(j, mean_j)).sqrt();
+                assert!((sample.correlation(i, j) - correlation).abs() < 1e-14, "{i} {j}");
+                assert!((sample.standard_deviation(i) - variance(i, mean).sqrt()).abs() < 1e-14);
             }
         }
     }

@@ -155,3 +155,17 @@ fn refuse_duplicates(points: &[Vec2], side: &'static str) -> Result<(), PlaneErr
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zeros_of_both_signs_are_one_place() {
+        // By the sign alone the second would stand between the other two, which then are no neighbours.
+        let points = [Vec2::new(-0.0, 1.0), Vec2::new(-0.0, 2.0), Vec2::new(0.0, 1.0)];
+        let error = refuse_duplicates(&points, "pixels").unwrap_err();
+        assert!(matches!(error, PlaneError::Duplicate { first: 0, second: 2, .. }), "{error:?}");
+        assert!(refuse_duplicates(&points[..2], "pixels").is_ok());
+    }
+}
