@@ -87,20 +87,18 @@ mod tests {
         let origin = [3.0, 3.0, 0.0];
         let mut sample = Sample::about(&origin);
         data.iter().for_each(|row| sample.add(row));
+        let mean = |i: usize| data.iter().map(|r| r[i]).sum::<f64>() / 4.0;
+        let covariance =
+            |i: usize, j: usize| data.iter().map(|r| (r[i] - mean(i)) * (r[j] - mean(j))).sum::<f64>() / 3.0;
         for i in 0..3 {
-            let mean = data.iter().map(|r| r[i]).sum::<f64>() / 4.0;
-            assert!((sample.mean(i) - mean).abs() < 1e-14);
+            assert!((sample.mean(i) - mean(i)).abs() < 1e-14);
+            assert!((sample.standard_deviation(i) - covariance(i, i).sqrt()).abs() < 1e-14, "{i}");
             let square = data.iter().map(|r| (r[i] - origin[i]) * (r[i] - origin[i])).sum::<f64>() / 4.0;
             assert!((sample.root_mean_square(i) - square.sqrt()).abs() < 1e-14);
             for j in 0..3 {
-                let mean_j = data.iter().map(|r| r[j]).sum::<f64>() / 4.0;
-                let covariance = data.iter().map(|r| (r[i] - mean) * (r[j] - mean_j)).sum::<f64>() / 3.0;
-                assert!((sample.covariance(i, j) - covariance).abs() < 1e-14, "{i} {j}");
-                let variance =
-                    |k: usize, m: f64| data.iter().map(|r| (r[k] - m) * (r[k] - m)).sum::<f64>() / 3.0;
-                let correlation = covariance / (variance(i, mean) * variance(j, mean_j)).sqrt();
+                assert!((sample.covariance(i, j) - covariance(i, j)).abs() < 1e-14, "{i} {j}");
+                let correlation = covariance(i, j) / (covariance(i, i) * covariance(j, j)).sqrt();
                 assert!((sample.correlation(i, j) - correlation).abs() < 1e-14, "{i} {j}");
-                assert!((sample.standard_deviation(i) - variance(i, mean).sqrt()).abs() < 1e-14);
             }
         }
     }
