@@ -174,3 +174,18 @@ mod linux {
         found
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn the_peak_of_memory_is_as_large_as_what_was_held() {
+        let held = std::hint::black_box(vec![1u8; 32 << 20]);
+        let peak = peak_memory_bytes(std::process::id(), "no mark").unwrap();
+        assert!((held.len() as u64..1 << 40).contains(&peak), "{peak}");
+        // No process has this number, and none carries this mark.
+        assert_eq!(peak_memory_bytes(u32::MAX, "no mark"), None);
+    }
+}

@@ -392,4 +392,18 @@ mod tests {
         let (_, z) = spread(&pairs(|x, y| (x + 0.1 * y) / 1.01f64.sqrt())).unwrap();
         assert!(two_sided(z) > 1e-4, "{z}");
     }
+
+    #[test]
+    fn the_median_is_the_middle_one() {
+        assert_eq!(median([5.0, 1.0, 9.0, 3.0, 7.0].into_iter()), 5.0);
+        assert_eq!(median([4.0, 1.0, 3.0, 2.0].into_iter()), 3.0);
+        assert!(median(std::iter::empty()).is_nan());
+    }
+
+    #[test]
+    fn thirty_pairs_tell_something_and_fewer_nothing() {
+        let all = pairs(|x, y| x + 0.1 * y);
+        assert!(shift(&all[..30]).is_some() && spread(&all[..30]).is_some());
+        assert!(shift(&all[..29]).is_none() && spread(&all[..29]).is_none());
+    }
 }

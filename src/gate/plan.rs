@@ -280,4 +280,36 @@ mod tests {
         assert_ne!(of(10)[..6], of(11)[..6]);
         assert_ne!(Plan::new(2, 40).unwrap().id(&plan.cases[0]), plan.id(&plan.cases[0]));
     }
+
+    #[test]
+    fn a_scene_is_asked_exactly_as_samples_some_twice_and_fewer_in_every_variant() {
+        let plan = Plan::new(1, 40).unwrap();
+        let count = |of: fn(&Purpose) -> bool| {
+            plan.cases.iter().filter(|case| case.scenario == 0 && of(&case.purpose)).count()
+        };
+        assert_eq!(plan.scenarios[0].id, "four-pose");
+        assert_eq!(count(|purpose| *purpose == Purpose::Exact), 1);
+        assert_eq!(count(|purpose| *purpose == Purpose::Sample), 40);
+        assert_eq!(count(|purpose| *purpose == Purpose::Repeat), 4);
+        assert_eq!(count(|purpose| matches!(purpose, Purpose::Variant(_))), 2 * 5);
+    }
+
+    #[test]
+    fn in_the_scene_with_outliers_two_marks_in_a_hundred_lie_5_to_20_px_off() {
+        let asked = Asked { scenes: vec!["outliers".into()], ..Asked::default() };
+        let plan = Plan::of(1, 32, asked).unwrap();
+        let exact = plan.scenarios[0].setup.exact();
+        let exact: Vec<Vec2> = exact.iter().flat_map(View::pixels).copied().collect();
+        let off_px = |case: &Case| -> Vec<f64> {
+            let views = plan.problem(case).views;
+            let seen = views.iter().flat_map(|view| &view.pixels).map(|&[u, v]| Vec2::new(u, v));
+            seen.zip(&exact).map(|(seen, exact)| (seen - exact).norm()).collect()
+        };
+        let all: Vec<f64> = plan.cases.iter().flat_map(off_px).collect();
+        // Noise of 0.1 px; of 8064 marks 161 +- 13, five standard deviations.
+        let (far, near): (Vec<f64>, Vec<f64>) = all.iter().partition(|px| **px > 1.0);
+        assert_eq!(all.len(), 32 * 252);
+        assert!((98..225).contains(&far.len()), "{}", far.len());
+        assert!(far.iter().all(|px| (4.4..20.6).contains(px)) && near.iter().all(|px| *px < 0.6));
+    }
 }

@@ -284,3 +284,26 @@ fn fingerprint(estimate: &Estimate) -> u64 {
     let numbers = numbers.chain(of_poses.flat_map(|c| c.iter().copied()));
     fnv1a(numbers.chain(estimate.rmse_px).flat_map(|x| x.to_bits().to_le_bytes()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Builtin;
+    use crate::solver::Solver;
+
+    #[test]
+    fn refitted_poses_leave_what_the_best_ones_leave_and_more_with_a_worse_camera() {
+        let plan = Plan::new(1, 1).unwrap();
+        let problem = plan.problem(&Case { scenario: 0, purpose: Purpose::Sample, trial: 0 });
+        let answer = Builtin.ask(&problem).unwrap();
+        let Outcome::Estimate(estimate) = super::super::accept::accept(&problem, answer) else {
+            panic!("no estimate");
+        };
+        let camera = estimate.camera;
+        let best = square(&camera, estimate.cam_from_target.as_ref().unwrap(), &problem);
+        let refitted = refitted_square(&camera, &problem).unwrap();
+        assert!((refitted / best - 1.0).abs() < 1e-9, "{refitted} {best}");
+        let worse = camera.with_value(Parameter::Fx, camera.fx + 1.0).unwrap();
+        assert!(refitted_square(&worse, &problem).unwrap() > 1.01 * best);
+    }
+}

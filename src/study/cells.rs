@@ -233,3 +233,27 @@ impl Cell {
         self.prediction.0[at]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::example::STUDY;
+
+    #[test]
+    fn a_precision_is_of_something_that_every_cell_measures() {
+        let with = |quantity: &str| {
+            let wanted =
+                format!("batch = 2\nprecision = {{ quantity = \"{quantity}\", relative_half_width = 0.1 }}");
+            let text = STUDY.replace("batch = 2", &wanted);
+            Spec::parse(&text).unwrap().cells(&text).map(|cells| cells.len())
+        };
+        assert_eq!(with("fx").unwrap(), 2);
+        let refused = with("k3").unwrap_err();
+        let expected = SpecError::Precision {
+            quantity: "k3".into(),
+            cell: "noise = 0.1".into(),
+            known: "rmse, nees, fx, fy, cx, cy, k1, k2, depth".into(),
+        };
+        assert_eq!(refused.to_string(), expected.to_string());
+    }
+}

@@ -310,4 +310,18 @@ mod tests {
         // The variance of the paired difference is rounding; its root, 1e-8, is what is left.
         assert!((ratio.value - 3.0).abs() < 1e-14 && ratio.low > 2.999_999 && ratio.high < 3.000_001);
     }
+
+    #[test]
+    fn a_verdict_needs_an_interval_that_leaves_out_no_difference() {
+        let one = |list: &[(f64, f64)]| {
+            let mut pairs = Pairs::default();
+            (0..25).flat_map(|_| list).for_each(|(x, y)| pairs.add(*x, *y));
+            let shared = [(Quantity::Depth, 0, 0)];
+            conclude(&["cell".into()], &shared, &[pairs], &[(0, 0)], 0.05).effects[0].verdict
+        };
+        assert_eq!(one(&[(1.0, 1.0), (2.0, 2.0)]), Verdict::Alike);
+        assert_eq!(one(&[(1.0, 1.5), (2.0, 2.4)]), Verdict::FirstBetter);
+        assert_eq!(one(&[(1.5, 1.0), (2.4, 2.0)]), Verdict::SecondBetter);
+        assert_eq!(one(&[(1.0, 2.0), (2.0, 1.0)]), Verdict::NotTold);
+    }
 }

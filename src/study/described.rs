@@ -108,3 +108,28 @@ pub(super) fn in_head(manifest: &Manifest) -> Vec<(String, String)> {
     .map(|(key, value)| (format!("calibench.{key}"), value.to_string()))
     .to_vec()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::example::STUDY;
+    use crate::{Shard, Spec};
+
+    #[test]
+    fn the_head_of_a_file_of_trials_says_what_made_them() {
+        let commit = Some(Commit { hash: "abc".into(), dirty: false });
+        let build = Build { commit, ..Build::default() };
+        let spec = Spec::parse(STUDY).unwrap();
+        let shard = Shard { index: 1, count: 3 };
+        let manifest = Manifest::new(&spec, shard, &build);
+        let head = in_head(&manifest);
+        let keys: Vec<&str> = head.iter().map(|(key, _)| key.strip_prefix("calibench.").unwrap()).collect();
+        assert_eq!(keys, ["study", "seed", "shard", "spec_sha256", "version", "commit"]);
+        let of = |key: &str| {
+            let name = format!("calibench.{key}");
+            head.iter().find(|(k, _)| *k == name).map(|(_, value)| value.clone()).unwrap()
+        };
+        assert_eq!([of("study"), of("seed"), of("shard"), of("commit")], ["two-cells", "1", "1/3", "abc"]);
+        assert_eq!(of("spec_sha256"), manifest.spec_sha256);
+    }
+}

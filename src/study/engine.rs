@@ -395,4 +395,35 @@ mod tests {
         let least = if widths[0] > widths[1] { "noise = 0.1" } else { "noise = 0.3" };
         assert_eq!(engine.worst().unwrap().cell, least);
     }
+
+    #[test]
+    fn parts_take_all_trials_of_the_whole_together() {
+        // Two whole batches of two and a last one of one, of each of two cells.
+        let text = STUDY.replace("per_cell = 3\nbatch = 2", "per_cell = 5\nbatch = 2");
+        let most = |index, count| Engine::new(&text, Shard { index, count }).unwrap().most_trials();
+        assert_eq!(most(0, 1), 10);
+        for count in 2..8 {
+            assert_eq!((0..count).map(|index| most(index, count)).sum::<u64>(), 10, "{count} parts");
+        }
+        // Batches are dealt in turn: (0, 0), (0, 1), (0, 2) of the first part, the others of the second.
+        assert_eq!([most(0, 2), most(1, 2)], [5, 5]);
+        assert_eq!([0, 1, 2, 3].map(|index| most(index, 4)), [3, 3, 2, 2]);
+    }
+
+    #[test]
+    fn equal_values_are_known_exactly_and_others_by_half_of_their_interval() {
+        let mut engine = Engine::new(STUDY, Shard::WHOLE).unwrap();
+        let at = engine.quantities.iter().position(|q| q.name() == "fx").unwrap();
+        for x in [7.0, 7.0, 7.0, 7.0] {
+            engine.tallies[0].moments[at].add(x);
+        }
+        for x in [-1.0, 2.0, 0.5, -3.0, 1.0, 0.0] {
+            engine.tallies[1].moments[at].add(x);
+        }
+        assert_eq!(engine.relative_half_width(0, "fx"), Some(0.0));
+        let sd = engine.tallies[1].moments[at].sd_interval(0.05).unwrap();
+        let width = engine.relative_half_width(1, "fx").unwrap();
+        assert!((2.0 * width * sd.value - (sd.high - sd.low)).abs() < 1e-12 && width > 0.1, "{width}");
+        assert_eq!(engine.relative_half_width(0, "cx"), None);
+    }
 }

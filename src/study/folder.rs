@@ -316,3 +316,19 @@ impl Folder {
         FolderError::Damaged { path: self.file(name), what: what.into() }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn trials_of_another_run_are_refused_with_the_beginnings_of_both_fingerprints() {
+        let foreign = |found: &str| {
+            let (found, expected) = (found.to_string(), "0123456789abcdef".repeat(4));
+            FolderError::Foreign { path: "checkpoint.json".into(), found, expected }.to_string()
+        };
+        let said = foreign(&"fedcba9876543210".repeat(4));
+        assert!(said.contains("(fingerprint fedcba987654, this run's is 0123456789ab)"), "{said}");
+        assert!(foreign("").contains("(fingerprint none, this"), "{}", foreign(""));
+    }
+}

@@ -250,6 +250,9 @@ pub(super) fn hash_of(path: &Path, bytes: u64) -> Result<(Sha256, u64), FolderEr
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::example::STUDY;
+    use crate::{Shard, Spec, finish};
+    use calibench_harness::Build;
 
     #[test]
     fn a_file_is_hashed_as_far_as_is_asked() {
@@ -262,5 +265,21 @@ mod tests {
         assert_eq!(hashed(3), (abc.to_string(), 3));
         assert_eq!(hashed(u64::MAX).1, 6);
         std::fs::remove_file(path).unwrap();
+    }
+
+    #[test]
+    fn the_trials_of_a_complete_run_are_read_from_its_own_kind_of_file() {
+        let path = std::env::temp_dir().join(format!("calibench-log-{}", std::process::id()));
+        let spec = Spec::parse(STUDY).unwrap();
+        let manifest = Manifest::new(&spec, Shard::WHOLE, &Build::default());
+        let folder = Folder::create(&path, STUDY, &manifest).unwrap();
+        let mut engine = folder.engine(Shard::WHOLE).unwrap();
+        let done = folder.run(&mut engine, &Interruption::default(), |_| ()).unwrap();
+        assert_eq!(done, Outcome::Complete);
+        finish(&folder, &engine).unwrap();
+        let again = folder.replayed().unwrap();
+        assert_eq!((again.trials(), again.tallies), (6, engine.tallies));
+        drop(folder);
+        std::fs::remove_dir_all(path).unwrap();
     }
 }

@@ -193,3 +193,40 @@ fn commit(parts: &[Part]) -> Option<Commit> {
     let same = parts.iter().all(|p| p.manifest.commit.as_ref() == Some(&hash));
     same.then(|| Commit { hash, dirty: parts.iter().any(|p| p.manifest.dirty == Some(true)) })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::example::STUDY;
+    use crate::{Spec, finish};
+
+    #[test]
+    fn the_whole_names_the_commit_that_its_parts_share_and_no_other() {
+        let at = std::env::temp_dir().join(format!("calibench-merge-{}", std::process::id()));
+        let build = |hash: &str| {
+            let commit = Some(Commit { hash: hash.into(), dirty: false });
+            Build { commit, date: Some("2026-01-31".into()), ..Build::default() }
+        };
+        let part = |name: &str, index: u64, hash: &str| {
+            let (path, shard) = (at.join(name), Shard { index, count: 2 });
+            let manifest = Manifest::new(&Spec::parse(STUDY).unwrap(), shard, &build(hash));
+            let folder = Folder::create(&path, STUDY, &manifest).unwrap();
+            let mut engine = folder.engine(shard).unwrap();
+            folder.run(&mut engine, &Default::default(), |_| ()).unwrap();
+            finish(&folder, &engine).unwrap();
+            path
+        };
+        let parts = [part("first", 0, "one"), part("second", 1, "one"), part("other", 1, "two")];
+        let merged = |parts: [&PathBuf; 2], out: &str| {
+            let (folder, engine) =
+                merge(&parts.map(Clone::clone), &at.join(out), None, &build("mine")).unwrap();
+            assert_eq!(engine.trials(), 6);
+            let Manifest { commit, day, .. } = folder.manifest().unwrap();
+            (commit, day)
+        };
+        let known = (Some("one".to_string()), Some("2026-01-31".to_string()));
+        assert_eq!(merged([&parts[0], &parts[1]], "alike"), known);
+        assert_eq!(merged([&parts[0], &parts[2]], "unlike"), (None, None));
+        std::fs::remove_dir_all(at).unwrap();
+    }
+}

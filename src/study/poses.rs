@@ -397,4 +397,19 @@ mod tests {
     fn the_radical_inverse_is_van_der_corputs() {
         assert_eq!([1, 2, 3, 4].map(van_der_corput), [0.5, 0.25, 0.75, 0.125]);
     }
+
+    #[test]
+    fn the_image_ends_half_a_pixel_beyond_its_last_pixels() {
+        let camera = Camera::pinhole(100.0, 100.0, 0.0, 0.0).into();
+        let sight = Sight { camera: &camera, image: (640, 480), points: &[] };
+        let pose = looking_at_centre([0.0; 3], 1.0);
+        let shows = sight.shows(&pose);
+        let at = |u: f64, v: f64| shows(&(Vec2::new(u, v) / 100.0));
+        for (u, v) in [(-0.4, -0.4), (639.4, 0.0), (0.0, 479.4)] {
+            assert!(at(u, v), "({u}, {v})");
+        }
+        for (u, v) in [(-0.6, 0.0), (0.0, -0.6), (639.6, 0.0), (0.0, 479.6)] {
+            assert!(!at(u, v), "({u}, {v})");
+        }
+    }
 }

@@ -115,6 +115,7 @@ fn length_sd(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use calibench::camera::Parameter;
 
     #[test]
     fn over_several_sets_of_poses_means_and_variances_are_averaged() {
@@ -137,5 +138,25 @@ mod tests {
             );
         }
         assert!(nees(6.0, 4.0).is_none() && nees(0.0, 20.0).is_none());
+    }
+
+    #[test]
+    fn a_length_without_distortion_errs_as_its_focal_length_does() {
+        let truth = Truth::example();
+        let camera: Camera<Lens> = Camera::pinhole(600.0, 600.0, 326.0, 243.0).into();
+        let truth = Truth {
+            camera,
+            image_size: truth.image_size,
+            points: truth.points,
+            cam_from_target: truth.cam_from_target,
+        };
+        let free = FreeParameters::of(&[Parameter::Fx, Parameter::Fy, Parameter::Cx, Parameter::Cy]);
+        let bound = cramer_rao(&truth, free, 0.1).unwrap();
+        // Along u a length is L = Z du / fx, so that dL / dfx = -L / fx, and nothing else counts.
+        let length = Length { centre_mm: [5.0, -3.0, 200.0], length_mm: 40.0, direction_deg: 0.0 };
+        let seen = (length, length.pixels(&camera).unwrap());
+        let sd = length_sd(&camera, free, &bound, &seen).unwrap();
+        let expected = 40.0 / 600.0 * bound.standard_deviation(Parameter::Fx).unwrap();
+        assert!((sd / expected - 1.0).abs() < 1e-6, "{sd} {expected}");
     }
 }

@@ -86,3 +86,29 @@ fn ideal(camera: &Camera<Lens>, pixel: &Vec2) -> Option<Vec2> {
     let ray = camera.ray(pixel).ok()?;
     (ray.z > 0.0).then(|| ray.xy() / ray.z)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use calibench::camera::Model;
+
+    #[test]
+    fn the_true_camera_measures_the_true_length_through_any_lens() {
+        let fisheye = Lens::new(Model::KannalaBrandt, &[-0.03, 0.004, 0.0, 0.0]).unwrap();
+        let cameras = [
+            Camera::with_lens(600.0, 590.0, 320.0, 240.0, fisheye),
+            calibench::synth::Truth::example_camera().into(),
+        ];
+        let length = Length { centre_mm: [30.0, -20.0, 200.0], length_mm: 40.0, direction_deg: 30.0 };
+        for camera in cameras {
+            let pixels = length.pixels(&camera).unwrap();
+            assert!(length.error_mm(&camera, &pixels).unwrap().abs() < 1e-9);
+            // A focal length 1 % too long measures 1 % too little.
+            let longer = Camera { fx: 1.01 * camera.fx, fy: 1.01 * camera.fy, ..camera };
+            let shrunk =
+                |p: &Vec2| Vec2::new(camera.cx, camera.cy) + (p - Vec2::new(camera.cx, camera.cy)) * 1.01;
+            assert!(length.error_mm(&longer, &pixels.map(|p| shrunk(&p))).unwrap().abs() < 1e-9);
+            assert!(length.error_mm(&longer, &pixels).unwrap() < -0.3);
+        }
+    }
+}

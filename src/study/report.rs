@@ -196,9 +196,28 @@ fn escape(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::example::STUDY;
+    use crate::{Shard, Trial, summarise};
 
     #[test]
     fn a_share_is_told_without_the_rounding_of_its_binary_fraction() {
         assert_eq!([0.95, 0.999, 0.997_3].map(percent), [95.0, 99.9, 99.73]);
+    }
+
+    #[test]
+    fn every_way_in_which_trials_ended_has_a_row_with_its_share() {
+        let mut engine = Engine::new(STUDY, Shard::WHOLE).unwrap();
+        let values = vec![None; engine.quantities.len()];
+        for outcome in ["converged", "converged", "converged", "refused-<few>"] {
+            let trial =
+                Trial { cell: 0, trial: 0, outcome: outcome.into(), iterations: 1, values: values.clone() };
+            engine.tallies[0].add(&trial);
+        }
+        let html = endings(&summarise(&engine));
+        for row in ["noise = 0.1", "converged", "<td>3", "refused-&lt;few&gt;", "<td>1"] {
+            assert!(html.contains(row), "{row}: {html}");
+        }
+        // The other cell has none.
+        assert!(!html.contains("noise = 0.3"), "{html}");
     }
 }

@@ -394,4 +394,38 @@ mod tests {
         assert_eq!((spec.trials.batch, spec.trials.precision), (500, None));
         assert_eq!((spec.confidence, spec.common_random_numbers), (0.95, true));
     }
+
+    #[test]
+    fn what_no_study_can_have_is_refused_by_its_field() {
+        for (old, new, field) in [
+            ("per_cell = 3", "per_cell = 1", "trials.per_cell"),
+            ("batch = 2", "batch = 0", "trials.batch"),
+            ("seed = 1", "seed = 1\nconfidence = 1.0", "confidence"),
+            (
+                "batch = 2",
+                "batch = 2\nprecision = { quantity = \"fx\", relative_half_width = 0.0 }",
+                "trials.precision.relative_half_width",
+            ),
+        ] {
+            let refused = Spec::parse(&STUDY.replace(old, new)).unwrap_err();
+            assert!(matches!(&refused, SpecError::Value { field: own, .. } if *own == field), "{refused}");
+        }
+        let refused = Spec::parse(&STUDY.replace("two-cells", "Two cells")).unwrap_err();
+        assert!(matches!(&refused, SpecError::Name(name) if name == "Two cells"), "{refused}");
+    }
+
+    #[test]
+    fn a_target_of_a_file_has_the_marks_that_stand_there() {
+        let grid = "{ columns = 3, rows = 3, spacing_mm = 10.0 }";
+        let text = STUDY.replace(grid, "{ file = \"marks.csv\" }");
+        let inputs = Inputs::parse(r#"{ "marks.csv": "X,Y\n0,0\n12.5,0\n0,9\n12.5,9.25\n" }"#).unwrap();
+        let spec = Spec::parse_with(&text, &inputs).unwrap();
+        let scene = spec.scene.clone().read(&inputs).unwrap();
+        let marks = scene.target.points().unwrap();
+        assert_eq!(
+            marks.iter().map(|p| [p.x, p.y]).collect::<Vec<_>>(),
+            [[0.0, 0.0], [12.5, 0.0], [0.0, 9.0], [12.5, 9.25]]
+        );
+        assert!(spec.scene.read(&Inputs::default()).is_err());
+    }
 }

@@ -317,4 +317,23 @@ mod tests {
         (0..3).for_each(|i| few.add(f64::from(i)));
         assert_eq!(quantile(&few, 0.0, 0.5, 0.05), None);
     }
+
+    #[test]
+    fn shares_of_outcomes_are_of_all_trials_and_lie_within_their_intervals() {
+        let engine = Engine::new(STUDY, Shard::WHOLE).unwrap();
+        let mut tally = engine.tallies[0].clone();
+        let values = vec![None; engine.quantities.len()];
+        for outcome in ["converged", "refused-few", "converged", "converged"] {
+            let trial =
+                Trial { cell: 0, trial: 0, outcome: outcome.into(), iterations: 1, values: values.clone() };
+            tally.add(&trial);
+        }
+        let found = outcomes(&tally, 0.05);
+        let told: Vec<(&str, u64, f64)> =
+            found.iter().map(|(name, n, s)| (name.as_str(), *n, s.value)).collect();
+        assert_eq!(told, [("converged", 3, 0.75), ("refused-few", 1, 0.25)]);
+        // Wilson's interval of 3 in 4: (0.75 + z^2 / 8 -+ z sqrt(0.1875 / 4 + z^2 / 64)) / (1 + z^2 / 4).
+        let share = found[0].2;
+        assert!((share.low - 0.300_642).abs() < 1e-6 && (share.high - 0.954_413).abs() < 1e-6, "{share:?}");
+    }
 }

@@ -69,3 +69,19 @@ impl FromStr for TrialFile {
             .ok_or_else(|| TrialFileError(text.to_string()))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn csv_is_always_there_and_parquet_where_it_was_built_in() {
+        assert_eq!(TrialFile::Csv.check(), Ok(()));
+        assert_eq!(TrialFile::Parquet.check().is_ok(), cfg!(feature = "parquet"));
+        for file in [TrialFile::Csv, TrialFile::Parquet] {
+            assert_eq!(file.to_string().parse(), Ok(file));
+            assert_eq!(file.name(), format!("trials.{file}"));
+        }
+        assert!("xlsx".parse::<TrialFile>().is_err());
+    }
+}

@@ -254,3 +254,20 @@ fn quadratic_form(
     }
     (sum, left.iter().filter(|&&left| left).count())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_quadratic_form_of_a_matrix_without_full_rank_is_that_of_its_pseudo_inverse() {
+        // M = a a^T + 4 e3 e3^T with a = (2, 1, 0): r^T M^+ r = 9 + 1 for r = 3 a + 2 e3, and one rank is missing.
+        let (mut matrix, mut right, mut scale) = ([[0.0; N]; N], [0.0; N], [0.0; N]);
+        matrix[0][..3].copy_from_slice(&[4.0, 2.0, 0.0]);
+        matrix[1][..3].copy_from_slice(&[2.0, 1.0, 0.0]);
+        matrix[2][..3].copy_from_slice(&[0.0, 0.0, 4.0]);
+        right[..3].copy_from_slice(&[6.0, 3.0, 2.0]);
+        scale[..3].copy_from_slice(&[4.0, 1.0, 4.0]);
+        assert_eq!(quadratic_form(&mut matrix, &mut right, &scale, 3), (10.0, 1));
+    }
+}

@@ -205,4 +205,18 @@ mod tests {
             Err(ClosedFormError::TooFewViews { need: 2, .. })
         ));
     }
+
+    #[test]
+    fn only_a_definite_conic_is_of_a_real_camera() {
+        // K^-T K^-1 of fx = 2, fy = 4 about the centre, at any scale.
+        for scale in [1.0, -3.0] {
+            let found = camera_from_conic([0.25 * scale, 0.0, 0.0625 * scale, 0.0, 0.0, scale]).unwrap();
+            assert_eq!((found.fx, found.fy, found.cx, found.cy), (2.0, 4.0, 0.0, 0.0));
+        }
+        for signs in [[-1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, -1.0], [0.0, 1.0, 1.0]] {
+            let [b11, b22, b33] = signs;
+            let refused = camera_from_conic([b11, 0.0, b22, 0.0, 0.0, b33]);
+            assert_eq!(refused, Err(ClosedFormError::NoRealCamera), "{signs:?}");
+        }
+    }
 }

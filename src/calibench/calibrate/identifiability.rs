@@ -323,3 +323,51 @@ fn turned_to(state: &State, slope: Vec2) -> State {
     };
     State { camera: state.camera, cam_from_target: state.cam_from_target.iter().map(turn).collect() }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::retraction::Retraction;
+    use crate::calibrate::{Loss, Termination};
+    use crate::camera::Camera;
+
+    /// What is said of a parameter that was moved far away at the cost of so many variances.
+    fn verdict(parameter: Parameter, value: f64, variances: f64) -> Result<(), CalibrationError> {
+        let (camera, noise_px) = (Camera::pinhole(600.0, 600.0, 320.0, 240.0), 0.1);
+        let at = |camera: Camera, rise: f64| {
+            let mut system = System::new(FreeParameters::STANDARD, 0);
+            system.cost = 5.0 + rise * noise_px * noise_px;
+            let state = State { camera, cam_from_target: Vec::new() };
+            Minimum { state, system, termination: Termination::Converged, iterations: 5 }
+        };
+        let far = Far { parameter, minimum: at(camera.with(parameter, value), variances) };
+        let walked = Walked { best: at(camera, 0.0), starts: 1, far: vec![far], met: Vec::new() };
+        let problem = Problem {
+            free: FreeParameters::STANDARD,
+            fy_per_fx: None,
+            priors: Priors::NONE,
+            observations: &[],
+            loss: Loss::Squares,
+            max_iterations: 1,
+            hold_tilt: false,
+            retraction: Retraction::Straight,
+            focal_limits: (0.0, f64::INFINITY),
+            rounding_cost: 0.0,
+        };
+        refuse_if_flat(&problem, &walked, noise_px)
+    }
+
+    #[test]
+    fn a_focal_length_far_away_must_cost_three_deviations_and_a_principal_point_two() {
+        for (parameter, value, deviations) in [(Parameter::Fx, 1800.0, 3.0f64), (Parameter::Cy, 540.0, 2.0)] {
+            let refused = verdict(parameter, value, 0.98 * deviations * deviations);
+            let Err(CalibrationError::NotIdentifiable { inseparable, .. }) = refused else {
+                panic!("{parameter}: {refused:?}");
+            };
+            assert_eq!(inseparable[0], Unknown::Intrinsic(parameter).group());
+            assert_eq!(verdict(parameter, value, 1.02 * deviations * deviations), Ok(()));
+        }
+        // Where the walk came back to the minimum it says nothing.
+        assert_eq!(verdict(Parameter::Fx, 600.01, 0.0), Ok(()));
+    }
+}

@@ -60,3 +60,19 @@ fn fall(problem: &Problem<'_>, minimum: &Minimum, parameters: &[Parameter]) -> O
     system.solve_into(0.0, &mut step)?;
     Some(step.predicted_gain).filter(|gain| gain.is_finite())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_decided_on_is_not_asked() {
+        use Parameter::{K3, P1, P2};
+        let standard = Settings::standard();
+        let (tangential, radial): (LeftOut, LeftOut) = (&[P1, P2], &[K3]);
+        assert_eq!(undecided(&standard), [tangential, radial]);
+        assert_eq!(undecided(&standard.clone().hold(K3, 0.0)), [tangential]);
+        assert_eq!(undecided(&standard.clone().estimate(P2)), [radial]);
+        assert!(undecided(&standard.estimate(P1).estimate(K3)).is_empty());
+    }
+}

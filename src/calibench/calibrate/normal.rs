@@ -180,3 +180,59 @@ pub fn information(
     fill(&mut system, camera, cam_from_target, &observations, Loss::Squares, None)?;
     Some(system)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Vec3, rotation};
+
+    #[test]
+    fn tied_focal_lengths_follow_the_chain_rule() {
+        use Parameter::{Cx, Cy, Fx, Fy, K1};
+        let ratio = 1.25;
+        let camera = Camera::pinhole(600.0, 750.0, 320.0, 240.0);
+        let pose = Pose {
+            rotation: rotation::from_xyz_rad(0.3, -0.4, 0.2),
+            translation: Vec3::new(5.0, -7.0, 150.0),
+        };
+        let points = (0..35).map(|i| Vec2::new(f64::from(i % 7) - 3.0, f64::from(i / 7) - 2.0) * 12.0);
+        let seen = |(i, p): (usize, Vec2)| {
+            (
+                p,
+                predict(&camera, &pose, &p).unwrap()
+                    + Vec2::new(libm::sin(i as f64), libm::cos(3.0 * i as f64)),
+            )
+        };
+        let pairs: Vec<(Vec2, Vec2)> = points.enumerate().map(seen).collect();
+        let filled = |free: &[Parameter], tie: Option<f64>| {
+            let mut system = System::new(FreeParameters::of(free), 1);
+            let observations = [Observations::new(pairs.iter().copied())];
+            fill(&mut system, &camera, &[pose], &observations, Loss::Squares, tie).unwrap();
+            system
+        };
+        let (untied, tied) = (filled(&[Fx, Fy, Cx, Cy, K1], None), filled(&[Fx, Cx, Cy, K1], Some(ratio)));
+        // Columns of the tied problem as combinations of the untied one's.
+        let change = nalgebra::SMatrix::<f64, 5, 4>::from_row_slice(&[
+            1.0, 0.0, 0.0, 0.0, ratio, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0,
+            1.0,
+        ]);
+        let close = |a: nalgebra::DMatrix<f64>, b: nalgebra::DMatrix<f64>| {
+            assert!((&a - &b).amax() < 1e-12 * b.amax(), "{a}{b}");
+        };
+        let square = untied.intrinsics.fixed_view::<5, 5>(0, 0);
+        close(
+            nalgebra::DMatrix::from_fn(4, 4, |i, j| tied.intrinsics[(i, j)]),
+            nalgebra::DMatrix::from_column_slice(4, 4, (change.transpose() * square * change).as_slice()),
+        );
+        let gradient = change.transpose() * untied.gradient.fixed_rows::<5>(0);
+        close(
+            nalgebra::DMatrix::from_fn(4, 1, |i, _| tied.gradient[i]),
+            nalgebra::DMatrix::from_column_slice(4, 1, gradient.as_slice()),
+        );
+        let coupling = change.transpose() * untied.views[0].coupling.fixed_rows::<5>(0);
+        close(
+            nalgebra::DMatrix::from_fn(4, 6, |i, j| tied.views[0].coupling[(i, j)]),
+            nalgebra::DMatrix::from_column_slice(4, 6, coupling.as_slice()),
+        );
+    }
+}

@@ -401,3 +401,25 @@ fn inverse_of_lower(lower: &Square, n: usize) -> Square {
     }
     inverse
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Vec3, rotation};
+    use nalgebra::Vector6;
+
+    #[test]
+    fn a_step_turns_a_pose_as_in_plain_numbers() {
+        let pose = Pose {
+            rotation: rotation::from_xyz_rad(0.3, -0.4, 0.2),
+            translation: Vec3::new(5.0, -7.0, 150.0),
+        };
+        let step = [3e-4, -5e-4, 7e-4, 0.01, -0.02, 0.03];
+        let mut numbers = PoseNumbers::of(&pose);
+        assert!((numbers.to_pose().rotation - pose.rotation).norm() < 1e-15);
+        numbers.take(&step.map(Number::from));
+        let (own, expected) = (numbers.to_pose(), pose.perturbed(&Vector6::from(step)));
+        assert!((own.rotation - expected.rotation).norm() < 1e-15);
+        assert!((own.translation - expected.translation).norm() < 1e-13);
+    }
+}

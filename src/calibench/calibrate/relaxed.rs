@@ -374,3 +374,94 @@ impl State {
         State { lens: self.lens.stepped(free, step.lens.as_slice()), homographies }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::BrownConrady;
+
+    const FREE: [Parameter; 6] =
+        [Parameter::Fy, Parameter::Cx, Parameter::Skew, Parameter::K1, Parameter::K2, Parameter::P1];
+
+    fn state() -> State {
+        let distortion = BrownConrady { k1: -0.2, k2: 0.05, p1: 1e-3, p2: -2e-3, k3: 0.01 };
+        let lens = Camera { skew: 1.5, ..Camera::pinhole(600.0, 580.0, 326.0, 243.0) };
+        let homographies = [
+            [0.3, 0.02, 0.03, -0.01, 0.28, -0.02, 0.05, -0.04],
+            [0.25, -0.03, 0.01, 0.02, 0.3, 0.02, -0.06, 0.08],
+        ];
+        State {
+            lens: lens.with_distortion(distortion),
+            homographies: homographies.map(|h| Entries::from_column_slice(&h)).to_vec(),
+        }
+    }
+
+    /// What the state predicts, off by so many pixels at most.
+    fn observations(state: &State, off_px: f64) -> Vec<Observations> {
+        let of_view = |h: &Entries| {
+            let seen = |i: usize| {
+                let p = Vec2::new((i % 5) as f64 - 2.0, (i / 5) as f64 - 2.0) * 0.6;
+                let ideal = matrix(h) * Vec3::new(p.x, p.y, 1.0);
+                let wave = Vec2::new(libm::sin(7.0 * i as f64), libm::cos(11.0 * i as f64));
+                (p, state.lens.project(&ideal).unwrap() + wave * off_px)
+            };
+            Observations::new((0..25).map(seen))
+        };
+        state.homographies.iter().map(of_view).collect()
+    }
+
+    #[test]
+    fn gradients_are_half_the_slope_of_the_cost() {
+        let (at, free) = (state(), FreeParameters::of(&FREE));
+        let observations = observations(&at, 2.0);
+        let fit = Fit { observations: &observations, loss: Loss::Cauchy { scale_px: 1.5 } };
+        let cost = |state: &State| fit.equations(state, free).cost;
+        let equations = fit.equations(&at, free);
+        let agree = |analytic: f64, ahead: State, behind: State, h: f64| {
+            let difference = 0.5 * (cost(&ahead) - cost(&behind)) / (2.0 * h);
+            assert!((difference - analytic).abs() < 1e-5 * (1.0 + analytic.abs()), "{difference} {analytic}");
+        };
+        for (k, parameter) in FREE.into_iter().enumerate() {
+            let h = 1e-6 * (1.0 + at.lens.get(parameter).abs());
+            let moved =
+                |h: f64| State { lens: at.lens.with(parameter, at.lens.get(parameter) + h), ..at.clone() };
+            agree(equations.lens_gradient[k], moved(h), moved(-h), h);
+        }
+        for view in 0..2 {
+            for entry in 0..ENTRIES {
+                let moved = |h: f64| {
+                    let mut state = at.clone();
+                    state.homographies[view][entry] += h;
+                    state
+                };
+                agree(equations.views[view].gradient[entry], moved(1e-6), moved(-1e-6), 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn a_short_step_gains_what_it_promises() {
+        let (truth, free) = (state(), FreeParameters::of(&FREE));
+        let observations = observations(&truth, 0.1);
+        let fit = Fit { observations: &observations, loss: Loss::Squares };
+        let start = State {
+            lens: truth.lens.with(Parameter::Cx, truth.lens.cx + 0.3),
+            homographies: truth.homographies.iter().map(|h| h.map(|x| x + 1e-4)).collect(),
+        };
+        let equations = fit.equations(&start, free);
+        for damping in [0.0, 0.5] {
+            let (step, promised) = equations.solve(damping, free.len()).unwrap();
+            let gained = equations.cost - fit.equations(&start.stepped(free, &step), free).cost;
+            assert!((gained / promised - 1.0).abs() < 0.01, "{gained} {promised}");
+        }
+    }
+
+    #[test]
+    fn a_homography_with_a_point_beyond_its_horizon_keeps_its_affine_part_only() {
+        let pairs =
+            Observations::new([Vec2::new(1.0, 1.0), Vec2::new(-1.0, 0.5)].map(|p| (p, p)).into_iter());
+        let with = |tilt: f64| Entries::from_column_slice(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, tilt, tilt]);
+        assert_eq!(in_front(with(-0.4), &pairs), with(-0.4));
+        assert_eq!(in_front(with(-0.6), &pairs), with(0.0));
+    }
+}

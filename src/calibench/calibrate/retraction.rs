@@ -204,4 +204,25 @@ mod tests {
         let ratio = apart(1e-2) / apart(1e-3);
         assert!((80.0..125.0).contains(&ratio), "{ratio}");
     }
+
+    #[test]
+    fn a_scaled_states_images_agree_to_second_order_in_the_tilts() {
+        let distortion = BrownConrady { k1: -0.2, k2: 0.1, p1: 1e-3, p2: -2e-3, k3: 0.03 };
+        let camera = Camera::pinhole(600.0, 610.0, 320.0, 240.0).with_distortion(distortion);
+        let free = FreeParameters::of(&Parameter::ALL);
+        let apart = |tilt: f64| {
+            let rotation = rotation::from_xyz_rad(tilt, -1.5 * tilt, 0.2);
+            let pose = Pose { rotation, translation: Vec3::new(0.3, -0.2, 4.0) };
+            let state = State { camera, cam_from_target: vec![pose] };
+            let longer = scaled(&state, free, None, 1.3);
+            assert_eq!((longer.camera.fx, longer.camera.fy), (780.0, 793.0));
+            let image = |state: &State, x: f64, y: f64| {
+                state.camera.project(&state.cam_from_target[0].apply(&Vec3::new(x, y, 0.0))).unwrap()
+            };
+            let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
+            corners.map(|(x, y)| (image(&state, x, y) - image(&longer, x, y)).norm()).iter().sum::<f64>()
+        };
+        let ratio = apart(0.05) / apart(0.005);
+        assert!((80.0..125.0).contains(&ratio), "{ratio}");
+    }
 }

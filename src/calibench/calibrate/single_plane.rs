@@ -271,3 +271,16 @@ fn refuse_unseen_centre(frames: &Frames, view: &View, held: &Outcome) -> Result<
 fn lens_camera(focal_px: f64, centre: &Vec2, distortion: BrownConrady) -> Camera {
     Camera::pinhole(focal_px, focal_px, centre.x, centre.y).with_distortion(distortion)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_expected_rms_is_that_of_the_degrees_of_freedom() {
+        // 0.1 sqrt((100 - 10) / 50) and 0.1 / sqrt(100).
+        let (rms_px, sd_px) = predicted_rms_px(0.1, 50, 10);
+        assert!((rms_px - 0.134_164_078_649_987_4).abs() < 1e-15 && (sd_px - 0.01).abs() < 1e-15);
+        assert_eq!(predicted_rms_px(0.1, 5, 10).0, 0.0);
+    }
+}

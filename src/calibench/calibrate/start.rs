@@ -158,3 +158,38 @@ impl Held {
         poses.map(|cam_from_target| State { camera, cam_from_target })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Vec3, rotation};
+
+    fn homographies(camera: &Camera) -> Vec<Homography> {
+        let of_turn = |[x, y, z]: [f64; 3]| {
+            let r = rotation::from_xyz_rad(x, y, z);
+            let columns = [r.column(0).into(), r.column(1).into(), Vec3::new(3.0, -2.0, 120.0)];
+            Homography(camera.k() * Mat3::from_columns(&columns))
+        };
+        [[0.3, 0.1, 0.0], [0.0, -0.35, 0.4], [-0.25, 0.25, 0.2]].map(of_turn).to_vec()
+    }
+
+    #[test]
+    fn exact_homographies_give_the_exact_camera_in_any_pixel_frame() {
+        let camera = Camera::pinhole(3800.0, 3700.0, 2060.0, 1490.0);
+        for frame in [(Vec2::new(2000.0, 1500.0), 1800.0), (Vec2::new(2300.0, 1100.0), 900.0)] {
+            let found = normalised_closed_form(&homographies(&camera), &Settings::standard(), frame).unwrap();
+            for (own, expected) in found.parameters().iter().zip(camera.parameters()) {
+                assert!((own - expected).abs() < 1e-7, "{found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_known_principal_point_gives_the_exact_focal_length_of_cells_of_any_shape() {
+        for aspect in [1.0, 0.75] {
+            let camera = Camera::pinhole(600.0, 600.0 * aspect, 326.0, 243.0);
+            let found = focal_from_centre(&homographies(&camera), Vec2::new(326.0, 243.0), aspect).unwrap();
+            assert!((found - 600.0).abs() < 1e-8, "{found}");
+        }
+    }
+}

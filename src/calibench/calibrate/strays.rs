@@ -153,3 +153,21 @@ fn median(residuals: &[Vec<Vec2>]) -> f64 {
     let middle = squares.len() / 2;
     *squares.select_nth_unstable_by(middle, f64::total_cmp).1
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn many_strays_show_in_the_tails_where_none_of_them_stands_out() {
+        let residual = |i: usize| Vec2::new(if i % 10 == 3 { 1.0 + 1e-3 * i as f64 } else { 0.1 }, 0.0);
+        let residuals = vec![(0..50).map(residual).collect::<Vec<_>>(), (50..100).map(residual).collect()];
+        let variance = residuals.iter().flatten().map(Vec2::norm_squared).sum::<f64>() / 200.0;
+        let largest = residuals.iter().flatten().map(Vec2::norm_squared).fold(0.0, f64::max);
+        assert!(!is_suspicious(100, largest, 2.0, variance));
+        let found = of_residuals(&residuals, 20, variance, |_| residuals.clone()).unwrap();
+        assert_eq!((found.marks, found.share, found.view, found.point), (10, 0.1, 1, 43));
+        assert!((found.residual_px - 1.093).abs() < 1e-12);
+        assert!((found.median_px - 0.1).abs() < 1e-12);
+    }
+}

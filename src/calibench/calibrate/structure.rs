@@ -59,3 +59,21 @@ pub(super) fn structure(residuals: &[Vec<Vec2>], variance: f64) -> Option<Warnin
     let Neighbours { correlation, z } = with_variance(residuals, variance);
     (z > CHANCE && correlation > MATERIAL).then_some(Warning::Structured { correlation })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn correlations_are_those_of_marks_next_to_each_other_in_a_view() {
+        let view = |list: &[(f64, f64)]| list.iter().map(|&(x, y)| Vec2::new(x, y)).collect::<Vec<_>>();
+        // s^2 = 4 * 25 / 8, three pairs of product 25: correlation 1, z = 75 / (12.5 sqrt(6)).
+        let alike = neighbours(&[view(&[(3.0, 4.0); 4])]);
+        assert_eq!(alike.correlation, 1.0);
+        assert!((alike.z - 2.449_489_742_783_178).abs() < 1e-14);
+        assert_eq!(neighbours(&[view(&[(0.0, 1.0), (0.0, -1.0), (0.0, 1.0)])]).correlation, -1.0);
+        // At a right angle; and the last of a view is no neighbour of the next one's first.
+        let square = view(&[(1.0, 0.0), (0.0, 1.0)]);
+        assert_eq!(neighbours(&[square.clone(), view(&[(0.0, 1.0), (1.0, 0.0)])]).correlation, 0.0);
+    }
+}

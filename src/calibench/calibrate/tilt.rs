@@ -107,4 +107,15 @@ mod tests {
             assert!(first < 0.01 * libm::hypot(a.0 - o.0, a.1 - o.1), "{first}");
         }
     }
+
+    #[test]
+    fn planes_differ_by_the_angle_of_their_normals_however_they_are_rolled() {
+        let pose = |tilt: f64, roll: f64| Pose {
+            rotation: rotation::from_xyz_rad(tilt, 0.0, 0.0) * rotation::from_xyz_rad(0.0, 0.0, roll),
+            translation: Vec3::new(3.0, -2.0, 100.0),
+        };
+        for turn in [0.0, 0.3, 2.0, 3.1] {
+            assert!((angle_between(&pose(0.1, 0.7), &pose(0.1 + turn, -1.2)) - turn).abs() < 1e-14);
+        }
+    }
 }

@@ -58,3 +58,23 @@ pub fn leverages(calibration: &Calibration, views: &[View]) -> Option<Vec<Vec<Ve
         .map(|(i, view)| view.points().iter().map(|point| of_point(i, point)).collect())
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::{Settings, calibrate};
+    use crate::synth::{Scene, Stream, StreamKey};
+
+    #[test]
+    fn leverages_lie_between_0_and_1_and_sum_to_the_number_of_unknowns() {
+        let key = StreamKey { seed: 1, scenario: "leverage", trial: 0, purpose: "noise" };
+        let views = Scene::example().observe(0.1, &mut Stream::open(key));
+        let result = calibrate(&views, &Settings::standard()).unwrap();
+        let all = leverages(&result, &views).unwrap();
+        assert!(all.iter().flatten().all(|h| h.min() > 0.0 && h.max() < 1.0));
+        // Six of the camera, six of each of four views.
+        let sum: f64 = all.iter().flatten().map(|h| h.x + h.y).sum();
+        assert!((sum - 30.0).abs() < 1e-6, "{sum}");
+        assert_eq!(leverages(&result, &views[1..]), None);
+    }
+}

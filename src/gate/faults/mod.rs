@@ -183,6 +183,7 @@ fn mixed(bytes: impl Iterator<Item = u8>) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plan::{Case, Plan, Purpose};
 
     #[test]
     fn there_are_enough_faults_and_each_has_its_name() {
@@ -198,5 +199,16 @@ mod tests {
         let count = (0..20_000u32).filter(|i| mixed(i.to_le_bytes().into_iter()).is_multiple_of(100)).count();
         // Binomial: 200 +- 14; five standard deviations.
         assert!((130..270).contains(&count), "{count}");
+    }
+
+    #[test]
+    fn degrees_of_freedom_are_those_of_the_scene() {
+        let plan = Plan::new(1, 1).unwrap();
+        for (index, scenario) in plan.scenarios.iter().enumerate() {
+            let problem = plan.problem(&Case { scenario: index, purpose: Purpose::Sample, trial: 0 });
+            assert_eq!(freedom(&problem), scenario.degrees_of_freedom() as f64, "{}", scenario.id);
+        }
+        // Four views of 63 marks, six parameters.
+        assert_eq!(plan.scenarios[0].degrees_of_freedom(), 2 * 252 - 6 - 24);
     }
 }

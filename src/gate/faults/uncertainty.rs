@@ -236,3 +236,47 @@ fn contrast(residuals: &[(Vec2, Vec2)], name: &str) -> f64 {
     }
     sum / (square * mean_square).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::{Case, Plan, Purpose};
+    use crate::protocol::{AnswerCovariance, Status};
+
+    /// fx = 600 +- 2 and k1 = -0.2 +- 3, of covariance 1.
+    fn answer() -> Answer {
+        let parameters = ["fx", "k1"].map(String::from);
+        Answer {
+            parameters: parameters.iter().cloned().zip([600.0, -0.2]).collect(),
+            covariance: Some(AnswerCovariance {
+                parameters: parameters.to_vec(),
+                matrix: vec![vec![4.0, 1.0], vec![1.0, 9.0]],
+            }),
+            rmse: Some(0.1),
+            ..Answer::without_estimate("a", Status::Ok, "")
+        }
+    }
+
+    #[test]
+    fn a_bias_of_fx_is_followed_by_its_regressions() {
+        let mut biased = answer();
+        biased_together(&mut biased, 0.5);
+        // Half a deviation of 2, and 1 / 4 of that.
+        assert_eq!((biased.parameters["fx"], biased.parameters["k1"]), (601.0, -0.2 + 0.25));
+        assert_eq!((biased.poses, biased.rmse), (None, None));
+    }
+
+    #[test]
+    fn of_one_triangle_the_upper_one_is_left_with_the_diagonal() {
+        let plan = Plan::new(1, 1).unwrap();
+        let problem = plan.problem(&Case { scenario: 0, purpose: Purpose::Sample, trial: 0 });
+        let right = correct(&problem).covariance.unwrap().matrix;
+        let fault = FAULTS.iter().find(|fault| fault.id == "covariance-of-one-triangle").unwrap();
+        let stated = (fault.how)(&problem, &|| 0).covariance.unwrap().matrix;
+        for i in 0..6 {
+            for j in 0..6 {
+                assert_eq!(stated[i][j], if j >= i { right[i][j] } else { 0.0 });
+            }
+        }
+    }
+}

@@ -152,3 +152,24 @@ pub(super) fn honesty(scenario: &Scenario, answers: &Answers<'_>) -> Check {
     };
     Check::new(Property::Honesty, scenario.id, basis, conducts.len(), evidence.join(", ")).gravely()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{answered, change_trials};
+    use super::*;
+
+    #[test]
+    fn a_warning_flags_an_answer_where_warnings_are_rare() {
+        let (plan, mut seen) = answered(1);
+        change_trials(&plan, &mut seen, Purpose::Sample, |trial| {
+            trial.warnings = 1;
+            trial.standard_deviations = None;
+        });
+        let at = plan.cases.iter().position(|case| case.purpose == Purpose::Sample).unwrap();
+        let met = |warns_rarely| {
+            let habits = Habits { warns_rarely, ..Habits::UNKNOWN };
+            conduct(seen[at].as_ref().unwrap(), habits, |_| false)
+        };
+        assert_eq!((met(true), met(false)), (Conduct::Flagged, Conduct::Wrong));
+    }
+}

@@ -114,3 +114,25 @@ fn time(scenario: &Scenario, answers: &Answers<'_>, limit_s: Option<f64>) -> Opt
     let basis = limit_s.map_or(Basis::Told, |s| Basis::Certain(at(0.5) <= 1e3 * s));
     Some(Check::new(Property::Time, scenario.id, basis, milliseconds.len(), evidence))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{answered, change, on_scene};
+    use super::*;
+
+    #[test]
+    fn a_problem_that_is_refused_when_it_is_asked_again_is_no_repetition() {
+        let (plan, mut seen) = answered(1);
+        let judged = |seen: &[Option<Seen>]| {
+            let check = on_scene(&plan, seen, determinism)?;
+            Some((check.basis, check.problems))
+        };
+        assert_eq!(judged(&seen), Some((Basis::Certain(true), 1)));
+        let refuse = |seen: &mut Seen| *seen = Seen::Refused { reason: "no".into(), seconds: 0.0 };
+        change(&plan, &mut seen, Purpose::Repeat, refuse);
+        assert_eq!(judged(&seen), Some((Basis::Certain(false), 1)));
+        // Refused both times it says nothing.
+        change(&plan, &mut seen, Purpose::Sample, refuse);
+        assert_eq!(judged(&seen), None);
+    }
+}

@@ -67,3 +67,34 @@ fn compare(scenario: &Scenario, answers: &Answers<'_>, variant: Variant) -> Opti
     let check = worst_px.into_iter().fold(check, Check::of_size);
     (pairs > 0).then_some(check)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{answered, change_trials, on_scene};
+    use super::*;
+
+    #[test]
+    fn an_answer_that_moves_by_three_tenths_of_a_deviation_moves_as_by_three_tenths_of_the_noise() {
+        let (plan, mut seen) = answered(1);
+        let shift = Purpose::Variant(Variant::ImageShift);
+        let judged = |seen: &[Option<Seen>]| {
+            on_scene(&plan, seen, |scenario, answers| compare(scenario, answers, Variant::ImageShift))
+                .unwrap()
+        };
+        let follows = judged(&seen);
+        assert!(matches!(follows.basis, Basis::Chance(_)) && follows.size_px.unwrap() < 1e-6);
+        // One way and the other, as the sample's own errors are of both signs.
+        for step in [0.3, -0.3] {
+            change_trials(&plan, &mut seen, Purpose::Sample, |trial| {
+                trial.whitened = vec![1.0, -2.0, 0.5, 0.0, -0.5, 3.0];
+            });
+            change_trials(&plan, &mut seen, shift, |trial| {
+                trial.whitened = [1.0, -2.0, 0.5, 0.0, -0.5, 3.0].map(|z| z + step).to_vec();
+            });
+            let moves = judged(&seen);
+            let expected_px = 0.3 * plan.scenarios[0].sigma_px;
+            assert!((moves.size_px.unwrap() - expected_px).abs() < 1e-12);
+            assert_eq!((moves.basis, moves.problems), (Basis::Certain(false), 2));
+        }
+    }
+}

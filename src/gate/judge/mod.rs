@@ -243,4 +243,41 @@ mod tests {
         assert!(checks.iter().any(|check| check["verdict"] == "failed"));
         assert!(checks.iter().filter(|check| check["verdict"] != "failed").all(|c| c["repeat"].is_null()));
     }
+
+    /// A run of this library on four-pose.
+    pub(super) fn answered(samples: usize) -> (Plan, Vec<Option<Seen>>) {
+        let plan =
+            Plan::of(1, samples, Asked { scenes: vec!["four-pose".into()], ..Asked::default() }).unwrap();
+        let seen = run(&plan, &Builtin, &|_| ());
+        (plan, seen)
+    }
+
+    /// Changes the answers to cases of this purpose.
+    pub(super) fn change(plan: &Plan, seen: &mut [Option<Seen>], purpose: Purpose, how: impl Fn(&mut Seen)) {
+        let cases = plan.cases.iter().zip(seen).filter(|(case, _)| case.purpose == purpose);
+        cases.for_each(|(_, seen)| seen.iter_mut().for_each(&how));
+    }
+
+    /// Changes the estimates among them.
+    pub(super) fn change_trials(
+        plan: &Plan,
+        seen: &mut [Option<Seen>],
+        purpose: Purpose,
+        how: impl Fn(&mut Trial),
+    ) {
+        change(plan, seen, purpose, |seen| {
+            if let Seen::Estimate(trial) = seen {
+                how(trial);
+            }
+        });
+    }
+
+    /// What is judged of the only scene.
+    pub(super) fn on_scene<T>(
+        plan: &Plan,
+        seen: &[Option<Seen>],
+        judge: impl FnOnce(&Scenario, &Answers<'_>) -> T,
+    ) -> T {
+        judge(&plan.scenarios[0], &Answers::of(plan, seen, 0, Habits::UNKNOWN))
+    }
 }

@@ -89,3 +89,42 @@ fn distribution(
     let basis = Basis::Chance(chance::both_sides(sum, all));
     Check::new(Property::Rmse, scenario.id, basis, stated.len(), evidence)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{answered, change_trials, on_scene};
+    use super::*;
+    use crate::plan::Purpose;
+
+    #[test]
+    fn an_rmse_of_another_definition_is_told_by_its_name() {
+        // Four views of 63 marks: 252 points, 474 degrees of freedom.
+        for (factor, name, is_right) in [
+            (1.0, "per point: sqrt(sum / N)", true),
+            (0.5f64.sqrt(), "per coordinate: sqrt(sum / 2N)", false),
+            ((252.0f64 / 474.0).sqrt(), "by degrees of freedom: sqrt(sum / (2N - p))", false),
+        ] {
+            let (plan, mut seen) = answered(2);
+            change_trials(&plan, &mut seen, Purpose::Sample, |trial| {
+                trial.rmse_px = trial.rmse_px.map(|px| px * factor);
+            });
+            let checks = on_scene(&plan, &seen, check);
+            assert_eq!(checks[0].evidence, format!("stated {name}"));
+            assert_eq!(checks[0].basis, Basis::Certain(is_right));
+            // Once the definition is known the size is judged by it.
+            let Basis::Chance(p) = checks[1].basis else { panic!("{:?}", checks[1]) };
+            assert!(p > 1e-3, "{p}");
+        }
+    }
+
+    #[test]
+    fn an_rmse_of_no_known_definition_is_told_by_its_ratio() {
+        let (plan, mut seen) = answered(2);
+        change_trials(&plan, &mut seen, Purpose::Sample, |trial| {
+            trial.rmse_px = trial.rmse_px.map(|px| 1.1 * px)
+        });
+        let checks = on_scene(&plan, &seen, check);
+        assert_eq!(checks[0].evidence, "stated is 1.100 times sqrt(sum / N): no definition known");
+        assert_eq!(checks[0].basis, Basis::Certain(false));
+    }
+}

@@ -299,3 +299,39 @@ impl About<'_> {
         self.scenario.setup.observations() as f64
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{answered, change, on_scene};
+    use super::*;
+
+    #[test]
+    fn good_problems_left_unanswered_are_counted_against_one_in_a_thousand() {
+        let (plan, mut seen) = answered(2);
+        let check = on_scene(&plan, &seen, convergence);
+        assert_eq!(check.evidence, "no good problem of 2 left unanswered");
+        assert_eq!((check.basis, check.problems), (Basis::Chance(1.0), 2));
+        change(&plan, &mut seen, Purpose::Sample, |seen| {
+            *seen = Seen::Refused { reason: "no".into(), seconds: 0.0 };
+        });
+        let check = on_scene(&plan, &seen, convergence);
+        assert_eq!(check.evidence, "2 of 2 good problems left unanswered, first: no");
+        let Basis::Chance(p) = check.basis else { panic!("{check:?}") };
+        assert!((p / 1e-6 - 1.0).abs() < 1e-9, "{p}");
+    }
+
+    #[test]
+    fn a_variance_off_by_a_known_factor_is_named() {
+        let (plan, _) = answered(0);
+        // Four views of 63 marks: 504 coordinates, 474 degrees of freedom.
+        let about = About { scenario: &plan.scenarios[0], samples: &[], habits: Habits::UNKNOWN };
+        let named = |ratio: f64| about.known_variance_fault(ratio, 1000).unwrap_or("none");
+        assert_eq!(named(1.0), "none");
+        assert_eq!(named(1.5), "none");
+        assert_eq!(named(474.0 / 504.0), " (residual variance over 2N instead of 2N - p)");
+        assert_eq!(named(2.0 * 474.0 / 504.0), " (residual variance over N instead of 2N - p)");
+        assert_eq!(named(2.0), " (per-point instead of per-coordinate variance)");
+        // Four answers do not tell 6 % from chance.
+        assert_eq!(about.known_variance_fault(474.0 / 504.0, 4), None);
+    }
+}

@@ -193,4 +193,17 @@ mod tests {
         assert_eq!((caught.problems, caught.samples), (1, Some(1)));
         assert_eq!(caught.by, [Property::Protocol, Property::Exactness]);
     }
+
+    #[test]
+    fn the_correct_solver_is_judged_by_chance_and_held() {
+        let asked = std::sync::atomic::AtomicUsize::new(0);
+        let count = |more| {
+            asked.fetch_add(more, std::sync::atomic::Ordering::Relaxed);
+        };
+        let alarms = false_alarms(1, 1, 1, &count).unwrap();
+        assert_eq!((alarms.seeds, asked.into_inner(), alarms.certain.len()), (1, 1, 0));
+        // Of hundreds of p-values the smallest is small, and not too small for so many.
+        assert!(alarms.smallest[0] > 1e-3, "{:?}", alarms.smallest);
+        assert_eq!((alarms.at(1e-3), alarms.at(f64::INFINITY)), (0, 1));
+    }
 }

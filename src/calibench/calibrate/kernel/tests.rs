@@ -160,3 +160,50 @@ fn a_point_behind_the_camera_has_no_sums_and_an_infinite_residual() {
     assert_eq!(found.residuals.len(), 6);
     assert!(found.residuals.iter().any(|r| r.x == f64::INFINITY) && found.square == f64::INFINITY);
 }
+
+#[test]
+fn strains_are_those_of_the_definition_for_every_model_and_loss() {
+    let losses = [Loss::Squares, Loss::Huber { delta_px: 0.2 }, Loss::Cauchy { scale_px: 0.2 }];
+    for (camera, free) in
+        [(radial_camera(), FreeParameters::STANDARD), (full_camera(), FreeParameters::of(&Parameter::ALL))]
+    {
+        for loss in losses {
+            let pairs = pairs(&camera, 63);
+            let found = view_strain(&camera, &pose(), &pairs, loss, is_radial(&camera, free));
+            let r = pose().rotation;
+            let (mut square, mut gradient) = ([0.0; 3], [0.0; 2]);
+            let (mut of_pose, mut intrinsics) = ([[0.0; 6]; 2], [[0.0; Parameter::COUNT]; 2]);
+            for (point, pixel) in pairs.iter() {
+                let at = project_with_jacobian(&camera, &pose(), &Vec3::new(point.x, point.y, 0.0)).unwrap();
+                // d X_c / d a = r1 x - r2 y, d X_c / d b = r2 x + r1 y; the last three columns are by X_c.
+                let by_point = at.pose.fixed_columns::<3>(3);
+                let columns: [Vec2; 2] = [
+                    by_point * (r.column(0) * point.x - r.column(1) * point.y),
+                    by_point * (r.column(1) * point.x + r.column(0) * point.y),
+                ];
+                let residual = at.pixel - pixel;
+                let weight = loss.at(residual.norm_squared()).1;
+                for (sum, (i, j)) in square.iter_mut().zip([(0, 0), (0, 1), (1, 1)]) {
+                    *sum += weight * columns[i].dot(&columns[j]);
+                }
+                for k in 0..2 {
+                    gradient[k] += weight * columns[k].dot(&residual);
+                    (0..6).for_each(|i| of_pose[k][i] += weight * columns[k].dot(&at.pose.column(i)));
+                    for p in free.iter().map(|p| p as usize) {
+                        intrinsics[k][p] += weight * columns[k].dot(&at.intrinsics.column(p));
+                    }
+                }
+            }
+            // Products of columns of size about 100 to 10000, summed over 63 marks.
+            let close = |own: f64, expected: f64| {
+                assert!((own - expected).abs() < 1e-9 * (1.0 + expected.abs()), "{loss:?}: {own} {expected}");
+            };
+            (0..3).for_each(|i| close(found.square[i], square[i]));
+            for k in 0..2 {
+                close(found.gradient[k], gradient[k]);
+                (0..6).for_each(|i| close(found.pose[k][i], of_pose[k][i]));
+                free.iter().for_each(|p| close(found.intrinsics[k][p as usize], intrinsics[k][p as usize]));
+            }
+        }
+    }
+}
