@@ -32,6 +32,9 @@ struct Arguments {
     /// Counts wrong boards instead, in ten thousand photographs of these scenes and others
     #[arg(long)]
     wrong: bool,
+    /// Draws other photographs of those ten thousand
+    #[arg(long, requires = "wrong", requires = "out")]
+    seed: Option<u64>,
     /// Writes there instead
     #[arg(long)]
     out: Option<PathBuf>,
@@ -51,7 +54,8 @@ fn run(arguments: &Arguments) -> Result<(), String> {
                 program.name
             ));
         }
-        return wrong::write(arguments.photos.unwrap_or(wrong::PHOTOS), arguments.out.as_deref());
+        let (seed, photos) = (arguments.seed.unwrap_or(SEED), arguments.photos.unwrap_or(wrong::PHOTOS));
+        return wrong::write(seed, photos, arguments.out.as_deref());
     }
     let photos = arguments.photos.unwrap_or(PHOTOS);
     let (mut detector, versions, fingerprint): (Box<dyn Detector>, String, Fingerprint) = match program.method

@@ -109,6 +109,7 @@ fn outcome(scene: &Scene, truth: &Truth, answer: super::judge::Answered) -> Outc
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::protocol::Kind;
     use crate::{Builtin, scenes, show};
 
     fn scene(id: &str) -> Scene {
@@ -141,5 +142,19 @@ mod tests {
     fn a_board_that_is_not_there_is_not_found() {
         let each = outcomes(&scene("another-size"), &mut Builtin, 1, 0..4).unwrap().unwrap();
         assert!(each.iter().all(|(_, outcome)| *outcome == Outcome::NotFound));
+    }
+
+    /// Two photographs of the search for wrong boards: a disc taken for the missing one beside it, and a moved corner fitted to a marker's edge.
+    #[test]
+    fn a_mark_is_not_answered_at_anothers_place() {
+        for (kind, id, trial) in [(Kind::Asymmetric, "steep", 34), (Kind::Charuco, "moved", 32)] {
+            let is_it = |scene: &Scene| scene.kind == kind && scene.id == id;
+            let scene = scenes().into_iter().find(is_it).expect("it is a scene");
+            let each = outcomes(&scene, &mut Builtin, 1, trial..trial + 1).unwrap().unwrap();
+            for (_, outcome) in each {
+                assert!(outcome.right().is_none_or(|marks| marks.worst_px < 2.0), "{id}: {outcome:?}");
+                assert!(!outcome.is_board() || outcome.right().is_some(), "{id}: {outcome:?}");
+            }
+        }
     }
 }

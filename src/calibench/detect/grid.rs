@@ -4,6 +4,7 @@ use super::blob::Blob;
 use super::discs::{BlobOptions, blobs};
 use super::grid_error::GridError;
 use super::lattice::largest;
+use super::misplaced::take_out_misplaced;
 use super::order::{is_certain, ordered_part, ordered_rectangle};
 use super::orientation::Orientation;
 use super::seen::SeenBoard;
@@ -128,6 +129,8 @@ fn grid_in_part(discs: &[Blob], columns: usize, rows: usize) -> Option<SeenBoard
     let marks = ordered_part(&largest(&alike), &centres, columns, rows)?;
     let mut places_px: Vec<Option<Vec2>> = marks.into_iter().map(|mark| Some(centres[mark?])).collect();
     out_of_line(&mut places_px, columns);
+    let place = |index: usize| Vec2::new((index % columns) as f64, (index / columns) as f64);
+    take_out_misplaced(&mut places_px, &(0..columns * rows).map(place).collect::<Vec<Vec2>>());
     is_certain(&places_px, columns, rows)
         .then(|| SeenBoard::new(columns, rows, places_px, Orientation::of_discs(columns, rows)))
 }

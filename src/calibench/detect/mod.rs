@@ -17,6 +17,7 @@ mod lattice;
 mod levels;
 mod looks;
 mod mean;
+mod misplaced;
 mod neighbours;
 mod order;
 mod orientation;

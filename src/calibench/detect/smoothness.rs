@@ -15,62 +15,86 @@ struct Rule {
     tolerance: f64,
 }
 
-const RULES: [Rule; 7] = [
+const RULES: [Rule; 6] = [
     Rule { weights: &[(-1, 4.0 / 6.0), (1, 4.0 / 6.0), (-2, -1.0 / 6.0), (2, -1.0 / 6.0)], tolerance: 0.05 },
     Rule { weights: &[(-1, 1.0 / 3.0), (1, 1.0), (2, -1.0 / 3.0)], tolerance: 0.1 },
     Rule { weights: &[(1, 1.0 / 3.0), (-1, 1.0), (-2, -1.0 / 3.0)], tolerance: 0.1 },
     Rule { weights: &[(1, 3.0), (2, -3.0), (3, 1.0)], tolerance: 0.2 },
     Rule { weights: &[(-1, 3.0), (-2, -3.0), (-3, 1.0)], tolerance: 0.2 },
     Rule { weights: &[(-1, 0.5), (1, 0.5)], tolerance: 0.3 },
-    // A square's fourth corner, from the line beside: along the line alone there is nothing to compare with.
-    Rule { weights: &[], tolerance: 0.4 },
 ];
+
+/// How far a corner may lie from where the other three of a square put it, in steps.
+const FOURTH_TOLERANCE: f64 = 0.4;
 
 /// Least tolerance, px: noise.
 const LEAST_TOLERANCE_PX: f64 = 1.0;
 
-/// Where the corners beside put a corner along a row (`axis` 0) or a column (1), and how far from it it may
-/// lie, px.
-fn expected_along(good: &[Option<Vec2>], columns: usize, index: usize, axis: usize) -> Option<(Vec2, f64)> {
-    let rows = good.len() / columns;
-    let (column, row) = ((index % columns) as isize, (index / columns) as isize);
-    let at = |along: isize, across: isize| {
-        let (x, y) = if axis == 0 { (column + along, row + across) } else { (column + across, row + along) };
-        let inside = x >= 0 && y >= 0 && x < columns as isize && y < rows as isize;
-        inside.then(|| good[y as usize * columns + x as usize]).flatten()
-    };
-    RULES.iter().find_map(|Rule { weights, tolerance }| {
-        let (place, step) = match weights {
-            [] => [(1, 1), (1, -1), (-1, 1), (-1, -1)].into_iter().find_map(|(along, across)| {
-                let step = at(0, across)? - at(along, across)?;
-                Some((at(along, 0)? + step, step))
-            })?,
-            [(near, _), (far, _), ..] => {
-                let mut place = Vec2::zeros();
-                for (k, weight) in *weights {
-                    place += at(*k, 0)? * *weight;
-                }
-                (place, (at(*far, 0)? - at(*near, 0)?) / (far - near) as f64)
+/// The corners about one, along a row (`axis` 0) or a column (1).
+struct About<'a> {
+    good: &'a [Option<Vec2>],
+    columns: usize,
+    index: usize,
+    axis: usize,
+}
+
+impl About<'_> {
+    fn at(&self, along: isize, across: isize) -> Option<Vec2> {
+        let (columns, rows) = (self.columns as isize, (self.good.len() / self.columns) as isize);
+        let (column, row) = ((self.index % self.columns) as isize, (self.index / self.columns) as isize);
+        let (x, y) =
+            if self.axis == 0 { (column + along, row + across) } else { (column + across, row + along) };
+        let inside = x >= 0 && y >= 0 && x < columns && y < rows;
+        inside.then(|| self.good[(y * columns + x) as usize]).flatten()
+    }
+
+    /// Where those on its line put it, and how far from it it may lie, px.
+    fn on_line(&self) -> Option<(Vec2, f64)> {
+        RULES.iter().find_map(|Rule { weights, tolerance }| {
+            let mut place = Vec2::zeros();
+            for (k, weight) in *weights {
+                place += self.at(*k, 0)? * *weight;
             }
-            [_] => return None,
-        };
-        Some((place, (tolerance * step.norm()).max(LEAST_TOLERANCE_PX)))
-    })
+            let [(near, _), (far, _), ..] = weights else { return None };
+            let step = (self.at(*far, 0)? - self.at(*near, 0)?) / (far - near) as f64;
+            Some(allowed(place, step, *tolerance))
+        })
+    }
+
+    /// Where the other corners of a square put it, and how far from it it may lie, px.
+    fn of_square(&self) -> Option<(Vec2, f64)> {
+        [(1, 1), (1, -1), (-1, 1), (-1, -1)].into_iter().find_map(|(along, across)| {
+            let step = self.at(0, across)? - self.at(along, across)?;
+            Some(allowed(self.at(along, 0)? + step, step, FOURTH_TOLERANCE))
+        })
+    }
+}
+
+/// A place and how far from it a corner may lie, px.
+fn allowed(place: Vec2, step: Vec2, tolerance: f64) -> (Vec2, f64) {
+    (place, (tolerance * step.norm()).max(LEAST_TOLERANCE_PX))
+}
+
+/// Where its row and its column put a corner, and how far from it it may lie, px. Where neither goes on beside it, the squares there tell, which
+/// are far less sure of it: a corner that its row has out of line must not be kept by them because its column has a gap.
+fn expectations(good: &[Option<Vec2>], columns: usize, index: usize) -> [Option<(Vec2, f64)>; 2] {
+    let about = [0, 1].map(|axis| About { good, columns, index, axis });
+    let on_lines = about.each_ref().map(About::on_line);
+    if on_lines == [None; 2] { about.each_ref().map(About::of_square) } else { on_lines }
 }
 
 /// Where the corners beside put a corner, by the surer of its row and its column, and how far from it it may
 /// lie, px.
 pub fn expected(good: &[Option<Vec2>], columns: usize, index: usize) -> Option<(Vec2, f64)> {
-    let along = [0, 1].map(|axis| expected_along(good, columns, index, axis));
-    along.into_iter().flatten().min_by(|a, b| a.1.total_cmp(&b.1))
+    let beside = expectations(good, columns, index).into_iter().flatten();
+    beside.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// How far a corner lies from where its neighbours put it, in tolerances, along the line that it fits better.
 fn deviation(good: &[Option<Vec2>], columns: usize, index: usize) -> f64 {
     let Some(here) = good[index] else { return 0.0 };
     let of = |(place, tolerance): (Vec2, f64)| (here - place).norm() / tolerance;
-    let along = [0, 1].map(|axis| expected_along(good, columns, index, axis).map(of));
-    along.into_iter().flatten().reduce(f64::min).unwrap_or(0.0)
+    expectations(good, columns, index).into_iter().flatten().map(of).reduce(f64::min).unwrap_or(0.0)
 }
 
 /// The corners that are missing, and those out of line, which are taken out: the worst first, for one shifts
@@ -119,5 +143,19 @@ mod tests {
                 assert!((place - truth[index].unwrap()).norm() < tolerance);
             }
         }
+    }
+
+    #[test]
+    fn a_corner_that_its_row_has_out_of_line_is_not_kept_because_its_column_has_a_gap() {
+        let (mut good, truth) = (places(), places());
+        // Column 4 of row 2, with nothing above and below it within reach but one corner beside.
+        for index in [4, 4 + 3 * 9, 4 + 4 * 9, 4 + 5 * 9] {
+            good[index] = None;
+        }
+        let index = 4 + 2 * 9;
+        // A third of a step along its column, which the squares beside would allow.
+        let step = truth[index + 9].unwrap() - truth[index].unwrap();
+        good[index] = truth[index].map(|place| place + 0.33 * step);
+        assert!(out_of_line(&mut good, 9).contains(&index));
     }
 }

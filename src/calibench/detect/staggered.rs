@@ -159,6 +159,11 @@ fn place_on_board(index: usize, columns: usize) -> Place {
     (2 * column + row % 2, row)
 }
 
+/// The places of all marks of a board, in its order.
+pub fn places_on_board(columns: usize, rows: usize) -> Vec<Vec2> {
+    (0..columns * rows).map(|index| on_board(index, columns)).collect()
+}
+
 fn on_board(index: usize, columns: usize) -> Vec2 {
     let (x, y) = place_on_board(index, columns);
     Vec2::new(f64::from(x), f64::from(y))

@@ -5,11 +5,13 @@ use super::discs::{BlobOptions, blobs};
 use super::grid::{DotGrid, alike_on_board};
 use super::grid_error::GridError;
 use super::lattice::{Lattice, largest};
+use super::misplaced::take_out_misplaced;
 use super::orientation::Orientation;
 use super::seen::SeenBoard;
 use super::smoothness::out_of_line;
 use super::staggered::{
     LEAST_COLUMNS, LEAST_ROWS, along_diagonals, from_diagonals, ordered_staggered, ordered_staggered_part,
+    places_on_board,
 };
 use crate::geometry::Vec2;
 use crate::raster::{Level, Raster};
@@ -83,7 +85,8 @@ fn in_part(discs: &[Blob], columns: usize, rows: usize) -> Option<SeenBoard> {
     let places_px: Vec<Option<Vec2>> = marks.iter().map(|mark| Some(centres[(*mark)?])).collect();
     let (mut grid, width) = along_diagonals(&places_px, columns);
     out_of_line(&mut grid, width);
-    let in_line = from_diagonals(&grid, places_px.len(), columns);
+    let mut in_line = from_diagonals(&grid, places_px.len(), columns);
+    take_out_misplaced(&mut in_line, &places_on_board(columns, rows));
     let kept = |mark: usize| {
         marks.iter().position(|other| *other == Some(mark)).is_some_and(|k| in_line[k].is_some())
     };

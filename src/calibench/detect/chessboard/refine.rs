@@ -174,6 +174,12 @@ pub fn refined<T: Level>(
             (1..=BLURRED_LEVELS).find_map(|level| in_level(level).filter(is_near))
         });
     }
+    if look.between_tags.is_none() {
+        // One that was fitted anew may lie beside its line still, and others may where it was their neighbour before.
+        for index in out_of_line(&mut good, columns) {
+            crossings[index] = None;
+        }
+    }
     Fitted { corners: good, crossings, look: *look }
 }
 

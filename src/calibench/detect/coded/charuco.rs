@@ -19,6 +19,7 @@ use crate::detect::chessboard::look::Look;
 use crate::detect::chessboard::refine::refined;
 use crate::detect::chessboard::search_order;
 use crate::detect::lattice::{Lattice, Place};
+use crate::detect::misplaced::take_out_beside;
 use crate::detect::{Orientation, SeenBoard};
 use crate::geometry::{Homography, Vec2};
 use crate::raster::{Level, Raster};
@@ -50,23 +51,27 @@ const MOST_BENT: f64 = 0.6;
 pub fn seen_charuco<T: Level>(image: &Raster<T>, board: &Charuco) -> Result<SeenBoard, CodedError> {
     let search = Search { pyramid: Pyramid::new(image), board, look: Look::with_markers(board.marker()) };
     let mut best: Option<Placed> = None;
-    let mut failure: Option<Failure> = None;
+    let mut failures: Vec<Failure> = Vec::new();
     for level in search_order(image, search.pyramid.levels()) {
-        match search.in_level(level) {
-            Ok(placed) if best.as_ref().is_none_or(|best| placed.count() > best.count()) => {
+        match search.in_level(level, &mut failures) {
+            Some(placed) if best.as_ref().is_none_or(|best| placed.count() > best.count()) => {
                 best = Some(placed);
             }
-            Ok(_) => {}
-            Err(failed) => failure = Some(failed.or(failure)),
+            _ => {}
         }
         if best.as_ref().is_some_and(|best| best.is_all(&search)) {
             break;
         }
     }
-    match (best, failure) {
-        (Some(placed), _) => search.fitted(&placed),
-        (None, Some(failure)) => Err(search.explained(failure)),
-        (None, None) => Err(CodedError::NoCorners { seen: 0 }),
+    match best {
+        Some(placed) => {
+            search.refuse_if_of_any_width(&placed, &failures)?;
+            search.fitted(&placed)
+        }
+        None => {
+            let failure = failures.into_iter().reduce(|first, next| next.or(first));
+            Err(failure.map_or(CodedError::NoCorners { seen: 0 }, |failure| search.explained(failure)))
+        }
     }
 }
 
@@ -80,6 +85,8 @@ struct Search<'a, T> {
 struct Placed {
     level: usize,
     corners: Vec<Option<Vec2>>,
+    /// Numbers of the markers that agree on where they are.
+    markers: BTreeSet<usize>,
 }
 
 /// A lattice in a level: where its corners are in the photograph, px.
@@ -116,11 +123,8 @@ impl Failure {
     }
 
     /// The one that tells more.
-    fn or(self, other: Option<Failure>) -> Failure {
-        match other {
-            Some(other) if other.rank() >= self.rank() => other,
-            _ => self,
-        }
+    fn or(self, other: Failure) -> Failure {
+        if other.rank() >= self.rank() { other } else { self }
     }
 }
 
@@ -131,9 +135,10 @@ impl<T: Level> Search<'_, T> {
     }
 
     /// Strong corners first; where they do not make the board, all.
-    fn in_level(&self, level: usize) -> Result<Placed, Failure> {
-        self.among(level, Strength::Strong)
-            .or_else(|strong| self.among(level, Strength::Any).map_err(|any| any.or(Some(strong))))
+    fn in_level(&self, level: usize, failures: &mut Vec<Failure>) -> Option<Placed> {
+        [Strength::Strong, Strength::Any]
+            .into_iter()
+            .find_map(|strength| self.among(level, strength).map_err(|failure| failures.push(failure)).ok())
     }
 
     fn among(&self, level: usize, strength: Strength) -> Result<Placed, Failure> {
@@ -142,27 +147,42 @@ impl<T: Level> Search<'_, T> {
         let mut failure = Failure { error: CodedError::NoCorners { seen: candidates.len() }, part: None };
         let count = self.columns() * (self.board.rows() - 1);
         let grown = lattices(&smoothed, &self.look, candidates, count);
-        let mut placed = Placed { level, corners: vec![None; count] };
+        let mut placed = Placed { level, corners: vec![None; count], markers: BTreeSet::new() };
         for lattice in grown.lattices.into_iter().take(MOST_LATTICES) {
             let part = Part::of(lattice, &grown.corners, level);
             match self.placement(&part) {
-                Ok(placement) => {
+                Ok((placement, markers)) => {
                     // The largest piece comes first, and others must lie in its plane.
-                    let with = self.with(&placed, &part, &placement, &grown.corners);
+                    let mut with = self.with(&placed, &part, &placement, &grown.corners);
+                    with.markers.extend(markers);
                     if placed.count() == 0 || with.is_flat(self.columns()) {
                         placed = with;
                     }
                 }
                 // A piece whose markers contradict each other puts all in doubt: the board may be another.
                 Err(error) if error.is_grave() => return Err(Failure { error, part: Some(part) }),
-                Err(error) => failure = Failure { error, part: Some(part) }.or(Some(failure)),
+                Err(error) => failure = Failure { error, part: Some(part) }.or(failure),
             }
         }
         if placed.count() > 0 { Ok(placed) } else { Err(failure) }
     }
 
-    /// Where on the board a lattice is.
-    fn placement(&self, part: &Part) -> Result<Placement, CodedError> {
+    /// Markers of one row stand to each other alike on boards of any width, and those of two rows may on another one. That the board is the one
+    /// asked is taken for granted, but not where others were read in the photograph that contradict it.
+    fn refuse_if_of_any_width(&self, placed: &Placed, failures: &[Failure]) -> Result<(), CodedError> {
+        let contradicted = failures.iter().any(|failure| failure.error.is_grave());
+        match another_width(&self.board.markers(), self.board.columns(), &placed.markers) {
+            Some(other) if contradicted => Err(CodedError::AnyWidth {
+                markers: placed.markers.len(),
+                columns: self.board.columns(),
+                other,
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Where on the board a lattice is, and the numbers of the markers that say so.
+    fn placement(&self, part: &Part) -> Result<(Placement, Vec<usize>), CodedError> {
         let dictionary = self.board.dictionary();
         let read: Vec<(Place, Recognised)> = self
             .squares(part, dictionary.side())
@@ -182,7 +202,8 @@ impl<T: Level> Search<'_, T> {
         if beyond as f64 > (MOST_BEYOND * part.corners.len() as f64).max(1.0) {
             return Err(CodedError::GoesOn { columns: self.board.columns(), rows: self.board.rows() });
         }
-        Ok(vote.placement)
+        let for_it = read.iter().zip(&opinions).filter(|(_, opinion)| **opinion == Some(vote.placement));
+        Ok((vote.placement, for_it.map(|((_, marker), _)| marker.id).collect()))
     }
 
     fn disagree(&self, vote: Option<Vote>, read: &[(Place, Recognised)]) -> CodedError {
@@ -202,7 +223,8 @@ impl<T: Level> Search<'_, T> {
 
     /// The corners with those of another piece.
     fn with(&self, placed: &Placed, part: &Part, placement: &Placement, corners: &[Candidate]) -> Placed {
-        let mut with = Placed { level: placed.level, corners: placed.corners.clone() };
+        let mut with =
+            Placed { level: placed.level, corners: placed.corners.clone(), markers: placed.markers.clone() };
         for (&place, &mark) in &part.lattice {
             if let Some(index) = self.index(placement, place) {
                 with.corners[index].get_or_insert(corners[mark].at);
@@ -242,7 +264,10 @@ impl<T: Level> Search<'_, T> {
         let (columns, rows) = (self.columns(), self.board.rows() - 1);
         let dark = self.board.starts_dark();
         let fitted = refined(&self.pyramid, placed.level, &placed.corners, columns, dark, &self.look);
-        let corners = fitted.alike(self.pyramid.photo(), columns);
+        let mut corners = fitted.alike(self.pyramid.photo(), columns);
+        // Where all is moved, a corner may be fitted to a marker's edge.
+        let place = |index: usize| Vec2::new((index % columns) as f64, (index / columns) as f64);
+        take_out_beside(&mut corners, &(0..columns * rows).map(place).collect::<Vec<Vec2>>());
         let found = corners.iter().flatten().count();
         if found < FEWEST_MARKS {
             return Err(CodedError::Unclear { found });
@@ -296,17 +321,41 @@ const WIDEST: usize = 40;
 fn other_board(read: &[(Place, Recognised)], asked: (usize, bool), agree: usize) -> Option<(usize, bool)> {
     let last = read.iter().map(|(_, marker)| marker.id).max()?;
     let agree_on = |(width, white): (usize, bool)| {
-        let squares = (0..).flat_map(|row| (0..width).map(move |column| (column, row)));
-        let white = squares.filter(|(column, row)| ((column + row) % 2 == 0) == white);
-        let markers: Vec<(usize, usize)> = white.take(last + 1).collect();
+        let markers = first_squares(width, white, last + 1);
         let opinions: Vec<Option<Placement>> = read.iter().map(|read| opinion(read, &markers)).collect();
         Vote::of(&opinions).filter(Vote::is_certain).map_or(0, |vote| vote.agree)
     };
-    let boards = (3..=WIDEST).flat_map(|width| [(width, true), (width, false)]);
-    let others = boards.filter(|&board| board != asked).map(|board| (agree_on(board), board));
+    let others = other_boards().filter(|&board| board != asked).map(|board| (agree_on(board), board));
     // Of equal ones the last: black comes first on most boards.
     let (most, board) = others.max_by_key(|(count, _)| *count)?;
     (most > agree).then_some(board)
+}
+
+/// The width of another board on which these markers stand to each other as on one of width `columns` with its markers in these squares.
+fn another_width(squares: &[(usize, usize)], columns: usize, markers: &BTreeSet<usize>) -> Option<usize> {
+    let last = *markers.last()?;
+    let stand_alike = |&(width, white): &(usize, bool)| {
+        let there = first_squares(width, white, last + 1);
+        let shift = |&id: &usize| {
+            let ((a, b), (c, d)) = (there[id], squares[id]);
+            (a as isize - c as isize, b as isize - d as isize)
+        };
+        let mut shifts = markers.iter().map(shift);
+        let first = shifts.next();
+        shifts.all(|shift| Some(shift) == first)
+    };
+    other_boards().find(|board| board.0 != columns && stand_alike(board)).map(|(width, _)| width)
+}
+
+/// Widths of boards, and whether they begin with a white square.
+fn other_boards() -> impl Iterator<Item = (usize, bool)> {
+    (3..=WIDEST).flat_map(|width| [(width, true), (width, false)])
+}
+
+/// The white squares of a board, column and row, in the order of their markers.
+fn first_squares(width: usize, starts_white: bool, count: usize) -> Vec<(usize, usize)> {
+    let squares = (0..).flat_map(|row| (0..width).map(move |column| (column, row)));
+    squares.filter(|(column, row)| ((column + row) % 2 == 0) == starts_white).take(count).collect()
 }
 
 impl Part {
@@ -384,4 +433,21 @@ impl Placed {
 
 fn on_board(index: usize, columns: usize) -> Vec2 {
     Vec2::new((index % columns) as f64, (index / columns) as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn markers_of_one_row_stand_alike_on_boards_of_any_width_and_those_of_two_may_on_another() {
+        // Six squares wide, black first: markers 0, 1, 2 after one square each, and 3, 4, 5 in the row below.
+        let squares = first_squares(6, false, 12);
+        assert_eq!(squares[..4], [(1, 0), (3, 0), (5, 0), (0, 1)]);
+        let other = |markers: &[usize]| another_width(&squares, 6, &markers.iter().copied().collect());
+        assert!(other(&[0, 1]).is_some() && other(&[3, 4, 5]).is_some());
+        // On one seven squares wide the second row goes on to marker 6, and the third begins later.
+        assert_eq!(other(&[0, 1, 2, 3, 4, 5]), Some(7));
+        assert_eq!(other(&[0, 3, 6]), None);
+    }
 }

@@ -77,6 +77,19 @@ pub enum CodedError {
         /// Tags that agree.
         tags: usize,
     },
+    /// Few markers, which stand to each other as on boards of another width too, beside others that contradict the board.
+    #[error(
+        "{markers} markers agree on where the board is, but stand alike on a board {other} wide, and others in the image do not stand as on \
+         one {columns} wide: show more rows of it, and no other board of its markers"
+    )]
+    AnyWidth {
+        /// Markers that agree.
+        markers: usize,
+        /// Asked squares along a row.
+        columns: usize,
+        /// Squares along a row of another board on which they stand alike.
+        other: usize,
+    },
     /// The markers do not stand as on the board.
     #[error(
         "{agree} of {read} markers agree on where the board is, and the others do not: is it {columns} wide and {rows} high?{}",
