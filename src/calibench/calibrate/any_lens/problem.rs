@@ -47,6 +47,10 @@ pub(super) struct Problem<'a> {
     /// A step that promises less than this part of the cost is the last.
     pub relative_gain: f64,
     pub rounding_cost: f64,
+    /// Whether [`certificate::counts_for`] the model that is wanted, so that starts are spared and poses are refined alone.
+    ///
+    /// [`certificate::counts_for`]: super::certificate::counts_for
+    pub is_certifiable: bool,
 }
 
 /// A shared unknown of which something is known beforehand.
@@ -110,6 +114,21 @@ impl Problem<'_> {
             marks: &self.views[at],
             loss: self.loss,
             columns,
+        }
+    }
+
+    /// The cost of a state without derivatives: the bits of [`Descent::linearise_into`], as the sums have its order. Infinite where the
+    /// lens has no image of a mark.
+    pub fn cost(&self, state: &State) -> f64 {
+        let columns = Columns::NONE;
+        let of_view = |at: usize, _: &Marks| kernel::cost(&self.view(state, &columns, at));
+        let of_views: Option<Vec<f64>> = chunks::map(self.views, of_view).into_iter().collect();
+        let of_marks = of_views.map(|costs| costs.chunks(CHUNK).map(|chunk| chunk.iter().sum::<f64>()).sum());
+        match of_marks {
+            Some(cost) if state.camera.fx > 0.0 && state.camera.fy > 0.0 && !f64::is_nan(cost) => {
+                self.known(state).iter().fold(cost, |sum, known| sum + known.weight * known.off * known.off)
+            }
+            _ => f64::INFINITY,
         }
     }
 
