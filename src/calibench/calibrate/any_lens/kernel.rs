@@ -525,3 +525,60 @@ impl<M: LensModel<P>, const P: usize> Kernel for Costs<'_, '_, M, P> {
         Some(cost)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::minimise::Descent;
+    use super::super::super::settings::Bend;
+    use super::super::super::system::Step;
+    use super::super::fixture::{FREE, at_minimum};
+    use super::super::problem::{Problem, State};
+    use super::*;
+
+    /// Of a bent board, with a loss that weighs, away from the minimum.
+    fn with_problem(then: impl Fn(&Problem<'_>, &State)) {
+        at_minimum(FreeParameters::of(&FREE), 1.0, |flat, minimum| {
+            let bend = Some(Bend { deformations: DEFORMATIONS, standard_deviation: f64::INFINITY });
+            let problem = Problem { bend, loss: Loss::Cauchy { scale_px: 0.1 }, ..*flat };
+            then(&problem, &State { shape: [0.05, -0.03, 0.04], ..minimum.state.clone() });
+        });
+    }
+
+    /// Half the slope of the cost along a step, from costs on either side of a state.
+    fn half_slope(problem: &Problem<'_>, state: &State, size: f64, set: impl Fn(&mut Step<WIDTH>)) -> f64 {
+        let cost_at = |size: f64| {
+            let mut step = Step::default();
+            step.poses.resize(problem.views.len(), SVector::zeros());
+            set(&mut step);
+            step.intrinsics *= size;
+            step.poses.iter_mut().for_each(|pose| *pose *= size);
+            problem.cost(&problem.stepped(state, step))
+        };
+        (cost_at(size) - cost_at(-size)) / (4.0 * size)
+    }
+
+    /// A difference of this many px in the largest residual loses some 1e-7 of the slope to curvature, and as much to rounding.
+    const MOVED_PX: f64 = 1e-4;
+
+    #[test]
+    fn the_gradient_is_half_the_slope_of_the_cost() {
+        with_problem(|problem, state| {
+            let mut system = problem.system();
+            problem.linearise_into(state, &mut system);
+            let is_slope = |gradient: f64, square: f64, set: &dyn Fn(&mut Step<WIDTH>)| {
+                // `square` is the information of the unknown, so that this is what the gradient's terms come to.
+                let unit = (square * system.cost).sqrt();
+                let slope = half_slope(problem, state, MOVED_PX / square.sqrt(), set);
+                assert!((gradient - slope).abs() < 1e-5 * unit, "{gradient} {slope} {unit}");
+            };
+            for k in 0..FREE.len() + DEFORMATIONS {
+                is_slope(system.gradient[k], system.intrinsics[(k, k)], &|step| step.intrinsics[k] = 1.0);
+            }
+            for (view, block) in system.views.iter().enumerate() {
+                for k in 0..6 {
+                    is_slope(block.gradient[k], block.pose[(k, k)], &|step| step.poses[view][k] = 1.0);
+                }
+            }
+        });
+    }
+}
