@@ -6,7 +6,7 @@ use super::super::system::Step;
 use super::super::target_frame::TargetFrames;
 use super::super::{CalibrationError, LensCalibration, Prior, Settings, Termination, chunks, domain};
 use super::problem::{Problem, State, rounding_cost};
-use super::{WIDTH, judge, marks, report, shape, start, walk};
+use super::{WIDTH, certificate, judge, marks, report, shape, start, walk};
 use crate::board::View;
 use crate::camera::Parameter;
 use crate::geometry::{Homography, HomographyError};
@@ -93,26 +93,34 @@ fn estimate(views: &[View], settings: &Settings) -> Result<LensCalibration, Cali
         max_iterations: settings.max_iterations,
         relative_gain: RELATIVE_GAIN,
         rounding_cost: rounding_cost(&marks),
+        is_certifiable: certificate::counts_for(settings.model()),
     };
     let walked = walk::walk(&flat, views, settings)?;
-    let state = start::with_better_tilts(&flat, walked.best.state);
+    let mut best = walked.best;
+    let state = start::with_better_tilts(&flat, best.state.clone());
     let bent = Problem { bend: settings.board.bend(), ..flat };
-    let (problem, minimum) = settled(bent, state, walked.best.iterations);
+    let is_turned = state.cam_from_target != best.state.cam_from_target;
+    // A search that has not ended may do so in as many iterations again, and in the valley of a lens of many coefficients one that has
+    // may still go on.
+    let has_ended = best.termination == Termination::Converged && bent.is_certifiable;
+    if is_turned || bent.bend.is_some() || !has_ended {
+        let end = descend(&bent, state);
+        best = Minimum { iterations: best.iterations + end.iterations, ..end };
+    }
+    let (problem, minimum) = settled(bent, best);
     let found = minimum.clone();
     let calibration = judge::judge(&problem, minimum, walked.met)
         .and_then(|judged| report::report(judged, &problem, &frames, region, settings));
     report::or_blamed(&problem, &found, calibration)
 }
 
-/// The minimum at which the noise that weighs what is known beforehand is the noise that the residuals show.
+/// The minimum at which the noise that weighs what is known beforehand is the noise that the residuals show, from one with any noise.
 fn settled(
     mut problem: Problem<'_>,
-    state: State,
-    iterations: usize,
+    mut minimum: Minimum<State, WIDTH>,
 ) -> (Problem<'_>, Minimum<State, WIDTH>) {
     let is_told = !problem.priors.is_empty() || problem.bend.is_some();
-    let mut minimum = descend(&problem, state);
-    let mut iterations = iterations + minimum.iterations;
+    let mut iterations = minimum.iterations;
     for _ in 0..MOST_REFITS {
         let variance = report::variance(&problem, &minimum).max(LEAST_PX * LEAST_PX);
         let is_settled = (variance - problem.variance).abs() <= SETTLED * variance;

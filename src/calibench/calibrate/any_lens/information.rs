@@ -53,6 +53,7 @@ pub fn lens_information(
         max_iterations: 0,
         relative_gain: RELATIVE_GAIN,
         rounding_cost: 0.0,
+        is_certifiable: false,
     };
     let own = cam_from_target.iter().enumerate().map(|(view, pose)| frames.at(view).of_pose(pose)).collect();
     let state = State { camera: *camera, cam_from_target: own, shape: [0.0; 3] };

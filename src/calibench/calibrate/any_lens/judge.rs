@@ -137,11 +137,10 @@ fn is_parabola(
     if minimum.system.cost <= problem.rounding_cost {
         return true;
     }
-    let mut system = problem.system();
-    let mut rises_as_said = |direction: SVector<f64, WIDTH>| {
+    let rises_as_said = |direction: SVector<f64, WIDTH>| {
         let step = reduction.following(noise_px * direction);
-        problem.linearise_into(&problem.stepped(&minimum.state, step), &mut system);
-        let rise = (system.cost - minimum.system.cost) / (noise_px * noise_px);
+        let cost = problem.cost(&problem.stepped(&minimum.state, step));
+        let rise = (cost - minimum.system.cost) / (noise_px * noise_px);
         (CHECKED_AT / rise.max(0.0).sqrt() - 1.0).abs() <= TOLERATED
     };
     weakest(reduction)

@@ -11,7 +11,7 @@ use super::marks::{Block, Marks};
 use crate::camera::{Camera, FreeParameters, Lens, LensModel, LensVisitor, Parameter, visit};
 use crate::geometry::Pose;
 use crate::geometry::lanes::{Kernel, LANES, Lanes, dispatch};
-use nalgebra::{DMatrix, SVector};
+use nalgebra::{DMatrix, SMatrix, SVector};
 
 /// Pose, shared unknowns, residual, in whole lanes.
 const COLUMNS: usize = 32;
@@ -30,6 +30,9 @@ pub(super) struct Columns {
 }
 
 impl Columns {
+    /// No shared unknown.
+    pub const NONE: Columns = Columns { places: Vec::new(), fy_per_fx: None };
+
     /// The free parameters in order, then so many deformations of the board.
     pub fn of(lens: &Lens, free: FreeParameters, fy_per_fx: Option<f64>, deformations: usize) -> Columns {
         let coefficients = lens.model().coefficients();
@@ -278,14 +281,7 @@ fn weigh<L: Lanes>(view: &View<'_>, block: &Block, rows: &mut Rows<L>, count: us
     if !rows.inside.all_positive() {
         return None;
     }
-    let mut root = L::load(&block.weight);
-    let [ru, rv] = rows.residual;
-    let mut cost = (ru * ru + rv * rv) * root * root;
-    if view.loss != Loss::Squares {
-        let at = cost.store().map(|square| view.loss.at(square));
-        cost = L::load(&at.map(|(rho, _)| rho));
-        root = root * L::load(&at.map(|(_, weight)| weight)).sqrt();
-    }
+    let (cost, root) = cost_and_root(view, block, &rows.residual);
     for row in &mut rows.columns {
         for column in &mut row[..count] {
             *column = *column * root;
@@ -294,7 +290,77 @@ fn weigh<L: Lanes>(view: &View<'_>, block: &Block, rows: &mut Rows<L>, count: us
     Some(cost)
 }
 
-/// The Jacobian of four marks: `d X_c / d delta = -[q]x` with `q = R X`, `d X_c / d t = I`, `d X_c / d height = r3`.
+/// The cost of four marks, and the roots of their weights, those of the loss among them.
+#[inline(always)]
+fn cost_and_root<L: Lanes>(view: &View<'_>, block: &Block, [ru, rv]: &[L; 2]) -> (L, L) {
+    let root = L::load(&block.weight);
+    let cost = (*ru * *ru + *rv * *rv) * root * root;
+    if view.loss == Loss::Squares {
+        return (cost, root);
+    }
+    let at = cost.store().map(|square| view.loss.at(square));
+    let weight = L::load(&at.map(|(_, weight)| weight));
+    (L::load(&at.map(|(rho, _)| rho)), root * weight.sqrt())
+}
+
+/// Four marks in camera coordinates.
+struct Placed<L> {
+    /// `R X`, from the target's origin.
+    arm: [L; 3],
+    point: [L; 3],
+    /// Per unit of each deformation.
+    heights: [L; DEFORMATIONS],
+}
+
+#[inline(always)]
+fn placed<L: Lanes>(view: &View<'_>, block: &Block) -> Placed<L> {
+    let (r, t) = (&view.cam_from_target.rotation, &view.cam_from_target.translation);
+    let mut heights = [L::zero(); DEFORMATIONS];
+    let mut z = L::zero();
+    for k in 0..DEFORMATIONS {
+        heights[k] = L::load(&block.height[k]);
+        z = z + L::splat(view.shape[k]) * heights[k];
+    }
+    let (x, y) = (L::load(&block.x), L::load(&block.y));
+    let mut arm = [L::zero(); 3];
+    let mut point = [L::zero(); 3];
+    for i in 0..3 {
+        arm[i] = L::splat(r[(i, 0)]) * x + L::splat(r[(i, 1)]) * y + L::splat(r[(i, 2)]) * z;
+        point[i] = arm[i] + L::splat(t[i]);
+    }
+    Placed { arm, point, heights }
+}
+
+/// Predicted - observed of four marks that the lens sees there.
+#[inline(always)]
+fn residual<L: Lanes>(camera: &Camera<Lens>, block: &Block, [xd, yd]: &[L; 2]) -> [L; 2] {
+    let [fx, fy, skew] = [L::splat(camera.fx), L::splat(camera.fy), L::splat(camera.skew)];
+    [
+        fx * *xd + skew * *yd + L::splat(camera.cx) - L::load(&block.u),
+        fy * *yd + L::splat(camera.cy) - L::load(&block.v),
+    ]
+}
+
+/// Derivatives of pixels by the points in camera coordinates, from those of the lens.
+#[inline(always)]
+fn by_point<L: Lanes>(camera: &Camera<Lens>, by_lens: &[[L; 3]; 2]) -> [[L; 3]; 2] {
+    let [fx, fy, skew] = [L::splat(camera.fx), L::splat(camera.fy), L::splat(camera.skew)];
+    let mut slopes = [[L::zero(); 3]; 2];
+    for i in 0..3 {
+        let (dx, dy) = (by_lens[0][i], by_lens[1][i]);
+        slopes[0][i] = fx * dx + skew * dy;
+        slopes[1][i] = fy * dy;
+    }
+    slopes
+}
+
+/// Derivatives by the pose: `d X_c / d delta = -[q]x` with `q = R X`, `d X_c / d t = I`.
+#[inline(always)]
+fn by_pose<L: Lanes>(q: &[L; 3], p: &[L; 3]) -> [L; 6] {
+    [q[1] * p[2] - q[2] * p[1], q[2] * p[0] - q[0] * p[2], q[0] * p[1] - q[1] * p[0], p[0], p[1], p[2]]
+}
+
+/// The Jacobian of four marks, with `d X_c / d height = r3`.
 #[inline(always)]
 fn fill_rows<L: Lanes, M: LensModel<P>, const P: usize>(
     view: &View<'_>,
@@ -302,28 +368,14 @@ fn fill_rows<L: Lanes, M: LensModel<P>, const P: usize>(
     block: &Block,
     rows: &mut Rows<L>,
 ) {
-    let (camera, r, t) = (view.camera, &view.cam_from_target.rotation, &view.cam_from_target.translation);
-    let heights = block.height.map(|h| L::load(&h));
-    let mut z = L::zero();
-    for k in 0..DEFORMATIONS {
-        z = z + L::splat(view.shape[k]) * heights[k];
-    }
-    let (x, y) = (L::load(&block.x), L::load(&block.y));
-    let mut q = [L::zero(); 3];
-    let mut point = [L::zero(); 3];
-    for i in 0..3 {
-        q[i] = L::splat(r[(i, 0)]) * x + L::splat(r[(i, 1)]) * y + L::splat(r[(i, 2)]) * z;
-        point[i] = q[i] + L::splat(t[i]);
-    }
+    let (camera, r) = (view.camera, &view.cam_from_target.rotation);
+    let Placed { arm, point, heights } = placed::<L>(view, block);
     let at = M::project(constants, point);
-    let [fx, fy, skew] = [camera.fx, camera.fy, camera.skew].map(L::splat);
+    let [fx, fy, skew] = [L::splat(camera.fx), L::splat(camera.fy), L::splat(camera.skew)];
     let [xd, yd] = at.at;
     rows.inside = at.inside;
-    rows.residual = [
-        fx * xd + skew * yd + L::splat(camera.cx) - L::load(&block.u),
-        fy * yd + L::splat(camera.cy) - L::load(&block.v),
-    ];
-    let (zero, one) = (L::zero(), L::splat(1.0));
+    rows.residual = residual(camera, block, &at.at);
+    let one = L::splat(1.0);
     let Rows { columns, all, residual, .. } = rows;
     (all[0][Parameter::Fx as usize], all[0][Parameter::Cx as usize]) = (xd, one);
     all[0][Parameter::Skew as usize] = yd;
@@ -333,18 +385,10 @@ fn fill_rows<L: Lanes, M: LensModel<P>, const P: usize>(
         all[0][LINEAR + k] = fx * dx + skew * dy;
         all[1][LINEAR + k] = fy * dy;
     }
-    let mut by_point = [[zero; 3]; 2];
-    for i in 0..3 {
-        let (dx, dy) = (at.by_point[0][i], at.by_point[1][i]);
-        by_point[0][i] = fx * dx + skew * dy;
-        by_point[1][i] = fy * dy;
-    }
+    let slopes = by_point(camera, &at.by_point);
     for row in 0..2 {
-        let p = by_point[row];
-        columns[row][0] = q[1] * p[2] - q[2] * p[1];
-        columns[row][1] = q[2] * p[0] - q[0] * p[2];
-        columns[row][2] = q[0] * p[1] - q[1] * p[0];
-        (columns[row][3], columns[row][4], columns[row][5]) = (p[0], p[1], p[2]);
+        let p = slopes[row];
+        columns[row][..6].copy_from_slice(&by_pose(&arm, &p));
         let along = p[0] * L::splat(r[(0, 2)]) + p[1] * L::splat(r[(1, 2)]) + p[2] * L::splat(r[(2, 2)]);
         for k in 0..DEFORMATIONS {
             all[row][LINEAR + P + k] = along * heights[k];
@@ -356,5 +400,185 @@ fn fill_rows<L: Lanes, M: LensModel<P>, const P: usize>(
             columns[row][6] = all[row][place] + L::splat(ratio) * all[row][Parameter::Fy as usize];
         }
         columns[row][6 + view.columns.places.len()] = residual[row];
+    }
+}
+
+/// What a view says of its pose alone.
+pub(super) struct OfPose {
+    pub square: SMatrix<f64, 6, 6>,
+    pub gradient: SVector<f64, 6>,
+    pub cost: f64,
+}
+
+/// The normal equations of a view's pose. `None` where the lens has no image of a mark.
+pub(super) fn of_pose(view: &View<'_>) -> Option<OfPose> {
+    visit(&view.camera.distortion, PoseOfModel { view })
+}
+
+struct PoseOfModel<'a, 'b> {
+    view: &'a View<'b>,
+}
+
+impl LensVisitor for PoseOfModel<'_, '_> {
+    type Output = Option<OfPose>;
+
+    fn run<M: LensModel<P>, const P: usize>(self, coefficients: [f64; P]) -> Self::Output {
+        dispatch(PoseSums::<M, P> { view: self.view, coefficients, model: std::marker::PhantomData })
+    }
+}
+
+struct PoseSums<'a, 'b, M, const P: usize> {
+    view: &'a View<'b>,
+    coefficients: [f64; P],
+    model: std::marker::PhantomData<M>,
+}
+
+impl<M: LensModel<P>, const P: usize> Kernel for PoseSums<'_, '_, M, P> {
+    type Output = Option<OfPose>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Self::Output {
+        const RESIDUAL: usize = 6;
+        let view = self.view;
+        let constants = M::constants(self.coefficients.map(L::splat));
+        let mut sums = [[L::zero(); 8]; 6];
+        let mut cost = L::zero();
+        for block in &view.marks.blocks {
+            let Placed { arm, point, .. } = placed::<L>(view, block);
+            let at = M::project(&constants, point);
+            if !at.inside.all_positive() {
+                return None;
+            }
+            let off = residual(view.camera, block, &at.at);
+            let (square, root) = cost_and_root(view, block, &off);
+            cost = cost + square;
+            let slopes = by_point(view.camera, &at.by_point);
+            for row in 0..2 {
+                let mut columns = [L::zero(); 7];
+                columns[..6].copy_from_slice(&by_pose(&arm, &slopes[row]));
+                columns[RESIDUAL] = off[row];
+                for column in &mut columns {
+                    *column = *column * root;
+                }
+                for i in 0..6 {
+                    for j in i..7 {
+                        sums[i][j] = sums[i][j] + columns[i] * columns[j];
+                    }
+                }
+            }
+        }
+        let mut found = OfPose { square: SMatrix::zeros(), gradient: SVector::zeros(), cost: 0.0 };
+        for i in 0..6 {
+            let [a, b, c, d, e, f, g, h] = sums[i];
+            let (low, high) = (L::sums([a, b, c, d]), L::sums([e, f, g, h]));
+            for j in i..6 {
+                let sum = if j < 4 { low[j] } else { high[j - 4] };
+                (found.square[(i, j)], found.square[(j, i)]) = (sum, sum);
+            }
+            found.gradient[i] = high[RESIDUAL - 4];
+        }
+        [found.cost, ..] = L::sums([cost; 4]);
+        Some(found)
+    }
+}
+
+/// The cost of a view, without derivatives. `None` where the lens has no image of a mark.
+pub(super) fn cost(view: &View<'_>) -> Option<f64> {
+    visit(&view.camera.distortion, CostOfModel { view })
+}
+
+struct CostOfModel<'a, 'b> {
+    view: &'a View<'b>,
+}
+
+impl LensVisitor for CostOfModel<'_, '_> {
+    type Output = Option<f64>;
+
+    fn run<M: LensModel<P>, const P: usize>(self, coefficients: [f64; P]) -> Self::Output {
+        dispatch(Costs::<M, P> { view: self.view, coefficients, model: std::marker::PhantomData })
+    }
+}
+
+struct Costs<'a, 'b, M, const P: usize> {
+    view: &'a View<'b>,
+    coefficients: [f64; P],
+    model: std::marker::PhantomData<M>,
+}
+
+impl<M: LensModel<P>, const P: usize> Kernel for Costs<'_, '_, M, P> {
+    type Output = Option<f64>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Self::Output {
+        let view = self.view;
+        let constants = M::constants(self.coefficients.map(L::splat));
+        let mut sum = L::zero();
+        for block in &view.marks.blocks {
+            let at = M::project(&constants, placed::<L>(view, block).point);
+            if !at.inside.all_positive() {
+                return None;
+            }
+            let (cost, _) = cost_and_root(view, block, &residual(view.camera, block, &at.at));
+            sum = sum + cost;
+        }
+        let [cost, ..] = L::sums([sum; 4]);
+        Some(cost)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::minimise::Descent;
+    use super::super::super::settings::Bend;
+    use super::super::super::system::Step;
+    use super::super::fixture::{FREE, at_minimum};
+    use super::super::problem::{Problem, State};
+    use super::*;
+
+    /// Of a bent board, with a loss that weighs, away from the minimum.
+    fn with_problem(then: impl Fn(&Problem<'_>, &State)) {
+        at_minimum(FreeParameters::of(&FREE), 1.0, |flat, minimum| {
+            let bend = Some(Bend { deformations: DEFORMATIONS, standard_deviation: f64::INFINITY });
+            let problem = Problem { bend, loss: Loss::Cauchy { scale_px: 0.1 }, ..*flat };
+            then(&problem, &State { shape: [0.05, -0.03, 0.04], ..minimum.state.clone() });
+        });
+    }
+
+    /// Half the slope of the cost along a step, from costs on either side of a state.
+    fn half_slope(problem: &Problem<'_>, state: &State, size: f64, set: impl Fn(&mut Step<WIDTH>)) -> f64 {
+        let cost_at = |size: f64| {
+            let mut step = Step::default();
+            step.poses.resize(problem.views.len(), SVector::zeros());
+            set(&mut step);
+            step.intrinsics *= size;
+            step.poses.iter_mut().for_each(|pose| *pose *= size);
+            problem.cost(&problem.stepped(state, step))
+        };
+        (cost_at(size) - cost_at(-size)) / (4.0 * size)
+    }
+
+    /// A difference of this many px in the largest residual loses some 1e-7 of the slope to curvature, and as much to rounding.
+    const MOVED_PX: f64 = 1e-4;
+
+    #[test]
+    fn the_gradient_is_half_the_slope_of_the_cost() {
+        with_problem(|problem, state| {
+            let mut system = problem.system();
+            problem.linearise_into(state, &mut system);
+            let is_slope = |gradient: f64, square: f64, set: &dyn Fn(&mut Step<WIDTH>)| {
+                // `square` is the information of the unknown, so that this is what the gradient's terms come to.
+                let unit = (square * system.cost).sqrt();
+                let slope = half_slope(problem, state, MOVED_PX / square.sqrt(), set);
+                assert!((gradient - slope).abs() < 1e-5 * unit, "{gradient} {slope} {unit}");
+            };
+            for k in 0..FREE.len() + DEFORMATIONS {
+                is_slope(system.gradient[k], system.intrinsics[(k, k)], &|step| step.intrinsics[k] = 1.0);
+            }
+            for (view, block) in system.views.iter().enumerate() {
+                for k in 0..6 {
+                    is_slope(block.gradient[k], block.pose[(k, k)], &|step| step.poses[view][k] = 1.0);
+                }
+            }
+        });
     }
 }

@@ -49,6 +49,7 @@ pub fn locate(camera: &Camera<Lens>, view: &View) -> Option<Located> {
         max_iterations: Settings::standard().max_iterations,
         relative_gain: RELATIVE_GAIN,
         rounding_cost: rounding_cost(&marks),
+        is_certifiable: false,
     };
     let state = start::with_poses(&marks, *camera)?;
     let state = start::with_better_tilts(&problem, descend(&problem, state).state);

@@ -6,9 +6,12 @@
 //!
 //! [`Model`]: crate::camera::Model
 
+mod certificate;
 mod counterpart;
 mod curvature;
 mod estimate;
+#[cfg(test)]
+mod fixture;
 mod focal;
 mod information;
 mod judge;
@@ -17,7 +20,9 @@ mod locate;
 mod marks;
 mod problem;
 mod radial;
+mod rays;
 mod report;
+mod resection;
 mod root;
 mod shape;
 mod start;

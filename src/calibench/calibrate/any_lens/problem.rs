@@ -47,6 +47,10 @@ pub(super) struct Problem<'a> {
     /// A step that promises less than this part of the cost is the last.
     pub relative_gain: f64,
     pub rounding_cost: f64,
+    /// Whether [`certificate::counts_for`] the model that is wanted, so that starts are spared and poses are refined alone.
+    ///
+    /// [`certificate::counts_for`]: super::certificate::counts_for
+    pub is_certifiable: bool,
 }
 
 /// A shared unknown of which something is known beforehand.
@@ -110,6 +114,21 @@ impl Problem<'_> {
             marks: &self.views[at],
             loss: self.loss,
             columns,
+        }
+    }
+
+    /// The cost of a state without derivatives: the bits of [`Descent::linearise_into`], as the sums have its order. Infinite where the
+    /// lens has no image of a mark.
+    pub fn cost(&self, state: &State) -> f64 {
+        let columns = Columns::NONE;
+        let of_view = |at: usize, _: &Marks| kernel::cost(&self.view(state, &columns, at));
+        let of_views: Option<Vec<f64>> = chunks::map(self.views, of_view).into_iter().collect();
+        let of_marks = of_views.map(|costs| costs.chunks(CHUNK).map(|chunk| chunk.iter().sum::<f64>()).sum());
+        match of_marks {
+            Some(cost) if state.camera.fx > 0.0 && state.camera.fy > 0.0 && !f64::is_nan(cost) => {
+                self.known(state).iter().fold(cost, |sum, known| sum + known.weight * known.off * known.off)
+            }
+            _ => f64::INFINITY,
         }
     }
 
@@ -223,5 +242,39 @@ impl Descent<WIDTH> for Problem<'_> {
 
     fn rounding_cost(&self) -> f64 {
         self.rounding_cost
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture::{FREE, at_minimum};
+    use super::*;
+    use crate::camera::Parameter;
+
+    #[test]
+    fn what_is_known_weighs_by_the_variance_of_a_coordinate_over_its_own() {
+        at_minimum(FreeParameters::of(&FREE), 1.0, |nothing_known, minimum| {
+            let prior = Prior { parameter: Parameter::Cx, mean: 300.0, standard_deviation: 0.2 };
+            let bend = Some(Bend { deformations: 2, standard_deviation: 0.05 });
+            let problem = Problem { priors: &[prior], variance: 0.01, bend, ..*nothing_known };
+            let state = State { shape: [0.3, -0.1, 0.0], ..minimum.state.clone() };
+            let known = problem.known(&state);
+            let expected =
+                [(2, state.camera.cx - 300.0, 0.01 / 0.04), (6, 0.3, 0.01 / 0.0025), (7, -0.1, 4.0)];
+            assert_eq!(known.len(), expected.len());
+            for (Known { row, off, weight }, (row_expected, off_expected, weight_expected)) in
+                known.iter().zip(expected)
+            {
+                assert_eq!((*row, *off), (row_expected, off_expected));
+                assert!((weight / weight_expected - 1.0).abs() < 1e-14, "{weight}");
+            }
+            // And so it costs, with derivatives and without.
+            let known_cost: f64 = expected.iter().map(|(_, off, weight)| weight * off * off).sum();
+            let mut system = problem.system();
+            problem.linearise_into(&state, &mut system);
+            let of_marks = Problem { priors: &[], bend: None, ..problem }.cost(&state);
+            assert!((system.cost / (of_marks + known_cost) - 1.0).abs() < 1e-14);
+            assert_eq!(problem.cost(&state), system.cost);
+        });
     }
 }

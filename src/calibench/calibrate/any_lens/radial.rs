@@ -161,3 +161,45 @@ fn best_sphere(lens: Lens, free: FreeParameters, xis: &[f64], radii: &[[f64; 2]]
     }
     best.map(|(_, lens, factor)| (lens, factor))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Angles and radii of a lens, as if it left the axis with slope 1.
+    fn radii(lens: &Lens, slope: f64) -> Vec<[f64; 2]> {
+        let radius =
+            |angle: f64| lens.project(&Vec3::new(libm::sin(angle), 0.0, libm::cos(angle))).unwrap().x;
+        (1..=20).map(|k| 0.06 * f64::from(k)).map(|angle| [angle, radius(angle) / slope]).collect()
+    }
+
+    #[test]
+    fn a_polynomial_is_found_from_its_radii_with_some_of_its_terms_held() {
+        use Parameter::{K1, K2, K3, K4};
+        let truth = Lens::new(Model::KannalaBrandt, &[0.02, -0.01, 0.004, -0.0015]).unwrap();
+        for free in [vec![K1, K2, K3, K4], vec![K1, K3], vec![K2], vec![]] {
+            let start = free.iter().fold(truth, |lens, &p| lens.with(p, 0.0).unwrap());
+            let found = fitted(start, FreeParameters::of(&free), &radii(&truth, 1.0));
+            let [(lens, factor)] = found[..] else { panic!("{found:?}") };
+            assert_eq!(factor, 1.0);
+            for p in [K1, K2, K3, K4] {
+                let [is, should] = [lens, truth].map(|lens| lens.get(p).unwrap());
+                // The eighth power of these angles is told a thousandth as well as the square.
+                assert!((is - should).abs() < 1e-9, "{free:?} {p:?}: {is} {should}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_double_sphere_whose_xi_is_held_keeps_it_and_takes_the_closest_alpha() {
+        use Parameter::{Alpha, Xi};
+        // On the grid of alpha, and off the grid of xi.
+        let truth = Lens::new(Model::DoubleSphere, &[0.23, 0.6]).unwrap();
+        let start = truth.with(Alpha, 0.4).unwrap();
+        let radii = radii(&truth, 1.0 / 1.23);
+        let found = fitted(start, FreeParameters::of(&[Alpha]), &radii);
+        let [(lens, factor)] = found[..] else { panic!("{found:?}") };
+        assert_eq!((lens.get(Xi), factor), (Some(0.23), 1.23));
+        assert!((lens.get(Alpha).unwrap() - 0.6).abs() < 0.04, "{lens:?}");
+    }
+}

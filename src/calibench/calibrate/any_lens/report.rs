@@ -185,3 +185,29 @@ pub(super) fn report(
     calibration.warnings = warnings::of_lens(&calibration, largest_angle, of_residuals, &skewed, rival);
     Ok(calibration)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::{Board, Settings};
+    use super::super::{estimate, fixture};
+    use crate::camera::Model;
+
+    #[test]
+    fn the_deformations_that_are_estimated_have_deviations_and_the_others_none() {
+        let views = fixture::wide_views();
+        let standard_deviation = f64::INFINITY;
+        for (board, estimated) in
+            [(Board::Bowed { standard_deviation }, 2), (Board::Bent { standard_deviation }, 3)]
+        {
+            let mut settings = Settings::of_model(Model::KannalaBrandt);
+            settings.board = board;
+            let shape = estimate::calibrate(&views, &settings).unwrap().board.unwrap();
+            let numbers = [shape.bow_x, shape.bow_y, shape.twist];
+            for (k, (number, sd)) in numbers.into_iter().zip(shape.standard_deviations).enumerate() {
+                // The board is flat: five deviations are what chance does once in a million.
+                assert_eq!(sd > 0.0, k < estimated, "{k} {sd}");
+                assert!(number.abs() <= 5.0 * sd, "{k}: {number} {sd}");
+            }
+        }
+    }
+}

@@ -100,6 +100,7 @@ mod tests {
             max_iterations: 0,
             relative_gain: RELATIVE_GAIN,
             rounding_cost: 0.0,
+            is_certifiable: false,
         };
         let poses = cam_from_target.iter().enumerate();
         let cam_from_target = poses.map(|(view, pose)| frames.at(view).of_pose(pose)).collect();

@@ -7,14 +7,17 @@
 //! fitted to the rays that this one sees.
 
 use super::super::Settings;
+use super::super::chunks;
 use super::super::estimate::state_alone;
-use super::super::minimise::{Minimum, descend};
+use super::super::minimise::descend;
+use super::super::target_frame::TargetFrames;
 use super::super::tie::tied;
 use super::super::tilt::mirrored;
-use super::WIDTH;
 use super::marks::{Mark, Marks};
 use super::problem::{Problem, ROUGH_GAIN, State};
 use super::radial;
+use super::rays::Rays;
+use super::resection::{Posed, Resection};
 use crate::board::View;
 use crate::camera::{Camera, FreeParameters, Lens, Model, Parameter};
 use crate::geometry::{Mat3, Pose, Vec2, Vec3};
@@ -43,15 +46,57 @@ const FIRST_STEPS: usize = 15;
 const LENS_STEPS: usize = 40;
 
 /// States with lenses of the wanted model like the one that the pinhole's solver finds with k1 and k2, however it
-/// fits, and whether that is certified.
+/// fits, and whether that is certified. Of many marks some views tell a lens that is certifiable, and the others follow.
 pub(super) fn by_pinhole(problem: &Problem<'_>, views: &[View], settings: &Settings) -> (Vec<State>, bool) {
-    match pinhole(problem, views, settings) {
-        Some((state, certified)) => (with_model(problem, &state, settings), certified),
-        None => (Vec::new(), false),
+    let chosen = chosen_views(problem.views);
+    if chosen.len() == views.len() || !problem.is_certifiable {
+        return from_pinhole(problem, views, settings, |_, pose| *pose);
     }
+    let marks: Vec<Marks> = chosen.iter().map(|&view| problem.views[view].clone()).collect();
+    let few_views: Vec<View> = chosen.iter().map(|&view| views[view].clone()).collect();
+    let (frames, own) = (TargetFrames::of(views), TargetFrames::of(&few_views));
+    let few = Problem { views: &marks, relative_gain: ROUGH_GAIN, ..*problem };
+    let in_frame = |k: usize, pose: &Pose| frames.at(chosen[k]).of_pose(&own.at(k).cam_from_target(pose));
+    let (states, is_certified) = from_pinhole(&few, &few_views, settings, in_frame);
+    let of_all = |state| with_other_poses(problem, &chosen, &descend(&few, state).state);
+    (states.into_iter().filter_map(of_all).collect(), is_certified)
 }
 
-fn pinhole(problem: &Problem<'_>, views: &[View], settings: &Settings) -> Option<(State, bool)> {
+/// The state of some views with poses for all; `None` where a view has none or the lens does not see a mark.
+fn with_other_poses(problem: &Problem<'_>, chosen: &[usize], state: &State) -> Option<State> {
+    let State { camera, shape, .. } = state;
+    let rays = Rays::of(camera);
+    let ray = |pixel: &Vec2| rays.near(pixel);
+    let pose = |view: usize, marks: &Marks| match chosen.binary_search(&view) {
+        Ok(k) => Some(state.cam_from_target[k]),
+        Err(_) => {
+            let alone = Resection { problem, camera, shape, view };
+            Some(alone.refined(pose_from_rays(marks, &ray)?, POSE_STEPS).pose)
+        }
+    };
+    let cam_from_target = chunks::map(problem.views, pose).into_iter().collect::<Option<_>>()?;
+    let of_all = State { camera: *camera, cam_from_target, shape: *shape };
+    is_seen(problem.views, &of_all).then_some(of_all)
+}
+
+/// The same from all views of a problem; `in_frame` is a pose in the frame of the problem's marks.
+fn from_pinhole(
+    problem: &Problem<'_>,
+    views: &[View],
+    settings: &Settings,
+    in_frame: impl Fn(usize, &Pose) -> Pose,
+) -> (Vec<State>, bool) {
+    let Some((mut state, is_certified)) = pinhole(views, settings) else { return (Vec::new(), false) };
+    for (view, pose) in state.cam_from_target.iter_mut().enumerate() {
+        *pose = in_frame(view, pose);
+    }
+    if !is_seen(problem.views, &state) {
+        return (Vec::new(), false);
+    }
+    (with_model(problem, &state, settings), is_certified)
+}
+
+fn pinhole(views: &[View], settings: &Settings) -> Option<(State, bool)> {
     let mut plain = Settings::standard();
     let marks: usize = views.iter().map(View::len).sum();
     (plain.image_size, plain.loss) = (settings.image_size, settings.loss);
@@ -59,9 +104,8 @@ fn pinhole(problem: &Problem<'_>, views: &[View], settings: &Settings) -> Option
     let unweighted = |v: &View| View::new(v.points().to_vec(), v.pixels().to_vec()).ok();
     let unweighted: Vec<View> = views.iter().map(unweighted).collect::<Option<_>>()?;
     let (found, is_certified) = state_alone(&unweighted, &plain).ok()?;
-    let state =
-        State { camera: found.camera.into(), cam_from_target: found.cam_from_target, shape: [0.0; 3] };
-    is_seen(problem.views, &state).then_some((state, is_certified))
+    let (camera, cam_from_target) = (found.camera.into(), found.cam_from_target);
+    Some((State { camera, cam_from_target, shape: [0.0; 3] }, is_certified))
 }
 
 /// States with lenses of the wanted model like angle polynomials of two terms: with pixels of the shape that is tied,
@@ -95,24 +139,25 @@ fn polynomial(fisheye: &Problem<'_>, settings: &Settings) -> Option<State> {
     let chosen: Vec<Marks> =
         chosen_views(fisheye.views).into_iter().map(|view| fisheye.views[view].clone()).collect();
     let few = Problem { views: &chosen, ..*fisheye };
-    let poses_alone = Problem { free: FreeParameters::NONE, max_iterations: POSE_STEPS, ..few };
     let aspects = match few.fy_per_fx {
         Some(known) => vec![known],
         None => ASPECTS.to_vec(),
     };
-    let mut tried = Vec::with_capacity(ANGLES * aspects.len());
+    let mut tried: Vec<(f64, State)> = Vec::with_capacity(REFINED + 1);
     let mut angle = NARROWEST;
     for _ in 0..ANGLES {
         for aspect in &aspects {
             let lens = Lens::ideal(Model::KannalaBrandt);
             let camera = Camera::with_lens(reach / angle, aspect * reach / angle, centre.x, centre.y, lens);
-            if let Some(state) = with_poses(&chosen, camera) {
-                tried.push(descend(&poses_alone, state));
+            let dearest = tried.get(REFINED - 1).map_or(f64::INFINITY, |(cost, _)| *cost);
+            if let Some(found) = with_refined_poses(&few, camera, dearest) {
+                tried.push(found);
+                tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+                tried.truncate(REFINED);
             }
         }
         angle *= ANGLE_FACTOR;
     }
-    tried.sort_by(|a, b| a.system.cost.total_cmp(&b.system.cost));
     use Parameter::{Cx, Cy, Fx, Fy, K1, K2};
     let kept = |list: &[Parameter]| {
         let free = FreeParameters::of(list);
@@ -121,12 +166,18 @@ fn polynomial(fisheye: &Problem<'_>, settings: &Settings) -> Option<State> {
     let first = Problem { free: kept(&[Fx, Fy, K1]), max_iterations: FIRST_STEPS, ..few };
     let lens = kept(&[Fx, Fy, Cx, Cy, K1, K2]);
     let better = Problem { free: lens, max_iterations: LENS_STEPS, ..few };
-    let refined = tried.into_iter().take(REFINED).map(|m| descend(&better, descend(&first, m.state).state));
+    let refined = tried.into_iter().map(|(_, state)| descend(&better, descend(&first, state).state));
     let best = refined
         .filter(|m| m.system.cost.is_finite())
         .min_by(|a, b| a.system.cost.total_cmp(&b.system.cost))?;
     let whole = Problem { free: lens, max_iterations: LENS_STEPS, ..*fisheye };
-    let state = with_better_tilts(&whole, with_poses(fisheye.views, best.state.camera)?);
+    let camera = best.state.camera;
+    let state = if fisheye.is_certifiable {
+        with_poses_alone(fisheye, camera, f64::INFINITY)?.1
+    } else {
+        with_poses(fisheye.views, camera)?
+    };
+    let state = with_better_tilts(&whole, state);
     Some(descend(&whole, state).state)
 }
 
@@ -155,18 +206,49 @@ fn chosen_views(views: &[Marks]) -> Vec<usize> {
     (0..count).map(|k| k * views.len() / count).collect()
 }
 
+/// The camera with a pose for every view, refined a few steps, and their cost; `None` where a view has none, and perhaps where they cost
+/// more than `dearest`.
+fn with_refined_poses(problem: &Problem<'_>, camera: Camera<Lens>, dearest: f64) -> Option<(f64, State)> {
+    if problem.is_certifiable {
+        return with_poses_alone(problem, camera, dearest);
+    }
+    let together = Problem { free: FreeParameters::NONE, max_iterations: POSE_STEPS, ..*problem };
+    let found = descend(&together, with_poses(problem.views, camera)?);
+    Some((found.system.cost, found.state))
+}
+
+/// The same, with each pose refined alone from rays of a table, until they cost more than `dearest`.
+fn with_poses_alone(problem: &Problem<'_>, camera: Camera<Lens>, dearest: f64) -> Option<(f64, State)> {
+    let shape = [0.0; 3];
+    let mut cost = 0.0;
+    let mut cam_from_target = Vec::with_capacity(problem.views.len());
+    let rays = Rays::of(&camera);
+    let ray = |pixel: &Vec2| rays.near(pixel);
+    for (view, marks) in problem.views.iter().enumerate() {
+        let alone = Resection { problem, camera: &camera, shape: &shape, view };
+        let found = alone.refined(pose_from_rays(marks, &ray)?, POSE_STEPS);
+        cost += found.cost;
+        if cost.is_nan() || cost >= dearest {
+            return None;
+        }
+        cam_from_target.push(found.pose);
+    }
+    Some((cost, State { camera, cam_from_target, shape }))
+}
+
 /// The camera with a pose for every view; `None` where one has none.
 pub(super) fn with_poses(views: &[Marks], camera: Camera<Lens>) -> Option<State> {
-    let cam_from_target = views.iter().map(|view| pose_from_rays(view, &camera)).collect::<Option<_>>()?;
+    let ray = |pixel: &Vec2| camera.ray(pixel).ok();
+    let cam_from_target = views.iter().map(|view| pose_from_rays(view, &ray)).collect::<Option<_>>()?;
     Some(State { camera, cam_from_target, shape: [0.0; 3] })
 }
 
 /// The pose of a flat board from the rays of its marks; `None` with fewer than four.
-fn pose_from_rays(view: &Marks, camera: &Camera<Lens>) -> Option<Pose> {
+fn pose_from_rays(view: &Marks, ray: &impl Fn(&Vec2) -> Option<Vec3>) -> Option<Pose> {
     let mut normal = SMatrix::<f64, 9, 9>::zeros();
     let mut rays = Vec::with_capacity(view.len());
     for mark in &view.list {
-        let Ok(ray) = camera.ray(&mark.pixel) else { continue };
+        let Some(ray) = ray(&mark.pixel) else { continue };
         // Two directions across the ray: H X has no part along them.
         let other = if ray.x.abs() < 0.6 { Vec3::x() } else { Vec3::y() };
         let first = ray.cross(&other).normalize();
@@ -194,28 +276,16 @@ fn pose_from_rays(view: &Marks, camera: &Camera<Lens>) -> Option<Pose> {
 
 /// Turns the targets to their other tilt where that costs less: seen from afar the two look alike.
 pub(super) fn with_better_tilts(problem: &Problem<'_>, mut state: State) -> State {
-    for (view, marks) in problem.views.iter().enumerate() {
-        let alone = Problem {
-            views: std::slice::from_ref(marks),
-            free: FreeParameters::NONE,
-            priors: &[],
-            bend: None,
-            max_iterations: LENS_STEPS,
-            relative_gain: ROUGH_GAIN,
-            ..*problem
-        };
-        let at = |pose: Pose| State { cam_from_target: vec![pose], ..state };
-        let as_it_is = descend(&alone, at(state.cam_from_target[view]));
-        let other = at(mirrored(&as_it_is.state.cam_from_target[0]));
-        let turned = descend_unless_dear(&alone, other, as_it_is.system.cost);
-        let better = match turned {
-            Some(turned) if turned.system.cost < as_it_is.system.cost => turned,
-            _ => as_it_is,
-        };
-        if better.system.cost.is_finite() {
-            state.cam_from_target[view] = better.state.cam_from_target[0];
+    let State { camera, shape, .. } = &state;
+    let better = |view: usize, pose: &Pose| {
+        let alone = Resection { problem, camera, shape, view };
+        let as_it_is = alone.refined(*pose, LENS_STEPS);
+        match refined_unless_dear(&alone, mirrored(&as_it_is.pose), as_it_is.cost) {
+            Some(turned) if turned.cost < as_it_is.cost => turned.pose,
+            _ => as_it_is.pose,
         }
-    }
+    };
+    state.cam_from_target = chunks::map(&state.cam_from_target, better);
     state
 }
 
@@ -227,16 +297,16 @@ const DEAR: [(usize, f64); 2] = [(3, 100.0), (3, 4.0)];
 const SAME: f64 = 1e-3;
 
 /// The minimum near a pose; `None` where it is seen early to cost far more than `cost`, or the same.
-fn descend_unless_dear(alone: &Problem<'_>, mut state: State, cost: f64) -> Option<Minimum<State, WIDTH>> {
-    for (max_iterations, factor) in DEAR {
-        let found = descend(&Problem { max_iterations, ..*alone }, state);
-        let is_the_same = (found.system.cost - cost).abs() <= SAME * cost;
-        if is_the_same || found.system.cost > factor * cost {
+fn refined_unless_dear(alone: &Resection<'_>, mut pose: Pose, cost: f64) -> Option<Posed> {
+    for (steps, factor) in DEAR {
+        let found = alone.refined(pose, steps);
+        let is_the_same = (found.cost - cost).abs() <= SAME * cost;
+        if is_the_same || found.cost > factor * cost {
             return None;
         }
-        state = found.state;
+        pose = found.pose;
     }
-    Some(descend(alone, state))
+    Some(alone.refined(pose, LENS_STEPS))
 }
 
 /// Whether the lens has an image of every mark.

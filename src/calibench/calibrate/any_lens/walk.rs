@@ -4,19 +4,19 @@ use super::super::minimise::{Minimum, descend};
 use super::super::rival::{Met, RIVALS};
 use super::super::{CalibrationError, Settings, Termination, Warning};
 use super::problem::{Problem, ROUGH_GAIN, State};
-use super::{WIDTH, report, start};
+use super::{WIDTH, certificate, report, start};
 use crate::board::View;
 use crate::camera::Lens;
 
-/// The best of the minima, and all that were met, most of them to [`ROUGH_GAIN`].
+/// The best of the minima, refined to the end where the model is certifiable, and all that were met, most of them to [`ROUGH_GAIN`].
 pub(super) struct Walked {
     pub best: Minimum<State, WIDTH>,
     pub met: Vec<Met<Lens>>,
 }
 
-/// Refines the starts: those that the pinhole's solver gives, and, unless that is certified to have found no
-/// minimum beside the right one and one of them converges to residuals that look like noise, those that an angle polynomial gives. A
-/// certificate counts for the lens of the pinhole, and where that does not hold it may be one of a wrong camera.
+/// Refines the starts: those that the pinhole's solver gives, and, unless one of them converges to residuals that look like noise and
+/// either the pinhole or this minimum is certified, those that an angle polynomial gives. The pinhole's certificate counts for its own
+/// lens, and where that does not hold it may be one of a wrong camera.
 ///
 /// # Errors
 /// No lens of the model sees every mark.
@@ -30,8 +30,9 @@ pub(super) fn walk(
     let is_right = |m: &Minimum<State, WIDTH>| {
         m.termination == Termination::Converged && !report::may_have_structure(problem, &m.state)
     };
-    let is_found = minima.iter().any(is_right);
-    if !(is_certified && is_found) {
+    let is_settled =
+        |m: &Minimum<State, WIDTH>| is_right(m) && (is_certified || certificate::holds(problem, m));
+    if !minima.iter().any(is_settled) {
         minima.extend(refined(problem, start::by_rays(problem, settings)));
     }
     if let Some(first) = best(problem, &minima) {
@@ -46,6 +47,9 @@ pub(super) fn walk(
     }
     let met = minima.iter().map(met).collect();
     let best = best(problem, &minima).unwrap_or(rough);
+    if problem.is_certifiable && best != rough {
+        follow(problem, &mut minima[best]);
+    }
     Ok(Walked { best: minima.swap_remove(best), met })
 }
 
@@ -97,5 +101,27 @@ pub(super) fn met(minimum: &Minimum<State, WIDTH>) -> Met<Lens> {
         camera: minimum.state.camera,
         cost: minimum.system.cost,
         converged: minimum.termination == Termination::Converged,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::target_frame::TargetFrames;
+    use super::super::estimate::calibrate;
+    use super::super::{fixture, marks, shape};
+    use super::*;
+    use crate::camera::Model;
+
+    #[test]
+    fn a_fisheye_that_is_certified_needs_no_other_start_although_the_pinhole_is_not() {
+        let views = fixture::wide_views();
+        let settings = Settings::of_model(Model::KannalaBrandt);
+        let listed = marks::of_views(&views, &TargetFrames::of(&views), &shape::region(&views));
+        let problem = fixture::problem(&listed, settings.free());
+        let (_, pinhole_is_certified) = start::by_pinhole(&problem, &views, &settings);
+        assert!(!pinhole_is_certified);
+        let found = calibrate(&views, &settings).unwrap();
+        assert_eq!(found.starts, 1);
+        assert!((found.sigma_px / fixture::WIDE_NOISE_PX - 1.0).abs() < 0.2, "{}", found.sigma_px);
     }
 }
