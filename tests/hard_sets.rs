@@ -2,7 +2,9 @@
 //! right.
 
 use calibench::board::View;
-use calibench::calibrate::{Calibration, CalibrationError, Settings, Termination, Warning, calibrate};
+use calibench::calibrate::{
+    Calibration, CalibrationError, Outliers, Settings, Termination, Warning, calibrate,
+};
 use calibench::camera::FreeParameters;
 use calibench::io::parse_corners;
 
@@ -83,5 +85,5 @@ fn copies_are_found_behind_their_rounding() {
 #[test]
 fn one_mark_in_ten_astray_is_blamed_and_not_the_tilts() {
     let error = calibrated("one-mark-in-ten-astray", CHAPTER, None).unwrap_err();
-    assert!(matches!(error, CalibrationError::Strays { marks: 38, .. }), "{error}");
+    assert!(matches!(error, CalibrationError::Outliers(Outliers { marks: 38, .. })), "{error}");
 }

@@ -3,7 +3,7 @@
 
 use calibench::board::View;
 use calibench::calibrate::{
-    Board, CalibrationError, Candidate, Settings, Warning, calibrate_lens, compare_models,
+    Board, CalibrationError, Candidate, Outliers, Settings, Warning, calibrate_lens, compare_models,
     explaining_freedoms,
 };
 use calibench::camera::{Camera, Lens, Model, Parameter};
@@ -197,7 +197,8 @@ fn a_stray_mark_is_named_with_any_lens() {
         pixels[17].x += 10.0;
         views[3] = View::new(views[3].points().to_vec(), pixels).unwrap();
         let found = calibrate_lens(&views, &settings(model)).unwrap();
-        let is_named = |w: &Warning| matches!(w, Warning::Outliers { marks: 1, view: 3, point: 17, .. });
+        let is_named =
+            |w: &Warning| matches!(w, Warning::Outliers(Outliers { marks: 1, view: 3, point: 17, .. }));
         assert!(found.warnings.iter().any(is_named), "{model}: {:?}", found.warnings);
     }
 }

@@ -2,7 +2,9 @@
 //! that mislead.
 
 use calibench::board::View;
-use calibench::calibrate::{Calibration, CalibrationError, Settings, Termination, Warning, calibrate};
+use calibench::calibrate::{
+    Calibration, CalibrationError, Outliers, Settings, Termination, Warning, calibrate,
+};
 use calibench::camera::{Camera, FreeParameters, Parameter};
 use calibench::geometry::{Pose, Vec2, Vec3};
 use calibench::synth::{Scene, Stream, StreamKey, Truth, scene::looking_at_centre};
@@ -104,14 +106,14 @@ fn one_stray_mark_is_named_as_one() {
             let stray = with_strays(&views, 2, &[(17, Vec2::new(size, -0.5 * size))]);
             let result = calibrate(&stray, &Settings::standard()).unwrap();
             let found = result.warnings.iter().find_map(|w| match w {
-                Warning::Outliers { marks, view, point, .. } => Some((*marks, *view, *point)),
+                Warning::Outliers(Outliers { marks, view, point, .. }) => Some((*marks, *view, *point)),
                 _ => None,
             });
             let (marks, view, point) = found.unwrap_or_else(|| panic!("{size} px: {:?}", result.warnings));
             assert_eq!((marks, view, point), (1, 2, 17), "{size} px");
         }
         let clean = calibrate(&views, &Settings::standard()).unwrap();
-        assert!(!clean.warnings.iter().any(|w| matches!(w, Warning::Outliers { .. })));
+        assert!(!clean.warnings.iter().any(|w| matches!(w, Warning::Outliers(_))));
     }
 }
 

@@ -133,7 +133,7 @@ fn refusal(error: &CalibrationError) -> String {
         CalibrationError::TooFewPoints { .. } => "refused: too few points".to_string(),
         CalibrationError::View { .. } => "refused: a view has no homography".to_string(),
         CalibrationError::NoStart { .. } => "refused: no starting values".to_string(),
-        CalibrationError::Strays { .. } => "refused: gross errors".to_string(),
+        CalibrationError::Outliers(_) => "refused: gross errors".to_string(),
         CalibrationError::HeldWithoutValue { .. }
         | CalibrationError::BadHeldValue { .. }
         | CalibrationError::BadRatio { .. }

@@ -75,7 +75,7 @@ fn reason(error: &CalibrationError) -> &'static str {
         CalibrationError::View { .. } => "homography",
         CalibrationError::HeldWithoutValue { .. } | CalibrationError::BadHeldValue { .. } => "held-value",
         CalibrationError::BadLoss | CalibrationError::NarrowLoss { .. } => "loss",
-        CalibrationError::Strays { .. } => "gross-errors",
+        CalibrationError::Outliers(_) => "gross-errors",
         CalibrationError::NotIdentifiable { .. } => "not-identifiable",
         CalibrationError::NoStart { .. } => "no-start",
         _ => "refused",

@@ -1,7 +1,7 @@
 //! Views and marks that were given more than once are calibrated from once, and have their place in the result.
 
 use super::duplicates::Distinct;
-use super::{Calibration, CalibrationError, Warning};
+use super::{Calibration, CalibrationError, Outliers, Warning};
 use crate::board::View;
 
 /// What `calibrate` makes of the views without copies, for all that were given.
@@ -18,9 +18,9 @@ pub(super) fn without<L>(
         Err(CalibrationError::TooFewViews { need, got, linear, .. }) => {
             Err(CalibrationError::TooFewViews { need, got, linear, copies: views.len() - got })
         }
-        Err(CalibrationError::Strays { marks, view, point, residual_px, median_px }) => {
-            let (view, point) = distinct.given_mark(view, point);
-            Err(CalibrationError::Strays { marks, view, point, residual_px, median_px })
+        Err(CalibrationError::Outliers(mut outliers)) => {
+            (outliers.view, outliers.point) = distinct.given_mark(outliers.view, outliers.point);
+            Err(CalibrationError::Outliers(outliers))
         }
         Err(error) => Err(error),
     }
@@ -40,7 +40,9 @@ fn with_copies<L>(mut calibration: Calibration<L>, distinct: &Distinct) -> Calib
     calibration.covariance.cross = at(&calibration.covariance.cross, place);
     for warning in &mut calibration.warnings {
         match warning {
-            Warning::Outliers { view, point, .. } => (*view, *point) = distinct.given_mark(*view, *point),
+            Warning::Outliers(Outliers { view, point, .. }) => {
+                (*view, *point) = distinct.given_mark(*view, *point);
+            }
             Warning::TwinPose { view, .. } | Warning::FromBehind { view, .. } => *view = distinct.kept[*view],
             _ => {}
         }

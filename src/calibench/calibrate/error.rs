@@ -1,6 +1,6 @@
 //! Why can no camera be estimated from these data?
 
-use super::{ClosedFormError, Unknown, unknown};
+use super::{ClosedFormError, Outliers, Unknown, unknown};
 use crate::camera::{Model, Parameter};
 use crate::geometry::HomographyError;
 use std::borrow::Cow;
@@ -145,10 +145,10 @@ pub enum CalibrationError {
     /// The loss has no scale, or one whose square is lost in rounding.
     #[error("a robust loss needs a scale from 1e-9 to 1e9 px")]
     BadLoss,
-    /// A robust loss under which nearly every mark counts as a stray.
+    /// A robust loss under which nearly every mark counts as an outlier.
     #[error(
         "the scale of the robust loss, {scale_px:e} px, lies far below the residuals, half of which exceed {median_px:.2e} px: every mark \
-         would count as a stray; use a scale of about {:.2e}", 2.0 * median_px
+         would count as an outlier; use a scale of about {:.2e}", 2.0 * median_px
     )]
     NarrowLoss {
         /// Scale of the loss, px.
@@ -158,22 +158,11 @@ pub enum CalibrationError {
     },
     /// Gross errors that hide what the other marks could tell.
     #[error(
-        "{marks} mark(s) lie too far off to be noise, the worst (view {view}, point {point}) by {residual_px:.2} px where half of all stay \
-         below {median_px:.2} px, and with them nothing is determined: correct or remove them, or use a robust loss (huber:{:.2})",
-        2.0 * median_px
+        "{} mark(s) lie too far off to be noise, the worst (view {}, point {}) by {:.2} px where half of all stay below {:.2} px, and with \
+         them nothing is determined: correct or remove them, or use a robust loss (huber:{:.2})",
+        .0.marks, .0.view, .0.point, .0.residual_px, .0.median_px, 2.0 * .0.median_px
     )]
-    Strays {
-        /// How many.
-        marks: usize,
-        /// View of the worst.
-        view: usize,
-        /// Its number there.
-        point: usize,
-        /// Its residual, px.
-        residual_px: f64,
-        /// The residual that half of the marks stay below, px.
-        median_px: f64,
-    },
+    Outliers(Outliers),
     /// The data do not tell the free parameters apart.
     #[error(
         "the data cannot separate {}: {why}. {}",

@@ -16,7 +16,7 @@ use super::system::System;
 use super::target_frame::TargetFrames;
 use super::{
     Board, Calibration, CalibrationError, Loss, Prior, Settings, Termination, Warning, chunks, copies,
-    domain, identifiability, kernel, polish, start, strays, structure, warnings,
+    domain, identifiability, kernel, outliers, polish, start, structure, warnings,
 };
 use crate::board::View;
 use crate::camera::{Model, Parameter};
@@ -230,7 +230,7 @@ fn report(
     let settled = problem.priors.settled(&minimum);
     let freedom = fit.freedom(system, settled);
     let degrees_of_freedom = whole((2 * points) as f64 + settled - system.unknowns() as f64);
-    strays::refuse_narrow_loss(problem.loss, &fit)?;
+    outliers::refuse_narrow_loss(problem.loss, &fit)?;
     let left_out = left_out::asked_for(problem, &minimum, undecided, fit.square / freedom, freedom);
     let of_residuals = warnings_of_residuals(problem, &minimum.state, &fit, freedom).chain(left_out);
     let variance = if problem.priors.list.is_empty() {
@@ -290,13 +290,13 @@ fn warnings_of_residuals(
     fit: &Fit,
     freedom: f64,
 ) -> impl Iterator<Item = Warning> + use<> {
-    let (strays, structure) = if fit.square > problem.rounding_cost {
-        let strays = strays::strays(problem, state, fit, fit.square / freedom);
-        (strays, structure::structure(&fit.residuals, 0.5 * fit.square / fit.marks() as f64))
+    let (outliers, structure) = if fit.square > problem.rounding_cost {
+        let outliers = outliers::outliers(problem, state, fit, fit.square / freedom);
+        (outliers, structure::structure(&fit.residuals, 0.5 * fit.square / fit.marks() as f64))
     } else {
         (None, None)
     };
-    strays.map(Warning::from).into_iter().chain(structure)
+    outliers.map(Warning::Outliers).into_iter().chain(structure)
 }
 
 /// A minimum counts as one only where the certificate holds.

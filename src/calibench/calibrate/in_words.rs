@@ -19,7 +19,7 @@ const EACH: usize = 3;
 /// assert!(lines[0].starts_with("4 pairs of parameters are correlated by up to 0.9900"));
 /// ```
 pub fn in_words(warnings: &[Warning]) -> Vec<String> {
-    let skewed: Vec<(Parameter, f64, f64)> = warnings.iter().filter_map(not_linear).collect();
+    let skewed: Vec<(Parameter, [Option<f64>; 2])> = warnings.iter().filter_map(not_linear).collect();
     let pairs: Vec<(Parameter, Parameter, f64)> = warnings.iter().filter_map(correlated).collect();
     let (mut told_skewed, mut told_pairs) = (false, false);
     let mut lines = Vec::new();
@@ -41,9 +41,9 @@ pub fn in_words(warnings: &[Warning]) -> Vec<String> {
     lines
 }
 
-fn not_linear(warning: &Warning) -> Option<(Parameter, f64, f64)> {
+fn not_linear(warning: &Warning) -> Option<(Parameter, [Option<f64>; 2])> {
     match *warning {
-        Warning::NotLinear { parameter, below, above } => Some((parameter, below, above)),
+        Warning::NotLinear { parameter, below, above } => Some((parameter, [below, above])),
         _ => None,
     }
 }
@@ -55,12 +55,13 @@ fn correlated(warning: &Warning) -> Option<(Parameter, Parameter, f64)> {
     }
 }
 
-fn all_skewed(skewed: &[(Parameter, f64, f64)]) -> String {
+fn all_skewed(skewed: &[(Parameter, [Option<f64>; 2])]) -> String {
     let names: Vec<&str> = skewed.iter().map(|(parameter, ..)| parameter.name()).collect();
-    let ratios = || skewed.iter().flat_map(|&(_, below, above)| [below, above]);
+    let ratios = || skewed.iter().flat_map(|(_, ratios)| ratios.map(|ratio| ratio.unwrap_or(f64::INFINITY)));
     let (least, most) = (ratios().fold(f64::INFINITY, f64::min), ratios().fold(0.0, f64::max));
+    let most = if most.is_finite() { format!("{most:.2} times as far") } else { "without end".to_string() };
     format!(
-        "the standard deviations of {} mislead: intervals of two of them truly reach {least:.2} to {most:.2} times as far; \
+        "the standard deviations of {} mislead: intervals of two of them truly reach {least:.2} times as far to {most}; \
          state intervals by the profile of the cost, or free fewer coefficients",
         names.join(", ")
     )

@@ -17,8 +17,8 @@ use super::minimise::{Descent, Minimum, Problem, State, descend};
 use super::system::Reduction;
 use super::tie::tied;
 use crate::camera::{FreeParameters, Parameter};
+use crate::distribution::student_two_sided;
 use nalgebra::SVector;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// An interval by the profile of the cost, beside the linear one of the same coverage.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -215,7 +215,5 @@ const LOWER: f64 = 1e-3;
 /// Half the width of the interval of Student's distribution that holds `coverage`; to nine digits, the same
 /// on every machine.
 pub(super) fn student_quantile(coverage: f64, degrees_of_freedom: usize) -> f64 {
-    let t = StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1) as f64)
-        .map_or(f64::NAN, |distribution| distribution.inverse_cdf(0.5 + 0.5 * coverage));
-    super::chance::significant(t)
+    super::chance::significant(student_two_sided(1.0 - coverage, degrees_of_freedom.max(1) as f64))
 }

@@ -7,7 +7,7 @@ use super::intervals::Skewed;
 use super::minimise::{Minimum, Problem, State};
 use super::rival::{Met, RIVALS, Rival};
 use super::system::Reduction;
-use super::{CalibrationError, Termination, strays, tilt};
+use super::{CalibrationError, Termination, outliers, tilt};
 use crate::camera::{Camera, FreeParameters, Parameter};
 use nalgebra::DMatrix;
 
@@ -136,7 +136,7 @@ impl Judged {
             return Ok(false);
         }
         let lower = identifiability::refuse_if_parallel(problem, &self.minimum, self.noise_px(problem));
-        let lower = strays::or_blamed(problem, &self.minimum.state, lower)?;
+        let lower = outliers::or_blamed(problem, &self.minimum.state, lower)?;
         Ok(lower.is_none() && self.is_clear(problem))
     }
 

@@ -1,6 +1,8 @@
 //! What does a calibration say? The estimate, how sure it is, how it fits, and what to be careful about.
 
-use super::{BoardShape, Certificate, Conditioning, Covariance, Prior, ProfileInterval, Termination};
+use super::{
+    BoardShape, Certificate, Conditioning, Covariance, Outliers, Prior, ProfileInterval, Termination,
+};
 use crate::camera::{BrownConrady, Camera, FreeParameters, Parameter};
 use crate::geometry::{Pose, Vec2};
 use std::fmt;
@@ -121,20 +123,7 @@ pub enum Warning {
         views: usize,
     },
     /// A few marks lie so far from where they should that they are no noise.
-    Outliers {
-        /// How many.
-        marks: usize,
-        /// Which part of all marks.
-        share: f64,
-        /// View of the worst.
-        view: usize,
-        /// Its number there.
-        point: usize,
-        /// Its residual, px.
-        residual_px: f64,
-        /// The residual that half of the marks stay below, px.
-        median_px: f64,
-    },
+    Outliers(Outliers),
     /// Another camera explains the data nearly as well: the standard deviations speak of this one only.
     Ambiguous {
         /// The parameter that differs most.
@@ -150,10 +139,11 @@ pub enum Warning {
     NotLinear {
         /// Of which parameter.
         parameter: Parameter,
-        /// True half-width of an interval of two standard deviations over the linear one, below the estimate.
-        below: f64,
-        /// The same above; infinite where the cost never rises.
-        above: f64,
+        /// True half-width of an interval of two standard deviations over the linear one, below the estimate; none where
+        /// the cost never rises.
+        below: Option<f64>,
+        /// The same above.
+        above: Option<f64>,
     },
     /// Residuals of neighbouring marks agree: something that is no noise is left out of the model.
     Structured {
@@ -243,6 +233,11 @@ pub(super) const STRONG_CORRELATION: f64 = 0.98;
 /// A focal length worse than this makes the linearisation behind the covariance doubtful.
 pub(super) const UNCERTAIN_FOCAL: f64 = 0.05;
 
+/// How far a true interval reaches, over the linear one.
+fn reach(ratio: Option<f64>) -> String {
+    ratio.map_or("without end".to_string(), |ratio| format!("{ratio:.2} times as far"))
+}
+
 /// A larger part of the marks than this goes astray by itself seldom.
 const MANY: f64 = 0.1;
 
@@ -302,7 +297,7 @@ impl fmt::Display for Warning {
                 "view {view}{} shows the target from its other side: is the order of its marks that of the others?",
                 if *views > 1 { format!(" (and {views} views in all)") } else { String::new() }
             ),
-            Warning::Outliers { marks, share, view, point, residual_px, median_px } => write!(
+            Warning::Outliers(Outliers { marks, share, view, point, residual_px, median_px }) => write!(
                 f,
                 "{marks} mark(s) lie too far off to be noise, the worst (view {view}, point {point}) by {residual_px:.2} px where half of all \
                  stay below {median_px:.2} px: correct or remove them, or use a robust loss (huber:{:.2}){}",
@@ -316,8 +311,10 @@ impl fmt::Display for Warning {
             ),
             Warning::NotLinear { parameter, below, above } => write!(
                 f,
-                "the standard deviation of {parameter} misleads: an interval of two of them truly reaches {below:.2} times as far below \
-                 and {above:.2} times above; state intervals by the profile of the cost"
+                "the standard deviation of {parameter} misleads: an interval of two of them truly reaches {} below and {} above; state \
+                 intervals by the profile of the cost",
+                reach(*below),
+                reach(*above)
             ),
             Warning::Structured { correlation } => write!(
                 f,

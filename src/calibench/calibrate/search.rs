@@ -13,7 +13,7 @@ use super::judged::{Judged, noise_of};
 use super::minimise::{Minimum, Problem, State};
 use super::retraction::Retraction;
 use super::walk::Walked;
-use super::{CalibrationError, Termination, strays, walk};
+use super::{CalibrationError, Termination, outliers, walk};
 
 /// The best minimum that is found; `starts` are tried in order until one converges, and the search goes on if
 /// that is in doubt.
@@ -86,7 +86,7 @@ fn refuse_undetermined(
     }
     let refused = identifiability::refuse_if_parallel(problem, &walked.best, noise_px)
         .and_then(|lower| identifiability::refuse_if_flat(problem, walked, noise_px).map(|()| lower));
-    strays::or_blamed(problem, &walked.best.state, refused)
+    outliers::or_blamed(problem, &walked.best.state, refused)
 }
 
 /// Minima that profiles may meet on their way before the search is left as it is.

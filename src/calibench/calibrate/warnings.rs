@@ -111,8 +111,10 @@ impl Warning {
 }
 
 fn not_linear(skewed: &[Skewed]) -> impl Iterator<Item = Warning> {
-    let warning =
-        |s: &Skewed| Warning::NotLinear { parameter: s.parameter, below: s.ratios[0], above: s.ratios[1] };
+    let warning = |s: &Skewed| {
+        let [below, above] = s.ratios.map(|ratio| Some(ratio).filter(|ratio| ratio.is_finite()));
+        Warning::NotLinear { parameter: s.parameter, below, above }
+    };
     skewed.iter().map(warning)
 }
 

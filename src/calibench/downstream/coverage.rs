@@ -1,14 +1,6 @@
 //! How far does an interval reach whose standard uncertainty is itself estimated?
 
-use crate::evaluate::distribution::{normal_two_sided, round_significant};
-use statrs::distribution::{ContinuousCDF, StudentsT};
-
-/// Digits that do not depend on the platform's mathematics.
-const DIGITS: i32 = 10;
-/// Degrees of freedom from which the quantile is that of an expansion, whose error is there below 1e-14 of it. The
-/// inverse of the incomplete beta function ends short of the quantile by 4e-6 of it at a hundred thousand, by 7 % at ten
-/// million, and not at all at some more.
-const MANY: f64 = 1000.0;
+use crate::distribution::student_two_sided;
 
 /// The factor `k` by which a standard uncertainty is multiplied for an interval that contains the value with
 /// probability `coverage`, 0 < coverage < 1: the two-sided quantile of Student's distribution, of the normal
@@ -22,27 +14,7 @@ const MANY: f64 = 1000.0;
 /// assert!((coverage_factor(0.9545, None) - 2.00).abs() < 0.005);
 /// ```
 pub fn coverage_factor(coverage: f64, degrees_of_freedom: Option<f64>) -> f64 {
-    if let Some(freedom) = degrees_of_freedom.filter(|freedom| *freedom >= MANY) {
-        return round_significant(expanded(normal_two_sided(1.0 - coverage), freedom), DIGITS);
-    }
-    let student = degrees_of_freedom.and_then(|freedom| StudentsT::new(0.0, 1.0, freedom).ok());
-    match student {
-        Some(student) => round_significant(-student.inverse_cdf(0.5 * (1.0 - coverage)), DIGITS),
-        None => normal_two_sided(1.0 - coverage),
-    }
-}
-
-/// The quantile of Student's distribution at the probability of the normal quantile `z`, by the inverse powers of its degrees of
-/// freedom (Abramowitz & Stegun 1964, 26.7.5).
-fn expanded(z: f64, freedom: f64) -> f64 {
-    let s = z * z;
-    let terms = [
-        (s + 1.0) * z / 4.0,
-        ((5.0 * s + 16.0) * s + 3.0) * z / 96.0,
-        (((3.0 * s + 19.0) * s + 17.0) * s - 15.0) * z / 384.0,
-        ((((79.0 * s + 776.0) * s + 1482.0) * s - 1920.0) * s - 945.0) * z / 92160.0,
-    ];
-    z + terms.iter().rev().fold(0.0, |sum, term| (sum + term) / freedom)
+    student_two_sided(1.0 - coverage, degrees_of_freedom.unwrap_or(f64::INFINITY))
 }
 
 /// Effective degrees of freedom of a sum of independent contributions, each a variance with the degrees of

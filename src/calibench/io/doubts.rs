@@ -21,7 +21,7 @@ mod tests {
     fn the_warnings_are_known_by_their_words() {
         let parameter = Parameter::Fx;
         let doubting = [
-            Warning::NotLinear { parameter, below: 0.5, above: 2.0 },
+            Warning::NotLinear { parameter, below: Some(0.5), above: None },
             Warning::Ambiguous { parameter, value: 1.0, other: 2.0, excess: 0.1 },
         ];
         let other = Warning::Correlated { a: Parameter::Fx, b: Parameter::Fy, correlation: 0.99 };

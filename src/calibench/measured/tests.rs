@@ -2,7 +2,9 @@
 
 use super::*;
 use crate::board::View;
-use crate::calibrate::{CalibrationError, Loss, Settings, Termination, Warning, calibrate, calibrate_lens};
+use crate::calibrate::{
+    CalibrationError, Loss, Outliers, Settings, Termination, Warning, calibrate, calibrate_lens,
+};
 use crate::camera::{BrownConrady, Camera, FreeParameters, Lens, Model, Parameter};
 use crate::distribution::ChiSquare;
 use crate::geometry::{Pose, Vec2, Vec3, rotation};
@@ -407,7 +409,7 @@ fn a_stray_in_one_view_is_told_with_its_number_there() {
     views[3] = MeasuredView::new(marks).unwrap();
     let found = calibrate_measured(&target, &views, &scene.settings(), Noise::default()).unwrap();
     let worst = found.calibration.warnings.iter().find_map(|warning| match warning {
-        Warning::Outliers { view, point, residual_px, .. } => Some((*view, *point, *residual_px)),
+        Warning::Outliers(Outliers { view, point, residual_px, .. }) => Some((*view, *point, *residual_px)),
         _ => None,
     });
     let (view, point, residual_px) = worst.expect("it is told");

@@ -2,7 +2,7 @@
 //! apply to it, under the same conditions; those of the marks stand in the result itself.
 
 use super::MeasuredView;
-use crate::calibrate::{LensCalibration, Prior, Termination, Warning};
+use crate::calibrate::{LensCalibration, Outliers, Prior, Termination, Warning};
 use crate::camera::Parameter;
 
 /// Beyond this two parameters share 96 % of their variance.
@@ -57,7 +57,14 @@ fn outliers(calibration: &LensCalibration, views: &[MeasuredView], variance: f64
     let marks = all.iter().take_while(|(square, ..)| *square > bound).count();
     let (_, view, point, residual_px) = *all.first().filter(|_| marks > 0)?;
     let median_px = all[all.len() / 2].3;
-    Some(Warning::Outliers { marks, share: marks as f64 / count, view, point, residual_px, median_px })
+    Some(Warning::Outliers(Outliers {
+        marks,
+        share: marks as f64 / count,
+        view,
+        point,
+        residual_px,
+        median_px,
+    }))
 }
 
 fn contradicted(calibration: &LensCalibration, prior: &Prior) -> Option<Warning> {

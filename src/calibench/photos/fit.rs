@@ -129,7 +129,7 @@ impl Fitter<'_> {
                     return Err(CalibrationError::View { view: kept[view], source });
                 }
                 // A view so wrong that under its errors nothing seems determined.
-                Err(error @ (CalibrationError::NotIdentifiable { .. } | CalibrationError::Strays { .. }))
+                Err(error @ (CalibrationError::NotIdentifiable { .. } | CalibrationError::Outliers(_)))
                     if may_drop =>
                 {
                     let Some(place) = self.best_without_one(&chosen) else { return Err(error) };

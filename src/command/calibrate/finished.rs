@@ -5,7 +5,7 @@ use super::models::Comparison;
 use super::optics::Optics;
 use super::view_names::ViewNames;
 use calibench::board::View;
-use calibench::calibrate::{BoardShape, Certificate, LensCalibration, Warning, in_words};
+use calibench::calibrate::{BoardShape, Certificate, LensCalibration, Outliers, Warning, in_words};
 use calibench::camera::Parameter;
 use calibench::detect::Orientation;
 use calibench::geometry::Vec2;
@@ -89,7 +89,7 @@ pub(super) fn warnings(finished: &Finished) -> Vec<String> {
 /// numbers its points otherwise.
 fn stray(finished: &Finished) -> Option<String> {
     let found = finished.fit.calibration.warnings.iter().find_map(|warning| match warning {
-        Warning::Outliers { view, point, .. } => Some((*view, *point)),
+        Warning::Outliers(Outliers { view, point, .. }) => Some((*view, *point)),
         _ => None,
     });
     let (view, point) = found?;

@@ -1,6 +1,6 @@
 //! How is a view called on the page? By one number, and by as much of its path as tells it from the others.
 
-use calibench::calibrate::Warning;
+use calibench::calibrate::{Outliers, Warning};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Views as they were given, those that were left out among them.
@@ -69,7 +69,7 @@ impl ViewNames {
                 Warning::RepeatedMarks { view, .. }
                 | Warning::TwinPose { view, .. }
                 | Warning::FromBehind { view, .. }
-                | Warning::Outliers { view, .. } => *view = self.number(*view),
+                | Warning::Outliers(Outliers { view, .. }) => *view = self.number(*view),
                 _ => {}
             }
         }

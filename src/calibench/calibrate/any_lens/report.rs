@@ -4,7 +4,7 @@ use super::super::conditioning::Conditioning;
 use super::super::estimate::{noise_variance, whole};
 use super::super::intervals::Profile;
 use super::super::minimise::{Minimum, descend};
-use super::super::strays::{self, Strays};
+use super::super::outliers::{self, Outliers};
 use super::super::target_frame::TargetFrames;
 use super::super::{
     CalibrationError, LensCalibration, Loss, Settings, Warning, identifiability, structure, warnings,
@@ -79,24 +79,24 @@ pub(super) fn may_have_structure(problem: &Problem<'_>, state: &State) -> bool {
 }
 
 /// Gross errors among the marks of a minimum of least squares.
-fn strays(
+fn outliers(
     problem: &Problem<'_>,
     minimum: &Minimum<State, WIDTH>,
     residuals: &Residuals,
     freedom: f64,
-) -> Option<Strays> {
+) -> Option<Outliers> {
     if problem.loss != Loss::Squares {
         return None;
     }
     let mut state = minimum.state.clone();
     let variance = residuals.square / freedom.max(1.0);
-    strays::of_residuals(&residuals.weighted, minimum.system.unknowns(), variance, |loss| {
+    outliers::of_residuals(&residuals.weighted, minimum.system.unknowns(), variance, |loss| {
         state = descend(&Problem { loss, relative_gain: ROUGH_GAIN, ..*problem }, state.clone()).state;
         Residuals::of(problem, &state).weighted
     })
 }
 
-/// A refusal for want of information, or for the strays that hide it if there are any.
+/// A refusal for want of information, or for the outliers that hide it if there are any.
 pub(super) fn or_blamed<T>(
     problem: &Problem<'_>,
     minimum: &Minimum<State, WIDTH>,
@@ -105,8 +105,8 @@ pub(super) fn or_blamed<T>(
     let Err(CalibrationError::NotIdentifiable { .. }) = outcome else { return outcome };
     let residuals = Residuals::of(problem, &minimum.state);
     let freedom = residuals.freedom(minimum, 0.0);
-    match strays(problem, minimum, &residuals, freedom) {
-        Some(found) => Err(found.into()),
+    match outliers(problem, minimum, &residuals, freedom) {
+        Some(found) => Err(CalibrationError::Outliers(found)),
         None => outcome,
     }
 }
@@ -153,8 +153,8 @@ pub(super) fn report(
     let of_residuals: Vec<Warning> = if residuals.square > problem.rounding_cost {
         let per_coordinate = 0.5 * residuals.square / residuals.marks as f64;
         let structure = structure::structure(&residuals.weighted, per_coordinate);
-        strays(problem, &minimum, &residuals, freedom)
-            .map(Warning::from)
+        outliers(problem, &minimum, &residuals, freedom)
+            .map(Warning::Outliers)
             .into_iter()
             .chain(structure)
             .collect()

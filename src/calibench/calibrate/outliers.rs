@@ -1,43 +1,38 @@
-//! Which marks are no noise? A stray pulls its neighbours along, so it is looked for where it cannot.
+//! Which marks are no noise? An outlier pulls its neighbours along, so it is looked for where it cannot.
 
 use super::estimate::Fit;
 use super::minimise::{Problem, State};
-use super::{CalibrationError, Loss, Warning};
+use super::{CalibrationError, Loss};
 use crate::geometry::Vec2;
 
-/// Noise makes one set in this many look as if it had a stray, before a robust fit has been asked: `exp(-7)`.
+/// Noise makes one set in this many look as if it had an outlier, before a robust fit has been asked: `exp(-7)`.
 const LOG_LOOK: f64 = 7.0;
 /// Of noise the mean square of a squared residual is twice the square of its mean; this many times are none.
 const HEAVY: f64 = 4.0;
 /// And one in this many after it: `exp(-13)`.
-const LOG_STRAY: f64 = 13.0;
-/// More than this part of the marks are no strays: the model is wrong.
+const LOG_OUTLIER: f64 = 13.0;
+/// More than this part of the marks are no outliers: the model is wrong.
 const MOST: f64 = 0.3;
-/// A robust loss with a scale below this part of the median residual takes noise for strays.
+/// A robust loss with a scale below this part of the median residual takes noise for outliers.
 const NARROW: f64 = 0.3;
 
-/// Gross errors.
+/// Marks that lie too far from where they should to be noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Strays {
-    marks: usize,
-    /// Part of all marks.
-    share: f64,
-    view: usize,
-    point: usize,
-    residual_px: f64,
-    median_px: f64,
-}
-
-impl From<Strays> for Warning {
-    fn from(Strays { marks, share, view, point, residual_px, median_px }: Strays) -> Warning {
-        Warning::Outliers { marks, share, view, point, residual_px, median_px }
-    }
-}
-
-impl From<Strays> for CalibrationError {
-    fn from(Strays { marks, view, point, residual_px, median_px, .. }: Strays) -> CalibrationError {
-        CalibrationError::Strays { marks, view, point, residual_px, median_px }
-    }
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct Outliers {
+    /// How many.
+    pub marks: usize,
+    /// Which part of all marks.
+    pub share: f64,
+    /// View of the worst.
+    pub view: usize,
+    /// Its number there.
+    pub point: usize,
+    /// Its residual, px.
+    pub residual_px: f64,
+    /// The residual that half of the marks stay below, px.
+    pub median_px: f64,
 }
 
 /// Refuses a robust loss that is narrower than the noise: its weights, and so the covariance, would mean
@@ -56,7 +51,7 @@ pub(super) fn refuse_narrow_loss(loss: Loss, fit: &Fit) -> Result<(), Calibratio
 /// Robust fits, each at the scale that the one before found.
 const FITS: usize = 3;
 
-/// A refusal for want of information, or for the strays that hide it if there are any.
+/// A refusal for want of information, or for the outliers that hide it if there are any.
 pub(super) fn or_blamed<T>(
     problem: &Problem<'_>,
     state: &State,
@@ -64,14 +59,14 @@ pub(super) fn or_blamed<T>(
 ) -> Result<T, CalibrationError> {
     let Err(CalibrationError::NotIdentifiable { .. }) = outcome else { return outcome };
     let fit = Fit::of(state, problem.observations);
-    match strays(problem, state, &fit, fit.square / fit.marks() as f64) {
-        Some(found) => Err(found.into()),
+    match outliers(problem, state, &fit, fit.square / fit.marks() as f64) {
+        Some(found) => Err(CalibrationError::Outliers(found)),
         None => outcome,
     }
 }
 
-/// The strays of a least-squares fit with residuals of variance `variance`, if there are a few.
-pub(super) fn strays(problem: &Problem<'_>, state: &State, fit: &Fit, variance: f64) -> Option<Strays> {
+/// The outliers of a least-squares fit with residuals of variance `variance`, if there are a few.
+pub(super) fn outliers(problem: &Problem<'_>, state: &State, fit: &Fit, variance: f64) -> Option<Outliers> {
     let is_suspicious = is_suspicious(fit.marks(), fit.largest_square, fit.tails(), variance);
     if problem.loss != Loss::Squares || !is_suspicious {
         return None;
@@ -91,7 +86,7 @@ pub(super) fn of_residuals(
     unknowns: usize,
     variance: f64,
     refit: impl FnMut(Loss) -> Vec<Vec<Vec2>>,
-) -> Option<Strays> {
+) -> Option<Outliers> {
     let squares = || residuals.iter().flatten().map(Vec2::norm_squared);
     let (square, fourth) = squares().fold((0.0, 0.0), |(s, f), square| (s + square, f + square * square));
     let marks = squares().count();
@@ -100,12 +95,12 @@ pub(super) fn of_residuals(
         .then(|| named(residuals.to_vec(), unknowns, refit))?
 }
 
-/// Strays by name: the fit is repeated with Cauchy's loss at the scale of the median, which strays do not move.
+/// Outliers by name: the fit is repeated with Cauchy's loss at the scale of the median, which outliers do not move.
 fn named(
     mut residuals: Vec<Vec<Vec2>>,
     unknowns: usize,
     mut refit: impl FnMut(Loss) -> Vec<Vec<Vec2>>,
-) -> Option<Strays> {
+) -> Option<Outliers> {
     for _ in 0..FITS {
         let loss = Loss::Cauchy { scale_px: median(&residuals).sqrt() };
         if !loss.is_valid() {
@@ -126,7 +121,7 @@ fn named(
     });
     let (view, point, residual_px) = numbered.max_by(|a, b| a.2.total_cmp(&b.2))?;
     let share = marks as f64 / all as f64;
-    Some(Strays { marks, share, view, point, residual_px, median_px: median.sqrt() })
+    Some(Outliers { marks, share, view, point, residual_px, median_px: median.sqrt() })
 }
 
 /// What hardly any set of noise exceeds, over the median squared residual. A squared residual exceeds `x
@@ -137,7 +132,7 @@ fn named(
 fn largest_of_noise(marks: usize, unknowns: usize) -> Option<f64> {
     let freedom = (2 * marks).checked_sub(unknowns)?;
     let followed = 2.0 * marks as f64 / freedom as f64;
-    let largest = 2.0 * (libm::log(marks as f64) + LOG_STRAY);
+    let largest = 2.0 * (libm::log(marks as f64) + LOG_OUTLIER);
     (freedom >= marks).then(|| largest * followed * followed / (2.0 * std::f64::consts::LN_2))
 }
 
@@ -159,7 +154,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn many_strays_show_in_the_tails_where_none_of_them_stands_out() {
+    fn many_outliers_show_in_the_tails_where_none_of_them_stands_out() {
         let residual = |i: usize| Vec2::new(if i % 10 == 3 { 1.0 + 1e-3 * i as f64 } else { 0.1 }, 0.0);
         let residuals = vec![(0..50).map(residual).collect::<Vec<_>>(), (50..100).map(residual).collect()];
         let variance = residuals.iter().flatten().map(Vec2::norm_squared).sum::<f64>() / 200.0;
