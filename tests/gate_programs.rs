@@ -176,6 +176,12 @@ fn how_a_program_ends_and_its_memory_are_reported_and_no_finding() {
     assert_eq!((late.by_itself, late.exit_code, late.how().as_str()), (true, Some(7), "exit code 7"));
     let killed = end(format!("{refuses}; kill -9 $$"));
     assert_eq!((killed.by_itself, killed.exit_code, killed.signal), (true, None, Some(9)));
+    assert_eq!(good.answers_unasked + late.answers_unasked + killed.answers_unasked, 0);
+    let more = end(format!("{refuses}; echo 'farewell'; echo '{{\"id\":\"x\"}}'; echo '{{}}'"));
+    assert_eq!(
+        (more.answers_unasked, more.how().as_str()),
+        (2, "exit code 0 after 2 answers that nobody asked for")
+    );
     let stays = end(format!("{refuses}; sleep 1000"));
     assert_eq!((stays.by_itself, stays.how().as_str()), (false, "did not end with its input"));
     // The shell itself is small; what it started counts too: here a process that holds 60 MB.

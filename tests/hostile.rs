@@ -4,6 +4,7 @@
 
 use crate::program::{folder, text};
 use std::fs;
+use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -192,6 +193,20 @@ fn a_photograph_that_needs_more_memory_than_there_is_is_refused_before_it_is_dec
     // With the memory it asks for, the file is found to be cut off.
     refused(&folder, &["ninepoint", "--memory", "8GiB", "large.pgm"], &["broken image"]);
     refused(&folder, &["ninepoint", "--memory", "much", "large.pgm"], &["2GiB"]);
+}
+
+#[test]
+fn a_jpeg_that_is_long_for_its_image_is_refused_before_it_is_read() {
+    let folder = folder("long-jpeg");
+    // 8 x 8 px of one component, a scan of as many zeros as fill the file, and the end.
+    let head = b"\xff\xd8\xff\xc0\0\x0b\x08\0\x08\0\x08\x01\x01\x11\0\xff\xda\0\x08\x01\x01\0\0\x3f\0";
+    let mut file = fs::File::create(folder.join("long.jpg")).expect("made");
+    file.write_all(head).expect("written");
+    file.seek(SeekFrom::Start(599_999_998)).expect("sought");
+    file.write_all(b"\xff\xd9and what follows").expect("written");
+    let need = ["long.jpg: needs some 1200000896 bytes of memory", "limit is 1000000000", "--memory"];
+    refused(&folder, &["ninepoint", "--memory", "1GB", "long.jpg"], &need);
+    refused(&folder, &["calibrate", "--board", "dots:3x3:1", "--memory", "1GB", "long.jpg"], &need);
 }
 
 #[test]

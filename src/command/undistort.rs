@@ -11,7 +11,7 @@ use calibench::io::{Channels, Memory, image_extent, read_channels, write_atomica
 use calibench::raster::Raster;
 use calibench::rectify::{Interpolated, OutputView, Projection, RectifyError, RectifyMap, output_camera};
 use clap::{Args, ValueEnum};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
@@ -106,7 +106,8 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
         warn(&message);
         return Exit::Usage;
     }
-    let mut work = Work { arguments, camera, image_size, maps: BTreeMap::new(), written: Vec::new() };
+    let mut work =
+        Work { arguments, camera, image_size, map: None, described: BTreeSet::new(), written: Vec::new() };
     let mut exit = Exit::Held;
     // A photograph that cannot be corrected does not keep the others from it.
     for photo in &arguments.photos {
@@ -178,8 +179,10 @@ struct Work<'a> {
     arguments: &'a Arguments,
     camera: Camera<Lens>,
     image_size: Option<Size>,
-    /// One look-up table for all photographs of a size.
-    maps: BTreeMap<Size, RectifyMap>,
+    /// The look-up table of the size that came last: a table of each would take memory that nobody counted.
+    map: Option<(Size, RectifyMap)>,
+    /// Sizes whose output is described.
+    described: BTreeSet<Size>,
     /// Files written so far.
     written: Vec<PathBuf>,
 }
@@ -196,12 +199,12 @@ impl Work<'_> {
         let memory = Memory::new(self.arguments.memory);
         let _taken = memory.take(photo, extent.memory_to_correct()).map_err(|e| wrong(e.to_string()))?;
         let image = read_channels(photo).map_err(|error| wrong(error.to_string()))?;
-        self.prepare(image.size())?;
-        let map = &self.maps[&image.size()];
-        let output = output_path(&self.arguments.out, photo);
+        let arguments = self.arguments;
+        let map = self.map_of(image.size())?;
+        let output = output_path(&arguments.out, photo);
         // A map is made for the size of the image.
         let same_size = |error: RectifyError| wrong(error.to_string());
-        let border = self.arguments.border;
+        let border = arguments.border;
         let corrected = match &image {
             Channels::U8(channels) => all(map, channels, (255.0 * border).round() as u8, 0).map(Channels::U8),
             Channels::U16(channels) => {
@@ -211,7 +214,7 @@ impl Work<'_> {
         };
         let written = corrected.map_err(same_size)?.write_png(&output);
         written.map_err(|error| (Exit::Incomplete, error.to_string()))?;
-        if self.arguments.format == Format::Text {
+        if arguments.format == Format::Text {
             print(&format!("{}\n", output.shown()));
         }
         self.written.push(output);
@@ -232,11 +235,19 @@ impl Work<'_> {
         }
     }
 
-    /// Makes the table for a size, and writes the camera of its output.
-    fn prepare(&mut self, size: Size) -> Result<(), Failure> {
-        if self.maps.contains_key(&size) {
-            return Ok(());
-        }
+    /// The table for a size.
+    fn map_of(&mut self, size: Size) -> Result<&RectifyMap, Failure> {
+        let map = match self.map.take() {
+            Some((of, map)) if of == size => map,
+            // The table of another size is dropped before this one is made.
+            _ => self.made(size)?,
+        };
+        let (_, map) = self.map.insert((size, map));
+        Ok(map)
+    }
+
+    /// Makes the table for a size. Of one that is new the camera of its output is written.
+    fn made(&mut self, size: Size) -> Result<RectifyMap, Failure> {
         let wrong = |error: &dyn std::fmt::Display| (Exit::Usage, error.to_string());
         let (output, map) = match (self.camera.brown_conrady(), self.arguments.projection) {
             (Some(camera), To::Pinhole) => {
@@ -255,10 +266,12 @@ impl Work<'_> {
                 return Err((Exit::Usage, message.to_string()));
             }
         };
-        let written = self.describe(size, output, &map).map_err(|message| (Exit::Incomplete, message))?;
-        self.written.extend(written);
-        self.maps.insert(size, map);
-        Ok(())
+        if !self.described.contains(&size) {
+            let written = self.describe(size, output, &map).map_err(|message| (Exit::Incomplete, message))?;
+            self.written.extend(written);
+            self.described.insert(size);
+        }
+        Ok(map)
     }
 
     /// Writes the camera of an output, and where it has data; the files' paths.

@@ -75,6 +75,13 @@ enum Heard {
     TooLong,
 }
 
+impl Heard {
+    /// Whether it may be an answer: other lines are a library's.
+    fn is_object(&self) -> bool {
+        matches!(self, Heard::Line(line) if line.starts_with('{'))
+    }
+}
+
 /// Why a program is not heard.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Silence {
@@ -106,24 +113,31 @@ pub struct ProgramEnd {
     /// Most memory that was resident at a time, of the largest process of those that ran when its input ended; `None`
     /// where the system does not say, as systems other than Linux.
     pub peak_memory_bytes: Option<u64>,
+    /// JSON objects that it wrote after its last answer, which nobody asked for.
+    pub answers_unasked: usize,
 }
 
 impl ProgramEnd {
-    fn of(status: Option<ExitStatus>, peak_memory_bytes: Option<u64>) -> ProgramEnd {
+    fn of(status: Option<ExitStatus>, peak_memory_bytes: Option<u64>, answers_unasked: usize) -> ProgramEnd {
         #[cfg(unix)]
         let signal = status.and_then(|status| std::os::unix::process::ExitStatusExt::signal(&status));
         #[cfg(not(unix))]
         let signal = None;
         let exit_code = status.and_then(|status| status.code());
-        ProgramEnd { by_itself: status.is_some(), exit_code, signal, peak_memory_bytes }
+        ProgramEnd { by_itself: status.is_some(), exit_code, signal, peak_memory_bytes, answers_unasked }
     }
 
     /// In words.
     pub fn how(&self) -> String {
-        match (self.exit_code, self.signal) {
+        let how = match (self.exit_code, self.signal) {
             (Some(code), _) => format!("exit code {code}"),
             (None, Some(signal)) => format!("ended by signal {signal}"),
             (None, None) => "did not end with its input".to_string(),
+        };
+        match self.answers_unasked {
+            0 => how,
+            1 => format!("{how} after an answer that nobody asked for"),
+            unasked => format!("{how} after {unasked} answers that nobody asked for"),
         }
     }
 }
@@ -204,21 +218,30 @@ impl PipedProgram {
         }
     }
 
-    /// Ends the program's input and waits for it to end by itself; what it still writes is not read.
+    /// Ends the program's input and waits for it to end by itself; what it still writes is counted and not judged.
     pub fn finish(mut self) -> ProgramEnd {
         let peak = descendants::peak_memory_bytes(self.child.id(), &self.mark);
         self.to_child = None;
         let deadline = Instant::now() + AFTER_INPUT;
+        let mut unasked = 0;
         let status = loop {
             // A program that writes to a full pipe would never end.
-            while self.from_child.try_recv().is_ok() {}
+            unasked += self.from_child.try_iter().filter(Heard::is_object).count();
             match self.child.try_wait() {
                 Ok(Some(status)) => break Some(status),
                 Ok(None) if Instant::now() < deadline => std::thread::sleep(MOMENT),
                 _ => break None,
             }
         };
-        ProgramEnd::of(status, peak)
+        // What it wrote last may still be on its way; what it left behind may hold its output open.
+        let deadline = Instant::now() + LAST_WORDS;
+        while status.is_some()
+            && let Ok(heard) =
+                self.from_child.recv_timeout(deadline.saturating_duration_since(Instant::now()))
+        {
+            unasked += usize::from(heard.is_object());
+        }
+        ProgramEnd::of(status, peak, unasked)
     }
 
     /// How the program ended, and the end of what it wrote to standard error.

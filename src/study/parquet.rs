@@ -236,3 +236,47 @@ fn damaged(path: &Path, what: String) -> FolderError {
 fn unwritten(path: &Path, error: ParquetError) -> FolderError {
     Located { path: path.to_path_buf(), cause: std::io::Error::other(error) }.into()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::example::STUDY;
+    use crate::{Shard, Spec};
+    use calibench_harness::Build;
+
+    struct Given(std::vec::IntoIter<Trial>);
+
+    impl Source for Given {
+        fn next(&mut self) -> Result<Option<Trial>, FolderError> {
+            Ok(self.0.next())
+        }
+
+        fn place(&self) -> String {
+            String::new()
+        }
+    }
+
+    #[test]
+    fn trials_are_read_as_they_were_written() {
+        let engine = Engine::new(STUDY, Shard::WHOLE).unwrap();
+        let manifest = Manifest::new(&Spec::parse(STUDY).unwrap(), Shard::WHOLE, &Build::default());
+        // More than a group holds, every third value missing, and a quantity that no trial has.
+        let value =
+            |i: usize, q: usize| (q > 1 && !(i + q).is_multiple_of(3)).then(|| (i as f64).sqrt() - q as f64);
+        let trials = (0..GROUP + 5).map(|i| Trial {
+            cell: i % 2,
+            trial: i as u64 / 2,
+            outcome: ["converged", "refused-few"][i % 2].into(),
+            iterations: i % 7,
+            values: (0..engine.quantities.len()).map(|q| value(i, q)).collect(),
+        });
+        let trials: Vec<Trial> = trials.collect();
+        let path = std::env::temp_dir().join(format!("calibench-parquet-{}", std::process::id()));
+        let file = File::create(&path).unwrap();
+        write(file, &path, &engine, &manifest, &mut Given(trials.clone().into_iter())).unwrap();
+        let mut rows = open(&path, &engine).unwrap();
+        let read: Vec<Trial> = std::iter::from_fn(|| rows.next().unwrap()).collect();
+        assert!(read == trials);
+        std::fs::remove_file(path).unwrap();
+    }
+}

@@ -258,6 +258,30 @@ fn quadratic_form(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibrate::tests::four_views;
+    use crate::calibrate::{Settings, calibrate};
+
+    #[test]
+    fn the_floor_is_what_pixels_reach_whatever_is_known_beforehand() {
+        let views = four_views(0.1);
+        // A search would fit the floor; here it is told by the score alone.
+        let settings = Settings::standard().without_search();
+        let alone = calibrate(&views, &settings).unwrap();
+        let floor = alone.certificate.unwrap();
+        // Homographies do not know the focal length: one of six intrinsics.
+        assert_eq!((floor.freedom, floor.floor_freedom), (2 * 4 - 1, 504 - 8 * 4 - 5));
+        for parameter in [Parameter::K1, Parameter::Cx] {
+            let (value, sd) = (alone.camera.get(parameter), alone.standard_deviation(parameter).unwrap());
+            // A prior as narrow as what the pixels say, six standard deviations beside.
+            let known = settings.clone().with_prior(parameter, value + 6.0 * sd, sd);
+            let both = calibrate(&views, &known).unwrap();
+            assert!(both.rmse_px > 1.005 * alone.rmse_px);
+            let own = both.certificate.unwrap();
+            let ratio = own.floor_rmse_px / floor.floor_rmse_px;
+            assert!((ratio - 1.0).abs() < 1e-4, "{parameter}: {ratio}");
+            assert_eq!((own.freedom, own.floor_freedom), (2 * 4 - 1 + 1, floor.floor_freedom));
+        }
+    }
 
     #[test]
     fn the_quadratic_form_of_a_matrix_without_full_rank_is_that_of_its_pseudo_inverse() {

@@ -261,6 +261,7 @@ pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibr
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibrate::tests::four_views;
 
     #[test]
     fn the_criterion_decides_and_predictions_where_it_says_nothing() {
@@ -272,5 +273,14 @@ mod tests {
         // Where no part of the views can be left out the criterion is alone.
         assert_eq!(chosen(&[(-350.0, none), (-349.0, none)]), Some(0));
         assert_eq!(chosen(&[(-350.0, none), (-349.0, 0.2)]), Some(1));
+    }
+
+    #[test]
+    fn the_true_model_predicts_views_left_out_as_well_as_noise_allows() {
+        let views = four_views(0.1);
+        let (compared, _) = compare_models(&views, &Settings::standard(), &Candidate::usual()[..1]);
+        // Of 480 degrees of freedom the noise is known to 3 %; the camera of three views adds a little.
+        let hold_out_px = compared[0].hold_out_px.unwrap();
+        assert!((0.09..0.12).contains(&hold_out_px), "{hold_out_px}");
     }
 }

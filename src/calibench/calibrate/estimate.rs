@@ -385,3 +385,25 @@ pub(super) fn noise_variance(residuals: &[Vec<Vec2>], square: f64, loss: Loss, f
     }
     square / freedom * weights * count / (slopes * slopes)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::tests::four_views;
+
+    #[test]
+    fn every_view_has_six_unknowns_that_its_marks_must_pay_for() {
+        let some = |marks: usize| -> Vec<View> {
+            let of = |view: &View| {
+                let corners = [0, 8, 54, 62, 31].into_iter().take(marks);
+                let (points, pixels) = corners.map(|i| (view.points()[i], view.pixels()[i])).unzip();
+                View::new(points, pixels).unwrap()
+            };
+            four_views(0.0)[1..3].iter().map(of).collect()
+        };
+        // Six of the camera and six of each of two views.
+        let refused = CalibrationError::TooFewPoints { coordinates: 16, unknowns: 18 };
+        assert_eq!(check_counts(&some(4), &Settings::standard()), Err(refused));
+        assert_eq!(check_counts(&some(5), &Settings::standard()), Ok(()));
+    }
+}

@@ -217,3 +217,39 @@ const LOWER: f64 = 1e-3;
 pub(super) fn student_quantile(coverage: f64, degrees_of_freedom: usize) -> f64 {
     super::chance::significant(student_two_sided(1.0 - coverage, degrees_of_freedom.max(1) as f64))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::student_quantile;
+    use crate::calibrate::tests::four_views;
+    use crate::calibrate::{Settings, calibrate};
+
+    #[test]
+    fn the_quantile_comes_with_any_degrees_of_freedom() {
+        // By `scipy.stats.t.ppf`.
+        for (freedom, t) in
+            [(1, 12.706_204_736), (300, 1.967_903_011), (100_000, 1.959_987_708), (10_000_000, 1.959_964_222)]
+        {
+            assert!((student_quantile(0.95, freedom) / t - 1.0).abs() < 1e-9, "{freedom}");
+        }
+    }
+
+    #[test]
+    fn intervals_of_good_data_lie_students_quantile_about_the_estimate() {
+        let views = four_views(0.1);
+        let found = calibrate(&views, &Settings::standard().with_profile_intervals(0.95)).unwrap();
+        assert_eq!((found.degrees_of_freedom, found.intervals.len()), (474, 6));
+        for interval in &found.intervals {
+            // 1.959964 + (1.959964^3 + 1.959964) / (4 * 474), to first order.
+            let half = 1.964969 * found.standard_deviation(interval.parameter).unwrap();
+            let estimate = found.camera.get(interval.parameter);
+            let ends =
+                [(interval.low.unwrap(), interval.linear.0), (interval.high.unwrap(), interval.linear.1)];
+            for ((end, linear), expected) in ends.into_iter().zip([estimate - half, estimate + half]) {
+                assert!((linear - expected).abs() < 1e-4 * half, "{interval:?}");
+                // Where the cost is nearly a parabola the profile says the same.
+                assert!((end - expected).abs() < 0.1 * half, "{interval:?}");
+            }
+        }
+    }
+}

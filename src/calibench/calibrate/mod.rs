@@ -72,3 +72,35 @@ pub use settings::{Board, Role, Settings};
 pub use system::System;
 pub use termination::Termination;
 pub use unknown::Unknown;
+
+#[cfg(test)]
+mod tests {
+    //! Views for the unit tests of this folder, which does not know the scenes that `synth` draws.
+
+    use crate::board::View;
+    use crate::camera::{BrownConrady, Camera};
+    use crate::geometry::{Pose, Vec2, Vec3, rotation};
+
+    /// Four views of 9 x 7 marks, 10 mm apart, from 120 mm, with deviations of standard deviation `noise_px` that have
+    /// nothing in common: the phases are those of a chirp.
+    pub(super) fn four_views(noise_px: f64) -> Vec<View> {
+        let camera =
+            Camera::pinhole(600.0, 600.0, 326.0, 243.0).with_distortion(BrownConrady::radial(-0.18, 0.05));
+        let points: Vec<Vec2> =
+            (0..63).map(|i| Vec2::new(f64::from(i % 9) - 4.0, f64::from(i / 9) - 3.0) * 10.0).collect();
+        let mut count = 0.0;
+        let mut noise = || {
+            count += 1.0;
+            noise_px * std::f64::consts::SQRT_2 * libm::sin(0.7 * count * count)
+        };
+        let mut seen = |[x, y, z]: [f64; 3]| {
+            let rotation = rotation::from_xyz_rad(x, y, z);
+            let pose = Pose { rotation, translation: Vec3::new(0.0, 0.0, 120.0) };
+            let mut pixel = |p: &Vec2| {
+                camera.project(&pose.apply(&Vec3::new(p.x, p.y, 0.0))).unwrap() + Vec2::new(noise(), noise())
+            };
+            View::new(points.clone(), points.iter().map(&mut pixel).collect()).unwrap()
+        };
+        [[0.0, 0.0, 0.0], [0.35, 0.0, 0.0], [0.0, -0.35, 0.0], [-0.26, 0.26, 0.17]].map(&mut seen).to_vec()
+    }
+}

@@ -190,3 +190,45 @@ fn variance_at(problem: &Problem<'_>, minimum: &Minimum) -> f64 {
     let freedom = fit.freedom(&minimum.system, problem.priors.settled(minimum));
     fit.variance(problem.loss, freedom).max(LEAST_PX * LEAST_PX)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::Settings;
+    use crate::calibrate::minimise::rounding_cost;
+    use crate::calibrate::normal::Observations;
+    use crate::calibrate::retraction::Retraction;
+    use crate::calibrate::start::Held;
+    use crate::calibrate::tests::four_views;
+    use crate::geometry::{Homography, Vec2};
+
+    #[test]
+    fn the_noise_is_known_before_any_camera_is() {
+        let views = four_views(0.3);
+        let observations: Vec<Observations> = views
+            .iter()
+            .map(|view| Observations::new(view.pairs().map(|(point, pixel)| (point / 40.0, *pixel))))
+            .collect();
+        let homographies: Vec<Homography> =
+            observations.iter().map(|pairs| Homography::fit_pairs(pairs, 1e-3).unwrap().homography).collect();
+        let pixel_frame = (Vec2::new(320.0, 240.0), 300.0);
+        let settings = Settings::standard();
+        let held = Held::of(&settings, pixel_frame.0).unwrap();
+        let problem = Problem {
+            free: settings.free(),
+            fy_per_fx: None,
+            priors: Priors::NONE,
+            observations: &observations,
+            loss: settings.loss,
+            max_iterations: settings.max_iterations,
+            hold_tilt: false,
+            retraction: Retraction::Straight,
+            focal_limits: (0.0, f64::INFINITY),
+            rounding_cost: rounding_cost(&observations),
+        };
+        let evidence = Evidence { homographies: &homographies, held: &held, pixel_frame, search: true };
+        // Of 467 degrees of freedom the noise is known to 3.3 %.
+        let noise_px = first_variance(&problem, &evidence).sqrt();
+        assert!((0.27..0.33).contains(&noise_px), "{noise_px}");
+    }
+}

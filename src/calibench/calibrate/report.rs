@@ -420,7 +420,7 @@ fn rms<'a>(residuals: impl ExactSizeIterator<Item = &'a Vec2>) -> f64 {
 #[cfg(all(test, feature = "serde", feature = "io"))]
 mod tests {
     use crate::board::View;
-    use crate::calibrate::{Calibration, CalibrationError, Conditioning, Loss, Settings, calibrate};
+    use crate::calibrate::{Calibration, CalibrationError, Conditioning, Loss, Settings, Warning, calibrate};
     use crate::camera::{BrownConrady, Camera, Parameter};
     use crate::geometry::{Pose, Vec2, Vec3, rotation};
     use serde::{Serialize, de::DeserializeOwned};
@@ -449,6 +449,13 @@ mod tests {
     /// What a value is after the way through JSON.
     fn there_and_back<T: Serialize + DeserializeOwned>(value: &T) -> T {
         serde_json::from_str(&serde_json::to_string(value).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn an_interval_without_end_is_said_and_kept() {
+        let warning = Warning::NotLinear { parameter: Parameter::Fx, below: Some(0.8), above: None };
+        assert_eq!(there_and_back(&warning), warning);
+        assert!(warning.to_string().contains("truly reaches 0.80 times as far below and without end above"));
     }
 
     #[test]

@@ -254,3 +254,31 @@ fn folding(camera: &Camera, largest_observed: f64) -> Option<Warning> {
     (monotone_radius < 1.2 * largest_observed)
         .then_some(Warning::FoldsInsideImage { monotone_radius, largest_observed })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::tests::four_views;
+    use crate::calibrate::{Settings, calibrate};
+
+    #[test]
+    fn a_prior_is_contradicted_by_its_distance_over_the_deviation_of_both() {
+        let views = four_views(0.1);
+        let alone = calibrate(&views, &Settings::standard()).unwrap();
+        let (k1, sd) = (alone.camera.distortion.k1, alone.standard_deviation(Parameter::K1).unwrap());
+        // Six deviations of the difference of two independent estimates.
+        let prior_sd = 3.0 * sd;
+        let both_sd = libm::hypot(sd, prior_sd);
+        let told = |away: f64| {
+            let settings = Settings::standard().with_prior(Parameter::K1, k1 + away * both_sd, prior_sd);
+            let warnings = calibrate(&views, &settings).unwrap().warnings;
+            warnings.into_iter().find_map(|warning| match warning {
+                Warning::Contradicted { parameter: Parameter::K1, deviations, .. } => Some(deviations),
+                _ => None,
+            })
+        };
+        let deviations = told(6.0).unwrap();
+        assert!((deviations - 6.0).abs() < 0.1, "{deviations}");
+        assert_eq!(told(-4.0), None);
+    }
+}

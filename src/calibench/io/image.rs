@@ -4,13 +4,13 @@
 //! + 114 B) / 1000` rounded, the weights of the field's other tools; an alpha channel is ignored.
 
 use super::input::{InputError, MOST_IMAGE_BYTES, open_regular};
-use super::jpeg_end;
+use super::jpeg::{self, Jpeg};
 use super::shown::ShownPath;
 use crate::raster::Raster;
 pub(super) use image::DynamicImage as Decoded;
 use image::{DynamicImage, ImageDecoder, ImageReader};
 use std::fs::File;
-use std::io::{BufReader, Cursor, Seek};
+use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
 /// A grey image with the depth of its file.
@@ -166,27 +166,43 @@ pub fn parse_image(bytes: &[u8], name: &str) -> Result<Grey, ImageError> {
 }
 
 pub(super) fn decoded(mut source: impl std::io::BufRead + Seek, name: &str) -> Result<Decoded, ImageError> {
-    refuse_cut_jpeg(&mut source, name)?;
-    let decoder = decoder(source, name)?;
+    let Some(jpeg) = scanned_jpeg(&mut source, name)? else {
+        return decoded_by(decoder(source, name)?, name);
+    };
+    // The decoder of a JPEG reads to the end of the file, whatever follows the image.
+    let mut bytes = Vec::new();
+    source.take(jpeg.length).read_to_end(&mut bytes).map_err(|cause| unread(cause, name))?;
+    let decoder = decoder(Cursor::new(bytes), name)?;
+    let extent = Extent::of(&*decoder);
+    if jpeg.frame.is_some_and(|frame| frame.size() != extent.size) {
+        return Err(broken("the JPEG has frames of several sizes".into(), name));
+    }
+    decoded_by(decoder, name)
+}
+
+fn decoded_by(decoder: Box<dyn ImageDecoder + '_>, name: &str) -> Result<Decoded, ImageError> {
     DynamicImage::from_decoder(decoder).map_err(|error| of_decoder(error, name))
 }
 
-/// Refuses a JPEG that was cut off.
-fn refuse_cut_jpeg(source: &mut (impl std::io::BufRead + Seek), name: &str) -> Result<(), ImageError> {
-    let io = |cause| ImageError::Io { path: name.to_string(), cause };
-    if !source.fill_buf().map_err(io)?.starts_with(&[0xff, 0xd8]) {
-        return Ok(());
+fn unread(cause: std::io::Error, name: &str) -> ImageError {
+    ImageError::Io { path: name.to_string(), cause }
+}
+
+fn broken(reason: String, name: &str) -> ImageError {
+    ImageError::Broken { path: name.to_string(), reason }
+}
+
+/// What the segments of a JPEG say; `None` of another format. The source is at its beginning again.
+///
+/// # Errors
+/// A JPEG that was cut off.
+fn scanned_jpeg(source: &mut (impl std::io::BufRead + Seek), name: &str) -> Result<Option<Jpeg>, ImageError> {
+    if !source.fill_buf().map_err(|cause| unread(cause, name))?.starts_with(&[0xff, 0xd8]) {
+        return Ok(None);
     }
-    let mut bytes = Vec::new();
-    source.read_to_end(&mut bytes).map_err(io)?;
-    source.rewind().map_err(io)?;
-    if jpeg_end::has_end(&bytes) {
-        return Ok(());
-    }
-    Err(ImageError::Broken {
-        path: name.to_string(),
-        reason: "the JPEG was cut off: its end is missing".into(),
-    })
+    let jpeg = jpeg::scanned(source).map_err(|cause| unread(cause, name))?;
+    source.rewind().map_err(|cause| unread(cause, name))?;
+    jpeg.map(Some).ok_or_else(|| broken("the JPEG was cut off: its end is missing".into(), name))
 }
 
 /// The size of an image, known before it is decoded.
@@ -198,26 +214,49 @@ pub struct Extent {
     pub pixels: u64,
     /// Bytes of all samples of the file, once they are decoded.
     pub bytes: u64,
+    /// Bytes of the file that are held while it is decoded: all of a JPEG, none of the other formats.
+    pub file_bytes: u64,
 }
 
 impl Extent {
     fn of(decoder: &dyn ImageDecoder) -> Extent {
         let (width, height) = decoder.dimensions();
         let (size, pixels) = ((width as usize, height as usize), u64::from(width) * u64::from(height));
-        Extent { size, pixels, bytes: decoder.total_bytes() }
+        Extent { size, pixels, bytes: decoder.total_bytes(), file_bytes: 0 }
+    }
+
+    /// That of the first photograph that a source holds.
+    fn read(mut source: impl std::io::BufRead + Seek, name: &str) -> Result<Extent, ImageError> {
+        let Some(Jpeg { length, frame }) = scanned_jpeg(&mut source, name)? else {
+            return Ok(Extent::of(&*decoder(source, name)?));
+        };
+        let frame = frame.ok_or_else(|| broken("the JPEG has no frame".into(), name))?;
+        let (width, height) = frame.size();
+        refuse_size(width as u32, height as u32, name)?;
+        let pixels = width as u64 * height as u64;
+        let bytes = pixels.saturating_mul(u64::from(frame.components));
+        Ok(Extent { size: (width, height), pixels, bytes, file_bytes: length })
     }
 
     /// Memory that reading the photograph as grey, finding its marks and drawing them in takes at most: the
     /// samples, the grey levels, and for each pixel eight bytes of detection or four of the overlay and its
-    /// file.
+    /// file; of the file what is held, once here and once in its decoder.
     pub fn memory_to_detect(&self) -> u64 {
-        self.bytes.saturating_mul(2).saturating_add(self.pixels.saturating_mul(12))
+        self.of_file()
+            .saturating_add(self.bytes.saturating_mul(2))
+            .saturating_add(self.pixels.saturating_mul(12))
+    }
+
+    fn of_file(&self) -> u64 {
+        self.file_bytes.saturating_mul(2)
     }
 
     /// Memory that correcting the photograph takes: its samples as they were decoded, by channels, corrected,
-    /// and as they are written, and for each pixel the look-up table and its making.
+    /// and as they are written, for each pixel the look-up table and its making, and of the file what is held.
     pub fn memory_to_correct(&self) -> u64 {
-        self.bytes.saturating_mul(4).saturating_add(self.pixels.saturating_mul(32))
+        self.of_file()
+            .saturating_add(self.bytes.saturating_mul(4))
+            .saturating_add(self.pixels.saturating_mul(32))
     }
 }
 
@@ -226,7 +265,7 @@ impl Extent {
 /// # Errors
 /// See [`ImageError`].
 pub fn image_extent(path: &Path) -> Result<Extent, ImageError> {
-    Ok(Extent::of(&*decoder(opened(path)?, &path.shown())?))
+    Extent::read(opened(path)?, &path.shown())
 }
 
 /// As [`image_extent`], from the bytes of a file; `name` stands in errors.
@@ -234,7 +273,7 @@ pub fn image_extent(path: &Path) -> Result<Extent, ImageError> {
 /// # Errors
 /// See [`ImageError`].
 pub fn parse_extent(bytes: &[u8], name: &str) -> Result<Extent, ImageError> {
-    Ok(Extent::of(&*decoder(Cursor::new(bytes), name)?))
+    Extent::read(Cursor::new(bytes), name)
 }
 
 fn of_decoder(error: image::ImageError, name: &str) -> ImageError {
@@ -259,16 +298,18 @@ fn decoder<'a>(
     }
     let decoder = reader.into_decoder().map_err(|error| of_decoder(error, name))?;
     let (width, height) = decoder.dimensions();
+    refuse_size(width, height, name)?;
+    Ok(Box::new(decoder))
+}
+
+fn refuse_size(width: u32, height: u32, name: &str) -> Result<(), ImageError> {
     if u64::from(width) * u64::from(height) > LIMIT_PX {
-        return Err(ImageError::TooLarge { path: path(), width, height, limit_px: LIMIT_PX });
+        return Err(ImageError::TooLarge { path: name.to_string(), width, height, limit_px: LIMIT_PX });
     }
     if width == 0 || height == 0 {
-        return Err(ImageError::Broken {
-            path: path(),
-            reason: format!("{width} x {height} px hold no image"),
-        });
+        return Err(broken(format!("{width} x {height} px hold no image"), name));
     }
-    Ok(Box::new(decoder))
+    Ok(())
 }
 
 /// Grey levels of a decoded image.

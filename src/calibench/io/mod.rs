@@ -16,7 +16,7 @@ pub mod hash;
 pub mod image;
 pub mod input;
 #[cfg(feature = "photo")]
-mod jpeg_end;
+mod jpeg;
 mod kept;
 pub mod known;
 pub mod marks;
