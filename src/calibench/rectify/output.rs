@@ -177,8 +177,7 @@ mod tests {
                 prop_assert!(inside >= -1e-12, "{inside}");
                 nearest = nearest.min(inside);
             }
-            // Tight: the box touches the image but for the allowance between samples, 0.25 * curvature of a
-            // few 1e-3 px.
+            // Tight: the box touches the image but for the allowance between samples, 0.25 * curvature.
             prop_assert!(nearest < 0.02, "{nearest}");
         }
     }
