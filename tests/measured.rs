@@ -77,6 +77,16 @@ fn a_measured_target_gives_a_camera_and_names_the_mark_that_was_bumped() {
     );
     let marks = said["target"]["marks"].as_array().unwrap();
     assert!(marks.len() == 64 && marks[17]["correction"][1].as_f64().unwrap() < -0.1, "{}", marks[17]);
+    let page = fs::read_to_string(folder.join("out/report.html")).unwrap();
+    for words in [
+        "marks that are not where they were measured: w17 (",
+        "<td>w17</td>",
+        "54 more marks",
+        "Points in each part of the frame",
+    ] {
+        assert!(page.contains(words), "{words}");
+    }
+    assert!(folder.join("out/residuals.svg").is_file());
     // What stands in the folder is read by whoever reads cameras, with the covariance; marks.csv is a target again.
     let Known::Camera(known) = read_known(&folder.join("out/result.json")).unwrap() else {
         panic!("a camera")

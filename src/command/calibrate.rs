@@ -28,6 +28,7 @@ mod gallery;
 mod html;
 mod maps;
 mod measured;
+mod measured_page;
 mod models;
 mod optics;
 mod page;

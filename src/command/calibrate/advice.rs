@@ -61,7 +61,7 @@ fn radius(fit: &Fit, size: (usize, usize)) -> Option<String> {
 }
 
 fn empty_cells(fit: &Fit, size: (usize, usize)) -> Option<String> {
-    let counts = Cells::of(size).counts(&fit.views);
+    let counts = Cells::of(size).counts(fit.views.iter().flat_map(|view| view.pixels()));
     let empty = counts.iter().filter(|&&count| count == 0).count();
     (empty as f64 > EMPTY_CELLS * counts.len() as f64).then(|| {
         format!(

@@ -4,6 +4,7 @@ use super::before_after::BeforeAfter;
 use super::finished::{Finished, parameter_rows, summary, warnings, weakest};
 use super::models::{self, Comparison};
 use super::optics::Optics;
+use super::scatter::Residuals;
 use super::view_names::ViewNames;
 use super::{
     Arguments, Exit, Failure, Format, ModelChoice, advice, maps, page, plots, poses, print, scatter, table,
@@ -222,10 +223,15 @@ fn corners(finished: &Finished) -> String {
 fn figures(finished: &Finished) -> Vec<Figure> {
     let calibration = &finished.fit.calibration;
     let numbers: Vec<usize> = (0..finished.fit.views.len()).map(|view| finished.names.number(view)).collect();
-    let mut figures = plots::figures(calibration, &finished.fit.views, &numbers, finished.image_size);
-    figures.extend(scatter::figures(finished));
+    let pixels: Vec<Vec2> = finished.fit.views.iter().flat_map(|view| view.pixels()).copied().collect();
+    let mut figures = plots::figures(calibration, &pixels, &numbers, finished.image_size);
+    figures.extend(scatter::figures(&Residuals {
+        all: finished.weighted_residuals().iter().flatten().map(|r| (r.x, r.y)).collect(),
+        sigma_px: calibration.sigma_px,
+        is_weighted: finished.is_weighted(),
+    }));
     figures.extend(poses::figures(finished));
-    let maps = |size| maps::figures(calibration, &finished.fit.views, size);
+    let maps = |size| maps::figures(calibration, &pixels, size);
     figures.extend(finished.image_size.into_iter().flat_map(maps));
     figures
 }
@@ -251,7 +257,7 @@ fn interval_table(intervals: &[ProfileInterval]) -> String {
 fn text(finished: &Finished) -> String {
     let calibration = &finished.fit.calibration;
     let mut parameters = table(&["parameter", "value", "standard deviation", "unit"]);
-    parameter_rows(finished).into_iter().for_each(|row| {
+    parameter_rows(calibration).into_iter().for_each(|row| {
         parameters.add_row(row);
     });
     let comparison = finished.comparison.as_ref().map(Comparison::text).unwrap_or_default();
@@ -276,7 +282,7 @@ fn text(finished: &Finished) -> String {
         finished.optics.text()
     );
     // Writing to a string cannot fail, here and below.
-    if let Some(weakest) = weakest(finished) {
+    if let Some(weakest) = weakest(calibration) {
         let _ = writeln!(text, "weakest direction: {weakest}");
     }
     for LeftOut { name, reason } in &finished.left_out {

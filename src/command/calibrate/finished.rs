@@ -104,8 +104,7 @@ fn stray(finished: &Finished) -> Option<String> {
 }
 
 /// Parameters worth a line: name, value, standard deviation or `held`, unit.
-pub(super) fn parameter_rows(finished: &Finished) -> Vec<[String; 4]> {
-    let calibration = &finished.fit.calibration;
+pub(super) fn parameter_rows(calibration: &LensCalibration) -> Vec<[String; 4]> {
     let row = |(parameter, value): (Parameter, f64)| {
         let deviation = match calibration.standard_deviation(parameter) {
             Some(sd) => significant(sd, 3),
@@ -119,8 +118,8 @@ pub(super) fn parameter_rows(finished: &Finished) -> Vec<[String; 4]> {
 }
 
 /// The weakest direction in words; `None` if nothing but poses was free.
-pub(super) fn weakest(finished: &Finished) -> Option<String> {
-    let conditioning = finished.fit.calibration.conditioning.as_ref()?;
+pub(super) fn weakest(calibration: &LensCalibration) -> Option<String> {
+    let conditioning = calibration.conditioning.as_ref()?;
     let members: Vec<String> =
         conditioning.weakest.iter().map(|m| format!("{} {:+.2}", m.unknown, m.weight)).collect();
     Some(members.join(", "))

@@ -1,6 +1,5 @@
 //! Where in the frame does the calibration rest on points, and how well does it know where a pixel looks?
 
-use calibench::board::View;
 use calibench::calibrate::LensCalibration;
 use calibench::camera::{Camera, Lens};
 use calibench::geometry::Vec2;
@@ -30,9 +29,9 @@ impl Cells {
     }
 
     /// Points in each cell, row by row from the top.
-    pub(super) fn counts(&self, views: &[View]) -> Vec<usize> {
+    pub(super) fn counts<'a>(&self, pixels: impl IntoIterator<Item = &'a Vec2>) -> Vec<usize> {
         let mut counts = vec![0; self.columns * self.rows];
-        for pixel in views.iter().flat_map(|view| view.pixels()) {
+        for pixel in pixels {
             let place = |x: f64, n: usize, length: usize| libm::floor((x + 0.5) / length as f64 * n as f64);
             let (i, j) = (place(pixel.x, self.columns, self.size.0), place(pixel.y, self.rows, self.size.1));
             if i >= 0.0 && j >= 0.0 && i < self.columns as f64 && j < self.rows as f64 {
@@ -75,10 +74,10 @@ pub(super) fn corner_radius_px(camera: &Camera<Lens>, size: (usize, usize)) -> f
         .fold(0.0, f64::max)
 }
 
-/// The maps of a calibration.
-pub(super) fn figures(calibration: &LensCalibration, views: &[View], size: (usize, usize)) -> Vec<Figure> {
+/// The maps of a calibration from marks at these pixels.
+pub(super) fn figures(calibration: &LensCalibration, pixels: &[Vec2], size: (usize, usize)) -> Vec<Figure> {
     let cells = Cells::of(size);
-    let counts: Vec<f64> = cells.counts(views).into_iter().map(|count| count as f64).collect();
+    let counts: Vec<f64> = cells.counts(pixels).into_iter().map(|count| count as f64).collect();
     let coverage = cells.plot("Points in each part of the frame", "points", &counts, 1).map(|plot| {
         let caption = "Number of points seen in each cell of the frame, all views together; cells are named by their centre. \
                        Where there are none, the lens model is extrapolated.";
@@ -104,10 +103,11 @@ mod tests {
     use calibench::calibrate::{Settings, calibrate_lens};
     use calibench::synth::{Scene, Stream, StreamKey};
 
-    fn calibration() -> (LensCalibration, Vec<View>) {
+    fn calibration() -> (LensCalibration, Vec<Vec2>) {
         let key = StreamKey { seed: 1, scenario: "maps", trial: 0, purpose: "noise" };
         let views = Scene::example().observe(0.1, &mut Stream::open(key));
-        (calibrate_lens(&views, &Settings::standard()).unwrap(), views)
+        let pixels = views.iter().flat_map(|view| view.pixels()).copied().collect();
+        (calibrate_lens(&views, &Settings::standard()).unwrap(), pixels)
     }
 
     #[test]
@@ -122,11 +122,11 @@ mod tests {
 
     #[test]
     fn every_point_is_counted_in_its_cell() {
-        let (calibration, views) = calibration();
+        let (calibration, pixels) = calibration();
         let cells = Cells::of((640, 480));
         assert_eq!((cells.columns, cells.rows), (10, 8));
-        assert_eq!(cells.counts(&views).iter().sum::<usize>(), 252);
-        assert!(cells.counts(&views)[0] == 0);
-        assert_eq!(figures(&calibration, &views, (640, 480)).len(), 2);
+        assert_eq!(cells.counts(&pixels).iter().sum::<usize>(), 252);
+        assert!(cells.counts(&pixels)[0] == 0);
+        assert_eq!(figures(&calibration, &pixels, (640, 480)).len(), 2);
     }
 }

@@ -1,9 +1,9 @@
 //! A camera from a corner file and the measured places of its marks: `calibrate CORNERS.csv --target TARGET.csv`.
 
+use super::finished::{parameter_rows, weakest};
 use super::optics::Optics;
-use super::{Arguments, Exit, Failure, Format, print, table, unended};
+use super::{Arguments, Exit, Failure, Format, measured_page, print, table, unended};
 use calibench::calibrate::in_words;
-use calibench::camera::Parameter;
 use calibench::geometry::{Vec2, Vec3};
 use calibench::io::input::{MOST_TABLE_BYTES, read_named};
 use calibench::io::{
@@ -42,14 +42,35 @@ pub(super) fn run(arguments: &Arguments, corners: &Path, target: &Path) -> Resul
     let optics = Optics::of(&found.calibration, arguments.image_size, arguments.pixel_pitch);
     fields.calibration.warnings.extend(notes.iter().cloned());
     let json = optics.with(&fields);
+    let report = Report { corners: name, target: target_name, found: &found, seen: &seen, optics, notes };
     if let Some(folder) = &arguments.out {
-        write_together(&files(folder, &found, &json)).map_err(Failure::unwritten)?;
+        write_together(&files(folder, &report, arguments.image_size, &json)).map_err(Failure::unwritten)?;
     }
     match arguments.format {
         Format::Json => print(&json),
-        Format::Text => print(&text(&found, &seen.view_names, &optics, &notes)),
+        Format::Text => print(&text(&report)),
     }
     Ok(if found.calibration.is_usable() { Exit::Held } else { Exit::Incomplete })
+}
+
+/// A finished calibration with all that is said of it.
+pub(super) struct Report<'a> {
+    /// What the corner file is called.
+    pub(super) corners: String,
+    /// What the target's file is called.
+    pub(super) target: String,
+    pub(super) found: &'a MeasuredCalibration,
+    pub(super) seen: &'a SeenFile,
+    pub(super) optics: Optics,
+    pub(super) notes: Vec<String>,
+}
+
+impl Report<'_> {
+    /// What to be careful about.
+    pub(super) fn warnings(&self) -> impl Iterator<Item = String> {
+        let own = in_words(&self.found.calibration.warnings).into_iter().chain(self.found.doubts());
+        own.chain(self.notes.iter().cloned())
+    }
 }
 
 fn read(file: &Path) -> Result<(String, Vec<u8>), String> {
@@ -65,9 +86,18 @@ fn pixels(seen: &SeenFile) -> Vec<(&str, Vec2)> {
 }
 
 /// All or none, `result.json` last.
-fn files(folder: &Path, found: &MeasuredCalibration, json: &str) -> Vec<(PathBuf, Vec<u8>)> {
-    let marks = (folder.join("marks.csv"), marks(found).into_bytes());
-    vec![marks, (folder.join("result.json"), json.as_bytes().to_vec())]
+fn files(
+    folder: &Path,
+    report: &Report<'_>,
+    image_size: Option<(usize, usize)>,
+    json: &str,
+) -> Vec<(PathBuf, Vec<u8>)> {
+    let figures = measured_page::figures(report, image_size);
+    let page = measured_page::html(report, &figures);
+    let plots = figures.into_iter().map(|figure| (folder.join(figure.file_name()), figure.bytes));
+    let marks = marks(report.found);
+    let rest = [("report.html", page.as_str()), ("marks.csv", &marks), ("result.json", json)];
+    plots.chain(rest.map(|(name, text)| (folder.join(name), text.as_bytes().to_vec()))).collect()
 }
 
 /// The marks as a table: where they are now, how well that is known, and how far they were corrected.
@@ -90,20 +120,15 @@ fn quoted(name: &str) -> String {
     if is_plain { name.to_string() } else { format!("\"{}\"", name.replace('"', "\"\"")) }
 }
 
-fn text(found: &MeasuredCalibration, names: &[String], optics: &Optics, notes: &[String]) -> String {
+fn text(report: &Report<'_>) -> String {
+    let Report { found, seen, optics, .. } = report;
     let calibration = &found.calibration;
     let mut parameters = table(&["parameter", "value", "standard deviation", "unit"]);
-    for (parameter, value) in calibration.camera.values() {
-        let deviation = match calibration.standard_deviation(parameter) {
-            Some(sd) => significant(sd, 3),
-            None if value == 0.0 => continue,
-            None => "held".to_string(),
-        };
-        let unit = Parameter::unit(parameter).to_string();
-        parameters.add_row([parameter.name().to_string(), significant(value, 10), deviation, unit]);
-    }
+    parameter_rows(calibration).into_iter().for_each(|row| {
+        parameters.add_row(row);
+    });
     let mut views = table(&["view", "points", "RMSE (px)", "distance"]);
-    for (i, name) in names.iter().enumerate() {
+    for (i, name) in seen.view_names.iter().enumerate() {
         let rmse = calibration.view_rmse_px(i).unwrap_or(f64::NAN);
         let distance = calibration.cam_from_target[i].translation.z;
         let points = calibration.residuals[i].len().to_string();
@@ -112,27 +137,28 @@ fn text(found: &MeasuredCalibration, names: &[String], optics: &Optics, notes: &
     let mut text = format!("{}\n\n{}\n\n", parameters.trim_fmt(), views.trim_fmt());
     text += &corrections(found);
     text += &summary(found);
+    if let Some(weakest) = weakest(calibration) {
+        let _ = writeln!(text, "weakest direction: {weakest}");
+    }
     text += &optics.text();
-    for warning in
-        in_words(&calibration.warnings).into_iter().chain(found.doubts()).chain(notes.iter().cloned())
-    {
+    for warning in report.warnings() {
         let _ = writeln!(text, "warning: {warning}");
     }
     text
 }
 
-/// The least probable corrections; nothing where all marks are exact.
-fn corrections(found: &MeasuredCalibration) -> String {
+/// Columns of [`correction_rows`].
+pub(super) const CORRECTION_COLUMNS: [&str; 7] =
+    ["mark", "views", "dX", "dY", "dZ", "in deviations", "by chance"];
+
+/// The least probable corrections, and how many there are besides; of marks that are known exactly there are none.
+pub(super) fn correction_rows(found: &MeasuredCalibration) -> (Vec<[String; 7]>, usize) {
     let mut uncertain: Vec<&CorrectedMark> = found.marks.iter().filter(|m| m.expected.norm() > 0.0).collect();
     uncertain.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
-    if uncertain.is_empty() {
-        return String::new();
-    }
-    let mut rows = table(&["mark", "views", "dX", "dY", "dZ", "in deviations", "by chance"]);
-    for mark in uncertain.iter().take(MARKS_SHOWN) {
+    let row = |mark: &&CorrectedMark| {
         let length = |k: usize| significant(mark.correction[k], 3);
         let normalised: Vec<String> = mark.normalised.iter().map(|w| format!("{w:+.1}")).collect();
-        rows.add_row([
+        [
             mark.id.clone(),
             mark.views.to_string(),
             length(0),
@@ -140,18 +166,30 @@ fn corrections(found: &MeasuredCalibration) -> String {
             length(2),
             normalised.join(" "),
             significant(mark.p_value, 2),
-        ]);
+        ]
+    };
+    let rows = uncertain.iter().take(MARKS_SHOWN).map(row).collect();
+    (rows, uncertain.len().saturating_sub(MARKS_SHOWN))
+}
+
+fn corrections(found: &MeasuredCalibration) -> String {
+    let (corrected, more) = correction_rows(found);
+    if corrected.is_empty() {
+        return String::new();
     }
-    let more = uncertain.len().saturating_sub(MARKS_SHOWN);
-    let more = if more > 0 {
-        format!("and {more} marks whose corrections are more probable\n")
-    } else {
-        String::new()
+    let mut rows = table(&CORRECTION_COLUMNS);
+    corrected.into_iter().for_each(|row| {
+        rows.add_row(row);
+    });
+    let more = match more {
+        0 => String::new(),
+        more => format!("and {more} marks whose corrections are more probable\n"),
     };
     format!("{}\n{more}\n", rows.trim_fmt())
 }
 
-fn summary(found: &MeasuredCalibration) -> String {
+/// The fit in sentences.
+pub(super) fn summary(found: &MeasuredCalibration) -> String {
     let calibration = &found.calibration;
     let noise = match found.noise {
         Noise::Estimated => "estimated",
@@ -183,11 +221,6 @@ fn summary(found: &MeasuredCalibration) -> String {
         .credibility
         .map_or(String::new(), |t| tested("corrections: the marks' standard deviations", &t));
     text += &found.noise_test.map_or(String::new(), |t| tested("residuals: the noise that was given", &t));
-    if let Some(conditioning) = &calibration.conditioning {
-        let members: Vec<String> =
-            conditioning.weakest.iter().map(|m| format!("{} {:+.2}", m.unknown, m.weight)).collect();
-        let _ = writeln!(text, "weakest direction: {}", members.join(", "));
-    }
     if !found.unseen.is_empty() {
         let _ = writeln!(text, "marks of the target that no view shows: {}", found.unseen.len());
     }

@@ -3,7 +3,9 @@
 use super::before_after::BeforeAfter;
 use super::finished::{Finished, parameter_rows, summary, warnings, weakest};
 use super::html::{self, escaped, heading, note, number, paragraph, table};
+use super::optics::Optics;
 use super::{gallery, worst};
+use calibench::calibrate::LensCalibration;
 use calibench_harness::Figure;
 use std::fmt::Write;
 
@@ -17,8 +19,8 @@ pub(super) fn html(finished: &Finished, figures: &[Figure], before_after: Option
     for line in warnings(finished) {
         html::warning(&mut page, &finished.names.shortened(&line));
     }
-    parameters(&mut page, finished);
-    optics(&mut page, finished);
+    parameters(&mut page, &finished.fit.calibration);
+    optics(&mut page, &finished.optics);
     views(&mut page, finished);
     left_out(&mut page, finished);
     worst_marks(&mut page, finished);
@@ -43,9 +45,10 @@ fn used(finished: &Finished) -> String {
     }
 }
 
-fn parameters(page: &mut String, finished: &Finished) {
+/// The parameters with their standard deviations, and the weakest direction.
+pub(super) fn parameters(page: &mut String, calibration: &LensCalibration) {
     heading(page, "Parameters");
-    let rows: Vec<Vec<String>> = parameter_rows(finished)
+    let rows: Vec<Vec<String>> = parameter_rows(calibration)
         .into_iter()
         .map(|row| row.iter().map(|cell| escaped(cell)).collect())
         .collect();
@@ -58,15 +61,14 @@ fn parameters(page: &mut String, finished: &Finished) {
         notes.push("Held: not estimated, so without standard deviation.");
     }
     note(page, &notes.join(" "));
-    if let Some(weakest) = weakest(finished) {
+    if let Some(weakest) = weakest(calibration) {
         let line = format!("Weakest direction, the combination that the data say least about: {weakest}.");
         paragraph(page, &line);
     }
 }
 
 /// Field of view and focal length in mm, where they are known.
-fn optics(page: &mut String, finished: &Finished) {
-    let optics = &finished.optics;
+pub(super) fn optics(page: &mut String, optics: &Optics) {
     heading(page, "Field of view and focal length");
     let mut rows = Vec::new();
     let row = |name: &str, value: f64, digits: usize, sd: Option<f64>, unit: &str| {

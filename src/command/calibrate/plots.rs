@@ -1,36 +1,34 @@
 //! What does a calibration look like? Residuals over the frame, view by view, and the lens with its
 //! uncertainty.
 
-use calibench::board::View;
 use calibench::calibrate::LensCalibration;
 use calibench::camera::{Camera, Parameter};
 use calibench::geometry::{Vec2, Vec3};
 use calibench_harness::{Figure, Look, Plot};
 
-/// The figures of a calibration.
+/// The figures of a calibration from marks at these pixels, view after view.
 pub(super) fn figures(
     calibration: &LensCalibration,
-    views: &[View],
+    pixels: &[Vec2],
     numbers: &[usize],
     image_size: Option<(usize, usize)>,
 ) -> Vec<Figure> {
     vec![
-        residuals(calibration, views, image_size),
+        residuals(calibration, pixels, image_size),
         view_errors(calibration, numbers),
-        lens(calibration, views),
+        lens(calibration, pixels),
     ]
 }
 
 /// Residuals as arrows where they were seen.
-fn residuals(calibration: &LensCalibration, views: &[View], image_size: Option<(usize, usize)>) -> Figure {
-    let pixels = || views.iter().flat_map(|v| v.pixels());
+fn residuals(calibration: &LensCalibration, pixels: &[Vec2], image_size: Option<(usize, usize)>) -> Figure {
     let residuals = || calibration.residuals.iter().flatten();
-    let extent = pixels().fold(0.0f64, |m, p| m.max(p.x).max(p.y));
+    let extent = pixels.iter().fold(0.0f64, |m, p| m.max(p.x).max(p.y));
     // The longest arrow takes a twentieth of the frame; a round factor is easier to undo by eye.
     let longest = residuals().map(|r| r.norm()).fold(f64::MIN_POSITIVE, f64::max);
     let factor = round_down(extent / 20.0 / longest);
     let arrows: Vec<(f64, f64, f64, f64)> =
-        pixels().zip(residuals()).map(|(p, r)| (p.x, p.y, factor * r.x, factor * r.y)).collect();
+        pixels.iter().zip(residuals()).map(|(p, r)| (p.x, p.y, factor * r.x, factor * r.y)).collect();
     let title = format!("Residuals, predicted \u{2212} observed, {factor} times enlarged");
     let mut plot = Plot::new(title, "u (px)", "v (px)").equal_aspect().y_down();
     if let Some((width, height)) = image_size {
@@ -79,10 +77,10 @@ fn view_errors(calibration: &LensCalibration, numbers: &[usize]) -> Figure {
 
 /// The radius at which the lens shows an angle, against that of a pinhole or, where it sees far to the side, of an
 /// equidistant lens; with its standard deviation, out to the farthest point seen.
-fn lens(calibration: &LensCalibration, views: &[View]) -> Figure {
+fn lens(calibration: &LensCalibration, pixels: &[Vec2]) -> Figure {
     let camera = &calibration.camera;
-    let pixels = views.iter().flat_map(|v| v.pixels());
-    let angles = pixels.filter_map(|p| camera.ray(p).ok()).map(|ray| libm::atan2(ray.xy().norm(), ray.z));
+    let angles =
+        pixels.iter().filter_map(|p| camera.ray(p).ok()).map(|ray| libm::atan2(ray.xy().norm(), ray.z));
     let farthest = angles.fold(0.0, f64::max);
     let is_wide = camera.distortion.model().sees_behind();
     let (reference, name) = if is_wide { (farthest, "equidistant") } else { (libm::tan(farthest), "ideal") };

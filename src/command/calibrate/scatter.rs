@@ -1,6 +1,5 @@
 //! How are the residuals distributed? Against each other, and by their length.
 
-use super::finished::Finished;
 use calibench_harness::figure::density;
 use calibench_harness::{Figure, Look, Plot};
 use nalgebra::Matrix2;
@@ -16,10 +15,10 @@ const BINS: usize = 24;
 const HOLDS_95: f64 = 2.447_746_830_680_816;
 
 /// Residuals, each times its mark's weight, and the noise of a coordinate of them.
-struct Residuals {
-    all: Vec<(f64, f64)>,
-    sigma_px: f64,
-    is_weighted: bool,
+pub(super) struct Residuals {
+    pub(super) all: Vec<(f64, f64)>,
+    pub(super) sigma_px: f64,
+    pub(super) is_weighted: bool,
 }
 
 impl Residuals {
@@ -28,17 +27,10 @@ impl Residuals {
     }
 }
 
-/// Both figures.
-pub(super) fn figures(finished: &Finished) -> Vec<Figure> {
-    let all = finished.weighted_residuals().iter().flatten().map(|r| (r.x, r.y)).collect();
-    let sigma_px = finished.fit.calibration.sigma_px;
-    drawn(&Residuals { all, sigma_px, is_weighted: finished.is_weighted() })
-}
-
-fn drawn(residuals: &Residuals) -> Vec<Figure> {
+/// Both figures; none of an exact fit.
+pub(super) fn figures(residuals: &Residuals) -> Vec<Figure> {
     let lengths: Vec<f64> = residuals.all.iter().map(|r| libm::hypot(r.0, r.1)).collect();
     let longest = lengths.iter().copied().fold(0.0, f64::max);
-    // An exact fit has nothing to show.
     let shown = longest > 0.0 && residuals.sigma_px > 0.0 && residuals.sigma_px.is_finite();
     if !shown {
         return Vec::new();
@@ -86,7 +78,7 @@ fn histogram(residuals: &Residuals, lengths: &[f64], longest: f64) -> Figure {
     .histogram("marks", &bars)
     .line("normal noise", &curve);
     let caption = "Lengths of all residuals, and what normal noise of the estimated size would give (Rayleigh's distribution). Bars \
-                   far to the right are strays: the table of the worst marks names them.";
+                   far to the right are outliers.";
     Figure::plot("histogram", &plot, caption)
 }
 
@@ -103,9 +95,9 @@ mod tests {
         let calibration = calibrate_lens(&views, &Settings::standard()).unwrap();
         let all = calibration.residuals.iter().flatten().map(|r| (r.x, r.y)).collect();
         let mut residuals = Residuals { all, sigma_px: calibration.sigma_px, is_weighted: false };
-        assert_eq!(drawn(&residuals).len(), 2);
+        assert_eq!(figures(&residuals).len(), 2);
         residuals.all.fill((0.0, 0.0));
-        assert!(drawn(&residuals).is_empty());
+        assert!(figures(&residuals).is_empty());
     }
 
     #[test]
