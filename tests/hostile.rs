@@ -102,6 +102,8 @@ fn sizes_beyond_their_limits_are_refused_at_once_with_what_they_would_need() {
     fs::write(folder.join("plan.toml"), crate::study::SPEC).expect("a study is written");
     let plan = ["study", "plan", "plan.toml", "--want", "fx=1"];
     refused(&folder, &[&plan[..], &["--most-views", "1000000000"]].concat(), &["63000000000 points a trial"]);
+    let most = u64::MAX.to_string();
+    refused(&folder, &[&plan[..], &["--most-views", &most]].concat(), &["--most-views 18446744073709551615"]);
     refused(&folder, &["study", "measure", "plan.toml", "--trials", "18446744073709551615"], &["limit"]);
     refused(&folder, &["study", "run", "plan.toml", "--shard", "0/1000000000000"], &["1000000"]);
     refused(&folder, &["gate", "--samples", "1000000000000"], &["100000"]);
@@ -185,10 +187,10 @@ fn a_photograph_that_needs_more_memory_than_there_is_is_refused_before_it_is_dec
     fs::write(folder.join("large.pgm"), "P5\n14000 14000\n65535\n").expect("written");
     let camera = r#"{"camera": {"fx": 600, "fy": 600, "cx": 320, "cy": 240}}"#;
     fs::write(folder.join("camera.json"), camera).expect("written");
-    let need = ["large.pgm: needs some 3136000000 bytes of memory", "limit is 2147483648", "--memory"];
+    let need = ["large.pgm: needs some 3144388608 bytes of memory", "limit is 2147483648", "--memory"];
     refused(&folder, &["calibrate", "--board", "dots:3x3:1", "large.pgm"], &need);
     refused(&folder, &["ninepoint", "large.pgm"], &need);
-    let more = ["large.pgm: needs some 7840000000 bytes of memory", "--memory"];
+    let more = ["large.pgm: needs some 7848388608 bytes of memory", "--memory"];
     refused(&folder, &["undistort", "--camera", "camera.json", "--out", "o", "large.pgm"], &more);
     // With the memory it asks for, the file is found to be cut off.
     refused(&folder, &["ninepoint", "--memory", "8GiB", "large.pgm"], &["broken image"]);

@@ -20,6 +20,11 @@ fn marks_and_pictures_of_an_earlier_run_beside_a_result_are_named() {
     let alone = run();
     assert_eq!(alone.status.code(), Some(0), "{}", text(&alone.stderr));
     assert!(!text(&alone.stderr).contains("earlier run"), "{}", text(&alone.stderr));
+    // Its own input is of this result, wherever it lies.
+    fs::create_dir_all(folder.join("own")).expect("made");
+    fs::write(folder.join("own/corners.csv"), corner_file()).expect("written");
+    let own = limited(&folder, &["calibrate", "own/corners.csv", "--out", "own"]);
+    assert!(own.status.code() == Some(0) && !text(&own.stderr).contains("earlier"), "{}", text(&own.stderr));
     for file in ["o/corners.csv", "o/overlay/001-a.png"] {
         fs::write(folder.join(file), "").expect("written");
     }
@@ -67,6 +72,25 @@ fn a_pipe_blocks_nobody_and_headers_are_read_as_csv_has_them() {
     drop(input);
     let output = child.wait_with_output().expect("it ends");
     assert!(text(&output.stdout).contains("world from pixel"), "{output:?}");
+}
+
+/// What is no table is quoted in a few words, however long its first line, its names and its numbers.
+#[test]
+fn megabytes_without_a_comma_or_a_line_end_are_told_in_a_sentence() {
+    let folder = folder("no-table");
+    let long = "7x".repeat(2_000_000);
+    let files = [
+        ("nul", "\0".repeat(4_000_000), "is missing: the header is"),
+        ("name", format!("view,px,py,X,Y\n{long},1,2,3,4\n"), "is longer than 4096 bytes"),
+        ("number", format!("view,px,py,X,Y\na,{long},2,3,4\n"), "is not a number"),
+    ];
+    for (name, content, expected) in files {
+        fs::write(folder.join(name), content).expect("written");
+        let output = limited(&folder, &["calibrate", name, "--image-size", "640x480"]);
+        let said = text(&output.stderr);
+        assert!(output.status.code() == Some(2) && said.contains(expected), "{name}: {}", said.len());
+        assert!(said.len() < 2500, "{name}: {} bytes", said.len());
+    }
 }
 
 /// Linux calls it a regular file, and reading it waits for the next message of the system, where this user may read it at all.
@@ -302,6 +326,26 @@ fn no_verb_replaces_what_it_was_given_to_read() {
         assert!(left.starts_with(text_of_it), "{name}: {left}");
         let said = text(&output.stderr);
         assert!(output.status.code() == Some(3) && said.contains("given to read"), "{name}: {said}");
+    }
+}
+
+/// The answers that are judged are no place for a report on them.
+#[test]
+fn no_report_replaces_the_answers_that_it_is_of() {
+    let folder = folder("judged");
+    let recorded = limited(
+        &folder,
+        &["gate", "--scene", "few-points", "--models", "brown-conrady", "--samples", "3", "--record", "rec"],
+    );
+    assert!(folder.join("rec/answers.jsonl").exists(), "{}", text(&recorded.stderr));
+    for (option, file) in
+        [("--json", "answers.jsonl"), ("--json", "manifest.json"), ("--html", "problems.jsonl")]
+    {
+        let before = fs::read(folder.join("rec").join(file)).expect("it is there");
+        let output = limited(&folder, &["gate", "--judge", "rec", option, &format!("rec/{file}")]);
+        let said = text(&output.stderr);
+        assert!(output.status.code() == Some(3) && said.contains("given to read"), "{file}: {said}");
+        assert!(fs::read(folder.join("rec").join(file)).expect("it is there") == before, "{file}");
     }
 }
 

@@ -335,3 +335,30 @@ fn a_study_names_its_files_from_its_own_folder() {
     assert!(Inputs::beside(Path::new("nowhere/small.toml"), SPEC).unwrap().is_empty());
     fs::remove_dir_all(folder).unwrap();
 }
+
+/// Where results would stand beside what a study reads, under whatever name, nothing is run and nothing is replaced.
+#[test]
+fn results_do_not_go_where_the_study_reads_from() {
+    let folder = scratch("own-inputs-kept");
+    for (name, out) in [("marks.csv", "."), ("summary.csv", "."), ("in/other.csv", "in")] {
+        let own = folder.join(name.replace('/', "-"));
+        fs::create_dir_all(own.join("in")).unwrap();
+        fs::write(own.join(name), MARKS).unwrap();
+        let spec = SPEC.replace(
+            "target = { columns = 9, rows = 7, spacing_mm = 10.0 }",
+            &format!("target = {{ file = \"{name}\" }}"),
+        );
+        assert!(spec.contains(name), "{spec}");
+        fs::write(own.join("own.toml"), spec).unwrap();
+        let refused = calibench(&own, &format!("study run own.toml --out {out}"));
+        let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert!(
+            refused.status.code() == Some(2) && said.contains("choose another folder with --out"),
+            "{name}: {said}"
+        );
+        assert_eq!(fs::read_to_string(own.join(name)).unwrap(), MARKS);
+        assert!(!own.join(out).join("manifest.json").exists());
+        // A folder of its own, beside or below, is one.
+        done(&own, "study run own.toml --out in/run");
+    }
+}

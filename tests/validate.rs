@@ -154,6 +154,14 @@ fn what_cannot_be_judged_is_refused_with_its_view() {
     assert_eq!(few, Err(HoldOutError::TooFewPoints { view: 1, points: 3 }));
     let exact = Estimate { sigma_px: 0.0, ..estimate(&result) };
     assert_eq!(hold_out(&exact, &views, 0.01), Err(HoldOutError::NoPrediction { sigma_px: 0.0 }));
+    // A noise of so few degrees of freedom predicts nothing, whatever number stands there.
+    for few in 0..=2 {
+        let told = Estimate { degrees_of_freedom: Some(few), ..estimate(&result) };
+        let refused = hold_out(&told, &views, 0.01);
+        assert_eq!(refused, Err(HoldOutError::NoPrediction { sigma_px: result.sigma_px }), "{few}");
+    }
+    let told = Estimate { degrees_of_freedom: Some(3), ..estimate(&result) };
+    assert!(hold_out(&told, &views, 0.01).unwrap().together.p_value > 0.05);
 }
 
 /// A corner file of views, numbered from `first`.

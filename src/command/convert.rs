@@ -114,6 +114,8 @@ struct Converted {
     converted: Vec<String>,
     lost: Vec<String>,
     read_back_px: Option<f64>,
+    /// Whether a lens may have been fitted, to be written and then to be read.
+    may_be_fitted: bool,
 }
 
 impl Converted {
@@ -128,8 +130,9 @@ impl Converted {
         if let Some(px) = self.read_back_px {
             let _ = writeln!(
                 text,
-                "read back: over the whole frame pixels differ by {} px at most",
-                significant(px, 2)
+                "read back by this program: over the whole frame pixels differ by {} px at most{}",
+                significant(px, 2),
+                if self.may_be_fitted { ", errors of a fit on the way back included" } else { "" }
             );
         }
         text
@@ -223,7 +226,16 @@ fn camera(arguments: &Arguments, name: &str, text: &str, to: &Path) -> Result<Co
     }
     converted.extend(written.converted);
     let (from, to) = (from.name.to_string(), to.name.to_string());
-    Ok(Converted { text: written.text, from, to, noted, converted, lost: written.lost, read_back_px })
+    Ok(Converted {
+        text: written.text,
+        from,
+        to,
+        noted,
+        converted,
+        lost: written.lost,
+        read_back_px,
+        may_be_fitted: arguments.fit,
+    })
 }
 
 /// The camera with the size that the user states, and scaled as the user asks.

@@ -11,8 +11,7 @@ use super::said::{refuse_standard_output, say_written};
 use super::terminal::warn_lines;
 use super::{Exit, print, program, warn};
 use calibench::camera::Model;
-use calibench::io::ShownPath;
-use calibench::io::write_atomically;
+use calibench::io::{ShownPath, keep_files, write_atomically};
 use calibench_gate::faults::{Faulty, planted};
 use calibench_gate::files::{self, FilesError};
 use calibench_gate::{
@@ -281,6 +280,8 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
         });
         return Ok(Exit::Held);
     }
+    let judged = [arguments.judge.as_deref(), arguments.against.as_deref().map(Path::new)];
+    judged.into_iter().flatten().for_each(keep_recorded);
     if let Some(folder) = &arguments.judge {
         if let Some(reference) = &arguments.against {
             return compare::of_answers(arguments, folder, reference);
@@ -306,6 +307,15 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
     }
     let plan = plan_of(arguments, samples, || solver.models())?;
     judge(arguments, &plan, solver.as_ref(), build)
+}
+
+/// Keeps the answers of a folder, which are judged, from being replaced by a report on them.
+fn keep_recorded(folder: &Path) {
+    for folder in [folder.to_path_buf(), folder.join("answers")] {
+        let files: Vec<PathBuf> =
+            std::fs::read_dir(folder).into_iter().flatten().flatten().map(|f| f.path()).collect();
+        keep_files(files.iter().map(PathBuf::as_path));
+    }
 }
 
 /// The plan of the arguments, with the lens models that are `known` unless they name some.

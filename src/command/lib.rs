@@ -134,8 +134,8 @@ pub fn main(experiments: &[Experiment], build: &Build, carried: Files) -> ExitCo
         Ok(arguments) => arguments,
         Err(error) => return terminal::ended(terminal::usage(&error)).into(),
     };
-    // A study finishes its batch first, and has a handler of its own.
-    if !matches!(arguments.verb, Some(Verb::Study(_))) {
+    // A study that runs finishes its batch first, and has a handler of its own.
+    if !matches!(&arguments.verb, Some(Verb::Study(study)) if study.finishes_its_batch()) {
         end_well_on_interrupt();
     }
     if let Err(exit) = set_threads(arguments.threads) {

@@ -51,6 +51,13 @@ pub(super) struct Arguments {
     verb: Verb,
 }
 
+impl Arguments {
+    /// Whether the verb runs trials into a folder, and on an interrupt ends after the batch.
+    pub(super) fn finishes_its_batch(&self) -> bool {
+        matches!(self.verb, Verb::Run(_) | Verb::Resume(_))
+    }
+}
+
 pub(super) fn run(arguments: &Arguments, build: &Build) -> Exit {
     let ended = match &arguments.verb {
         Verb::Run(arguments) => run::run(arguments, build),
@@ -138,7 +145,7 @@ fn read_study(path: &Path) -> Result<(String, Inputs), Failure> {
 
 /// The folder of a run that is complete.
 fn complete(path: &Path) -> Result<Folder, Failure> {
-    let folder = Folder::open(path)?;
+    let folder = Folder::open_to_read(path)?;
     if folder.manifest()?.complete {
         return Ok(folder);
     }

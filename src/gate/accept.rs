@@ -1,7 +1,7 @@
 //! Can the answer be read as an estimate? Counts, names and numbers are checked before anything is judged.
 
 use super::covariance_form::{self, CovarianceFault};
-use super::protocol::{Answer, AnswerPose, Problem, Status};
+use super::protocol::{Answer, AnswerCovariance, AnswerPose, Problem, Status};
 use super::quoted::quoted;
 use calibench::camera::{Camera, FreeParameters, Lens, Parameter};
 use calibench::geometry::Pose;
@@ -153,6 +153,71 @@ pub fn read_line(line: &str) -> Result<Answer, Breakage> {
     })
 }
 
+/// Warnings that are kept.
+const MOST_WARNINGS: usize = 20;
+
+/// Of an answer what can mean anything for its problem: names that are parameters, the beginnings of texts, and lists no longer than they may
+/// be. A run holds as many answers as it asks questions, and a line may have a megabyte.
+///
+/// # Errors
+/// Lists that are too long, or a covariance that is no square.
+pub(super) fn within(problem: &Problem, answer: Answer) -> Result<Answer, Breakage> {
+    let message = answer.message.as_deref().map(quoted);
+    if answer.status != Status::Ok {
+        return Ok(Answer { message, ..Answer::without_estimate(&answer.id, answer.status, "") });
+    }
+    let views = problem.views.len();
+    at_most("poses", views, answer.poses.as_ref().map_or(0, Vec::len))?;
+    for matrix in answer.pose_covariances.iter().flatten() {
+        sides(matrix).try_for_each(|length| at_most("rows and columns of a pose covariance", 6, length))?;
+    }
+    at_most("pose covariances", views, answer.pose_covariances.as_ref().map_or(0, Vec::len))?;
+    Ok(Answer {
+        parameters: of_parameters(answer.parameters),
+        standard_deviations: answer.standard_deviations.map(of_parameters),
+        covariance: answer.covariance.map(covariance_of_parameters).transpose()?,
+        warnings: answer.warnings.iter().take(MOST_WARNINGS).map(|warning| quoted(warning)).collect(),
+        message,
+        ..answer
+    })
+}
+
+fn at_most(what: &'static str, need: usize, got: usize) -> Result<(), Breakage> {
+    if got > need { Err(Breakage::Count { what, need, got }) } else { Ok(()) }
+}
+
+/// Numbers of rows and of each row's entries.
+fn sides(matrix: &[Vec<f64>]) -> impl Iterator<Item = usize> {
+    std::iter::once(matrix.len()).chain(matrix.iter().map(Vec::len))
+}
+
+fn is_parameter(name: &str) -> bool {
+    name.parse::<Parameter>().is_ok()
+}
+
+fn of_parameters(mut named: BTreeMap<String, f64>) -> BTreeMap<String, f64> {
+    named.retain(|name, _| is_parameter(name));
+    named
+}
+
+fn covariance_of_parameters(given: AnswerCovariance) -> Result<AnswerCovariance, Breakage> {
+    refuse_oblong(&given)?;
+    let kept: Vec<usize> =
+        (0..given.parameters.len()).filter(|&i| is_parameter(&given.parameters[i])).collect();
+    Ok(AnswerCovariance {
+        parameters: kept.iter().map(|&i| given.parameters[i].clone()).collect(),
+        matrix: kept.iter().map(|&i| kept.iter().map(|&j| given.matrix[i][j]).collect()).collect(),
+    })
+}
+
+fn refuse_oblong(given: &AnswerCovariance) -> Result<(), Breakage> {
+    let need = given.parameters.len();
+    match sides(&given.matrix).find(|&length| length != need) {
+        Some(got) => Err(Breakage::Count { what: "rows and columns of the covariance", need, got }),
+        None => Ok(()),
+    }
+}
+
 /// For which problem a line is meant, even where it is no answer.
 pub fn id_in(line: &str) -> Option<&str> {
     let after_key = line.trim_start().strip_prefix('{')?.split_once("\"id\"")?.1;
@@ -239,13 +304,7 @@ fn camera(
 
 fn covariance(answer: &Answer, free: FreeParameters) -> Result<Option<DMatrix<f64>>, Breakage> {
     let Some(given) = &answer.covariance else { return Ok(None) };
-    let need = given.parameters.len();
-    if let Some(got) = std::iter::once(given.matrix.len())
-        .chain(given.matrix.iter().map(Vec::len))
-        .find(|&length| length != need)
-    {
-        return Err(Breakage::Count { what: "rows and columns of the covariance", need, got });
-    }
+    refuse_oblong(given)?;
     let place = |parameter: Parameter| {
         given
             .parameters
@@ -291,8 +350,7 @@ fn pose_covariances(given: &[Vec<Vec<f64>>], need: usize) -> Result<Vec<Matrix6<
         return Err(Breakage::Count { what: "pose covariances", need, got: given.len() });
     }
     let of_pose = |(i, matrix): (usize, &Vec<Vec<f64>>)| {
-        let lengths = std::iter::once(matrix.len()).chain(matrix.iter().map(Vec::len));
-        if let Some(got) = lengths.into_iter().find(|&length| length != 6) {
+        if let Some(got) = sides(matrix).find(|&length| length != 6) {
             return Err(Breakage::Count { what: "rows and columns of a pose covariance", need: 6, got });
         }
         let read = Matrix6::from_fn(|row, column| matrix[row][column]);
@@ -370,6 +428,51 @@ mod tests {
         assert!(matches!(read_line(r#"{"id":"a","x":[NaN]}"#), Err(Breakage::BadNumber { .. })));
         assert!(matches!(read_line(r#"{"id":"a","x":}"#), Err(Breakage::Garbage { .. })));
         assert_eq!((id_in("hello"), id_in(r#"{"id":7}"#)), (None, None));
+    }
+
+    #[test]
+    fn what_no_problem_asks_for_is_not_held() {
+        let read = |line: &str| within(&problem(), serde_json::from_str(line).unwrap());
+        let long = "x".repeat(900_000);
+        let warned = format!("[{}]", vec![format!("\"{long}\""); 30].join(","));
+        let line = format!(
+            r#"{{"id":"a","status":"ok","parameters":{{"fx":1,"{long}":2}},"standard_deviations":{{"fx":0.5,"q":1}},
+                "covariance":{{"parameters":["q","fx","r"],"matrix":[[1,2,3],[2,0.25,5],[3,5,6]]}},"warnings":{warned},"message":"{long}"}}"#
+        );
+        let kept = read(&line).unwrap();
+        assert_eq!(kept.parameters, [("fx".to_string(), 1.0)].into());
+        assert_eq!(kept.standard_deviations, Some([("fx".to_string(), 0.5)].into()));
+        assert_eq!(
+            kept.covariance,
+            Some(AnswerCovariance { parameters: vec!["fx".into()], matrix: vec![vec![0.25]] })
+        );
+        assert_eq!(
+            (kept.warnings.len(), serde_json::to_string(&kept).unwrap().len() < 10_000),
+            (MOST_WARNINGS, true)
+        );
+        // It means what it meant.
+        let whole = accept(&problem(), serde_json::from_str(&line).unwrap());
+        let (Outcome::Estimate(whole), Outcome::Estimate(kept)) = (whole, accept(&problem(), kept)) else {
+            panic!("both keep the protocol")
+        };
+        assert_eq!(*kept, Estimate { warnings: kept.warnings.clone(), ..*whole });
+        let refused = format!(r#"{{"id":"a","status":"refused","poses":[],"message":"{long}"}}"#);
+        let kept = read(&refused).unwrap();
+        assert_eq!((kept.poses.is_none(), kept.message.unwrap().chars().count()), (true, 401));
+        let many = |what: &str, list: &str| {
+            let line = format!(r#"{{"id":"a","status":"ok","parameters":{{"fx":1}},"{what}":[{list}]}}"#);
+            (read(&line).unwrap_err().to_string(), accept(&problem(), serde_json::from_str(&line).unwrap()))
+        };
+        let pose = r#"{"rotation":[[1,0,0],[0,1,0],[0,0,1]],"translation":[0,0,1]}"#;
+        for (what, list) in [
+            ("poses", vec![pose; 9].join(",")),
+            ("pose_covariances", "[[1]],[[1]]".into()),
+            ("pose_covariances", "[[1,2,3,4,5,6,7]]".into()),
+        ] {
+            let (said, Outcome::Broken(breakage)) = many(what, &list) else { panic!("{what} are too many") };
+            assert!(said.contains(" needed, got "), "{said}");
+            assert_eq!(said.contains("pose covariance"), breakage.to_string().contains("pose covariance"));
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! How is a program judged that is not ours? It is kept alive over all problems, and started again when it breaks.
 
-use super::accept::{Breakage, LINE_HEAD, id_in, read_line};
+use super::accept::{Breakage, LINE_HEAD, id_in, read_line, within};
 use super::greeting::{Greeting, probe};
 use super::program::{Ending, MOST_LINE_BYTES, PipedProgram, ProgramEnd, Silence};
 use super::protocol::{Answer, Problem};
@@ -185,7 +185,9 @@ impl Process {
                 continue;
             }
             match read_line(&line) {
-                Ok(answer) if answer.id == problem.id => return wrong.map_or(Ok(answer), Err),
+                Ok(answer) if answer.id == problem.id => {
+                    return wrong.map_or_else(|| within(problem, answer), Err);
+                }
                 Ok(answer) => wrong = wrong.or(Some(Breakage::WrongId { got: quoted(&answer.id) })),
                 Err(breakage) => {
                     wrong = wrong.or(Some(breakage));

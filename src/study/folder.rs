@@ -24,8 +24,8 @@ use std::time::Duration;
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
-    /// Held while the run lasts; the system lets go of it however the process ends.
-    _lock: File,
+    /// Held while the run lasts; the system lets go of it however the process ends. `None` where what is only read cannot be locked.
+    _lock: Option<File>,
     pub(super) files: Arc<dyn Files>,
 }
 
@@ -128,16 +128,16 @@ const TRIES: usize = 20;
 /// Pause between them: a second in all.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// Locks a file. A program that this one is starting at this moment holds all of its open files, and the
+/// Locks a file, by one of the ways to do it. A program that this one is starting at this moment holds all of its open files, and the
 /// locks of those that were just closed, until it has begun.
-fn patiently(file: &File) -> Result<(), fs::TryLockError> {
+fn patiently(lock: impl Fn() -> Result<(), fs::TryLockError>) -> Result<(), fs::TryLockError> {
     for _ in 1..TRIES {
-        match file.try_lock() {
+        match lock() {
             Err(fs::TryLockError::WouldBlock) => std::thread::sleep(PAUSE),
             other => return other,
         }
     }
-    file.try_lock()
+    lock()
 }
 
 /// Refuses a folder with links in it, which might lead to anybody's files.
@@ -150,6 +150,17 @@ fn refuse_links(path: &Path) -> Result<(), FolderError> {
         }
     }
     Ok(())
+}
+
+/// The lock of a folder in which only a run's own regular files stand.
+fn refuse_what_is_not_a_runs(path: &Path) -> Result<PathBuf, FolderError> {
+    let lock = path.join(".lock");
+    // What is opened without being read whole; other files are looked at when they are read.
+    for opened in OF_A_RUN.map(|name| path.join(name)).iter().chain([&lock]) {
+        regular_or_absent(opened)?;
+    }
+    refuse_links(path)?;
+    Ok(lock)
 }
 
 impl Folder {
@@ -202,17 +213,30 @@ impl Folder {
         Folder::lock(files, path)
     }
 
-    fn lock(files: Arc<dyn Files>, path: &Path) -> Result<Folder, FolderError> {
-        let name = path.join(".lock");
-        // What is opened without being read whole; other files are looked at when they are read.
-        for opened in OF_A_RUN.map(|name| path.join(name)).iter().chain([&name]) {
-            regular_or_absent(opened)?;
+    /// Opens a run to read it, beside others that do. A folder that this user may not write to is read without a lock where it has none.
+    pub fn open_to_read(path: &Path) -> Result<Folder, FolderError> {
+        if !path.join("manifest.json").is_file() {
+            return Err(FolderError::Missing(path.to_path_buf()));
         }
-        refuse_links(path)?;
+        let name = refuse_what_is_not_a_runs(path)?;
+        let folder = |lock| Folder { path: path.to_path_buf(), _lock: lock, files: Arc::new(Disk) };
+        let Ok(file) = File::open(&name) else {
+            let made = OpenOptions::new().create(true).append(true).open(&name);
+            return Ok(folder(made.ok().filter(|file| file.try_lock_shared().is_ok())));
+        };
+        match patiently(|| file.try_lock_shared()) {
+            Ok(()) => Ok(folder(Some(file))),
+            Err(fs::TryLockError::WouldBlock) => Err(FolderError::InUse(path.to_path_buf())),
+            Err(fs::TryLockError::Error(cause)) => Err(Located { path: name, cause }.into()),
+        }
+    }
+
+    fn lock(files: Arc<dyn Files>, path: &Path) -> Result<Folder, FolderError> {
+        let name = refuse_what_is_not_a_runs(path)?;
         let located = |cause| Located { path: name.clone(), cause };
         let file = OpenOptions::new().create(true).append(true).open(&name).map_err(located)?;
-        match patiently(&file) {
-            Ok(()) => Folder { path: path.to_path_buf(), _lock: file, files }.cleaned(),
+        match patiently(|| file.try_lock()) {
+            Ok(()) => Folder { path: path.to_path_buf(), _lock: Some(file), files }.cleaned(),
             Err(fs::TryLockError::WouldBlock) => Err(FolderError::InUse(path.to_path_buf())),
             Err(fs::TryLockError::Error(cause)) => Err(located(cause).into()),
         }

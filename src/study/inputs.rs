@@ -7,7 +7,7 @@ use calibench::io::input::MOST_SPEC_BYTES;
 use calibench::io::read_regular_text;
 use serde_json::Value as Json;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use toml::{Table, Value};
 
@@ -36,6 +36,12 @@ impl Inputs {
             files.insert(name, content);
         }
         Ok(Inputs(Arc::new(files)))
+    }
+
+    /// Where the files lie that a study at `spec` names.
+    pub fn places(&self, spec: &Path) -> Vec<PathBuf> {
+        let folder = spec.parent().unwrap_or(Path::new(""));
+        self.0.keys().map(|name| folder.join(name)).collect()
     }
 
     /// Those that stand in `inputs.json` of a run; `None` if the text is none of that.

@@ -152,7 +152,7 @@ fn distinct(parts: &[PathBuf], out: &Path) -> Result<(), MergeError> {
 }
 
 fn open(path: &Path) -> Result<Part, MergeError> {
-    let folder = Folder::open(path)?;
+    let folder = Folder::open_to_read(path)?;
     let (manifest, shard) = (folder.manifest()?, folder.shard()?);
     if !manifest.complete {
         return Err(MergeError::Incomplete { path: path.to_path_buf(), shard: manifest.shard });

@@ -20,7 +20,7 @@ pub(super) struct Reading {
 impl Reading {
     /// The run in a folder, whatever its state.
     pub fn open(path: &Path) -> Result<Reading, RunError> {
-        let folder = Folder::open(path)?;
+        let folder = Folder::open_to_read(path)?;
         let engine = folder.engine(folder.shard()?)?;
         Ok(Reading::begin(folder, engine)?)
     }

@@ -59,7 +59,7 @@ pub struct Conditions {
     /// Of a coordinate of a mark, px.
     pub mark_px: f64,
     /// Degrees of freedom of the calibration's noise, which scales the covariance of camera and pose (or of the
-    /// map).
+    /// map); `None` where that noise was known beforehand, and intervals are those of the normal distribution.
     pub noise_freedom: Option<usize>,
     /// Whether `mark_px` is that noise, and not known from elsewhere.
     pub mark_is_noise: bool,
@@ -76,7 +76,8 @@ pub struct Conditions {
 }
 
 impl Conditions {
-    /// Marks with this standard deviation, known, and nothing else uncertain.
+    /// Marks with this standard deviation, known beforehand as the calibration's noise was, and nothing else uncertain. Of a noise that the
+    /// calibration estimated, [`of_noise`](Conditions::of_noise).
     pub fn marks(mark_px: f64) -> Conditions {
         Conditions {
             mark_px,
@@ -87,6 +88,15 @@ impl Conditions {
             flatness: 0.0,
             temperature_k: 0.0,
             expansion_per_k: 0.0,
+        }
+    }
+
+    /// Marks with the calibration's noise, which it estimated on so many degrees of freedom, and nothing else uncertain.
+    pub fn of_noise(sigma_px: f64, degrees_of_freedom: usize) -> Conditions {
+        Conditions {
+            noise_freedom: Some(degrees_of_freedom),
+            mark_is_noise: true,
+            ..Conditions::marks(sigma_px)
         }
     }
 
@@ -215,7 +225,8 @@ impl Length {
 /// let true_length = (scene.truth.points[8] - scene.truth.points[0]).norm();
 /// let plane = PlaneView::of_view(&result.camera, &result.cam_from_target, &result.covariance, 0)?;
 /// let ends = [scene.pixels()[0][0], scene.pixels()[0][8]];
-/// let length = length_in_view(&plane, &ends, &Conditions::marks(0.1))?;
+/// let conditions = Conditions::of_noise(result.sigma_px, result.degrees_of_freedom);
+/// let length = length_in_view(&plane, &ends, &conditions)?;
 /// assert!((length.value - true_length).abs() < 4.0 * length.standard_uncertainty());
 /// // Which cause makes how much of it?
 /// let of_marks = length.budget.iter().find(|share| share.cause == Cause::Marks).expect("it is listed");
@@ -261,8 +272,11 @@ pub fn length_in_view(
 /// let map = calibrate_plane(PlaneModel::Affine, &pixels, &world)?;
 /// // The map's unit is one millimetre.
 /// let ends = [Vec2::new(10.0, 10.0), Vec2::new(160.0, 10.0)];
-/// let length = length_on_map(&map, 1.0, &ends, &Conditions::marks(0.05))?;
+/// // The map's covariance is scaled by what its own residuals say.
+/// let conditions = Conditions { noise_freedom: Some(map.degrees_of_freedom), ..Conditions::marks(0.05) };
+/// let length = length_on_map(&map, 1.0, &ends, &conditions)?;
 /// assert!((length.value - 30.0).abs() < 4.0 * length.standard_uncertainty());
+/// assert!(length.effective_freedom().is_some_and(|freedom| freedom > 12.0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn length_on_map(

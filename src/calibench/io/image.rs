@@ -8,7 +8,8 @@ use super::jpeg::{self, Jpeg};
 use super::shown::ShownPath;
 use crate::raster::Raster;
 pub(super) use image::DynamicImage as Decoded;
-use image::{DynamicImage, ImageDecoder, ImageReader};
+use image::codecs::png::PngDecoder;
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::Path;
@@ -81,6 +82,10 @@ pub enum ImageError {
 /// Largest number of pixels: 200 megapixels, above the largest sensors and below what exhausts a small
 /// machine.
 pub const LIMIT_PX: u64 = 200_000_000;
+
+/// What a decoder may hold beside the samples: rows, texts, and of a PNG a colour profile, which some kilobytes may unpack to gigabytes and
+/// which is dropped, unused as it is, where it is longer.
+const MOST_NOTES_BYTES: u64 = 8 << 20;
 
 impl Grey {
     /// Width, px.
@@ -214,15 +219,16 @@ pub struct Extent {
     pub pixels: u64,
     /// Bytes of all samples of the file, once they are decoded.
     pub bytes: u64,
-    /// Bytes of the file that are held while it is decoded: all of a JPEG, none of the other formats.
-    pub file_bytes: u64,
+    /// Bytes that are held beside the samples while it is decoded: a JPEG's file, here and in its decoder, or what the decoder of another
+    /// format may hold of colour profiles, texts and rows.
+    pub held_bytes: u64,
 }
 
 impl Extent {
     fn of(decoder: &dyn ImageDecoder) -> Extent {
         let (width, height) = decoder.dimensions();
         let (size, pixels) = ((width as usize, height as usize), u64::from(width) * u64::from(height));
-        Extent { size, pixels, bytes: decoder.total_bytes(), file_bytes: 0 }
+        Extent { size, pixels, bytes: decoder.total_bytes(), held_bytes: MOST_NOTES_BYTES }
     }
 
     /// That of the first photograph that a source holds.
@@ -235,26 +241,22 @@ impl Extent {
         refuse_size(width as u32, height as u32, name)?;
         let pixels = width as u64 * height as u64;
         let bytes = pixels.saturating_mul(u64::from(frame.components));
-        Ok(Extent { size: (width, height), pixels, bytes, file_bytes: length })
+        Ok(Extent { size: (width, height), pixels, bytes, held_bytes: length.saturating_mul(2) })
     }
 
     /// Memory that reading the photograph as grey, finding its marks and drawing them in takes at most: the
-    /// samples, the grey levels, and for each pixel eight bytes of detection or four of the overlay and its
-    /// file; of the file what is held, once here and once in its decoder.
+    /// samples, the grey levels, for each pixel eight bytes of detection or four of the overlay and its file, and
+    /// what is held beside.
     pub fn memory_to_detect(&self) -> u64 {
-        self.of_file()
+        self.held_bytes
             .saturating_add(self.bytes.saturating_mul(2))
             .saturating_add(self.pixels.saturating_mul(12))
     }
 
-    fn of_file(&self) -> u64 {
-        self.file_bytes.saturating_mul(2)
-    }
-
     /// Memory that correcting the photograph takes: its samples as they were decoded, by channels, corrected,
-    /// and as they are written, for each pixel the look-up table and its making, and of the file what is held.
+    /// and as they are written, for each pixel the look-up table and its making, and what is held beside.
     pub fn memory_to_correct(&self) -> u64 {
-        self.of_file()
+        self.held_bytes
             .saturating_add(self.bytes.saturating_mul(4))
             .saturating_add(self.pixels.saturating_mul(32))
     }
@@ -296,10 +298,18 @@ fn decoder<'a>(
     if reader.format().is_none() {
         return Err(ImageError::UnknownFormat { path: path(), reason: "unknown first bytes".into() });
     }
-    let decoder = reader.into_decoder().map_err(|error| of_decoder(error, name))?;
+    let of_decoder = |error| of_decoder(error, name);
+    let decoder: Box<dyn ImageDecoder + 'a> = match reader.format() {
+        Some(ImageFormat::Png) => {
+            let mut limits = Limits::no_limits();
+            limits.max_alloc = Some(MOST_NOTES_BYTES);
+            Box::new(PngDecoder::with_limits(reader.into_inner(), limits).map_err(of_decoder)?)
+        }
+        _ => Box::new(reader.into_decoder().map_err(of_decoder)?),
+    };
     let (width, height) = decoder.dimensions();
     refuse_size(width, height, name)?;
-    Ok(Box::new(decoder))
+    Ok(decoder)
 }
 
 fn refuse_size(width: u32, height: u32, name: &str) -> Result<(), ImageError> {
@@ -534,6 +544,52 @@ mod tests {
         assert!(matches!(error, ImageError::TooLarge { .. } | ImageError::Broken { .. }), "{error}");
         let error = parse_image(b"P5\n40000 40000\n255\nabc", "forged.pgm").unwrap_err();
         assert!(matches!(error, ImageError::TooLarge { width: 40_000, .. }), "{error}");
+    }
+
+    /// A PNG with a chunk behind its header. What its check says is not looked at in notes.
+    fn with_note(kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
+        let whole = file_of(image::GrayImage::new(30, 20).into(), image::ImageFormat::Png);
+        let (header, rest) = whole.split_at(33);
+        let length = u32::try_from(data.len()).unwrap().to_be_bytes();
+        [header, &length, kind, data, &crc(kind, data).to_be_bytes(), rest].concat()
+    }
+
+    /// CRC-32 of a chunk (PNG, third edition, annex D).
+    fn crc(kind: &[u8], data: &[u8]) -> u32 {
+        let step = |crc: u32| if crc & 1 == 1 { 0xedb8_8320 ^ (crc >> 1) } else { crc >> 1 };
+        let add = |crc: u32, byte: &u8| (0..8).fold(crc ^ u32::from(*byte), |crc, _| step(crc));
+        !kind.iter().chain(data).fold(!0, add)
+    }
+
+    /// Zeros, packed as zlib does: stored blocks only tell the reader's limit as well as any.
+    fn stored(length: usize) -> Vec<u8> {
+        let mut packed = vec![0x78, 0x01];
+        for start in (0..length).step_by(65_535) {
+            let size = (length - start).min(65_535) as u16;
+            packed.push(u8::from(start + usize::from(size) == length));
+            packed.extend(size.to_le_bytes());
+            packed.extend((!size).to_le_bytes());
+            packed.resize(packed.len() + usize::from(size), 0);
+        }
+        // Adler-32 of zeros: `a` stays 1, and `b` counts them.
+        packed.extend((((length % 65_521) as u32) << 16 | 1).to_be_bytes());
+        packed
+    }
+
+    #[test]
+    fn notes_of_a_png_are_held_within_a_limit_and_are_no_part_of_the_image() {
+        let profile = |length| [&b"of a camera\0\0"[..], &stored(length)].concat();
+        for (kind, data) in
+            [(b"iCCP", profile(3_000)), (b"tEXt", b"Title\0board".to_vec()), (b"eXIf", vec![0; 9])]
+        {
+            let read = parse_image(&with_note(kind, &data), "noted.png").unwrap();
+            assert_eq!(read.size(), (30, 20), "{kind:?}");
+        }
+        for kind in [b"iCCP", b"tEXt", b"eXIf"] {
+            let error = parse_image(&with_note(kind, &profile(2 * MOST_NOTES_BYTES as usize)), "large.png")
+                .unwrap_err();
+            assert!(error.to_string().contains("limits are exceeded"), "{error}");
+        }
     }
 
     #[test]

@@ -14,10 +14,15 @@ pub fn keep_files<'a>(files: impl IntoIterator<Item = &'a Path>) {
     kept.extend(places);
 }
 
+/// Whether a file is one of those that [`keep_files`] named.
+pub fn is_kept(file: &Path) -> bool {
+    let kept = KEPT.read().unwrap_or_else(|poisoned| poisoned.into_inner());
+    !kept.is_empty() && place(file).is_some_and(|place| kept.contains(&place))
+}
+
 /// An error where a file is kept.
 pub(super) fn refuse_kept(file: &Path) -> io::Result<()> {
-    let kept = KEPT.read().unwrap_or_else(|poisoned| poisoned.into_inner());
-    if kept.is_empty() || place(file).is_none_or(|place| !kept.contains(&place)) {
+    if !is_kept(file) {
         return Ok(());
     }
     let said = "it is a file that this command was given to read, and would be replaced: name another folder or file";

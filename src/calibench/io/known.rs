@@ -2,7 +2,7 @@
 //! `result.json`: a camera with its poses and their joint covariance, or a map of a plane with its points.
 
 use super::doubts::doubts;
-use super::input::{InputError, MOST_TABLE_BYTES, read_regular_text};
+use super::input::{InputError, MOST_SIDE_PX, MOST_TABLE_BYTES, read_regular_text};
 use super::result::{ResultError, parse_lens_camera};
 use super::shown::{ShownPath, on_one_line};
 use crate::calibrate::Covariance;
@@ -216,13 +216,15 @@ pub fn parse_known(file: &str, text: &str) -> Result<Known, KnownError> {
     let no_covariance = || KnownError::NoCovariance { file: file.into() };
     let covariance = covariance(free, &fields).ok_or_else(no_covariance)?;
     refuse_impossible(file, &covariance, &fields.views)?;
+    let sigma_px = fields.sigma_px.filter(|sigma| *sigma >= 0.0).ok_or_else(no_covariance)?;
+    refuse_no_noise(file, sigma_px, fields.degrees_of_freedom)?;
     Ok(Known::Camera(Box::new(KnownCalibration {
         camera,
         image_size,
         views: fields.views.iter().map(|view| view.name.clone()).collect(),
         cam_from_target: fields.views.iter().map(|view| pose(file, view)).collect::<Result<_, _>>()?,
         covariance,
-        sigma_px: fields.sigma_px.filter(|sigma| *sigma >= 0.0).ok_or_else(no_covariance)?,
+        sigma_px,
         degrees_of_freedom: fields.degrees_of_freedom,
         has_priors: !fields.priors.is_empty(),
         has_board: fields.board.is_some(),
@@ -318,14 +320,32 @@ fn refuse_impossible(file: &str, covariance: &Covariance, views: &[ViewFields]) 
     Ok(())
 }
 
-fn is_possible(size: usize, entry: &dyn Fn(usize, usize) -> f64) -> bool {
+/// Refuses a noise that no photograph has, or that nothing tells: the covariance is scaled by it.
+fn refuse_no_noise(file: &str, sigma_px: f64, degrees_of_freedom: usize) -> Result<(), KnownError> {
+    let what = if degrees_of_freedom == 0 {
+        "degrees_of_freedom: 0, so that nothing tells its noise, nor how well it is known".to_string()
+    } else if sigma_px > MOST_SIDE_PX as f64 {
+        format!("sigma_px: {sigma_px} px is wider than any image")
+    } else {
+        return Ok(());
+    };
+    Err(KnownError::Shape { file: file.into(), what })
+}
+
+/// A larger variance is a slip, in whatever unit, and its products soon are no numbers.
+const MOST_VARIANCE: f64 = 1e60;
+
+/// Whether a symmetric matrix may be a covariance, as far as its entries two by two tell: variances of 0 or more, and correlations from -1
+/// to 1, up to the digits that files keep.
+pub(super) fn is_possible(size: usize, entry: &dyn Fn(usize, usize) -> f64) -> bool {
     let most = |i: usize, j: usize| entry(i, i).sqrt() * entry(j, j).sqrt();
     // A comparison with the root of a number below nought does not hold.
     (0..size).all(|i| {
-        (0..=i).all(|j| {
-            let (most, differ) = (most(i, j), (entry(i, j) - entry(j, i)).abs());
-            entry(i, j).abs() <= (1.0 + CONTRADICTION) * most && differ <= CONTRADICTION * most
-        })
+        entry(i, i) <= MOST_VARIANCE
+            && (0..=i).all(|j| {
+                let (most, differ) = (most(i, j), (entry(i, j) - entry(j, i)).abs());
+                entry(i, j).abs() <= (1.0 + CONTRADICTION) * most && differ <= CONTRADICTION * most
+            })
     })
 }
 
@@ -397,6 +417,9 @@ mod tests {
         let name = serde_json::to_value(&whole).unwrap()["views"][1]["name"].as_str().unwrap().to_string();
         let (camera, view) = (refused("the camera"), refused(&format!("view '{name}'")));
         assert_eq!(said(&|r| r["covariance"][0][0] = (-1.0).into()), camera);
+        assert_eq!(said(&|r| r["covariance"][0][0] = 1e308.into()), camera);
+        assert!(said(&|r| r["degrees_of_freedom"] = 0.into()).unwrap_err().contains("degrees_of_freedom: 0"));
+        assert!(said(&|r| r["sigma_px"] = 1e308.into()).unwrap_err().contains("wider than any image"));
         assert_eq!(said(&|r| r["covariance"][0][1] = 1e9.into()), camera);
         assert_eq!(said(&|r| r["views"][1]["covariance_with_camera"][1][2] = 2e9.into()), view);
         assert_eq!(said(&|r| r["views"][1]["covariance"][4][3] = 0.0.into()), view);

@@ -48,7 +48,7 @@ pub use hash::sha256_hex;
 #[cfg(feature = "photo")]
 pub use image::{Extent, Grey, ImageError, image_extent, read_image, write_png, write_png_16};
 pub use input::{InputError, MOST_SIDE_PX, read_regular, read_regular_text};
-pub use kept::keep_files;
+pub use kept::{is_kept, keep_files};
 pub use known::{Known, KnownCalibration, KnownError, parse_known, read_known};
 pub use marks::{MarkFile, parse_marks, read_marks};
 pub use measured::{MeasuredFields, SeenFile, TargetFileError, parse_seen, parse_target, refusal_by_names};

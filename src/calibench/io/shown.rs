@@ -16,6 +16,23 @@ pub fn on_one_line(text: &str) -> Cow<'_, str> {
     numbered(text, commands)
 }
 
+/// Characters of an [`excerpt`].
+const MOST: usize = 200;
+
+/// The beginning of a text [`on_one_line`]: enough to know what it is, however long a file without line ends.
+///
+/// ```
+/// use calibench::io::shown::excerpt;
+///
+/// assert_eq!(excerpt("px,py"), "px,py");
+/// assert_eq!(excerpt(&"\0".repeat(40_000_000)).len(), 200 * "\\u0000".len() + "\u{2026}".len());
+/// ```
+pub fn excerpt(text: &str) -> String {
+    let end = text.char_indices().nth(MOST).map_or(text.len(), |(at, _)| at);
+    let cut = if end < text.len() { "\u{2026}" } else { "" };
+    format!("{}{cut}", on_one_line(&text[..end]))
+}
+
 /// A file's name as messages and results show it.
 pub trait ShownPath {
     /// The name, [`on_one_line`].

@@ -1,7 +1,7 @@
 //! What stands in a table of numbers? CSV with named columns; every complaint carries file, line and column.
 
 use super::input::{InputError, MOST_SIDE_PX, MOST_TABLE_BYTES, read_regular};
-use super::shown::{ShownPath, on_one_line};
+use super::shown::{ShownPath, excerpt, on_one_line};
 use crate::board::ViewError;
 use std::io::Read;
 
@@ -132,6 +132,22 @@ pub enum TableError {
         /// The column's position, from 1.
         field: usize,
     },
+    /// A name (of a view or a point) is longer than any.
+    #[error(
+        "{file}:{line}: column '{column}' is longer than {most} bytes: '{text}'; is it a table with commas and line ends?"
+    )]
+    LongName {
+        /// The file.
+        file: String,
+        /// The line.
+        line: u64,
+        /// The column's name.
+        column: &'static str,
+        /// The beginning of the name.
+        text: String,
+        /// Most bytes of a name.
+        most: usize,
+    },
     /// The same point stands twice in one view.
     #[error("{file}:{line}: point '{point}' {place} was given on line {first} already")]
     RepeatedPoint {
@@ -181,6 +197,9 @@ impl Column {
 
 /// Lines below the header: 150 000 views of 63 points. Each takes some 200 bytes until its view is made.
 pub const MOST_ROWS: usize = 10_000_000;
+
+/// Bytes of a name: as long as a path may be.
+const MOST_NAME_BYTES: usize = 4096;
 
 /// One line: where it stands, its names and its numbers.
 pub(super) struct Row<const NAMES: usize, const NUMBERS: usize> {
@@ -294,7 +313,7 @@ fn find_columns<const N: usize>(
         *place = found.next().ok_or_else(|| TableError::MissingColumn {
             file: file.into(),
             column,
-            header: on_one_line(&header.iter().collect::<Vec<_>>().join(",")).into_owned(),
+            header: excerpt(&header.iter().collect::<Vec<_>>().join(",")),
             expected: expected(),
         })?;
         if found.next().is_some() {
@@ -308,19 +327,31 @@ fn name(file: &str, line: u64, column: &'static str, field: usize, text: &str) -
     if text.is_empty() {
         return Err(TableError::NoName { file: file.into(), line, column, field: field + 1 });
     }
+    if text.len() > MOST_NAME_BYTES {
+        let text = excerpt(text);
+        return Err(TableError::LongName { file: file.into(), line, column, text, most: MOST_NAME_BYTES });
+    }
     Ok(on_one_line(text).into_owned())
 }
 
 fn number(file: &str, line: u64, column: Column, field: usize, text: &str) -> Result<f64, TableError> {
     let Column { name: column, most } = column;
-    let (file, field, owned) = (file.to_string(), field + 1, on_one_line(text).into_owned());
+    // Texts are made for what is wrong alone: a table has millions of numbers.
+    let said = || (file.to_string(), field + 1, excerpt(text));
     match text.parse::<f64>() {
         Ok(value) if value.abs() <= most => Ok(value),
         Ok(value) if value.is_finite() => {
-            Err(TableError::TooLarge { file, line, column, field, text: owned, most })
+            let (file, field, text) = said();
+            Err(TableError::TooLarge { file, line, column, field, text, most })
         }
-        Ok(_) => Err(TableError::NotFinite { file, line, column, field, text: owned }),
-        Err(_) => Err(TableError::NotANumber { file, line, column, field, text: owned }),
+        Ok(_) => {
+            let (file, field, text) = said();
+            Err(TableError::NotFinite { file, line, column, field, text })
+        }
+        Err(_) => {
+            let (file, field, text) = said();
+            Err(TableError::NotANumber { file, line, column, field, text })
+        }
     }
 }
 

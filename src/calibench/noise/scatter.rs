@@ -55,7 +55,7 @@ pub struct Scatter {
 
 impl Scatter {
     /// Of deviations from which the fields of a motion were taken; `pairs` are the marks side by side.
-    pub fn of(deviations: &Deviations, taken: &Motion, pairs: &[[usize; 2]]) -> Scatter {
+    pub(super) fn of(deviations: &Deviations, taken: &Motion, pairs: &[[usize; 2]]) -> Scatter {
         let of = |pick: fn(&Vec2) -> f64| -> Vec<Vec<f64>> {
             deviations.frames.iter().map(|frame| frame.iter().map(pick).collect()).collect()
         };
@@ -237,7 +237,7 @@ fn fading(apparent: f64, n: usize) -> f64 {
 const MOST_FRAMES: usize = 1 << 30;
 
 /// Frames after which the interval of a standard deviation lies within `precision` of the estimate on both sides, of
-/// so many independent coordinates a frame.
+/// so many independent coordinates a frame; `2^30` where no number of frames that anybody takes is enough.
 ///
 /// ```
 /// // One coordinate alone to 10 %: 234 frames; 118 of them together: 3.

@@ -144,7 +144,7 @@ pub enum HoldOutError {
     },
     /// The calibration does not say how well it is known.
     #[error(
-        "the calibration's noise of {sigma_px} px and its covariance predict nothing: it needs degrees of freedom"
+        "the calibration's noise of {sigma_px} px and its covariance predict nothing: it needs more than {LEAST_FREEDOM} degrees of freedom"
     )]
     NoPrediction {
         /// Its noise.
@@ -178,12 +178,14 @@ pub enum HoldOutError {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn hold_out(estimate: &Estimate, views: &[View], false_alarm: f64) -> Result<HoldOut, HoldOutError> {
-    let Estimate { sigma_px, covariance, .. } = *estimate;
+    let Estimate { sigma_px, covariance, degrees_of_freedom, .. } = *estimate;
+    let is_known = sigma_px > 0.0
+        && sigma_px.is_finite()
+        && degrees_of_freedom.is_none_or(|freedom| freedom > LEAST_FREEDOM);
     if views.is_empty() {
         return Err(HoldOutError::NoViews);
     }
-    let unit =
-        (sigma_px > 0.0 && sigma_px.is_finite()).then(|| &covariance.intrinsics / (sigma_px * sigma_px));
+    let unit = is_known.then(|| &covariance.intrinsics / (sigma_px * sigma_px));
     let root = unit.and_then(|unit| root(&unit)).ok_or(HoldOutError::NoPrediction { sigma_px })?;
     let mut all = Sums::zero(root.ncols());
     let mut judged = Vec::new();
@@ -333,6 +335,10 @@ impl Sums {
         (degrees_of_freedom > 0).then_some(CameraTest { chi_squared, degrees_of_freedom, p_value })
     }
 }
+
+/// With so few degrees of freedom of the noise, errors over it have no mean (that of Fisher's ratio is `nu / (nu - 2)`), and limits for them
+/// lie beyond all that is of use.
+const LEAST_FREEDOM: usize = 2;
 
 /// New views that tell less than this part of what the calibration knows of a combination tell rounding of it.
 const UNTOLD: f64 = 1e-6;

@@ -17,6 +17,9 @@ const MOST_TERMS: usize = 1_000_000;
 /// Halvings of an interval: its ends then agree to ten digits, which is what the tail is known to.
 const HALVINGS: usize = 34;
 
+/// Probabilities are known to a tenth of this.
+const LEAST_TAIL: f64 = 1e-8;
+
 /// The distribution of `F`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ratio {
@@ -77,8 +80,10 @@ impl Ratio {
         (0.5 + sum).clamp(0.0, 1.0)
     }
 
-    /// The `x` with `P(F > x) = tail`. Domain: `0 < tail < 1`.
+    /// The `x` with `P(F > x) = tail`. Domain: `1e-8 <= tail <= 1 - 1e-8`, which is what the tail is known to; what lies beyond is taken for the
+    /// nearest of it, and NaN for the least.
     pub fn quantile(&self, tail: f64) -> f64 {
+        let tail = tail.max(LEAST_TAIL).min(1.0 - LEAST_TAIL);
         let mut high = self.mean_of_numerator().max(f64::MIN_POSITIVE);
         while self.tail(high) > tail && high < f64::MAX / 4.0 {
             high *= 2.0;
@@ -100,6 +105,17 @@ impl Ratio {
 mod tests {
     use super::*;
     use crate::distribution::{ChiSquare, fisher_tail};
+
+    #[test]
+    fn quantiles_of_what_is_no_probability_are_those_of_the_nearest() {
+        let ratio = Ratio::new(vec![(1.0, 4.0), (2.0, 3.0)], Some(30));
+        let (least, most) = (ratio.quantile(1e-8), ratio.quantile(1.0 - 1e-8));
+        assert!((ratio.tail(least) / 1e-8 - 1.0).abs() < 0.2 && most > 0.0 && most < 0.1, "{least} {most}");
+        for beyond in [1e-12, 0.0, -1.0, f64::NAN, f64::NEG_INFINITY] {
+            assert_eq!(ratio.quantile(beyond), least, "{beyond}");
+        }
+        assert_eq!(ratio.quantile(f64::INFINITY), most);
+    }
 
     #[test]
     fn equal_terms_are_chi_squared_and_fisher() {

@@ -16,7 +16,7 @@ use calibench::detect::Orientation;
 use calibench::geometry::Vec2;
 use calibench::io::formats::corner_text;
 use calibench::io::{
-    CalibrationFields, CornerFile, LeftOut, ShownPath, message, significant, write_together,
+    CalibrationFields, CornerFile, LeftOut, ShownPath, is_kept, message, significant, write_together,
 };
 use calibench::photos::{Fit, Fitter};
 use calibench_harness::Figure;
@@ -202,10 +202,12 @@ fn of_earlier_runs(folder: &Path, finished: &Finished) -> Vec<String> {
     let pictures = std::fs::read_dir(folder.join("overlay")).into_iter().flatten().flatten();
     let names = pictures.map(|file| format!("overlay/{}", file.file_name().to_string_lossy()));
     let corners = finished.orientation.is_none() && folder.join("corners.csv").exists();
-    let is_of_this = |name: &String| finished.overlays.values().any(|own| own == name);
-    let mut files: Vec<String> = names.filter(|name| !is_of_this(name)).collect();
+    let is_of_this =
+        |name: &String| finished.overlays.values().any(|own| own == name) || is_kept(&folder.join(name));
+    let mut files: Vec<String> = names.collect();
     files.sort();
     files.extend(corners.then(|| "corners.csv".to_string()));
+    files.retain(|name| !is_of_this(name));
     files
 }
 
@@ -268,7 +270,7 @@ fn text(finished: &Finished) -> String {
     let mut views = table(&columns[first..]);
     for (i, name) in finished.whole_names.iter().enumerate() {
         let rmse = calibration.view_rmse_px(i).unwrap_or(f64::NAN);
-        let distance = calibration.cam_from_target[i].translation.z;
+        let distance = calibration.cam_from_target[i].translation.norm();
         let points = calibration.residuals[i].len().to_string();
         let number = finished.names.number(i).to_string();
         let row = [number, name.clone(), points, significant(rmse, 4), significant(distance, 5)];

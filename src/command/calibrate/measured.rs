@@ -130,7 +130,7 @@ fn text(report: &Report<'_>) -> String {
     let mut views = table(&["view", "points", "RMSE (px)", "distance"]);
     for (i, name) in seen.view_names.iter().enumerate() {
         let rmse = calibration.view_rmse_px(i).unwrap_or(f64::NAN);
-        let distance = calibration.cam_from_target[i].translation.z;
+        let distance = calibration.cam_from_target[i].translation.norm();
         let points = calibration.residuals[i].len().to_string();
         views.add_row([name.clone(), points, significant(rmse, 4), significant(distance, 5)]);
     }

@@ -52,7 +52,7 @@ fn views(page: &mut String, report: &Report<'_>) {
             residuals.len().to_string(),
             number(calibration.view_rmse_px(view).unwrap_or(f64::NAN), 4),
             number(largest, 3),
-            number(calibration.cam_from_target[view].translation.z, 5),
+            number(calibration.cam_from_target[view].translation.norm(), 5),
         ]
     };
     let rows: Vec<Vec<String>> = report.seen.view_names.iter().enumerate().map(row).collect();

@@ -154,7 +154,7 @@ fn view_row(finished: &Finished, view: usize) -> Vec<String> {
         residuals.len().to_string(),
         number(calibration.view_rmse_px(view).unwrap_or(f64::NAN), 4),
         number(largest, 3),
-        number(pose.translation.z, 5),
+        number(pose.translation.norm(), 5),
         format!("{tilt:.1}"),
     ]
 }

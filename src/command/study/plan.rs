@@ -83,6 +83,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
     if arguments.confirm < 4 || arguments.most_views == 0 {
         return Err(Failure::usage("--confirm needs at least 4 trials, --most-views at least 1 view"));
     }
+    // A study's numbers are those of TOML, which end at 2^63; its own limits are far below.
+    if u32::try_from(arguments.most_views).is_err() {
+        return Err(Failure::usage(format!(
+            "--most-views {}: a trial has room for some thousands",
+            arguments.most_views
+        )));
+    }
     let range = Search {
         tilts_deg: arguments.tilt.clone(),
         coverages: arguments.coverage.clone(),

@@ -5,8 +5,7 @@ use super::solver::ProgramArguments;
 use super::{Failure, read_study};
 use crate::calibrate::Format;
 use crate::{Exit, warn};
-use calibench::io::ShownPath;
-use calibench::io::significant;
+use calibench::io::{ShownPath, keep_files, significant};
 use calibench_harness::project::Project;
 use calibench_harness::stopwatch::Stopwatch;
 use calibench_harness::{Build, ProgressDisplay};
@@ -14,7 +13,7 @@ use calibench_study::{
     CellSummary, Engine, Folder, FolderError, Interruption, Manifest, Outcome, Shard, Summary, TrialFile,
     Worst, finish, merge,
 };
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -77,8 +76,28 @@ pub(super) fn run(arguments: &Arguments, build: &Build) -> Result<Exit, Failure>
     let manifest = Manifest::new(&engine.spec, arguments.shard, build);
     let manifest = manifest.with_trials(arguments.trials).with_solver(arguments.program.solver.clone());
     let engine = arguments.program.applied(engine)?;
+    keep_inputs(&inputs.places(&arguments.spec), &out)?;
     let folder = Folder::create(&out, &text, &manifest)?;
     drive(&folder, engine, arguments.format)
+}
+
+/// Refuses a folder for the results in which something lies that the study reads: a result might have its name, which would show when the
+/// trials are done, or when a run that was interrupted is resumed and no longer knows of it.
+fn keep_inputs(inputs: &[PathBuf], out: &Path) -> Result<(), Failure> {
+    keep_files(inputs.iter().map(PathBuf::as_path));
+    let Ok(out) = out.canonicalize() else { return Ok(()) };
+    let folder = |place: &Path| place.parent()?.canonicalize().ok();
+    let is_within = |input: &&PathBuf| {
+        let leads_to = input.canonicalize().ok().and_then(|place| folder(&place));
+        [folder(input), leads_to].contains(&Some(out.clone()))
+    };
+    match inputs.iter().find(is_within) {
+        Some(input) => Err(Failure::usage(format!(
+            "{}: the study reads it, and in the folder of its results it might be replaced: choose another folder with --out",
+            input.shown()
+        ))),
+        None => Ok(()),
+    }
 }
 
 pub(super) fn resume(arguments: &ResumeArguments, build: &Build) -> Result<Exit, Failure> {

@@ -8,7 +8,7 @@ use super::super::{CalibrationError, LensCalibration, Prior, Settings, Terminati
 use super::problem::{Problem, State, rounding_cost};
 use super::{WIDTH, certificate, judge, marks, report, shape, start, walk};
 use crate::board::View;
-use crate::camera::Parameter;
+use crate::camera::{FreeParameters, Parameter};
 use crate::geometry::{Homography, HomographyError};
 
 /// Where nothing else tells the noise of a coordinate, priors are first weighed with this one, px.
@@ -85,6 +85,7 @@ fn estimate(views: &[View], settings: &Settings) -> Result<LensCalibration, Cali
     let flat = Problem {
         views: &marks,
         free: settings.free(),
+        held: FreeParameters::NONE,
         fy_per_fx: settings.tie()?,
         priors: &priors,
         variance: USUAL_PX * USUAL_PX,
@@ -109,7 +110,8 @@ fn estimate(views: &[View], settings: &Settings) -> Result<LensCalibration, Cali
     }
     let (problem, minimum) = settled(bent, best);
     let found = minimum.clone();
-    let calibration = judge::judge(&problem, minimum, walked.met)
+    let met = walked.met.into_iter().map(|met| walk::weighed_anew(met, &flat, &problem)).collect();
+    let calibration = judge::judge(&problem, minimum, met)
         .and_then(|judged| report::report(judged, &problem, &frames, region, settings));
     report::or_blamed(&problem, &found, calibration)
 }

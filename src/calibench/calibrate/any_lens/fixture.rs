@@ -70,6 +70,7 @@ pub(super) fn problem(views: &[Marks], free: FreeParameters) -> Problem<'_> {
     Problem {
         views,
         free,
+        held: FreeParameters::NONE,
         fy_per_fx: None,
         priors: &[],
         variance: 0.01,

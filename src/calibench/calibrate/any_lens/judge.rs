@@ -175,8 +175,8 @@ impl Profiled<WIDTH> for Problem<'_> {
 
     fn holding(&self, parameter: Parameter) -> Self {
         let max_iterations = self.max_iterations.min(MOST_REFIT);
-        let free = self.free.without(parameter);
-        Problem { free, max_iterations, relative_gain: REFIT_GAIN, ..*self }
+        let (free, held) = (self.free.without(parameter), self.held.with(parameter));
+        Problem { free, held, max_iterations, relative_gain: REFIT_GAIN, ..*self }
     }
 
     fn value(state: &State, parameter: Parameter) -> f64 {

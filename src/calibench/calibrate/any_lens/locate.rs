@@ -35,12 +35,16 @@ pub struct Located {
 /// assert!((found.cam_from_target.translation - truth.translation).norm() < 1e-6);
 /// ```
 pub fn locate(camera: &Camera<Lens>, view: &View) -> Option<Located> {
+    if view.len() < FEWEST_MARKS {
+        return None;
+    }
     let views = std::slice::from_ref(view);
     let frames = TargetFrames::of(views);
     let marks = [Marks::of(view, frames.at(0), &shape::region(views))];
     let problem = Problem {
         views: &marks,
         free: FreeParameters::NONE,
+        held: FreeParameters::NONE,
         fy_per_fx: None,
         priors: &[],
         variance: 0.0,
@@ -59,6 +63,9 @@ pub fn locate(camera: &Camera<Lens>, view: &View) -> Option<Located> {
         square,
     })
 }
+
+/// Three marks leave four poses.
+const FEWEST_MARKS: usize = 4;
 
 fn residuals(marks: &Marks, state: &State) -> Option<(Vec<Vec2>, f64)> {
     let residual = |mark| state.pixel(0, mark).map(|pixel| pixel - mark.pixel);

@@ -36,6 +36,8 @@ impl State {
 pub(super) struct Problem<'a> {
     pub views: &'a [Marks],
     pub free: FreeParameters,
+    /// Parameters that are held for a while, as along a profile: of what is known of them beforehand they pay for their place.
+    pub held: FreeParameters,
     pub fy_per_fx: Option<f64>,
     /// What is known beforehand, and the variance of a coordinate of weight 1 that weighs it, px^2.
     pub priors: &'a [Prior],
@@ -53,9 +55,10 @@ pub(super) struct Problem<'a> {
     pub is_certifiable: bool,
 }
 
-/// A shared unknown of which something is known beforehand.
+/// What is known of a parameter or of a deformation beforehand.
 pub(super) struct Known {
-    pub row: usize,
+    /// Among the shared unknowns; `None` where it is held.
+    pub row: Option<usize>,
     /// Distance from the value that is expected.
     pub off: f64,
     pub weight: f64,
@@ -87,6 +90,7 @@ impl Problem<'_> {
     fn add_priors(&self, state: &State, system: &mut System<WIDTH>) {
         for Known { row, off, weight } in self.known(state) {
             system.cost += weight * off * off;
+            let Some(row) = row else { continue };
             system.intrinsics[(row, row)] += weight;
             system.gradient[row] += weight * off;
         }
@@ -94,15 +98,25 @@ impl Problem<'_> {
 
     /// What is known beforehand: of parameters first, then of the board's deformations.
     pub fn known(&self, state: &State) -> Vec<Known> {
-        let known = |row: usize, off: f64, sd: f64| Known { row, off, weight: self.variance / (sd * sd) };
+        let known =
+            |row: Option<usize>, off: f64, sd: f64| Known { row, off, weight: self.variance / (sd * sd) };
         let of_prior = |prior: &Prior| {
-            let row = self.free.position(prior.parameter)?;
+            let row = self.free.position(prior.parameter);
+            if row.is_none() && !self.held.contains(prior.parameter) {
+                return None;
+            }
             Some(known(row, state.camera.value(prior.parameter)? - prior.mean, prior.standard_deviation))
         };
         let bend = self.known_bend();
         let deformations = (0..bend.map_or(0, |bend| bend.deformations)).zip(state.shape);
-        let of_board = |(k, value)| Some(known(self.free.len() + k, value, bend?.standard_deviation));
+        let of_board = |(k, value)| Some(known(Some(self.free.len() + k), value, bend?.standard_deviation));
         self.priors.iter().filter_map(of_prior).chain(deformations.filter_map(of_board)).collect()
+    }
+
+    /// What a camera costs for what is known of its parameters beforehand.
+    pub fn cost_of_priors(&self, camera: &Camera<Lens>) -> f64 {
+        let state = State { camera: *camera, cam_from_target: Vec::new(), shape: [0.0; 3] };
+        self.known(&state).iter().map(|known| known.weight * known.off * known.off).sum()
     }
 
     /// What the kernel is asked of view `at`.
@@ -265,7 +279,7 @@ mod tests {
             for (Known { row, off, weight }, (row_expected, off_expected, weight_expected)) in
                 known.iter().zip(expected)
             {
-                assert_eq!((*row, *off), (row_expected, off_expected));
+                assert_eq!((*row, *off), (Some(row_expected), off_expected));
                 assert!((weight / weight_expected - 1.0).abs() < 1e-14, "{weight}");
             }
             // And so it costs, with derivatives and without.

@@ -188,9 +188,28 @@ pub(super) fn report(
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::{Board, Settings};
+    use super::super::super::{Board, Settings, Warning};
     use super::super::{estimate, fixture};
-    use crate::camera::Model;
+    use crate::camera::{Model, Parameter};
+
+    #[test]
+    fn an_interval_counts_what_is_known_of_its_own_parameter() {
+        let views = fixture::wide_views();
+        let settings = Settings::of_model(Model::KannalaBrandt).with_profile_intervals(0.95);
+        let alone = estimate::calibrate(&views, &settings).unwrap();
+        let sd = 1e-3 * alone.standard_deviation(Parameter::K4).unwrap();
+        let settings = settings.with_prior(Parameter::K4, -0.0015, sd);
+        let found = estimate::calibrate(&views, &settings).unwrap();
+        // Little but the prior speaks of it, and a prior's cost is a parabola.
+        let interval = found.intervals.iter().find(|i| i.parameter == Parameter::K4).unwrap();
+        let half = found.intervals[0].linear.1 - found.intervals[0].linear.0;
+        let t = 0.5 * half / found.standard_deviation(Parameter::Fx).unwrap();
+        for (end, expected) in [(interval.low.unwrap(), -t * sd), (interval.high.unwrap(), t * sd)] {
+            assert!(((end + 0.0015) / expected - 1.0).abs() < 0.02, "{interval:?}");
+        }
+        let misleads = |w: &Warning| matches!(w, Warning::NotLinear { parameter: Parameter::K4, .. });
+        assert!(!found.warnings.iter().any(misleads), "{:?}", found.warnings);
+    }
 
     #[test]
     fn the_deformations_that_are_estimated_have_deviations_and_the_others_none() {

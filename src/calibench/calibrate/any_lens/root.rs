@@ -39,10 +39,10 @@ fn root(problem: &Problem<'_>, state: &State) -> Option<DMatrix<f64>> {
             kernel::rows_of_view(&problem.view(state, &columns, at)).map(|rows| without_pose(rows, shared))
         })
         .collect::<Option<_>>()?;
-    rest.extend(problem.known(state).iter().map(|known| {
+    rest.extend(problem.known(state).iter().filter_map(|known| {
         let mut row = DMatrix::zeros(1, shared);
-        row[(0, known.row)] = known.weight.sqrt();
-        row
+        row[(0, known.row?)] = known.weight.sqrt();
+        Some(row)
     }));
     let height = rest.iter().map(DMatrix::nrows).sum();
     let mut stacked = DMatrix::zeros(height, shared);
@@ -92,6 +92,7 @@ mod tests {
         let problem = Problem {
             views: &listed,
             free: FreeParameters::STANDARD,
+            held: FreeParameters::NONE,
             fy_per_fx: None,
             priors: &[Prior { parameter: Parameter::K1, mean: 0.0, standard_deviation: 0.01 }],
             variance: 0.01,

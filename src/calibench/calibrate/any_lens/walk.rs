@@ -95,6 +95,13 @@ fn is_sound(minimum: &Minimum<State, WIDTH>) -> bool {
     minimum.termination == Termination::Converged && is_defined
 }
 
+/// A minimum as another problem weighs what is known beforehand, which it does by its own noise. Where that is no minimum of its, the next
+/// one costs less.
+pub(super) fn weighed_anew(met: Met<Lens>, before: &Problem<'_>, now: &Problem<'_>) -> Met<Lens> {
+    let cost = met.cost - before.cost_of_priors(&met.camera) + now.cost_of_priors(&met.camera);
+    Met { cost, ..met }
+}
+
 /// A minimum among those that were met.
 pub(super) fn met(minimum: &Minimum<State, WIDTH>) -> Met<Lens> {
     Met {
@@ -106,11 +113,27 @@ pub(super) fn met(minimum: &Minimum<State, WIDTH>) -> Met<Lens> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::prior::Prior;
     use super::super::super::target_frame::TargetFrames;
     use super::super::estimate::calibrate;
     use super::super::{fixture, marks, shape};
     use super::*;
-    use crate::camera::Model;
+    use crate::camera::{FreeParameters, Model, Parameter};
+
+    #[test]
+    fn what_is_known_beforehand_is_weighed_by_the_noise_that_has_settled() {
+        let free = FreeParameters::of(&fixture::FREE);
+        fixture::at_minimum(free, 1.0, |nothing_known, minimum| {
+            let mean = minimum.state.camera.fx - 2.0;
+            let prior = Prior { parameter: Parameter::Fx, mean, standard_deviation: 0.5 };
+            let before = Problem { priors: &[prior], variance: 0.01, ..*nothing_known };
+            let now = Problem { variance: 0.09, ..before };
+            let anew = weighed_anew(Met { cost: before.cost(&minimum.state), ..met(minimum) }, &before, &now);
+            // (2 / 0.5)^2 variances.
+            assert!((anew.cost - before.cost(&minimum.state) - 16.0 * 0.08).abs() < 1e-9, "{anew:?}");
+            assert!((anew.cost / now.cost(&minimum.state) - 1.0).abs() < 1e-12, "{anew:?}");
+        });
+    }
 
     #[test]
     fn a_fisheye_that_is_certified_needs_no_other_start_although_the_pinhole_is_not() {

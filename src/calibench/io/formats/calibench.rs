@@ -4,6 +4,7 @@
 //! schema.
 
 use super::super::doubts::doubts;
+use super::super::known::is_possible;
 use super::super::result::{LensFields, parse_lens_camera};
 use super::camera_file::{CameraFile, Estimated};
 use super::error::FormatError;
@@ -131,6 +132,15 @@ fn estimated(source: &Source, fields: &Fields, model: Model) -> Result<Option<Es
     if covariance.iter().any(|value| !value.is_finite()) {
         return wrong("covariance", "a number is not finite".into());
     }
+    if !is_possible(n, &|i, j| covariance[(i, j)]) {
+        let message =
+            "variances of 0 or more are expected, and correlations from -1 to 1, both ways the same";
+        return wrong("covariance", message.into());
+    }
+    // Nothing tells the noise that the covariance is scaled by.
+    if fields.degrees_of_freedom == Some(0) {
+        return Ok(None);
+    }
     let (fy_per_fx, degrees_of_freedom) = (fields.fy_per_fx, fields.degrees_of_freedom);
     let doubts = doubts(fields.warnings.clone());
     Ok(Some(Estimated { free, fy_per_fx, covariance, degrees_of_freedom, doubts }))
@@ -237,6 +247,8 @@ mod tests {
             ("\"free\": [\"fx\"],\n\"covariance\": [[1, 2]]}", "f:2:1: covariance: 1 rows of 1 numbers"),
             ("\"free\": [\"cx\", \"fx\"], \"covariance\": [[1]]}", "free: fx is out of order"),
             ("\"free\": [\"alpha\"], \"covariance\": [[1]]}", "the brown-conrady model has no alpha"),
+            ("\"free\": [\"fx\"], \"covariance\": [[-1]]}", "f:1:65: covariance: variances of 0 or more"),
+            ("\"free\": [\"fx\"], \"covariance\": [[1e308]]}", "covariance: variances of 0 or more"),
             ("\"free\": [\"f\"], \"covariance\": [[1]]}", "unknown camera parameter `f`"),
         ];
         for (rest, expected) in cases {
