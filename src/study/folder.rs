@@ -306,7 +306,8 @@ impl Folder {
     /// # Errors
     /// A file that cannot be read, or a study that cannot be run as written.
     pub fn engine(&self, shard: Shard) -> Result<Engine, RunError> {
-        Ok(Engine::with_inputs(&self.read("spec.toml")?, &self.inputs()?, shard)?)
+        let engine = Engine::with_inputs(&self.read("spec.toml")?, &self.inputs()?, shard);
+        Ok(engine.map_err(|error| self.damaged("spec.toml", error.to_string()))?)
     }
 
     /// The study of the run with all trials that stand in the folder.

@@ -114,6 +114,9 @@ impl Board {
     pub const MOST_MARKS: usize = 1_000_000;
 
     /// A board of `columns x rows` marks on a square grid, `spacing` apart.
+    ///
+    /// # Errors
+    /// See [`BoardError`]: too few marks or too many, and lengths that no such board has.
     pub fn new(columns: usize, rows: usize, spacing: f64, pattern: Pattern) -> Result<Board, BoardError> {
         Board::arranged(columns, rows, spacing, pattern, Arrangement::Square)
     }
@@ -161,11 +164,17 @@ impl Board {
     }
 
     /// A circle grid.
+    ///
+    /// # Errors
+    /// See [`BoardError`]; discs that touch each other, too.
     pub fn circles(columns: usize, rows: usize, spacing: f64, diameter: f64) -> Result<Board, BoardError> {
         Board::new(columns, rows, spacing, Pattern::Circles { diameter })
     }
 
     /// A chessboard, counted by its inner corners.
+    ///
+    /// # Errors
+    /// See [`BoardError`].
     pub fn chessboard(columns: usize, rows: usize, square: f64) -> Result<Board, BoardError> {
         Board::new(columns, rows, square, Pattern::Chessboard)
     }

@@ -96,6 +96,9 @@ pub enum ViewError {
 
 impl View {
     /// Pairs target points with pixels.
+    ///
+    /// # Errors
+    /// See [`ViewError`]: lists of two lengths, and numbers that are not finite.
     pub fn new(points: Vec<Vec2>, pixels: Vec<Vec2>) -> Result<View, ViewError> {
         if points.len() != pixels.len() {
             return Err(ViewError::Lengths { points: points.len(), pixels: pixels.len() });

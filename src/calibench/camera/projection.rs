@@ -41,6 +41,9 @@ pub struct BehindCamera {
 /// assert!((seen.intrinsics[(0, Parameter::Fx as usize)] - 0.1).abs() < 1e-15);
 /// # Ok::<(), calibench::camera::BehindCamera>(())
 /// ```
+///
+/// # Errors
+/// A point that is not in front of the camera.
 pub fn project_with_jacobian(
     camera: &Camera,
     cam_from_target: &Pose,

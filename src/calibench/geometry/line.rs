@@ -48,6 +48,9 @@ impl LineFit {
     ///
     /// With the centred second moments `S`, the direction has the angle `atan2(2 S_xy, S_xx - S_yy) / 2`: the
     /// axis of the larger eigenvalue of `S`.
+    ///
+    /// # Errors
+    /// See [`LineError`]: fewer than two points, all of them the same, or a coordinate that is not finite.
     pub fn new(points: &[Vec2]) -> Result<LineFit, LineError> {
         if points.len() < 2 {
             return Err(LineError::TooFewPoints { got: points.len() });

@@ -87,6 +87,9 @@ impl<'a> Beside<'a> {
     }
 
     /// A file with all of its contents, on the disk.
+    ///
+    /// # Errors
+    /// What the system says, with the file.
     pub fn write(files: &'a dyn Files, path: &Path, contents: &[u8]) -> io::Result<Beside<'a>> {
         let mut beside = Beside::begin(files, path)?;
         beside.append(contents)?;
@@ -95,17 +98,26 @@ impl<'a> Beside<'a> {
     }
 
     /// Adds to the contents.
+    ///
+    /// # Errors
+    /// What the system says, with the file.
     pub fn append(&mut self, contents: &[u8]) -> io::Result<()> {
         self.files.write(&mut self.file, contents).map_err(with_path(&self.path))
     }
 
     /// Waits until the contents are on the disk, as they must be before the rename: else a power cut may leave
     /// the new name without them.
+    ///
+    /// # Errors
+    /// What the system says, with the file.
     pub fn sync(&self) -> io::Result<()> {
         self.files.sync(&self.file).map_err(with_path(&self.path))
     }
 
     /// Puts the file in its place.
+    ///
+    /// # Errors
+    /// What the system says, with the file.
     pub fn place(mut self) -> io::Result<()> {
         self.files.rename(&self.temporary, &self.path).map_err(with_path(&self.path))?;
         self.placed = true;

@@ -472,6 +472,9 @@ pub enum ResultError {
 
 /// Reads the camera, and the image size if it is there, of a `result.json`.
 ///
+/// # Errors
+/// See [`ResultError`].
+///
 /// ```
 /// use calibench::calibrate::{Settings, calibrate};
 /// use calibench::io::{CalibrationFields, read_camera, write_atomically};
@@ -494,12 +497,18 @@ pub fn read_camera(path: &Path) -> Result<(Camera, Option<(usize, usize)>), Resu
 pub type ImageSize = Option<(usize, usize)>;
 
 /// As [`read_camera`], of any lens model.
+///
+/// # Errors
+/// See [`ResultError`].
 pub fn read_lens_camera(path: &Path) -> Result<(Camera<Lens>, ImageSize), ResultError> {
     let file = path.shown();
     parse_lens_camera(&file, &read_regular_text(path, MOST_TABLE_BYTES)?)
 }
 
 /// As [`read_lens_camera`], from text; `file` names it in errors.
+///
+/// # Errors
+/// See [`ResultError`].
 pub fn parse_lens_camera(file: &str, text: &str) -> Result<(Camera<Lens>, ImageSize), ResultError> {
     let Some(model) = stated_model(file, text)? else {
         return parse_camera(file, text).map(|(camera, size)| (camera.into(), size));
@@ -547,6 +556,9 @@ fn refuse_unfinished(file: &str, termination: Option<String>) -> Result<(), Resu
 }
 
 /// As [`read_camera`], from text; `file` names it in errors.
+///
+/// # Errors
+/// See [`ResultError`].
 pub fn parse_camera(file: &str, text: &str) -> Result<(Camera, Option<(usize, usize)>), ResultError> {
     if let Some(model) = stated_model(file, text)? {
         let (camera, size) = parse_lens_camera(file, text)?;

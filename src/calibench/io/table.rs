@@ -22,6 +22,16 @@ pub enum TableError {
         /// Most lines below the header.
         most: usize,
     },
+    /// A line longer than any of a table.
+    #[error("{file}:{line}: a line of more than {most} bytes: is it a table, with commas and line ends?")]
+    LongLine {
+        /// The file.
+        file: String,
+        /// The line.
+        line: u64,
+        /// Most bytes of a line.
+        most: usize,
+    },
     /// Reading stopped in the middle, or a line is not UTF-8 text.
     #[error("{file}:{line}: {message}")]
     Unreadable {
@@ -198,6 +208,9 @@ impl Column {
 /// Lines below the header: 150 000 views of 63 points. Each takes some 200 bytes until its view is made.
 pub const MOST_ROWS: usize = 10_000_000;
 
+/// Bytes of a line: some ten thousand columns.
+const MOST_LINE_BYTES: usize = 1 << 20;
+
 /// Bytes of a name: as long as a path may be.
 const MOST_NAME_BYTES: usize = 4096;
 
@@ -272,7 +285,22 @@ fn read_all(file: &str, mut input: impl Read) -> Result<Vec<u8>, TableError> {
     if bytes.starts_with(BYTE_ORDER_MARK) {
         bytes.drain(..BYTE_ORDER_MARK.len());
     }
+    refuse_long_lines(file, &bytes)?;
     Ok(bytes)
+}
+
+/// What is no table is told before fields are made of it, which take several times its length.
+fn refuse_long_lines(file: &str, bytes: &[u8]) -> Result<(), TableError> {
+    let is_end = |byte: &u8| matches!(byte, b'\n' | b'\r');
+    let mut start = 0;
+    for part in bytes.split(is_end) {
+        if part.len() > MOST_LINE_BYTES {
+            let line = 1 + bytes[..start].iter().filter(|byte| **byte == b'\n').count() as u64;
+            return Err(TableError::LongLine { file: file.into(), line, most: MOST_LINE_BYTES });
+        }
+        start += part.len() + 1;
+    }
+    Ok(())
 }
 
 /// Counts lines up to a record's first byte. The csv reader's own count stops before the blank lines, and
@@ -386,6 +414,7 @@ pub fn unended_line(bytes: &[u8]) -> Option<u64> {
 /// why.
 pub fn columns(bytes: &[u8]) -> Vec<String> {
     let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
+    let bytes = &bytes[..bytes.len().min(MOST_LINE_BYTES)];
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(bytes);
     reader.headers().map(|header| header.iter().map(String::from).collect()).unwrap_or_default()
 }

@@ -34,6 +34,9 @@ impl<T: Copy> Raster<T> {
     }
 
     /// An image of given samples, row by row.
+    ///
+    /// # Errors
+    /// Another number of samples than `width x height`.
     pub fn from_samples(width: usize, height: usize, samples: Vec<T>) -> Result<Raster<T>, RasterError> {
         if samples.len() == width * height {
             Ok(Raster { width, height, samples })

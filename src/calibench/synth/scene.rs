@@ -113,6 +113,9 @@ impl Scene {
 
 impl<L: Imaging> Scene<L> {
     /// Projects every target point in every view.
+    ///
+    /// # Errors
+    /// See [`SceneError`]: a point that the camera does not see, or that its lens folds over another.
     pub fn new(truth: Truth<L>) -> Result<Scene<L>, SceneError> {
         let is_one_to_one = truth.camera.distortion.one_to_one();
         let see = |view: usize, pose: &Pose| -> Result<Vec<Vec2>, SceneError> {
@@ -158,6 +161,9 @@ impl<L: Imaging> Scene<L> {
 
     /// The views with Gaussian noise of standard deviation `sigma_px` on each of u and v, drawn view by view,
     /// point by point, u before v.
+    ///
+    /// # Panics
+    /// A standard deviation that is not finite: no pixel has such a place.
     pub fn observe(&self, sigma_px: f64, stream: &mut Stream) -> Vec<View> {
         self.observe_with(|pixel| {
             let du = stream.normal();
