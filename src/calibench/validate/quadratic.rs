@@ -83,7 +83,7 @@ impl Ratio {
     /// The `x` with `P(F > x) = tail`. Domain: `1e-8 <= tail <= 1 - 1e-8`, which is what the tail is known to; what lies beyond is taken for the
     /// nearest of it, and NaN for the least.
     pub fn quantile(&self, tail: f64) -> f64 {
-        let tail = tail.max(LEAST_TAIL).min(1.0 - LEAST_TAIL);
+        let tail = if tail.is_nan() { LEAST_TAIL } else { tail.clamp(LEAST_TAIL, 1.0 - LEAST_TAIL) };
         let mut high = self.mean_of_numerator().max(f64::MIN_POSITIVE);
         while self.tail(high) > tail && high < f64::MAX / 4.0 {
             high *= 2.0;
