@@ -588,7 +588,7 @@ mod tests {
         for kind in [b"iCCP", b"tEXt", b"eXIf"] {
             let error = parse_image(&with_note(kind, &profile(2 * MOST_NOTES_BYTES as usize)), "large.png")
                 .unwrap_err();
-            assert!(error.to_string().contains("limits are exceeded"), "{error}");
+            assert!(error.to_string().to_lowercase().contains("limit"), "{error}");
         }
     }
 
