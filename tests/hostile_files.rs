@@ -84,11 +84,11 @@ fn megabytes_without_a_comma_or_a_line_end_are_told_in_a_sentence() {
         ("header", "\0".repeat(500_000), "is missing: the header is"),
         (
             "line",
-            format!("view,px,py,X,Y\na,1,2,3,4\na,{},2,3,4\n", long.repeat(4)),
+            format!("view,point,X,Y,u,v\na,1,0,0,3,4\na,2,{},2,3,4\n", long.repeat(4)),
             "line:3: a line of more than",
         ),
-        ("name", format!("view,px,py,X,Y\n{long},1,2,3,4\n"), "is longer than 4096 bytes"),
-        ("number", format!("view,px,py,X,Y\na,{long},2,3,4\n"), "is not a number"),
+        ("name", format!("view,point,X,Y,u,v\n{long},1,0,0,3,4\n"), "is longer than 4096 bytes"),
+        ("number", format!("view,point,X,Y,u,v\na,1,{long},2,3,4\n"), "is not a number"),
     ];
     for (name, content, expected) in files {
         fs::write(folder.join(name), content).expect("written");
