@@ -465,7 +465,7 @@ mod tests {
         };
         let pose = r#"{"rotation":[[1,0,0],[0,1,0],[0,0,1]],"translation":[0,0,1]}"#;
         for (what, list) in [
-            ("poses", vec![pose; 9].join(",")),
+            ("poses", [pose; 9].join(",")),
             ("pose_covariances", "[[1]],[[1]]".into()),
             ("pose_covariances", "[[1,2,3,4,5,6,7]]".into()),
         ] {
