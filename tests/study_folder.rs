@@ -133,8 +133,8 @@ fn parts_that_make_no_whole_are_refused() {
     fs::write(&manifest, text.replace("\"behaviour\": \"", "\"behaviour\": \"0")).unwrap();
     let error = refuse(&[&paths[0], &paths[1], &paths[3]]);
     assert!(error.to_string().contains("code.behaviour"), "{error}");
-    // A folder is locked while it is open, so the same part twice is refused as in use.
-    assert!(merge(&[paths[0].clone(), paths[0].clone()], &scratch("twice"), None, &build()).is_err());
+    let twice = refuse(&[&paths[0], &paths[0]]);
+    assert!(matches!(twice, MergeError::NamedTwice(_)), "{twice}");
     paths.iter().for_each(|p| fs::remove_dir_all(p).unwrap());
 }
 
@@ -197,7 +197,14 @@ fn a_damaged_or_occupied_folder_is_refused() {
     assert!(refuse(std::str::from_utf8(&flipped).unwrap()).contains("SHA-256"));
     let held = Folder::open(&path).unwrap();
     assert!(matches!(Folder::open(&path), Err(FolderError::InUse(_))));
+    assert!(matches!(Folder::open_to_read(&path), Err(FolderError::InUse(_))));
     drop(held);
+    // Readers do not wait for each other, and a run waits for them; a folder that was copied has no lock.
+    let readers = [Folder::open_to_read(&path).unwrap(), Folder::open_to_read(&path).unwrap()];
+    assert!(matches!(Folder::open(&path), Err(FolderError::InUse(_))));
+    drop(readers);
+    fs::remove_file(path.join(".lock")).unwrap();
+    drop(Folder::open_to_read(&path).unwrap());
     let engine = Engine::new(SPEC, Shard::WHOLE).unwrap();
     let again = Folder::create(&path, SPEC, &Manifest::new(&engine.spec, Shard::WHOLE, &build()));
     assert!(matches!(again, Err(FolderError::Taken(_))));

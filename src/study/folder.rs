@@ -152,6 +152,13 @@ fn refuse_links(path: &Path) -> Result<(), FolderError> {
     Ok(())
 }
 
+fn refuse_missing(path: &Path) -> Result<(), FolderError> {
+    match path.join("manifest.json").is_file() {
+        true => Ok(()),
+        false => Err(FolderError::Missing(path.to_path_buf())),
+    }
+}
+
 /// The lock of a folder in which only a run's own regular files stand.
 fn refuse_what_is_not_a_runs(path: &Path) -> Result<PathBuf, FolderError> {
     let lock = path.join(".lock");
@@ -207,17 +214,16 @@ impl Folder {
 
     /// Opens a run whose files are changed by the given operations.
     pub fn open_on(files: Arc<dyn Files>, path: &Path) -> Result<Folder, FolderError> {
-        if !path.join("manifest.json").is_file() {
-            return Err(FolderError::Missing(path.to_path_buf()));
-        }
+        refuse_missing(path)?;
         Folder::lock(files, path)
     }
 
     /// Opens a run to read it, beside others that do. A folder that this user may not write to is read without a lock where it has none.
+    ///
+    /// # Errors
+    /// A folder that holds no run, or one at which a run is.
     pub fn open_to_read(path: &Path) -> Result<Folder, FolderError> {
-        if !path.join("manifest.json").is_file() {
-            return Err(FolderError::Missing(path.to_path_buf()));
-        }
+        refuse_missing(path)?;
         let name = refuse_what_is_not_a_runs(path)?;
         let folder = |lock| Folder { path: path.to_path_buf(), _lock: lock, files: Arc::new(Disk) };
         let Ok(file) = File::open(&name) else {

@@ -546,7 +546,7 @@ mod tests {
         assert!(matches!(error, ImageError::TooLarge { width: 40_000, .. }), "{error}");
     }
 
-    /// A PNG with a chunk behind its header. What its check says is not looked at in notes.
+    /// A PNG with a chunk behind its header.
     fn with_note(kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
         let whole = file_of(image::GrayImage::new(30, 20).into(), image::ImageFormat::Png);
         let (header, rest) = whole.split_at(33);
@@ -561,7 +561,7 @@ mod tests {
         !kind.iter().chain(data).fold(!0, add)
     }
 
-    /// Zeros, packed as zlib does: stored blocks only tell the reader's limit as well as any.
+    /// Zeros as zlib writes them, in blocks that are stored and not packed: the limit is one of the decoder's, whatever the file's length.
     fn stored(length: usize) -> Vec<u8> {
         let mut packed = vec![0x78, 0x01];
         for start in (0..length).step_by(65_535) {

@@ -208,7 +208,7 @@ impl Column {
 /// Lines below the header: 150 000 views of 63 points. Each takes some 200 bytes until its view is made.
 pub const MOST_ROWS: usize = 10_000_000;
 
-/// Bytes of a line: some ten thousand columns.
+/// Bytes of a line: some fifty thousand numbers of twenty digits.
 const MOST_LINE_BYTES: usize = 1 << 20;
 
 /// Bytes of a name: as long as a path may be.

@@ -85,10 +85,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
     }
     // A study's numbers are those of TOML, which end at 2^63; its own limits are far below.
     if u32::try_from(arguments.most_views).is_err() {
-        return Err(Failure::usage(format!(
-            "--most-views {}: a trial has room for some thousands",
-            arguments.most_views
-        )));
+        return Err(Failure::usage(format!("--most-views {}: no trial shows so many", arguments.most_views)));
     }
     let range = Search {
         tilts_deg: arguments.tilt.clone(),
