@@ -105,3 +105,38 @@ fn a_board_without_an_end_is_refused() {
     (0..6).for_each(|row| cover(&mut image, photo.centres_true[9 * row + 8], 16.0));
     assert!(seen_chessboard(&image, 9, 6).is_err());
 }
+
+/// The upper part of an image.
+fn upper(image: &Raster<f32>, height: usize) -> Raster<f32> {
+    let samples = (0..height).flat_map(|y| image.row(y).iter().copied()).collect();
+    Raster::from_samples(image.width(), height, samples).expect("rows of one width")
+}
+
+#[test]
+fn a_board_whose_last_row_is_near_the_images_end_is_not_taken_for_a_smaller_one() {
+    // Squares of 35 px. At half the size the last row is too near the end to be searched.
+    let photo = photo(&Board::chessboard(9, 7, 8.0).expect("a board"), [15.0, 5.0, 0.0]);
+    let last_v = photo.centres_true[54..].iter().map(|place| place.y).fold(0.0, f64::max);
+    for below_px in 6..24 {
+        let image = upper(&photo.image, last_v as usize + below_px);
+        let smaller = seen_chessboard(&image, 9, 6);
+        assert!(smaller.is_err(), "{below_px} px: {smaller:?}");
+    }
+}
+
+#[test]
+fn discs_in_shadow_are_still_of_the_board() {
+    let board = Board::circles(11, 7, 8.0, 5.0).expect("a board");
+    let photo = photo(&board, [15.0, 5.0, 0.0]);
+    let mut image = photo.image.clone();
+    let from = photo.centres_true[9].x.min(photo.centres_true[75].x) - 8.0;
+    for y in 0..image.height() {
+        for x in from as usize..image.width() {
+            image.set(x, y, 0.6 * image.row(y)[x]);
+        }
+    }
+    // Nothing is a complete board of another size.
+    cover(&mut image, photo.centres_true[10], 10.0);
+    let smaller = seen_circle_grid_of(&blobs(&image, &BlobOptions::default()), 9, 7);
+    assert!(smaller.is_err(), "{smaller:?}");
+}

@@ -4,8 +4,8 @@
 //! 1. A level of the pyramid is searched for places where two edges cross ([`candidates`]).
 //! 2. Lattices grow from corner to corner along the squares' edges ([`growth`]); where one is missing, it is
 //!    looked for ([`probe`]).
-//! 3. A lattice with exactly one full rectangle of the asked size, and no board beyond it, is the board
-//!    ([`board`]). A larger rectangle is another board.
+//! 3. A lattice with exactly one full rectangle of the asked size, and no board beyond it, there or in a level that was searched
+//!    before, is the board ([`board`]). A larger rectangle is another board.
 //! 4. Its corners are fitted in the photograph ([`refine`]).
 //!
 //! The level of about a megapixel comes first, then finer ones (small squares), then coarser ones (noise and
@@ -21,16 +21,17 @@ mod places;
 mod probe;
 pub(super) mod refine;
 
+use super::beyond::goes_on;
 use super::lattice::Lattice;
 use super::order::is_certain;
 use super::orientation::Orientation;
-use super::rectangle::Rectangle;
+use super::rectangle::{LEAST_PART, Rectangle};
 use super::seen::SeenBoard;
 use crate::geometry::Vec2;
 use crate::raster::{Level, Raster};
 use board::Found;
 use candidates::Strength;
-use level::{Pyramid, Smoothed};
+use level::{Pyramid, Smoothed, photo_from_level};
 use look::Look;
 use refine::Fitted;
 
@@ -212,7 +213,8 @@ pub fn seen_chessboard<T: Level>(
         Ok((board, fitted)) => certain(fitted.alike(image, columns), columns, rows, board.orientation)
             .ok_or(ChessboardError::Unclear { columns, rows }),
         Err(failure) => {
-            let part = failure.part.and_then(|(level, seen)| in_part(&pyramid, level, &seen, columns, rows));
+            let part = failure.part.and_then(|seen| in_part(&pyramid, &seen, columns, rows));
+            let part = part.filter(|board| !goes_on(board.places_px(), columns, 1, &failure.corners_px));
             part.ok_or(failure.error)
         }
     }
@@ -224,16 +226,18 @@ fn complete<T: Level>(
     rows: usize,
 ) -> Result<(Chessboard, Fitted), Failure> {
     if columns.min(rows) < 2 {
-        return Err(Failure { found: 0, error: ChessboardError::TooSmall { columns, rows }, part: None });
+        return Err(Failure::of(ChessboardError::TooSmall { columns, rows }));
     }
-    let mut best = Failure { found: 0, error: nothing(columns, rows, 0), part: None };
+    let mut best = Failure::of(nothing(columns, rows, 0));
     for level in search_order(pyramid.photo(), pyramid.levels()) {
         match search(pyramid, level, columns, rows) {
-            Ok(seen) => match finished(pyramid, level, &seen, columns, rows) {
+            Ok(seen) => match finished(pyramid, &seen, columns, rows) {
+                // A row near the image's end is lost where pixels are large.
+                Some((_, fitted)) if goes_on(&fitted.corners, columns, 1, &best.corners_px) => {}
                 Some(board) => return Ok(board),
-                None => best = Failure::unclear(columns, rows, best.part, (level, seen)),
+                None => best = best.unclear(columns, rows, seen),
             },
-            Err(failure) => best = best.or(failure.at(level)),
+            Err(failure) => best = best.or(failure),
         }
     }
     Err(best)
@@ -246,54 +250,48 @@ pub(super) fn search_order<T: Level>(image: &Raster<T>, levels: usize) -> impl I
     (0..=first).rev().chain(first + 1..levels)
 }
 
-/// A level without the board.
-struct Failure<Part = (usize, Box<Seen>)> {
-    /// Corners of its largest lattice.
+/// Levels without the board.
+struct Failure {
+    /// Corners of their largest lattice.
     found: usize,
     error: ChessboardError,
-    /// The board with corners missing, and its level.
-    part: Option<Part>,
+    /// The board with corners missing.
+    part: Option<Box<Seen>>,
+    /// Corners of every lattice that is large enough to be part of the board or more, px of the photograph.
+    corners_px: Vec<Vec2>,
 }
 
 impl Failure {
+    /// Without a corner.
+    fn of(error: ChessboardError) -> Failure {
+        Failure { found: 0, error, part: None, corners_px: Vec::new() }
+    }
+
     /// The board was found, but its corners have no fit.
-    fn unclear(
-        columns: usize,
-        rows: usize,
-        part: Option<(usize, Box<Seen>)>,
-        (level, seen): (usize, Seen),
-    ) -> Failure {
+    fn unclear(self, columns: usize, rows: usize, seen: Seen) -> Failure {
         let error = ChessboardError::Unclear { columns, rows };
-        Failure { found: columns * rows, error, part: more(part, Some((level, Box::new(seen)))) }
+        Failure { found: columns * rows, error, part: more(self.part, Some(Box::new(seen))), ..self }
     }
 
     /// The failure with more corners, and the part with more.
     fn or(self, other: Failure) -> Failure {
-        let part = more(self.part, other.part);
-        let Failure { found, error, .. } = if other.found > self.found {
-            Failure { part: None, ..other }
-        } else {
-            Failure { part: None, ..self }
-        };
-        Failure { found, error, part }
-    }
-}
-
-impl Failure<Box<Seen>> {
-    /// In a level.
-    fn at(self, level: usize) -> Failure {
-        Failure { found: self.found, error: self.error, part: self.part.map(|seen| (level, seen)) }
+        let (found, error) =
+            if other.found > self.found { (other.found, other.error) } else { (self.found, self.error) };
+        let mut corners_px = self.corners_px;
+        corners_px.extend(other.corners_px);
+        Failure { found, error, part: more(self.part, other.part), corners_px }
     }
 }
 
 /// The part with more corners, the first of equal ones.
-fn more(a: Option<(usize, Box<Seen>)>, b: Option<(usize, Box<Seen>)>) -> Option<(usize, Box<Seen>)> {
-    let count = |part: &Option<(usize, Box<Seen>)>| part.as_ref().map_or(0, |(_, seen)| seen.lattice.len());
+fn more(a: Option<Box<Seen>>, b: Option<Box<Seen>>) -> Option<Box<Seen>> {
+    let count = |part: &Option<Box<Seen>>| part.as_ref().map_or(0, |seen| seen.lattice.len());
     if count(&b) > count(&a) { b } else { a }
 }
 
 /// A board in a level.
 struct Seen {
+    level: usize,
     rectangle: Rectangle,
     lattice: Lattice,
     places: Vec<Vec2>,
@@ -309,29 +307,28 @@ fn search<T: Level>(
     level: usize,
     columns: usize,
     rows: usize,
-) -> Result<Seen, Failure<Box<Seen>>> {
+) -> Result<Seen, Failure> {
     let smoothed = pyramid.smoothed(level);
-    search_among(&smoothed, Strength::Strong, columns, rows).or_else(|strong| {
-        search_among(&smoothed, Strength::Any, columns, rows)
-            .map_err(|any| if any.found > strong.found { any } else { strong })
-    })
+    let among = |strength| search_among(&smoothed, level, strength, columns, rows);
+    among(Strength::Strong).or_else(|strong| among(Strength::Any).map_err(|any| strong.or(any)))
 }
 
 fn search_among(
     smoothed: &Smoothed,
+    level: usize,
     strength: Strength,
     columns: usize,
     rows: usize,
-) -> Result<Seen, Failure<Box<Seen>>> {
+) -> Result<Seen, Failure> {
     let candidates = candidates::candidates(smoothed, strength);
     let seen = candidates.len();
     let grown = growth::lattices(smoothed, &Look::PLAIN, candidates, columns * rows);
     let places: Vec<Vec2> = grown.corners.iter().map(|corner| corner.at).collect();
-    let mut failure: Option<Failure<Box<Seen>>> = None;
+    let mut failure: Option<Failure> = None;
     for lattice in grown.lattices {
         let found = lattice.len();
         let error = match board::find(&lattice, columns, rows) {
-            Found::Board(rectangle) => return Ok(Seen { rectangle, lattice, places }),
+            Found::Board(rectangle) => return Ok(Seen { level, rectangle, lattice, places }),
             Found::Other { columns: found_columns, rows: found_rows } => {
                 ChessboardError::WrongSize { columns, rows, found_columns, found_rows }
             }
@@ -341,24 +338,27 @@ fn search_among(
             Found::Incomplete => ChessboardError::NotRectangular { columns, rows, found },
         };
         // The largest comes first.
-        let failure = failure.get_or_insert(Failure { found, error, part: None });
+        let failure = failure.get_or_insert(Failure { found, ..Failure::of(error) });
+        if found as f64 >= LEAST_PART * (columns * rows) as f64 {
+            let in_photo = |mark: &usize| photo_from_level(&places[*mark], level);
+            failure.corners_px.extend(lattice.values().map(in_photo));
+        }
         if failure.part.is_none()
             && let Some(rectangle) = Rectangle::in_part(&lattice, columns, rows)
         {
-            failure.part = Some(Box::new(Seen { rectangle, lattice, places: places.clone() }));
+            failure.part = Some(Box::new(Seen { level, rectangle, lattice, places: places.clone() }));
         }
     }
-    Err(failure.unwrap_or(Failure { found: 0, error: nothing(columns, rows, seen), part: None }))
+    Err(failure.unwrap_or(Failure::of(nothing(columns, rows, seen))))
 }
 
 fn finished<T: Level>(
     pyramid: &Pyramid<'_, T>,
-    level: usize,
     seen: &Seen,
     columns: usize,
     rows: usize,
 ) -> Option<(Chessboard, Fitted)> {
-    let (fitted, orientation) = seen.fitted(pyramid, level, columns, rows);
+    let (fitted, orientation) = seen.fitted(pyramid, columns, rows);
     let corners_px = fitted.corners.iter().copied().collect::<Option<Vec<Vec2>>>()?;
     Some((Chessboard { columns, rows, corners_px, orientation }, fitted))
 }
@@ -366,12 +366,11 @@ fn finished<T: Level>(
 /// The board with the corners that are seen, if after their fit it is still certain which they are.
 fn in_part<T: Level>(
     pyramid: &Pyramid<'_, T>,
-    level: usize,
     seen: &Seen,
     columns: usize,
     rows: usize,
 ) -> Option<SeenBoard> {
-    let (fitted, orientation) = seen.fitted(pyramid, level, columns, rows);
+    let (fitted, orientation) = seen.fitted(pyramid, columns, rows);
     certain(fitted.alike(pyramid.photo(), columns), columns, rows, orientation)
 }
 
@@ -390,14 +389,13 @@ impl Seen {
     fn fitted<T: Level>(
         &self,
         pyramid: &Pyramid<'_, T>,
-        level: usize,
         columns: usize,
         rows: usize,
     ) -> (Fitted, Orientation) {
         let ordered = board::ordered(&self.lattice, &self.rectangle, &self.places, (columns, rows));
         let found: Vec<Option<Vec2>> =
             ordered.marks.iter().map(|mark| mark.map(|mark| self.places[mark])).collect();
-        let fitted = refine::refined(pyramid, level, &found, columns, ordered.starts_dark, &Look::PLAIN);
+        let fitted = refine::refined(pyramid, self.level, &found, columns, ordered.starts_dark, &Look::PLAIN);
         (fitted, ordered.orientation)
     }
 }

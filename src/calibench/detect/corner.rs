@@ -98,7 +98,11 @@ pub fn refine_corner<T: Level>(image: &Raster<T>, start: Vec2, half_px: usize) -
 /// One solution of the linear problem around a place.
 fn step<T: Level>(image: &Raster<T>, at: Vec2, half_px: usize) -> Result<Vec2, RefineError> {
     let (u, v) = (at.x, at.y);
-    let patch = patch(image, at, half_px + 1).ok_or(RefineError::OutsideImage { u, v, half_px })?;
+    let outside = RefineError::OutsideImage { u, v, half_px };
+    if half_px >= image.width().max(image.height()) {
+        return Err(outside);
+    }
+    let patch = patch(image, at, half_px + 1).ok_or(outside)?;
     let side = 2 * half_px + 3;
     let level = |x: usize, y: usize| patch[y * side + x];
     let (mut scatter, mut weighted) = (Matrix2::zeros(), Vec2::zeros());

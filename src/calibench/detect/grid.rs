@@ -1,5 +1,6 @@
 //! Which disc is which mark of the board? Grids of discs in line, dense or sparse, complete and ordered.
 
+use super::beyond::goes_on;
 use super::blob::Blob;
 use super::discs::{BlobOptions, blobs};
 use super::grid_error::GridError;
@@ -131,7 +132,9 @@ fn grid_in_part(discs: &[Blob], columns: usize, rows: usize) -> Option<SeenBoard
     out_of_line(&mut places_px, columns);
     let place = |index: usize| Vec2::new((index % columns) as f64, (index / columns) as f64);
     take_out_misplaced(&mut places_px, &(0..columns * rows).map(place).collect::<Vec<Vec2>>());
-    is_certain(&places_px, columns, rows)
+    // What was left out may be its next row.
+    let all: Vec<Vec2> = discs.iter().map(|disc| disc.centre_px).collect();
+    (is_certain(&places_px, columns, rows) && !goes_on(&places_px, columns, 1, &all))
         .then(|| SeenBoard::new(columns, rows, places_px, Orientation::of_discs(columns, rows)))
 }
 

@@ -1,6 +1,7 @@
 //! Where are the marks in a photograph? Discs, ordered grids of discs, chessboard corners, boards with markers.
 
 mod beside;
+mod beyond;
 mod bias;
 mod blob;
 mod centre;

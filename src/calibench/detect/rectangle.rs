@@ -14,14 +14,14 @@ pub struct Rectangle {
 }
 
 /// Marks beside a rectangle that may be chance, as part of the side: texture that looks like one more mark.
-const MOST_STRAYS: f64 = 0.34;
+pub const MOST_STRAYS: f64 = 0.34;
 
 /// Fewest marks of an outer row or column that show where a board of which marks are hidden ends, on sides that have
 /// as many.
 const FEWEST_ON_A_SIDE: usize = 3;
 
 /// Least part of a board's marks that must be seen.
-const LEAST_PART: f64 = 0.5;
+pub const LEAST_PART: f64 = 0.5;
 
 impl Rectangle {
     pub fn is_full(&self, lattice: &Lattice) -> bool {

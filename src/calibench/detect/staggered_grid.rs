@@ -1,5 +1,6 @@
 //! Where are the discs of a board whose rows are staggered? All of them in order, or those that are seen.
 
+use super::beyond::goes_on;
 use super::blob::Blob;
 use super::discs::{BlobOptions, blobs};
 use super::grid::{DotGrid, alike_on_board};
@@ -92,5 +93,10 @@ fn in_part(discs: &[Blob], columns: usize, rows: usize) -> Option<SeenBoard> {
     };
     let lattice: Lattice = lattice.into_iter().filter(|(_, mark)| kept(*mark)).collect();
     ordered_staggered_part(&lattice, &centres, columns, rows)?;
+    // What was left out may be its next row.
+    let all: Vec<Vec2> = discs.iter().map(|disc| disc.centre_px).collect();
+    if goes_on(&in_line, columns, 2, &all) {
+        return None;
+    }
     Some(SeenBoard::new(columns, rows, in_line, Orientation::of_staggered(rows)))
 }

@@ -45,6 +45,9 @@ const MOST_WIDER: f64 = 0.04;
 /// pairs of tags tell: that of corners that err by a tenth of a pixel, or that a strong lens bends.
 const MOST_WIDER_EXACTLY: f64 = 0.01;
 
+/// Fewest pairs of tags whose corners tell the spacing; that of so few may differ as that of the tags' middles may.
+const FEWEST_PAIRS: usize = 5;
+
 /// Tags beyond the board that others confirm: one may be read wrongly.
 const FEWEST_BEYOND: usize = 2;
 
@@ -315,9 +318,10 @@ fn another_spacing(corners_px: &[Option<Vec2>], columns: usize, grid: &AprilGrid
         .filter_map(|(column, row)| of_four(&|k| (column + k, row)))
         .chain(down_column.filter_map(|(column, row)| of_four(&|k| (column, row + k))))
         .collect();
-    let spacing = median(&mut told).filter(|_| told.len() >= 2 * FEWEST_NEIGHBOURS)?;
+    let spacing = median(&mut told).filter(|_| told.len() >= FEWEST_PAIRS)?;
     let mut off: Vec<f64> = told.iter().map(|one| (one - spacing).abs()).collect();
-    let most = MOST_WIDER_EXACTLY + median(&mut off)?;
+    let (few, deviation) = (told.len() < 2 * FEWEST_NEIGHBOURS, median(&mut off)?);
+    let most = if few { MOST_WIDER + 2.0 * deviation } else { MOST_WIDER_EXACTLY + deviation };
     ((spacing - grid.spacing()).abs() > most).then_some(spacing)
 }
 
@@ -355,7 +359,45 @@ fn agreeing(tags: Vec<Tag>, grid: &AprilGrid) -> Vec<Tag> {
         }
     }
     let kept: Vec<bool> = (0..tags.len()).map(|index| best.contains(&Some(index))).collect();
-    tags.into_iter().zip(kept).filter(|(_, kept)| *kept).map(|(tag, _)| tag).collect()
+    one_board(tags.into_iter().zip(kept).filter(|(_, kept)| *kept).map(|(tag, _)| tag).collect(), grid)
+}
+
+/// The tags, if all stand on one board; none where some that confirm each other stand elsewhere than the most do. Rows of a grid of which the
+/// numbers begin elsewhere, or of another width, go on in the next row of this one: their parts agree, each by itself.
+fn one_board(tags: Vec<Tag>, grid: &AprilGrid) -> Vec<Tag> {
+    let agree = |tag: &Tag, other: &Tag| agree(tag, other, grid) && agree(other, tag, grid);
+    let parts = connected(tags, |tag, other| other.apart(tag.at) <= FARTHEST && agree(tag, other));
+    let mut parts = parts.into_iter();
+    let Some(mut most) = parts.next() else { return Vec::new() };
+    let mut elsewhere = 0;
+    for part in parts {
+        // What lies farther from the rest than tags look, as beyond something that covers the middle.
+        if part.iter().any(|tag| most.iter().any(|other| agree(tag, other))) {
+            most.extend(part);
+        } else {
+            elsewhere += part.len();
+        }
+    }
+    if most.len() < FOR_EACH_AGAINST * elsewhere { Vec::new() } else { most }
+}
+
+/// Parts of which each tag is linked to another, the largest first, and the first of equal ones.
+fn connected(tags: Vec<Tag>, are_linked: impl Fn(&Tag, &Tag) -> bool) -> Vec<Vec<Tag>> {
+    let mut left = tags;
+    let mut parts = Vec::new();
+    while !left.is_empty() {
+        let mut part = vec![left.remove(0)];
+        let mut next = 0;
+        while next < part.len() {
+            let (linked, others) = left.into_iter().partition(|tag| are_linked(&part[next], tag));
+            left = others;
+            part.extend::<Vec<Tag>>(linked);
+            next += 1;
+        }
+        parts.push(part);
+    }
+    parts.sort_by_key(|part| std::cmp::Reverse(part.len()));
+    parts
 }
 
 /// Whether a tag lies where another puts it.
@@ -366,4 +408,43 @@ fn agree(tag: &Tag, other: &Tag, grid: &AprilGrid) -> bool {
     };
     (expected - middle_px(&other.corners_px)).norm()
         < MOST_OFF * side_px(&other.corners_px) * other.apart(tag.at) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tag of a grid of six columns, 20 px wide, which stands elsewhere than its number says.
+    fn tag(id: usize, column: usize, row: usize) -> Tag {
+        let corner = |x: f64, y: f64| {
+            26.0 * Vec2::new(column as f64, -(row as f64)) + 20.0 * Vec2::new(x, y) + Vec2::new(300.0, 300.0)
+        };
+        let corners_px = [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)];
+        Tag { id, at: (id % 6, id / 6), corners_px, contrast: 1.0 }
+    }
+
+    fn ids(tags: Vec<Tag>) -> Vec<usize> {
+        let mut ids: Vec<usize> =
+            agreeing(tags, &AprilGrid::new(6, 6, 0.3).unwrap()).iter().map(|tag| tag.id).collect();
+        ids.sort_unstable();
+        ids
+    }
+
+    #[test]
+    fn rows_that_go_on_in_the_next_row_are_another_grid() {
+        // Its numbers begin with 3: what stands right of its third column seems to stand left of it, a row higher.
+        let of_six = |id: usize| tag(id, (id - 3) % 6, (id - 3) / 6);
+        let left = [9, 10, 11, 15, 16, 17, 22, 23, 28, 29, 34, 35].map(of_six).to_vec();
+        let right = [12, 18, 24, 30, 31].map(of_six).to_vec();
+        assert_eq!(ids(left.clone()).len(), 12);
+        assert_eq!(ids(right.clone()).len(), 5);
+        assert!(ids([left, right].concat()).is_empty());
+    }
+
+    #[test]
+    fn a_grid_of_which_the_middle_is_covered_is_one() {
+        let seen: Vec<usize> = (0..36).filter(|id| matches!(id % 6, 0 | 1 | 5)).collect();
+        let tags = seen.iter().map(|&id| tag(id, id % 6, id / 6)).collect();
+        assert_eq!(ids(tags), seen);
+    }
 }
