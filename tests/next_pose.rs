@@ -263,3 +263,30 @@ fn what_cannot_be_planned_is_wrong_usage_with_what_to_do() {
         assert_eq!(text(&output.stdout), "", "{arguments:?}");
     }
 }
+
+#[test]
+fn what_residuals_with_strays_spread_by_is_not_taken_for_noise() {
+    let (folder, _) = calibrated_folder("next-pose-robust");
+    let robust = calibrated(&folder, "corners.csv", "robust", &["--loss", "huber:0.2"]);
+    assert_eq!(robust["loss"], "huber:0.2");
+    let bent = calibrated(&folder, "corners.csv", "bent", &["--board-shape", "bow:0.01"]);
+    assert!(bent.get("loss").is_none());
+    let measure = |of: &'static str| vec!["measure", of, "--view", "1", "--pixels", "300,200,340,200"];
+    let plan = |of: &'static str| vec!["next-pose", of, "--board", BOARD, "--want", "fx"];
+    let file = "robust/result.json";
+    for (arguments, words) in [
+        (measure(file), "--mark-sd"),
+        (plan(file), "--mark-sd"),
+        (vec!["validate", file, "corners.csv"], "--again"),
+        (measure("bent/result.json"), "flat boards only"),
+    ] {
+        let output = run(&folder, &arguments);
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        assert!(said.contains(words), "{arguments:?}: {said}");
+    }
+    for arguments in [measure(file), plan(file)] {
+        let output = run(&folder, &[&arguments[..], &["--mark-sd", "0.1"]].concat());
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", text(&output.stderr));
+    }
+}

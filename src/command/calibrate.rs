@@ -81,7 +81,9 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "MODEL")]
     model: Option<ModelChoice>,
     /// Estimates how the board is bent, each number known beforehand to be 0 with a standard deviation in the
-    /// target's unit, or free: bow:SD (two bows), bow:free, bent:SD (with a twist), bent:free
+    /// target's unit, or free: bow:SD (two bows), bow:free, bent:SD (with a twist), bent:free. A mark lies
+    /// bow_x (1 - x^2) + bow_y (1 - y^2) + twist x y towards the target's +Z, x and y from -1 to 1 over all marks; nothing
+    /// certifies the minimum then
     #[arg(long = "board-shape", value_name = "SHAPE", value_parser = parse_shape)]
     bow: Option<Board>,
     /// Parameters to estimate, of fx fy cx cy skew k1 k2 p1 p2 k3 and those of other lens models; the others
@@ -292,6 +294,15 @@ fn parse_loss(text: &str) -> Result<Loss, String> {
         _ => return Err(wanted()),
     };
     if loss.is_valid() { Ok(loss) } else { Err(CalibrationError::BadLoss.to_string()) }
+}
+
+/// A robust loss as [`parse_loss`] reads it.
+fn loss_name(loss: Loss) -> Option<String> {
+    match loss {
+        Loss::Huber { delta_px } => Some(format!("huber:{delta_px}")),
+        Loss::Cauchy { scale_px } => Some(format!("cauchy:{scale_px}")),
+        _ => None,
+    }
 }
 
 fn parse_factor(text: &str) -> Result<f64, String> {

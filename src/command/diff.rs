@@ -30,7 +30,7 @@ pub(super) struct Arguments {
     /// Size of the frame, where neither file says it
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     image_size: Option<(usize, usize)>,
-    /// Distance of what is looked at, in mm: the best translation is taken out too [default: the best
+    /// Distance of what is looked at, along its ray, in mm: the best translation is taken out too [default: the best
     /// rotation alone, for any distance]
     #[arg(long, value_name = "MM", value_parser = parse_distance)]
     at: Option<f64>,

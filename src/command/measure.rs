@@ -120,8 +120,16 @@ fn measured_in_view(
     }
     refuse_outside(known, &ends)?;
     let file = arguments.result.shown();
+    if known.has_board {
+        return Err(format!(
+            "{file}: the board's shape was estimated: lengths are measured on flat boards only"
+        ));
+    }
     let camera = known.brown_conrady(&file).map_err(|error| error.to_string())?;
     let plane = plane(arguments, known, &camera)?;
+    if arguments.mark_sd.is_none() {
+        known.noise_px(&file).map_err(|error| format!("{error}: give it, --mark-sd PX"))?;
+    }
     let noise = Noise { sigma_px: known.sigma_px, freedom: known.degrees_of_freedom };
     let conditions = noise.conditions(arguments);
     each(ends, |pixels| length_in_view(&plane, pixels, &conditions).map_err(|error| error.to_string()))

@@ -148,7 +148,8 @@ fn plan(arguments: &Arguments) -> Result<Plan, String> {
     }
     let image_size = image_size(arguments, &known)?;
     let (points, unit) = marks(arguments)?;
-    let sigma_px = match arguments.mark_sd.unwrap_or(known.sigma_px) {
+    let noise_px = || known.noise_px(&file).map_err(|error| format!("{error}: give it, --mark-sd PX"));
+    let sigma_px = match arguments.mark_sd.map_or_else(noise_px, Ok)? {
         sigma if sigma > 0.0 => sigma,
         _ => {
             return Err(format!(

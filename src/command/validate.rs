@@ -102,6 +102,9 @@ fn found(arguments: &Arguments) -> Result<Found, String> {
     };
     if !arguments.files.is_empty() {
         refuse_bent_board(arguments, &known)?;
+        known.noise_px(&arguments.result.shown()).map_err(|error| {
+            format!("{error}, nor that of views to validate it by (--again compares cameras)")
+        })?;
         let size = arguments.image_size.or(known.image_size);
         let views = views_of(&arguments.files, arguments.board.as_ref(), size, arguments.memory)?;
         match arguments.k_fold {

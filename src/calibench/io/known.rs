@@ -28,8 +28,10 @@ pub struct KnownCalibration {
     pub cam_from_target: Vec<Pose>,
     /// Joint covariance of camera and poses.
     pub covariance: Covariance,
-    /// Estimated noise of a pixel coordinate, px.
+    /// Estimated noise of a pixel coordinate, px; with a robust loss the spread of all residuals, strays included.
     pub sigma_px: f64,
+    /// The robust loss that residuals counted by, if one did.
+    pub loss: Option<String>,
     /// Degrees of freedom of that noise.
     pub degrees_of_freedom: usize,
     /// Whether something was known of parameters beforehand, and counts in the covariance.
@@ -48,6 +50,19 @@ impl KnownCalibration {
     pub fn brown_conrady(&self, file: &str) -> Result<Camera, ResultError> {
         let model = self.camera.distortion.model();
         self.camera.brown_conrady().ok_or(ResultError::OtherModel { file: file.into(), model })
+    }
+
+    /// The noise of a mark's coordinate, px, and its degrees of freedom; `file` names the result in the error.
+    ///
+    /// # Errors
+    /// [`KnownError::RobustLoss`].
+    pub fn noise_px(&self, file: &str) -> Result<f64, KnownError> {
+        match &self.loss {
+            None => Ok(self.sigma_px),
+            Some(loss) => {
+                Err(KnownError::RobustLoss { file: file.into(), loss: on_one_line(loss).into_owned() })
+            }
+        }
     }
 }
 
@@ -94,6 +109,16 @@ pub enum KnownError {
         /// The file.
         file: String,
     },
+    /// The spread of residuals with strays among them is not the noise of the others.
+    #[error(
+        "{file}: it was calibrated with the loss {loss}, and what its residuals spread by counts strays too: it does not tell the noise of a mark"
+    )]
+    RobustLoss {
+        /// The file.
+        file: String,
+        /// The loss.
+        loss: String,
+    },
     /// A name in `free` is none.
     #[error("{file}: free: {cause}")]
     Free {
@@ -131,6 +156,8 @@ struct CameraFields {
     covariance: Vec<Vec<Option<f64>>>,
     #[serde(default)]
     sigma_px: Option<f64>,
+    #[serde(default)]
+    loss: Option<String>,
     #[serde(default)]
     degrees_of_freedom: usize,
     #[serde(default)]
@@ -228,6 +255,7 @@ pub fn parse_known(file: &str, text: &str) -> Result<Known, KnownError> {
         degrees_of_freedom: fields.degrees_of_freedom,
         has_priors: !fields.priors.is_empty(),
         has_board: fields.board.is_some(),
+        loss: fields.loss,
         doubts: doubts(fields.warnings),
     })))
 }

@@ -299,8 +299,11 @@ pub struct CalibrationFields {
     pub covariance: Vec<Vec<f64>>,
     /// `sqrt(sum |w r|^2 / N)`, px, with the weights `w` of the marks, 1 where the file has none.
     pub rmse_px: f64,
-    /// Estimated noise of one pixel coordinate, px.
+    /// Estimated noise of one pixel coordinate, px: `sqrt(sum |w r|^2 / (2 N - p))`, strays included whatever the loss.
     pub sigma_px: f64,
+    /// What residuals counted by, where not by their squares: `huber:PX` or `cauchy:PX`; the caller adds it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loss: Option<String>,
     /// `2 N - p`.
     pub degrees_of_freedom: usize,
     /// `converged`, `above-floor`, `iteration-limit` or `stalled`.
@@ -352,6 +355,7 @@ impl CalibrationFields {
             covariance: (0..n).map(|i| (0..n).map(|j| covariance[(i, j)]).collect()).collect(),
             rmse_px: calibration.rmse_px,
             sigma_px: calibration.sigma_px,
+            loss: None,
             degrees_of_freedom: calibration.degrees_of_freedom,
             termination: calibration.termination.name(),
             certificate: calibration
@@ -535,10 +539,11 @@ pub fn parse_lens_camera(file: &str, text: &str) -> Result<(Camera<Lens>, ImageS
     }
 }
 
-/// The model that a camera states; `None` if it states none, or text that other readers complain of.
+/// The model that a camera states, if it states one.
 fn stated_model(file: &str, text: &str) -> Result<Option<Model>, ResultError> {
-    let value: Option<serde_json::Value> = serde_json::from_str(text).ok();
-    let stated = value.as_ref().and_then(|value| value.get("camera")?.get("model")?.as_str());
+    let format = |cause| ResultError::Format { file: file.into(), cause };
+    let value: serde_json::Value = serde_json::from_str(text).map_err(format)?;
+    let stated = value.get("camera").and_then(|camera| camera.get("model")?.as_str());
     let unknown = |error: crate::camera::UnknownModel| ResultError::Lens {
         file: file.into(),
         message: error.to_string(),
@@ -605,6 +610,9 @@ mod tests {
     fn broken_files_are_refused_with_their_place() {
         let error = parse_camera("r.json", "{\"camera\": {\"fx\": 1,\n \"fy\": x}}").unwrap_err().to_string();
         assert!(error.starts_with("r.json:2:"), "{error}");
+        let fisheye = "{\"camera\": {\"model\": \"kannala-brandt\",\n \"fx\": 1e999}}";
+        let error = parse_lens_camera("r.json", fisheye).unwrap_err().to_string();
+        assert!(error.starts_with("r.json:2:") && !error.contains("model"), "{error}");
         let no_camera = r#"{"camera": {"fx": -1, "fy": 1, "cx": 0, "cy": 0}}"#;
         assert!(matches!(parse_camera("r.json", no_camera), Err(ResultError::NoCamera { .. })));
     }

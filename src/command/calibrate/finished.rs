@@ -41,6 +41,8 @@ pub(super) struct Finished {
     pub(super) orientation: Option<Orientation>,
     /// Of lens models, if one was to be chosen.
     pub(super) comparison: Option<Comparison>,
+    /// What residuals counted by, where not by their squares.
+    pub(super) loss: Option<String>,
 }
 
 impl Finished {
@@ -145,6 +147,13 @@ pub(super) fn summary(finished: &Finished) -> String {
     );
     if finished.is_weighted() {
         text.push_str(OF_WEIGHTS);
+    }
+    if let Some(loss) = &finished.loss {
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "residuals count by {loss}: strays are in RMSE and noise, and hardly in camera and deviations"
+        );
     }
     if let Some(sentence) = calibration.certificate.as_ref().and_then(certificate) {
         text.push_str(&sentence);
