@@ -52,7 +52,7 @@ impl KnownCalibration {
         self.camera.brown_conrady().ok_or(ResultError::OtherModel { file: file.into(), model })
     }
 
-    /// The noise of a mark's coordinate, px, and its degrees of freedom; `file` names the result in the error.
+    /// The noise of a mark's coordinate, px; `file` names the result in the error.
     ///
     /// # Errors
     /// [`KnownError::RobustLoss`].
