@@ -38,9 +38,9 @@ pub fn normal_cdf(z: f64) -> f64 {
     stable(standard_normal().cdf(z))
 }
 
-/// The `z` with `P(Z <= z) = p`, 0 < p < 1.
+/// The `z` with `P(Z <= z) = p`: infinite at 0 and 1, NaN where `p` is no probability.
 pub fn normal_quantile(p: f64) -> f64 {
-    stable(standard_normal().inverse_cdf(p))
+    if (0.0..=1.0).contains(&p) { stable(standard_normal().inverse_cdf(p)) } else { f64::NAN }
 }
 
 /// The half-width `z` of a two-sided interval that a standard normal variable leaves with probability
@@ -55,9 +55,12 @@ pub fn normal_two_sided(false_alarm: f64) -> f64 {
 /// million, and not at all at some more.
 const MANY: f64 = 1000.0;
 
+/// The tail keeps its digits where the inverse of the incomplete beta function, of what is as rare, does not.
+const RARE: f64 = 1e-15;
+
 /// The half-width `t` of a two-sided interval that a variable of Student's distribution leaves with probability
-/// `false_alarm`, 0 < false_alarm < 1 (Student 1908); that of the normal distribution if `degrees_of_freedom` is infinite,
-/// or none that the distribution has: 0, below 0, or NaN.
+/// `false_alarm` (Student 1908); that of the normal distribution if `degrees_of_freedom` is infinite. It is infinite where none are
+/// left, and NaN where `false_alarm` is no probability or `degrees_of_freedom` no number.
 ///
 /// ```
 /// use calibench::distribution::student_two_sided;
@@ -65,13 +68,23 @@ const MANY: f64 = 1000.0;
 /// assert!((student_two_sided(0.05, 10.0) - 2.228).abs() < 5e-4);
 /// ```
 pub fn student_two_sided(false_alarm: f64, degrees_of_freedom: f64) -> f64 {
+    if degrees_of_freedom <= 0.0 {
+        return f64::INFINITY;
+    }
+    if degrees_of_freedom.is_nan() || !(0.0..=1.0).contains(&false_alarm) {
+        return f64::NAN;
+    }
     if degrees_of_freedom >= MANY {
         return stable(student_expanded(normal_two_sided(false_alarm), degrees_of_freedom));
     }
-    match StudentsT::new(0.0, 1.0, degrees_of_freedom) {
-        Ok(student) => stable(-student.inverse_cdf(0.5 * false_alarm)),
-        Err(_) => normal_two_sided(false_alarm),
+    let student = StudentsT::new(0.0, 1.0, degrees_of_freedom).expect("degrees of freedom are positive");
+    if false_alarm > RARE {
+        return stable(-student.inverse_cdf(0.5 * false_alarm));
     }
+    if false_alarm == 0.0 {
+        return f64::INFINITY;
+    }
+    stable(bisected(1.0, |t| 2.0 * student.cdf(-t) > false_alarm))
 }
 
 /// The quantile of Student's distribution at the probability of the normal quantile `z`, by the inverse powers of its degrees
@@ -99,6 +112,26 @@ pub fn fisher_cdf(f: f64, numerator_freedom: usize, denominator_freedom: usize) 
 pub fn fisher_tail(f: f64, numerator_freedom: usize, denominator_freedom: usize) -> f64 {
     FisherSnedecor::new(numerator_freedom as f64, denominator_freedom as f64)
         .map_or(f64::NAN, |d| stable(d.sf(f.max(0.0))))
+}
+
+/// The positive number up to which `below` holds, by bisection from 0 and from `high`, doubled until it does not hold there.
+fn bisected(mut high: f64, below: impl Fn(f64) -> bool) -> f64 {
+    let mut low = 0.0;
+    while below(high) {
+        high *= 2.0;
+    }
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            break;
+        }
+        if below(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
 }
 
 /// The standard normal equivalent of a chi-squared value: the cube root of chi-squared over its degrees of
@@ -149,34 +182,28 @@ impl ChiSquare {
         stable(self.distribution().sf(x.max(0.0)))
     }
 
-    /// The `x` with `P(X <= x) = p`, 0 < p < 1, to ten digits.
+    /// The `x` with `P(X <= x) = p`, to ten digits: 0 and infinite at the ends, NaN where `p` is no probability.
     ///
     /// Bisection of the distribution function between bounds from the normal approximation (Wilson & Hilferty
     /// 1931).
     pub fn quantile(self, p: f64) -> f64 {
+        if !(p > 0.0 && p < 1.0) {
+            return if p == 0.0 {
+                0.0
+            } else if p == 1.0 {
+                f64::INFINITY
+            } else {
+                f64::NAN
+            };
+        }
         let d = self.degrees_of_freedom;
         let c = 2.0 / (9.0 * d);
         let root = 1.0 - c + normal_quantile(p) * c.sqrt();
         let guess = (d * root * root * root).max(1e-3);
-        let (mut low, mut high) = (0.0, 2.0 * guess + 10.0);
         let distribution = self.distribution();
         // The tail in which p is small keeps its digits.
         let below = |x: f64| if p < 0.5 { distribution.cdf(x) < p } else { distribution.sf(x) > 1.0 - p };
-        while below(high) {
-            high *= 2.0;
-        }
-        for _ in 0..200 {
-            let middle = 0.5 * (low + high);
-            if middle <= low || middle >= high {
-                break;
-            }
-            if below(middle) {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        stable(0.5 * (low + high))
+        stable(bisected(2.0 * guess + 10.0, below))
     }
 
     /// Mean of the square root of the variable: `sqrt(2) Gamma((d + 1) / 2) / Gamma(d / 2)`.
@@ -197,6 +224,34 @@ mod tests {
             let exact = -2.0 * libm::log(tail);
             assert!((ChiSquare::new(2).quantile(1.0 - tail) / exact - 1.0).abs() < 1e-8, "{tail}");
         }
+    }
+
+    #[test]
+    fn students_quantiles_of_what_is_rare_are_those_of_closed_forms() {
+        for rare in [1e-3, 1e-14, 1e-16, 1e-30, 1e-100] {
+            let of_one = 1.0 / libm::tan(0.5 * std::f64::consts::PI * rare);
+            assert!((student_two_sided(rare, 1.0) / of_one - 1.0).abs() < 1e-8, "{rare}");
+            let of_two = (2.0 / (rare * (2.0 - rare)) - 2.0).sqrt();
+            assert!((student_two_sided(rare, 2.0) / of_two - 1.0).abs() < 1e-8, "{rare}");
+        }
+        assert_eq!(student_two_sided(0.0, 5.0), f64::INFINITY);
+        assert_eq!(student_two_sided(0.05, 0.0), f64::INFINITY);
+    }
+
+    #[test]
+    fn what_is_no_probability_has_no_quantile() {
+        for p in [f64::NAN, -0.1, 1.1] {
+            let quantiles = [
+                normal_quantile(p),
+                ChiSquare::new(3).quantile(p),
+                student_two_sided(p, 5.0),
+                student_two_sided(p, 5000.0),
+            ];
+            assert!(quantiles.iter().all(|quantile| quantile.is_nan()), "{p}: {quantiles:?}");
+        }
+        assert!(student_two_sided(0.05, f64::NAN).is_nan());
+        assert_eq!([0.0, 1.0].map(normal_quantile), [f64::NEG_INFINITY, f64::INFINITY]);
+        assert_eq!([0.0, 1.0].map(|p| ChiSquare::new(3).quantile(p)), [0.0, f64::INFINITY]);
     }
 
     #[test]

@@ -127,7 +127,7 @@ fn score_of_pixels(problem: &Problem<'_>, state: &State) -> (f64, usize) {
     let mut right = [0.0; N];
     for (prior, weight) in problem.priors.weighted() {
         if let Some(row) = problem.free.position(prior.parameter) {
-            right[row] = weight * (state.camera.get(prior.parameter) - prior.mean);
+            right[row] = weight.cost * (state.camera.get(prior.parameter) - prior.mean);
         }
     }
     score(&pixels, state, &reduction, right)

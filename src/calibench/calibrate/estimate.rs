@@ -7,6 +7,7 @@ use super::intervals::Profile;
 use super::judged::Judged;
 use super::left_out::{self, LeftOut};
 use super::minimise::{Problem, State, rounding_cost};
+use super::noise::Noise;
 use super::normal::Observations;
 use super::prior::{self, Priors};
 use super::retraction::Retraction;
@@ -67,23 +68,19 @@ fn calibrate_different(
     undecided: &[LeftOut],
 ) -> Result<Calibration, CalibrationError> {
     check_counts(views, settings)?;
-    let (calibration, variance) = chunks::in_pool(views.len(), || estimate(views, settings, undecided))?;
-    Ok(if settings.polish {
-        polish::polish(views, settings.loss, variance, calibration)
-    } else {
-        calibration
-    })
+    let (calibration, noise) = chunks::in_pool(views.len(), || estimate(views, settings, undecided))?;
+    Ok(if settings.polish { polish::polish(views, settings.loss, noise, calibration) } else { calibration })
 }
 
-/// The calibration, and the variance of a pixel coordinate that weighed the priors.
+/// The calibration, and the noise that weighed the priors.
 fn estimate(
     views: &[View],
     settings: &Settings,
     undecided: &[LeftOut],
-) -> Result<(Calibration, f64), CalibrationError> {
+) -> Result<(Calibration, Noise), CalibrationError> {
     searched(views, settings, |judged, problem, frames| {
-        let variance = problem.priors.variance;
-        Ok((report(judged, problem, frames, settings, undecided)?, variance))
+        let noise = problem.priors.noise;
+        Ok((report(judged, problem, frames, settings, undecided)?, noise))
     })
 }
 
@@ -119,7 +116,7 @@ fn searched<T>(
     let problem = Problem {
         free: settings.free(),
         fy_per_fx: held.fy_per_fx,
-        priors: Priors { list: &priors, variance: 0.0 },
+        priors: Priors { list: &priors, noise: Noise::of_squares(0.0) },
         observations: &observations,
         loss: settings.loss,
         max_iterations: settings.max_iterations,
@@ -130,12 +127,12 @@ fn searched<T>(
     };
     let evidence =
         Evidence { homographies: &homographies, held: &held, pixel_frame, search: settings.search };
-    let (judged, variance) = if priors.is_empty() {
-        (search::best_minimum(&problem, starts, &evidence)?, 0.0)
+    let (judged, noise) = if priors.is_empty() {
+        (search::best_minimum(&problem, starts, &evidence)?, problem.priors.noise)
     } else {
         prior::best_minimum(&problem, starts, &evidence)?
     };
-    then(judged, &Problem { priors: Priors { variance, ..problem.priors }, ..problem }, &frames)
+    then(judged, &Problem { priors: Priors { noise, ..problem.priors }, ..problem }, &frames)
 }
 
 fn check_counts(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
@@ -233,11 +230,8 @@ fn report(
     outliers::refuse_narrow_loss(problem.loss, &fit)?;
     let left_out = left_out::asked_for(problem, &minimum, undecided, fit.square / freedom, freedom);
     let of_residuals = warnings_of_residuals(problem, &minimum.state, &fit, freedom).chain(left_out);
-    let variance = if problem.priors.list.is_empty() {
-        fit.variance(problem.loss, freedom)
-    } else {
-        problem.priors.variance
-    };
+    let noise =
+        if problem.priors.list.is_empty() { fit.noise(problem.loss, freedom) } else { problem.priors.noise };
     let Fit { residuals, square, largest_radius, .. } = fit;
     let sigma_px = (square / freedom).sqrt();
     let conditioning = reduction.as_ref().and_then(|reduction| Conditioning::of(system, reduction));
@@ -247,13 +241,13 @@ fn report(
         .zip(reduction.as_ref())
         .and_then(|(coverage, reduction)| {
             let curved = Problem { retraction: Retraction::Curved, ..*problem };
-            let profile = Profile::new(&curved, &minimum, reduction, variance.sqrt())?;
+            let profile = Profile::new(&curved, &minimum, reduction, noise)?;
             Some(profile.intervals(coverage, degrees_of_freedom))
         })
         .unwrap_or_default();
     let unit =
         reduction.and_then(|reduction| reduction.covariance()).ok_or_else(identifiability::singular)?;
-    let mut covariance = frames.covariance(unit, cam_from_target, variance);
+    let mut covariance = frames.covariance(unit, cam_from_target, noise.variance);
     covariance.fy_per_fx = problem.fy_per_fx;
     let mut calibration = Calibration {
         camera: *camera,
@@ -336,9 +330,9 @@ impl Fit {
         (coordinates as f64 + settled - system.unknowns() as f64).max(1.0)
     }
 
-    /// Factor of the unit covariance: the residual variance, or Huber's correction for a robust loss.
-    pub fn variance(&self, loss: Loss, freedom: f64) -> f64 {
-        noise_variance(&self.residuals, self.square, loss, freedom)
+    /// The noise that the residuals show.
+    pub fn noise(&self, loss: Loss, freedom: f64) -> Noise {
+        Noise::of_residuals(&self.residuals, self.square, loss, freedom)
     }
 
     pub fn of(state: &State, observations: &[Observations]) -> Fit {
@@ -364,26 +358,6 @@ impl Fit {
     pub fn tails(&self) -> f64 {
         self.fourth * self.marks() as f64 / (self.square * self.square)
     }
-}
-
-/// Factor of the unit covariance: the residual variance, or Huber's correction for a robust loss.
-///
-/// The weighted normal matrix is `sum w J^T J`; with `mean w` it stands for `mean w J^T J`, so the sandwich
-/// `sum w^2 r^2 / (mean psi')^2 (J^T J)^-1` is `sum w^2 r^2 mean w / (mean psi')^2` times its inverse.
-pub(super) fn noise_variance(residuals: &[Vec<Vec2>], square: f64, loss: Loss, freedom: f64) -> f64 {
-    if loss == Loss::Squares {
-        return square / freedom;
-    }
-    let (mut square, mut weights, mut slopes, mut count) = (0.0, 0.0, 0.0, 0.0);
-    for r in residuals.iter().flatten() {
-        let s = r.norm_squared();
-        let weight = loss.at(s).1;
-        square += weight * weight * s;
-        weights += weight;
-        slopes += loss.slope(s);
-        count += 1.0;
-    }
-    square / freedom * weights * count / (slopes * slopes)
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@
 
 use super::conditioning::{Conditioning, WeakComponent};
 use super::minimise::{Minimum, Problem, State};
+use super::noise::Noise;
 use super::normal::Observations;
 use super::prior::Priors;
 use super::system::System;
@@ -83,13 +84,13 @@ fn doubtful_slopes(problem: &Problem<'_>, state: &State, noise_px: f64) -> Vec<(
 pub(super) fn refuse_if_parallel(
     problem: &Problem<'_>,
     minimum: &Minimum,
-    noise_px: f64,
+    noise: Noise,
 ) -> Result<Option<State>, CalibrationError> {
     if problem.free.is_empty() {
         return Ok(None);
     }
-    for (slope, what) in doubtful_slopes(problem, &minimum.state, noise_px) {
-        if let Some(lower) = refuse_if_fits(problem, minimum, noise_px, slope, what)? {
+    for (slope, what) in doubtful_slopes(problem, &minimum.state, noise.px()) {
+        if let Some(lower) = refuse_if_fits(problem, minimum, noise, slope, what)? {
             return Ok(Some(lower));
         }
     }
@@ -104,7 +105,7 @@ pub(super) fn refuse_if_parallel(
 fn refuse_if_fits(
     problem: &Problem<'_>,
     minimum: &Minimum,
-    noise_px: f64,
+    noise: Noise,
     slope: Vec2,
     what: &str,
 ) -> Result<Option<State>, CalibrationError> {
@@ -112,7 +113,7 @@ fn refuse_if_fits(
     let held = parallel.minimise(turned_to(&minimum.state, slope));
     let degrees_of_freedom = 4 * problem.observations.len();
     let bound = largest_chance_chi_squared(degrees_of_freedom);
-    let ratio = (held.system.cost - minimum.system.cost) / variance(problem, noise_px);
+    let ratio = (held.system.cost - minimum.system.cost) / self::noise(problem, noise).rise;
     if ratio < -LOWER {
         return Ok(Some(held.state));
     }
@@ -166,9 +167,9 @@ fn refuse_if_priors_give_way(
     Err(CalibrationError::NotIdentifiable { inseparable, why })
 }
 
-/// Variance of a pixel coordinate; exact data leave rounding as noise.
-pub(super) fn variance(problem: &Problem<'_>, noise_px: f64) -> f64 {
-    (noise_px * noise_px).max(problem.rounding_cost)
+/// Noise of a pixel coordinate; exact data leave rounding as noise.
+pub(super) fn noise(problem: &Problem<'_>, noise: Noise) -> Noise {
+    noise.at_least(problem.rounding_cost)
 }
 
 /// Refuses the normal equations of a minimum with these free parameters if they are singular.
@@ -204,10 +205,10 @@ fn refuse_if_singular(
 pub(super) fn refuse_if_flat(
     problem: &Problem<'_>,
     walked: &Walked,
-    noise_px: f64,
+    noise: Noise,
 ) -> Result<(), CalibrationError> {
-    let variance = variance(problem, noise_px);
-    let rise = |far: &Minimum| (far.system.cost - walked.best.system.cost) / variance;
+    let noise = self::noise(problem, noise);
+    let rise = |far: &Minimum| (far.system.cost - walked.best.system.cost) / noise.rise;
     let share = |far: &Far| rise(&far.minimum) / least_rise(far.parameter);
     // A better minimum met on the way may lie where the walk ended.
     let is_elsewhere = |far: &&Far| {
@@ -354,7 +355,7 @@ mod tests {
             focal_limits: (0.0, f64::INFINITY),
             rounding_cost: 0.0,
         };
-        refuse_if_flat(&problem, &walked, noise_px)
+        refuse_if_flat(&problem, &walked, Noise::of_squares(noise_px * noise_px))
     }
 
     #[test]

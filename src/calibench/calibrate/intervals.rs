@@ -6,14 +6,15 @@
 //! cost has risen: with the signed root
 //!
 //! ```text
-//! tau(v) = sign(v - estimate) sqrt((cost(v) - least cost) / sigma^2)
+//! tau(v) = sign(v - estimate) sqrt((cost(v) - least cost) / u)
 //! ```
-//! the interval of coverage `1 - alpha` is `|tau| <= t`, `t` the quantile of Student's distribution (Bates &
+//! where `u` is what the cost rises by at one standard deviation (the variance of a coordinate under least squares), the interval of coverage `1 - alpha` is `|tau| <= t`, `t` the quantile of Student's distribution (Bates &
 //! Watts 1988, section 6.1). Linear theory has `tau = (v - estimate) / standard deviation`; JCGM 101 (2008),
 //! section 8.1, asks for such a comparison before a standard uncertainty is stated.
 
 use super::blocks::N;
 use super::minimise::{Descent, Minimum, Problem, State, descend};
+use super::noise::Noise;
 use super::system::Reduction;
 use super::tie::tied;
 use crate::camera::{FreeParameters, Parameter};
@@ -98,7 +99,7 @@ pub(super) struct Profile<'a, P: Profiled<W>, const W: usize> {
     reduction: &'a Reduction<W>,
     /// Covariance of the shared unknowns for unit noise.
     covariance: nalgebra::DMatrix<f64>,
-    noise_px: f64,
+    noise: Noise,
 }
 
 impl<'a, P: Profiled<W>, const W: usize> Profile<'a, P, W> {
@@ -107,10 +108,10 @@ impl<'a, P: Profiled<W>, const W: usize> Profile<'a, P, W> {
         problem: &'a P,
         minimum: &'a Minimum<P::State, W>,
         reduction: &'a Reduction<W>,
-        noise_px: f64,
+        noise: Noise,
     ) -> Option<Self> {
         let covariance = reduction.intrinsics_covariance()?;
-        Some(Profile { problem, minimum, reduction, covariance, noise_px })
+        Some(Profile { problem, minimum, reduction, covariance, noise })
     }
 
     /// The parameters whose profile is no parabola, or a state of lower cost if one is met.
@@ -163,7 +164,7 @@ impl<'a, P: Profiled<W>, const W: usize> Profile<'a, P, W> {
 
     fn deviation(&self, parameter: Parameter) -> f64 {
         let row = self.problem.free().position(parameter).expect("the parameter is free");
-        self.covariance[(row, row)].sqrt() * self.noise_px
+        self.covariance[(row, row)].sqrt() * self.noise.px()
     }
 
     /// Where `|tau| = t`, starting from the linear end: secants through the estimate, which the profile makes
@@ -187,7 +188,7 @@ impl<'a, P: Profiled<W>, const W: usize> Profile<'a, P, W> {
     /// `|tau|` with `parameter` held `offset` away from its estimate; a state of lower cost if one is met.
     fn tau(&self, parameter: Parameter, offset: f64) -> Result<f64, Box<P::State>> {
         let refitted = descend(&self.problem.holding(parameter), self.moved(parameter, offset));
-        let rise = (refitted.system.cost - self.minimum.system.cost) / (self.noise_px * self.noise_px);
+        let rise = (refitted.system.cost - self.minimum.system.cost) / self.noise.rise;
         if rise < -LOWER {
             return Err(Box::new(refitted.state));
         }

@@ -1,10 +1,13 @@
 //! What speaks for a minimum, and what against it?
 
 use super::certificate::{self, Certificate};
+use super::estimate::Fit;
 use super::from_relaxed::beside;
 use super::identifiability;
 use super::intervals::Skewed;
+use super::loss::Loss;
 use super::minimise::{Minimum, Problem, State};
+use super::noise::Noise;
 use super::rival::{Met, RIVALS, Rival};
 use super::system::Reduction;
 use super::{CalibrationError, Termination, outliers, tilt};
@@ -105,22 +108,22 @@ impl Judged {
         let Some(covariance) = self.reduction.as_ref().and_then(Reduction::intrinsics_covariance) else {
             return self;
         };
-        let variance = identifiability::variance(problem, self.noise_px(problem));
+        let noise = identifiability::noise(problem, self.noise(problem));
         let best = Met::of(&self.minimum);
         let value = |camera: &Camera, parameter| camera.get(parameter);
-        self.rival = best.rival(met, problem.free, &(covariance * variance), variance, value);
+        self.rival = best.rival(met, problem.free, &(covariance * noise.variance), noise.rise, value);
         self
     }
 
     /// With the views whose other tilt, the camera held, is nearly as good.
     pub fn with_twins(mut self, problem: &Problem<'_>) -> Judged {
-        let variance = identifiability::variance(problem, self.noise_px(problem));
+        let noise = identifiability::noise(problem, self.noise(problem));
         let state = &self.minimum.state;
         let twin = |view: usize| {
             let pose = state.cam_from_target[view];
             let (own, cost) = tilt::resected(problem, state, view, pose);
             let (other, other_cost) = tilt::resected(problem, state, view, tilt::mirrored(&own));
-            let excess = (other_cost - cost) / variance;
+            let excess = (other_cost - cost) / noise.rise;
             let degrees = tilt::angle_between(&own, &other).to_degrees();
             (excess < RIVALS && degrees > APART_DEGREES).then_some(Twin { view, degrees, excess })
         };
@@ -135,12 +138,12 @@ impl Judged {
         if !self.certificate.as_ref().is_some_and(|c| c.is_possible() && c.holds()) {
             return Ok(false);
         }
-        let lower = identifiability::refuse_if_parallel(problem, &self.minimum, self.noise_px(problem));
+        let lower = identifiability::refuse_if_parallel(problem, &self.minimum, self.noise(problem));
         let lower = outliers::or_blamed(problem, &self.minimum.state, lower)?;
         Ok(lower.is_none() && self.is_clear(problem))
     }
 
-    pub fn noise_px(&self, problem: &Problem<'_>) -> f64 {
+    pub fn noise(&self, problem: &Problem<'_>) -> Noise {
         noise_of(problem, &self.minimum)
     }
 
@@ -150,7 +153,7 @@ impl Judged {
         let Some(covariance) = self.reduction.as_ref().and_then(Reduction::intrinsics_covariance) else {
             return false;
         };
-        let noise_px = self.noise_px(problem);
+        let noise_px = self.noise(problem).px();
         let camera = &self.minimum.state.camera;
         let flexible = [Parameter::Skew, Parameter::P1, Parameter::P2, Parameter::K3];
         let is_flexible = flexible.iter().any(|&p| problem.free.contains(p));
@@ -173,14 +176,18 @@ impl Judged {
         let covariance = self.reduction.as_ref().and_then(Reduction::intrinsics_covariance);
         [Parameter::Cx, Parameter::Cy].map(|parameter| {
             let row = problem.free.position(parameter)?;
-            Some(covariance.as_ref().map_or(f64::INFINITY, |c| c[(row, row)].sqrt() * self.noise_px(problem)))
+            Some(
+                covariance
+                    .as_ref()
+                    .map_or(f64::INFINITY, |c| c[(row, row)].sqrt() * self.noise(problem).px()),
+            )
         })
     }
 
     /// Views whose other tilt might do as well.
     fn doubtful_tilts(&self, problem: &Problem<'_>) -> Vec<usize> {
         let State { camera, cam_from_target } = &self.minimum.state;
-        let (focal, noise_px) = (0.5 * (camera.fx + camera.fy), self.noise_px(problem));
+        let (focal, noise_px) = (0.5 * (camera.fx + camera.fy), self.noise(problem).px());
         let views = cam_from_target.iter().zip(problem.observations).enumerate();
         views
             .filter(|(_, (pose, observations))| tilt::is_doubtful(pose, observations, focal, noise_px))
@@ -202,11 +209,14 @@ fn trades_off(free: FreeParameters, covariance: &DMatrix<f64>) -> bool {
     centre.iter().any(|&i| tangential.iter().any(|&j| correlation(i, j).abs() > TRADES_OFF))
 }
 
-/// Standard deviation of a pixel coordinate, from the cost under the loss in use: gross errors, which a
-/// robust loss discounts, say nothing of the noise.
-pub(super) fn noise_of(problem: &Problem<'_>, minimum: &Minimum) -> f64 {
+/// Noise of a pixel coordinate: under least squares from the cost, and otherwise from what the residuals count for, as gross
+/// errors, which a robust loss discounts, say nothing of it.
+pub(super) fn noise_of(problem: &Problem<'_>, minimum: &Minimum) -> Noise {
     let coordinates = 2 * problem.observations.iter().map(|o| o.len()).sum::<usize>();
     let measurements = coordinates + problem.priors.list.len();
     let freedom = measurements.saturating_sub(minimum.system.unknowns()).max(1);
-    (minimum.system.cost / freedom as f64).sqrt()
+    if problem.loss == Loss::Squares {
+        return Noise::of_squares(minimum.system.cost / freedom as f64);
+    }
+    Fit::of(&minimum.state, problem.observations).noise(problem.loss, freedom as f64)
 }

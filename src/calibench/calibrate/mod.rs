@@ -29,6 +29,7 @@ mod left_out;
 mod lens;
 mod loss;
 mod minimise;
+mod noise;
 mod normal;
 mod outliers;
 mod polish;

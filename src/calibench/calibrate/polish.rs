@@ -9,7 +9,8 @@
 #![allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
 
 use super::kernel::{self, Model, Rows};
-use super::prior::Priors;
+use super::noise::Noise;
+use super::prior::{Priors, Weight};
 use super::{Calibration, Covariance, Loss, Warning};
 use crate::board::View;
 use crate::camera::{Camera, FreeParameters, Parameter};
@@ -37,12 +38,12 @@ type Square = [[Number; COLUMNS]; COLUMNS];
 /// shrink too, with a warning.
 ///
 /// Under a robust loss the covariance stays that of the unpolished minimum, which differs from this one by
-/// some 1e-7 of itself. `variance` is that of a pixel coordinate, px^2, which weighs the priors.
-pub(super) fn polish(views: &[View], loss: Loss, variance: f64, mut calibration: Calibration) -> Calibration {
+/// some 1e-7 of itself. `noise` is that which weighs the priors.
+pub(super) fn polish(views: &[View], loss: Loss, noise: Noise, mut calibration: Calibration) -> Calibration {
     if !calibration.termination.is_minimum() {
         return calibration;
     }
-    let mut state = State::of(&calibration, variance);
+    let mut state = State::of(&calibration, noise);
     let mut last = f64::INFINITY;
     for _ in 0..MOST_STEPS {
         let Some((step, length_px)) = Equations::of(&state, views, loss).and_then(|e| e.step()) else {
@@ -67,10 +68,10 @@ pub(super) fn polish(views: &[View], loss: Loss, variance: f64, mut calibration:
 struct State {
     free: FreeParameters,
     fy_per_fx: Option<Number>,
-    /// The variance that weighs the priors, px^2.
-    variance: f64,
+    /// The noise that weighs the priors.
+    noise: Noise,
     /// Parameter, mean and weight.
-    priors: Vec<(Parameter, f64, f64)>,
+    priors: Vec<(Parameter, f64, Weight)>,
     parameters: [Number; Parameter::COUNT],
     poses: Vec<PoseNumbers>,
 }
@@ -82,10 +83,10 @@ struct PoseNumbers {
 }
 
 impl State {
-    fn of(calibration: &Calibration, variance: f64) -> State {
-        let priors = Priors { list: &calibration.priors, variance };
+    fn of(calibration: &Calibration, noise: Noise) -> State {
+        let priors = Priors { list: &calibration.priors, noise };
         State {
-            variance,
+            noise,
             priors: priors.weighted().map(|(prior, weight)| (prior.parameter, prior.mean, weight)).collect(),
             free: calibration.free,
             fy_per_fx: calibration.covariance.fy_per_fx.map(Number::from),
@@ -202,9 +203,9 @@ impl Equations {
         }
         for &(parameter, mean, weight) in &state.priors {
             let row = state.free.position(parameter)?;
-            let weight = Number::from(weight);
-            reduced[row][row] += weight;
-            reduced[n][row] += weight * (state.parameters[parameter as usize] - Number::from(mean));
+            reduced[row][row] += Number::from(weight.information);
+            reduced[n][row] +=
+                Number::from(weight.cost) * (state.parameters[parameter as usize] - Number::from(mean));
         }
         factor(&mut reduced, n, n + 1)?;
         Some(Equations { n, views: factored, reduced })
@@ -259,7 +260,7 @@ impl Equations {
         };
         let variance = match state.priors.is_empty() {
             true => square / Number::from(freedom.max(1.0)),
-            false => Number::from(state.variance),
+            false => Number::from(state.noise.variance),
         };
         let covariance = match loss {
             Loss::Squares => {

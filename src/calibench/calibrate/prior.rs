@@ -22,6 +22,7 @@ use super::estimate::Fit;
 use super::from_relaxed::{Evidence, relax};
 use super::judged::Judged;
 use super::minimise::{Minimum, Problem, State};
+use super::noise::Noise;
 use super::search;
 use super::system::System;
 use super::{CalibrationError, relaxed};
@@ -61,21 +62,37 @@ pub struct Prior {
     pub standard_deviation: f64,
 }
 
-/// Priors, and the variance of a pixel coordinate that weighs them, px^2.
+/// Priors, and the noise of a pixel coordinate that weighs them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Priors<'a> {
     pub list: &'a [Prior],
-    pub variance: f64,
+    pub noise: Noise,
+}
+
+/// What a prior counts for beside pixels of some noise: two numbers, because a robust loss has two of that.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Weight {
+    /// In the cost and its gradient.
+    pub cost: f64,
+    /// In the normal matrix.
+    pub information: f64,
+}
+
+impl Weight {
+    /// Of what is known with a standard deviation.
+    pub fn of(noise: Noise, standard_deviation: f64) -> Weight {
+        let known = standard_deviation * standard_deviation;
+        Weight { cost: noise.rise / known, information: noise.variance / known }
+    }
 }
 
 impl Priors<'_> {
     /// Nothing is known beforehand.
-    pub const NONE: Priors<'static> = Priors { list: &[], variance: 0.0 };
+    pub const NONE: Priors<'static> = Priors { list: &[], noise: Noise { variance: 0.0, rise: 0.0 } };
 
     /// Each with its weight, `sigma^2 / sd^2`.
-    pub fn weighted(&self) -> impl Iterator<Item = (&Prior, f64)> {
-        let weight = |prior: &Prior| self.variance / (prior.standard_deviation * prior.standard_deviation);
-        self.list.iter().map(move |prior| (prior, weight(prior)))
+    pub fn weighted(&self) -> impl Iterator<Item = (&Prior, Weight)> {
+        self.list.iter().map(|prior| (prior, Weight::of(self.noise, prior.standard_deviation)))
     }
 
     /// Their share of the cost, px^2. A parameter that is held for a while, as along a profile, pays for its
@@ -83,7 +100,7 @@ impl Priors<'_> {
     pub fn cost(&self, camera: &Camera) -> f64 {
         let squared = |x: f64| x * x;
         self.weighted()
-            .map(|(prior, weight)| weight * squared(camera.get(prior.parameter) - prior.mean))
+            .map(|(prior, weight)| weight.cost * squared(camera.get(prior.parameter) - prior.mean))
             .sum()
     }
 
@@ -92,8 +109,8 @@ impl Priors<'_> {
         system.cost += self.cost(camera);
         for (prior, weight) in self.weighted() {
             if let Some(row) = system.free.position(prior.parameter) {
-                system.intrinsics[(row, row)] += weight;
-                system.gradient[row] += weight * (camera.get(prior.parameter) - prior.mean);
+                system.intrinsics[(row, row)] += weight.information;
+                system.gradient[row] += weight.cost * (camera.get(prior.parameter) - prior.mean);
             }
         }
     }
@@ -106,9 +123,9 @@ impl Priors<'_> {
         }
         let free = minimum.system.free;
         let covariance = minimum.system.reduction().and_then(|reduction| reduction.intrinsics_covariance());
-        let share = |(prior, weight): (&Prior, f64)| {
+        let share = |(prior, weight): (&Prior, Weight)| {
             let row = free.position(prior.parameter)?;
-            Some(covariance.as_ref()?[(row, row)] * weight)
+            Some(covariance.as_ref()?[(row, row)] * weight.information)
         };
         self.weighted().filter_map(share).sum()
     }
@@ -127,33 +144,33 @@ const MOST_REFITS: usize = 60;
 /// a lower minimum.
 const MOST_SEARCHES: usize = 4;
 
-/// The best minimum under priors, and the variance of a pixel coordinate that weighed them.
+/// The best minimum under priors, and the noise of a pixel coordinate that weighed them.
 pub(super) fn best_minimum(
     problem: &Problem<'_>,
     mut starts: Vec<State>,
     evidence: &Evidence<'_>,
-) -> Result<(Judged, f64), CalibrationError> {
-    let with = |variance: f64| Problem { priors: Priors { variance, ..problem.priors }, ..*problem };
-    let mut variance = first_variance(problem, evidence);
+) -> Result<(Judged, Noise), CalibrationError> {
+    let with = |noise: Noise| Problem { priors: Priors { noise, ..problem.priors }, ..*problem };
+    let mut noise = Noise::of_squares(first_variance(problem, evidence));
     let (mut searches, mut iterations) = (0, 0);
     loop {
-        let mut judged = search::best_minimum(&with(variance), starts, evidence)?;
+        let mut judged = search::best_minimum(&with(noise), starts, evidence)?;
         searches += 1;
         iterations += judged.minimum.iterations;
         judged.minimum.iterations = iterations;
-        let settled = settle(problem, &judged.minimum, variance);
-        if is_settled(settled, variance) || searches == MOST_SEARCHES {
-            return Ok((judged, variance));
+        let settled = settle(problem, &judged.minimum, noise);
+        if is_settled(settled, noise) || searches == MOST_SEARCHES {
+            return Ok((judged, noise));
         }
-        (variance, starts) = (settled, vec![judged.minimum.state]);
+        (noise, starts) = (settled, vec![judged.minimum.state]);
     }
 }
 
-/// The variance at which weights and residuals agree, next to a minimum.
-fn settle(problem: &Problem<'_>, minimum: &Minimum, variance: f64) -> f64 {
-    let with = |variance: f64| Problem { priors: Priors { variance, ..problem.priors }, ..*problem };
-    let mut next = variance_at(&with(variance), minimum);
-    let mut last = variance;
+/// The noise at which weights and residuals agree, next to a minimum.
+fn settle(problem: &Problem<'_>, minimum: &Minimum, noise: Noise) -> Noise {
+    let with = |noise: Noise| Problem { priors: Priors { noise, ..problem.priors }, ..*problem };
+    let mut next = noise_at(&with(noise), minimum);
+    let mut last = noise;
     let mut state = minimum.state.clone();
     for _ in 0..MOST_REFITS {
         if is_settled(next, last) {
@@ -161,15 +178,16 @@ fn settle(problem: &Problem<'_>, minimum: &Minimum, variance: f64) -> f64 {
         }
         let problem = with(next);
         let refined = problem.minimise(state);
-        (last, next) = (next, variance_at(&problem, &refined));
+        (last, next) = (next, noise_at(&problem, &refined));
         state = refined.state;
     }
     next
 }
 
-fn is_settled(next: f64, last: f64) -> bool {
+fn is_settled(next: Noise, last: Noise) -> bool {
     // A variance changes by twice the part that its root does.
-    (next - last).abs() <= 2.0 * SETTLED * last
+    let agree = |next: f64, last: f64| (next - last).abs() <= 2.0 * SETTLED * last;
+    agree(next.variance, last.variance) && agree(next.rise, last.rise)
 }
 
 /// Before any camera is known: what homographies behind a common lens leave over.
@@ -184,11 +202,11 @@ fn first_variance(problem: &Problem<'_>, evidence: &Evidence<'_>) -> f64 {
     if is_told { variance.max(LEAST_PX * LEAST_PX) } else { USUAL_PX * USUAL_PX }
 }
 
-/// The variance that the residuals of a minimum say, at the scale at which the covariance is stated.
-fn variance_at(problem: &Problem<'_>, minimum: &Minimum) -> f64 {
+/// The noise that the residuals of a minimum show.
+fn noise_at(problem: &Problem<'_>, minimum: &Minimum) -> Noise {
     let fit = Fit::of(&minimum.state, problem.observations);
     let freedom = fit.freedom(&minimum.system, problem.priors.settled(minimum));
-    fit.variance(problem.loss, freedom).max(LEAST_PX * LEAST_PX)
+    fit.noise(problem.loss, freedom).at_least(LEAST_PX * LEAST_PX)
 }
 
 #[cfg(test)]

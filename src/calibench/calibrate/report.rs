@@ -233,6 +233,11 @@ pub(super) const STRONG_CORRELATION: f64 = 0.98;
 /// A focal length worse than this makes the linearisation behind the covariance doubtful.
 pub(super) const UNCERTAIN_FOCAL: f64 = 0.05;
 
+/// A number with two significant digits at the least, as a user may type it.
+pub(super) fn digits(number: f64) -> String {
+    if number >= 0.1 { format!("{number:.2}") } else { format!("{number:.1e}") }
+}
+
 /// How far a true interval reaches, over the linear one.
 fn reach(ratio: Option<f64>) -> String {
     ratio.map_or("without end".to_string(), |ratio| format!("{ratio:.2} times as far"))
@@ -300,14 +305,16 @@ impl fmt::Display for Warning {
             Warning::Outliers(Outliers { marks, share, view, point, residual_px, median_px }) => write!(
                 f,
                 "{marks} mark(s) lie too far off to be noise, the worst (view {view}, point {point}) by {residual_px:.2} px where half of all \
-                 stay below {median_px:.2} px: correct or remove them, or use a robust loss (huber:{:.2}){}",
-                2.0 * median_px,
+                 stay below {median_px:.2} px: correct or remove them, or use a robust loss (huber:{}){}",
+                digits(2.0 * median_px),
                 if *share > MANY { "; so many may also mean that lens model or board do not hold there" } else { "" }
             ),
             Warning::Ambiguous { parameter, value, other, excess } => write!(
                 f,
-                "another camera explains the data nearly as well: {parameter} = {other:.6} instead of {value:.6} costs {excess:.1} variances \
-                 more; the standard deviations speak of one of the two only. Take more views, with tilts about different axes"
+                "another camera explains the data nearly as well: {parameter} = {other:.6} instead of {value:.6} costs {:.1} variances \
+                 {}; the standard deviations speak of one of the two only. Take more views, with tilts about different axes",
+                excess.abs(),
+                if *excess < 0.0 { "less, but its search did not end or its lens is not defined" } else { "more" }
             ),
             Warning::NotLinear { parameter, below, above } => write!(
                 f,

@@ -11,6 +11,7 @@ use super::identifiability::{self, tilts_are_evident};
 use super::intervals::Profile;
 use super::judged::{Judged, noise_of};
 use super::minimise::{Minimum, Problem, State};
+use super::noise::Noise;
 use super::retraction::Retraction;
 use super::walk::Walked;
 use super::{CalibrationError, Termination, outliers, walk};
@@ -45,14 +46,14 @@ pub(super) fn best_minimum(
     let Found { best, starts: count, mut met, lowest_relaxed } = from_relaxed(&patient, first, evidence);
     let best = walk::with_better_tilts(&patient, best);
     let judged = Judged::of(problem, best, count);
-    let noise_px = judged.noise_px(problem);
-    if judged.is_well_known(problem) && tilts_are_evident(problem, &judged.minimum.state, noise_px) {
+    let noise = judged.noise(problem);
+    if judged.is_well_known(problem) && tilts_are_evident(problem, &judged.minimum.state, noise.px()) {
         return Ok(judged.certified(problem, lowest_relaxed).with_rival(problem, &met).with_twins(problem));
     }
     let centre_sd = judged.centre_deviations(problem);
-    let walked = walk::far_away(&patient, judged.minimum, noise_px, centre_sd);
-    let noise_px = noise_of(problem, &walked.best);
-    let lower = refuse_undetermined(problem, &walked, noise_px)?;
+    let walked = walk::far_away(&patient, judged.minimum, noise, centre_sd);
+    let noise = noise_of(problem, &walked.best);
+    let lower = refuse_undetermined(problem, &walked, noise)?;
     let mut best = walked.best;
     if let Some(lower) = lower {
         let minimum = patient.minimise(lower);
@@ -74,7 +75,7 @@ pub(super) fn best_minimum(
 fn refuse_undetermined(
     problem: &Problem<'_>,
     walked: &Walked,
-    noise_px: f64,
+    noise: Noise,
 ) -> Result<Option<State>, CalibrationError> {
     let certified = walked.best.system.reduction().is_none_or(|reduction| {
         let best = &walked.best;
@@ -84,8 +85,8 @@ fn refuse_undetermined(
     if !certified {
         return Ok(None);
     }
-    let refused = identifiability::refuse_if_parallel(problem, &walked.best, noise_px)
-        .and_then(|lower| identifiability::refuse_if_flat(problem, walked, noise_px).map(|()| lower));
+    let refused = identifiability::refuse_if_parallel(problem, &walked.best, noise)
+        .and_then(|lower| identifiability::refuse_if_flat(problem, walked, noise).map(|()| lower));
     outliers::or_blamed(problem, &walked.best.state, refused)
 }
 
@@ -95,9 +96,9 @@ const BETTER_BY_PROFILE: usize = 3;
 /// Looks along the profile of every parameter: for those that are no parabola, and for lower costs.
 fn with_profiles(problem: &Problem<'_>, mut judged: Judged) -> Judged {
     for _ in 0..BETTER_BY_PROFILE {
-        let noise_px = judged.noise_px(problem);
+        let noise = judged.noise(problem);
         let Some(reduction) = &judged.reduction else { break };
-        let Some(profile) = Profile::new(problem, &judged.minimum, reduction, noise_px) else { break };
+        let Some(profile) = Profile::new(problem, &judged.minimum, reduction, noise) else { break };
         match profile.skewed() {
             Ok(skewed) => {
                 judged.skewed = skewed;

@@ -6,8 +6,9 @@
 //! meets them one after another. The same walk tells how far the focal length could be off: where the cost
 //! does not rise, the data do not determine it.
 
-use super::identifiability::{least_rise, variance};
+use super::identifiability::{self, least_rise};
 use super::minimise::{Minimum, Problem};
+use super::noise::Noise;
 use super::retraction::scaled;
 use super::rival::Met;
 use super::search::is_better;
@@ -47,28 +48,28 @@ pub(super) struct Far {
     pub minimum: Minimum,
 }
 
-/// Walks from a minimum, and again from any better one it meets, for noise of `noise_px`; `centre_sd` are the
+/// Walks from a minimum, and again from any better one it meets, for such noise; `centre_sd` are the
 /// standard deviations of the principal point.
 pub(super) fn far_away(
     problem: &Problem<'_>,
     minimum: Minimum,
-    noise_px: f64,
+    noise: Noise,
     centre_sd: [Option<f64>; 2],
 ) -> Walked {
     let mut walked = Walked { best: minimum, starts: 0, far: Vec::new(), met: Vec::new() };
-    let limit = RISEN * variance(problem, noise_px);
+    let limit = RISEN * identifiability::noise(problem, noise).rise;
     for _ in 0..WALKS {
         walked.far.clear();
         let mut better = None;
         for factor in [STEP, 1.0 / STEP] {
-            walk(problem, factor, noise_px, limit, &mut walked, &mut better);
+            walk(problem, factor, noise, limit, &mut walked, &mut better);
         }
         for (parameter, sd) in [Parameter::Cx, Parameter::Cy].into_iter().zip(centre_sd) {
             if sd.is_some_and(|sd| sd > KNOWN_CENTRE * walked.best.state.camera.fx) {
                 step_aside(
                     problem,
                     parameter,
-                    least_rise(parameter) * variance(problem, noise_px),
+                    least_rise(parameter) * identifiability::noise(problem, noise).rise,
                     &mut walked,
                 );
             }
@@ -89,7 +90,7 @@ pub(super) fn far_away(
 fn walk(
     problem: &Problem<'_>,
     factor: f64,
-    noise_px: f64,
+    noise: Noise,
     limit: f64,
     walked: &mut Walked,
     better: &mut Option<Minimum>,
@@ -105,7 +106,7 @@ fn walk(
             with_better_tilts(&held, held.minimise(scaled(&state, problem.free, problem.fy_per_fx, factor)));
         walked.starts += 1;
         let least = better.as_ref().map_or(origin, |b| b.system.cost);
-        if step.system.cost < least + PROMISING * noise_px * noise_px {
+        if step.system.cost < least + PROMISING * noise.rise {
             let minimum = with_better_tilts(problem, problem.minimise(step.state.clone()));
             walked.starts += 1;
             walked.met.push(Met::of(&minimum));

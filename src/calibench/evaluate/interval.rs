@@ -58,9 +58,12 @@ impl Interval {
     }
 
     /// The true correlation behind a sample correlation of `trials` pairs (Fisher 1921): `atanh r +- z /
-    /// sqrt(n - 3)`.
+    /// sqrt(n - 3)`; any, -1 to 1, where there are but three.
     pub fn of_correlation(sample: f64, trials: usize, false_alarm: f64) -> Interval {
-        let half = normal_two_sided(false_alarm) / (trials.max(4) as f64 - 3.0).sqrt();
+        if trials <= 3 {
+            return Interval { low: -1.0, high: 1.0 };
+        }
+        let half = normal_two_sided(false_alarm) / (trials as f64 - 3.0).sqrt();
         let centre = libm::atanh(sample);
         Interval { low: libm::tanh(centre - half), high: libm::tanh(centre + half) }
     }
@@ -86,6 +89,7 @@ mod tests {
         assert!((ratio.half_width() - 1.96 * 0.0158).abs() < 2e-4);
         assert!(Interval::of_mean_chi_squared(6, 2000, 0.05).contains(6.0));
         assert!(Interval::of_correlation(0.9, 100, 0.05).contains(0.9));
+        assert_eq!(Interval::of_correlation(0.9, 3, 0.05), Interval { low: -1.0, high: 1.0 });
         assert_eq!(each_of(20, 0.01), 0.0005);
         // z = 1.959964: 2 +- z 3 / sqrt(100).
         let mean = Interval::of_mean(2.0, 3.0, 100, 0.05);

@@ -32,18 +32,7 @@ pub(super) fn of(fit: &Fit, names: &[String], image_size: Option<(usize, usize)>
     }
     advice.extend(tilt(&fit.calibration));
     advice.extend(standing_out(&fit.calibration, names));
-    advice.extend(second_minimum(&fit.calibration));
     advice
-}
-
-/// Marks within some 60 degrees of the axis fit two double spheres nearly as well; both are compared on flat boards alone.
-fn second_minimum(calibration: &LensCalibration) -> Option<String> {
-    let is_bent = calibration.board.is_some();
-    (is_bent && calibration.camera.distortion.model() == Model::DoubleSphere).then(|| {
-        "a double sphere often has two minima, and with the board's shape estimated the second is not looked for: this may be the \
-         worse one, with another focal length; compare with --model kannala-brandt"
-            .to_string()
-    })
 }
 
 /// The highest radial term that was estimated.

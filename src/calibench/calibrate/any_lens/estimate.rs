@@ -1,6 +1,7 @@
 //! From marks to a camera with a lens of any model and its uncertainty.
 
 use super::super::minimise::{Descent, Minimum, RELATIVE_GAIN, descend};
+use super::super::noise::Noise;
 use super::super::settings::Bend;
 use super::super::system::Step;
 use super::super::target_frame::TargetFrames;
@@ -15,7 +16,7 @@ use crate::geometry::{Homography, HomographyError};
 const USUAL_PX: f64 = 0.1;
 /// Nobody's marks are better than this, px: exact data would otherwise leave priors no weight at all.
 const LEAST_PX: f64 = 1e-4;
-/// The noise that weighs priors is settled when its variance changes by less than this part.
+/// The noise that weighs priors is settled when it changes by less than this part.
 const SETTLED: f64 = 2e-6;
 /// Steps that sharpen a minimum.
 const LAST_STEPS: usize = 2;
@@ -88,7 +89,7 @@ fn estimate(views: &[View], settings: &Settings) -> Result<LensCalibration, Cali
         held: FreeParameters::NONE,
         fy_per_fx: settings.tie()?,
         priors: &priors,
-        variance: USUAL_PX * USUAL_PX,
+        noise: Noise::of_squares(USUAL_PX * USUAL_PX),
         bend: None,
         loss: settings.loss,
         max_iterations: settings.max_iterations,
@@ -96,21 +97,23 @@ fn estimate(views: &[View], settings: &Settings) -> Result<LensCalibration, Cali
         rounding_cost: rounding_cost(&marks),
         is_certifiable: certificate::counts_for(settings.model()),
     };
-    let walked = walk::walk(&flat, views, settings)?;
-    let mut best = walked.best;
-    let state = start::with_better_tilts(&flat, best.state.clone());
+    let mut walked = walk::walk(&flat, views, settings)?;
+    let state = start::with_better_tilts(&flat, walked.best.state.clone());
+    let is_turned = state.cam_from_target != walked.best.state.cam_from_target;
+    walked.best.state = state;
     let bent = Problem { bend: settings.board.bend(), ..flat };
-    let is_turned = state.cam_from_target != best.state.cam_from_target;
     // A search that has not ended may do so in as many iterations again, and in the valley of a lens of many coefficients one that has
     // may still go on.
-    let has_ended = best.termination == Termination::Converged && bent.is_certifiable;
-    if is_turned || bent.bend.is_some() || !has_ended {
-        let end = descend(&bent, state);
-        best = Minimum { iterations: best.iterations + end.iterations, ..end };
+    let has_ended = walked.best.termination == Termination::Converged && bent.is_certifiable;
+    if bent.bend.is_some() {
+        walked = walk::walked_anew(walked, &bent);
+    } else if is_turned || !has_ended {
+        walk::follow(&bent, &mut walked.best);
     }
-    let (problem, minimum) = settled(bent, best);
+    let (problem, minimum) = settled(bent, walked.best);
     let found = minimum.clone();
-    let met = walked.met.into_iter().map(|met| walk::weighed_anew(met, &flat, &problem)).collect();
+    let others = walked.others.iter().map(|other| walk::weighed_anew(other, &bent, &problem));
+    let met = others.chain([walk::met(&minimum)]).collect();
     let calibration = judge::judge(&problem, minimum, met)
         .and_then(|judged| report::report(judged, &problem, &frames, region, settings));
     report::or_blamed(&problem, &found, calibration)
@@ -124,12 +127,14 @@ fn settled(
     let is_told = !problem.priors.is_empty() || problem.bend.is_some();
     let mut iterations = minimum.iterations;
     for _ in 0..MOST_REFITS {
-        let variance = report::variance(&problem, &minimum).max(LEAST_PX * LEAST_PX);
-        let is_settled = (variance - problem.variance).abs() <= SETTLED * variance;
+        let noise = report::noise(&problem, &minimum).at_least(LEAST_PX * LEAST_PX);
+        let agree = |next: f64, last: f64| (next - last).abs() <= SETTLED * next;
+        let is_settled =
+            agree(noise.variance, problem.noise.variance) && agree(noise.rise, problem.noise.rise);
         if !is_told || is_settled || minimum.termination != Termination::Converged {
             break;
         }
-        problem.variance = variance;
+        problem.noise = noise;
         minimum = descend(&problem, minimum.state);
         iterations += minimum.iterations;
     }

@@ -2,6 +2,7 @@
 
 use super::super::Loss;
 use super::super::minimise::{Minimum, RELATIVE_GAIN, descend};
+use super::super::noise::Noise;
 use super::super::target_frame::TargetFrames;
 use super::marks::Marks;
 use super::problem::{Problem, State};
@@ -73,7 +74,7 @@ pub(super) fn problem(views: &[Marks], free: FreeParameters) -> Problem<'_> {
         held: FreeParameters::NONE,
         fy_per_fx: None,
         priors: &[],
-        variance: 0.01,
+        noise: Noise::of_squares(0.01),
         bend: None,
         loss: Loss::Squares,
         max_iterations: 200,

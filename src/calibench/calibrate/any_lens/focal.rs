@@ -4,6 +4,7 @@
 //! roughly is set three times as long and as short and all else refitted, as [`super::super::calibrate`] does.
 
 use super::super::minimise::{Minimum, descend};
+use super::super::noise::Noise;
 use super::super::tie::tied;
 use super::super::{CalibrationError, Unknown, identifiability};
 use super::WIDTH;
@@ -17,14 +18,14 @@ const FACTORS: [f64; 2] = [3.0, 1.0 / 3.0];
 const MOVED: f64 = 0.1;
 
 /// Refuses a focal length that may as well be three times as long or as short; `relative` is its standard deviation over
-/// itself, `variance` that of a coordinate.
+/// itself, `noise` that of a coordinate.
 ///
 /// # Errors
 /// [`CalibrationError::NotIdentifiable`].
 pub(super) fn refuse_if_open(
     problem: &Problem<'_>,
     minimum: &Minimum<State, WIDTH>,
-    variance: f64,
+    noise: Noise,
     relative: f64,
 ) -> Result<(), CalibrationError> {
     use Parameter::{Fx, Fy, Xi};
@@ -36,10 +37,10 @@ pub(super) fn refuse_if_open(
     let free = problem.free.without(Fx).without(Fy).without(Xi);
     let rest = Problem { free, fy_per_fx: None, relative_gain: ROUGH_GAIN, ..*problem };
     let least = identifiability::least_rise(Fx);
-    let variance = variance.max(problem.rounding_cost);
+    let noise = noise.at_least(problem.rounding_cost);
     for factor in FACTORS {
         let other = descend(&rest, with_focal_length(problem, &minimum.state, factor));
-        let rise = (other.system.cost - minimum.system.cost) / variance;
+        let rise = (other.system.cost - minimum.system.cost) / noise.rise;
         if rise < least {
             let fx = minimum.state.camera.fx;
             let why = format!(

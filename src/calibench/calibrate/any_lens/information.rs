@@ -2,6 +2,7 @@
 
 use super::super::conditioning::Conditioning;
 use super::super::minimise::{Descent, RELATIVE_GAIN};
+use super::super::noise::Noise;
 use super::super::target_frame::TargetFrames;
 use super::super::{Covariance, Loss};
 use super::problem::{Problem, State};
@@ -48,7 +49,7 @@ pub fn lens_information(
         held: FreeParameters::NONE,
         fy_per_fx: None,
         priors: &[],
-        variance: 1.0,
+        noise: Noise::of_squares(1.0),
         bend: None,
         loss: Loss::Squares,
         max_iterations: 0,

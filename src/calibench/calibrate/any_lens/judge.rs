@@ -3,6 +3,7 @@
 use super::super::conditioning::Spectrum;
 use super::super::intervals::{Profile, Profiled, Skewed};
 use super::super::minimise::{Descent, Minimum, descend};
+use super::super::noise::Noise;
 use super::super::rival::{Met, Rival};
 use super::super::system::Reduction;
 use super::super::tie::tied;
@@ -17,8 +18,8 @@ use nalgebra::SVector;
 pub(super) struct Judged {
     pub minimum: Minimum<State, WIDTH>,
     pub reduction: Reduction<WIDTH>,
-    /// Variance of a coordinate of weight 1, px^2.
-    pub variance: f64,
+    /// Of a coordinate of weight 1.
+    pub noise: Noise,
     /// Starts that were refined.
     pub starts: usize,
     /// Parameters whose cost is no parabola.
@@ -51,23 +52,23 @@ pub(super) fn judge(
 ) -> Result<Judged, CalibrationError> {
     let mut skewed = Vec::new();
     let mut reduction = reduction_of(problem, &minimum)?;
-    let mut variance = report::variance(problem, &minimum);
-    if !is_parabola(problem, &minimum, &reduction, variance.sqrt()) {
+    let mut noise = report::noise(problem, &minimum);
+    if !is_parabola(problem, &minimum, &reduction, noise) {
         for state in start::alternatives(problem, &minimum.state) {
             take_better(problem, &mut minimum, state, &mut met);
         }
         skewed = profiles(problem, &mut minimum, &mut met)?;
         reduction = reduction_of(problem, &minimum)?;
-        variance = report::variance(problem, &minimum);
+        noise = report::noise(problem, &minimum);
     }
     let starts = met.len();
     let value = |camera: &Camera<Lens>, parameter| camera.value(parameter).unwrap_or(0.0);
     let rival = reduction.intrinsics_covariance().and_then(|unit| {
-        let covariance = unit * variance;
+        let covariance = unit * noise.variance;
         met.extend(counterpart(problem, &minimum, &covariance));
-        walk::met(&minimum).rival(&met, problem.free, &covariance, variance, value)
+        walk::met(&minimum).rival(&met, problem.free, &covariance, noise.rise, value)
     });
-    Ok(Judged { minimum, reduction, variance, starts, skewed, rival })
+    Ok(Judged { minimum, reduction, noise, starts, skewed, rival })
 }
 
 /// Notes the minimum that a start leads to, and takes it where it is better: also once it is refined to the end, which
@@ -101,8 +102,8 @@ fn profiles(
 ) -> Result<Vec<Skewed>, CalibrationError> {
     for _ in 0..BETTER_BY_PROFILE {
         let reduction = reduction_of(problem, minimum)?;
-        let noise_px = report::variance(problem, minimum).sqrt();
-        let Some(profile) = Profile::new(problem, minimum, &reduction, noise_px) else { break };
+        let noise = report::noise(problem, minimum);
+        let Some(profile) = Profile::new(problem, minimum, &reduction, noise) else { break };
         let lower = match profile.skewed() {
             Ok(skewed) => return Ok(skewed),
             Err(lower) => lower,
@@ -132,15 +133,15 @@ fn is_parabola(
     problem: &Problem<'_>,
     minimum: &Minimum<State, WIDTH>,
     reduction: &Reduction<WIDTH>,
-    noise_px: f64,
+    noise: Noise,
 ) -> bool {
     if minimum.system.cost <= problem.rounding_cost {
         return true;
     }
     let rises_as_said = |direction: SVector<f64, WIDTH>| {
-        let step = reduction.following(noise_px * direction);
+        let step = reduction.following(noise.px() * direction);
         let cost = problem.cost(&problem.stepped(&minimum.state, step));
-        let rise = (cost - minimum.system.cost) / (noise_px * noise_px);
+        let rise = (cost - minimum.system.cost) / noise.rise;
         (CHECKED_AT / rise.max(0.0).sqrt() - 1.0).abs() <= TOLERATED
     };
     weakest(reduction)

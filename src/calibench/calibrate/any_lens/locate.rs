@@ -1,6 +1,7 @@
 //! Where was the board in one view, for a camera that is known?
 
 use super::super::minimise::{RELATIVE_GAIN, descend};
+use super::super::noise::Noise;
 use super::super::target_frame::TargetFrames;
 use super::super::{Loss, Settings};
 use super::marks::Marks;
@@ -47,7 +48,7 @@ pub fn locate(camera: &Camera<Lens>, view: &View) -> Option<Located> {
         held: FreeParameters::NONE,
         fy_per_fx: None,
         priors: &[],
-        variance: 0.0,
+        noise: Noise::of_squares(0.0),
         bend: None,
         loss: Loss::Squares,
         max_iterations: Settings::standard().max_iterations,

@@ -5,7 +5,8 @@ use super::super::Loss;
 use super::super::blocks::ViewBlock;
 use super::super::chunks::{self, CHUNK};
 use super::super::minimise::Descent;
-use super::super::prior::Prior;
+use super::super::noise::Noise;
+use super::super::prior::{Prior, Weight};
 use super::super::settings::Bend;
 use super::super::system::{Step, System};
 use super::super::tie::tied;
@@ -39,9 +40,9 @@ pub(super) struct Problem<'a> {
     /// Parameters that are held for a while, as along a profile: of what is known of them beforehand they pay for their place.
     pub held: FreeParameters,
     pub fy_per_fx: Option<f64>,
-    /// What is known beforehand, and the variance of a coordinate of weight 1 that weighs it, px^2.
+    /// What is known beforehand, and the noise of a coordinate of weight 1 that weighs it.
     pub priors: &'a [Prior],
-    pub variance: f64,
+    pub noise: Noise,
     /// What is unknown of the board.
     pub bend: Option<Bend>,
     pub loss: Loss,
@@ -61,7 +62,7 @@ pub(super) struct Known {
     pub row: Option<usize>,
     /// Distance from the value that is expected.
     pub off: f64,
-    pub weight: f64,
+    pub weight: Weight,
 }
 
 /// Where minima are compared or left for another model, a cost that is known to this part of itself is known well
@@ -89,17 +90,17 @@ impl Problem<'_> {
 
     fn add_priors(&self, state: &State, system: &mut System<WIDTH>) {
         for Known { row, off, weight } in self.known(state) {
-            system.cost += weight * off * off;
+            system.cost += weight.cost * off * off;
             let Some(row) = row else { continue };
-            system.intrinsics[(row, row)] += weight;
-            system.gradient[row] += weight * off;
+            system.intrinsics[(row, row)] += weight.information;
+            system.gradient[row] += weight.cost * off;
         }
     }
 
     /// What is known beforehand: of parameters first, then of the board's deformations.
     pub fn known(&self, state: &State) -> Vec<Known> {
         let known =
-            |row: Option<usize>, off: f64, sd: f64| Known { row, off, weight: self.variance / (sd * sd) };
+            |row: Option<usize>, off: f64, sd: f64| Known { row, off, weight: Weight::of(self.noise, sd) };
         let of_prior = |prior: &Prior| {
             let row = self.free.position(prior.parameter);
             if row.is_none() && !self.held.contains(prior.parameter) {
@@ -114,9 +115,8 @@ impl Problem<'_> {
     }
 
     /// What a camera costs for what is known of its parameters beforehand.
-    pub fn cost_of_priors(&self, camera: &Camera<Lens>) -> f64 {
-        let state = State { camera: *camera, cam_from_target: Vec::new(), shape: [0.0; 3] };
-        self.known(&state).iter().map(|known| known.weight * known.off * known.off).sum()
+    pub fn cost_of_priors(&self, state: &State) -> f64 {
+        self.known(state).iter().map(|known| known.weight.cost * known.off * known.off).sum()
     }
 
     /// What the kernel is asked of view `at`.
@@ -139,9 +139,10 @@ impl Problem<'_> {
         let of_views: Option<Vec<f64>> = chunks::map(self.views, of_view).into_iter().collect();
         let of_marks = of_views.map(|costs| costs.chunks(CHUNK).map(|chunk| chunk.iter().sum::<f64>()).sum());
         match of_marks {
-            Some(cost) if state.camera.fx > 0.0 && state.camera.fy > 0.0 && !f64::is_nan(cost) => {
-                self.known(state).iter().fold(cost, |sum, known| sum + known.weight * known.off * known.off)
-            }
+            Some(cost) if state.camera.fx > 0.0 && state.camera.fy > 0.0 && !f64::is_nan(cost) => self
+                .known(state)
+                .iter()
+                .fold(cost, |sum, known| sum + known.weight.cost * known.off * known.off),
             _ => f64::INFINITY,
         }
     }
@@ -158,7 +159,7 @@ impl Problem<'_> {
             return 0.0;
         }
         let Some(covariance) = system.reduction().and_then(|r| r.intrinsics_covariance()) else { return 0.0 };
-        let share = |row: usize, sd: f64| covariance[(row, row)] * self.variance / (sd * sd);
+        let share = |row: usize, sd: f64| covariance[(row, row)] * self.noise.variance / (sd * sd);
         let of_priors = self
             .priors
             .iter()
@@ -266,11 +267,16 @@ mod tests {
     use crate::camera::Parameter;
 
     #[test]
-    fn what_is_known_weighs_by_the_variance_of_a_coordinate_over_its_own() {
+    fn what_is_known_weighs_by_the_noise_of_a_coordinate_over_its_own() {
         at_minimum(FreeParameters::of(&FREE), 1.0, |nothing_known, minimum| {
             let prior = Prior { parameter: Parameter::Cx, mean: 300.0, standard_deviation: 0.2 };
             let bend = Some(Bend { deformations: 2, standard_deviation: 0.05 });
-            let problem = Problem { priors: &[prior], variance: 0.01, bend, ..*nothing_known };
+            let problem = Problem {
+                priors: &[prior],
+                noise: Noise { variance: 0.01, rise: 0.008 },
+                bend,
+                ..*nothing_known
+            };
             let state = State { shape: [0.3, -0.1, 0.0], ..minimum.state.clone() };
             let known = problem.known(&state);
             let expected =
@@ -280,10 +286,11 @@ mod tests {
                 known.iter().zip(expected)
             {
                 assert_eq!((*row, *off), (Some(row_expected), off_expected));
-                assert!((weight / weight_expected - 1.0).abs() < 1e-14, "{weight}");
+                assert!((weight.information / weight_expected - 1.0).abs() < 1e-14, "{weight:?}");
+                assert!((weight.cost / weight_expected - 0.8).abs() < 1e-14, "{weight:?}");
             }
             // And so it costs, with derivatives and without.
-            let known_cost: f64 = expected.iter().map(|(_, off, weight)| weight * off * off).sum();
+            let known_cost: f64 = expected.iter().map(|(_, off, weight)| 0.8 * weight * off * off).sum();
             let mut system = problem.system();
             problem.linearise_into(&state, &mut system);
             let of_marks = Problem { priors: &[], bend: None, ..problem }.cost(&state);

@@ -1,9 +1,10 @@
 //! What does a calibration with a lens of any model say? The minimum as a [`LensCalibration`].
 
 use super::super::conditioning::Conditioning;
-use super::super::estimate::{noise_variance, whole};
+use super::super::estimate::whole;
 use super::super::intervals::Profile;
 use super::super::minimise::{Minimum, descend};
+use super::super::noise::Noise;
 use super::super::outliers::{self, Outliers};
 use super::super::target_frame::TargetFrames;
 use super::super::{
@@ -64,12 +65,11 @@ fn largest_angle(problem: &Problem<'_>, state: &State) -> f64 {
     problem.views.iter().zip(&state.cam_from_target).map(of_view).fold(0.0, f64::max)
 }
 
-/// The variance of a coordinate of weight 1 that the residuals of a minimum show, at the scale at which the
-/// covariance is stated.
-pub(super) fn variance(problem: &Problem<'_>, minimum: &Minimum<State, WIDTH>) -> f64 {
+/// The noise of a coordinate of weight 1 that the residuals of a minimum show.
+pub(super) fn noise(problem: &Problem<'_>, minimum: &Minimum<State, WIDTH>) -> Noise {
     let residuals = Residuals::of(problem, &minimum.state);
     let freedom = residuals.freedom(minimum, problem.settled(&minimum.system)).max(1.0);
-    noise_variance(&residuals.weighted, residuals.square, problem.loss, freedom)
+    Noise::of_residuals(&residuals.weighted, residuals.square, problem.loss, freedom)
 }
 
 /// Whether the residuals of a state may be more than noise.
@@ -122,7 +122,7 @@ pub(super) fn report(
     region: [Vec2; 2],
     settings: &Settings,
 ) -> Result<LensCalibration, CalibrationError> {
-    let Judged { minimum, reduction, variance, starts, skewed, rival } = judged;
+    let Judged { minimum, reduction, noise, starts, skewed, rival } = judged;
     let Minimum { state, system, termination, iterations } = &minimum;
     let residuals = Residuals::of(problem, state);
     let freedom = residuals.freedom(&minimum, problem.settled(system));
@@ -131,12 +131,13 @@ pub(super) fn report(
     identifiability::refuse_singular_minimum(problem.free, conditioning.as_ref())?;
     let unit = reduction.covariance().ok_or_else(identifiability::singular)?;
     let fx = problem.free.position(Parameter::Fx);
-    let relative = fx.map_or(0.0, |row| (unit.intrinsics[(row, row)] * variance).sqrt() / state.camera.fx);
-    focal::refuse_if_open(problem, &minimum, variance, relative)?;
-    let profile = Profile::new(problem, &minimum, &reduction, variance.sqrt());
+    let relative =
+        fx.map_or(0.0, |row| (unit.intrinsics[(row, row)] * noise.variance).sqrt() / state.camera.fx);
+    focal::refuse_if_open(problem, &minimum, noise, relative)?;
+    let profile = Profile::new(problem, &minimum, &reduction, noise);
     let intervals = settings.profile_coverage.zip(profile);
     let intervals = intervals.map_or(Vec::new(), |(coverage, p)| p.intervals(coverage, degrees_of_freedom));
-    let mut covariance = frames.covariance(unit, &state.cam_from_target, variance);
+    let mut covariance = frames.covariance(unit, &state.cam_from_target, noise.variance);
     covariance.fy_per_fx = problem.fy_per_fx;
     // The board's shape stands behind the camera's parameters.
     let n = problem.free.len();

@@ -41,7 +41,7 @@ fn root(problem: &Problem<'_>, state: &State) -> Option<DMatrix<f64>> {
         .collect::<Option<_>>()?;
     rest.extend(problem.known(state).iter().filter_map(|known| {
         let mut row = DMatrix::zeros(1, shared);
-        row[(0, known.row?)] = known.weight.sqrt();
+        row[(0, known.row?)] = known.weight.information.sqrt();
         Some(row)
     }));
     let height = rest.iter().map(DMatrix::nrows).sum();
@@ -64,6 +64,7 @@ fn without_pose(rows: DMatrix<f64>, shared: usize) -> DMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::super::super::minimise::{Descent, RELATIVE_GAIN};
+    use super::super::super::noise::Noise;
     use super::super::super::target_frame::TargetFrames;
     use super::super::super::{Loss, Prior};
     use super::super::{marks, shape};
@@ -95,7 +96,7 @@ mod tests {
             held: FreeParameters::NONE,
             fy_per_fx: None,
             priors: &[Prior { parameter: Parameter::K1, mean: 0.0, standard_deviation: 0.01 }],
-            variance: 0.01,
+            noise: Noise::of_squares(0.01),
             bend: None,
             loss: Loss::Huber { delta_px: 0.3 },
             max_iterations: 0,

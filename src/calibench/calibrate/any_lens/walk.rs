@@ -7,11 +7,13 @@ use super::problem::{Problem, ROUGH_GAIN, State};
 use super::{WIDTH, certificate, report, start};
 use crate::board::View;
 use crate::camera::Lens;
+use std::cmp::Ordering;
 
-/// The best of the minima, refined to the end where the model is certifiable, and all that were met, most of them to [`ROUGH_GAIN`].
+/// The best of the minima, refined to the end where the model is certifiable, and the others that were met, most of them to
+/// [`ROUGH_GAIN`].
 pub(super) struct Walked {
     pub best: Minimum<State, WIDTH>,
-    pub met: Vec<Met<Lens>>,
+    pub others: Vec<Minimum<State, WIDTH>>,
 }
 
 /// Refines the starts: those that the pinhole's solver gives, and, unless one of them converges to residuals that look like noise and
@@ -35,32 +37,55 @@ pub(super) fn walk(
     if !minima.iter().any(is_settled) {
         minima.extend(refined(problem, start::by_rays(problem, settings)));
     }
-    if let Some(first) = best(problem, &minima) {
+    if let Some(first) = best_of(problem, &minima) {
         minima.extend(refined(problem, start::other_spheres(problem, &minima[first].state)));
     }
-    let rough = best(problem, &minima).ok_or(CalibrationError::NoImage { model: settings.model() })?;
+    let rough = best_of(problem, &minima).ok_or(CalibrationError::NoImage { model: settings.model() })?;
     follow(problem, &mut minima[rough]);
     if minima[rough].termination != Termination::Converged {
         // Its valley goes on and on, and another start may lead to a minimum that is as good.
         let others = minima.iter_mut().enumerate().filter(|(place, _)| *place != rough);
         others.for_each(|(_, minimum)| follow(problem, minimum));
     }
-    let met = minima.iter().map(met).collect();
-    let best = best(problem, &minima).unwrap_or(rough);
+    let best = best_of(problem, &minima).unwrap_or(rough);
     if problem.is_certifiable && best != rough {
         follow(problem, &mut minima[best]);
     }
-    Ok(Walked { best: minima.swap_remove(best), met })
+    Ok(Walked { best: minima.swap_remove(best), others: minima })
+}
+
+/// Costs that differ by less than this part, at focal lengths that do, are those of one minimum.
+const ONE_MINIMUM: f64 = 1e-4;
+
+/// The minima of another problem that lie where these do, each once: the best there need not be the best here, as where a lens takes up
+/// what the board's shape explains.
+pub(super) fn walked_anew(walked: Walked, problem: &Problem<'_>) -> Walked {
+    let Walked { mut best, others } = walked;
+    let is_same = |a: f64, b: f64| (a - b).abs() <= ONE_MINIMUM * b.abs();
+    let mut seen = vec![(best.system.cost, best.state.camera.fx)];
+    follow(problem, &mut best);
+    let mut minima = vec![best];
+    for mut other in others {
+        let at = (other.system.cost, other.state.camera.fx);
+        if seen.iter().any(|known| is_same(at.0, known.0) && is_same(at.1, known.1)) {
+            continue;
+        }
+        seen.push(at);
+        follow(problem, &mut other);
+        minima.push(other);
+    }
+    let place = best_of(problem, &minima).unwrap_or(0);
+    Walked { best: minima.swap_remove(place), others: minima }
 }
 
 /// Refines a minimum to the end.
-fn follow(problem: &Problem<'_>, minimum: &mut Minimum<State, WIDTH>) {
+pub(super) fn follow(problem: &Problem<'_>, minimum: &mut Minimum<State, WIDTH>) {
     let end = descend(problem, minimum.state.clone());
     *minimum = Minimum { iterations: minimum.iterations + end.iterations, ..end };
 }
 
 /// Which of the minima is the best.
-fn best(problem: &Problem<'_>, minima: &[Minimum<State, WIDTH>]) -> Option<usize> {
+fn best_of(problem: &Problem<'_>, minima: &[Minimum<State, WIDTH>]) -> Option<usize> {
     let better = |best, next| if is_better(problem, &minima[next], &minima[best]) { next } else { best };
     (0..minima.len()).reduce(better)
 }
@@ -71,35 +96,38 @@ fn refined(problem: &Problem<'_>, starts: Vec<State>) -> Vec<Minimum<State, WIDT
     minima.filter(|minimum| minimum.system.cost.is_finite()).collect()
 }
 
-/// Whether one minimum is to be preferred to another: it costs less, and if it is none, because the search went on
-/// and on, or has coefficients for which the model is not defined, so much less that chance does not explain it. Where
-/// numerator and denominator of a fraction nearly cancel, a valley goes on to coefficients without end, at a fraction of a
-/// variance; two spheres make nearly the same picture in and out of their range.
+/// Whether one minimum is to be preferred to another: it costs less, and if less speaks for it than for the other, so much less that chance
+/// does not explain it. Where numerator and denominator of a fraction nearly cancel, a valley goes on to coefficients without end, at a
+/// fraction of a variance; two spheres make nearly the same picture in and out of their range.
 pub(super) fn is_better(
     problem: &Problem<'_>,
     next: &Minimum<State, WIDTH>,
     best: &Minimum<State, WIDTH>,
 ) -> bool {
-    let [next_is_sound, best_is_sound] = [next, best].map(is_sound);
-    let margin = match (next_is_sound, best_is_sound) {
-        (true, false) => -RIVALS * report::variance(problem, next),
-        (false, true) => RIVALS * report::variance(problem, best),
-        _ => 0.0,
+    let margin = match standing(next).cmp(&standing(best)) {
+        Ordering::Greater => -RIVALS * report::noise(problem, next).rise,
+        Ordering::Less => RIVALS * report::noise(problem, best).rise,
+        Ordering::Equal => 0.0,
     };
     next.system.cost + margin < best.system.cost
 }
 
-/// Whether a search ended, and with a camera for which its model is defined.
-fn is_sound(minimum: &Minimum<State, WIDTH>) -> bool {
+/// Whether a minimum is a camera for which its model is defined, and then whether its search ended: beside a camera that is in its range
+/// a search may go on and on, and out of the range end.
+fn standing(minimum: &Minimum<State, WIDTH>) -> (bool, bool) {
     let is_defined = Warning::outside_range(&minimum.state.camera).next().is_none();
-    minimum.termination == Termination::Converged && is_defined
+    (is_defined, minimum.termination == Termination::Converged)
 }
 
 /// A minimum as another problem weighs what is known beforehand, which it does by its own noise. Where that is no minimum of its, the next
 /// one costs less.
-pub(super) fn weighed_anew(met: Met<Lens>, before: &Problem<'_>, now: &Problem<'_>) -> Met<Lens> {
-    let cost = met.cost - before.cost_of_priors(&met.camera) + now.cost_of_priors(&met.camera);
-    Met { cost, ..met }
+pub(super) fn weighed_anew(
+    minimum: &Minimum<State, WIDTH>,
+    before: &Problem<'_>,
+    now: &Problem<'_>,
+) -> Met<Lens> {
+    let of_priors = now.cost_of_priors(&minimum.state) - before.cost_of_priors(&minimum.state);
+    Met { cost: minimum.system.cost + of_priors, ..met(minimum) }
 }
 
 /// A minimum among those that were met.
@@ -113,6 +141,7 @@ pub(super) fn met(minimum: &Minimum<State, WIDTH>) -> Met<Lens> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::noise::Noise;
     use super::super::super::prior::Prior;
     use super::super::super::target_frame::TargetFrames;
     use super::super::estimate::calibrate;
@@ -126,9 +155,11 @@ mod tests {
         fixture::at_minimum(free, 1.0, |nothing_known, minimum| {
             let mean = minimum.state.camera.fx - 2.0;
             let prior = Prior { parameter: Parameter::Fx, mean, standard_deviation: 0.5 };
-            let before = Problem { priors: &[prior], variance: 0.01, ..*nothing_known };
-            let now = Problem { variance: 0.09, ..before };
-            let anew = weighed_anew(Met { cost: before.cost(&minimum.state), ..met(minimum) }, &before, &now);
+            let before = Problem { priors: &[prior], noise: Noise::of_squares(0.01), ..*nothing_known };
+            let now = Problem { noise: Noise::of_squares(0.09), ..before };
+            let mut weighed = minimum.clone();
+            weighed.system.cost = before.cost(&minimum.state);
+            let anew = weighed_anew(&weighed, &before, &now);
             // (2 / 0.5)^2 variances.
             assert!((anew.cost - before.cost(&minimum.state) - 16.0 * 0.08).abs() < 1e-9, "{anew:?}");
             assert!((anew.cost / now.cost(&minimum.state) - 1.0).abs() < 1e-12, "{anew:?}");
