@@ -13,9 +13,9 @@ use crate::records::{all_mirrored, certificate, conditioning, mirrored, record, 
 use crate::settings::settings;
 use crate::watch::{detached, needs_threads};
 use calibench::board::View;
-use calibench::calibrate::{LensCalibration, Settings, calibrate_lens};
+use calibench::calibrate::{LensCalibration, Loss, Settings, calibrate_lens};
 use calibench::geometry::{Vec2, Vec3, rotation};
-use calibench::io::CalibrationFields;
+use calibench::io::{CalibrationFields, loss_to_text};
 use calibench::photos::Fitter;
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
@@ -34,6 +34,8 @@ const MANY_MARKS: usize = 5000;
 pub(crate) struct Calibration {
     pub(crate) result: LensCalibration,
     image_size: Option<(usize, usize)>,
+    /// By which residuals counted.
+    loss: Loss,
     /// Time that the estimator took, where it alone was called.
     solver_seconds: Option<f64>,
 }
@@ -41,7 +43,7 @@ pub(crate) struct Calibration {
 /// Equal numbers, whatever time they took.
 impl PartialEq for Calibration {
     fn eq(&self, other: &Calibration) -> bool {
-        (&self.result, self.image_size) == (&other.result, other.image_size)
+        (&self.result, self.image_size, self.loss) == (&other.result, other.image_size, other.loss)
     }
 }
 
@@ -184,7 +186,7 @@ pub(crate) fn calibrate(
 ) -> PyResult<Calibration> {
     let settings = settings(py, options)?;
     let views = views(points, pixels, weights)?;
-    let (image_size, long) = (settings.image_size, is_long(&views, &settings));
+    let (image_size, loss, long) = (settings.image_size, settings.loss, is_long(&views, &settings));
     refuse_marks_outside(py, &views, image_size)?;
     if is_shared_out(&views) {
         needs_threads(py)?;
@@ -194,7 +196,7 @@ pub(crate) fn calibrate(
         (calibrate_lens(&views, &settings), started.elapsed())
     })?;
     let result = result.map_err(|e| errors::calibration(py, &e))?;
-    Ok(Calibration { result, image_size, solver_seconds: Some(took.as_secs_f64()) })
+    Ok(Calibration { result, image_size, loss, solver_seconds: Some(took.as_secs_f64()) })
 }
 
 /// Calibrates from marks that `Board.detect` found: imaged discs are corrected for their bias once the camera is known (Heikkila 2000), and stray
@@ -220,7 +222,7 @@ pub(crate) fn fit_views<'py>(
     let view = |(index, pixels)| View::new(points.clone(), pixels).map_err(|e| errors::view(py, index, &e));
     let views: Vec<View> =
         views_of_points(pixels, "pixels")?.into_iter().enumerate().map(view).collect::<PyResult<_>>()?;
-    let image_size = settings.image_size;
+    let (image_size, loss) = (settings.image_size, settings.loss);
     refuse_marks_outside(py, &views, image_size)?;
     if is_shared_out(&views) {
         needs_threads(py)?;
@@ -237,7 +239,7 @@ pub(crate) fn fit_views<'py>(
     let corrected = fit.views.iter().map(|view| of_plane(py, view.pixels())).collect::<PyResult<Vec<_>>>()?;
     fields.set_item("pixels", PyTuple::new(py, corrected)?)?;
     fields.set_item("largest_bias_px", fit.bias.map(|bias| bias.largest_px))?;
-    fields.set_item("calibration", Calibration::of(fit.calibration, image_size))?;
+    fields.set_item("calibration", Calibration::of(fit.calibration, image_size, loss))?;
     record(py, "Fit", &fields)
 }
 
@@ -277,8 +279,8 @@ pub(crate) fn locate<'py>(
 }
 
 impl Calibration {
-    pub(crate) fn of(result: LensCalibration, image_size: Option<(usize, usize)>) -> Calibration {
-        Calibration { result, image_size, solver_seconds: None }
+    pub(crate) fn of(result: LensCalibration, image_size: Option<(usize, usize)>, loss: Loss) -> Calibration {
+        Calibration { result, image_size, loss, solver_seconds: None }
     }
 
     /// A calibration from what `__reduce__` gave.
@@ -286,11 +288,12 @@ impl Calibration {
         camera: Camera,
         result: calibench::calibrate::Calibration,
         image_size: Option<(usize, usize)>,
+        loss: Loss,
         solver_seconds: Option<f64>,
     ) -> Calibration {
         let mut result: LensCalibration = result.into();
         result.camera = camera.0;
-        Calibration { result, image_size, solver_seconds }
+        Calibration { result, image_size, loss, solver_seconds }
     }
 
     /// Width and height, px, where they were stated.
@@ -457,14 +460,16 @@ impl Calibration {
         let mut result = self.result.clone();
         result.camera = calibench::camera::Camera::pinhole(1.0, 1.0, 0.0, 0.0).into();
         let data = result.brown_conrady().map(|plain| pythonize(py, &plain)).transpose()?;
-        let state = (self.camera(), data, self.image_size, self.solver_seconds);
+        let state = (self.camera(), data, self.image_size, loss_to_text(self.loss), self.solver_seconds);
         reduced(py, "Calibration", state.into_pyobject(py)?.into_any())
     }
 
     /// The text of `result.json` as the command writes it, all digits kept.
     #[pyo3(signature = (view_names = None))]
     fn to_json(&self, view_names: Option<Vec<String>>) -> String {
-        CalibrationFields::of(&self.result, &view_names.unwrap_or_default(), self.image_size).to_json()
+        CalibrationFields::of(&self.result, &view_names.unwrap_or_default(), self.image_size)
+            .with_loss(self.loss)
+            .to_json()
     }
 
     fn __repr__(&self) -> String {

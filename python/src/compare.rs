@@ -27,7 +27,7 @@ pub(crate) fn compare_models<'py>(
 ) -> PyResult<Bound<'py, PyTuple>> {
     let settings = settings(py, options)?;
     let views = views(points, pixels, weights)?;
-    let image_size = settings.image_size;
+    let (image_size, loss) = (settings.image_size, settings.loss);
     refuse_marks_outside(py, &views, image_size)?;
     if is_shared_out(&views) {
         needs_threads(py)?;
@@ -44,7 +44,7 @@ pub(crate) fn compare_models<'py>(
         fields.set_item("hold_out_px", compared.hold_out_px)?;
         fields.set_item("bic", compared.bic)?;
         fields.set_item("correlation", compared.correlation)?;
-        fields.set_item("calibration", Calibration::of(compared.calibration, image_size))?;
+        fields.set_item("calibration", Calibration::of(compared.calibration, image_size, loss))?;
         record(py, "ComparedModel", &fields)
     };
     PyTuple::new(py, compared.into_iter().map(of).collect::<PyResult<Vec<_>>>()?)

@@ -3,6 +3,7 @@
 use crate::calibrate::Calibration;
 use crate::camera::Camera;
 use crate::covariance::Covariance;
+use calibench::io::loss_from_text;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pythonize::depythonize;
@@ -29,9 +30,11 @@ pub(crate) fn restored<'py>(
     match name {
         "Covariance" => Ok(Covariance(depythonize(state)?).into_pyobject(py)?.into_any()),
         "Calibration" => {
-            let (camera, result, image_size, seconds) =
-                state.extract::<(Camera, Bound<'py, PyAny>, Option<(usize, usize)>, Option<f64>)>()?;
-            let restored = Calibration::restored(camera, depythonize(&result)?, image_size, seconds);
+            type State<'py> = (Camera, Bound<'py, PyAny>, Option<(usize, usize)>, String, Option<f64>);
+            let (camera, result, image_size, loss, seconds) = state.extract::<State<'py>>()?;
+            let loss =
+                loss_from_text(&loss).ok_or_else(|| PyValueError::new_err(format!("no loss {loss:?}")))?;
+            let restored = Calibration::restored(camera, depythonize(&result)?, image_size, loss, seconds);
             Ok(restored.into_pyobject(py)?.into_any())
         }
         other => Err(PyValueError::new_err(format!("no class {other:?} is restored here"))),

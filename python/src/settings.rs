@@ -5,6 +5,7 @@ use crate::camera::{Camera, model, parameter};
 use crate::errors;
 use calibench::calibrate::{Board, Loss, Settings};
 use calibench::camera::{FreeParameters, Model};
+use calibench::io::loss_from_text;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -103,14 +104,7 @@ fn refused(py: Python<'_>, kind: &str, text: String) -> PyErr {
 
 /// `squares`, `huber:PX` or `cauchy:PX`.
 fn loss(py: Python<'_>, text: &str) -> PyResult<Loss> {
-    let scaled = |px: &str| px.parse().ok();
-    let found = match text.split_once(':') {
-        None if text == "squares" => Some(Loss::Squares),
-        Some(("huber", px)) => scaled(px).map(|delta_px| Loss::Huber { delta_px }),
-        Some(("cauchy", px)) => scaled(px).map(|scale_px| Loss::Cauchy { scale_px }),
-        _ => None,
-    };
-    found.ok_or_else(|| {
+    loss_from_text(text).ok_or_else(|| {
         refused(
             py,
             "Loss",

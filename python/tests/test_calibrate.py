@@ -1,6 +1,7 @@
 """Calibrations from arrays: every option, every shape, and what is refused."""
 
 import json
+import pickle
 import threading
 import time
 
@@ -51,6 +52,14 @@ def test_a_result_has_its_arrays() -> None:
     assert result.conditioning is not None and result.conditioning.weakest[0].weight != 0.0
     fields = json.loads(result.to_json(["a", "b", "c", "d"]))
     assert fields["camera"]["fx"] == result.camera.fx and fields["views"][3]["name"] == "d"
+    assert "loss" not in fields
+
+
+def test_a_result_names_its_robust_loss() -> None:
+    result = calibench.calibrate(SCENE.points, observed(), loss="huber:0.3")
+    copy = pickle.loads(pickle.dumps(result))
+    assert copy == result
+    assert [json.loads(each.to_json())["loss"] for each in (result, copy)] == ["huber:0.3"] * 2
 
 
 def test_options_do_what_they_say() -> None:

@@ -11,7 +11,7 @@ use calibench::io::ShownPath;
 use calibench::io::input::{MOST_SIDE_PX, MOST_TABLE_BYTES, read_named};
 use calibench::io::memory::{DEFAULT_MEMORY, parse_bytes};
 use calibench::io::table::{columns, unended_line};
-use calibench::io::{misplaced_marks, parse_corners};
+use calibench::io::{loss_from_text, misplaced_marks, parse_corners};
 use calibench::photos::BoardSpec;
 use calibench::planar::PlaneModel;
 use camera::Observed;
@@ -286,23 +286,8 @@ pub(super) fn parse_size(text: &str) -> Result<(usize, usize), String> {
 }
 
 fn parse_loss(text: &str) -> Result<Loss, String> {
-    let wanted = || "expected squares, huber:PX or cauchy:PX, such as huber:0.5".to_string();
-    let loss = match text.split_once(':') {
-        None if text == "squares" => Loss::Squares,
-        Some(("huber", px)) => Loss::Huber { delta_px: px.parse().map_err(|_| wanted())? },
-        Some(("cauchy", px)) => Loss::Cauchy { scale_px: px.parse().map_err(|_| wanted())? },
-        _ => return Err(wanted()),
-    };
-    if loss.is_valid() { Ok(loss) } else { Err(CalibrationError::BadLoss.to_string()) }
-}
-
-/// A robust loss as [`parse_loss`] reads it.
-fn loss_name(loss: Loss) -> Option<String> {
-    match loss {
-        Loss::Huber { delta_px } => Some(format!("huber:{delta_px}")),
-        Loss::Cauchy { scale_px } => Some(format!("cauchy:{scale_px}")),
-        _ => None,
-    }
+    let wanted = "expected squares, huber:PX or cauchy:PX, such as huber:0.5; ";
+    loss_from_text(text).ok_or_else(|| format!("{wanted}{}", CalibrationError::BadLoss))
 }
 
 fn parse_factor(text: &str) -> Result<f64, String> {

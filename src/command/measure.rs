@@ -120,11 +120,9 @@ fn measured_in_view(
     }
     refuse_outside(known, &ends)?;
     let file = arguments.result.shown();
-    if known.has_board {
-        return Err(format!(
-            "{file}: the board's shape was estimated: lengths are measured on flat boards only"
-        ));
-    }
+    known
+        .refuse_bent_board(&file)
+        .map_err(|error| format!("{error}: lengths are measured on flat boards only"))?;
     let camera = known.brown_conrady(&file).map_err(|error| error.to_string())?;
     let plane = plane(arguments, known, &camera)?;
     if arguments.mark_sd.is_none() {

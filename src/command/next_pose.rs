@@ -214,13 +214,15 @@ fn known(arguments: &Arguments) -> Result<KnownCalibration, String> {
         Known::Plane(_) => {
             Err(format!("{file}: the map of a plane has no camera: no pose is better than another"))
         }
-        Known::Camera(known) if known.has_board => Err(format!(
-            "{file}: the board's shape was estimated: what a view tells of it is not planned, only poses of flat boards are"
-        )),
         Known::Camera(known) if !known.camera.is_possible() => {
             Err(format!("{file}: its camera is none: every parameter must be finite, fx and fy above 0"))
         }
-        Known::Camera(known) => Ok(*known),
+        Known::Camera(known) => {
+            known
+                .refuse_bent_board(&file)
+                .map_err(|error| format!("{error}: poses are planned for flat boards only"))?;
+            Ok(*known)
+        }
     }
 }
 

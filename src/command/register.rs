@@ -9,7 +9,7 @@ use calibench::calibrate::Loss;
 use calibench::downstream::{MapModel, Mark, Registration, coverage_factor, register};
 use calibench::geometry::Vec2;
 use calibench::io::shown::on_one_line;
-use calibench::io::{MarkFile, ShownPath, read_marks, significant};
+use calibench::io::{MarkFile, ShownPath, loss_from_text, read_marks, significant};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -77,14 +77,7 @@ fn parse_point(text: &str) -> Result<Vec2, String> {
 }
 
 fn parse_loss(text: &str) -> Result<Loss, String> {
-    let scale = |number: &str| number.parse().unwrap_or(f64::NAN);
-    let loss = match text.split_once(':') {
-        None if text == "squares" => Some(Loss::Squares),
-        Some(("huber", number)) => Some(Loss::Huber { delta_px: scale(number) }),
-        Some(("cauchy", number)) => Some(Loss::Cauchy { scale_px: scale(number) }),
-        _ => None,
-    };
-    loss.filter(Loss::is_valid).ok_or_else(|| "expected squares, huber:D or cauchy:D, such as huber:2".into())
+    loss_from_text(text).ok_or_else(|| "expected squares, huber:D or cauchy:D, such as huber:2".into())
 }
 
 pub(super) fn run(arguments: &Arguments) -> Exit {

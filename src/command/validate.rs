@@ -176,13 +176,10 @@ fn warn_of_copies(arguments: &Arguments, all: &[&KnownCalibration]) {
 
 /// Views are located by the marks of a plane.
 fn refuse_bent_board(arguments: &Arguments, known: &KnownCalibration) -> Result<(), String> {
-    match known.has_board {
-        false => Ok(()),
-        true => Err(format!(
-            "{}: the board's shape was estimated: views are validated on flat boards only (--again compares cameras)",
-            arguments.result.shown()
-        )),
-    }
+    let refused = known.refuse_bent_board(&arguments.result.shown());
+    refused.map_err(|error| {
+        format!("{error}: views are validated on flat boards only (--again compares cameras)")
+    })
 }
 
 fn on_new(arguments: &Arguments, known: &KnownCalibration, views: &Views) -> Result<HoldOut, String> {

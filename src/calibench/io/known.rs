@@ -64,6 +64,14 @@ impl KnownCalibration {
             }
         }
     }
+
+    /// For what knows flat boards only; `file` names the result in the error.
+    ///
+    /// # Errors
+    /// [`KnownError::BentBoard`].
+    pub fn refuse_bent_board(&self, file: &str) -> Result<(), KnownError> {
+        if self.has_board { Err(KnownError::BentBoard { file: file.into() }) } else { Ok(()) }
+    }
 }
 
 impl<'a> From<&'a KnownCalibration> for Estimate<'a> {
@@ -118,6 +126,12 @@ pub enum KnownError {
         file: String,
         /// The loss.
         loss: String,
+    },
+    /// Its board is not flat.
+    #[error("{file}: the board's shape was estimated, so that its marks lie in no plane")]
+    BentBoard {
+        /// The file.
+        file: String,
     },
     /// A name in `free` is none.
     #[error("{file}: free: {cause}")]

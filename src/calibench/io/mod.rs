@@ -19,6 +19,7 @@ pub mod input;
 mod jpeg;
 mod kept;
 pub mod known;
+mod loss;
 pub mod marks;
 pub mod measured;
 pub mod memory;
@@ -50,6 +51,7 @@ pub use image::{Extent, Grey, ImageError, image_extent, read_image, write_png, w
 pub use input::{InputError, MOST_SIDE_PX, read_regular, read_regular_text};
 pub use kept::{is_kept, keep_files};
 pub use known::{Known, KnownCalibration, KnownError, parse_known, read_known};
+pub use loss::{loss_from_text, loss_to_text};
 pub use marks::{MarkFile, parse_marks, read_marks};
 pub use measured::{MeasuredFields, SeenFile, TargetFileError, parse_seen, parse_target, refusal_by_names};
 pub use memory::Memory;

@@ -1,10 +1,11 @@
 //! How is a calibration kept and handed on? `result.json`: the camera by its parameters' names, with all that
 //! is known of it.
 
-use super::input::{InputError, MOST_TABLE_BYTES, read_regular_text};
+use super::input::{InputError, MOST_SIDE_PX, MOST_TABLE_BYTES, read_regular_text};
+use super::loss::loss_to_text;
 use super::shown::ShownPath;
 use crate::calibrate::{
-    BoardShape, Certificate, Compared, LensCalibration, Prior, ProfileInterval, Termination, in_words,
+    BoardShape, Certificate, Compared, LensCalibration, Loss, Prior, ProfileInterval, Termination, in_words,
 };
 use crate::camera::{Camera, Lens, Model, Parameter};
 use crate::geometry::{Vec2, rotation};
@@ -12,45 +13,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The ten intrinsic parameters by name; those left out of a file are 0, and any other name is refused:
-/// without it this would be another camera.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[allow(missing_docs, reason = "the names are those of `Parameter`")]
-pub struct CameraFields {
-    pub fx: f64,
-    pub fy: f64,
-    pub cx: f64,
-    pub cy: f64,
-    #[serde(default)]
-    pub skew: f64,
-    #[serde(default)]
-    pub k1: f64,
-    #[serde(default)]
-    pub k2: f64,
-    #[serde(default)]
-    pub p1: f64,
-    #[serde(default)]
-    pub p2: f64,
-    #[serde(default)]
-    pub k3: f64,
-}
-
-impl From<Camera> for CameraFields {
-    fn from(camera: Camera) -> CameraFields {
-        let [fx, fy, cx, cy, skew, k1, k2, p1, p2, k3] = camera.parameters();
-        CameraFields { fx, fy, cx, cy, skew, k1, k2, p1, p2, k3 }
-    }
-}
-
-impl From<CameraFields> for Camera {
-    fn from(f: CameraFields) -> Camera {
-        Camera::from_parameters([f.fx, f.fy, f.cx, f.cy, f.skew, f.k1, f.k2, f.p1, f.p2, f.k3])
-    }
-}
-
 /// A camera with a lens of any model, by its parameters' names; `model` says which, and a camera without one has
-/// Brown-Conrady's lens.
+/// Brown-Conrady's lens. Coefficients left out of a file are 0, and any other name is refused: without it this would be another camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LensFields(pub Camera<Lens>);
 
@@ -69,7 +33,7 @@ impl Serialize for LensFields {
     }
 }
 
-/// Reads what [`Serialize`] writes, in any order; coefficients that are not named are 0.
+/// Reads what [`Serialize`] writes, in any order.
 impl<'de> Deserialize<'de> for LensFields {
     fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<LensFields, D::Error> {
         from.deserialize_map(NamedParameters)
@@ -90,6 +54,9 @@ impl<'de> serde::de::Visitor<'de> for NamedParameters {
         let (mut model, mut named) = (None, Vec::<(Parameter, f64)>::new());
         while let Some(name) = map.next_key::<String>()? {
             if name == "model" {
+                if model.is_some() {
+                    return Err(A::Error::custom("model is given twice"));
+                }
                 let name: String = map.next_value()?;
                 model = Some(name.parse::<Model>().map_err(A::Error::custom)?);
                 continue;
@@ -301,7 +268,7 @@ pub struct CalibrationFields {
     pub rmse_px: f64,
     /// Estimated noise of one pixel coordinate, px: `sqrt(sum |w r|^2 / (2 N - p))`, strays included whatever the loss.
     pub sigma_px: f64,
-    /// What residuals counted by, where not by their squares: `huber:PX` or `cauchy:PX`; the caller adds it.
+    /// What residuals counted by, where not by their squares: `huber:PX` or `cauchy:PX`: see [`CalibrationFields::with_loss`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<String>,
     /// `2 N - p`.
@@ -381,6 +348,11 @@ impl CalibrationFields {
         }
     }
 
+    /// The same of a calibration whose residuals counted by a loss: a robust one is named.
+    pub fn with_loss(self, loss: Loss) -> CalibrationFields {
+        CalibrationFields { loss: (loss != Loss::Squares).then(|| loss_to_text(loss)), ..self }
+    }
+
     /// The file's text.
     pub fn to_json(&self) -> String {
         // Plain fields and string keys: nothing in them can fail to serialise.
@@ -406,21 +378,11 @@ fn view_fields(calibration: &LensCalibration, names: &[String], i: usize) -> Vie
 }
 
 /// What another command needs of a result; further fields are ignored.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-struct CameraOnly {
-    camera: CameraFields,
-    #[serde(default)]
-    image_size: Option<(usize, usize)>,
-    #[serde(default)]
-    termination: Option<String>,
-}
-
-/// The same with parameters of any model.
 #[derive(Debug, Deserialize)]
-struct NamedOnly {
-    camera: BTreeMap<String, serde_json::Value>,
+struct CameraOnly {
+    camera: LensFields,
     #[serde(default)]
-    image_size: Option<(usize, usize)>,
+    image_size: ImageSize,
     #[serde(default)]
     termination: Option<String>,
 }
@@ -458,19 +420,22 @@ pub enum ResultError {
         /// The model.
         model: Model,
     },
-    /// No such lens.
-    #[error("{file}: {message}")]
-    Lens {
-        /// The file.
-        file: String,
-        /// What is wrong.
-        message: String,
-    },
     /// No camera has these numbers.
     #[error("{file}: fx and fy must be positive, and every parameter finite")]
     NoCamera {
         /// The file.
         file: String,
+    },
+    /// No image has this size.
+    #[error("{file}: image_size: each side must have 1 to {most} px, and it has {width} x {height}; leave it out where it is not known",
+        most = MOST_SIDE_PX)]
+    NoImage {
+        /// The file.
+        file: String,
+        /// As stated, px.
+        width: usize,
+        /// As stated, px.
+        height: usize,
     },
 }
 
@@ -492,7 +457,7 @@ pub enum ResultError {
 /// assert_eq!(read_camera(&file)?, (result.camera, Some((640, 480))));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn read_camera(path: &Path) -> Result<(Camera, Option<(usize, usize)>), ResultError> {
+pub fn read_camera(path: &Path) -> Result<(Camera, ImageSize), ResultError> {
     let file = path.shown();
     parse_camera(&file, &read_regular_text(path, MOST_TABLE_BYTES)?)
 }
@@ -514,41 +479,19 @@ pub fn read_lens_camera(path: &Path) -> Result<(Camera<Lens>, ImageSize), Result
 /// # Errors
 /// See [`ResultError`].
 pub fn parse_lens_camera(file: &str, text: &str) -> Result<(Camera<Lens>, ImageSize), ResultError> {
-    let Some(model) = stated_model(file, text)? else {
-        return parse_camera(file, text).map(|(camera, size)| (camera.into(), size));
-    };
-    let format = |cause| ResultError::Format { file: file.into(), cause };
-    let fields: NamedOnly = serde_json::from_str(text).map_err(format)?;
+    let fields: CameraOnly =
+        serde_json::from_str(text).map_err(|cause| ResultError::Format { file: file.into(), cause })?;
+    let LensFields(camera) = fields.camera;
     refuse_unfinished(file, fields.termination)?;
-    let lens = |message: String| ResultError::Lens { file: file.into(), message };
-    let mut camera = Camera::with_lens(f64::NAN, f64::NAN, f64::NAN, f64::NAN, Lens::ideal(model));
-    for (name, value) in fields.camera {
-        if name == "model" {
-            continue;
+    if !camera.is_possible() {
+        return Err(ResultError::NoCamera { file: file.into() });
+    }
+    match fields.image_size {
+        Some((width, height)) if width.min(height) == 0 || width.max(height) > MOST_SIDE_PX => {
+            Err(ResultError::NoImage { file: file.into(), width, height })
         }
-        let parameter: Parameter =
-            name.parse().map_err(|error: crate::camera::UnknownParameter| lens(error.to_string()))?;
-        let number = value.as_f64().ok_or_else(|| lens(format!("{name} is not a number")))?;
-        camera = camera
-            .with_value(parameter, number)
-            .ok_or_else(|| lens(format!("the {model} model has no {name}")))?;
+        size => Ok((camera, size)),
     }
-    match camera.is_possible() {
-        true => Ok((camera, fields.image_size)),
-        false => Err(ResultError::NoCamera { file: file.into() }),
-    }
-}
-
-/// The model that a camera states, if it states one.
-fn stated_model(file: &str, text: &str) -> Result<Option<Model>, ResultError> {
-    let format = |cause| ResultError::Format { file: file.into(), cause };
-    let value: serde_json::Value = serde_json::from_str(text).map_err(format)?;
-    let stated = value.get("camera").and_then(|camera| camera.get("model")?.as_str());
-    let unknown = |error: crate::camera::UnknownModel| ResultError::Lens {
-        file: file.into(),
-        message: error.to_string(),
-    };
-    stated.map(|name| name.parse().map_err(unknown)).transpose()
 }
 
 fn refuse_unfinished(file: &str, termination: Option<String>) -> Result<(), ResultError> {
@@ -564,21 +507,11 @@ fn refuse_unfinished(file: &str, termination: Option<String>) -> Result<(), Resu
 ///
 /// # Errors
 /// See [`ResultError`].
-pub fn parse_camera(file: &str, text: &str) -> Result<(Camera, Option<(usize, usize)>), ResultError> {
-    if let Some(model) = stated_model(file, text)? {
-        let (camera, size) = parse_lens_camera(file, text)?;
-        let plain = camera.brown_conrady().ok_or(ResultError::OtherModel { file: file.into(), model })?;
-        return Ok((plain, size));
-    }
-    let fields: CameraOnly =
-        serde_json::from_str(text).map_err(|cause| ResultError::Format { file: file.into(), cause })?;
-    refuse_unfinished(file, fields.termination)?;
-    let camera = Camera::from(fields.camera);
-    if camera.is_valid() {
-        Ok((camera, fields.image_size))
-    } else {
-        Err(ResultError::NoCamera { file: file.into() })
-    }
+pub fn parse_camera(file: &str, text: &str) -> Result<(Camera, ImageSize), ResultError> {
+    let (camera, size) = parse_lens_camera(file, text)?;
+    let model = camera.distortion.model();
+    let plain = camera.brown_conrady().ok_or(ResultError::OtherModel { file: file.into(), model })?;
+    Ok((plain, size))
 }
 
 #[cfg(test)]
@@ -590,7 +523,7 @@ mod tests {
         let camera =
             Camera::from_parameters([600.1, 599.7, 326.0, 243.0, 0.1, -0.18, 0.05, 1e-3, -1e-3, 0.0]);
         let text =
-            serde_json::json!({"camera": CameraFields::from(camera), "image_size": [640, 480], "extra": 1});
+            serde_json::json!({"camera": LensFields(camera.into()), "image_size": [640, 480], "extra": 1});
         assert_eq!(parse_camera("f", &text.to_string()).unwrap(), (camera, Some((640, 480))));
     }
 
@@ -615,5 +548,23 @@ mod tests {
         assert!(error.starts_with("r.json:2:") && !error.contains("model"), "{error}");
         let no_camera = r#"{"camera": {"fx": -1, "fy": 1, "cx": 0, "cy": 0}}"#;
         assert!(matches!(parse_camera("r.json", no_camera), Err(ResultError::NoCamera { .. })));
+    }
+
+    #[test]
+    fn no_camera_is_read_otherwise_than_it_was_written() {
+        let refused = |camera: &str, rest: &str| {
+            let text =
+                format!("{{\"camera\": {{\"fx\": 1, \"fy\": 1, \"cx\": 0, \"cy\": 0{camera}}}{rest}}}");
+            parse_lens_camera("r.json", &text).unwrap_err().to_string()
+        };
+        let kannala_brandt = r#", "model": "kannala-brandt""#;
+        assert!(refused(&kannala_brandt.repeat(2), "").contains("model is given twice"));
+        assert!(refused(&format!("{kannala_brandt}, \"fx\": 2"), "").contains("fx is given twice"));
+        assert!(refused(r#", "k4": 0.1"#, "").contains("the brown-conrady model has no k4"));
+        assert!(refused(r#", "focus": 0.1"#, "").contains("focus"));
+        for size in ["[0, 480]", "[640, 0]", "[640, 10000000000]"] {
+            let error = refused("", &format!(", \"image_size\": {size}"));
+            assert!(error.contains("each side must have 1 to"), "{error}");
+        }
     }
 }

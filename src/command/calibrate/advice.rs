@@ -3,7 +3,7 @@
 
 use super::maps::{Cells, corner_radius_px, pixel_deviation};
 use calibench::calibrate::LensCalibration;
-use calibench::camera::{Model, Parameter};
+use calibench::camera::Parameter;
 use calibench::geometry::{Vec2, Vec3};
 use calibench::io::significant;
 use calibench::photos::Fit;

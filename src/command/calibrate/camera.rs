@@ -7,8 +7,8 @@ use super::optics::Optics;
 use super::scatter::Residuals;
 use super::view_names::ViewNames;
 use super::{
-    Arguments, Exit, Failure, Format, ModelChoice, advice, loss_name, maps, page, plots, poses, print,
-    scatter, table, warn,
+    Arguments, Exit, Failure, Format, ModelChoice, advice, maps, page, plots, poses, print, scatter, table,
+    warn,
 };
 use calibench::board::{Board, View};
 use calibench::calibrate::ProfileInterval;
@@ -117,10 +117,10 @@ pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, Fai
     let mut finished = finish(observed, fit, arguments.pixel_pitch);
     finished.advice.extend(models::freedoms(&finished.fit, &settings));
     finished.comparison = comparison;
-    finished.loss = loss_name(settings.loss);
     let mut fields =
-        CalibrationFields::of(&finished.fit.calibration, &finished.whole_names, finished.image_size);
-    fields.loss = finished.loss.clone();
+        CalibrationFields::of(&finished.fit.calibration, &finished.whole_names, finished.image_size)
+            .with_loss(settings.loss);
+    finished.loss = fields.loss.clone();
     fields.left_out = finished.left_out.clone();
     fields.orientation = finished.orientation.map(Orientation::name);
     fields.models = finished.comparison.iter().flat_map(|c| c.fields()).collect();
