@@ -7,7 +7,8 @@ use calibench::geometry::Vec2;
 use calibench::io::formats::{
     FORMATS, VnlBoard, Wishes, detect, parse_target, parse_vnl, read_camera_file, write_camera_file,
 };
-use calibench::io::image::{parse_extent, parse_image};
+use calibench::io::extent::parse_extent;
+use calibench::io::image::parse_image;
 use calibench::io::measured::parse_target as parse_measured_target;
 use calibench::io::result::{parse_camera, parse_lens_camera};
 use calibench::io::robot::parse_robot;

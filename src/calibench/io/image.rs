@@ -85,7 +85,7 @@ pub const LIMIT_PX: u64 = 200_000_000;
 
 /// What a decoder may hold beside the samples: rows, texts, and of a PNG a colour profile, which some kilobytes may unpack to gigabytes and
 /// which is dropped, unused as it is, where it is longer.
-const MOST_NOTES_BYTES: u64 = 8 << 20;
+pub(super) const MOST_NOTES_BYTES: u64 = 8 << 20;
 
 impl Grey {
     /// Width, px.
@@ -178,8 +178,8 @@ pub(super) fn decoded(mut source: impl std::io::BufRead + Seek, name: &str) -> R
     let mut bytes = Vec::new();
     source.take(jpeg.length).read_to_end(&mut bytes).map_err(|cause| unread(cause, name))?;
     let decoder = decoder(Cursor::new(bytes), name)?;
-    let extent = Extent::of(&*decoder);
-    if jpeg.frame.is_some_and(|frame| frame.size() != extent.size) {
+    let (width, height) = decoder.dimensions();
+    if jpeg.frame.is_some_and(|frame| frame.size() != (width as usize, height as usize)) {
         return Err(broken("the JPEG has frames of several sizes".into(), name));
     }
     decoded_by(decoder, name)
@@ -189,11 +189,11 @@ fn decoded_by(decoder: Box<dyn ImageDecoder + '_>, name: &str) -> Result<Decoded
     DynamicImage::from_decoder(decoder).map_err(|error| of_decoder(error, name))
 }
 
-fn unread(cause: std::io::Error, name: &str) -> ImageError {
+pub(super) fn unread(cause: std::io::Error, name: &str) -> ImageError {
     ImageError::Io { path: name.to_string(), cause }
 }
 
-fn broken(reason: String, name: &str) -> ImageError {
+pub(super) fn broken(reason: String, name: &str) -> ImageError {
     ImageError::Broken { path: name.to_string(), reason }
 }
 
@@ -201,81 +201,16 @@ fn broken(reason: String, name: &str) -> ImageError {
 ///
 /// # Errors
 /// A JPEG that was cut off.
-fn scanned_jpeg(source: &mut (impl std::io::BufRead + Seek), name: &str) -> Result<Option<Jpeg>, ImageError> {
+pub(super) fn scanned_jpeg(
+    source: &mut (impl std::io::BufRead + Seek),
+    name: &str,
+) -> Result<Option<Jpeg>, ImageError> {
     if !source.fill_buf().map_err(|cause| unread(cause, name))?.starts_with(&[0xff, 0xd8]) {
         return Ok(None);
     }
     let jpeg = jpeg::scanned(source).map_err(|cause| unread(cause, name))?;
     source.rewind().map_err(|cause| unread(cause, name))?;
     jpeg.map(Some).ok_or_else(|| broken("the JPEG was cut off: its end is missing".into(), name))
-}
-
-/// The size of an image, known before it is decoded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Extent {
-    /// Width and height, px.
-    pub size: (usize, usize),
-    /// Pixels.
-    pub pixels: u64,
-    /// Bytes of all samples of the file, once they are decoded.
-    pub bytes: u64,
-    /// Bytes that are held beside the samples while it is decoded: a JPEG's file, here and in its decoder, or what the decoder of another
-    /// format may hold of colour profiles, texts and rows.
-    pub held_bytes: u64,
-}
-
-impl Extent {
-    fn of(decoder: &dyn ImageDecoder) -> Extent {
-        let (width, height) = decoder.dimensions();
-        let (size, pixels) = ((width as usize, height as usize), u64::from(width) * u64::from(height));
-        Extent { size, pixels, bytes: decoder.total_bytes(), held_bytes: MOST_NOTES_BYTES }
-    }
-
-    /// That of the first photograph that a source holds.
-    fn read(mut source: impl std::io::BufRead + Seek, name: &str) -> Result<Extent, ImageError> {
-        let Some(Jpeg { length, frame }) = scanned_jpeg(&mut source, name)? else {
-            return Ok(Extent::of(&*decoder(source, name)?));
-        };
-        let frame = frame.ok_or_else(|| broken("the JPEG has no frame".into(), name))?;
-        let (width, height) = frame.size();
-        refuse_size(width as u32, height as u32, name)?;
-        let pixels = width as u64 * height as u64;
-        let bytes = pixels.saturating_mul(u64::from(frame.components));
-        Ok(Extent { size: (width, height), pixels, bytes, held_bytes: length.saturating_mul(2) })
-    }
-
-    /// Memory that reading the photograph as grey, finding its marks and drawing them in takes at most: the
-    /// samples, the grey levels, for each pixel eight bytes of detection or four of the overlay and its file, and
-    /// what is held beside.
-    pub fn memory_to_detect(&self) -> u64 {
-        self.held_bytes
-            .saturating_add(self.bytes.saturating_mul(2))
-            .saturating_add(self.pixels.saturating_mul(12))
-    }
-
-    /// Memory that correcting the photograph takes: its samples as they were decoded, by channels, corrected,
-    /// and as they are written, for each pixel the look-up table and its making, and what is held beside.
-    pub fn memory_to_correct(&self) -> u64 {
-        self.held_bytes
-            .saturating_add(self.bytes.saturating_mul(4))
-            .saturating_add(self.pixels.saturating_mul(32))
-    }
-}
-
-/// The size of a photograph, from the beginning of its file.
-///
-/// # Errors
-/// See [`ImageError`].
-pub fn image_extent(path: &Path) -> Result<Extent, ImageError> {
-    Extent::read(opened(path)?, &path.shown())
-}
-
-/// As [`image_extent`], from the bytes of a file; `name` stands in errors.
-///
-/// # Errors
-/// See [`ImageError`].
-pub fn parse_extent(bytes: &[u8], name: &str) -> Result<Extent, ImageError> {
-    Extent::read(Cursor::new(bytes), name)
 }
 
 fn of_decoder(error: image::ImageError, name: &str) -> ImageError {
@@ -287,7 +222,7 @@ fn of_decoder(error: image::ImageError, name: &str) -> ImageError {
 }
 
 /// A decoder of an image whose size is within the limit.
-fn decoder<'a>(
+pub(super) fn decoder<'a>(
     source: impl std::io::BufRead + Seek + 'a,
     name: &str,
 ) -> Result<Box<dyn ImageDecoder + 'a>, ImageError> {
@@ -312,7 +247,7 @@ fn decoder<'a>(
     Ok(decoder)
 }
 
-fn refuse_size(width: u32, height: u32, name: &str) -> Result<(), ImageError> {
+pub(super) fn refuse_size(width: u32, height: u32, name: &str) -> Result<(), ImageError> {
     if u64::from(width) * u64::from(height) > LIMIT_PX {
         return Err(ImageError::TooLarge { path: name.to_string(), width, height, limit_px: LIMIT_PX });
     }

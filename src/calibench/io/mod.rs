@@ -9,6 +9,8 @@ pub mod data;
 pub mod digits;
 mod doubts;
 pub mod ends;
+#[cfg(feature = "photo")]
+pub mod extent;
 pub mod files;
 pub mod formats;
 pub mod hash;
@@ -45,9 +47,11 @@ pub use data::{MissingDataFolder, data_folder};
 pub use digits::significant;
 pub use doubts::doubts;
 pub use ends::{PixelEnds, parse_pixel_ends, read_pixel_ends};
+#[cfg(feature = "photo")]
+pub use extent::{Extent, image_extent};
 pub use hash::sha256_hex;
 #[cfg(feature = "photo")]
-pub use image::{Extent, Grey, ImageError, image_extent, read_image, write_png, write_png_16};
+pub use image::{Grey, ImageError, read_image, write_png, write_png_16};
 pub use input::{InputError, MOST_SIDE_PX, read_regular, read_regular_text};
 pub use kept::{is_kept, keep_files};
 pub use known::{Known, KnownCalibration, KnownError, parse_known, read_known};

@@ -1,0 +1,76 @@
+//! How large is a photograph, and what memory will it take? Known from the beginning of its file, before it is decoded.
+
+use super::image::{ImageError, MOST_NOTES_BYTES, broken, decoder, opened, refuse_size, scanned_jpeg};
+use super::jpeg::Jpeg;
+use super::shown::ShownPath;
+use image::ImageDecoder;
+use std::io::{Cursor, Seek};
+use std::path::Path;
+
+/// The size of an image, known before it is decoded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Extent {
+    /// Width and height, px.
+    pub size: (usize, usize),
+    /// Pixels.
+    pub pixels: u64,
+    /// Bytes of all samples of the file, once they are decoded.
+    pub bytes: u64,
+    /// Bytes that are held beside the samples while it is decoded: a JPEG's file, here and in its decoder, or what the decoder of another
+    /// format may hold of colour profiles, texts and rows.
+    pub held_bytes: u64,
+}
+
+impl Extent {
+    fn of(decoder: &dyn ImageDecoder) -> Extent {
+        let (width, height) = decoder.dimensions();
+        let (size, pixels) = ((width as usize, height as usize), u64::from(width) * u64::from(height));
+        Extent { size, pixels, bytes: decoder.total_bytes(), held_bytes: MOST_NOTES_BYTES }
+    }
+
+    /// That of the first photograph that a source holds.
+    fn read(mut source: impl std::io::BufRead + Seek, name: &str) -> Result<Extent, ImageError> {
+        let Some(Jpeg { length, frame }) = scanned_jpeg(&mut source, name)? else {
+            return Ok(Extent::of(&*decoder(source, name)?));
+        };
+        let frame = frame.ok_or_else(|| broken("the JPEG has no frame".into(), name))?;
+        let (width, height) = frame.size();
+        refuse_size(width as u32, height as u32, name)?;
+        let pixels = width as u64 * height as u64;
+        let bytes = pixels.saturating_mul(u64::from(frame.components));
+        Ok(Extent { size: (width, height), pixels, bytes, held_bytes: length.saturating_mul(2) })
+    }
+
+    /// Memory that reading the photograph as grey, finding its marks and drawing them in takes at most: the
+    /// samples, the grey levels, for each pixel eight bytes of detection or four of the overlay and its file, and
+    /// what is held beside.
+    pub fn memory_to_detect(&self) -> u64 {
+        self.held_bytes
+            .saturating_add(self.bytes.saturating_mul(2))
+            .saturating_add(self.pixels.saturating_mul(12))
+    }
+
+    /// Memory that correcting the photograph takes: its samples as they were decoded, by channels, corrected,
+    /// and as they are written, for each pixel the look-up table and its making, and what is held beside.
+    pub fn memory_to_correct(&self) -> u64 {
+        self.held_bytes
+            .saturating_add(self.bytes.saturating_mul(4))
+            .saturating_add(self.pixels.saturating_mul(32))
+    }
+}
+
+/// The size of a photograph, from the beginning of its file.
+///
+/// # Errors
+/// See [`ImageError`].
+pub fn image_extent(path: &Path) -> Result<Extent, ImageError> {
+    Extent::read(opened(path)?, &path.shown())
+}
+
+/// As [`image_extent`], from the bytes of a file; `name` stands in errors.
+///
+/// # Errors
+/// See [`ImageError`].
+pub fn parse_extent(bytes: &[u8], name: &str) -> Result<Extent, ImageError> {
+    Extent::read(Cursor::new(bytes), name)
+}
