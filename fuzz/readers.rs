@@ -4,10 +4,10 @@ use calibench::calibrate::{Loss, Settings, calibrate};
 use calibench::camera::FreeParameters;
 use calibench::downstream::{MapModel, register};
 use calibench::geometry::Vec2;
+use calibench::io::extent::parse_extent;
 use calibench::io::formats::{
     FORMATS, VnlBoard, Wishes, detect, parse_target, parse_vnl, read_camera_file, write_camera_file,
 };
-use calibench::io::extent::parse_extent;
 use calibench::io::image::parse_image;
 use calibench::io::measured::parse_target as parse_measured_target;
 use calibench::io::result::{parse_camera, parse_lens_camera};
