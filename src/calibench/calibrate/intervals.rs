@@ -8,7 +8,8 @@
 //! ```text
 //! tau(v) = sign(v - estimate) sqrt((cost(v) - least cost) / u)
 //! ```
-//! where `u` is what the cost rises by at one standard deviation (the variance of a coordinate under least squares), the interval of coverage `1 - alpha` is `|tau| <= t`, `t` the quantile of Student's distribution (Bates &
+//! where `u` is what the cost rises by at one standard deviation (the variance of a coordinate under least
+//! squares), the interval of coverage `1 - alpha` is `|tau| <= t`, `t` the quantile of Student's distribution (Bates &
 //! Watts 1988, section 6.1). Linear theory has `tau = (v - estimate) / standard deviation`; JCGM 101 (2008),
 //! section 8.1, asks for such a comparison before a standard uncertainty is stated.
 

@@ -42,7 +42,7 @@ impl Met {
 
 impl<L> Met<L> {
     /// The best of the other minima that is another camera and nearly as good; `covariance` is that of the free
-    /// parameters, px^2 and so on, `variance` that of a coordinate, px^2.
+    /// parameters, px^2 and so on, `variance` what one standard deviation costs, px^2.
     pub fn rival(
         &self,
         others: &[Met<L>],

@@ -114,7 +114,7 @@ impl Problem<'_> {
         self.priors.iter().filter_map(of_prior).chain(deformations.filter_map(of_board)).collect()
     }
 
-    /// What a camera costs for what is known of its parameters beforehand.
+    /// What a state costs for what is known of camera and board beforehand.
     pub fn cost_of_priors(&self, state: &State) -> f64 {
         self.known(state).iter().map(|known| known.weight.cost * known.off * known.off).sum()
     }

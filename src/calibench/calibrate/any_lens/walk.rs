@@ -54,7 +54,7 @@ pub(super) fn walk(
     Ok(Walked { best: minima.swap_remove(best), others: minima })
 }
 
-/// Costs that differ by less than this part, at focal lengths that do, are those of one minimum.
+/// Costs that differ by less than this part, at focal lengths that do, are taken for those of one minimum.
 const ONE_MINIMUM: f64 = 1e-4;
 
 /// The minima of another problem that lie where these do, each once: the best there need not be the best here, as where a lens takes up
