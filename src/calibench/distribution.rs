@@ -51,9 +51,8 @@ pub fn normal_two_sided(false_alarm: f64) -> f64 {
 }
 
 /// Degrees of freedom from which Student's quantile is that of an expansion, whose error is there below 1e-14 of it down to one in a
-/// thousand, and some 1e-10 at one in 1e15. The
-/// inverse of the incomplete beta function ends short of the quantile by 4e-6 of it at a hundred thousand, by 7 % at ten
-/// million, and not at all at some more.
+/// thousand, and some 1e-10 at one in 1e15. The inverse of the incomplete beta function ends short of the quantile by 4e-6 of it at a
+/// hundred thousand, by 7 % at ten million, and not at all at some more.
 const MANY: f64 = 1000.0;
 
 /// The tail keeps its digits where the inverse of the incomplete beta function, of what is as rare, does not.

@@ -2,9 +2,9 @@
 //!
 //! With the influence `psi = rho'(|r|^2) r` of a residual let `S` be the sum of its squares, `w` the mean of the weights `rho'`, `s` the
 //! mean slope of the influence and `f` the degrees of freedom. The estimate's covariance is `S / (f s^2) (J^T J)^-1` (Huber 1981,
-//! section 7.6, without its correction for few marks), the weighted normal matrix is about `w J^T J`, and half the cost's curvature `s J^T J`. So the covariance is
-//! `S w / (f s^2)` times the inverse of the normal matrix, and one standard deviation costs `S / (f s)`. Under least squares `w = s = 1`,
-//! and both are the variance of a coordinate.
+//! section 7.6, without its correction for few marks), the weighted normal matrix is about `w J^T J`, and half the cost's curvature
+//! `s J^T J`. So the covariance is `S w / (f s^2)` times the inverse of the normal matrix, and one standard deviation costs `S / (f s)`.
+//! Under least squares `w = s = 1`, and both are the variance of a coordinate.
 
 use super::loss::Loss;
 use crate::geometry::Vec2;
