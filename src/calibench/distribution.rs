@@ -71,11 +71,11 @@ const RARE: f64 = 1e-15;
 /// assert!((student_two_sided(0.05, 10.0) - 2.228).abs() < 5e-4);
 /// ```
 pub fn student_two_sided(false_alarm: f64, degrees_of_freedom: f64) -> f64 {
-    if degrees_of_freedom <= 0.0 {
-        return f64::INFINITY;
-    }
     if degrees_of_freedom.is_nan() || !(0.0..=1.0).contains(&false_alarm) {
         return f64::NAN;
+    }
+    if degrees_of_freedom <= 0.0 || false_alarm == 0.0 {
+        return f64::INFINITY;
     }
     if degrees_of_freedom >= MANY {
         return stable(student_expanded(normal_two_sided(false_alarm), degrees_of_freedom));
@@ -83,9 +83,6 @@ pub fn student_two_sided(false_alarm: f64, degrees_of_freedom: f64) -> f64 {
     let student = StudentsT::new(0.0, 1.0, degrees_of_freedom).expect("degrees of freedom are positive");
     if false_alarm > RARE {
         return stable(-student.inverse_cdf(0.5 * false_alarm));
-    }
-    if false_alarm == 0.0 {
-        return f64::INFINITY;
     }
     stable(bisected(1.0, |t| 2.0 * student.cdf(-t) > false_alarm))
 }
@@ -239,7 +236,9 @@ mod tests {
             let of_two = (2.0 / (rare * (2.0 - rare)) - 2.0).sqrt();
             assert!((student_two_sided(rare, 2.0) / of_two - 1.0).abs() < 1e-8, "{rare}");
         }
-        assert_eq!(student_two_sided(0.0, 5.0), f64::INFINITY);
+        for freedom in [5.0, 5000.0, f64::INFINITY] {
+            assert_eq!(student_two_sided(0.0, freedom), f64::INFINITY);
+        }
         assert_eq!(student_two_sided(0.05, 0.0), f64::INFINITY);
     }
 

@@ -23,14 +23,21 @@
 //! more measurement that the calibration must meet and the relaxed model need not, so that the excess counts
 //! the priors' share of the cost and `d1` grows by their number. A prior that the pixels contradict is a part
 //! of the model that does not hold, and is not certified.
+//!
+//! **Robust losses.** What chance adds to the cost there is less than the mean cost of a degree of freedom, which strays
+//! raise: `u = S / (f s)` ([`super::noise`]). The floor's own `u` is taken to be as much less than its mean cost as that of
+//! the minimum is. And the score, whose matrix is weighted, is `s / w` of the fall that the curvature says.
 #![allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
 
 use super::blocks::N;
 use super::chance::fisher_tail;
 use super::chunks;
 use super::elimination::Eliminated;
+use super::estimate::Fit;
 use super::kernel::{self, Strain};
-use super::minimise::{Problem, State};
+use super::loss::Loss;
+use super::minimise::{Minimum, Problem, State};
+use super::noise::Noise;
 use super::prior::Priors;
 use super::system::{Reduction, System};
 use crate::camera::Parameter;
@@ -46,7 +53,8 @@ pub(super) const FALSE_ALARM: f64 = 1e-6;
 pub struct Certificate {
     /// RMSE per point, px, that the views reach with homographies of their own in place of poses.
     pub floor_rmse_px: f64,
-    /// By how much the cost exceeds that floor, in variances of a pixel coordinate.
+    /// By how much the cost exceeds that floor, in variances of a pixel coordinate; with a robust loss in what one
+    /// standard deviation costs.
     pub excess: f64,
     /// Degrees of freedom of the excess: two a view less those of the intrinsics that homographies do not
     /// determine; at 0 nothing can be certified.
@@ -76,13 +84,21 @@ impl Certificate {
     }
 
     /// The same with a floor that was fitted.
-    pub(super) fn with_floor(&self, cost: f64, floor: f64, points: usize) -> Certificate {
-        Certificate::of(cost, floor.min(cost), points, self.freedom, self.floor_freedom)
+    pub(super) fn with_floor(&self, problem: &Problem<'_>, minimum: &Minimum, floor: f64) -> Certificate {
+        let cost = minimum.system.cost;
+        let Chance { share, .. } = Chance::of(problem, &minimum.state);
+        Certificate::of(cost, floor.min(cost), points(problem), [self.freedom, self.floor_freedom], share)
     }
 
     /// Compares a cost with a floor.
-    fn of(cost: f64, floor: f64, points: usize, freedom: usize, floor_freedom: usize) -> Certificate {
-        let variance = floor / floor_freedom.max(1) as f64;
+    fn of(
+        cost: f64,
+        floor: f64,
+        points: usize,
+        [freedom, floor_freedom]: [usize; 2],
+        share: f64,
+    ) -> Certificate {
+        let variance = share * (floor / floor_freedom.max(1) as f64);
         let excess = (cost - floor).max(0.0) / variance;
         let p_value = if floor_freedom == 0 || freedom == 0 || excess.is_nan() {
             1.0
@@ -103,18 +119,46 @@ impl Certificate {
 /// `cost`.
 pub(super) fn certify(problem: &Problem<'_>, state: &State, reduction: &Reduction, cost: f64) -> Certificate {
     let views = problem.observations.len();
-    let points: usize = problem.observations.iter().map(|pairs| pairs.len()).sum();
+    let points = points(problem);
+    let Chance { share, stretch } = Chance::of(problem, state);
     // What rounding leaves of exact data proves nothing.
     let (gain, undetermined) = if problem.priors.list.is_empty() {
         score(problem, state, reduction, [0.0; N])
     } else {
         score_of_pixels(problem, state)
     };
-    let floor = (cost - problem.priors.cost(&state.camera) - gain).max(problem.rounding_cost).min(cost);
+    let floor =
+        (cost - problem.priors.cost(&state.camera) - stretch * gain).max(problem.rounding_cost).min(cost);
     let freedom = (2 * views + problem.priors.list.len()).saturating_sub(undetermined);
     let lens = problem.free.len() - undetermined;
     let floor_freedom = (2 * points).saturating_sub(8 * views + lens);
-    Certificate::of(cost, floor, points, freedom, floor_freedom)
+    Certificate::of(cost, floor, points, [freedom, floor_freedom], share)
+}
+
+/// Number of marks.
+fn points(problem: &Problem<'_>) -> usize {
+    problem.observations.iter().map(|pairs| pairs.len()).sum()
+}
+
+/// What chance costs under a loss, beside least squares.
+struct Chance {
+    /// What one standard deviation costs, over the mean cost of a degree of freedom.
+    share: f64,
+    /// The fall of a step's cost over its score: the curvature is less than the weighted normal matrix.
+    stretch: f64,
+}
+
+impl Chance {
+    fn of(problem: &Problem<'_>, state: &State) -> Chance {
+        if problem.loss == Loss::Squares {
+            return Chance { share: 1.0, stretch: 1.0 };
+        }
+        let fit = Fit::of(state, problem.observations);
+        let residuals = fit.residuals.iter().flatten();
+        let cost: f64 = residuals.map(|residual| problem.loss.at(residual.norm_squared()).0).sum();
+        let Noise { variance, rise, .. } = fit.noise(problem.loss, 1.0);
+        Chance { share: (rise / cost).min(1.0), stretch: variance / rise }
+    }
 }
 
 /// The score of the pixels alone, at a minimum under priors: there the priors hold the balance to the pixels'

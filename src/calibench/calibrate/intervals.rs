@@ -165,7 +165,7 @@ impl<'a, P: Profiled<W>, const W: usize> Profile<'a, P, W> {
 
     fn deviation(&self, parameter: Parameter) -> f64 {
         let row = self.problem.free().position(parameter).expect("the parameter is free");
-        self.covariance[(row, row)].sqrt() * self.noise.px()
+        self.covariance[(row, row)].sqrt() * self.noise.scale()
     }
 
     /// Where `|tau| = t`, starting from the linear end: secants through the estimate, which the profile makes

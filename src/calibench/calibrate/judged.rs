@@ -70,7 +70,6 @@ impl Judged {
     /// With the floor fitted where a step towards it does not certify the minimum: the step is straight, the
     /// relaxed model is not. A lower cost of the relaxed model that was met elsewhere is a floor too.
     pub fn certified(mut self, problem: &Problem<'_>, lowest_relaxed: f64) -> Judged {
-        let cost = self.minimum.system.cost;
         let points = problem.observations.iter().map(|o| o.len()).sum();
         // What rounding leaves of exact data proves nothing.
         let rounding = problem.rounding_cost;
@@ -78,10 +77,10 @@ impl Judged {
             if !certificate.holds()
                 && let Some(beside) = beside(problem, &self.minimum)
             {
-                *certificate = certificate.with_floor(cost, beside.cost.max(rounding), points);
+                *certificate = certificate.with_floor(problem, &self.minimum, beside.cost.max(rounding));
             }
             if lowest_relaxed.max(rounding) < certificate.floor(points) {
-                *certificate = certificate.with_floor(cost, lowest_relaxed.max(rounding), points);
+                *certificate = certificate.with_floor(problem, &self.minimum, lowest_relaxed.max(rounding));
             }
         }
         self
@@ -153,7 +152,7 @@ impl Judged {
         let Some(covariance) = self.reduction.as_ref().and_then(Reduction::intrinsics_covariance) else {
             return false;
         };
-        let noise_px = self.noise(problem).px();
+        let scale_px = self.noise(problem).scale();
         let camera = &self.minimum.state.camera;
         let flexible = [Parameter::Skew, Parameter::P1, Parameter::P2, Parameter::K3];
         let is_flexible = flexible.iter().any(|&p| problem.free.contains(p));
@@ -167,7 +166,7 @@ impl Judged {
                 Parameter::Fy | Parameter::Cy => camera.fy,
                 _ => return true,
             };
-            variance.sqrt() * noise_px <= limit * scale
+            variance.sqrt() * scale_px <= limit * scale
         })
     }
 
@@ -179,7 +178,7 @@ impl Judged {
             Some(
                 covariance
                     .as_ref()
-                    .map_or(f64::INFINITY, |c| c[(row, row)].sqrt() * self.noise(problem).px()),
+                    .map_or(f64::INFINITY, |c| c[(row, row)].sqrt() * self.noise(problem).scale()),
             )
         })
     }

@@ -88,7 +88,8 @@ impl Weight {
 
 impl Priors<'_> {
     /// Nothing is known beforehand.
-    pub const NONE: Priors<'static> = Priors { list: &[], noise: Noise { variance: 0.0, rise: 0.0 } };
+    pub const NONE: Priors<'static> =
+        Priors { list: &[], noise: Noise { coordinate: 0.0, variance: 0.0, rise: 0.0 } };
 
     /// Each with its weight: `sigma^2 / sd^2` under least squares.
     pub fn weighted(&self) -> impl Iterator<Item = (&Prior, Weight)> {

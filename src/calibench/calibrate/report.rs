@@ -314,7 +314,7 @@ impl fmt::Display for Warning {
                 "another camera explains the data nearly as well: {parameter} = {other:.6} instead of {value:.6} costs {:.1} variances \
                  {}; the standard deviations speak of one of the two only. Take more views, with tilts about different axes",
                 excess.abs(),
-                if *excess < 0.0 { "less, but its search did not end or its lens is not defined" } else { "more" }
+                if *excess < 0.0 { "less" } else { "more" }
             ),
             Warning::NotLinear { parameter, below, above } => write!(
                 f,

@@ -42,13 +42,13 @@ impl Met {
 
 impl<L> Met<L> {
     /// The best of the other minima that is another camera and nearly as good; `covariance` is that of the free
-    /// parameters, px^2 and so on, `variance` what one standard deviation costs, px^2.
+    /// parameters, px^2 and so on, `rise` what one standard deviation costs, px^2.
     pub fn rival(
         &self,
         others: &[Met<L>],
         free: FreeParameters,
         covariance: &DMatrix<f64>,
-        variance: f64,
+        rise: f64,
         value: impl Fn(&Camera<L>, Parameter) -> f64,
     ) -> Option<Rival> {
         let apart = |other: &Met<L>| {
@@ -59,7 +59,7 @@ impl<L> Met<L> {
             differences.max_by(|a, b| a.1.total_cmp(&b.1))
         };
         let rivals = others.iter().filter(|other| other.converged).filter_map(|other| {
-            let excess = (other.cost - self.cost) / variance;
+            let excess = (other.cost - self.cost) / rise;
             let (parameter, deviations) = apart(other)?;
             let is_rival = excess < RIVALS && deviations > SAME;
             is_rival.then(|| Rival { parameter, value: value(&other.camera, parameter), excess })

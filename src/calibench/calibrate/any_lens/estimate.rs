@@ -100,6 +100,9 @@ fn estimate(views: &[View], settings: &Settings) -> Result<LensCalibration, Cali
     let mut walked = walk::walk(&flat, views, settings)?;
     let state = start::with_better_tilts(&flat, walked.best.state.clone());
     let is_turned = state.cam_from_target != walked.best.state.cam_from_target;
+    if is_turned && settings.board.bend().is_none() {
+        walked.others.push(walked.best.clone());
+    }
     walked.best.state = state;
     let bent = Problem { bend: settings.board.bend(), ..flat };
     // A search that has not ended may do so in as many iterations again, and in the valley of a lens of many coefficients one that has

@@ -139,7 +139,7 @@ fn is_parabola(
         return true;
     }
     let rises_as_said = |direction: SVector<f64, WIDTH>| {
-        let step = reduction.following(noise.px() * direction);
+        let step = reduction.following(noise.scale() * direction);
         let cost = problem.cost(&problem.stepped(&minimum.state, step));
         let rise = (cost - minimum.system.cost) / noise.rise;
         (CHECKED_AT / rise.max(0.0).sqrt() - 1.0).abs() <= TOLERATED

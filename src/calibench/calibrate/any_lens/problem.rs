@@ -273,7 +273,7 @@ mod tests {
             let bend = Some(Bend { deformations: 2, standard_deviation: 0.05 });
             let problem = Problem {
                 priors: &[prior],
-                noise: Noise { variance: 0.01, rise: 0.008 },
+                noise: Noise { coordinate: 0.02, variance: 0.01, rise: 0.008 },
                 bend,
                 ..*nothing_known
             };

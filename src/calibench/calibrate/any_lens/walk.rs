@@ -7,7 +7,6 @@ use super::problem::{Problem, ROUGH_GAIN, State};
 use super::{WIDTH, certificate, report, start};
 use crate::board::View;
 use crate::camera::Lens;
-use std::cmp::Ordering;
 
 /// The best of the minima, refined to the end where the model is certifiable, and the others that were met, most of them to
 /// [`ROUGH_GAIN`].
@@ -86,8 +85,10 @@ pub(super) fn follow(problem: &Problem<'_>, minimum: &mut Minimum<State, WIDTH>)
 
 /// Which of the minima is the best.
 fn best_of(problem: &Problem<'_>, minima: &[Minimum<State, WIDTH>]) -> Option<usize> {
-    let better = |best, next| if is_better(problem, &minima[next], &minima[best]) { next } else { best };
-    (0..minima.len()).reduce(better)
+    let cheapest = minima.iter().min_by(|a, b| a.system.cost.total_cmp(&b.system.cost))?;
+    let rise = report::noise(problem, cheapest).rise;
+    let dearness = |place: &usize| dearness(&minima[*place], rise);
+    (0..minima.len()).min_by(|a, b| dearness(a).total_cmp(&dearness(b)))
 }
 
 fn refined(problem: &Problem<'_>, starts: Vec<State>) -> Vec<Minimum<State, WIDTH>> {
@@ -96,27 +97,26 @@ fn refined(problem: &Problem<'_>, starts: Vec<State>) -> Vec<Minimum<State, WIDT
     minima.filter(|minimum| minimum.system.cost.is_finite()).collect()
 }
 
-/// Whether one minimum is to be preferred to another: it costs less, and if less speaks for it than for the other, so much less that chance
-/// does not explain it. Where numerator and denominator of a fraction nearly cancel, a valley goes on to coefficients without end, at a
-/// fraction of a variance; two spheres make nearly the same picture in and out of their range.
+/// Whether one minimum is to be preferred to another.
 pub(super) fn is_better(
     problem: &Problem<'_>,
     next: &Minimum<State, WIDTH>,
     best: &Minimum<State, WIDTH>,
 ) -> bool {
-    let margin = match standing(next).cmp(&standing(best)) {
-        Ordering::Greater => -RIVALS * report::noise(problem, next).rise,
-        Ordering::Less => RIVALS * report::noise(problem, best).rise,
-        Ordering::Equal => 0.0,
-    };
-    next.system.cost + margin < best.system.cost
+    let cheaper = if next.system.cost < best.system.cost { next } else { best };
+    let rise = report::noise(problem, cheaper).rise;
+    dearness(next, rise) < dearness(best, rise)
 }
 
-/// Whether a minimum is a camera for which its model is defined, and then whether its search ended: beside a camera that is in its range
-/// a search may go on and on, and out of the range end.
-fn standing(minimum: &Minimum<State, WIDTH>) -> (bool, bool) {
-    let is_defined = Warning::outside_range(&minimum.state.camera).next().is_none();
-    (is_defined, minimum.termination == Termination::Converged)
+/// The cost of a minimum, and for each of its faults so much more that chance does not explain it; `rise` is what one standard deviation
+/// costs. Where numerator and denominator of a fraction nearly cancel, a valley goes on to coefficients without end, at a fraction of a
+/// variance; two spheres make nearly the same picture in and out of their range, and beside a camera in its range a search may go on and
+/// on where it ends out of the range.
+fn dearness(minimum: &Minimum<State, WIDTH>, rise: f64) -> f64 {
+    let is_outside = Warning::outside_range(&minimum.state.camera).next().is_some();
+    let is_unended = minimum.termination != Termination::Converged;
+    let faults = 2 * u8::from(is_outside) + u8::from(is_unended);
+    minimum.system.cost + f64::from(faults) * RIVALS * rise
 }
 
 /// A minimum as another problem weighs what is known beforehand, which it does by its own noise. Where that is no minimum of its, the next
