@@ -113,7 +113,7 @@ fn refuse_if_fits(
     let held = parallel.minimise(turned_to(&minimum.state, slope));
     let degrees_of_freedom = 4 * problem.observations.len();
     let bound = largest_chance_chi_squared(degrees_of_freedom);
-    let ratio = (held.system.cost - minimum.system.cost) / self::noise(problem, noise).rise;
+    let ratio = (held.system.cost - minimum.system.cost) / noise.at_least(problem.rounding_cost).rise;
     if ratio < -LOWER {
         return Ok(Some(held.state));
     }
@@ -167,11 +167,6 @@ fn refuse_if_priors_give_way(
     Err(CalibrationError::NotIdentifiable { inseparable, why })
 }
 
-/// Noise of a pixel coordinate; exact data leave rounding as noise.
-pub(super) fn noise(problem: &Problem<'_>, noise: Noise) -> Noise {
-    noise.at_least(problem.rounding_cost)
-}
-
 /// Refuses the normal equations of a minimum with these free parameters if they are singular.
 pub(super) fn refuse_singular_minimum(
     free: FreeParameters,
@@ -207,7 +202,8 @@ pub(super) fn refuse_if_flat(
     walked: &Walked,
     noise: Noise,
 ) -> Result<(), CalibrationError> {
-    let noise = self::noise(problem, noise);
+    // Exact data leave rounding as noise.
+    let noise = noise.at_least(problem.rounding_cost);
     let rise = |far: &Minimum| (far.system.cost - walked.best.system.cost) / noise.rise;
     let share = |far: &Far| rise(&far.minimum) / least_rise(far.parameter);
     // A better minimum met on the way may lie where the walk ended.

@@ -107,7 +107,7 @@ impl Judged {
         let Some(covariance) = self.reduction.as_ref().and_then(Reduction::intrinsics_covariance) else {
             return self;
         };
-        let noise = identifiability::noise(problem, self.noise(problem));
+        let noise = self.noise(problem).at_least(problem.rounding_cost);
         let best = Met::of(&self.minimum);
         let value = |camera: &Camera, parameter| camera.get(parameter);
         self.rival = best.rival(met, problem.free, &(covariance * noise.variance), noise.rise, value);
@@ -116,7 +116,7 @@ impl Judged {
 
     /// With the views whose other tilt, the camera held, is nearly as good.
     pub fn with_twins(mut self, problem: &Problem<'_>) -> Judged {
-        let noise = identifiability::noise(problem, self.noise(problem));
+        let noise = self.noise(problem).at_least(problem.rounding_cost);
         let state = &self.minimum.state;
         let twin = |view: usize| {
             let pose = state.cam_from_target[view];

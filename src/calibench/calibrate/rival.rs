@@ -5,11 +5,12 @@ use super::blocks::N;
 use super::minimise::{Minimum, State};
 use crate::camera::{BrownConrady, Camera, FreeParameters, Parameter};
 use nalgebra::DMatrix;
+use std::cmp::Ordering;
 
 /// A minimum whose cost is higher by fewer variances than this is a rival: four standard deviations.
 pub(super) const RIVALS: f64 = 16.0;
 /// A minimum whose parameters all lie within this many standard deviations is the same one.
-const SAME: f64 = 6.0;
+pub(super) const SAME: f64 = 6.0;
 
 /// A minimum that the search met.
 #[derive(Debug, Clone, Copy)]
@@ -64,6 +65,13 @@ impl<L> Met<L> {
             let is_rival = excess < RIVALS && deviations > SAME;
             is_rival.then(|| Rival { parameter, value: value(&other.camera, parameter), excess })
         });
-        rivals.min_by(|a, b| a.excess.total_cmp(&b.excess))
+        rivals.min_by(Rival::nearer)
+    }
+}
+
+impl Rival {
+    /// Which of two explains the data better.
+    pub fn nearer(&self, other: &Rival) -> Ordering {
+        self.excess.total_cmp(&other.excess)
     }
 }

@@ -6,7 +6,7 @@
 //! meets them one after another. The same walk tells how far the focal length could be off: where the cost
 //! does not rise, the data do not determine it.
 
-use super::identifiability::{self, least_rise};
+use super::identifiability::least_rise;
 use super::minimise::{Minimum, Problem};
 use super::noise::Noise;
 use super::retraction::scaled;
@@ -57,7 +57,8 @@ pub(super) fn far_away(
     centre_sd: [Option<f64>; 2],
 ) -> Walked {
     let mut walked = Walked { best: minimum, starts: 0, far: Vec::new(), met: Vec::new() };
-    let limit = RISEN * identifiability::noise(problem, noise).rise;
+    let rise = noise.at_least(problem.rounding_cost).rise;
+    let limit = RISEN * rise;
     for _ in 0..WALKS {
         walked.far.clear();
         let mut better = None;
@@ -66,12 +67,7 @@ pub(super) fn far_away(
         }
         for (parameter, sd) in [Parameter::Cx, Parameter::Cy].into_iter().zip(centre_sd) {
             if sd.is_some_and(|sd| sd > KNOWN_CENTRE * walked.best.state.camera.fx) {
-                step_aside(
-                    problem,
-                    parameter,
-                    least_rise(parameter) * identifiability::noise(problem, noise).rise,
-                    &mut walked,
-                );
+                step_aside(problem, parameter, least_rise(parameter) * rise, &mut walked);
             }
         }
         match better {

@@ -3,11 +3,13 @@
 //! With `alpha = 0` the radius of a ray is `f |(X, Y)| / (xi d + Z)`, with `xi = 0` it is
 //! `f |(X, Y)| / (alpha d + (1 - alpha) Z)`, `d` being the distance: the first is the second at `alpha' = xi / (1 + xi)` and
 //! `f' = f / (1 + xi)`, ray by ray. Beside one of the two a search ends in a minimum whose deviations know nothing of the other,
-//! and to that one no descent leads: at `xi = 0` the derivatives by `f`, `xi` and `alpha` span two directions.
+//! and to that one no descent leads: at `xi = 0` the derivatives by `f`, `xi` and `alpha` span two directions. There the deviations have
+//! no bound either, and do not say that the other is another camera: those at a coefficient held at 0 do.
 
 use super::super::intervals::Profiled;
-use super::super::minimise::{Descent, Minimum, descend};
-use super::super::rival::Met;
+use super::super::minimise::{Minimum, descend};
+use super::super::noise::Noise;
+use super::super::rival::{RIVALS, Rival, SAME};
 use super::WIDTH;
 use super::problem::{Problem, State};
 use crate::calibrate::Warning;
@@ -18,20 +20,21 @@ use nalgebra::DMatrix;
 /// may.
 const MAY_BE_ZERO: f64 = 4.0;
 
-/// The second camera as a minimum that was met, if alpha or xi of a minimum may be 0 and both are free, as the focal length
-/// is. `covariance` is that of the free parameters.
+/// The second camera if it explains the marks nearly as well and has another focal length; alpha or xi of the minimum may be 0 then, and
+/// both are free, as the focal length is. `unit` is the covariance of the free parameters for unit noise.
 pub(super) fn counterpart(
     problem: &Problem<'_>,
     minimum: &Minimum<State, WIDTH>,
-    covariance: &DMatrix<f64>,
-) -> Option<Met<Lens>> {
+    unit: &DMatrix<f64>,
+    noise: Noise,
+) -> Option<Rival> {
     use Parameter::{Alpha, Fx, Xi};
     if ![Fx, Xi, Alpha].into_iter().all(|parameter| problem.free.contains(parameter)) {
         return None;
     }
     let distance_from_zero = |parameter| {
         let row = problem.free.position(parameter)?;
-        Some(minimum.state.camera.value(parameter)?.abs() / covariance[(row, row)].sqrt())
+        Some(minimum.state.camera.value(parameter)?.abs() / deviation(unit, row, noise))
     };
     let nearest = [Alpha, Xi]
         .into_iter()
@@ -40,11 +43,18 @@ pub(super) fn counterpart(
     let (zero, _) = nearest.filter(|(_, deviations)| *deviations < MAY_BE_ZERO)?;
     let held = problem.holding(zero);
     let there = descend(&held, held.with_value(minimum.state.clone(), zero, 0.0));
+    let focal_length = held.free.position(Fx)?;
+    let unit = there.system.reduction()?.intrinsics_covariance()?;
     let state = State { camera: same_picture(&there.state.camera)?, ..there.state };
+    let apart = (state.camera.fx - there.state.camera.fx).abs() / deviation(&unit, focal_length, noise);
     // Priors tell the two apart, pixels do not.
-    let mut system = problem.system();
-    problem.linearise_into(&state, &mut system);
-    Some(Met { camera: state.camera, cost: system.cost, converged: true })
+    let excess = (problem.cost(&state) - minimum.system.cost) / noise.rise;
+    (excess < RIVALS && apart > SAME).then_some(Rival { parameter: Fx, value: state.camera.fx, excess })
+}
+
+/// Standard deviation of a shared unknown.
+fn deviation(unit: &DMatrix<f64>, row: usize, noise: Noise) -> f64 {
+    noise.scale() * unit[(row, row)].sqrt()
 }
 
 /// The other double sphere with the picture of one whose alpha or xi is 0; none where it lies out of the range for which the model is

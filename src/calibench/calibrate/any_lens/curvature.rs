@@ -7,11 +7,10 @@
 
 use super::super::Loss;
 use super::super::minimise::Descent;
-use super::super::prior::Prior;
 use super::super::system::Step;
 use super::WIDTH;
 use super::marks::{Mark, Marks};
-use super::problem::{Problem, State};
+use super::problem::{Known, Problem, State};
 use crate::geometry::Vec2;
 
 /// Part of the step at which the second derivative is taken, by central differences.
@@ -35,16 +34,17 @@ impl Problem<'_> {
                 })
             })
             .collect::<Option<_>>()?;
-        // What is known beforehand is linear in the unknowns: it has a weight and no second derivative.
-        let priors: Vec<Prior> = {
-            let here = |prior: &Prior| Some(Prior { mean: from.camera.value(prior.parameter)?, ..*prior });
-            self.priors.iter().filter_map(here).collect()
-        };
-        let problem = Problem { views: &bent, priors: &priors, loss: Loss::Squares, ..*self };
+        let problem = Problem { views: &bent, loss: Loss::Squares, ..*self };
         let mut system = problem.system();
         problem.linearise_into(from, &mut system);
         if !system.cost.is_finite() {
             return None;
+        }
+        // What is known beforehand is linear in the unknowns: it has a weight and no second derivative.
+        for Known { row, off, weight } in self.known(from) {
+            if let Some(row) = row {
+                system.gradient[row] -= weight.cost * off;
+            }
         }
         let mut acceleration = Step::default();
         system.solve_into(damping, &mut acceleration)?;

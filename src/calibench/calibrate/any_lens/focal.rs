@@ -35,7 +35,8 @@ pub(super) fn refuse_if_open(
     }
     // Two spheres make up for the focal length with their distance, at the same picture: that is no other depth.
     let free = problem.free.without(Fx).without(Fy).without(Xi);
-    let rest = Problem { free, fy_per_fx: None, relative_gain: ROUGH_GAIN, ..*problem };
+    let held = problem.held.with(Xi);
+    let rest = Problem { free, held, fy_per_fx: None, relative_gain: ROUGH_GAIN, ..*problem };
     let least = identifiability::least_rise(Fx);
     let noise = noise.at_least(problem.rounding_cost);
     for factor in FACTORS {

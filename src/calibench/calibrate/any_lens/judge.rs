@@ -64,9 +64,9 @@ pub(super) fn judge(
     let starts = met.len();
     let value = |camera: &Camera<Lens>, parameter| camera.value(parameter).unwrap_or(0.0);
     let rival = reduction.intrinsics_covariance().and_then(|unit| {
-        let covariance = unit * noise.variance;
-        met.extend(counterpart(problem, &minimum, &covariance));
-        walk::met(&minimum).rival(&met, problem.free, &covariance, noise.rise, value)
+        let second = counterpart(problem, &minimum, &unit, noise);
+        let met = walk::met(&minimum).rival(&met, problem.free, &(unit * noise.variance), noise.rise, value);
+        second.into_iter().chain(met).min_by(Rival::nearer)
     });
     Ok(Judged { minimum, reduction, noise, starts, skewed, rival })
 }
