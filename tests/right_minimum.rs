@@ -3,7 +3,7 @@
 
 use calibench::board::View;
 use calibench::calibrate::{
-    Calibration, CalibrationError, Outliers, Settings, Termination, Warning, calibrate,
+    Calibration, CalibrationError, Loss, Outliers, Settings, Termination, Warning, calibrate,
 };
 use calibench::camera::{Camera, FreeParameters, Parameter};
 use calibench::geometry::{Pose, Vec2, Vec3};
@@ -218,4 +218,46 @@ fn the_certificate_refuses_no_more_than_it_says() {
     // Binomial(2000, 0.05): mean 100, standard deviation 9.7; 148 is exceeded with probability 1e-6.
     assert!(low <= 148, "{low} of {trials}");
     assert!(low > 10, "{low} of {trials}: the bound is far too wide to be of use");
+}
+
+/// One mark in ten astray.
+fn one_in_ten_astray(views: Vec<View>, stream: &mut Stream) -> Vec<View> {
+    let strayed = |view: View| {
+        let mut pixels = view.pixels().to_vec();
+        for pixel in pixels.iter_mut().step_by(10) {
+            *pixel += 3.0 * Vec2::new(stream.normal(), stream.normal());
+        }
+        View::new(view.points().to_vec(), pixels).unwrap()
+    };
+    views.into_iter().map(strayed).collect()
+}
+
+#[test]
+fn under_a_robust_loss_an_excess_is_that_of_chance() {
+    const TRIALS: u64 = 40;
+    let settings = Settings::standard().with_loss(Loss::Cauchy { scale_px: 0.2 });
+    let example = Truth::example();
+    // Of a board ten times as far perspective hardly tells the tilt's sign: a search, which fits the floor.
+    let mut far = example.clone();
+    let Pose { rotation, translation } = far.cam_from_target[1];
+    far.cam_from_target.push(Pose { rotation, translation: 10.0 * translation });
+    for (truth, is_searched) in [(example, false), (far, true)] {
+        let scene = Scene::new(truth).unwrap();
+        let (mut mean, mut freedom, mut most_starts) = (0.0, 0.0, 0);
+        for trial in 0..TRIALS {
+            let mut stream =
+                Stream::open(StreamKey { seed: 7, scenario: "certificate", trial, purpose: "marks" });
+            let views = one_in_ten_astray(scene.observe(0.1, &mut stream), &mut stream);
+            let found = calibrate(&views, &settings).unwrap();
+            most_starts = most_starts.max(found.starts);
+            let certificate = found.certificate.unwrap();
+            assert!(certificate.holds());
+            freedom = certificate.freedom as f64;
+            mean += certificate.excess / TRIALS as f64;
+        }
+        assert_eq!(most_starts > 1, is_searched);
+        // A mean of so many variables of chi-squared, five standard deviations.
+        let within = 5.0 * (2.0 * freedom / TRIALS as f64).sqrt();
+        assert!((mean - freedom).abs() < within, "{mean} of {freedom} +- {within}");
+    }
 }

@@ -302,53 +302,8 @@ fn quadratic_form(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::board::View;
     use crate::calibrate::tests::four_views;
     use crate::calibrate::{Settings, calibrate};
-    use crate::geometry::{Pose, Vec2};
-    use crate::synth::{Scene, Stream, StreamKey, Truth};
-
-    /// One mark in ten astray.
-    fn with_strays(views: Vec<View>, stream: &mut Stream) -> Vec<View> {
-        let strayed = |view: View| {
-            let mut pixels = view.pixels().to_vec();
-            for pixel in pixels.iter_mut().step_by(10) {
-                *pixel += 3.0 * Vec2::new(stream.normal(), stream.normal());
-            }
-            View::new(view.points().to_vec(), pixels).unwrap()
-        };
-        views.into_iter().map(strayed).collect()
-    }
-
-    #[test]
-    fn under_a_robust_loss_an_excess_is_that_of_chance() {
-        const TRIALS: u64 = 40;
-        let settings = Settings::standard().with_loss(Loss::Cauchy { scale_px: 0.2 });
-        let example = Truth::example();
-        // Of a board ten times as far perspective hardly tells the tilt's sign: a search, which fits the floor.
-        let mut far = example.clone();
-        let Pose { rotation, translation } = far.cam_from_target[1];
-        far.cam_from_target.push(Pose { rotation, translation: 10.0 * translation });
-        for (truth, is_searched) in [(example, false), (far, true)] {
-            let scene = Scene::new(truth).unwrap();
-            let (mut mean, mut freedom, mut most_starts) = (0.0, 0.0, 0);
-            for trial in 0..TRIALS {
-                let mut stream =
-                    Stream::open(StreamKey { seed: 7, scenario: "certificate", trial, purpose: "marks" });
-                let views = with_strays(scene.observe(0.1, &mut stream), &mut stream);
-                let found = calibrate(&views, &settings).unwrap();
-                most_starts = most_starts.max(found.starts);
-                let certificate = found.certificate.unwrap();
-                assert!(certificate.holds());
-                freedom = certificate.freedom as f64;
-                mean += certificate.excess / TRIALS as f64;
-            }
-            assert_eq!(most_starts > 1, is_searched);
-            // A mean of so many variables of chi-squared, five standard deviations.
-            let within = 5.0 * (2.0 * freedom / TRIALS as f64).sqrt();
-            assert!((mean - freedom).abs() < within, "{mean} of {freedom} +- {within}");
-        }
-    }
 
     #[test]
     fn the_floor_is_what_pixels_reach_whatever_is_known_beforehand() {
