@@ -51,7 +51,7 @@ pub(super) const FALSE_ALARM: f64 = 1e-6;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Certificate {
-    /// RMSE per point, px, that the views reach with homographies of their own in place of poses.
+    /// RMSE per point, px, that the views reach with homographies of their own in place of poses; with a robust loss the root of its mean.
     pub floor_rmse_px: f64,
     /// By how much the cost exceeds that floor, in variances of a pixel coordinate; with a robust loss in what one
     /// standard deviation costs.

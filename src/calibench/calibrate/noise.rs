@@ -92,7 +92,7 @@ mod tests {
             let residuals: Vec<Vec2> = marks.iter().map(|mark| least - mark).collect();
             let squares = || residuals.iter().map(Vec2::norm_squared);
             let freedom = 2.0 * marks.len() as f64 - 2.0;
-            let noise = Noise::of_residuals(&[residuals.clone()], squares().sum(), loss, freedom);
+            let noise = Noise::of_residuals(std::slice::from_ref(&residuals), squares().sum(), loss, freedom);
             // The normal matrix of a common place is the sum of the weights.
             let information: f64 = squares().map(|square| loss.at(square).1).sum();
             let cost = |at: Vec2| marks.iter().map(|mark| loss.at((at - mark).norm_squared()).0).sum::<f64>();

@@ -39,7 +39,7 @@ pub struct Calibration<L = BrownConrady> {
     /// How the refinement ended.
     pub termination: Termination,
     /// How the cost compares with its floor; `None` where a pose is undetermined. Under a robust loss it
-    /// compares weighted residuals, and its probability is rough.
+    /// compares what the loss counts, and its probability is rough where the loss is many times as wide as the noise.
     pub certificate: Option<Certificate>,
     /// Intervals by the profile of the cost, one a free parameter; empty unless
     /// [`super::Settings::with_profile_intervals`] asked for them.
