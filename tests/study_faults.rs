@@ -14,7 +14,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Two cells, three batches each, one set of poses: many runs take little time.
 fn spec() -> String {
@@ -167,18 +167,33 @@ fn a_run_that_is_killed_two_hundred_times_ends_in_the_same_bytes() {
     fs::write(folder.join("spec.toml"), long).unwrap();
     let run = |arguments: &[&str]| command(arguments, &folder).spawn().unwrap();
     let ended = |child: Child| child.wait_with_output().unwrap();
-    assert!(ended(run(&["study", "run", "spec.toml", "--out", "whole"])).status.success());
+    let checkpoint = |name: &str| fs::read(folder.join(name).join("checkpoint.json")).unwrap_or_default();
+    // Waits until the run has kept one more batch, or has ended: a busy machine takes its time to begin.
+    let kept_more = |child: &mut Child, name: &str| {
+        let before = checkpoint(name);
+        while checkpoint(name) == before && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_micros(200));
+        }
+    };
+    let (start, mut whole) = (Instant::now(), run(&["study", "run", "spec.toml", "--out", "whole"]));
+    kept_more(&mut whole, "whole");
+    let beginning = start.elapsed();
+    assert!(ended(whole).status.success());
     let mut moments = Stream::open(StreamKey { seed: 1, scenario: "kills", trial: 0, purpose: "moment" });
     let mut killed = 0;
-    for _ in 0..KILLS {
+    for kill in 0..KILLS {
         let begun = folder.join("killed/manifest.json").exists();
         let mut child = run(if begun {
             &["study", "resume", "killed"]
         } else {
             &["study", "run", "spec.toml", "--out", "killed"]
         });
-        // From before the first write to some batches later.
-        std::thread::sleep(Duration::from_micros((150_000.0 * moments.uniform()) as u64));
+        // Each second one while it begins, before the first write and after; the others among their batches.
+        let within = if kill % 2 == 0 { beginning } else { Duration::from_millis(5) };
+        if kill % 2 == 1 {
+            kept_more(&mut child, "killed");
+        }
+        std::thread::sleep(within.mul_f64(moments.uniform()));
         // SIGKILL: no handler runs. It fails where the run has ended.
         let _ = child.kill();
         let output = ended(child);
