@@ -2,7 +2,7 @@
 //! found: at another size of the image, or left out because light or an edge spoiled them.
 
 use super::neighbours::Neighbours;
-use super::rectangle::MOST_STRAYS;
+use super::rectangle::MOST_BEYOND;
 use crate::geometry::Vec2;
 
 /// How far a mark may lie from where the last step puts the next one, in steps: perspective changes a step by less, and the next mark
@@ -13,23 +13,58 @@ const MOST_OFF: f64 = 0.3;
 /// that are not seen; `period`: after so many rows marks stand above each other again, 1 or, where rows are staggered, 2; `marks_px`: all that
 /// were seen.
 pub fn goes_on(places_px: &[Option<Vec2>], columns: usize, period: usize, marks_px: &[Vec2]) -> bool {
-    let rows = places_px.len() / columns;
     let marks = Neighbours::new(marks_px);
-    let is_beyond = |outer: (usize, usize), inner: (usize, usize)| {
-        let at = |(column, row): (usize, usize)| places_px[row * columns + column];
-        let (Some(outer), Some(inner)) = (at(outer), at(inner)) else { return false };
-        let step = outer - inner;
-        marks.within(&(outer + step), MOST_OFF / period as f64 * step.norm()).next().is_some()
-    };
-    let side =
-        |of: usize, outer: &dyn Fn(usize) -> (usize, usize), inner: &dyn Fn(usize) -> (usize, usize)| {
-            let beyond = (0..of).filter(|&k| is_beyond(outer(k), inner(k))).count();
-            beyond as f64 > MOST_STRAYS * of as f64
+    let reach = MOST_OFF / period as f64;
+    sides(places_px, columns, period).any(|side| {
+        side.goes_on(|next| marks.within(&next.place, reach * next.outwards.norm()).next().is_some())
+    })
+}
+
+/// Where the mark beyond an outer one would lie, or an outer one lies, with the steps to its neighbours.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Next {
+    pub place: Vec2,
+    pub outwards: Vec2,
+    /// Along the side.
+    pub along: Vec2,
+}
+
+/// The outer marks of a side that are seen, and how many there are.
+pub(super) struct Side {
+    of: usize,
+    pub outer: Vec<Next>,
+}
+
+impl Side {
+    /// Whether there are more marks beyond than chance puts there.
+    pub fn goes_on(&self, is_there: impl Fn(&Next) -> bool) -> bool {
+        let beyond = |outer: &&Next| is_there(&Next { place: outer.place + outer.outwards, ..**outer });
+        self.outer.iter().filter(beyond).count() as f64 > MOST_BEYOND * self.of as f64
+    }
+}
+
+/// The four sides of a board; see [`goes_on`].
+pub(super) fn sides(places_px: &[Option<Vec2>], columns: usize, period: usize) -> impl Iterator<Item = Side> {
+    let rows = places_px.len() / columns;
+    let at = move |(column, row): (usize, usize)| places_px[row * columns + column];
+    let side = move |of: usize, pair: &dyn Fn(usize) -> [(usize, usize); 2], stride: usize| {
+        let next = |k: usize| {
+            let [outer, inner] = pair(k).map(at);
+            let place = outer?;
+            let towards = |other: usize| Some(at(pair(other)[0])? - place);
+            let behind = k.checked_sub(stride).and_then(towards).map(|step| -step);
+            let along = Some(k + stride).filter(|&k| k < of).and_then(towards).or(behind)?;
+            Some(Next { place, outwards: place - inner?, along })
         };
-    side(rows, &|row| (0, row), &|row| (1, row))
-        || side(rows, &|row| (columns - 1, row), &|row| (columns - 2, row))
-        || side(columns, &|column| (column, period - 1), &|column| (column, 2 * period - 1))
-        || side(columns, &|column| (column, rows - period), &|column| (column, rows - 2 * period))
+        Side { of, outer: (0..of).filter_map(next).collect() }
+    };
+    [
+        side(rows, &|row| [(0, row), (1, row)], period),
+        side(rows, &|row| [(columns - 1, row), (columns - 2, row)], period),
+        side(columns, &|column| [(column, period - 1), (column, 2 * period - 1)], 1),
+        side(columns, &|column| [(column, rows - period), (column, rows - 2 * period)], 1),
+    ]
+    .into_iter()
 }
 
 #[cfg(test)]

@@ -59,6 +59,16 @@ pub enum GridError {
         /// Its smaller side.
         found_rows: usize,
     },
+    /// The grid, and more of it beyond a side.
+    #[error(
+        "a grid of {columns} x {rows} was asked, and what was found goes on beyond a side: count the discs of a row, and the rows"
+    )]
+    Larger {
+        /// Asked marks along a row.
+        columns: usize,
+        /// Asked rows.
+        rows: usize,
+    },
     /// Enough marks, but they do not form a rectangle.
     #[error(
         "found a lattice of {found} marks that is not a {columns} x {rows} rectangle: other marks near the board, or \

@@ -2,7 +2,7 @@
 //! `circles:9x7:10mm:3mm`, `charuco:7x5:30mm:22mm:DICT_4X4_50`.
 
 use super::coded::{self, Coded};
-use super::discs::{NotFound, ordered_discs};
+use super::discs::{NotFound, alone, ordered_discs};
 use crate::board::{Arrangement, Board, BoardError, Pattern};
 use crate::detect::{
     AprilGrid, ChessboardError, CodedError, GridError, LayoutError, SeenBoard, UnknownDictionary, chessboard,
@@ -341,21 +341,21 @@ impl BoardSpec {
     pub fn detect(&self, photo: &Grey) -> Result<Vec<Vec2>, NotFound> {
         let (columns, rows) = (self.board.columns(), self.board.rows());
         let no_candidates = |reason| NotFound { reason, candidates_px: Vec::new() };
-        let grid = match self.kind {
-            MarkKind::Chess => return self.corners(photo).map_err(no_candidates),
+        match self.kind {
+            MarkKind::Chess => self.corners(photo).map_err(no_candidates),
             MarkKind::Charuco | MarkKind::AprilGrid => {
                 let seen = self.see(photo)?;
                 let (missing, marks) = (seen.missing(), seen.places_px().len());
                 let all = seen.places_px().iter().copied().collect::<Option<Vec<Vec2>>>();
-                return all.ok_or_else(|| no_candidates(DetectError::Hidden { missing, marks }));
+                all.ok_or_else(|| no_candidates(DetectError::Hidden { missing, marks }))
             }
-            MarkKind::Dots => ordered_discs(photo, |discs| sparse_dots_of(discs, columns, rows)),
-            MarkKind::Circles => ordered_discs(photo, |discs| circle_grid_of(discs, columns, rows)),
-            MarkKind::Asymmetric | MarkKind::Hexagonal => {
-                ordered_discs(photo, |discs| staggered_grid_of(discs, columns, rows))
+            MarkKind::Dots => ordered_discs(photo, |discs| sparse_dots_of(discs, columns, rows))
+                .map(|grid| grid.centres_px()),
+            MarkKind::Circles | MarkKind::Asymmetric | MarkKind::Hexagonal => {
+                let seen = self.whole_discs(photo).and_then(|seen| alone(photo, seen, self.period()))?;
+                Ok(seen.seen().map(|(_, place)| place).collect())
             }
-        };
-        Ok(grid?.centres_px())
+        }
     }
 
     /// The marks that are seen in a photograph. Of a board with markers they are those that are seen, wherever on the board
@@ -385,15 +385,32 @@ impl BoardSpec {
                 ordered_discs(photo, |discs| sparse_dots_of(discs, columns, rows)).map(SeenBoard::from)
             }
             // A whole board of either kind of discs comes before a part of one.
-            MarkKind::Circles => ordered_discs(photo, |discs| circle_grid_of(discs, columns, rows))
-                .map(SeenBoard::from)
-                .or_else(|_| ordered_discs(photo, |discs| seen_circle_grid_of(discs, columns, rows))),
-            MarkKind::Asymmetric | MarkKind::Hexagonal => {
-                ordered_discs(photo, |discs| staggered_grid_of(discs, columns, rows))
-                    .map(SeenBoard::from)
-                    .or_else(|_| ordered_discs(photo, |discs| seen_staggered_grid_of(discs, columns, rows)))
+            MarkKind::Circles | MarkKind::Asymmetric | MarkKind::Hexagonal => {
+                let in_part = |_| match self.kind {
+                    MarkKind::Circles => {
+                        ordered_discs(photo, |discs| seen_circle_grid_of(discs, columns, rows))
+                    }
+                    _ => ordered_discs(photo, |discs| seen_staggered_grid_of(discs, columns, rows)),
+                };
+                let seen = self.whole_discs(photo).or_else(in_part)?;
+                alone(photo, seen, self.period())
             }
         }
+    }
+
+    /// A dense grid of discs, all seen.
+    fn whole_discs(&self, photo: &Grey) -> Result<SeenBoard, NotFound> {
+        let (columns, rows) = (self.board.columns(), self.board.rows());
+        let grid = match self.kind {
+            MarkKind::Circles => ordered_discs(photo, |discs| circle_grid_of(discs, columns, rows)),
+            _ => ordered_discs(photo, |discs| staggered_grid_of(discs, columns, rows)),
+        };
+        grid.map(SeenBoard::from)
+    }
+
+    /// After so many rows discs stand above each other again.
+    fn period(&self) -> usize {
+        if self.kind == MarkKind::Circles { 1 } else { 2 }
     }
 
     fn corners(&self, photo: &Grey) -> Result<Vec<Vec2>, DetectError> {

@@ -1,7 +1,9 @@
 //! Where are a board's discs in a photograph, be they dark on bright ground or bright on dark?
 
 use super::DetectError;
-use crate::detect::{Blob, BlobOptions, GridError, Polarity, blobs, searched_blobs};
+use crate::detect::{
+    Blob, BlobOptions, GridError, Polarity, SeenBoard, blobs, refuse_larger, searched_blobs,
+};
 use crate::geometry::Vec2;
 use crate::io::Grey;
 use crate::raster::{Level, Raster};
@@ -31,6 +33,20 @@ pub fn ordered_discs<Ordered>(
         Grey::U16(image) => of_either_polarity(image, order),
         Grey::F32(image) => of_either_polarity(image, order),
     }
+}
+
+/// A board that was found, unless more of it stands beyond a side ([`refuse_larger`]); `period` is 1 or, where rows are staggered, 2.
+///
+/// # Errors
+/// It goes on.
+pub(super) fn alone(photo: &Grey, board: SeenBoard, period: usize) -> Result<SeenBoard, NotFound> {
+    let candidates_px = board.seen().map(|(_, place)| place).collect();
+    let alone = match photo {
+        Grey::U8(image) => refuse_larger(image, board, period),
+        Grey::U16(image) => refuse_larger(image, board, period),
+        Grey::F32(image) => refuse_larger(image, board, period),
+    };
+    alone.map_err(|reason| NotFound { reason: reason.into(), candidates_px })
 }
 
 fn of_either_polarity<T: Level, Ordered>(
