@@ -26,10 +26,8 @@ pub fn refuse_larger<T: Level>(
 ) -> Result<SeenBoard, GridError> {
     let (columns, rows) = (board.columns(), board.rows());
     let goes_on = |side: Side| discs_go_on(image, &side, period);
-    match sides(board.places_px(), columns, period).any(goes_on) {
-        true => Err(GridError::Larger { columns, rows }),
-        false => Ok(board),
-    }
+    let is_part = sides(board.places_px(), columns, period).any(goes_on);
+    if is_part { Err(GridError::Larger { columns, rows }) } else { Ok(board) }
 }
 
 fn discs_go_on<T: Level>(image: &Raster<T>, side: &Side, period: usize) -> bool {
