@@ -4,6 +4,8 @@
 use calibench::board::Board;
 use calibench::detect::{BlobOptions, Orientation, blobs, chessboard, seen_chessboard, seen_circle_grid_of};
 use calibench::geometry::Vec2;
+use calibench::io::Grey;
+use calibench::photos::BoardSpec;
 use calibench::raster::Raster;
 use calibench::synth::Truth;
 use calibench::synth::render::{Imaging, Photograph, photograph};
@@ -139,4 +141,30 @@ fn discs_in_shadow_are_still_of_the_board() {
     cover(&mut image, photo.centres_true[10], 10.0);
     let smaller = seen_circle_grid_of(&blobs(&image, &BlobOptions::default()), 9, 7);
     assert!(smaller.is_err(), "{smaller:?}");
+}
+
+/// Discs in a hard shadow are found by no threshold of the whole, and are seen to stand where the next column would.
+#[test]
+fn a_board_with_a_column_in_a_hard_shadow_is_not_taken_for_a_smaller_one() {
+    let asked = |text: &str| text.parse::<BoardSpec>().expect("a board");
+    let (smaller, whole) = (asked("circles:9x7:8mm:5mm"), asked("circles:10x7:8mm:5mm"));
+    let photo = photo(whole.board(), [15.0, 5.0, 0.0]);
+    let [inner, outer] = [8, 9].map(|column| photo.centres_true[column]);
+    let mut found_whole = 0;
+    for light in [0.35, 0.5, 0.7] {
+        for between in [0.3, 0.5, 0.7] {
+            let edge = (inner + between * (outer - inner)).x as usize;
+            let mut image = photo.image.clone();
+            for y in 0..image.height() {
+                for x in edge..image.width() {
+                    image.set(x, y, light * image.row(y)[x]);
+                }
+            }
+            let grey = Grey::U8(image.to_u8());
+            let taken = smaller.see(&grey);
+            assert!(taken.is_err(), "{light} of the light from {between} on");
+            found_whole += usize::from(whole.see(&grey).is_ok());
+        }
+    }
+    assert!(found_whole > 0);
 }
