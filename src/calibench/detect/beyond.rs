@@ -2,7 +2,7 @@
 //! found: at another size of the image, or left out because light or an edge spoiled them.
 
 use super::neighbours::Neighbours;
-use super::rectangle::MOST_BEYOND;
+use super::rectangle::MOST_STRAYS;
 use crate::geometry::Vec2;
 
 /// How far a mark may lie from where the last step puts the next one, in steps: perspective changes a step by less, and the next mark
@@ -16,7 +16,9 @@ pub fn goes_on(places_px: &[Option<Vec2>], columns: usize, period: usize, marks_
     let marks = Neighbours::new(marks_px);
     let reach = MOST_OFF / period as f64;
     sides(places_px, columns, period).any(|side| {
-        side.goes_on(|next| marks.within(&next.place, reach * next.outwards.norm()).next().is_some())
+        side.goes_on(MOST_STRAYS, |next| {
+            marks.within(&next.place, reach * next.outwards.norm()).next().is_some()
+        })
     })
 }
 
@@ -36,10 +38,10 @@ pub(super) struct Side {
 }
 
 impl Side {
-    /// Whether there are more marks beyond than chance puts there.
-    pub fn goes_on(&self, is_there: impl Fn(&Next) -> bool) -> bool {
+    /// Whether there are more marks beyond than this part of the side, which chance may put there.
+    pub fn goes_on(&self, chance: f64, is_there: impl Fn(&Next) -> bool) -> bool {
         let beyond = |outer: &&Next| is_there(&Next { place: outer.place + outer.outwards, ..**outer });
-        self.outer.iter().filter(beyond).count() as f64 > MOST_BEYOND * self.of as f64
+        self.outer.iter().filter(beyond).count() as f64 > chance * self.of as f64
     }
 }
 
@@ -89,8 +91,8 @@ mod tests {
         for (columns, rows) in [(10, 6), (9, 7)] {
             assert!(goes_on(&board(), 9, 1, &places(columns, rows)), "{columns} x {rows}");
         }
-        // And a quarter of one.
-        assert!(goes_on(&board(), 9, 1, &places(9, 7)[..54 + 2]));
+        // And half of one.
+        assert!(goes_on(&board(), 9, 1, &places(9, 7)[..54 + 4]));
         let shifted: Vec<Option<Vec2>> = (places(10, 7).into_iter().enumerate())
             .filter(|(index, _)| index % 10 > 0 && *index >= 10)
             .map(|(_, place)| Some(place))
@@ -101,7 +103,7 @@ mod tests {
     #[test]
     fn its_own_marks_and_a_few_strays_are_no_more_of_it() {
         assert!(!goes_on(&board(), 9, 1, &places(9, 6)));
-        assert!(!goes_on(&board(), 9, 1, &places(9, 7)[..54 + 1]));
+        assert!(!goes_on(&board(), 9, 1, &places(9, 7)[..54 + 3]));
         assert!(!goes_on(&board(), 9, 1, &[]));
         let hidden: Vec<Option<Vec2>> =
             board().into_iter().enumerate().map(|(k, p)| p.filter(|_| k < 45)).collect();

@@ -14,10 +14,7 @@ pub struct Rectangle {
 }
 
 /// Marks beside a rectangle that may be chance, as part of the side: texture that looks like one more mark.
-pub const MOST_BEYOND: f64 = 0.2;
-
-/// Marks of an outer row or column that do not show yet that a board ends there, as part of the side.
-const TOO_FEW_FOR_AN_END: f64 = 0.34;
+pub const MOST_STRAYS: f64 = 0.34;
 
 /// Fewest marks of an outer row or column that show where a board of which marks are hidden ends, on sides that have
 /// as many.
@@ -40,15 +37,14 @@ impl Rectangle {
     /// Whether the board goes on beyond a side.
     pub fn goes_on(&self, lattice: &Lattice) -> bool {
         let (w, h) = (self.width as i32, self.height as i32);
-        self.sides(lattice, [-1, h], [-1, w]).any(|(count, of)| count as f64 > MOST_BEYOND * of as f64)
+        self.sides(lattice, [-1, h], [-1, w]).any(|(count, of)| count as f64 > MOST_STRAYS * of as f64)
     }
 
     /// Whether all four outer rows and columns are there: without one of them the board may lie a step further.
     fn ends_are_seen(&self, lattice: &Lattice) -> bool {
         let (w, h) = (self.width as i32, self.height as i32);
-        self.sides(lattice, [0, h - 1], [0, w - 1]).all(|(count, of)| {
-            count >= FEWEST_ON_A_SIDE.min(of) && count as f64 > TOO_FEW_FOR_AN_END * of as f64
-        })
+        self.sides(lattice, [0, h - 1], [0, w - 1])
+            .all(|(count, of)| count >= FEWEST_ON_A_SIDE.min(of) && count as f64 > MOST_STRAYS * of as f64)
     }
 
     /// Marks in two rows and two columns, counted from the lowest place, with the places of each.

@@ -8,6 +8,8 @@ use super::seen::SeenBoard;
 use crate::geometry::Vec2;
 use crate::raster::{Level, Raster};
 
+/// Discs beyond that may be chance, as part of a side: fewer than of the marks that other means find, as contrast on all sides is seldom one.
+const CHANCE: f64 = 0.2;
 /// A disc beyond has at least this part of the contrast of the board's own, each over the light about it.
 const LEAST_OF_OWN: f64 = 0.5;
 /// Half the side of the square over which a level is averaged, in steps of the board: well within a disc.
@@ -40,7 +42,7 @@ fn discs_go_on<T: Level>(image: &Raster<T>, side: &Side, period: usize) -> bool 
     let Some(middle) = contrasts.get(contrasts.len() / 2).filter(|middle| **middle > 0.0) else {
         return false;
     };
-    side.goes_on(|next| lit(next).is_some_and(|lit| lit.contrast(sign) >= LEAST_OF_OWN * middle))
+    side.goes_on(CHANCE, |next| lit(next).is_some_and(|lit| lit.contrast(sign) >= LEAST_OF_OWN * middle))
 }
 
 /// Levels of a disc and of the ground about it.
