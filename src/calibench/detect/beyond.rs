@@ -16,9 +16,8 @@ pub fn goes_on(places_px: &[Option<Vec2>], columns: usize, period: usize, marks_
     let marks = Neighbours::new(marks_px);
     let reach = MOST_OFF / period as f64;
     sides(places_px, columns, period).any(|side| {
-        side.goes_on(MOST_STRAYS, |next| {
-            marks.within(&next.place, reach * next.outwards.norm()).next().is_some()
-        })
+        let is_mark = |next: &Next| marks.within(&next.place, reach * next.outwards.norm()).next().is_some();
+        side.more_than_chance(is_mark).is_some()
     })
 }
 
@@ -38,10 +37,11 @@ pub(super) struct Side {
 }
 
 impl Side {
-    /// Whether there are more marks beyond than this part of the side, which chance may put there.
-    pub fn goes_on(&self, chance: f64, is_there: impl Fn(&Next) -> bool) -> bool {
+    /// How many marks stand beyond, of how many places, where these are more than chance puts there.
+    pub fn more_than_chance(&self, is_there: impl Fn(&Next) -> bool) -> Option<(usize, usize)> {
         let beyond = |outer: &&Next| is_there(&Next { place: outer.place + outer.outwards, ..**outer });
-        self.outer.iter().filter(beyond).count() as f64 > chance * self.of as f64
+        let found = self.outer.iter().filter(beyond).count();
+        (found as f64 > MOST_STRAYS * self.of as f64).then_some((found, self.of))
     }
 }
 

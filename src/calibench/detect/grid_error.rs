@@ -61,13 +61,18 @@ pub enum GridError {
     },
     /// The grid, and more of it beyond a side.
     #[error(
-        "a grid of {columns} x {rows} was asked, and what was found goes on beyond a side: count the discs of a row, and the rows"
+        "found {columns} x {rows} discs, and beyond a side {found} of {of} places look like discs too: if the board is larger, count the \
+         discs of a row, and the rows; if they are holes or print beside it, cover them"
     )]
     Larger {
         /// Asked marks along a row.
         columns: usize,
         /// Asked rows.
         rows: usize,
+        /// Discs beyond one of the sides.
+        found: usize,
+        /// Places there.
+        of: usize,
     },
     /// Enough marks, but they do not form a rectangle.
     #[error(

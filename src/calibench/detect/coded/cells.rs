@@ -2,9 +2,10 @@
 //! marker's own black border and the white about it.
 
 use super::dictionary::Cells;
+use crate::detect::bilinear::bilinear;
 use crate::detect::chessboard::level::{Pyramid, level_from_photo};
 use crate::geometry::{Homography, Vec2};
-use crate::raster::{Level, Raster};
+use crate::raster::Level;
 
 /// Where a marker is: its unit square, y down, in the photograph.
 pub struct Patch {
@@ -175,16 +176,4 @@ fn sample<T: Level>(pyramid: &Pyramid<'_, T>, level: usize, place: &Vec2) -> Opt
         Some(reduced) => bilinear(reduced, &level_from_photo(place, level)),
         None => bilinear(pyramid.photo(), place),
     }
-}
-
-fn bilinear<T: Level>(image: &Raster<T>, place: &Vec2) -> Option<f64> {
-    let fits = |at: f64, size: usize| at >= 0.0 && at + 1.0 < size as f64;
-    if !(fits(place.x, image.width()) && fits(place.y, image.height())) {
-        return None;
-    }
-    let (x, y) = (place.x as usize, place.y as usize);
-    let (a, b) = (place.x - x as f64, place.y - y as f64);
-    let mix = |row: &[T]| row[x].to_f64() + (row[x + 1].to_f64() - row[x].to_f64()) * a;
-    let (upper, lower) = (mix(image.row(y)), mix(image.row(y + 1)));
-    Some(upper + (lower - upper) * b)
 }
