@@ -13,11 +13,13 @@ use crate::raster::{Level, Raster};
 const REACH: f64 = 0.35;
 /// Samples along each axis.
 const SAMPLES: usize = 11;
-/// Part of them that must lie in the image.
+/// Samples of the own discs count as disc, or as ground, up to this part of the way to the other: at an edge they are neither.
+const CLEARLY: f64 = 0.25;
+/// Part of the samples, of a disc and of its ground, that must lie in the image.
 const LEAST_INSIDE: f64 = 0.5;
-/// Correlation with the board's own discs at which a place looks like one: letters, smaller holes and the edge of a sheet stay below.
-const LEAST_CORRELATION: f64 = 0.8;
-/// Contrast, over the mean level, of a disc beyond as part of the own discs'.
+/// Part of the samples that may be on the wrong side: noise.
+const ASTRAY: f64 = 0.1;
+/// Contrast of a disc beyond, as part of the own discs': the edge of a shadow through it leaves about as much.
 const LEAST_CONTRAST: f64 = 0.5;
 
 /// Refuses a board of discs that goes on beyond a side: it is a part of a larger one. `period` is 1 or, where rows are staggered, 2.
@@ -40,9 +42,16 @@ pub fn refuse_larger<T: Level>(
 /// How many places beyond a side look like discs, of how many, where these are too many for chance.
 fn discs_beyond<T: Level>(image: &Raster<T>, side: &Side) -> Option<(usize, usize)> {
     // Of the inner neighbours: beside the outer discs the board may end.
-    let inner = |outer: &Next| Next { place: outer.place - outer.outwards, ..*outer };
-    let own = mean(side.outer.iter().map(|outer| levels(image, &inner(outer))))?;
-    side.more_than_chance(|next| is_alike(&own, &levels(image, next)))
+    let inner = |outer: &Next| levels(image, &Next { place: outer.place - outer.outwards, ..*outer });
+    let own: Vec<Vec<Option<f64>>> = side.outer.iter().map(inner).collect();
+    let shape = Shape::of(&own)?;
+    let mut contrasts: Vec<f64> = own.iter().filter_map(|disc| shape.contrast(disc)).collect();
+    contrasts.sort_by(f64::total_cmp);
+    let usual = *contrasts.get(contrasts.len() / 2).filter(|usual| **usual > 0.0)?;
+    let is_disc = |levels: &[Option<f64>]| {
+        shape.contrast(levels).is_some_and(|contrast| contrast >= LEAST_CONTRAST * usual)
+    };
+    side.more_than_chance(|next| is_disc(&levels(image, next)))
 }
 
 /// Levels about a place, row by row along the board; `None` outside of the image.
@@ -54,27 +63,44 @@ fn levels<T: Level>(image: &Raster<T>, about: &Next) -> Vec<Option<f64>> {
     (0..SAMPLES * SAMPLES).map(|k| bilinear(image, &place(k))).collect()
 }
 
-/// Mean levels of discs that are wholly in the image.
-fn mean(discs: impl Iterator<Item = Vec<Option<f64>>>) -> Option<Vec<f64>> {
-    let whole: Vec<Vec<f64>> = discs.filter_map(|disc| disc.into_iter().collect()).collect();
-    let sum = |k: usize| whole.iter().map(|disc| disc[k]).sum::<f64>();
-    (!whole.is_empty()).then(|| (0..SAMPLES * SAMPLES).map(|k| sum(k) / whole.len() as f64).collect())
+/// Which samples are of a disc, and which of its ground.
+struct Shape {
+    disc: Vec<usize>,
+    ground: Vec<usize>,
+    /// 1 where discs are darker than the ground, else -1.
+    sign: f64,
 }
 
-/// Whether levels are those of the own discs in other light.
-fn is_alike(own: &[f64], levels: &[Option<f64>]) -> bool {
-    let pairs: Vec<(f64, f64)> =
-        own.iter().zip(levels).filter_map(|(own, level)| Some((*own, (*level)?))).collect();
-    let n = pairs.len() as f64;
-    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / n;
-    let (x, y) = (mean(&|pair| pair.0), mean(&|pair| pair.1));
-    let xx = mean(&|pair| (pair.0 - x) * (pair.0 - x));
-    let xy = mean(&|pair| (pair.0 - x) * (pair.1 - y));
-    let yy = mean(&|pair| (pair.1 - y) * (pair.1 - y));
-    // None of it is true of what is not a number, as where all levels are one.
-    n >= LEAST_INSIDE * own.len() as f64
-        && xy / (xx * yy).sqrt() >= LEAST_CORRELATION
-        && (xy / xx) * x.abs() >= LEAST_CONTRAST * y.abs()
+impl Shape {
+    /// By the mean of discs that are wholly in the image; `None` where none is.
+    fn of(discs: &[Vec<Option<f64>>]) -> Option<Shape> {
+        let whole: Vec<Vec<f64>> = discs.iter().filter_map(|disc| disc.iter().copied().collect()).collect();
+        let sum = |k: usize| whole.iter().map(|disc| disc[k]).sum::<f64>();
+        let mean: Vec<f64> = (0..SAMPLES * SAMPLES).map(sum).collect();
+        let centre = mean[mean.len() / 2];
+        let farthest =
+            |far: f64, level: &f64| if (level - centre).abs() > (far - centre).abs() { *level } else { far };
+        let far = mean.iter().fold(centre, farthest);
+        let towards = |level: &f64| (level - centre) / (far - centre);
+        let those = |is_one: &dyn Fn(f64) -> bool| {
+            (0..mean.len()).filter(|&k| is_one(towards(&mean[k]))).collect::<Vec<usize>>()
+        };
+        let (disc, ground) = (those(&|t| t < CLEARLY), those(&|t| t > 1.0 - CLEARLY));
+        (!whole.is_empty()).then(|| Shape { disc, ground, sign: (far - centre).signum() })
+    }
+
+    /// How much darker the disc is than the ground, over both; of each the sample that nearly all others are farther from the other than.
+    /// `None` where too little is in the image.
+    fn contrast(&self, levels: &[Option<f64>]) -> Option<f64> {
+        let nearest = |of: &[usize], sign: f64| {
+            let mut seen: Vec<f64> = of.iter().filter_map(|&k| Some(sign * levels[k]?)).collect();
+            seen.sort_by(f64::total_cmp);
+            let is_enough = !seen.is_empty() && seen.len() as f64 >= LEAST_INSIDE * of.len() as f64;
+            is_enough.then(|| sign * seen[(ASTRAY * seen.len() as f64) as usize])
+        };
+        let (disc, ground) = (nearest(&self.disc, -self.sign)?, nearest(&self.ground, self.sign)?);
+        Some(self.sign * (ground - disc) / (ground + disc).abs().max(f64::MIN_POSITIVE))
+    }
 }
 
 #[cfg(test)]
@@ -105,7 +131,8 @@ mod tests {
 
     #[test]
     fn a_column_in_a_shadow_is_seen() {
-        for shadow_x in [1e9, 40.0 + 24.0 * 8.5, 40.0 + 24.0 * 8.3] {
+        // None, between the columns, and through the last one.
+        for shadow_x in [1e9, 40.0 + 24.0 * 8.5, 40.0 + 24.0 * 8.3, 40.0 + 24.0 * 9.0] {
             let larger = photo(10, 7, shadow_x, 1e9);
             let refused = refuse_larger(&larger, board(9, 7), 1);
             assert_eq!(
