@@ -19,8 +19,8 @@ const CLEARLY: f64 = 0.25;
 const LEAST_INSIDE: f64 = 0.5;
 /// Part of the samples that may be on the wrong side: noise.
 const ASTRAY: f64 = 0.1;
-/// Contrast of a disc beyond, as part of the own discs': the edge of a shadow through it leaves about as much.
-const LEAST_CONTRAST: f64 = 0.5;
+/// Contrast of a disc beyond, as part of the own discs': the edge of a shadow through it, where a fifth of the light is left, leaves more.
+const LEAST_CONTRAST: f64 = 0.25;
 
 /// Refuses a board of discs that goes on beyond a side: it is a part of a larger one. `period` is 1 or, where rows are staggered, 2.
 ///
