@@ -84,7 +84,7 @@ mod tests {
         let even = |at: usize, step: f64| normal_quantile(((at as f64 + 0.5) * step).fract());
         let mark = |at: usize| {
             let noise = 0.1 * Vec2::new(even(at, 0.618_033_988_749_895), even(at, 0.414_213_562_373_095));
-            if at % 10 == 0 { noise + Vec2::new(3.0 * (at % 3) as f64 - 3.0, 2.0) } else { noise }
+            if at.is_multiple_of(10) { noise + Vec2::new(3.0 * (at % 3) as f64 - 3.0, 2.0) } else { noise }
         };
         let marks: Vec<Vec2> = (0..4000).map(mark).collect();
         for loss in [Loss::Squares, Loss::Huber { delta_px: 0.1 }, Loss::Cauchy { scale_px: 0.2 }] {
