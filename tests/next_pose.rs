@@ -289,4 +289,9 @@ fn what_residuals_with_strays_spread_by_is_not_taken_for_noise() {
         let output = run(&folder, &[&arguments[..], &["--mark-sd", "0.1"]].concat());
         assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", text(&output.stderr));
     }
+    // Its covariance is another than these marks would have given by squares: that is no other board.
+    let output =
+        run(&folder, &["next-pose", file, "--corners", "corners.csv", "--want", "fx", "--mark-sd", "0.1"]);
+    let said = text(&output.stderr);
+    assert!(said.contains("does not tell") && !said.contains("another board"), "{said}");
 }

@@ -107,7 +107,8 @@ pub(super) struct Arguments {
     /// Distance of the sensor's pixels, micrometres: says the focal length in mm too
     #[arg(long, value_name = "UM", value_parser = super::said::positive)]
     pixel_pitch: Option<f64>,
-    /// Loss of a residual: squares, huber:PX or cauchy:PX [default: squares]
+    /// Loss of a residual: squares, huber:PX or cauchy:PX; of marks with weights PX is one of weight times residual, with sigma_px a multiple
+    /// of it [default: squares]
     #[arg(long, value_name = "LOSS", value_parser = parse_loss)]
     loss: Option<Loss>,
     /// Leaves out views whose RMSE exceeds FACTOR times the median, worst first, such as 3

@@ -177,14 +177,20 @@ fn plan(arguments: &Arguments) -> Result<Plan, String> {
     if found.ranked.is_empty() {
         return Err("the marks of the board do not fix its pose: are they on a line?".into());
     }
-    let repeated = match is_board_of(&known, &points) {
+    if known.loss.is_some() && !known.views.is_empty() {
+        warn(&format!(
+            "{file}: it was calibrated with a robust loss, whose covariance does not tell whether these marks are its board: views taken are \
+             compared as if they were"
+        ));
+    }
+    let repeated = match known.loss.is_some() || is_board_of(&known, &points) {
         true => {
             let marks = (&points[..], sigma_px);
             best_repeated(&known.camera, &knowledge, &wishes, marks, &known.cam_from_target)
         }
         false => None,
     };
-    if repeated.is_none() && !known.views.is_empty() {
+    if repeated.is_none() && known.loss.is_none() && !known.views.is_empty() {
         warn(&format!(
             "{file}: these marks, at the poses of the result, would not have given its covariance: another board, another unit, \
              or an origin elsewhere on it (--corners FILE takes the marks from the calibration's own corner file). Views taken are \
