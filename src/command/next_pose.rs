@@ -177,25 +177,25 @@ fn plan(arguments: &Arguments) -> Result<Plan, String> {
     if found.ranked.is_empty() {
         return Err("the marks of the board do not fix its pose: are they on a line?".into());
     }
-    if known.loss.is_some() && !known.views.is_empty() {
-        warn(&format!(
-            "{file}: it was calibrated with a robust loss, whose covariance does not tell whether these marks are its board: views taken are \
-             compared as if they were"
-        ));
-    }
-    let repeated = match known.loss.is_some() || is_board_of(&known, &points) {
-        true => {
+    let whose = whose(&known, &points);
+    let repeated = match whose {
+        Whose::Other => None,
+        Whose::Result | Whose::Untold => {
             let marks = (&points[..], sigma_px);
             best_repeated(&known.camera, &knowledge, &wishes, marks, &known.cam_from_target)
         }
-        false => None,
     };
-    if repeated.is_none() && known.loss.is_none() && !known.views.is_empty() {
-        warn(&format!(
+    match (whose, &repeated) {
+        (Whose::Untold, Some(_)) => warn(&format!(
+            "{file}: it was calibrated with a robust loss, whose covariance does not tell whether these marks are its board: views taken are \
+             compared as if they were"
+        )),
+        (_, None) if !known.views.is_empty() => warn(&format!(
             "{file}: these marks, at the poses of the result, would not have given its covariance: another board, another unit, \
              or an origin elsewhere on it (--corners FILE takes the marks from the calibration's own corner file). Views taken are \
              not compared"
-        ));
+        )),
+        _ => {}
     }
     Ok(Plan { known, wishes, points, unit, sigma_px, image_size, reach, found, repeated })
 }
@@ -328,13 +328,23 @@ fn distances_taken(known: &KnownCalibration, points: &[Vec2]) -> Option<(f64, f6
     Some((near / BEYOND, far * BEYOND))
 }
 
-/// Whether one view at least has the covariance that these marks give it.
-fn is_board_of(known: &KnownCalibration, points: &[Vec2]) -> bool {
+/// Whose marks are they, by the covariance of the result's views?
+#[derive(Clone, Copy)]
+enum Whose {
+    /// One view at least has the covariance that these marks give it.
+    Result,
+    /// None has.
+    Other,
+    /// Under a robust loss it is another one whatever the board.
+    Untold,
+}
+
+fn whose(known: &KnownCalibration, points: &[Vec2]) -> Whose {
+    if known.loss.is_some() {
+        return Whose::Untold;
+    }
     let marks = (points, known.sigma_px);
     let of_view = |view| marks_against_covariance(&known.camera, &known.covariance, view, marks);
-    known
-        .cam_from_target
-        .iter()
-        .enumerate()
-        .any(|view| of_view(view).is_some_and(|ratio| ratio < OTHER_BOARD))
+    let is_of = |view| of_view(view).is_some_and(|ratio| ratio < OTHER_BOARD);
+    if known.cam_from_target.iter().enumerate().any(is_of) { Whose::Result } else { Whose::Other }
 }
