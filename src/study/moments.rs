@@ -1,7 +1,7 @@
 //! What do many values say, in one pass and little memory? Sums of powers about their mean, and intervals that do
 //! not assume a normal distribution.
 
-use calibench::evaluate::distribution::normal_two_sided;
+use calibench::evaluate::distribution::{normal_two_sided, student_two_sided};
 
 /// Sums of powers of values about their mean, brought up to date with every value.
 ///
@@ -144,19 +144,6 @@ fn root_interval(value: f64, n: f64, relative: f64, false_alarm: f64) -> Option<
     (c > 0.0).then(|| Estimated { value, low: value * c.sqrt() / factor, high: value * c.sqrt() * factor })
 }
 
-/// The half-width of a two-sided interval that Student's t leaves with probability `false_alarm`, by its expansion about the normal one
-/// (Abramowitz & Stegun 1964, 26.7.5): at 0.05 and three degrees of freedom within a hundredth, beyond ten within 1e-4.
-fn student_two_sided(false_alarm: f64, freedom: f64) -> f64 {
-    let z = normal_two_sided(false_alarm);
-    let s = z * z;
-    let terms = [
-        (s + 1.0) / 4.0,
-        ((5.0 * s + 16.0) * s + 3.0) / 96.0,
-        (((3.0 * s + 19.0) * s + 17.0) * s - 15.0) / 384.0,
-    ];
-    z * (1.0 + (terms[0] + (terms[1] + terms[2] / freedom) / freedom) / freedom)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -267,16 +254,13 @@ mod tests {
     }
 
     #[test]
-    fn the_expansion_is_students_t() {
-        // Tables of the 97.5 % and 99.5 % points.
-        for (false_alarm, freedom, table, within) in [
-            (0.05, 3.0, 3.1824, 0.03),
-            (0.05, 9.0, 2.2622, 1e-3),
-            (0.05, 30.0, 2.0423, 1e-4),
-            (0.01, 10.0, 3.1693, 5e-3),
-        ] {
-            let t = student_two_sided(false_alarm, freedom);
-            assert!((t - table).abs() < within, "{t} for {table}");
+    fn the_interval_of_a_mean_is_as_wide_as_students_t_says() {
+        // Tables of the 97.5 % point with three and nine degrees of freedom.
+        for (count, t) in [(4, 3.182_446), (10, 2.262_157)] {
+            let moments = of((0..count).map(f64::from));
+            let interval = moments.mean_interval(0.05).unwrap();
+            let half = t * moments.sd() / f64::from(count).sqrt();
+            assert!((0.5 * (interval.high - interval.low) / half - 1.0).abs() < 1e-6, "{interval:?}");
         }
     }
 
