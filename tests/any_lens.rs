@@ -92,6 +92,28 @@ fn every_model_finds_its_camera_without_noise() {
 }
 
 #[test]
+fn what_is_held_keeps_its_value_with_any_lens() {
+    use Parameter::{Cx, Cy, Fx, Fy};
+    for (truth, distance) in cameras() {
+        let views = seen(&truth, &poses(distance), |_| 0.0, 0.1, 7);
+        for held in [Fx, Fy, Cx, Cy] {
+            let value = truth.value(held).unwrap();
+            let found = calibrate_lens(&views, &settings(&truth).hold(held, value)).unwrap();
+            assert_eq!(found.camera.value(held), Some(value), "{}", truth.distortion.model());
+            for free in [Fx, Fy, Cx, Cy].into_iter().filter(|&parameter| parameter != held) {
+                let off = found.camera.value(free).unwrap() - truth.value(free).unwrap();
+                let sd = found.standard_deviation(free).unwrap();
+                assert!(
+                    off.abs() < 5.0 * sd,
+                    "{} with {held} held: {free} off by {off}, {sd}",
+                    truth.distortion.model()
+                );
+            }
+        }
+    }
+}
+
+#[test]
 fn errors_have_the_stated_covariance_with_every_model() {
     for (truth, distance) in cameras() {
         let settings = settings(&truth);

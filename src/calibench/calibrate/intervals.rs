@@ -173,7 +173,8 @@ impl<'a, P: Profiled<W>, const W: usize> Profile<'a, P, W> {
     fn end(&self, parameter: Parameter, linear: f64, t: f64) -> Option<f64> {
         let mut offset = linear;
         for _ in 0..REFITS {
-            let tau = self.tau(parameter, offset).ok()?;
+            // Where another minimum costs less, the profile has not risen yet.
+            let tau = self.tau(parameter, offset).unwrap_or(0.0);
             if (tau - t).abs() <= CLOSE * t {
                 return Some(offset);
             }

@@ -101,6 +101,11 @@ fn hardly_separable(calibration: &LensCalibration) -> Option<Warning> {
 
 impl Warning {
     /// Those of coefficients outside of the range for which their model is defined.
+    pub(crate) fn is_outside_range(camera: &Camera<Lens>) -> bool {
+        Warning::outside_range(camera).next().is_some()
+    }
+
+    /// Which those are.
     pub(crate) fn outside_range(camera: &Camera<Lens>) -> impl Iterator<Item = Warning> {
         let is_outside = |&(parameter, value): &(Parameter, f64)| !parameter.is_defined_at(value);
         camera.values().filter(is_outside).map(|(parameter, value)| {
@@ -205,7 +210,7 @@ fn ending(calibration: &Calibration) -> Option<Warning> {
     match (calibration.termination, calibration.certificate) {
         (Termination::Converged, _) => None,
         (Termination::AboveFloor, Some(certificate)) => Some(Warning::AboveFloor {
-            rmse_px: calibration.rmse_px,
+            rmse_px: certificate.rmse_px,
             floor_rmse_px: certificate.floor_rmse_px,
             p_value: certificate.p_value,
             starts: calibration.starts,

@@ -69,7 +69,7 @@ fn same_picture(camera: &Camera<Lens>) -> Option<Camera<Lens>> {
     };
     let mut other = camera.with_value(Xi, xi)?.with_value(Alpha, alpha)?;
     (other.fx, other.fy, other.skew) = (factor * camera.fx, factor * camera.fy, factor * camera.skew);
-    Warning::outside_range(&other).next().is_none().then_some(other)
+    (!Warning::is_outside_range(&other)).then_some(other)
 }
 
 #[cfg(test)]

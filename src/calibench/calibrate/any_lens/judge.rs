@@ -7,7 +7,7 @@ use super::super::noise::Noise;
 use super::super::rival::{Met, Rival};
 use super::super::system::Reduction;
 use super::super::tie::tied;
-use super::super::{CalibrationError, identifiability};
+use super::super::{CalibrationError, Warning, identifiability};
 use super::counterpart::counterpart;
 use super::problem::{Problem, ROUGH_GAIN, State};
 use super::{WIDTH, report, root, start, walk};
@@ -62,6 +62,10 @@ pub(super) fn judge(
         noise = report::noise(problem, &minimum);
     }
     let starts = met.len();
+    // A camera that the model does not have is no other one.
+    if !Warning::is_outside_range(&minimum.state.camera) {
+        met.retain(|other| !Warning::is_outside_range(&other.camera));
+    }
     let value = |camera: &Camera<Lens>, parameter| camera.value(parameter).unwrap_or(0.0);
     let rival = reduction.intrinsics_covariance().and_then(|unit| {
         let second = counterpart(problem, &minimum, &unit, noise);

@@ -324,12 +324,14 @@ fn with_model(problem: &Problem<'_>, state: &State, settings: &Settings) -> Vec<
     with_lenses(problem, &State { camera: told, ..state.clone() }, lenses)
 }
 
-/// The state with other lenses, each with its factor of the focal length, where they see every mark.
+/// The state with other lenses, each with its factor of the focal lengths that are free, where they see every mark.
 fn with_lenses(problem: &Problem<'_>, state: &State, lenses: Vec<(Lens, f64)>) -> Vec<State> {
     let with_lens = |(lens, factor): (Lens, f64)| {
         let mut camera = Camera { distortion: lens, ..state.camera };
-        if problem.free.contains(Parameter::Fx) {
-            (camera.fx, camera.fy) = (factor * camera.fx, factor * camera.fy);
+        for (parameter, focal_length) in [(Parameter::Fx, &mut camera.fx), (Parameter::Fy, &mut camera.fy)] {
+            if problem.free.contains(parameter) {
+                *focal_length *= factor;
+            }
         }
         State { camera: tied(camera, problem.fy_per_fx), ..state.clone() }
     };

@@ -36,16 +36,27 @@ pub(super) fn walk(
     if !minima.iter().any(is_settled) {
         minima.extend(refined(problem, start::by_rays(problem, settings)));
     }
+    let mut spheres = Vec::new();
     if let Some(first) = best_of(problem, &minima) {
-        minima.extend(refined(problem, start::other_spheres(problem, &minima[first].state)));
+        spheres = start::other_spheres(problem, &minima[first].state);
     }
+    let may_be_alike = !spheres.is_empty();
+    minima.extend(refined(problem, spheres));
     let rough = best_of(problem, &minima).ok_or(CalibrationError::NoImage { model: settings.model() })?;
     follow(problem, &mut minima[rough]);
-    if minima[rough].termination != Termination::Converged {
-        // Its valley goes on and on, and another start may lead to a minimum that is as good.
-        let others = minima.iter_mut().enumerate().filter(|(place, _)| *place != rough);
-        others.for_each(|(_, minimum)| follow(problem, minimum));
-    }
+    // Where its valley goes on and on, another start may lead to a minimum that is as good; where two spheres make nearly the same picture,
+    // rough costs do not tell which of them is better.
+    let followed_below = if minima[rough].termination != Termination::Converged {
+        f64::INFINITY
+    } else if may_be_alike {
+        minima[rough].system.cost + RIVALS * report::noise(problem, &minima[rough]).rise
+    } else {
+        f64::NEG_INFINITY
+    };
+    let others = minima.iter_mut().enumerate().filter(|(place, _)| *place != rough);
+    others
+        .filter(|(_, minimum)| minimum.system.cost < followed_below)
+        .for_each(|(_, minimum)| follow(problem, minimum));
     let best = best_of(problem, &minima).unwrap_or(rough);
     if problem.is_certifiable && best != rough {
         follow(problem, &mut minima[best]);
@@ -113,7 +124,7 @@ pub(super) fn is_better(
 /// variance; two spheres make nearly the same picture in and out of their range, and beside a camera in its range a search may go on and
 /// on where it ends out of the range.
 fn dearness(minimum: &Minimum<State, WIDTH>, rise: f64) -> f64 {
-    let is_outside = Warning::outside_range(&minimum.state.camera).next().is_some();
+    let is_outside = Warning::is_outside_range(&minimum.state.camera);
     let is_unended = minimum.termination != Termination::Converged;
     let faults = 2 * u8::from(is_outside) + u8::from(is_unended);
     minimum.system.cost + f64::from(faults) * RIVALS * rise
