@@ -62,6 +62,7 @@ mod rectify;
 mod render;
 mod report_page;
 mod right_minimum;
+mod robust_losses;
 mod shell;
 mod study;
 mod study_faults;

@@ -33,8 +33,10 @@ class Certificate:
 
     holds: bool
     """Whether the excess can be chance, at a false-alarm rate of 1e-6."""
+    rmse_px: float
+    """RMSE per point of the minimum, px; with a robust loss the root of the mean loss of its marks."""
     floor_rmse_px: float
-    """RMSE per point that free homographies reach, px."""
+    """That of free homographies, px."""
     excess: float
     """Cost above theirs, in variances of a pixel coordinate."""
     freedom: int

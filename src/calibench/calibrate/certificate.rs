@@ -51,7 +51,9 @@ pub(super) const FALSE_ALARM: f64 = 1e-6;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Certificate {
-    /// RMSE per point, px, that the views reach with homographies of their own in place of poses; with a robust loss the root of its mean.
+    /// RMSE of the minimum per point, px; with a robust loss the root of the mean loss of its marks.
+    pub rmse_px: f64,
+    /// RMSE per point, px, that the views reach with homographies of their own in place of poses; with a robust loss the root of the mean loss.
     pub floor_rmse_px: f64,
     /// By how much the cost exceeds that floor, in variances of a pixel coordinate; with a robust loss in what one
     /// standard deviation costs.
@@ -87,7 +89,11 @@ impl Certificate {
     pub(super) fn with_floor(&self, problem: &Problem<'_>, minimum: &Minimum, floor: f64) -> Certificate {
         let cost = minimum.system.cost;
         let Chance { share, .. } = Chance::of(problem, &minimum.state);
-        Certificate::of(cost, floor.min(cost), points(problem), [self.freedom, self.floor_freedom], share)
+        let freedoms = [self.freedom, self.floor_freedom];
+        Certificate {
+            rmse_px: self.rmse_px,
+            ..Certificate::of(cost, floor.min(cost), points(problem), freedoms, share)
+        }
     }
 
     /// Compares a cost with a floor.
@@ -105,8 +111,10 @@ impl Certificate {
         } else {
             fisher_tail(excess / freedom as f64, freedom, floor_freedom)
         };
+        let root_mean = |cost: f64| (cost / points as f64).sqrt();
         Certificate {
-            floor_rmse_px: (floor / points as f64).sqrt(),
+            rmse_px: root_mean(cost),
+            floor_rmse_px: root_mean(floor),
             excess: if excess.is_nan() { 0.0 } else { excess },
             freedom,
             floor_freedom,
@@ -127,12 +135,13 @@ pub(super) fn certify(problem: &Problem<'_>, state: &State, reduction: &Reductio
     } else {
         score_of_pixels(problem, state)
     };
-    let floor =
-        (cost - problem.priors.cost(&state.camera) - stretch * gain).max(problem.rounding_cost).min(cost);
+    let of_pixels = cost - problem.priors.cost(&state.camera);
+    let floor = (of_pixels - stretch * gain).max(problem.rounding_cost).min(cost);
     let freedom = (2 * views + problem.priors.list.len()).saturating_sub(undetermined);
     let lens = problem.free.len() - undetermined;
     let floor_freedom = (2 * points).saturating_sub(8 * views + lens);
-    Certificate::of(cost, floor, points, [freedom, floor_freedom], share)
+    let certificate = Certificate::of(cost, floor, points, [freedom, floor_freedom], share);
+    Certificate { rmse_px: (of_pixels / points as f64).sqrt(), ..certificate }
 }
 
 /// Number of marks.
@@ -156,7 +165,7 @@ impl Chance {
         let fit = Fit::of(state, problem.observations);
         let residuals = fit.residuals.iter().flatten();
         let cost: f64 = residuals.map(|residual| problem.loss.at(residual.norm_squared()).0).sum();
-        let Noise { variance, rise, .. } = fit.noise(problem.loss, 1.0);
+        let Noise { variance, rise, .. } = Noise::of_all(&fit.residuals, problem.loss);
         Chance { share: (rise / cost).min(1.0), stretch: variance / rise }
     }
 }

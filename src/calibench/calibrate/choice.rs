@@ -9,12 +9,15 @@
 //! hold-out = sqrt(sum |r|^2 / sum (2 N - 6)) over views that the camera was not fitted to
 //! ```
 //!
+//! Under a robust loss the squares are those of the marks that count ([`Counted`]), and `N` is their number.
+//!
 //! The criterion looks at all views at once; a fifth of few views is little to predict, and from four fifths of them a
 //! rich model is known poorly. So the criterion decides, and predictions only where it says nothing.
 
-use super::any_lens::spans_a_plane;
+use super::any_lens::{located, spans_a_plane};
+use super::counted::Counted;
 use super::structure::neighbours;
-use super::{Board, CalibrationError, LensCalibration, Role, Settings, calibrate_lens, locate};
+use super::{Board, CalibrationError, LensCalibration, Role, Settings, Warning, calibrate_lens};
 use crate::board::View;
 use crate::camera::{FreeParameters, Model, Parameter};
 
@@ -68,6 +71,8 @@ pub struct Compared {
     pub hold_out_px: Option<f64>,
     /// Squared error of each fold, for the comparison of two candidates.
     folds: Vec<f64>,
+    /// Whether a coefficient lies where the model is not defined.
+    is_outside: bool,
     /// Correlation of a mark's residual with the next one's: 0 for noise.
     pub correlation: f64,
 }
@@ -95,8 +100,9 @@ const NO_EVIDENCE: f64 = 2.0;
 
 /// Fits every candidate. The first of the result is the choice: of those whose criterion of Schwarz lies within 2 of the
 /// least, the one that best predicts views that were left out (in five parts of the views in turn). The others follow by
-/// their criterion. Candidates that the views do not determine come with their reason. Views whose marks do not span a
-/// plane tell nothing and take no part, as long as half of the views do.
+/// their criterion; behind them those whose coefficients lie where their model is not defined. Candidates that the views do
+/// not determine come with their reason. Views whose marks do not span a plane tell nothing and take no part, as long as half
+/// of the views do.
 ///
 /// ```
 /// use calibench::calibrate::{Candidate, Settings, compare_models};
@@ -118,15 +124,21 @@ pub fn compare_models(
     candidates: &[Candidate],
 ) -> (Vec<Compared>, Vec<(Candidate, CalibrationError)>) {
     let views = &telling(views);
-    let (mut compared, mut refused) = (Vec::new(), Vec::new());
+    let (mut fitted, mut refused) = (Vec::new(), Vec::new());
     for &candidate in candidates {
         match calibrate_lens(views, &candidate.settings(settings)) {
-            Ok(calibration) => compared.push(judged(views, settings, candidate, calibration)),
+            Ok(calibration) => fitted.push((candidate, calibration)),
             Err(error) => refused.push((candidate, error)),
         }
     }
-    compared.sort_by(|a, b| a.bic.total_cmp(&b.bic));
-    let measures: Vec<(f64, f64)> = compared.iter().map(|c| (c.bic, c.predicted())).collect();
+    let counted = Counted::of(views, fitted.iter().map(|(_, fit)| fit), settings.loss);
+    let judge = |(candidate, fit)| judged(views, settings, &counted, candidate, fit);
+    let mut compared: Vec<Compared> = fitted.into_iter().map(judge).collect();
+    // A camera that the model does not have comes behind all that have one.
+    compared.sort_by(|a, b| (a.is_outside.cmp(&b.is_outside)).then(a.bic.total_cmp(&b.bic)));
+    let worst = compared.first().is_some_and(|first| first.is_outside);
+    let eligible = compared.iter().take_while(|c| c.is_outside == worst);
+    let measures: Vec<(f64, f64)> = eligible.map(|c| (c.bic, c.predicted())).collect();
     if let Some(place) = chosen(&measures) {
         compared[..=place].rotate_right(1);
     }
@@ -149,13 +161,11 @@ fn telling(views: &[View]) -> Vec<View> {
 fn judged(
     views: &[View],
     settings: &Settings,
+    counted: &Counted,
     candidate: Candidate,
     calibration: LensCalibration,
 ) -> Compared {
-    let coordinates = 2.0 * calibration.points() as f64;
-    let square = calibration.rmse_px * calibration.rmse_px * calibration.points() as f64;
-    let unknowns = (coordinates - calibration.degrees_of_freedom as f64).max(0.0);
-    let folds = hold_out(views, &candidate.settings(settings));
+    let folds = hold_out(views, &candidate.settings(settings), counted);
     let error = |folds: &[(f64, f64)]| {
         let (square, freedom) =
             folds.iter().fold((0.0, 0.0), |(s, f), (square, freedom)| (s + square, f + freedom));
@@ -163,17 +173,28 @@ fn judged(
     };
     Compared {
         candidate,
-        bic: coordinates * libm::log(square / coordinates) + unknowns * libm::log(coordinates),
+        bic: criterion(counted.in_fit(views, &calibration), unknowns(&calibration)),
         hold_out_px: folds.as_deref().map(error),
         folds: folds.unwrap_or_default().into_iter().map(|(square, _)| square).collect(),
-        correlation: neighbours(&calibration.residuals).correlation,
+        is_outside: Warning::is_outside_range(&calibration.camera),
+        correlation: neighbours(&calibration.residuals, settings.loss).correlation,
         calibration,
     }
 }
 
+/// Schwarz's criterion of a sum of squares over so many marks.
+fn criterion((square, marks): (f64, usize), unknowns: f64) -> f64 {
+    let coordinates = 2.0 * marks as f64;
+    coordinates * libm::log(square / coordinates) + unknowns * libm::log(coordinates)
+}
+
+fn unknowns(fit: &LensCalibration) -> f64 {
+    (2.0 * fit.points() as f64 - fit.degrees_of_freedom as f64).max(0.0)
+}
+
 /// Of each fold the squared, weighted error on its views and its degrees of freedom; `None` where a fold cannot be
 /// calibrated without.
-fn hold_out(views: &[View], settings: &Settings) -> Option<Vec<(f64, f64)>> {
+fn hold_out(views: &[View], settings: &Settings, counted: &Counted) -> Option<Vec<(f64, f64)>> {
     let folds = FOLDS.min(views.len());
     (0..folds)
         .map(|fold| {
@@ -181,9 +202,13 @@ fn hold_out(views: &[View], settings: &Settings) -> Option<Vec<(f64, f64)>> {
                 views.iter().enumerate().partition(|(view, _)| view % folds == fold);
             let kept: Vec<View> = kept.into_iter().map(|(_, view)| view.clone()).collect();
             let camera = calibrate_lens(&kept, settings).ok()?.camera;
-            let of_view = |view: &View| Some((locate(&camera, view)?.square, 2.0 * view.len() as f64 - 6.0));
-            out.into_iter().try_fold((0.0, 0.0), |(square, freedom), (_, view)| {
-                of_view(view).map(|(s, f)| (square + s, freedom + f))
+            let of_view = |(place, view): (usize, &View)| {
+                let residuals = located(&camera, view, settings.loss)?.residuals;
+                let (square, marks) = counted.in_view(place, view, &residuals);
+                Some((square, (2.0 * marks as f64 - 6.0).max(0.0)))
+            };
+            out.into_iter().try_fold((0.0, 0.0), |(square, freedom), left_out| {
+                of_view(left_out).map(|(s, f)| (square + s, freedom + f))
             })
         })
         .collect()
@@ -195,17 +220,22 @@ fn hold_out(views: &[View], settings: &Settings) -> Option<Vec<(f64, f64)>> {
 pub struct Freedom {
     /// The model with it.
     pub candidate: Candidate,
-    /// RMSE with it, px.
+    /// RMSE with it, px; under a robust loss of the marks that are strays to none of the models that were tried.
     pub rmse_px: f64,
+    /// RMSE without it, of the same marks, px.
+    pub rmse_without_px: f64,
     /// Correlation of neighbours' residuals with it.
     pub correlation: f64,
 }
 
-/// A freedom that takes away less than this part of the RMSE explains nothing.
+/// A freedom that takes away less than this part of the RMSE explains little.
 const WORTH: f64 = 0.05;
+/// A criterion of Schwarz's that falls by so much is very strong evidence (Kass & Raftery 1995).
+const STRONG_EVIDENCE: f64 = 10.0;
 
 /// Where residuals of neighbouring marks agree: which one freedom more, of the lens or of the board, lowers the
-/// RMSE of `fit` by a twentieth or more, the best first.
+/// RMSE of `fit` by a twentieth or more, the best first; where none does, those for which the criterion of Schwarz is very
+/// strong evidence.
 pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibration) -> Vec<Freedom> {
     use Parameter::{K1, K2, K3, P1, P2, S1, S2, S3, S4, TauX, TauY};
     let model = settings.model();
@@ -234,19 +264,26 @@ pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibr
         .map(|(model, coefficients)| Candidate { model, coefficients, board: settings.board })
         .filter(|candidate| candidate.coefficients != own)
         .chain(boards.into_iter().map(|board| Candidate { model, coefficients: own, board }));
-    let mut found: Vec<Freedom> = candidates
-        .filter_map(|candidate| {
-            let calibration = calibrate_lens(views, &candidate.settings(settings)).ok()?;
-            let correlation = neighbours(&calibration.residuals).correlation;
-            let rmse_px = calibration.rmse_px;
-            let is_minimum = calibration.termination.is_minimum();
-            (is_minimum && rmse_px < (1.0 - WORTH) * fit.rmse_px).then_some(Freedom {
-                candidate,
-                rmse_px,
-                correlation,
-            })
-        })
+    let fitted: Vec<(Candidate, LensCalibration)> = candidates
+        .filter_map(|candidate| Some((candidate, calibrate_lens(views, &candidate.settings(settings)).ok()?)))
+        .filter(|(_, calibration)| calibration.termination.is_minimum())
         .collect();
+    let fits = fitted.iter().map(|(_, calibration)| calibration);
+    let counted = Counted::of(views, fits.chain([fit]), settings.loss);
+    let rmse_without_px = counted.rmse_px(views, fit);
+    let of_fit = |fit: &LensCalibration| criterion(counted.in_fit(views, fit), unknowns(fit));
+    let without = of_fit(fit);
+    let freedom = |(candidate, calibration): (Candidate, LensCalibration)| {
+        let gain = without - of_fit(&calibration);
+        let rmse_px = counted.rmse_px(views, &calibration);
+        let correlation = neighbours(&calibration.residuals, settings.loss).correlation;
+        (gain, Freedom { candidate, rmse_px, rmse_without_px, correlation })
+    };
+    let mut tried: Vec<(f64, Freedom)> = fitted.into_iter().map(freedom).collect();
+    let is_much = |freedom: &Freedom| freedom.rmse_px < (1.0 - WORTH) * rmse_without_px;
+    let one_is_much = tried.iter().any(|(_, freedom)| is_much(freedom));
+    tried.retain(|(gain, freedom)| if one_is_much { is_much(freedom) } else { *gain > STRONG_EVIDENCE });
+    let mut found: Vec<Freedom> = tried.into_iter().map(|(_, freedom)| freedom).collect();
     // A twist besides two bows explains something only where bows alone do not explain it.
     let is_bowed = |f: &&Freedom| matches!(f.candidate.board, Board::Bowed { .. });
     let bowed_px = found.iter().find(is_bowed).map_or(f64::INFINITY, |bowed| bowed.rmse_px);

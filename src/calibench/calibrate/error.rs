@@ -145,10 +145,10 @@ pub enum CalibrationError {
     /// The loss has no scale, or one whose square is lost in rounding.
     #[error("a robust loss needs a scale from 1e-9 to 1e9 px")]
     BadLoss,
-    /// A robust loss under which nearly every mark counts as an outlier.
+    /// A robust loss under which most marks count as outliers.
     #[error(
-        "the scale of the robust loss, {scale_px:e} px, lies far below the residuals, half of which exceed {median_px:.2e} px: every mark \
-         would count as an outlier; use a scale of about {:.2e}", 2.0 * median_px
+        "the scale of the robust loss, {scale_px:e} px, lies far below the residuals, half of which exceed {median_px:.2e} px: noise would \
+         count as outliers, and the standard deviations would be wrong; use a scale of about {:.2e}", 2.0 * median_px
     )]
     NarrowLoss {
         /// Scale of the loss, px.

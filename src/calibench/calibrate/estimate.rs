@@ -227,7 +227,7 @@ fn report(
     let settled = problem.priors.settled(&minimum);
     let freedom = fit.freedom(system, settled);
     let degrees_of_freedom = whole((2 * points) as f64 + settled - system.unknowns() as f64);
-    outliers::refuse_narrow_loss(problem.loss, &fit)?;
+    outliers::refuse_narrow_loss(problem.loss, &fit.residuals)?;
     let left_out = left_out::asked_for(problem, &minimum, undecided, fit.square / freedom, freedom);
     let of_residuals = warnings_of_residuals(problem, &minimum.state, &fit, freedom).chain(left_out);
     let noise =
@@ -286,7 +286,7 @@ fn warnings_of_residuals(
 ) -> impl Iterator<Item = Warning> + use<> {
     let (outliers, structure) = if fit.square > problem.rounding_cost {
         let outliers = outliers::outliers(problem, state, fit, fit.square / freedom);
-        (outliers, structure::structure(&fit.residuals, 0.5 * fit.square / fit.marks() as f64))
+        (outliers, structure::structure(&fit.residuals, 0.5 * fit.square / fit.marks() as f64, problem.loss))
     } else {
         (None, None)
     };

@@ -53,6 +53,13 @@ impl Loss {
             Loss::Cauchy { .. } => weight * weight,
         }
     }
+
+    /// Mean of the squares of those two slopes: across the residual the slope is the weight.
+    pub fn squared_slope(&self, s: f64) -> f64 {
+        let (across, mean) = (self.at(s).1, self.slope(s));
+        let along = 2.0 * mean - across;
+        0.5 * (along * along + across * across)
+    }
 }
 
 #[cfg(test)]
@@ -69,6 +76,9 @@ mod tests {
                 let curvature = (loss.at(s + h).1 - loss.at(s - h).1) / (2.0 * h);
                 // The weight's rounding, 1e-16, over the step, 1e-6 s, times s.
                 assert!((slope + s * curvature - loss.slope(s)).abs() < 1e-8, "{loss:?} at {s}");
+                let (along, across) = (slope + 2.0 * s * curvature, slope);
+                let squared = 0.5 * (along * along + across * across);
+                assert!((squared - loss.squared_slope(s)).abs() < 2e-8, "{loss:?} at {s}");
             }
         }
     }

@@ -13,8 +13,10 @@ const HEAVY: f64 = 4.0;
 const LOG_OUTLIER: f64 = 13.0;
 /// More than this part of the marks are no outliers: the model is wrong.
 const MOST: f64 = 0.3;
-/// A robust loss with a scale below this part of the median residual takes noise for outliers.
-const NARROW: f64 = 0.3;
+/// A robust loss with a scale below this part of the median residual, Huber's or Cauchy's, takes noise for outliers: the stated covariance
+/// no longer is that of the estimate.
+const NARROW_HUBER: f64 = 0.3;
+const NARROW_CAUCHY: f64 = 0.5;
 
 /// Marks that lie too far from where they should to be noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,13 +39,14 @@ pub struct Outliers {
 
 /// Refuses a robust loss that is narrower than the noise: its weights, and so the covariance, would mean
 /// nothing.
-pub(super) fn refuse_narrow_loss(loss: Loss, fit: &Fit) -> Result<(), CalibrationError> {
-    let scale_px = match loss {
+pub(super) fn refuse_narrow_loss(loss: Loss, residuals: &[Vec<Vec2>]) -> Result<(), CalibrationError> {
+    let (scale_px, narrow) = match loss {
         Loss::Squares => return Ok(()),
-        Loss::Huber { delta_px: scale } | Loss::Cauchy { scale_px: scale } => scale,
+        Loss::Huber { delta_px } => (delta_px, NARROW_HUBER),
+        Loss::Cauchy { scale_px } => (scale_px, NARROW_CAUCHY),
     };
-    let median_px = median(&fit.residuals).sqrt();
-    if scale_px < NARROW * median_px {
+    let median_px = median(residuals).sqrt();
+    if scale_px < narrow * median_px {
         return Err(CalibrationError::NarrowLoss { scale_px, median_px });
     }
     Ok(())
@@ -143,7 +146,7 @@ fn is_suspicious(marks: usize, largest_square: f64, tails: f64, variance: f64) -
 }
 
 /// The median squared residual.
-fn median(residuals: &[Vec<Vec2>]) -> f64 {
+pub(super) fn median(residuals: &[Vec<Vec2>]) -> f64 {
     let mut squares: Vec<f64> = residuals.iter().flatten().map(Vec2::norm_squared).collect();
     let middle = squares.len() / 2;
     *squares.select_nth_unstable_by(middle, f64::total_cmp).1

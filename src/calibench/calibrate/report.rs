@@ -31,8 +31,8 @@ pub struct Calibration<L = BrownConrady> {
     /// Degrees of freedom `2 N - p`; with priors rounded down.
     pub degrees_of_freedom: usize,
     /// First-order covariance of intrinsics and poses. Under a robust loss it is scaled by Huber's correction
-    /// `[sum psi^2 / (2N - p)] / [mean psi']^2` (Huber & Ronchetti 2009, section 7.6), psi' being
-    /// [`Loss::slope`](crate::calibrate::Loss::slope).
+    /// `K^2 [sum psi^2 / (2N - p)] / [mean psi']^2` (Huber & Ronchetti 2009, section 7.6), psi' being
+    /// [`Loss::slope`](crate::calibrate::Loss::slope), `K = 1 + (p / 2N) var psi' / [mean psi']^2`.
     pub covariance: Covariance,
     /// Weakest direction of the estimate; `None` if nothing but poses was free.
     pub conditioning: Option<Conditioning>,
@@ -68,7 +68,7 @@ pub enum Warning {
     },
     /// The minimum lies above its floor: the lens model does not fit, or a better minimum was not found.
     AboveFloor {
-        /// Root mean square error, px.
+        /// Root mean square error, px; with a robust loss the root of the mean loss.
         rmse_px: f64,
         /// That of free homographies behind the same lens, px.
         floor_rmse_px: f64,
@@ -388,10 +388,10 @@ impl fmt::Display for Warning {
 }
 
 impl<L> Calibration<L> {
-    /// Whether the estimate is a minimum whose RMSE lies no more than a quarter above its floor: beyond that
+    /// Whether the estimate is a minimum whose RMSE, as its [`Certificate`] counts it, lies no more than a quarter above its floor: beyond that
     /// it is another minimum than the right one, or a model that has little to do with the data.
     pub fn is_usable(&self) -> bool {
-        let is_gross = |c: &Certificate| !c.holds() && self.rmse_px > GROSS * c.floor_rmse_px;
+        let is_gross = |c: &Certificate| !c.holds() && c.rmse_px > GROSS * c.floor_rmse_px;
         self.termination.is_minimum() && !self.certificate.as_ref().is_some_and(is_gross)
     }
 

@@ -9,7 +9,7 @@
 //! for `n` pairs and `N` marks has mean 0 and variance 1 (Moran 1950, for neighbours on a line); what a fit
 //! takes out of the residuals lowers it a little. Marks in another order make the test blind, not wrong.
 
-use super::Warning;
+use super::{Loss, Warning, strays};
 use crate::geometry::Vec2;
 
 /// A normal number exceeds this with a probability of one in a million.
@@ -35,8 +35,10 @@ impl Neighbours {
     }
 }
 
-/// Of residuals of one size; a set without neighbours has none.
-pub(super) fn neighbours(residuals: &[Vec<Vec2>]) -> Neighbours {
+/// Of residuals of one size, strays under a robust loss left aside; a set without neighbours has none.
+pub(super) fn neighbours(residuals: &[Vec<Vec2>], loss: Loss) -> Neighbours {
+    let residuals = strays::at_zero(residuals, loss);
+    let residuals = residuals.as_ref();
     let marks: usize = residuals.iter().map(Vec::len).sum();
     let square: f64 = residuals.iter().flatten().map(Vec2::norm_squared).sum();
     with_variance(residuals, 0.5 * square / marks as f64)
@@ -54,9 +56,12 @@ fn with_variance(residuals: &[Vec<Vec2>], variance: f64) -> Neighbours {
     }
 }
 
-/// The warning, where neighbours' residuals agree; `variance` is `s^2`.
-pub(super) fn structure(residuals: &[Vec<Vec2>], variance: f64) -> Option<Warning> {
-    let Neighbours { correlation, z } = with_variance(residuals, variance);
+/// The warning, where neighbours' residuals agree; `variance` is `s^2` under least squares.
+pub(super) fn structure(residuals: &[Vec<Vec2>], variance: f64, loss: Loss) -> Option<Warning> {
+    let Neighbours { correlation, z } = match loss {
+        Loss::Squares => with_variance(residuals, variance),
+        _ => neighbours(residuals, loss),
+    };
     (z > CHANCE && correlation > MATERIAL).then_some(Warning::Structured { correlation })
 }
 
@@ -68,6 +73,7 @@ mod tests {
     fn correlations_are_those_of_marks_next_to_each_other_in_a_view() {
         let view = |list: &[(f64, f64)]| list.iter().map(|&(x, y)| Vec2::new(x, y)).collect::<Vec<_>>();
         // s^2 = 4 * 25 / 8, three pairs of product 25: correlation 1, z = 75 / (12.5 sqrt(6)).
+        let neighbours = |residuals: &[Vec<Vec2>]| neighbours(residuals, Loss::Squares);
         let alike = neighbours(&[view(&[(3.0, 4.0); 4])]);
         assert_eq!(alike.correlation, 1.0);
         assert!((alike.z - 2.449_489_742_783_178).abs() < 1e-14);

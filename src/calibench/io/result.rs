@@ -141,7 +141,9 @@ pub struct LeftOut {
 pub struct CertificateFields {
     /// Whether it holds.
     pub holds: bool,
-    /// RMSE per point of free homographies, px.
+    /// RMSE per point of the minimum, px; with a robust loss the root of the mean loss of its marks.
+    pub rmse_px: f64,
+    /// That of free homographies, px.
     pub floor_rmse_px: f64,
     /// Cost above theirs, in variances of a pixel coordinate.
     pub excess: f64,
@@ -157,6 +159,7 @@ impl CertificateFields {
     fn of(certificate: &Certificate) -> CertificateFields {
         CertificateFields {
             holds: certificate.holds(),
+            rmse_px: certificate.rmse_px,
             floor_rmse_px: certificate.floor_rmse_px,
             excess: certificate.excess,
             freedom: certificate.freedom,

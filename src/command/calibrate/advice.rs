@@ -2,7 +2,7 @@
 //! do.
 
 use super::maps::{Cells, corner_radius_px, pixel_deviation};
-use calibench::calibrate::LensCalibration;
+use calibench::calibrate::{LensCalibration, Loss};
 use calibench::camera::Parameter;
 use calibench::geometry::{Vec2, Vec3};
 use calibench::io::significant;
@@ -23,7 +23,7 @@ const LEAST_TILT_DEGREES: f64 = 15.0;
 const STANDS_OUT: f64 = 2.0;
 
 /// Advice on a fit; what concerns the frame needs its size.
-pub(super) fn of(fit: &Fit, names: &[String], image_size: Option<(usize, usize)>) -> Vec<String> {
+pub(super) fn of(fit: &Fit, names: &[String], image_size: Option<(usize, usize)>, loss: Loss) -> Vec<String> {
     let mut advice = Vec::new();
     if let Some(size) = image_size {
         advice.extend(radius(fit, size));
@@ -31,7 +31,7 @@ pub(super) fn of(fit: &Fit, names: &[String], image_size: Option<(usize, usize)>
         advice.extend(corner_deviation(&fit.calibration, size));
     }
     advice.extend(tilt(&fit.calibration));
-    advice.extend(standing_out(&fit.calibration, names));
+    advice.extend(standing_out(&fit.calibration, names, loss));
     advice
 }
 
@@ -116,7 +116,7 @@ fn outermost(normals: &[Vec3]) -> Vec<Vec3> {
     (0..DIRECTIONS).filter_map(farthest).collect()
 }
 
-fn standing_out(calibration: &LensCalibration, names: &[String]) -> Option<String> {
+fn standing_out(calibration: &LensCalibration, names: &[String], loss: Loss) -> Option<String> {
     let rmse: Vec<f64> = (0..names.len()).filter_map(|i| calibration.view_rmse_px(i)).collect();
     let mut sorted = rmse.clone();
     sorted.sort_by(f64::total_cmp);
@@ -127,10 +127,14 @@ fn standing_out(calibration: &LensCalibration, names: &[String]) -> Option<Strin
         .filter(|(rmse, _)| **rmse > STANDS_OUT * median)
         .map(|(_, name)| name.as_str())
         .collect();
+    let (views, are) = if out.len() == 1 { ("view", "is") } else { ("views", "is each") };
+    let cure = match loss {
+        Loss::Squares => ", or leave out strays with --reject-views 3",
+        _ => "; the loss keeps strays among them out of the camera",
+    };
     (!out.is_empty()).then(|| {
         format!(
-            "the RMSE of view {} is more than {STANDS_OUT} times the median: look at the marks found there, or leave out strays with \
-             --reject-views 3",
+            "the RMSE of {views} {} {are} more than {STANDS_OUT} times the median: look at the marks found there{cure}",
             out.join(", ")
         )
     })

@@ -11,7 +11,7 @@ use super::{
     warn,
 };
 use calibench::board::{Board, View};
-use calibench::calibrate::ProfileInterval;
+use calibench::calibrate::{Loss, ProfileInterval};
 use calibench::detect::Orientation;
 use calibench::geometry::Vec2;
 use calibench::io::formats::corner_text;
@@ -114,7 +114,7 @@ pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, Fai
         Fitter { settings: &settings, discs: observed.discs.as_ref(), reject_factor: arguments.reject_views };
     let fit =
         fitter.fit(&observed.views).map_err(|error| format!("{}: {}", observed.source, message(&error)))?;
-    let mut finished = finish(observed, fit, arguments.pixel_pitch);
+    let mut finished = finish(observed, fit, arguments.pixel_pitch, settings.loss);
     finished.advice.extend(models::freedoms(&finished.fit, &settings));
     finished.comparison = comparison;
     let mut fields =
@@ -139,7 +139,7 @@ pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, Fai
     Ok(if finished.fit.calibration.is_usable() { Exit::Held } else { Exit::Incomplete })
 }
 
-fn finish(observed: Observed, fit: Fit, pixel_pitch_um: Option<f64>) -> Finished {
+fn finish(observed: Observed, fit: Fit, pixel_pitch_um: Option<f64>, loss: Loss) -> Finished {
     let (mut left_out, mut left_out_places) = (observed.left_out, observed.left_out_places);
     for rejected in &fit.rejected {
         let name = observed.names[rejected.view].clone();
@@ -150,7 +150,7 @@ fn finish(observed: Observed, fit: Fit, pixel_pitch_um: Option<f64>) -> Finished
     let names = ViewNames::new(observed.given, fit.kept.iter().map(|&view| observed.places[view]).collect());
     let mut notes = observed.notes;
     notes.extend(bias_note(&fit));
-    let advice = advice::of(&fit, &whole_names, observed.image_size);
+    let advice = advice::of(&fit, &whole_names, observed.image_size, loss);
     let optics = Optics::of(&fit.calibration, observed.image_size, pixel_pitch_um);
     let Observed { title, unit, photos, image_size, overlays, orientation, .. } = observed;
     Finished {

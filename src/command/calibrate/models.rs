@@ -4,8 +4,8 @@ use super::Failure;
 use super::camera::Observed;
 use super::table;
 use calibench::calibrate::{
-    Board, Candidate, Compared, Freedom, LensCalibration, Settings, Warning, calibrate_lens, compare_models,
-    explaining_freedoms,
+    Board, Candidate, Compared, Freedom, LensCalibration, Loss, Settings, Warning, calibrate_lens,
+    compare_models, explaining_freedoms,
 };
 use calibench::camera::Model;
 use calibench::io::result::ModelFields;
@@ -93,15 +93,18 @@ pub(super) fn freedoms(fit: &Fit, settings: &Settings) -> Vec<String> {
     if !fit.calibration.warnings.iter().any(is_structured) {
         return better_model(fit, settings).into_iter().collect();
     }
-    let before = fit.calibration.rmse_px;
     let found = explaining_freedoms(&fit.views, settings, &fit.calibration);
     if found.is_empty() {
-        return vec![
-            "none of the lens models and shapes of the board that were tried explains these residuals: they may come from the marks themselves"
-                .to_string(),
-        ];
+        let narrow = match settings.loss {
+            Loss::Squares => "",
+            _ => ", or the loss be too narrow for a lens that would (ask again with a wider one)",
+        };
+        return vec![format!(
+            "none of the lens models and shapes of the board that were tried explains these residuals: they may come from the marks \
+             themselves{narrow}"
+        )];
     }
-    found.iter().map(|freedom| in_words(freedom, settings, before)).collect()
+    found.iter().map(|freedom| in_words(freedom, settings)).collect()
 }
 
 /// With fewer marks a view than this, poses take up what residuals of neighbours would share.
@@ -111,10 +114,12 @@ const FEW_MARKS: usize = 20;
 const STRONG: f64 = 20.0;
 
 /// A lens model that explains few marks a view far better than the one that was asked for: their residuals do not tell that it is
-/// wrong, and other models are fitted in no time. Brown-Conrady's lens has its certificate.
+/// wrong, and other models are fitted in no time. Brown-Conrady's lens has its certificate. Under a robust loss strays, which are in the
+/// RMSE, would decide.
 fn better_model(fit: &Fit, settings: &Settings) -> Option<String> {
     let marks = fit.calibration.points();
-    if settings.model() == Model::BrownConrady || marks >= FEW_MARKS * fit.views.len() {
+    let is_told = settings.model() == Model::BrownConrady || settings.loss != Loss::Squares;
+    if is_told || marks >= FEW_MARKS * fit.views.len() {
         return None;
     }
     let own = criterion(&fit.calibration);
@@ -145,8 +150,8 @@ fn criterion(calibration: &LensCalibration) -> f64 {
     freedom * libm::log(square) + calibration.free.len() as f64 * libm::log(freedom)
 }
 
-fn in_words(freedom: &Freedom, settings: &Settings, before: f64) -> String {
-    let Freedom { candidate, rmse_px, correlation, .. } = freedom;
+fn in_words(freedom: &Freedom, settings: &Settings) -> String {
+    let Freedom { candidate, rmse_px, rmse_without_px, correlation, .. } = freedom;
     let what = if candidate.board != settings.board {
         match candidate.board {
             Board::Bent { .. } => "a bowed and twisted board (--board-shape bent:free)".to_string(),
@@ -159,7 +164,7 @@ fn in_words(freedom: &Freedom, settings: &Settings, before: f64) -> String {
     };
     format!(
         "{what} lowers the RMSE from {} to {} px and leaves neighbours a correlation of {correlation:+.2}",
-        significant(before, 3),
+        significant(*rmse_without_px, 3),
         significant(*rmse_px, 3),
     )
 }

@@ -36,6 +36,11 @@ pub struct Located {
 /// assert!((found.cam_from_target.translation - truth.translation).norm() < 1e-6);
 /// ```
 pub fn locate(camera: &Camera<Lens>, view: &View) -> Option<Located> {
+    located(camera, view, Loss::Squares)
+}
+
+/// The same with the pose of least loss.
+pub(in super::super) fn located(camera: &Camera<Lens>, view: &View, loss: Loss) -> Option<Located> {
     if view.len() < FEWEST_MARKS {
         return None;
     }
@@ -50,7 +55,7 @@ pub fn locate(camera: &Camera<Lens>, view: &View) -> Option<Located> {
         priors: &[],
         noise: Noise::of_squares(0.0),
         bend: None,
-        loss: Loss::Squares,
+        loss,
         max_iterations: Settings::standard().max_iterations,
         relative_gain: RELATIVE_GAIN,
         rounding_cost: rounding_cost(&marks),

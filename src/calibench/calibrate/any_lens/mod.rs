@@ -30,6 +30,7 @@ mod walk;
 
 pub(super) use estimate::{calibrate, spans_a_plane};
 pub use information::lens_information;
+pub(super) use locate::located;
 pub use locate::{Located, locate};
 pub use shape::BoardShape;
 

@@ -75,7 +75,8 @@ pub(super) fn noise(problem: &Problem<'_>, minimum: &Minimum<State, WIDTH>) -> N
 /// Whether the residuals of a state may be more than noise.
 pub(super) fn may_have_structure(problem: &Problem<'_>, state: &State) -> bool {
     let residuals = Residuals::of(problem, state);
-    residuals.square > problem.rounding_cost && structure::neighbours(&residuals.weighted).may_agree()
+    residuals.square > problem.rounding_cost
+        && structure::neighbours(&residuals.weighted, problem.loss).may_agree()
 }
 
 /// Gross errors among the marks of a minimum of least squares.
@@ -127,6 +128,7 @@ pub(super) fn report(
     let residuals = Residuals::of(problem, state);
     let freedom = residuals.freedom(&minimum, problem.settled(system));
     let degrees_of_freedom = whole(freedom);
+    outliers::refuse_narrow_loss(problem.loss, &residuals.weighted)?;
     let conditioning = Conditioning::of(system, &reduction);
     identifiability::refuse_singular_minimum(problem.free, conditioning.as_ref())?;
     let unit = reduction.covariance().ok_or_else(identifiability::singular)?;
@@ -153,7 +155,7 @@ pub(super) fn report(
     covariance.cross = covariance.cross.iter().map(|cross| cross.rows(0, n).into_owned()).collect();
     let of_residuals: Vec<Warning> = if residuals.square > problem.rounding_cost {
         let per_coordinate = 0.5 * residuals.square / residuals.marks as f64;
-        let structure = structure::structure(&residuals.weighted, per_coordinate);
+        let structure = structure::structure(&residuals.weighted, per_coordinate, problem.loss);
         outliers(problem, &minimum, &residuals, freedom)
             .map(Warning::Outliers)
             .into_iter()
