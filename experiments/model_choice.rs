@@ -453,10 +453,13 @@ fn claim_auto(record: &mut Record, trials: &[Trial<'_>]) -> Result<(), Experimen
     record
         .claim_that(
             "auto-is-what-it-says",
-            "`--model auto` takes, of those whose BIC is within 2 of the least, the one with the least error on views left out",
+            "`--model auto` takes, of those in their model's range whose BIC is within 2 of the least, the one with the least error on views \
+             left out",
         )
         .every("trials", trials.iter().map(as_said))
-        .because("the definition, applied to the committed table");
+        .because(
+            "the definition, applied to the committed table, in which what is out of its range stands behind candidates of a higher BIC",
+        );
     let is_right = |t: &Trial<'_>, criterion: Criterion| t.verdict(criterion) == Verdict::Right;
     let only = |one: Criterion, other: Criterion| count(trials, |t| is_right(t, one) && !is_right(t, other));
     let (bic, hold_out) =

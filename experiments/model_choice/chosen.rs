@@ -15,7 +15,8 @@ pub enum Criterion {
     HoldOut,
     /// The choice of `compare_models`.
     Auto,
-    /// Of those whose Schwarz criterion exceeds the least by no more than this, the least error on views left out.
+    /// Of those that lie in their model's range and whose Schwarz criterion exceeds the least by no more than this, the least error on views
+    /// left out.
     Within(f64),
     /// No choice: Brown-Conrady's five coefficients, whatever the marks say.
     Five,
@@ -112,17 +113,25 @@ impl<'a> Trial<'a> {
             Criterion::HoldOut => least(&predicted),
             Criterion::Auto => least(&|f| f.place as f64),
             Criterion::Within(difference) => {
-                let least_bic = self.fitted.iter().flatten().map(|f| f.bic).fold(f64::INFINITY, f64::min);
-                let is_near = |f: &Fitted| f.bic - least_bic <= difference;
+                let in_range = || self.fitted.iter().flatten().filter(|f| !self.is_put_behind(f));
+                let least_bic = in_range().map(|f| f.bic).fold(f64::INFINITY, f64::min);
+                let is_near = |f: &Fitted| f.bic - least_bic <= difference && !self.is_put_behind(f);
                 // Where no part of the views can be left out, the criterion is alone.
-                let is_predicted =
-                    self.fitted.iter().flatten().any(|f| is_near(f) && f.hold_out_px.is_some());
+                let is_predicted = in_range().any(|f| is_near(f) && f.hold_out_px.is_some());
                 let error = |f: &Fitted| if is_near(f) { predicted(f) } else { f64::INFINITY };
-                if is_predicted { least(&error) } else { least(&|f| f.bic) }
+                let bic = |f: &Fitted| if self.is_put_behind(f) { f64::INFINITY } else { f.bic };
+                if is_predicted { least(&error) } else { least(&bic) }
             }
             Criterion::Five => Some(FIVE).filter(|&i| self.fitted[i].is_some()),
             Criterion::Known => self.truth.right().filter(|&i| self.fitted[i].is_some()),
         }
+    }
+
+    /// Whether a candidate stands behind one of a higher criterion that is not the choice: the comparison does so with coefficients that lie
+    /// where their model is not defined.
+    fn is_put_behind(&self, fitted: &Fitted) -> bool {
+        let is_before = |other: &Fitted| (1..fitted.place).contains(&other.place);
+        self.fitted.iter().flatten().any(|other| is_before(other) && other.bic > fitted.bic)
     }
 
     /// Difference of a candidate's camera from the truth over the frame, px; infinite where it does not show the frame or was refused.
@@ -182,9 +191,9 @@ mod tests {
     fn each_criterion_takes_what_is_least_in_it() {
         let mut rows: Vec<Row> = (0..8).map(|i| row(i, None)).collect();
         rows[0] = row(0, Some((0, 0.14, -100.0, 0.1503, 0.3)));
-        rows[1] = row(1, Some((1, 0.13, -90.0, 0.1500, 0.2)));
-        rows[3] = row(3, Some((2, 0.12, -80.0, 0.1600, 0.4)));
-        rows[7] = row(7, Some((3, 0.15, -110.0, 0.1510, 0.6)));
+        rows[1] = row(1, Some((2, 0.13, -90.0, 0.1500, 0.2)));
+        rows[3] = row(3, Some((3, 0.12, -80.0, 0.1600, 0.4)));
+        rows[7] = row(7, Some((1, 0.15, -110.0, 0.1510, 0.6)));
         let trials = Trial::all(&TRUTHS[0], &rows).unwrap();
         let taken = |criterion| trials[0].chosen(criterion);
         assert_eq!(Criterion::JUDGED.map(taken), [Some(3), Some(7), Some(1), Some(0)]);
@@ -197,5 +206,12 @@ mod tests {
         let verdicts = Criterion::JUDGED.map(|c| trials[0].verdict(c));
         assert_eq!(verdicts, [Verdict::TooRich, Verdict::Other, Verdict::TooRich, Verdict::Right]);
         assert!(Trial::all(&TRUTHS[0], &rows[..7]).is_none());
+        // Behind those of a higher criterion: out of its model's range.
+        rows[7] = row(7, Some((3, 0.15, -110.0, 0.1510, 0.6)));
+        rows[1] = row(1, Some((1, 0.13, -90.0, 0.1500, 0.2)));
+        rows[3] = row(3, Some((2, 0.12, -80.0, 0.1600, 0.4)));
+        let trials = Trial::all(&TRUTHS[0], &rows).unwrap();
+        let taken = [0.0, 10.0].map(|difference| trials[0].chosen(Criterion::Within(difference)));
+        assert_eq!(taken, [Some(0), Some(1)]);
     }
 }
