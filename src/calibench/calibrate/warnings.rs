@@ -100,12 +100,12 @@ fn hardly_separable(calibration: &LensCalibration) -> Option<Warning> {
 }
 
 impl Warning {
-    /// Those of coefficients outside of the range for which their model is defined.
+    /// Whether a coefficient lies outside of the range for which its model is defined.
     pub(crate) fn is_outside_range(camera: &Camera<Lens>) -> bool {
         Warning::outside_range(camera).next().is_some()
     }
 
-    /// Which those are.
+    /// Those of coefficients outside of the range for which their model is defined.
     pub(crate) fn outside_range(camera: &Camera<Lens>) -> impl Iterator<Item = Warning> {
         let is_outside = |&(parameter, value): &(Parameter, f64)| !parameter.is_defined_at(value);
         camera.values().filter(is_outside).map(|(parameter, value)| {
