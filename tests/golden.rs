@@ -29,7 +29,7 @@ fn records() -> Vec<Record> {
 }
 
 /// Run once for all tests that only look at them.
-static RECORDS: LazyLock<Vec<Record>> = LazyLock::new(|| {
+pub static RECORDS: LazyLock<Vec<Record>> = LazyLock::new(|| {
     rayon::ThreadPoolBuilder::new().num_threads(5).build().expect("a thread pool starts").install(records)
 });
 
@@ -69,7 +69,9 @@ fn every_published_value_that_can_be_judged_is_reconciled_exactly_once() {
     assert_eq!(reconciled, listed);
 }
 
+/// Every experiment runs again: as long as all that compares with golden/.
 #[test]
+#[ignore = "runs every experiment once more: `cargo test --test all -- --ignored another_seed`, as .ci/run does"]
 fn claims_and_published_values_hold_for_another_seed_too() {
     for experiment in calibench_experiments::EXPERIMENTS {
         let context = Context::of(experiment).with_seed(experiment.seed + 1);
