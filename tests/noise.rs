@@ -12,6 +12,7 @@ use calibench::synth::{Stream, StreamKey, Truth};
 use serde_json::Value;
 use std::fmt::Write;
 use std::fs;
+use std::sync::LazyLock;
 
 /// Chance that a right program fails one of these counts.
 const DOUBT: f64 = 1e-3;
@@ -26,8 +27,8 @@ fn stream(scenario: &str, trial: u64) -> Stream {
     Stream::open(StreamKey { seed: 61, scenario, trial, purpose: "noise" })
 }
 
-/// The marks of the chapter's tilted view.
-fn board() -> (Vec<Vec2>, Vec<Vec2>) {
+/// The marks of the chapter's tilted view, on the board and in the image: photographed once for all frames.
+static BOARD: LazyLock<(Vec<Vec2>, Vec<Vec2>)> = LazyLock::new(|| {
     let pose: Pose = Truth::example_poses()[3];
     let photo = photograph(
         &Truth::example_camera(),
@@ -37,11 +38,11 @@ fn board() -> (Vec<Vec2>, Vec<Vec2>) {
         &Imaging::default(),
     );
     (Truth::example_board().points(), photo.expect("it is seen").centres_true)
-}
+});
 
 /// What is added to the marks of each frame.
 fn frames(count: usize, mut error: impl FnMut(usize, usize) -> Vec2) -> Vec<View> {
-    let (points, places) = board();
+    let (points, places) = &*BOARD;
     let frame = |t: usize, error: &mut dyn FnMut(usize, usize) -> Vec2| {
         let pixels = places.iter().enumerate().map(|(i, place)| place + error(t, i)).collect();
         View::new(points.clone(), pixels).expect("finite")
@@ -229,7 +230,7 @@ fn planted_correlations_are_found_and_widen_the_interval_of_sigma() {
 fn what_moves_is_told_and_does_not_enter_the_noise_within_the_frames() {
     const TRIALS: usize = 200;
     const FRAMES: usize = 10;
-    let (_, places) = board();
+    let (_, places) = &*BOARD;
     let turn = |place: &Vec2, rad: f64| Vec2::new(240.0 - place.y, place.x - 320.0) * rad;
     let (mut counts, mut independent) = (Counts::default(), 0.0);
     for trial in 0..TRIALS as u64 {
