@@ -401,6 +401,16 @@ fn a_study_with_a_field_that_would_be_lost_is_refused_by_the_name_of_the_field()
     }
 }
 
+/// A quotation mark that stands open makes one field of all that follows it.
+#[test]
+fn an_open_quotation_mark_is_refused_before_the_rest_is_kept() {
+    let folder = folder("open-quote");
+    for (name, begins) in [("row.csv", "view,point,X,Y,u,v\n0,\""), ("header.csv", "view,\"point\n")] {
+        fs::write(folder.join(name), [begins, &"1,2\n".repeat(600_000)].concat()).expect("written");
+        refused(&folder, &["calibrate", name], &[name, "quotation mark stands open"]);
+    }
+}
+
 #[test]
 fn a_plan_for_what_is_no_number_and_a_run_without_its_study_are_wrong_usage() {
     let folder = folder("no-number");
@@ -414,6 +424,10 @@ fn a_plan_for_what_is_no_number_and_a_run_without_its_study_are_wrong_usage() {
     refused(&folder, &with(&["length=1", "--at", "0,0,300", "--length", "nan"]), &["length_mm is NaN"]);
     refused(&folder, &with(&["length=1", "--at", "nan,0,300", "--length", "10"]), &["centre_mm is NaN"]);
     assert_eq!(limited(&folder, &["study", "run", "spec.toml", "--out", "run"]).status.code(), Some(0));
+    let manifest = fs::read(folder.join("run/manifest.json")).expect("written");
+    fs::write(folder.join("run/manifest.json"), b"\xff\xfe").expect("written");
+    refused(&folder, &["study", "resume", "run"], &["run/manifest.json is damaged", "begin again"]);
+    fs::write(folder.join("run/manifest.json"), manifest).expect("written");
     fs::remove_file(folder.join("run/spec.toml")).expect("removed");
     refused(&folder, &["study", "resume", "run"], &["run/spec.toml"]);
     refused(&folder, &["study", "merge", "run", "--out", "whole"], &["run/spec.toml"]);

@@ -203,6 +203,7 @@ fn the_command_says_by_its_exit_code_whether_a_calibration_holds() {
     assert_eq!(asked(&["--again", "again.json"], 0)["repetitions"]["degrees_of_freedom"], 6);
     asked(&["--again", "again.json", "other.json"], 1);
     asked(&[], 2);
+    asked(&["new.csv", "--image-size", "480x640"], 2);
     let shown = run(&folder, &["validate", "result.json", "seen.csv"]);
     assert!(text(&shown.stderr).contains("views of the same names"), "{}", text(&shown.stderr));
 }

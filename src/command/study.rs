@@ -16,7 +16,7 @@ use calibench::io::input::{InputError, MOST_SPEC_BYTES};
 use calibench::io::shown::on_one_line;
 use calibench::io::{ShownPath, read_regular_text};
 use calibench_harness::Build;
-use calibench_study::{Folder, FolderError, Inputs, MergeError, RunError};
+use calibench_study::{Folder, FolderError, Inputs, Located, MergeError, RunError};
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -94,7 +94,9 @@ impl Failure {
 /// the run incomplete.
 fn exit_of_folder(error: &FolderError) -> Exit {
     match error {
-        FolderError::Input(InputError::Open { cause, .. }) if cause.kind() == ErrorKind::NotFound => {
+        FolderError::Input(InputError::Open { cause, .. }) | FolderError::File(Located { cause, .. })
+            if cause.kind() == ErrorKind::NotFound =>
+        {
             Exit::Usage
         }
         FolderError::File(_) | FolderError::Unwritten(_) | FolderError::Input(InputError::Open { .. }) => {

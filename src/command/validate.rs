@@ -92,6 +92,7 @@ struct Found {
 
 fn found(arguments: &Arguments) -> Result<Found, String> {
     let known = read(&arguments.result)?;
+    refuse_another_size(arguments.image_size, &known)?;
     let mut found = Found {
         names: Vec::new(),
         hold_out: None,
@@ -138,6 +139,17 @@ fn read(path: &Path) -> Result<KnownCalibration, String> {
     match parse_known(&file, &text).map_err(|error| error.to_string())? {
         Known::Plane(_) => Err(format!("{file}: the map of a plane has no camera to validate")),
         Known::Camera(known) => Ok(*known),
+    }
+}
+
+/// A result says of which images it is; what is given is for those that do not.
+fn refuse_another_size(given: Option<(usize, usize)>, known: &KnownCalibration) -> Result<(), String> {
+    match (given, known.image_size) {
+        (Some(given), Some(size)) if given != size => Err(format!(
+            "--image-size {}x{}: the result is of images of {}x{}; leave the option out",
+            given.0, given.1, size.0, size.1
+        )),
+        _ => Ok(()),
     }
 }
 

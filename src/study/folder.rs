@@ -273,7 +273,12 @@ impl Folder {
 
     /// Text of a file.
     pub fn read(&self, name: &str) -> Result<String, FolderError> {
-        Ok(read_regular_text(&self.file(name), MOST_SPEC_BYTES)?)
+        read_regular_text(&self.file(name), MOST_SPEC_BYTES).map_err(|error| match error {
+            InputError::Open { cause, .. } if cause.kind() == io::ErrorKind::InvalidData => {
+                self.damaged(name, cause.to_string())
+            }
+            error => error.into(),
+        })
     }
 
     /// The manifest.

@@ -3,7 +3,8 @@
 use super::input::{InputError, MOST_SIDE_PX, MOST_TABLE_BYTES, read_regular};
 use super::shown::{ShownPath, excerpt, on_one_line};
 use crate::board::ViewError;
-use std::io::Read;
+use std::cell::Cell;
+use std::io::{self, Read};
 
 /// Why a table cannot be read. Lines count from 1; the header is line 1.
 #[derive(Debug, thiserror::Error)]
@@ -30,6 +31,18 @@ pub enum TableError {
         /// The line.
         line: u64,
         /// Most bytes of a line.
+        most: usize,
+    },
+    /// A quotation mark joins lines to one field until the next mark.
+    #[error(
+        "{file}:{line}: more than {most} bytes without the end of a row: a quotation mark stands open; close it, or take it away"
+    )]
+    OpenQuote {
+        /// The file.
+        file: String,
+        /// The line where the row begins.
+        line: u64,
+        /// Most bytes of a row.
         most: usize,
     },
     /// Reading stopped in the middle, or a line is not UTF-8 text.
@@ -231,9 +244,11 @@ pub(super) fn read_table<const NAMES: usize, const NUMBERS: usize>(
 ) -> Result<Vec<Row<NAMES, NUMBERS>>, TableError> {
     let bytes = read_all(file, input)?;
     let mut lines = LineCounter { bytes: &bytes, counted_to: 0, line: 1 };
-    let mut reader =
-        csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(bytes.as_slice());
-    let header = reader.headers().map_err(|e| unreadable(file, &mut lines, &e))?.clone();
+    let begins = Cell::new(0);
+    let rows_of = Rows { bytes: &bytes, given: 0, begins: &begins };
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(rows_of);
+    let start = reader.position().clone();
+    let header = reader.headers().map_err(|e| unreadable(file, &mut lines, &e, &start))?.clone();
     let expected =
         || names.into_iter().chain(numbers.map(|column| column.name)).collect::<Vec<_>>().join(",");
     if header.is_empty() {
@@ -242,8 +257,14 @@ pub(super) fn read_table<const NAMES: usize, const NUMBERS: usize>(
     let name_fields = find_columns(file, &header, names, &expected)?;
     let number_fields = find_columns(file, &header, numbers.map(|column| column.name), &expected)?;
     let mut rows = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(|e| unreadable(file, &mut lines, &e))?;
+    let mut record = csv::StringRecord::new();
+    loop {
+        let at = reader.position().clone();
+        begins.set(at.byte() as usize);
+        let read = reader.read_record(&mut record);
+        if !read.map_err(|error| unreadable(file, &mut lines, &error, &at))? {
+            break;
+        }
         let line = lines.line_of(record.position());
         if record.len() != header.len() {
             return Err(TableError::Ragged {
@@ -287,6 +308,25 @@ fn read_all(file: &str, mut input: impl Read) -> Result<Vec<u8>, TableError> {
     }
     refuse_long_lines(file, &bytes)?;
     Ok(bytes)
+}
+
+/// The bytes of a table for the parser, which keeps a row until its end: the row that it reads may be no longer than a line.
+struct Rows<'a> {
+    bytes: &'a [u8],
+    given: usize,
+    /// Where the row begins that is being read.
+    begins: &'a Cell<usize>,
+}
+
+impl Read for Rows<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.given > self.begins.get() + MOST_LINE_BYTES {
+            return Err(io::ErrorKind::InvalidData.into());
+        }
+        let count = (&self.bytes[self.given..]).read(buffer)?;
+        self.given += count;
+        Ok(count)
+    }
 }
 
 /// What is no table is told before fields are made of it, which take several times its length.
@@ -383,8 +423,13 @@ fn number(file: &str, line: u64, column: Column, field: usize, text: &str) -> Re
     }
 }
 
-fn unreadable(file: &str, lines: &mut LineCounter<'_>, error: &csv::Error) -> TableError {
+/// What the parser says of the row that it looked for at `at`; no row ended where [`Rows`] gave no more.
+fn unreadable(file: &str, lines: &mut LineCounter<'_>, error: &csv::Error, at: &csv::Position) -> TableError {
     let message = match error.kind() {
+        csv::ErrorKind::Io(_) => {
+            let line = lines.line_of(Some(at));
+            return TableError::OpenQuote { file: file.into(), line, most: MOST_LINE_BYTES };
+        }
         csv::ErrorKind::Utf8 { err, .. } => format!("field {} is not UTF-8 text", err.field() + 1),
         _ => error.to_string(),
     };
