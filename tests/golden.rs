@@ -69,7 +69,6 @@ fn every_published_value_that_can_be_judged_is_reconciled_exactly_once() {
     assert_eq!(reconciled, listed);
 }
 
-/// Every experiment runs again: as long as all that compares with golden/.
 #[test]
 #[ignore = "runs every experiment once more: `cargo test --test all -- --ignored another_seed`, as .ci/run does"]
 fn claims_and_published_values_hold_for_another_seed_too() {

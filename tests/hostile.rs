@@ -401,7 +401,7 @@ fn a_study_with_a_field_that_would_be_lost_is_refused_by_the_name_of_the_field()
     }
 }
 
-/// A quotation mark that stands open makes one field of all that follows it.
+/// A quotation mark that stands open makes one field of all that follows it; blank lines, however many, are harmless.
 #[test]
 fn an_open_quotation_mark_is_refused_before_the_rest_is_kept() {
     let folder = folder("open-quote");
@@ -409,6 +409,10 @@ fn an_open_quotation_mark_is_refused_before_the_rest_is_kept() {
         fs::write(folder.join(name), [begins, &"1,2\n".repeat(600_000)].concat()).expect("written");
         refused(&folder, &["calibrate", name], &[name, "quotation mark stands open"]);
     }
+    let blank = "\r\n".repeat(800_000);
+    let table = [&blank, "view,point,X,Y,u,v\n", &blank, "0,0,1,1,5,x\n"].concat();
+    fs::write(folder.join("blank.csv"), table).expect("written");
+    refused(&folder, &["calibrate", "blank.csv"], &["blank.csv:1600002", "'x'"]);
 }
 
 #[test]
@@ -428,6 +432,10 @@ fn a_plan_for_what_is_no_number_and_a_run_without_its_study_are_wrong_usage() {
     fs::write(folder.join("run/manifest.json"), b"\xff\xfe").expect("written");
     refused(&folder, &["study", "resume", "run"], &["run/manifest.json is damaged", "begin again"]);
     fs::write(folder.join("run/manifest.json"), manifest).expect("written");
+    let [trials, away] = ["run/trials.csv", "run/away"].map(|name| folder.join(name));
+    fs::rename(&trials, &away).expect("moved");
+    refused(&folder, &["study", "merge", "run", "--out", "whole"], &["run/trials.csv"]);
+    fs::rename(&away, &trials).expect("moved");
     fs::remove_file(folder.join("run/spec.toml")).expect("removed");
     refused(&folder, &["study", "resume", "run"], &["run/spec.toml"]);
     refused(&folder, &["study", "merge", "run", "--out", "whole"], &["run/spec.toml"]);

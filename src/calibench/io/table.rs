@@ -247,8 +247,9 @@ pub(super) fn read_table<const NAMES: usize, const NUMBERS: usize>(
     let begins = Cell::new(0);
     let rows_of = Rows { bytes: &bytes, given: 0, begins: &begins };
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(rows_of);
-    let start = reader.position().clone();
-    let header = reader.headers().map_err(|e| unreadable(file, &mut lines, &e, &start))?.clone();
+    let line = lines.line_of(reader.position());
+    begins.set(lines.counted_to);
+    let header = reader.headers().map_err(|error| unreadable(file, line, &error))?.clone();
     let expected =
         || names.into_iter().chain(numbers.map(|column| column.name)).collect::<Vec<_>>().join(",");
     if header.is_empty() {
@@ -259,13 +260,11 @@ pub(super) fn read_table<const NAMES: usize, const NUMBERS: usize>(
     let mut rows = Vec::new();
     let mut record = csv::StringRecord::new();
     loop {
-        let at = reader.position().clone();
-        begins.set(at.byte() as usize);
-        let read = reader.read_record(&mut record);
-        if !read.map_err(|error| unreadable(file, &mut lines, &error, &at))? {
+        let line = lines.line_of(reader.position());
+        begins.set(lines.counted_to);
+        if !reader.read_record(&mut record).map_err(|error| unreadable(file, line, &error))? {
             break;
         }
-        let line = lines.line_of(record.position());
         if record.len() != header.len() {
             return Err(TableError::Ragged {
                 file: file.into(),
@@ -352,10 +351,8 @@ struct LineCounter<'a> {
 }
 
 impl LineCounter<'_> {
-    /// The line of a record that starts at `position` or after the line ends that follow it; 0 without a
-    /// position.
-    fn line_of(&mut self, position: Option<&csv::Position>) -> u64 {
-        let Some(position) = position else { return 0 };
+    /// The line of a record that starts at `position` or after the line ends that follow it.
+    fn line_of(&mut self, position: &csv::Position) -> u64 {
         let start = position.byte() as usize;
         while self.counted_to < self.bytes.len() {
             let byte = self.bytes[self.counted_to];
@@ -423,17 +420,15 @@ fn number(file: &str, line: u64, column: Column, field: usize, text: &str) -> Re
     }
 }
 
-/// What the parser says of the row that it looked for at `at`; no row ended where [`Rows`] gave no more.
-fn unreadable(file: &str, lines: &mut LineCounter<'_>, error: &csv::Error, at: &csv::Position) -> TableError {
+/// What the parser says of the row that begins in a line; no row ended where [`Rows`] gave no more.
+fn unreadable(file: &str, line: u64, error: &csv::Error) -> TableError {
+    let file = file.to_string();
     let message = match error.kind() {
-        csv::ErrorKind::Io(_) => {
-            let line = lines.line_of(Some(at));
-            return TableError::OpenQuote { file: file.into(), line, most: MOST_LINE_BYTES };
-        }
+        csv::ErrorKind::Io(_) => return TableError::OpenQuote { file, line, most: MOST_LINE_BYTES },
         csv::ErrorKind::Utf8 { err, .. } => format!("field {} is not UTF-8 text", err.field() + 1),
         _ => error.to_string(),
     };
-    TableError::Unreadable { file: file.into(), line: lines.line_of(error.position()), message }
+    TableError::Unreadable { file, line, message }
 }
 
 /// Name and bytes of a file for one of the readers.
