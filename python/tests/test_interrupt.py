@@ -9,6 +9,9 @@ from pathlib import Path
 
 import pytest
 
+# A shell that starts the tests in its background has SIGINT ignored, and what they start would inherit that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
 STUDY = (Path(__file__).resolve().parents[2] / "studies/four-pose.toml").read_text().replace("per_cell = 20000", "per_cell = 2000000")
 LONG = """
 import sys, time, numpy as np, calibench
@@ -34,6 +37,15 @@ CALLS = {
 }
 
 
+def last_words(process: subprocess.Popen[str], timeout_s: float) -> tuple[str, str]:
+    """Output and errors until the end; a process that does not end is killed, so that none is left behind a test that failed."""
+    try:
+        return process.communicate(timeout=timeout_s)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        raise
+
+
 @pytest.mark.skipif(os.name == "nt", reason="a process of Windows is sent no Ctrl-C alone")
 @pytest.mark.parametrize("call", CALLS.values(), ids=CALLS.keys())
 def test_an_interrupt_is_heard(call: str) -> None:
@@ -42,7 +54,7 @@ def test_an_interrupt_is_heard(call: str) -> None:
     with pytest.raises(subprocess.TimeoutExpired):
         process.wait(0.5)
     process.send_signal(signal.SIGINT)
-    said, _ = process.communicate(timeout=30)
+    said, _ = last_words(process, 30)
     assert said == "heard\n" and process.returncode == 0
 
 
@@ -95,7 +107,7 @@ def test_no_program_is_left_after_an_interrupt(way: str, program: str, after: fl
         time.sleep(0.01)
     time.sleep(after)
     process.send_signal(signal.SIGINT)
-    said, told = process.communicate(timeout=20)
+    said, told = last_words(process, 20)
     assert (said, process.returncode) == (("", 3) if way == "command" else ("heard\n", 0)), told
     time.sleep(0.1)
     assert running(seconds) == []
