@@ -114,6 +114,7 @@ fn answers_from_files_get_the_verdict_of_the_same_answers_from_a_pipe() {
         .map(|(i, line)| match i {
             3 => format!("{{{}\n", &line[1..].replacen("\"rmse\":", "\"rmse\":NaN,\"x\":", 1)),
             5 => format!("{line}\n{line}\n"),
+            6 => format!("{line}\n{}\n", line.replace("\"id\":\"", "\"id\":\"another-\u{1b}[31m")),
             7 => "garbage\n".to_string(),
             _ => format!("{line}\n"),
         })
@@ -126,6 +127,9 @@ fn answers_from_files_get_the_verdict_of_the_same_answers_from_a_pipe() {
         text.contains("protocol / four-pose: 3 of 15 broken, first: a number of the answer is NaN"),
         "{text}"
     );
+    // So is what answers a problem of another folder.
+    assert!(text.contains("answers.jsonl, line 9: no problem here is called another-"), "{text}");
+    assert!(!text.contains('\u{1b}'), "{text:?}");
     std::fs::remove_file(path).expect("removed");
     assert_eq!(gate(&["--judge", &place]).status.code(), Some(2));
 }

@@ -8,7 +8,7 @@ use calibench::io::formats::{
     self, AprilTarget, CameraFile, ChessTarget, Format, KalibrTarget, VnlBoard, Wishes, format_names,
     format_of_name, read_camera_file,
 };
-use calibench::io::input::{read_regular, regular_or_absent};
+use calibench::io::input::{read_regular, replaceable};
 use calibench::io::{parse_corners, significant, table, write_atomically};
 use calibench::photos::{BoardSpec, MarkKind};
 use clap::Args;
@@ -167,7 +167,7 @@ fn converted(arguments: &Arguments, from: &Path, to: &Path) -> Result<Converted,
         return board_to_target(&board);
     }
     let name = from.shown();
-    regular_or_absent(to).map_err(said)?;
+    replaceable(to).map_err(said)?;
     if let (Ok(a), Ok(b)) = (from.canonicalize(), to.canonicalize())
         && a == b
     {
@@ -205,7 +205,8 @@ fn camera(arguments: &Arguments, name: &str, text: &str, to: &Path) -> Result<Co
     let to = arguments.to.map_or_else(|| formats::format_to_write(&out), Ok).map_err(said)?;
     let read = read_camera_file(from, name, text, arguments.camera.as_deref(), &wishes).map_err(said)?;
     let first_pixel = wishes.first_pixel.unwrap_or(from.first_pixel);
-    let noted = read.notes.clone();
+    read.assumed.iter().for_each(|assumed| warn(&format!("{name}: {assumed}")));
+    let noted = read.notes.iter().chain(&read.assumed).cloned().collect();
     let (camera, scaled) = sized(arguments, name, read)?;
     let written = formats::write_camera_file(to, &camera, &wishes).map_err(said)?;
     let read_back_px = formats::read_back_px(to, &written, &camera).map_err(said)?;

@@ -128,14 +128,17 @@ fn read(path: &Path) -> Result<CameraFile, String> {
     let file = path.shown();
     let text = read_regular_text(path, MOST_BYTES).map_err(|error| error.to_string())?;
     let format = detect(&file, &text).map_err(|error| error.to_string())?;
-    read_camera_file(format, &file, &text, None, &Wishes::default()).map_err(|error| match error {
-        FormatError::Several { names, .. } => format!(
-            "{file}: {} cameras: take one of {} out first, with calibench convert --camera NAME",
-            names.len(),
-            names.join(", ")
-        ),
-        error => error.to_string(),
-    })
+    let read =
+        read_camera_file(format, &file, &text, None, &Wishes::default()).map_err(|error| match error {
+            FormatError::Several { names, .. } => format!(
+                "{file}: {} cameras: take one of {} out first, with calibench convert --camera NAME",
+                names.len(),
+                names.join(", ")
+            ),
+            error => error.to_string(),
+        })?;
+    read.assumed.iter().for_each(|assumed| warn(&format!("{file}: {assumed}")));
+    Ok(read)
 }
 
 /// The frame of both.

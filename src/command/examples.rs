@@ -1,6 +1,6 @@
 //! What would one type? Examples at the end of every verb's help. They are commands that run: a test runs them all.
 
-use clap::{Command, CommandFactory};
+use clap::{Arg, Command, CommandFactory};
 
 /// Verbs, those of a verb after it, and what one would type. What it reads is in `tests/verb_examples.rs`.
 const EXAMPLES: &[(&str, &[&str])] = &[
@@ -137,11 +137,20 @@ const EXAMPLES: &[(&str, &[&str])] = &[
 
 /// The command line with its examples.
 pub(super) fn command() -> Command {
-    let plain = super::Arguments::command();
+    let plain = taking_negative_numbers(super::Arguments::command());
     EXAMPLES.iter().fold(plain, |command, (verb, lines)| {
         let words: Vec<&str> = verb.split(' ').collect();
         with_examples(command, &words, lines)
     })
+}
+
+/// The command with options that take -5 for a number, so that whoever wants another says why, and not for an option that does not exist.
+fn taking_negative_numbers(command: Command) -> Command {
+    let of_option = |arg: Arg| {
+        let takes_a_value = !arg.is_positional() && arg.get_action().takes_values();
+        if takes_a_value { arg.allow_negative_numbers(true) } else { arg }
+    };
+    command.mut_args(of_option).mut_subcommands(taking_negative_numbers)
 }
 
 /// The command whose verb, or whose verb's verb, has these examples behind what it says.

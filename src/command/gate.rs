@@ -13,7 +13,7 @@ use super::{Exit, print, program, warn};
 use calibench::camera::Model;
 use calibench::io::{ShownPath, keep_files, write_atomically};
 use calibench_gate::faults::{Faulty, planted};
-use calibench_gate::files::{self, FilesError};
+use calibench_gate::files::{self, FilesError, Recorded};
 use calibench_gate::{
     Allowance, Asked, Builtin, EXPECTED_FALSE_ALARMS, Plan, PlanError, Property, QUICK, Recorder, Report,
     Solver, THOROUGH, Terms, plan, protocol,
@@ -286,7 +286,7 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
         if let Some(reference) = &arguments.against {
             return compare::of_answers(arguments, folder, reference);
         }
-        let (plan, answers) = files::recorded(folder).map_err(of_files)?;
+        let (plan, answers) = recorded(folder)?;
         return judge(arguments, &plan, &answers, build);
     }
     let solver = solver(arguments)?;
@@ -307,6 +307,15 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
     }
     let plan = plan_of(arguments, samples, || solver.models())?;
     judge(arguments, &plan, solver.as_ref(), build)
+}
+
+/// Problems and answers of a folder, with a word on what in it answers none of them.
+fn recorded(folder: &Path) -> Result<(Plan, Recorded), Stop> {
+    let (plan, answers) = files::recorded(folder).map_err(of_files)?;
+    if let Some(stray) = answers.stray() {
+        warn(&format!("not all lines are answers to the problems of {}: {stray}", folder.shown()));
+    }
+    Ok((plan, answers))
 }
 
 /// Keeps the answers of a folder, which are judged, from being replaced by a report on them.

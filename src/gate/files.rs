@@ -4,6 +4,7 @@
 use super::accept::{Breakage, id_in, read_line};
 use super::plan::{Asked, Plan, PlanError, Purpose};
 use super::protocol::{Answer, Problem};
+use super::quoted::quoted;
 use super::recorder::{self, Recorder};
 use super::solver::{Given, Solver};
 use calibench::camera::{Model, UnknownModel};
@@ -11,7 +12,7 @@ use calibench::io::hash::sha256_hex;
 use calibench::io::{InputError, read_regular_text, write_atomically};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -159,7 +160,7 @@ fn truth_lines(plan: &Plan) -> String {
 pub struct Recorded {
     folder: PathBuf,
     answers: BTreeMap<String, Result<Answer, Breakage>>,
-    /// The first line that is no answer to anything, and where.
+    /// The first line that answers no problem of the folder, and where.
     stray: Option<String>,
 }
 
@@ -178,10 +179,11 @@ pub fn recorded(folder: &Path) -> Result<(Plan, Recorded), FilesError> {
     if now != manifest.sha256 {
         return Err(FilesError::OtherVersion { found: manifest.sha256, now });
     }
+    let asked: BTreeSet<String> = plan.cases.iter().map(|case| plan.id(case)).collect();
     let mut recorded = Recorded { folder: folder.to_path_buf(), answers: BTreeMap::new(), stray: None };
     for path in answer_files(folder)? {
         for (i, line) in read(&path)?.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
-            recorded.take(line, || format!("{}, line {}", path.display(), i + 1));
+            recorded.take(line, &asked, || format!("{}, line {}", path.display(), i + 1));
         }
     }
     Ok((plan, recorded))
@@ -203,8 +205,13 @@ fn answer_files(folder: &Path) -> Result<Vec<PathBuf>, FilesError> {
 }
 
 impl Recorded {
+    /// The first line that answers no problem of the folder, and where, if there is one.
+    pub fn stray(&self) -> Option<&str> {
+        self.stray.as_deref()
+    }
+
     /// Files a line under the problem that it answers.
-    fn take(&mut self, line: &str, place: impl Fn() -> String) {
+    fn take(&mut self, line: &str, asked: &BTreeSet<String>, place: impl Fn() -> String) {
         if let Some((id, breakage)) = recorder::broken(line) {
             self.answers.insert(id, Err(breakage));
             return;
@@ -212,6 +219,10 @@ impl Recorded {
         let answer = read_line(line);
         let id = answer.as_ref().map_or_else(|_| id_in(line).map(str::to_string), |a| Some(a.id.clone()));
         match (id, answer) {
+            (Some(id), _) if !asked.contains(&id) => {
+                self.stray
+                    .get_or_insert_with(|| format!("{}: no problem here is called {}", place(), quoted(&id)));
+            }
             (Some(id), answer) => {
                 let filed = if self.answers.contains_key(&id) { Err(Breakage::Twice) } else { answer };
                 self.answers.insert(id, filed);

@@ -11,7 +11,7 @@ use calibench::io::ShownPath;
 use calibench::io::atomic::{remove_leftovers, write_atomically_to};
 use calibench::io::files::{Disk, Files};
 use calibench::io::hash::sha256_hex;
-use calibench::io::input::{InputError, MOST_SPEC_BYTES, regular_or_absent};
+use calibench::io::input::{InputError, MOST_SPEC_BYTES, replaceable};
 use calibench::io::read_regular_text;
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -164,7 +164,7 @@ fn refuse_what_is_not_a_runs(path: &Path) -> Result<PathBuf, FolderError> {
     let lock = path.join(".lock");
     // What is opened without being read whole; other files are looked at when they are read.
     for opened in OF_A_RUN.map(|name| path.join(name)).iter().chain([&lock]) {
-        regular_or_absent(opened)?;
+        replaceable(opened)?;
     }
     refuse_links(path)?;
     Ok(lock)

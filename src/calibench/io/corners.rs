@@ -6,6 +6,7 @@ use crate::board::{View, ViewError};
 use crate::geometry::Vec2;
 use std::collections::BTreeMap;
 use std::io::Read;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 /// The views of a corner file, in order of first appearance.
@@ -80,15 +81,34 @@ pub fn parse_corners(file: &str, mut input: impl Read) -> Result<CornerFile, Tab
     }
 }
 
+/// Weights, and standard deviations in px, with which marks are weighed against each other: their squares are summed.
+const WEIGHTS: RangeInclusive<f64> = 1e-9..=1e9;
+
 fn weighted(file: &str, bytes: &[u8]) -> Result<CornerFile, TableError> {
-    grouped(file, with_column(file, bytes, Column::length("weight"))?, |numbers| Some(numbers[4]))
+    let rows = with_column(file, bytes, Column::length("weight"))?;
+    refuse_extreme(file, "weight", &rows)?;
+    grouped(file, rows, |numbers| Some(numbers[4]))
+}
+
+/// Refuses what is positive and outside of [`WEIGHTS`].
+fn refuse_extreme(file: &str, column: &str, rows: &[Row<2, 5>]) -> Result<(), TableError> {
+    let is_extreme = |value: f64| value > 0.0 && !WEIGHTS.contains(&value);
+    let Some(Row { numbers, line, .. }) = rows.iter().find(|row| is_extreme(row.numbers[4])) else {
+        return Ok(());
+    };
+    let (least, most) = (WEIGHTS.start(), WEIGHTS.end());
+    let message = format!(
+        "column '{column}': {:e} is not within {least:e} to {most:e}, which can be weighed",
+        numbers[4]
+    );
+    Err(TableError::Unreadable { file: file.into(), line: *line, message })
 }
 
 /// The corners of a table with standard deviations, which are told here as what they are: as weights nobody wrote them.
 fn spread(file: &str, bytes: &[u8]) -> Result<CornerFile, TableError> {
     let rows = with_column(file, bytes, Column::pixels("sigma_px"))?;
-    let is_none = |sigma: f64| !(sigma > 0.0 && (1.0 / sigma).is_finite());
-    if let Some(Row { numbers, line, .. }) = rows.iter().find(|row| is_none(row.numbers[4])) {
+    refuse_extreme(file, "sigma_px", &rows)?;
+    if let Some(Row { numbers, line, .. }) = rows.iter().find(|row| row.numbers[4] <= 0.0) {
         let message =
             format!("column 'sigma_px': {} is no standard deviation: give a positive number", numbers[4]);
         return Err(TableError::Unreadable { file: file.into(), line: *line, message });
@@ -119,7 +139,23 @@ fn grouped<const N: usize>(
     weight: impl Fn(&[f64; N]) -> Option<f64>,
 ) -> Result<CornerFile, TableError> {
     let (view_names, views) = by_view(file, rows, |rows| view_of(rows, &weight))?;
+    refuse_one_place(file, &view_names, &views)?;
     Ok(CornerFile { view_names, views })
+}
+
+/// Marks of a view of which it makes no sense that they all stand at one place of the target.
+const SEVERAL: usize = 4;
+
+/// Refuses a view whose marks all are at one place: one mark in all views, taken for one view.
+fn refuse_one_place(file: &str, names: &[String], views: &[View]) -> Result<(), TableError> {
+    let at_one_place =
+        |view: &View| view.points().len() >= SEVERAL && view.points().iter().all(|p| *p == view.points()[0]);
+    match names.iter().zip(views).find(|(_, view)| at_one_place(view)) {
+        Some((view, seen)) => {
+            Err(TableError::OnePlace { file: file.into(), view: view.clone(), marks: seen.points().len() })
+        }
+        None => Ok(()),
+    }
 }
 
 /// Names and views of rows `view, point`, both in order of first appearance.

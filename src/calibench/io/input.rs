@@ -38,6 +38,14 @@ pub enum InputError {
         /// Another way, where there is one.
         hint: &'static str,
     },
+    /// Only a regular file is replaced.
+    #[error("{path}: {kind}, where a file is to be written: name another place")]
+    NotReplaceable {
+        /// The path.
+        path: String,
+        /// What it is.
+        kind: &'static str,
+    },
     /// More memory than photographs may take.
     #[error("{path}: needs some {needed} bytes of memory, and the limit is {most}: see --memory")]
     NeedsMemory {
@@ -70,21 +78,24 @@ impl From<InputError> for io::Error {
     }
 }
 
-/// Refuses what is there and is no regular file: opening a pipe blocks until somebody opens its other end,
-/// for writing too.
+/// Refuses a path to write to where something is that is no regular file: opening a pipe blocks until somebody opens
+/// its other end, for writing too.
 ///
 /// # Errors
-/// [`InputError::NotRegular`].
-pub fn regular_or_absent(path: &Path) -> Result<(), InputError> {
-    std::fs::metadata(path).map_or(Ok(()), |seen| regular(path, &seen))
+/// [`InputError::NotReplaceable`].
+pub fn replaceable(path: &Path) -> Result<(), InputError> {
+    let kind = std::fs::metadata(path).ok().as_ref().and_then(other_than_a_file);
+    kind.map_or(Ok(()), |kind| Err(InputError::NotReplaceable { path: path.shown(), kind }))
 }
 
 fn regular(path: &Path, seen: &Metadata) -> Result<(), InputError> {
-    if seen.is_file() {
-        return Ok(());
-    }
-    let kind = if seen.is_dir() { "a folder" } else { "a pipe or a device" };
-    Err(InputError::NotRegular { path: path.shown(), kind, hint: "" })
+    let kind = other_than_a_file(seen);
+    kind.map_or(Ok(()), |kind| Err(InputError::NotRegular { path: path.shown(), kind, hint: "" }))
+}
+
+/// What is there, where it is no regular file.
+fn other_than_a_file(seen: &Metadata) -> Option<&'static str> {
+    (!seen.is_file()).then_some(if seen.is_dir() { "a folder" } else { "a pipe or a device" })
 }
 
 /// Opens a regular file of at most `most` bytes, and tells its length. It is looked at before it is opened,

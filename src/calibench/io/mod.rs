@@ -30,6 +30,7 @@ pub mod misplaced;
 #[cfg(feature = "photo")]
 pub mod overlay;
 pub mod pairs;
+mod plausible;
 pub mod provenance;
 pub mod result;
 pub mod robot;

@@ -3,6 +3,7 @@
 
 use super::input::{InputError, MOST_SIDE_PX, MOST_TABLE_BYTES, read_regular_text};
 use super::loss::loss_to_text;
+use super::plausible::implausible;
 use super::shown::ShownPath;
 use crate::calibrate::{
     BoardShape, Certificate, Compared, LensCalibration, Loss, Prior, ProfileInterval, Termination, in_words,
@@ -424,10 +425,12 @@ pub enum ResultError {
         model: Model,
     },
     /// No camera has these numbers.
-    #[error("{file}: fx and fy must be positive, and every parameter finite")]
+    #[error("{file}: {reason}")]
     NoCamera {
         /// The file.
         file: String,
+        /// Which, and what would do.
+        reason: String,
     },
     /// No image has this size.
     #[error("{file}: image_size: each side must have 1 to {most} px, and it has {width} x {height}; leave it out where it is not known",
@@ -486,8 +489,8 @@ pub fn parse_lens_camera(file: &str, text: &str) -> Result<(Camera<Lens>, ImageS
         serde_json::from_str(text).map_err(|cause| ResultError::Format { file: file.into(), cause })?;
     let LensFields(camera) = fields.camera;
     refuse_unfinished(file, fields.termination)?;
-    if !camera.is_possible() {
-        return Err(ResultError::NoCamera { file: file.into() });
+    if let Some(reason) = implausible(&camera) {
+        return Err(ResultError::NoCamera { file: file.into(), reason });
     }
     match fields.image_size {
         Some((width, height)) if width.min(height) == 0 || width.max(height) > MOST_SIDE_PX => {

@@ -85,8 +85,20 @@ pub enum TableError {
         /// The column.
         column: &'static str,
     },
+    /// The marks of a view are all at one place of the target.
+    #[error(
+        "{file}: all {marks} marks of view '{view}' are at one place (X, Y) of the target: are the columns view and point swapped?"
+    )]
+    OnePlace {
+        /// The file.
+        file: String,
+        /// The view.
+        view: String,
+        /// Its marks.
+        marks: usize,
+    },
     /// A line has more or fewer fields than the header.
-    #[error("{file}:{line}: {got} fields where the header has {need}")]
+    #[error("{file}:{line}: {got} fields where the header has {need}{}", if got > need { ": a comma is no decimal point here" } else { "" })]
     Ragged {
         /// The file.
         file: String,
@@ -98,7 +110,7 @@ pub enum TableError {
         got: usize,
     },
     /// A field is not a number.
-    #[error("{file}:{line}: column '{column}' (field {field}): '{text}' is not a number")]
+    #[error("{file}:{line}: column '{column}' (field {field}): '{text}' is not a number{}", if text.contains(',') { ": a comma is no decimal point here" } else { "" })]
     NotANumber {
         /// The file.
         file: String,
@@ -293,6 +305,8 @@ pub(super) fn read_table<const NAMES: usize, const NUMBERS: usize>(
 
 /// U+FEFF in UTF-8.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+/// The same in UTF-16, either byte first.
+const OF_UTF_16: [&[u8]; 2] = [b"\xff\xfe", b"\xfe\xff"];
 
 /// The whole input, without a byte order mark.
 fn read_all(file: &str, mut input: impl Read) -> Result<Vec<u8>, TableError> {
@@ -304,6 +318,10 @@ fn read_all(file: &str, mut input: impl Read) -> Result<Vec<u8>, TableError> {
     })?;
     if bytes.starts_with(BYTE_ORDER_MARK) {
         bytes.drain(..BYTE_ORDER_MARK.len());
+    }
+    if OF_UTF_16.iter().any(|mark| bytes.starts_with(mark)) {
+        let message = "the text is UTF-16: save it as UTF-8".to_string();
+        return Err(TableError::Unreadable { file: file.into(), line: 1, message });
     }
     refuse_long_lines(file, &bytes)?;
     Ok(bytes)

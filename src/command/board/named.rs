@@ -1,7 +1,7 @@
 //! A board as it is named on the command line: by words, or by the file that lies beside a printed page.
 
 use calibench::io::input::{MOST_TABLE_BYTES, read_regular};
-use calibench::photos::{BoardSpec, parse_board_file};
+use calibench::photos::{BoardSpec, BoardSpecError, parse_board_file};
 use std::path::Path;
 
 /// What a file of a printed board is called by its ending.
@@ -10,8 +10,11 @@ const ENDING: &str = ".toml";
 /// `circles:9x7:10mm:3mm`, or a file such as `board.toml`.
 pub(in super::super) fn board_or_file(text: &str) -> Result<BoardSpec, String> {
     if !text.ends_with(ENDING) {
-        return text.parse().map_err(|error: calibench::photos::BoardSpecError| {
-            format!("{error}, or the board.toml beside a page that `calibench board` drew")
+        return text.parse().map_err(|error: BoardSpecError| match error {
+            BoardSpecError::Form(_) => {
+                format!("{error}; or the board.toml beside a page that `calibench board` drew")
+            }
+            error => error.to_string(),
         });
     }
     let bytes = read_regular(Path::new(text), MOST_TABLE_BYTES).map_err(|error| error.to_string())?;

@@ -1,12 +1,12 @@
 //! `calibench gate --against`: two solvers on the same problems, asked now or judged by the answers they gave
 //! before.
 
-use super::{Arguments, Stop, incomplete, of_files, plan_of, process, terms, usage};
+use super::{Arguments, Stop, incomplete, plan_of, process, recorded, terms, usage};
 use crate::{Exit, print};
 use calibench::camera::Model;
 use calibench::io::{ShownPath, write_atomically};
 use calibench_gate::paired::{self, Paired};
-use calibench_gate::{Asked, Builtin, Plan, Report, Solver, files};
+use calibench_gate::{Asked, Builtin, Plan, Report, Solver};
 use calibench_harness::ProgressDisplay;
 use std::path::Path;
 
@@ -53,7 +53,7 @@ pub(super) fn run(
     let (plan, other): (Plan, Box<dyn Solver>) = match reference {
         "builtin" => (plan_of(arguments, samples, || solver.models())?, Box::new(Builtin)),
         folder if holds_a_run(folder) => {
-            let (plan, answers) = files::recorded(Path::new(folder)).map_err(of_files)?;
+            let (plan, answers) = recorded(Path::new(folder))?;
             (plan, Box::new(answers))
         }
         command => {
@@ -68,12 +68,12 @@ pub(super) fn run(
 
 /// Compares the answers in a folder, whose problems the reference is asked if it has not answered them before.
 pub(super) fn of_answers(arguments: &Arguments, folder: &Path, reference: &str) -> Result<Exit, Stop> {
-    let (plan, answers) = files::recorded(folder).map_err(of_files)?;
+    let (plan, answers) = recorded(folder)?;
     let (plan, other): (Plan, Box<dyn Solver>) = match reference {
         "builtin" => (plan, Box::new(Builtin)),
         before if holds_a_run(before) => {
             let before = Path::new(before);
-            let (theirs, answers) = files::recorded(before).map_err(of_files)?;
+            let (theirs, answers) = recorded(before)?;
             (common((folder, &plan), (before, &theirs))?, Box::new(answers))
         }
         command => {

@@ -32,8 +32,10 @@ pub struct CameraFile {
     pub estimated: Option<Estimated>,
     /// Where the camera stands: from the coordinates of a reference to those of the camera.
     pub cam_from_reference: Option<Pose>,
-    /// What the file says that is not kept, and what had to be assumed.
+    /// What the file says that is not kept.
     pub notes: Vec<String>,
+    /// What had to be assumed, since the file does not say it: a file that was cut off may look so.
+    pub assumed: Vec<String>,
 }
 
 impl CameraFile {
@@ -46,6 +48,7 @@ impl CameraFile {
             estimated: None,
             cam_from_reference: None,
             notes: Vec::new(),
+            assumed: Vec::new(),
         }
     }
 

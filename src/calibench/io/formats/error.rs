@@ -83,10 +83,12 @@ pub enum FormatError {
         names: Vec<String>,
     },
     /// No camera has these numbers.
-    #[error("{file}: fx and fy must be positive, and every parameter finite")]
+    #[error("{file}: {reason}")]
     NoCamera {
         /// The file.
         file: String,
+        /// Which, and what would do.
+        reason: String,
     },
     /// Neither contents nor ending tell the format.
     #[error("{file}: its format is not known: name it with {option}, one of {}", names.join(", "))]

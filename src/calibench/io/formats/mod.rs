@@ -32,6 +32,7 @@ pub use error::FormatError;
 pub use kalibr::{AprilTarget, ChessTarget, KalibrTarget, parse_target, target_text};
 pub use vnl::{VnlBoard, corner_text, looks_like_vnl, parse_vnl, vnl_text};
 
+use super::plausible::implausible;
 use crate::camera::Model;
 use crate::geometry::Vec3;
 use node::Source;
@@ -221,9 +222,9 @@ pub fn read_camera_file(
     let cameras = (format.read)(&Source { file, text }, wishes)?;
     let first_pixel = wishes.first_pixel.unwrap_or(format.first_pixel);
     let read = chosen(file, cameras, camera)?.with_origin_moved(-first_pixel);
-    match read.camera.is_possible() {
-        true => Ok(read),
-        false => Err(FormatError::NoCamera { file: file.into() }),
+    match implausible(&read.camera) {
+        None => Ok(read),
+        Some(reason) => Err(FormatError::NoCamera { file: file.into(), reason }),
     }
 }
 
@@ -237,7 +238,9 @@ fn chosen(file: &str, mut cameras: Vec<Found>, wanted: Option<&str>) -> Result<C
             None => return Err(FormatError::NoSuchCamera { file, name: wanted.to_string(), names: names() }),
         },
         None if cameras.len() > 1 => return Err(FormatError::Several { file, names: names() }),
-        None if cameras.is_empty() => return Err(FormatError::NoCamera { file }),
+        None if cameras.is_empty() => {
+            return Err(FormatError::NoCamera { file, reason: "no camera stands in it".into() });
+        }
         None => 0,
     };
     cameras.swap_remove(place).camera
@@ -283,8 +286,8 @@ fn refuse_what_has_no_room(format: &Format, camera: &CameraFile) -> Result<(), F
     };
     let Format { room, .. } = format;
     let lens = camera.camera.distortion.model();
-    if !camera.camera.is_possible() {
-        return refuse("this camera", "fx and fy must be positive, and every parameter finite");
+    if let Some(reason) = implausible(&camera.camera) {
+        return refuse("this camera", &reason);
     }
     if !room.lenses.contains(&lens) {
         let held: Vec<&str> = room.lenses.iter().map(|model| model.name()).collect();

@@ -81,18 +81,18 @@ fn read(source: &Source, node: &Node) -> Result<Vec<Found>, FormatError> {
     let root = Field::root(*source, node);
     let matrix = root.get_any(&NAMES_OF_K).ok_or_else(|| root.missing("camera_matrix"))?;
     let linear = linear_of(&matrix, &matrix.matrix()?)?;
-    let mut notes = Vec::new();
+    let mut assumed = Vec::new();
     let distortion = match (is_fisheye(&root)?, root.get_any(&NAMES_OF_LENS)) {
         (true, Some(field)) => fisheye_of(&field, &field.matrix()?)?,
         (true, None) => return Err(root.missing("distortion_coefficients")),
         (false, Some(field)) => lens::from_opencv_order(source, field.node.offset, &field.matrix()?)?,
         (false, None) => {
-            notes.push("no distortion coefficients stand in the file: an ideal lens".to_string());
+            assumed.push("no distortion coefficients stand in the file: an ideal lens".to_string());
             lens::ideal()
         }
     };
     let camera = lens::camera(linear, distortion);
-    Ok(vec![CameraFile { image_size: image_size(&root)?, notes, ..CameraFile::of(camera) }.into()])
+    Ok(vec![CameraFile { image_size: image_size(&root)?, assumed, ..CameraFile::of(camera) }.into()])
 }
 
 /// Whether the coefficients are those of `cv::fisheye`.

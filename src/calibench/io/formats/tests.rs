@@ -391,7 +391,7 @@ fn complaints_name_file_line_and_value() {
         ("1 OPENCV 640 480 1 2 3\n", "f:1:1: OPENCV: 3 numbers are not what this model has"),
         ("1 PINHOLE 640 480.5 1 1 0 0\n", "f:1:1"),
         ("1 PINHOLE 640 480 1 1 nan 0\n", "f:1:23: PARAMS: `nan` is not a finite number"),
-        ("1 PINHOLE 640 480 -1 1 0 0\n", "fx and fy must be positive"),
+        ("1 PINHOLE 640 480 -1 1 0 0\n", "fx = -1e0 px, and focal lengths are from 1e-6 to 1e9 px"),
     ];
     for (text, expected) in cases {
         let format = detect("f", text).unwrap_or(format_of_name("colmap").unwrap());
