@@ -15,7 +15,7 @@
 //! rich model is known poorly. So the criterion decides, and predictions only where it says nothing.
 
 use super::any_lens::{located, spans_a_plane};
-use super::counted::Counted;
+use super::counted::{Counted, weighted_residuals};
 use super::structure::neighbours;
 use super::{Board, CalibrationError, LensCalibration, Role, Settings, Warning, calibrate_lens};
 use crate::board::View;
@@ -177,7 +177,7 @@ fn judged(
         hold_out_px: folds.as_deref().map(error),
         folds: folds.unwrap_or_default().into_iter().map(|(square, _)| square).collect(),
         is_outside: Warning::is_outside_range(&calibration.camera),
-        correlation: neighbours(&calibration.residuals, settings.loss).correlation,
+        correlation: neighbours(&weighted_residuals(views, &calibration), settings.loss).correlation,
         calibration,
     }
 }
@@ -276,7 +276,7 @@ pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibr
     let freedom = |(candidate, calibration): (Candidate, LensCalibration)| {
         let gain = without - of_fit(&calibration);
         let rmse_px = counted.rmse_px(views, &calibration);
-        let correlation = neighbours(&calibration.residuals, settings.loss).correlation;
+        let correlation = neighbours(&weighted_residuals(views, &calibration), settings.loss).correlation;
         (gain, Freedom { candidate, rmse_px, rmse_without_px, correlation })
     };
     let mut tried: Vec<(f64, Freedom)> = fitted.into_iter().map(freedom).collect();

@@ -28,10 +28,7 @@ impl Counted {
         if loss == Loss::Squares {
             return Counted { limit: f64::INFINITY, is_stray };
         }
-        let of_fit = |fit: &LensCalibration| -> Vec<Vec<Vec2>> {
-            views.iter().zip(&fit.residuals).map(|(view, list)| weighted(view, list).collect()).collect()
-        };
-        let weighted: Vec<_> = fits.map(of_fit).collect();
+        let weighted: Vec<_> = fits.map(|fit| weighted_residuals(views, fit)).collect();
         let limit = weighted.iter().map(|fit| strays::limit(fit, loss)).fold(f64::INFINITY, f64::min);
         for fit in &weighted {
             for (strays, residuals) in is_stray.iter_mut().zip(fit) {
@@ -70,6 +67,11 @@ impl Counted {
         let (square, marks) = self.in_fit(views, fit);
         (square / marks as f64).sqrt()
     }
+}
+
+/// The residuals of a fit times the weights of their marks.
+pub(super) fn weighted_residuals(views: &[View], fit: &LensCalibration) -> Vec<Vec<Vec2>> {
+    views.iter().zip(&fit.residuals).map(|(view, list)| weighted(view, list).collect()).collect()
 }
 
 /// Residuals times the weights of their marks.

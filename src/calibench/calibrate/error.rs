@@ -147,8 +147,9 @@ pub enum CalibrationError {
     BadLoss,
     /// A robust loss under which most marks count as outliers.
     #[error(
-        "the scale of the robust loss, {scale_px:e} px, lies far below the residuals, half of which exceed {median_px:.2e} px: noise would \
-         count as outliers, and the standard deviations would be wrong; use a scale of about {:.2e}", 2.0 * median_px
+        "the scale of the robust loss, {scale_px:e}, lies far below the residuals, half of which exceed {median_px:.2e} (px, or where marks \
+         have weights that of a mark of weight 1): noise would count as outliers, and the standard deviations would be wrong; use a scale of about {:.2e}",
+        2.0 * median_px
     )]
     NarrowLoss {
         /// Scale of the loss, px.

@@ -1,6 +1,7 @@
 //! How are many warnings said? One line a warning, and one for all of a kind that twelve parameters would repeat.
 
 use super::Warning;
+use super::report::reach;
 use crate::camera::Parameter;
 
 /// Of one kind this many stand in lines of their own; more are summed up.
@@ -59,9 +60,7 @@ fn all_skewed(skewed: &[(Parameter, [Option<f64>; 2])]) -> String {
     let names: Vec<&str> = skewed.iter().map(|(parameter, ..)| parameter.name()).collect();
     let ratios = || skewed.iter().flat_map(|(_, ratios)| ratios.map(|ratio| ratio.unwrap_or(f64::INFINITY)));
     let (least, most) = (ratios().fold(f64::INFINITY, f64::min), ratios().fold(0.0, f64::max));
-    let far = |ratio: f64| {
-        if ratio.is_finite() { format!("{ratio:.2} times as far") } else { "without end".to_string() }
-    };
+    let far = |ratio: f64| reach(Some(ratio).filter(|ratio| ratio.is_finite()));
     let reach = if least == most { far(most) } else { format!("{} to {}", far(least), far(most)) };
     format!(
         "the standard deviations of {} mislead: intervals of two of them truly reach {reach}; state intervals by the profile of the cost, \

@@ -44,11 +44,17 @@ const CHECKED_AT: f64 = 2.0;
 /// The intervals differ where a half-width does by more than this part.
 const TOLERATED: f64 = 0.1;
 /// Refits of an end.
-const REFITS: usize = 24;
+const REFITS: usize = 40;
+/// Those that go along secants, once the end lies between two values.
+const SECANTS: usize = 8;
 /// An end is found when `tau` is this close to `t`.
 const CLOSE: f64 = 1e-4;
 /// A `tau` so many times the wanted one is far off.
 const FAR_OFF: f64 = 10.0;
+/// Parts of a way between two of which the cost is looked at.
+const STEPS_OF_A_WAY: usize = 8;
+/// An end between two values that differ by less than this part is found.
+const LEAP: f64 = 1e-6;
 /// An end farther away than this many linear half-widths counts as open.
 const FARTHEST: f64 = 50.0;
 
@@ -73,6 +79,9 @@ pub(super) trait Profiled<const W: usize>: Descent<W> + Sized {
 
     /// The state with another value of a parameter, and what is tied to it.
     fn with_value(&self, state: Self::State, parameter: Parameter, value: f64) -> Self::State;
+
+    /// A parameter that lies where the model is not defined, and the limit that it is beyond.
+    fn beyond(state: &Self::State) -> Option<(Parameter, f64)>;
 }
 
 impl Profiled<N> for Problem<'_> {
@@ -90,6 +99,11 @@ impl Profiled<N> for Problem<'_> {
 
     fn with_value(&self, state: State, parameter: Parameter, value: f64) -> State {
         State { camera: tied(state.camera.with(parameter, value), self.fy_per_fx), ..state }
+    }
+
+    /// Its coefficients have no limits.
+    fn beyond(_: &State) -> Option<(Parameter, f64)> {
+        None
     }
 }
 
@@ -163,23 +177,39 @@ impl<'a, P: Profiled<W>, const W: usize> Profile<'a, P, W> {
         self.problem.free().iter().map(interval).collect()
     }
 
+    /// Whether `|tau|` stays within `most` on the way to a value `offset` away from the estimate: an interval of so many standard
+    /// deviations then goes on to there.
+    pub fn reaches(&self, parameter: Parameter, offset: f64, most: f64) -> bool {
+        let on_the_way = |step: usize| offset * step as f64 / STEPS_OF_A_WAY as f64;
+        (1..STEPS_OF_A_WAY).all(|step| self.tau_in_range(parameter, on_the_way(step)) <= most)
+    }
+
     fn deviation(&self, parameter: Parameter) -> f64 {
         let row = self.problem.free().position(parameter).expect("the parameter is free");
         self.covariance[(row, row)].sqrt() * self.noise.scale()
     }
 
     /// Where `|tau| = t`, starting from the linear end: secants through the estimate, which the profile makes
-    /// nearly straight.
+    /// nearly straight, and halves of what is left where it does not.
     fn end(&self, parameter: Parameter, linear: f64, t: f64) -> Option<f64> {
         let mut offset = linear;
-        for _ in 0..REFITS {
-            // Where another minimum costs less, the profile has not risen yet.
-            let tau = self.tau(parameter, offset).unwrap_or(0.0);
+        let (mut inside, mut outside) = (0.0, f64::INFINITY);
+        for refits in 1..=REFITS {
+            let tau = self.tau_in_range(parameter, offset);
             if (tau - t).abs() <= CLOSE * t {
                 return Some(offset);
             }
+            *if tau < t { &mut inside } else { &mut outside } = offset.abs();
+            // Where the cost leaps, as at the edge of what a lens sees, the interval ends there.
+            if outside - inside < LEAP * outside {
+                return Some(inside.copysign(linear));
+            }
             // A linear end that is absurdly far off has a cost without bound.
             offset *= if tau > FAR_OFF * t { 1.0 / FAR_OFF } else { (t / tau).clamp(0.4, 2.5) };
+            let is_between = inside < offset.abs() && offset.abs() < outside;
+            if !is_between || (refits > SECANTS && outside.is_finite()) {
+                offset = 0.5 * (inside + outside).copysign(linear);
+            }
             if offset.abs() > FARTHEST * linear.abs() {
                 return None;
             }
@@ -189,10 +219,51 @@ impl<'a, P: Profiled<W>, const W: usize> Profile<'a, P, W> {
 
     /// `|tau|` with `parameter` held `offset` away from its estimate; a state of lower cost if one is met.
     fn tau(&self, parameter: Parameter, offset: f64) -> Result<f64, Box<P::State>> {
-        let refitted = descend(&self.problem.holding(parameter), self.moved(parameter, offset));
+        self.tau_of(self.refitted(&self.problem.holding(parameter), parameter, offset))
+    }
+
+    /// The minimum with `parameter` held `offset` away from its estimate, from where all others follow it to first order. Where that
+    /// costs far more than deviations say, these are absurd: then also from where no other follows.
+    fn refitted(&self, problem: &P, parameter: Parameter, offset: f64) -> Minimum<P::State, W> {
+        let following = descend(problem, self.moved(parameter, offset));
+        let most = FAR_OFF * (offset / self.deviation(parameter)).powi(2) * self.noise.rise;
+        if following.system.cost - self.minimum.system.cost <= most {
+            return following;
+        }
+        let value = P::value(&self.minimum.state, parameter) + offset;
+        let alone = descend(problem, self.problem.with_value(self.minimum.state.clone(), parameter, value));
+        if alone.system.cost < following.system.cost || following.system.cost.is_nan() {
+            alone
+        } else {
+            following
+        }
+    }
+
+    /// The same where no parameter may leave the range in which the model is defined, if none is beyond it at the minimum: one that
+    /// would is held at its limit. Infinite where the one that is moved is beyond; 0 where another minimum costs less, as the profile has
+    /// not risen yet.
+    fn tau_in_range(&self, parameter: Parameter, offset: f64) -> f64 {
+        let mut problem = self.problem.holding(parameter);
+        let mut refitted = self.refitted(&problem, parameter, offset);
+        let is_bounded = P::beyond(&self.minimum.state).is_none();
+        while let Some((beyond, limit)) = P::beyond(&refitted.state).filter(|_| is_bounded) {
+            if !problem.free().contains(beyond) {
+                return f64::INFINITY;
+            }
+            problem = problem.holding(beyond);
+            refitted = descend(&problem, self.problem.with_value(refitted.state, beyond, limit));
+        }
+        self.tau_of(refitted).unwrap_or(0.0)
+    }
+
+    /// `|tau|` at a refit; infinite where no camera is.
+    fn tau_of(&self, refitted: Minimum<P::State, W>) -> Result<f64, Box<P::State>> {
         let rise = (refitted.system.cost - self.minimum.system.cost) / self.noise.rise;
         if rise < -LOWER {
             return Err(Box::new(refitted.state));
+        }
+        if rise.is_nan() {
+            return Ok(f64::INFINITY);
         }
         Ok(rise.max(0.0).sqrt())
     }

@@ -239,8 +239,13 @@ pub(super) fn digits(number: f64) -> String {
 }
 
 /// How far a true interval reaches, over the linear one.
-fn reach(ratio: Option<f64>) -> String {
-    ratio.map_or("without end".to_string(), |ratio| format!("{ratio:.2} times as far"))
+pub(super) fn reach(ratio: Option<f64>) -> String {
+    match ratio {
+        None => "without end".to_string(),
+        // Also where two standard deviations away there is no camera at all.
+        Some(ratio) if ratio < 0.01 => "less than 0.01 times as far".to_string(),
+        Some(ratio) => format!("{ratio:.2} times as far"),
+    }
 }
 
 /// A larger part of the marks than this goes astray by itself seldom.
@@ -330,10 +335,11 @@ impl fmt::Display for Warning {
             ),
             Warning::LeftOut { parameters, fall, probability } => {
                 let names: Vec<&str> = parameters.iter().map(|parameter| parameter.name()).collect();
+                let them = if names.len() == 1 { "it" } else { "them" };
                 write!(
                     f,
-                    "the marks ask for {}, which are held at 0: the cost would fall by {fall:.0} variances, by chance \
-                     with probability {probability:.1e}; estimate them too, as the other parameters make up for them",
+                    "the marks ask for {}, held at 0: the cost would fall by {fall:.0} variances, by chance \
+                     with probability {probability:.1e}; estimate {them} too, as the other parameters make up for {them}",
                     names.join(" and ")
                 )
             }

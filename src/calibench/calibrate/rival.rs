@@ -52,20 +52,33 @@ impl<L> Met<L> {
         rise: f64,
         value: impl Fn(&Camera<L>, Parameter) -> f64,
     ) -> Option<Rival> {
-        let apart = |other: &Met<L>| {
-            let differences = free.iter().enumerate().map(|(i, parameter)| {
-                let difference = (value(&other.camera, parameter) - value(&self.camera, parameter)).abs();
-                (parameter, difference / covariance[(i, i)].sqrt())
-            });
-            differences.max_by(|a, b| a.1.total_cmp(&b.1))
-        };
         let rivals = others.iter().filter(|other| other.converged).filter_map(|other| {
-            let excess = (other.cost - self.cost) / rise;
-            let (parameter, deviations) = apart(other)?;
+            let excess = self.excess(other, rise);
+            let (parameter, deviations) = self.apart(other, free, covariance, &value)?;
             let is_rival = excess < RIVALS && deviations > SAME;
             is_rival.then(|| Rival { parameter, value: value(&other.camera, parameter), excess })
         });
         rivals.min_by(Rival::nearer)
+    }
+
+    /// By how many variances another minimum costs more.
+    pub fn excess(&self, other: &Met<L>, rise: f64) -> f64 {
+        (other.cost - self.cost) / rise
+    }
+
+    /// The free parameter by which another minimum differs most, and by how many standard deviations.
+    pub fn apart(
+        &self,
+        other: &Met<L>,
+        free: FreeParameters,
+        covariance: &DMatrix<f64>,
+        value: impl Fn(&Camera<L>, Parameter) -> f64,
+    ) -> Option<(Parameter, f64)> {
+        let differences = free.iter().enumerate().map(|(i, parameter)| {
+            let difference = (value(&other.camera, parameter) - value(&self.camera, parameter)).abs();
+            (parameter, difference / covariance[(i, i)].sqrt())
+        });
+        differences.max_by(|a, b| a.1.total_cmp(&b.1))
     }
 }
 

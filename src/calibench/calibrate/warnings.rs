@@ -49,7 +49,7 @@ pub(super) fn of_lens(
     largest_angle: f64,
     of_residuals: Vec<Warning>,
     skewed: &[Skewed],
-    rival: Option<Rival>,
+    rivals: &[Rival],
 ) -> Vec<Warning> {
     let mut warnings = Vec::new();
     if calibration.termination != Termination::Converged {
@@ -83,7 +83,7 @@ pub(super) fn of_lens(
     }
     warnings.extend(Warning::outside_range(&calibration.camera));
     warnings.extend(not_linear(skewed));
-    warnings.extend(rival.map(|rival| ambiguous(&rival, value)));
+    warnings.extend(rivals.iter().map(|rival| ambiguous(rival, value)));
     warnings
 }
 

@@ -27,7 +27,7 @@ pub(super) fn counterpart(
     minimum: &Minimum<State, WIDTH>,
     unit: &DMatrix<f64>,
     noise: Noise,
-) -> Option<Rival> {
+) -> Option<(Rival, Camera<Lens>)> {
     use Parameter::{Alpha, Fx, Xi};
     if ![Fx, Xi, Alpha].into_iter().all(|parameter| problem.free.contains(parameter)) {
         return None;
@@ -49,7 +49,8 @@ pub(super) fn counterpart(
     let apart = (state.camera.fx - there.state.camera.fx).abs() / deviation(&unit, focal_length, noise);
     // Priors tell the two apart, pixels do not.
     let excess = (problem.cost(&state) - minimum.system.cost) / noise.rise;
-    (excess < RIVALS && apart > SAME).then_some(Rival { parameter: Fx, value: state.camera.fx, excess })
+    let rival = Rival { parameter: Fx, value: state.camera.fx, excess };
+    (excess < RIVALS && apart > SAME).then_some((rival, state.camera))
 }
 
 /// Standard deviation of a shared unknown.

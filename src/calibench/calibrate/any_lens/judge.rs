@@ -8,10 +8,9 @@ use super::super::rival::{Met, Rival};
 use super::super::system::Reduction;
 use super::super::tie::tied;
 use super::super::{CalibrationError, Warning, identifiability};
-use super::counterpart::counterpart;
 use super::problem::{Problem, ROUGH_GAIN, State};
-use super::{WIDTH, report, root, start, walk};
-use crate::camera::{Camera, FreeParameters, Lens, Parameter};
+use super::{WIDTH, report, rivals, root, start, walk};
+use crate::camera::{FreeParameters, Lens, Parameter};
 use nalgebra::SVector;
 
 /// A minimum with what is needed to state it.
@@ -24,8 +23,8 @@ pub(super) struct Judged {
     pub starts: usize,
     /// Parameters whose cost is no parabola.
     pub skewed: Vec<Skewed>,
-    /// Another camera that is nearly as good.
-    pub rival: Option<Rival>,
+    /// Other cameras that are nearly as good, the best first.
+    pub rivals: Vec<Rival>,
 }
 
 /// Minima that profiles may meet on their way before the search is left as it is.
@@ -66,13 +65,8 @@ pub(super) fn judge(
     if !Warning::is_outside_range(&minimum.state.camera) {
         met.retain(|other| !Warning::is_outside_range(&other.camera));
     }
-    let value = |camera: &Camera<Lens>, parameter| camera.value(parameter).unwrap_or(0.0);
-    let rival = reduction.intrinsics_covariance().and_then(|unit| {
-        let second = counterpart(problem, &minimum, &unit, noise);
-        let met = walk::met(&minimum).rival(&met, problem.free, &(unit * noise.variance), noise.rise, value);
-        second.into_iter().chain(met).min_by(Rival::nearer)
-    });
-    Ok(Judged { minimum, reduction, noise, starts, skewed, rival })
+    let rivals = rivals::of(problem, &minimum, &reduction, noise, &met, &skewed);
+    Ok(Judged { minimum, reduction, noise, starts, skewed, rivals })
 }
 
 /// Notes the minimum that a start leads to, and takes it where it is better: also once it is refined to the end, which
@@ -194,5 +188,13 @@ impl Profiled<WIDTH> for Problem<'_> {
         }
         state.camera = tied(state.camera, self.fy_per_fx);
         state
+    }
+
+    fn beyond(state: &State) -> Option<(Parameter, f64)> {
+        let limits = |(parameter, value): (Parameter, f64)| {
+            let (low, high) = parameter.defined_range();
+            (!parameter.is_defined_at(value)).then(|| (parameter, if value < low { low } else { high }))
+        };
+        state.camera.values().find_map(limits)
     }
 }

@@ -23,6 +23,7 @@ mod radial;
 mod rays;
 mod report;
 mod resection;
+mod rivals;
 mod root;
 mod shape;
 mod start;

@@ -123,7 +123,7 @@ pub(super) fn report(
     region: [Vec2; 2],
     settings: &Settings,
 ) -> Result<LensCalibration, CalibrationError> {
-    let Judged { minimum, reduction, noise, starts, skewed, rival } = judged;
+    let Judged { minimum, reduction, noise, starts, skewed, rivals } = judged;
     let Minimum { state, system, termination, iterations } = &minimum;
     let residuals = Residuals::of(problem, state);
     let freedom = residuals.freedom(&minimum, problem.settled(system));
@@ -185,7 +185,7 @@ pub(super) fn report(
         residuals: residuals.plain,
     };
     let largest_angle = largest_angle(problem, state);
-    calibration.warnings = warnings::of_lens(&calibration, largest_angle, of_residuals, &skewed, rival);
+    calibration.warnings = warnings::of_lens(&calibration, largest_angle, of_residuals, &skewed, &rivals);
     Ok(calibration)
 }
 

@@ -1,0 +1,86 @@
+//! Which other cameras explain the data nearly as well?
+//!
+//! A minimum that the search met is another camera where it lies so many standard deviations away that it cannot be the same one.
+//! Where the cost is no parabola deviations may be absurdly wide, and there the profile tells: with the focal length held on the way from one
+//! camera to the other the cost rises so far that an interval of two standard deviations ends before (Bates & Watts 1988, section 6.1).
+
+use super::super::intervals::{Profile, Skewed};
+use super::super::minimise::Minimum;
+use super::super::noise::Noise;
+use super::super::rival::{Met, RIVALS, Rival, SAME};
+use super::super::system::Reduction;
+use super::counterpart::counterpart;
+use super::problem::{Problem, State};
+use super::{WIDTH, walk};
+use crate::camera::{Camera, Lens, Parameter};
+
+/// Standard deviations of the intervals that end before another camera.
+const INTERVAL: f64 = 2.0;
+/// Cameras whose values differ by less than this part are taken for one.
+const ONE_CAMERA: f64 = 0.02;
+/// Cameras that are named at most.
+const MOST_NAMED: usize = 3;
+
+/// Other cameras among those that were met, the best first; `skewed` are the parameters whose cost is no parabola.
+pub(super) fn of(
+    problem: &Problem<'_>,
+    minimum: &Minimum<State, WIDTH>,
+    reduction: &Reduction<WIDTH>,
+    noise: Noise,
+    met: &[Met<Lens>],
+    skewed: &[Skewed],
+) -> Vec<Rival> {
+    let Some(unit) = reduction.intrinsics_covariance() else { return Vec::new() };
+    let second = counterpart(problem, minimum, &unit, noise);
+    let profile = Profile::new(problem, minimum, reduction, noise).filter(|_| !skewed.is_empty());
+    let (best, covariance) = (walk::met(minimum), unit * noise.variance);
+    let mut others: Vec<&Met<Lens>> =
+        met.iter().filter(|other| other.converged && best.excess(other, noise.rise) < RIVALS).collect();
+    others.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let mut named: Vec<(Rival, Camera<Lens>)> = second.into_iter().collect();
+    let mut reached: Vec<Camera<Lens>> = Vec::new();
+    for other in others {
+        let camera = &other.camera;
+        if named.iter().any(|(_, known)| is_one_camera(known, camera)) {
+            continue;
+        }
+        let apart = best.apart(other, problem.free, &covariance, value);
+        let mut parameter =
+            apart.filter(|(_, deviations)| *deviations > SAME).map(|(parameter, _)| parameter);
+        if parameter.is_none() && !reached.iter().any(|known| is_one_camera(known, camera)) {
+            let ends =
+                profile.as_ref().is_some_and(|profile| ends_before(profile, problem, &best.camera, camera));
+            parameter = ends.then_some(Parameter::Fx);
+            reached.extend((!ends).then_some(*camera));
+        }
+        let excess = best.excess(other, noise.rise);
+        named.extend(parameter.map(|p| (Rival { parameter: p, value: value(camera, p), excess }, *camera)));
+    }
+    named.sort_by(|(a, _), (b, _)| a.nearer(b));
+    named.into_iter().map(|(rival, _)| rival).take(MOST_NAMED).collect()
+}
+
+/// Whether the interval of the focal length ends before another camera's.
+fn ends_before(
+    profile: &Profile<'_, Problem<'_>, WIDTH>,
+    problem: &Problem<'_>,
+    best: &Camera<Lens>,
+    other: &Camera<Lens>,
+) -> bool {
+    problem.free.contains(Parameter::Fx)
+        && differ(best.fx, other.fx)
+        && !profile.reaches(Parameter::Fx, other.fx - best.fx, INTERVAL)
+}
+
+fn value(camera: &Camera<Lens>, parameter: Parameter) -> f64 {
+    camera.value(parameter).unwrap_or(0.0)
+}
+
+/// Cameras whose focal lengths agree are one to whom they are named; where these are held, the best of the others is.
+fn is_one_camera(a: &Camera<Lens>, b: &Camera<Lens>) -> bool {
+    !differ(a.fx, b.fx) && !differ(a.fy, b.fy)
+}
+
+fn differ(a: f64, b: f64) -> bool {
+    (a - b).abs() > ONE_CAMERA * a.abs().max(b.abs())
+}
