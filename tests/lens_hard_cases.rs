@@ -3,8 +3,8 @@
 
 use calibench::board::View;
 use calibench::calibrate::{
-    Board, CalibrationError, Candidate, Outliers, Settings, Warning, calibrate_lens, compare_models,
-    explaining_freedoms,
+    Board, CalibrationError, Candidate, LensCalibration, Outliers, Settings, Warning, calibrate_lens,
+    compare_models, explaining_freedoms,
 };
 use calibench::camera::{Camera, Lens, Model, Parameter};
 use calibench::geometry::{Pose, Vec2, Vec3, rotation};
@@ -302,4 +302,75 @@ fn a_double_sphere_in_its_range_is_preferred_to_one_out_of_it() {
             );
         }
     }
+}
+
+/// Sets of few views with wide double spheres, in which xi, alpha and the focal length are hardly told apart.
+fn wide_spheres() -> Vec<Vec<View>> {
+    let truths = [(0.5, 0.5), (0.7, 0.5), (0.7, 0.6), (0.85, 0.55)];
+    let set = |(xi, alpha): (f64, f64), count: u32| {
+        let truth = camera(Model::DoubleSphere, 500.0, 505.0, &[xi, alpha]);
+        seen(&truth, &poses(count, 90.0), |_| board(), 0.0)
+    };
+    truths.into_iter().flat_map(|truth| (4..8).map(move |count| set(truth, count))).collect()
+}
+
+/// By how many variances a fit costs more than another to the same marks.
+fn excess(held: &LensCalibration, least: &LensCalibration) -> f64 {
+    let square = held.rmse_px * held.rmse_px - least.rmse_px * least.rmse_px;
+    square * least.points() as f64 / (least.sigma_px * least.sigma_px)
+}
+
+fn tells(found: &LensCalibration, of_kind: impl Fn(&Warning) -> bool) -> bool {
+    found.warnings.iter().any(of_kind)
+}
+
+/// What the covariance of a wide double sphere says of its focal length may be absurd. The ends of the profile are in the model's range, and
+/// there a calibration with the focal length held costs what the interval says, or less where another camera is told. Whatever else explains
+/// the marks is within the interval, or told.
+#[test]
+fn other_double_spheres_are_within_the_interval_or_told_however_absurd_deviations_are() {
+    let (mut sets, mut absurd, mut others) = (0, 0, 0);
+    for views in wide_spheres() {
+        let settings = settings(Model::DoubleSphere);
+        let found = calibrate_lens(&views, &settings.clone().with_profile_intervals(0.95)).unwrap();
+        for interval in &found.intervals {
+            for end in [interval.low, interval.high].into_iter().flatten() {
+                assert!(interval.parameter.is_defined_at(end), "set {sets}: {interval:?}");
+            }
+        }
+        let interval = found.intervals.iter().find(|interval| interval.parameter == Parameter::Fx).unwrap();
+        let (Some(low), Some(high)) = (interval.low, interval.high) else {
+            panic!("set {sets}: {interval:?}")
+        };
+        let another_is_told = tells(&found, |w| matches!(w, Warning::Ambiguous { .. }));
+        let held = |fx: f64| calibrate_lens(&views, &settings.clone().hold(Parameter::Fx, fx)).ok();
+        let is_possible = |fit: &LensCalibration| !tells(fit, |w| matches!(w, Warning::OutsideRange { .. }));
+        for end in [low, high] {
+            let fit = held(end).unwrap();
+            // A quantile of Student's distribution with hundreds of degrees of freedom.
+            let t = excess(&fit, &found).max(0.0).sqrt() / 1.964;
+            assert!(
+                (0.98..1.02).contains(&t) || (t < 1.0 && (another_is_told || !is_possible(&fit))),
+                "set {sets}: {interval:?}: {t}"
+            );
+        }
+        for step in 0..40 {
+            let fx = found.camera.fx * (0.4 + 0.045 * f64::from(step));
+            let explains = held(fx).is_some_and(|fit| is_possible(&fit) && excess(&fit, &found) < 3.5);
+            if explains && !(low..=high).contains(&fx) {
+                assert!(
+                    another_is_told,
+                    "set {sets}: {fx} explains the marks: {interval:?} {:?}",
+                    found.warnings
+                );
+                others += 1;
+            }
+        }
+        absurd += usize::from(found.standard_deviation(Parameter::Fx).unwrap() > found.camera.fx);
+        sets += 1;
+    }
+    assert!(
+        absurd > 0 && others > 0,
+        "of {sets} sets {absurd} have absurd deviations, {others} values are another camera's"
+    );
 }
