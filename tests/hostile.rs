@@ -480,6 +480,13 @@ fn a_camera_whose_numbers_overflow_is_no_camera_in_any_verb() {
         refused(&folder, &["undistort", "--camera", "absurd.json", "photo.png", "--out", "out"], &words);
         refused(&folder, &["convert", "absurd.json", "out.yaml", "--to", "ros"], &words);
     }
+    let beyond = r#"{"camera": {"model": "double-sphere", "fx": 300, "fy": 300, "cx": 320, "cy": 240, "xi": 0, "alpha": 1.1}, "image_size": [640, 480]}"#;
+    fs::write(folder.join("beyond.json"), beyond).expect("written");
+    refused(
+        &folder,
+        &["convert", "beyond.json", "out.yaml", "--to", "kalibr"],
+        &["alpha = 1.1", "from 0 to 1"],
+    );
     let yaml =
         "%YAML:1.0\n---\ncamera_matrix: [600., 0., 1e300, 0., 600., 240., 0., 0., 1.]\nD: [0., 0., 0., 0.]\n";
     fs::write(folder.join("far.yaml"), yaml).expect("written");
@@ -519,6 +526,19 @@ fn wrong_usage_brings_no_escape_sequence_to_a_terminal() {
         let said = text(&output.stderr);
         assert!(said.starts_with("error: invalid value") && !said.contains(['\u{1b}', '\u{9b}']), "{said:?}");
     }
+    // Nor does it begin a line.
+    for toml in [
+        "board = \"cir\\nerror: all lost:9x7\"\ndrawn_mm = [1, 1]\nmeasured_mm = [1, 1]\n",
+        "\"a\\nerror: all lost\" = 1\n",
+    ] {
+        fs::write(folder.join("board.toml"), toml).expect("written");
+        let said = text(&within(PATIENCE, &folder, &["calibrate", "--board", "board.toml", "a.png"]).stderr);
+        assert!(said.contains("\\u000aerror: all lost") && !said.contains("\nerror: all lost"), "{said}");
+    }
+    let named = r#"{"name": "a\nerror: all lost", "camera": {"fx": 600, "fy": 600, "cx": 320, "cy": 240}, "image_size": [640, 480]}"#;
+    fs::write(folder.join("named.json"), named).expect("written");
+    let said = text(&limited(&folder, &["convert", "named.json", "out.yaml", "--to", "kalibr"]).stdout);
+    assert!(said.contains("\\u000aerror: all lost") && !said.contains("\nerror: all lost"), "{said}");
 }
 
 #[test]
@@ -563,4 +583,32 @@ fn options_say_what_they_expect_in_place_of_a_negative_number() {
         &["/dev/null", "name another place"],
     );
     refused(&folder, &["calibrate", "--board", "chess:9x6:-1", "a.png"], &["do not make a board"]);
+}
+
+/// What is computed from numbers within all limits may be beyond numbers all the same: it is refused, and not told as NaN.
+#[test]
+fn a_length_beyond_numbers_and_one_of_no_place_are_refused() {
+    let folder = folder("no-length");
+    fs::write(folder.join("c.csv"), corner_file()).expect("written");
+    let calibrated = limited(&folder, &["calibrate", "c.csv", "--image-size", "640x480", "--out", "r"]);
+    assert_eq!(calibrated.status.code(), Some(0));
+    let measure =
+        |rest: &[&'static str]| [&["measure", "r/result.json", "--pixels", "200,200,300,250"], rest].concat();
+    let cases: [(&[&str], &str); 5] = [
+        (&["--pose", "0,0,0,0,0,100", "--mark-sd", "1e300"], "a number from 0 to 1e30"),
+        (&["--pose", "0,0,0,0,0,1e150"], "6 numbers of at most 1e30"),
+        (&["--pose", "0,0,0,0,0,100", "--pose-sd", "1e200,0,0,0,0,0"], "6 numbers from 0 to 1e30"),
+        (&["--pose", "0,0,0,0,0,100", "--pose-sd", "-1,0,0,0,0,0"], "6 numbers from 0 to 1e30"),
+        (&["--pose", "1.5707963267948966,0,0,0,0,100"], "the plane goes through the camera's centre"),
+    ];
+    for (rest, word) in cases {
+        refused(&folder, &measure(rest), &[word]);
+    }
+    // Some materials shrink when they are heated.
+    let shrinks = measure(&["--pose", "0,0,0,0,0,100", "--temperature-sd", "2", "--expansion", "-1e-6"]);
+    assert_eq!(limited(&folder, &shrinks).status.code(), Some(0));
+    let history = format!("when,value\n{}", "a,25\n".repeat(100_001));
+    fs::write(folder.join("history.csv"), history).expect("written");
+    let check = ["check-reference", "history.csv", "--reference", "25", "--sd", "0.1"];
+    refused(&folder, &check, &["100001 checks, and the limit is 100000"]);
 }

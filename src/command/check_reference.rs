@@ -6,7 +6,9 @@ use super::said::{MOST, number_that, positive, written_by};
 use super::{Exit, print, warn};
 use calibench::downstream::control::{Ewma, Rule, Shewhart};
 use calibench::io::input::{MOST_TABLE_BYTES, read_regular};
-use calibench::io::{Check, keep_files, parse_checks, significant, write_atomically, write_together};
+use calibench::io::{
+    Check, ShownPath, keep_files, parse_checks, significant, write_atomically, write_together,
+};
 use calibench_harness::{Figure, Look, Plot};
 use clap::Args;
 use serde_json::{Value, json};
@@ -85,6 +87,14 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
             return Exit::Usage;
         }
     };
+    if checks.len() > MOST_CHECKS {
+        warn(&format!(
+            "{}: {} checks, and the limit is {MOST_CHECKS}: calibrate, and begin a new history",
+            arguments.history.shown(),
+            checks.len()
+        ));
+        return Exit::Usage;
+    }
     let judged = Judged::of(arguments, checks);
     let json = format!("{:#}\n", judged.json(arguments));
     if let Err(error) = write_files(arguments, &text, &json, &judged) {
@@ -97,6 +107,9 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
     }
     if judged.first_alarm().is_some() { Exit::Deviates } else { Exit::Held }
 }
+
+/// Checks of a history: one a minute for two months. Each is kept, drawn and told.
+const MOST_CHECKS: usize = 100_000;
 
 /// The columns of a history that this command begins.
 const HEADER: &str = "when,value";

@@ -9,6 +9,7 @@ use calibench::io::formats::{
     format_of_name, read_camera_file,
 };
 use calibench::io::input::{read_regular, replaceable};
+use calibench::io::shown::on_one_line;
 use calibench::io::{parse_corners, significant, table, write_atomically};
 use calibench::photos::{BoardSpec, MarkKind};
 use clap::Args;
@@ -124,7 +125,7 @@ impl Converted {
         for (word, lines) in [("read", &self.noted), ("converted", &self.converted), ("lost", &self.lost)] {
             for line in lines {
                 // Writing to a string cannot fail.
-                let _ = writeln!(text, "{word}: {line}");
+                let _ = writeln!(text, "{word}: {}", on_one_line(line));
             }
         }
         if let Some(px) = self.read_back_px {

@@ -3,7 +3,7 @@
 use super::Exit;
 use super::calibrate::Format;
 use super::report::table;
-use super::said::{Said, number_that, positive, say, written_by};
+use super::said::{MOST, Said, number_that, positive, say, written_by};
 use calibench::camera::Camera;
 use calibench::downstream::{Cause, Conditions, Length, PlaneView, length_in_view, length_on_map};
 use calibench::geometry::{Pose, Vec2, Vec3, rotation};
@@ -28,7 +28,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "RX,RY,RZ,X,Y,Z", value_parser = parse_pose, allow_hyphen_values = true)]
     pose: Option<Numbers<6>>,
     /// Standard deviations of that pose, independent of the camera's errors [default: 0]
-    #[arg(long, value_name = "RX,RY,RZ,X,Y,Z", value_parser = parse_pose, requires = "pose")]
+    #[arg(long, value_name = "RX,RY,RZ,X,Y,Z", value_parser = parse_pose_sd, allow_hyphen_values = true, requires = "pose")]
     pose_sd: Option<Numbers<6>>,
     /// Pixels at both ends of a length, such as 100.5,200,300,201.2; may be repeated
     #[arg(long, value_name = "U1,V1,U2,V2", value_parser = parse_ends, allow_hyphen_values = true)]
@@ -55,7 +55,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "K", value_parser = parse_deviation, requires = "expansion")]
     temperature_sd: Option<f64>,
     /// Expansion of the board, 1/K, such as 11.5e-6 for steel
-    #[arg(long, value_name = "PER_K", value_parser = parse_deviation, requires = "temperature_sd")]
+    #[arg(long, value_name = "PER_K", value_parser = parse_expansion, allow_hyphen_values = true, requires = "temperature_sd")]
     expansion: Option<f64>,
     /// Folder for lengths.json
     #[arg(long, value_name = "DIR")]
@@ -69,16 +69,21 @@ pub(super) struct Arguments {
 type Numbers<const N: usize> = nalgebra::SVector<f64, N>;
 
 fn parse_numbers<const N: usize>(text: &str) -> Result<Numbers<N>, String> {
-    let number = |part: &str| part.trim().parse().ok().filter(|x: &f64| x.is_finite());
+    let number = |part: &str| part.trim().parse().ok().filter(|x: &f64| x.abs() <= MOST);
     let numbers: Option<Vec<f64>> = text.split(',').map(number).collect();
     numbers
         .filter(|numbers| numbers.len() == N)
         .map(|numbers| Numbers::from_row_slice(&numbers))
-        .ok_or_else(|| format!("expected {N} numbers separated by commas"))
+        .ok_or_else(|| format!("expected {N} numbers of at most 1e30, separated by commas"))
 }
 
 fn parse_pose(text: &str) -> Result<Numbers<6>, String> {
     parse_numbers(text)
+}
+
+fn parse_pose_sd(text: &str) -> Result<Numbers<6>, String> {
+    let deviations = parse_numbers(text).ok().filter(|numbers| numbers.min() >= 0.0);
+    deviations.ok_or_else(|| "expected 6 numbers from 0 to 1e30, separated by commas".into())
 }
 
 fn parse_ends(text: &str) -> Result<Numbers<4>, String> {
@@ -86,7 +91,12 @@ fn parse_ends(text: &str) -> Result<Numbers<4>, String> {
 }
 
 fn parse_deviation(text: &str) -> Result<f64, String> {
-    number_that(text, |x| x >= 0.0, "a number of 0 or more")
+    number_that(text, |x| (0.0..=MOST).contains(&x), "a number from 0 to 1e30")
+}
+
+/// Some materials shrink when they are heated.
+fn parse_expansion(text: &str) -> Result<f64, String> {
+    number_that(text, |x| x.abs() <= MOST, "a number of at most 1e30, such as 11.5e-6")
 }
 
 pub(super) fn run(arguments: &Arguments) -> Exit {
@@ -171,6 +181,11 @@ fn each(
 ) -> Result<Vec<Measured>, String> {
     let measure = |PixelEnds { name, pixels }: PixelEnds| {
         let length = length(&pixels).map_err(|error| format!("length {name}: {error}"))?;
+        if !(length.value.is_finite() && length.standard_uncertainty().is_finite()) {
+            return Err(format!(
+                "length {name}: it or its uncertainty is beyond all numbers: look at the pose and the deviations"
+            ));
+        }
         Ok(Measured { name, pixels, length })
     };
     ends.into_iter().map(measure).collect()
@@ -238,7 +253,8 @@ impl Noise {
             scale: arguments.scale_sd,
             flatness: arguments.flatness,
             temperature_k: arguments.temperature_sd.unwrap_or(0.0),
-            expansion_per_k: arguments.expansion.unwrap_or(0.0),
+            // Either way it makes as much of a length's variance.
+            expansion_per_k: arguments.expansion.unwrap_or(0.0).abs(),
             ..Conditions::marks(arguments.mark_sd.unwrap_or(self.sigma_px))
         }
     }

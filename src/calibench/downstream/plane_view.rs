@@ -6,6 +6,9 @@ use crate::camera::{Camera, UndistortError, project_with_jacobian};
 use crate::geometry::{Pose, Vec2, Vec3};
 use nalgebra::{DMatrix, Matrix2, Matrix2x3, RowDVector, SMatrix};
 
+/// A camera nearer to a plane than this part of its distance from the plane's origin lies in it: rounding leaves as much.
+const IN_THE_PLANE: f64 = 1e-12;
+
 /// Why a pixel shows no point of the plane.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -28,6 +31,9 @@ pub enum PlaneViewError {
         /// v, px.
         v: f64,
     },
+    /// The camera's centre lies in the plane, which it sees as a line.
+    #[error("the plane goes through the camera's centre: it shows no places of it")]
+    ThroughCamera,
     /// There is no such view.
     #[error("view {view} of {views}: there is none")]
     NoSuchView {
@@ -108,7 +114,7 @@ impl PlaneView {
     /// The point of the plane that a pixel shows, in the target's unit.
     ///
     /// # Errors
-    /// [`PlaneViewError::OutsideLens`], [`PlaneViewError::BehindHorizon`].
+    /// [`PlaneViewError::OutsideLens`], [`PlaneViewError::BehindHorizon`], [`PlaneViewError::ThroughCamera`].
     pub fn point(&self, pixel: &Vec2) -> Result<Vec2, PlaneViewError> {
         let (u, v) = (pixel.x, pixel.y);
         let ray =
@@ -116,6 +122,9 @@ impl PlaneView {
         let plane_from_cam = self.cam_from_plane.inverse();
         let (centre, along) =
             (plane_from_cam.translation, plane_from_cam.rotation * Vec3::new(ray.x, ray.y, 1.0));
+        if centre.z.abs() <= IN_THE_PLANE * centre.norm() {
+            return Err(PlaneViewError::ThroughCamera);
+        }
         let depth = -centre.z / along.z;
         if !(depth > 0.0 && depth.is_finite()) {
             return Err(PlaneViewError::BehindHorizon { u, v });

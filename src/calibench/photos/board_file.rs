@@ -16,12 +16,14 @@ const SCALES: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BoardFileError {
-    /// It is not the TOML that `calibench board` writes; the message has line and column.
-    #[error("{file}: {message}")]
+    /// It is not the TOML that `calibench board` writes.
+    #[error("{file}:{line}: {message}")]
     Syntax {
         /// The file.
         file: String,
-        /// What is wrong, and where.
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong.
         message: String,
     },
     /// The board in it does not exist.
@@ -87,8 +89,11 @@ struct File {
 /// ```
 pub fn parse_board_file(name: &str, text: &str) -> Result<BoardSpec, BoardFileError> {
     let file = || name.to_string();
-    let read: File = toml::from_str(text)
-        .map_err(|error| BoardFileError::Syntax { file: file(), message: error.to_string() })?;
+    let read: File = toml::from_str(text).map_err(|error| {
+        let before = error.span().map_or("", |span| &text[..span.start]);
+        let line = before.matches('\n').count() + 1;
+        BoardFileError::Syntax { file: file(), line, message: error.message().trim().to_string() }
+    })?;
     let drawn: BoardSpec =
         read.board.parse().map_err(|reason| BoardFileError::Board { file: file(), reason })?;
     let scale = |i: usize| {

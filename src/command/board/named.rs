@@ -1,6 +1,7 @@
 //! A board as it is named on the command line: by words, or by the file that lies beside a printed page.
 
 use calibench::io::input::{MOST_TABLE_BYTES, read_regular};
+use calibench::io::shown::on_one_line;
 use calibench::photos::{BoardSpec, BoardSpecError, parse_board_file};
 use std::path::Path;
 
@@ -18,7 +19,9 @@ pub(in super::super) fn board_or_file(text: &str) -> Result<BoardSpec, String> {
         });
     }
     let bytes = read_regular(Path::new(text), MOST_TABLE_BYTES).map_err(|error| error.to_string())?;
-    parse_board_file(text, &String::from_utf8_lossy(&bytes)).map_err(|error| error.to_string())
+    // What stands in the file begins no line of the parser's message.
+    parse_board_file(text, &String::from_utf8_lossy(&bytes))
+        .map_err(|error| on_one_line(&error.to_string()).into_owned())
 }
 
 /// The file of a page: what was drawn, and what its owner will measure.

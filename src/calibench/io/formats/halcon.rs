@@ -167,7 +167,7 @@ fn nearest(
         &lens::camera(linear, lens),
         &rays.into_iter().zip(pixels).collect::<Vec<_>>(),
     );
-    Some((lens, error))
+    error.is_finite().then_some((lens, error))
 }
 
 /// The polynomial of a file, if it has one.
@@ -233,6 +233,9 @@ fn division(lens: &Lens) -> Option<f64> {
 }
 
 /// K1, K2, K3, P1, P2 in units of the focal length, and the largest error, px.
+/// Why a fit is none.
+const FAR: &str = "no lens there comes near it over the frame";
+
 fn inverse_polynomial(
     camera: &Camera<Lens>,
     size: (usize, usize),
@@ -254,10 +257,14 @@ fn inverse_polynomial(
         }
     }
     let Some(fit) = fitted::polynomial(&pairs) else {
-        return refuse("no lens there comes near it over the frame".into());
+        return refuse(FAR.into());
     };
     let by_halcon: Vec<(Vec2, Vec2)> =
         fitted::frame(size).map(|pixel| (fit.distort(&seen(&pixel)), pixel)).collect();
     let BrownConrady { k1, k2, p1, p2, k3 } = fit;
-    Ok(([k1, k2, k3, p2, p1], fitted::largest_error_px(camera, &by_halcon)))
+    let error_px = fitted::largest_error_px(camera, &by_halcon);
+    if !error_px.is_finite() {
+        return refuse(FAR.into());
+    }
+    Ok(([k1, k2, k3, p2, p1], error_px))
 }

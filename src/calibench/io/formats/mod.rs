@@ -33,7 +33,7 @@ pub use kalibr::{AprilTarget, ChessTarget, KalibrTarget, parse_target, target_te
 pub use vnl::{VnlBoard, corner_text, looks_like_vnl, parse_vnl, vnl_text};
 
 use super::plausible::implausible;
-use crate::camera::Model;
+use crate::camera::{Model, Parameter};
 use crate::geometry::Vec3;
 use node::Source;
 
@@ -288,6 +288,18 @@ fn refuse_what_has_no_room(format: &Format, camera: &CameraFile) -> Result<(), F
     let lens = camera.camera.distortion.model();
     if let Some(reason) = implausible(&camera.camera) {
         return refuse("this camera", &reason);
+    }
+    let is_outside = |(parameter, value): &(Parameter, f64)| !parameter.is_defined_at(*value);
+    if let Some((parameter, value)) = camera.camera.values().find(is_outside)
+        && format.of != calibench::FORMAT.of
+    {
+        let (low, high) = parameter.defined_range();
+        return refuse(
+            &format!("{parameter} = {value}"),
+            &format!(
+                "the model is defined from {low} to {high}; calibrate with another --model, or hold it (--fix)"
+            ),
+        );
     }
     if !room.lenses.contains(&lens) {
         let held: Vec<&str> = room.lenses.iter().map(|model| model.name()).collect();
