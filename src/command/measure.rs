@@ -82,7 +82,7 @@ fn parse_pose(text: &str) -> Result<Numbers<6>, String> {
 }
 
 fn parse_pose_sd(text: &str) -> Result<Numbers<6>, String> {
-    let deviations = parse_numbers(text).ok().filter(|numbers| numbers.min() >= 0.0);
+    let deviations = parse_numbers(text).ok().filter(|numbers: &Numbers<6>| numbers.min() >= 0.0);
     deviations.ok_or_else(|| "expected 6 numbers from 0 to 1e30, separated by commas".into())
 }
 
