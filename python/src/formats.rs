@@ -71,7 +71,8 @@ fn camera_file<'py>(py: Python<'py>, format: &str, read: &CameraFile) -> PyResul
     fields.set_item("format", format)?;
     fields.set_item("image_size", read.image_size)?;
     fields.set_item("name", &read.name)?;
-    fields.set_item("notes", PyTuple::new(py, read.notes.iter().chain(&read.assumed))?)?;
+    let notes: Vec<&String> = read.notes.iter().chain(&read.assumed).collect();
+    fields.set_item("notes", PyTuple::new(py, notes)?)?;
     if let Some(estimated) = &read.estimated {
         fields.set_item("free", names(py, estimated.free)?)?;
         fields.set_item("covariance", of_matrix(py, &estimated.covariance)?)?;
