@@ -34,6 +34,7 @@ mod hard_sets;
 mod hostile;
 mod hostile_files;
 mod hostile_solvers;
+mod hostile_text;
 mod json_forms;
 mod laboratory;
 mod layout;

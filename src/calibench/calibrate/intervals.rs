@@ -49,7 +49,7 @@ const REFITS: usize = 40;
 const SECANTS: usize = 8;
 /// An end is found when `tau` is this close to `t`.
 const CLOSE: f64 = 1e-4;
-/// A `tau` so many times the wanted one is far off.
+/// A `tau` so many times the wanted one is far off, and so is a rise so many times what deviations say.
 const FAR_OFF: f64 = 10.0;
 /// Parts of a way between two of which the cost is looked at.
 const STEPS_OF_A_WAY: usize = 8;
@@ -239,7 +239,7 @@ impl<'a, P: Profiled<W>, const W: usize> Profile<'a, P, W> {
         }
     }
 
-    /// The same where no parameter may leave the range in which the model is defined, if none is beyond it at the minimum: one that
+    /// `|tau|` where no parameter may leave the range in which the model is defined, if none is beyond it at the minimum: one that
     /// would is held at its limit. Infinite where the one that is moved is beyond; 0 where another minimum costs less, as the profile has
     /// not risen yet.
     fn tau_in_range(&self, parameter: Parameter, offset: f64) -> f64 {

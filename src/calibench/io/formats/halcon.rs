@@ -232,10 +232,10 @@ fn division(lens: &Lens) -> Option<f64> {
     }
 }
 
-/// K1, K2, K3, P1, P2 in units of the focal length, and the largest error, px.
 /// Why a fit is none.
 const FAR: &str = "no lens there comes near it over the frame";
 
+/// K1, K2, K3, P1, P2 in units of the focal length, and the largest error, px.
 fn inverse_polynomial(
     camera: &Camera<Lens>,
     size: (usize, usize),

@@ -1,0 +1,100 @@
+//! What is said of input that nobody means well, or that is of another form? What it is and what was likely meant, in words that command no
+//! terminal and begin no line of their own.
+#![cfg(target_os = "linux")]
+
+use crate::hostile::{CALIBENCH, PATIENCE, limited, refused, within};
+use crate::program::{folder, text};
+use std::fs;
+use std::process::Command;
+
+/// A file that was cut off behind its matrix looks like one of an ideal lens.
+#[test]
+fn a_lens_that_had_to_be_assumed_is_said_where_errors_are() {
+    let folder = folder("assumed-lens");
+    let yaml = "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: [600., 0., 320., 0., 600., 240., 0., 0., 1.]\n";
+    fs::write(folder.join("cut.yaml"), yaml).expect("written");
+    for verb in [["diff", "cut.yaml", "cut.yaml"], ["convert", "cut.yaml", "camera.json"]] {
+        let output = limited(&folder, &verb);
+        assert_eq!(output.status.code(), Some(0));
+        assert!(
+            text(&output.stderr).contains("cut.yaml: no distortion coefficients stand in the file"),
+            "{verb:?}"
+        );
+    }
+}
+
+/// Whoever sends a file or gives it a name does not colour, move or clear a terminal by the message on it.
+#[test]
+fn wrong_usage_brings_no_escape_sequence_to_a_terminal() {
+    let folder = folder("escapes");
+    fs::write(folder.join("board.toml"), "board = \n\u{1b}[2J\u{1b}[31mall held\u{9b}1m = 5\n")
+        .expect("written");
+    for arguments in
+        [["calibrate", "--board", "board.toml"], ["calibrate", "--board", "\u{1b}[2Jchess\u{9b}31m"]]
+    {
+        // As on a terminal.
+        let mut command = Command::new(CALIBENCH);
+        command.args(arguments).arg("a.png").env("CLICOLOR_FORCE", "1").current_dir(&folder);
+        let output = command.output().expect("the program starts");
+        assert_eq!(output.status.code(), Some(2));
+        let said = text(&output.stderr);
+        assert!(said.starts_with("error: invalid value") && !said.contains(['\u{1b}', '\u{9b}']), "{said:?}");
+    }
+    // Nor does it begin a line.
+    for toml in [
+        "board = \"cir\\nerror: all lost:9x7\"\ndrawn_mm = [1, 1]\nmeasured_mm = [1, 1]\n",
+        "\"a\\nerror: all lost\" = 1\n",
+    ] {
+        fs::write(folder.join("board.toml"), toml).expect("written");
+        let said = text(&within(PATIENCE, &folder, &["calibrate", "--board", "board.toml", "a.png"]).stderr);
+        assert!(said.contains("\\u000aerror: all lost") && !said.contains("\nerror: all lost"), "{said}");
+    }
+    let named = r#"{"name": "a\nerror: all lost", "camera": {"fx": 600, "fy": 600, "cx": 320, "cy": 240}, "image_size": [640, 480]}"#;
+    fs::write(folder.join("named.json"), named).expect("written");
+    let said = text(&limited(&folder, &["convert", "named.json", "out.yaml", "--to", "kalibr"]).stdout);
+    assert!(said.contains("\\u000aerror: all lost") && !said.contains("\nerror: all lost"), "{said}");
+}
+
+#[test]
+fn what_is_likely_meant_is_said_of_tables_of_another_form() {
+    let folder = folder("other-tables");
+    let swapped: String = (0..6).map(|i| format!("mark,{i},0,0,{i},5\n")).collect();
+    let header = "view,point,X,Y,u,v\n";
+    let utf_16: Vec<u8> = "\u{feff}view,point".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let marks = |sigma: &str| format!("view,point,X,Y,u,v,sigma_px\na,0,0,0,1,1,1\na,1,1,0,1,1,{sigma}\n");
+    let cases: [(Vec<u8>, &str); 6] = [
+        (format!("{header}{swapped}").into(), "are the columns view and point swapped?"),
+        (utf_16, "the text is UTF-16: save it as UTF-8"),
+        (
+            format!("{header}a,0,0,0,371,2,5\n").into(),
+            "7 fields where the header has 6: a comma is no decimal point",
+        ),
+        (
+            format!("{header}a,0,0,0,\"371,2\",5\n").into(),
+            "'371,2' is not a number: a comma is no decimal point",
+        ),
+        (marks("1e-300").into(), "c.csv:3: column 'sigma_px': 1e-300 is not within 1e-9 to 1e9"),
+        (marks("1e20").replace("sigma_px", "weight").into(), "c.csv:3: column 'weight': 1e20 is not within"),
+    ];
+    for (table, words) in cases {
+        fs::write(folder.join("c.csv"), table).expect("written");
+        refused(&folder, &["calibrate", "c.csv"], &[words]);
+    }
+}
+
+#[test]
+fn options_say_what_they_expect_in_place_of_a_negative_number() {
+    let folder = folder("negative");
+    refused(
+        &folder,
+        &["diff", "a.json", "b.json", "--at", "-5"],
+        &["'--at <MM>': expected a distance in mm, above 0"],
+    );
+    refused(&folder, &["study", "run", "s.toml", "--threads", "-1"], &["invalid value '-1'"]);
+    refused(
+        &folder,
+        &["convert", "a.json", "/dev/null", "--to", "ros"],
+        &["/dev/null", "name another place"],
+    );
+    refused(&folder, &["calibrate", "--board", "chess:9x6:-1", "a.png"], &["do not make a board"]);
+}
