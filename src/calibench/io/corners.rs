@@ -266,7 +266,10 @@ mod tests {
                 "c.csv:1: column 'u' stands more than once in the header",
             ),
             (&format!("{header}0,0,1,2,3,4\n0,1,1,2,3\n"), "c.csv:3: 5 fields where the header has 6"),
-            (&format!("{header}0,0,1,2,3,4\n\n0,1,1,2,3,4,5\n"), "c.csv:4: 7 fields where the header has 6"),
+            (
+                &format!("{header}0,0,1,2,3,4\n\n0,1,1,2,3,4,5\n"),
+                "c.csv:4: 7 fields where the header has 6: a comma is no decimal point here",
+            ),
             (
                 "view,point,X,Y,u,v\r\n0,0,1,2,3,4\r\n\r\n0,1,1,2,3,x\r\n",
                 "c.csv:4: column 'v' (field 6): 'x' is not a number",
