@@ -62,7 +62,7 @@ fn what_is_likely_meant_is_said_of_tables_of_another_form() {
     let header = "view,point,X,Y,u,v\n";
     let utf_16: Vec<u8> = "\u{feff}view,point".encode_utf16().flat_map(u16::to_le_bytes).collect();
     let marks = |sigma: &str| format!("view,point,X,Y,u,v,sigma_px\na,0,0,0,1,1,1\na,1,1,0,1,1,{sigma}\n");
-    let cases: [(Vec<u8>, &str); 6] = [
+    let cases: [(Vec<u8>, &str); 7] = [
         (format!("{header}{swapped}").into(), "are the columns view and point swapped?"),
         (utf_16, "the text is UTF-16: save it as UTF-8"),
         (
@@ -72,6 +72,11 @@ fn what_is_likely_meant_is_said_of_tables_of_another_form() {
         (
             format!("{header}a,0,0,0,\"371,2\",5\n").into(),
             "'371,2' is not a number: a comma is no decimal point",
+        ),
+        // A mark of an unfinished file: what stands behind it is missing, whatever the number says.
+        (
+            format!("{header}a,\"0\"\"\",0,0,371,2\n\nb,0,0,0,371,\"2\n").into(),
+            "c.csv:4: a quotation mark stands open where the table ends",
         ),
         (marks("1e-300").into(), "c.csv:3: column 'sigma_px': 1e-300 is not within 1e-9 to 1e9"),
         (marks("1e20").replace("sigma_px", "weight").into(), "c.csv:3: column 'weight': 1e20 is not within"),
@@ -90,11 +95,85 @@ fn options_say_what_they_expect_in_place_of_a_negative_number() {
         &["diff", "a.json", "b.json", "--at", "-5"],
         &["'--at <MM>': expected a distance in mm, above 0"],
     );
-    refused(&folder, &["study", "run", "s.toml", "--threads", "-1"], &["invalid value '-1'"]);
+    let threads = ["study", "run", "s.toml", "--threads"];
+    for no_number in ["-1", "1e3", "18446744073709551616"] {
+        let words = format!("invalid value '{no_number}'");
+        let told = [words.as_str(), "expected a whole number from 0 to 18446744073709551615"];
+        refused(&folder, &[&threads[..], &[no_number]].concat(), &told);
+    }
+    refused(&folder, &["gate", "--seed", "-1"], &["invalid value '-1'", "expected a whole number"]);
     refused(
         &folder,
         &["convert", "a.json", "/dev/null", "--to", "ros"],
         &["/dev/null", "name another place"],
     );
     refused(&folder, &["calibrate", "--board", "chess:9x6:-1", "a.png"], &["do not make a board"]);
+}
+
+/// Nothing is told of a camera from numbers that only a slip has.
+#[test]
+fn numbers_of_no_camera_are_refused_where_they_are_given() {
+    let folder = folder("no-camera");
+    let calibrate = |rest: [&'static str; 2]| [&["calibrate", "c.csv"][..], &rest].concat();
+    refused(&folder, &calibrate(["--fix", "k1=1e300"]), &["k1 = 1e300, and at most 1e30"]);
+    refused(&folder, &calibrate(["--fix", "fx=nan"]), &["fx = NaN px, and focal lengths are"]);
+    refused(&folder, &calibrate(["--prior", "fx=-600+-1"]), &["fx = -6e2 px, and focal lengths are"]);
+    refused(&folder, &calibrate(["--tie", "fy/fx=1e300"]), &["a ratio from 0.01 to 100"]);
+    refused(&folder, &calibrate(["--sigma", "1e-300"]), &["a number of pixels from 1e-9 to 1e9"]);
+    refused(
+        &folder,
+        &["tsai", "c.csv", "--image-size", "9x9", "--aspect", "1e300"],
+        &["0.01 to 100, or free"],
+    );
+    let next = ["next-pose", "a.json", "--board", "chess:9x6:1mm", "--want", "fx", "--mark-sd", "1e-300"];
+    refused(&folder, &next, &["a number of pixels from 1e-9 to 1e9"]);
+    fs::write(folder.join("c.csv"), "view,point,u,v\n0,a,1,1\n").expect("written");
+    fs::write(folder.join("t.csv"), "point,X,Y,Z,sd\na,0,0,0,0.01\nb,0,1,0,1e-300\n").expect("written");
+    refused(
+        &folder,
+        &["calibrate", "c.csv", "--target", "t.csv"],
+        &["t.csv:3: a standard deviation of 1e-300, and the least is 1e-15: give 0 where the mark is exact"],
+    );
+}
+
+/// Programs of Windows begin text with a mark that is none of it.
+#[test]
+fn a_byte_order_mark_belongs_to_no_text() {
+    let folder = folder("byte-order-mark");
+    let camera = r#"{"camera": {"fx": 600, "fy": 600, "cx": 320, "cy": 240}, "image_size": [640, 480]}"#;
+    fs::write(folder.join("plain.json"), camera).expect("written");
+    fs::write(folder.join("marked.json"), format!("\u{feff}{camera}")).expect("written");
+    let diff = limited(&folder, &["diff", "plain.json", "marked.json"]);
+    assert_eq!(diff.status.code(), Some(0), "{}", text(&diff.stderr));
+    assert_eq!(limited(&folder, &["gate", "--samples", "1", "--record", "g"]).status.code(), Some(0));
+    let answers = folder.join("g/answers.jsonl");
+    let given = fs::read_to_string(&answers).expect("recorded");
+    fs::write(&answers, format!("\u{feff}{given}")).expect("written");
+    let judged = limited(&folder, &["gate", "--judge", "g"]);
+    assert_eq!(judged.status.code(), Some(0), "{}", text(&judged.stdout));
+}
+
+#[test]
+fn parts_whose_checkpoint_counts_wrongly_make_no_whole() {
+    let folder = folder("miscounted");
+    fs::write(folder.join("spec.toml"), crate::hostile::fixed_poses()).expect("written");
+    assert_eq!(limited(&folder, &["study", "run", "spec.toml", "--out", "run"]).status.code(), Some(0));
+    let checkpoint = folder.join("run/checkpoint.json");
+    let kept = fs::read_to_string(&checkpoint).expect("written");
+    let counted: serde_json::Value = serde_json::from_str(&kept).expect("JSON");
+    let batches = counted["batches"].as_u64().expect("a number");
+    let other = kept.replace(&format!("\"batches\":{batches}"), &format!("\"batches\":{}", batches + 1));
+    assert_ne!(other, kept);
+    fs::write(&checkpoint, other).expect("written");
+    let words = format!("it counts {} batches, and trials.csv holds {batches}", batches + 1);
+    for verb in [["study", "merge", "run", "--out", "whole"], ["study", "resume", "run", "--format", "json"]]
+    {
+        let output = limited(&folder, &verb);
+        assert!(
+            output.status.code() == Some(2) && text(&output.stderr).contains(&words),
+            "{verb:?}: {}",
+            text(&output.stderr)
+        );
+    }
+    assert!(!folder.join("whole/trials.csv").exists());
 }

@@ -3,6 +3,7 @@
 
 use super::board::board_or_file;
 use super::report::table;
+use super::said::ratio;
 use super::{Exit, print, warn};
 use calibench::board::View;
 use calibench::calibrate::{Board, CalibrationError, Loss, Prior, Settings};
@@ -11,7 +12,7 @@ use calibench::io::ShownPath;
 use calibench::io::input::{MOST_SIDE_PX, MOST_TABLE_BYTES, read_named};
 use calibench::io::memory::{DEFAULT_MEMORY, parse_bytes};
 use calibench::io::table::{columns, unended_line};
-use calibench::io::{loss_from_text, misplaced_marks, parse_corners};
+use calibench::io::{implausible_value, loss_from_text, misplaced_marks, parse_corners};
 use calibench::photos::BoardSpec;
 use calibench::planar::PlaneModel;
 use camera::Observed;
@@ -74,7 +75,7 @@ pub(super) struct Arguments {
     target: Option<PathBuf>,
     /// With --target: the noise of a pixel coordinate, px, where it is known (of a mark of weight 1; 1 takes a column
     /// sigma_px at its word) [default: estimated from the residuals]
-    #[arg(long, value_name = "PX", value_parser = super::said::positive)]
+    #[arg(long, value_name = "PX", value_parser = super::said::noise_px)]
     sigma: Option<f64>,
     /// Lens model: brown-conrady, rational, thin-prism, tilted, kannala-brandt, division or double-sphere; auto
     /// compares eight (tilted and thin-prism are not among them) by Schwarz's criterion, and by how they predict views that were left out where it is undecided [default: brown-conrady]
@@ -236,7 +237,7 @@ fn parse_held(text: &str) -> Result<(Parameter, f64), String> {
     let parameter: Parameter =
         name.trim().parse().map_err(|e: calibench::camera::UnknownParameter| e.to_string())?;
     let value = value.trim().parse::<f64>().map_err(|_| format!("`{value}` is not a number"))?;
-    Ok((parameter, value))
+    implausible_value(parameter, value).map_or(Ok((parameter, value)), Err)
 }
 
 /// `bow:SD` or `bent:SD`, the standard deviation being a positive number or `free`.
@@ -256,11 +257,11 @@ fn parse_shape(text: &str) -> Result<Board, String> {
 
 /// `fy=fx` or `fy/fx=RATIO`: no sign in it means anything to a shell.
 fn parse_tie(text: &str) -> Result<f64, String> {
-    let wanted = || "expected fy=fx, or a positive ratio such as fy/fx=1.02".to_string();
+    let wanted = || "expected fy=fx, or a ratio from 0.01 to 100 such as fy/fx=1.02".to_string();
     let (what, value) = text.split_once('=').ok_or_else(wanted)?;
     match (what.trim(), value.trim()) {
         ("fy", "fx") => Ok(1.0),
-        ("fy/fx", ratio) => ratio.parse().ok().filter(|r: &f64| *r > 0.0 && r.is_finite()).ok_or_else(wanted),
+        ("fy/fx", number) => ratio(number).map_err(|_| wanted()),
         _ => Err(wanted()),
     }
 }
@@ -268,10 +269,12 @@ fn parse_tie(text: &str) -> Result<f64, String> {
 fn parse_prior(text: &str) -> Result<Prior, String> {
     let wanted = || "expected NAME=VALUE+-SD, such as k1=-0.2+-0.01".to_string();
     let (name, value) = text.split_once('=').ok_or_else(wanted)?;
-    let parameter = name.trim().parse().map_err(|e: calibench::camera::UnknownParameter| e.to_string())?;
+    let parameter: Parameter =
+        name.trim().parse().map_err(|e: calibench::camera::UnknownParameter| e.to_string())?;
     let (mean, deviation) = value.split_once("+-").ok_or_else(wanted)?;
     let number = |text: &str| text.trim().parse::<f64>().map_err(|_| format!("`{text}` is not a number"));
-    Ok(Prior { parameter, mean: number(mean)?, standard_deviation: number(deviation)? })
+    let prior = Prior { parameter, mean: number(mean)?, standard_deviation: number(deviation)? };
+    implausible_value(parameter, prior.mean).map_or(Ok(prior), Err)
 }
 
 pub(super) fn parse_size(text: &str) -> Result<(usize, usize), String> {

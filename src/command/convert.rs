@@ -128,7 +128,9 @@ impl Converted {
                 let _ = writeln!(text, "{word}: {}", on_one_line(line));
             }
         }
-        if let Some(px) = self.read_back_px {
+        if self.read_back_px == Some(f64::INFINITY) {
+            text.push_str("read back by this program: some rays of the frame have no pixel in the camera that was written\n");
+        } else if let Some(px) = self.read_back_px {
             let _ = writeln!(
                 text,
                 "read back by this program: over the whole frame pixels differ by {} px at most{}",

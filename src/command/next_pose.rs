@@ -4,7 +4,7 @@
 mod words;
 
 use super::calibrate::{Format, parse_size};
-use super::said::{Said, number_that, positive, say};
+use super::said::{Said, noise_px, number_that, positive, say};
 use super::{Exit, warn};
 use crate::board::board_or_file;
 use calibench::camera::Parameter;
@@ -50,7 +50,7 @@ pub(super) struct Arguments {
     margin: Option<f64>,
     /// Standard deviation of a coordinate of a mark in the next photograph, px [default: the noise that the calibration
     /// found]
-    #[arg(long, value_name = "PX", value_parser = positive)]
+    #[arg(long, value_name = "PX", value_parser = noise_px)]
     mark_sd: Option<f64>,
     /// Size of the image, where the result does not say it
     #[arg(long, value_name = "WxH", value_parser = parse_size)]

@@ -79,3 +79,13 @@ pub(super) const MOST: f64 = 1e30;
 pub(super) fn positive(text: &str) -> Result<f64, String> {
     number_that(text, |x| x > 0.0 && x <= MOST, "a number above 0, of at most 1e30")
 }
+
+/// The standard deviation of a pixel coordinate, as a table may have it.
+pub(super) fn noise_px(text: &str) -> Result<f64, String> {
+    number_that(text, |x| (1e-9..=1e9).contains(&x), "a number of pixels from 1e-9 to 1e9")
+}
+
+/// fy over fx of a sensor: pixels are a hundred times as wide as high at the most, or as high as wide.
+pub(super) fn ratio(text: &str) -> Result<f64, String> {
+    number_that(text, |x| (0.01..=100.0).contains(&x), "a ratio from 0.01 to 100")
+}

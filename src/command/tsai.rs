@@ -3,7 +3,7 @@
 
 use super::calibrate::{Format, parse_size, unended};
 use super::report::table;
-use super::said::{Said, number_that, say, written_by};
+use super::said::{Said, number_that, ratio, say, written_by};
 use super::{Exit, warn};
 use calibench::board::{View, ViewError};
 use calibench::calibrate::{Settings, calibrate};
@@ -58,7 +58,9 @@ fn parse_point(text: &str) -> Result<Vec2, String> {
 fn parse_aspect(text: &str) -> Result<Aspect, String> {
     match text {
         "free" => Ok(Aspect(None)),
-        ratio => number_that(ratio, |x| x > 0.0, "a ratio above 0, or free").map(|ratio| Aspect(Some(ratio))),
+        number => {
+            ratio(number).map(|ratio| Aspect(Some(ratio))).map_err(|wanted| format!("{wanted}, or free"))
+        }
     }
 }
 

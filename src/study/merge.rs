@@ -133,6 +133,10 @@ pub fn merge_on(
         whole.absorb((cell, batch), &trials);
         log.append(tables::rows(&trials).as_bytes())?;
     }
+    // Every trial was taken, and the checkpoint of each part must say so.
+    for reading in &mut readings {
+        reading.next()?;
+    }
     log.place(&text, &manifest, whole.batches)?;
     Ok((folder, whole))
 }

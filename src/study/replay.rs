@@ -22,11 +22,18 @@ pub(super) trait Source {
 pub(super) struct Replay {
     source: Box<dyn Source>,
     path: PathBuf,
+    /// Batches of the file, where a checkpoint counts them.
+    counted: Option<u64>,
 }
 
 impl Replay {
     pub(super) fn new(source: Box<dyn Source>, path: PathBuf) -> Replay {
-        Replay { source, path }
+        Replay { source, path, counted: None }
+    }
+
+    /// The same of a file whose checkpoint counts so many batches.
+    pub(super) fn counting(self, batches: u64) -> Replay {
+        Replay { counted: Some(batches), ..self }
     }
 
     /// Takes in the batch that the engine expects next; whether there was one.
@@ -41,20 +48,30 @@ impl Replay {
     pub(super) fn trials(&mut self, engine: &Engine) -> Result<Option<Vec<Trial>>, FolderError> {
         let Some((cell, batch)) = engine.next() else {
             return match self.source.next()? {
-                None => Ok(None),
+                None => self.ended(engine),
                 Some(_) => Err(self.damaged("more trials than the study has")),
             };
         };
         let mut trials = Vec::new();
         for index in engine.trials_of(batch) {
             match self.source.next()? {
-                None if trials.is_empty() => return Ok(None),
+                None if trials.is_empty() => return self.ended(engine),
                 None => return Err(self.damaged("it ends within a batch")),
                 Some(trial) if trial.cell == cell && trial.trial == index => trials.push(trial),
                 Some(_) => return Err(self.damaged(&format!("not trial {index} of cell {cell}"))),
             }
         }
         Ok(Some(trials))
+    }
+
+    /// The end of the file, which must be where the checkpoint has it.
+    fn ended(&self, engine: &Engine) -> Result<Option<Vec<Trial>>, FolderError> {
+        let Some(counted) = self.counted.filter(|counted| *counted != engine.batches) else {
+            return Ok(None);
+        };
+        let path = self.path.with_file_name("checkpoint.json");
+        let what = format!("it counts {counted} batches, and trials.csv holds {}", engine.batches);
+        Err(FolderError::Damaged { path, what })
     }
 
     fn damaged(&self, what: &str) -> FolderError {

@@ -147,12 +147,22 @@ pub fn read_regular(path: &Path, most: u64) -> Result<Vec<u8>, InputError> {
     read_at_most(file, &path.shown(), length as usize, most)
 }
 
-/// The text of a regular file.
+/// U+FEFF in UTF-8, which some programs put before a text.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// Length of the byte order mark that a text begins with, 0 without one.
+pub(super) fn byte_order_mark_len(bytes: &[u8]) -> usize {
+    if bytes.starts_with(BYTE_ORDER_MARK) { BYTE_ORDER_MARK.len() } else { 0 }
+}
+
+/// The text of a regular file, without a byte order mark.
 ///
 /// # Errors
 /// See [`InputError`]; text that is not UTF-8 counts as unreadable.
 pub fn read_regular_text(path: &Path, most: u64) -> Result<String, InputError> {
-    String::from_utf8(read_regular(path, most)?).map_err(|error| InputError::Open {
+    let mut bytes = read_regular(path, most)?;
+    bytes.drain(..byte_order_mark_len(&bytes));
+    String::from_utf8(bytes).map_err(|error| InputError::Open {
         path: path.shown(),
         cause: io::Error::new(io::ErrorKind::InvalidData, error.utf8_error()),
     })

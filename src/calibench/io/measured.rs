@@ -71,6 +71,7 @@ pub fn parse_target(file: &str, bytes: &[u8]) -> Result<MeasuredTarget, TargetFi
             marks(file, bytes, [x, y, z, a, b, c], |[.., a, b, c]| Vec3::new(a, b, c))?
         }
     };
+    refuse_vanishing(file, &rows)?;
     let mut lines = BTreeMap::new();
     for (line, id, ..) in &rows {
         if let Some(first) = lines.insert(id, *line) {
@@ -82,6 +83,21 @@ pub fn parse_target(file: &str, bytes: &[u8]) -> Result<MeasuredTarget, TargetFi
     let mark = |(_, id, position, standard_deviation)| MeasuredMark { id, position, standard_deviation };
     MeasuredTarget::new(rows.into_iter().map(mark).collect())
         .map_err(|cause| TargetFileError::Target { file: file.into(), cause })
+}
+
+/// The least standard deviation but 0, of an exact mark: its square is a weight's inverse.
+const LEAST_DEVIATION: f64 = 1e-15;
+
+/// Refuses deviations that are none and not 0 either.
+fn refuse_vanishing(file: &str, rows: &[(u64, String, Vec3, Vec3)]) -> Result<(), TableError> {
+    let vanishes = |sd: f64| sd > 0.0 && sd < LEAST_DEVIATION;
+    let found =
+        rows.iter().find_map(|(line, .., sd)| sd.iter().find(|sd| vanishes(**sd)).map(|sd| (*line, *sd)));
+    let Some((line, sd)) = found else { return Ok(()) };
+    let message = format!(
+        "a standard deviation of {sd:e}, and the least is {LEAST_DEVIATION:e}: give 0 where the mark is exact"
+    );
+    Err(TableError::Unreadable { file: file.into(), line, message })
 }
 
 /// Line, name, place and standard deviations of each row.

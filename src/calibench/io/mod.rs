@@ -65,6 +65,7 @@ pub use misplaced::misplaced_marks;
 #[cfg(feature = "photo")]
 pub use overlay::{Colour, Overlay};
 pub use pairs::{PointPairs, parse_point_pairs, read_point_pairs};
+pub use plausible::implausible_value;
 pub use provenance::Commit;
 pub use result::{CalibrationFields, LeftOut, ResultError, read_camera, read_lens_camera};
 pub use shown::{ShownPath, shown};

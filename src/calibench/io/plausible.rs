@@ -15,24 +15,34 @@ const MOST_COEFFICIENT: f64 = 1e30;
 
 /// Why no camera has these numbers, if none has.
 pub(super) fn implausible(camera: &Camera<Lens>) -> Option<String> {
-    camera.values().find_map(|(parameter, value)| {
-        let most = match parameter {
-            Parameter::Fx | Parameter::Fy if FOCAL_PX.contains(&value) => return None,
-            Parameter::Fx | Parameter::Fy => {
-                let (least, most) = (FOCAL_PX.start(), FOCAL_PX.end());
-                return Some(format!(
-                    "{parameter} = {value:e} px, and focal lengths are from {least:e} to {most:e} px"
-                ));
-            }
-            Parameter::Cx | Parameter::Cy | Parameter::Skew => MOST_PX,
-            _ => MOST_COEFFICIENT,
-        };
-        // Not a number is not within it.
-        let within = value.abs() <= most;
-        (!within).then(|| {
-            format!("{parameter} = {value:e}, and at most {most:e} either way can be calculated with")
-        })
-    })
+    camera.values().find_map(|(parameter, value)| implausible_value(parameter, value))
+}
+
+/// Why no camera has this value of a parameter, px or without a unit, if none has: nothing can be calculated with it.
+///
+/// ```
+/// use calibench::camera::Parameter;
+/// use calibench::io::implausible_value;
+///
+/// assert_eq!(implausible_value(Parameter::Fx, 600.0), None);
+/// assert!(implausible_value(Parameter::Fx, -600.0).is_some());
+/// ```
+pub fn implausible_value(parameter: Parameter, value: f64) -> Option<String> {
+    let most = match parameter {
+        Parameter::Fx | Parameter::Fy if FOCAL_PX.contains(&value) => return None,
+        Parameter::Fx | Parameter::Fy => {
+            let (least, most) = (FOCAL_PX.start(), FOCAL_PX.end());
+            return Some(format!(
+                "{parameter} = {value:e} px, and focal lengths are from {least:e} to {most:e} px"
+            ));
+        }
+        Parameter::Cx | Parameter::Cy | Parameter::Skew => MOST_PX,
+        _ => MOST_COEFFICIENT,
+    };
+    // Not a number is not within it.
+    let within = value.abs() <= most;
+    (!within)
+        .then(|| format!("{parameter} = {value:e}, and at most {most:e} either way can be calculated with"))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! What stands in a table of numbers? CSV with named columns; every complaint carries file, line and column.
 
-use super::input::{InputError, MOST_SIDE_PX, MOST_TABLE_BYTES, read_regular};
+use super::input::{InputError, MOST_SIDE_PX, MOST_TABLE_BYTES, byte_order_mark_len, read_regular};
 use super::shown::{ShownPath, excerpt, on_one_line};
 use crate::board::ViewError;
 use std::cell::Cell;
@@ -44,6 +44,14 @@ pub enum TableError {
         line: u64,
         /// Most bytes of a row.
         most: usize,
+    },
+    /// The table ends within a quotation mark, so that it may have gone on.
+    #[error("{file}:{line}: a quotation mark stands open where the table ends: close it, or take it away")]
+    UnclosedQuote {
+        /// The file.
+        file: String,
+        /// The line where its row begins.
+        line: u64,
     },
     /// Reading stopped in the middle, or a line is not UTF-8 text.
     #[error("{file}:{line}: {message}")]
@@ -270,6 +278,7 @@ pub(super) fn read_table<const NAMES: usize, const NUMBERS: usize>(
     let name_fields = find_columns(file, &header, names, &expected)?;
     let number_fields = find_columns(file, &header, numbers.map(|column| column.name), &expected)?;
     let mut rows = Vec::new();
+    let mut last = (line, begins.get());
     let mut record = csv::StringRecord::new();
     loop {
         let line = lines.line_of(reader.position());
@@ -296,6 +305,11 @@ pub(super) fn read_table<const NAMES: usize, const NUMBERS: usize>(
             row.numbers[i] = number(file, line, numbers[i], field, &record[field])?;
         }
         rows.push(row);
+        last = (line, begins.get());
+    }
+    let (line, begin) = last;
+    if is_quote_open(&bytes[begin..]) {
+        return Err(TableError::UnclosedQuote { file: file.into(), line });
     }
     if rows.is_empty() {
         return Err(TableError::Empty { file: file.into(), expected: expected() });
@@ -303,9 +317,7 @@ pub(super) fn read_table<const NAMES: usize, const NUMBERS: usize>(
     Ok(rows)
 }
 
-/// U+FEFF in UTF-8.
-const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
-/// The same in UTF-16, either byte first.
+/// A byte order mark in UTF-16, either byte first.
 const OF_UTF_16: [&[u8]; 2] = [b"\xff\xfe", b"\xfe\xff"];
 
 /// The whole input, without a byte order mark.
@@ -316,9 +328,7 @@ fn read_all(file: &str, mut input: impl Read) -> Result<Vec<u8>, TableError> {
         line: 0,
         message: e.to_string(),
     })?;
-    if bytes.starts_with(BYTE_ORDER_MARK) {
-        bytes.drain(..BYTE_ORDER_MARK.len());
-    }
+    bytes.drain(..byte_order_mark_len(&bytes));
     if OF_UTF_16.iter().any(|mark| bytes.starts_with(mark)) {
         let message = "the text is UTF-16: save it as UTF-8".to_string();
         return Err(TableError::Unreadable { file: file.into(), line: 1, message });
@@ -344,6 +354,20 @@ impl Read for Rows<'_> {
         self.given += count;
         Ok(count)
     }
+}
+
+/// Whether a row ends within a field that a quotation mark began. A mark within a field that none began is a character of it, and two within one
+/// that a mark began are one of it.
+fn is_quote_open(row: &[u8]) -> bool {
+    let (mut is_open, mut may_open) = (false, true);
+    for byte in row {
+        match byte {
+            b'"' if is_open => (is_open, may_open) = (false, true),
+            b'"' => is_open = may_open,
+            _ => may_open = matches!(byte, b',' | b'\n' | b'\r'),
+        }
+    }
+    is_open
 }
 
 /// What is no table is told before fields are made of it, which take several times its length.
@@ -471,7 +495,7 @@ pub fn unended_line(bytes: &[u8]) -> Option<u64> {
 /// The names of the columns; none where the first line cannot be read, of which the reader of the table says
 /// why.
 pub fn columns(bytes: &[u8]) -> Vec<String> {
-    let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
+    let bytes = &bytes[byte_order_mark_len(bytes)..];
     let bytes = &bytes[..bytes.len().min(MOST_LINE_BYTES)];
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(bytes);
     reader.headers().map(|header| header.iter().map(String::from).collect()).unwrap_or_default()

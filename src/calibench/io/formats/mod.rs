@@ -330,7 +330,8 @@ fn lost_behind(format: &Format, camera: &CameraFile) -> Option<String> {
 }
 
 /// Largest distance between the pixels of a written file's camera and those of the camera it was written
-/// from, px, for rays through the whole frame; `None` where the image's size is not known.
+/// from, px, for rays through the whole frame, infinite if the former has no pixel for one; `None` where the image's
+/// size is not known, and where the latter itself has a pixel for none of its rays.
 ///
 /// # Errors
 /// What keeps the written file from being read: a fault of this library.
@@ -342,7 +343,10 @@ pub fn read_back_px(
     let wishes = Wishes { fit: true, ..Wishes::default() };
     let back = read_camera_file(format, "what was written", &written.text, None, &wishes)?;
     let Some(size) = camera.image_size else { return Ok(None) };
-    let apart = |ray: &Vec3| Some((back.camera.pixel(ray)? - camera.camera.pixel(ray)?).norm());
     let rays = fitted::frame(size).filter_map(|pixel| camera.camera.ray(&pixel).ok());
-    Ok(Some(rays.map(|ray| apart(&ray).unwrap_or(f64::INFINITY)).fold(0.0, f64::max)))
+    let apart = rays.filter_map(|ray| {
+        let pixel = camera.camera.pixel(&ray)?;
+        Some(back.camera.pixel(&ray).map_or(f64::INFINITY, |back| (back - pixel).norm()))
+    });
+    Ok(apart.reduce(f64::max))
 }
