@@ -172,7 +172,7 @@ fn a_pipe_in_a_run_folder_blocks_nobody() {
         fs::remove_file(&pipe).expect("removed");
         assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo").success());
         // A folder whose manifest is no file holds no run.
-        let word = if name == "manifest.json" { "holds no run" } else { "not a regular file" };
+        let word = if name == "manifest.json" { "holds no run" } else { "a pipe or a device" };
         for verb in [
             &["study", "resume", "r"][..],
             &["study", "merge", "r", "--out", "w"],

@@ -98,7 +98,7 @@ fn options_say_what_they_expect_in_place_of_a_negative_number() {
     let threads = ["study", "run", "s.toml", "--threads"];
     for no_number in ["-1", "1e3", "18446744073709551616"] {
         let words = format!("invalid value '{no_number}'");
-        let told = [words.as_str(), "expected a whole number from 0 to 18446744073709551615"];
+        let told = [words.as_str(), "expected a whole number of 0 or more, below 2^64"];
         refused(&folder, &[&threads[..], &[no_number]].concat(), &told);
     }
     refused(&folder, &["gate", "--seed", "-1"], &["invalid value '-1'", "expected a whole number"]);

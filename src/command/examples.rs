@@ -1,9 +1,6 @@
 //! What would one type? Examples at the end of every verb's help. They are commands that run: a test runs them all.
 
 use clap::{Arg, Command, CommandFactory};
-use std::any::TypeId;
-use std::fmt::Display;
-use std::str::FromStr;
 
 /// Verbs, those of a verb after it, and what one would type. What it reads is in `tests/verb_examples.rs`.
 const EXAMPLES: &[(&str, &[&str])] = &[
@@ -140,32 +137,20 @@ const EXAMPLES: &[(&str, &[&str])] = &[
 
 /// The command line with its examples.
 pub(super) fn command() -> Command {
-    let plain = with_plain_values(super::Arguments::command());
+    let plain = taking_negative_numbers(super::Arguments::command());
     EXAMPLES.iter().fold(plain, |command, (verb, lines)| {
         let words: Vec<&str> = verb.split(' ').collect();
         with_examples(command, &words, lines)
     })
 }
 
-/// The command with options whose wrong values are told as what they are: -5 is a number, which an option may refuse, and no option that does
-/// not exist; what is no whole number is told so.
-fn with_plain_values(command: Command) -> Command {
+/// The command with options that take -5 for a number, so that whoever wants another says why, and not for an option that does not exist.
+fn taking_negative_numbers(command: Command) -> Command {
     let of_option = |arg: Arg| {
-        let kind = arg.get_value_parser().type_id();
         let takes_a_value = !arg.is_positional() && arg.get_action().takes_values();
-        let arg = if takes_a_value { arg.allow_negative_numbers(true) } else { arg };
-        match () {
-            () if kind == TypeId::of::<usize>() => arg.value_parser(|text: &str| whole(text, usize::MAX)),
-            () if kind == TypeId::of::<u64>() => arg.value_parser(|text: &str| whole(text, u64::MAX)),
-            () => arg,
-        }
+        if takes_a_value { arg.allow_negative_numbers(true) } else { arg }
     };
-    command.mut_args(of_option).mut_subcommands(with_plain_values)
-}
-
-/// A whole number up to the largest of its type.
-fn whole<T: FromStr + Display>(text: &str, most: T) -> Result<T, String> {
-    text.parse().map_err(|_| format!("expected a whole number from 0 to {most}"))
+    command.mut_args(of_option).mut_subcommands(taking_negative_numbers)
 }
 
 /// The command whose verb, or whose verb's verb, has these examples behind what it says.

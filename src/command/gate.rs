@@ -39,7 +39,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "COMMAND")]
     solver: Option<String>,
     /// Copies of the program that run at the same time
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = super::said::whole::<usize>)]
     jobs: usize,
     /// Seconds that the program may take for a problem
     #[arg(long, value_name = "SECONDS", default_value_t = 20.0)]
@@ -48,10 +48,10 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, default_value_t = Size::Quick)]
     size: Size,
     /// Samples a scenario, in place of --size
-    #[arg(long, value_name = "N", conflicts_with = "size")]
+    #[arg(long, value_name = "N", conflicts_with = "size", value_parser = super::said::whole::<usize>)]
     samples: Option<usize>,
     /// Seed of the noise
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = super::said::whole::<u64>)]
     seed: u64,
     /// Lens models whose scenes are asked, such as brown-conrady,rational [default: those that the solver says
     /// it knows; brown-conrady of a program that says nothing, and in files]

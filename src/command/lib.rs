@@ -57,7 +57,7 @@ struct Arguments {
     #[command(subcommand)]
     verb: Option<Verb>,
     /// Threads to use; no result depends on it [default: all cores]
-    #[arg(long, global = true, value_name = "N")]
+    #[arg(long, global = true, value_name = "N", value_parser = said::whole::<usize>)]
     threads: Option<usize>,
 }
 

@@ -23,10 +23,10 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, default_value_t = Mode::Planar)]
     mode: Mode,
     /// Dots along a row
-    #[arg(long, value_name = "N", default_value_t = 3)]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = super::said::whole::<usize>)]
     columns: usize,
     /// Rows
-    #[arg(long, value_name = "N", default_value_t = 3)]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = super::said::whole::<usize>)]
     rows: usize,
     /// Memory that the photograph may take, such as 500MB or 2GiB [default: 2GiB]
     #[arg(long, value_name = "BYTES", value_parser = parse_bytes, default_value_t = DEFAULT_MEMORY, hide_default_value = true)]

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 struct Options {
     /// Seed of the random streams; golden values hold for the default seed only [default: the experiment's
     /// own]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = super::said::whole::<u64>)]
     seed: Option<u64>,
     /// Folder for tables, record and figures [default: out/, with the figures of the locked run in figures/]
     #[arg(long, value_name = "DIR")]

@@ -6,6 +6,7 @@ use super::{Exit, print, warn};
 use calibench::io::write_atomically;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 /// What was found, in both forms.
 pub(super) struct Said {
@@ -88,4 +89,9 @@ pub(super) fn noise_px(text: &str) -> Result<f64, String> {
 /// fy over fx of a sensor: pixels are a hundred times as wide as high at the most, or as high as wide.
 pub(super) fn ratio(text: &str) -> Result<f64, String> {
     number_that(text, |x| (0.01..=100.0).contains(&x), "a ratio from 0.01 to 100")
+}
+
+/// A whole number: the standard library's errors speak of digits and strings.
+pub(super) fn whole<T: FromStr>(text: &str) -> Result<T, String> {
+    text.trim().parse().map_err(|_| "expected a whole number of 0 or more, below 2^64".into())
 }

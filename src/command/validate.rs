@@ -45,7 +45,7 @@ pub(super) struct Arguments {
     board: Option<BoardSpec>,
     /// The files are the calibration's own views: leaves out each of K parts in turn, calibrates what the result estimates
     /// from the rest, and validates with the part
-    #[arg(long, value_name = "K", requires = "files")]
+    #[arg(long, value_name = "K", requires = "files", value_parser = super::said::whole::<usize>)]
     k_fold: Option<usize>,
     /// Results of the same camera from other photographs: do all agree within what each says of itself?
     #[arg(long, value_name = "RESULT", num_args = 1..)]

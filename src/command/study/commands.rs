@@ -11,7 +11,7 @@ pub(crate) struct Arguments {
     /// The study
     spec: PathBuf,
     /// Parts of the study
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = crate::said::whole::<u64>)]
     shards: u64,
     /// Folder for the parts, and for the whole in `whole`
     #[arg(long, value_name = "DIR")]

@@ -16,7 +16,7 @@ pub(crate) struct Arguments {
     /// The study
     spec: PathBuf,
     /// Trials a cell in the first of two runs; the second has four times as many
-    #[arg(long, default_value_t = 2000)]
+    #[arg(long, default_value_t = 2000, value_parser = crate::said::whole::<u64>)]
     trials: u64,
     /// Text for people or JSON for programs
     #[arg(long, value_enum, default_value_t = Format::Text)]

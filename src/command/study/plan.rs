@@ -50,10 +50,10 @@ pub(crate) struct Arguments {
     #[arg(long, default_value_t = 160.0)]
     distance: f64,
     /// Most views, also of those tried after a number that trials did not confirm
-    #[arg(long, default_value_t = 200)]
+    #[arg(long, default_value_t = 200, value_parser = crate::said::whole::<usize>)]
     most_views: usize,
     /// Trials of each number of views that is tried
-    #[arg(long, default_value_t = 500)]
+    #[arg(long, default_value_t = 500, value_parser = crate::said::whole::<u64>)]
     confirm: u64,
     /// Text for people or JSON for programs
     #[arg(long, value_enum, default_value_t = Format::Text)]

@@ -17,7 +17,7 @@ pub(super) struct ProgramArguments {
     #[arg(long, value_name = "COMMAND")]
     pub solver: Option<String>,
     /// Copies of the program that run at the same time [default: one a thread]
-    #[arg(long, value_name = "N", requires = "solver")]
+    #[arg(long, value_name = "N", requires = "solver", value_parser = crate::said::whole::<usize>)]
     jobs: Option<usize>,
     /// Seconds that the program may take for a calibration
     #[arg(long, value_name = "SECONDS", default_value_t = 20.0, requires = "solver")]
