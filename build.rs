@@ -1,5 +1,6 @@
-//! From which sources is this program built? Asked once, of git and Cargo.lock, while it is built: a program that is older than the
-//! sources beside it still names its own. What does the command carry with it? And are there data for the tests that need some?
+//! From which sources is this program built? Asked once, of git and Cargo.lock, while it is built: a program
+//! that is older than the sources beside it still names its own. What does the command carry with it? And are
+//! there data for the tests that need some?
 
 #[path = "src/calibench/io/data.rs"]
 mod data;
@@ -7,15 +8,25 @@ mod data;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What the program is made of, relative to the package.
-const SOURCES: [&str; 7] = [
+/// What the program is made of, relative to the package: its code, and what is compiled in that a number
+/// stands on. Snapshots and figures are what numbers are compared with.
+const SOURCES: [&str; 16] = [
     "Cargo.toml",
     "Cargo.lock",
     "build.rs",
     "src",
     "experiments",
-    "golden/published.toml",
+    "adapters",
+    "golden/detector-gate",
     "golden/gate-power",
+    "golden/global-minimum",
+    "golden/lens-minimum",
+    "golden/model-choice",
+    "golden/other-solvers",
+    "golden/published.toml",
+    "golden/scoreboard.csv",
+    "reference",
+    "studies",
 ];
 
 /// Crates whose arithmetic stands in the path of a number.
@@ -30,7 +41,8 @@ fn main() {
     let tree = Tree::at(&root);
     let (commit, changed) = tree.as_ref().and_then(Tree::state).unwrap_or_default();
     let day = tree.as_ref().and_then(Tree::day).unwrap_or_default();
-    // Elsewhere than in its own tree Cargo may have chosen other versions than those of the lock file that came along.
+    // Elsewhere than in its own tree Cargo may have chosen other versions than those of the lock file that
+    // came along.
     let crates = if tree.is_some() { versions(&root.join("Cargo.lock")) } else { String::new() };
     look_for_data();
     carry(&root);
@@ -91,7 +103,8 @@ fn quoted_code(page: &str) -> Vec<&str> {
     [of("{{code "), of("{{shell ")].concat()
 }
 
-/// Tests that need the measurements of others are ignored, and counted so, where these are absent or CALIBENCH_DATA is `none`.
+/// Tests that need the measurements of others are ignored, and counted so, where these are absent or
+/// CALIBENCH_DATA is `none`.
 fn look_for_data() {
     println!("cargo::rustc-check-cfg=cfg(calibench_data)");
     println!("cargo::rerun-if-env-changed={}", data::VARIABLE);
@@ -113,7 +126,8 @@ impl Tree<'_> {
         same.then_some(tree)
     }
 
-    /// The commit's hash, and whether a source differs from it or is unknown to it. Looked at anew after every commit and checkout.
+    /// The commit's hash, and whether a source differs from it or is unknown to it. Looked at anew after
+    /// every commit and checkout.
     fn state(&self) -> Option<(String, bool)> {
         for name in ["HEAD", "logs/HEAD"] {
             let path = self.0.join(self.git(&["rev-parse", "--git-path", name])?);

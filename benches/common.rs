@@ -33,9 +33,10 @@ pub fn fisheye_views(views: usize) -> Vec<View> {
     seen_through(&Camera::with_lens(600.0, 600.0, 320.0, 240.0, lens), poses(views))
 }
 
-/// Views through a wide lens of a model, with noise of 0.1 px: a fisheye, or the rational model with all its coefficients. The
-/// poses are those above at a third of their distance: marks lie up to 65 degrees from the axis and more, and tell k1 of the rational
-/// model to 0.15 from four views. At half the distance they tell it to 30, which is nothing.
+/// Views through a wide lens of a model, with noise of 0.1 px: a fisheye, or the rational model with all its
+/// coefficients. The poses are those above at a third of their distance: marks lie up to 65 degrees from the
+/// axis and more, and tell k1 of the rational model to 0.15 from four views. At half the distance they tell
+/// it to 30, which is nothing.
 pub fn wide_views(model: Model, views: usize) -> Vec<View> {
     let (focal, coefficients): (f64, &[f64]) = match model {
         Model::KannalaBrandt => (230.0, &[0.02, -0.01, 0.004, -0.0015]),

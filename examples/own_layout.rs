@@ -1,7 +1,9 @@
-//! A camera from marks in a layout of one's own, which is no lattice: rings about a middle, each view showing other marks.
+//! A camera from marks in a layout of one's own, which is no lattice: rings about a middle, each view showing
+//! other marks.
 //!
-//! `cargo run --release --example own_layout`. The same marks as a file are `calibench calibrate rings.csv`; marks that were measured, in
-//! space and with standard deviations, are `--target`, and `calibench::measured` in the library.
+//! `cargo run --release --example own_layout`. The same marks as a file are `calibench calibrate rings.csv`;
+//! marks that were measured, in space and with standard deviations, are `--target`, and `calibench::measured`
+//! in the library.
 #![allow(clippy::print_stdout, reason = "an example shows what it finds")]
 
 use calibench::board::View;

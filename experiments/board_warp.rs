@@ -1,12 +1,13 @@
 //! What does a board cost that is not flat, and what does it take to know?
 //!
-//! A printed board bows by tenths of a millimetre, and a calibration that takes it for flat puts the difference
-//! elsewhere. mrcal and others estimate the bow with the camera. Here boards of known bow are photographed; each set is
-//! calibrated as flat and with two bows estimated.
+//! A printed board bows by tenths of a millimetre, and a calibration that takes it for flat puts the
+//! difference elsewhere. mrcal and others estimate the bow with the camera. Here boards of known bow are
+//! photographed; each set is calibrated as flat and with two bows estimated.
 //!
-//! Expected: taken for flat, the camera is biased in proportion to the bow, by standard deviations long before the RMSE
-//! looks wrong, and the stated covariance is a lie; residuals that agree with their neighbours' tell of it where the
-//! RMSE does not. With the bows estimated bias and lie are gone, at the price of a little spread.
+//! Expected: taken for flat, the camera is biased in proportion to the bow, by standard deviations long
+//! before the RMSE looks wrong, and the stated covariance is a lie; residuals that agree with their
+//! neighbours' tell of it where the RMSE does not. With the bows estimated bias and lie are gone, at the
+//! price of a little spread.
 //!
 //! A board that bends otherwise is calibrated with its marks measured in space besides.
 //!
@@ -250,8 +251,8 @@ fn claim_repaired(record: &mut Record, levels: &[Level]) {
     let parameters = FREE.len();
     let rate = each_of(levels.len(), RATE);
     let interval = Interval::of_mean_chi_squared(parameters, TRIALS, rate);
-    // The noise is estimated with 1500 degrees of freedom: F in place of chi-squared, a part 2 / 1500 more, and terms of
-    // second order in the noise.
+    // The noise is estimated with 1500 degrees of freedom: F in place of chi-squared, a part 2 / 1500 more,
+    // and terms of second order in the noise.
     let slack = 0.02 * parameters as f64;
     let holds = |level: &Level| {
         let found = level.mean(BOWED, nees);

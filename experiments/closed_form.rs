@@ -1,14 +1,15 @@
 //! How near does Zhang's closed form come before it is refined?
 //!
-//! The closed form ignores the lens and minimises what nobody measures; the refinement is there to mend both. To take
-//! the two faults apart, the four poses are calibrated with a lens and without one, over the noise. The refinement may
-//! use what the closed form uses: without a lens it holds the lens at zero.
+//! The closed form ignores the lens and minimises what nobody measures; the refinement is there to mend both.
+//! To take the two faults apart, the four poses are calibrated with a lens and without one, over the noise.
+//! The refinement may use what the closed form uses: without a lens it holds the lens at zero.
 //!
-//! Expected: without lens and noise the closed form is exact; without a lens it spreads as linear propagation of the
-//! noise says, and not less than the bound; with the lens it is off by many standard deviations, whatever the noise.
-//! The refinement attains the bound in both cases.
+//! Expected: without lens and noise the closed form is exact; without a lens it spreads as linear propagation
+//! of the noise says, and not less than the bound; with the lens it is off by many standard deviations,
+//! whatever the noise. The refinement attains the bound in both cases.
 //!
-//! What it cannot show: that a worse start does not matter. Where a search from it ends is asked in `global-minimum`.
+//! What it cannot show: that a worse start does not matter. Where a search from it ends is asked in
+//! `global-minimum`.
 
 use calibench::board::View;
 use calibench::calibrate::{Calibration, Settings, calibrate, closed_form};
@@ -39,11 +40,11 @@ const SIGMAS_PX: [f64; 4] = [0.05, 0.1, 0.2, 0.5];
 const TRIALS: usize = 2000;
 /// Chance that a correct program fails one claim.
 const RATE: f64 = 1e-4;
-/// Pixels of 600 are rounded by 1e-13; the equations, whose coefficients span the square of the focal length and are
-/// solved by their smallest singular vector, enlarge that by 1e6 at most.
+/// Pixels of 600 are rounded by 1e-13; the equations, whose coefficients span the square of the focal length
+/// and are solved by their smallest singular vector, enlarge that by 1e6 at most.
 const ROUNDING_PX: f64 = 1e-7;
-/// Each pixel is moved by this much to see what the closed form makes of it: the square of it is far below one, and
-/// rounding of the result over it far below a thousandth.
+/// Each pixel is moved by this much to see what the closed form makes of it: the square of it is far below
+/// one, and rounding of the result over it far below a thousandth.
 const STEP_PX: f64 = 1e-2;
 /// At half a pixel of noise the second order adds a hundredth of a spread.
 const SECOND_ORDER: f64 = 0.01;
@@ -119,8 +120,8 @@ fn closed_form_camera(homographies: &[Homography]) -> Result<Camera, ExperimentE
     closed_form(homographies, false).map_err(ExperimentError::at("closed form"))
 }
 
-/// The spread of fx by the closed form under unit noise: the root of the sum of its squared derivatives by all
-/// coordinates.
+/// The spread of fx by the closed form under unit noise: the root of the sum of its squared derivatives by
+/// all coordinates.
 fn linear_spread(scene: &Scene, homographies: &[Homography]) -> Result<f64, ExperimentError> {
     let views = scene.exact();
     let fx_with = |view: usize, point: usize, step: Vec2| -> Result<f64, ExperimentError> {

@@ -1,13 +1,16 @@
 //! How well do this library's detectors, and OpenCV's, find the marks of a board in hidden photographs?
 //!
-//! Expected: what is sharp and evenly lit is found, never a board that is not there, and no mark errs less than the noise of the pixels makes it
-//! err (Cramer & Rao). Blur wider than a mark's edge, motion and strong tilt cost more than their bound says; by how much is told, not judged.
+//! Expected: what is sharp and evenly lit is found, never a board that is not there, and no mark errs less
+//! than the noise of the pixels makes it err (Cramer & Rao). Blur wider than a mark's edge, motion and strong
+//! tilt cost more than their bound says; by how much is told, not judged.
 //!
-//! What it cannot show: photographs of a real camera. The scenes were written beside this library's detectors, and these were mended where a
-//! scene showed a fault; OpenCV's finders are asked as its tutorial does.
+//! What it cannot show: photographs of a real camera. The scenes were written beside this library's
+//! detectors, and these were mended where a scene showed a fault; OpenCV's finders are asked as its tutorial
+//! does.
 //!
-//! The photographs take minutes: the command `detector-gate-trials` showed them and wrote golden/detector-gate/, which is read. It is refused as
-//! stale when a line of what draws or judges the photographs, of an adapter or, for this library's own, of its detectors has changed since.
+//! The photographs take minutes: the command `detector-gate-trials` showed them and wrote
+//! golden/detector-gate/, which is read. It is refused as stale when a line of what draws or judges the
+//! photographs, of an adapter or, for this library's own, of its detectors has changed since.
 
 use calibench::evaluate::interval::each_of;
 use calibench_detector_gate::protocol::Kind;

@@ -58,7 +58,8 @@ const NONLINEARITY: f64 = 0.02;
 /// order in the sine stay within 1 %.
 const LAW_TILTS_DEG: (f64, f64) = (1.0, 4.0);
 
-/// A tilt, with the correlation of focal length and distance that its bound predicts; NaN where there is none.
+/// A tilt, with the correlation of focal length and distance that its bound predicts; NaN where there is
+/// none.
 struct Tilt<'a> {
     cell: Swept<'a>,
     correlation: f64,

@@ -1,10 +1,11 @@
 //! Does a corrected image show straight lines, in its pixels?
 //!
-//! The chapter proves its correction on computed points, which no interpolation touches (section 5.4). Here a grid of
-//! lines is photographed through the lens, corrected pixel by pixel, and the line is found again in the levels of
-//! the corrected image. Expected: straight to what 8-bit levels allow, with the true lens; a little less straight
-//! with a lens from one noisy view; and visibly wrong where the nearest sample stands in for interpolation. Mapping
-//! forwards, from photograph to output, leaves holes wherever the lens had shrunk the scene.
+//! The chapter proves its correction on computed points, which no interpolation touches (section 5.4). Here a
+//! grid of lines is photographed through the lens, corrected pixel by pixel, and the line is found again in
+//! the levels of the corrected image. Expected: straight to what 8-bit levels allow, with the true lens; a
+//! little less straight with a lens from one noisy view; and visibly wrong where the nearest sample stands in
+//! for interpolation. Mapping forwards, from photograph to output, leaves holes wherever the lens had shrunk
+//! the scene.
 //!
 //! What it cannot show: a shift of the whole image. A line that is moved stays straight.
 
@@ -41,8 +42,8 @@ const PAPER: f64 = 230.0;
 const INK: f64 = 30.0;
 /// A pixel is the mean of so many samples along u and v: more where the line's centre is measured.
 const SAMPLES: (usize, usize) = (2, 8);
-/// The line is looked for this far from where it would be without a lens, and its centre measured over this many
-/// rows on each side of the darkest.
+/// The line is looked for this far from where it would be without a lens, and its centre measured over this
+/// many rows on each side of the darkest.
 const SEARCH_PX: usize = 30;
 const WINDOW_PX: usize = 5;
 /// Columns nearer than this to an upright line are left out.
@@ -85,7 +86,8 @@ fn run(context: &Context) -> Result<Record, ExperimentError> {
     Ok(record)
 }
 
-/// The grid through a lens: each pixel the mean of its samples, each sample looked up where it was without lens.
+/// The grid through a lens: each pixel the mean of its samples, each sample looked up where it was without
+/// lens.
 fn photograph(camera: &Camera) -> Raster<u8> {
     let (width, height) = Truth::EXAMPLE_IMAGE;
     let (across, down) = SAMPLES;
@@ -211,10 +213,11 @@ fn without_lens(camera: &Camera) -> Camera {
     camera.with_distortion(BrownConrady::radial(0.0, 0.0))
 }
 
-/// What whole levels and samples may move the centre by. Each of the rows of the window is off by half a level in the
-/// photograph and by half a level in the corrected image, at most; a line's darkness is its width times the contrast,
-/// less a tenth for the lens, which makes it narrower. And the mean of samples `h` apart is off by `h^2 / 8` of the
-/// contrast at each of four places where the ink begins or ceases to thin out, two pixels from the centre.
+/// What whole levels and samples may move the centre by. Each of the rows of the window is off by half a
+/// level in the photograph and by half a level in the corrected image, at most; a line's darkness is its
+/// width times the contrast, less a tenth for the lens, which makes it narrower. And the mean of samples `h`
+/// apart is off by `h^2 / 8` of the contrast at each of four places where the ink begins or ceases to thin
+/// out, two pixels from the centre.
 fn rounding_px() -> f64 {
     let lever: f64 = 2.0 * (1..=WINDOW_PX).map(|k| k as f64).sum::<f64>();
     let width = 0.9 * 2.0 * HALF_WIDTH_PX;
@@ -270,7 +273,8 @@ fn report(record: &mut Record, lines: &[Line], lens_error_px: f64, forward: &For
     );
 }
 
-/// Where the top line lies, computed point by point, that is seen through one lens and corrected with another.
+/// Where the top line lies, computed point by point, that is seen through one lens and corrected with
+/// another.
 fn bent_by_both(truth: &Camera, estimate: &Camera, line: &Line) -> Result<LineFit, ExperimentError> {
     /// The correction moves a point along the line by a pixel at most, and less each time.
     const STEPS: usize = 6;

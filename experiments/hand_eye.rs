@@ -1,20 +1,22 @@
 //! How well is a camera's place on a robot known, and which motions make it known?
 //!
-//! A robot with a camera on its gripper visits stations before a fixed target, or holds the target before a fixed
-//! camera. Its poses err by what it repeats; the camera's come from calibrations of photographs with noise. Four methods
-//! find the mounting X: the closed forms of Tsai & Lenz and of Park & Martin for `A X = X B`, of Shah for `A X = Z B`, and
-//! the most likely X and Z together.
+//! A robot with a camera on its gripper visits stations before a fixed target, or holds the target before a
+//! fixed camera. Its poses err by what it repeats; the camera's come from calibrations of photographs with
+//! noise. Four methods find the mounting X: the closed forms of Tsai & Lenz and of Park & Martin for `A X = X
+//! B`, of Shah for `A X = Z B`, and the most likely X and Z together.
 //!
-//! Noise model: every coordinate of a pixel errs by a normal number of one standard deviation; every pose of the robot
-//! by a turn from the left and a shift, both normal and the same about each axis. The Cramer-Rao bound is that of all
-//! pixels and all poses of the robot, with the camera, every true pose of the robot, X and Z unknown.
+//! Noise model: every coordinate of a pixel errs by a normal number of one standard deviation; every pose of
+//! the robot by a turn from the left and a shift, both normal and the same about each axis. The Cramer-Rao
+//! bound is that of all pixels and all poses of the robot, with the camera, every true pose of the robot, X
+//! and Z unknown.
 //!
-//! Expected: the most likely X attains the bound and its covariance is true; no closed form does. Errors fall with the number of
-//! stations by its root. By the turns alone the rotation's would fall in proportion to their angle; the shifts of the robot tell of
-//! the rotation too, the more so the smaller the turns are, and closed forms make no use of it. A few stations turned far about
-//! different axes are worth many at random.
+//! Expected: the most likely X attains the bound and its covariance is true; no closed form does. Errors fall
+//! with the number of stations by its root. By the turns alone the rotation's would fall in proportion to
+//! their angle; the shifts of the robot tell of the rotation too, the more so the smaller the turns are, and
+//! closed forms make no use of it. A few stations turned far about different axes are worth many at random.
 //!
-//! What it cannot show: a robot whose errors are systematic, as kinematic ones are, and poses that were not taken at rest.
+//! What it cannot show: a robot whose errors are systematic, as kinematic ones are, and poses that were not
+//! taken at rest.
 
 mod cases;
 mod pixels;
@@ -232,7 +234,8 @@ fn claim_laws(record: &mut Record, found: &[(&Sweep, Vec<Cell>)], seed: u64) -> 
     Ok(())
 }
 
-/// Exponent of the rotation's bound against the largest angle. The sets of stations are the same at every angle but for their scale.
+/// Exponent of the rotation's bound against the largest angle. The sets of stations are the same at every
+/// angle but for their scale.
 fn angle_exponent(case: impl Fn(f64) -> Case, seed: u64) -> Result<f64, ExperimentError> {
     const SETS: u64 = 30;
     let at = |angle_deg: f64| -> Result<(f64, f64), ExperimentError> {

@@ -1,9 +1,11 @@
 //! Do a study's intervals hold the truth as often as they say, also after few trials?
 //!
-//! Expected: errors of parameters are nearly normal, so that the intervals of their bias and of their spread hold 95 times in 100 from ten trials on.
-//! NEES has the law of chi-squared with six degrees of freedom, whose tail a few trials do not show: the interval of its spread holds less often.
+//! Expected: errors of parameters are nearly normal, so that the intervals of their bias and of their spread
+//! hold 95 times in 100 from ten trials on. NEES has the law of chi-squared with six degrees of freedom,
+//! whose tail a few trials do not show: the interval of its spread holds less often.
 //!
-//! What it cannot show: coverage where theory of first order fails, near degenerate scenes or in strong noise.
+//! What it cannot show: coverage where theory of first order fails, near degenerate scenes or in strong
+//! noise.
 
 use super::sweep::Sweep;
 use calibench_harness::{Band, Context, Experiment, ExperimentError, Record, Rows, Table};
@@ -44,9 +46,11 @@ const NORMAL: [&str; 3] = ["fx", "cx", "k1"];
 const SKEWED: &str = "nees";
 /// What the intervals of a study leave out.
 const FALSE_ALARM: f64 = 0.05;
-/// Chance that right intervals fail one of the claims: four binomial standard deviations, two-sided, eighteen and six cases.
+/// Chance that right intervals fail one of the claims: four binomial standard deviations, two-sided, eighteen
+/// and six cases.
 const CHANCE: f64 = 2e-3;
-/// What the terms of small samples leave at ten trials of a normal law, by simulation in another language: 0.940 to 0.951.
+/// What the terms of small samples leave at ten trials of a normal law, by simulation in another language:
+/// 0.940 to 0.951.
 const APPROXIMATION: f64 = 0.012;
 /// The same for the spread of chi-squared with six degrees of freedom, and for the mean: 0.90 to 0.95.
 const APPROXIMATION_SKEWED: f64 = 0.05;

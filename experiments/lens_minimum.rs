@@ -1,15 +1,17 @@
 //! Does the solver find the right minimum with every lens model, whatever people photograph?
 //!
-//! Expected: wherever the marks determine the camera (Cramer-Rao bound of sd(fx) below 2 % of fx) the solver ends at the cost that a search
-//! from the truth reaches, or says that it does not know. Nothing certifies a minimum of these models: a number of starts is refined, and
-//! this measures how often that suffices.
+//! Expected: wherever the marks determine the camera (Cramer-Rao bound of sd(fx) below 2 % of fx) the solver
+//! ends at the cost that a search from the truth reaches, or says that it does not know. Nothing certifies a
+//! minimum of these models: a number of starts is refined, and this measures how often that suffices.
 //!
-//! What it cannot show: marks that break the model. Noise is Gaussian, the lens is of the model that is fitted, the board is flat and has
-//! six marks or more in every view. The reference itself is a local minimum: where it is not the lowest one, a solver that ends lower counts
-//! as right. Where numerator and denominator of a lens nearly cancel, it may have gone along a valley without end.
+//! What it cannot show: marks that break the model. Noise is Gaussian, the lens is of the model that is
+//! fitted, the board is flat and has six marks or more in every view. The reference itself is a local
+//! minimum: where it is not the lowest one, a solver that ends lower counts as right. Where numerator and
+//! denominator of a lens nearly cancel, it may have gone along a valley without end.
 //!
-//! The run judges the first scenes of every model; all of them take minutes, stand in golden/lens-minimum/, and are read here. They are
-//! refused as stale when a line of the solver, of the scenes or of the reference has changed.
+//! The run judges the first scenes of every model; all of them take minutes, stand in golden/lens-minimum/,
+//! and are read here. They are refused as stale when a line of the solver, of the scenes or of the reference
+//! has changed.
 
 use crate::global_minimum::{ENDINGS, judged::Class, more_than};
 use calibench::camera::Model;
@@ -133,11 +135,13 @@ fn claim_share(record: &mut Record, measured: &[Measured], context: &Context) {
         .because("the streams are keyed by seed, model and index, and every sum has its order");
 }
 
-/// Claims that something never happens: the false-alarm rate is that of a solver to which it happens once in a million scenes.
+/// Claims that something never happens: the false-alarm rate is that of a solver to which it happens once in
+/// a million scenes.
 const NEVER: f64 = 1e-6;
 /// How far a mean squared error over the stated variance may be off.
 const MEAN_OFF: f64 = 0.05;
-/// And chance besides, in standard deviations of such a mean; a normal number lies farther out with the probability below.
+/// And chance besides, in standard deviations of such a mean; a normal number lies farther out with the
+/// probability below.
 const MEAN_DEVIATIONS: f64 = 3.3;
 const MEAN_CHANCE: f64 = 9.7e-4;
 /// Fewest results that such a mean is taken of.
@@ -266,8 +270,8 @@ fn claim_deviations(record: &mut Record, measured: &[Measured]) {
         .because("a mean of n chi-squared numbers of k degrees of freedom has a relative standard deviation of sqrt(2 / (n k)), and 3.3 of them are allowed besides");
 }
 
-/// Errors of the right results of a model whose scenes are determined, in units of what is stated of them: of fx, and the
-/// square of all parameters under their covariance.
+/// Errors of the right results of a model whose scenes are determined, in units of what is stated of them: of
+/// fx, and the square of all parameters under their covariance.
 struct Stated {
     model: &'static str,
     parameters: f64,

@@ -1,14 +1,18 @@
 //! Which lens model should one choose, and which criterion picks right how often?
 //!
-//! Expected: the RMSE takes the richest candidate that is fitted, whatever the truth. Schwarz's criterion takes the right one the more often the
-//! more marks there are, and one that is too rich as often as Fisher's distribution says; where the marks cannot tell two families apart it takes
-//! the one with fewer coefficients. What matters, the error over the frame, depends less on the choice than the choice on the criterion.
+//! Expected: the RMSE takes the richest candidate that is fitted, whatever the truth. Schwarz's criterion
+//! takes the right one the more often the more marks there are, and one that is too rich as often as Fisher's
+//! distribution says; where the marks cannot tell two families apart it takes the one with fewer
+//! coefficients. What matters, the error over the frame, depends less on the choice than the choice on the
+//! criterion.
 //!
-//! What it cannot show: noise of another size or shape, boards that are not flat, poses that are chosen with care, lenses that no model
-//! describes but for two. The candidates are those of `calibench calibrate --model auto`.
+//! What it cannot show: noise of another size or shape, boards that are not flat, poses that are chosen with
+//! care, lenses that no model describes but for two. The candidates are those of `calibench calibrate --model
+//! auto`.
 //!
-//! The fits take minutes: the command `model-choice-trials` made them and wrote golden/model-choice/, which is read. It is refused as stale when
-//! a line of the solver, of the truths or of the layouts has changed since.
+//! The fits take minutes: the command `model-choice-trials` made them and wrote golden/model-choice/, which
+//! is read. It is refused as stale when a line of the solver, of the truths or of the layouts has changed
+//! since.
 
 use calibench::calibrate::{Candidate, calibrate_lens};
 use calibench::evaluate::Interval;
@@ -63,7 +67,8 @@ const WIDER: f64 = 10.0;
 const NO_EVIDENCE: f64 = 2.0;
 /// Candidates that contain each other, the smaller first.
 const NESTED: [(usize, usize); 6] = [(0, 1), (0, 2), (1, 3), (2, 3), (0, 3), (3, 4)];
-/// How much worse a fit with more coefficients may be: a refinement ends where a further step would gain less.
+/// How much worse a fit with more coefficients may be: a refinement ends where a further step would gain
+/// less.
 const AS_GOOD: f64 = 1e-5;
 
 /// What was committed of each truth.
@@ -174,7 +179,8 @@ fn claim_repeated(record: &mut Record, context: &Context) -> Result<(), Experime
     Ok(())
 }
 
-/// How far from the truth the camera of exact marks may be, px: their refinement ends where a step would gain less than rounding.
+/// How far from the truth the camera of exact marks may be, px: their refinement ends where a step would gain
+/// less than rounding.
 const EXACT_PX: f64 = 1e-3;
 
 /// Without noise the true model is the truth.
@@ -249,7 +255,8 @@ fn right(trials: &[Trial<'_>], marks: usize, criterion: Criterion) -> Share {
     Share::mean(&shares)
 }
 
-/// How far what a criterion takes is from the truth, over the best candidate: in all trials with so many marks that take anything.
+/// How far what a criterion takes is from the truth, over the best candidate: in all trials with so many
+/// marks that take anything.
 fn ratios(trials: &[Trial<'_>], marks: usize, criterion: Criterion) -> Vec<f64> {
     trials.iter().filter(|t| t.marks == marks).filter_map(|t| t.ratio(criterion)).collect()
 }
@@ -260,7 +267,8 @@ fn far(trials: &[Trial<'_>], marks: usize, criterion: Criterion) -> Share {
     Share::of(all.iter().filter(|ratio| **ratio > FAR).count(), all.len())
 }
 
-/// The middle of a quantity of a candidate over the trials of a truth with so many marks, refused ones counted as infinite.
+/// The middle of a quantity of a candidate over the trials of a truth with so many marks, refused ones
+/// counted as infinite.
 fn middle(trials: &[Trial<'_>], truth: &Truth, marks: usize, value: impl Fn(&Trial<'_>) -> f64) -> f64 {
     stats::median(&of(trials, truth, marks).into_iter().map(value).collect::<Vec<_>>())
 }
@@ -388,8 +396,8 @@ fn claim_rmse(record: &mut Record, trials: &[Trial<'_>]) {
         .because("one coefficient more follows some noise, if only beyond the digits of the table");
 }
 
-/// Chance that Schwarz's criterion prefers a candidate with `more` coefficients than the true one: `n ln(1 + d F / f) > d ln n`, F Fisher's
-/// with d and f degrees of freedom.
+/// Chance that Schwarz's criterion prefers a candidate with `more` coefficients than the true one: `n ln(1 +
+/// d F / f) > d ln n`, F Fisher's with d and f degrees of freedom.
 fn preferred(layout: &Layout, true_coefficients: usize, more: usize) -> f64 {
     let n = 2.0 * layout.marks() as f64;
     let freedom = 2 * layout.marks() - 4 - true_coefficients - more - 6 * layout.views;
@@ -405,7 +413,8 @@ fn too_rich_at_most(layout: &Layout, truth: &Truth) -> f64 {
     richer.map(|c| preferred(layout, own, c.coefficients.len() - own)).sum::<f64>().min(1.0)
 }
 
-/// Schwarz's criterion picks too rich a model no more often than theory says, and one that contains the truth more and more often.
+/// Schwarz's criterion picks too rich a model no more often than theory says, and one that contains the truth
+/// more and more often.
 fn claim_bic(record: &mut Record, trials: &[Trial<'_>]) {
     let truths = || known().filter(|truth| truth.right().is_some_and(|i| i < 3));
     let each = stats::each_of(LAYOUTS.len(), FALSE_ALARM);

@@ -1,15 +1,17 @@
 //! Which photograph should be taken next, and how many photographs does choosing save?
 //!
-//! Three views are taken, the first ones of the studies' spread. From there the set grows in four ways: each next view is the
-//! one that tells most of fx, or of a direction's pixel over the whole frame, among all poses of a grid (as
-//! `calibench next-pose` finds it); or the spread goes on, all views tilted alike in directions that follow the golden angle;
-//! or a pose of the grid is drawn. All may use the same distances and the same largest tilt.
+//! Three views are taken, the first ones of the studies' spread. From there the set grows in four ways: each
+//! next view is the one that tells most of fx, or of a direction's pixel over the whole frame, among all
+//! poses of a grid (as `calibench next-pose` finds it); or the spread goes on, all views tilted alike in
+//! directions that follow the golden angle; or a pose of the grid is drawn. All may use the same distances
+//! and the same largest tilt.
 //!
-//! Expected: what is chosen for a quantity is better for it than the spread and than nearly every drawn set, by some views;
-//! and since a view that is best for fx need not reach the corners, the two chosen sets differ.
+//! Expected: what is chosen for a quantity is better for it than the spread and than nearly every drawn set,
+//! by some views; and since a view that is best for fx need not reach the corners, the two chosen sets
+//! differ.
 //!
-//! What it cannot show: marks whose noise grows with tilt and distance, and boards that nobody can hold so. A greedy set need
-//! not be the best of its size.
+//! What it cannot show: marks whose noise grows with tilt and distance, and boards that nobody can hold so. A
+//! greedy set need not be the best of its size.
 
 use calibench::calibrate::{Covariance, Settings};
 use calibench::camera::{Camera, FreeParameters, Lens, Parameter};
@@ -54,7 +56,8 @@ const NEAR_MM: f64 = 120.0;
 const FAR_MM: f64 = 180.0;
 const TILT_DEG: f64 = 45.0;
 
-/// The poses of the studies: every view tilted as far as is allowed, from the middle towards the border, near.
+/// The poses of the studies: every view tilted as far as is allowed, from the middle towards the border,
+/// near.
 const SPREAD: &str = r#"
 name = "next-pose-spread"
 question = "Which poses does a study spread?"
@@ -80,7 +83,8 @@ struct Growth {
     words: &'static str,
     poses: Vec<Pose>,
     course: Course,
-    /// Largest relative difference between what was said of a view and what it brought; 0 where nothing was said.
+    /// Largest relative difference between what was said of a view and what it brought; 0 where nothing was
+    /// said.
     said_apart: f64,
 }
 
@@ -446,7 +450,7 @@ fn figure(grown: &[Growth], drawn: &[Course], seed: u64) -> Figure {
     let caption = format!(
         "Cramer-Rao bound of fx, and of a direction's pixel over the frame (root mean square, a rotation taken out), for sets of views \
          that grow from the same three: each next view chosen for one of both, by the golden angle, or drawn (seed {seed}); noise of \
-         {SIGMA_PX} px. Notice how many drawn views a chosen one is worth, and that no chosen set is the best for both."
+         {SIGMA_PX} px. Notice how many drawn views a chosen one is worth, and which set is the best for each of both."
     );
     Figure::panels("courses", &panels, 2, caption)
 }

@@ -1,17 +1,19 @@
 //! What does one view give, by Tsai's method, and when does it mislead?
 //!
-//! One photograph of a tilted plane tells focal length, distance and lens, if the principal point is told: two of the
-//! plane's eight numbers go to them, six to the pose. Zhang's method finds the principal point too, from more views. Here
-//! the camera of the chapter's experiment, its lens with one coefficient, is calibrated from one view by Tsai's two
-//! stages, from the same view by maximum likelihood, and from two views and more with the principal point free.
+//! One photograph of a tilted plane tells focal length, distance and lens, if the principal point is told:
+//! two of the plane's eight numbers go to them, six to the pose. Zhang's method finds the principal point
+//! too, from more views. Here the camera of the chapter's experiment, its lens with one coefficient, is
+//! calibrated from one view by Tsai's two stages, from the same view by maximum likelihood, and from two
+//! views and more with the principal point free.
 //!
-//! Expected: refined, one view attains its Cramer-Rao bound, which falls with the squared sine of the tilt; Tsai's own
-//! answer is a little worse. A principal point that is wrong by pixels moves the focal length by pixels, in proportion,
-//! while residuals hardly tell: the stated uncertainty is then too small. What was expected besides and does not hold: that
-//! one view with an exact principal point does what two or three with a free one do. Two do better.
+//! Expected: refined, one view attains its Cramer-Rao bound, which falls with the squared sine of the tilt;
+//! Tsai's own answer is a little worse. A principal point that is wrong by pixels moves the focal length by
+//! pixels, in proportion, while residuals hardly tell: the stated uncertainty is then too small. What was
+//! expected besides and does not hold: that one view with an exact principal point does what two or three
+//! with a free one do. Two do better.
 //!
-//! What it cannot show: targets in three dimensions, whose one view finds the principal point; lenses that need two
-//! coefficients.
+//! What it cannot show: targets in three dimensions, whose one view finds the principal point; lenses that
+//! need two coefficients.
 
 use calibench_harness::{Context, Experiment, ExperimentError, Record};
 

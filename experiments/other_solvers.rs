@@ -1,12 +1,14 @@
 //! How do other solvers do on the noise of the studies?
 //!
-//! Expected: where the data determine the camera, every program that minimises the same sum of squares gives the same camera, trial by trial, to
-//! what its arithmetic and its stopping rule leave; spread, bias and stated uncertainty are then the bound's. They differ where the data tell
-//! little: there one refuses and another answers.
+//! Expected: where the data determine the camera, every program that minimises the same sum of squares gives
+//! the same camera, trial by trial, to what its arithmetic and its stopping rule leave; spread, bias and
+//! stated uncertainty are then the bound's. They differ where the data tell little: there one refuses and
+//! another answers.
 //!
-//! What it cannot show: data that break the model, and how long a program takes. The programs are not run here: the command
-//! `other-solvers-trials` asked them and wrote golden/other-solvers/, which is read. It is refused as stale when a line of what draws the trials,
-//! of an adapter, or, for this library's own trials, of the solver has changed since.
+//! What it cannot show: data that break the model, and how long a program takes. The programs are not run
+//! here: the command `other-solvers-trials` asked them and wrote golden/other-solvers/, which is read. It is
+//! refused as stale when a line of what draws the trials, of an adapter, or, for this library's own trials,
+//! of the solver has changed since.
 
 use calibench::evaluate::Interval;
 use calibench::evaluate::distribution::normal_two_sided;
@@ -42,19 +44,24 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// Chance that correct programs fail one of the statistical claims, over all programs, cells and quantities of the claim.
+/// Chance that correct programs fail one of the statistical claims, over all programs, cells and quantities
+/// of the claim.
 const FALSE_ALARM: f64 = 1e-4;
 /// First trials of each cell that every run repeats with this library's solver.
 const REPEATED: u64 = 3;
-/// How far two programs of double precision may differ, in units of the bound. Their stopping rules leave a gain of 1e-15 of a cost of a
-/// thousand variances: a millionth of a standard deviation. A search that converges linearly stops a hundredfold too early at worst.
+/// How far two programs of double precision may differ, in units of the bound. Their stopping rules leave a
+/// gain of 1e-15 of a cost of a thousand variances: a millionth of a standard deviation. A search that
+/// converges linearly stops a hundredfold too early at worst.
 const ROUNDING: f64 = 1e-4;
-/// Single precision moves each pixel by an error of its own, and so each parameter by that share of the bound, if its errors were equal
-/// everywhere. The last digit of a coordinate is worth twice as much beyond each power of two.
+/// Single precision moves each pixel by an error of its own, and so each parameter by that share of the
+/// bound, if its errors were equal everywhere. The last digit of a coordinate is worth twice as much beyond
+/// each power of two.
 const SINGLE_PRECISION: f64 = 2.0;
-/// Cost above this library's, in variances, from which on a camera is another minimum: a tenth of a standard deviation.
+/// Cost above this library's, in variances, from which on a camera is another minimum: a tenth of a standard
+/// deviation.
 const OTHER_MINIMUM: f64 = 0.01;
-/// Stated standard deviations that an error without warning may not exceed: of honest answers one in 500 million does.
+/// Stated standard deviations that an error without warning may not exceed: of honest answers one in 500
+/// million does.
 const MISLEADING: f64 = 6.0;
 
 /// A program with its trials.
@@ -175,8 +182,8 @@ fn determined<'a>(places: &'a [Place], measured: &'a [Measured]) -> Vec<(&'stati
     measured.iter().flat_map(|m| cells().map(|place| (m.program.name, m.in_cell(place)))).collect()
 }
 
-/// Rate of each of the intervals that are judged together: of two quantities, in every cell that determines the
-/// camera, of every program.
+/// Rate of each of the intervals that are judged together: of two quantities, in every cell that determines
+/// the camera, of every program.
 fn joint(places: &[Place], measured: &[Measured]) -> f64 {
     each_of(JUDGED.len() * determined(places, measured).len(), FALSE_ALARM)
 }
@@ -231,9 +238,9 @@ fn report_answered(record: &mut Record, places: &[Place], m: &Measured) {
     }
 }
 
-/// What terms of second order in the noise may do to a parameter, in units of its bound or relative to its spread:
-/// twice the relative standard deviation of the focal length, since the pixels tell its square or its inverse rather
-/// than itself.
+/// What terms of second order in the noise may do to a parameter, in units of its bound or relative to its
+/// spread: twice the relative standard deviation of the focal length, since the pixels tell its square or its
+/// inverse rather than itself.
 fn second_order(place: &Place) -> f64 {
     2.0 * place.relative
 }
@@ -298,8 +305,8 @@ fn claim_stated(record: &mut Record, places: &[Place], measured: &[Measured]) {
         .collect();
     let each = each_of(stated.len(), FALSE_ALARM);
     let cases = stated.iter().map(|(name, cell, what, freedom, mean)| {
-        // Where sigma is estimated the square is Fisher's F, whose mean and variance are larger by two and four parts
-        // in its freedom.
+        // Where sigma is estimated the square is Fisher's F, whose mean and variance are larger by two and
+        // four parts in its freedom.
         let slack = 2.0 * second_order(cell.place) + 4.0 / cell.place.freedom;
         let chance = Interval::of_mean_chi_squared(*freedom, cell.answered(), each);
         let (low, high) = (chance.low * (1.0 - slack), chance.high * (1.0 + slack));

@@ -1,13 +1,15 @@
 //! A part lies where it was not taught: how well does a robot still grip it?
 //!
-//! Six marks of a plate are measured once, when it is taught, and again wherever it lies. The map between them corrects
-//! the point at which the robot grips: near the marks, or an arm's length away. The map is rigid, a similarity or affine.
+//! Six marks of a plate are measured once, when it is taught, and again wherever it lies. The map between
+//! them corrects the point at which the robot grips: near the marks, or an arm's length away. The map is
+//! rigid, a similarity or affine.
 //!
-//! Expected, for marks that err by `s` in each coordinate, `N` of them about their middle and with the squares `S` of
-//! their distances summed: a point at the offset `d` errs by `s^2 (1/N + d^2/S)` across `d`, and along it by `s^2/N` if the map is
-//! rigid; a similarity errs along as it does across, and an affine map by `s^2 (1/N + d^T M^-1 d)` both ways. So more parameters cost
-//! accuracy far from the marks, unless the part has grown. The stated uncertainty is true. A robot that repeats itself repeats the
-//! error of the teaching. One stray mark spoils squares, not a loss that forgets it.
+//! Expected, for marks that err by `s` in each coordinate, `N` of them about their middle and with the
+//! squares `S` of their distances summed: a point at the offset `d` errs by `s^2 (1/N + d^2/S)` across `d`,
+//! and along it by `s^2/N` if the map is rigid; a similarity errs along as it does across, and an affine map
+//! by `s^2 (1/N + d^T M^-1 d)` both ways. So more parameters cost accuracy far from the marks, unless the
+//! part has grown. The stated uncertainty is true. A robot that repeats itself repeats the error of the
+//! teaching. One stray mark spoils squares, not a loss that forgets it.
 //!
 //! What it cannot show: marks that err together, a part that bends, and the robot's own errors.
 
@@ -51,8 +53,9 @@ const FAR_MM: f64 = 200.0;
 const GROWTHS: [f64; 5] = [0.0, 1e-4, 3e-4, 1e-3, 3e-3];
 /// How far one mark is found off its place, mm.
 const STRAYS_MM: [f64; 6] = [0.0, 0.05, 0.1, 0.2, 0.5, 2.0];
-/// Losses, with the constants at which they lose 5 % of efficiency against squares. A residual has two coordinates, whose length
-/// is Rayleigh's: `E[w + r w' / 2]^2 / E[r^2 w^2 / 2]` is 0.95 at 1.501 and 2.549 (for single numbers 1.345 and 2.385).
+/// Losses, with the constants at which they lose 5 % of efficiency against squares. A residual has two
+/// coordinates, whose length is Rayleigh's: `E[w + r w' / 2]^2 / E[r^2 w^2 / 2]` is 0.95 at 1.501 and 2.549
+/// (for single numbers 1.345 and 2.385).
 const LOSSES: [(&str, &str, Loss); 3] = [
     ("squares", "squares", Loss::Squares),
     ("huber", "huber:1.5", Loss::Huber { delta_px: 1.5 }),
@@ -353,7 +356,8 @@ fn claim_stray(record: &mut Record, results: &Results) {
         .because("5 % of efficiency by the choice of their constants, half of it in a deviation; few marks leave the residuals of each correlated, which the rest is for");
 }
 
-/// Trace of a rigid map's covariance at an offset from the marks' origin, whose middle may lie elsewhere, mm^2.
+/// Trace of a rigid map's covariance at an offset from the marks' origin, whose middle may lie elsewhere,
+/// mm^2.
 fn variance_at(offset: &Vec2, marks: &[Vec2]) -> f64 {
     let n = marks.len() as f64;
     let middle = marks.iter().sum::<Vec2>() / n;

@@ -1,14 +1,16 @@
 //! Where in the image is a calibration good? The error of what it predicts, over the frame.
 //!
-//! The parameters of the chapter's table 5.1 are off by many times what a measurement needs, and the chapter says
-//! that predictions within the covered region cannot be told from the truth's all the same (section 5.3). So the
-//! published camera, and many calibrations of the same scene, are compared with the truth pixel by pixel.
+//! The parameters of the chapter's table 5.1 are off by many times what a measurement needs, and the chapter
+//! says that predictions within the covered region cannot be told from the truth's all the same (section
+//! 5.3). So the published camera, and many calibrations of the same scene, are compared with the truth pixel
+//! by pixel.
 //!
-//! What "prediction" means decides. A camera may be used for points at the target's distance: then a motion of the camera
-//! makes up for some of its errors, and it may be used for directions: then only a turn does. Expected: at the target's
-//! distance, as far out as points were seen, predictions are off by less than the noise of a single point, although
-//! k2 is off by a third; farther out they are not. For directions they are off by more even within, because a focal
-//! length that is wrong is made up for by the distance, and a direction has none.
+//! What "prediction" means decides. A camera may be used for points at the target's distance: then a motion
+//! of the camera makes up for some of its errors, and it may be used for directions: then only a turn does.
+//! Expected: at the target's distance, as far out as points were seen, predictions are off by less than the
+//! noise of a single point, although k2 is off by a third; farther out they are not. For directions they are
+//! off by more even within, because a focal length that is wrong is made up for by the distance, and a
+//! direction has none.
 //!
 //! What it cannot show: errors of a lens that the model does not describe. They are largest outside as well.
 
@@ -221,9 +223,9 @@ struct Predicted {
 }
 
 impl Predicted {
-    /// To first order the error at a pixel is `G (estimate - truth)`, with the derivatives `G` of the pixel by the
-    /// parameters, the motion that fits best taken out, and its mean square is the trace of `G P G^T`. `G` comes
-    /// from difference quotients of the same comparison.
+    /// To first order the error at a pixel is `G (estimate - truth)`, with the derivatives `G` of the pixel
+    /// by the parameters, the motion that fits best taken out, and its mean square is the trace of `G P G^T`.
+    /// `G` comes from difference quotients of the same comparison.
     fn new(truth: &Camera, bound: &Covariance, of: Use) -> Result<Predicted, ExperimentError> {
         let sd = |p: Parameter| bound.standard_deviation(p).unwrap_or(0.0);
         let free: Vec<Parameter> =

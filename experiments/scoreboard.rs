@@ -1,10 +1,11 @@
 //! How do public calibrators do before the judge that this library's own solver faces?
 //!
-//! Expected: a program that minimises the same sum of squares and reaches its minimum is trusted, whoever wrote it; what fails is a start that ends
-//! in another minimum, a covariance that is not stated or not so, points in single precision.
+//! Expected: a program that minimises the same sum of squares and reaches its minimum is trusted, whoever
+//! wrote it; what fails is a start that ends in another minimum, a covariance that is not stated or not so,
+//! points in single precision.
 //!
-//! What it cannot show: how good a program is at what it was made for. The programs are not run here: `python3 adapters/scoreboard.py --write`
-//! measured them, and what it wrote is read.
+//! What it cannot show: how good a program is at what it was made for. The programs are not run here:
+//! `python3 adapters/scoreboard.py --write` measured them, and what it wrote is read.
 
 use calibench_harness::{Context, Experiment, ExperimentError, Record, Table};
 

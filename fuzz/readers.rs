@@ -1,4 +1,5 @@
-//! Which readers meet untrusted bytes? Each as a function of bytes that must end, and must not panic, whatever they are.
+//! Which readers meet untrusted bytes? Each as a function of bytes that must end, and must not panic,
+//! whatever they are.
 
 use calibench::calibrate::{Loss, Settings, calibrate};
 use calibench::camera::FreeParameters;
@@ -66,7 +67,8 @@ pub fn corners(bytes: &[u8]) {
     let _ = parse_measured_target("target", bytes);
 }
 
-/// Point pairs, marks of a part, pixels at both ends of lengths, poses of a robot, checks of a reference, and marks and poses of a scene.
+/// Point pairs, marks of a part, pixels at both ends of lengths, poses of a robot, checks of a reference, and
+/// marks and poses of a scene.
 pub fn pairs(bytes: &[u8]) {
     let _ = parse_point_pairs("pairs", bytes);
     let _ = parse_marks("marks", bytes);
@@ -82,7 +84,8 @@ pub fn pairs(bytes: &[u8]) {
 /// Most points of a table that these tests calibrate from.
 const FEW_MARKS: usize = 60;
 
-/// What is computed from tables that can be read: a camera, Tsai's camera, the map of a plane, where a part lies.
+/// What is computed from tables that can be read: a camera, Tsai's camera, the map of a plane, where a part
+/// lies.
 pub fn solved(bytes: &[u8]) {
     if let Ok(corners) = parse_corners("corners", bytes)
         && corners.views.iter().map(|view| view.len()).sum::<usize>() <= FEW_MARKS
@@ -124,7 +127,8 @@ pub fn camera(bytes: &[u8]) {
     }
 }
 
-/// Cameras, corners and boards in the files of other programs: the same bytes as every format, and what is read written as every one.
+/// Cameras, corners and boards in the files of other programs: the same bytes as every format, and what is
+/// read written as every one.
 pub fn formats(bytes: &[u8]) {
     let text = String::from_utf8_lossy(bytes);
     let wishes = Wishes { fit: true, ..Wishes::default() };
@@ -153,7 +157,8 @@ pub fn study(bytes: &[u8]) {
     let marks = target.count();
     let draws = if spec.scene.poses.redraws() { DRAWS } else { 1 };
     let size = marks.saturating_mul(spec.scene.poses.views()).saturating_mul(levels).saturating_mul(draws);
-    // Too large is refused before any work, as small is done at once; between them, poses that are drawn anew take long.
+    // Too large is refused before any work, as small is done at once; between them, poses that are drawn anew
+    // take long.
     if size <= FEW_POINTS || marks > calibench::board::Board::MOST_MARKS {
         let _ = spec.cells(&text);
     }
@@ -205,7 +210,8 @@ pub fn answer(bytes: &[u8]) {
     }
 }
 
-/// What the gate reads beside answers: failures that are known, measurements of itself, digits, certified problems, and the numbers of the chapter.
+/// What the gate reads beside answers: failures that are known, measurements of itself, digits, certified
+/// problems, and the numbers of the chapter.
 pub fn tables(bytes: &[u8]) {
     let text = String::from_utf8_lossy(bytes);
     let _ = Allowance::of_toml(&text);
@@ -248,7 +254,8 @@ const BOARDS: [&str; 7] = [
 /// Most rows of a photograph of these tests.
 const FEW_ROWS: usize = 128;
 
-/// A photograph in which a board is looked for: the first byte says which, the second how wide it is, the others are its levels.
+/// A photograph in which a board is looked for: the first byte says which, the second how wide it is, the
+/// others are its levels.
 pub fn photograph(bytes: &[u8]) {
     let [board, width, levels @ ..] = bytes else { return };
     let width = usize::from(*width).max(1);

@@ -1,5 +1,5 @@
-//! Cameras with lenses of every model, from exact and noisy marks: the estimate, its covariance, and the choice
-//! between models.
+//! Cameras with lenses of every model, from exact and noisy marks: the estimate, its covariance, and the
+//! choice between models.
 
 use calibench::board::View;
 use calibench::calibrate::{

@@ -308,7 +308,8 @@ fn the_command_counts_digits_and_says_who_refused() {
     let (code, text) = gate(&["--certified", "--problem", "nine-points", "--solver", refuses]);
     assert_eq!(code, Some(1), "{text}");
     assert!(text.contains("refused: too few"), "{text}");
-    // A program that does not say that it knows a lens model is not asked; of what it knows nothing is left here.
+    // A program that does not say that it knows a lens model is not asked; of what it knows nothing is left
+    // here.
     let (code, text) = gate(&["--certified", "--problem", "rational", "--solver", refuses]);
     assert_eq!(code, Some(1), "{text}");
     assert!(text.contains("unsupported: it does not know the lens model rational"), "{text}");

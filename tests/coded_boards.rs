@@ -1,5 +1,5 @@
-//! Boards with markers, from files to a camera: photographs that OpenCV drew (`tests/coded_boards/draw.py`), Kalibr's targets, and the
-//! command that a user types.
+//! Boards with markers, from files to a camera: photographs that OpenCV drew (`tests/coded_boards/draw.py`),
+//! Kalibr's targets, and the command that a user types.
 
 use crate::program::{calibench, folder};
 use calibench::detect::Orientation;

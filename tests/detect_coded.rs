@@ -253,7 +253,8 @@ fn another_grid_of_tags_is_refused() {
     assert!(matches!(error(3, 2), Err(CodedError::GoesOn { .. } | CodedError::Disagree { .. })));
 }
 
-/// Blurred and noisy, so that some levels of the image show two or three tags only: what the others show counts too.
+/// Blurred and noisy, so that some levels of the image show two or three tags only: what the others show
+/// counts too.
 #[test]
 fn another_grid_of_tags_is_refused_however_few_tags_a_level_of_the_image_shows() {
     let grid = AprilGrid::new(5, 4, 0.3).unwrap();

@@ -1,5 +1,5 @@
-//! Boards of which marks are hidden: each costs itself and not the photograph, where it is certain which it is; and the
-//! first mark is the board's own wherever its pattern fixes it.
+//! Boards of which marks are hidden: each costs itself and not the photograph, where it is certain which it
+//! is; and the first mark is the board's own wherever its pattern fixes it.
 
 use calibench::board::Board;
 use calibench::detect::{BlobOptions, Orientation, blobs, chessboard, seen_chessboard, seen_circle_grid_of};
@@ -143,7 +143,8 @@ fn discs_in_shadow_are_still_of_the_board() {
     assert!(smaller.is_err(), "{smaller:?}");
 }
 
-/// Discs in a hard shadow are found by no threshold of the whole, and are seen to stand where the next column would.
+/// Discs in a hard shadow are found by no threshold of the whole, and are seen to stand where the next column
+/// would.
 #[test]
 fn a_board_with_a_column_in_a_hard_shadow_is_not_taken_for_a_smaller_one() {
     let asked = |text: &str| text.parse::<BoardSpec>().expect("a board");

@@ -1,5 +1,5 @@
-//! Boards whose rows are staggered, on rendered photographs: the order, which disc is the first, refusals that name what was seen, and the
-//! accuracy of centres beside that of rows in line.
+//! Boards whose rows are staggered, on rendered photographs: the order, which disc is the first, refusals
+//! that name what was seen, and the accuracy of centres beside that of rows in line.
 
 use calibench::board::{Arrangement, Board, Pattern};
 use calibench::camera::{BrownConrady, Camera};
@@ -67,7 +67,8 @@ fn any_turn_tilt_and_lens_gives_the_order_of_the_board() {
     }
 }
 
-/// Each centre lies where the truth of its number is; of two orders the one whose first mark is nearer to the top left.
+/// Each centre lies where the truth of its number is; of two orders the one whose first mark is nearer to the
+/// top left.
 fn assert_ordered(grid: &DotGrid, centres_true: &[Vec2], what: &str) {
     let last = centres_true.len() - 1;
     let may_turn = grid.orientation() == Orientation::HalfTurn;
@@ -113,8 +114,8 @@ fn corrected_centres_are_as_good_as_those_of_rows_in_line() {
             };
             let (staggered, hexagonal, straight) =
                 (rms(&asymmetric()), rms(&board(Arrangement::Hexagonal, 8, 7, 9.0, 5.0)), rms(&in_line));
-            // The project's target on clean images; on noisy ones the same discs at other places: the RMS of some fifty
-            // differs by a tenth of itself (standard deviation).
+            // The project's target on clean images; on noisy ones the same discs at other places: the RMS of
+            // some fifty differs by a tenth of itself (standard deviation).
             let most = if noise == 0.0 { 0.01 } else { 1.5 * straight };
             assert!(
                 staggered < most && hexagonal < most,

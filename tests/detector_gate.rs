@@ -1,4 +1,5 @@
-//! Are the committed photographs of the experiment detector-gate those that a program is shown when it is asked again?
+//! Are the committed photographs of the experiment detector-gate those that a program is shown when it is
+//! asked again?
 
 use crate::program::{folder, text};
 use calibench_detector_gate::{Builtin, Program, Scene, scenes};

@@ -358,8 +358,8 @@ fn hand_eye_errors_of_repeated_calibrations_are_as_large_as_each_states() {
         let near = |mean: f64, d: f64| (mean - d).abs() < 3.9 * (2.0 * d / DRAWS as f64).sqrt();
         assert!(near(nees, 6.0), "{set_up:?}: {nees} of 6");
         assert!(near(squares, 72.0), "{set_up:?}: {squares} of 72");
-        // Weighing is worth something: the closed form errs more than the most likely pose, in squares by a fifth
-        // when this was written.
+        // Weighing is worth something: the closed form errs more than the most likely pose, in squares by a
+        // fifth when this was written.
         assert!(closed_form > nees, "{set_up:?}: {closed_form} against {nees}");
     }
 }

@@ -134,8 +134,8 @@ fn answers_from_files_get_the_verdict_of_the_same_answers_from_a_pipe() {
     assert_eq!(gate(&["--judge", &place]).status.code(), Some(2));
 }
 
-/// A scene without estimates has no check of its bias or its poses: the checks of the other run must not be compared with those
-/// that stand in their places.
+/// A scene without estimates has no check of its bias or its poses: the checks of the other run must not be
+/// compared with those that stand in their places.
 #[test]
 fn verdicts_are_compared_scene_by_scene_where_one_run_has_fewer_checks() {
     let [silent, off] = ["gate-silent", "gate-off"].map(folder);

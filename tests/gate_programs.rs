@@ -1,4 +1,5 @@
-//! How does the gate hold programs that hang, crash, babble or greet? It asks them while that makes sense, and leaves none behind.
+//! How does the gate hold programs that hang, crash, babble or greet? It asks them while that makes sense,
+//! and leaves none behind.
 #![cfg(unix)]
 
 use crate::gate::{CALIBENCH, folder, gate, problems};

@@ -401,7 +401,8 @@ fn a_study_with_a_field_that_would_be_lost_is_refused_by_the_name_of_the_field()
     }
 }
 
-/// A quotation mark that stands open makes one field of all that follows it; blank lines, however many, are harmless.
+/// A quotation mark that stands open makes one field of all that follows it; blank lines, however many, are
+/// harmless.
 #[test]
 fn an_open_quotation_mark_is_refused_before_the_rest_is_kept() {
     let folder = folder("open-quote");
@@ -493,7 +494,8 @@ fn a_camera_whose_numbers_overflow_is_no_camera_in_any_verb() {
     refused(&folder, &["convert", "far.yaml", "out.txt", "--to", "colmap"], &["far.yaml: cx = 1e300"]);
 }
 
-/// What is computed from numbers within all limits may be beyond numbers all the same: it is refused, and not told as NaN.
+/// What is computed from numbers within all limits may be beyond numbers all the same: it is refused, and not
+/// told as NaN.
 #[test]
 fn a_length_beyond_numbers_and_one_of_no_place_are_refused() {
     let folder = folder("no-length");

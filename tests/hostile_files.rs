@@ -1,5 +1,5 @@
-//! What becomes of files in the hands of nobody who means well? Pipes, links, full disks, closed outputs: nothing waits for ever,
-//! nothing is lost.
+//! What becomes of files in the hands of nobody who means well? Pipes, links, full disks, closed outputs:
+//! nothing waits for ever, nothing is lost.
 #![cfg(target_os = "linux")]
 
 use crate::hostile::{
@@ -99,7 +99,8 @@ fn megabytes_without_a_comma_or_a_line_end_are_told_in_a_sentence() {
     }
 }
 
-/// Linux calls it a regular file, and reading it waits for the next message of the system, where this user may read it at all.
+/// Linux calls it a regular file, and reading it waits for the next message of the system, where this user
+/// may read it at all.
 #[test]
 fn a_file_of_the_system_that_waits_for_its_next_line_blocks_nobody() {
     let folder = folder("waiting");

@@ -1,4 +1,5 @@
-//! What does the gate do with solvers that mean no good? Those that write without end, start others, or command the terminal.
+//! What does the gate do with solvers that mean no good? Those that write without end, start others, or
+//! command the terminal.
 #![cfg(target_os = "linux")]
 
 use crate::hostile::{CALIBENCH, refused};

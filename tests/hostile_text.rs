@@ -1,5 +1,5 @@
-//! What is said of input that nobody means well, or that is of another form? What it is and what was likely meant, in words that command no
-//! terminal and begin no line of their own.
+//! What is said of input that nobody means well, or that is of another form? What it is and what was likely
+//! meant, in words that command no terminal and begin no line of their own.
 #![cfg(target_os = "linux")]
 
 use crate::hostile::{CALIBENCH, PATIENCE, limited, refused, within};

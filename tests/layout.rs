@@ -180,3 +180,30 @@ fn figures_stay_small_and_golden_files_carry_no_trace_of_the_machine() {
         assert!(!text.contains(&here), "{} names this machine's folder", file.display());
     }
 }
+
+/// The formatter keeps code within its width, and leaves comments as they are.
+#[test]
+fn the_text_of_comments_is_within_the_formatters_width() {
+    let settings = read("rustfmt.toml");
+    let width = settings.lines().find_map(|line| line.strip_prefix("max_width = ")).expect("it is set");
+    let width: usize = width.trim().parse().expect("a number");
+    let mut long = Vec::new();
+    for path in ["src", "experiments", "tests", "benches"].iter().flat_map(|folder| files(folder, &["rs"])) {
+        let text = fs::read_to_string(&path).expect("it is text");
+        let mut is_code = false;
+        for (i, line) in text.lines().enumerate() {
+            let Some(comment) = line.trim_start().strip_prefix("//") else {
+                is_code = false;
+                continue;
+            };
+            let words = comment.trim_start_matches(['/', '!']);
+            is_code ^= words.trim_start().starts_with("```");
+            // Lists, tables and formulae stand by themselves.
+            let is_text = words.strip_prefix(' ').is_some_and(|words| words.starts_with(char::is_alphabetic));
+            if is_text && !is_code && line.chars().count() > width {
+                long.push(format!("{}:{}", path.display(), i + 1));
+            }
+        }
+    }
+    assert!(long.is_empty(), "lines of comments beyond {width} characters:\n{}", long.join("\n"));
+}

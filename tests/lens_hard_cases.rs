@@ -1,5 +1,5 @@
-//! Sets that an estimator for any lens is easily wrong about: views that show a line of the board, as many unknowns as
-//! measurements, pixels far from square, twisted boards.
+//! Sets that an estimator for any lens is easily wrong about: views that show a line of the board, as many
+//! unknowns as measurements, pixels far from square, twisted boards.
 
 use calibench::board::View;
 use calibench::calibrate::{
@@ -201,7 +201,8 @@ fn a_view_given_twice_counts_once_with_any_lens() {
     assert!(twice.warnings.contains(&told), "{:?}", twice.warnings);
 }
 
-/// Where the spheres coincide, focal length, xi and alpha move the picture alike, and a minimum may lie just there.
+/// Where the spheres coincide, focal length, xi and alpha move the picture alike, and a minimum may lie just
+/// there.
 #[test]
 fn spheres_that_coincide_are_told_and_not_blamed_on_the_tilt() {
     let mut coincide = 0;
@@ -283,7 +284,8 @@ fn a_double_sphere_before_a_bent_board_is_the_best_of_its_minima() {
     assert!(near + 2 >= all, "{near} of {all}");
 }
 
-/// Two spheres make nearly the same picture in and out of their range, and where they do the search in the range may go on and on.
+/// Two spheres make nearly the same picture in and out of their range, and where they do the search in the
+/// range may go on and on.
 #[test]
 fn a_double_sphere_in_its_range_is_preferred_to_one_out_of_it() {
     let truth = camera(Model::DoubleSphere, 250.0, 250.0, &[0.0, 0.6]);
@@ -324,9 +326,10 @@ fn tells(found: &LensCalibration, of_kind: impl Fn(&Warning) -> bool) -> bool {
     found.warnings.iter().any(of_kind)
 }
 
-/// What the covariance of a wide double sphere says of its focal length may be absurd. The ends of the profile are in the model's range, and
-/// there a calibration with the focal length held costs what the interval says, or less where another camera is told. Whatever else explains
-/// the marks is within the interval, or told.
+/// What the covariance of a wide double sphere says of its focal length may be absurd. The ends of the
+/// profile are in the model's range, and there a calibration with the focal length held costs what the
+/// interval says, or less where another camera is told. Whatever else explains the marks is within the
+/// interval, or told.
 #[test]
 fn other_double_spheres_are_within_the_interval_or_told_however_absurd_deviations_are() {
     let (mut sets, mut absurd, mut others) = (0, 0, 0);

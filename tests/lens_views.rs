@@ -10,7 +10,8 @@ pub fn board() -> Vec<Vec2> {
     (0..63).map(|i| Vec2::new(10.0 * f64::from(i % 9), 10.0 * f64::from(i / 9))).collect()
 }
 
-/// Poses around that board, tilted by 14 to 31 degrees; `offset` is how far from the axis it goes, in parts of the distance.
+/// Poses around that board, tilted by 14 to 31 degrees; `offset` is how far from the axis it goes, in parts
+/// of the distance.
 pub fn poses(count: u32, distance: f64, offset: [f64; 2]) -> Vec<Pose> {
     (0..count)
         .map(|k| {
@@ -28,7 +29,8 @@ pub fn poses(count: u32, distance: f64, offset: [f64; 2]) -> Vec<Pose> {
         .collect()
 }
 
-/// What the camera sees of some marks in each view, with noise of 0.1 px; the board is twisted by `twist` at its corners.
+/// What the camera sees of some marks in each view, with noise of 0.1 px; the board is twisted by `twist` at
+/// its corners.
 pub fn seen(
     camera: &Camera<Lens>,
     poses: &[Pose],

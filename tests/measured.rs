@@ -1,5 +1,5 @@
-//! `calibench calibrate CORNERS.csv --target TARGET.csv`: what it prints and leaves, what other verbs make of that, and what
-//! it refuses. The estimator itself is tested in `src/calibench/measured/tests.rs`.
+//! `calibench calibrate CORNERS.csv --target TARGET.csv`: what it prints and leaves, what other verbs make of
+//! that, and what it refuses. The estimator itself is tested in `src/calibench/measured/tests.rs`.
 
 use crate::program::{calibench as run, folder, text};
 use calibench::geometry::{Pose, Vec2, Vec3, rotation};
@@ -19,8 +19,8 @@ fn walls() -> Vec<Vec3> {
     (0..64).map(mark).collect()
 }
 
-/// A folder with `target.csv` and `corners.csv`: marks measured to 0.02 mm, one bumped by 0.3 mm, and seen with noise
-/// of 0.1 px; nominal places in the corner file that are wrong.
+/// A folder with `target.csv` and `corners.csv`: marks measured to 0.02 mm, one bumped by 0.3 mm, and seen
+/// with noise of 0.1 px; nominal places in the corner file that are wrong.
 fn scene(name: &str) -> PathBuf {
     let folder = folder(name);
     let mut noise =
@@ -87,7 +87,8 @@ fn a_measured_target_gives_a_camera_and_names_the_mark_that_was_bumped() {
         assert!(page.contains(words), "{words}");
     }
     assert!(folder.join("out/residuals.svg").is_file());
-    // What stands in the folder is read by whoever reads cameras, with the covariance; marks.csv is a target again.
+    // What stands in the folder is read by whoever reads cameras, with the covariance; marks.csv is a target
+    // again.
     let Known::Camera(known) = read_known(&folder.join("out/result.json")).unwrap() else {
         panic!("a camera")
     };

@@ -1,4 +1,5 @@
-//! Are the committed trials of the experiment model-choice those that are drawn again, and does an interrupted measurement go on?
+//! Are the committed trials of the experiment model-choice those that are drawn again, and does an
+//! interrupted measurement go on?
 
 use crate::program::{folder, text};
 use calibench_experiments::model_choice::layout::LAYOUTS;

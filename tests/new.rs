@@ -59,7 +59,8 @@ fn a_new_experiment_holds_and_is_registered_everywhere() {
     assert!(String::from_utf8_lossy(&elsewhere.stderr).contains("source tree"));
 }
 
-/// Starts an adapter in a language and makes it ready with a command; `None`, and a word about it, where the command is not there.
+/// Starts an adapter in a language and makes it ready with a command; `None`, and a word about it, where the
+/// command is not there.
 fn adapter_made_ready(language: &str, command: &[&str]) -> Option<PathBuf> {
     let folder = folder(&format!("new-adapter-{language}"));
     succeeds(&folder, &["new", "adapter", "my-solver", "--language", language]);

@@ -1,4 +1,5 @@
-//! Does `calibench next-pose` say what a photograph from its pose does? The photograph is taken, and the camera calibrated anew.
+//! Does `calibench next-pose` say what a photograph from its pose does? The photograph is taken, and the
+//! camera calibrated anew.
 
 use crate::program::{calibench as run, folder, text};
 use calibench::board::View;
@@ -60,8 +61,8 @@ fn vector(value: &Value) -> Vec3 {
     Vec3::from(std::array::from_fn(|i| value[i].as_f64().expect("a number")))
 }
 
-/// The noise of the added view is none, so that the estimate stays and only the covariance changes; that is for the noise
-/// that the residuals tell, which is then a little smaller.
+/// The noise of the added view is none, so that the estimate stays and only the covariance changes; that is
+/// for the noise that the residuals tell, which is then a little smaller.
 #[test]
 fn the_camera_calibrated_with_the_view_is_as_sure_as_was_said() {
     for (name, options, want) in [

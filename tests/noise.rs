@@ -1,4 +1,5 @@
-//! Does the noise of extraction come out as it was planted, with intervals that hold, and is what moved told as such?
+//! Does the noise of extraction come out as it was planted, with intervals that hold, and is what moved told
+//! as such?
 
 use crate::program::{calibench, folder, text};
 use calibench::board::{Board, View};
@@ -150,8 +151,8 @@ impl Mixed {
         2.0 * marks * marks / (squares * (1.0 + self.uv * self.uv))
     }
 
-    /// Errors of `count` frames. A mark has its own number and that of the marks beside it; a frame a part of the one
-    /// before.
+    /// Errors of `count` frames. A mark has its own number and that of the marks beside it; a frame a part of
+    /// the one before.
     fn errors(&self, count: usize, stream: &mut Stream) -> Vec<Vec<Vec2>> {
         let mut before: Option<Vec<Vec2>> = None;
         let mut all = Vec::new();
@@ -206,8 +207,9 @@ fn planted_correlations_are_found_and_widen_the_interval_of_sigma() {
             contained(&mut inside, name, &found.as_seen, truth);
             independent += found.as_seen.independent_coordinates / TRIALS as f64;
         }
-        // (sum of eigenvalues)^2 / sum of squares: with u and v correlated by r, 126 / (1 + r^2); with neighbours sharing
-        // half of what they share with themselves, 126 / (1 + sum of the squared correlations of a mark with all others).
+        // (sum of eigenvalues)^2 / sum of squares: with u and v correlated by r, 126 / (1 + r^2); with
+        // neighbours sharing half of what they share with themselves, 126 / (1 + sum of the squared
+        // correlations of a mark with all others).
         eprintln!("{name}: {independent} independent coordinates");
         assert!((independent / mixed.independent() - 1.0).abs() < 0.05, "{name}: {independent}");
         inside.each(TRIALS, 0.93, 0.98);
@@ -269,7 +271,8 @@ fn what_moves_is_told_and_does_not_enter_the_noise_within_the_frames() {
         counts.add("light", !flickering.still.passes(&flickering.still.light.expect("the light is known")));
     }
     counts.each(TRIALS, 0.99, 1.0);
-    // A quarter of the variance in common: (63 * 1.25)^2 / (63 (1 + 0.5) + 63^2 / 16) = 18.1 of u, as many of v.
+    // A quarter of the variance in common: (63 * 1.25)^2 / (63 (1 + 0.5) + 63^2 / 16) = 18.1 of u, as many of
+    // v.
     assert!((20.0..60.0).contains(&independent), "{independent}");
 }
 

@@ -1,4 +1,5 @@
-//! Are the committed trials of the experiment other-solvers those that a program gives when it is asked again?
+//! Are the committed trials of the experiment other-solvers those that a program gives when it is asked
+//! again?
 
 use crate::program::{folder, text};
 use calibench_experiments::other_solvers::trials::ask;
@@ -33,7 +34,8 @@ fn a_trial_does_not_depend_on_how_many_are_asked() {
     for row in &asked.rows {
         assert_eq!(Some(&row.text()), committed.get(&(row.cell, row.trial)));
     }
-    // Pixels of an image 640 wide: half of the last digit of single precision is 3e-5 px at most, the noise 0.1 px.
+    // Pixels of an image 640 wide: half of the last digit of single precision is 3e-5 px at most, the noise
+    // 0.1 px.
     assert!(asked.rounding.iter().all(|share| (1e-5..3e-4).contains(share)), "{:?}", asked.rounding);
 }
 
@@ -67,7 +69,8 @@ fn the_minimal_solver_gives_the_committed_trials_again() {
         let numbers =
             |line: &str| -> Vec<Option<f64>> { line.split(',').map(|field| field.parse().ok()).collect() };
         let (now, then) = (row.text(), then.clone());
-        // Cells 14, 17 and 20 tilt by one degree: whether their normal equations are singular is a matter of rounding.
+        // Cells 14, 17 and 20 tilt by one degree: whether their normal equations are singular is a matter of
+        // rounding.
         if [14, 17, 20].contains(&row.cell) {
             continue;
         }

@@ -97,7 +97,8 @@ fn photographs_give_the_camera_and_bad_files_are_named_and_left_out() {
     for name in bad.iter().chain(&CHAPTER_PHOTOS) {
         assert!(page.contains(name), "{name} is not in the report");
     }
-    // Residuals, views, lens, scatter, histogram, poses in space, from above and from the side, coverage, deviation of a pixel.
+    // Residuals, views, lens, scatter, histogram, poses in space, from above and from the side, coverage,
+    // deviation of a pixel.
     assert_eq!(page.matches("<svg").count(), 10);
     for external in ["http", "<script", "<link", "@import", "url("] {
         let found = page.replace("xmlns=\"http://www.w3.org/2000/svg\"", "").contains(external);

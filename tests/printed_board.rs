@@ -1,5 +1,6 @@
-//! Is a printed board as large as it says, and does the way from its page to a camera lead anywhere? The page as PDF and as
-//! SVG, read back; and photographs of the whole page, rulers and all, through the command that a newcomer types.
+//! Is a printed board as large as it says, and does the way from its page to a camera lead anywhere? The page
+//! as PDF and as SVG, read back; and photographs of the whole page, rulers and all, through the command that
+//! a newcomer types.
 
 use crate::program::{calibench, folder};
 use calibench::camera::Camera;
@@ -68,7 +69,8 @@ fn the_rulers_are_as_long_as_the_file_beside_the_page_says() {
     let rulers: Vec<f64> = numbers(&file, "drawn_mm");
     assert_eq!(rulers, numbers(&file, "measured_mm"));
     let rectangles: Vec<Vec<f64>> = numbers_before(&page, " re").collect();
-    // Squares are wide and high; what is thin are the rulers' lines, which reach from edge to edge of their last ticks.
+    // Squares are wide and high; what is thin are the rulers' lines, which reach from edge to edge of their
+    // last ticks.
     let longest = |side: usize, thin: usize| {
         let lines = rectangles.iter().filter(|r| r[thin] < 1.0).map(|r| r[side]);
         lines.fold(0.0, f64::max)
@@ -161,7 +163,8 @@ impl Page {
         self.discs.iter().map(|(centre, _)| centre).sum::<Vec2>() / self.discs.len() as f64
     }
 
-    /// A photograph of the page, printed at `scale`: each pixel the mean of a few points of it. The pose is the board's.
+    /// A photograph of the page, printed at `scale`: each pixel the mean of a few points of it. The pose is
+    /// the board's.
     fn photograph(
         &self,
         camera: &Camera,
@@ -228,10 +231,12 @@ fn a_newcomer_gets_from_nothing_to_a_report() {
         assert_eq!(run.status.code(), Some(0), "{board}: {said}");
         let result: Value = serde_json::from_slice(&run.stdout).expect("JSON");
         assert_eq!(result["views"].as_array().map(Vec::len), Some(TILTS.len()), "{said}");
-        // Five of the standard deviations that the result states: marks are found to some hundredths of a pixel.
+        // Five of the standard deviations that the result states: marks are found to some hundredths of a
+        // pixel.
         let fx = result["camera"]["fx"].as_f64().expect("a focal length");
         assert!((fx - camera.fx).abs() < 3.0, "{board}: {fx}");
-        // The distance is in the millimetres of the page as it came out: with the drawn sizes it would be 3 % too long.
+        // The distance is in the millimetres of the page as it came out: with the drawn sizes it would be 3 %
+        // too long.
         let distance = result["views"][0]["translation"][2].as_f64().expect("a distance");
         assert!((distance / distance_mm - 1.0).abs() < 0.01, "{board}: {distance}");
         assert!(folder.join("result/report.html").is_file());

@@ -1,4 +1,5 @@
-//! Can others read what a run wrote? `datapackage.json` and `ro-crate-metadata.json` against the files beside them.
+//! Can others read what a run wrote? `datapackage.json` and `ro-crate-metadata.json` against the files beside
+//! them.
 
 use crate::program::{calibench as run, folder, text};
 use calibench::io::hash::sha256_hex;

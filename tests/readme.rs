@@ -1,5 +1,5 @@
-//! Do README.md and the pages behind it say what the program says? Their tables, numbers and figures are compared with golden/
-//! and with a run.
+//! Do README.md and the pages behind it say what the program says? Their tables, numbers and figures are
+//! compared with golden/ and with a run.
 
 use calibench_harness::published::{Kind, not_judged};
 use calibench_harness::verdict::ByKind;

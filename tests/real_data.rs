@@ -137,8 +137,8 @@ fn rational(numbers: &[f64]) -> Camera<Lens> {
     Camera::with_lens(numbers[0], numbers[1], numbers[2], numbers[3], lens)
 }
 
-/// The largest distance, px, of where two cameras see the marks of a calibration, each mark at its own ray of the
-/// other camera: k1 with k4, k2 with k5 and k3 with k6 nearly trade off, pixels do not.
+/// The largest distance, px, of where two cameras see the marks of a calibration, each mark at its own ray of
+/// the other camera: k1 with k4, k2 with k5 and k3 with k6 nearly trade off, pixels do not.
 fn apart(found: &LensCalibration, other: &Camera<Lens>, corners: &CornerFile) -> f64 {
     let mut largest = 0.0_f64;
     for (view, pose) in corners.views.iter().zip(&found.cam_from_target) {

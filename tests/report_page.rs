@@ -1,4 +1,5 @@
-//! Does a reader of `report.html` find every view by one name, the pictures, the poses and what is known of each point?
+//! Does a reader of `report.html` find every view by one name, the pictures, the poses and what is known of
+//! each point?
 
 use crate::program::{calibench, folder, text};
 use calibench::board::View;
@@ -128,7 +129,8 @@ fn of_a_corner_file_the_page_needs_nothing_else_and_keeps_the_numbers_of_the_fil
     for absent in ["src=", "<img", "<h2>Photographs", "<h2>Before", "<script", "<link", "@import", "url("] {
         assert!(!page.contains(absent), "{absent}");
     }
-    // Residuals, views, lens, scatter, histogram, poses in space, from above and from the side, coverage, deviation.
+    // Residuals, views, lens, scatter, histogram, poses in space, from above and from the side, coverage,
+    // deviation.
     assert_eq!(page.matches("<svg").count(), 10);
     // Names that are no numbers get them, from 1.
     corner_file(&folder.join("paths.csv"), &["/d/a.png", "/d/b.png", "/e/a.png", "/e/c.png"]);

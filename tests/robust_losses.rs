@@ -20,7 +20,8 @@ fn settings(model: Model) -> Settings {
     Settings::of_model(model).with_image_size(SIZE)
 }
 
-/// What a camera sees of twelve boards with noise of 0.1 px, one mark in ten astray by `off` px; the boards are twisted by `twist`.
+/// What a camera sees of twelve boards with noise of 0.1 px, one mark in ten astray by `off` px; the boards
+/// are twisted by `twist`.
 fn astray(truth: &Camera<Lens>, distance: f64, off: f64, twist: f64) -> Vec<View> {
     let mut views = seen(truth, &poses(12, distance, [0.5, 0.5]), |_| board(), twist);
     for (k, view) in views.iter_mut().enumerate() {
@@ -46,8 +47,8 @@ fn with_strays() -> [(Model, Vec<View>); 2] {
 
 const ROBUST: [Loss; 2] = [Loss::Cauchy { scale_px: 0.2 }, Loss::Huber { delta_px: 0.1 }];
 
-/// What is known beforehand as well as the marks say it takes half of the way, whatever the loss: the cost's curvature, the normal matrix and
-/// the covariance are three numbers there.
+/// What is known beforehand as well as the marks say it takes half of the way, whatever the loss: the cost's
+/// curvature, the normal matrix and the covariance are three numbers there.
 #[test]
 fn a_prior_under_a_robust_loss_weighs_what_it_says() {
     for (model, views) in with_strays() {

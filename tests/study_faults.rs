@@ -203,7 +203,8 @@ fn a_run_that_is_killed_two_hundred_times_ends_in_the_same_bytes() {
             kills += 1;
             continue;
         }
-        // Where the machine is busy a run may be done before it is killed: it is a whole one, and the next begins anew.
+        // Where the machine is busy a run may be done before it is killed: it is a whole one, and the next
+        // begins anew.
         assert_same(&folder.join("whole"), &killed);
         fs::remove_dir_all(&killed).unwrap();
         ends += 1;
@@ -320,8 +321,8 @@ fn a_clock_that_jumps_while_a_study_runs_stops_and_goes_on_changes_no_byte() {
         let manifest = folder.join("jumped/manifest.json");
         let goes_on = manifest.exists();
         let mut child = jumping(arguments);
-        // A run has begun once its folder says what it is, which on a busy machine may be soon or late; how far one that goes on has come
-        // nothing says.
+        // A run has begun once its folder says what it is, which on a busy machine may be soon or late; how
+        // far one that goes on has come nothing says.
         while !manifest.exists() && child.try_wait().unwrap().is_none() {
             std::thread::sleep(Duration::from_millis(1));
         }

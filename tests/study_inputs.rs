@@ -1,4 +1,5 @@
-//! Do studies take marks and poses of the user's own, write out those that they used, and give the same bits from them?
+//! Do studies take marks and poses of the user's own, write out those that they used, and give the same bits
+//! from them?
 
 use crate::study::{SPEC, assert_same, scratch};
 use calibench::calibrate::{Settings, calibrate};
@@ -11,8 +12,8 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// Own marks against a grid, whose noise neighbours may share, own poses against drawn ones, in nine cells that draw noise of
-/// their own.
+/// Own marks against a grid, whose noise neighbours may share, own poses against drawn ones, in nine cells
+/// that draw noise of their own.
 const OWN: &str = r#"
 name = "own"
 question = "Do files give what they hold?"
@@ -336,7 +337,8 @@ fn a_study_names_its_files_from_its_own_folder() {
     fs::remove_dir_all(folder).unwrap();
 }
 
-/// Where results would stand beside what a study reads, under whatever name, nothing is run and nothing is replaced.
+/// Where results would stand beside what a study reads, under whatever name, nothing is run and nothing is
+/// replaced.
 #[test]
 fn results_do_not_go_where_the_study_reads_from() {
     let folder = scratch("own-inputs-kept");

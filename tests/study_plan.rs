@@ -1,4 +1,5 @@
-//! Does `calibench study plan` tell what is confirmed, what is refuted and what is open apart, in text, JSON and exit code?
+//! Does `calibench study plan` tell what is confirmed, what is refuted and what is open apart, in text, JSON
+//! and exit code?
 
 use crate::program::{calibench as run, folder, text};
 use serde_json::Value;
@@ -71,8 +72,8 @@ fn what_is_confirmed_refuted_open_and_out_of_reach_is_told_apart() {
     assert!(said.contains(&format!("CONFIRMED: {} views", more["confirmed_views"])), "{said}");
 }
 
-/// By the bound one view at 30 degrees and two at 2 degrees know fx to 100 px. No trial of one view has an answer, and of two
-/// at 2 degrees a third.
+/// By the bound one view at 30 degrees and two at 2 degrees know fx to 100 px. No trial of one view has an
+/// answer, and of two at 2 degrees a third.
 #[test]
 fn a_design_that_is_not_answered_gives_way_to_others() {
     let folder = folder("plan-unanswered");
@@ -94,7 +95,8 @@ fn a_design_that_is_not_answered_gives_way_to_others() {
     assert_eq!(found["chosen"]["tilt_deg"], last["tilt_deg"], "{found:#}");
 }
 
-/// A board that bulges by half a millimetre makes the focal length wrong by 8 px, however many views there are.
+/// A board that bulges by half a millimetre makes the focal length wrong by 8 px, however many views there
+/// are.
 #[test]
 fn a_mean_error_larger_than_the_wish_is_refuted_with_the_most_views() {
     let folder = folder("plan-bias");

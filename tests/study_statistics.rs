@@ -171,8 +171,8 @@ fn several_wishes_take_the_most_views_that_one_of_them_needs() {
     assert!(twice.contains("`fx` is wanted twice"), "{twice}");
 }
 
-/// A wish that the bound of some number of views meets to a hair: trials cannot confirm that number, and are asked for more
-/// until they do.
+/// A wish that the bound of some number of views meets to a hair: trials cannot confirm that number, and are
+/// asked for more until they do.
 #[test]
 fn a_number_of_views_that_is_too_near_the_wish_is_followed_by_a_larger_one_that_is_confirmed() {
     let text = spec("{ kind = \"chapter\" }", "trials = { per_cell = 100 }");

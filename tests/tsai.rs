@@ -1,4 +1,5 @@
-//! Does Tsai's method give the camera of one view, refuse the views that have none, and start the refinement well?
+//! Does Tsai's method give the camera of one view, refuse the views that have none, and start the refinement
+//! well?
 
 use crate::data;
 use crate::program::{calibench as run, folder, text};
@@ -115,9 +116,10 @@ fn a_plane_that_faces_the_camera_is_refused_and_a_tilted_one_is_not() {
     }
     let exact = two_stage(&SpatialView::from(&Scene::example().exact()[0]), &SQUARE).unwrap_err();
     assert!(exact.to_string().starts_with("focal length and distance (f, T_z) are inseparable"), "{exact}");
-    // At a degree (0.9 and 0.45 about two axes) perspective is seen, and the focal length known to 55 %: the squared sine of the tilt to 1.1 times
-    // itself. For a third of the focal length to be excluded by three standard deviations it must come out 2.5 of them
-    // too large, seven times in a thousand; more than five of a hundred come once in ten thousand.
+    // At a degree (0.9 and 0.45 about two axes) perspective is seen, and the focal length known to 55 %: the
+    // squared sine of the tilt to 1.1 times itself. For a third of the focal length to be excluded by three
+    // standard deviations it must come out 2.5 of them too large, seven times in a thousand; more than five
+    // of a hundred come once in ten thousand.
     let answered = |trial: &u64| two_stage(&SpatialView::from(&noisy(0.9, *trial)[0]), &SQUARE).is_ok();
     let answered = (0..100).filter(answered).count();
     assert!(answered <= 5, "{answered}");
@@ -211,8 +213,8 @@ fn the_covariance_of_a_refined_view_is_that_of_its_errors() {
         let e = nalgebra::DVector::from_iterator(11, errors.into_iter().chain(moved.iter().copied()));
         sum += e.dot(&found.covariance.clone().cholesky().unwrap().solve(&e));
     }
-    // e^T P^-1 e is 11 F(11, 115), of mean 11 x 115 / 113 and variance 24.9; 3.3 standard deviations of the mean of 300
-    // leave a thousandth, and terms of second order a tenth.
+    // e^T P^-1 e is 11 F(11, 115), of mean 11 x 115 / 113 and variance 24.9; 3.3 standard deviations of the
+    // mean of 300 leave a thousandth, and terms of second order a tenth.
     let mean = sum / TRIALS as f64;
     assert!((mean - 11.2).abs() < 3.3 * (24.9 / TRIALS as f64).sqrt() + 0.1, "{mean}");
 }
@@ -270,7 +272,8 @@ fn the_command_answers_for_planes_and_for_targets_in_three_dimensions() {
     assert_eq!(neither.status.code(), Some(2));
 }
 
-/// Zhang's own photographs: his report has fx = 832.5 px and the principal point (303.959, 206.585) from all five.
+/// Zhang's own photographs: his report has fx = 832.5 px and the principal point (303.959, 206.585) from all
+/// five.
 #[test]
 #[cfg_attr(not(calibench_data), ignore = "needs the measurements of others: CONTRIBUTING.md, real data")]
 fn each_of_zhangs_views_gives_his_focal_length_if_it_is_told_his_principal_point() {

@@ -65,7 +65,8 @@ fn right_calibrations_fail_on_new_views_as_rarely_as_is_said() {
         .collect();
     let share =
         |fails: &dyn Fn(&calibench::validate::HoldOut) -> bool| judged.iter().filter(|h| fails(h)).count();
-    // Two tests at half the rate each, nearly independent: 1 - 0.975^2 = 4.94 %. Counted when this was written: 23 of 600.
+    // Two tests at half the rate each, nearly independent: 1 - 0.975^2 = 4.94 %. Counted when this was
+    // written: 23 of 600.
     let failed = share(&|h| !h.holds());
     counted(failed, TRIALS, 0.045, RATE);
     // The probabilities themselves are uniform; and of single views.
@@ -84,7 +85,8 @@ fn right_calibrations_fail_on_new_views_as_rarely_as_is_said() {
     let alone = mean(&|h| h.together.noise_alone_px * h.together.noise_alone_px);
     // A relative standard deviation of 0.09 a trial, in views and in noise: 0.004 of the mean.
     assert!((square / predicted - 1.0).abs() < 0.013, "{square} {predicted}");
-    // Six parameters, each known from five views and asked of three: six tenths of a degree of freedom each, of 360.
+    // Six parameters, each known from five views and asked of three: six tenths of a degree of freedom each,
+    // of 360.
     assert!((1.005..1.02).contains(&(predicted / alone)), "{predicted} {alone}");
 }
 

@@ -1,4 +1,5 @@
-//! Do `validate` and `diff` doubt right calibrations of other lenses as rarely as they say, and see wrong ones?
+//! Do `validate` and `diff` doubt right calibrations of other lenses as rarely as they say, and see wrong
+//! ones?
 
 use crate::program::{calibench as run, folder, text};
 use crate::validate::{csv, estimate};
@@ -176,7 +177,8 @@ fn one_camera_by_two_models_is_doubted_as_rarely_as_is_said_and_a_model_that_doe
             one_camera(&known(&a), &known(&b), SIZE, TakenOut::Rotation).unwrap()
         })
         .collect();
-    // Both share six directions, and k4 is one more; a draw that hardly determines one direction hides others behind it.
+    // Both share six directions, and k4 is one more; a draw that hardly determines one direction hides others
+    // behind it.
     let seven = tests.iter().filter(|test| test.degrees_of_freedom == 7).count();
     eprintln!("seven directions: {seven} of {}", tests.len());
     assert!(seven >= 190 && tests.iter().all(|test| (4..=7).contains(&test.degrees_of_freedom)));

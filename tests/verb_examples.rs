@@ -1,5 +1,5 @@
-//! Does every verb's help end with examples, and do they run? All of them, in the order of the help, in a folder with what
-//! they read.
+//! Does every verb's help end with examples, and do they run? All of them, in the order of the help, in a
+//! folder with what they read.
 
 use crate::shell::verbs;
 use calibench::calibrate::{Settings, calibrate};

@@ -382,8 +382,9 @@ fn a_file_is_old_or_whole_whichever_operation_fails() {
     fs::remove_dir_all(folder).expect("removed");
 }
 
-/// What stands in the folder after the next write, or after a later one: a program that another test is starting at this moment holds the
-/// locks of all open files until it has begun, and what somebody may still be writing is left alone.
+/// What stands in the folder after the next write, or after a later one: a program that another test is
+/// starting at this moment holds the locks of all open files until it has begun, and what somebody may still
+/// be writing is left alone.
 fn left_by_next(folder: &Path, expected: &Tree, write: impl Fn()) -> Tree {
     let started = Instant::now();
     loop {

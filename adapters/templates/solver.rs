@@ -3,10 +3,10 @@
 //!     rustc --edition 2021 -O -o my-name my-name.rs
 //!     calibench gate --solver ./my-name
 //!
-//! It reads problems, a JSON object a line, and writes answers, a JSON object a line. `main`, `answer` and the JSON at the end
-//! can stay; put your own calibrator in the place of `solve`. What it does now: homographies, a focal length from them, and
-//! Gauss-Newton with Levenberg's damping and numerical derivatives (Zhang 2000). It states its covariance, and refuses what it
-//! cannot solve.
+//! It reads problems, a JSON object a line, and writes answers, a JSON object a line. `main`, `answer` and
+//! the JSON at the end can stay; put your own calibrator in the place of `solve`. What it does now:
+//! homographies, a focal length from them, and Gauss-Newton with Levenberg's damping and numerical
+//! derivatives (Zhang 2000). It states its covariance, and refuses what it cannot solve.
 
 use std::io::{BufRead, Write};
 
@@ -132,7 +132,8 @@ fn least_squares(rows: &[Vector], right: &[f64]) -> Refusable<Vector> {
 
 // --- The camera --------------------------------------------------------------------------------------
 
-/// A pose after a step: exp(w) on the left of its rotation (Rodrigues), and a shift. The step is w, then the shift.
+/// A pose after a step: exp(w) on the left of its rotation (Rodrigues), and a shift. The step is w, then the
+/// shift.
 fn moved(pose: &Pose, step: &[f64]) -> Pose {
     let angle = norm(&step[..3]);
     let (s, c) = match angle < 1e-9 {
@@ -183,7 +184,8 @@ fn middle_and_scale(points: &[[f64; 2]]) -> Refusable<([f64; 2], f64)> {
     }
 }
 
-/// From the target's plane to pixels relative to (cx, cy), by the direct linear transform with both sides about their middle.
+/// From the target's plane to pixels relative to (cx, cy), by the direct linear transform with both sides
+/// about their middle.
 fn homography(view: &View, cx: f64, cy: f64) -> Refusable<[[f64; 3]; 3]> {
     let (t, t_scale) = middle_and_scale(&view.target)?;
     let (u, u_scale) = middle_and_scale(&view.pixels)?;
@@ -226,7 +228,8 @@ struct State {
     poses: Vec<Pose>,
 }
 
-/// The focal lengths with the principal point in the image's middle: columns of K^-1 H are perpendicular and equally long.
+/// The focal lengths with the principal point in the image's middle: columns of K^-1 H are perpendicular and
+/// equally long.
 fn start(problem: &Problem) -> Refusable<State> {
     let mut camera = [0.0; 10];
     camera[2] = (problem.image_size[0] - 1.0) / 2.0;

@@ -1,8 +1,9 @@
-//! What becomes of boards of which marks are hidden? Exact renders of chessboards and grids of discs, in line and
-//! staggered, covered in part, cut by the frame, or in glare: boards found, marks kept, marks out of place, boards of another size.
+//! What becomes of boards of which marks are hidden? Exact renders of chessboards and grids of discs, in line
+//! and staggered, covered in part, cut by the frame, or in glare: boards found, marks kept, marks out of
+//! place, boards of another size.
 //!
-//! `cargo run --release --bin hidden -- [--trials N]`; every trial asks for the board that is there and for three that are
-//! not.
+//! `cargo run --release --bin hidden -- [--trials N]`; every trial asks for the board that is there and for
+//! three that are not.
 #![allow(clippy::print_stdout, reason = "a program whose output is its result")]
 
 use calibench::board::{Arrangement, Board, Pattern};

@@ -1,7 +1,9 @@
-//! What is found of boards whose rows are staggered, beside rows in line? Exact renders under random poses, lenses, blur and noise:
-//! boards found, in a wrong order, errors of the centres; boards of other sizes and kinds that are asked for and not there.
+//! What is found of boards whose rows are staggered, beside rows in line? Exact renders under random poses,
+//! lenses, blur and noise: boards found, in a wrong order, errors of the centres; boards of other sizes and
+//! kinds that are asked for and not there.
 //!
-//! `cargo run --release --bin staggered -- [--trials N] [--write FOLDER]`. The folder is for `opencv.py FOLDER`, which asks OpenCV.
+//! `cargo run --release --bin staggered -- [--trials N] [--write FOLDER]`. The folder is for `opencv.py
+//! FOLDER`, which asks OpenCV.
 #![allow(clippy::print_stdout, reason = "a program whose output is its result")]
 
 use calibench::board::{Arrangement, Board, Pattern};

@@ -1,4 +1,5 @@
-//! The trials of the experiment `model-choice`, every candidate fitted: what is committed in golden/model-choice/.
+//! The trials of the experiment `model-choice`, every candidate fitted: what is committed in
+//! golden/model-choice/.
 
 use calibench_experiments::model_choice::campaign;
 use std::process::ExitCode;

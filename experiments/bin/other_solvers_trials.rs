@@ -1,4 +1,5 @@
-//! The trials of the experiment `other-solvers`, asked of one program: what is committed in golden/other-solvers/.
+//! The trials of the experiment `other-solvers`, asked of one program: what is committed in
+//! golden/other-solvers/.
 
 use calibench_experiments::other_solvers::campaign;
 use std::process::ExitCode;

@@ -18,7 +18,8 @@ const TIMEOUT: Duration = Duration::from_secs(120);
 /// What the adapter imports.
 const MODULES: [&str; 2] = ["cv2", "numpy"];
 
-/// Shows a program the photographs of the experiment detector-gate, and writes what it found to golden/detector-gate/NAME.csv.
+/// Shows a program the photographs of the experiment detector-gate, and writes what it found to
+/// golden/detector-gate/NAME.csv.
 #[derive(Debug, Parser)]
 struct Arguments {
     /// calibench, opencv or opencv-sb

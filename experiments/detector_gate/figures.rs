@@ -9,7 +9,8 @@ use calibench_detector_gate::{Scene, scenes};
 use calibench_harness::{Align, Dash, Drawing, ExperimentError, Figure, Look, stats};
 use rayon::prelude::*;
 
-/// Widths of the scenes' names, of a panel's axis and of a column of counts, and the gap between the panels, px.
+/// Widths of the scenes' names, of a panel's axis and of a column of counts, and the gap between the panels,
+/// px.
 const NAMES: f64 = 112.0;
 const AXIS: f64 = 236.0;
 const COUNT: f64 = 42.0;
@@ -234,7 +235,7 @@ pub fn photographs() -> Result<Figure, ExperimentError> {
     let names: Vec<String> = ids.chunks(COLUMNS).map(|names| names.join(", ")).collect();
     let caption = format!(
         "The middle of the first photograph of every scene, at half its size, the kinds of boards in turn. Row by row: {}. Seed {SEED}. Notice \
-         that faint boards are hardly seen.",
+         those of little contrast.",
         names.join("; ")
     );
     Ok(Figure::photo("photographs", &sheet, caption))

@@ -106,8 +106,9 @@ impl<'a> Judged<'a> {
     }
 }
 
-/// The root of a ratio of sums. Marks of a photograph err together, so that its interval is that of independent photographs: by the linearised
-/// logarithm of the ratio (Cochran 1977, 6.4, has the ratio's) and Student's t. `None` of fewer than two.
+/// The root of a ratio of sums. Marks of a photograph err together, so that its interval is that of
+/// independent photographs: by the linearised logarithm of the ratio (Cochran 1977, 6.4, has the ratio's) and
+/// Student's t. `None` of fewer than two.
 fn root_of_ratio(pairs: &[(f64, f64)], false_alarm: f64) -> Option<Measured> {
     if pairs.len() < 2 {
         return None;
@@ -123,8 +124,8 @@ fn root_of_ratio(pairs: &[(f64, f64)], false_alarm: f64) -> Option<Measured> {
     Some(Measured { value: ratio.sqrt(), interval })
 }
 
-/// The probability behind `part` of `all` (Clopper & Pearson 1934): beyond its ends as few, or as many, would be seen in half of `false_alarm`
-/// at most.
+/// The probability behind `part` of `all` (Clopper & Pearson 1934): beyond its ends as few, or as many, would
+/// be seen in half of `false_alarm` at most.
 pub fn clopper_pearson(part: usize, all: usize, false_alarm: f64) -> Interval {
     let (k, n) = (part as f64, all as f64);
     // P(X >= k) at probability p is the incomplete beta function I_p(k, n - k + 1).
@@ -180,7 +181,8 @@ mod tests {
 
     #[test]
     fn photographs_count_and_not_their_marks() {
-        // Squares of 4 and 12 over 1 and 1: a mean of 8 with a standard error of 4, and t of one degree at 50 % is 1.
+        // Squares of 4 and 12 over 1 and 1: a mean of 8 with a standard error of 4, and t of one degree at 50
+        // % is 1.
         let found = root_of_ratio(&[(4.0, 1.0), (12.0, 1.0)], 0.5).unwrap();
         let factor = libm::exp(0.25);
         assert!((found.interval.low - 8f64.sqrt() / factor).abs() < 1e-9);

@@ -39,7 +39,8 @@ impl Errors {
     }
 }
 
-/// This library's errors in the discs of the first photographs of a scene: of those that have others all around them, and of the outermost.
+/// This library's errors in the discs of the first photographs of a scene: of those that have others all
+/// around them, and of the outermost.
 pub fn inner_and_outer(id: &str) -> Option<[Errors; 2]> {
     let scene = scenes().into_iter().find(|scene| scene.kind == Kind::Circles && scene.id == id)?;
     let of_photo = |trial| {

@@ -3,8 +3,9 @@
 use calibench_detector_gate::protocol::Kind;
 use calibench_detector_gate::{Marks, Outcome};
 
-/// The columns of a line. `squares` is the sum of the squared distances of the marks from their places (px^2), `worst` the largest distance (px),
-/// `bound` what the sum is at the bound (px^2). What there is none of is empty.
+/// The columns of a line. `squares` is the sum of the squared distances of the marks from their places
+/// (px^2), `worst` the largest distance (px), `bound` what the sum is at the bound (px^2). What there is none
+/// of is empty.
 pub const HEADER: &str = "board,scene,trial,ending,mirrored,confused,missing,marks,squares,worst,bound";
 
 const BROKEN: &str = "broken";

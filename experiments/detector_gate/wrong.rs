@@ -1,5 +1,6 @@
-//! How often is a board wrong? Ten thousand photographs, of the gate's scenes and of what else may stand before a camera: other boards beside
-//! it, its own end outside of the image, a tiled floor, a keyboard. Counted by scene, as it is committed in golden/detector-gate/.
+//! How often is a board wrong? Ten thousand photographs, of the gate's scenes and of what else may stand
+//! before a camera: other boards beside it, its own end outside of the image, a tiled floor, a keyboard.
+//! Counted by scene, as it is committed in golden/detector-gate/.
 
 use super::DRAWN;
 use super::campaign::FOLDER;

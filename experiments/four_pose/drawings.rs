@@ -4,13 +4,15 @@ use super::*;
 use calibench::geometry::Pose;
 use calibench_harness::{Align, Drawing, Expectation};
 
-/// Where the sheet shows points of space, px: seen from the right of the camera, behind it and above it, from far away.
+/// Where the sheet shows points of space, px: seen from the right of the camera, behind it and above it, from
+/// far away.
 struct Sheet;
 
 impl Sheet {
     const ORIGIN: (f64, f64) = (84.0, 300.0);
     const PX_PER_MM: f64 = 3.7;
-    /// To the right and down on the sheet, along the camera's X, Y and Z: turned by 53 degrees, looking down by 20.
+    /// To the right and down on the sheet, along the camera's X, Y and Z: turned by 53 degrees, looking down
+    /// by 20.
     const AXES: [(f64, f64); 3] = [(0.6, 0.274), (0.0, 0.940), (0.8, -0.205)];
 
     fn place(p: &Vec3) -> (f64, f64) {
@@ -119,7 +121,8 @@ fn camera_axes(sheet: Drawing) -> Drawing {
     })
 }
 
-/// One row of the picture of verdicts: a question, and a line of numbers with an interval and what is held against it.
+/// One row of the picture of verdicts: a question, and a line of numbers with an interval and what is held
+/// against it.
 struct Asked {
     question: &'static str,
     rows: [String; 2],

@@ -37,8 +37,8 @@ struct Arguments {
     /// Prints the rows of scenes that ended so: right, wrong, not-converged, refused
     #[arg(long)]
     list: Option<String>,
-    /// Asks another program, given with --solver, about the first scenes of every family, and writes how it ended
-    /// to golden/global-minimum/<PEER>.csv, or where --out says
+    /// Asks another program, given with --solver, about the first scenes of every family, and writes how it
+    /// ended to golden/global-minimum/<PEER>.csv, or where --out says
     #[arg(long, requires = "solver", conflicts_with_all = ["family", "from", "to", "write"])]
     peer: Option<String>,
     /// The program, as for `calibench gate`

@@ -107,8 +107,8 @@ impl Line {
 /// The command that asks OpenCV.
 pub const COMMAND: &str = "cargo run --release --bin global-minimum-scenes -- --peer opencv --solver 'python3 adapters/opencv_solver.py'";
 
-/// Asks a program about the first scenes of every family, at most `first` of each, and writes how it ended to `path`.
-/// Scenes whose skew is unknown are left out: few programs know it.
+/// Asks a program about the first scenes of every family, at most `first` of each, and writes how it ended to
+/// `path`. Scenes whose skew is unknown are left out: few programs know it.
 pub fn measure(command: &str, name: &str, jobs: usize, first: u64, path: &Path) -> Result<(), String> {
     let process = Process::new(command, TIMEOUT, jobs);
     let mut lines = String::new();

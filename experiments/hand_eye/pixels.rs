@@ -23,7 +23,8 @@ pub(super) fn both_bounds(case: &Case, seed: u64) -> Result<(Matrix6<f64>, Matri
     Ok((by_poses, factor.inverse().fixed_view::<SIX, SIX>(0, 0).into_owned()))
 }
 
-/// All that is unknown: X, Y, the robot's true poses, the camera, and the poses of the views beside the stations.
+/// All that is unknown: X, Y, the robot's true poses, the camera, and the poses of the views beside the
+/// stations.
 struct Unknown {
     x: Pose,
     y: Pose,

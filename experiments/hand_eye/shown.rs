@@ -94,7 +94,7 @@ pub(super) fn figures(found: &[(&Sweep, Vec<Cell>)], seed: u64) -> [Figure; 2] {
             &panels(&TRANSLATION),
             2,
             format!(
-                "Root mean square error of the camera's position on the gripper. {common} Notice how far the closed forms lie above the \
+                "Root mean square error of the camera's position on the gripper. {common} Notice which methods come near the \
                  bound where the robot is good and the camera poor, or the reverse."
             ),
         ),

@@ -1,4 +1,5 @@
-//! One trial: stations, photographs and robot poses with noise, what each method makes of them, and the bound.
+//! One trial: stations, photographs and robot poses with noise, what each method makes of them, and the
+//! bound.
 
 use super::cases::Case;
 use calibench::calibrate::{Covariance, Settings, calibrate};
@@ -20,8 +21,8 @@ pub(super) const METHODS: [(&str, &str); 4] = [
     ("shah", "Shah 2013"),
 ];
 
-/// Views beside those of the stations, of which the robot knows nothing: they make the camera known as well in
-/// every cell.
+/// Views beside those of the stations, of which the robot knows nothing: they make the camera known as well
+/// in every cell.
 const MORE_VIEWS: usize = 8;
 const MORE_TILT_DEG: f64 = 30.0;
 /// `X`: some 130 mm in front of the gripper's flange, or a camera beside the robot.

@@ -1,4 +1,5 @@
-//! Which lenses do people calibrate? A distribution for every model but Brown-Conrady's, which has an experiment of its own.
+//! Which lenses do people calibrate? A distribution for every model but Brown-Conrady's, which has an
+//! experiment of its own.
 
 use calibench::camera::{FreeParameters, Model, Parameter, Parameter::*};
 

@@ -16,10 +16,11 @@ pub const DETERMINED: f64 = 0.02;
 /// Hexadecimal digits of the fingerprint of the bits.
 const BITS: usize = 8;
 
-/// The columns of a line. `field` is the angle of the farthest corner from the axis, degrees; `aspect` fy over fx; `bound` the Cramer-Rao
-/// bound of sd(fx) over fx; `end` whether the reference is a minimum; `excess` the cost above the reference's in noise variances; `z` the
-/// error of fx over its stated deviation, `square` the squared error of all parameters under the stated covariance; `bits` a fingerprint
-/// of all digits.
+/// The columns of a line. `field` is the angle of the farthest corner from the axis, degrees; `aspect` fy
+/// over fx; `bound` the Cramer-Rao bound of sd(fx) over fx; `end` whether the reference is a minimum;
+/// `excess` the cost above the reference's in noise variances; `z` the error of fx over its stated deviation,
+/// `square` the squared error of all parameters under the stated covariance; `bits` a fingerprint of all
+/// digits.
 pub const HEADER: &str =
     "index,views,marks,field,aspect,noise,bound,end,class,asks,excess,z,square,note,bits";
 
@@ -48,7 +49,8 @@ pub struct Line {
     pub is_questioned: bool,
     /// Cost above the reference's over the noise variance; 0 where there is none.
     pub excess: f64,
-    /// Error of fx over its stated deviation, and the squared error of all parameters; where the result is right.
+    /// Error of fx over its stated deviation, and the squared error of all parameters; where the result is
+    /// right.
     pub errors: Option<[f64; 2]>,
     /// The termination, the error, or fx where it is wrong.
     pub note: String,

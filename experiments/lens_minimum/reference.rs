@@ -1,9 +1,9 @@
-//! Where does a search that starts at the truth end? An independent Levenberg-Marquardt minimisation for any lens, the reference of every
-//! scene.
+//! Where does a search that starts at the truth end? An independent Levenberg-Marquardt minimisation for any
+//! lens, the reference of every scene.
 //!
-//! It minimises what the solver minimises, the sum of squared pixel distances, and shares no search code with it: the whole normal matrix,
-//! summed mark by mark from `Camera::pixel_with_derivatives`, scaled to a unit diagonal and factored by Cholesky; damping in proportion to
-//! the diagonal (Marquardt 1963).
+//! It minimises what the solver minimises, the sum of squared pixel distances, and shares no search code with
+//! it: the whole normal matrix, summed mark by mark from `Camera::pixel_with_derivatives`, scaled to a unit
+//! diagonal and factored by Cholesky; damping in proportion to the diagonal (Marquardt 1963).
 
 use super::scenes::Drawn;
 use calibench::board::View;
@@ -144,7 +144,8 @@ impl Equations {
         Some((scaled.cholesky()?, scale))
     }
 
-    /// The step of `(H + damping diag H) step = -gradient` with what the cost loses by it to second order; `None` if `H` is singular.
+    /// The step of `(H + damping diag H) step = -gradient` with what the cost loses by it to second order;
+    /// `None` if `H` is singular.
     fn step(&self, damping: f64) -> Option<(DVector<f64>, f64)> {
         let (factor, scale) = self.factor(damping)?;
         let step = -factor.solve(&self.gradient.component_mul(&scale)).component_mul(&scale);

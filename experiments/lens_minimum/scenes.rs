@@ -1,4 +1,5 @@
-//! Which scene has the number `i`? Camera, board, poses, noise and settings, drawn from a family by seed and index alone.
+//! Which scene has the number `i`? Camera, board, poses, noise and settings, drawn from a family by seed and
+//! index alone.
 
 use super::families::Family;
 use calibench::board::View;
@@ -12,7 +13,8 @@ use std::f64::consts::TAU;
 const WIDTH_PX: (f64, f64) = (640.0, 4000.0);
 /// Width over height of the image, one of these.
 const ASPECTS: [f64; 4] = [4.0 / 3.0, 1.5, 16.0 / 9.0, 1.0];
-/// Height over width of a pixel: square to two parts in a hundred, or, in a quarter of the scenes, far from it.
+/// Height over width of a pixel: square to two parts in a hundred, or, in a quarter of the scenes, far from
+/// it.
 const NEARLY_SQUARE: (f64, f64) = (0.98, 1.02);
 const FAR_FROM_SQUARE: (f64, f64) = (0.5, 2.0);
 const FAR_SHARE: f64 = 0.25;
@@ -159,7 +161,8 @@ fn board(stream: &mut Stream) -> Vec<Vec2> {
     cells.map(|cell| (cell - middle) * spacing).collect()
 }
 
-/// The board's middle on the ray of some pixel, its normal tilted from that ray in any direction, rolled by any angle.
+/// The board's middle on the ray of some pixel, its normal tilted from that ray in any direction, rolled by
+/// any angle.
 fn pose(
     camera: &Camera<Lens>,
     (width, height): (usize, usize),

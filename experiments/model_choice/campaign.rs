@@ -15,7 +15,8 @@ use std::process::ExitCode;
 /// Where the committed lines stand, from the root of the project.
 pub const FOLDER: &str = "golden/model-choice";
 
-/// Fits every candidate to the trials of the experiment model-choice, and writes a table a truth to golden/model-choice/.
+/// Fits every candidate to the trials of the experiment model-choice, and writes a table a truth to
+/// golden/model-choice/.
 ///
 /// A table that the present code wrote is left as it is: an interrupted run goes on where it was.
 #[derive(Debug, Parser)]
@@ -49,7 +50,8 @@ fn write(truth: &Truth, folder: &Path) -> Result<(), String> {
     campaign::write_unless_current(&path, &head, table)
 }
 
-/// All trials of a truth, the longest first so that no processor is left with one of them at the end; rows in order.
+/// All trials of a truth, the longest first so that no processor is left with one of them at the end; rows in
+/// order.
 fn measured(truth: &Truth) -> Result<Vec<Row>, String> {
     let jobs =
         LAYOUTS.iter().rev().flat_map(|layout| (0..layout.trials(truth)).map(move |trial| (*layout, trial)));

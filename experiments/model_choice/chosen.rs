@@ -15,8 +15,8 @@ pub enum Criterion {
     HoldOut,
     /// The choice of `compare_models`.
     Auto,
-    /// Of those that lie in their model's range and whose Schwarz criterion exceeds the least by no more than this, the least error on views
-    /// left out.
+    /// Of those that lie in their model's range and whose Schwarz criterion exceeds the least by no more than
+    /// this, the least error on views left out.
     Within(f64),
     /// No choice: Brown-Conrady's five coefficients, whatever the marks say.
     Five,
@@ -127,14 +127,15 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// Whether a candidate stands behind one of a higher criterion that is not the choice: the comparison does so with coefficients that lie
-    /// where their model is not defined.
+    /// Whether a candidate stands behind one of a higher criterion that is not the choice: the comparison
+    /// does so with coefficients that lie where their model is not defined.
     fn is_put_behind(&self, fitted: &Fitted) -> bool {
         let is_before = |other: &Fitted| (1..fitted.place).contains(&other.place);
         self.fitted.iter().flatten().any(|other| is_before(other) && other.bic > fitted.bic)
     }
 
-    /// Difference of a candidate's camera from the truth over the frame, px; infinite where it does not show the frame or was refused.
+    /// Difference of a candidate's camera from the truth over the frame, px; infinite where it does not show
+    /// the frame or was refused.
     pub fn frame_px(&self, candidate: usize) -> f64 {
         self.fitted[candidate].filter(|f| f.shown >= SHOWN).map_or(f64::INFINITY, |f| f.rms_px)
     }

@@ -1,4 +1,5 @@
-//! How often each criterion picks right, how often too rich, what each candidate's camera is worth, and what a choice costs.
+//! How often each criterion picks right, how often too rich, what each candidate's camera is worth, and what
+//! a choice costs.
 
 use super::chosen::{Criterion, Trial, Verdict};
 use super::layout::LAYOUTS;

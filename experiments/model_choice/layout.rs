@@ -74,7 +74,8 @@ impl Layout {
     }
 }
 
-/// A fixed number of draws: the board's middle anywhere in the image, its normal tilted from the ray to it in any direction, then rolled.
+/// A fixed number of draws: the board's middle anywhere in the image, its normal tilted from the ray to it in
+/// any direction, then rolled.
 fn draw(camera: &Camera<Lens>, (width, height): (usize, usize), stream: &mut Stream) -> Option<Pose> {
     let [x, y, extent, direction, tilt, roll] = std::array::from_fn(|_| stream.uniform());
     let between = |(low, high): (f64, f64), share: f64| low + (high - low) * share;

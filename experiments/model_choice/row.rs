@@ -3,9 +3,10 @@
 use super::truths::CANDIDATES;
 use calibench::io::sha256_hex;
 
-/// The columns of a line. `place` counts from the choice of `compare_models`, 0; `rmse` and `hold_out` in px, `fx` to `cy` are errors in px,
-/// `rms` and `worst` the difference from the truth over the frame in px, `shown` the share of the frame that the camera shows, `told`
-/// whether a warning says that the model does not hold; `bits` is a fingerprint of all digits. Only the name where a candidate was refused.
+/// The columns of a line. `place` counts from the choice of `compare_models`, 0; `rmse` and `hold_out` in px,
+/// `fx` to `cy` are errors in px, `rms` and `worst` the difference from the truth over the frame in px,
+/// `shown` the share of the frame that the camera shows, `told` whether a warning says that the model does
+/// not hold; `bits` is a fingerprint of all digits. Only the name where a candidate was refused.
 pub const HEADER: &str =
     "marks,trial,candidate,place,rmse,bic,hold_out,fx,fy,cx,cy,rms,worst,shown,told,bits";
 

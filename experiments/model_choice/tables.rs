@@ -26,7 +26,8 @@ pub fn truths() -> Table {
     .into()
 }
 
-/// The angle between the rays of two pixels at the ends of the middle row or of a diagonal, through the optical axis.
+/// The angle between the rays of two pixels at the ends of the middle row or of a diagonal, through the
+/// optical axis.
 fn field_deg(truth: &Truth, diagonal: bool) -> f64 {
     let (camera, (width, height)) = (truth.camera(), truth.size);
     let (right, bottom) = (width as f64 - 1.0, height as f64 - 1.0);

@@ -1,4 +1,5 @@
-//! What does a trial say? A truth photographed, every candidate fitted, and each camera held against the truth.
+//! What does a trial say? A truth photographed, every candidate fitted, and each camera held against the
+//! truth.
 
 use super::layout::Layout;
 use super::row::{Fitted, Row};

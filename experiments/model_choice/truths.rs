@@ -49,7 +49,8 @@ pub const TRUTHS: [Truth; 9] = [
         coefficients: &[-0.30, 0.14, 0.0, 0.0, -0.03],
         is_slow: false,
     },
-    // The depth camera of an Azure Kinect, as its maker calibrated one (issue 1488 of the Azure-Kinect-Sensor-SDK), rounded.
+    // The depth camera of an Azure Kinect, as its maker calibrated one (issue 1488 of the
+    // Azure-Kinect-Sensor-SDK), rounded.
     Truth {
         name: "rational",
         about: "rational: a wide depth camera as its maker calibrated it",
@@ -128,8 +129,8 @@ impl Truth {
         Camera::with_lens(fx, fy, cx, cy, lens)
     }
 
-    /// Whether a candidate, with coefficients of its own, can be this lens exactly: of the same model, or rational where the lens is
-    /// Brown-Conrady's, with all that is not zero here among its coefficients.
+    /// Whether a candidate, with coefficients of its own, can be this lens exactly: of the same model, or
+    /// rational where the lens is Brown-Conrady's, with all that is not zero here among its coefficients.
     pub fn is_within(&self, candidate: &Candidate) -> bool {
         let lens = self.camera().distortion;
         let same_family = candidate.model == self.model

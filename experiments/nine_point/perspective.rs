@@ -1,8 +1,8 @@
 //! Is there "practically no perspective"? What the printed residual and the printed spacings allow.
 //!
-//! With a perspective `(a, b)` a dot at the grid's place `(X, Y)` is seen at `s (X, Y) / (1 + a X + b Y)`: from one
-//! spacing to the next the scale changes by that fraction. To first order an affine fit of nine dots leaves
-//! `(a (X^2 - 2/3) + b X Y, a X Y + b (Y^2 - 2/3))`, root mean square `sqrt(2/3) |(a, b)|`.
+//! With a perspective `(a, b)` a dot at the grid's place `(X, Y)` is seen at `s (X, Y) / (1 + a X + b Y)`:
+//! from one spacing to the next the scale changes by that fraction. To first order an affine fit of nine dots
+//! leaves `(a (X^2 - 2/3) + b X Y, a X Y + b (Y^2 - 2/3))`, root mean square `sqrt(2/3) |(a, b)|`.
 
 use super::*;
 use book::entry;
@@ -17,7 +17,8 @@ pub fn judge_perspective(record: &mut Record) -> Result<(), ExperimentError> {
     let rms = value("rms")?;
     let spacing_px = 2.0 / (value("sx")? + value("sy")?);
     let largest = rms / (2.0f64 / 3.0).sqrt();
-    // A corner dot lies sqrt(2) spacings out, and its place is changed by sqrt(2) times the perspective, at most.
+    // A corner dot lies sqrt(2) spacings out, and its place is changed by sqrt(2) times the perspective, at
+    // most.
     let moved_px = 2.0 * largest * spacing_px;
     let ratio = value("spacing-rows")? / value("spacing-columns")?;
     record

@@ -54,8 +54,8 @@ pub(super) fn tilt_figure(tilts: &[Cell], seed: u64) -> Figure {
         panel("k1", "RMS error", 2),
     ];
     let caption = format!(
-        "RMS error of one view against its tilt, {TRIALS} photographs a point where all are answered, noise {SIGMA_PX} px, seed {seed}. Notice that \
-         refinement attains the bound, and that with a wrong principal point more tilt does not help as much."
+        "RMS error of one view against its tilt, {TRIALS} photographs a point where all are answered, noise {SIGMA_PX} px, seed {seed}. Notice how far \
+         refinement stays from the bound, and what more tilt is worth with a wrong principal point."
     );
     Figure::panels("tilt", &panels, 3, caption)
 }

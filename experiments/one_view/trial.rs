@@ -19,7 +19,8 @@ pub(super) fn camera() -> Camera {
     Truth::example_camera().with(Parameter::K2, 0.0)
 }
 
-/// Where someone puts the principal point who does not know it: the image's centre, 6.5 px left and 3.5 px above.
+/// Where someone puts the principal point who does not know it: the image's centre, 6.5 px left and 3.5 px
+/// above.
 pub(super) fn image_centre() -> Vec2 {
     Assumed::centre_of(Truth::EXAMPLE_IMAGE).principal_point_px
 }
@@ -58,8 +59,8 @@ pub(super) fn all_free() -> Settings {
     held_at(true_centre()).estimate(Parameter::Cx).estimate(Parameter::Cy)
 }
 
-/// What is asked of an estimate: error of f (px), of the distance (mm), of k1, and the standard deviation that it states
-/// of f.
+/// What is asked of an estimate: error of f (px), of the distance (mm), of k1, and the standard deviation
+/// that it states of f.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Estimate {
     pub(super) errors: [f64; 3],
@@ -210,8 +211,8 @@ pub(super) fn one_view_bound(tilt_deg: f64, sigma_px: f64) -> Option<[f64; 3]> {
     Some([tied[(0, 0)].sqrt(), depth.sqrt(), tied[(2, 2)].sqrt()])
 }
 
-/// The covariance of the intrinsics, and the variance of the first view's distance, once `fx = fy` is known: with `a^T x =
-/// 0` for a vector `a`, `C - C a a^T C / (a^T C a)`.
+/// The covariance of the intrinsics, and the variance of the first view's distance, once `fx = fy` is known:
+/// with `a^T x = 0` for a vector `a`, `C - C a a^T C / (a^T C a)`.
 pub(super) fn tied(bound: &Covariance) -> (DMatrix<f64>, f64) {
     let n = bound.free.len();
     let joint = DMatrix::from_fn(n + 1, n + 1, |i, j| match (i < n, j < n) {

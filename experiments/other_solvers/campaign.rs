@@ -16,7 +16,8 @@ pub const FOLDER: &str = "golden/other-solvers";
 /// Longest time for one answer.
 const TIMEOUT: Duration = Duration::from_secs(120);
 
-/// Asks a program about the trials of the experiment other-solvers, and writes how it did to golden/other-solvers/NAME.csv.
+/// Asks a program about the trials of the experiment other-solvers, and writes how it did to
+/// golden/other-solvers/NAME.csv.
 #[derive(Debug, Parser)]
 struct Arguments {
     /// calibench, opencv, colmap, scipy or minimal

@@ -50,9 +50,9 @@ pub fn spread(places: &[Place], measured: &[Measured], each: f64) -> Figure {
         "Left: standard deviation of fx over its bound, against how well the data determine it: a point a program and \
          cell with {FEWEST} answers or more, of {trials} trials ({} of minimal, {} of scipy); noise 0.1 px, seeds of the \
          studies. Grey: where such a ratio of {trials} trials lies if the bound is attained, all together at 1e-4. \
-         Right: the share of trials that gave a camera. Notice that the programs lie on each other left of the dashed \
-         line: they met the same noise. So do the cells of a study, which therefore move together. Right of it they \
-         part, and the spread of those that are not refused is no spread of all.",
+         Right: the share of trials that gave a camera. Notice how far the programs lie apart left \
+         of the dashed line and right of it. All met the same noise, and so did the cells of a study, which therefore \
+         move together; where some trials are refused the spread is that of the others alone.",
         trials_of("minimal"),
         trials_of("scipy"),
     );

@@ -1,5 +1,5 @@
-//! Which cells are all solvers asked? Those of three studies of `studies/`, of two of them not every level: a trial is that of the whole
-//! study all the same, since its noise does not depend on the cell.
+//! Which cells are all solvers asked? Those of three studies of `studies/`, of two of them not every level: a
+//! trial is that of the whole study all the same, since its noise does not depend on the cell.
 
 use calibench_study::{Spec, SpecError};
 

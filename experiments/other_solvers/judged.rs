@@ -93,7 +93,8 @@ impl<'a> Judged<'a> {
         self.rows.iter().filter(|row| row.answer.is_some() && row.warned).count()
     }
 
-    /// Cameras without a warning whose fx is off by more than `limit` of the stated standard deviations. `None` where none are stated.
+    /// Cameras without a warning whose fx is off by more than `limit` of the stated standard deviations.
+    /// `None` where none are stated.
     pub fn misleading(&self, limit: f64) -> Option<usize> {
         let mut count = 0;
         for row in &self.rows {

@@ -1,7 +1,8 @@
 //! What became of a trial? A line each, as it is committed in golden/other-solvers/.
 
-/// The columns of a line. `cell` counts through the cells of all studies; `fx` (px) and `k2` are errors, `sd_` what the program states;
-/// `cost` is the sum of squared residuals over the noise variance. What a program does not state is empty.
+/// The columns of a line. `cell` counts through the cells of all studies; `fx` (px) and `k2` are errors,
+/// `sd_` what the program states; `cost` is the sum of squared residuals over the noise variance. What a
+/// program does not state is empty.
 pub const HEADER: &str = "cell,trial,ending,warned,fx,k2,sd_fx,sd_k2,nees,cost";
 
 /// How a program ended.

@@ -20,7 +20,8 @@ pub const JUDGED: [Parameter; 2] = [Parameter::Fx, Parameter::K2];
 pub struct Asked {
     /// A trial a row, cell after cell.
     pub rows: Vec<Row>,
-    /// Of each row: root mean square of what single precision moves a pixel coordinate by, over the noise's standard deviation.
+    /// Of each row: root mean square of what single precision moves a pixel coordinate by, over the noise's
+    /// standard deviation.
     pub rounding: Vec<f64>,
 }
 

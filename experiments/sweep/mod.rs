@@ -1,4 +1,5 @@
-//! What did each cell of a study find, along the axis that it sweeps? What experiments share that run a study.
+//! What did each cell of a study find, along the axis that it sweeps? What experiments share that run a
+//! study.
 
 use calibench_harness::stats::{Interval, each_of};
 use calibench_harness::{Band, Context, Dash, ExperimentError, Look, Plot, Record};

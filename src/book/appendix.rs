@@ -1,4 +1,5 @@
-//! What stands in the appendix? Every published number beside ours, and the tables of what the experiments found.
+//! What stands in the appendix? Every published number beside ours, and the tables of what the experiments
+//! found.
 
 use super::evidence::{ExperimentEvidence, RecordClaim, number};
 use super::format::{self, significant, typeset};

@@ -1,6 +1,6 @@
-//! Which figures can a reader move? A placeholder stands beside the figure. What it becomes is empty and holds the golden
-//! values that the page is to find again; the scripts of book/laboratory fill it where they run. Without them, and on
-//! paper, the figure is all there is.
+//! Which figures can a reader move? A placeholder stands beside the figure. What it becomes is empty and
+//! holds the golden values that the page is to find again; the scripts of book/laboratory fill it where they
+//! run. Without them, and on paper, the figure is all there is.
 
 use super::evidence::Evidence;
 use super::text::attribute;
@@ -8,8 +8,8 @@ use calibench_harness::project::Project;
 use serde_json::{Value, json};
 use std::io;
 
-/// A laboratory: its name, which is that of its script, the golden numbers that it computes anew, and what it begins with
-/// besides: columns of a table of the last run.
+/// A laboratory: its name, which is that of its script, the golden numbers that it computes anew, and what it
+/// begins with besides: columns of a table of the last run.
 struct Laboratory {
     name: &'static str,
     golden: &'static [&'static str],
@@ -100,8 +100,8 @@ const LABORATORIES: [Laboratory; 5] = [
     },
 ];
 
-/// What all laboratories share, in the order in which a page loads it; that of the solver's code is made of the
-/// WebAssembly.
+/// What all laboratories share, in the order in which a page loads it; that of the solver's code is made of
+/// the WebAssembly.
 const SHARED: [&str; 7] =
     ["solver.js", "calibench.js", "drawing.js", "knobs.js", "same-numbers.js", "monte-carlo.js", "scene.js"];
 /// Starts them; loaded last.

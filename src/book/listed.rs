@@ -1,5 +1,5 @@
-//! How are the lists of the book read? TOML files whose entries stand under one key, as `[[reference]]` does, each with its
-//! line, so that a finding can name it.
+//! How are the lists of the book read? TOML files whose entries stand under one key, as `[[reference]]` does,
+//! each with its line, so that a finding can name it.
 
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;

@@ -1,5 +1,5 @@
-//! What stands on the page of a record? Everything that an experiment found, what computed it, and where the text
-//! speaks of it.
+//! What stands on the page of a record? Everything that an experiment found, what computed it, and where the
+//! text speaks of it.
 
 use super::appendix::{claims_table, verdict};
 use super::evidence::{ExperimentEvidence, RecordItem, RecordProvenance};

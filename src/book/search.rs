@@ -1,4 +1,5 @@
-//! Where does a word stand? Every section of every page with its plain text, for the script of the search page.
+//! Where does a word stand? Every section of every page with its plain text, for the script of the search
+//! page.
 
 use super::page::CompiledPage;
 use serde_json::json;

@@ -50,18 +50,20 @@ pub fn normal_two_sided(false_alarm: f64) -> f64 {
     -normal_quantile(0.5 * false_alarm)
 }
 
-/// Degrees of freedom from which Student's quantile is that of an expansion, whose error is there below 1e-14 of it down to one in a
-/// thousand, and some 1e-10 at one in 1e15. The inverse of the incomplete beta function ends short of the quantile by 4e-6 of it at a
-/// hundred thousand, by 7 % at ten million, and not at all at some more.
+/// Degrees of freedom from which Student's quantile is that of an expansion, whose error is there below 1e-14
+/// of it down to one in a thousand, and some 1e-10 at one in 1e15. The inverse of the incomplete beta
+/// function ends short of the quantile by 4e-6 of it at a hundred thousand, by 7 % at ten million, and not at
+/// all at some more.
 const MANY: f64 = 1000.0;
 
-/// The tail keeps its digits where the inverse of the incomplete beta function, of what is as rare, may not: with one degree of freedom it
-/// ends far from the quantile from 1e-7 on.
+/// The tail keeps its digits where the inverse of the incomplete beta function, of what is as rare, may not:
+/// with one degree of freedom it ends far from the quantile from 1e-7 on.
 const RARE: f64 = 1e-6;
 
-/// The half-width `t` of a two-sided interval that a variable of Student's distribution leaves with probability
-/// `false_alarm` (Student 1908); that of the normal distribution if `degrees_of_freedom` is infinite. It is infinite where none are
-/// left, and else NaN where `false_alarm` is no probability or `degrees_of_freedom` no number.
+/// The half-width `t` of a two-sided interval that a variable of Student's distribution leaves with
+/// probability `false_alarm` (Student 1908); that of the normal distribution if `degrees_of_freedom` is
+/// infinite. It is infinite where none are left, and else NaN where `false_alarm` is no probability or
+/// `degrees_of_freedom` no number.
 ///
 /// ```
 /// use calibench::distribution::student_two_sided;
@@ -85,8 +87,8 @@ pub fn student_two_sided(false_alarm: f64, degrees_of_freedom: f64) -> f64 {
     stable(bisected(1.0, |t| 2.0 * student.cdf(-t) > false_alarm))
 }
 
-/// The quantile of Student's distribution at the probability of the normal quantile `z`, by the inverse powers of its degrees
-/// of freedom (Abramowitz & Stegun 1964, 26.7.5).
+/// The quantile of Student's distribution at the probability of the normal quantile `z`, by the inverse
+/// powers of its degrees of freedom (Abramowitz & Stegun 1964, 26.7.5).
 fn student_expanded(z: f64, freedom: f64) -> f64 {
     let s = z * z;
     let terms = [
@@ -112,7 +114,8 @@ pub fn fisher_tail(f: f64, numerator_freedom: usize, denominator_freedom: usize)
         .map_or(f64::NAN, |d| stable(d.sf(f.max(0.0))))
 }
 
-/// The positive number up to which `below` holds, by bisection from 0 and from `high`, doubled until it does not hold there.
+/// The positive number up to which `below` holds, by bisection from 0 and from `high`, doubled until it does
+/// not hold there.
 fn bisected(mut high: f64, below: impl Fn(f64) -> bool) -> f64 {
     let mut low = 0.0;
     while below(high) {
@@ -180,7 +183,8 @@ impl ChiSquare {
         stable(self.distribution().sf(x.max(0.0)))
     }
 
-    /// The `x` with `P(X <= x) = p`, to ten digits: 0 and infinite at the ends, NaN where `p` is no probability.
+    /// The `x` with `P(X <= x) = p`, to ten digits: 0 and infinite at the ends, NaN where `p` is no
+    /// probability.
     ///
     /// Bisection of the distribution function between bounds from the normal approximation (Wilson & Hilferty
     /// 1931).

@@ -1,5 +1,5 @@
-//! `calibench board BOARD`: a page to print, true to scale, with rulers to check the printer, and the file for
-//! `calibench calibrate --board`.
+//! `calibench board BOARD`: a page to print, true to scale, with rulers to check the printer, and the file
+//! for `calibench calibrate --board`.
 
 mod named;
 mod paper;
@@ -23,9 +23,9 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// chess:9x6:25mm (inner corners, side of a square), circles:9x7:20mm:8mm (spacing, diameter),
-    /// asymmetric:4x9:19mm:14mm (distance of rows, half that of a row's discs; OpenCV's asymmetric grid), hexagonal:9x9:10mm:5mm,
-    /// dots:3x3:40mm:10mm, charuco:7x5:35mm:26mm:DICT_4X4_50 (squares, their side, that of a marker) or aprilgrid:6x4:30mm:0.3 (tags,
-    /// their side, space between them in sides)
+    /// asymmetric:4x9:19mm:14mm (distance of rows, half that of a row's discs; OpenCV's asymmetric grid),
+    /// hexagonal:9x9:10mm:5mm, dots:3x3:40mm:10mm, charuco:7x5:35mm:26mm:DICT_4X4_50 (squares, their side,
+    /// that of a marker) or aprilgrid:6x4:30mm:0.3 (tags, their side, space between them in sides)
     board: BoardSpec,
     /// Draws a PDF for this paper: A5 to A0, letter, legal, tabloid, or WIDTHxHEIGHT in mm [default: A4]
     #[arg(long, value_name = "PAPER")]

@@ -59,32 +59,36 @@ Code 1 is of other verbs.";
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_CODES)]
 pub(super) struct Arguments {
-    /// Corner file with the columns view,point,X,Y,u,v (and weight, by which a mark's residual is multiplied, or its sigma_px, if marks differ), or point pairs with point,px,py,X,Y, or - for one of
-    /// them on standard input; with --board, photographs
+    /// Corner file with the columns view,point,X,Y,u,v (and weight, by which a mark's residual is multiplied,
+    /// or its sigma_px, if marks differ), or point pairs with point,px,py,X,Y, or - for one of them on
+    /// standard input; with --board, photographs
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// The board in the photographs: chess:9x6:25mm (inner corners), circles:9x7:10mm:3mm (spacing, diameter),
-    /// asymmetric:4x11:20mm:15mm (distance of rows, half that of a row's discs; OpenCV's asymmetric grid), hexagonal:9x9:10mm:5mm,
-    /// dots:3x3:1, charuco:7x5:30mm:22mm:DICT_4X4_50 (squares, their side, that of a marker; OpenCV's dictionaries) or
-    /// aprilgrid:6x6:88mm:0.3 (Kalibr's tagCols, tagRows, tagSize, tagSpacing); or the board.toml beside a page that `calibench board` drew
+    /// The board in the photographs: chess:9x6:25mm (inner corners), circles:9x7:10mm:3mm (spacing,
+    /// diameter), asymmetric:4x11:20mm:15mm (distance of rows, half that of a row's discs; OpenCV's
+    /// asymmetric grid), hexagonal:9x9:10mm:5mm, dots:3x3:1, charuco:7x5:30mm:22mm:DICT_4X4_50 (squares,
+    /// their side, that of a marker; OpenCV's dictionaries) or aprilgrid:6x6:88mm:0.3 (Kalibr's tagCols,
+    /// tagRows, tagSize, tagSpacing); or the board.toml beside a page that `calibench board` drew
     #[arg(long, value_name = "BOARD", value_parser = board_or_file)]
     board: Option<BoardSpec>,
-    /// Where the marks of a corner file are, measured in space: a file with the columns point,X,Y,Z and their standard deviation
-    /// sd, or sdX,sdY,sdZ; without them marks are exact. The corner file then needs view,point,u,v only
+    /// Where the marks of a corner file are, measured in space: a file with the columns point,X,Y,Z and their
+    /// standard deviation sd, or sdX,sdY,sdZ; without them marks are exact. The corner file then needs
+    /// view,point,u,v only
     #[arg(long, value_name = "FILE")]
     target: Option<PathBuf>,
-    /// With --target: the noise of a pixel coordinate, px, where it is known (of a mark of weight 1; 1 takes a column
-    /// sigma_px at its word) [default: estimated from the residuals]
+    /// With --target: the noise of a pixel coordinate, px, where it is known (of a mark of weight 1; 1 takes
+    /// a column sigma_px at its word) [default: estimated from the residuals]
     #[arg(long, value_name = "PX", value_parser = super::said::noise_px)]
     sigma: Option<f64>,
-    /// Lens model: brown-conrady, rational, thin-prism, tilted, kannala-brandt, division or double-sphere; auto
-    /// compares eight (tilted and thin-prism are not among them) by Schwarz's criterion, and by how they predict views that were left out where it is undecided [default: brown-conrady]
+    /// Lens model: brown-conrady, rational, thin-prism, tilted, kannala-brandt, division or double-sphere;
+    /// auto compares eight (tilted and thin-prism are not among them) by Schwarz's criterion, and by how they
+    /// predict views that were left out where it is undecided [default: brown-conrady]
     #[arg(long, value_name = "MODEL")]
     model: Option<ModelChoice>,
     /// Estimates how the board is bent, each number known beforehand to be 0 with a standard deviation in the
     /// target's unit, or free: bow:SD (two bows), bow:free, bent:SD (with a twist), bent:free. A mark lies
-    /// bow_x (1 - x^2) + bow_y (1 - y^2) + twist x y towards the target's +Z, x and y from -1 to 1 over all marks; nothing
-    /// certifies the minimum then
+    /// bow_x (1 - x^2) + bow_y (1 - y^2) + twist x y towards the target's +Z, x and y from -1 to 1 over all
+    /// marks; nothing certifies the minimum then
     #[arg(long = "board-shape", value_name = "SHAPE", value_parser = parse_shape)]
     bow: Option<Board>,
     /// Parameters to estimate, of fx fy cx cy skew k1 k2 p1 p2 k3 and those of other lens models; the others
@@ -108,8 +112,8 @@ pub(super) struct Arguments {
     /// Distance of the sensor's pixels, micrometres: says the focal length in mm too
     #[arg(long, value_name = "UM", value_parser = super::said::positive)]
     pixel_pitch: Option<f64>,
-    /// Loss of a residual: squares, huber:PX or cauchy:PX; of marks with weights PX is one of weight times residual, with sigma_px a multiple
-    /// of it [default: squares]
+    /// Loss of a residual: squares, huber:PX or cauchy:PX; of marks with weights PX is one of weight times
+    /// residual, with sigma_px a multiple of it [default: squares]
     #[arg(long, value_name = "LOSS", value_parser = parse_loss)]
     loss: Option<Loss>,
     /// Leaves out views whose RMSE exceeds FACTOR times the median, worst first, such as 3
@@ -126,8 +130,8 @@ pub(super) struct Arguments {
     /// [default: 2GiB]
     #[arg(long, value_name = "BYTES", value_parser = parse_bytes, default_value_t = DEFAULT_MEMORY, hide_default_value = true)]
     memory: u64,
-    /// Folder for result.json, the page report.html, plots, and of photographs corners.csv, with the marks as they were
-    /// fitted, pictures with the marks drawn in, and one photograph before and after undistortion
+    /// Folder for result.json, the page report.html, plots, and of photographs corners.csv, with the marks as
+    /// they were fitted, pictures with the marks drawn in, and one photograph before and after undistortion
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Text for people or JSON for programs

@@ -1,5 +1,5 @@
-//! `calibench check-reference HISTORY.csv`: is a station still as it was? One reference of known size, measured
-//! again and again.
+//! `calibench check-reference HISTORY.csv`: is a station still as it was? One reference of known size,
+//! measured again and again.
 
 use super::calibrate::Format;
 use super::said::{MOST, number_that, positive, written_by};

@@ -1,5 +1,6 @@
-//! `calibench claims`: which command shows which claim, and what does it cost? Every experiment is run in a process of its own, so that
-//! time and memory are its own: what those ask who look at the artefacts of a paper.
+//! `calibench claims`: which command shows which claim, and what does it cost? Every experiment is run in a
+//! process of its own, so that time and memory are its own: what those ask who look at the artefacts of a
+//! paper.
 
 use super::calibrate::Format;
 use super::{Exit, find, print, warn};

@@ -22,16 +22,16 @@ const EXIT_CODES: &str = "Exit codes: 0 nothing speaks against one camera, or th
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_CODES)]
 pub(super) struct Arguments {
-    /// A camera with any lens in any format that `calibench convert` reads; result.json of `calibench calibrate` brings its
-    /// covariance along
+    /// A camera with any lens in any format that `calibench convert` reads; result.json of `calibench
+    /// calibrate` brings its covariance along
     a: PathBuf,
     /// The other camera
     b: PathBuf,
     /// Size of the frame, where neither file says it
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     image_size: Option<(usize, usize)>,
-    /// Distance of what is looked at, along its ray, in mm: the best translation is taken out too [default: the best
-    /// rotation alone, for any distance]
+    /// Distance of what is looked at, along its ray, in mm: the best translation is taken out too [default:
+    /// the best rotation alone, for any distance]
     #[arg(long, value_name = "MM", value_parser = parse_distance)]
     at: Option<f64>,
     /// Rate of false alarms of the test

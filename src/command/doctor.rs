@@ -1,5 +1,5 @@
-//! `calibench doctor`: is this program what one thinks it is? Its build, what it can do here, and whether it belongs to the
-//! golden values beside it.
+//! `calibench doctor`: is this program what one thinks it is? Its build, what it can do here, and whether it
+//! belongs to the golden values beside it.
 
 use super::calibrate::Format;
 use super::report::table;

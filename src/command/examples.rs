@@ -1,4 +1,5 @@
-//! What would one type? Examples at the end of every verb's help. They are commands that run: a test runs them all.
+//! What would one type? Examples at the end of every verb's help. They are commands that run: a test runs
+//! them all.
 
 use clap::{Arg, Command, CommandFactory};
 
@@ -144,7 +145,8 @@ pub(super) fn command() -> Command {
     })
 }
 
-/// The command with options that take -5 for a number, so that whoever wants another says why, and not for an option that does not exist.
+/// The command with options that take -5 for a number, so that whoever wants another says why, and not for an
+/// option that does not exist.
 fn taking_negative_numbers(command: Command) -> Command {
     let of_option = |arg: Arg| {
         let takes_a_value = !arg.is_positional() && arg.get_action().takes_values();

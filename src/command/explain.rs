@@ -1,5 +1,6 @@
-//! `calibench explain NAME`: where does a number, a claim, a published value, a figure or a table come from, and what is it
-//! worth? Its experiment is run, and what it says is put beside golden/, the chapter and the book.
+//! `calibench explain NAME`: where does a number, a claim, a published value, a figure or a table come from,
+//! and what is it worth? Its experiment is run, and what it says is put beside golden/, the chapter and the
+//! book.
 
 mod chapter;
 mod entry;
@@ -19,8 +20,8 @@ use words::Answer;
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// What is asked for: a number, claim, published value, figure or table (four-pose.fx), an experiment (four-pose), a
-    /// section of the chapter (5.1), or one of the book's contradictions (two-views-suffice)
+    /// What is asked for: a number, claim, published value, figure or table (four-pose.fx), an experiment
+    /// (four-pose), a section of the chapter (5.1), or one of the book's contradictions (two-views-suffice)
     name: String,
     /// Text for people or JSON for programs
     #[arg(long, value_enum, default_value_t = Format::Text)]

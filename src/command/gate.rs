@@ -53,8 +53,8 @@ pub(super) struct Arguments {
     /// Seed of the noise
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = super::said::whole::<u64>)]
     seed: u64,
-    /// Lens models whose scenes are asked, such as brown-conrady,rational [default: those that the solver says
-    /// it knows; brown-conrady of a program that says nothing, and in files]
+    /// Lens models whose scenes are asked, such as brown-conrady,rational [default: those that the solver
+    /// says it knows; brown-conrady of a program that says nothing, and in files]
     #[arg(long, value_name = "MODELS", value_delimiter = ',', conflicts_with_all = ["judge", "power", "certified", "hand_eye", "detector"])]
     models: Vec<Model>,
     /// The only scene or bad input to ask, by its name in reports; may be repeated
@@ -122,14 +122,15 @@ pub(super) struct Arguments {
         "export", "judge", "power", "planted", "record", "against", "junit", "html", "accept", "median_time", "certified", "jobs",
     ])]
     hand_eye: bool,
-    /// Judges a detector of calibration boards, by photographs of known truth (see adapters/DETECTOR-PROTOCOL.md)
-    /// [default detector here: this library's]
+    /// Judges a detector of calibration boards, by photographs of known truth (see
+    /// adapters/DETECTOR-PROTOCOL.md) [default detector here: this library's]
     #[arg(long, conflicts_with_all = [
         "export", "judge", "power", "planted", "record", "against", "junit", "html", "accept", "allow", "median_time", "certified", "jobs",
         "hand_eye",
     ])]
     detector: bool,
-    /// Kinds of boards that the detector is asked for: chessboard, circles, asymmetric, hexagonal, charuco, aprilgrid [default: all]
+    /// Kinds of boards that the detector is asked for: chessboard, circles, asymmetric, hexagonal, charuco,
+    /// aprilgrid [default: all]
     #[arg(long, value_name = "KINDS", value_delimiter = ',', requires = "detector", value_parser = detector::kind)]
     boards: Vec<calibench_detector_gate::protocol::Kind>,
     /// Judges this library and the hand-eye methods of the programs in adapters/, and writes the table as
@@ -444,7 +445,8 @@ fn judge(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build)
     Ok(if report.held() { Exit::Held } else { Exit::Deviates })
 }
 
-/// Tells what a gate of its own kind found: JSON where it is wanted, and the answer in the form that is asked for.
+/// Tells what a gate of its own kind found: JSON where it is wanted, and the answer in the form that is asked
+/// for.
 fn tell(arguments: &Arguments, json: &str, text: &str, trusted: bool) -> Result<Exit, Stop> {
     if let Some(path) = &arguments.json {
         write_atomically(path, json.as_bytes()).map_err(incomplete)?;

@@ -1,4 +1,5 @@
-//! Which files was a verb given to read? All that its arguments name, but those that say what to write. No verb may replace them by what it finds.
+//! Which files was a verb given to read? All that its arguments name, but those that say what to write. No
+//! verb may replace them by what it finds.
 
 use clap::ArgMatches;
 use std::path::Path;

@@ -19,16 +19,17 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Poses of the gripper seen from the robot's base, in the board's unit: view,x,y,z and rx,ry,rz (rotation
-    /// vector, rad), qw,qx,qy,qz or roll,pitch,yaw (degrees, Rz(yaw) Ry(pitch) Rx(roll)); views are named as in
-    /// the result
+    /// Poses of the gripper seen from the robot's base, in the board's unit: view,x,y,z and rx,ry,rz
+    /// (rotation vector, rad), qw,qx,qy,qz or roll,pitch,yaw (degrees, Rz(yaw) Ry(pitch) Rx(roll)); views are
+    /// named as in the result
     robot: PathBuf,
     /// result.json of `calibench calibrate`
     result: PathBuf,
     /// What moves with the robot: the camera, or the target before a fixed camera
     #[arg(long, value_enum, default_value_t = Moves::EyeInHand)]
     set_up: Moves,
-    /// Standard deviation of each coordinate of the robot's position, in mm (the board's unit): what it repeats
+    /// Standard deviation of each coordinate of the robot's position, in mm (the board's unit): what it
+    /// repeats
     #[arg(long, value_name = "MM", value_parser = positive)]
     robot_sd_mm: f64,
     /// Standard deviation of the robot's rotation about each axis, degrees

@@ -94,7 +94,8 @@ enum Verb {
     /// Converts cameras, corners and boards between the files of OpenCV, ROS, Kalibr, mrcal, COLMAP, MATLAB,
     /// HALCON and this program
     Convert(Box<convert::Arguments>),
-    /// Calibrates a camera from one view of a tilted plane or of a target in three dimensions, by Tsai's two stages
+    /// Calibrates a camera from one view of a tilted plane or of a target in three dimensions, by Tsai's two
+    /// stages
     Tsai(tsai::Arguments),
     /// Judges a calibration by views that it has not seen, by its own in parts, or by repetitions
     Validate(validate::Arguments),

@@ -18,7 +18,8 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// result.json of `calibrate` (a camera with Brown-Conrady's lens, or a plane from point pairs) or of `ninepoint`
+    /// result.json of `calibrate` (a camera with Brown-Conrady's lens, or a plane from point pairs) or of
+    /// `ninepoint`
     result: PathBuf,
     /// View of the calibration whose target lies in the plane
     #[arg(long, value_name = "NAME", conflicts_with = "pose")]

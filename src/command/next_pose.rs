@@ -1,5 +1,5 @@
-//! `calibench next-pose RESULT.json --want fx`: which photograph should be taken next, so that what is wanted is known
-//! best?
+//! `calibench next-pose RESULT.json --want fx`: which photograph should be taken next, so that what is wanted
+//! is known best?
 
 mod words;
 
@@ -28,28 +28,30 @@ pub(super) struct Arguments {
     /// The corner file of the calibration in place of a board: its marks are those of the target
     #[arg(long, value_name = "FILE", conflicts_with = "board")]
     corners: Option<PathBuf>,
-    /// What is to be known better: a parameter (fx, k1, ...), `pixel` (where a direction is seen, over the whole image) or
-    /// `length` (see --at); may be repeated, and then what remains of all together counts
+    /// What is to be known better: a parameter (fx, k1, ...), `pixel` (where a direction is seen, over the
+    /// whole image) or `length` (see --at); may be repeated, and then what remains of all together counts
     #[arg(long, value_name = "QUANTITY", value_parser = parse_quantity, required = true)]
     want: Vec<Quantity>,
-    /// For `length`: place of its middle in the camera's frame, in the board's unit; it lies along the image's rows
+    /// For `length`: place of its middle in the camera's frame, in the board's unit; it lies along the
+    /// image's rows
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_place, allow_hyphen_values = true, requires = "length")]
     at: Option<Vec3>,
     /// For `length`: the length, in the board's unit
     #[arg(long, value_name = "LENGTH", value_parser = positive, requires = "at")]
     length: Option<f64>,
-    /// Nearest and farthest distance of the board's middle, in the board's unit [default: a fifth beyond those of the
-    /// photographs taken]
+    /// Nearest and farthest distance of the board's middle, in the board's unit [default: a fifth beyond
+    /// those of the photographs taken]
     #[arg(long, value_name = "NEAR,FAR", value_parser = parse_distances)]
     distance: Option<(f64, f64)>,
     /// Largest tilt of the board against its line of sight, degrees: less than 80
     #[arg(long, value_name = "DEG", value_parser = parse_tilt, default_value_t = 45.0)]
     most_tilt: f64,
-    /// How far from the image's border a mark has to stay, px [default: a fiftieth of the image's shorter side]
+    /// How far from the image's border a mark has to stay, px [default: a fiftieth of the image's shorter
+    /// side]
     #[arg(long, value_name = "PX", value_parser = parse_margin)]
     margin: Option<f64>,
-    /// Standard deviation of a coordinate of a mark in the next photograph, px [default: the noise that the calibration
-    /// found]
+    /// Standard deviation of a coordinate of a mark in the next photograph, px [default: the noise that the
+    /// calibration found]
     #[arg(long, value_name = "PX", value_parser = noise_px)]
     mark_sd: Option<f64>,
     /// Size of the image, where the result does not say it
@@ -127,7 +129,8 @@ struct Plan {
     repeated: Option<(usize, Vec<Gain>)>,
 }
 
-/// Part by which a distance may be smaller or larger than those of the photographs taken: they are in focus there.
+/// Part by which a distance may be smaller or larger than those of the photographs taken: they are in focus
+/// there.
 const BEYOND: f64 = 1.2;
 /// Steps of distance, places along the image's longer side, steps of the tilt, directions of it, and turns.
 const DISTANCES: usize = 6;
@@ -136,8 +139,8 @@ const TILTS: usize = 4;
 const DIRECTIONS: usize = 8;
 const TURNS: usize = 4;
 
-/// How many times the standard deviation of a pose may be that of the marks before they are taken for another board: marks
-/// that were hidden, or counted less, make it larger.
+/// How many times the standard deviation of a pose may be that of the marks before they are taken for another
+/// board: marks that were hidden, or counted less, make it larger.
 const OTHER_BOARD: f64 = 1.1;
 
 fn plan(arguments: &Arguments) -> Result<Plan, String> {

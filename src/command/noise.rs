@@ -1,4 +1,5 @@
-//! `calibench noise PHOTOS...|CSV`: how much do the marks of a still board scatter from frame to frame, and was it still?
+//! `calibench noise PHOTOS...|CSV`: how much do the marks of a still board scatter from frame to frame, and
+//! was it still?
 
 use super::calibrate::{Format, Views, parse_size, views_of};
 use super::diff::parse_rate;
@@ -29,8 +30,8 @@ Exit codes:
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_CODES)]
 pub(super) struct Arguments {
-    /// Photographs of a board that nobody touched, in the order in which they were taken, with --board; or a corner file
-    /// (view,point,X,Y,u,v), a view a frame
+    /// Photographs of a board that nobody touched, in the order in which they were taken, with --board; or a
+    /// corner file (view,point,X,Y,u,v), a view a frame
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// The board in the photographs, as for `calibench calibrate`

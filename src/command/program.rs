@@ -7,8 +7,8 @@ use std::time::Duration;
 /// Longest time for a problem.
 const LONGEST: Duration = Duration::from_secs(86_400);
 
-/// `jobs` copies of the program `command`, each given `seconds` for a problem; what is wrong with these numbers is for
-/// people.
+/// `jobs` copies of the program `command`, each given `seconds` for a problem; what is wrong with these
+/// numbers is for people.
 pub(super) fn process(command: &str, seconds: f64, jobs: usize) -> Result<Process, String> {
     if jobs > MOST_THREADS {
         return Err(format!("--jobs {jobs}, and the limit is {MOST_THREADS}"));

@@ -1,5 +1,5 @@
-//! What a verb found or wrote, as text and as JSON: printed in one form, written in the other. And how numbers of
-//! options are read.
+//! What a verb found or wrote, as text and as JSON: printed in one form, written in the other. And how
+//! numbers of options are read.
 
 use super::calibrate::Format;
 use super::{Exit, print, warn};

@@ -1,5 +1,5 @@
-//! What must be known and set before anything is written? Whether there is a standard output, and that too large a
-//! file is an error of the write and not the end of the program.
+//! What must be known and set before anything is written? Whether there is a standard output, and that too
+//! large a file is an error of the write and not the end of the program.
 
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,9 +7,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Whether the program was started without a standard output.
 static CLOSED: AtomicBool = AtomicBool::new(false);
 
-// Before `main`: the run-time library puts /dev/null in the place of a standard output that is closed, and nobody
-// can tell it from one that the user asked for. The function asks the system for one copy of a file descriptor,
-// and nothing else of the run-time library.
+// Before `main`: the run-time library puts /dev/null in the place of a standard output that is closed, and
+// nobody can tell it from one that the user asked for. The function asks the system for one copy of a file
+// descriptor, and nothing else of the run-time library.
 #[cfg(unix)]
 ctor::declarative::ctor! {
     #[ctor(unsafe)]
@@ -29,9 +29,9 @@ pub(super) fn standard_output() -> io::Result<()> {
     Ok(())
 }
 
-/// Makes a write beyond the largest file that the shell allows (`ulimit -f`) fail like one on a full disk, so that
-/// what was begun is removed. Otherwise the system ends the program by a signal. Threads that are started later do
-/// as this one.
+/// Makes a write beyond the largest file that the shell allows (`ulimit -f`) fail like one on a full disk, so
+/// that what was begun is removed. Otherwise the system ends the program by a signal. Threads that are
+/// started later do as this one.
 pub(super) fn take_large_files_for_errors() {
     #[cfg(unix)]
     {

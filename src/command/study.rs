@@ -90,8 +90,8 @@ impl Failure {
     }
 }
 
-/// What the user gave is the user's to mend, also a folder from which a file was taken; a disk that fails leaves
-/// the run incomplete.
+/// What the user gave is the user's to mend, also a folder from which a file was taken; a disk that fails
+/// leaves the run incomplete.
 fn exit_of_folder(error: &FolderError) -> Exit {
     match error {
         FolderError::Input(InputError::Open { cause, .. }) | FolderError::File(Located { cause, .. })

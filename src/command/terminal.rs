@@ -30,8 +30,8 @@ pub(super) fn warn_lines(text: &str) {
     let _ = writeln!(io::stderr().lock(), "{}", shown(text));
 }
 
-/// Help and version end well, a wrong argument does not; clap knows which stream each belongs to. What is wrong is told
-/// without colours: a name or a line of a file that stands in it could bring its own.
+/// Help and version end well, a wrong argument does not; clap knows which stream each belongs to. What is
+/// wrong is told without colours: a name or a line of a file that stands in it could bring its own.
 pub(super) fn usage(error: &clap::Error) -> Exit {
     if error.use_stderr() {
         warn_lines(error.render().to_string().trim_end());

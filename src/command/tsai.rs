@@ -1,5 +1,5 @@
-//! `calibench tsai CORNERS.csv`: a camera from one view of a tilted plane or of a target in three dimensions, by Tsai's
-//! two stages, and refined from there.
+//! `calibench tsai CORNERS.csv`: a camera from one view of a tilted plane or of a target in three dimensions,
+//! by Tsai's two stages, and refined from there.
 
 use super::calibrate::{Format, parse_size, unended};
 use super::report::table;
@@ -21,7 +21,8 @@ use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Corner file with the columns view,point,X,Y,u,v, and Z for a target in three dimensions; or - for standard input
+    /// Corner file with the columns view,point,X,Y,u,v, and Z for a target in three dimensions; or - for
+    /// standard input
     corners: PathBuf,
     /// Image size, such as 640x480: the principal point is its centre
     #[arg(long, value_name = "WxH", value_parser = parse_size, required_unless_present = "principal_point")]
@@ -32,8 +33,8 @@ pub(super) struct Arguments {
     /// fy over fx, or free to estimate it from a target in three dimensions
     #[arg(long, value_name = "RATIO", value_parser = parse_aspect, default_value = "1")]
     aspect: Aspect,
-    /// What is estimated of the camera when Tsai's answer is refined; fy follows fx unless it is named or --aspect is
-    /// free
+    /// What is estimated of the camera when Tsai's answer is refined; fy follows fx unless it is named or
+    /// --aspect is free
     #[arg(long, value_name = "LIST", default_value = "fx,k1")]
     free: FreeParameters,
     /// Folder for tsai.json, and result.json of the refined calibration from all views of a plane
@@ -100,7 +101,8 @@ struct Found {
     views: Vec<OfView>,
     /// Names of views that were refused, with the reason.
     refused: Vec<(String, String)>,
-    /// The calibration from all views of a plane, started at Tsai's answer; `None` for targets in three dimensions.
+    /// The calibration from all views of a plane, started at Tsai's answer; `None` for targets in three
+    /// dimensions.
     joint: Option<Result<CalibrationFields, String>>,
 }
 

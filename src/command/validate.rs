@@ -1,5 +1,5 @@
-//! `calibench validate RESULT.json PHOTOS|CSV`: does a calibration hold on views that it has not seen, do its own views
-//! predict each other, and do repeated calibrations agree?
+//! `calibench validate RESULT.json PHOTOS|CSV`: does a calibration hold on views that it has not seen, do its
+//! own views predict each other, and do repeated calibrations agree?
 
 use super::calibrate::{Format, Views, parse_size, views_of};
 use super::diff::{NOT_DECIDED, doubts_of, parse_rate};
@@ -37,14 +37,15 @@ Exit codes:
 pub(super) struct Arguments {
     /// result.json of `calibench calibrate`, with a lens of any model
     result: PathBuf,
-    /// Views that the calibration has not seen: a corner file (view,point,X,Y,u,v), or with --board photographs
+    /// Views that the calibration has not seen: a corner file (view,point,X,Y,u,v), or with --board
+    /// photographs
     #[arg(required_unless_present = "again")]
     files: Vec<PathBuf>,
     /// The board in the photographs, as for `calibench calibrate`
     #[arg(long, value_name = "BOARD", value_parser = board_or_file)]
     board: Option<BoardSpec>,
-    /// The files are the calibration's own views: leaves out each of K parts in turn, calibrates what the result estimates
-    /// from the rest, and validates with the part
+    /// The files are the calibration's own views: leaves out each of K parts in turn, calibrates what the
+    /// result estimates from the rest, and validates with the part
     #[arg(long, value_name = "K", requires = "files", value_parser = super::said::whole::<usize>)]
     k_fold: Option<usize>,
     /// Results of the same camera from other photographs: do all agree within what each says of itself?

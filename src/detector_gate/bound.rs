@@ -1,15 +1,18 @@
-//! How well can a mark's place be known? The Cramer-Rao bound of a shift of what is seen about it, from the pixels' noise alone:
+//! How well can a mark's place be known? The Cramer-Rao bound of a shift of what is seen about it, from the
+//! pixels' noise alone:
 //!
 //! ```text
 //! F = sum (grad I) (grad I)^T / sigma^2     over the pixels of the mark's cell
 //! Cov(place) >= F^-1,      sigma^2 = noise^2 + 1 / (12 * 255^2)
 //! ```
-//! `I` is the photograph before noise, as part of the range; the second term is the rounding to 256 levels. The cell is half way to the next
-//! marks, along rows and along columns. A detector that knows the whole board, its pose and the lens can do better: marks tell of each other.
+//! `I` is the photograph before noise, as part of the range; the second term is the rounding to 256 levels.
+//! The cell is half way to the next marks, along rows and along columns. A detector that knows the whole
+//! board, its pose and the lens can do better: marks tell of each other.
 //!
-//! The slope is that of the curve through the samples that has no frequency above the pixels' own (Shannon 1949), cut off by Hann's window.
-//! Half the difference of a pixel's two neighbours is flatter than an edge is: the bound's standard deviation would be 16 % too large with a blur
-//! of 0.6 px and 25 % with 0.4 px, where it is now 0.4 % and 1.6 % (mean over all places of a straight edge within a pixel).
+//! The slope is that of the curve through the samples that has no frequency above the pixels' own (Shannon
+//! 1949), cut off by Hann's window. Half the difference of a pixel's two neighbours is flatter than an edge
+//! is: the bound's standard deviation would be 16 % too large with a blur of 0.6 px and 25 % with 0.4 px,
+//! where it is now 0.4 % and 1.6 % (mean over all places of a straight edge within a pixel).
 
 use super::cell::Cell;
 use calibench::geometry::Vec2;
@@ -19,7 +22,8 @@ use nalgebra::{Matrix2, Vector2};
 /// Neighbours on either side that a slope is taken from.
 const NEIGHBOURS: usize = 6;
 
-/// Variance of a coordinate of a place, px^2: half the trace of the bound, of what is seen in the mark's cell. `None` where nothing is seen.
+/// Variance of a coordinate of a place, px^2: half the trace of the bound, of what is seen in the mark's
+/// cell. `None` where nothing is seen.
 pub fn variance_px2(clean: &Raster<f32>, place: &Vec2, cell: &Cell, noise: f64) -> Option<f64> {
     let [across, down] = cell.to_next;
     let part_of_cell = Matrix2::from_columns(&[across, down]).try_inverse()?;

@@ -1,4 +1,5 @@
-//! Which pixels tell of a mark? Those that are nearer to it than to the next ones, along the board's rows and columns.
+//! Which pixels tell of a mark? Those that are nearer to it than to the next ones, along the board's rows and
+//! columns.
 
 use calibench::geometry::Vec2;
 use calibench::photos::BoardSpec;
@@ -13,7 +14,8 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// The cell of the mark of a number. A tag's corner has half of the tag on one side, and half of the gap on the other.
+    /// The cell of the mark of a number. A tag's corner has half of the tag on one side, and half of the gap
+    /// on the other.
     pub fn of(board: &BoardSpec, places_px: &[Vec2], mark: usize) -> Cell {
         let (columns, rows) = (board.board().columns(), board.board().rows());
         let (column, row) = (mark % columns, mark / columns);
@@ -34,7 +36,8 @@ impl Cell {
         2.0 * self.back * across.norm().min(down.norm())
     }
 
-    /// Whether a place belongs to it: `part` is what leads there from the mark, in parts of [`Cell::to_next`].
+    /// Whether a place belongs to it: `part` is what leads there from the mark, in parts of
+    /// [`Cell::to_next`].
     pub(super) fn holds(&self, part: &Vec2) -> bool {
         part.max() <= 0.5 && part.min() >= -self.back
     }

@@ -79,7 +79,8 @@ fn seen(asked: &Asked) -> Answer {
     Answer { id: asked.id.clone(), status, marks, message }
 }
 
-/// A program that reads questions and writes answers, one JSON object a line, and photographs from files of a folder of its own.
+/// A program that reads questions and writes answers, one JSON object a line, and photographs from files of a
+/// folder of its own.
 #[derive(Debug)]
 pub struct Program {
     dialogue: Dialogue,

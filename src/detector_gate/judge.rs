@@ -9,10 +9,12 @@ use calibench::io::significant;
 use calibench_gate::judge::{Basis, Verdict};
 use serde::Serialize;
 
-/// An error that many photographs do not average out matters from here on, px: a tenth of what a good detector errs by in one mark of one
-/// photograph, and what a calibration from a hundred photographs still sees.
+/// An error that many photographs do not average out matters from here on, px: a tenth of what a good
+/// detector errs by in one mark of one photograph, and what a calibration from a hundred photographs still
+/// sees.
 pub const MATTERS_PX: f64 = 0.02;
-/// A mark is astray that is farther from its place than so many standard deviations of the bound, and than half a pixel.
+/// A mark is astray that is farther from its place than so many standard deviations of the bound, and than
+/// half a pixel.
 const FAR_SD: f64 = 10.0;
 const FAR_PX: f64 = 0.5;
 
@@ -182,8 +184,8 @@ impl Shown {
         self.check(Property::Strays, Basis::Certain(astray.is_empty()), right.len(), evidence)
     }
 
-    /// The mean of the photographs' mean errors, against their spread: one-sided t-tests of more than what matters, for the worse of two
-    /// coordinates.
+    /// The mean of the photographs' mean errors, against their spread: one-sided t-tests of more than what
+    /// matters, for the worse of two coordinates.
     fn bias(&self, right: &[&Found]) -> Check {
         let means = mean_errors(right);
         let n = means.len();
@@ -262,7 +264,8 @@ fn mean_errors(boards: &[&Found]) -> Vec<Vec2> {
     boards.iter().filter(|board| !board.errors.is_empty()).map(mean).collect()
 }
 
-/// Amplitude of `e = a sin(2 pi x) + b cos(2 pi x)`, of both coordinates of all marks together, px, and its standard deviation.
+/// Amplitude of `e = a sin(2 pi x) + b cos(2 pi x)`, of both coordinates of all marks together, px, and its
+/// standard deviation.
 fn pixel_phase(boards: &[&Found]) -> Option<(f64, f64)> {
     let errors = || {
         let marks = boards.iter().flat_map(|board| &board.errors);

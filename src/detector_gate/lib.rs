@@ -1,4 +1,5 @@
-//! Is a detector of calibration boards to be trusted? The gate of calibrators, for those who find the marks in photographs.
+//! Is a detector of calibration boards to be trusted? The gate of calibrators, for those who find the marks
+//! in photographs.
 //!
 //! ```text
 //! Scene (a condition) -> Photo (exact render of known truth) -> Problem --Detector--> Answer
@@ -123,8 +124,8 @@ fn show(
     Ok(Some(shown))
 }
 
-/// Answers by their marks; `None` where the first says that such boards are not known. A board that is not in the photograph may be another than
-/// the scene's: who does not know it does not find it.
+/// Answers by their marks; `None` where the first says that such boards are not known. A board that is not in
+/// the photograph may be another than the scene's: who does not know it does not find it.
 fn answered(
     detector: &mut dyn Detector,
     scene: &Scene,

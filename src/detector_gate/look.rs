@@ -1,5 +1,5 @@
-//! How does a photograph of known truth arise? A random pose that keeps the whole board in the image, rendered, moved, made noisy, rounded
-//! to grey levels, and packed by a codec where that is asked.
+//! How does a photograph of known truth arise? A random pose that keeps the whole board in the image,
+//! rendered, moved, made noisy, rounded to grey levels, and packed by a codec where that is asked.
 
 use calibench::board::Pattern;
 use calibench::camera::{BrownConrady, Camera};
@@ -134,8 +134,8 @@ impl Look {
             .with_distortion(BrownConrady::radial(self.lens[0], self.lens[1]))
     }
 
-    /// A random tilt about a random axis, as near as the image allows or up to `far` times farther; `None` where
-    /// it sees the board's edge.
+    /// A random tilt about a random axis, as near as the image allows or up to `far` times farther; `None`
+    /// where it sees the board's edge.
     fn pose(&self, board: &BoardSpec, camera: &Camera, random: &mut Stream) -> Option<Pose> {
         let tilt = random.uniform_in(self.tilt.0, self.tilt.1).to_radians();
         let axis = random.uniform_in(0.0, std::f64::consts::TAU);

@@ -153,7 +153,8 @@ mod tests {
     fn only_boards_that_map_to_themselves_have_other_orders() {
         let count = |words: &str| orders(&words.parse().unwrap()).len();
         assert_eq!([count("chess:5x4:10"), count("circles:4x4:10")], [4, 4]);
-        // Of an odd number of staggered rows the mirror image is the board upside down, of an even one half a turn is.
+        // Of an odd number of staggered rows the mirror image is the board upside down, of an even one half a
+        // turn is.
         for kind in ["asymmetric", "hexagonal"] {
             let named = |rows: usize| -> Vec<Order> {
                 orders(&format!("{kind}:4x{rows}:10").parse().unwrap())

@@ -71,8 +71,8 @@ impl Marks {
     }
 }
 
-/// Shows a detector these photographs of a scene, and judges each by itself. A trial in which no pose fits the image is left out. `None` where
-/// the detector does not know such boards.
+/// Shows a detector these photographs of a scene, and judges each by itself. A trial in which no pose fits
+/// the image is left out. `None` where the detector does not know such boards.
 ///
 /// # Errors
 /// Photographs that cannot be handed to it.
@@ -144,7 +144,8 @@ mod tests {
         assert!(each.iter().all(|(_, outcome)| *outcome == Outcome::NotFound));
     }
 
-    /// Two photographs of the search for wrong boards: a disc taken for the missing one beside it, and a moved corner fitted to a marker's edge.
+    /// Two photographs of the search for wrong boards: a disc taken for the missing one beside it, and a
+    /// moved corner fitted to a marker's edge.
     #[test]
     fn a_mark_is_not_answered_at_anothers_place() {
         for (kind, id, trial) in [(Kind::Asymmetric, "steep", 34), (Kind::Charuco, "moved", 32)] {

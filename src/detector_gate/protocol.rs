@@ -1,4 +1,5 @@
-//! What is asked, and what is answered? One JSON object a line; `adapters/DETECTOR-PROTOCOL.md` says it in words.
+//! What is asked, and what is answered? One JSON object a line; `adapters/DETECTOR-PROTOCOL.md` says it in
+//! words.
 
 use calibench::geometry::Vec2;
 use calibench::photos::BoardSpec;
@@ -90,7 +91,8 @@ impl Wanted {
         self.board(1.0, None)
     }
 
-    /// The board with this distance of its marks, of a grid of tags with this side of one, and with discs of this diameter where it has any.
+    /// The board with this distance of its marks, of a grid of tags with this side of one, and with discs of
+    /// this diameter where it has any.
     pub fn board(&self, spacing: f64, diameter: Option<f64>) -> BoardSpec {
         let Wanted { kind, columns, rows, markers } = *self;
         let sized = |word: &str| {

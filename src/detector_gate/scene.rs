@@ -1,4 +1,5 @@
-//! Under which conditions is a detector tried? Every scene is a condition of photographs, for a kind of board.
+//! Under which conditions is a detector tried? Every scene is a condition of photographs, for a kind of
+//! board.
 
 use super::look::Look;
 use super::protocol::{Kind, Markers, Wanted};
@@ -34,7 +35,8 @@ pub struct Scene {
 const SPACING: f64 = 10.0;
 /// Boards of other sizes that are asked for: marks in a row, and rows, more or less than there are.
 const OTHERS: [(isize, isize); 4] = [(-1, 0), (0, -1), (1, 0), (1, 1)];
-/// The same of boards with markers. They may be seen in part: with rows added at the end they have the markers that are seen.
+/// The same of boards with markers. They may be seen in part: with rows added at the end they have the
+/// markers that are seen.
 const OTHER_WIDTHS: [isize; 4] = [-1, 1, -2, 2];
 /// Markers of a ChArUco board, and those of another.
 const MARKERS: &str = "DICT_4X4_50";

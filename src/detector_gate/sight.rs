@@ -1,4 +1,5 @@
-//! What else may stand before a camera? Boards that are cut off, doubled, on a tiled floor or beside others, and patterns that are no board.
+//! What else may stand before a camera? Boards that are cut off, doubled, on a tiled floor or beside others,
+//! and patterns that are no board.
 
 use super::look::{Look, Photo};
 use super::observed::Truth;
@@ -90,8 +91,8 @@ pub fn sights() -> Vec<Sight> {
 }
 
 impl Picture {
-    /// Whether there is such a picture of a kind of board: a board without markers is one in a mirror too, and one with markers ends with
-    /// their number.
+    /// Whether there is such a picture of a kind of board: a board without markers is one in a mirror too,
+    /// and one with markers ends with their number.
     fn is_of(self, kind: Kind) -> bool {
         match self {
             Picture::Mirrored => kind.is_coded(),
@@ -229,7 +230,8 @@ fn width_of(board: &BoardSpec) -> f64 {
     2.0 * most.max()
 }
 
-/// A tilt about any axis, at a distance from which `width` takes a part of the image, off its middle by up to `side` of its width.
+/// A tilt about any axis, at a distance from which `width` takes a part of the image, off its middle by up to
+/// `side` of its width.
 fn pose(random: &mut Stream, tilt: (f64, f64), width: f64, part: (f64, f64), side: f64) -> Pose {
     let tilt = random.uniform_in(tilt.0, tilt.1).to_radians();
     let axis = random.uniform_in(0.0, std::f64::consts::TAU);

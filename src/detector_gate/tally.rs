@@ -1,4 +1,5 @@
-//! How many boards are wrong? Photographs of the gate's scenes and of what else may stand before a camera, counted.
+//! How many boards are wrong? Photographs of the gate's scenes and of what else may stand before a camera,
+//! counted.
 
 use super::detectors::{Asked, Detector};
 use super::judge::Answered;
@@ -21,7 +22,8 @@ pub struct Tally {
     pub found: usize,
     /// Photographs in which no board was found.
     pub refused: usize,
-    /// Trials with a wrong board: a mark farther than 2 px from its place, marks numbered as in a mirror, or a board that is not there.
+    /// Trials with a wrong board: a mark farther than 2 px from its place, marks numbered as in a mirror, or
+    /// a board that is not there.
     pub wrong: Vec<u64>,
     /// Answers that break the protocol.
     pub broken: usize,
@@ -34,8 +36,8 @@ impl Tally {
     }
 }
 
-/// Shows a detector `photos` photographs of a scene. A trial in which no pose fits the image is left out. `None` where the detector does not
-/// know such boards.
+/// Shows a detector `photos` photographs of a scene. A trial in which no pose fits the image is left out.
+/// `None` where the detector does not know such boards.
 ///
 /// # Errors
 /// Photographs that cannot be handed to it.

@@ -156,8 +156,9 @@ pub fn read_line(line: &str) -> Result<Answer, Breakage> {
 /// Warnings that are kept.
 const MOST_WARNINGS: usize = 20;
 
-/// Of an answer what can mean anything for its problem: names that are parameters, the beginnings of texts, and lists no longer than they may
-/// be. A run holds as many answers as it asks questions, and a line may have a megabyte.
+/// Of an answer what can mean anything for its problem: names that are parameters, the beginnings of texts,
+/// and lists no longer than they may be. A run holds as many answers as it asks questions, and a line may
+/// have a megabyte.
 ///
 /// # Errors
 /// Lists that are too long, or a covariance that is no square.

@@ -1,5 +1,5 @@
-//! What is known to fail, and why? A file of allowances: a property, the scenes where it may fail or by how much,
-//! and a reason each.
+//! What is known to fail, and why? A file of allowances: a property, the scenes where it may fail or by how
+//! much, and a reason each.
 //!
 //! ```toml
 //! [[allow]]
@@ -94,9 +94,9 @@ impl Allowance {
     /// Reads a file.
     ///
     /// # Errors
-    /// A file that cannot be read or is no list of allowances (an empty one is a list of none); a property or scene
-    /// that there is not; a scene on which the property is never judged, or that is named twice; a reason that is
-    /// empty; a limit where nothing has a size.
+    /// A file that cannot be read or is no list of allowances (an empty one is a list of none); a property or
+    /// scene that there is not; a scene on which the property is never judged, or that is named twice; a
+    /// reason that is empty; a limit where nothing has a size.
     pub fn read(path: &Path) -> Result<Vec<Allowance>, AllowError> {
         let text = read_regular_text(path, MOST_SPEC_BYTES)?;
         Allowance::of_toml(&text).map_err(|(line, message)| AllowError::At {
@@ -158,8 +158,8 @@ impl Allowance {
         let spoken_of = || checks.iter().filter(|check| self.speaks_of(check));
         let judged = || spoken_of().filter(|check| check.verdict != Verdict::NotJudged);
         let is_named = |check: &&Check| self.scenes.iter().any(|scene| scene == check.scenario);
-        // What was asked and is told only fails nobody: a violation that residuals do not show, a time without
-        // a limit.
+        // What was asked and is told only fails nobody: a violation that residuals do not show, a time
+        // without a limit.
         let cannot_fail = |check: &Check| check.verdict == Verdict::NotJudged && check.problems > 0;
         let holds = |check: &&Check| check.verdict == Verdict::Held || cannot_fail(check);
         Allowed {

@@ -1,8 +1,8 @@
-//! How well could anybody know camera and poses if every view sees other marks? The Cramer-Rao bound of ragged
-//! views.
+//! How well could anybody know camera and poses if every view sees other marks? The Cramer-Rao bound of
+//! ragged views.
 //!
-//! `calibench::evaluate::cramer_rao` bounds scenes whose views all see the whole board. Here a view brings the
-//! marks it sees: with `J = [J_a J_p]` its derivatives by the free parameters and by its pose,
+//! `calibench::evaluate::cramer_rao` bounds scenes whose views all see the whole board. Here a view brings
+//! the marks it sees: with `J = [J_a J_p]` its derivatives by the free parameters and by its pose,
 //!
 //! ```text
 //! A = J_a^T J_a    B = J_a^T J_p    C = J_p^T J_p    Y = B C^-1
@@ -19,8 +19,8 @@ use calibench::geometry::{Pose, Vec2};
 use calibench::planning::{Estimated, ViewBlocks};
 use nalgebra::{DMatrix, Matrix6, MatrixXx6};
 
-/// The bound for noise of standard deviation `sigma_px` on every coordinate; `views` are poses with the points of
-/// the target that each sees. `None` where a point has no image or the views determine no camera.
+/// The bound for noise of standard deviation `sigma_px` on every coordinate; `views` are poses with the
+/// points of the target that each sees. `None` where a point has no image or the views determine no camera.
 pub fn bound(
     camera: &Camera<Lens>,
     free: FreeParameters,
@@ -91,8 +91,8 @@ mod tests {
             let ours = bound(&truth.camera, scenario.free, &views, scenario.sigma_px).unwrap();
             let theirs = cramer_rao(truth, scenario.free, scenario.sigma_px).unwrap();
             let sd = theirs.intrinsics.diagonal().map(f64::sqrt);
-            // Two ways to invert: they were seen to differ by 2.5e-9 at most, on the scene whose parameters are
-            // hardest to separate.
+            // Two ways to invert: they were seen to differ by 2.5e-9 at most, on the scene whose parameters
+            // are hardest to separate.
             let apart = near(&ours.intrinsics, &theirs.intrinsics, &|i, j| sd[i] * sd[j]);
             assert!(apart < 1e-7, "{}: {apart}", scenario.id);
             for view in 0..views.len() {

@@ -29,8 +29,8 @@ pub(super) fn end(group: u32, value: &str) {
     let _ = value;
 }
 
-/// Most memory that was resident at a time of the largest process among the program `group` and those that carry
-/// the mark `value`, bytes; `None` where the system does not say.
+/// Most memory that was resident at a time of the largest process among the program `group` and those that
+/// carry the mark `value`, bytes; `None` where the system does not say.
 pub(super) fn peak_memory_bytes(group: u32, value: &str) -> Option<u64> {
     #[cfg(target_os = "linux")]
     return linux::peak_memory_bytes(|process| process.id == group || process.carries(value));
@@ -98,8 +98,8 @@ mod linux {
             environment.split(|byte| *byte == 0).any(|variable| variable == wanted.as_bytes())
         }
 
-        /// Ends it. In a session of its own there are only its like: their group ends in one moment, also with
-        /// what the process has started since it was seen.
+        /// Ends it. In a session of its own there are only its like: their group ends in one moment, also
+        /// with what the process has started since it was seen.
         fn end(&self, our_session: i32) {
             // Each fails only where all have ended, or are another's children.
             if self.session != our_session && self.group > 1 {
@@ -108,8 +108,8 @@ mod linux {
             let _ = kill(self.pid(), Signal::SIGKILL);
         }
 
-        /// Lets go of an orphan that has ended: the system keeps its number until its parent has asked how. What
-        /// was started here is asked by who started it.
+        /// Lets go of an orphan that has ended: the system keeps its number until its parent has asked how.
+        /// What was started here is asked by who started it.
         fn let_go(&self, ourselves: u32) {
             if ADOPTS.load(Ordering::Relaxed) && self.parent == ourselves && !is_waited_for(self.id) {
                 let _ = waitpid(self.pid(), Some(WaitPidFlag::WNOHANG));
@@ -121,8 +121,8 @@ mod linux {
         }
     }
 
-    /// Every process, looked at one after the other, the newest first: one that starts itself anew is among them,
-    /// and ends soon.
+    /// Every process, looked at one after the other, the newest first: one that starts itself anew is among
+    /// them, and ends soon.
     fn processes() -> impl Iterator<Item = Process> {
         let names = std::fs::read_dir("/proc").into_iter().flatten().flatten();
         let mut ids: Vec<u32> = names.filter_map(|name| name.file_name().to_str()?.parse().ok()).collect();

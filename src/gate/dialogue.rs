@@ -1,5 +1,5 @@
-//! How are questions put to a program that is not ours, one after the other? As JSON objects, one a line, with a time limit for each; it is
-//! started again when it breaks.
+//! How are questions put to a program that is not ours, one after the other? As JSON objects, one a line,
+//! with a time limit for each; it is started again when it breaks.
 
 use crate::program::{PipedProgram, Silence};
 use crate::quoted::quoted;

@@ -59,8 +59,8 @@ pub struct Paired {
     pub tests: usize,
     /// Scenario by scenario.
     pub comparisons: Vec<Comparison>,
-    /// Problems of any kind, not the samples only, to which one said something else than the other: another number, a warning more, no
-    /// answer.
+    /// Problems of any kind, not the samples only, to which one said something else than the other: another
+    /// number, a warning more, no answer.
     pub differing: usize,
     /// Checks whose verdict differs: property, scenario, reference's, new.
     pub verdicts: Vec<(Property, &'static str, Verdict, Verdict)>,
@@ -109,8 +109,8 @@ fn says_the_same(new: &Seen, old: &Seen) -> bool {
     }
 }
 
-/// Where the verdicts differ: property, scenario, reference's, new. A check that one run does not have, such as that of the bias in a scene
-/// without estimates, was not judged there.
+/// Where the verdicts differ: property, scenario, reference's, new. A check that one run does not have, such
+/// as that of the bias in a scene without estimates, was not judged there.
 fn verdicts(new: &[Check], old: &[Check]) -> Vec<(Property, &'static str, Verdict, Verdict)> {
     let by_name = |checks: &[Check]| -> BTreeMap<(Property, &'static str), Verdict> {
         checks.iter().map(|check| ((check.property, check.scenario), check.verdict)).collect()

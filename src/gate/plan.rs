@@ -118,8 +118,8 @@ const REPEATS: usize = 4;
 const VARIED: usize = 2;
 /// Samples a scenario that test honesty: each takes a verdict of its own.
 const HONEST: usize = 32;
-/// Samples a scenario that breaks an assumption: fits that go wrong take long, and sixteen tell a ratio to two
-/// fifths.
+/// Samples a scenario that breaks an assumption: fits that go wrong take long, and sixteen tell a ratio to
+/// two fifths.
 const BROKEN: usize = 16;
 
 impl Plan {

@@ -1,4 +1,5 @@
-//! How is a program judged that is not ours? It is kept alive over all problems, and started again when it breaks.
+//! How is a program judged that is not ours? It is kept alive over all problems, and started again when it
+//! breaks.
 
 use super::accept::{Breakage, LINE_HEAD, id_in, read_line, within};
 use super::greeting::{Greeting, probe};
@@ -114,8 +115,8 @@ impl Process {
         }
     }
 
-    /// Ends every copy, and starts none after it: what is asked from now on is not answered. For a thread that hears an
-    /// interrupt while others ask; other programs of this process go on.
+    /// Ends every copy, and starts none after it: what is asked from now on is not answered. For a thread
+    /// that hears an interrupt while others ask; other programs of this process go on.
     pub fn stop(&self) {
         self.is_stopped.store(true, Ordering::SeqCst);
         let begun = Instant::now();
@@ -129,8 +130,8 @@ impl Process {
         }
     }
 
-    /// Does what may start a program, unless the run was stopped. Who is seen by [`stop`](Process::stop) as busy is waited
-    /// for; who is not sees that it came.
+    /// Does what may start a program, unless the run was stopped. Who is seen by [`stop`](Process::stop) as
+    /// busy is waited for; who is not sees that it came.
     fn unless_stopped<T>(&self, work: impl FnOnce() -> T) -> Option<T> {
         self.busy.fetch_add(1, Ordering::SeqCst);
         let done = (!self.is_stopped.load(Ordering::SeqCst)).then(work);

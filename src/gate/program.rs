@@ -110,8 +110,8 @@ pub struct ProgramEnd {
     pub exit_code: Option<i32>,
     /// The signal that it ended by itself with.
     pub signal: Option<i32>,
-    /// Most memory that was resident at a time, of the largest process of those that ran when its input ended; `None`
-    /// where the system does not say, as systems other than Linux.
+    /// Most memory that was resident at a time, of the largest process of those that ran when its input
+    /// ended; `None` where the system does not say, as systems other than Linux.
     pub peak_memory_bytes: Option<u64>,
     /// JSON objects that it wrote after its last answer, which nobody asked for.
     pub answers_unasked: usize,
@@ -218,7 +218,8 @@ impl PipedProgram {
         }
     }
 
-    /// Ends the program's input and waits for it to end by itself; what it still writes is counted and not judged.
+    /// Ends the program's input and waits for it to end by itself; what it still writes is counted and not
+    /// judged.
     pub fn finish(mut self) -> ProgramEnd {
         let peak = descendants::peak_memory_bytes(self.child.id(), &self.mark);
         self.to_child = None;

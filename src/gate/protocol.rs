@@ -1,6 +1,7 @@
 //! What is said between the gate and a solver? One JSON object a line: problems one way, answers the other.
 //!
-//! The page for authors of solvers is `adapters/PROTOCOL.md`; the schemas in `src/gate/schema` are those of these types, which a test checks.
+//! The page for authors of solvers is `adapters/PROTOCOL.md`; the schemas in `src/gate/schema` are those of
+//! these types, which a test checks.
 
 use calibench::board::View;
 use calibench::camera::{Camera, FreeParameters, Lens, Model};
@@ -21,7 +22,8 @@ pub struct Problem {
     pub model: String,
     /// What was seen in each photograph.
     pub views: Vec<ProblemView>,
-    /// Names of the parameters to estimate, of the model's: `fx fy cx cy skew k1 k2 p1 p2 k3` for Brown-Conrady's.
+    /// Names of the parameters to estimate, of the model's: `fx fy cx cy skew k1 k2 p1 p2 k3` for
+    /// Brown-Conrady's.
     pub free: Vec<String>,
     /// Values of all the other parameters of the model. The answer must keep them.
     pub held: BTreeMap<String, f64>,
@@ -41,8 +43,8 @@ fn is_brown_conrady(model: &str) -> bool {
 pub struct ProblemView {
     /// Points of the target's plane Z = 0, in the target's unit.
     pub target: Vec<[f64; 2]>,
-    /// Pixels (u right, v down; (0, 0) is the centre of the top-left pixel). `null` is a coordinate that was not measured:
-    /// bad input, to be refused.
+    /// Pixels (u right, v down; (0, 0) is the centre of the top-left pixel). `null` is a coordinate that was
+    /// not measured: bad input, to be refused.
     #[cfg_attr(test, schemars(with = "Vec<[Option<f64>; 2]>"))]
     pub pixels: Vec<[f64; 2]>,
 }
@@ -58,7 +60,8 @@ pub enum Status {
     Refused,
     /// The search did not end in a minimum.
     NotConverged,
-    /// The program does not know a parameter that is free or held, or cannot hold it: no problem of that kind is judged.
+    /// The program does not know a parameter that is free or held, or cannot hold it: no problem of that kind
+    /// is judged.
     Unsupported,
 }
 
@@ -82,9 +85,9 @@ pub struct Answer {
     /// Covariance of the free parameters; takes the place of `standard_deviations`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covariance: Option<AnswerCovariance>,
-    /// Covariance of every pose, 6 x 6, row by row: of the small rotation vector `w`, rad, by which the answered
-    /// rotation is wrong, `R_answered = exp([w]x) R_true`, about the camera's x, y, z, then of the translation along them in the target's unit;
-    /// marginal.
+    /// Covariance of every pose, 6 x 6, row by row: of the small rotation vector `w`, rad, by which the
+    /// answered rotation is wrong, `R_answered = exp([w]x) R_true`, about the camera's x, y, z, then of the
+    /// translation along them in the target's unit; marginal.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pose_covariances: Option<Vec<Vec<Vec<f64>>>>,
     /// `sqrt(sum |r|^2 / N)` over all N points, px.

@@ -13,10 +13,10 @@
 //! - a richer lens: by how much the sum of squares falls with p1, p2 and k3 free as well, over what is left,
 //!   each by its degrees of freedom, F-distributed (Fisher 1924).
 //!
-//! The fit takes a little out of the residuals, which makes the first four cautious or changes them
-//! little. What one of them
-//! shows at [`SURE`] a solver of ordinary quality could have shown its user. How often that is so was measured
-//! for every scene that breaks an assumption, and stands in the suite: it decides whether silence is a finding.
+//! The fit takes a little out of the residuals, which makes the first four cautious or changes them little.
+//! What one of them shows at [`SURE`] a solver of ordinary quality could have shown its user. How often that
+//! is so was measured for every scene that breaks an assumption, and stands in the suite: it decides whether
+//! silence is a finding.
 
 use super::plan::{Case, Plan, PlanError, Purpose};
 use super::protocol::Problem;
@@ -143,8 +143,8 @@ pub struct Shown {
 }
 
 impl Shown {
-    /// Whether the suite's share for the scene agrees with the count, within five standard deviations of their
-    /// difference and one draw.
+    /// Whether the suite's share for the scene agrees with the count, within five standard deviations of
+    /// their difference and one draw.
     pub fn agrees(&self) -> bool {
         let (share, draws) = (self.scenario.seen_in_residuals, self.draws as f64);
         let variance = share * (1.0 - share) * (1.0 / draws + 1.0 / DRAWS as f64);

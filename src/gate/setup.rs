@@ -14,7 +14,8 @@ use calibench::synth::{Scene, SceneError, Stream, Truth};
 pub struct Setup {
     /// Camera, poses and the whole board, with exact pixels.
     pub scene: Scene<Lens>,
-    /// Of every view the marks that it sees, by their place on the board; nothing where all see the whole board.
+    /// Of every view the marks that it sees, by their place on the board; nothing where all see the whole
+    /// board.
     seen: Option<Vec<Vec<usize>>>,
     /// Cramer-Rao bound of camera and poses.
     pub bound: Covariance,

@@ -94,8 +94,8 @@ impl SuiteError {
     }
 }
 
-/// How far drawn poses lie from those of their scene: rotation about each axis, rad, then translation along each
-/// in units of the target.
+/// How far drawn poses lie from those of their scene: rotation about each axis, rad, then translation along
+/// each in units of the target.
 const DRAWN: [f64; 6] = [0.2, 0.2, 0.2, 6.0, 6.0, 10.0];
 
 /// Noise of the scenes that test the law. The bias of a least-squares estimate is of second order in the

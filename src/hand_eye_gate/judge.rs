@@ -12,7 +12,8 @@ use nalgebra::{Matrix6, Vector6};
 
 /// Samples of a scene that wants a refusal.
 const REFUSALS: usize = 8;
-/// An exact problem is solved to this part of the bound's standard deviation: what iterative solvers end with.
+/// An exact problem is solved to this part of the bound's standard deviation: what iterative solvers end
+/// with.
 const EXACT: f64 = 1e-4;
 /// So many standard deviations of the bound are far off: no method is as inefficient as that.
 const FAR: f64 = 50.0;
@@ -21,7 +22,8 @@ const ADMITTED_RAD: f64 = 0.05;
 /// Metres in place of millimetres.
 const UNIT: f64 = 1e-3;
 
-/// A scene and its problems: the exact one, the samples, and of the exact one the stations backwards and in metres.
+/// A scene and its problems: the exact one, the samples, and of the exact one the stations backwards and in
+/// metres.
 pub(super) struct Asked {
     scene: Scene,
     /// Covariance of X at the truth; `None` where the motions leave it open.
@@ -204,7 +206,8 @@ impl Answered {
         self.check(property, Basis::Certain(off.is_some_and(|off| off < EXACT)), 2, evidence)
     }
 
-    /// Is the mean error zero, against the spread of the errors themselves (Hotelling 1931)? They may be larger than the bound.
+    /// Is the mean error zero, against the spread of the errors themselves (Hotelling 1931)? They may be
+    /// larger than the bound.
     fn bias(&self, samples: &[Estimate], inverse: &Matrix6<f64>) -> Check {
         let n = samples.len();
         let mean = samples.iter().map(|e| e.error).sum::<Vector6<f64>>() / n as f64;
@@ -217,7 +220,8 @@ impl Answered {
         let basis = match square {
             // Too few samples for a spread.
             _ if n <= 6 => Basis::Told,
-            // n m^T (S / (n - 1))^-1 m (n - 6) / (6 (n - 1)) is distributed as F with 6 and n - 6 degrees of freedom.
+            // n m^T (S / (n - 1))^-1 m (n - 6) / (6 (n - 1)) is distributed as F with 6 and n - 6 degrees of
+            // freedom.
             Some(square) if square.is_finite() => {
                 Basis::Chance(fisher_tail(square * (n - 6) as f64 / 6.0, 6, n - 6))
             }

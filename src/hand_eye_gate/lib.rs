@@ -1,4 +1,5 @@
-//! Is a hand-eye solver to be trusted? The gate of calibrators, for those who find a camera's place on a robot.
+//! Is a hand-eye solver to be trusted? The gate of calibrators, for those who find a camera's place on a
+//! robot.
 //!
 //! ```text
 //! Scene (stations of known truth, errors of robot and camera)
@@ -6,8 +7,8 @@
 //!   -> Check (one a property and scene) --decide (Holm, one overall false-alarm rate)--> Report
 //! ```
 //!
-//! Errors are held against the Cramer-Rao bound of each scene: the smallest covariance that an unbiased X can have when
-//! every true pose of the robot and Y are unknown too.
+//! Errors are held against the Cramer-Rao bound of each scene: the smallest covariance that an unbiased X can
+//! have when every true pose of the robot and Y are unknown too.
 
 mod judge;
 pub mod program;
@@ -126,7 +127,8 @@ mod tests {
             Ok(found) => Answer { x: Some(rows(&found.park_martin)), covariance: None, ..answer },
             Err(_) => answer,
         });
-        // A motion and its inverse leave other equations for the translation where rotations of robot and camera differ.
+        // A motion and its inverse leave other equations for the translation where rotations of robot and
+        // camera differ.
         assert_eq!(failing(&report), [Property::Nees, Property::ViewOrder], "{}", report.to_text());
     }
 

@@ -1,4 +1,5 @@
-//! What is asked, and what is answered? One JSON object a line; `adapters/HAND-EYE-PROTOCOL.md` says it in words.
+//! What is asked, and what is answered? One JSON object a line; `adapters/HAND-EYE-PROTOCOL.md` says it in
+//! words.
 
 use calibench::calibrate::Covariance;
 use calibench::camera::FreeParameters;

@@ -1,4 +1,5 @@
-//! In which scenes is a solver tried? Each is one set of stations of known truth; every sample has errors of its own.
+//! In which scenes is a solver tried? Each is one set of stations of known truth; every sample has errors of
+//! its own.
 
 use super::protocol::{Problem, RobotNoise, Which, rows};
 use super::stations::{Turns, robot_at, seen};
@@ -34,7 +35,8 @@ pub struct Scene {
 
 /// What an industrial robot repeats: 0.02 degrees and 0.05 mm.
 const ROBOT: RobotNoise = RobotNoise { rotation_rad: 3.5e-4, position: 0.05 };
-/// Standard deviations of a pose of the camera, about and along its axes: a board of 63 points at 230 mm, 0.1 px.
+/// Standard deviations of a pose of the camera, about and along its axes: a board of 63 points at 230 mm, 0.1
+/// px.
 const CAMERA: [f64; 6] = [4e-4, 4e-4, 1e-4, 0.02, 0.02, 0.08];
 
 fn mounting(turn: Vec3) -> Pose {

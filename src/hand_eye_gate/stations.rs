@@ -8,7 +8,8 @@ use std::f64::consts::PI;
 /// How the camera is turned at the stations, against facing the target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Turns {
-    /// About axes drawn evenly within a cone about the x axis, by angles drawn evenly up to the largest, both ways.
+    /// About axes drawn evenly within a cone about the x axis, by angles drawn evenly up to the largest, both
+    /// ways.
     Drawn {
         /// Half the opening of the cone, degrees; 90 is any axis.
         cone_deg: f64,
@@ -25,7 +26,8 @@ pub enum Turns {
         /// The angle, degrees.
         largest_deg: f64,
     },
-    /// By the largest angle about axes spread evenly in the plane of the target: tilts, and no turn about the view.
+    /// By the largest angle about axes spread evenly in the plane of the target: tilts, and no turn about the
+    /// view.
     Tilts {
         /// The angle, degrees.
         largest_deg: f64,
@@ -70,8 +72,8 @@ fn axis_in_cone(half_angle: f64, stream: &mut Stream) -> Vec3 {
     Vec3::new(x, across * cos, across * sin)
 }
 
-/// Distance of the target, mm: a target of 80 by 60 mm is seen whole by a camera of 640 by 480 px and a focal length of
-/// 600 px, however it is turned.
+/// Distance of the target, mm: a target of 80 by 60 mm is seen whole by a camera of 640 by 480 px and a focal
+/// length of 600 px, however it is turned.
 pub const DISTANCE_MM: (f64, f64) = (210.0, 250.0);
 /// How far the target's middle lies off the optical axis, mm.
 const ASIDE_MM: f64 = 8.0;

@@ -1,5 +1,6 @@
-//! What of the source tree travels in the program? The chapter's values, and the code that committed measurements depend on, so that it can
-//! tell whether they are stale. Neither where the crate is built outside the source tree.
+//! What of the source tree travels in the program? The chapter's values, and the code that committed
+//! measurements depend on, so that it can tell whether they are stale. Neither where the crate is built
+//! outside the source tree.
 
 #[path = "fingerprint/code.rs"]
 mod code;
@@ -55,7 +56,8 @@ const LENS_MINIMUM: &[&str] = &[
     "experiments/lens_minimum/scenes.rs",
 ];
 
-/// What draws the photographs of the experiment detector-gate, judges what is found in them, and writes it down.
+/// What draws the photographs of the experiment detector-gate, judges what is found in them, and writes it
+/// down.
 const PHOTOGRAPHS: &[&str] = &[
     "src/calibench/board",
     "src/calibench/camera",

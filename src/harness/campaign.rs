@@ -1,4 +1,5 @@
-//! What do commands that measure for minutes share: how they end, go on where they were, and name what they asked?
+//! What do commands that measure for minutes share: how they end, go on where they were, and name what they
+//! asked?
 
 use calibench::io::input::MOST_TABLE_BYTES;
 use calibench::io::{read_regular_text, write_atomically};
@@ -40,7 +41,8 @@ pub fn write(out: Option<&Path>, folder: &str, name: &str, text: &str) -> Result
     write_atomically(&path, text.as_bytes()).map_err(|error| error.to_string())
 }
 
-/// Writes `head` and what `measured` gives below it, unless the table begins with `head` already: then the present code wrote it.
+/// Writes `head` and what `measured` gives below it, unless the table begins with `head` already: then the
+/// present code wrote it.
 ///
 /// # Errors
 /// What could not be measured or written, in words.

@@ -1,5 +1,6 @@
-//! How do others read the tables? `datapackage.json`, a Data Package (version 2 of the standard, 2024) with the schema of each
-//! CSV file: the name of every column as its header has it, type, unit, and what the rows are.
+//! How do others read the tables? `datapackage.json`, a Data Package (version 2 of the standard, 2024) with
+//! the schema of each CSV file: the name of every column as its header has it, type, unit, and what the rows
+//! are.
 
 use super::table::{Cell, Table};
 use calibench::io::hash::sha256_hex;

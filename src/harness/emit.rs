@@ -14,8 +14,8 @@ use serde_json::{Value, json};
 use std::io;
 use std::path::Path;
 
-/// Writes `<out>/<experiment>/*.csv`, `record.json`, `datapackage.json` and `ro-crate-metadata.json`, and the figures to the folder
-/// `figures`. An interrupted run leaves whole files only.
+/// Writes `<out>/<experiment>/*.csv`, `record.json`, `datapackage.json` and `ro-crate-metadata.json`, and the
+/// figures to the folder `figures`. An interrupted run leaves whole files only.
 ///
 /// # Errors
 /// What the file system says, with the path.

@@ -26,7 +26,8 @@ impl Fingerprint {
         Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/detector-gate-scenes.code")))
     }
 
-    /// The photographs in which wrong boards are looked for, how they are judged, and this library's detectors.
+    /// The photographs in which wrong boards are looked for, how they are judged, and this library's
+    /// detectors.
     pub fn of_wrong_boards() -> Fingerprint {
         Fingerprint::of(include_str!(concat!(env!("OUT_DIR"), "/wrong-boards.code")))
     }

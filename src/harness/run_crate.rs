@@ -1,8 +1,8 @@
-//! Who made these files, with what, from what? `ro-crate-metadata.json`: an RO-Crate 1.1 of the profile Process Run Crate 0.5
-//! (Leo et al. 2024), which says it in words that archives and workflow systems read.
+//! Who made these files, with what, from what? `ro-crate-metadata.json`: an RO-Crate 1.1 of the profile
+//! Process Run Crate 0.5 (Leo et al. 2024), which says it in words that archives and workflow systems read.
 //!
-//! No time stands in it, although the profile recommends that of the end: a run gives the same bytes whenever it is made. The date of a
-//! crate, which the standard demands, is that of the commit.
+//! No time stands in it, although the profile recommends that of the end: a run gives the same bytes whenever
+//! it is made. The date of a crate, which the standard demands, is that of the commit.
 
 use super::provenance::Build;
 use calibench::io::hash::sha256_hex;

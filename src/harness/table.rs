@@ -188,8 +188,8 @@ impl<R> Rows<R> {
         self
     }
 
-    /// Adds columns of one unit that belong together, such as a value and the ends of its interval: each row has a
-    /// cell for every one of them.
+    /// Adds columns of one unit that belong together, such as a value and the ends of its interval: each row
+    /// has a cell for every one of them.
     pub fn columns<C: Into<Cell>, I: IntoIterator<Item = C>>(
         mut self,
         names: impl IntoIterator<Item = impl Into<String>>,

@@ -1,6 +1,6 @@
-//! Which bits do the questions of the laboratory give natively? First the fingerprint of the sources, then one case a
-//! line, for `.ci/laboratory` to ask the WebAssembly the same: `question | its numbers | the bits of the answer,
-//! hexadecimal`, or the words of a refusal.
+//! Which bits do the questions of the laboratory give natively? First the fingerprint of the sources, then
+//! one case a line, for `.ci/laboratory` to ask the WebAssembly the same: `question | its numbers | the bits
+//! of the answer, hexadecimal`, or the words of a refusal.
 
 use calibench_laboratory::{CHAPTER, answer};
 use std::io::{BufWriter, Write};

@@ -1,5 +1,5 @@
-//! From which sources is this WebAssembly built? It carries their fingerprint, so that nobody can commit one without the
-//! other.
+//! From which sources is this WebAssembly built? It carries their fingerprint, so that nobody can commit one
+//! without the other.
 
 #[path = "../harness/fingerprint/code.rs"]
 mod code;

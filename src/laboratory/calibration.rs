@@ -9,14 +9,15 @@ use calibench::evaluate::{RmseDistribution, cramer_rao, errors_of};
 use calibench::geometry::Vec2;
 use calibench::synth::{Scene, Stream, StreamKey};
 
-/// Bars of the predicted histogram of the RMSE, over this many standard deviations to either side of its mean.
+/// Bars of the predicted histogram of the RMSE, over this many standard deviations to either side of its
+/// mean.
 const BARS: usize = 24;
 const BARS_REACH: f64 = 4.0;
 
-/// Knobs -> what is known before anything is drawn: the six true parameters; their covariance by the Cramer-Rao
-/// bound, row by row, NaN where the scene bounds nothing; mean, standard deviation and floor of the RMSE, px; how far
-/// from the principal point points are seen, px; the lowest RMSE of the histogram and the width of its bars, px; the
-/// share of trials in each bar.
+/// Knobs -> what is known before anything is drawn: the six true parameters; their covariance by the
+/// Cramer-Rao bound, row by row, NaN where the scene bounds nothing; mean, standard deviation and floor of
+/// the RMSE, px; how far from the principal point points are seen, px; the lowest RMSE of the histogram and
+/// the width of its bars, px; the share of trials in each bar.
 pub(crate) fn predict(numbers: &[f64]) -> Answer {
     let knobs = Knobs::read(exactly(numbers)?)?;
     let scene = knobs.scene()?;
@@ -56,8 +57,9 @@ pub(crate) fn observe(numbers: &[f64]) -> Answer {
     Ok(answer)
 }
 
-/// Knobs and the number of the draw -> the six estimates; their own standard deviations; RMSE, px; chi-squared of the
-/// six errors under the bound, NaN without one; the residual of every point, px, view by view.
+/// Knobs and the number of the draw -> the six estimates; their own standard deviations; RMSE, px;
+/// chi-squared of the six errors under the bound, NaN without one; the residual of every point, px, view by
+/// view.
 pub(crate) fn calibrate_once(numbers: &[f64]) -> Answer {
     let (knobs, scene, views) = drawn(numbers)?;
     let found = calibrate(&views, &Settings::standard()).map_err(|error| error.to_string())?;
@@ -103,7 +105,8 @@ mod tests {
     #[test]
     fn the_chapters_prediction_is_met() {
         let answer = predict(&CHAPTER).unwrap();
-        // Printed for this scene: the standard deviation of fx, mean and deviation of the RMSE, the noise floor.
+        // Printed for this scene: the standard deviation of fx, mean and deviation of the RMSE, the noise
+        // floor.
         for (value, printed, digit) in [
             (answer[6].sqrt(), 0.681, 1e-3),
             (answer[42], 0.1371, 1e-4),

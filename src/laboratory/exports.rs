@@ -1,5 +1,6 @@
-//! What does a page call? Plain functions over memory, without glue: it writes the numbers of a question to [`lab_input`],
-//! calls the question, and reads the answer from [`lab_output`], or the words of a refusal from [`lab_refusal`].
+//! What does a page call? Plain functions over memory, without glue: it writes the numbers of a question to
+//! [`lab_input`], calls the question, and reads the answer from [`lab_output`], or the words of a refusal
+//! from [`lab_refusal`].
 
 use super::questions::{Answer, Question};
 use std::sync::{Mutex, MutexGuard, PoisonError};

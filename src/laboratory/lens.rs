@@ -26,10 +26,10 @@ pub(crate) fn distort(numbers: &[f64]) -> Answer {
         .collect())
 }
 
-/// k1 and k2 of the lens that bends, k1 and k2 of the lens that corrects, and the height v of a line, px -> largest and
-/// RMS distance of the bent line from its regression line, the same of the corrected line, the largest distance of a
-/// corrected point from its ideal place, px; then u, v of every bent point, its distance from the regression line,
-/// u, v of the corrected point and its distance.
+/// k1 and k2 of the lens that bends, k1 and k2 of the lens that corrects, and the height v of a line, px ->
+/// largest and RMS distance of the bent line from its regression line, the same of the corrected line, the
+/// largest distance of a corrected point from its ideal place, px; then u, v of every bent point, its
+/// distance from the regression line, u, v of the corrected point and its distance.
 pub(crate) fn bend(numbers: &[f64]) -> Answer {
     let [k1, k2, k1_known, k2_known, v] = exactly(numbers)?;
     let (lens, known) = (camera(k1, k2), camera(k1_known, k2_known));

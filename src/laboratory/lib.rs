@@ -5,8 +5,9 @@
 //! knobs (numbers) -> question -> answer (numbers) | refusal (words)
 //! ```
 //!
-//! `exports` puts them before a page as WebAssembly; [`answer`] asks the same natively, so that the bits of both can be
-//! compared. Nothing is drawn or kept here: a page draws, and the same numbers always get the same answer.
+//! `exports` puts them before a page as WebAssembly; [`answer`] asks the same natively, so that the bits of
+//! both can be compared. Nothing is drawn or kept here: a page draws, and the same numbers always get the
+//! same answer.
 
 mod calibration;
 mod exports;
@@ -21,7 +22,8 @@ mod uncertainty;
 pub use questions::{answer, questions};
 pub use scene::CHAPTER;
 
-/// Of the sources, in a section of the WebAssembly that has its own name: `tests/laboratory.rs` compares it with theirs.
+/// Of the sources, in a section of the WebAssembly that has its own name: `tests/laboratory.rs` compares it
+/// with theirs.
 #[cfg(target_arch = "wasm32")]
 #[used]
 #[unsafe(link_section = "calibench-fingerprint")]

@@ -7,7 +7,8 @@ use calibench::raster::Raster;
 use calibench::rectify::RectifyMap;
 use calibench::synth::Truth;
 
-/// Lines of the grid, ideal pixels: upright ones every 60 px from 20 to 620, level ones every 60 px from 60 to 420.
+/// Lines of the grid, ideal pixels: upright ones every 60 px from 20 to 620, level ones every 60 px from 60
+/// to 420.
 const FIRST_PX: (f64, f64) = (20.0, 60.0);
 const SPACING_PX: f64 = 60.0;
 const SPACES: (f64, f64) = (10.0, 6.0);
@@ -44,7 +45,8 @@ fn level(ideal: &Vec2) -> f64 {
     PAPER - (PAPER - INK) * upright.max(level)
 }
 
-/// k1 and k2 of the lens that is taken for the true one, and the levels of a photograph -> those of the corrected image.
+/// k1 and k2 of the lens that is taken for the true one, and the levels of a photograph -> those of the
+/// corrected image.
 pub(crate) fn rectify(numbers: &[f64]) -> Answer {
     let [k1, k2, levels @ ..] = numbers else { return Err("a lens has k1 and k2".to_string()) };
     let camera = camera(*k1, *k2);

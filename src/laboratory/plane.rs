@@ -7,9 +7,9 @@ use calibench::planar::{PlaneCalibration, PlaneModel, calibrate_plane};
 /// The kinds of map, in the order of the answer.
 const MODELS: [PlaneModel; 3] = [PlaneModel::Affine, PlaneModel::Similarity, PlaneModel::Projective];
 
-/// Nine pixels, u and v of each, row by row from the top left -> for an affine map to the unit grid, a similarity and a
-/// projective map: the nine entries of its matrix, row by row; world units per pixel along u and along v; RMS and largest
-/// residual, units; and the residual of every dot, units.
+/// Nine pixels, u and v of each, row by row from the top left -> for an affine map to the unit grid, a
+/// similarity and a projective map: the nine entries of its matrix, row by row; world units per pixel along u
+/// and along v; RMS and largest residual, units; and the residual of every dot, units.
 pub(crate) fn nine_points(numbers: &[f64]) -> Answer {
     let pixels = exactly::<18>(numbers)?;
     let (pixels, _) = pixels.as_chunks::<2>();

@@ -23,11 +23,12 @@ const MOST_POINTS: u32 = 20;
 /// Width and height of the target, from its first to its last point, mm.
 const TARGET_MM: (f64, f64) = (80.0, 60.0);
 
-/// Angle between the axes about which views beyond the fourth are tilted, degrees: the golden angle, so that any number
-/// of them is spread evenly.
+/// Angle between the axes about which views beyond the fourth are tilted, degrees: the golden angle, so that
+/// any number of them is spread evenly.
 const BETWEEN_AXES_DEG: f64 = 137.5;
 
-/// Directions in which the views are shifted, one after the other: towards the corners, along the target's diagonals.
+/// Directions in which the views are shifted, one after the other: towards the corners, along the target's
+/// diagonals.
 const CORNERS: [(f64, f64); 4] = [(0.8, 0.6), (-0.8, 0.6), (-0.8, -0.6), (0.8, -0.6)];
 
 /// What the reader has chosen.
@@ -36,7 +37,8 @@ pub(crate) struct Knobs {
     tilt_deg: f64,
     /// From the camera to the target's centre, mm.
     distance_mm: f64,
-    /// How far each view's target is shifted from the axis towards a corner of its own, at the same distance, mm.
+    /// How far each view's target is shifted from the axis towards a corner of its own, at the same distance,
+    /// mm.
     shift_mm: f64,
     views: usize,
     /// Noise on each of u and v, px.
@@ -85,7 +87,8 @@ impl Knobs {
         (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))).map(place).collect()
     }
 
-    /// The chapter's four turns with another tilt; further views are tilted about other axes. Each is shifted towards a corner.
+    /// The chapter's four turns with another tilt; further views are tilted about other axes. Each is shifted
+    /// towards a corner.
     fn pose(&self, view: usize) -> Pose {
         let t = self.tilt_deg;
         let turns = [[0.0, 0.0, 0.0], [t, 0.0, 0.0], [0.0, -t, 0.0], [-0.75 * t, 0.75 * t, 10.0]];
@@ -121,7 +124,8 @@ mod tests {
         let knobs = Knobs::read([30.0, 120.0, 0.0, 12.0, 0.1, -0.18, 0.05, 9.0, 7.0]).unwrap();
         let normals: Vec<_> = (4..12).map(|view| knobs.pose(view).rotation.column(2).into_owned()).collect();
         for (i, a) in normals.iter().enumerate() {
-            // Turns about X and Y one after the other tilt nearly as far as one turn about the axis between them.
+            // Turns about X and Y one after the other tilt nearly as far as one turn about the axis between
+            // them.
             let tilt_deg = libm::acos(a.z).to_degrees();
             assert!((29.0..=30.0 + 1e-9).contains(&tilt_deg), "{tilt_deg}");
             assert!(normals[..i].iter().all(|b| (a - b).norm() > 0.1));

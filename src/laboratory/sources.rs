@@ -1,5 +1,5 @@
-//! Which sources make the answers of the laboratory? The build script and the test that looks whether the committed
-//! WebAssembly is stale read the same list.
+//! Which sources make the answers of the laboratory? The build script and the test that looks whether the
+//! committed WebAssembly is stale read the same list.
 
 /// Folders and files whose lines change an answer, below the root of the project.
 pub const SOURCES: &[&str] = &[

@@ -13,8 +13,8 @@ const MOST: u32 = 10_000;
 /// What a trial says: the errors of the parameters and its RMSE.
 const OF_A_TRIAL: usize = PARAMETERS + 1;
 
-/// Knobs, the number of the first trial, and how many -> estimate less truth of the six parameters and RMSE, px, trial
-/// by trial; NaN where the data were refused or the search ended in no minimum.
+/// Knobs, the number of the first trial, and how many -> estimate less truth of the six parameters and RMSE,
+/// px, trial by trial; NaN where the data were refused or the search ended in no minimum.
 pub(crate) fn trials(numbers: &[f64]) -> Answer {
     let [knobs @ .., first, many] = exactly::<{ KNOBS + 2 }>(numbers)?;
     let knobs = Knobs::read(knobs)?;
@@ -38,8 +38,8 @@ pub(crate) fn trials(numbers: &[f64]) -> Answer {
     Ok(answer)
 }
 
-/// The trials' answers, one after the other -> how many have an estimate; standard deviation of the six errors; mean
-/// RMSE, px. NaN where there are too few.
+/// The trials' answers, one after the other -> how many have an estimate; standard deviation of the six
+/// errors; mean RMSE, px. NaN where there are too few.
 pub(crate) fn spread(numbers: &[f64]) -> Answer {
     let (trials, rest) = numbers.as_chunks::<OF_A_TRIAL>();
     if !rest.is_empty() {

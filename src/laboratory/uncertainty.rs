@@ -9,14 +9,14 @@ use calibench::evaluate::difference::{TakenOut, frame_difference, frame_nodes};
 use calibench::geometry::Vec2;
 use calibench::synth::Truth;
 
-/// Change of a parameter for a difference quotient, in its standard deviations: small against what bends, and large
-/// against rounding.
+/// Change of a parameter for a difference quotient, in its standard deviations: small against what bends, and
+/// large against rounding.
 const STEP: f64 = 1e-3;
 
-/// Knobs, and what the camera is used for (0: points at the target's distance, 1: directions) -> how far from the
-/// principal point points are seen, px; root of the mean squared error of a pixel as far as that and beyond, px; then
-/// every node of the frame, row by row from the top: u, v, and the root of its mean squared error, px, NaN where the lens
-/// folds back.
+/// Knobs, and what the camera is used for (0: points at the target's distance, 1: directions) -> how far from
+/// the principal point points are seen, px; root of the mean squared error of a pixel as far as that and
+/// beyond, px; then every node of the frame, row by row from the top: u, v, and the root of its mean squared
+/// error, px, NaN where the lens folds back.
 pub(crate) fn uncertainty(numbers: &[f64]) -> Answer {
     let [knobs @ .., used_for] = exactly::<{ KNOBS + 1 }>(numbers)?;
     let knobs = Knobs::read(knobs)?;
@@ -44,9 +44,10 @@ pub(crate) fn uncertainty(numbers: &[f64]) -> Answer {
     Ok(answer)
 }
 
-/// To first order the error at a pixel is `G (estimate - truth)`, with the derivatives `G` of the pixel by the parameters,
-/// the motion that fits best taken out, and its mean square is the trace of `G P G^T`, `P` the bound. `G` comes from
-/// difference quotients of the comparison of two cameras. NaN at nodes that one of these leaves out.
+/// To first order the error at a pixel is `G (estimate - truth)`, with the derivatives `G` of the pixel by
+/// the parameters, the motion that fits best taken out, and its mean square is the trace of `G P G^T`, `P`
+/// the bound. `G` comes from difference quotients of the comparison of two cameras. NaN at nodes that one of
+/// these leaves out.
 fn errors(camera: &Camera, bound: &Covariance, taken_out: TakenOut) -> Result<Vec<(Vec2, f64)>, String> {
     let column = |parameter: Parameter| -> Result<Vec<(Vec2, Vec2)>, String> {
         let step = STEP * bound.standard_deviation(parameter).unwrap_or(0.0);

@@ -1,5 +1,5 @@
-//! How is one cell of a study run again, by itself? The marks and poses that it used stand in tables beside its results; a study of its own takes
-//! them from there and gives the same trials.
+//! How is one cell of a study run again, by itself? The marks and poses that it used stand in tables beside
+//! its results; a study of its own takes them from there and gives the same trials.
 
 use super::cells::Cell;
 use super::engine::Engine;
@@ -27,9 +27,11 @@ pub(super) fn poses(engine: &Engine) -> Option<String> {
 }
 
 impl Engine {
-    /// The study of one cell alone, with marks and poses from the tables of a run in `folder`; `None` if there is no such cell.
+    /// The study of one cell alone, with marks and poses from the tables of a run in `folder`; `None` if
+    /// there is no such cell.
     ///
-    /// Its trials are those of the cell, bit for bit. Where trials draw poses of their own, they draw the same ones again.
+    /// Its trials are those of the cell, bit for bit. Where trials draw poses of their own, they draw the
+    /// same ones again.
     pub fn alone(&self, index: usize, folder: &str) -> Option<Spec> {
         let cell = self.cells.get(index)?;
         let mut spec = self.spec.clone();
@@ -50,7 +52,8 @@ impl Engine {
     }
 }
 
-/// Where cells draw noise of their own, their names are part of the keys of its streams: a factor of one level gives the cell its name.
+/// Where cells draw noise of their own, their names are part of the keys of its streams: a factor of one
+/// level gives the cell its name.
 fn named(cell: &Cell, spec: &Spec) -> Vec<Factor> {
     let Some((first, label)) = cell.name.split_once(" = ").filter(|_| !spec.common_random_numbers) else {
         return Vec::new();

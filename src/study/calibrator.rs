@@ -28,14 +28,15 @@ pub struct Estimate {
 
 /// Somebody else's solver.
 pub trait Calibrator: fmt::Debug + Send + Sync {
-    /// Calibrates what several trials of a cell have seen, in their order. What a program refuses or breaks is the
-    /// name of an outcome, in kebab-case.
+    /// Calibrates what several trials of a cell have seen, in their order. What a program refuses or breaks
+    /// is the name of an outcome, in kebab-case.
     fn calibrate(&self, cell: &Cell, seen: &[Vec<View>]) -> Vec<Result<Estimate, String>>;
 }
 
 /// This library's solver with the settings of a cell.
 pub(super) fn builtin(cell: &Cell, views: &[View]) -> Result<Estimate, String> {
-    // Nobody reads a trial's warnings, and `calibrate_lens` takes half as long again for those of Brown-Conrady's lens.
+    // Nobody reads a trial's warnings, and `calibrate_lens` takes half as long again for those of
+    // Brown-Conrady's lens.
     let known = match calibrate(views, &cell.settings) {
         Err(CalibrationError::OfAnyLens { .. }) => calibrate_lens(views, &cell.settings),
         known => known.map(LensCalibration::from),

@@ -204,8 +204,8 @@ impl Cell {
         self.model() == self.camera.distortion.model()
     }
 
-    /// The Cramer-Rao covariance of the cell's scene; `None` where it is singular, where each trial has poses of
-    /// its own, and where another lens is estimated.
+    /// The Cramer-Rao covariance of the cell's scene; `None` where it is singular, where each trial has poses
+    /// of its own, and where another lens is estimated.
     pub fn bound(&self) -> Option<Covariance> {
         if !self.knows_its_lens() {
             return None;

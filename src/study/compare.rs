@@ -63,7 +63,8 @@ pub enum Verdict {
     SecondBetter,
     /// The first run's errors are smaller.
     FirstBetter,
-    /// The whole interval lies within a thousandth of "no difference": what two programs that stop at other roundings leave.
+    /// The whole interval lies within a thousandth of "no difference": what two programs that stop at other
+    /// roundings leave.
     Alike,
     /// The interval holds "no difference".
     NotTold,
@@ -293,7 +294,8 @@ mod tests {
 
     #[test]
     fn the_interval_of_a_ratio_is_that_of_its_logarithm() {
-        // a^2 = 1 and b^2 = 0.5, 1.5, ...: the pairs' differences have variance 0.25, the logarithm 0.25 / (4 n).
+        // a^2 = 1 and b^2 = 0.5, 1.5, ...: the pairs' differences have variance 0.25, the logarithm 0.25 / (4
+        // n).
         let mut pairs = Pairs::default();
         (0..100).for_each(|i| pairs.add(1.0, [0.5f64, 1.5][i % 2].sqrt()));
         let ratio = pairs.ratio(0.05).unwrap();

@@ -1,5 +1,5 @@
-//! How do others read a study's folder? `datapackage.json` says what the columns of its tables are, `ro-crate-metadata.json` what made
-//! them, and the same stands in the head of a Parquet file.
+//! How do others read a study's folder? `datapackage.json` says what the columns of its tables are,
+//! `ro-crate-metadata.json` what made them, and the same stands in the head of a Parquet file.
 
 use super::engine::Engine;
 use super::folder::INPUTS;

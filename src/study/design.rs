@@ -48,8 +48,8 @@ pub(super) fn designs(spec: &Spec, text: &str) -> Result<Vec<(Vec<usize>, Design
         .collect()
 }
 
-/// Refuses a field whose level another one overwrites, its own or that of the table around it: cells that seem
-/// to differ would be the same.
+/// Refuses a field whose level another one overwrites, its own or that of the table around it: cells that
+/// seem to differ would be the same.
 fn refuse_set_twice(factors: &[Factor]) -> Result<(), SpecError> {
     let fields: Vec<(&str, &str)> = factors
         .iter()

@@ -191,7 +191,8 @@ impl Engine {
             .is_some_and(|width| width <= precision.relative_half_width)
     }
 
-    /// Half-width of the interval of a quantity's standard deviation over that; zero where all values are equal.
+    /// Half-width of the interval of a quantity's standard deviation over that; zero where all values are
+    /// equal.
     fn relative_half_width(&self, cell: usize, quantity: &str) -> Option<f64> {
         let at = self.quantities.iter().position(|q| q.name() == quantity)?;
         let sd = self.tallies[cell].moments[at].sd_interval(1.0 - self.spec.confidence)?;

@@ -44,7 +44,8 @@ pub(super) struct Alone {
     pub figure: Figure,
 }
 
-/// Every panel as a figure of its own; none where the study has no numeric factor, or too many series for one plot.
+/// Every panel as a figure of its own; none where the study has no numeric factor, or too many series for one
+/// plot.
 pub(super) fn panels(engine: &Engine, summary: &Summary) -> Vec<Alone> {
     let grid = Grid { engine, summary };
     let Some(x) = grid.x_factor().filter(|&x| grid.series(x).len() <= MOST_SERIES) else { return Vec::new() };
@@ -141,8 +142,8 @@ impl Grid<'_> {
         )
     }
 
-    /// What is drawn of errors and of the others: where the noise varies, every number over what the bound expects, which is proportional to
-    /// the noise and spans as many decades.
+    /// What is drawn of errors and of the others: where the noise varies, every number over what the bound
+    /// expects, which is proportional to the noise and spans as many decades.
     fn shown(&self, x: usize) -> [Shows; 3] {
         let is_noise = self.engine.spec.factor[x].set.iter().any(|path| path == "scene.noise_px");
         match is_noise {

@@ -47,8 +47,8 @@ pub fn finish(folder: &Folder, engine: &Engine) -> Result<Summary, FolderError> 
     Ok(summary)
 }
 
-/// Every panel of the figures that show quantities against a factor, as a figure of its own under its name, such as `bias/fx`; none where a
-/// study has no such figures.
+/// Every panel of the figures that show quantities against a factor, as a figure of its own under its name,
+/// such as `bias/fx`; none where a study has no such figures.
 pub fn single_panels(engine: &Engine) -> Vec<(String, Figure)> {
     let panels = figures::panels(engine, &summarise(engine));
     panels.into_iter().map(|panel| (panel.name, panel.figure)).collect()

@@ -24,7 +24,8 @@ use std::time::Duration;
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
-    /// Held while the run lasts; the system lets go of it however the process ends. `None` where what is only read cannot be locked.
+    /// Held while the run lasts; the system lets go of it however the process ends. `None` where what is only
+    /// read cannot be locked.
     _lock: Option<File>,
     pub(super) files: Arc<dyn Files>,
 }
@@ -128,8 +129,8 @@ const TRIES: usize = 20;
 /// Pause between them: a second in all.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// Locks a file, by one of the ways to do it. A program that this one is starting at this moment holds all of its open files, and the
-/// locks of those that were just closed, until it has begun.
+/// Locks a file, by one of the ways to do it. A program that this one is starting at this moment holds all of
+/// its open files, and the locks of those that were just closed, until it has begun.
 fn patiently(lock: impl Fn() -> Result<(), fs::TryLockError>) -> Result<(), fs::TryLockError> {
     for _ in 1..TRIES {
         match lock() {
@@ -218,7 +219,8 @@ impl Folder {
         Folder::lock(files, path)
     }
 
-    /// Opens a run to read it, beside others that do. A folder that this user may not write to is read without a lock where it has none.
+    /// Opens a run to read it, beside others that do. A folder that this user may not write to is read
+    /// without a lock where it has none.
     ///
     /// # Errors
     /// A folder that holds no run, or one at which a run is.

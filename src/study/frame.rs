@@ -1,5 +1,6 @@
-//! By how much does an estimated camera misplace pixels? The displacement over the frame that its error causes, as it is, and with the rotation
-//! taken out that fits best: a calibration does not tell where its camera looks (Kogan 2021).
+//! By how much does an estimated camera misplace pixels? The displacement over the frame that its error
+//! causes, as it is, and with the rotation taken out that fits best: a calibration does not tell where its
+//! camera looks (Kogan 2021).
 
 use calibench::calibrate::Covariance;
 use calibench::camera::{Camera, FreeParameters, Lens};
@@ -72,8 +73,8 @@ fn shown(camera: &Camera<Lens>, size: (usize, usize)) -> Option<f64> {
 }
 
 impl Engine {
-    /// The first cell whose camera does not show the whole frame over which displacements are measured, and the share that it
-    /// shows.
+    /// The first cell whose camera does not show the whole frame over which displacements are measured, and
+    /// the share that it shows.
     pub fn frame_in_part(&self) -> Option<(&Cell, f64)> {
         let measured = self.cells.iter().filter(|cell| cell.measures_frame);
         measured.into_iter().find_map(|cell| Some((cell, shown(&cell.camera, cell.design.scene.image)?)))
@@ -100,8 +101,9 @@ fn turned(truth: &Camera<Lens>, estimate: &Camera<Lens>, size: (usize, usize)) -
     Some([difference.rms_px, difference.largest()?.difference.norm()])
 }
 
-/// What the bound expects of the root mean square, to first order in the noise: the error of the camera is normal, so that the mean square is a
-/// sum of squares of normal numbers, each times an eigenvalue of `L^T W L` with `P = L L^T`. Theory says nothing of the largest.
+/// What the bound expects of the root mean square, to first order in the noise: the error of the camera is
+/// normal, so that the mean square is a sum of squares of normal numbers, each times an eigenvalue of `L^T W
+/// L` with `P = L L^T`. Theory says nothing of the largest.
 pub(super) fn expected(
     quantity: FrameQuantity,
     truth: &Camera<Lens>,
@@ -120,13 +122,15 @@ pub(super) fn expected(
     root_of_squares(eigenvalues.as_slice())
 }
 
-/// The integral below is cut off at `exp(+-this / 2)` of its largest integrand, 1e-10, and taken in steps of a quarter: the integrand is smooth,
-/// and the trapezoidal rule converges with the exponential of the inverse step.
+/// The integral below is cut off at `exp(+-this / 2)` of its largest integrand, 1e-10, and taken in steps of
+/// a quarter: the integrand is smooth, and the trapezoidal rule converges with the exponential of the inverse
+/// step.
 const REACH: f64 = 46.0;
 const STEP: f64 = 0.25;
 
-/// Mean and standard deviation of `sqrt(Q)`, `Q = sum l_i z_i^2` with standard normal `z_i`: `E Q = sum l_i`, and
-/// `E sqrt(Q) = 1 / (2 sqrt(pi)) * integral over t > 0 of (1 - E exp(-t Q)) t^(-3/2)`, with `E exp(-t Q) = prod (1 + 2 l_i t)^(-1/2)`.
+/// Mean and standard deviation of `sqrt(Q)`, `Q = sum l_i z_i^2` with standard normal `z_i`: `E Q = sum l_i`,
+/// and `E sqrt(Q) = 1 / (2 sqrt(pi)) * integral over t > 0 of (1 - E exp(-t Q)) t^(-3/2)`, with `E exp(-t Q)
+/// = prod (1 + 2 l_i t)^(-1/2)`.
 fn root_of_squares(eigenvalues: &[f64]) -> Option<Expected> {
     // Roundings of a form that is not negative.
     let eigenvalues: Vec<f64> = eigenvalues.iter().map(|l| l.max(0.0)).collect();
@@ -156,8 +160,8 @@ mod tests {
     fn a_lens_that_folds_back_within_the_frame_shows_a_part_of_it() {
         let ideal: Camera<Lens> = Camera::pinhole(600.0, 600.0, 319.5, 239.5).into();
         assert_eq!(shown(&ideal, (640, 480)), None);
-        // r (1 - r^2) grows as far as r = 1 / sqrt(3), where it is 2 / sqrt(27): a circle of 231 px in the frame. Nodes stand
-        // 21 px apart, and the ring of cells that it cuts is a tenth of the frame.
+        // r (1 - r^2) grows as far as r = 1 / sqrt(3), where it is 2 / sqrt(27): a circle of 231 px in the
+        // frame. Nodes stand 21 px apart, and the ring of cells that it cuts is a tenth of the frame.
         let folding = ideal.with_value(Parameter::K1, -1.0).unwrap();
         let radius = 600.0 * 2.0 / 27.0f64.sqrt();
         let expected = std::f64::consts::PI * radius * radius / (640.0 * 480.0);
@@ -167,7 +171,8 @@ mod tests {
 
     #[test]
     fn the_root_of_a_sum_of_squares_has_the_moments_of_a_chi_distribution() {
-        // Of one, two and three equal squares: half-normal, Rayleigh and Maxwell, means sqrt(2 / pi), sqrt(pi / 2), sqrt(8 / pi).
+        // Of one, two and three equal squares: half-normal, Rayleigh and Maxwell, means sqrt(2 / pi), sqrt(pi
+        // / 2), sqrt(8 / pi).
         let pi = std::f64::consts::PI;
         for (eigenvalues, mean) in [
             (vec![1.0, 0.0], (2.0 / pi).sqrt()),

@@ -1,5 +1,5 @@
-//! Which files does a study read beside its own? Tables of marks and poses that its scenes name, kept by their content: where they lie is no
-//! part of a study.
+//! Which files does a study read beside its own? Tables of marks and poses that its scenes name, kept by
+//! their content: where they lie is no part of a study.
 
 use super::spec_error::SpecError;
 use calibench::io::hash::sha256_hex;
@@ -19,7 +19,8 @@ pub struct Inputs(Arc<BTreeMap<String, String>>);
 const FIELD: &str = "file";
 
 impl Inputs {
-    /// The files that a study names, read from the folder in which it lies; names that begin with `/` are taken as they are.
+    /// The files that a study names, read from the folder in which it lies; names that begin with `/` are
+    /// taken as they are.
     ///
     /// # Errors
     /// A file that cannot be read.
@@ -130,7 +131,8 @@ fn named_in(text: &str) -> BTreeSet<String> {
     names
 }
 
-/// Whether a level of a factor that sets these fields names a file: its path must not become the name of a cell.
+/// Whether a level of a factor that sets these fields names a file: its path must not become the name of a
+/// cell.
 pub(super) fn names_a_file(set: &[String], level: &Value) -> bool {
     let mut level = serde_json::to_value(level).expect("a value of TOML is JSON");
     let mut is_file = set.iter().any(|path| is_name(path));

@@ -34,8 +34,8 @@ pub struct Manifest {
     /// The day of that commit, where known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub day: Option<String>,
-    /// The command of the program that calibrates, where it is not this library's solver. Whether it gives the same
-    /// answers another day is its own business.
+    /// The command of the program that calibrates, where it is not this library's solver. Whether it gives
+    /// the same answers another day is its own business.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub solver: Option<String>,
     /// Code.
@@ -118,8 +118,8 @@ impl Manifest {
         found
     }
 
-    /// Which trials may stand in the run's folder: SHA-256 of specification, part, code, and solver if it is not
-    /// this library's.
+    /// Which trials may stand in the run's folder: SHA-256 of specification, part, code, and solver if it is
+    /// not this library's.
     pub(super) fn identity(&self) -> String {
         let parts = match &self.solver {
             None => serde_json::json!([self.spec, self.shard, self.code]),

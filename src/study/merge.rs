@@ -141,7 +141,8 @@ pub fn merge_on(
     Ok((folder, whole))
 }
 
-/// Each part once, and none of them the whole: its trials would count twice, or be replaced by what is made of them.
+/// Each part once, and none of them the whole: its trials would count twice, or be replaced by what is made
+/// of them.
 fn distinct(parts: &[PathBuf], out: &Path) -> Result<(), MergeError> {
     // A folder that is not there is reported when it is opened.
     let place = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_path_buf());

@@ -1,14 +1,14 @@
-//! What do many values say, in one pass and little memory? Sums of powers about their mean, and intervals that do
-//! not assume a normal distribution.
+//! What do many values say, in one pass and little memory? Sums of powers about their mean, and intervals
+//! that do not assume a normal distribution.
 
 use calibench::evaluate::distribution::{normal_two_sided, student_two_sided};
 
 /// Sums of powers of values about their mean, brought up to date with every value.
 ///
-/// Each value counts by its distance from the first one: values that are nearly equal keep the digits in which they
-/// differ, whatever their size, and equal ones have a spread of exactly zero. A distance is rounded to a part in 2^53
-/// of itself, and no distance exceeds sqrt(2 (n - 1)) standard deviations of n values, so that a first value that lies
-/// far off costs no digits of the spread either.
+/// Each value counts by its distance from the first one: values that are nearly equal keep the digits in
+/// which they differ, whatever their size, and equal ones have a spread of exactly zero. A distance is
+/// rounded to a part in 2^53 of itself, and no distance exceeds sqrt(2 (n - 1)) standard deviations of n
+/// values, so that a first value that lies far off costs no digits of the spread either.
 ///
 /// The update is that of Welford (Technometrics 4, 1962) with Pebay's third and fourth powers (Sandia report
 /// SAND2008-6212, 2008, eq. 1.5 and 1.6, one value added). The order of the values decides the last bits.
@@ -104,8 +104,8 @@ impl Moments {
         })
     }
 
-    /// The standard deviation with its interval, for values that need not be normal (Bonett 2006); that of equal values is zero, and so are its
-    /// ends. `None` below four values.
+    /// The standard deviation with its interval, for values that need not be normal (Bonett 2006); that of
+    /// equal values is zero, and so are its ends. `None` below four values.
     pub fn sd_interval(&self, false_alarm: f64) -> Option<Estimated> {
         let n = self.count as f64;
         if self.count < FEWEST || self.sums[0] == 0.0 {
@@ -117,8 +117,8 @@ impl Moments {
         root_interval(self.sd(), n, relative, false_alarm)
     }
 
-    /// The root mean square with its interval, by the same argument about `ln mean(x^2)`, whose variance is one freedom larger; of zeros it is
-    /// zero. `None` below four values.
+    /// The root mean square with its interval, by the same argument about `ln mean(x^2)`, whose variance is
+    /// one freedom larger; of zeros it is zero. `None` below four values.
     pub fn rms_interval(&self, false_alarm: f64) -> Option<Estimated> {
         let n = self.count as f64;
         let (square, fourth) = self.about_zero();
@@ -134,9 +134,10 @@ impl Moments {
 /// The fewest values that an interval is drawn from: below, its estimate of the kurtosis means nothing.
 const FEWEST: u64 = 4;
 
-/// The interval of the root of a mean square: `ln(c s^2)` is nearly normal with the standard deviation `c r`, `c = n / (n - z)`, and r the
-/// relative standard deviation of `s^2`: after Bonett (Computational Statistics & Data Analysis 50, 2006), with the kurtosis about the mean in
-/// place of his trimmed one, which power sums do not have. `None` where z exceeds n.
+/// The interval of the root of a mean square: `ln(c s^2)` is nearly normal with the standard deviation `c r`,
+/// `c = n / (n - z)`, and r the relative standard deviation of `s^2`: after Bonett (Computational Statistics
+/// & Data Analysis 50, 2006), with the kurtosis about the mean in place of his trimmed one, which power sums
+/// do not have. `None` where z exceeds n.
 fn root_interval(value: f64, n: f64, relative: f64, false_alarm: f64) -> Option<Estimated> {
     let z = normal_two_sided(false_alarm);
     let c = n / (n - z);
@@ -189,8 +190,9 @@ mod tests {
 
     #[test]
     fn values_that_differ_in_their_last_digits_keep_their_moments() {
-        // 0, 1, ..., 9 in steps of 2^-30 about 2^20: all exact. The variance of the first n numbers is n (n + 1) / 12, here 110 / 12; the
-        // fourth central moment of a uniform law on n points (n^2 - 1)(3 n^2 - 7) / 240 = 99 * 293 / 240.
+        // 0, 1, ..., 9 in steps of 2^-30 about 2^20: all exact. The variance of the first n numbers is n (n +
+        // 1) / 12, here 110 / 12; the fourth central moment of a uniform law on n points (n^2 - 1)(3 n^2 - 7)
+        // / 240 = 99 * 293 / 240.
         let step = libm::exp2(-30.0);
         for repeats in [1, 100, 10_000] {
             let values = (0..repeats).flat_map(|_| (0..10).map(|i| libm::exp2(20.0) + step * f64::from(i)));
@@ -208,7 +210,8 @@ mod tests {
 
     #[test]
     fn a_first_value_far_off_costs_no_digits_of_the_spread() {
-        // Two values: n = 1 + 99, the mean of squares about the mean is D^2 99 / 100^2, but for the spread of the others.
+        // Two values: n = 1 + 99, the mean of squares about the mean is D^2 99 / 100^2, but for the spread of
+        // the others.
         let far = 1e8;
         let moments = of(std::iter::once(far).chain(std::iter::repeat_n(0.0, 99)));
         let variance = far * far * 99.0 / 100.0 / 99.0;
@@ -242,8 +245,9 @@ mod tests {
 
     #[test]
     fn intervals_cover_as_often_as_they_say() {
-        // Binomial sd sqrt(0.05 * 0.95 / 4000) = 0.0034; the approximations lose up to a hundredth at 20 values of a normal law, which an
-        // interval without the small-sample terms leaves one time in eight. Five sd and that.
+        // Binomial sd sqrt(0.05 * 0.95 / 4000) = 0.0034; the approximations lose up to a hundredth at 20
+        // values of a normal law, which an interval without the small-sample terms leaves one time in eight.
+        // Five sd and that.
         for draws in [10, 20, 50, 300] {
             let shares = covered(draws, 1.0, Stream::normal);
             assert!(shares.iter().all(|share| (share - 0.95).abs() < 0.028), "{draws}: {shares:?}");

@@ -1,4 +1,5 @@
-//! What does one panel of a study's figures show? One quantity against the x factor: its spread, its bias, or its mean, beside what theory expects.
+//! What does one panel of a study's figures show? One quantity against the x factor: its spread, its bias, or
+//! its mean, beside what theory expects.
 
 use super::figures::{Grid, Series, wide};
 use super::moments::Estimated;
@@ -11,7 +12,8 @@ use calibench_harness::{Look, Plot};
 pub(super) enum Shows {
     /// Standard deviation of an error, and the bound.
     Spread,
-    /// Standard deviation of an error over the bound: where the bound itself spans decades, these hide what is left.
+    /// Standard deviation of an error over the bound: where the bound itself spans decades, these hide what
+    /// is left.
     SpreadOverBound,
     /// Mean of an error over the bound.
     Bias,

@@ -1,6 +1,6 @@
-//! How many views, how far tilted, how widely placed, for a wanted accuracy? Predicted from the bound, confirmed by
-//! trials: the bound is what no unbiased calibration of many views exceeds, and trials say whether the estimator keeps
-//! it with these.
+//! How many views, how far tilted, how widely placed, for a wanted accuracy? Predicted from the bound,
+//! confirmed by trials: the bound is what no unbiased calibration of many views exceeds, and trials say
+//! whether the estimator keeps it with these.
 
 use super::engine::{Pace, in_memory};
 use super::moments::Estimated;
@@ -50,8 +50,8 @@ pub struct Design {
 pub enum Outcome {
     /// The whole interval of the standard deviation lies at or below what is wanted.
     Confirmed,
-    /// The whole interval lies above what is wanted, or that of the mean error lies further from 0 than it, or too few trials
-    /// found a camera.
+    /// The whole interval lies above what is wanted, or that of the mean error lies further from 0 than it,
+    /// or too few trials found a camera.
     Refuted,
     /// The interval holds what is wanted.
     Undecided,
@@ -96,8 +96,9 @@ pub struct Finding {
     pub mean: Estimated,
     /// What follows.
     pub outcome: Outcome,
-    /// Where nothing is decided: about how many trials would, if their standard deviation were the one measured; the
-    /// logarithm of the interval narrows with the root of their number. `None` where that is no number of use.
+    /// Where nothing is decided: about how many trials would, if their standard deviation were the one
+    /// measured; the logarithm of the interval narrows with the root of their number. `None` where that is no
+    /// number of use.
     pub deciding_trials: Option<u64>,
 }
 
@@ -161,8 +162,8 @@ impl Attempt {
         undecided().map(|finding| finding.deciding_trials).collect::<Option<Vec<u64>>>()?.into_iter().max()
     }
 
-    /// Whether these predictions, taken by as much as the trials of this attempt exceed its own, would be confirmed by
-    /// as many trials.
+    /// Whether these predictions, taken by as much as the trials of this attempt exceed its own, would be
+    /// confirmed by as many trials.
     fn expects(&self, predicted: &[f64]) -> bool {
         self.findings.iter().zip(predicted).all(|(finding, sd)| sd * finding.ratio.high <= finding.goal.sd)
     }
@@ -203,8 +204,8 @@ pub enum PlanError {
 
 /// For every tilt and coverage the fewest views whose Cramer-Rao bound meets every goal.
 ///
-/// The views of a longer series contain those of a shorter one, so the bound of every quantity falls with every view and
-/// halving finds the fewest.
+/// The views of a longer series contain those of a shorter one, so the bound of every quantity falls with
+/// every view and halving finds the fewest.
 ///
 /// # Errors
 /// [`PlanError`]: a scene that cannot be, a goal that is none.
@@ -308,7 +309,8 @@ fn predicted(spec: &Spec, goals: &[Goal]) -> Result<Option<Vec<f64>>, PlanError>
     Ok(places.into_iter().map(|at| cells[0].prediction.0[at].map(|p| p.sd)).collect())
 }
 
-/// The designs that suffice, fewest views first; among equals the one whose predictions stay furthest below what is wanted.
+/// The designs that suffice, fewest views first; among equals the one whose predictions stay furthest below
+/// what is wanted.
 pub fn ranked<'a>(designs: &'a [Design], goals: &[Goal]) -> Vec<(usize, &'a Design)> {
     let largest = |sds: &[f64]| sds.iter().zip(goals).map(|(sd, goal)| sd / goal.sd).fold(0.0, f64::max);
     let known =
@@ -318,8 +320,8 @@ pub fn ranked<'a>(designs: &'a [Design], goals: &[Goal]) -> Vec<(usize, &'a Desi
     known.into_iter().map(|(views, _, design)| (views, design)).collect()
 }
 
-/// Where fewer trials converge, the standard deviation is that of a selection, and the photographs of a user are often
-/// refused.
+/// Where fewer trials converge, the standard deviation is that of a selection, and the photographs of a user
+/// are often refused.
 const CONVERGED: f64 = 0.95;
 
 /// Trials of a design with some number of views.
@@ -351,10 +353,10 @@ fn finding(cell: &CellSummary, goal: &Goal) -> Option<Finding> {
     Some(Finding::of(goal, statistic.predicted?.sd, measured, cell.trials))
 }
 
-/// The number of views to try after an attempt that confirmed nothing: the fewest more whose bound, taken by as much as
-/// the trials exceeded it at most, meets every goal, so that as many trials are expected to confirm it. The most views
-/// where none does or a mean error is larger than what is wanted, of which the bound says nothing, and twice as many where too few trials
-/// converged; `None` beyond the most views.
+/// The number of views to try after an attempt that confirmed nothing: the fewest more whose bound, taken by
+/// as much as the trials exceeded it at most, meets every goal, so that as many trials are expected to
+/// confirm it. The most views where none does or a mean error is larger than what is wanted, of which the
+/// bound says nothing, and twice as many where too few trials converged; `None` beyond the most views.
 ///
 /// # Errors
 /// [`PlanError`]: a scene that cannot be.
@@ -458,7 +460,8 @@ mod tests {
 
     #[test]
     fn as_many_trials_decide_as_narrow_the_interval_to_the_wish() {
-        // The upper end has to come down from 6 to 3 per cent above: four times the trials, but for the curvature of the logarithm.
+        // The upper end has to come down from 6 to 3 per cent above: four times the trials, but for the
+        // curvature of the logarithm.
         let trials = finding(1.0, 0.06, 1.03).deciding_trials.unwrap();
         assert!((1900..2000).contains(&trials), "{trials}");
         let trials = finding(1.0, 0.06, 0.98).deciding_trials.unwrap();

@@ -130,7 +130,8 @@ mod tests {
     fn the_nees_has_the_moments_of_a_ratio_of_chi_squares() {
         for (n, d) in [(1.0, 5.0), (6.0, 20.0), (10.0, 480.0)] {
             let Expected { mean, sd } = nees(n, d).unwrap();
-            // Of chi-squared numbers: E[x] = n, E[x^2] = n (n + 2), E[1 / y] = 1 / (d - 2), E[1 / y^2] = 1 / ((d - 2) (d - 4)).
+            // Of chi-squared numbers: E[x] = n, E[x^2] = n (n + 2), E[1 / y] = 1 / (d - 2), E[1 / y^2] = 1 /
+            // ((d - 2) (d - 4)).
             let (first, second) = (n * d / (d - 2.0), n * (n + 2.0) * d * d / ((d - 2.0) * (d - 4.0)));
             assert!(
                 (mean - first).abs() < 1e-12 * first

@@ -79,7 +79,8 @@ impl Replay {
     }
 }
 
-/// Bytes of a line of trials: a thousand times what a study with every quantity has. A file without line ends would be read whole.
+/// Bytes of a line of trials: a thousand times what a study with every quantity has. A file without line ends
+/// would be read whole.
 const MOST_LINE_BYTES: u64 = 1 << 20;
 
 /// `trials.csv`, as far as the checkpoint counts it.

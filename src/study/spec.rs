@@ -245,7 +245,8 @@ impl Spec {
         Ok(spec)
     }
 
-    /// The spec with its defaults, the same text however the file was laid out and wherever the files lie that it names.
+    /// The spec with its defaults, the same text however the file was laid out and wherever the files lie
+    /// that it names.
     pub fn canonical(&self) -> serde_json::Value {
         let mut tree = serde_json::to_value(self).expect("a spec holds nothing that JSON cannot");
         self.inputs.put_contents(&mut tree);

@@ -57,8 +57,8 @@ pub struct Statistic {
     pub predicted: Option<Expected>,
     /// Standard deviation over the predicted one.
     pub ratio: Option<Estimated>,
-    /// The same with the interval widened so that all such intervals of the study hold together with its confidence
-    /// (Bonferroni), whether or not its cells are independent.
+    /// The same with the interval widened so that all such intervals of the study hold together with its
+    /// confidence (Bonferroni), whether or not its cells are independent.
     pub ratio_jointly: Option<Estimated>,
 }
 
@@ -306,7 +306,8 @@ mod tests {
         let mut sketch = Sketch::default();
         (1..=10_000).for_each(|i| sketch.add(f64::from(i)));
         let found = quantile(&sketch, 1000.0, 0.25, 0.05).unwrap();
-        // 2500 below on average, with a standard deviation of sqrt(10 000 * 0.25 * 0.75) = 43.3, of which 1.96 are 84.9.
+        // 2500 below on average, with a standard deviation of sqrt(10 000 * 0.25 * 0.75) = 43.3, of which
+        // 1.96 are 84.9.
         for (value, rank) in [(found.value, 2500.0), (found.low, 2415.0), (found.high, 2586.0)] {
             assert!(
                 (value - 1000.0 - rank).abs() <= 1.000_001 * Sketch::RELATIVE_ERROR * rank,

@@ -187,8 +187,8 @@ fn measure(
     value.is_finite().then_some(value)
 }
 
-/// Whether a parameter means the same with different models: coefficients never do, of one name or not, and a double
-/// sphere's focal length is not the scale of the image on the axis.
+/// Whether a parameter means the same with different models: coefficients never do, of one name or not, and a
+/// double sphere's focal length is not the scale of the image on the axis.
 fn is_the_same_thing(parameter: Parameter, models: [Model; 2]) -> bool {
     match parameter {
         Parameter::Cx | Parameter::Cy | Parameter::Skew => true,

@@ -21,11 +21,11 @@ pub enum Pattern {
 pub enum Arrangement {
     /// On a square grid: neighbours in a row and in a column are the board's spacing apart.
     Square,
-    /// Rows one spacing apart, the marks of a row two, every second row moved by one: what OpenCV calls an asymmetric grid.
-    /// The nearest neighbours lie on the diagonals, `sqrt(2)` spacings away.
+    /// Rows one spacing apart, the marks of a row two, every second row moved by one: what OpenCV calls an
+    /// asymmetric grid. The nearest neighbours lie on the diagonals, `sqrt(2)` spacings away.
     Asymmetric,
-    /// The marks of a row one spacing apart, every second row moved by half of it, rows `sqrt(3) / 2` spacings apart: each
-    /// mark has six neighbours at one spacing.
+    /// The marks of a row one spacing apart, every second row moved by half of it, rows `sqrt(3) / 2`
+    /// spacings apart: each mark has six neighbours at one spacing.
     Hexagonal,
 }
 
@@ -204,8 +204,8 @@ impl Board {
         self.arrangement
     }
 
-    /// The marks, row by row, X growing along a row, Y from row to row; the origin is half-way between the outermost in X and
-    /// in Y. Of staggered rows the first, third and so on begin farther to the left.
+    /// The marks, row by row, X growing along a row, Y from row to row; the origin is half-way between the
+    /// outermost in X and in Y. Of staggered rows the first, third and so on begin farther to the left.
     pub fn points(&self) -> Vec<Vec2> {
         let step = self.arrangement.steps() * self.spacing;
         let staggered = if self.arrangement.is_staggered() { 0.5 } else { 0.0 };

@@ -18,9 +18,9 @@ use crate::geometry::Vec2;
 ///
 /// # A layout of your own
 ///
-/// The points may lie anywhere in the plane: a view needs no [`Board`](super::Board), which is a lattice, and each
-/// view may show other points. You then detect the marks yourself. Marks that do not lie in a plane, or whose places
-/// are not exact, are for [`crate::measured`].
+/// The points may lie anywhere in the plane: a view needs no [`Board`](super::Board), which is a lattice, and
+/// each view may show other points. You then detect the marks yourself. Marks that do not lie in a plane, or
+/// whose places are not exact, are for [`crate::measured`].
 ///
 /// ```
 /// use calibench::board::View;
@@ -111,8 +111,8 @@ impl View {
         Ok(View { points, pixels, weights: None })
     }
 
-    /// Gives every mark a weight by which its residual is multiplied: 1 over its standard deviation, in units of
-    /// that of a mark of weight 1.
+    /// Gives every mark a weight by which its residual is multiplied: 1 over its standard deviation, in units
+    /// of that of a mark of weight 1.
     ///
     /// # Errors
     /// Not a weight a mark, or one that is not positive and finite.

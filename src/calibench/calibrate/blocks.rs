@@ -4,8 +4,8 @@ use crate::camera::Parameter;
 use crate::geometry::lanes::LANES;
 use nalgebra::{SMatrix, SVector};
 
-/// Room for every intrinsic parameter of a camera with Brown-Conrady's lens and the gradient, in whole lanes; rows
-/// beyond the free ones stay 0. The blocks of other lenses are `W` wide.
+/// Room for every intrinsic parameter of a camera with Brown-Conrady's lens and the gradient, in whole lanes;
+/// rows beyond the free ones stay 0. The blocks of other lenses are `W` wide.
 pub(super) const N: usize = (Parameter::COUNT + 1).next_multiple_of(LANES);
 
 pub(super) type Intrinsics<const W: usize = N> = SMatrix<f64, W, W>;

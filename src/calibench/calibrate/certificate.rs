@@ -25,8 +25,9 @@
 //! of the model that does not hold, and is not certified.
 //!
 //! **Robust losses.** What chance adds to the cost there is less than the mean cost of a degree of freedom, which strays
-//! raise: `u = S / (f s)` ([`super::noise`]). The floor's own `u` is taken to be as much less than its mean cost as that of
-//! the minimum is. And the score, whose matrix is weighted, is `s / w` of the fall that the curvature says.
+//! raise: `u = S / (f s)` ([`super::noise`]). The floor's own `u` is taken to be as much less than its mean
+//! cost as that of the minimum is. And the score, whose matrix is weighted, is `s / w` of the fall that the
+//! curvature says.
 #![allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
 
 use super::blocks::N;
@@ -53,10 +54,11 @@ pub(super) const FALSE_ALARM: f64 = 1e-6;
 pub struct Certificate {
     /// RMSE of the minimum per point, px; with a robust loss the root of the mean loss of its marks.
     pub rmse_px: f64,
-    /// RMSE per point, px, that the views reach with homographies of their own in place of poses; with a robust loss the root of the mean loss.
+    /// RMSE per point, px, that the views reach with homographies of their own in place of poses; with a
+    /// robust loss the root of the mean loss.
     pub floor_rmse_px: f64,
-    /// By how much the cost exceeds that floor, in variances of a pixel coordinate; with a robust loss in what one
-    /// standard deviation costs.
+    /// By how much the cost exceeds that floor, in variances of a pixel coordinate; with a robust loss in
+    /// what one standard deviation costs.
     pub excess: f64,
     /// Degrees of freedom of the excess: two a view less those of the intrinsics that homographies do not
     /// determine; at 0 nothing can be certified.
@@ -338,7 +340,8 @@ mod tests {
 
     #[test]
     fn the_quadratic_form_of_a_matrix_without_full_rank_is_that_of_its_pseudo_inverse() {
-        // M = a a^T + 4 e3 e3^T with a = (2, 1, 0): r^T M^+ r = 9 + 1 for r = 3 a + 2 e3, and one rank is missing.
+        // M = a a^T + 4 e3 e3^T with a = (2, 1, 0): r^T M^+ r = 9 + 1 for r = 3 a + 2 e3, and one rank is
+        // missing.
         let (mut matrix, mut right, mut scale) = ([[0.0; N]; N], [0.0; N], [0.0; N]);
         matrix[0][..3].copy_from_slice(&[4.0, 2.0, 0.0]);
         matrix[1][..3].copy_from_slice(&[2.0, 1.0, 0.0]);

@@ -1,8 +1,8 @@
-//! Which lens model do the marks ask for? Models compared by Schwarz's criterion, and by what they predict of views
-//! that they have not seen.
+//! Which lens model do the marks ask for? Models compared by Schwarz's criterion, and by what they predict of
+//! views that they have not seen.
 //!
-//! The residuals of the fit always fall with more coefficients. Two measures do not: Schwarz's criterion (1978), which
-//! charges every unknown `ln n`, and the error on views that were left out:
+//! The residuals of the fit always fall with more coefficients. Two measures do not: Schwarz's criterion
+//! (1978), which charges every unknown `ln n`, and the error on views that were left out:
 //!
 //! ```text
 //! BIC = n ln(sum |r|^2 / n) + p ln n,   n = 2 N coordinates, p unknowns
@@ -11,8 +11,9 @@
 //!
 //! Under a robust loss the squares are those of the marks that count ([`Counted`]), and `N` is their number.
 //!
-//! The criterion looks at all views at once; a fifth of few views is little to predict, and from four fifths of them a
-//! rich model is known poorly. So the criterion decides, and predictions only where it says nothing.
+//! The criterion looks at all views at once; a fifth of few views is little to predict, and from four fifths
+//! of them a rich model is known poorly. So the criterion decides, and predictions only where it says
+//! nothing.
 
 use super::any_lens::{located, spans_a_plane};
 use super::counted::{Counted, weighted_residuals};
@@ -33,8 +34,8 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// The models worth comparing where nothing is known of the lens: Brown-Conrady's from two coefficients to
-    /// five, the rational model, two fisheyes and the division model, with a flat board.
+    /// The models worth comparing where nothing is known of the lens: Brown-Conrady's from two coefficients
+    /// to five, the rational model, two fisheyes and the division model, with a flat board.
     pub fn usual() -> Vec<Candidate> {
         use Parameter::{K1, K2, K3, P1, P2};
         let plain: [&[Parameter]; 4] = [&[K1, K2], &[K1, K2, K3], &[K1, K2, P1, P2], &[K1, K2, P1, P2, K3]];
@@ -66,8 +67,8 @@ pub struct Compared {
     pub calibration: LensCalibration,
     /// Schwarz's criterion: the least is best, 10 more is very strong evidence against (Kass & Raftery 1995).
     pub bic: f64,
-    /// Error of a coordinate on views that were left out, px; `None` where too few views are left to calibrate
-    /// from.
+    /// Error of a coordinate on views that were left out, px; `None` where too few views are left to
+    /// calibrate from.
     pub hold_out_px: Option<f64>,
     /// Squared error of each fold, for the comparison of two candidates.
     folds: Vec<f64>,
@@ -94,15 +95,15 @@ impl Compared {
 /// Parts into which the views are divided; each is left out once.
 const FOLDS: usize = 5;
 
-/// A difference of the criterion below this one is "not worth more than a bare mention" (Kass & Raftery 1995): odds of
-/// less than e to one.
+/// A difference of the criterion below this one is "not worth more than a bare mention" (Kass & Raftery
+/// 1995): odds of less than e to one.
 const NO_EVIDENCE: f64 = 2.0;
 
-/// Fits every candidate. The first of the result is the choice: of those whose criterion of Schwarz lies within 2 of the
-/// least, the one that best predicts views that were left out (in five parts of the views in turn). The others follow by
-/// their criterion; behind them those whose coefficients lie where their model is not defined. Candidates that the views do
-/// not determine come with their reason. Views whose marks do not span a plane tell nothing and take no part, as long as half
-/// of the views do.
+/// Fits every candidate. The first of the result is the choice: of those whose criterion of Schwarz lies
+/// within 2 of the least, the one that best predicts views that were left out (in five parts of the views in
+/// turn). The others follow by their criterion; behind them those whose coefficients lie where their model is
+/// not defined. Candidates that the views do not determine come with their reason. Views whose marks do not
+/// span a plane tell nothing and take no part, as long as half of the views do.
 ///
 /// ```
 /// use calibench::calibrate::{Candidate, Settings, compare_models};
@@ -145,7 +146,8 @@ pub fn compare_models(
     (compared, refused)
 }
 
-/// Which of some candidates is taken, by their criteria, in ascending order, and their errors on views left out.
+/// Which of some candidates is taken, by their criteria, in ascending order, and their errors on views left
+/// out.
 fn chosen(measures: &[(f64, f64)]) -> Option<usize> {
     let (least, _) = *measures.first()?;
     let no_worse = measures.iter().take_while(|(bic, _)| bic - least <= NO_EVIDENCE);
@@ -192,8 +194,8 @@ fn unknowns(fit: &LensCalibration) -> f64 {
     (2.0 * fit.points() as f64 - fit.degrees_of_freedom as f64).max(0.0)
 }
 
-/// Of each fold the squared, weighted error on its views and its degrees of freedom; `None` where a fold cannot be
-/// calibrated without.
+/// Of each fold the squared, weighted error on its views and its degrees of freedom; `None` where a fold
+/// cannot be calibrated without.
 fn hold_out(views: &[View], settings: &Settings, counted: &Counted) -> Option<Vec<(f64, f64)>> {
     let folds = FOLDS.min(views.len());
     (0..folds)
@@ -220,7 +222,8 @@ fn hold_out(views: &[View], settings: &Settings, counted: &Counted) -> Option<Ve
 pub struct Freedom {
     /// The model with it.
     pub candidate: Candidate,
-    /// RMSE with it, px; under a robust loss of the marks that are strays to none of the models that were tried.
+    /// RMSE with it, px; under a robust loss of the marks that are strays to none of the models that were
+    /// tried.
     pub rmse_px: f64,
     /// RMSE without it, of the same marks, px.
     pub rmse_without_px: f64,
@@ -233,9 +236,9 @@ const WORTH: f64 = 0.05;
 /// A criterion of Schwarz's that falls by so much is very strong evidence (Kass & Raftery 1995).
 const STRONG_EVIDENCE: f64 = 10.0;
 
-/// Where residuals of neighbouring marks agree: which one freedom more, of the lens or of the board, lowers the
-/// RMSE of `fit` by a twentieth or more, the best first; where none does, those for which the criterion of Schwarz is very
-/// strong evidence.
+/// Where residuals of neighbouring marks agree: which one freedom more, of the lens or of the board, lowers
+/// the RMSE of `fit` by a twentieth or more, the best first; where none does, those for which the criterion
+/// of Schwarz is very strong evidence.
 pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibration) -> Vec<Freedom> {
     use Parameter::{K1, K2, K3, P1, P2, S1, S2, S3, S4, TauX, TauY};
     let model = settings.model();

@@ -12,8 +12,8 @@ use nalgebra::{DMatrix, DVector, SVector};
 pub struct Conditioning {
     /// Smallest eigenvalue of the intrinsics' information after the poses are eliminated, scaled to unit
     /// diagonal before the elimination: the part of the information about the weakest combination that is
-    /// left when the poses and the other intrinsics are unknown too. 1 is perfect; 0 is not identifiable, also
-    /// where rounding alone keeps it from 0.
+    /// left when the poses and the other intrinsics are unknown too. 1 is perfect; 0 is not identifiable,
+    /// also where rounding alone keeps it from 0.
     pub smallest_eigenvalue: f64,
     /// Largest over smallest eigenvalue of the same matrix.
     pub condition_number: f64,
@@ -36,7 +36,8 @@ pub struct WeakComponent {
 /// Smallest eigenvalue of the scaled information below which it is rounding: the elimination subtracts
 /// numbers of size 1, so its error is some hundred roundings.
 const ROUNDING: f64 = 1e-12;
-/// The same where it is the square of a singular value of the Jacobian, which has an error of some ten roundings.
+/// The same where it is the square of a singular value of the Jacobian, which has an error of some ten
+/// roundings.
 const ROUNDING_OF_ROOT: f64 = 1e-28;
 /// Members of the weakest combination below this share of the largest one are not worth a name.
 const NAMED_SHARE: f64 = 0.2;
@@ -59,7 +60,8 @@ impl Conditioning {
         self.smallest_eigenvalue.is_nan() || self.smallest_eigenvalue <= 0.0
     }
 
-    /// Whether the weakest combination is known worse than each of its members alone by a factor of a million or more.
+    /// Whether the weakest combination is known worse than each of its members alone by a factor of a million
+    /// or more.
     pub fn is_hardly_separable(&self) -> bool {
         self.smallest_eigenvalue <= ROUNDING
     }

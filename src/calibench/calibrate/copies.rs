@@ -1,4 +1,5 @@
-//! Views and marks that were given more than once are calibrated from once, and have their place in the result.
+//! Views and marks that were given more than once are calibrated from once, and have their place in the
+//! result.
 
 use super::duplicates::Distinct;
 use super::{Calibration, CalibrationError, Outliers, Warning};

@@ -1,8 +1,10 @@
-//! What counts of each mark where fits are compared? All of it under least squares; under a robust loss what could be noise.
+//! What counts of each mark where fits are compared? All of it under least squares; under a robust loss what
+//! could be noise.
 //!
-//! A sum of squares over all marks is that of the strays, which the loss keeps out of the cameras, and a lens with coefficients to spare
-//! bends to one of them. So a mark counts with what noise comes to at the most, which one stray cannot buy many coefficients with, and
-//! one that is a stray to every fit counts nowhere. Which marks count is the same for all fits.
+//! A sum of squares over all marks is that of the strays, which the loss keeps out of the cameras, and a lens
+//! with coefficients to spare bends to one of them. So a mark counts with what noise comes to at the most,
+//! which one stray cannot buy many coefficients with, and one that is a stray to every fit counts nowhere.
+//! Which marks count is the same for all fits.
 
 use super::{LensCalibration, Loss, strays};
 use crate::board::View;

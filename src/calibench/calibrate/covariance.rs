@@ -60,9 +60,9 @@ impl Covariance {
         self.free.iter().map(with_tie).collect()
     }
 
-    /// How an output is spread, px, in its worst direction, whose derivatives by a camera's parameters are given:
-    /// with `J` those of the estimated ones and `P` their covariance the root of the larger eigenvalue of `J P
-    /// J^T`. To that of fx an fy that is tied to it adds its share.
+    /// How an output is spread, px, in its worst direction, whose derivatives by a camera's parameters are
+    /// given: with `J` those of the estimated ones and `P` their covariance the root of the larger eigenvalue
+    /// of `J P J^T`. To that of fx an fy that is tied to it adds its share.
     pub fn largest_spread(&self, by_parameters: &[(Parameter, Vec2)]) -> f64 {
         let slope = |parameter: Parameter| {
             by_parameters.iter().find(|(p, _)| *p == parameter).map_or(Vec2::zeros(), |(_, slope)| *slope)

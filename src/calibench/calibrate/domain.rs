@@ -24,8 +24,8 @@ impl Prior {
     }
 }
 
-/// The loss, priors, start, image size and coverage are possible, each parameter belongs to the model and is free or
-/// has a value.
+/// The loss, priors, start, image size and coverage are possible, each parameter belongs to the model and is
+/// free or has a value.
 ///
 /// # Errors
 /// The first that is not.

@@ -56,7 +56,8 @@ pub fn calibrate(views: &[View], settings: &Settings) -> Result<Calibration, Cal
     copies::without(views, |views| calibrate_different(views, settings, &[]))
 }
 
-/// [`calibrate`], and whether the marks ask for coefficients that are left out, which takes half as long again.
+/// [`calibrate`], and whether the marks ask for coefficients that are left out, which takes half as long
+/// again.
 pub(super) fn calibrate_asking(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
     let undecided = left_out::undecided(settings);
     copies::without(views, |views| calibrate_different(views, settings, &undecided))
@@ -84,8 +85,8 @@ fn estimate(
     })
 }
 
-/// The state of [`calibrate`] in the targets' own frames, and whether it is certified: where a search with another
-/// lens starts, which needs neither covariance nor warnings.
+/// The state of [`calibrate`] in the targets' own frames, and whether it is certified: where a search with
+/// another lens starts, which needs neither covariance nor warnings.
 ///
 /// # Errors
 /// As [`calibrate`].

@@ -1,5 +1,5 @@
-//! Where else may a refinement start? The relaxed model gives the lens and the homographies without it; focal lengths are
-//! tried against both tilts of every plane, and the best are refined.
+//! Where else may a refinement start? The relaxed model gives the lens and the homographies without it; focal
+//! lengths are tried against both tilts of every plane, and the best are refined.
 
 use super::Termination;
 use super::closed_form;

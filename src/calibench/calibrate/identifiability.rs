@@ -229,8 +229,8 @@ pub(super) fn refuse_if_flat(
     }
 }
 
-/// Groups for people: fx and fy together are the focal length, and so on; the poses' share last. Coefficients that
-/// hang together among themselves only are named one by one.
+/// Groups for people: fx and fy together are the focal length, and so on; the poses' share last. Coefficients
+/// that hang together among themselves only are named one by one.
 fn names(weakest: &[WeakComponent]) -> Vec<Unknown> {
     if weakest.iter().all(|member| member.unknown.group() == Unknown::RadialDistortion) {
         return weakest.iter().map(|member| member.unknown).collect();

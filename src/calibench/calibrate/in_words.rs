@@ -1,4 +1,5 @@
-//! How are many warnings said? One line a warning, and one for all of a kind that twelve parameters would repeat.
+//! How are many warnings said? One line a warning, and one for all of a kind that twelve parameters would
+//! repeat.
 
 use super::Warning;
 use super::report::reach;
@@ -7,8 +8,8 @@ use crate::camera::Parameter;
 /// Of one kind this many stand in lines of their own; more are summed up.
 const EACH: usize = 3;
 
-/// Warnings in lines for people: each its own sentence, but those that say the same of many parameters in one, at
-/// the place of the first.
+/// Warnings in lines for people: each its own sentence, but those that say the same of many parameters in
+/// one, at the place of the first.
 ///
 /// ```
 /// use calibench::calibrate::{Warning, in_words};

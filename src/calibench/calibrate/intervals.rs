@@ -9,9 +9,9 @@
 //! tau(v) = sign(v - estimate) sqrt((cost(v) - least cost) / u)
 //! ```
 //! where `u` is what the cost rises by at one standard deviation (the variance of a coordinate under least
-//! squares), the interval of coverage `1 - alpha` is `|tau| <= t`, `t` the quantile of Student's distribution (Bates &
-//! Watts 1988, section 6.1). Linear theory has `tau = (v - estimate) / standard deviation`; JCGM 101 (2008),
-//! section 8.1, asks for such a comparison before a standard uncertainty is stated.
+//! squares), the interval of coverage `1 - alpha` is `|tau| <= t`, `t` the quantile of Student's distribution
+//! (Bates & Watts 1988, section 6.1). Linear theory has `tau = (v - estimate) / standard deviation`; JCGM 101
+//! (2008), section 8.1, asks for such a comparison before a standard uncertainty is stated.
 
 use super::blocks::N;
 use super::minimise::{Descent, Minimum, Problem, State, descend};
@@ -177,8 +177,8 @@ impl<'a, P: Profiled<W>, const W: usize> Profile<'a, P, W> {
         self.problem.free().iter().map(interval).collect()
     }
 
-    /// Whether `|tau|` stays within `most` on the way to a value `offset` away from the estimate: an interval of so many standard
-    /// deviations then goes on to there.
+    /// Whether `|tau|` stays within `most` on the way to a value `offset` away from the estimate: an interval
+    /// of so many standard deviations then goes on to there.
     pub fn reaches(&self, parameter: Parameter, offset: f64, most: f64) -> bool {
         let on_the_way = |step: usize| offset * step as f64 / STEPS_OF_A_WAY as f64;
         (1..STEPS_OF_A_WAY).all(|step| self.tau_in_range(parameter, on_the_way(step)) <= most)
@@ -222,8 +222,9 @@ impl<'a, P: Profiled<W>, const W: usize> Profile<'a, P, W> {
         self.tau_of(self.refitted(&self.problem.holding(parameter), parameter, offset))
     }
 
-    /// The minimum with `parameter` held `offset` away from its estimate, from where all others follow it to first order. Where that
-    /// costs far more than deviations say, these are absurd: then also from where no other follows.
+    /// The minimum with `parameter` held `offset` away from its estimate, from where all others follow it to
+    /// first order. Where that costs far more than deviations say, these are absurd: then also from where no
+    /// other follows.
     fn refitted(&self, problem: &P, parameter: Parameter, offset: f64) -> Minimum<P::State, W> {
         let following = descend(problem, self.moved(parameter, offset));
         let most = FAR_OFF * (offset / self.deviation(parameter)).powi(2) * self.noise.rise;
@@ -239,9 +240,9 @@ impl<'a, P: Profiled<W>, const W: usize> Profile<'a, P, W> {
         }
     }
 
-    /// `|tau|` where no parameter may leave the range in which the model is defined, if none is beyond it at the minimum: one that
-    /// would is held at its limit. Infinite where the one that is moved is beyond; 0 where another minimum costs less, as the profile has
-    /// not risen yet.
+    /// `|tau|` where no parameter may leave the range in which the model is defined, if none is beyond it at
+    /// the minimum: one that would is held at its limit. Infinite where the one that is moved is beyond; 0
+    /// where another minimum costs less, as the profile has not risen yet.
     fn tau_in_range(&self, parameter: Parameter, offset: f64) -> f64 {
         let mut problem = self.problem.holding(parameter);
         let mut refitted = self.refitted(&problem, parameter, offset);

@@ -208,8 +208,8 @@ fn trades_off(free: FreeParameters, covariance: &DMatrix<f64>) -> bool {
     centre.iter().any(|&i| tangential.iter().any(|&j| correlation(i, j).abs() > TRADES_OFF))
 }
 
-/// Noise of a pixel coordinate: under least squares from the cost, and otherwise from what the residuals count for, as gross
-/// errors, which a robust loss discounts, say nothing of it.
+/// Noise of a pixel coordinate: under least squares from the cost, and otherwise from what the residuals
+/// count for, as gross errors, which a robust loss discounts, say nothing of it.
 pub(super) fn noise_of(problem: &Problem<'_>, minimum: &Minimum) -> Noise {
     let coordinates = 2 * problem.observations.iter().map(|o| o.len()).sum::<usize>();
     let measurements = coordinates + problem.priors.list.len();

@@ -1,9 +1,9 @@
-//! Do coefficients that are left out matter? Rao's score test (1948): what the cost would fall by if they were free, to
-//! second order at the minimum without them, with no further fit.
+//! Do coefficients that are left out matter? Rao's score test (1948): what the cost would fall by if they
+//! were free, to second order at the minimum without them, with no further fit.
 //!
-//! With the normal equations `H` and the gradient `g` of a problem in which `k` coefficients more are free, at the minimum
-//! with these at 0, the cost falls by `g^T H^-1 g`. If they are 0 in truth, that over `k` variances of a coordinate follows
-//! Fisher's F of `k` and the residuals' degrees of freedom.
+//! With the normal equations `H` and the gradient `g` of a problem in which `k` coefficients more are free,
+//! at the minimum with these at 0, the cost falls by `g^T H^-1 g`. If they are 0 in truth, that over `k`
+//! variances of a coordinate follows Fisher's F of `k` and the residuals' degrees of freedom.
 
 use super::chance::fisher_tail;
 use super::minimise::{Minimum, Problem};
@@ -25,7 +25,8 @@ pub(super) fn undecided(settings: &Settings) -> Vec<LeftOut> {
     ASKED.into_iter().filter(is_left_out).collect()
 }
 
-/// Those of `undecided` that the marks ask for; `variance` is that of a coordinate, with so many degrees of freedom.
+/// Those of `undecided` that the marks ask for; `variance` is that of a coordinate, with so many degrees of
+/// freedom.
 pub(super) fn asked_for(
     problem: &Problem<'_>,
     minimum: &Minimum,

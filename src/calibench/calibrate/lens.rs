@@ -1,5 +1,5 @@
-//! Which of the two estimators calibrates? That of [`super::calibrate`] knows one lens, and much about it; that of
-//! [`super::any_lens`] knows all.
+//! Which of the two estimators calibrates? That of [`super::calibrate`] knows one lens, and much about it;
+//! that of [`super::any_lens`] knows all.
 
 use super::estimate::calibrate_asking;
 use super::{Board, Calibration, CalibrationError, Settings, any_lens, copies};
@@ -51,15 +51,18 @@ impl LensCalibration {
 /// [`calibrate`](super::calibrate) with a lens of any model ([`Settings::of_model`]), marks of unequal weight
 /// ([`View::with_weights`]) and a board that need not be flat ([`Board`]).
 ///
-/// The cost is `sum w^2 |r|^2` under the loss, with the priors' share; see [`Prior`](super::Prior). The covariance is that of
-/// [`calibrate`](super::calibrate), the noise that of a coordinate of weight 1. A camera with Brown-Conrady's lens, marks of
-/// weight 1 and a flat board is handed to [`calibrate`](super::calibrate), with all that it checks, and asked whether its marks ask for p1 and p2, or k3, where
-/// nobody has decided on them ([`Warning::LeftOut`](super::Warning::LeftOut)). For all else the best of a few
-/// starts is refined, by the rays of a fisheye and by a pinhole, and the profiles of the parameters are walked
-/// where the cost is no parabola; nothing certifies that minimum. Views given twice count once, but where marks have weights.
+/// The cost is `sum w^2 |r|^2` under the loss, with the priors' share; see [`Prior`](super::Prior). The
+/// covariance is that of [`calibrate`](super::calibrate), the noise that of a coordinate of weight 1. A
+/// camera with Brown-Conrady's lens, marks of weight 1 and a flat board is handed to
+/// [`calibrate`](super::calibrate), with all that it checks, and asked whether its marks ask for p1 and p2,
+/// or k3, where nobody has decided on them ([`Warning::LeftOut`](super::Warning::LeftOut)). For all else the
+/// best of a few starts is refined, by the rays of a fisheye and by a pinhole, and the profiles of the
+/// parameters are walked where the cost is no parabola; nothing certifies that minimum. Views given twice
+/// count once, but where marks have weights.
 ///
 /// # Errors
-/// As [`calibrate`](super::calibrate); a parameter that the model does not have; a model that cannot see every mark.
+/// As [`calibrate`](super::calibrate); a parameter that the model does not have; a model that cannot see
+/// every mark.
 ///
 /// ```
 /// use calibench::board::View;

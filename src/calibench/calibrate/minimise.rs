@@ -170,8 +170,8 @@ pub(super) trait Descent<const W: usize> {
         false
     }
 
-    /// Whether a step that gains next to nothing may lead far away, along a combination that is hardly known, and is to
-    /// be looked at.
+    /// Whether a step that gains next to nothing may lead far away, along a combination that is hardly known,
+    /// and is to be looked at.
     fn may_leap(&self) -> bool {
         false
     }

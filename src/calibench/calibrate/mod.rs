@@ -84,8 +84,8 @@ mod tests {
     use crate::camera::{BrownConrady, Camera};
     use crate::geometry::{Pose, Vec2, Vec3, rotation};
 
-    /// Four views of 9 x 7 marks, 10 mm apart, from 120 mm, with deviations of standard deviation `noise_px` that have
-    /// nothing in common: the phases are those of a chirp.
+    /// Four views of 9 x 7 marks, 10 mm apart, from 120 mm, with deviations of standard deviation `noise_px`
+    /// that have nothing in common: the phases are those of a chirp.
     pub(super) fn four_views(noise_px: f64) -> Vec<View> {
         let camera =
             Camera::pinhole(600.0, 600.0, 326.0, 243.0).with_distortion(BrownConrady::radial(-0.18, 0.05));

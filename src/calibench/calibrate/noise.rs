@@ -1,16 +1,18 @@
-//! What do the residuals of a minimum say of the noise? One number under least squares, two under a robust loss.
+//! What do the residuals of a minimum say of the noise? One number under least squares, two under a robust
+//! loss.
 //!
-//! With the influence `psi = rho'(|r|^2) r` of a residual let `S` be the sum of its squares, `w` the mean of the weights `rho'`, `s` the
-//! mean slope of the influence and `f` the degrees of freedom. The estimate's covariance is `K^2 S / (f s^2) (J^T J)^-1` with
+//! With the influence `psi = rho'(|r|^2) r` of a residual let `S` be the sum of its squares, `w` the mean of
+//! the weights `rho'`, `s` the mean slope of the influence and `f` the degrees of freedom. The estimate's
+//! covariance is `K^2 S / (f s^2) (J^T J)^-1` with
 //!
 //! ```text
 //! K = 1 + (p / n) (q - s^2) / s^2
 //! ```
-//! for `p` unknowns from `n` coordinates, `q` the mean square of the slopes (Huber 1981, section 7.6). In what follows `S` has
-//! the factor `K^2`. The weighted normal matrix is about `w J^T J`, and half the cost's curvature
-//! `s J^T J`. So a coordinate counts as if it had the variance `S / (f s^2)`, the covariance is `S w / (f s^2)` times the inverse of the
-//! normal matrix, and one standard deviation costs `S / (f s)`. Under least squares `w = s = 1`, and all three are the variance of a
-//! coordinate.
+//! for `p` unknowns from `n` coordinates, `q` the mean square of the slopes (Huber 1981, section 7.6). In
+//! what follows `S` has the factor `K^2`. The weighted normal matrix is about `w J^T J`, and half the cost's
+//! curvature `s J^T J`. So a coordinate counts as if it had the variance `S / (f s^2)`, the covariance is `S
+//! w / (f s^2)` times the inverse of the normal matrix, and one standard deviation costs `S / (f s)`. Under
+//! least squares `w = s = 1`, and all three are the variance of a coordinate.
 
 use super::loss::Loss;
 use crate::geometry::Vec2;
@@ -138,8 +140,9 @@ mod tests {
         };
         let squares = ratio(Loss::Squares);
         assert!((squares - 1.0).abs() < 0.05, "{squares}");
-        // What chance does to the draws it does under every loss. The correction is of first order; what it leaves was found of 20 000 such
-        // groups by a program of its own, in Python. Without it Huber's 0.5 has 1.50 and Cauchy's 1 has 1.58.
+        // What chance does to the draws it does under every loss. The correction is of first order; what it
+        // leaves was found of 20 000 such groups by a program of its own, in Python. Without it Huber's 0.5
+        // has 1.50 and Cauchy's 1 has 1.58.
         for (loss, expected) in [
             (Loss::Huber { delta_px: 2.0 }, 1.00),
             (Loss::Huber { delta_px: 1.0 }, 1.03),

@@ -5,7 +5,8 @@ use super::minimise::{Problem, State};
 use super::{CalibrationError, Loss};
 use crate::geometry::Vec2;
 
-/// Noise makes one set in this many look as if it had an outlier, before a robust fit has been asked: `exp(-7)`.
+/// Noise makes one set in this many look as if it had an outlier, before a robust fit has been asked:
+/// `exp(-7)`.
 const LOG_LOOK: f64 = 7.0;
 /// Of noise the mean square of a squared residual is twice the square of its mean; this many times are none.
 const HEAVY: f64 = 4.0;
@@ -13,8 +14,8 @@ const HEAVY: f64 = 4.0;
 const LOG_OUTLIER: f64 = 13.0;
 /// More than this part of the marks are no outliers: the model is wrong.
 const MOST: f64 = 0.3;
-/// A robust loss with a scale below this part of the median residual, Huber's or Cauchy's, takes noise for outliers: the stated covariance
-/// no longer is that of the estimate.
+/// A robust loss with a scale below this part of the median residual, Huber's or Cauchy's, takes noise for
+/// outliers: the stated covariance no longer is that of the estimate.
 const NARROW_HUBER: f64 = 0.3;
 const NARROW_CAUCHY: f64 = 0.5;
 
@@ -82,8 +83,8 @@ pub(super) fn outliers(problem: &Problem<'_>, state: &State, fit: &Fit, variance
     })
 }
 
-/// Those of any fit with these residuals, of so many unknowns: `refit` gives the residuals under another loss, and starts where
-/// the fit before ended.
+/// Those of any fit with these residuals, of so many unknowns: `refit` gives the residuals under another
+/// loss, and starts where the fit before ended.
 pub(super) fn of_residuals(
     residuals: &[Vec<Vec2>],
     unknowns: usize,
@@ -98,7 +99,8 @@ pub(super) fn of_residuals(
         .then(|| named(residuals.to_vec(), unknowns, refit))?
 }
 
-/// Outliers by name: the fit is repeated with Cauchy's loss at the scale of the median, which outliers do not move.
+/// Outliers by name: the fit is repeated with Cauchy's loss at the scale of the median, which outliers do not
+/// move.
 fn named(
     mut residuals: Vec<Vec<Vec2>>,
     unknowns: usize,

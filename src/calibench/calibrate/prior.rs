@@ -1,8 +1,8 @@
 //! What is known of a parameter before any photograph is taken? A value with its standard deviation: one more
 //! measurement.
 //!
-//! With the noise `sigma` of a pixel coordinate a prior is a residual of `sigma (p - mean) / sd` px, and under
-//! least squares the cost becomes
+//! With the noise `sigma` of a pixel coordinate a prior is a residual of `sigma (p - mean) / sd` px, and
+//! under least squares the cost becomes
 //!
 //! ```text
 //! sum |r|^2 + sigma^2 sum ((p - mean) / sd)^2,   covariance = sigma^2 (J^T J + W)^-1,   W = diag(sigma^2 / sd^2)

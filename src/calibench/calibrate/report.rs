@@ -39,7 +39,8 @@ pub struct Calibration<L = BrownConrady> {
     /// How the refinement ended.
     pub termination: Termination,
     /// How the cost compares with its floor; `None` where a pose is undetermined. Under a robust loss it
-    /// compares what the loss counts, and its probability is rough where the loss is many times as wide as the noise.
+    /// compares what the loss counts, and its probability is rough where the loss is many times as wide as
+    /// the noise.
     pub certificate: Option<Certificate>,
     /// Intervals by the profile of the cost, one a free parameter; empty unless
     /// [`super::Settings::with_profile_intervals`] asked for them.
@@ -139,8 +140,8 @@ pub enum Warning {
     NotLinear {
         /// Of which parameter.
         parameter: Parameter,
-        /// True half-width of an interval of two standard deviations over the linear one, below the estimate; none where
-        /// the cost never rises.
+        /// True half-width of an interval of two standard deviations over the linear one, below the estimate;
+        /// none where the cost never rises.
         below: Option<f64>,
         /// The same above.
         above: Option<f64>,
@@ -168,8 +169,8 @@ pub enum Warning {
         /// Correlation coefficient.
         correlation: f64,
     },
-    /// A combination of parameters that hardly changes the picture: known worse than each of them alone by a factor of a
-    /// million or more.
+    /// A combination of parameters that hardly changes the picture: known worse than each of them alone by a
+    /// factor of a million or more.
     HardlySeparable {
         /// Those that take part, the strongest first.
         parameters: Vec<Parameter>,
@@ -394,8 +395,9 @@ impl fmt::Display for Warning {
 }
 
 impl<L> Calibration<L> {
-    /// Whether the estimate is a minimum whose RMSE, as its [`Certificate`] counts it, lies no more than a quarter above its floor: beyond that
-    /// it is another minimum than the right one, or a model that has little to do with the data.
+    /// Whether the estimate is a minimum whose RMSE, as its [`Certificate`] counts it, lies no more than a
+    /// quarter above its floor: beyond that it is another minimum than the right one, or a model that has
+    /// little to do with the data.
     pub fn is_usable(&self) -> bool {
         let is_gross = |c: &Certificate| !c.holds() && c.rmse_px > GROSS * c.floor_rmse_px;
         self.termination.is_minimum() && !self.certificate.as_ref().is_some_and(is_gross)

@@ -1,4 +1,5 @@
-//! Does another camera explain the data nearly as well? Minima that a search met, compared with the one it chose.
+//! Does another camera explain the data nearly as well? Minima that a search met, compared with the one it
+//! chose.
 
 use super::Termination;
 use super::blocks::N;
@@ -42,8 +43,8 @@ impl Met {
 }
 
 impl<L> Met<L> {
-    /// The best of the other minima that is another camera and nearly as good; `covariance` is that of the free
-    /// parameters, px^2 and so on, `rise` what one standard deviation costs, px^2.
+    /// The best of the other minima that is another camera and nearly as good; `covariance` is that of the
+    /// free parameters, px^2 and so on, `rise` what one standard deviation costs, px^2.
     pub fn rival(
         &self,
         others: &[Met<L>],

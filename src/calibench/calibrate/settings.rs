@@ -48,8 +48,9 @@ impl Board {
 
 /// How flat the board is taken to be.
 ///
-/// A board that is not flat has its marks at the height `a (1 - x^2) + b (1 - y^2) + c x y` over its plane, `x` and
-/// `y` from -1 to 1 over all marks: a bow along x, a bow along y, and a twist. The same board is seen in all views.
+/// A board that is not flat has its marks at the height `a (1 - x^2) + b (1 - y^2) + c x y` over its plane,
+/// `x` and `y` from -1 to 1 over all marks: a bow along x, a bow along y, and a twist. The same board is seen
+/// in all views.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
@@ -58,8 +59,8 @@ pub enum Board {
     /// Exactly.
     #[default]
     Flat,
-    /// Two bows are estimated, each known beforehand to be 0 with this standard deviation; infinite where nothing
-    /// is known.
+    /// Two bows are estimated, each known beforehand to be 0 with this standard deviation; infinite where
+    /// nothing is known.
     Bowed {
         /// Of each, in the target's unit.
         standard_deviation: f64,
@@ -288,8 +289,8 @@ impl Settings {
     /// A principal point that is neither free nor given is the image's centre: `(w - 1) / 2`.
     ///
     /// # Errors
-    /// A value that no camera has; a focal length, or a principal point of an image of unknown size, that is held
-    /// without one.
+    /// A value that no camera has; a focal length, or a principal point of an image of unknown size, that is
+    /// held without one.
     pub fn held(&self, parameter: Parameter) -> Result<Option<f64>, CalibrationError> {
         if self.is_tied(parameter) {
             return Ok(self.held(Parameter::Fx)?.zip(self.fy_per_fx).map(|(fx, ratio)| ratio * fx));

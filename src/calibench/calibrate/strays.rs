@@ -1,8 +1,8 @@
 //! Which marks are strays under a robust loss, where fits are judged by their residuals?
 //!
-//! The loss keeps strays out of the camera, but a sum of squares over all marks is theirs. A squared residual of noise exceeds `x sigma^2`
-//! with probability `exp(-x / 2)`, and half of them `2 ln 2 sigma^2`: what exceeds 25 variances, as their median tells them, is noise
-//! once in 270 000.
+//! The loss keeps strays out of the camera, but a sum of squares over all marks is theirs. A squared residual
+//! of noise exceeds `x sigma^2` with probability `exp(-x / 2)`, and half of them `2 ln 2 sigma^2`: what
+//! exceeds 25 variances, as their median tells them, is noise once in 270 000.
 
 use super::Loss;
 use super::outliers::median;
@@ -12,7 +12,8 @@ use std::borrow::Cow;
 /// The largest squared residual of noise over the median.
 const LARGEST: f64 = 25.0 / (2.0 * std::f64::consts::LN_2);
 
-/// The squared residual beyond which a mark is a stray; infinite under least squares, which knows none, and without noise.
+/// The squared residual beyond which a mark is a stray; infinite under least squares, which knows none, and
+/// without noise.
 pub(super) fn limit(residuals: &[Vec<Vec2>], loss: Loss) -> f64 {
     if loss == Loss::Squares || residuals.iter().all(Vec::is_empty) {
         return f64::INFINITY;

@@ -37,7 +37,8 @@ pub(super) struct Reduction<const W: usize = N> {
     pub eliminated: Vec<Eliminated<W>>,
     /// `S`, the intrinsics' information when the poses are unknown too.
     pub schur: DMatrix<f64>,
-    /// `R` with `R^T R = S`, upper triangle, where it comes from the Jacobian and so has digits that `S` has lost.
+    /// `R` with `R^T R = S`, upper triangle, where it comes from the Jacobian and so has digits that `S` has
+    /// lost.
     pub root: Option<DMatrix<f64>>,
 }
 
@@ -74,8 +75,8 @@ impl<const W: usize> Step<W> {
         Step::along(part * self.intrinsics, self.poses.iter().map(|pose| part * pose).collect())
     }
 
-    /// Adds half of an acceleration. False, and unchanged, where that is so long, in the metric of `system`, that
-    /// the path is not known to second order.
+    /// Adds half of an acceleration. False, and unchanged, where that is so long, in the metric of `system`,
+    /// that the path is not known to second order.
     pub fn bend(&mut self, acceleration: &Step<W>, system: &System<W>) -> bool {
         let is_known = acceleration.square(system) <= LARGEST_BEND * LARGEST_BEND * self.square(system);
         if is_known {
@@ -210,8 +211,8 @@ impl<const W: usize> Reduction<W> {
     }
 }
 
-/// `(R^T R)^-1` of an upper triangle; `None` if that is singular. Every sum is written out: a library's product of
-/// matrices may round otherwise on another processor.
+/// `(R^T R)^-1` of an upper triangle; `None` if that is singular. Every sum is written out: a library's
+/// product of matrices may round otherwise on another processor.
 fn inverse_of_square(root: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = root.nrows();
     let inverse = root.solve_upper_triangular(&DMatrix::identity(n, n))?;

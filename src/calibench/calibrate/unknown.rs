@@ -87,8 +87,8 @@ pub(super) fn joined(unknowns: &[Unknown]) -> String {
     unknowns.iter().map(|unknown| unknown.name()).collect::<Vec<_>>().join(" and ")
 }
 
-/// What to do where they cannot be told apart: coefficients of the lens alone are too many, the camera's frame alone needs tilts,
-/// and where both take part it may be either.
+/// What to do where they cannot be told apart: coefficients of the lens alone are too many, the camera's
+/// frame alone needs tilts, and where both take part it may be either.
 pub(super) fn advice(unknowns: &[Unknown]) -> &'static str {
     if unknowns.iter().all(|unknown| unknown.is_of_lens()) {
         "Take a lens model with fewer coefficients, or give one of them a value to be held at"

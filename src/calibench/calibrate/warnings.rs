@@ -87,7 +87,8 @@ pub(super) fn of_lens(
     warnings
 }
 
-/// Where the profile says that a parameter is known better than its standard deviation by this factor, that tells nothing of it.
+/// Where the profile says that a parameter is known better than its standard deviation by this factor, that
+/// tells nothing of it.
 const MISLED: f64 = 0.5;
 
 fn hardly_separable(calibration: &LensCalibration) -> Option<Warning> {
@@ -238,11 +239,11 @@ fn correlated(covariance: &Covariance, free: FreeParameters) -> Vec<Warning> {
     found
 }
 
-/// Whether a pair of parameters makes up for each other in every calibration, so that its correlation tells nothing of
-/// this one: radial coefficients of one lens, whose terms grow with the same angle, and the focal length with those of
-/// the double sphere, which change the scale on the axis. Nothing is to be held there: pixels are known well, however
-/// poorly each of the numbers is. Of a Brown-Conrady lens coefficients are left out as a matter of course, and the pair
-/// says which may be.
+/// Whether a pair of parameters makes up for each other in every calibration, so that its correlation tells
+/// nothing of this one: radial coefficients of one lens, whose terms grow with the same angle, and the focal
+/// length with those of the double sphere, which change the scale on the axis. Nothing is to be held there:
+/// pixels are known well, however poorly each of the numbers is. Of a Brown-Conrady lens coefficients are
+/// left out as a matter of course, and the pair says which may be.
 fn is_by_construction(warning: &Warning) -> bool {
     use Parameter::{Alpha, Fx, Fy, K1, K2, K3, K4, K5, K6, Xi};
     let is_radial = |p: &Parameter| matches!(p, K1 | K2 | K3 | K4 | K5 | K6 | Xi | Alpha);

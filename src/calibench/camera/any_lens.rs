@@ -36,7 +36,8 @@ impl Camera<Lens> {
         self.distortion.ray(&self.before_sensor(pixel))
     }
 
-    /// The pixel of a point in camera coordinates and its derivatives; `None` where the lens has no image of it.
+    /// The pixel of a point in camera coordinates and its derivatives; `None` where the lens has no image of
+    /// it.
     pub fn pixel_with_derivatives(&self, point_cam: &Vec3) -> Option<PixelDerivatives> {
         let linear = Matrix2::new(self.fx, self.skew, 0.0, self.fy);
         let Slopes { at, by_point, by_lens } = visit(&self.distortion, SlopesAt(*point_cam))?;

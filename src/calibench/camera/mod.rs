@@ -1,4 +1,5 @@
-//! How does a point in front of the camera become a pixel? Pinhole and lens models, their derivatives and inverses.
+//! How does a point in front of the camera become a pixel? Pinhole and lens models, their derivatives and
+//! inverses.
 
 mod any_lens;
 mod brown_conrady;

@@ -1,4 +1,5 @@
-//! Which of the camera's numbers are estimated? The intrinsic parameters of all lens models and subsets of them.
+//! Which of the camera's numbers are estimated? The intrinsic parameters of all lens models and subsets of
+//! them.
 
 use std::fmt;
 use std::str::FromStr;
@@ -96,8 +97,9 @@ impl Parameter {
         }
     }
 
-    /// The lowest and the highest value for which a camera is defined: a focal length above 0, a sensor tilted by less
-    /// than a right angle, a double sphere's `xi` from -1 to 1 and `alpha` from 0 to 1 (Usenko, Demmel & Cremers 2018).
+    /// The lowest and the highest value for which a camera is defined: a focal length above 0, a sensor
+    /// tilted by less than a right angle, a double sphere's `xi` from -1 to 1 and `alpha` from 0 to 1
+    /// (Usenko, Demmel & Cremers 2018).
     pub fn defined_range(self) -> (f64, f64) {
         match self {
             Parameter::Fx | Parameter::Fy => (f64::MIN_POSITIVE, f64::MAX),

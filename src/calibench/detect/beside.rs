@@ -1,8 +1,10 @@
-//! Where exactly is the centre of a disc beside which something else lies? The ellipse that explains what is clear of its edge.
+//! Where exactly is the centre of a disc beside which something else lies? The ellipse that explains what is
+//! clear of its edge.
 //!
-//! Beside the end of a sheet the ring around a disc is not all ground. The ground comes from the sectors that agree on it
-//! ([`super::sectors`]); where another level comes near the disc's edge, its outer half is left out. What is left is not symmetric,
-//! so that the centre is estimated together with the ellipse's form: Gauss-Newton on the coverage `c = S(d)`, by the first-order distance
+//! Beside the end of a sheet the ring around a disc is not all ground. The ground comes from the sectors that
+//! agree on it ([`super::sectors`]); where another level comes near the disc's edge, its outer half is left
+//! out. What is left is not symmetric, so that the centre is estimated together with the ellipse's form:
+//! Gauss-Newton on the coverage `c = S(d)`, by the first-order distance
 //!
 //! ```text
 //! d = (rho^2 - rho) / |F q|,   rho^2 = q^T F q,   q = p - centre:   dd/d(centre) = -n,   dd/dF_ij = q_i q_j / (2 |F q|)
@@ -18,10 +20,12 @@ use crate::geometry::Vec2;
 use crate::raster::{Level, Raster};
 use nalgebra::{Matrix2, SMatrix, SVector};
 
-/// Looks at the ring: two at most find how wide it must be, the others take ellipse and width from the one before.
+/// Looks at the ring: two at most find how wide it must be, the others take ellipse and width from the one
+/// before.
 const LOOKS: usize = 5;
 
-/// Width of the part of the ring that is next to the edge, px: every sector of a disc of 5 px has pixels in it.
+/// Width of the part of the ring that is next to the edge, px: every sector of a disc of 5 px has pixels in
+/// it.
 const NEAR_PX: f64 = 1.5;
 
 /// Gauss-Newton steps; from a threshold's ellipse four suffice.
@@ -44,7 +48,8 @@ struct EdgePixel {
     is_clear: bool,
 }
 
-/// The disc as what is clear of its edge shows it; `None` where all of its ring is ground, or too little of it.
+/// The disc as what is clear of its edge shows it; `None` where all of its ring is ground, or too little of
+/// it.
 pub(super) fn refine<T: Level>(image: &Raster<T>, rough: &Ellipse, clear_px: f64) -> Option<Blob> {
     let (mut ellipse, mut clear) = (*rough, clear_px);
     let mut found = None;
@@ -172,7 +177,8 @@ fn fit(start: &Ellipse, pixels: &[EdgePixel], edge: &Edge) -> Option<(Ellipse, f
     (last_px < LAST_PX).then_some((ellipse, misfit))
 }
 
-/// The pixels within `reach_px` of an ellipse or inside of it, as offsets from its centre; `None` where there is no such region.
+/// The pixels within `reach_px` of an ellipse or inside of it, as offsets from its centre; `None` where there
+/// is no such region.
 fn for_each_near<T: Level>(
     image: &Raster<T>,
     ellipse: &Ellipse,
@@ -188,8 +194,8 @@ mod tests {
     use super::super::{BlobOptions, blobs};
     use super::*;
 
-    /// A disc of radius 9 px on a sheet that ends at `right` and `below`, through a Gaussian blur: the steps of the sheet exactly, that of
-    /// the disc as of a straight edge.
+    /// A disc of radius 9 px on a sheet that ends at `right` and `below`, through a Gaussian blur: the steps
+    /// of the sheet exactly, that of the disc as of a straight edge.
     fn photo(centre: Vec2, [right, below]: [f64; 2], blur_px: f64, beyond: f64) -> Raster<f32> {
         let step = |d: f64| 0.5 * libm::erfc(d / (blur_px * std::f64::consts::SQRT_2));
         Raster::from_fn(70, 70, |x, y| {
@@ -219,7 +225,8 @@ mod tests {
                 assert!(alone < 2e-3, "{i}: {alone}");
                 for edges in [[right, far], [far, below], [right, below]] {
                     let error = error_px(&photo(*centre, edges, 0.7, beyond), *centre);
-                    // As much as noise of 2 % moves a disc; with all of the ring it is 0.02 to 0.2 px, or the disc is lost.
+                    // As much as noise of 2 % moves a disc; with all of the ring it is 0.02 to 0.2 px, or the
+                    // disc is lost.
                     assert!(error < 0.01, "{i}, {beyond}, {edges:?}: {error}");
                 }
             }

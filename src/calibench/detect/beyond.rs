@@ -1,17 +1,18 @@
-//! Does a board go on beyond what was taken for its last row or column? Marks where the next ones would lie tell, wherever they were
-//! found: at another size of the image, or left out because light or an edge spoiled them.
+//! Does a board go on beyond what was taken for its last row or column? Marks where the next ones would lie
+//! tell, wherever they were found: at another size of the image, or left out because light or an edge spoiled
+//! them.
 
 use super::neighbours::Neighbours;
 use super::rectangle::MOST_STRAYS;
 use crate::geometry::Vec2;
 
-/// How far a mark may lie from where the last step puts the next one, in steps: perspective changes a step by less, and the next mark
-/// is a whole one away.
+/// How far a mark may lie from where the last step puts the next one, in steps: perspective changes a step by
+/// less, and the next mark is a whole one away.
 const MOST_OFF: f64 = 0.3;
 
-/// Whether more marks lie beyond a side of a board than chance puts there. `places_px`: the board's marks, row by row, `None` for those
-/// that are not seen; `period`: after so many rows marks stand above each other again, 1 or, where rows are staggered, 2; `marks_px`: all that
-/// were seen.
+/// Whether more marks lie beyond a side of a board than chance puts there. `places_px`: the board's marks,
+/// row by row, `None` for those that are not seen; `period`: after so many rows marks stand above each other
+/// again, 1 or, where rows are staggered, 2; `marks_px`: all that were seen.
 pub fn goes_on(places_px: &[Option<Vec2>], columns: usize, period: usize, marks_px: &[Vec2]) -> bool {
     let marks = Neighbours::new(marks_px);
     let reach = MOST_OFF / period as f64;

@@ -94,7 +94,8 @@ fn pixel_and_slope(
 
 /// A camera of either kind.
 pub trait Imaging {
-    /// The pixel of a point in camera coordinates, and its derivative by the point; `None` where there is none.
+    /// The pixel of a point in camera coordinates, and its derivative by the point; `None` where there is
+    /// none.
     fn image(&self, point_cam: &Vec3) -> Option<(Vec2, Matrix2x3<f64>)>;
 }
 

@@ -3,7 +3,8 @@
 use crate::geometry::Vec2;
 use crate::raster::{Level, Raster};
 
-/// The level at a place, linear along both axes between the four pixels about it; `None` outside of the image.
+/// The level at a place, linear along both axes between the four pixels about it; `None` outside of the
+/// image.
 pub(super) fn bilinear<T: Level>(image: &Raster<T>, place: &Vec2) -> Option<f64> {
     let fits = |at: f64, size: usize| at >= 0.0 && at + 1.0 < size as f64;
     if !(fits(place.x, image.width()) && fits(place.y, image.height())) {

@@ -1,8 +1,9 @@
 //! Where exactly is the centre of an imaged disc? The ellipse whose edge explains the pixels best.
 //!
 //! 1. Levels: a plane is fitted to the ground around the disc and one to the inside, so that smooth shading
-//!    cancels; the pixels near the edge become coverage `c = (ground - level) / (ground - inside)`. Where the ring around the disc is not all
-//!    ground, because the sheet ends there, the disc is fitted to the part of its edge that is clear ([`super::beside`]).
+//!    cancels; the pixels near the edge become coverage `c = (ground - level) / (ground - inside)`. Where the
+//! ring around the disc is not all    ground, because the sheet ends there, the disc is fitted to the part of
+//! its edge that is clear ([`super::beside`]).
 //! 2. Moments of the coverage give the ellipse and a grey-weighted centroid. Pixels clear of the edge count
 //!    as 1 or 0, so only the noise of a narrow ring enters.
 //! 3. One Gauss-Newton step on the centre against the model `c = S(d)`, `d` the distance to the ellipse. It
@@ -165,12 +166,12 @@ impl Look {
     }
 }
 
-/// Means of the parts of a ring that differ from a plane by less, as a fraction of the contrast, are of one ground. What may lie beside it
-/// is looked at closely only where they differ by more.
+/// Means of the parts of a ring that differ from a plane by less, as a fraction of the contrast, are of one
+/// ground. What may lie beside it is looked at closely only where they differ by more.
 const EVEN: f64 = 0.005;
 
-/// Where to look for levels instead if an edge of this half-width fills what was looked at; `None` where it does not, or the mark has no
-/// room for more.
+/// Where to look for levels instead if an edge of this half-width fills what was looked at; `None` where it
+/// does not, or the mark has no room for more.
 pub(super) fn wider(clear_px: f64, edge_px: f64, ellipse: &Ellipse) -> Option<f64> {
     let most_px = LARGEST_CLEAR * ellipse.short_px;
     (edge_px >= clear_px && clear_px < most_px).then(|| (2.0 * clear_px).min(most_px))

@@ -9,8 +9,8 @@
 //! 4. Its corners are fitted in the photograph ([`refine`]).
 //!
 //! The level of about a megapixel comes first, then finer ones (small squares), then coarser ones (noise and
-//! blur). [`chessboard`] returns a board complete and in order, or not at all; [`seen_chessboard`] also one of which
-//! corners are hidden, where it is certain which.
+//! blur). [`chessboard`] returns a board complete and in order, or not at all; [`seen_chessboard`] also one
+//! of which corners are hidden, where it is certain which.
 
 mod board;
 pub(super) mod candidates;
@@ -164,12 +164,12 @@ pub fn chessboard<T: Level>(
     complete(&Pyramid::new(image), columns, rows).map(|(board, _)| board).map_err(|failure| failure.error)
 }
 
-/// Finds a chessboard of `columns x rows` inner corners of which some may be hidden, outside of the image, in glare or too
-/// blurred.
+/// Finds a chessboard of `columns x rows` inner corners of which some may be hidden, outside of the image, in
+/// glare or too blurred.
 ///
-/// It is certain which corners these are where the board's outer rows and columns are each seen in part (three corners and
-/// a third of the side), and half of the corners in all; and corners whose squares do not look like those of the others,
-/// because something covers them in part, are left out.
+/// It is certain which corners these are where the board's outer rows and columns are each seen in part
+/// (three corners and a third of the side), and half of the corners in all; and corners whose squares do not
+/// look like those of the others, because something covers them in part, are left out.
 ///
 /// # Errors
 /// See [`ChessboardError`]: no such board, or none that is certain.

@@ -59,7 +59,8 @@ pub fn blobs<T: Level>(image: &Raster<T>, options: &BlobOptions) -> Vec<Blob> {
     }
 }
 
-/// The discs that thresholds show in an image averaged over squares of so many pixels, refined in the image itself.
+/// The discs that thresholds show in an image averaged over squares of so many pixels, refined in the image
+/// itself.
 pub(super) fn blobs_by<T: Level, A: Level>(
     image: &Raster<T>,
     averaged: &Raster<A>,

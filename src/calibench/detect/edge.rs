@@ -47,8 +47,8 @@ impl Edge {
         }
     }
 
-    /// The same of boxes, however soft: nearer to a Gaussian than the parabola's integral, and slower. Where only a part of an edge is
-    /// looked at, its shape matters.
+    /// The same of boxes, however soft: nearer to a Gaussian than the parabola's integral, and slower. Where
+    /// only a part of an edge is looked at, its shape matters.
     pub fn of_boxes(half_width_px: f64) -> Edge {
         // Variance 1/12 of the pixel and c^2 / 12 of each of two boxes of width c.
         let lens_px = (1.2 * half_width_px * half_width_px - 0.5).max(0.0).sqrt();

@@ -43,8 +43,8 @@ impl DotGrid {
         &self.blobs
     }
 
-    /// How far the image tells which disc is the board's first: discs look alike, so that half a turn cannot be seen where it
-    /// maps the board on itself.
+    /// How far the image tells which disc is the board's first: discs look alike, so that half a turn cannot
+    /// be seen where it maps the board on itself.
     pub fn orientation(&self) -> Orientation {
         self.orientation
     }
@@ -97,16 +97,17 @@ pub fn circle_grid_of(discs: &[Blob], columns: usize, rows: usize) -> Result<Dot
     order(discs, columns, rows)
 }
 
-/// Largest misfit of a disc of a board of which discs are hidden, against the middle one of all, and what is allowed
-/// beside it. Noise, blur and size enter all alike; the edge of what covers a disc in part does not.
+/// Largest misfit of a disc of a board of which discs are hidden, against the middle one of all, and what is
+/// allowed beside it. Noise, blur and size enter all alike; the edge of what covers a disc in part does not.
 const LARGEST_MISFIT: f64 = 1.5;
 const MISFIT_ALLOWED: f64 = 0.01;
 
-/// Orders discs that are already found into a dense grid of which some may be hidden, outside of the image or in glare.
+/// Orders discs that are already found into a dense grid of which some may be hidden, outside of the image or
+/// in glare.
 ///
-/// It is certain which these are where the outer rows and columns are each seen in part (three discs and a third of the
-/// side), and half of the discs in all. Discs whose outline is no ellipse as the others' are, because something covers them
-/// in part, are left out, and so are those out of line with their neighbours.
+/// It is certain which these are where the outer rows and columns are each seen in part (three discs and a
+/// third of the side), and half of the discs in all. Discs whose outline is no ellipse as the others' are,
+/// because something covers them in part, are left out, and so are those out of line with their neighbours.
 ///
 /// # Errors
 /// See [`GridError`]: no such grid, or none that is certain.
@@ -138,7 +139,8 @@ fn grid_in_part(discs: &[Blob], columns: usize, rows: usize) -> Option<SeenBoard
         .then(|| SeenBoard::new(columns, rows, places_px, Orientation::of_discs(columns, rows)))
 }
 
-/// The discs of the largest lattice whose outlines and contrasts are as the others': nothing covers them in part.
+/// The discs of the largest lattice whose outlines and contrasts are as the others': nothing covers them in
+/// part.
 pub(super) fn alike_on_board(discs: &[Blob]) -> Option<Vec<Blob>> {
     let mut misfits: Vec<f64> = discs.iter().map(|disc| disc.misfit).collect();
     misfits.sort_by(f64::total_cmp);
@@ -149,8 +151,8 @@ pub(super) fn alike_on_board(discs: &[Blob]) -> Option<Vec<Blob>> {
     Some(evenly_lit(on_board))
 }
 
-/// Largest difference of a disc's contrast from the plane through those of the others, as part of their middle, round by
-/// round: light that falls off over the board is a plane within this, and glare is not.
+/// Largest difference of a disc's contrast from the plane through those of the others, as part of their
+/// middle, round by round: light that falls off over the board is a plane within this, and glare is not.
 const LARGEST_CONTRASTS: [f64; 5] = [0.3, 0.15, 0.08, 0.05, 0.05];
 
 /// The discs whose contrast is that of light which is even or falls off.

@@ -164,7 +164,8 @@ pub enum GridError {
 }
 
 impl GridError {
-    /// Whether a complete board was seen that is another one than was asked for and has as many marks or more.
+    /// Whether a complete board was seen that is another one than was asked for and has as many marks or
+    /// more.
     pub fn is_other_board(&self) -> bool {
         match *self {
             GridError::WrongSize { columns, rows, found_columns, found_rows }

@@ -1,5 +1,6 @@
-//! Do discs stand where a board's next row would, in light in which none is found? In a hard shadow discs and their ground may both be
-//! darker than the ground beside it, so that no threshold parts them; they still look like the board's own, only darker.
+//! Do discs stand where a board's next row would, in light in which none is found? In a hard shadow discs and
+//! their ground may both be darker than the ground beside it, so that no threshold parts them; they still
+//! look like the board's own, only darker.
 
 use super::beyond::{Next, Side, sides};
 use super::bilinear::bilinear;
@@ -8,21 +9,24 @@ use super::seen::SeenBoard;
 use crate::geometry::Vec2;
 use crate::raster::{Level, Raster};
 
-/// What is compared of a disc and the ground about it reaches so far, in steps of the board: not to the next disc, also where rows are
-/// staggered.
+/// What is compared of a disc and the ground about it reaches so far, in steps of the board: not to the next
+/// disc, also where rows are staggered.
 const REACH: f64 = 0.35;
 /// Samples along each axis.
 const SAMPLES: usize = 11;
-/// Samples of the own discs count as disc, or as ground, up to this part of the way to the other: at an edge they are neither.
+/// Samples of the own discs count as disc, or as ground, up to this part of the way to the other: at an edge
+/// they are neither.
 const CLEARLY: f64 = 0.25;
 /// Part of the samples, of a disc and of its ground, that must lie in the image.
 const LEAST_INSIDE: f64 = 0.5;
 /// Part of the samples that may be on the wrong side: noise.
 const ASTRAY: f64 = 0.1;
-/// Contrast of a disc beyond, as part of the own discs': the edge of a shadow through it, where a fifth of the light is left, leaves more.
+/// Contrast of a disc beyond, as part of the own discs': the edge of a shadow through it, where a fifth of
+/// the light is left, leaves more.
 const LEAST_CONTRAST: f64 = 0.25;
 
-/// Refuses a board of discs that goes on beyond a side: it is a part of a larger one. `period` is 1 or, where rows are staggered, 2.
+/// Refuses a board of discs that goes on beyond a side: it is a part of a larger one. `period` is 1 or, where
+/// rows are staggered, 2.
 ///
 /// # Errors
 /// [`GridError::Larger`].
@@ -89,8 +93,8 @@ impl Shape {
         (!whole.is_empty()).then(|| Shape { disc, ground, sign: (far - centre).signum() })
     }
 
-    /// How much darker the disc is than the ground, over both; of each the sample that nearly all others are farther from the other than.
-    /// `None` where too little is in the image.
+    /// How much darker the disc is than the ground, over both; of each the sample that nearly all others are
+    /// farther from the other than. `None` where too little is in the image.
     fn contrast(&self, levels: &[Option<f64>]) -> Option<f64> {
         let nearest = |of: &[usize], sign: f64| {
             let mut seen: Vec<f64> = of.iter().filter_map(|&k| Some(sign * levels[k]?)).collect();
@@ -108,7 +112,8 @@ mod tests {
     use super::*;
     use crate::detect::Orientation;
 
-    /// A sheet with discs of diameter 12 px, 24 px apart, of which the first is at (40, 40); light beyond `shadow_x` is 0.4.
+    /// A sheet with discs of diameter 12 px, 24 px apart, of which the first is at (40, 40); light beyond
+    /// `shadow_x` is 0.4.
     fn photo(columns: usize, rows: usize, shadow_x: f64, frame_x: f64) -> Raster<f32> {
         Raster::from_fn(340, 260, |x, y| {
             let (x, y) = (x as f64, y as f64);
@@ -169,7 +174,8 @@ mod tests {
         }
     }
 
-    /// A whole board, and beyond its last row, a step away, spots of a half-size that are dark where `is_dark`, at offsets in px.
+    /// A whole board, and beyond its last row, a step away, spots of a half-size that are dark where
+    /// `is_dark`, at offsets in px.
     fn with_print(columns: &[usize], is_dark: impl Fn(f64, f64) -> bool) -> Raster<f32> {
         let sheet = photo(9, 7, 1e9, 1e9);
         Raster::from_fn(340, 260, |x, y| {

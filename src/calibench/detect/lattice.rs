@@ -28,8 +28,9 @@ const LARGEST_AREA_RATIO: f64 = 2.5;
 /// Least sine of the angle between the two steps of a seed.
 const LEAST_SINE: f64 = 0.35;
 
-/// A lattice of which marks are out of line may have slipped by a mark where perspective is strong and its seed's steps are diagonals. It is
-/// grown again from so many of its marks at most: of those of a tilted board half or more find it.
+/// A lattice of which marks are out of line may have slipped by a mark where perspective is strong and its
+/// seed's steps are diagonals. It is grown again from so many of its marks at most: of those of a tilted
+/// board half or more find it.
 const MOST_SEEDS: usize = 12;
 
 /// The four directions, as steps of a place.

@@ -183,7 +183,8 @@ impl Levels {
         Some(Levels { ground, mark, uneven: 0.0 })
     }
 
-    /// Farthest mean of a part of the ring from the ground's plane, as a fraction of the contrast: something else may lie there.
+    /// Farthest mean of a part of the ring from the ground's plane, as a fraction of the contrast: something
+    /// else may lie there.
     pub fn unevenness(&self) -> f64 {
         self.uneven / self.contrast().abs()
     }

@@ -1,11 +1,13 @@
-//! Where are the discs that the first look misses? The same search with other thresholds, and on the image averaged over squares of 2, 4 and
-//! 8 pixels.
+//! Where are the discs that the first look misses? The same search with other thresholds, and on the image
+//! averaged over squares of 2, 4 and 8 pixels.
 //!
-//! The first look ([`super::blobs`]) has tiles of 16 px and thresholds half-way between mark and ground, and takes for an edge what has 15 %
-//! of the image's range. It misses marks that touch a background of the same level by half, marks many tiles wide in noise, and marks that
-//! are faint beside something bright. Averaged squares have less noise and wider tiles; what contrast can be an edge's follows from the noise
-//! that is left. Where something far brighter lies within a tile of the marks, their threshold would lie above ground and marks alike: a third
-//! kind of threshold takes all that is brighter than the ground for as bright as the ground. Every disc is refined in the image itself.
+//! The first look ([`super::blobs`]) has tiles of 16 px and thresholds half-way between mark and ground, and
+//! takes for an edge what has 15 % of the image's range. It misses marks that touch a background of the same
+//! level by half, marks many tiles wide in noise, and marks that are faint beside something bright. Averaged
+//! squares have less noise and wider tiles; what contrast can be an edge's follows from the noise that is
+//! left. Where something far brighter lies within a tile of the marks, their threshold would lie above ground
+//! and marks alike: a third kind of threshold takes all that is brighter than the ground for as bright as the
+//! ground. Every disc is refined in the image itself.
 
 use super::blob::Blob;
 use super::components::Polarity;
@@ -16,7 +18,8 @@ use crate::raster::{Level, Raster};
 
 /// Sides of the squares over which the image is averaged, px.
 const SQUARES: [usize; 4] = [1, 2, 4, 8];
-/// Where thresholds lie between mark and ground: nearer to the mark, so that a ground of half the contrast is none of it.
+/// Where thresholds lie between mark and ground: nearer to the mark, so that a ground of half the contrast is
+/// none of it.
 const NEARER: f64 = 0.3;
 /// A neighbourhood of 2304 samples spans seven standard deviations of its noise; more is an edge.
 const SPANS: f64 = 9.0;
@@ -27,7 +30,8 @@ const LEAST_SIDE: usize = 48;
 
 /// The discs of an image that any look finds, each once; those of finer looks come first.
 ///
-/// It takes several times as long as [`super::blobs`], and finds more that is no mark: for photographs in which that finds no board.
+/// It takes several times as long as [`super::blobs`], and finds more that is no mark: for photographs in
+/// which that finds no board.
 pub fn searched_blobs<T: Level>(image: &Raster<T>, options: &BlobOptions) -> Vec<Blob> {
     let mut found: Vec<Blob> = Vec::new();
     for square in SQUARES {
@@ -51,8 +55,9 @@ pub fn searched_blobs<T: Level>(image: &Raster<T>, options: &BlobOptions) -> Vec
     found
 }
 
-/// The levels of ground and marks where something far brighter (for bright marks: darker) surrounds them: of the two parts that the image's
-/// levels fall into (Otsu 1979), the marks' part as far as its median, which is of the ground, for that is wider than its marks.
+/// The levels of ground and marks where something far brighter (for bright marks: darker) surrounds them: of
+/// the two parts that the image's levels fall into (Otsu 1979), the marks' part as far as its median, which
+/// is of the ground, for that is wider than its marks.
 fn ground_and_marks(image: &Raster<f32>, polarity: Polarity) -> (f64, f64) {
     let mut levels: Vec<f32> = image.samples().iter().copied().filter(|level| level.is_finite()).collect();
     levels.sort_by(f32::total_cmp);
@@ -63,8 +68,8 @@ fn ground_and_marks(image: &Raster<f32>, polarity: Polarity) -> (f64, f64) {
     }
 }
 
-/// How many of sorted levels are in the darker of two parts whose means differ most against what is left within them: the greatest
-/// `n1 n2 (m1 - m2)^2`. `None` where they are all the same.
+/// How many of sorted levels are in the darker of two parts whose means differ most against what is left
+/// within them: the greatest `n1 n2 (m1 - m2)^2`. `None` where they are all the same.
 fn otsu(levels: &[f32]) -> Option<usize> {
     let total: f64 = levels.iter().map(|level| f64::from(*level)).sum();
     let (mut sum, mut best, mut split) = (0.0, 0.0, None);
@@ -104,7 +109,8 @@ pub(super) fn in_image(place: Vec2, side: usize) -> Vec2 {
     place * side + Vec2::repeat(0.5 * (side - 1.0))
 }
 
-/// Standard deviation of the noise: the median of second differences along rows, which few edges reach, for a normal law.
+/// Standard deviation of the noise: the median of second differences along rows, which few edges reach, for a
+/// normal law.
 fn noise_of(image: &Raster<f32>) -> f64 {
     /// Every so many samples one is looked at.
     const STEP: usize = 7;

@@ -1,14 +1,16 @@
-//! Is a mark at another mark's place, or beside its own? Each is asked of the plane through the marks about it.
+//! Is a mark at another mark's place, or beside its own? Each is asked of the plane through the marks about
+//! it.
 //!
-//! Lattices are grown from mark to mark, and one that is taken a place too far at the rim may have nothing beside it in its rows that would
-//! tell. A corner that was fitted to another edge of a moved photograph lies beside its place, and where corners about it are missing, its row and
-//! its column tell little. The plane through those that are there tells.
+//! Lattices are grown from mark to mark, and one that is taken a place too far at the rim may have nothing
+//! beside it in its rows that would tell. A corner that was fitted to another edge of a moved photograph lies
+//! beside its place, and where corners about it are missing, its row and its column tell little. The plane
+//! through those that are there tells.
 
 use super::neighbours::Neighbours;
 use crate::geometry::{Homography, Vec2};
 
-/// Marks through which the plane goes: three times as many as a homography needs tell it in spite of one that is misplaced, and of more the
-/// lens bends what it says.
+/// Marks through which the plane goes: three times as many as a homography needs tell it in spite of one that
+/// is misplaced, and of more the lens bends what it says.
 const ABOUT: usize = 12;
 /// Fewer do not tell.
 const FEWEST: usize = 8;
@@ -17,13 +19,14 @@ const OTHERS: usize = 8;
 
 /// How far a mark may lie from the plane, in steps: what a lens bends a board within three steps.
 const BENT: f64 = 0.05;
-/// The same, in the middle one of such distances on the board: what blur, noise and a stronger lens do to all.
+/// The same, in the middle one of such distances on the board: what blur, noise and a stronger lens do to
+/// all.
 const MIDDLES: f64 = 5.0;
 /// The same, px: what no mark is taken out for.
 const LEAST_PX: f64 = 1.0;
 
-/// Takes out the marks that lie nearer to where another one is expected than to their own place. `on_board`: where marks are on the board,
-/// neighbours about 1 apart.
+/// Takes out the marks that lie nearer to where another one is expected than to their own place. `on_board`:
+/// where marks are on the board, neighbours about 1 apart.
 pub fn take_out_misplaced(places_px: &mut [Option<Vec2>], on_board: &[Vec2]) {
     let all = Neighbours::new(on_board);
     take_out(places_px, on_board, |mark, _| {
@@ -35,7 +38,8 @@ pub fn take_out_misplaced(places_px: &mut [Option<Vec2>], on_board: &[Vec2]) {
     });
 }
 
-/// Takes out the marks that lie beside their place, farther than a lens, blur or noise puts others of the board.
+/// Takes out the marks that lie beside their place, farther than a lens, blur or noise puts others of the
+/// board.
 pub fn take_out_beside(places_px: &mut [Option<Vec2>], on_board: &[Vec2]) {
     let all = Neighbours::new(on_board);
     take_out(places_px, on_board, |mark, middle_px| {
@@ -62,8 +66,9 @@ impl Mark {
     }
 }
 
-/// Takes out the marks that lie farther from where they are expected than allowed, px, which is told a mark and the middle one of the distances of
-/// all: the worst first, for one moves what is expected of those about it.
+/// Takes out the marks that lie farther from where they are expected than allowed, px, which is told a mark
+/// and the middle one of the distances of all: the worst first, for one moves what is expected of those about
+/// it.
 fn take_out(places_px: &mut [Option<Vec2>], on_board: &[Vec2], allowed_px: impl Fn(&Mark, f64) -> f64) {
     loop {
         let marks = marks(places_px, on_board);

@@ -1,4 +1,5 @@
-//! Where are the marks in a photograph? Discs, ordered grids of discs, chessboard corners, boards with markers.
+//! Where are the marks in a photograph? Discs, ordered grids of discs, chessboard corners, boards with
+//! markers.
 
 mod beside;
 mod beyond;

@@ -3,7 +3,8 @@
 use crate::geometry::Vec2;
 use std::cmp::Ordering;
 
-/// Radius of the circle that is searched first for so many points, against that of one which holds as many cells.
+/// Radius of the circle that is searched first for so many points, against that of one which holds as many
+/// cells.
 const SURELY: f64 = 1.2;
 
 /// Points in cells about as many as points.

@@ -60,8 +60,8 @@ pub fn complete_sides(lattice: &Lattice) -> Option<(usize, usize)> {
     Some((full.width.max(full.height), full.width.min(full.height)))
 }
 
-/// The marks of a lattice in the order of a `columns x rows` board of which marks are hidden; `None` where it is not
-/// certain which.
+/// The marks of a lattice in the order of a `columns x rows` board of which marks are hidden; `None` where it
+/// is not certain which.
 pub fn ordered_part(
     lattice: &Lattice,
     centres: &[Vec2],
@@ -253,7 +253,8 @@ impl Order {
     }
 }
 
-/// The order of the convention above, of a rectangle with these corners: at (0, 0), (w, 0), (0, h) and (w, h).
+/// The order of the convention above, of a rectangle with these corners: at (0, 0), (w, 0), (0, h) and (w,
+/// h).
 fn first_nearest_top_left(
     corners_px: [Vec2; 4],
     (width, height): (usize, usize),

@@ -16,8 +16,8 @@ pub struct Rectangle {
 /// Marks beside a rectangle that may be chance, as part of the side: texture that looks like one more mark.
 pub const MOST_STRAYS: f64 = 0.34;
 
-/// Fewest marks of an outer row or column that show where a board of which marks are hidden ends, on sides that have
-/// as many.
+/// Fewest marks of an outer row or column that show where a board of which marks are hidden ends, on sides
+/// that have as many.
 const FEWEST_ON_A_SIDE: usize = 3;
 
 /// Least part of a board's marks that must be seen.
@@ -40,7 +40,8 @@ impl Rectangle {
         self.sides(lattice, [-1, h], [-1, w]).any(|(count, of)| count as f64 > MOST_STRAYS * of as f64)
     }
 
-    /// Whether all four outer rows and columns are there: without one of them the board may lie a step further.
+    /// Whether all four outer rows and columns are there: without one of them the board may lie a step
+    /// further.
     fn ends_are_seen(&self, lattice: &Lattice) -> bool {
         let (w, h) = (self.width as i32, self.height as i32);
         self.sides(lattice, [0, h - 1], [0, w - 1])
@@ -67,8 +68,8 @@ impl Rectangle {
         .into_iter()
     }
 
-    /// Whether a board of this size is certain to lie here, though marks are missing: its ends are seen and half of its
-    /// marks, and nothing lies beside it.
+    /// Whether a board of this size is certain to lie here, though marks are missing: its ends are seen and
+    /// half of its marks, and nothing lies beside it.
     pub fn is_certain(&self, lattice: &Lattice) -> bool {
         let inside = self.places().filter(|place| lattice.contains_key(place)).count();
         inside == lattice.len()
@@ -76,8 +77,8 @@ impl Rectangle {
             && self.ends_are_seen(lattice)
     }
 
-    /// The one place where a board of `columns x rows`, either way round, is certain to lie in a lattice in which marks
-    /// are missing; `None` where there is none or a choice.
+    /// The one place where a board of `columns x rows`, either way round, is certain to lie in a lattice in
+    /// which marks are missing; `None` where there is none or a choice.
     pub fn in_part(lattice: &Lattice, columns: usize, rows: usize) -> Option<Rectangle> {
         let places = columns.saturating_mul(rows);
         if lattice.len() > places || (lattice.len() as f64) < LEAST_PART * places as f64 {

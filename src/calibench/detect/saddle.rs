@@ -77,8 +77,8 @@ pub(super) enum Window {
 const LEAST_OF_PLAIN: f64 = 0.5;
 
 impl Window {
-    /// Whether a pixel shows nothing but the crossing: what lies in the squares' middle, and its blur, is left out in all
-    /// four alike, so that the window stays symmetric under half a turn.
+    /// Whether a pixel shows nothing but the crossing: what lies in the squares' middle, and its blur, is
+    /// left out in all four alike, so that the window stays symmetric under half a turn.
     fn is_plain(&self, offset: &Vec2, edges_px: [f64; 2]) -> bool {
         let Window::Along { sides: [first, second], plain: Some(plain) } = self else { return true };
         let area = first.perp(second);
@@ -134,7 +134,8 @@ pub(super) fn fit_near_edges<T: Level>(
     None
 }
 
-/// Root mean square of what a crossing leaves of the levels in a window about its corner, as part of its amplitude.
+/// Root mean square of what a crossing leaves of the levels in a window about its corner, as part of its
+/// amplitude.
 pub(super) fn misfit<T: Level>(
     image: &Raster<T>,
     crossing: &Crossing,
@@ -311,7 +312,8 @@ impl Side {
         let along = L::splat(self.along.x) * x + L::splat(self.along.y) * y;
         let straight = L::splat(self.normal.x) * x + L::splat(self.normal.y) * y;
         let d = straight - L::splat(0.5 * self.curvature) * along * along;
-        // Most pixels lie far from one edge or the other, and what is known of these need not be computed again.
+        // Most pixels lie far from one edge or the other, and what is known of these need not be computed
+        // again.
         let (f, slope) = if (d.max(-d) - L::splat(self.far_px)).all_positive() {
             let far = d.store().map(|d| self.far[usize::from(d > 0.0)]);
             (L::load(&far.map(|(f, _)| f)), L::load(&far.map(|(_, slope)| slope)))

@@ -1,7 +1,9 @@
-//! Where around a disc is its ground? A ring of sectors, of which those that something else lies in are left out.
+//! Where around a disc is its ground? A ring of sectors, of which those that something else lies in are left
+//! out.
 //!
-//! A sheet that ends near a disc lies in a part of the directions only; at its corner, in more than half of them. What neighbouring sectors
-//! show that are most alike is taken for the ground, and every sector that agrees with it is added, as a region is grown from a seed.
+//! A sheet that ends near a disc lies in a part of the directions only; at its corner, in more than half of
+//! them. What neighbouring sectors show that are most alike is taken for the ground, and every sector that
+//! agrees with it is added, as a region is grown from a seed.
 
 use super::levels::{Plane, PlaneFit};
 use super::mean::Mean;
@@ -10,11 +12,13 @@ use crate::geometry::Vec2;
 /// Sectors of the ring: of fifteen degrees.
 pub const SECTORS: usize = 24;
 
-/// A mean belongs to the ground if it is within so many standard deviations of its noise and the plane's. Of the two means of 24 sectors of a
-/// hundred discs one in three boards exceeds it, and costs a fiftieth of a ring.
+/// A mean belongs to the ground if it is within so many standard deviations of its noise and the plane's. Of
+/// the two means of 24 sectors of a hundred discs one in three boards exceeds it, and costs a fiftieth of a
+/// ring.
 const NOISE_SDS: f64 = 4.0;
 
-/// And a part of the contrast that does no harm: one sector that is so much off moves a disc with a sharp edge by less than 0.001 px.
+/// And a part of the contrast that does no harm: one sector that is so much off moves a disc with a sharp
+/// edge by less than 0.001 px.
 const HARMLESS: f64 = 0.003;
 
 /// Rounds in which sectors are added; two or three add some.
@@ -47,7 +51,8 @@ pub struct Ground {
     pub is_near: [bool; SECTORS],
 }
 
-/// The sector of an offset from the centre. What lies between two belongs to the same one of them however the image is turned.
+/// The sector of an offset from the centre. What lies between two belongs to the same one of them however the
+/// image is turned.
 pub fn sector_of(offset: &Vec2) -> usize {
     let turn = libm::atan2(offset.y, offset.x) / std::f64::consts::TAU + 0.5;
     (turn * SECTORS as f64) as usize % SECTORS
@@ -88,7 +93,8 @@ struct Agreed {
 }
 
 impl Agreed {
-    /// Of the neighbouring sectors that are most alike, and of every sector that agrees with them, until none is added.
+    /// Of the neighbouring sectors that are most alike, and of every sector that agrees with them, until none
+    /// is added.
     fn grown(means: &[Means; SECTORS], pixels: &[RingPixel], contrast: f64) -> Option<Agreed> {
         let of = |chosen: &[bool; SECTORS]| Agreed::of(means, pixels, chosen, contrast);
         let window = |first: usize| -> [bool; SECTORS] {
@@ -110,8 +116,8 @@ impl Agreed {
         Some(agreed)
     }
 
-    /// Of some sectors. The noise is that of the pixels, or what the means show if that is more: what is the same for pixels beside each
-    /// other, as the codec of a file makes it, is in these.
+    /// Of some sectors. The noise is that of the pixels, or what the means show if that is more: what is the
+    /// same for pixels beside each other, as the codec of a file makes it, is in these.
     fn of(
         means: &[Means; SECTORS],
         pixels: &[RingPixel],

@@ -1,4 +1,5 @@
-//! Which marks of a board are seen? All of them, or those that are not hidden, outside of the image or in glare.
+//! Which marks of a board are seen? All of them, or those that are not hidden, outside of the image or in
+//! glare.
 
 use super::Orientation;
 use super::chessboard::Chessboard;

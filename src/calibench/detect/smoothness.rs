@@ -75,8 +75,9 @@ fn allowed(place: Vec2, step: Vec2, tolerance: f64) -> (Vec2, f64) {
     (place, (tolerance * step.norm()).max(LEAST_TOLERANCE_PX))
 }
 
-/// Where its row and its column put a corner, and how far from it it may lie, px. Where neither goes on beside it, the squares there tell, which
-/// are far less sure of it: a corner that its row has out of line must not be kept by them because its column has a gap.
+/// Where its row and its column put a corner, and how far from it it may lie, px. Where neither goes on
+/// beside it, the squares there tell, which are far less sure of it: a corner that its row has out of line
+/// must not be kept by them because its column has a gap.
 fn expectations(good: &[Option<Vec2>], columns: usize, index: usize) -> [Option<(Vec2, f64)>; 2] {
     let about = [0, 1].map(|axis| About { good, columns, index, axis });
     let on_lines = about.each_ref().map(About::on_line);

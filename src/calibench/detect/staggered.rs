@@ -1,14 +1,17 @@
-//! Which disc is which of a board whose rows are staggered? All of them, or those that are seen where that is certain.
+//! Which disc is which of a board whose rows are staggered? All of them, or those that are seen where that is
+//! certain.
 //!
 //! **Places.** Marks lie at whole places `(x, y)` with `x + y` even: row `y`, and in it every second x. A board of
-//! `columns x rows` fills a rectangle of `2 columns x rows` places whose lowest is one of them, so that the second row
-//! begins farther along than the first. That holds for asymmetric and hexagonal boards alike: they differ by a stretch
-//! of y, which perspective can undo, so that a single photograph does not tell them apart.
+//! `columns x rows` fills a rectangle of `2 columns x rows` places whose lowest is one of them, so that the
+//! second row begins farther along than the first. That holds for asymmetric and hexagonal boards alike: they
+//! differ by a stretch of y, which perspective can undo, so that a single photograph does not tell them
+//! apart.
 //!
 //! **Order.** Row by row, as [`Board::points`](crate::board::Board::points), seen from the front (X to Y turns the way u
-//! turns to v). Half a turn maps the rectangle's even places onto its even ones where the number of rows is even, and
-//! onto its odd ones otherwise: an odd number of rows has one order only. Of two, the one whose first mark has the least
-//! `u + v`. A quarter turn maps even places onto odd ones or onto those of a rectangle that is no board.
+//! turns to v). Half a turn maps the rectangle's even places onto its even ones where the number of rows is
+//! even, and onto its odd ones otherwise: an odd number of rows has one order only. Of two, the one whose
+//! first mark has the least `u + v`. A quarter turn maps even places onto odd ones or onto those of a
+//! rectangle that is no board.
 
 use super::grid_error::GridError;
 use super::lattice::{Lattice, Place};
@@ -16,18 +19,18 @@ use super::order::{LARGEST_DEVIATION, LEAST_NAMED_SIDE, complete_sides};
 use crate::geometry::{Homography, Vec2};
 use nalgebra::Matrix2;
 
-/// Fewest marks along a row, and fewest rows. Boards with fewer may have more orders than half a turn explains (2 x 2), and
-/// lines too short to confirm each other.
+/// Fewest marks along a row, and fewest rows. Boards with fewer may have more orders than half a turn
+/// explains (2 x 2), and lines too short to confirm each other.
 pub const LEAST_COLUMNS: usize = 3;
 /// See above.
 pub const LEAST_ROWS: usize = 4;
 
-/// Steps of a seed are a short basis of the lattice; so are rows and diagonals, and foreshortening by three changes
-/// coefficients by no more than this.
+/// Steps of a seed are a short basis of the lattice; so are rows and diagonals, and foreshortening by three
+/// changes coefficients by no more than this.
 const LARGEST_COEFFICIENT: i32 = 3;
 
-/// Marks that another reading of the same lattice must leave out, else they do not tell which is right: this many,
-/// and this part of the shorter side. What else is in a photograph may look like one or two marks.
+/// Marks that another reading of the same lattice must leave out, else they do not tell which is right: this
+/// many, and this part of the shorter side. What else is in a photograph may look like one or two marks.
 const LEAST_TELLING: usize = 3;
 const LEAST_TELLING_PART: f64 = 0.34;
 
@@ -169,8 +172,8 @@ fn on_board(index: usize, columns: usize) -> Vec2 {
     Vec2::new(f64::from(x), f64::from(y))
 }
 
-/// The marks by the only one of some readings, or by that of two half a turn apart whose first mark is nearer to the
-/// top left; `None` where there is a choice.
+/// The marks by the only one of some readings, or by that of two half a turn apart whose first mark is nearer
+/// to the top left; `None` where there is a choice.
 fn only(
     readings: &[Reading],
     lattice: &Lattice,
@@ -204,8 +207,8 @@ pub fn complete_size(lattice: &Lattice, centres: &[Vec2]) -> Option<(usize, usiz
     })
 }
 
-/// The marks of a lattice in the order of a board of `rows` staggered rows of `columns`. `centres[mark]` is a mark's
-/// place in the image.
+/// The marks of a lattice in the order of a board of `rows` staggered rows of `columns`. `centres[mark]` is a
+/// mark's place in the image.
 ///
 /// # Errors
 /// See [`GridError`].
@@ -256,9 +259,9 @@ fn not_there(lattice: &Lattice, centres: &[Vec2], columns: usize, rows: usize) -
     }
 }
 
-/// The marks of a lattice in the order of a board of which marks are hidden; `None` where it is not certain which: no
-/// mark may lie beside the board, half of its marks must be there and enough of its ends, and every other reading must leave
-/// some out.
+/// The marks of a lattice in the order of a board of which marks are hidden; `None` where it is not certain
+/// which: no mark may lie beside the board, half of its marks must be there and enough of its ends, and every
+/// other reading must leave some out.
 pub fn ordered_staggered_part(
     lattice: &Lattice,
     centres: &[Vec2],
@@ -278,8 +281,9 @@ pub fn ordered_staggered_part(
     ends_are_seen(&marks, columns).then_some(marks)
 }
 
-/// Whether enough marks of the outermost rows and columns are there: what is missing may be missing on the board itself, which is then
-/// another one. A board of 5 x 8 is, a quarter turn on, one of 4 x 11 without its first row.
+/// Whether enough marks of the outermost rows and columns are there: what is missing may be missing on the
+/// board itself, which is then another one. A board of 5 x 8 is, a quarter turn on, one of 4 x 11 without its
+/// first row.
 fn ends_are_seen(marks: &[Option<usize>], columns: usize) -> bool {
     let last_row = marks.len() / columns - 1;
     let enough = |is_on_side: &dyn Fn(usize, usize) -> bool| {
@@ -293,8 +297,8 @@ fn ends_are_seen(marks: &[Option<usize>], columns: usize) -> bool {
         && enough(&|column, row| column == columns - 1 && row % 2 == 1)
 }
 
-/// The marks of a board by their places along its two diagonals, so that neighbours are the nearest; and how many are
-/// in a line. For what compares marks with those beside them in a grid.
+/// The marks of a board by their places along its two diagonals, so that neighbours are the nearest; and how
+/// many are in a line. For what compares marks with those beside them in a grid.
 pub fn along_diagonals(places_px: &[Option<Vec2>], columns: usize) -> (Vec<Option<Vec2>>, usize) {
     let (slots, width, height) = diagonal_slots(places_px.len(), columns);
     let mut grid = vec![None; width * height];

@@ -18,8 +18,8 @@ use crate::geometry::Vec2;
 use crate::raster::{Level, Raster};
 
 /// Finds `rows` staggered rows of `columns` dark discs, all visible: what OpenCV calls an asymmetric grid of
-/// `columns x rows`, and hexagonal ones, which a single photograph does not tell apart from it. At least 3 columns and 4
-/// rows.
+/// `columns x rows`, and hexagonal ones, which a single photograph does not tell apart from it. At least 3
+/// columns and 4 rows.
 ///
 /// # Errors
 /// See [`GridError`]; a grid is returned complete and ordered, or not at all.
@@ -64,9 +64,9 @@ pub fn staggered_grid_of(discs: &[Blob], columns: usize, rows: usize) -> Result<
     Ok(DotGrid::new(columns, rows, Orientation::of_staggered(rows), blobs))
 }
 
-/// Orders discs that are already found into staggered rows of which some discs may be hidden, outside of the image or in
-/// glare, where it is certain which: half of them are seen, nothing lies beside them, and wherever else the board might
-/// lie, three of them and a third of the shorter side would be none of it. What
+/// Orders discs that are already found into staggered rows of which some discs may be hidden, outside of the
+/// image or in glare, where it is certain which: half of them are seen, nothing lies beside them, and
+/// wherever else the board might lie, three of them and a third of the shorter side would be none of it. What
 /// [`seen_circle_grid_of`](super::seen_circle_grid_of) leaves out is left out here.
 ///
 /// # Errors

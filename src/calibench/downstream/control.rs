@@ -49,8 +49,8 @@ impl Rule for Shewhart {
 /// Alarm when `z <- (1 - w) z + w x` exceeds the limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ewma {
-    /// Weight `w` of the newest check: 0.05 to 1, where the integral below is exact to a part in a thousand over
-    /// thousands of checks.
+    /// Weight `w` of the newest check: 0.05 to 1, where the integral below is exact to a part in a thousand
+    /// over thousands of checks.
     pub weight: f64,
     /// Largest size without alarm, in standard deviations of a check.
     pub limit: f64,
@@ -138,8 +138,8 @@ mod tests {
 
     #[test]
     fn false_alarms_are_those_of_the_published_average_run_lengths() {
-        // Lucas & Saccucci 1990, table 3: an average of 500 checks to a false alarm. Runs are geometric but for
-        // their first few checks.
+        // Lucas & Saccucci 1990, table 3: an average of 500 checks to a false alarm. Runs are geometric but
+        // for their first few checks.
         for (weight, limit) in [(0.25_f64, 2.998), (0.10, 2.814)] {
             let ewma = Ewma { weight, limit: limit * (weight / (2.0 - weight)).sqrt() };
             let expected = -libm::expm1(-1.0);

@@ -12,8 +12,8 @@
 //! | camera on the gripper, target fixed | base_from_gripper | gripper_from_cam | base_from_target |
 //! | camera fixed, target on the gripper | gripper_from_base | base_from_cam | gripper_from_target |
 //!
-//! Two stations give `A X = X B` with `A = G_j^-1 G_i`, `B = C_j C_i^-1`. With `A = G`, `Z = Y` and `B = C^-1` the
-//! equation is that of robot, world, hand and eye, `A X = Z B`: both poses are found.
+//! Two stations give `A X = X B` with `A = G_j^-1 G_i`, `B = C_j C_i^-1`. With `A = G`, `Z = Y` and `B =
+//! C^-1` the equation is that of robot, world, hand and eye, `A X = Z B`: both poses are found.
 
 mod closed_form;
 mod motions;
@@ -195,14 +195,15 @@ impl HandEye {
     }
 }
 
-/// Calibrates a camera against a robot: closed forms of Tsai & Lenz 1989 and Park & Martin 1994 for `A X = X B`, of
-/// Shah 2013 for `A X = Z B`, then the most likely X and Y under the errors of both sides.
+/// Calibrates a camera against a robot: closed forms of Tsai & Lenz 1989 and Park & Martin 1994 for `A X = X
+/// B`, of Shah 2013 for `A X = Z B`, then the most likely X and Y under the errors of both sides.
 ///
 /// The refinement minimises `sum r_i^T S_i^-1 r_i`, `r_i` the step from the measured `C_i` to the predicted
 /// `X^-1 G_i^-1 Y`. A measured pose errs by `K_i d + e_i`: `d` is the error of the camera's parameters, the
 /// same in all stations, with the covariance `P` of the calibration and `K_i = cross_i^T P^-1`; `e_i` is what
-/// is left, with the covariance `P_i - K_i cross_i`. The robot's error is carried to `r_i` by its Jacobian. X,
-/// Y and `d` are estimated together by Gauss-Newton steps; the covariance is the inverse of the normal matrix.
+/// is left, with the covariance `P_i - K_i cross_i`. The robot's error is carried to `r_i` by its Jacobian.
+/// X, Y and `d` are estimated together by Gauss-Newton steps; the covariance is the inverse of the normal
+/// matrix.
 ///
 /// # Errors
 /// See [`HandEyeError`].
@@ -475,7 +476,8 @@ mod tests {
                 let error = alone.x.step_to(&true_x());
                 without += error.dot(&(alone.x_covariance().try_inverse().unwrap() * error)) / DRAWS as f64;
             }
-            // Chi-squared of 6 and of 60; 3.9 standard deviations of the mean are left by one in ten thousand.
+            // Chi-squared of 6 and of 60; 3.9 standard deviations of the mean are left by one in ten
+            // thousand.
             let near = |mean: f64, d: f64| (mean - d).abs() < 3.9 * (2.0 * d / DRAWS as f64).sqrt();
             assert!(near(nees, 6.0), "{set_up:?}: {nees} of 6");
             assert!(near(squares, 60.0), "{set_up:?}: {squares} of 60");

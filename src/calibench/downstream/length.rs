@@ -58,8 +58,9 @@ impl Cause {
 pub struct Conditions {
     /// Of a coordinate of a mark, px.
     pub mark_px: f64,
-    /// Degrees of freedom of the calibration's noise, which scales the covariance of camera and pose (or of the
-    /// map); `None` where that noise was known beforehand, and intervals are those of the normal distribution.
+    /// Degrees of freedom of the calibration's noise, which scales the covariance of camera and pose (or of
+    /// the map); `None` where that noise was known beforehand, and intervals are those of the normal
+    /// distribution.
     pub noise_freedom: Option<usize>,
     /// Whether `mark_px` is that noise, and not known from elsewhere.
     pub mark_is_noise: bool,
@@ -76,8 +77,8 @@ pub struct Conditions {
 }
 
 impl Conditions {
-    /// Marks with this standard deviation, known beforehand as the calibration's noise was, and nothing else uncertain. Of a noise that the
-    /// calibration estimated, [`of_noise`](Conditions::of_noise).
+    /// Marks with this standard deviation, known beforehand as the calibration's noise was, and nothing else
+    /// uncertain. Of a noise that the calibration estimated, [`of_noise`](Conditions::of_noise).
     pub fn marks(mark_px: f64) -> Conditions {
         Conditions {
             mark_px,
@@ -91,7 +92,8 @@ impl Conditions {
         }
     }
 
-    /// Marks with the calibration's noise, which it estimated on so many degrees of freedom, and nothing else uncertain.
+    /// Marks with the calibration's noise, which it estimated on so many degrees of freedom, and nothing else
+    /// uncertain.
     pub fn of_noise(sigma_px: f64, degrees_of_freedom: usize) -> Conditions {
         Conditions {
             noise_freedom: Some(degrees_of_freedom),
@@ -113,8 +115,8 @@ impl Conditions {
     }
 }
 
-/// Part of the variance of camera and pose by which that of both may lie below nought: they can make up for each other, and
-/// what is left is rounding.
+/// Part of the variance of camera and pose by which that of both may lie below nought: they can make up for
+/// each other, and what is left is rounding.
 const ROUNDING: f64 = 1e-6;
 
 /// Why a length cannot be measured.

@@ -1,5 +1,5 @@
-//! What does a calibration feed? Positions, lengths and mountings in target units with their uncertainty: what
-//! drawings and machines ask for.
+//! What does a calibration feed? Positions, lengths and mountings in target units with their uncertainty:
+//! what drawings and machines ask for.
 
 pub mod control;
 pub mod coverage;

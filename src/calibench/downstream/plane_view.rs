@@ -6,7 +6,8 @@ use crate::camera::{Camera, UndistortError, project_with_jacobian};
 use crate::geometry::{Pose, Vec2, Vec3};
 use nalgebra::{DMatrix, Matrix2, Matrix2x3, RowDVector, SMatrix};
 
-/// A camera nearer to a plane than this part of its distance from the plane's origin lies in it: rounding leaves as much.
+/// A camera nearer to a plane than this part of its distance from the plane's origin lies in it: rounding
+/// leaves as much.
 const IN_THE_PLANE: f64 = 1e-12;
 
 /// Why a pixel shows no point of the plane.
@@ -132,8 +133,8 @@ impl PlaneView {
         Ok((centre + along * depth).xy())
     }
 
-    /// The point with its derivatives. The pixel `p = F(X, Y, Z; theta)` stays where it was found, so `d(X, Y) =
-    /// (dF/d(X, Y))^-1 (dp - dF/dZ dZ - dF/dtheta dtheta)`.
+    /// The point with its derivatives. The pixel `p = F(X, Y, Z; theta)` stays where it was found, so `d(X,
+    /// Y) = (dF/d(X, Y))^-1 (dp - dF/dZ dZ - dF/dtheta dtheta)`.
     pub(super) fn foot(&self, pixel: &Vec2) -> Result<Foot, PlaneViewError> {
         let at = self.point(pixel)?;
         let horizon = || PlaneViewError::BehindHorizon { u: pixel.x, v: pixel.y };

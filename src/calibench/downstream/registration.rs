@@ -55,7 +55,8 @@ impl MapModel {
 pub struct Mark {
     /// Its place, in any unit.
     pub at: Vec2,
-    /// Standard deviations of both coordinates, in the same unit; 0 for a place that is given, as on a drawing.
+    /// Standard deviations of both coordinates, in the same unit; 0 for a place that is given, as on a
+    /// drawing.
     pub deviations: Vec2,
 }
 
@@ -292,8 +293,8 @@ impl Registration {
         self.linear.determinant().abs().sqrt()
     }
 
-    /// Covariance of the found position of a taught point, in squares of the marks' unit: what the map adds to
-    /// the error of the point itself. `None` where nothing tells the noise.
+    /// Covariance of the found position of a taught point, in squares of the marks' unit: what the map adds
+    /// to the error of the point itself. `None` where nothing tells the noise.
     pub fn covariance_at(&self, taught: &Vec2) -> Option<Matrix2<f64>> {
         let jacobian = self.jacobian((taught - self.taught_centre) / self.radius);
         let product = &jacobian * self.covariance.as_ref()? * jacobian.transpose();
@@ -459,7 +460,8 @@ mod tests {
             mean +=
                 error.dot(&(fit.covariance_at(&far).unwrap().try_inverse().unwrap() * error)) / DRAWS as f64;
         }
-        // Twice Fisher's F of 2 and 9 degrees of freedom: mean 2 * 9 / 7, variance 4 * 2 * 81 * 9 / (2 * 49 * 5).
+        // Twice Fisher's F of 2 and 9 degrees of freedom: mean 2 * 9 / 7, variance 4 * 2 * 81 * 9 / (2 * 49 *
+        // 5).
         let (expected, spread) =
             (18.0 / 7.0, (4.0 * 2.0 * 81.0 * 9.0 / (2.0 * 49.0 * 5.0) / DRAWS as f64).sqrt());
         assert!((mean - expected).abs() < 3.9 * spread, "{mean} of {expected}");

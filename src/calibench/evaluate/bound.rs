@@ -56,7 +56,8 @@ pub fn cramer_rao<L: Bounded>(
     unit.map(|unit| unit.scaled(sigma_px * sigma_px)).ok_or_else(singular)
 }
 
-/// How well the data separate the parameters, and their covariance for unit noise; `None` where there is none.
+/// How well the data separate the parameters, and their covariance for unit noise; `None` where there is
+/// none.
 pub type Unit = (Option<Conditioning>, Option<Covariance>);
 
 /// A lens whose parameters a scene bounds.

@@ -94,7 +94,8 @@ mod tests {
         // z = 1.959964: 2 +- z 3 / sqrt(100).
         let mean = Interval::of_mean(2.0, 3.0, 100, 0.05);
         assert!((mean.low - 1.412_011).abs() < 1e-6 && (mean.high - 2.587_989).abs() < 1e-6);
-        // Wilson's formula for 3 of 10: (0.3 + z^2 / 20 +- z sqrt(0.3 * 0.7 / 10 + z^2 / 400)) / (1 + z^2 / 10).
+        // Wilson's formula for 3 of 10: (0.3 + z^2 / 20 +- z sqrt(0.3 * 0.7 / 10 + z^2 / 400)) / (1 + z^2 /
+        // 10).
         let some = Interval::of_proportion(3, 10, 0.05);
         assert!((some.low - 0.107_79).abs() < 1e-5 && (some.high - 0.603_22).abs() < 1e-5, "{some:?}");
     }

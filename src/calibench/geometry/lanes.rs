@@ -20,8 +20,8 @@ pub(crate) trait Arithmetic:
     fn splat(value: f64) -> Self;
 }
 
-/// Arithmetic with the functions that lenses are made of; those that no register has come from libm, the same on
-/// every machine.
+/// Arithmetic with the functions that lenses are made of; those that no register has come from libm, the same
+/// on every machine.
 pub(crate) trait Real: Arithmetic {
     fn sqrt(self) -> Self;
     fn sin(self) -> Self;

@@ -105,8 +105,8 @@ impl<'a> Beside<'a> {
         self.files.write(&mut self.file, contents).map_err(with_path(&self.path))
     }
 
-    /// Waits until the contents are on the disk, as they must be before the rename: else a power cut may leave
-    /// the new name without them.
+    /// Waits until the contents are on the disk, as they must be before the rename: else a power cut may
+    /// leave the new name without them.
     ///
     /// # Errors
     /// What the system says, with the file.

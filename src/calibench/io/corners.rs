@@ -1,5 +1,5 @@
-//! What was seen where? Corner files: `view,point,X,Y,u,v`, one line an observed point, and if it is known how well
-//! each was seen, `weight` or `sigma_px`.
+//! What was seen where? Corner files: `view,point,X,Y,u,v`, one line an observed point, and if it is known
+//! how well each was seen, `weight` or `sigma_px`.
 
 use super::table::{Column, Row, TableError, columns, open, read_table};
 use crate::board::{View, ViewError};
@@ -45,8 +45,8 @@ pub fn read_corners(path: &Path) -> Result<CornerFile, TableError> {
 
 /// Reads corners from any source; `file` names it in errors. Lines of one view need not stand together.
 ///
-/// A column `weight` has the factor of each mark's residual, a column `sigma_px` the standard deviation of its
-/// coordinates: 1 over the weight ([`View::with_weights`]).
+/// A column `weight` has the factor of each mark's residual, a column `sigma_px` the standard deviation of
+/// its coordinates: 1 over the weight ([`View::with_weights`]).
 ///
 /// # Errors
 /// See [`TableError`]; both columns at once.
@@ -81,7 +81,8 @@ pub fn parse_corners(file: &str, mut input: impl Read) -> Result<CornerFile, Tab
     }
 }
 
-/// Weights, and standard deviations in px, with which marks are weighed against each other: their squares are summed.
+/// Weights, and standard deviations in px, with which marks are weighed against each other: their squares are
+/// summed.
 const WEIGHTS: RangeInclusive<f64> = 1e-9..=1e9;
 
 fn weighted(file: &str, bytes: &[u8]) -> Result<CornerFile, TableError> {
@@ -104,7 +105,8 @@ fn refuse_extreme(file: &str, column: &str, rows: &[Row<2, 5>]) -> Result<(), Ta
     Err(TableError::Unreadable { file: file.into(), line: *line, message })
 }
 
-/// The corners of a table with standard deviations, which are told here as what they are: as weights nobody wrote them.
+/// The corners of a table with standard deviations, which are told here as what they are: as weights nobody
+/// wrote them.
 fn spread(file: &str, bytes: &[u8]) -> Result<CornerFile, TableError> {
     let rows = with_column(file, bytes, Column::pixels("sigma_px"))?;
     refuse_extreme(file, "sigma_px", &rows)?;

@@ -1,4 +1,5 @@
-//! Does a result doubt its own standard deviations? What first-order theory says of it is then no test of anything.
+//! Does a result doubt its own standard deviations? What first-order theory says of it is then no test of
+//! anything.
 
 /// Words of [`Warning::NotLinear`](crate::calibrate::Warning::NotLinear) and
 /// [`Warning::Ambiguous`](crate::calibrate::Warning::Ambiguous), as results hold them.

@@ -1,4 +1,5 @@
-//! How large is a photograph, and what memory will it take? Known from the beginning of its file, before it is decoded.
+//! How large is a photograph, and what memory will it take? Known from the beginning of its file, before it
+//! is decoded.
 
 use super::image::{ImageError, MOST_NOTES_BYTES, broken, decoder, opened, refuse_size, scanned_jpeg};
 use super::jpeg::Jpeg;
@@ -16,8 +17,8 @@ pub struct Extent {
     pub pixels: u64,
     /// Bytes of all samples of the file, once they are decoded.
     pub bytes: u64,
-    /// Bytes that are held beside the samples while it is decoded: a JPEG's file, here and in its decoder, or what the decoder of another
-    /// format may hold of colour profiles, texts and rows.
+    /// Bytes that are held beside the samples while it is decoded: a JPEG's file, here and in its decoder, or
+    /// what the decoder of another format may hold of colour profiles, texts and rows.
     pub held_bytes: u64,
 }
 
@@ -42,8 +43,8 @@ impl Extent {
     }
 
     /// Memory that reading the photograph as grey, finding its marks and drawing them in takes at most: the
-    /// samples, the grey levels, for each pixel eight bytes of detection or four of the overlay and its file, and
-    /// what is held beside.
+    /// samples, the grey levels, for each pixel eight bytes of detection or four of the overlay and its file,
+    /// and what is held beside.
     pub fn memory_to_detect(&self) -> u64 {
         self.held_bytes
             .saturating_add(self.bytes.saturating_mul(2))

@@ -83,8 +83,8 @@ pub enum ImageError {
 /// machine.
 pub const LIMIT_PX: u64 = 200_000_000;
 
-/// What a decoder may hold beside the samples: rows, texts, and of a PNG a colour profile, which some kilobytes may unpack to gigabytes and
-/// which is dropped, unused as it is, where it is longer.
+/// What a decoder may hold beside the samples: rows, texts, and of a PNG a colour profile, which some
+/// kilobytes may unpack to gigabytes and which is dropped, unused as it is, where it is longer.
 pub(super) const MOST_NOTES_BYTES: u64 = 8 << 20;
 
 impl Grey {
@@ -496,7 +496,8 @@ mod tests {
         !kind.iter().chain(data).fold(!0, add)
     }
 
-    /// Zeros as zlib writes them, in blocks that are stored and not packed: the limit is one of the decoder's, whatever the file's length.
+    /// Zeros as zlib writes them, in blocks that are stored and not packed: the limit is one of the
+    /// decoder's, whatever the file's length.
     fn stored(length: usize) -> Vec<u8> {
         let mut packed = vec![0x78, 0x01];
         for start in (0..length).step_by(65_535) {

@@ -27,8 +27,8 @@ pub enum InputError {
         /// What the system said.
         cause: io::Error,
     },
-    /// A pipe may block for ever, a device never end, and a folder has no bytes; nor is one a regular file that
-    /// does not give at once what it holds.
+    /// A pipe may block for ever, a device never end, and a folder has no bytes; nor is one a regular file
+    /// that does not give at once what it holds.
     #[error("{path}: {kind}, not a regular file: copy what it gives into a file{hint}")]
     NotRegular {
         /// The path.
@@ -78,8 +78,8 @@ impl From<InputError> for io::Error {
     }
 }
 
-/// Refuses a path to write to where something is that is no regular file: opening a pipe blocks until somebody opens
-/// its other end, for writing too.
+/// Refuses a path to write to where something is that is no regular file: opening a pipe blocks until
+/// somebody opens its other end, for writing too.
 ///
 /// # Errors
 /// [`InputError::NotReplaceable`].
@@ -223,13 +223,15 @@ mod tests {
         assert!(matches!(read_regular(Path::new("/dev/zero"), 9), Err(InputError::NotRegular { .. })));
     }
 
-    /// A pipe stands for whatever has to be waited for: it may take the place of a file after that was looked at.
+    /// A pipe stands for whatever has to be waited for: it may take the place of a file after that was looked
+    /// at.
     #[test]
     #[cfg(unix)]
     fn nothing_is_waited_for() {
         let pipe = std::env::temp_dir().join(format!("calibench-input-{}.pipe", std::process::id()));
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-        // With another end that says nothing, as a file of the system does; without one there would be nothing to wait for.
+        // With another end that says nothing, as a file of the system does; without one there would be
+        // nothing to wait for.
         let other_end = OpenOptions::new().read(true).write(true).open(&pipe).unwrap();
         let waiting = open_without_waiting(&pipe).unwrap();
         let refused = read_at_most(waiting, "x", 0, 9).unwrap_err().to_string();

@@ -1,5 +1,5 @@
-//! How long is a JPEG, and how large its image? Told from its segments, before anything is decoded: decoders read the
-//! whole file first, and paint what is missing of one that was cut off in grey and say nothing.
+//! How long is a JPEG, and how large its image? Told from its segments, before anything is decoded: decoders
+//! read the whole file first, and paint what is missing of one that was cut off in grey and say nothing.
 //!
 //! A file is a row of segments, each `FF`, a kind, and mostly a length; after a scan's header (`FF DA`) its
 //! data follow, in which a byte `FF` is always followed by `00` or the number of a restart. It ends with `FF
@@ -10,7 +10,8 @@ use std::io::{BufRead, Result};
 /// What the segments of a JPEG say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Jpeg {
-    /// Bytes up to its end, whatever follows it; all of the file where bytes are no segment, which is left to the decoder.
+    /// Bytes up to its end, whatever follows it; all of the file where bytes are no segment, which is left to
+    /// the decoder.
     pub length: u64,
     /// The header of the first frame.
     pub frame: Option<Frame>,
@@ -167,7 +168,8 @@ mod tests {
     use super::*;
     use std::io::BufReader;
 
-    /// A frame of 2 x 3 px of one component, a header of four bytes, a scan with data in which `FF` occurs, and the end.
+    /// A frame of 2 x 3 px of one component, a header of four bytes, a scan with data in which `FF` occurs,
+    /// and the end.
     const WHOLE: [u8; 33] = [
         0xff, 0xd8, 0xff, 0xff, 0xc0, 0, 11, 8, 0, 3, 0, 2, 1, 9, 9, 9, 0xff, 0xe0, 0, 4, 1, 2, 0xff, 0xda,
         0, 3, 7, 0x12, 0xff, 0x00, 0x34, 0xff, 0xd9,

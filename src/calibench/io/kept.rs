@@ -1,4 +1,5 @@
-//! Which files must a program not replace? Those that it was given to read: photographs, measured targets and corner files may exist once only.
+//! Which files must a program not replace? Those that it was given to read: photographs, measured targets and
+//! corner files may exist once only.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -6,8 +7,9 @@ use std::sync::RwLock;
 
 static KEPT: RwLock<Vec<PathBuf>> = RwLock::new(Vec::new());
 
-/// Names files that nothing of this process replaces from now on: [`write_atomically`](super::write_atomically) and all that writes as it does
-/// refuse to. For programs, which know what they were given to read; a file that is not there is not named.
+/// Names files that nothing of this process replaces from now on:
+/// [`write_atomically`](super::write_atomically) and all that writes as it does refuse to. For programs,
+/// which know what they were given to read; a file that is not there is not named.
 pub fn keep_files<'a>(files: impl IntoIterator<Item = &'a Path>) {
     let places = files.into_iter().filter(|file| file.is_file()).flat_map(places);
     let mut kept = KEPT.write().unwrap_or_else(|poisoned| poisoned.into_inner());
@@ -29,13 +31,14 @@ pub(super) fn refuse_kept(file: &Path) -> io::Result<()> {
     Err(io::Error::new(io::ErrorKind::InvalidInput, said))
 }
 
-/// A file's own place, and that of what it leads to where it is a link: without either it could not be read again.
+/// A file's own place, and that of what it leads to where it is a link: without either it could not be read
+/// again.
 fn places(file: &Path) -> Vec<PathBuf> {
     place(file).into_iter().chain(file.canonicalize()).collect()
 }
 
-/// Where a name stands, with no link on the way to it; a link itself is not followed, since a file that is put in its place leaves what it leads
-/// to alone. `None` where nothing stands.
+/// Where a name stands, with no link on the way to it; a link itself is not followed, since a file that is
+/// put in its place leaves what it leads to alone. `None` where nothing stands.
 fn place(file: &Path) -> Option<PathBuf> {
     let is_link = file.symlink_metadata().ok()?.file_type().is_symlink();
     if !is_link {

@@ -28,7 +28,8 @@ pub struct KnownCalibration {
     pub cam_from_target: Vec<Pose>,
     /// Joint covariance of camera and poses.
     pub covariance: Covariance,
-    /// Estimated noise of a pixel coordinate, px; with a robust loss the spread of all residuals, strays included.
+    /// Estimated noise of a pixel coordinate, px; with a robust loss the spread of all residuals, strays
+    /// included.
     pub sigma_px: f64,
     /// The robust loss that residuals counted by, if one did.
     pub loss: Option<String>,
@@ -334,8 +335,8 @@ fn covariance(free: FreeParameters, fields: &CameraFields) -> Option<Covariance>
 /// Part by which numbers of a covariance may contradict each other: far above what is lost in computing one.
 const CONTRADICTION: f64 = 1e-3;
 
-/// Refuses what is no covariance of anything, as after a damage of the file: a variance below nought, a half that is not the other,
-/// and what varies together more than each does alone.
+/// Refuses what is no covariance of anything, as after a damage of the file: a variance below nought, a half
+/// that is not the other, and what varies together more than each does alone.
 fn refuse_impossible(file: &str, covariance: &Covariance, views: &[ViewFields]) -> Result<(), KnownError> {
     let n = covariance.intrinsics.nrows();
     let refused = |of: String| {
@@ -377,8 +378,8 @@ fn refuse_no_noise(file: &str, sigma_px: f64, degrees_of_freedom: usize) -> Resu
 /// A larger variance is a slip, in whatever unit, and its products soon are no numbers.
 const MOST_VARIANCE: f64 = 1e60;
 
-/// Whether a symmetric matrix may be a covariance, as far as its entries two by two tell: variances of 0 or more, and correlations from -1
-/// to 1, up to the digits that files keep.
+/// Whether a symmetric matrix may be a covariance, as far as its entries two by two tell: variances of 0 or
+/// more, and correlations from -1 to 1, up to the digits that files keep.
 pub(super) fn is_possible(size: usize, entry: &dyn Fn(usize, usize) -> f64) -> bool {
     let most = |i: usize, j: usize| entry(i, i).sqrt() * entry(j, j).sqrt();
     // A comparison with the root of a number below nought does not hold.

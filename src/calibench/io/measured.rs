@@ -1,5 +1,6 @@
-//! Where are the marks of a measured target, where were they seen, and how is a calibration from them kept? Target files
-//! `point,X,Y,Z` with `sd` or `sdX,sdY,sdZ`, corner files that name marks, and a `result.json` with the marks in it.
+//! Where are the marks of a measured target, where were they seen, and how is a calibration from them kept?
+//! Target files `point,X,Y,Z` with `sd` or `sdX,sdY,sdZ`, corner files that name marks, and a `result.json`
+//! with the marks in it.
 
 use super::result::CalibrationFields;
 use super::table::{Column, Row, TableError, columns, read_table};
@@ -41,8 +42,9 @@ pub enum TargetFileError {
 
 const PLACE: [Column; 3] = [Column::length("X"), Column::length("Y"), Column::length("Z")];
 
-/// Reads a target file with the columns `point,X,Y,Z`, and `sd` for the standard deviation of every coordinate or `sdX`,
-/// `sdY`, `sdZ` for each; without them marks are exact. Further columns are ignored; `file` names the source in errors.
+/// Reads a target file with the columns `point,X,Y,Z`, and `sd` for the standard deviation of every
+/// coordinate or `sdX`, `sdY`, `sdZ` for each; without them marks are exact. Further columns are ignored;
+/// `file` names the source in errors.
 ///
 /// # Errors
 /// See [`TargetFileError`].
@@ -125,8 +127,8 @@ pub struct SeenFile {
     pub unread: Vec<String>,
 }
 
-/// Reads a corner file with the columns `view,point,u,v`, and `weight` or `sigma_px` as [`super::parse_corners`] has
-/// them; where marks are is not read, whatever it says.
+/// Reads a corner file with the columns `view,point,u,v`, and `weight` or `sigma_px` as
+/// [`super::parse_corners`] has them; where marks are is not read, whatever it says.
 ///
 /// # Errors
 /// See [`TableError`].

@@ -1,5 +1,5 @@
-//! Is a mark somewhere else on the target in one view than in all others? A corner file repeats where each mark is, line by line, and a slip in
-//! one of them is a target of another shape.
+//! Is a mark somewhere else on the target in one view than in all others? A corner file repeats where each
+//! mark is, line by line, and a slip in one of them is a target of another shape.
 
 use super::corners::PLACES;
 use super::shown::on_one_line;
@@ -8,7 +8,8 @@ use std::collections::BTreeMap;
 
 /// Other views that must agree with each other before one is said to differ from them.
 const LEAST_OTHERS: usize = 2;
-/// Part of the target's extent by which places differ that were meant to be the same: above what is lost in writing a number.
+/// Part of the target's extent by which places differ that were meant to be the same: above what is lost in
+/// writing a number.
 const ROUNDING: f64 = 1e-6;
 
 /// A place, so that it can be looked up.
@@ -17,11 +18,12 @@ type Place = [u64; 2];
 /// Sentences that are said at most: a file that repeats its marks has one for each.
 const MOST_SAID: usize = 5;
 
-/// What is to be said of marks of a corner file that stand at another place in one view than in all others, or where another
-/// mark of their view stands: a sentence for each, and one for those that are too many.
+/// What is to be said of marks of a corner file that stand at another place in one view than in all others,
+/// or where another mark of their view stands: a sentence for each, and one for those that are too many.
 ///
-/// Some files number the marks of each view anew. There the place of a mark that seems to have moved is that of another mark
-/// of the file, or the place that it should have is taken in its view: such marks are not named.
+/// Some files number the marks of each view anew. There the place of a mark that seems to have moved is that
+/// of another mark of the file, or the place that it should have is taken in its view: such marks are not
+/// named.
 ///
 /// # Errors
 /// See [`TableError`].

@@ -1,16 +1,16 @@
-//! Which numbers does a camera of a file have? Those that can be calculated with: every term of every lens stays
-//! finite over any image.
+//! Which numbers does a camera of a file have? Those that can be calculated with: every term of every lens
+//! stays finite over any image.
 
 use crate::camera::{Camera, Lens, Parameter};
 use std::ops::RangeInclusive;
 
-/// Focal lengths, px; that of a telescope of 10 m behind pixels of a micrometre is 1e7, and a camera of an image of
-/// width 1 has some 1.
+/// Focal lengths, px; that of a telescope of 10 m behind pixels of a micrometre is 1e7, and a camera of an
+/// image of width 1 has some 1.
 const FOCAL_PX: RangeInclusive<f64> = 1e-6..=1e9;
 /// Principal point and skew, px, either way.
 const MOST_PX: f64 = 1e9;
-/// Coefficients of a lens, either way. Those of long lenses are large, since they multiply powers of small angles:
-/// k3 = 1e18 where r = 0.001.
+/// Coefficients of a lens, either way. Those of long lenses are large, since they multiply powers of small
+/// angles: k3 = 1e18 where r = 0.001.
 const MOST_COEFFICIENT: f64 = 1e30;
 
 /// Why no camera has these numbers, if none has.
@@ -18,7 +18,8 @@ pub(super) fn implausible(camera: &Camera<Lens>) -> Option<String> {
     camera.values().find_map(|(parameter, value)| implausible_value(parameter, value))
 }
 
-/// Why no camera has this value of a parameter, px or without a unit, if none has: nothing can be calculated with it.
+/// Why no camera has this value of a parameter, px or without a unit, if none has: nothing can be calculated
+/// with it.
 ///
 /// ```
 /// use calibench::camera::Parameter;

@@ -14,8 +14,9 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// A camera with a lens of any model, by its parameters' names; `model` says which, and a camera without one has
-/// Brown-Conrady's lens. Coefficients left out of a file are 0, and any other name is refused: without it this would be another camera.
+/// A camera with a lens of any model, by its parameters' names; `model` says which, and a camera without one
+/// has Brown-Conrady's lens. Coefficients left out of a file are 0, and any other name is refused: without it
+/// this would be another camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LensFields(pub Camera<Lens>);
 
@@ -112,7 +113,8 @@ pub struct ViewFields {
     pub name: String,
     /// Number of points.
     pub points: usize,
-    /// RMSE per point, px; of marks with weights that of a mark of weight 1, so that it is a multiple of `sigma_px` where the file has it.
+    /// RMSE per point, px; of marks with weights that of a mark of weight 1, so that it is a multiple of
+    /// `sigma_px` where the file has it.
     pub rmse_px: f64,
     /// Rotation vector of `cam_from_target`, rad.
     pub rotation_vector_rad: [f64; 3],
@@ -248,8 +250,8 @@ pub struct CalibrationFields {
     pub camera: LensFields,
     /// Width and height, px, if known.
     pub image_size: Option<(usize, usize)>,
-    /// How far the photographs tell which mark is the board's first: `fixed`, `half-turn` or `quarter-turn`; the caller adds
-    /// it.
+    /// How far the photographs tell which mark is the board's first: `fixed`, `half-turn` or `quarter-turn`;
+    /// the caller adds it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub orientation: Option<&'static str>,
     /// The shape of the board, where it was estimated.
@@ -270,9 +272,11 @@ pub struct CalibrationFields {
     pub covariance: Vec<Vec<f64>>,
     /// `sqrt(sum |w r|^2 / N)`, px, with the weights `w` of the marks, 1 where the file has none.
     pub rmse_px: f64,
-    /// Estimated noise of one pixel coordinate, px: `sqrt(sum |w r|^2 / (2 N - p))`, strays included whatever the loss.
+    /// Estimated noise of one pixel coordinate, px: `sqrt(sum |w r|^2 / (2 N - p))`, strays included whatever
+    /// the loss.
     pub sigma_px: f64,
-    /// What residuals counted by, where not by their squares: `huber:PX` or `cauchy:PX`: see [`CalibrationFields::with_loss`].
+    /// What residuals counted by, where not by their squares: `huber:PX` or `cauchy:PX`: see
+    /// [`CalibrationFields::with_loss`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<String>,
     /// `2 N - p`.

@@ -1,8 +1,9 @@
-//! Which marks has the target of a scene, and where is it held? Tables of marks, `X,Y`, and of poses, `x,y,z` and the rotation as
-//! `rx,ry,rz` (rotation vector, rad) or `r11,r12,...,r33` (the matrix, row by row). A column `cell` lets one file hold several scenes.
+//! Which marks has the target of a scene, and where is it held? Tables of marks, `X,Y`, and of poses, `x,y,z`
+//! and the rotation as `rx,ry,rz` (rotation vector, rad) or `r11,r12,...,r33` (the matrix, row by row). A
+//! column `cell` lets one file hold several scenes.
 //!
-//! A matrix is taken bit for bit, so that poses that were written are read as what they were; a rotation vector is rounded on its way
-//! to a matrix. Written are matrices therefore.
+//! A matrix is taken bit for bit, so that poses that were written are read as what they were; a rotation
+//! vector is rounded on its way to a matrix. Written are matrices therefore.
 
 use super::table::{Column, Row, TableError, columns, read_table};
 use crate::geometry::{Mat3, Pose, Vec2, Vec3, rotation};
@@ -78,7 +79,8 @@ pub enum SceneTableError {
 /// How far from a rotation a matrix may be: ten printed digits.
 const MATRIX_TOLERANCE: f64 = 1e-9;
 
-/// Reads the marks of a target, in the target's unit, in the order of the file; `file` names it in errors. A column Z must hold zeros.
+/// Reads the marks of a target, in the target's unit, in the order of the file; `file` names it in errors. A
+/// column Z must hold zeros.
 ///
 /// # Errors
 /// See [`SceneTableError`].
@@ -106,7 +108,8 @@ pub fn parse_target_marks(
     rows_of(file, bytes, ["X", "Y", "Z"], cell)?.into_iter().map(flat).collect()
 }
 
-/// Reads poses of a target, target to camera, translations in the target's unit, in the order of the file; `file` names it in errors.
+/// Reads poses of a target, target to camera, translations in the target's unit, in the order of the file;
+/// `file` names it in errors.
 ///
 /// # Errors
 /// See [`SceneTableError`].

@@ -16,7 +16,8 @@ pub struct SpatialFile {
 const COLUMNS: [Column; 5] =
     [Column::length("X"), Column::length("Y"), Column::length("Z"), Column::pixels("u"), Column::pixels("v")];
 
-/// Reads corners with or without a column Z, which is 0 where there is none; `file` names the source in errors.
+/// Reads corners with or without a column Z, which is 0 where there is none; `file` names the source in
+/// errors.
 ///
 /// # Errors
 /// See [`TableError`].

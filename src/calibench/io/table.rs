@@ -337,7 +337,8 @@ fn read_all(file: &str, mut input: impl Read) -> Result<Vec<u8>, TableError> {
     Ok(bytes)
 }
 
-/// The bytes of a table for the parser, which keeps a row until its end: the row that it reads may be no longer than a line.
+/// The bytes of a table for the parser, which keeps a row until its end: the row that it reads may be no
+/// longer than a line.
 struct Rows<'a> {
     bytes: &'a [u8],
     given: usize,
@@ -356,8 +357,8 @@ impl Read for Rows<'_> {
     }
 }
 
-/// Whether a row ends within a field that a quotation mark began. A mark within a field that none began is a character of it, and two within one
-/// that a mark began are one of it.
+/// Whether a row ends within a field that a quotation mark began. A mark within a field that none began is a
+/// character of it, and two within one that a mark began are one of it.
 fn is_quote_open(row: &[u8]) -> bool {
     let (mut is_open, mut may_open) = (false, true);
     for byte in row {
@@ -478,8 +479,8 @@ pub(super) fn open(path: &std::path::Path) -> Result<(String, Vec<u8>), TableErr
     Ok((path.shown(), read_regular(path, MOST_TABLE_BYTES)?))
 }
 
-/// The number of the last line, if it has no end. Many programs write files so; a file that was cut off inside
-/// its last number looks the same, and its last number may be any.
+/// The number of the last line, if it has no end. Many programs write files so; a file that was cut off
+/// inside its last number looks the same, and its last number may be any.
 ///
 /// ```
 /// use calibench::io::table::unended_line;

@@ -1,4 +1,5 @@
-//! Which unknowns make the cost least? Levenberg-Marquardt with damping `lambda diag(H)`, after Nielsen (1999).
+//! Which unknowns make the cost least? Levenberg-Marquardt with damping `lambda diag(H)`, after Nielsen
+//! (1999).
 
 use super::equations::Equations;
 use super::problem::{Problem, State};
@@ -13,7 +14,8 @@ pub(super) struct Minimum {
     pub iterations: usize,
 }
 
-/// A step that gains less than this part of the cost moves no unknown by more than a millionth of its standard deviation.
+/// A step that gains less than this part of the cost moves no unknown by more than a millionth of its
+/// standard deviation.
 const RELATIVE_GAIN: f64 = 1e-14;
 /// Small enough not to slow a good start, large enough to tame a singular first matrix.
 const FIRST_DAMPING: f64 = 1e-6;

@@ -1,8 +1,8 @@
-//! How are hundreds of poses and marks solved for? Poses are eliminated view by view; camera and marks stay, one dense
-//! symmetric system.
+//! How are hundreds of poses and marks solved for? Poses are eliminated view by view; camera and marks stay,
+//! one dense symmetric system.
 //!
-//! With the shared unknowns `a` (free parameters, coordinates of marks), `A` their block, `C_i` that of a pose, `B_i` the
-//! coupling and `C_i = L_i L_i^T`, `W_i = L_i^-1 B_i^T`, `z_i = L_i^-1 g_i`:
+//! With the shared unknowns `a` (free parameters, coordinates of marks), `A` their block, `C_i` that of a
+//! pose, `B_i` the coupling and `C_i = L_i L_i^T`, `W_i = L_i^-1 B_i^T`, `z_i = L_i^-1 g_i`:
 //!
 //! ```text
 //! S = A - sum W_i^T W_i,   S d_a = -(g_a - sum W_i^T z_i),   L_i^T d_i = -(z_i + W_i d_a)
@@ -59,7 +59,8 @@ pub(super) struct Reduced {
     factors: Vec<Factors>,
 }
 
-/// Covariance for unit noise: `Q` of the shared unknowns, and of each pose its block and that with the shared ones.
+/// Covariance for unit noise: `Q` of the shared unknowns, and of each pose its block and that with the shared
+/// ones.
 pub(super) struct Inverse {
     pub shared: DMatrix<f64>,
     pub poses: Vec<Matrix6<f64>>,

@@ -11,8 +11,8 @@ use super::{MeasuredError, MeasuredTarget, MeasuredView, plane, rivals, space};
 use crate::calibrate::{Board, CalibrationError, Loss, Prior, Settings, Termination, Warning, domain};
 use crate::camera::Parameter;
 
-/// Most marks with a standard deviation that may be seen: 1500 coordinates, equations of 18 MB, a factorisation of some
-/// 10^9 operations.
+/// Most marks with a standard deviation that may be seen: 1500 coordinates, equations of 18 MB, a
+/// factorisation of some 10^9 operations.
 pub const MOST_UNCERTAIN_MARKS: usize = 500;
 
 /// How the noise of a pixel coordinate of weight 1 is known.
@@ -30,20 +30,22 @@ pub enum Noise {
     },
 }
 
-/// Where nothing else tells the noise of a coordinate, what is known beforehand is first weighed with this one, px.
+/// Where nothing else tells the noise of a coordinate, what is known beforehand is first weighed with this
+/// one, px.
 const USUAL_PX: f64 = 0.1;
 
-/// The most likely camera, poses and positions of marks, from views of a target whose marks were measured, through a lens
-/// of any model. The equations stand at [`crate::measured`].
+/// The most likely camera, poses and positions of marks, from views of a target whose marks were measured,
+/// through a lens of any model. The equations stand at [`crate::measured`].
 ///
-/// Parameters are free, held, tied or known beforehand as `settings` say. Marks near a plane (as thick as a thousandth of
-/// their width, or as they are known to be) start from [`calibrate_lens`](crate::calibrate::calibrate_lens), with all that
-/// it refuses; marks in space from their rays; up to a twentieth from both.
+/// Parameters are free, held, tied or known beforehand as `settings` say. Marks near a plane (as thick as a
+/// thousandth of their width, or as they are known to be) start from
+/// [`calibrate_lens`](crate::calibrate::calibrate_lens), with all that it refuses; marks in space from their
+/// rays; up to a twentieth from both.
 ///
 /// # Errors
-/// [`MeasuredError`]: names that do not agree, views with too few marks, data that do not determine what is free, more
-/// than [`MOST_UNCERTAIN_MARKS`]; robust losses, board shapes, profile intervals, starts and last digits, which are not
-/// known here. A refinement that does not converge is no error: the result says so.
+/// [`MeasuredError`]: names that do not agree, views with too few marks, data that do not determine what is
+/// free, more than [`MOST_UNCERTAIN_MARKS`]; robust losses, board shapes, profile intervals, starts and last
+/// digits, which are not known here. A refinement that does not converge is no error: the result says so.
 ///
 /// ```
 /// use calibench::calibrate::Settings;

@@ -1,5 +1,5 @@
-//! Do the data determine what is free, or does only their noise? Singular equations are refused by name, and focal lengths
-//! of which nothing is known.
+//! Do the data determine what is free, or does only their noise? Singular equations are refused by name, and
+//! focal lengths of which nothing is known.
 
 use super::MeasuredError;
 use super::data::Data;
@@ -14,8 +14,8 @@ use nalgebra::{DMatrix, DVector};
 const NAMED_SHARE: f64 = 0.2;
 /// Where a focal length is known worse than this part of itself, it is asked whether it is known at all.
 const DOUBTFUL: f64 = 0.03;
-/// Focal lengths so many times as long and as short must cost this many variances more, three standard deviations: as
-/// [`crate::calibrate::calibrate`] asks.
+/// Focal lengths so many times as long and as short must cost this many variances more, three standard
+/// deviations: as [`crate::calibrate::calibrate`] asks.
 const OTHER_FOCAL: f64 = 3.0;
 const FOCAL_RISE: f64 = 9.0;
 
@@ -75,8 +75,8 @@ pub(super) fn conditioning(
     Ok(Some(found))
 }
 
-/// Refuses a focal length that may as well be three times as long or as short; `relative` is its standard deviation over
-/// itself.
+/// Refuses a focal length that may as well be three times as long or as short; `relative` is its standard
+/// deviation over itself.
 pub(super) fn refuse_if_open(
     problem: &Problem<'_>,
     minimum: &Minimum,
@@ -118,8 +118,8 @@ fn loose(data: &Data) -> MeasuredError {
     MeasuredError::Loose { largest: data.unknown_deviations.iter().copied().fold(0.0, f64::max) }
 }
 
-/// The weakest combination, strongest member first: parameters, and what poses do with them, root mean square over the
-/// views, in units in which each alone has unit information.
+/// The weakest combination, strongest member first: parameters, and what poses do with them, root mean square
+/// over the views, in units in which each alone has unit information.
 fn named(
     free: FreeParameters,
     equations: &Equations,

@@ -8,10 +8,12 @@ use crate::camera::{Camera, FreeParameters, Lens, Model, Parameter};
 
 /// Steps of a lens beside poses that are held.
 const STEPS: usize = 60;
-/// Double spheres have two families, as a rule each with a minimum of its own: `xi` and `alpha` of one of each.
+/// Double spheres have two families, as a rule each with a minimum of its own: `xi` and `alpha` of one of
+/// each.
 const SPHERES: [[f64; 2]; 2] = [[-0.2, 0.55], [0.5, 0.6]];
 
-/// States with lenses of the wanted model like that of `state`; what is held or known beforehand has its value.
+/// States with lenses of the wanted model like that of `state`; what is held or known beforehand has its
+/// value.
 pub(super) fn with_model(problem: &Problem<'_>, state: &State, settings: &Settings) -> Vec<State> {
     let lenses = candidates(&state.camera, settings.model());
     let with_lens = |camera: Camera<Lens>| {
@@ -59,8 +61,8 @@ pub(super) fn with_values(
     Some(camera)
 }
 
-/// A lens that follows the pixels beside these poses: its radial terms one after another, then all that is free. Terms
-/// below a fraction's line follow last: with those above it they can make one curve in many ways.
+/// A lens that follows the pixels beside these poses: its radial terms one after another, then all that is
+/// free. Terms below a fraction's line follow last: with those above it they can make one curve in many ways.
 fn fitted(problem: &Problem<'_>, state: State) -> Option<State> {
     use Parameter::{Alpha, Cx, Cy, Fx, Fy, K1, K2, Xi};
     let wanted = |list: &[Parameter]| {

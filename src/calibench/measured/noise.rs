@@ -8,7 +8,8 @@ use super::{Noise, tests_of_sums::Moments};
 use crate::calibrate::Termination;
 use crate::geometry::Vec2;
 
-/// Nobody's marks are better than this, px: exact data would otherwise leave what is known beforehand no weight at all.
+/// Nobody's marks are better than this, px: exact data would otherwise leave what is known beforehand no
+/// weight at all.
 const LEAST_PX: f64 = 1e-4;
 /// The variance is settled when it changes by less than this part, `sigma` by half of it.
 const SETTLED: f64 = 2e-6;
@@ -79,7 +80,8 @@ impl Known {
     }
 }
 
-/// The minimum at which the noise that weighs what is known beforehand is the one that is given or that the residuals show.
+/// The minimum at which the noise that weighs what is known beforehand is the one that is given or that the
+/// residuals show.
 pub(super) fn settled<'a>(
     problem: Problem<'a>,
     noise: Noise,

@@ -7,8 +7,8 @@ use crate::board::View;
 use crate::calibrate::{CalibrationError, Settings, Warning, calibrate_lens};
 use crate::geometry::{Vec2, Vec3};
 
-/// The camera and the poses that [`calibrate_lens`] finds for the marks as a flat board, and its warnings where the cost is
-/// no parabola: they are the data's, whatever a few hundredths of a millimetre do.
+/// The camera and the poses that [`calibrate_lens`] finds for the marks as a flat board, and its warnings
+/// where the cost is no parabola: they are the data's, whatever a few hundredths of a millimetre do.
 ///
 /// # Errors
 /// What it refuses: planes that face the camera, too few views.

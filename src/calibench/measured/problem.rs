@@ -154,7 +154,8 @@ impl Problem<'_> {
         }
     }
 
-    /// The rows of what is known beforehand: their number, how far the state is off, and their standard deviation.
+    /// The rows of what is known beforehand: their number, how far the state is off, and their standard
+    /// deviation.
     pub fn known<'s>(&'s self, state: &'s State) -> impl Iterator<Item = (usize, f64, f64)> + 's {
         let of_prior = |prior: &Prior| {
             let row = self.free.position(prior.parameter)?;
@@ -193,7 +194,8 @@ impl Problem<'_> {
     }
 }
 
-/// By the pose, of a mark that is turned into the camera's axes: `R <- exp(delta) R` moves it by `delta x turned`.
+/// By the pose, of a mark that is turned into the camera's axes: `R <- exp(delta) R` moves it by `delta x
+/// turned`.
 fn of_pose(by_point: &Matrix2x3<f64>, turned: &Vec3) -> Matrix2x6<f64> {
     let by_rotation = -(by_point * rotation::skew(turned));
     let mut both = Matrix2x6::zeros();

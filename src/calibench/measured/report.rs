@@ -1,4 +1,5 @@
-//! What does a calibration from a measured target say? The camera with its uncertainty, and what became of every mark.
+//! What does a calibration from a measured target say? The camera with its uncertainty, and what became of
+//! every mark.
 
 use super::data::Data;
 use super::descent::Minimum;
@@ -19,9 +20,9 @@ use nalgebra::{DMatrix, Matrix6, MatrixXx6};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct MeasuredCalibration {
-    /// Camera, poses, residuals and their covariance, which counts what is not known of the marks. Residuals stand in the
-    /// order of each view's marks; `degrees_of_freedom` are those of the pixels, rounded down. Nothing certifies its
-    /// minimum.
+    /// Camera, poses, residuals and their covariance, which counts what is not known of the marks. Residuals
+    /// stand in the order of each view's marks; `degrees_of_freedom` are those of the pixels, rounded down.
+    /// Nothing certifies its minimum.
     pub calibration: LensCalibration,
     /// Where the noise `sigma_px` comes from.
     pub noise: Noise,
@@ -29,10 +30,12 @@ pub struct MeasuredCalibration {
     pub marks: Vec<CorrectedMark>,
     /// Names of marks that no view shows.
     pub unseen: Vec<String>,
-    /// Whether the stated standard deviations of the marks can be believed: the sum of their squared corrections, each
-    /// over its standard deviation. `None` where no mark is uncertain, or pixels tell nothing of them.
+    /// Whether the stated standard deviations of the marks can be believed: the sum of their squared
+    /// corrections, each over its standard deviation. `None` where no mark is uncertain, or pixels tell
+    /// nothing of them.
     pub credibility: Option<SumTest>,
-    /// Whether the noise that was given can be believed: the sum of squared residuals over it. `None` where it was estimated.
+    /// Whether the noise that was given can be believed: the sum of squared residuals over it. `None` where
+    /// it was estimated.
     pub noise_test: Option<SumTest>,
 }
 
@@ -51,14 +54,16 @@ pub struct CorrectedMark {
     pub covariance: Mat3,
     /// Estimated - measured position.
     pub correction: Vec3,
-    /// What the correction's standard deviation is to be expected, `sqrt(sd^2 - variance of the estimate)`: what pixels
-    /// leave where it was shows as nothing.
+    /// What the correction's standard deviation is to be expected, `sqrt(sd^2 - variance of the estimate)`:
+    /// what pixels leave where it was shows as nothing.
     pub expected: Vec3,
     /// Correction over that, standard normal if all is as stated (Baarda 1968); 0 for exact coordinates.
     pub normalised: Vec3,
-    /// Probability of a correction as large in all that pixels tell of the mark, by chance; 1 where they tell nothing.
+    /// Probability of a correction as large in all that pixels tell of the mark, by chance; 1 where they tell
+    /// nothing.
     pub p_value: f64,
-    /// Whether that is beyond expectation: one set of marks in a hundred has such a mark by chance ([`FALSE_ALARM`]).
+    /// Whether that is beyond expectation: one set of marks in a hundred has such a mark by chance
+    /// ([`FALSE_ALARM`]).
     pub is_beyond_expectation: bool,
 }
 
@@ -215,7 +220,8 @@ fn in_given_order(
     left.residuals.iter().enumerate().map(of_view).collect()
 }
 
-/// Of camera and poses. A pose's translation is that of the target's origin, `T = T_c - R c`, so `dT = dT_c + [R c]x delta`.
+/// Of camera and poses. A pose's translation is that of the target's origin, `T = T_c - R c`, so `dT = dT_c +
+/// [R c]x delta`.
 fn covariance(problem: &Problem<'_>, minimum: &Minimum, inverse: &Inverse, variance: f64) -> Covariance {
     let n = problem.free.len();
     let about_the_origin = |pose: &Pose| {
@@ -280,8 +286,8 @@ fn marks(
     (0..data.positions.len()).map(of_mark).collect()
 }
 
-/// The probability of a correction as large: `c^T D^+ c` is chi-squared, in units of the stated deviations with `D = I -
-/// posterior`, over the combinations that pixels tell something of.
+/// The probability of a correction as large: `c^T D^+ c` is chi-squared, in units of the stated deviations
+/// with `D = I - posterior`, over the combinations that pixels tell something of.
 fn chance(correction: &Vec3, covariance: &Mat3, sd: &Vec3) -> f64 {
     let scale = sd.map(|sd| if sd > 0.0 { 1.0 / sd } else { 0.0 });
     let own = |i: usize| if sd[i] > 0.0 { 1.0 } else { 0.0 };

@@ -1,8 +1,9 @@
 //! Where was the target in a view of a camera that is known? From the rays of its marks, linear.
 //!
-//! With the ray `b` of a mark at `X`, `b x (P (X, 1)) = 0` for the 3 x 4 matrix `P ~ [R | t]`: two equations a mark, eleven
-//! unknowns, so six marks that are not in one plane (the direct linear transform of Abdel-Aziz & Karara 1971, with rays in
-//! the place of pixels, so that it needs no pinhole). Marks near a plane have [`locate`].
+//! With the ray `b` of a mark at `X`, `b x (P (X, 1)) = 0` for the 3 x 4 matrix `P ~ [R | t]`: two equations
+//! a mark, eleven unknowns, so six marks that are not in one plane (the direct linear transform of Abdel-Aziz
+//! & Karara 1971, with rays in the place of pixels, so that it needs no pinhole). Marks near a plane have
+//! [`locate`].
 
 use super::data::Data;
 use super::descent::descend;
@@ -98,7 +99,8 @@ fn in_space(data: &Data, view: usize, camera: &Camera<Lens>) -> Option<Pose> {
     let shift = Vec3::new(least[3], least[7], least[11]);
     let along: f64 = rays.iter().map(|(p, ray)| (turn * p + shift).dot(ray)).sum();
     let (turn, shift) = if along < 0.0 { (-turn, -shift) } else { (turn, shift) };
-    // A mirrored target would have a negative determinant; its nearest rotation is a start that leads nowhere.
+    // A mirrored target would have a negative determinant; its nearest rotation is a start that leads
+    // nowhere.
     let svd = turn.svd(true, true);
     let scale = svd.singular_values.sum() / 3.0;
     let rotation = crate::geometry::rotation::nearest(&turn)?;

@@ -1,10 +1,11 @@
-//! Does another camera explain the data nearly as well? The other minima that starts led to, with the marks' positions
-//! estimated too.
+//! Does another camera explain the data nearly as well? The other minima that starts led to, with the marks'
+//! positions estimated too.
 
 use super::problem::{Problem, State};
 use crate::calibrate::{LensCalibration, Warning};
 
-/// A minimum whose cost is higher by fewer variances than this is a rival, four standard deviations, as in every calibration.
+/// A minimum whose cost is higher by fewer variances than this is a rival, four standard deviations, as in
+/// every calibration.
 const RIVALS: f64 = 16.0;
 /// A minimum whose parameters all lie within this many standard deviations is the same one.
 const SAME: f64 = 6.0;

@@ -2,13 +2,14 @@
 
 use crate::geometry::{Mat3, Pose, Vec3};
 
-/// Points are a plane's where their extent across it is at most this part of that along its narrower side: what a plane
-/// leaves of such marks, less than a tenth of a pixel on an ordinary image, starts no search wrongly.
+/// Points are a plane's where their extent across it is at most this part of that along its narrower side:
+/// what a plane leaves of such marks, less than a tenth of a pixel on an ordinary image, starts no search
+/// wrongly.
 pub(super) const FLAT: f64 = 1e-3;
 /// And near a plane up to here: a start may take them for flat, and one that does not is tried too.
 pub(super) const NEARLY_FLAT: f64 = 0.05;
-/// Extent along the second axis over that along the first below which points lie on a line; half of the digits are
-/// lost in squares.
+/// Extent along the second axis over that along the first below which points lie on a line; half of the
+/// digits are lost in squares.
 const ON_A_LINE: f64 = 1e-6;
 
 /// How points lie.
@@ -33,7 +34,8 @@ impl Shape {
         let axis = |k: usize| eigen.eigenvectors.column(order[k]).into_owned();
         let (first, second): (Vec3, Vec3) = (axis(0), axis(1));
         let axes = Mat3::from_columns(&[first, second, first.cross(&second)]);
-        // Of a plane the smallest eigenvalue is the rounding of the larger ones; the points themselves are not.
+        // Of a plane the smallest eigenvalue is the rounding of the larger ones; the points themselves are
+        // not.
         let along = |k: usize| {
             let square = points.iter().map(|p| (p - centre).dot(&axes.column(k)));
             (square.map(|x| x * x).sum::<f64>() / count).sqrt()

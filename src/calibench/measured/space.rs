@@ -1,9 +1,11 @@
-//! From where does a target in space start? From the rays of equidistant fisheyes, and from Tsai's answers to single views.
+//! From where does a target in space start? From the rays of equidistant fisheyes, and from Tsai's answers to
+//! single views.
 //!
-//! With a fisheye of some focal length every pixel has a ray, whatever its angle from the axis, and the rays of a view
-//! give its pose (`resection.rs`). The focal length is searched on a grid; the best few are refined with a polynomial of
-//! the angle, which follows any lens, and the wanted model is fitted to what that one sees. The same serves pinholes, which
-//! a polynomial follows too; a few views of Tsai's two stages start from pinholes themselves.
+//! With a fisheye of some focal length every pixel has a ray, whatever its angle from the axis, and the rays
+//! of a view give its pose (`resection.rs`). The focal length is searched on a grid; the best few are refined
+//! with a polynomial of the angle, which follows any lens, and the wanted model is fitted to what that one
+//! sees. The same serves pinholes, which a polynomial follows too; a few views of Tsai's two stages start
+//! from pinholes themselves.
 
 use super::data::Data;
 use super::descent::{Minimum, descend};
@@ -15,7 +17,8 @@ use crate::camera::{Camera, FreeParameters, Lens, Model, Parameter};
 use crate::geometry::Vec2;
 use crate::tsai::{Assumed, SpatialView, two_stage};
 
-/// Angles from the axis, rad, at which the farthest pixel may be seen: 3 to 103 degrees, each 1.3 times the last.
+/// Angles from the axis, rad, at which the farthest pixel may be seen: 3 to 103 degrees, each 1.3 times the
+/// last.
 const NARROWEST: f64 = 0.05;
 const ANGLES: usize = 14;
 const ANGLE_FACTOR: f64 = 1.3;
@@ -134,8 +137,8 @@ fn by_tsai(problem: &Problem<'_>, centre: Vec2, settings: &Settings) -> Vec<Stat
     (0..data.views.len()).filter(spatial).take(OF_TSAI).filter_map(state).collect()
 }
 
-/// What the starts lead to with the marks where they were measured, the best first, each camera once; and how many
-/// starts there were.
+/// What the starts lead to with the marks where they were measured, the best first, each camera once; and how
+/// many starts there were.
 pub(super) fn minima(problem: &Problem<'_>, starts: Vec<State>) -> (Vec<Minimum>, usize) {
     let exact = Problem { moves_marks: false, ..*problem };
     let mut all: Vec<Minimum> = starts.into_iter().filter_map(|state| descend(&exact, state)).collect();
@@ -160,7 +163,8 @@ fn is_same(a: &Camera<Lens>, b: &Camera<Lens>) -> bool {
     a.values().zip(b.values()).all(|((_, a), (_, b))| (a - b).abs() <= SAME * a.abs().max(1.0))
 }
 
-/// Less cost, and where only one of two searches ended in a minimum, so much less that it is not a valley without end.
+/// Less cost, and where only one of two searches ended in a minimum, so much less that it is not a valley
+/// without end.
 pub(super) fn is_better(next: &Minimum, best: &Minimum) -> bool {
     let ends = |m: &Minimum| m.termination == Termination::Converged;
     let (a, b) = (next.equations.cost, best.equations.cost);

@@ -1,4 +1,5 @@
-//! Is the camera from a measured target right, and is its covariance? Exact data, many trials, invariances, hostile input.
+//! Is the camera from a measured target right, and is its covariance? Exact data, many trials, invariances,
+//! hostile input.
 
 use super::*;
 use crate::board::View;
@@ -259,7 +260,8 @@ fn the_covariance_counts_the_errors_of_the_marks_and_without_them_is_far_too_sma
     assert!(ignored > 1.5 * high, "marks taken for exact: {ignored}");
     // What the command's page states of these trials.
     assert!((right - 5.95).abs() < 0.01 && (ignored - 15.3).abs() < 0.1, "{right} {ignored}");
-    // At a rate of 1 in 100 of 200 trials more than 10 are one in 10^4 (binomial); half of all p-values are below a half.
+    // At a rate of 1 in 100 of 200 trials more than 10 are one in 10^4 (binomial); half of all p-values are
+    // below a half.
     assert!(TRIALS - believed <= 10 && flagged <= 10, "{believed} believed, {flagged} flagged");
     assert!((72..=128).contains(&p_below_half), "{p_below_half} of {TRIALS}");
 }
@@ -275,7 +277,8 @@ fn the_noise_that_is_estimated_beside_the_marks_is_unbiased() {
         mean += variance / (SIGMA_PX * SIGMA_PX) / TRIALS as f64;
         nees_sum += nees(&found, &scene.camera) / TRIALS as f64;
     }
-    // Some 120 degrees of freedom: a variance is known to a part sqrt(2 / 120), its mean over 200 trials to 0.9 %.
+    // Some 120 degrees of freedom: a variance is known to a part sqrt(2 / 120), its mean over 200 trials to
+    // 0.9 %.
     assert!((mean - 1.0).abs() < 4.0 * 0.0092, "{mean}");
     let (low, high) = mean_of_chi_squared(6);
     // Estimated with 120 degrees of freedom, F in the place of chi-squared is larger by 2 / 120.
@@ -295,7 +298,8 @@ fn a_bumped_mark_is_named_and_deviations_that_were_stated_too_small_are_not_beli
     let found = calibrate_measured(&bumped, &views, &scene.settings(), known).unwrap();
     let named: Vec<&str> = found.beyond_expectation().iter().map(|mark| mark.id.as_str()).collect();
     assert_eq!(named, ["m7"]);
-    // What pixels tell of it takes so much of the bump back: the correction's expectation is -(I - posterior / sd^2) bump.
+    // What pixels tell of it takes so much of the bump back: the correction's expectation is -(I - posterior
+    // / sd^2) bump.
     let mark = &found.marks[7];
     let taken = -(bump - mark.covariance * bump / (0.02 * 0.02));
     for axis in 0..3 {

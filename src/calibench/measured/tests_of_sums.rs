@@ -5,7 +5,8 @@ use crate::distribution::ChiSquare;
 /// Rate at which a test that says "not so" is wrong.
 pub const FALSE_ALARM: f64 = 0.01;
 
-/// First two moments of a sum `sum lambda_j z_j^2` of standard normal `z_j`: `sum lambda`, and `sum lambda^2`.
+/// First two moments of a sum `sum lambda_j z_j^2` of standard normal `z_j`: `sum lambda`, and `sum
+/// lambda^2`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Moments {
     pub sum: f64,
@@ -14,10 +15,11 @@ pub(super) struct Moments {
 
 /// A sum of squares against its expectation.
 ///
-/// Under what is stated the sum is one of independent squares with weights between 0 and 1: marks that pixels say little
-/// of keep to where they were measured. Its mean `E = sum lambda` and variance `2 sum lambda^2` are known from the
-/// covariance, and a chi-squared variable with `E^2 / sum lambda^2` degrees of freedom, scaled to the same mean, has both
-/// (Satterthwaite 1946). The test looks at both ends: sums may be too small as well.
+/// Under what is stated the sum is one of independent squares with weights between 0 and 1: marks that pixels
+/// say little of keep to where they were measured. Its mean `E = sum lambda` and variance `2 sum lambda^2`
+/// are known from the covariance, and a chi-squared variable with `E^2 / sum lambda^2` degrees of freedom,
+/// scaled to the same mean, has both (Satterthwaite 1946). The test looks at both ends: sums may be too small
+/// as well.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]

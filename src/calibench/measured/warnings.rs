@@ -1,5 +1,5 @@
-//! What should a user know before trusting a calibration from a measured target? The warnings of every calibration that
-//! apply to it, under the same conditions; those of the marks stand in the result itself.
+//! What should a user know before trusting a calibration from a measured target? The warnings of every
+//! calibration that apply to it, under the same conditions; those of the marks stand in the result itself.
 
 use super::MeasuredView;
 use crate::calibrate::{LensCalibration, Outliers, Prior, Termination, Warning};
@@ -42,8 +42,8 @@ pub(super) fn of(
     warnings
 }
 
-/// Marks in single views that no noise explains: the squared residual over the variance of a coordinate is exponential
-/// with mean 2.
+/// Marks in single views that no noise explains: the squared residual over the variance of a coordinate is
+/// exponential with mean 2.
 fn outliers(calibration: &LensCalibration, views: &[MeasuredView], variance: f64) -> Option<Warning> {
     let count = calibration.points() as f64;
     let bound = 2.0 * (LOG_STRAY + libm::log(count)) * variance;

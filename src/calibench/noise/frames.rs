@@ -5,8 +5,8 @@ use crate::board::View;
 use crate::geometry::Vec2;
 use std::collections::BTreeMap;
 
-/// How far a mark may lie from where the first frame has it, as part of the distance to its nearest neighbour.
-/// Beyond half it may be the neighbour.
+/// How far a mark may lie from where the first frame has it, as part of the distance to its nearest
+/// neighbour. Beyond half it may be the neighbour.
 const LARGEST_MOVE: f64 = 0.25;
 
 /// Marks whose distance on the target exceeds the least by no more than this are neighbours too.
@@ -146,8 +146,8 @@ impl Deviations {
         self.frames.len() - 1
     }
 
-    /// `n - 1` contrasts of the frames, `z_k = (e_1 + ... + e_k - k e_(k + 1)) / sqrt(k (k + 1))` (Helmert): independent where
-    /// the frames are, with the frames' sums of squares and products.
+    /// `n - 1` contrasts of the frames, `z_k = (e_1 + ... + e_k - k e_(k + 1)) / sqrt(k (k + 1))` (Helmert):
+    /// independent where the frames are, with the frames' sums of squares and products.
     pub fn contrasts(&self) -> Vec<Vec<Vec2>> {
         let mut sum = vec![Vec2::zeros(); self.marks()];
         let mut contrasts = Vec::new();

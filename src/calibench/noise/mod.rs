@@ -1,18 +1,19 @@
-//! How much do the marks of a board scatter that nobody touches? The noise of extraction, measured from repeated
-//! photographs, with no camera in it.
+//! How much do the marks of a board scatter that nobody touches? The noise of extraction, measured from
+//! repeated photographs, with no camera in it.
 //!
 //! ```text
 //! e_ti = p_ti - mean over t of p_ti        mark i of m, frame t of n
 //! ```
-//! Whatever lens and target are, `e` is noise, and what moved between the frames. What moved as a whole is one of
-//! eight fields, those by which the image of a plane can change (`motion.rs`); a calibration's poses take it up. So
-//! everything is stated twice: as it was seen, and within the frames, the eight fields taken off. The second is the
-//! noise that a calibration meets.
+//! Whatever lens and target are, `e` is noise, and what moved between the frames. What moved as a whole is
+//! one of eight fields, those by which the image of a plane can change (`motion.rs`); a calibration's poses
+//! take it up. So everything is stated twice: as it was seen, and within the frames, the eight fields taken
+//! off. The second is the noise that a calibration meets.
 //!
-//! A variance has its interval from chi-squared with as many degrees of freedom as there are independent numbers:
-//! `(n - 1) M`, with `M` between 1 and the number of coordinates estimated from the data too (`scatter.rs`). The
-//! correlations take the frames for independent repetitions, and the correlation of a frame with the next asks
-//! whether they are. `still.rs` tests for motion, drift and marks that follow the light.
+//! A variance has its interval from chi-squared with as many degrees of freedom as there are independent
+//! numbers: `(n - 1) M`, with `M` between 1 and the number of coordinates estimated from the data too
+//! (`scatter.rs`). The correlations take the frames for independent repetitions, and the correlation of a
+//! frame with the next asks whether they are. `still.rs` tests for motion, drift and marks that follow the
+//! light.
 
 mod frames;
 mod motion;
@@ -106,7 +107,8 @@ pub struct MarkNoise {
     pub sigma_px: Vec2,
     /// Correlation of u and v.
     pub correlation_uv: f64,
-    /// Chance that one of all marks scatters so much more than the others, if all have the same noise (Bonferroni).
+    /// Chance that one of all marks scatters so much more than the others, if all have the same noise
+    /// (Bonferroni).
     pub p_value: f64,
 }
 
@@ -147,10 +149,11 @@ impl ExtractionNoise {
     }
 }
 
-/// The noise of extraction from photographs of a board that nobody touched, in the order in which they were taken.
+/// The noise of extraction from photographs of a board that nobody touched, in the order in which they were
+/// taken.
 ///
-/// `light` has a measure of each frame's light in any unit, for a test whether marks follow it; `false_alarm` is the
-/// rate of each test.
+/// `light` has a measure of each frame's light in any unit, for a test whether marks follow it; `false_alarm`
+/// is the rate of each test.
 ///
 /// # Errors
 /// See [`NoiseError`].

@@ -1,14 +1,14 @@
-//! What of the deviations did the board do as a whole? The part that lies in the eight fields by which the image
-//! of a plane can change.
+//! What of the deviations did the board do as a whole? The part that lies in the eight fields by which the
+//! image of a plane can change.
 //!
 //! A homography next to the identity moves a place `(x, y)` of the image by a combination of
 //!
 //! ```text
 //! (1, 0)  (0, 1)  (x, 0)  (y, 0)  (0, x)  (0, y)  (x^2, x y)  (x y, y^2)
 //! ```
-//! A board or camera that moves by a little moves the marks so, whatever the lens but for its own bending of these
-//! fields, which is of second order. The fields at the marks, made orthonormal, are `Q`; `Q Q^T e` is motion, the rest
-//! noise. Of white noise the fields take `8` of the `2 m` coordinates.
+//! A board or camera that moves by a little moves the marks so, whatever the lens but for its own bending of
+//! these fields, which is of second order. The fields at the marks, made orthonormal, are `Q`; `Q Q^T e` is
+//! motion, the rest noise. Of white noise the fields take `8` of the `2 m` coordinates.
 
 use super::frames::Deviations;
 use crate::geometry::Vec2;

@@ -104,10 +104,10 @@ pub fn factors(freedom: f64) -> (f64, f64) {
     (at(0.5 * (1.0 + COVERAGE)), at(0.5 * (1.0 - COVERAGE)))
 }
 
-/// How many independent coordinates have the variance of the sum of squares that these have: `M = (tr S)^2 / tr S^2`
-/// (Satterthwaite 1946), `S` the covariance of the coordinates, both parts estimated without bias from its sample
-/// (Srivastava 2005): `tr S^2 = v^2 / ((v - 1)(v + 2)) (tr C^2 - (tr C)^2 / v)` of `v = n - 1` degrees of freedom.
-/// Two frames cannot tell, and are taken for white.
+/// How many independent coordinates have the variance of the sum of squares that these have: `M = (tr S)^2 /
+/// tr S^2` (Satterthwaite 1946), `S` the covariance of the coordinates, both parts estimated without bias
+/// from its sample (Srivastava 2005): `tr S^2 = v^2 / ((v - 1)(v + 2)) (tr C^2 - (tr C)^2 / v)` of `v = n -
+/// 1` degrees of freedom. Two frames cannot tell, and are taken for white.
 fn independent(frames: &[Vec<f64>], coordinates: f64) -> f64 {
     let v = (frames.len() - 1) as f64;
     if v < 2.0 {
@@ -121,8 +121,8 @@ fn independent(frames: &[Vec<f64>], coordinates: f64) -> f64 {
     if trace_of_square > 0.0 { estimate.clamp(1.0, coordinates) } else { coordinates }
 }
 
-/// Sum of the squared products of all frames with each other, or, where there are more frames than coordinates, of
-/// all coordinates: it is the same.
+/// Sum of the squared products of all frames with each other, or, where there are more frames than
+/// coordinates, of all coordinates: it is the same.
 fn square_of_gram(frames: &[Vec<f64>]) -> f64 {
     let coordinates = frames[0].len();
     if frames.len() > coordinates {
@@ -142,9 +142,9 @@ fn products(rows: &[Vec<f64>]) -> f64 {
     sum
 }
 
-/// A ratio of sums over independent contrasts of the frames: `r = sum a / sum b`, of variance `k / (k - 1) sum (a - r b)^2
-/// / (sum b)^2` of `k` contrasts (Cochran 1977, section 2.11), Student's with `k - 1` degrees of freedom. `white` is
-/// what white noise has, and is taken off.
+/// A ratio of sums over independent contrasts of the frames: `r = sum a / sum b`, of variance `k / (k - 1)
+/// sum (a - r b)^2 / (sum b)^2` of `k` contrasts (Cochran 1977, section 2.11), Student's with `k - 1` degrees
+/// of freedom. `white` is what white noise has, and is taken off.
 fn ratio(a: &[f64], b: &[f64], white: f64) -> Option<Correlation> {
     let (k, sum) = (a.len() as f64, b.iter().sum::<f64>());
     if k < 2.0 {
@@ -187,9 +187,9 @@ fn neighbours(contrasts: &[Vec<Vec2>], taken: &Motion, pairs: &[[usize; 2]]) -> 
     ratio(&product, &size, covariance / variance)
 }
 
-/// Correlation with the next frame by squared differences, which the mean does not enter: `C = 1 - sum (e_t+1 - e_t)^2
-/// / (2 sum e_t^2)`, 0 for white noise, of variance `(n - 2) / ((n - 1)(n + 1))` a coordinate (von Neumann 1941, Young
-/// 1941).
+/// Correlation with the next frame by squared differences, which the mean does not enter:
+/// `C = 1 - sum (e_t+1 - e_t)^2 / (2 sum e_t^2)`, 0 for white noise, of variance `(n - 2) / ((n - 1)(n + 1))` a
+/// coordinate (von Neumann 1941, Young 1941).
 fn next_frame(frames: &[Vec<f64>], independent: f64) -> Option<Correlation> {
     let n = frames.len() as f64;
     if n < 3.0 {
@@ -209,8 +209,9 @@ fn next_frame(frames: &[Vec<f64>], independent: f64) -> Option<Correlation> {
     })
 }
 
-/// The correlation with the next frame that shows as `apparent` where it falls by the same factor `r` with every
-/// frame: squares about a mean of `n` are then `1 - 2 / (n - 1) sum (1 - k / n) r^k` of what they should be.
+/// The correlation with the next frame that shows as `apparent` where it falls by the same factor `r` with
+/// every frame: squares about a mean of `n` are then `1 - 2 / (n - 1) sum (1 - k / n) r^k` of what they
+/// should be.
 fn fading(apparent: f64, n: usize) -> f64 {
     let shows = |r: f64| {
         let (mut power, mut sum) = (1.0, 0.0);
@@ -236,8 +237,9 @@ fn fading(apparent: f64, n: usize) -> f64 {
 /// Most frames that are counted on: more than anybody takes.
 const MOST_FRAMES: usize = 1 << 30;
 
-/// Frames after which the interval of a standard deviation lies within `precision` of the estimate on both sides, of
-/// so many independent coordinates a frame; `2^30` where no number of frames that anybody takes is enough.
+/// Frames after which the interval of a standard deviation lies within `precision` of the estimate on both
+/// sides, of so many independent coordinates a frame; `2^30` where no number of frames that anybody takes is
+/// enough.
 ///
 /// ```
 /// // One coordinate alone to 10 %: 234 frames; 118 of them together: 3.
@@ -268,15 +270,16 @@ mod tests {
 
     #[test]
     fn a_fading_correlation_is_found_behind_what_shows() {
-        // By hand, n = 3, r = 1/2: squares about the mean are 1 - (2/3 r + 1/3 r^2) = 7/12 of what they should be, so
-        // that 1 - (1/2) / (7/12) = 1/7 shows.
+        // By hand, n = 3, r = 1/2: squares about the mean are 1 - (2/3 r + 1/3 r^2) = 7/12 of what they
+        // should be, so that 1 - (1/2) / (7/12) = 1/7 shows.
         assert!((fading(1.0 / 7.0, 3) - 0.5).abs() < 1e-9);
         assert!(fading(0.0, 12).abs() < 1e-9);
     }
 
     #[test]
     fn equal_and_single_coordinates_count_as_what_they_are() {
-        // Hadamard's columns are orthogonal: frames of three coordinates that have nothing in common, and of one thrice.
+        // Hadamard's columns are orthogonal: frames of three coordinates that have nothing in common, and of
+        // one thrice.
         let signs = [[1.0, 1.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0], [-1.0, -1.0, 1.0]];
         let white: Vec<Vec<f64>> = signs.iter().map(|s| s.to_vec()).collect();
         let equal: Vec<Vec<f64>> = signs.iter().map(|s| vec![s[0]; 3]).collect();

@@ -1,9 +1,10 @@
 //! Did anything but noise change? Four questions, each an F test against the scatter within the frames.
 //!
-//! Of white noise the squares in any `k` directions are `sigma^2` times chi-squared of `k` degrees of freedom, so
-//! that their ratio to the squares in other directions is Fisher's. Directions are the eight fields of a motion in
-//! space, and in time one sequence that is asked for, such as the frames' numbers: `|sum_t x_t e_t|^2 / sum x_t^2` is
-//! what follows `x`. Noise that neighbouring marks have in common looks like motion, and is told as such.
+//! Of white noise the squares in any `k` directions are `sigma^2` times chi-squared of `k` degrees of
+//! freedom, so that their ratio to the squares in other directions is Fisher's. Directions are the eight
+//! fields of a motion in space, and in time one sequence that is asked for, such as the frames' numbers:
+//! `|sum_t x_t e_t|^2 / sum x_t^2` is what follows `x`. Noise that neighbouring marks have in common looks
+//! like motion, and is told as such.
 
 use super::frames::Deviations;
 use super::motion::Motion;
@@ -36,7 +37,8 @@ pub struct Stillness {
     pub bending: Option<Test>,
     /// Do they move against each other with the light? `None` where it is not known or never changes.
     pub light: Option<Test>,
-    /// Mean shift of the marks from the first frame to the last by the straight line in time that fits best, px.
+    /// Mean shift of the marks from the first frame to the last by the straight line in time that fits best,
+    /// px.
     pub drift_px: Vec2,
     /// Rate of false alarms of each test.
     pub false_alarm: f64,

@@ -21,7 +21,8 @@ pub enum MarkKind {
     Chess,
     /// A dense grid of discs, at least 4 on a side.
     Circles,
-    /// Discs in staggered rows, as OpenCV's asymmetric grid has them: the marks of a row two spacings apart, rows one.
+    /// Discs in staggered rows, as OpenCV's asymmetric grid has them: the marks of a row two spacings apart,
+    /// rows one.
     Asymmetric,
     /// Discs in staggered rows, each with six neighbours at one spacing.
     Hexagonal,
@@ -266,8 +267,8 @@ impl fmt::Display for BoardSpec {
 }
 
 impl BoardSpec {
-    /// The board; discs of unknown diameter count as points. Of tags it has as many marks, all at their mean distance:
-    /// where they are, [`BoardSpec::points`] says.
+    /// The board; discs of unknown diameter count as points. Of tags it has as many marks, all at their mean
+    /// distance: where they are, [`BoardSpec::points`] says.
     pub fn board(&self) -> &Board {
         &self.board
     }
@@ -277,8 +278,8 @@ impl BoardSpec {
         self.coded.map_or_else(|| self.board.points(), |coded| coded.points(&self.board))
     }
 
-    /// What is black on a board with markers, as upright rectangles of which no two overlap, each by its corners of least
-    /// and of greatest coordinates; `None` for other boards.
+    /// What is black on a board with markers, as upright rectangles of which no two overlap, each by its
+    /// corners of least and of greatest coordinates; `None` for other boards.
     pub fn dark(&self) -> Option<Vec<[Vec2; 2]>> {
         self.coded.map(|coded| coded.dark(&self.board))
     }
@@ -358,10 +359,11 @@ impl BoardSpec {
         }
     }
 
-    /// The marks that are seen in a photograph. Of a board with markers they are those that are seen, wherever on the board
-    /// ([`seen_charuco`](crate::detect::seen_charuco)). Of a chessboard or a dense grid of discs some may be hidden, outside of the
-    /// image or in glare, where it is certain which ([`seen_chessboard`], [`seen_circle_grid_of`], [`seen_staggered_grid_of`]); a
-    /// few dots must all be there.
+    /// The marks that are seen in a photograph. Of a board with markers they are those that are seen,
+    /// wherever on the board ([`seen_charuco`](crate::detect::seen_charuco)). Of a chessboard or a dense grid
+    /// of discs some may be hidden, outside of the image or in glare, where it is certain which
+    /// ([`seen_chessboard`], [`seen_circle_grid_of`], [`seen_staggered_grid_of`]); a few dots must all be
+    /// there.
     ///
     /// # Errors
     /// See [`DetectError`].

@@ -1,12 +1,12 @@
-//! How large is a board that was printed? The file that goes with a page: the board as it was drawn, and how long the
-//! page's two rulers came out.
+//! How large is a board that was printed? The file that goes with a page: the board as it was drawn, and how
+//! long the page's two rulers came out.
 
 use super::board::{BoardSpec, BoardSpecError};
 use serde::Deserialize;
 
-/// Largest accepted difference of the page's two scales, as a fraction. A ruler of 150 mm is read to half a millimetre,
-/// which is a third of a per cent, and two readings differ by half of one at most; a printer that stretches more than that
-/// makes another board.
+/// Largest accepted difference of the page's two scales, as a fraction. A ruler of 150 mm is read to half a
+/// millimetre, which is a third of a per cent, and two readings differ by half of one at most; a printer that
+/// stretches more than that makes another board.
 const MOST_STRETCH: f64 = 0.005;
 
 /// Scales of a page that can be meant. Whoever writes centimetres, or inches, is beyond.
@@ -69,7 +69,8 @@ struct File {
     measured_mm: [f64; 2],
 }
 
-/// The board of a file as it came out of the printer: the drawn one, scaled by the mean of what both rulers tell.
+/// The board of a file as it came out of the printer: the drawn one, scaled by the mean of what both rulers
+/// tell.
 ///
 /// # Errors
 /// See [`BoardFileError`].

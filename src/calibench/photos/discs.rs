@@ -19,8 +19,9 @@ pub struct NotFound {
 }
 
 /// The discs of a photograph in the order that `order` gives them. Dark ones are tried first, then bright
-/// ones; where neither makes the board, both are searched for once more, harder ([`searched_blobs`]), unless another complete
-/// board of as many discs was seen: a harder look that then finds the board has lost a row of the other.
+/// ones; where neither makes the board, both are searched for once more, harder ([`searched_blobs`]), unless
+/// another complete board of as many discs was seen: a harder look that then finds the board has lost a row
+/// of the other.
 ///
 /// # Errors
 /// Neither makes the board: the reason of whichever kind has more discs.
@@ -35,7 +36,8 @@ pub fn ordered_discs<Ordered>(
     }
 }
 
-/// A board that was found, unless more of it stands beyond a side ([`refuse_larger`]); `period` is 1 or, where rows are staggered, 2.
+/// A board that was found, unless more of it stands beyond a side ([`refuse_larger`]); `period` is 1 or,
+/// where rows are staggered, 2.
 ///
 /// # Errors
 /// It goes on.

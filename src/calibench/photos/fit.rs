@@ -223,7 +223,8 @@ fn biases_at(camera: &Camera<Lens>, pose: &Pose, board: &Board) -> Option<Vec<Ve
     }
 }
 
-/// Of the values of a board's marks those of the marks in a view; `None` if one of them is none of the board's.
+/// Of the values of a board's marks those of the marks in a view; `None` if one of them is none of the
+/// board's.
 fn of_marks(view: &View, board: &Board, all: Vec<Vec2>) -> Option<Vec<Vec2>> {
     let points = board.points();
     if view.points() == points {
@@ -233,8 +234,8 @@ fn of_marks(view: &View, board: &Board, all: Vec<Vec2>) -> Option<Vec<Vec2>> {
     view.points().iter().map(value).collect()
 }
 
-/// A view of discs without the bias that a known camera predicts for them at the pose that it finds, in turns until
-/// that settles; `None` where the camera does not find the board.
+/// A view of discs without the bias that a known camera predicts for them at the pose that it finds, in turns
+/// until that settles; `None` where the camera does not find the board.
 ///
 /// ```
 /// use calibench::board::View;

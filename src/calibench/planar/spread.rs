@@ -66,8 +66,9 @@ mod tests {
 
     #[test]
     fn a_point_is_as_uncertain_as_a_regression_on_a_grid_says() {
-        // Nine marks 200 px apart. A slope rests on the squares of one coordinate in an affine map, 6 * 200^2 about
-        // the centroid, and of both in a similarity; at an offset d the variance of X and of Y is sigma^2 (1 / 9 +
+        // Nine marks 200 px apart. A slope rests on the squares of one coordinate in an affine map, 6 * 200^2
+        // about the centroid, and of both in a similarity; at an offset d the variance of X and of Y is
+        // sigma^2 (1 / 9 +
         // |d|^2 / sum of squares), and the two are not correlated.
         let pixels: Vec<Vec2> =
             (0..9).map(|i| Vec2::new(f64::from(i % 3), f64::from(i / 3)) * 200.0).collect();

@@ -1,5 +1,5 @@
-//! Where can the board be held? Every pose of a grid over the image, the distance, the tilt and the turn, at which each
-//! mark is seen.
+//! Where can the board be held? Every pose of a grid over the image, the distance, the tilt and the turn, at
+//! which each mark is seen.
 
 use crate::camera::{Camera, Imaging, Lens};
 use crate::geometry::{Mat3, Pose, Vec2, Vec3, rotation};
@@ -71,8 +71,9 @@ const MOST_MARKS: usize = 200_000_000;
 /// A plane that is seen more flatly than this, rad from its face, shows marks that nobody finds.
 const FLATTEST: f64 = 80.0 * PI / 180.0;
 
-/// How many times as far from the axis, as an angle, the lens has to be one-to-one as a mark is seen: near the angle at which
-/// it folds back nothing was calibrated, and the smallest error of the camera takes the mark beyond it.
+/// How many times as far from the axis, as an angle, the lens has to be one-to-one as a mark is seen: near
+/// the angle at which it folds back nothing was calibrated, and the smallest error of the camera takes the
+/// mark beyond it.
 const FOLD_MARGIN: f64 = 1.1;
 
 /// A pose of the board that can be reached.
@@ -134,8 +135,8 @@ impl Reach {
         Ok(())
     }
 
-    /// Every pose of the grid, in its order, at which each mark is seen where the lens is one-to-one to a tenth further out,
-    /// inside of the image's margin and not too flatly; with how many were tried.
+    /// Every pose of the grid, in its order, at which each mark is seen where the lens is one-to-one to a
+    /// tenth further out, inside of the image's margin and not too flatly; with how many were tried.
     ///
     /// # Errors
     /// [`ReachError`].
@@ -189,8 +190,8 @@ impl Reach {
         })
     }
 
-    /// Rotations of a board on the optical axis: its turn, then its tilt; with its steps and their angles. What faces the
-    /// camera is tilted in no direction.
+    /// Rotations of a board on the optical axis: its turn, then its tilt; with its steps and their angles.
+    /// What faces the camera is tilted in no direction.
     fn rotations(&self) -> impl Iterator<Item = (Mat3, [usize; 3], f64, f64, f64)> + '_ {
         let directions = |tilt: f64| if tilt == 0.0 { 1 } else { self.directions };
         self.tilts_rad.iter().enumerate().flat_map(move |(i, &tilt)| {

@@ -9,8 +9,8 @@ pub struct Knowledge {
     /// What was estimated.
     pub estimated: Estimated,
     covariance: DMatrix<f64>,
-    /// Standard deviations: each parameter is counted in its own, since pixels and coefficients of a lens are of sizes that
-    /// lie many powers of ten apart.
+    /// Standard deviations: each parameter is counted in its own, since pixels and coefficients of a lens are
+    /// of sizes that lie many powers of ten apart.
     unit: DVector<f64>,
     /// Inverse of the correlations.
     information: DMatrix<f64>,
@@ -68,7 +68,8 @@ impl Knowledge {
         &self.covariance
     }
 
-    /// The covariance `(P^-1 + S)^-1` with the information `S` of one more view; `None` if rounding leaves none.
+    /// The covariance `(P^-1 + S)^-1` with the information `S` of one more view; `None` if rounding leaves
+    /// none.
     pub fn after(&self, information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let n = self.unit.len();
         let pair = |i: usize, j: usize| self.unit[i] * self.unit[j];

@@ -24,8 +24,8 @@ impl Estimated {
         self.free.is_empty()
     }
 
-    /// The derivatives by the estimated parameters, 2 x n, from those by all: to that of fx an fy that is tied to it adds
-    /// its share.
+    /// The derivatives by the estimated parameters, 2 x n, from those by all: to that of fx an fy that is
+    /// tied to it adds its share.
     pub(super) fn columns(&self, by_parameters: &[(Parameter, Vec2)]) -> Matrix2xX<f64> {
         let slope = |parameter: Parameter| {
             by_parameters.iter().find(|(p, _)| *p == parameter).map_or(Vec2::zeros(), |(_, slope)| *slope)
@@ -42,17 +42,18 @@ impl Estimated {
     }
 }
 
-/// A smaller part of an unknown's information than this is rounding, of which marks on a line leave some 1e-16: a board that faces
-/// the camera from n times its size tells tilt from shift by about the part 1 / n^2, far more.
+/// A smaller part of an unknown's information than this is rounding, of which marks on a line leave some
+/// 1e-16: a board that faces the camera from n times its size tells tilt from shift by about the part 1 /
+/// n^2, far more.
 const SINGULAR: f64 = 1e-12;
 
-/// The information of a view about the estimated parameters, n x n, in units of their inverse squares: `S = (A - B C^-1
-/// B^T) / sigma^2`, with `A = sum J^T J` over the marks' derivatives by the parameters, `C` the same by the six numbers
-/// of the view's pose and `B` the products of both. The pose is eliminated (Schur complement): what the view says of
-/// the camera is what no other pose explains.
+/// The information of a view about the estimated parameters, n x n, in units of their inverse squares: `S =
+/// (A - B C^-1 B^T) / sigma^2`, with `A = sum J^T J` over the marks' derivatives by the parameters, `C` the
+/// same by the six numbers of the view's pose and `B` the products of both. The pose is eliminated (Schur
+/// complement): what the view says of the camera is what no other pose explains.
 ///
-/// `points` are the marks of the target, Z = 0, in the unit of the pose. `None` where a mark has no image, or the marks
-/// do not determine the pose.
+/// `points` are the marks of the target, Z = 0, in the unit of the pose. `None` where a mark has no image, or
+/// the marks do not determine the pose.
 pub fn view_information(
     camera: &Camera<Lens>,
     estimated: &Estimated,
@@ -75,7 +76,8 @@ pub fn view_information(
     information.iter().all(|x| x.is_finite()).then_some(information)
 }
 
-/// The information of a view about its own pose, the camera known: `C / sigma^2`. `None` where a mark has no image.
+/// The information of a view about its own pose, the camera known: `C / sigma^2`. `None` where a mark has no
+/// image.
 pub(super) fn pose_information(
     camera: &Camera<Lens>,
     cam_from_target: &Pose,
@@ -86,8 +88,8 @@ pub(super) fn pose_information(
     Some(ViewBlocks::of(camera, &nothing, cam_from_target, points)?.c / (sigma_px * sigma_px))
 }
 
-/// The sums `J^T J` of a view over its marks, for unit noise: what it says of the camera, of its own pose, and of both together. A step of the
-/// pose is `R <- exp(delta) R`, `t <- t + step`.
+/// The sums `J^T J` of a view over its marks, for unit noise: what it says of the camera, of its own pose,
+/// and of both together. A step of the pose is `R <- exp(delta) R`, `t <- t + step`.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct ViewBlocks {

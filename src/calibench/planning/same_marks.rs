@@ -1,13 +1,15 @@
-//! Are these the marks that were photographed? A wrong board, unit or origin makes every plan wrong without a word.
+//! Are these the marks that were photographed? A wrong board, unit or origin makes every plan wrong without a
+//! word.
 
 use super::information::pose_information;
 use crate::calibrate::Covariance;
 use crate::camera::{Camera, Lens};
 use crate::geometry::{Pose, Vec2};
 
-/// How many times the standard deviation of a number of the pose of `view`, the camera known, is that which these marks
-/// give, or the other way round: the largest of the six, 1 where they are the marks that the covariance rests on. `None`
-/// where the covariance has no such view, a mark has no image, or one of both determines no pose.
+/// How many times the standard deviation of a number of the pose of `view`, the camera known, is that which
+/// these marks give, or the other way round: the largest of the six, 1 where they are the marks that the
+/// covariance rests on. `None` where the covariance has no such view, a mark has no image, or one of both
+/// determines no pose.
 pub fn marks_against_covariance(
     camera: &Camera<Lens>,
     covariance: &Covariance,

@@ -29,7 +29,8 @@ pub struct Found {
     pub reachable: usize,
 }
 
-/// What a view of these marks at this pose does for every wish; `None` where a mark has no image, or rounding leaves nothing.
+/// What a view of these marks at this pose does for every wish; `None` where a mark has no image, or rounding
+/// leaves nothing.
 pub(super) fn gains(
     camera: &Camera<Lens>,
     knowledge: &Knowledge,
@@ -46,15 +47,16 @@ pub(super) fn gains(
     Some(wishes.iter().map(gain).collect())
 }
 
-/// What remains of all wishes together: the logarithm of the product of the parts of their standard deviations, so that
-/// none counts more for its unit.
+/// What remains of all wishes together: the logarithm of the product of the parts of their standard
+/// deviations, so that none counts more for its unit.
 pub(super) fn remains(gains: &[Gain]) -> f64 {
     gains.iter().map(|gain| libm::log(gain.ratio())).sum()
 }
 
-/// The poses of the board whose photograph lowers the standard deviations of what is wanted most, the best first, `most` of
-/// them: every pose of the grid that shows all marks is tried. Of several wishes the product of what remains of each counts.
-/// `marks` are the target's points, Z = 0, and the standard deviation of a pixel coordinate, px.
+/// The poses of the board whose photograph lowers the standard deviations of what is wanted most, the best
+/// first, `most` of them: every pose of the grid that shows all marks is tried. Of several wishes the product
+/// of what remains of each counts. `marks` are the target's points, Z = 0, and the standard deviation of a
+/// pixel coordinate, px.
 ///
 /// # Errors
 /// [`ReachError`].
@@ -118,8 +120,8 @@ pub fn next_pose(
     Ok(Found { ranked: chosen, tried, reachable })
 }
 
-/// The best of views that exist, taken once more: its place among the poses, and what it does; `None` where none shows
-/// these marks.
+/// The best of views that exist, taken once more: its place among the poses, and what it does; `None` where
+/// none shows these marks.
 ///
 /// [`next_pose`] has an example of all but the last argument: the poses of the views that exist.
 pub fn best_repeated(

@@ -1,4 +1,5 @@
-//! Does a photograph do what was said of it? The view is really added: to the Cramer-Rao bound, and to a calibration.
+//! Does a photograph do what was said of it? The view is really added: to the Cramer-Rao bound, and to a
+//! calibration.
 
 use super::*;
 use crate::board::View;
@@ -99,8 +100,9 @@ fn the_best_pose_is_the_best_of_all_bounds_and_better_than_any_view_again() {
     assert!((again[0].after / with - 1.0).abs() < 1e-9 && again[0].after > best);
 }
 
-/// A view without noise before the camera that was estimated leaves the estimate where it is, so that the covariance of the
-/// calibration with it, for the same noise, is the one that was said: also with fy tied to fx and a prior.
+/// A view without noise before the camera that was estimated leaves the estimate where it is, so that the
+/// covariance of the calibration with it, for the same noise, is the one that was said: also with fy tied to
+/// fx and a prior.
 #[test]
 fn a_calibration_with_the_view_is_as_sure_as_was_said() {
     let truth = Truth::example();
@@ -246,7 +248,8 @@ fn every_pose_shows_the_board_as_it_says() {
         // Its normal against the line of sight.
         let cos = pose.rotation.column(2).dot(&middle.normalize());
         assert!((libm::acos(cos.min(1.0)) - c.tilt_rad).abs() < 1e-6);
-        // Which side is away: a step in that direction of the image, on the board, leads away from the camera.
+        // Which side is away: a step in that direction of the image, on the board, leads away from the
+        // camera.
         if c.tilt_rad > 0.0 {
             let (sin, cos) = libm::sincos(c.away_rad - c.turn_rad);
             let end = pose.apply(&Vec3::new(40.0 + cos, 30.0 + sin, 0.0));

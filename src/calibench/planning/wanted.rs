@@ -1,5 +1,5 @@
-//! What is to be known better? A parameter, where the image of a direction falls, or a length; each is a quadratic form
-//! of the camera's covariance.
+//! What is to be known better? A parameter, where the image of a direction falls, or a length; each is a
+//! quadratic form of the camera's covariance.
 
 use super::information::Estimated;
 use crate::camera::{Camera, Lens, Parameter};
@@ -12,9 +12,10 @@ use nalgebra::{DMatrix, DVector, Matrix2, Matrix2xX, Matrix3, Matrix3xX};
 pub enum Wanted {
     /// A parameter of the camera.
     Parameter(Parameter),
-    /// The pixel on which a direction falls, over an image of this width and height, px: the root of the mean square of
-    /// its error over the nodes of the frame, the rotation taken out that fits best over all of them, since no
-    /// calibration tells where its camera looks (Kogan 2021, as [`crate::evaluate::frame_difference`]).
+    /// The pixel on which a direction falls, over an image of this width and height, px: the root of the mean
+    /// square of its error over the nodes of the frame, the rotation taken out that fits best over all of
+    /// them, since no calibration tells where its camera looks (Kogan 2021, as
+    /// [`crate::evaluate::frame_difference`]).
     Pixel((usize, usize)),
     /// A length seen between two fixed pixels, in a plane parallel to the image whose distance is known.
     Length {
@@ -35,7 +36,8 @@ impl Wanted {
         }
     }
 
-    /// The unit of its standard deviation: empty for a pure number, and for a length, which has that of the target.
+    /// The unit of its standard deviation: empty for a pure number, and for a length, which has that of the
+    /// target.
     pub fn unit(&self) -> &'static str {
         match self {
             Wanted::Parameter(parameter) => parameter.unit(),
@@ -89,7 +91,8 @@ pub enum WantedError {
 /// Several nodes for each of some twenty parameters and three numbers of a rotation.
 const LEAST_NODES: usize = 50;
 
-/// A wanted quantity of one camera: its variance is `trace(W P)`, with `P` the covariance of the estimated parameters.
+/// A wanted quantity of one camera: its variance is `trace(W P)`, with `P` the covariance of the estimated
+/// parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wish {
     /// What.
@@ -117,8 +120,8 @@ impl Wish {
         }
     }
 
-    /// The standard deviation, `sqrt(trace(W P))`: of the pixel the root mean square over the frame of the distance by
-    /// which it is wrong.
+    /// The standard deviation, `sqrt(trace(W P))`: of the pixel the root mean square over the frame of the
+    /// distance by which it is wrong.
     pub fn standard_deviation(&self, covariance: &DMatrix<f64>) -> f64 {
         self.form.dot(covariance).max(0.0).sqrt()
     }
@@ -134,11 +137,12 @@ fn of_parameter(parameter: Parameter, estimated: &Estimated) -> Result<DMatrix<f
     Ok(DMatrix::from_fn(n, n, |i, j| if (i, j) == (row, row) { factor * factor } else { 0.0 }))
 }
 
-/// The mean square over the nodes of a frame of `size` px by which an error `e` of the estimated parameters moves a pixel is `e^T W e`, px^2:
-/// the matrix `W`.
+/// The mean square over the nodes of a frame of `size` px by which an error `e` of the estimated parameters
+/// moves a pixel is `e^T W e`, px^2: the matrix `W`.
 ///
-/// `W = sum G^T G / N`, with `G = D - R (sum R^T R)^-1 (sum R^T D)` where the best rotation of the camera is taken out, else `G = D`: `D` the
-/// derivatives of the pixel by the parameters, `R` those by a rotation of the camera.
+/// `W = sum G^T G / N`, with `G = D - R (sum R^T R)^-1 (sum R^T D)` where the best rotation of the camera is
+/// taken out, else `G = D`: `D` the derivatives of the pixel by the parameters, `R` those by a rotation of
+/// the camera.
 ///
 /// # Errors
 /// [`WantedError::TooFewNodes`].

@@ -10,11 +10,11 @@ use crate::geometry::{Vec2, Vec3};
 pub enum Projection {
     /// A pinhole: straight lines are straight; `u = fx X / Z + cx`. Sees less than 180 degrees.
     Pinhole,
-    /// An equidistant fisheye: the distance from the principal point is the angle from the axis times the focal
-    /// length.
+    /// An equidistant fisheye: the distance from the principal point is the angle from the axis times the
+    /// focal length.
     Equidistant,
-    /// Longitude along u and latitude along v: `X : Y : Z = sin a cos b : sin b : cos a cos b` with `u = fx a + cx`,
-    /// `v = fy b + cy`.
+    /// Longitude along u and latitude along v: `X : Y : Z = sin a cos b : sin b : cos a cos b` with
+    /// `u = fx a + cx`, `v = fy b + cy`.
     Equirectangular,
 }
 
@@ -34,8 +34,8 @@ impl Projection {
         }
     }
 
-    /// The camera of the output, where it is one that a lens model describes: a pinhole or an equidistant fisheye
-    /// without skew.
+    /// The camera of the output, where it is one that a lens model describes: a pinhole or an equidistant
+    /// fisheye without skew.
     pub fn camera(self, camera: &Camera<Lens>) -> Option<Camera<Lens>> {
         let model = match self {
             Projection::Pinhole => Model::BrownConrady,
@@ -47,8 +47,8 @@ impl Projection {
 }
 
 impl RectifyMap {
-    /// The table that shows a photograph of `size` px through `camera` in another projection, at the same size.
-    /// What lies beyond the angle up to which the lens model is one-to-one has no data.
+    /// The table that shows a photograph of `size` px through `camera` in another projection, at the same
+    /// size. What lies beyond the angle up to which the lens model is one-to-one has no data.
     ///
     /// # Errors
     /// Photographs of fewer than 2 x 2 pixels.

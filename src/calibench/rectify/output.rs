@@ -177,8 +177,8 @@ mod tests {
                 prop_assert!(inside >= -1e-12, "{inside}");
                 nearest = nearest.min(inside);
             }
-            // Tight: the box touches the image but for the allowance between samples, 0.25 * curvature, which is large for an
-            // image as small as this.
+            // Tight: the box touches the image but for the allowance between samples, 0.25 * curvature, which
+            // is large for an image as small as this.
             prop_assert!(nearest < 0.1, "{nearest}");
         }
     }

@@ -1,7 +1,8 @@
-//! How may what is photographed depart from what a calibration assumes? Noise that neighbouring marks share, and a board that is not
-//! flat.
+//! How may what is photographed depart from what a calibration assumes? Noise that neighbouring marks share,
+//! and a board that is not flat.
 //!
-//! It stands apart from [`Scene`], which is the world as it is assumed; the gate and Monte Carlo studies photograph both.
+//! It stands apart from [`Scene`], which is the world as it is assumed; the gate and Monte Carlo studies
+//! photograph both.
 
 use super::{Scene, Stream};
 use crate::board::View;
@@ -11,7 +12,8 @@ use crate::geometry::{Vec2, Vec3};
 /// What of the world a calibration leaves out.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Departure {
-    /// Correlation of the noise from one mark of a grid to the next, along rows and columns, from 0 to below 1; see [`correlate`].
+    /// Correlation of the noise from one mark of a grid to the next, along rows and columns, from 0 to below
+    /// 1; see [`correlate`].
     pub noise_correlation: f64,
     /// By how much the board bulges towards the camera in its middle, in the target's unit; see [`bowed`].
     pub bow: f64,
@@ -23,10 +25,12 @@ impl Departure {
         *self == Departure::default()
     }
 
-    /// The views of a scene in the world as it is, with Gaussian noise of standard deviation `sigma_px` on each of u and v; `None` where
-    /// the lens does not show a mark of the bowed board. `columns` are the marks in a row of the target's grid.
+    /// The views of a scene in the world as it is, with Gaussian noise of standard deviation `sigma_px` on
+    /// each of u and v; `None` where the lens does not show a mark of the bowed board. `columns` are the
+    /// marks in a row of the target's grid.
     ///
-    /// The noise is drawn as [`Scene::observe`] draws it: without a departure the views are the same, to the last bit.
+    /// The noise is drawn as [`Scene::observe`] draws it: without a departure the views are the same, to the
+    /// last bit.
     pub fn observe<L: Imaging>(
         &self,
         scene: &Scene<L>,
@@ -65,17 +69,17 @@ impl Departure {
     }
 }
 
-/// Tells of the marks of a board where they are if it bulges towards the camera by `height` in its middle, in the target's unit: a paraboloid
-/// `Z = -h (1 - |p|^2 / r^2)`, `r` the distance of the farthest mark from the origin, so that the corner marks of a centred grid stay where
-/// they should be.
+/// Tells of the marks of a board where they are if it bulges towards the camera by `height` in its middle, in
+/// the target's unit: a paraboloid `Z = -h (1 - |p|^2 / r^2)`, `r` the distance of the farthest mark from the
+/// origin, so that the corner marks of a centred grid stay where they should be.
 pub fn bowed(points: &[Vec2], height: f64) -> impl Fn(&Vec2) -> Vec3 {
     let corner = points.iter().map(Vec2::norm_squared).fold(0.0, f64::max);
     move |point| Vec3::new(point.x, point.y, -height * (1.0 - point.norm_squared() / corner))
 }
 
-/// Makes white noise on a grid, given row by row, a stationary field: each row, then each column, an autoregression of first order,
-/// `x_i = c x_(i-1) + sqrt(1 - c^2) w_i`, which keeps the variance. Marks i columns and j rows apart have the correlation `c^(i + j)`.
-/// With `c = 0` the noise keeps its bits.
+/// Makes white noise on a grid, given row by row, a stationary field: each row, then each column, an
+/// autoregression of first order, `x_i = c x_(i-1) + sqrt(1 - c^2) w_i`, which keeps the variance. Marks i
+/// columns and j rows apart have the correlation `c^(i + j)`. With `c = 0` the noise keeps its bits.
 pub fn correlate(noise: &mut [Vec2], columns: usize, correlation: f64) {
     let innovation = (1.0 - correlation * correlation).sqrt();
     let mark_before = |along_rows: bool, i: usize| match along_rows {
@@ -122,7 +126,8 @@ mod tests {
         let mean = |product: &dyn Fn(&[Vec2]) -> f64| {
             draws.iter().map(|draw| product(draw)).sum::<f64>() / draws.len() as f64
         };
-        // Marks 30 and 31 are neighbours in a row of nine, 30 and 39 in a column. The standard error of a mean is 0.016 to 0.023.
+        // Marks 30 and 31 are neighbours in a row of nine, 30 and 39 in a column. The standard error of a
+        // mean is 0.016 to 0.023.
         for (i, j, expected) in
             [(30, 30, 1.0), (62, 62, 1.0), (30, 31, 0.6), (30, 39, 0.6), (30, 40, 0.36), (26, 27, 0.01)]
         {
@@ -138,8 +143,8 @@ mod tests {
         let bow = |bow: f64| Departure { bow, ..Departure::default() }.pixels(&scene);
         let seen = bow(2.0).unwrap();
         assert!((seen[1][0] - scene.pixels()[1][0]).norm() < 1e-9);
-        // The first view faces the camera at 120 mm, the middle of the board on its axis: a mark beside it is magnified by
-        // 120 / (120 - 2 (1 - 0.04)).
+        // The first view faces the camera at 120 mm, the middle of the board on its axis: a mark beside it is
+        // magnified by 120 / (120 - 2 (1 - 0.04)).
         let middle = scene.truth.points.iter().position(|p| p.norm() < 1e-9).unwrap();
         let place = bowed(&scene.truth.points, 2.0)(&scene.truth.points[middle + 1]);
         assert!((place.z + 2.0 * (1.0 - 100.0 / 2500.0)).abs() < 1e-12, "{place}");

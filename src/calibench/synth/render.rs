@@ -192,15 +192,15 @@ impl Projector<'_> {
     }
 }
 
-/// Photographs a board through a lens of any model: the noise-free image of `image_size` (width, height) px and the true
-/// pixels of its marks.
+/// Photographs a board through a lens of any model: the noise-free image of `image_size` (width, height) px
+/// and the true pixels of its marks.
 ///
 /// Chessboards have `(columns + 1) x (rows + 1)` squares; the square towards the board's origin corner (least
 /// X, least Y) is dark.
 ///
 /// # Errors
-/// Any outline that reaches further from the axis than the lens is one-to-one (behind a Brown-Conrady camera, or beyond its
-/// monotone radius), and settings out of domain.
+/// Any outline that reaches further from the axis than the lens is one-to-one (behind a Brown-Conrady camera,
+/// or beyond its monotone radius), and settings out of domain.
 ///
 /// ```
 /// use calibench::board::Board;
@@ -236,9 +236,9 @@ pub fn photograph<C: Copy + Into<Camera<Lens>>>(
     )
 }
 
-/// Photographs a board of upright black rectangles, such as one with markers ([`Charuco::dark`](crate::detect::Charuco::dark)): no
-/// two may overlap, and each is given by its corners of least and of greatest coordinates. Its sheet reaches `margin` beyond the
-/// outermost.
+/// Photographs a board of upright black rectangles, such as one with markers
+/// ([`Charuco::dark`](crate::detect::Charuco::dark)): no two may overlap, and each is given by its corners of
+/// least and of greatest coordinates. Its sheet reaches `margin` beyond the outermost.
 ///
 /// # Errors
 /// As for [`photograph`].

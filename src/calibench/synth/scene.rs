@@ -5,8 +5,8 @@ use crate::board::{Board, View};
 use crate::camera::{BrownConrady, Camera, Imaging};
 use crate::geometry::{Mat3, Pose, Vec2, Vec3, rotation};
 
-/// The truth of a synthetic experiment: camera, image size, target points and poses. The lens is Brown-Conrady's
-/// unless another type is named.
+/// The truth of a synthetic experiment: camera, image size, target points and poses. The lens is
+/// Brown-Conrady's unless another type is named.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Truth<L = BrownConrady> {

@@ -1,21 +1,23 @@
-//! Stage 1: where does a point appear from the principal point? In the direction of its camera coordinates `(x, y)`,
-//! whatever focal length, depth and radial lens.
+//! Stage 1: where does a point appear from the principal point? In the direction of its camera coordinates
+//! `(x, y)`, whatever focal length, depth and radial lens.
 //!
 //! ```text
 //! Y_d (r1 X + r2 Y + r3 Z + T_x) - X_d (r4 X + r5 Y + r6 Z + T_y) = 0
 //! ```
-//! (Tsai 1987, section II-A). A plane has no Z: 6 unknowns up to scale, else 8. The null vector is that of least
-//! singular value; its scale follows from rows of R having length 1, its sign from points lying before the camera.
+//! (Tsai 1987, section II-A). A plane has no Z: 6 unknowns up to scale, else 8. The null vector is that of
+//! least singular value; its scale follows from rows of R having length 1, its sign from points lying before
+//! the camera.
 
 use super::frame::TargetFrame;
 use super::{Assumed, SpatialView, TsaiError};
 use crate::geometry::{Mat3, Vec2, Vec3, rotation};
 use nalgebra::{DMatrix, DVector, Matrix2, RowVector3};
 
-/// The second-smallest singular value must exceed the largest by this part: half of the digits are lost in squares.
+/// The second-smallest singular value must exceed the largest by this part: half of the digits are lost in
+/// squares.
 const LEAST_SECOND: f64 = 1e-6;
-/// And the smallest, which is what noise and a wrong principal point make of 0, by this factor: with less the null
-/// vector is any of two.
+/// And the smallest, which is what noise and a wrong principal point make of 0, by this factor: with less the
+/// null vector is any of two.
 const ABOVE_NOISE: f64 = 3.0;
 
 /// A view whose rotation and sideways position are known.
@@ -113,9 +115,9 @@ impl Rows {
 
     /// R of a plane, and the factor that makes its rows unit vectors.
     ///
-    /// Rows of a rotation without their last numbers `w` are `A` with `A A^T = I - w w^T`: one singular value is 1,
-    /// the other the cosine of the tilt, and `w` is its singular vector by the sine. Both signs of `w` fit; they are
-    /// the two tilts of the plane, of which stage 2 tells by the sign of f.
+    /// Rows of a rotation without their last numbers `w` are `A` with `A A^T = I - w w^T`: one singular value
+    /// is 1, the other the cosine of the tilt, and `w` is its singular vector by the sine. Both signs of `w`
+    /// fit; they are the two tilts of the plane, of which stage 2 tells by the sign of f.
     fn of_plane(&self) -> (Mat3, f64) {
         let svd = Matrix2::new(self.x[0], self.x[1], self.y[0], self.y[1]).svd(true, false);
         let u = svd.u.unwrap_or_else(Matrix2::identity);
@@ -128,8 +130,8 @@ impl Rows {
         (Mat3::from_rows(&[first.transpose(), second.transpose(), first.cross(&second).transpose()]), scale)
     }
 
-    /// R of a target in three dimensions: the rotation nearest to the rows, which noise leaves neither of one length
-    /// nor quite at right angles.
+    /// R of a target in three dimensions: the rotation nearest to the rows, which noise leaves neither of one
+    /// length nor quite at right angles.
     fn of_solid(&self) -> (Mat3, f64) {
         let (first, second) = (self.x.normalize(), self.y.normalize());
         let third = first.transpose().cross(&second.transpose()).transpose();

@@ -1,8 +1,8 @@
 //! Stage 2: focal length and depth, then the lens.
 //!
-//! With `x, y` and `w = r7 X + r8 Y + r9 Z` known from stage 1, an ideal lens has `f x - X_d T_z = w X_d` and the same
-//! for y: linear in f and T_z. Columns `(x, y)` and `(X_d, Y_d)` are parallel where all points lie at one depth: f and
-//! T_z are then inseparable. `kappa` is found with both by least squares in ideal pixels.
+//! With `x, y` and `w = r7 X + r8 Y + r9 Z` known from stage 1, an ideal lens has `f x - X_d T_z = w X_d` and
+//! the same for y: linear in f and T_z. Columns `(x, y)` and `(X_d, Y_d)` are parallel where all points lie
+//! at one depth: f and T_z are then inseparable. `kappa` is found with both by least squares in ideal pixels.
 
 use super::TsaiError;
 use super::alignment::Aligned;

@@ -42,7 +42,8 @@ const LEAST_DAMPING: f64 = 1e-12;
 const MOST_DAMPING: f64 = 1e12;
 /// Good data take five to ten.
 const MOST_STEPS: usize = 200;
-/// A step that promises to lower the cost by less than this part of it has arrived: a millionth of a standard deviation.
+/// A step that promises to lower the cost by less than this part of it has arrived: a millionth of a standard
+/// deviation.
 const SETTLED: f64 = 1e-14;
 
 /// The minimum that the start leads to; `None` where the start has no cost, or the steps do not end.

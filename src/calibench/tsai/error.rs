@@ -53,8 +53,8 @@ pub enum TsaiError {
     Facing {
         /// Tilt that noise or target have, degrees.
         tilt_deg: f64,
-        /// Probability of as much perspective from a facing plane; `None` where no tilted plane before the camera has
-        /// the view's perspective at all.
+        /// Probability of as much perspective from a facing plane; `None` where no tilted plane before the
+        /// camera has the view's perspective at all.
         p_value: Option<f64>,
     },
     /// A plane whose perspective is seen, but too little of its foreshortening.

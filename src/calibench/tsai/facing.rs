@@ -1,10 +1,11 @@
 //! Does the plane face the camera? Then its focal length is what noise makes of it.
 //!
-//! A plane held parallel to the image plane has three unknowns less: two of its tilt, and f, which its distance
-//! imitates. If noise explains what it leaves over (F test), f and T_z are not to be had from the view. Nor are they
-//! where perspective is seen, which grows with the sine of the tilt, and foreshortening is not, which tells f and grows
-//! with its square: where a focal length three times as long or as short lies within three standard deviations, the
-//! cost itself being asked, since noise makes small tilts look larger and their standard deviations smaller.
+//! A plane held parallel to the image plane has three unknowns less: two of its tilt, and f, which its
+//! distance imitates. If noise explains what it leaves over (F test), f and T_z are not to be had from the
+//! view. Nor are they where perspective is seen, which grows with the sine of the tilt, and foreshortening is
+//! not, which tells f and grows with its square: where a focal length three times as long or as short lies
+//! within three standard deviations, the cost itself being asked, since noise makes small tilts look larger
+//! and their standard deviations smaller.
 
 use super::refine::{Fit, Refined};
 use super::{SpatialView, TsaiError, TwoStage, refine_view};
@@ -15,7 +16,8 @@ use crate::geometry::{Mat3, Pose, Vec3, rotation};
 /// A facing plane is believed unless its residuals are rarer than this by chance: the rate at which
 /// [`crate::calibrate::calibrate`] asks the same of its views.
 const BY_CHANCE: f64 = 1e-6;
-/// Focal lengths so many times as long and as short must be excluded, by so many standard deviations; as there.
+/// Focal lengths so many times as long and as short must be excluded, by so many standard deviations; as
+/// there.
 const OTHER_FOCAL: f64 = 3.0;
 const EXCLUDED_SD: f64 = 3.0;
 /// Residuals of computed points, px: rounding.
@@ -77,7 +79,8 @@ fn least_cost(view: &SpatialView, start: (&Camera, &Pose), of_pose: &[usize]) ->
     Some(fit.normal(&fit.descend(start)?)?.cost)
 }
 
-/// A lens with nearly the same picture at another focal length: radii shrink, so that `k1` grows with its square.
+/// A lens with nearly the same picture at another focal length: radii shrink, so that `k1` grows with its
+/// square.
 fn with_focal_length(camera: &Camera, factor: f64) -> Camera {
     let k1 = factor * factor * camera.distortion.k1;
     let longer = Camera { fx: factor * camera.fx, fy: factor * camera.fy, ..*camera };

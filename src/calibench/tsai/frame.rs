@@ -3,8 +3,8 @@
 use super::SpatialView;
 use crate::geometry::{Mat3, Pose, Vec3};
 
-/// Thickness over extent below which a target is a plane: rounding of its coordinates. A target that is thicker has
-/// to show by its singular values that the third dimension is seen.
+/// Thickness over extent below which a target is a plane: rounding of its coordinates. A target that is
+/// thicker has to show by its singular values that the third dimension is seen.
 const FLAT: f64 = 1e-9;
 
 /// Centroid, principal axes and size of a target: `X = centre + scale axes x`.

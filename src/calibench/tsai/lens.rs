@@ -1,8 +1,8 @@
 //! Which lens of this library is Tsai's?
 //!
-//! Tsai: `r_u = r_d + kappa r_d^3`, radii in units of the focal length. This library: `r_d = r_u (1 + k1 r_u^2 + k2
-//! r_u^4 + k3 r_u^6)`. The series of the inverse is `k1 = -kappa`, `k2 = 3 kappa^2`, `k3 = -12 kappa^3` (Lagrange);
-//! what it leaves, `55 kappa^4 r^9` and smaller, is measured over the points.
+//! Tsai: `r_u = r_d + kappa r_d^3`, radii in units of the focal length. This library: `r_d = r_u (1 + k1
+//! r_u^2 + k2 r_u^4 + k3 r_u^6)`. The series of the inverse is `k1 = -kappa`, `k2 = 3 kappa^2`, `k3 = -12
+//! kappa^3` (Lagrange); what it leaves, `55 kappa^4 r^9` and smaller, is measured over the points.
 
 use super::alignment::Aligned;
 use super::depth::Deep;

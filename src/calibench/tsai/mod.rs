@@ -1,6 +1,6 @@
-//! Which camera explains one view? Tsai's two stages (R. Y. Tsai, "A versatile camera calibration technique for
-//! high-accuracy 3D machine vision metrology using off-the-shelf TV cameras and lenses", IEEE Journal of Robotics and
-//! Automation 3(4), 1987): one photograph of a tilted plane, or of a target in three dimensions.
+//! Which camera explains one view? Tsai's two stages (R. Y. Tsai, "A versatile camera calibration technique
+//! for high-accuracy 3D machine vision metrology using off-the-shelf TV cameras and lenses", IEEE Journal of
+//! Robotics and Automation 3(4), 1987): one photograph of a tilted plane, or of a target in three dimensions.
 //!
 //! ```text
 //! x = R X + T                                     camera coordinates of target point X
@@ -8,16 +8,17 @@
 //! stage 1   X_d y = Y_d x                         radial alignment: no focal length, depth or radial lens in it
 //! stage 2   X_d (1 + kappa r_d^2 / f^2) = f x / z,  the same for Y_d;  r_d^2 = X_d^2 + Y_d^2
 //! ```
-//! Stage 1 (`alignment.rs`) is linear and gives R, T_x, T_y and, of a target in three dimensions, fy / fx; stage 2
-//! (`depth.rs`) gives `f = fy` and T_z, linear for an ideal lens, then refined with `kappa`.
+//! Stage 1 (`alignment.rs`) is linear and gives R, T_x, T_y and, of a target in three dimensions, fy / fx;
+//! stage 2 (`depth.rs`) gives `f = fy` and T_z, linear for an ideal lens, then refined with `kappa`.
 //!
-//! Tsai's `kappa` takes *distorted* coordinates to ideal ones, this library's `k1`, `k2`, `k3` ideal to distorted
-//! ones (Brown-Conrady): `lens.rs` converts, and says what is left over.
+//! Tsai's `kappa` takes *distorted* coordinates to ideal ones, this library's `k1`, `k2`, `k3` ideal to
+//! distorted ones (Brown-Conrady): `lens.rs` converts, and says what is left over.
 //!
 //! Names of the paper: its `s_x` is `fx / fy`, its `kappa_1` is `kappa / f^2` with the sensor's unit the px.
 //!
-//! The answer is no maximum-likelihood estimate: [`refine_view`] makes one of it, for targets of either kind, and
-//! [`crate::calibrate::Settings::starting_at`] takes its camera as the start of a calibration from one plane or more.
+//! The answer is no maximum-likelihood estimate: [`refine_view`] makes one of it, for targets of either kind,
+//! and [`crate::calibrate::Settings::starting_at`] takes its camera as the start of a calibration from one
+//! plane or more.
 
 mod alignment;
 mod depth;
@@ -89,13 +90,15 @@ pub struct TwoStage {
 
 /// Calibrates from one view by Tsai's two stages.
 ///
-/// Domain: the plane is tilted, by so much that noise cannot make its perspective and that a focal length three times
-/// as long or as short is excluded; the lens is radial about the given principal point; the target lies before the camera.
+/// Domain: the plane is tilted, by so much that noise cannot make its perspective and that a focal length
+/// three times as long or as short is excluded; the lens is radial about the given principal point; the
+/// target lies before the camera.
 ///
-/// The paper divides stage 1 by T_y, which fails where the target's origin appears beside the principal point; here
-/// the homogeneous system is solved, and the scale taken from the length of R's rows, so that the origin may appear
-/// anywhere. The rotation of a plane is completed by the singular vectors of its 2 x 2 block, which is the paper's
-/// equation 10 without its cases; stage 2 counts both coordinates of a point where the paper counts Y alone.
+/// The paper divides stage 1 by T_y, which fails where the target's origin appears beside the principal
+/// point; here the homogeneous system is solved, and the scale taken from the length of R's rows, so that the
+/// origin may appear anywhere. The rotation of a plane is completed by the singular vectors of its 2 x 2
+/// block, which is the paper's equation 10 without its cases; stage 2 counts both coordinates of a point
+/// where the paper counts Y alone.
 ///
 /// # Errors
 /// See [`TsaiError`]; a plane that faces the camera has none but a made-up focal length and is refused as
@@ -124,7 +127,8 @@ pub fn two_stage(view: &SpatialView, assumed: &Assumed) -> Result<TwoStage, Tsai
     let frame = TargetFrame::of(view).ok_or(TsaiError::OnePlace)?;
     let aligned = alignment::align(view, &frame, assumed)?;
     let deep = depth::depth(&aligned, frame.is_flat()).map_err(|error| match frame.is_flat() {
-        // A plane can always be tilted the other way: what is left are those that have no perspective to speak of.
+        // A plane can always be tilted the other way: what is left are those that have no perspective to
+        // speak of.
         true => TsaiError::Facing { tilt_deg: tilt_rad(&aligned.rotation).to_degrees(), p_value: None },
         false => error,
     })?;

@@ -1,9 +1,9 @@
-//! Which camera and pose make the pixels of one view most likely? Least squared pixel distance, points in three
-//! dimensions.
+//! Which camera and pose make the pixels of one view most likely? Least squared pixel distance, points in
+//! three dimensions.
 //!
-//! The unknowns are any of the ten intrinsics, fy tied to fx if that is asked, and six numbers of the pose, `R <-
-//! exp(delta) R`. [`crate::calibrate::calibrate`] does the same and much more for planes; this is what a target in three
-//! dimensions needs, and what tells a facing plane from a tilted one.
+//! The unknowns are any of the ten intrinsics, fy tied to fx if that is asked, and six numbers of the pose,
+//! `R <- exp(delta) R`. [`crate::calibrate::calibrate`] does the same and much more for planes; this is what
+//! a target in three dimensions needs, and what tells a facing plane from a tilted one.
 
 use super::SpatialView;
 use super::descent::{Normal, descend};
@@ -24,8 +24,8 @@ pub struct Refined {
     pub free: FreeParameters,
     /// fy over fx, if they were tied.
     pub fy_per_fx: Option<f64>,
-    /// Covariance of the free parameters, then of the pose: rotation `delta` (rad), translation; scaled by the noise
-    /// that the residuals show.
+    /// Covariance of the free parameters, then of the pose: rotation `delta` (rad), translation; scaled by
+    /// the noise that the residuals show.
     #[cfg_attr(feature = "serde", serde(with = "crate::rows"))]
     pub covariance: DMatrix<f64>,
     /// That noise: standard deviation of a pixel coordinate, px.
@@ -76,8 +76,8 @@ pub enum RefineError {
     NotDetermined,
 }
 
-/// The most likely camera and pose near a start, such as that of [`super::two_stage`]. Parameters that are not free
-/// stay as they are; with `fy_per_fx` fy follows fx.
+/// The most likely camera and pose near a start, such as that of [`super::two_stage`]. Parameters that are
+/// not free stay as they are; with `fy_per_fx` fy follows fx.
 ///
 /// # Errors
 /// Too few points, or unknowns that the view does not determine.
@@ -150,7 +150,8 @@ fn inverse(square: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(n, n, |i, j| size[i] * inverse[(i, j)] * size[j]))
 }
 
-/// Least eigenvalue of normal equations with a unit diagonal: sums of some hundred terms of size one are known to 1e-14.
+/// Least eigenvalue of normal equations with a unit diagonal: sums of some hundred terms of size one are
+/// known to 1e-14.
 const SINGULAR: f64 = 1e-13;
 
 /// Camera, and pose of the target's centroid.
@@ -232,8 +233,8 @@ impl<'a> Fit<'a> {
         Pose { rotation, translation: translation - rotation * self.centre }
     }
 
-    /// A covariance whose translation is that of the centroid, as that of the target's origin: `T = T_c - R c`, so `dT
-    /// = dT_c + [R c]x delta`.
+    /// A covariance whose translation is that of the centroid, as that of the target's origin: `T = T_c - R
+    /// c`, so `dT = dT_c + [R c]x delta`.
     fn about_the_origin(&self, at: &State, covariance: &DMatrix<f64>) -> DMatrix<f64> {
         let n = self.free.len();
         let mut change = DMatrix::identity(n + 6, n + 6);

@@ -3,8 +3,8 @@
 use crate::board::{View, ViewError};
 use crate::geometry::{Vec2, Vec3};
 
-/// The correspondences of one photograph: `points[i]` in the target's right-handed coordinates, in its unit, was seen
-/// at `pixels[i]`.
+/// The correspondences of one photograph: `points[i]` in the target's right-handed coordinates, in its unit,
+/// was seen at `pixels[i]`.
 ///
 /// ```
 /// use calibench::geometry::{Vec2, Vec3};

@@ -1,5 +1,5 @@
-//! Do the views of a calibration predict each other? They are divided into parts; each is left out in turn, the camera
-//! calibrated from the rest, and the part's error compared with its prediction.
+//! Do the views of a calibration predict each other? They are divided into parts; each is left out in turn,
+//! the camera calibrated from the rest, and the part's error compared with its prediction.
 
 use super::{Estimate, HoldOut, HoldOutError, hold_out};
 use crate::board::View;
@@ -48,8 +48,8 @@ pub enum FoldError {
     },
 }
 
-/// Leaves out every `folds`-th view in turn. `false_alarm` is the chance that any part of a right model fails: each is
-/// judged at its share (Bonferroni).
+/// Leaves out every `folds`-th view in turn. `false_alarm` is the chance that any part of a right model
+/// fails: each is judged at its share (Bonferroni).
 ///
 /// # Errors
 /// See [`FoldError`].

@@ -1,8 +1,8 @@
 //! How do two cameras differ over the frame, whatever their lenses?
 //!
-//! As [`evaluate::frame_difference`](crate::evaluate::frame_difference), which knows one lens: rays of camera A are
-//! turned by the rotation that makes B's pixels meet A's best, in least squares over the frame, and where the points lie
-//! at one distance a translation may be taken out as well.
+//! As [`evaluate::frame_difference`](crate::evaluate::frame_difference), which knows one lens: rays of camera
+//! A are turned by the rotation that makes B's pixels meet A's best, in least squares over the frame, and
+//! where the points lie at one distance a translation may be taken out as well.
 
 use super::slopes::Slopes;
 use crate::camera::{Camera, Lens};
@@ -42,8 +42,8 @@ impl Motion {
     }
 }
 
-/// The points that camera A sees at the nodes, at the distance; those left out at which one of the lenses is not
-/// one-to-one.
+/// The points that camera A sees at the nodes, at the distance; those left out at which one of the lenses is
+/// not one-to-one.
 pub(super) fn points_seen(
     a: &Camera<Lens>,
     b: &Camera<Lens>,

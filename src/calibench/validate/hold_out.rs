@@ -1,20 +1,21 @@
 //! How large is the error on views that a calibration has not seen, and how large should it be?
 //!
-//! A new view is located with the camera held. To first order its residuals are what the pose leaves of the noise and of
-//! the camera's error:
+//! A new view is located with the camera held. To first order its residuals are what the pose leaves of the
+//! noise and of the camera's error:
 //!
 //! ```text
 //! r = M (e + J d),   M = I - C (C^T C)^-1 C^T,   e ~ N(0, sigma^2 I),   d ~ N(0, P)
 //! cov r = sigma^2 M + M J P J^T M
 //! ```
-//! `J` has the derivatives of the pixels by the estimated parameters, `C` those by the view's pose, `P` is the camera's
-//! covariance, which all views share. With `P = sigma^2 L L^T` and `G = L^T (sum J^T M J) L`, of eigenvalues `g_k`, the
-//! sum of squares over `sigma^2` is chi-squared with `2 N - 6 V - n` degrees of freedom and, of `n` more terms, each
-//! `1 + g_k` times one of one degree. `sigma` and the scale of `P` are known from the calibration's residuals alone, so
-//! that the whole is a [`Ratio`].
+//! `J` has the derivatives of the pixels by the estimated parameters, `C` those by the view's pose, `P` is
+//! the camera's covariance, which all views share. With `P = sigma^2 L L^T` and `G = L^T (sum J^T M J) L`, of
+//! eigenvalues `g_k`, the sum of squares over `sigma^2` is chi-squared with `2 N - 6 V - n` degrees of
+//! freedom and, of `n` more terms, each `1 + g_k` times one of one degree. `sigma` and the scale of `P` are
+//! known from the calibration's residuals alone, so that the whole is a [`Ratio`].
 //!
-//! The second test asks of the camera alone: `b = L^T sum J^T r / sigma` has the covariance `G + G^2`. A camera that is
-//! wrong by a few of its standard deviations moves the RMSE of hundreds of points hardly, and this by as many.
+//! The second test asks of the camera alone: `b = L^T sum J^T r / sigma` has the covariance `G + G^2`. A
+//! camera that is wrong by a few of its standard deviations moves the RMSE of hundreds of points hardly, and
+//! this by as many.
 
 use super::Ratio;
 use super::root::root;
@@ -109,8 +110,8 @@ pub struct HoldOut {
 }
 
 impl HoldOut {
-    /// Whether the calibration holds: neither the error of all views nor the camera's test is rarer than half of the
-    /// rate of false alarms (Bonferroni).
+    /// Whether the calibration holds: neither the error of all views nor the camera's test is rarer than half
+    /// of the rate of false alarms (Bonferroni).
     pub fn holds(&self) -> bool {
         let of_camera = self.camera.map_or(1.0, |test| test.p_value);
         self.together.p_value.min(of_camera) >= 0.5 * self.false_alarm
@@ -152,8 +153,8 @@ pub enum HoldOutError {
     },
 }
 
-/// Locates new views with the camera held, and compares their error with its prediction. `false_alarm` is the chance
-/// that a right calibration fails.
+/// Locates new views with the camera held, and compares their error with its prediction. `false_alarm` is the
+/// chance that a right calibration fails.
 ///
 /// # Errors
 /// See [`HoldOutError`].
@@ -336,9 +337,10 @@ impl Sums {
     }
 }
 
-/// With so few degrees of freedom of the noise, errors over it have no mean (that of Fisher's ratio is `nu / (nu - 2)`), and limits for them
-/// lie beyond all that is of use.
+/// With so few degrees of freedom of the noise, errors over it have no mean (that of Fisher's ratio is `nu /
+/// (nu - 2)`), and limits for them lie beyond all that is of use.
 const LEAST_FREEDOM: usize = 2;
 
-/// New views that tell less than this part of what the calibration knows of a combination tell rounding of it.
+/// New views that tell less than this part of what the calibration knows of a combination tell rounding of
+/// it.
 const UNTOLD: f64 = 1e-6;

@@ -1,8 +1,8 @@
 //! Does a calibration hold on photographs that it has not seen, and when it is made again? Whatever its lens.
 //!
-//! [`hold_out`] compares the error on new views with its prediction, [`folds`] leaves out the calibration's own views
-//! in turn, [`repeated`] asks whether several calibrations are of one camera, [`one_camera`] whether two are, of one lens
-//! model or of two. Each states its chance of a false alarm.
+//! [`hold_out`] compares the error on new views with its prediction, [`folds`] leaves out the calibration's
+//! own views in turn, [`repeated`] asks whether several calibrations are of one camera, [`one_camera`]
+//! whether two are, of one lens model or of two. Each states its chance of a false alarm.
 
 mod folds;
 mod frame;

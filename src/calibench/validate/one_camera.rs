@@ -1,24 +1,26 @@
 //! May two calibrations be of one camera, of one lens model or of two?
 //!
-//! The difference over the frame that is left when the best motion is taken out, `d`, has to first order the covariance
-//! `G G^T` if both are one camera,
+//! The difference over the frame that is left when the best motion is taken out, `d`, has to first order the
+//! covariance `G G^T` if both are one camera,
 //!
 //! ```text
 //! G = M [J_A L_A, J_B L_B],   M = 1 - W (W^T W)^-1 W^T,   P = L L^T
 //! ```
-//! with `J` the derivatives of the frame's pixels by what was estimated, `W` those by the motion and `P` the covariances.
-//! With the singular values `s` and left vectors `u` of `G`, `sum (u^T d / s)^2` is chi-squared with as many degrees of
-//! freedom as it has terms. Combinations of little trace are left out, which takes power from the test and makes no false
-//! alarms: they are chosen by `G` alone.
+//! with `J` the derivatives of the frame's pixels by what was estimated, `W` those by the motion and `P` the
+//! covariances. With the singular values `s` and left vectors `u` of `G`, `sum (u^T d / s)^2` is chi-squared
+//! with as many degrees of freedom as it has terms. Combinations of little trace are left out, which takes
+//! power from the test and makes no false alarms: they are chosen by `G` alone.
 //!
 //! *One model.* Both are differentiated at the camera half-way, and `d = M J delta` with the difference of the parameters:
-//! `G` has then no more directions than there are parameters, and what is left out is only what the motion imitates.
+//! `G` has then no more directions than there are parameters, and what is left out is only what the motion
+//! imitates.
 //!
 //! *Two models.* Parameters are not comparable; `d` is what [`frame_difference`] finds. If neither model is that of the
-//! camera, the two predict other pixels, by more than chance allows where there are data enough: the test then says so.
+//! camera, the two predict other pixels, by more than chance allows where there are data enough: the test
+//! then says so.
 //!
-//! The noise that scales both covariances is estimated: the mean term follows Fisher's distribution, with the degrees of
-//! freedom of Satterthwaite (1946).
+//! The noise that scales both covariances is estimated: the mean term follows Fisher's distribution, with the
+//! degrees of freedom of Satterthwaite (1946).
 
 use super::frame::{Motion, enough, frame_difference, points_seen};
 use super::root::root;
@@ -66,18 +68,18 @@ pub struct OneCamera {
     pub p_value: f64,
 }
 
-/// With one model a combination whose difference is less than this part of that of the combination seen best is one that
-/// the motion imitates: what the linear model leaves out is larger than a ten-thousandth.
+/// With one model a combination whose difference is less than this part of that of the combination seen best
+/// is one that the motion imitates: what the linear model leaves out is larger than a ten-thousandth.
 const IMITATED: f64 = 1e-4;
-/// With two models directions that both share differ by what the linear models leave out, some standard deviations of a
-/// parameter over its value: a hundredth of the largest is well above it.
+/// With two models directions that both share differ by what the linear models leave out, some standard
+/// deviations of a parameter over its value: a hundredth of the largest is well above it.
 const SHARED: f64 = 1e-2;
 
 /// Tests whether two independent calibrations are of one camera, whatever their lens models.
 ///
 /// # Errors
-/// [`DifferenceError`]: a frame that is not seen, a covariance that is none, or, with one model, a parameter that was
-/// held at two values.
+/// [`DifferenceError`]: a frame that is not seen, a covariance that is none, or, with one model, a parameter
+/// that was held at two values.
 ///
 /// ```
 /// use calibench::camera::{Camera, FreeParameters, Lens, Model, Parameter};
@@ -246,8 +248,8 @@ impl Without {
         Ok(Without { by_motion, factor })
     }
 
-    /// `M` times columns. Twice: what rounding leaves of the motion after the first time is of the size of what a long
-    /// lens leaves of a principal point.
+    /// `M` times columns. Twice: what rounding leaves of the motion after the first time is of the size of
+    /// what a long lens leaves of a principal point.
     fn motion(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let once =
             |of: &DMatrix<f64>| of - &self.by_motion * self.factor.solve(&(self.by_motion.transpose() * of));

@@ -1,16 +1,17 @@
-//! How is a sum of squares distributed whose terms are not equally uncertain, over a variance that is estimated?
+//! How is a sum of squares distributed whose terms are not equally uncertain, over a variance that is
+//! estimated?
 //!
 //! ```text
 //! F = (sum_k lambda_k X_k) / (Y / nu),   X_k chi-squared with h_k degrees of freedom, Y with nu, all independent
 //! P(F > x) = P(sum_k lambda_k X_k - (x / nu) Y > 0)
 //! ```
-//! The right side is the tail of a quadratic form in normal variables, which its characteristic function gives by one
-//! integral (Imhof 1961), summed as by Davies (1980).
+//! The right side is the tail of a quadratic form in normal variables, which its characteristic function
+//! gives by one integral (Imhof 1961), summed as by Davies (1980).
 
 /// Terms of the sum that are left out are smaller than this together.
 const LEFT_OUT: f64 = 1e-10;
-/// The sum repeats the form's distribution at distances of this many standard deviations: beyond, even a single
-/// chi-squared variable has a probability of 1e-18.
+/// The sum repeats the form's distribution at distances of this many standard deviations: beyond, even a
+/// single chi-squared variable has a probability of 1e-18.
 const PERIOD_SD: f64 = 60.0;
 /// Terms at most; forms with four degrees of freedom and more need fewer.
 const MOST_TERMS: usize = 1_000_000;
@@ -30,8 +31,8 @@ pub struct Ratio {
 }
 
 impl Ratio {
-    /// Of terms `(lambda, degrees of freedom)`, positive both, over a variance with so many degrees of freedom, or over a
-    /// known one.
+    /// Of terms `(lambda, degrees of freedom)`, positive both, over a variance with so many degrees of
+    /// freedom, or over a known one.
     pub fn new(terms: Vec<(f64, f64)>, noise_freedom: Option<usize>) -> Ratio {
         Ratio { terms, noise_freedom }
     }
@@ -80,8 +81,8 @@ impl Ratio {
         (0.5 + sum).clamp(0.0, 1.0)
     }
 
-    /// The `x` with `P(F > x) = tail`. Domain: `1e-8 <= tail <= 1 - 1e-8`, which is what the tail is known to; what lies beyond is taken for the
-    /// nearest of it, and NaN for the least.
+    /// The `x` with `P(F > x) = tail`. Domain: `1e-8 <= tail <= 1 - 1e-8`, which is what the tail is known
+    /// to; what lies beyond is taken for the nearest of it, and NaN for the least.
     pub fn quantile(&self, tail: f64) -> f64 {
         let tail = if tail.is_nan() { LEAST_TAIL } else { tail.clamp(LEAST_TAIL, 1.0 - LEAST_TAIL) };
         let mut high = self.mean_of_numerator().max(f64::MIN_POSITIVE);

@@ -6,9 +6,9 @@
 //! m = (sum P_i^-1)^-1 sum P_i^-1 a_i
 //! chi^2 = sum (a_i - m)^T P_i^-1 (a_i - m)   with (k - 1) n degrees of freedom
 //! ```
-//! Where fy is tied to fx the two are one parameter. Parameters that trade against each other may scatter and predict the
-//! same pixels; in pixels over the frame two calibrations are compared by [`one_camera`], the rotation between them taken
-//! out.
+//! Where fy is tied to fx the two are one parameter. Parameters that trade against each other may scatter and
+//! predict the same pixels; in pixels over the frame two calibrations are compared by [`one_camera`], the
+//! rotation between them taken out.
 
 use super::one_camera::OneCamera;
 use super::{Calibrated, Estimate, frame_difference, one_camera};
@@ -38,7 +38,8 @@ pub struct Agreement {
 }
 
 impl Agreement {
-    /// Whether they agree: none of the tests is rarer than its share of the rate of false alarms (Bonferroni).
+    /// Whether they agree: none of the tests is rarer than its share of the rate of false alarms
+    /// (Bonferroni).
     pub fn holds(&self) -> bool {
         let each = self.each();
         let tests = self.in_pixels.iter().map(|(_, test)| test.p_value);
@@ -113,7 +114,8 @@ pub enum RepeatedError {
     },
 }
 
-/// Tests whether independent calibrations, from photographs of their own, are of one camera, over a frame of this size.
+/// Tests whether independent calibrations, from photographs of their own, are of one camera, over a frame of
+/// this size.
 ///
 /// # Errors
 /// See [`RepeatedError`].

@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
-/// `L` with `L L^T` the matrix, by its eigenvalues: what priors settle leaves next to nothing of some. `None` where a
-/// number is not finite.
+/// `L` with `L L^T` the matrix, by its eigenvalues: what priors settle leaves next to nothing of some. `None`
+/// where a number is not finite.
 pub(super) fn root(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     if matrix.iter().any(|x| !x.is_finite()) {
         return None;

@@ -39,7 +39,8 @@ pub(super) struct Slopes {
 }
 
 impl Slopes {
-    /// Of a point of the target; `None` where the lens has no image of it. With `X_c = R X + t`: `d X_c / d delta =
+    /// Of a point of the target; `None` where the lens has no image of it. With `X_c = R X + t`: `d X_c / d
+    /// delta =
     /// -[R X]x`, `d X_c / d t = I`.
     pub fn of(camera: &Camera<Lens>, cam_from_target: &Pose, point: &Vec3) -> Option<Slopes> {
         let rotated = cam_from_target.rotation * point;

@@ -1,5 +1,5 @@
-//! A page as PDF (ISO 32000-1): one page of filled paths and words in a font that every reader has. Five objects, whose
-//! places the table at the end lists.
+//! A page as PDF (ISO 32000-1): one page of filled paths and words in a font that every reader has. Five
+//! objects, whose places the table at the end lists.
 
 use super::sheet::{Ink, Sheet};
 use super::svg::mm;
@@ -10,7 +10,8 @@ use std::fmt::Write;
 /// Points a millimetre.
 const POINTS: f64 = 72.0 / 25.4;
 
-/// Arcs of a circle. A cubic curve leaves an eighth of a circle by 4e-6 of its radius at most (a quarter by 2.7e-4).
+/// Arcs of a circle. A cubic curve leaves an eighth of a circle by 4e-6 of its radius at most (a quarter by
+/// 2.7e-4).
 const ARCS: usize = 8;
 
 /// The file. It asks to be printed without scaling.

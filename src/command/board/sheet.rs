@@ -1,5 +1,5 @@
-//! What stands on the printed page? The board in the middle, a ruler below it and one on its left, and a line of words,
-//! all in millimetres from the page's top left corner, y down.
+//! What stands on the printed page? The board in the middle, a ruler below it and one on its left, and a line
+//! of words, all in millimetres from the page's top left corner, y down.
 
 use super::paper::Paper;
 use calibench::board::Pattern;
@@ -13,7 +13,8 @@ pub(super) enum Ink {
     Disc { centre: Vec2, diameter: f64 },
     /// An upright rectangle by its top left corner.
     Rectangle { corner: Vec2, size: Vec2 },
-    /// Upright rectangles by their top left and bottom right corners, filled as one: where two touch, no line shows.
+    /// Upright rectangles by their top left and bottom right corners, filled as one: where two touch, no line
+    /// shows.
     Cells(Vec<[Vec2; 2]>),
     /// Words, by the left end of their base line and the height of the type.
     Words { at: Vec2, height: f64, text: String },

@@ -1,4 +1,5 @@
-//! What does the lens do to a photograph? One of them as it was taken, and as an ideal lens would have shown it.
+//! What does the lens do to a photograph? One of them as it was taken, and as an ideal lens would have shown
+//! it.
 
 use super::finished::Finished;
 use super::html::{heading, paragraph, picture};

@@ -214,7 +214,8 @@ fn of_earlier_runs(folder: &Path, finished: &Finished) -> Vec<String> {
     files
 }
 
-/// The marks of photographs as they were fitted, without the bias of discs: calibrated again they give the same camera.
+/// The marks of photographs as they were fitted, without the bias of discs: calibrated again they give the
+/// same camera.
 fn corners(finished: &Finished) -> String {
     let mut seen = BTreeMap::new();
     let mut name = |name: &String| {

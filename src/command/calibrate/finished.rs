@@ -87,8 +87,8 @@ pub(super) fn warnings(finished: &Finished) -> Vec<String> {
     own.chain(finished.notes.iter().chain(&finished.advice).cloned()).collect()
 }
 
-/// Where the worst of the marks is that are too far off to be noise: by its number in the fit nobody finds it in a file that
-/// numbers its points otherwise.
+/// Where the worst of the marks is that are too far off to be noise: by its number in the fit nobody finds it
+/// in a file that numbers its points otherwise.
 fn stray(finished: &Finished) -> Option<String> {
     let found = finished.fit.calibration.warnings.iter().find_map(|warning| match warning {
         Warning::Outliers(Outliers { view, point, .. }) => Some((*view, *point)),

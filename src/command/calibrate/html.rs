@@ -58,8 +58,8 @@ pub(super) fn note(page: &mut String, text: &str) {
     let _ = writeln!(page, "<p class=\"note\">{}</p>", escaped(text));
 }
 
-/// A table; the cells are HTML already. The first `left` columns are words and stand at the left. An empty cell has
-/// [`DASH`].
+/// A table; the cells are HTML already. The first `left` columns are words and stand at the left. An empty
+/// cell has [`DASH`].
 pub(super) fn table(page: &mut String, left: usize, header: &[&str], rows: &[Vec<String>]) {
     let words = if left > 1 { "l1 l2" } else { "l1" };
     let _ = write!(page, "<div class=\"scroll\"><table class=\"{words}\">\n<tr>");

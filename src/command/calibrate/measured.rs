@@ -1,4 +1,5 @@
-//! A camera from a corner file and the measured places of its marks: `calibrate CORNERS.csv --target TARGET.csv`.
+//! A camera from a corner file and the measured places of its marks: `calibrate CORNERS.csv --target
+//! TARGET.csv`.
 
 use super::finished::{parameter_rows, weakest};
 use super::optics::Optics;
@@ -151,7 +152,8 @@ fn text(report: &Report<'_>) -> String {
 pub(super) const CORRECTION_COLUMNS: [&str; 7] =
     ["mark", "views", "dX", "dY", "dZ", "in deviations", "by chance"];
 
-/// The least probable corrections, and how many there are besides; of marks that are known exactly there are none.
+/// The least probable corrections, and how many there are besides; of marks that are known exactly there are
+/// none.
 pub(super) fn correction_rows(found: &MeasuredCalibration) -> (Vec<[String; 7]>, usize) {
     let mut uncertain: Vec<&CorrectedMark> = found.marks.iter().filter(|m| m.expected.norm() > 0.0).collect();
     uncertain.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));

@@ -1,4 +1,5 @@
-//! The report of a calibration from measured marks as a page: the camera, how the marks were corrected, and plots.
+//! The report of a calibration from measured marks as a page: the camera, how the marks were corrected, and
+//! plots.
 
 use super::html::{self, escaped, heading, note, number, paragraph, table};
 use super::measured::{CORRECTION_COLUMNS, Report, correction_rows, summary};

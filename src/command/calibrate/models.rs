@@ -109,13 +109,13 @@ pub(super) fn freedoms(fit: &Fit, settings: &Settings) -> Vec<String> {
 
 /// With fewer marks a view than this, poses take up what residuals of neighbours would share.
 const FEW_MARKS: usize = 20;
-/// What the criterion below must fall by: 10 is very strong evidence (Kass & Raftery 1995), and of eight models one falls by as much
-/// by chance now and then.
+/// What the criterion below must fall by: 10 is very strong evidence (Kass & Raftery 1995), and of eight
+/// models one falls by as much by chance now and then.
 const STRONG: f64 = 20.0;
 
-/// A lens model that explains few marks a view far better than the one that was asked for: their residuals do not tell that it is
-/// wrong, and other models are fitted in no time. Brown-Conrady's lens has its certificate. Under a robust loss strays, which are in the
-/// RMSE, would decide.
+/// A lens model that explains few marks a view far better than the one that was asked for: their residuals do
+/// not tell that it is wrong, and other models are fitted in no time. Brown-Conrady's lens has its
+/// certificate. Under a robust loss strays, which are in the RMSE, would decide.
 fn better_model(fit: &Fit, settings: &Settings) -> Option<String> {
     let marks = fit.calibration.points();
     let is_told = settings.model() == Model::BrownConrady || settings.loss != Loss::Squares;
@@ -141,8 +141,9 @@ fn better_model(fit: &Fit, settings: &Settings) -> Option<String> {
     ))
 }
 
-/// Schwarz's criterion (1978), up to what all models share: `f ln(sum |r|^2) + p ln f`, for the `f` degrees of freedom that the poses
-/// leave and `p` parameters of the camera. With few marks a view half of the coordinates tell of the poses alone, and would count twice.
+/// Schwarz's criterion (1978), up to what all models share: `f ln(sum |r|^2) + p ln f`, for the `f` degrees
+/// of freedom that the poses leave and `p` parameters of the camera. With few marks a view half of the
+/// coordinates tell of the poses alone, and would count twice.
 fn criterion(calibration: &LensCalibration) -> f64 {
     let coordinates = 2.0 * calibration.points() as f64;
     let freedom = (coordinates - 6.0 * calibration.cam_from_target.len() as f64).max(1.0);

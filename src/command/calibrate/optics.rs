@@ -18,7 +18,8 @@ pub(super) struct Optics {
     pub(super) focal_length: Option<FocalLength>,
 }
 
-/// Angles between the rays at opposite edges of the image, degrees; `None` where the lens model ends before the edge.
+/// Angles between the rays at opposite edges of the image, degrees; `None` where the lens model ends before
+/// the edge.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct FieldOfView {
     /// In the row of the principal point.
@@ -113,8 +114,8 @@ fn degrees(angle: Option<f64>) -> String {
     angle.map_or("unknown".to_string(), |angle| format!("{angle:.2}"))
 }
 
-/// Angles between the rays at opposite edges of the image, degrees: in the row and in the column of the principal point,
-/// and along the wider of both diagonals. `None` where the lens model ends before the edge.
+/// Angles between the rays at opposite edges of the image, degrees: in the row and in the column of the
+/// principal point, and along the wider of both diagonals. `None` where the lens model ends before the edge.
 fn field_of_view(camera: &Camera<Lens>, (width, height): (usize, usize)) -> FieldOfView {
     let (right, bottom) = (width as f64 - 0.5, height as f64 - 0.5);
     let (cx, cy) = (camera.cx.clamp(-0.5, right), camera.cy.clamp(-0.5, bottom));

@@ -160,8 +160,8 @@ fn plain(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect()
 }
 
-/// The board's marks that are seen, in their order; where it was not found, a red cross on each disc that might be one of
-/// them.
+/// The board's marks that are seen, in their order; where it was not found, a red cross on each disc that
+/// might be one of them.
 fn draw(photo: &Grey, marks: &Result<SeenBoard, NotFound>) -> Overlay {
     let scale = if photo.width() < ENLARGED_BELOW_PX { 2 } else { 1 };
     let mut overlay = Overlay::new(&photo.to_u8(), scale);

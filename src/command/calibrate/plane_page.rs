@@ -1,4 +1,5 @@
-//! The report of a plane's map as a page: the map, what each point leaves over, and how well the map is known there.
+//! The report of a plane's map as a page: the map, what each point leaves over, and how well the map is known
+//! there.
 
 use super::html::{self, escaped, given, heading, note, number, paragraph, picture, table};
 use super::plots::{round_down, whole_ticks};
@@ -167,7 +168,8 @@ impl PlaneReport<'_> {
         ViewNames::new(self.names.to_vec(), Vec::new())
     }
 
-    /// Standard deviations of the world coordinates that the map gives for a pixel; NaN where they are not known.
+    /// Standard deviations of the world coordinates that the map gives for a pixel; NaN where they are not
+    /// known.
     fn deviations(&self, pixel: &Vec2) -> [f64; 2] {
         let covariance = self.plane.spread.as_ref().and_then(|spread| spread.world_covariance(pixel));
         covariance.map_or([f64::NAN; 2], |c| [0, 1].map(|k| c[(k, k)].sqrt()))

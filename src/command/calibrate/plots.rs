@@ -75,8 +75,8 @@ fn view_errors(calibration: &LensCalibration, numbers: &[usize]) -> Figure {
     )
 }
 
-/// The radius at which the lens shows an angle, against that of a pinhole or, where it sees far to the side, of an
-/// equidistant lens; with its standard deviation, out to the farthest point seen.
+/// The radius at which the lens shows an angle, against that of a pinhole or, where it sees far to the side,
+/// of an equidistant lens; with its standard deviation, out to the farthest point seen.
 fn lens(calibration: &LensCalibration, pixels: &[Vec2]) -> Figure {
     let camera = &calibration.camera;
     let angles =

@@ -163,8 +163,8 @@ fn rectangle(points: &[Vec2]) -> [Vec2; 4] {
     [low, Vec2::new(high.x, low.y), high, Vec2::new(low.x, high.y)]
 }
 
-/// Where the corners of the image look, at a depth. Of lenses that see too far to the side, or where the image's size is
-/// not known, a pyramid of no meaning but its direction.
+/// Where the corners of the image look, at a depth. Of lenses that see too far to the side, or where the
+/// image's size is not known, a pyramid of no meaning but its direction.
 fn pyramid(finished: &Finished, depth: f64) -> [Vec3; 4] {
     let camera = &finished.fit.calibration.camera;
     let rays = finished.image_size.map(|(width, height)| {

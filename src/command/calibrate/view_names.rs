@@ -77,8 +77,8 @@ impl ViewNames {
     }
 }
 
-/// Names that are numbers keep them, as in files that count their views from 0; other views are counted from 1. Large numbers
-/// are no count, but dates and the like.
+/// Names that are numbers keep them, as in files that count their views from 0; other views are counted
+/// from 1. Large numbers are no count, but dates and the like.
 fn numbers(names: &[String]) -> Vec<usize> {
     let own: Option<Vec<usize>> =
         names.iter().map(|name| name.parse().ok().filter(|n: &usize| n.to_string() == *name)).collect();

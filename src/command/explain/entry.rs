@@ -1,4 +1,5 @@
-//! One thing of a record: what it is, how it is computed, what stands behind it, what the chapter prints, where it is shown.
+//! One thing of a record: what it is, how it is computed, what stands behind it, what the chapter prints,
+//! where it is shown.
 
 use super::Known;
 use super::pages::pages;

@@ -74,7 +74,8 @@ impl<'a> Names<'a> {
         )
     }
 
-    /// The nearest names, nearest first: whoever leaves out the experiment means any one. Names have no capitals.
+    /// The nearest names, nearest first: whoever leaves out the experiment means any one. Names have no
+    /// capitals.
     fn nearest(&self, name: &str) -> Vec<&str> {
         let name = name.to_lowercase();
         let entries = self.entries.iter().map(|known| {

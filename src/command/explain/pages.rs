@@ -6,8 +6,8 @@ use calibench_book::Page;
 const OF_ONE: [&str; 4] = ["num", "published", "figure", "table"];
 const OF_ALL: [&str; 2] = ["claims", "run"];
 
-/// Places of `experiment.own`, such as `book/text/four-pose.md:41`, each page once; if it stands nowhere itself, where the
-/// experiment does.
+/// Places of `experiment.own`, such as `book/text/four-pose.md:41`, each page once; if it stands nowhere
+/// itself, where the experiment does.
 pub(super) fn pages(pages: &[Page], experiment: &str, own: &str) -> Vec<String> {
     let name = format!("{experiment}.{own}");
     let own: Vec<String> = OF_ONE.iter().map(|word| format!("{{{{{word} {name}")).collect();

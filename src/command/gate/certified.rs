@@ -14,16 +14,16 @@ use calibench_harness::Build;
 use calibench_harness::project::Project;
 use std::path::Path;
 
-/// Programs of the table besides this library's two, by the names that the table has. Where there are several, each is
-/// asked the problems of lens models that those before it do not know.
+/// Programs of the table besides this library's two, by the names that the table has. Where there are
+/// several, each is asked the problems of lens models that those before it do not know.
 const PEERS: [(&str, &[&str]); 3] = [
     ("OpenCV", &["python3 adapters/opencv_solver.py", "python3 adapters/opencv_lenses_solver.py"]),
     ("SciPy", &["python3 adapters/scipy_solver.py"]),
     ("minimal solver", &["python3 adapters/minimal_solver.py"]),
 ];
 
-/// Prints the digits of one solver. Without a program that is this library's: polished, and as it is with the lens models
-/// that cannot be polished.
+/// Prints the digits of one solver. Without a program that is this library's: polished, and as it is with the
+/// lens models that cannot be polished.
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Stop> {
     let problems = chosen(arguments)?;
     let mut table = DigitsTable::default();

@@ -66,7 +66,8 @@ pub(super) fn run(
     compared(arguments, &plan, solver, other.as_ref())
 }
 
-/// Compares the answers in a folder, whose problems the reference is asked if it has not answered them before.
+/// Compares the answers in a folder, whose problems the reference is asked if it has not answered them
+/// before.
 pub(super) fn of_answers(arguments: &Arguments, folder: &Path, reference: &str) -> Result<Exit, Stop> {
     let (plan, answers) = recorded(folder)?;
     let (plan, other): (Plan, Box<dyn Solver>) = match reference {

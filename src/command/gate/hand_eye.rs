@@ -9,8 +9,8 @@ use calibench_hand_eye_gate::{Builtin, MOST_SAMPLES, Program, QUICK, Report, Sol
 use std::fmt::Write;
 use std::path::Path;
 
-/// Methods of the table besides this library's, with their programs. KinHEC's two refinements take so long that they are judged by
-/// themselves.
+/// Methods of the table besides this library's, with their programs. KinHEC's two refinements take so long
+/// that they are judged by themselves.
 const METHODS: [(&str, &str); 14] = [
     ("OpenCV, Tsai & Lenz", "python3 adapters/hand_eye_opencv_solver.py tsai"),
     ("OpenCV, Park & Martin", "python3 adapters/hand_eye_opencv_solver.py park"),

@@ -1,5 +1,5 @@
-//! What does a finished study say on standard output? A few lines for people, one object for programs; everything stands
-//! in the report and the tables.
+//! What does a finished study say on standard output? A few lines for people, one object for programs;
+//! everything stands in the report and the tables.
 
 use super::Failure;
 use crate::calibrate::Format;

@@ -1,5 +1,5 @@
-//! `calibench study plan`: what must be photographed for a wanted accuracy? Designs by the bound, then trials of the
-//! smallest one that suffices, with more views until they confirm it.
+//! `calibench study plan`: what must be photographed for a wanted accuracy? Designs by the bound, then trials
+//! of the smallest one that suffices, with more views until they confirm it.
 
 use super::finished::estimated_json;
 use super::{Failure, read_study};
@@ -30,8 +30,8 @@ Exit codes:
 pub(crate) struct Arguments {
     /// A study whose camera, target, noise and estimator are planned for
     spec: PathBuf,
-    /// What is wanted: a quantity and its largest standard deviation, such as fx=0.5 (px) or length=0.01 (mm); may be
-    /// repeated, and then all must hold
+    /// What is wanted: a quantity and its largest standard deviation, such as fx=0.5 (px) or length=0.01
+    /// (mm); may be repeated, and then all must hold
     #[arg(long, value_name = "QUANTITY=SD", value_parser = parse_goal, required = true)]
     want: Vec<Goal>,
     /// For `length`: place of its middle in the camera's frame, mm
@@ -121,9 +121,9 @@ fn warn_of_factors(spec: &Spec) {
     }
 }
 
-/// Trials of the designs that suffice by the bound, fewest views first, each with more views until they confirm it or there
-/// may be no more. A design with which too few trials converge waits, with twice its views, until none has fewer; one that
-/// answers is the last.
+/// Trials of the designs that suffice by the bound, fewest views first, each with more views until they
+/// confirm it or there may be no more. A design with which too few trials converge waits, with twice its
+/// views, until none has fewer; one that answers is the last.
 fn attempts<'a>(
     spec: &Spec,
     mut open: Vec<(usize, &'a Design)>,
@@ -338,7 +338,8 @@ fn attempt_json(tried: &Attempt) -> Value {
     })
 }
 
-/// `views` is `null` where no number of them suffices; `predicted_sd` is then that of the most views, if there is one.
+/// `views` is `null` where no number of them suffices; `predicted_sd` is then that of the most views, if
+/// there is one.
 fn design_json(design: &Design, arguments: &Arguments) -> Value {
     let best = design.best.as_ref();
     let sds = design.enough.as_ref().map(|(_, sds)| sds).or(best.ok().and_then(Option::as_ref));

@@ -81,8 +81,9 @@ pub(super) fn run(arguments: &Arguments, build: &Build) -> Result<Exit, Failure>
     drive(&folder, engine, arguments.format)
 }
 
-/// Refuses a folder for the results in which something lies that the study reads: a result might have its name, which would show when the
-/// trials are done, or when a run that was interrupted is resumed and no longer knows of it.
+/// Refuses a folder for the results in which something lies that the study reads: a result might have its
+/// name, which would show when the trials are done, or when a run that was interrupted is resumed and no
+/// longer knows of it.
 fn keep_inputs(inputs: &[PathBuf], out: &Path) -> Result<(), Failure> {
     keep_files(inputs.iter().map(PathBuf::as_path));
     let Ok(out) = out.canonicalize() else { return Ok(()) };
@@ -130,7 +131,8 @@ fn warn_of_the_frame(engine: &Engine) {
     }
 }
 
-/// Trials a second of one core with four views of 63 marks, about; and the days from which a study is told to be long.
+/// Trials a second of one core with four views of 63 marks, about; and the days from which a study is told to
+/// be long.
 const TRIALS_A_SECOND: f64 = 15_000.0;
 const LONG_DAYS: f64 = 1.0;
 

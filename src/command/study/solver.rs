@@ -1,4 +1,5 @@
-//! `calibench study run --solver`: any program that speaks the gate's protocol calibrates what a study has seen.
+//! `calibench study run --solver`: any program that speaks the gate's protocol calibrates what a study has
+//! seen.
 
 use super::super::{program, warn};
 use super::Failure;
@@ -13,7 +14,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct ProgramArguments {
-    /// Program that calibrates in place of this library's solver, on the same noise (see adapters/PROTOCOL.md)
+    /// Program that calibrates in place of this library's solver, on the same noise (see
+    /// adapters/PROTOCOL.md)
     #[arg(long, value_name = "COMMAND")]
     pub solver: Option<String>,
     /// Copies of the program that run at the same time [default: one a thread]
@@ -101,8 +103,8 @@ impl Calibrator for Program {
     }
 }
 
-/// What a trial takes from an answer, or the outcome's name and the reason. Warnings are not looked at, as they are not
-/// for this library's solver.
+/// What a trial takes from an answer, or the outcome's name and the reason. Warnings are not looked at, as
+/// they are not for this library's solver.
 fn estimate(outcome: Outcome) -> Result<Estimate, (&'static str, String)> {
     match outcome {
         Outcome::Estimate(estimate) if !estimate.camera.is_possible() => {

@@ -94,7 +94,8 @@ pub enum NoDigits {
 /// What a solver reached on a problem.
 pub type Measured = Result<Digits, NoDigits>;
 
-/// Puts the problems to a solver that are of a lens model it knows: the digits of every answer, or why there are none.
+/// Puts the problems to a solver that are of a lens model it knows: the digits of every answer, or why there
+/// are none.
 pub fn measure(problems: &[ReferenceProblem], solver: &dyn Solver) -> Vec<Measured> {
     let models = solver.models();
     let is_known = |p: &&ReferenceProblem| models.contains(&p.problem.lens_model());

@@ -20,7 +20,8 @@ pub struct Row {
     pub outcome: String,
     /// Least digits over the parameters.
     pub least: Option<f64>,
-    /// Digits of every parameter, in the order of [`Parameter::OF_ALL_MODELS`]; `None` of those that were not free.
+    /// Digits of every parameter, in the order of [`Parameter::OF_ALL_MODELS`]; `None` of those that were not
+    /// free.
     parameters: [Option<f64>; PARAMETERS.len()],
     /// Least digits over the standard deviations.
     pub standard_deviations: Option<f64>,
@@ -141,7 +142,8 @@ impl DigitsTable {
         format!("# {provenance}\n{}", String::from_utf8_lossy(&bytes))
     }
 
-    /// Reads what [`DigitsTable::to_csv`] wrote; a table without some of the parameters is one in which they were not free.
+    /// Reads what [`DigitsTable::to_csv`] wrote; a table without some of the parameters is one in which they
+    /// were not free.
     ///
     /// # Errors
     /// Text that is no such table.

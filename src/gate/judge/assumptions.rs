@@ -2,9 +2,9 @@
 //!
 //! The usual laws do not hold where an assumption is broken, so two things are measured instead: by how much
 //! the stated standard deviations are too small, and how often the solver says that something is wrong. It
-//! fails only where three things come together: the error is more than [`TOLERATED`] times what is stated, the
-//! solver is silent of more than one sample in ten, and an ordinary test of the residuals sees the violation in
-//! [`VISIBLE`] of all samples, so that a solver of ordinary quality could have said so.
+//! fails only where three things come together: the error is more than [`TOLERATED`] times what is stated,
+//! the solver is silent of more than one sample in ten, and an ordinary test of the residuals sees the
+//! violation in [`VISIBLE`] of all samples, so that a solver of ordinary quality could have said so.
 
 use super::checks::{Basis, Check, Property};
 use super::habits::Habits;
@@ -216,7 +216,8 @@ mod tests {
         assert_eq!(report.assumptions.len(), 9);
         let of = |scene: &str| report.assumptions.iter().find(|a| a.scenario == scene).unwrap();
         let worst = |scene: &str| of(scene).worst.clone().unwrap();
-        // A board of another size leaves the camera as it is; one that is stretched does not, and hardly shows.
+        // A board of another size leaves the camera as it is; one that is stretched does not, and hardly
+        // shows.
         let size = worst("board-of-another-size");
         assert!(size.interval.0 < 1.0 && size.interval.1 > 1.0, "{size:?}");
         let stretched = worst("board-stretched");

@@ -37,8 +37,9 @@ impl Terms {
     }
 }
 
-/// Which of these p-values are rejected, by Holm's step-down procedure (1979): with `m` of them in ascending order, the i-th is rejected while it
-/// is at most `overall / (m - i + 1)`; the chance of any false rejection is at most `overall`, however they depend on each other.
+/// Which of these p-values are rejected, by Holm's step-down procedure (1979): with `m` of them in ascending
+/// order, the i-th is rejected while it is at most `overall / (m - i + 1)`; the chance of any false rejection
+/// is at most `overall`, however they depend on each other.
 pub fn rejected(p_values: &[f64], overall: f64) -> Vec<bool> {
     let count = p_values.len();
     let mut order: Vec<usize> = (0..count).collect();

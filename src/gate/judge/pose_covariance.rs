@@ -1,7 +1,8 @@
 //! Are the stated pose covariances the true ones?
 //!
 //! As for the camera, a stated variance is the bound's times an estimate of the noise, `chi-squared / d`, for
-//! every pose and along every direction; and errors in units of the stated covariance follow an F distribution.
+//! every pose and along every direction; and errors in units of the stated covariance follow an F
+//! distribution.
 
 use super::chance;
 use super::checks::{Basis, Check, Property};
@@ -53,7 +54,8 @@ fn mean(stated: &[&PoseSpread], of: impl Fn(&PoseSpread) -> &[f64], i: usize) ->
     stated.iter().map(|spread| of(spread)[i]).sum::<f64>() / stated.len() as f64
 }
 
-/// The least probable of six ratios of variances: its p-value and place; of those beyond doubt the farthest off.
+/// The least probable of six ratios of variances: its p-value and place; of those beyond doubt the farthest
+/// off.
 fn worst(stated: &[&PoseSpread], freedom: usize, of: fn(&PoseSpread) -> &[f64]) -> (f64, usize) {
     let all = freedom * stated.len();
     let judged = |i: usize| {

@@ -102,8 +102,8 @@ impl About<'_> {
         each.min_by(|a, b| a.p.total_cmp(&b.p).then(b.value.abs().total_cmp(&a.value.abs())))
     }
 
-    /// An error may be far beyond the bound, or far beyond what this one answer states: a covariance that is a million times too small in one
-    /// answer of fifty shows in no mean.
+    /// An error may be far beyond the bound, or far beyond what this one answer states: a covariance that is
+    /// a million times too small in one answer of fifty shows in no mean.
     fn no_silent_failure(&self) -> Check {
         let silent = || self.samples.iter().filter(|trial| trial.warnings == 0 || !self.habits.warns_rarely);
         let largest = |values: &mut dyn Iterator<Item = f64>| {

@@ -28,8 +28,8 @@ pub struct Report {
     pub models: Vec<&'static str>,
     /// Names of the scenes that were asked; empty if none was left out.
     pub only: Vec<String>,
-    /// The command that repeats the run, if there is one. Every check that fails has the command that asks its
-    /// scene again.
+    /// The command that repeats the run, if there is one. Every check that fails has the command that asks
+    /// its scene again.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub repeat: Option<String>,
     /// Problems asked.
@@ -42,7 +42,8 @@ pub struct Report {
     pub verdict: Verdict,
     /// Wall-clock time, s.
     pub seconds: f64,
-    /// How each copy of the program ended when its input did, and its memory; empty where no program ran at the end.
+    /// How each copy of the program ended when its input did, and its memory; empty where no program ran at
+    /// the end.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub program_ends: Vec<ProgramEnd>,
     /// Commit of the gate.
@@ -135,8 +136,8 @@ impl Report {
         Report { commit: commit.map(Commit::to_string), ..self }
     }
 
-    /// States the command that asks all scenes of the run, from which follow that of the run and that of every
-    /// check that fails.
+    /// States the command that asks all scenes of the run, from which follow that of the run and that of
+    /// every check that fails.
     pub fn with_repeat(mut self, command: &str) -> Report {
         let of_scene = |scene: &str| format!(" --scene {scene}");
         for check in self.checks.iter_mut().filter(|c| c.verdict >= Verdict::Failed) {

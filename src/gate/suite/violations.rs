@@ -1,5 +1,5 @@
-//! In which scenes is the world not the model? Noise that is not independent or not equal, boards that are not
-//! what they are said to be, lenses that the model cannot be.
+//! In which scenes is the world not the model? Noise that is not independent or not equal, boards that are
+//! not what they are said to be, lenses that the model cannot be.
 
 use super::{Draft, chapter_draft, ring};
 use crate::violation::Violation;

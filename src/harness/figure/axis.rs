@@ -112,8 +112,8 @@ fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<Tick> {
 /// Fewer ticks do not tell how an axis is divided.
 const FEWEST_LOG_TICKS: usize = 3;
 
-/// Powers of ten; with few of them in view, their multiples by 2 and 5 as well, and with fewer those by 3 and 7 too. All
-/// are plain digits, or all that are powers of ten are raised.
+/// Powers of ten; with few of them in view, their multiples by 2 and 5 as well, and with fewer those by 3 and
+/// 7 too. All are plain digits, or all that are powers of ten are raised.
 fn log_ticks(low: f64, high: f64, wanted: usize) -> Vec<Tick> {
     if !(low > 0.0 && high > low && high.is_finite()) {
         return Vec::new();

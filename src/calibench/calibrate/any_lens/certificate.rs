@@ -1,12 +1,14 @@
 //! Does a minimum explain the marks as well as homographies of their own would, behind the same lens?
 //!
-//! The certificate of Brown-Conrady's lens (`calibrate/certificate.rs`) for any lens: a board that may also be strained in its plane has
-//! a free homography in place of a pose, and nothing in that model is ambiguous but the lens itself. At a minimum its gradient is left
-//! in the two strains of each board. With poses and shared unknowns eliminated from the strains' columns, `T = g^T (E^T E)^-1 g` is
-//! what the cost would fall by to first order (Rao's score test), and `(T / d1) / (F / d2)` with `F = cost - T` follows Fisher's
+//! The certificate of Brown-Conrady's lens (`calibrate/certificate.rs`) for any lens: a board that may also
+//! be strained in its plane has a free homography in place of a pose, and nothing in that model is ambiguous
+//! but the lens itself. At a minimum its gradient is left in the two strains of each board. With poses and
+//! shared unknowns eliminated from the strains' columns, `T = g^T (E^T E)^-1 g` is what the cost would fall
+//! by to first order (Rao's score test), and `(T / d1) / (F / d2)` with `F = cost - T` follows Fisher's
 //! distribution where the minimum is the right one and the model holds.
 //!
-//! It spares starts, and says nothing to the user: what it does not see is another minimum of the lens's own coefficients.
+//! It spares starts, and says nothing to the user: what it does not see is another minimum of the lens's own
+//! coefficients.
 
 use super::super::Loss;
 use super::super::certificate::FALSE_ALARM;
@@ -25,26 +27,28 @@ use nalgebra::{DMatrix, DVector};
 
 /// With fewer degrees of freedom the excess tells too little.
 const TELLING: usize = 4;
-/// Where the focal length is known worse than this part of itself, another minimum may be as good within noise.
+/// Where the focal length is known worse than this part of itself, another minimum may be as good within
+/// noise.
 const WELL_KNOWN: f64 = 0.01;
 /// A strain of which less than this part is left once the pose follows is rounding.
 const SMALLEST_SHARE: f64 = 1e-11;
 /// Homographies leave some shared unknowns undetermined; this part of their information stands for none.
 const UNTOLD: f64 = 1e-9;
 
-/// For which models a certified minimum spares starts, and poses are refined alone ([`super::resection`]): a polynomial of the angle, and
-/// a division by one term, whose picture tells the coefficients.
+/// For which models a certified minimum spares starts, and poses are refined alone ([`super::resection`]): a
+/// polynomial of the angle, and a division by one term, whose picture tells the coefficients.
 ///
-/// Beside a fraction's minimum and that of two spheres there are others of the same lens, of which the certificate says nothing, and other
-/// starts lead to others of them. Measured with the experiment lens-minimum: 11 of 700 rational scenes ended higher by more than a
-/// hundredth of a noise variance, and 5 of 2000 double spheres, where 3 ended lower. So these models, prisms and tilted sensors among them,
-/// start as if there were no certificate, to the same bits. Brown-Conrady's lens has a certificate of its own.
+/// Beside a fraction's minimum and that of two spheres there are others of the same lens, of which the
+/// certificate says nothing, and other starts lead to others of them. Measured with the experiment
+/// lens-minimum: 11 of 700 rational scenes ended higher by more than a hundredth of a noise variance, and 5
+/// of 2000 double spheres, where 3 ended lower. So these models, prisms and tilted sensors among them, start
+/// as if there were no certificate, to the same bits. Brown-Conrady's lens has a certificate of its own.
 pub(super) fn counts_for(model: Model) -> bool {
     matches!(model, Model::KannalaBrandt | Model::Division)
 }
 
-/// Whether a minimum of least squares without priors explains the marks as well as free homographies would, behind a lens that it
-/// [`counts_for`].
+/// Whether a minimum of least squares without priors explains the marks as well as free homographies would,
+/// behind a lens that it [`counts_for`].
 pub(super) fn holds(problem: &Problem<'_>, minimum: &Minimum<State, WIDTH>) -> bool {
     use Parameter::{Cx, Cy, Fx, Fy, Skew};
     if !problem.is_certifiable
@@ -80,7 +84,8 @@ fn is_well_known(problem: &Problem<'_>, state: &State, reduction: &Reduction<WID
         .is_some_and(|unit| (unit[(row, row)] * variance).sqrt() <= WELL_KNOWN * state.camera.fx)
 }
 
-/// `T`; `None` where the lens has no image of a mark, or what is left of the shared unknowns is no information.
+/// `T`; `None` where the lens has no image of a mark, or what is left of the shared unknowns is no
+/// information.
 fn score(problem: &Problem<'_>, state: &State, reduction: &Reduction<WIDTH>) -> Option<f64> {
     let columns = problem.columns(state);
     let n = reduction.schur.nrows();
@@ -123,8 +128,8 @@ fn residuals(state: &State, view: usize, marks: &Marks) -> Option<DVector<f64>> 
     Some(residuals)
 }
 
-/// The columns of a board's two strains, `X` longer and `Y` shorter, and the right angle between them bent: the points move by
-/// `R (X, -Y, 0)` and `R (Y, X, 0)`, the pixels as with a translation by that.
+/// The columns of a board's two strains, `X` longer and `Y` shorter, and the right angle between them bent:
+/// the points move by `R (X, -Y, 0)` and `R (Y, X, 0)`, the pixels as with a translation by that.
 fn strains(rows: &DMatrix<f64>, marks: &Marks, pose: &Pose) -> [DVector<f64>; 2] {
     let (right, down): (Vec3, Vec3) = (pose.rotation.column(0).into(), pose.rotation.column(1).into());
     let mut columns = [DVector::zeros(rows.nrows()), DVector::zeros(rows.nrows())];
@@ -139,14 +144,15 @@ fn strains(rows: &DMatrix<f64>, marks: &Marks, pose: &Pose) -> [DVector<f64>; 2]
     columns
 }
 
-/// A combination of a view's strains of unit length once the pose is eliminated: its products with the shared unknowns and with the
-/// residuals.
+/// A combination of a view's strains of unit length once the pose is eliminated: its products with the shared
+/// unknowns and with the residuals.
 struct Left {
     coupling: DVector<f64>,
     gradient: f64,
 }
 
-/// What is left of the strains of a view, by Gram and Schmidt; one that the pose or the other strain follows says nothing.
+/// What is left of the strains of a view, by Gram and Schmidt; one that the pose or the other strain follows
+/// says nothing.
 fn left(
     rows: &DMatrix<f64>,
     residuals: &DVector<f64>,

@@ -1,10 +1,11 @@
 //! Is there a second double sphere that makes the same picture?
 //!
-//! With `alpha = 0` the radius of a ray is `f |(X, Y)| / (xi d + Z)`, with `xi = 0` it is
-//! `f |(X, Y)| / (alpha d + (1 - alpha) Z)`, `d` being the distance: the first is the second at `alpha' = xi / (1 + xi)` and
-//! `f' = f / (1 + xi)`, ray by ray. Beside one of the two a search ends in a minimum whose deviations know nothing of the other,
-//! and to that one no descent leads: at `xi = 0` the derivatives by `f`, `xi` and `alpha` span two directions. There the deviations have
-//! no bound either, and do not say that the other is another camera: those at a coefficient held at 0 do.
+//! With `alpha = 0` the radius of a ray is `f |(X, Y)| / (xi d + Z)`, with `xi = 0` it is `f |(X, Y)| /
+//! (alpha d + (1 - alpha) Z)`, `d` being the distance: the first is the second at `alpha' = xi / (1 + xi)`
+//! and `f' = f / (1 + xi)`, ray by ray. Beside one of the two a search ends in a minimum whose deviations
+//! know nothing of the other, and to that one no descent leads: at `xi = 0` the derivatives by `f`, `xi` and
+//! `alpha` span two directions. There the deviations have no bound either, and do not say that the other is
+//! another camera: those at a coefficient held at 0 do.
 
 use super::super::intervals::Profiled;
 use super::super::minimise::{Minimum, descend};
@@ -16,12 +17,13 @@ use crate::calibrate::Warning;
 use crate::camera::{Camera, Lens, Parameter};
 use nalgebra::DMatrix;
 
-/// A coefficient within this many standard deviations of 0 may be 0: at so many the cost rises by as many variances as a rival's
-/// may.
+/// A coefficient within this many standard deviations of 0 may be 0: at so many the cost rises by as many
+/// variances as a rival's may.
 const MAY_BE_ZERO: f64 = 4.0;
 
-/// The second camera if it explains the marks nearly as well and has another focal length; alpha or xi of the minimum may be 0 then, and
-/// both are free, as the focal length is. `unit` is the covariance of the free parameters for unit noise.
+/// The second camera if it explains the marks nearly as well and has another focal length; alpha or xi of the
+/// minimum may be 0 then, and both are free, as the focal length is. `unit` is the covariance of the free
+/// parameters for unit noise.
 pub(super) fn counterpart(
     problem: &Problem<'_>,
     minimum: &Minimum<State, WIDTH>,
@@ -58,8 +60,8 @@ fn deviation(unit: &DMatrix<f64>, row: usize, noise: Noise) -> f64 {
     noise.scale() * unit[(row, row)].sqrt()
 }
 
-/// The other double sphere with the picture of one whose alpha or xi is 0; none where it lies out of the range for which the model is
-/// defined.
+/// The other double sphere with the picture of one whose alpha or xi is 0; none where it lies out of the
+/// range for which the model is defined.
 fn same_picture(camera: &Camera<Lens>) -> Option<Camera<Lens>> {
     use Parameter::{Alpha, Xi};
     let (xi, alpha) = (camera.value(Xi)?, camera.value(Alpha)?);

@@ -2,8 +2,8 @@
 //!
 //! Numerator and denominator of a rational lens nearly cancel, and a sensor's tilt, its axis and decentring
 //! nearly do. The minimum then lies at the end of a long curved valley, along which straight steps creep by
-//! hundreds. With the second derivative of the residuals along the step, `r''`, the path is followed to second
-//! order: `x + d + a / 2` with `(H + damping D) a = -J^T r''` (Transtrum & Sethna 2012).
+//! hundreds. With the second derivative of the residuals along the step, `r''`, the path is followed to
+//! second order: `x + d + a / 2` with `(H + damping D) a = -J^T r''` (Transtrum & Sethna 2012).
 
 use super::super::Loss;
 use super::super::minimise::Descent;

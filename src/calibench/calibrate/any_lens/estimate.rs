@@ -25,8 +25,8 @@ const NO_RISE: f64 = 1e-12;
 /// Refinements until that noise is settled.
 const MOST_REFITS: usize = 60;
 
-/// What [`super::super::calibrate_lens`] does with other lenses than Brown-Conrady's, marks of unequal weight, and boards
-/// that need not be flat.
+/// What [`super::super::calibrate_lens`] does with other lenses than Brown-Conrady's, marks of unequal
+/// weight, and boards that need not be flat.
 ///
 /// # Errors
 /// As there.
@@ -71,9 +71,9 @@ fn check(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
     })
 }
 
-/// Whether a view tells its pose. Marks on a line do not, and with but one beside the line they tell it as badly: such a
-/// view is refused, as [`calibrate`] does. The homography of the marks to themselves says it of the board's side; of
-/// pixels it is no question beyond a pinhole.
+/// Whether a view tells its pose. Marks on a line do not, and with but one beside the line they tell it as
+/// badly: such a view is refused, as [`calibrate`] does. The homography of the marks to themselves says it of
+/// the board's side; of pixels it is no question beyond a pinhole.
 pub(in super::super) fn spans_a_plane(view: &View) -> Result<(), HomographyError> {
     Homography::fit(view.points(), view.points()).map(drop)
 }
@@ -105,8 +105,8 @@ fn estimate(views: &[View], settings: &Settings) -> Result<LensCalibration, Cali
     }
     walked.best.state = state;
     let bent = Problem { bend: settings.board.bend(), ..flat };
-    // A search that has not ended may do so in as many iterations again, and in the valley of a lens of many coefficients one that has
-    // may still go on.
+    // A search that has not ended may do so in as many iterations again, and in the valley of a lens of many
+    // coefficients one that has may still go on.
     let has_ended = walked.best.termination == Termination::Converged && bent.is_certifiable;
     if bent.bend.is_some() {
         walked = walk::walked_anew(walked, &bent);
@@ -122,7 +122,8 @@ fn estimate(views: &[View], settings: &Settings) -> Result<LensCalibration, Cali
     report::or_blamed(&problem, &found, calibration)
 }
 
-/// The minimum at which the noise that weighs what is known beforehand is the noise that the residuals show, from one with any noise.
+/// The minimum at which the noise that weighs what is known beforehand is the noise that the residuals show,
+/// from one with any noise.
 fn settled(
     mut problem: Problem<'_>,
     mut minimum: Minimum<State, WIDTH>,
@@ -148,8 +149,8 @@ fn settled(
     (problem, minimum)
 }
 
-/// Takes a minimum a few undamped Gauss-Newton steps further: they give digits of the parameters that the sum of squares
-/// does not show, and that damping hides where a combination of them is hardly known.
+/// Takes a minimum a few undamped Gauss-Newton steps further: they give digits of the parameters that the sum
+/// of squares does not show, and that damping hides where a combination of them is hardly known.
 fn sharpen(problem: &Problem<'_>, minimum: &mut Minimum<State, WIDTH>) {
     let mut system = problem.system();
     let mut step = Step::default();

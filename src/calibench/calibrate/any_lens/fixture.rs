@@ -28,7 +28,8 @@ pub(super) fn truth() -> (Camera<Lens>, Vec<Pose>) {
 /// Noise of [`wide_views`], px.
 pub(super) const WIDE_NOISE_PX: f64 = 0.003;
 
-/// Twenty views from near by, marks up to 60 degrees from the axis: the certificate of a pinhole with k1 and k2 fails.
+/// Twenty views from near by, marks up to 60 degrees from the axis: the certificate of a pinhole with k1 and
+/// k2 fails.
 pub(super) fn wide_views() -> Vec<View> {
     let lens = Lens::new(Model::KannalaBrandt, &[0.02, -0.01, 0.004, -0.0015]).unwrap();
     let pose = |k: i32| Pose {
@@ -84,7 +85,8 @@ pub(super) fn problem(views: &[Marks], free: FreeParameters) -> Problem<'_> {
     }
 }
 
-/// What `then` makes of the minimum that is met from the truth with these parameters free and fx times a factor.
+/// What `then` makes of the minimum that is met from the truth with these parameters free and fx times a
+/// factor.
 pub(super) fn at_minimum<T>(
     free: FreeParameters,
     factor: f64,

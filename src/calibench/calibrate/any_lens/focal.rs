@@ -1,7 +1,8 @@
 //! Is the focal length known at all? Views that face the camera leave it to the distance, with any lens.
 //!
-//! A covariance is that of the neighbourhood, and noise makes one where nothing is known. So a focal length that is known
-//! roughly is set three times as long and as short and all else refitted, as [`super::super::calibrate`] does.
+//! A covariance is that of the neighbourhood, and noise makes one where nothing is known. So a focal length
+//! that is known roughly is set three times as long and as short and all else refitted, as
+//! [`super::super::calibrate`] does.
 
 use super::super::minimise::{Minimum, descend};
 use super::super::noise::Noise;
@@ -17,8 +18,8 @@ const FACTORS: [f64; 2] = [3.0, 1.0 / 3.0];
 /// A coefficient that changes by less than this, and less than this part of itself, did not move along.
 const MOVED: f64 = 0.1;
 
-/// Refuses a focal length that may as well be three times as long or as short; `relative` is its standard deviation over
-/// itself, `noise` that of a coordinate.
+/// Refuses a focal length that may as well be three times as long or as short; `relative` is its standard
+/// deviation over itself, `noise` that of a coordinate.
 ///
 /// # Errors
 /// [`CalibrationError::NotIdentifiable`].
@@ -33,7 +34,8 @@ pub(super) fn refuse_if_open(
     if !problem.free.contains(Fx) || is_told || relative < DOUBTFUL {
         return Ok(());
     }
-    // Two spheres make up for the focal length with their distance, at the same picture: that is no other depth.
+    // Two spheres make up for the focal length with their distance, at the same picture: that is no other
+    // depth.
     let free = problem.free.without(Fx).without(Fy).without(Xi);
     let held = problem.held.with(Xi);
     let rest = Problem { free, held, fy_per_fx: None, relative_gain: ROUGH_GAIN, ..*problem };

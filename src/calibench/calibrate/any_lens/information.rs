@@ -11,9 +11,10 @@ use crate::board::View;
 use crate::camera::{Camera, FreeParameters, Lens};
 use crate::geometry::{Pose, Vec2, Vec3};
 
-/// How well the marks `points` of a flat board, seen in these poses, separate the free parameters of a camera, and
-/// `(J^T J)^-1`, the covariance of camera and poses for noise of 1 px a coordinate: see [`information`](crate::calibrate::information).
-/// The covariance is `None` where `J^T J` is singular; all is `None` where the lens has no image of a mark.
+/// How well the marks `points` of a flat board, seen in these poses, separate the free parameters of a
+/// camera, and `(J^T J)^-1`, the covariance of camera and poses for noise of 1 px a coordinate: see
+/// [`information`](crate::calibrate::information). The covariance is `None` where `J^T J` is singular; all is
+/// `None` where the lens has no image of a mark.
 ///
 /// ```
 /// use calibench::calibrate::lens_information;

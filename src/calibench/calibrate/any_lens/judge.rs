@@ -35,12 +35,14 @@ const CHECKED_AT: f64 = 2.0;
 const LOOKED_ALONG: usize = 3;
 /// Iterations of a refit with one parameter held: where it takes more, its cost so far is an upper bound.
 const MOST_REFIT: usize = 40;
-/// A refit's cost is known to this part of itself: to a ten-thousandth of a variance with a thousand degrees of freedom.
+/// A refit's cost is known to this part of itself: to a ten-thousandth of a variance with a thousand degrees
+/// of freedom.
 const REFIT_GAIN: f64 = 1e-7;
 /// A cost that rises by another factor than linear theory says is worth the profiles.
 const TOLERATED: f64 = 0.1;
 
-/// Judges a minimum, and replaces it by a lower one that lies on a profile; `met` are those that the search met.
+/// Judges a minimum, and replaces it by a lower one that lies on a profile; `met` are those that the search
+/// met.
 ///
 /// # Errors
 /// Normal equations that are singular.
@@ -69,8 +71,8 @@ pub(super) fn judge(
     Ok(Judged { minimum, reduction, noise, starts, skewed, rivals })
 }
 
-/// Notes the minimum that a start leads to, and takes it where it is better: also once it is refined to the end, which
-/// a valley may turn out not to have.
+/// Notes the minimum that a start leads to, and takes it where it is better: also once it is refined to the
+/// end, which a valley may turn out not to have.
 fn take_better(
     problem: &Problem<'_>,
     minimum: &mut Minimum<State, WIDTH>,
@@ -126,7 +128,8 @@ fn reduction_of(
 
 /// Whether the cost rises as linear theory says on the straight way to where it says least: two standard
 /// deviations of the worst-known combinations of shared unknowns, both ways. A few evaluations say that the
-/// profiles need not be walked. Nor need they where exact data leave no cost but rounding, which has any shape.
+/// profiles need not be walked. Nor need they where exact data leave no cost but rounding, which has any
+/// shape.
 fn is_parabola(
     problem: &Problem<'_>,
     minimum: &Minimum<State, WIDTH>,
@@ -147,8 +150,8 @@ fn is_parabola(
         .all(|weak| [-CHECKED_AT, CHECKED_AT].into_iter().all(|deviations| rises_as_said(deviations * weak)))
 }
 
-/// One standard deviation, for unit noise, along each of the worst-known combinations in units in which each unknown
-/// alone is known equally well; none where nothing is shared or free.
+/// One standard deviation, for unit noise, along each of the worst-known combinations in units in which each
+/// unknown alone is known equally well; none where nothing is shared or free.
 fn weakest(reduction: &Reduction<WIDTH>) -> Vec<SVector<f64, WIDTH>> {
     let shared = reduction.schur.nrows();
     let scale = reduction.schur.diagonal().map(|information| 1.0 / information.sqrt());

@@ -1,7 +1,7 @@
 //! What are the sums over the marks of a view, for a lens of any model? Four marks at a time.
 //!
-//! Columns of a mark's Jacobian: six of the pose, then the unknowns that all views share, then the residual. All
-//! products of two columns are summed; the sums are the blocks of the normal equations.
+//! Columns of a mark's Jacobian: six of the pose, then the unknowns that all views share, then the residual.
+//! All products of two columns are summed; the sums are the blocks of the normal equations.
 #![allow(clippy::needless_range_loop, reason = "indices are those of the equations")]
 
 use super::super::Loss;
@@ -15,8 +15,8 @@ use nalgebra::{DMatrix, SMatrix, SVector};
 
 /// Pose, shared unknowns, residual, in whole lanes.
 const COLUMNS: usize = 32;
-/// Derivatives that a mark has by all that views may share: five linear parameters, a lens's coefficients, three
-/// deformations.
+/// Derivatives that a mark has by all that views may share: five linear parameters, a lens's coefficients,
+/// three deformations.
 const LINEAR: usize = 5;
 const DEFORMATIONS: usize = 3;
 const MOST: usize = LINEAR + 14 + DEFORMATIONS;
@@ -65,7 +65,8 @@ impl Share {
     }
 }
 
-/// Products of a view's columns, upper triangle, row by row: as large as the view needs, for it is cleared for each.
+/// Products of a view's columns, upper triangle, row by row: as large as the view needs, for it is cleared
+/// for each.
 #[derive(Default)]
 struct Products {
     /// Length of a row, in whole lanes.
@@ -133,7 +134,8 @@ pub(super) struct View<'a> {
     pub columns: &'a Columns,
 }
 
-/// The weighted rows of a view's Jacobian: pose, then what views share. `None` where the lens has no image of a mark.
+/// The weighted rows of a view's Jacobian: pose, then what views share. `None` where the lens has no image of
+/// a mark.
 pub(super) fn rows_of_view(view: &View<'_>) -> Option<DMatrix<f64>> {
     visit(&view.camera.distortion, RowsOfModel { view })
 }
@@ -274,8 +276,8 @@ impl<M: LensModel<P>, const P: usize> Kernel for Sums<'_, '_, M, P> {
     }
 }
 
-/// Multiplies the first `count` columns with the roots of the marks' weights, those of the loss among them: their cost.
-/// `None` where the lens has no image of a mark.
+/// Multiplies the first `count` columns with the roots of the marks' weights, those of the loss among them:
+/// their cost. `None` where the lens has no image of a mark.
 #[inline(always)]
 fn weigh<L: Lanes>(view: &View<'_>, block: &Block, rows: &mut Rows<L>, count: usize) -> Option<L> {
     if !rows.inside.all_positive() {
@@ -557,7 +559,8 @@ mod tests {
         (cost_at(size) - cost_at(-size)) / (4.0 * size)
     }
 
-    /// A difference of this many px in the largest residual loses some 1e-7 of the slope to curvature, and as much to rounding.
+    /// A difference of this many px in the largest residual loses some 1e-7 of the slope to curvature, and as
+    /// much to rounding.
     const MOVED_PX: f64 = 1e-4;
 
     #[test]
@@ -566,7 +569,8 @@ mod tests {
             let mut system = problem.system();
             problem.linearise_into(state, &mut system);
             let is_slope = |gradient: f64, square: f64, set: &dyn Fn(&mut Step<WIDTH>)| {
-                // `square` is the information of the unknown, so that this is what the gradient's terms come to.
+                // `square` is the information of the unknown, so that this is what the gradient's terms come
+                // to.
                 let unit = (square * system.cost).sqrt();
                 let slope = half_slope(problem, state, MOVED_PX / square.sqrt(), set);
                 assert!((gradient - slope).abs() < 1e-5 * unit, "{gradient} {slope} {unit}");

@@ -23,8 +23,8 @@ pub struct Located {
     pub square: f64,
 }
 
-/// The pose of a flat board in a view of a camera that is known: from the rays of its marks, refined, the better of
-/// its two tilts. `None` with fewer than four marks, or where the camera cannot see them.
+/// The pose of a flat board in a view of a camera that is known: from the rays of its marks, refined, the
+/// better of its two tilts. `None` with fewer than four marks, or where the camera cannot see them.
 ///
 /// ```
 /// use calibench::calibrate::locate;

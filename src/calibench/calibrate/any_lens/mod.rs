@@ -1,8 +1,9 @@
-//! Which camera explains the pixels, with a lens of any model, marks of unequal weight, a board that is not flat?
+//! Which camera explains the pixels, with a lens of any model, marks of unequal weight, a board that is not
+//! flat?
 //!
-//! The estimator of [`super::calibrate`] knows one lens, and much about it: every start, the floor of its cost, its
-//! other minima. This one knows any lens ([`Model`]): the same least squares, normal equations and covariance, with
-//! starts that need no pinhole. Nothing certifies its minimum, and every result says so.
+//! The estimator of [`super::calibrate`] knows one lens, and much about it: every start, the floor of its
+//! cost, its other minima. This one knows any lens ([`Model`]): the same least squares, normal equations and
+//! covariance, with starts that need no pinhole. Nothing certifies its minimum, and every result says so.
 //!
 //! [`Model`]: crate::camera::Model
 

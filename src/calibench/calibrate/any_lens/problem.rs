@@ -1,5 +1,5 @@
-//! What is minimised with a lens of any model? The sum of squared, weighted pixel distances, and what is known
-//! beforehand.
+//! What is minimised with a lens of any model? The sum of squared, weighted pixel distances, and what is
+//! known beforehand.
 
 use super::super::Loss;
 use super::super::blocks::ViewBlock;
@@ -37,7 +37,8 @@ impl State {
 pub(super) struct Problem<'a> {
     pub views: &'a [Marks],
     pub free: FreeParameters,
-    /// Parameters that are held for a while, as along a profile: of what is known of them beforehand they pay for their place.
+    /// Parameters that are held for a while, as along a profile: of what is known of them beforehand they pay
+    /// for their place.
     pub held: FreeParameters,
     pub fy_per_fx: Option<f64>,
     /// What is known beforehand, and the noise of a coordinate of weight 1 that weighs it.
@@ -50,7 +51,8 @@ pub(super) struct Problem<'a> {
     /// A step that promises less than this part of the cost is the last.
     pub relative_gain: f64,
     pub rounding_cost: f64,
-    /// Whether [`certificate::counts_for`] the model that is wanted, so that starts are spared and poses are refined alone.
+    /// Whether [`certificate::counts_for`] the model that is wanted, so that starts are spared and poses are
+    /// refined alone.
     ///
     /// [`certificate::counts_for`]: super::certificate::counts_for
     pub is_certifiable: bool,
@@ -65,8 +67,8 @@ pub(super) struct Known {
     pub weight: Weight,
 }
 
-/// Where minima are compared or left for another model, a cost that is known to this part of itself is known well
-/// enough: to a thousandth of a variance with a thousand degrees of freedom.
+/// Where minima are compared or left for another model, a cost that is known to this part of itself is known
+/// well enough: to a thousandth of a variance with a thousand degrees of freedom.
 pub(super) const ROUGH_GAIN: f64 = 1e-6;
 
 /// A good start takes fewer iterations.
@@ -131,8 +133,8 @@ impl Problem<'_> {
         }
     }
 
-    /// The cost of a state without derivatives: the bits of [`Descent::linearise_into`], as the sums have its order. Infinite where the
-    /// lens has no image of a mark.
+    /// The cost of a state without derivatives: the bits of [`Descent::linearise_into`], as the sums have its
+    /// order. Infinite where the lens has no image of a mark.
     pub fn cost(&self, state: &State) -> f64 {
         let columns = Columns::NONE;
         let of_view = |at: usize, _: &Marks| kernel::cost(&self.view(state, &columns, at));

@@ -11,10 +11,11 @@ const UNTOLD: f64 = 1e-6;
 /// Steps of each coefficient of the double sphere.
 const STEPS: usize = 12;
 
-/// The lens with those coefficients that are free fitted to pairs of angle (rad) and distorted radius; the others
-/// stay as they are. With it the factor of the focal length: the radii are those of a lens that leaves the axis
-/// with slope 1, and a double sphere does so with `1 / (1 + xi)`. Of these there are two, as a rule each a minimum of
-/// its own: one with a negative and one with a positive `xi`. None where a pinhole would have to see beside itself.
+/// The lens with those coefficients that are free fitted to pairs of angle (rad) and distorted radius; the
+/// others stay as they are. With it the factor of the focal length: the radii are those of a lens that leaves
+/// the axis with slope 1, and a double sphere does so with `1 / (1 + xi)`. Of these there are two, as a rule
+/// each a minimum of its own: one with a negative and one with a positive `xi`. None where a pinhole would
+/// have to see beside itself.
 pub(super) fn fitted(lens: Lens, free: FreeParameters, radii: &[[f64; 2]]) -> Vec<(Lens, f64)> {
     use Parameter::{K4, K5, K6};
     if !lens.model().sees_behind() && radii.iter().any(|[angle, _]| *angle > BESIDE) {
@@ -42,8 +43,8 @@ pub(super) fn fitted(lens: Lens, free: FreeParameters, radii: &[[f64; 2]]) -> Ve
     }
 }
 
-/// Other lenses of the same model with nearly the same radii: a fraction follows a curve in many ways, with some of
-/// its terms left out, each perhaps beside a minimum of its own. None where the model is no fraction.
+/// Other lenses of the same model with nearly the same radii: a fraction follows a curve in many ways, with
+/// some of its terms left out, each perhaps beside a minimum of its own. None where the model is no fraction.
 pub(super) fn alternatives(lens: Lens, free: FreeParameters, radii: &[[f64; 2]]) -> Vec<Lens> {
     use Parameter::{K1, K2, K3, K4, K5, K6};
     if lens.get(K6).is_none() {
@@ -62,8 +63,9 @@ pub(super) fn alternatives(lens: Lens, free: FreeParameters, radii: &[[f64; 2]])
 /// Ranges of xi in which a double sphere may have a minimum of its own.
 const XI_RANGES: [[f64; 2]; 4] = [[-0.6, -0.2], [-0.2, 0.1], [0.1, 0.5], [0.5, 1.1]];
 
-/// Double spheres with nearly the same radii, one in each range of `xi` but for the range of `lens` itself, with the factor of the focal length:
-/// spheres that are farther apart behind a longer lens make nearly the same picture. None where xi is not free or the model another.
+/// Double spheres with nearly the same radii, one in each range of `xi` but for the range of `lens` itself,
+/// with the factor of the focal length: spheres that are farther apart behind a longer lens make nearly the
+/// same picture. None where xi is not free or the model another.
 pub(super) fn other_spheres(lens: Lens, free: FreeParameters, radii: &[[f64; 2]]) -> Vec<(Lens, f64)> {
     let Some(own) = lens.get(Parameter::Xi).filter(|_| free.contains(Parameter::Xi)) else {
         return Vec::new();
@@ -77,7 +79,8 @@ pub(super) fn other_spheres(lens: Lens, free: FreeParameters, radii: &[[f64; 2]]
         .collect()
 }
 
-/// A model's equation multiplied out, linear in its radial coefficients: their factors and the right-hand side.
+/// A model's equation multiplied out, linear in its radial coefficients: their factors and the right-hand
+/// side.
 fn equation(model: Model, &[angle, radius]: &[f64; 2]) -> (Vec<(Parameter, f64)>, f64) {
     use Parameter::{K1, K2, K3, K4, K5, K6};
     let r = libm::tan(angle);

@@ -1,10 +1,11 @@
-//! Along which rays does a camera see its pixels, roughly? An exact inverse asks for the roots of a polynomial at every pixel; a start
-//! is refined anyway.
+//! Along which rays does a camera see its pixels, roughly? An exact inverse asks for the roots of a
+//! polynomial at every pixel; a start is refined anyway.
 
 use crate::camera::{Camera, Lens};
 use crate::geometry::{Vec2, Vec3};
 
-/// Angles of the table, rad: between two of them a radius is off by an eighth of its square times the curvature, some 1e-4 rad.
+/// Angles of the table, rad: between two of them a radius is off by an eighth of its square times the
+/// curvature, some 1e-4 rad.
 const STEP: f64 = 0.04;
 
 /// A camera whose lens bends every ray by its angle from the axis alone.

@@ -1,5 +1,6 @@
-//! Where was the board in one view, behind a camera that is known? Six unknowns, so that neither a system of all views nor
-//! derivatives by the lens are needed; a lens with minima side by side is descended with them all the same, as [`counts_for`] says.
+//! Where was the board in one view, behind a camera that is known? Six unknowns, so that neither a system of
+//! all views nor derivatives by the lens are needed; a lens with minima side by side is descended with them
+//! all the same, as [`counts_for`] says.
 //!
 //! [`counts_for`]: super::certificate::counts_for
 
@@ -10,7 +11,8 @@ use crate::camera::{Camera, FreeParameters, Lens};
 use crate::geometry::Pose;
 use nalgebra::SVector;
 
-/// Damping as in the descent of all unknowns: what it starts and falls to, its factor, and where nothing helps any more.
+/// Damping as in the descent of all unknowns: what it starts and falls to, its factor, and where nothing
+/// helps any more.
 const FIRST_DAMPING: f64 = 1e-6;
 const LEAST_DAMPING: f64 = 1e-12;
 const DAMPING_FACTOR: f64 = 10.0;
@@ -35,8 +37,8 @@ pub(super) struct Posed {
 }
 
 impl Resection<'_> {
-    /// The pose after so many steps at most, or from where a further one promises less than [`ROUGH_GAIN`]. A start that costs least is
-    /// left as it is.
+    /// The pose after so many steps at most, or from where a further one promises less than [`ROUGH_GAIN`]. A
+    /// start that costs least is left as it is.
     pub fn refined(&self, start: Pose, steps: usize) -> Posed {
         if self.problem.is_certifiable { self.alone(start, steps) } else { self.descended(start, steps) }
     }

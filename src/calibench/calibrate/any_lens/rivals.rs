@@ -1,8 +1,9 @@
 //! Which other cameras explain the data nearly as well?
 //!
-//! A minimum that the search met is another camera where it lies so many standard deviations away that it cannot be the same one.
-//! Where the cost is no parabola deviations may be absurdly wide, and there the profile tells: with the focal length held on the way from one
-//! camera to the other the cost rises so far that an interval of two standard deviations ends before (Bates & Watts 1988, section 6.1).
+//! A minimum that the search met is another camera where it lies so many standard deviations away that it
+//! cannot be the same one. Where the cost is no parabola deviations may be absurdly wide, and there the
+//! profile tells: with the focal length held on the way from one camera to the other the cost rises so far
+//! that an interval of two standard deviations ends before (Bates & Watts 1988, section 6.1).
 
 use super::super::intervals::{Profile, Skewed};
 use super::super::minimise::Minimum;
@@ -21,7 +22,8 @@ const ONE_CAMERA: f64 = 0.02;
 /// Cameras that are named at most.
 const MOST_NAMED: usize = 3;
 
-/// Other cameras among those that were met, the best first; `skewed` are the parameters whose cost is no parabola.
+/// Other cameras among those that were met, the best first; `skewed` are the parameters whose cost is no
+/// parabola.
 pub(super) fn of(
     problem: &Problem<'_>,
     minimum: &Minimum<State, WIDTH>,
@@ -76,7 +78,8 @@ fn value(camera: &Camera<Lens>, parameter: Parameter) -> f64 {
     camera.value(parameter).unwrap_or(0.0)
 }
 
-/// Cameras whose focal lengths agree are one to whom they are named; where these are held, the best of the others is.
+/// Cameras whose focal lengths agree are one to whom they are named; where these are held, the best of the
+/// others is.
 fn is_one_camera(a: &Camera<Lens>, b: &Camera<Lens>) -> bool {
     !differ(a.fx, b.fx) && !differ(a.fy, b.fy)
 }

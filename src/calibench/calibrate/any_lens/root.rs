@@ -1,11 +1,11 @@
-//! What do the marks say of a combination that the normal equations lose? The root of the information, by orthogonal
-//! transformations of the Jacobian.
+//! What do the marks say of a combination that the normal equations lose? The root of the information, by
+//! orthogonal transformations of the Jacobian.
 //!
-//! Numerator and denominator of a rational lens that nearly cancel leave combinations of coefficients that are known a
-//! million times worse than each coefficient alone. Normal equations `J^T J` square that ratio, and nothing but rounding
-//! is left of it. `J_v = Q_v [R_v, B_v; 0, T_v]` of each view, with the pose's columns first, leaves `T_v` for what the
-//! views share; the triangle `R` of all `T_v` has `R^T R = S`, the information with the poses unknown, and the digits of `J`
-//! (Golub & Van Loan 2013, section 5.3).
+//! Numerator and denominator of a rational lens that nearly cancel leave combinations of coefficients that
+//! are known a million times worse than each coefficient alone. Normal equations `J^T J` square that ratio,
+//! and nothing but rounding is left of it. `J_v = Q_v [R_v, B_v; 0, T_v]` of each view, with the pose's
+//! columns first, leaves `T_v` for what the views share; the triangle `R` of all `T_v` has `R^T R = S`, the
+//! information with the poses unknown, and the digits of `J` (Golub & Van Loan 2013, section 5.3).
 
 use super::super::conditioning::Spectrum;
 use super::super::system::{Reduction, System};
@@ -117,7 +117,8 @@ mod tests {
         for i in 0..6 {
             for j in 0..6 {
                 let unit = (schur[(i, i)] * schur[(j, j)]).sqrt();
-                // The elimination loses digits in the ratio of the information before and after: some thousands.
+                // The elimination loses digits in the ratio of the information before and after: some
+                // thousands.
                 assert!((square[(i, j)] - schur[(i, j)]).abs() < 1e-10 * unit, "{i} {j}");
             }
         }

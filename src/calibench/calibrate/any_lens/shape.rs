@@ -3,9 +3,9 @@
 use crate::board::View;
 use crate::geometry::Vec2;
 
-/// The shape of a board that is not flat: the mark at `(X, Y)` lies `bow_x (1 - x^2) + bow_y (1 - y^2) + twist x y`
-/// towards +Z of the target, with `x` and `y` from -1 to 1 over the box around all marks (the bows as in mrcal's
-/// `calobject_warp`).
+/// The shape of a board that is not flat: the mark at `(X, Y)` lies `bow_x (1 - x^2) + bow_y (1 - y^2) +
+/// twist x y` towards +Z of the target, with `x` and `y` from -1 to 1 over the box around all marks (the bows
+/// as in mrcal's `calobject_warp`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BoardShape {

@@ -1,10 +1,10 @@
 //! From where does the search for a camera with any lens start?
 //!
-//! A homography of pixels needs a pinhole, and beyond some 100 degrees there is none. A ray needs none: with an
-//! equidistant fisheye of some focal length every pixel has a ray `b`, and `b x (H X) = 0` gives the homography
-//! from the board to rays, whatever the angle. The focal length is searched on a grid; the best few are refined
-//! with a polynomial of the angle (Kannala & Brandt 2006), which follows any lens, and the wanted model is
-//! fitted to the rays that this one sees.
+//! A homography of pixels needs a pinhole, and beyond some 100 degrees there is none. A ray needs none: with
+//! an equidistant fisheye of some focal length every pixel has a ray `b`, and `b x (H X) = 0` gives the
+//! homography from the board to rays, whatever the angle. The focal length is searched on a grid; the best
+//! few are refined with a polynomial of the angle (Kannala & Brandt 2006), which follows any lens, and the
+//! wanted model is fitted to the rays that this one sees.
 
 use super::super::Settings;
 use super::super::chunks;
@@ -23,7 +23,8 @@ use crate::camera::{Camera, FreeParameters, Lens, Model, Parameter};
 use crate::geometry::{Mat3, Pose, Vec2, Vec3};
 use nalgebra::{SMatrix, SVector};
 
-/// Angles from the axis, rad, at which the farthest pixel may be seen: 3 to 103 degrees, each 1.3 times the last.
+/// Angles from the axis, rad, at which the farthest pixel may be seen: 3 to 103 degrees, each 1.3 times the
+/// last.
 const NARROWEST: f64 = 0.05;
 const ANGLES: usize = 14;
 const ANGLE_FACTOR: f64 = 1.3;
@@ -33,11 +34,13 @@ const ASPECTS: [f64; 2] = [0.6, 1.7];
 const NEARLY_SQUARE: f64 = 0.1;
 /// So many of them are refined.
 const REFINED: usize = 3;
-/// With fewer marks a view than this, the pinhole is searched for beyond its first minima, as those of five marks a view can
-/// lead astray (`lens_hard_cases::a_fisheye_behind_tall_pixels_is_found_from_five_marks_a_view`). The search costs little
+/// With fewer marks a view than this, the pinhole is searched for beyond its first minima, as those of five
+/// marks a view can lead astray
+/// (`lens_hard_cases::a_fisheye_behind_tall_pixels_is_found_from_five_marks_a_view`). The search costs little
 /// then; with many marks it costs more than all the rest, as it goes on for long where no pinhole fits.
 const FEW_MARKS: usize = 16;
-/// The focal length is chosen by so many marks of evenly taken views, of [`CHOOSERS`] at the least; all of them follow.
+/// The focal length is chosen by so many marks of evenly taken views, of [`CHOOSERS`] at the least; all of
+/// them follow.
 const CHOOSING_MARKS: usize = 500;
 const CHOOSERS: usize = 6;
 /// Steps of the poses alone, of a first lens, of a better one.
@@ -45,8 +48,9 @@ const POSE_STEPS: usize = 6;
 const FIRST_STEPS: usize = 15;
 const LENS_STEPS: usize = 40;
 
-/// States with lenses of the wanted model like the one that the pinhole's solver finds with k1 and k2, however it
-/// fits, and whether that is certified. Of many marks some views tell a lens that is certifiable, and the others follow.
+/// States with lenses of the wanted model like the one that the pinhole's solver finds with k1 and k2,
+/// however it fits, and whether that is certified. Of many marks some views tell a lens that is certifiable,
+/// and the others follow.
 pub(super) fn by_pinhole(problem: &Problem<'_>, views: &[View], settings: &Settings) -> (Vec<State>, bool) {
     let chosen = chosen_views(problem.views);
     if chosen.len() == views.len() || !problem.is_certifiable {
@@ -108,9 +112,9 @@ fn pinhole(views: &[View], settings: &Settings) -> Option<(State, bool)> {
     Some((State { camera, cam_from_target, shape: [0.0; 3] }, is_certified))
 }
 
-/// States with lenses of the wanted model like angle polynomials of two terms: with pixels of the shape that is tied,
-/// otherwise with square ones, and where they come out far from it once fy is free, with pixels of any shape besides. Few
-/// marks lead these astray where square ones are right.
+/// States with lenses of the wanted model like angle polynomials of two terms: with pixels of the shape that
+/// is tied, otherwise with square ones, and where they come out far from it once fy is free, with pixels of
+/// any shape besides. Few marks lead these astray where square ones are right.
 pub(super) fn by_rays(problem: &Problem<'_>, settings: &Settings) -> Vec<State> {
     let rough = Problem { priors: &[], bend: None, relative_gain: ROUGH_GAIN, ..*problem };
     let shaped = |fy_per_fx| Problem { fy_per_fx, ..rough };
@@ -124,7 +128,8 @@ pub(super) fn by_rays(problem: &Problem<'_>, settings: &Settings) -> Vec<State> 
     [square, any].into_iter().flatten().flat_map(|state| with_model(problem, &state, settings)).collect()
 }
 
-/// Whether pixels stay nearly square where an angle polynomial that takes them for it is refined with fy free.
+/// Whether pixels stay nearly square where an angle polynomial that takes them for it is refined with fy
+/// free.
 fn is_nearly_square(fisheye: &Problem<'_>, state: &State) -> bool {
     use Parameter::{Cx, Cy, Fx, Fy, K1, K2};
     let free = FreeParameters::of(&[Fx, Fy, Cx, Cy, K1, K2]);
@@ -206,8 +211,8 @@ fn chosen_views(views: &[Marks]) -> Vec<usize> {
     (0..count).map(|k| k * views.len() / count).collect()
 }
 
-/// The camera with a pose for every view, refined a few steps, and their cost; `None` where a view has none, and perhaps where they cost
-/// more than `dearest`.
+/// The camera with a pose for every view, refined a few steps, and their cost; `None` where a view has none,
+/// and perhaps where they cost more than `dearest`.
 fn with_refined_poses(problem: &Problem<'_>, camera: Camera<Lens>, dearest: f64) -> Option<(f64, State)> {
     if problem.is_certifiable {
         return with_poses_alone(problem, camera, dearest);
@@ -289,8 +294,8 @@ pub(super) fn with_better_tilts(problem: &Problem<'_>, mut state: State) -> Stat
     state
 }
 
-/// Steps after which a pose costs less than so many times the other tilt, or is not followed: three steps lead close
-/// to the minimum of six unknowns, and as many again into it.
+/// Steps after which a pose costs less than so many times the other tilt, or is not followed: three steps
+/// lead close to the minimum of six unknowns, and as many again into it.
 const DEAR: [(usize, f64); 2] = [(3, 100.0), (3, 4.0)];
 
 /// A pose that costs the same up to this part is the one that was there: close views have one tilt.
@@ -324,7 +329,8 @@ fn with_model(problem: &Problem<'_>, state: &State, settings: &Settings) -> Vec<
     with_lenses(problem, &State { camera: told, ..state.clone() }, lenses)
 }
 
-/// The state with other lenses, each with its factor of the focal lengths that are free, where they see every mark.
+/// The state with other lenses, each with its factor of the focal lengths that are free, where they see every
+/// mark.
 fn with_lenses(problem: &Problem<'_>, state: &State, lenses: Vec<(Lens, f64)>) -> Vec<State> {
     let with_lens = |(lens, factor): (Lens, f64)| {
         let mut camera = Camera { distortion: lens, ..state.camera };
@@ -352,8 +358,8 @@ fn with_values(problem: &Problem<'_>, camera: &Camera<Lens>, settings: &Settings
     Some(camera)
 }
 
-/// Starts near a minimum that may lead to another one: with the same picture made by other coefficients, and with
-/// the sensor tilted other ways.
+/// Starts near a minimum that may lead to another one: with the same picture made by other coefficients, and
+/// with the sensor tilted other ways.
 pub(super) fn alternatives(problem: &Problem<'_>, state: &State) -> Vec<State> {
     use Parameter::{TauX, TauY};
     let lens = state.camera.distortion;
@@ -366,8 +372,8 @@ pub(super) fn alternatives(problem: &Problem<'_>, state: &State) -> Vec<State> {
     lenses.into_iter().map(with_lens).filter(|state| is_seen(problem.views, state)).collect()
 }
 
-/// Starts at the double spheres that make nearly the same picture as the one of a minimum: a first lens that fits badly leads to any of them.
-/// None with another model.
+/// Starts at the double spheres that make nearly the same picture as the one of a minimum: a first lens that
+/// fits badly leads to any of them. None with another model.
 pub(super) fn other_spheres(problem: &Problem<'_>, state: &State) -> Vec<State> {
     let lenses = radial::other_spheres(state.camera.distortion, problem.free, &radii(problem.views, state));
     with_lenses(problem, state, lenses)

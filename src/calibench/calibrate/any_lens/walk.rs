@@ -8,16 +8,17 @@ use super::{WIDTH, certificate, report, start};
 use crate::board::View;
 use crate::camera::Lens;
 
-/// The best of the minima, refined to the end where the model is certifiable, and the others that were met, most of them to
-/// [`ROUGH_GAIN`].
+/// The best of the minima, refined to the end where the model is certifiable, and the others that were met,
+/// most of them to [`ROUGH_GAIN`].
 pub(super) struct Walked {
     pub best: Minimum<State, WIDTH>,
     pub others: Vec<Minimum<State, WIDTH>>,
 }
 
-/// Refines the starts: those that the pinhole's solver gives, and, unless one of them converges to residuals that look like noise and
-/// either the pinhole or this minimum is certified, those that an angle polynomial gives. The pinhole's certificate counts for its own
-/// lens, and where that does not hold it may be one of a wrong camera.
+/// Refines the starts: those that the pinhole's solver gives, and, unless one of them converges to residuals
+/// that look like noise and either the pinhole or this minimum is certified, those that an angle polynomial
+/// gives. The pinhole's certificate counts for its own lens, and where that does not hold it may be one of a
+/// wrong camera.
 ///
 /// # Errors
 /// No lens of the model sees every mark.
@@ -44,8 +45,8 @@ pub(super) fn walk(
     minima.extend(refined(problem, spheres));
     let rough = best_of(problem, &minima).ok_or(CalibrationError::NoImage { model: settings.model() })?;
     follow(problem, &mut minima[rough]);
-    // Where its valley goes on and on, another start may lead to a minimum that is as good; where two spheres make nearly the same picture,
-    // rough costs do not tell which of them is better.
+    // Where its valley goes on and on, another start may lead to a minimum that is as good; where two spheres
+    // make nearly the same picture, rough costs do not tell which of them is better.
     let followed_below = if minima[rough].termination != Termination::Converged {
         f64::INFINITY
     } else if may_be_alike {
@@ -67,8 +68,8 @@ pub(super) fn walk(
 /// Costs that differ by less than this part, at focal lengths that do, are taken for those of one minimum.
 const ONE_MINIMUM: f64 = 1e-4;
 
-/// The minima of another problem that lie where these do, each once: the best there need not be the best here, as where a lens takes up
-/// what the board's shape explains.
+/// The minima of another problem that lie where these do, each once: the best there need not be the best
+/// here, as where a lens takes up what the board's shape explains.
 pub(super) fn walked_anew(walked: Walked, problem: &Problem<'_>) -> Walked {
     let Walked { mut best, others } = walked;
     let is_same = |a: f64, b: f64| (a - b).abs() <= ONE_MINIMUM * b.abs();
@@ -119,10 +120,11 @@ pub(super) fn is_better(
     dearness(next, rise) < dearness(best, rise)
 }
 
-/// The cost of a minimum, and for each of its faults so much more that chance does not explain it; `rise` is what one standard deviation
-/// costs. Where numerator and denominator of a fraction nearly cancel, a valley goes on to coefficients without end, at a fraction of a
-/// variance; two spheres make nearly the same picture in and out of their range, and beside a camera in its range a search may go on and
-/// on where it ends out of the range.
+/// The cost of a minimum, and for each of its faults so much more that chance does not explain it; `rise` is
+/// what one standard deviation costs. Where numerator and denominator of a fraction nearly cancel, a valley
+/// goes on to coefficients without end, at a fraction of a variance; two spheres make nearly the same picture
+/// in and out of their range, and beside a camera in its range a search may go on and on where it ends out of
+/// the range.
 fn dearness(minimum: &Minimum<State, WIDTH>, rise: f64) -> f64 {
     let is_outside = Warning::is_outside_range(&minimum.state.camera);
     let is_unended = minimum.termination != Termination::Converged;
@@ -130,8 +132,8 @@ fn dearness(minimum: &Minimum<State, WIDTH>, rise: f64) -> f64 {
     minimum.system.cost + f64::from(faults) * RIVALS * rise
 }
 
-/// A minimum as another problem weighs what is known beforehand, which it does by its own noise. Where that is no minimum of its, the next
-/// one costs less.
+/// A minimum as another problem weighs what is known beforehand, which it does by its own noise. Where that
+/// is no minimum of its, the next one costs less.
 pub(super) fn weighed_anew(
     minimum: &Minimum<State, WIDTH>,
     before: &Problem<'_>,

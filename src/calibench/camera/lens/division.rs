@@ -1,13 +1,13 @@
 //! The division model (Lenz 1987; Fitzgibbon 2001), one coefficient: what machine vision uses most.
 //!
-//! The ideal point is the distorted one divided by `1 + k1 r_d^2`, so that the inverse is the simple direction. As
-//! rays, which go on beyond 90 degrees from the axis where `1 + k1 r_d^2` is negative:
+//! The ideal point is the distorted one divided by `1 + k1 r_d^2`, so that the inverse is the simple
+//! direction. As rays, which go on beyond 90 degrees from the axis where `1 + k1 r_d^2` is negative:
 //!
 //! ```text
 //! (X, Y, Z) ~ (x_d, y_d, 1 + k1 r_d^2),   (x_d, y_d) = 2 (X, Y) / (Z + sqrt(Z^2 - 4 k1 s)),   s = X^2 + Y^2
 //! ```
-//! With `k1 > 0` only points with `Z > 2 sqrt(k1 s)` have images; `k1 < 0` is a barrel, and all points have one but
-//! those exactly behind.
+//! With `k1 > 0` only points with `Z > 2 sqrt(k1 s)` have images; `k1 < 0` is a barrel, and all points have
+//! one but those exactly behind.
 
 use super::pinhole;
 use super::{LensModel, Projected, Real};
@@ -33,7 +33,8 @@ impl LensModel<1> for Division {
         let root = square.sqrt();
         let denominator = z + root;
         let g = two / denominator;
-        // d denominator / d (X, Y, Z, k1) = (-4 k1 X, -4 k1 Y, root + Z, -2 s) / root, and dg = -g^2 / 2 of that.
+        // d denominator / d (X, Y, Z, k1) = (-4 k1 X, -4 k1 Y, root + Z, -2 s) / root, and dg = -g^2 / 2 of
+        // that.
         let slope = g * g / root;
         let (across, along) = (two * (k1 * slope), -(A::splat(0.5) * (slope * (root + z))));
         let cross = across * (x * y);

@@ -1,5 +1,5 @@
-//! The double sphere (Usenko, Demmel & Cremers 2018), two coefficients: a fisheye with an inverse in closed form.
-//! With `xi = 0` it is the unified camera of Mei & Rives (2007).
+//! The double sphere (Usenko, Demmel & Cremers 2018), two coefficients: a fisheye with an inverse in closed
+//! form. With `xi = 0` it is the unified camera of Mei & Rives (2007).
 //!
 //! ```text
 //! d1 = |(X, Y, Z)|,   w = xi d1 + Z,   d2 = sqrt(X^2 + Y^2 + w^2)

@@ -46,7 +46,8 @@ pub enum Model {
     ThinPrism,
     /// The thin-prism model behind a tilted sensor: tau_x, tau_y besides.
     Tilted,
-    /// A polynomial of the angle, k1 to k4 (Kannala & Brandt 2006): fisheyes, beyond 90 degrees from the axis.
+    /// A polynomial of the angle, k1 to k4 (Kannala & Brandt 2006): fisheyes, beyond 90 degrees from the
+    /// axis.
     KannalaBrandt,
     /// One coefficient, k1, and a simple inverse (Fitzgibbon 2001).
     Division,
@@ -212,8 +213,8 @@ impl Lens {
         self.model.coefficients().iter().position(|&p| p == parameter)
     }
 
-    /// The image of a point in camera coordinates on the plane of the linear parameters; `None` where the model
-    /// has none: behind a pinhole, beyond the reach of a division.
+    /// The image of a point in camera coordinates on the plane of the linear parameters; `None` where the
+    /// model has none: behind a pinhole, beyond the reach of a division.
     pub fn project(&self, point_cam: &Vec3) -> Option<Vec2> {
         for_model!(self.model, M, P => {
             let constants = <M as LensModel<P>>::constants(self.array::<P>());

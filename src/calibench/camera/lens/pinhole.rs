@@ -1,5 +1,5 @@
-//! What do all lenses share that bend the picture of a pinhole? The ideal point `(X, Y) / Z`, which they move,
-//! and the inverse of that.
+//! What do all lenses share that bend the picture of a pinhole? The ideal point `(X, Y) / Z`, which they
+//! move, and the inverse of that.
 
 use super::{LensModel, Projected, Real};
 use crate::camera::UndistortError;
@@ -36,8 +36,8 @@ pub(super) fn ray_of(ideal: &Vec2) -> Vec3 {
     Vec3::new(ideal.x, ideal.y, 1.0).normalize()
 }
 
-/// Newton's method in the plane for the ideal point whose image is `at`, with steps halved until they help, kept
-/// within ideal radius `limit` and where the map keeps its orientation.
+/// Newton's method in the plane for the ideal point whose image is `at`, with steps halved until they help,
+/// kept within ideal radius `limit` and where the map keeps its orientation.
 pub(super) fn inverse<M: LensModel<P>, const P: usize>(
     coefficients: &[f64; P],
     at: &Vec2,

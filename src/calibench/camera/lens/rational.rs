@@ -94,8 +94,8 @@ fn radial(&[k1, k2, _, _, k3, k4, k5, k6]: &[f64; 8], s: f64) -> (f64, f64) {
     (g, slope / below)
 }
 
-/// The ideal radius up to which `r g(r^2)` grows: with `g = a / b` its slope has the sign of `(a + 2 s a') b - 2
-/// s a b'`, and a zero of `b` ends it too.
+/// The ideal radius up to which `r g(r^2)` grows: with `g = a / b` its slope has the sign of
+/// `(a + 2 s a') b - 2 s a b'`, and a zero of `b` ends it too.
 pub(super) fn monotone_radius(&[k1, k2, _, _, k3, k4, k5, k6]: &[f64; 8]) -> f64 {
     let a = [1.0, k1, k2, k3];
     let b = [1.0, k4, k5, k6];

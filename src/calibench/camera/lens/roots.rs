@@ -1,9 +1,10 @@
 //! Where does a polynomial first become 0? That is where a radial map folds back.
 
-/// Smallest positive root of `c[0] + c[1] s + c[2] s^2 + ...` with `c[0] > 0`, or `None` if it stays positive.
+/// Smallest positive root of `c[0] + c[1] s + c[2] s^2 + ...` with `c[0] > 0`, or `None` if it stays
+/// positive.
 ///
-/// Between the positive roots of its derivative a polynomial is monotone: the first piece that ends at or below
-/// 0 is bisected to neighbouring numbers.
+/// Between the positive roots of its derivative a polynomial is monotone: the first piece that ends at or
+/// below 0 is bisected to neighbouring numbers.
 pub(super) fn smallest_positive_root(c: &[f64]) -> Option<f64> {
     positive_roots(c).into_iter().next()
 }
@@ -51,8 +52,8 @@ fn bisect(value: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     }
 }
 
-/// The `x` in `[0, limit]` with `value(x) = wanted`, for a map that grows there from 0; `limit` may be infinite.
-/// `None` beyond the image of `limit`. `value` gives the slope too.
+/// The `x` in `[0, limit]` with `value(x) = wanted`, for a map that grows there from 0; `limit` may be
+/// infinite. `None` beyond the image of `limit`. `value` gives the slope too.
 pub(super) fn inverse_of_growing(
     value: impl Fn(f64) -> (f64, f64),
     wanted: f64,

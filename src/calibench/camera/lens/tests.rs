@@ -113,8 +113,8 @@ fn ray_at(angle: f64, around: f64) -> Vec3 {
     Vec3::new(libm::sin(angle) * libm::cos(around), libm::sin(angle) * libm::sin(around), libm::cos(angle))
 }
 
-/// Whether the image folds between the axis and that angle, as tangential terms and prisms make it before the radius does:
-/// a pixel then is the image of a ray nearer to the axis too.
+/// Whether the image folds between the axis and that angle, as tangential terms and prisms make it before the
+/// radius does: a pixel then is the image of a ray nearer to the axis too.
 fn is_folded(lens: &Lens, angle: f64, around: f64) -> bool {
     let at = |angle: f64, around: f64| lens.project(&ray_at(angle, around)).unwrap();
     (1..=100).map(|k| angle * f64::from(k) / 100.0).any(|angle| {
@@ -163,8 +163,8 @@ proptest! {
     ) {
         for model in Model::ALL {
             let lens = Lens::new(model, &coefficients(model, &random)).unwrap();
-            // Pinholes are tried up to 80 degrees and the division model, whose radius grows without bound too, up
-            // to 120, where a pixel is far outside of every image.
+            // Pinholes are tried up to 80 degrees and the division model, whose radius grows without bound
+            // too, up to 120, where a pixel is far outside of every image.
             let most = match model {
                 Model::KannalaBrandt | Model::DoubleSphere => lens.monotone_angle(),
                 Model::Division => lens.monotone_angle().min(2.1),
@@ -173,7 +173,8 @@ proptest! {
             let angle = part * most;
             let ray = ray_at(angle, around);
             let at = lens.project(&ray).unwrap();
-            // Next to the rim tangential terms may carry a point over it: that may be refused, not answered wrongly.
+            // Next to the rim tangential terms may carry a point over it: that may be refused, not answered
+            // wrongly.
             match lens.ray(&at) {
                 Ok(found) => {
                     let back = lens.project(&found).unwrap();

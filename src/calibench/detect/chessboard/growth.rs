@@ -322,8 +322,9 @@ pub const LEAST_EDGE: f64 = 0.3;
 /// Distance from an edge at which its two sides are compared, px of the level.
 const SIDE_PX: f64 = 2.0;
 
-/// Whether the way from one corner to the other has a dark side and a bright one that differ by `least`, compared
-/// `beside` lengths of the way beside it at most; `dark_after`: the dark side is where the way turns to as u turns to v.
+/// Whether the way from one corner to the other has a dark side and a bright one that differ by `least`,
+/// compared `beside` lengths of the way beside it at most; `dark_after`: the dark side is where the way turns
+/// to as u turns to v.
 pub fn is_edge(level: &Smoothed, beside: f64, from: &Vec2, to: &Vec2, dark_after: bool, least: f64) -> bool {
     let way = to - from;
     let length = way.norm();

@@ -55,8 +55,8 @@ impl<'a, T: Level> Pyramid<'a, T> {
         }))
     }
 
-    /// The photograph at twice its size, smoothed for the search of small marks: marks of a few pixels are a few more apart there.
-    /// `None` where it would have more than [`MOST_TWICE`] pixels.
+    /// The photograph at twice its size, smoothed for the search of small marks: marks of a few pixels are a
+    /// few more apart there. `None` where it would have more than [`MOST_TWICE`] pixels.
     pub fn twice(&self) -> Option<Smoothed> {
         let pixels = self.photo.width().saturating_mul(self.photo.height()).saturating_mul(4);
         (pixels <= MOST_TWICE).then(|| Smoothed::of(&doubled(self.photo)))
@@ -105,8 +105,8 @@ fn half<T: Level>(image: &Raster<T>) -> Raster<f32> {
     Raster::from_samples(width, height, samples).expect("a sample for every pixel was made")
 }
 
-/// Weights of the four samples about a place a quarter of a pixel behind the second: the cubic through them that keeps edges
-/// sharp (Keys 1981, a = -1/2).
+/// Weights of the four samples about a place a quarter of a pixel behind the second: the cubic through them
+/// that keeps edges sharp (Keys 1981, a = -1/2).
 const QUARTER: [f32; 4] = [-0.070_312_5, 0.867_187_5, 0.226_562_5, -0.023_437_5];
 
 /// The image at twice its size; pixel `(x, y)` is centred on `(x / 2 - 1/4, y / 2 - 1/4)`.
@@ -212,7 +212,8 @@ impl Smoothed {
     }
 }
 
-/// The binomial mean of five rows, written over a sixth. A kernel, so that it is compiled for wide registers too.
+/// The binomial mean of five rows, written over a sixth. A kernel, so that it is compiled for wide registers
+/// too.
 struct Binomial<'a> {
     rows: [&'a [f32]; 5],
     out: &'a mut [f32],

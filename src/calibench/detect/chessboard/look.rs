@@ -1,5 +1,5 @@
-//! How do the squares about a corner look? Plain, as on a chessboard, or with a marker inside of the bright ones, or of
-//! two sizes, as on a grid of tags.
+//! How do the squares about a corner look? Plain, as on a chessboard, or with a marker inside of the bright
+//! ones, or of two sizes, as on a grid of tags.
 
 /// What the search and the fit of corners must know of the squares.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -8,13 +8,13 @@ pub struct Look {
     pub beside: f64,
     /// Where a square's level is sampled, in steps from its corner along both edges.
     pub samples: [(f64, f64); 4],
-    /// Nearest candidates among which a corner looks for its first neighbours: noise, texture and a marker's cells may
-    /// stand between.
+    /// Nearest candidates among which a corner looks for its first neighbours: noise, texture and a marker's
+    /// cells may stand between.
     pub nearest: usize,
     /// How wide the squares are plain along their edges, in steps; `None`: all over.
     pub plain: Option<f64>,
-    /// Distance of corners between two tags, as part of the distance of the corners of one; `None`: all squares are
-    /// equal.
+    /// Distance of corners between two tags, as part of the distance of the corners of one; `None`: all
+    /// squares are equal.
     pub between_tags: Option<f64>,
 }
 
@@ -32,7 +32,8 @@ impl Look {
         between_tags: None,
     };
 
-    /// Of a chessboard with markers, whose sides are this part of a square's, in the middle of the bright squares.
+    /// Of a chessboard with markers, whose sides are this part of a square's, in the middle of the bright
+    /// squares.
     pub fn with_markers(marker: f64) -> Look {
         let plain = 0.5 * (1.0 - marker);
         let middle = 0.5 * plain;

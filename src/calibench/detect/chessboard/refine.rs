@@ -1,8 +1,8 @@
 //! Where exactly are the board's corners? Each fitted in a window that has the shape of its squares.
 //!
-//! Directions, window and curvature of the edges come from the corners beside; markers in the squares are left out of it. A corner found in a reduced
-//! image is fitted there first, where it is sharp and its place is near enough, then in the photograph
-//! itself.
+//! Directions, window and curvature of the edges come from the corners beside; markers in the squares are
+//! left out of it. A corner found in a reduced image is fitted there first, where it is sharp and its place
+//! is near enough, then in the photograph itself.
 
 use super::level::{Pyramid, level_from_photo, photo_from_level, scale};
 use super::look::Look;
@@ -26,12 +26,13 @@ const LARGEST_START_PX: f64 = 8.0;
 /// How far the fit in a level may lie from where the corner was found, px of the level.
 const LARGEST_MOVE_PX: f64 = 2.0;
 
-/// Largest misfit of a corner against the middle one of all, and what is allowed beside it. Noise and blur enter all
-/// alike; an edge of what covers a corner in part does not.
+/// Largest misfit of a corner against the middle one of all, and what is allowed beside it. Noise and blur
+/// enter all alike; an edge of what covers a corner in part does not.
 const LARGEST_MISFIT: f64 = 2.0;
 const MISFIT_ALLOWED: f64 = 0.05;
 
-/// Longest step of a grid of tags, in sides of a tag: a window then stays within a border of an eighth of a side.
+/// Longest step of a grid of tags, in sides of a tag: a window then stays within a border of an eighth of a
+/// side.
 const LONGEST_STEP_OF_TAGS: f64 = 0.29;
 
 /// Corners of a board, row by row, px; `None` for those that are hidden.
@@ -62,8 +63,8 @@ impl Corners<'_> {
         [at_place(at > 0, index.wrapping_sub(stride)), at_place(at + 1 < count, index + stride)]
     }
 
-    /// Steps to the corners before and behind a corner. Of tags a step is the shorter of the way between two and what
-    /// their borders leave plain.
+    /// Steps to the corners before and behind a corner. Of tags a step is the shorter of the way between two
+    /// and what their borders leave plain.
     fn steps_to(&self, index: usize, axis: usize) -> [f64; 2] {
         let Some(between) = self.look.between_tags else { return [1.0; 2] };
         let at = if axis == 0 { index % self.columns } else { index / self.columns };
@@ -127,8 +128,8 @@ pub struct Fitted {
     look: Look,
 }
 
-/// The corners of a board that were found in a level, fitted in the photograph. `starts_dark`: the square between the
-/// first row and column of corners is dark.
+/// The corners of a board that were found in a level, fitted in the photograph. `starts_dark`: the square
+/// between the first row and column of corners is dark.
 pub fn refined<T: Level>(
     pyramid: &Pyramid<'_, T>,
     level: usize,
@@ -175,7 +176,8 @@ pub fn refined<T: Level>(
         });
     }
     if look.between_tags.is_none() {
-        // One that was fitted anew may lie beside its line still, and others may where it was their neighbour before.
+        // One that was fitted anew may lie beside its line still, and others may where it was their neighbour
+        // before.
         for index in out_of_line(&mut good, columns) {
             crossings[index] = None;
         }
@@ -184,9 +186,9 @@ pub fn refined<T: Level>(
 }
 
 impl Fitted {
-    /// The corners whose squares look like those of the others: something that covers a corner in part moves it, and
-    /// leaves of the levels around it more than noise. A corner that only a reduced image shows is one of a blurred
-    /// photograph where most are, and else is covered.
+    /// The corners whose squares look like those of the others: something that covers a corner in part moves
+    /// it, and leaves of the levels around it more than noise. A corner that only a reduced image shows is
+    /// one of a blurred photograph where most are, and else is covered.
     pub fn alike<T: Level>(&self, photo: &Raster<T>, columns: usize) -> Vec<Option<Vec2>> {
         let neighbours = Corners { places: &self.corners, columns, look: &self.look };
         let misfit_of = |index: usize| {
@@ -298,8 +300,8 @@ struct Squares<'a> {
     is_dark: bool,
 }
 
-/// Directions from the corners beside, levels from the pixels in the middle of the quadrants, or of what is plain of
-/// them.
+/// Directions from the corners beside, levels from the pixels in the middle of the quadrants, or of what is
+/// plain of them.
 fn start<T: Level>(
     image: &Raster<T>,
     corner: Vec2,

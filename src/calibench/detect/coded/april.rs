@@ -1,5 +1,5 @@
-//! Where are the corners of a grid of AprilTags? Between the tags small black squares touch their corners, as Kalibr
-//! draws them, so that each is a corner of a chessboard to the search and to the fit.
+//! Where are the corners of a grid of AprilTags? Between the tags small black squares touch their corners, as
+//! Kalibr draws them, so that each is a corner of a chessboard to the search and to the fit.
 //!
 //! 1. From corner to corner along the edges, the dark side always on the same hand: four edges that lead back to the
 //!    first corner are a dark quadrangle ([`quads`](super::quads)).
@@ -34,26 +34,30 @@ const MOST_OFF: f64 = 0.25;
 /// Fewest corners whose places make a view.
 const FEWEST_MARKS: usize = 4;
 
-/// Least part of the tags' corners that must have exact places: where motion leaves edges to a few by chance, these are wrong.
+/// Least part of the tags' corners that must have exact places: where motion leaves edges to a few by chance,
+/// these are wrong.
 const LEAST_CLEAR: f64 = 1.0 / 3.0;
 
-/// Side neighbours whose distance tells the spacing of the tags, and by how much it may differ from what was said, in sides.
+/// Side neighbours whose distance tells the spacing of the tags, and by how much it may differ from what was
+/// said, in sides.
 const FEWEST_NEIGHBOURS: usize = 8;
 const MOST_WIDER: f64 = 0.04;
 
-/// By how much the spacing may differ where corners have exact places, in sides of a tag, beside the middle deviation of what single
-/// pairs of tags tell: that of corners that err by a tenth of a pixel, or that a strong lens bends.
+/// By how much the spacing may differ where corners have exact places, in sides of a tag, beside the middle
+/// deviation of what single pairs of tags tell: that of corners that err by a tenth of a pixel, or that a
+/// strong lens bends.
 const MOST_WIDER_EXACTLY: f64 = 0.01;
 
-/// Fewest pairs of tags whose corners tell the spacing; that of so few may differ as that of the tags' middles may.
+/// Fewest pairs of tags whose corners tell the spacing; that of so few may differ as that of the tags'
+/// middles may.
 const FEWEST_PAIRS: usize = 5;
 
 /// Tags beyond the board that others confirm: one may be read wrongly.
 const FEWEST_BEYOND: usize = 2;
 
-/// Finds the corners of a grid of AprilTags that are seen, in Kalibr's order: row by row of corners from the lower left
-/// one of the first tag upwards, twice as many along a row as tags. A tag counts if one near it agrees, and the tags of more
-/// than one row are needed: one row of them looks alike on grids of any width.
+/// Finds the corners of a grid of AprilTags that are seen, in Kalibr's order: row by row of corners from the
+/// lower left one of the first tag upwards, twice as many along a row as tags. A tag counts if one near it
+/// agrees, and the tags of more than one row are needed: one row of them looks alike on grids of any width.
 ///
 /// # Errors
 /// See [`CodedError`]; a grid of another size or spacing too, where enough of it is seen to tell.
@@ -292,8 +296,8 @@ fn of_spacing(grid: &AprilGrid, seen: f64) -> CodedError {
     CodedError::Spacing { asked: thousandths(grid.spacing()), seen: thousandths(seen) }
 }
 
-/// The spacing of the tags by their corners, if it is another than was asked. Four corners of two tags on a line, at 0, 1, 1 + s and
-/// 2 + s, have a cross ratio that perspective leaves as it is:
+/// The spacing of the tags by their corners, if it is another than was asked. Four corners of two tags on a
+/// line, at 0, 1, 1 + s and 2 + s, have a cross ratio that perspective leaves as it is:
 ///
 /// ```text
 /// c = (x3 - x1) (x4 - x2) / ((x3 - x2) (x4 - x1)) = (1 + s)^2 / (s (2 + s)),      1 + s = sqrt(c / (c - 1))
@@ -331,8 +335,8 @@ fn median(values: &mut [f64]) -> Option<f64> {
     values.get(values.len() / 2).copied()
 }
 
-/// Pairs of tags that agree for each that does not. Of a grid of another width those of a row agree, and those above each
-/// other do not.
+/// Pairs of tags that agree for each that does not. Of a grid of another width those of a row agree, and
+/// those above each other do not.
 const FOR_EACH_AGAINST: usize = 10;
 
 /// The tags of a grid that others confirm, each number once; none where too many contradict each other.
@@ -362,8 +366,9 @@ fn agreeing(tags: Vec<Tag>, grid: &AprilGrid) -> Vec<Tag> {
     one_board(tags.into_iter().zip(kept).filter(|(_, kept)| *kept).map(|(tag, _)| tag).collect(), grid)
 }
 
-/// The tags, if all stand on one board; none where some that confirm each other stand elsewhere than the most do. Rows of a grid of which the
-/// numbers begin elsewhere, or of another width, go on in the next row of this one: their parts agree, each by itself.
+/// The tags, if all stand on one board; none where some that confirm each other stand elsewhere than the most
+/// do. Rows of a grid of which the numbers begin elsewhere, or of another width, go on in the next row of
+/// this one: their parts agree, each by itself.
 fn one_board(tags: Vec<Tag>, grid: &AprilGrid) -> Vec<Tag> {
     let agree = |tag: &Tag, other: &Tag| agree(tag, other, grid) && agree(other, tag, grid);
     let parts = connected(tags, |tag, other| other.apart(tag.at) <= FARTHEST && agree(tag, other));
@@ -432,7 +437,8 @@ mod tests {
 
     #[test]
     fn rows_that_go_on_in_the_next_row_are_another_grid() {
-        // Its numbers begin with 3: what stands right of its third column seems to stand left of it, a row higher.
+        // Its numbers begin with 3: what stands right of its third column seems to stand left of it, a row
+        // higher.
         let of_six = |id: usize| tag(id, (id - 3) % 6, (id - 3) / 6);
         let left = [9, 10, 11, 15, 16, 17, 22, 23, 28, 29, 34, 35].map(of_six).to_vec();
         let right = [12, 18, 24, 30, 31].map(of_six).to_vec();

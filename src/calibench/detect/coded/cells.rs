@@ -1,5 +1,5 @@
-//! Which cells of a marker are white? Samples of the photograph at the places that a homography gives, against the
-//! marker's own black border and the white about it.
+//! Which cells of a marker are white? Samples of the photograph at the places that a homography gives,
+//! against the marker's own black border and the white about it.
 
 use super::dictionary::Cells;
 use crate::detect::bilinear::bilinear;
@@ -22,7 +22,8 @@ pub struct Patch {
 /// Places of a cell that are sampled, along each axis, in cells from its middle.
 const SAMPLES: [f64; 4] = [-0.27, -0.09, 0.09, 0.27];
 
-/// Pixels of a cell in the image that is sampled, at least, where the photograph has them: its noise is averaged.
+/// Pixels of a cell in the image that is sampled, at least, where the photograph has them: its noise is
+/// averaged.
 const CELL_PX: f64 = 4.0;
 
 /// Largest part of a border's cells that may look white: a shadow, dirt.
@@ -40,8 +41,8 @@ pub struct Inside {
     pub sharpened: Cells,
 }
 
-/// The inner cells of a marker, `side` along each side, if it has a black border on white ground whose levels differ by
-/// `least`.
+/// The inner cells of a marker, `side` along each side, if it has a black border on white ground whose levels
+/// differ by `least`.
 pub fn read<T: Level>(pyramid: &Pyramid<'_, T>, patch: &Patch, side: usize, least: f64) -> Option<Inside> {
     let count = side + 2 * patch.border;
     let cell = 1.0 / count as f64;
@@ -89,12 +90,13 @@ pub fn read<T: Level>(pyramid: &Pyramid<'_, T>, patch: &Patch, side: usize, leas
     inside(&means, count, patch.border, 0.5 * (white + black))
 }
 
-/// How far above its border's level the brightest inner cell of a marker is at least, as part of the difference of white and
-/// black. Cells that are white all around one another reach the white, however blurred.
+/// How far above its border's level the brightest inner cell of a marker is at least, as part of the
+/// difference of white and black. Cells that are white all around one another reach the white, however
+/// blurred.
 const LEAST_WHITE: f64 = 0.25;
 
-/// Whether any inner cell stands out of the border, by a sample of each: a tile of a floor is as dark in its middle as at its
-/// edge, and there may be thousands. `centre` gives the level in the middle of a cell.
+/// Whether any inner cell stands out of the border, by a sample of each: a tile of a floor is as dark in its
+/// middle as at its edge, and there may be thousands. `centre` gives the level in the middle of a cell.
 fn has_white(centre: &dyn Fn(f64, f64) -> Option<f64>, count: usize, patch: &Patch) -> bool {
     let (beside, last) = (0.5 * patch.white * count as f64, count as f64 - 0.5);
     let (mut white, mut black) = (Mean::default(), Mean::default());

@@ -1,5 +1,5 @@
-//! Where are the corners of a ChArUco board? A chessboard's lattice, and which part of the board it is by the markers in
-//! its white squares.
+//! Where are the corners of a ChArUco board? A chessboard's lattice, and which part of the board it is by the
+//! markers in its white squares.
 //!
 //! 1. Corners are searched and joined to lattices as on a plain chessboard, only that near an edge nothing but a narrow
 //!    strip of a white square is white.
@@ -28,23 +28,24 @@ use std::collections::BTreeSet;
 /// Fewest corners whose places make a view.
 const FEWEST_MARKS: usize = 4;
 
-/// Lattices of a level that are looked at: what covers a board may cut it in pieces, and markers have small ones of
-/// their own.
+/// Lattices of a level that are looked at: what covers a board may cut it in pieces, and markers have small
+/// ones of their own.
 const MOST_LATTICES: usize = 12;
 
 /// Least difference of a marker's white and black, as part of the corners' contrast.
 const LEAST_CONTRAST: f64 = 0.3;
 
-/// Corners that lie beyond the board's edge, as part of all, that may be chance; one always may. A row or a column of
-/// them is a board that goes on.
+/// Corners that lie beyond the board's edge, as part of all, that may be chance; one always may. A row or a
+/// column of them is a board that goes on.
 const MOST_BEYOND: f64 = 0.05;
 
-/// How far a corner may lie from where the plane through all has it, in squares: pieces of a lattice that are placed
-/// differently are a whole square apart, and no lens bends a board by so much.
+/// How far a corner may lie from where the plane through all has it, in squares: pieces of a lattice that are
+/// placed differently are a whole square apart, and no lens bends a board by so much.
 const MOST_BENT: f64 = 0.6;
 
-/// Finds the inner corners of a ChArUco board that are seen, row by row from the board's first square: `columns - 1` along
-/// a row. Which they are is certain: at least two markers agree on it, and ten for each that does not.
+/// Finds the inner corners of a ChArUco board that are seen, row by row from the board's first square:
+/// `columns - 1` along a row. Which they are is certain: at least two markers agree on it, and ten for each
+/// that does not.
 ///
 /// # Errors
 /// See [`CodedError`].
@@ -167,8 +168,9 @@ impl<T: Level> Search<'_, T> {
         if placed.count() > 0 { Ok(placed) } else { Err(failure) }
     }
 
-    /// Markers of one row stand to each other alike on boards of any width, and those of two rows may on another one. That the board is the one
-    /// asked is taken for granted, but not where others were read in the photograph that contradict it.
+    /// Markers of one row stand to each other alike on boards of any width, and those of two rows may on
+    /// another one. That the board is the one asked is taken for granted, but not where others were read in
+    /// the photograph that contradict it.
     fn refuse_if_of_any_width(&self, placed: &Placed, failures: &[Failure]) -> Result<(), CodedError> {
         let contradicted = failures.iter().any(|failure| failure.error.is_grave());
         match another_width(&self.board.markers(), self.board.columns(), &placed.markers) {
@@ -317,7 +319,8 @@ fn opinion((low, marker): &(Place, Recognised), markers: &[(usize, usize)]) -> O
 /// Widest board that is tried where markers do not stand as on the one that was asked.
 const WIDEST: usize = 40;
 
-/// The board on which more markers agree than on that asked: its width, and whether it begins with a white square.
+/// The board on which more markers agree than on that asked: its width, and whether it begins with a white
+/// square.
 fn other_board(read: &[(Place, Recognised)], asked: (usize, bool), agree: usize) -> Option<(usize, bool)> {
     let last = read.iter().map(|(_, marker)| marker.id).max()?;
     let agree_on = |(width, white): (usize, bool)| {
@@ -331,7 +334,8 @@ fn other_board(read: &[(Place, Recognised)], asked: (usize, bool), agree: usize)
     (most > agree).then_some(board)
 }
 
-/// The width of another board on which these markers stand to each other as on one of width `columns` with its markers in these squares.
+/// The width of another board on which these markers stand to each other as on one of width `columns` with
+/// its markers in these squares.
 fn another_width(squares: &[(usize, usize)], columns: usize, markers: &BTreeSet<usize>) -> Option<usize> {
     let last = *markers.last()?;
     let stand_alike = |&(width, white): &(usize, bool)| {
@@ -368,8 +372,8 @@ impl Part {
         Part { corners: places.collect(), contrast, lattice }
     }
 
-    /// From the unit square of a marker to the photograph, through the corners about its square, the nearest that fix a
-    /// homography.
+    /// From the unit square of a marker to the photograph, through the corners about its square, the nearest
+    /// that fix a homography.
     fn homography(&self, (i, j): Place, white: f64, marker: f64) -> Option<Homography> {
         (0..MOST_REACH).find_map(|reach| {
             let is_near = |&&((a, b), _): &&(Place, Vec2)| {

@@ -1,8 +1,8 @@
-//! Which markers are there? OpenCV's predefined dictionaries, by OpenCV's names (Garrido-Jurado et al. 2014, 2016), among
-//! them the AprilTag families (Olson 2011, Wang & Olson 2016).
+//! Which markers are there? OpenCV's predefined dictionaries, by OpenCV's names (Garrido-Jurado et al. 2014,
+//! 2016), among them the AprilTag families (Olson 2011, Wang & Olson 2016).
 //!
-//! The tables hold a marker a line, its inner cells as a hexadecimal number; `tables/write.py` says how they were
-//! written. OpenCV's smaller dictionaries are the first markers of those with 1000.
+//! The tables hold a marker a line, its inner cells as a hexadecimal number; `tables/write.py` says how they
+//! were written. OpenCV's smaller dictionaries are the first markers of those with 1000.
 
 use std::fmt;
 use std::str::FromStr;
@@ -43,8 +43,8 @@ table!(TAG_36_11, 6, "apriltag_36h11");
 /// OpenCV's name without `DICT_`, the markers, their number, and how many wrong cells the code corrects.
 type Entry = (&'static str, &'static Table, usize, u32);
 
-/// The smaller of a family first. Wrong cells as OpenCV has them (`maxCorrectionBits`): half of what the least Hamming
-/// distance of two markers leaves.
+/// The smaller of a family first. Wrong cells as OpenCV has them (`maxCorrectionBits`): half of what the
+/// least Hamming distance of two markers leaves.
 static ENTRIES: [Entry; 22] = [
     ("4X4_50", &FOUR, 50, 1),
     ("4X4_100", &FOUR, 100, 1),
@@ -156,7 +156,8 @@ impl Dictionary {
         self.0.1.side
     }
 
-    /// Whether a cell of a marker is white, by its row and column; `None` for a marker or a cell that does not exist.
+    /// Whether a cell of a marker is white, by its row and column; `None` for a marker or a cell that does
+    /// not exist.
     pub fn is_white(&self, marker: usize, row: usize, column: usize) -> Option<bool> {
         let side = self.side();
         let cells = self.cells().get(marker).filter(|_| row < side && column < side)?;
@@ -177,7 +178,8 @@ impl Dictionary {
         Some((turned_back(seen, self.side(), turns % 4) ^ cells).count_ones())
     }
 
-    /// The marker among the first `count` that is nearest to what was seen, if so near that no other can be meant.
+    /// The marker among the first `count` that is nearest to what was seen, if so near that no other can be
+    /// meant.
     pub(super) fn recognise(&self, seen: Cells, count: usize) -> Option<Recognised> {
         let turned: Vec<Cells> = (0..4).map(|turns| turned_back(seen, self.side(), turns)).collect();
         let markers = self.cells().iter().take(count).enumerate();

@@ -1,5 +1,5 @@
-//! Which tags are there that could not be found by themselves? Where one must stand is told by those about it, and so is
-//! which cells it must have: far fewer of them need be right than to tell one tag of 587.
+//! Which tags are there that could not be found by themselves? Where one must stand is told by those about
+//! it, and so is which cells it must have: far fewer of them need be right than to tell one tag of 587.
 
 use super::layout::AprilGrid;
 use super::tag::{FARTHEST, Reading, Tag, side_px, unit_corners};
@@ -17,7 +17,8 @@ const MOST_WRONG: u32 = 8;
 /// How far from where it is expected a corner is looked for, in sides of a tag.
 const REACH: f64 = 0.12;
 
-/// The tags with those that are seen where they must be. `corners_px`: places that look like corners, px of the photograph.
+/// The tags with those that are seen where they must be. `corners_px`: places that look like corners, px of
+/// the photograph.
 pub fn filled<T: Level>(
     pyramid: &Pyramid<'_, T>,
     corners_px: &[Vec2],

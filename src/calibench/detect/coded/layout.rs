@@ -16,8 +16,8 @@ pub struct Charuco {
     legacy: bool,
 }
 
-/// A grid of AprilTags with small black squares between their corners, as Kalibr's `aprilgrid` has it: the tags of the
-/// family 36h11, the first at the lower left, row by row upwards.
+/// A grid of AprilTags with small black squares between their corners, as Kalibr's `aprilgrid` has it: the
+/// tags of the family 36h11, the first at the lower left, row by row upwards.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AprilGrid {
     columns: usize,
@@ -72,15 +72,16 @@ pub enum LayoutError {
     },
 }
 
-/// Least and greatest side of a marker, in squares: beyond, no white is left about it, or its cells are too small.
+/// Least and greatest side of a marker, in squares: beyond, no white is left about it, or its cells are too
+/// small.
 const MARKERS: std::ops::RangeInclusive<f64> = 0.3..=0.95;
 
 /// Least and greatest space between tags, in their sides.
 const SPACINGS: std::ops::RangeInclusive<f64> = 0.1..=1.0;
 
 impl Charuco {
-    /// A board of `columns x rows` squares with markers of `marker` sides of a square. `legacy`: boards with an even number
-    /// of rows begin with a white square, as OpenCV drew them before 4.6.
+    /// A board of `columns x rows` squares with markers of `marker` sides of a square. `legacy`: boards with
+    /// an even number of rows begin with a white square, as OpenCV drew them before 4.6.
     ///
     /// # Errors
     /// See [`LayoutError`].
@@ -200,8 +201,8 @@ impl AprilGrid {
         self.spacing
     }
 
-    /// The corners of the tags in Kalibr's order, in sides of a tag: row by row of corners, twice as many along each side as
-    /// tags, x to the right and y upwards from the lower left corner of the first tag.
+    /// The corners of the tags in Kalibr's order, in sides of a tag: row by row of corners, twice as many
+    /// along each side as tags, x to the right and y upwards from the lower left corner of the first tag.
     pub fn points(&self) -> Vec<Vec2> {
         let at = |k: usize| (k / 2) as f64 * (1.0 + self.spacing) + (k % 2) as f64;
         let columns = 2 * self.columns;
@@ -210,8 +211,8 @@ impl AprilGrid {
             .collect()
     }
 
-    /// What is black on the board, in sides of a tag from the lower left corner of the first, y upwards, as Kalibr draws
-    /// it: borders of two cells. No two overlap.
+    /// What is black on the board, in sides of a tag from the lower left corner of the first, y upwards, as
+    /// Kalibr draws it: borders of two cells. No two overlap.
     pub fn dark(&self) -> Vec<Rectangle> {
         let pitch = 1.0 + self.spacing;
         let mut all = Vec::new();
@@ -234,8 +235,8 @@ impl AprilGrid {
         all
     }
 
-    /// Whether a cell of a tag is white as it stands on the board, by row from above and column: OpenCV's table has the
-    /// tags turned by half.
+    /// Whether a cell of a tag is white as it stands on the board, by row from above and column: OpenCV's
+    /// table has the tags turned by half.
     fn is_white(&self, id: usize, row: usize, column: usize) -> bool {
         let dictionary = Dictionary::april_36h11();
         let last = dictionary.side() - 1;
@@ -246,8 +247,8 @@ impl AprilGrid {
 /// Cells of the border of Kalibr's tags. (AprilTag's own have one.)
 const KALIBRS_BORDER: usize = 2;
 
-/// The dark cells of a marker, those beside each other in a row as one; `is_white` by row and column of the inner cells,
-/// in the order of the coordinates.
+/// The dark cells of a marker, those beside each other in a row as one; `is_white` by row and column of the
+/// inner cells, in the order of the coordinates.
 fn dark_cells(
     low: Vec2,
     size: f64,

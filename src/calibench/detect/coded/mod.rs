@@ -1,6 +1,7 @@
 //! Where are the marks of a board whose markers tell them apart? ChArUco boards and grids of AprilTags.
 //!
-//! The corners are those of the chessboard's own detector, found and fitted alike; the markers only tell which they are.
+//! The corners are those of the chessboard's own detector, found and fitted alike; the markers only tell
+//! which they are.
 
 mod april;
 mod cells;
@@ -77,7 +78,8 @@ pub enum CodedError {
         /// Tags that agree.
         tags: usize,
     },
-    /// Few markers, which stand to each other as on boards of another width too, beside others that contradict the board.
+    /// Few markers, which stand to each other as on boards of another width too, beside others that
+    /// contradict the board.
     #[error(
         "{markers} markers agree on where the board is, but stand alike on a board {other} wide, and others in the image do not stand as on \
          one {columns} wide: show more rows of it, and no other board of its markers"
@@ -156,7 +158,8 @@ impl CodedError {
         }
     }
 
-    /// How many markers of the asked dictionary were read, where that may be chance: cells of others look like some.
+    /// How many markers of the asked dictionary were read, where that may be chance: cells of others look
+    /// like some.
     fn by_chance(&self) -> Option<usize> {
         match self {
             CodedError::NoMarker { .. } => Some(0),

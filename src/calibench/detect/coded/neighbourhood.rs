@@ -9,13 +9,13 @@ const FARTHEST: usize = 3;
 /// Fewest corners that tell where one is.
 const FEWEST: usize = 8;
 
-/// Largest distance from there against the middle one of all, and what is allowed beside it, px. Noise, blur and the lens
-/// enter all alike.
+/// Largest distance from there against the middle one of all, and what is allowed beside it, px. Noise, blur
+/// and the lens enter all alike.
 const LARGEST: f64 = 4.0;
 const ALLOWED_PX: f64 = 0.1;
 
-/// Takes out the corners that are farther from where those about them put them than the others are, the worst first, for one
-/// moves what is expected of those beside it. Corners row by row from above.
+/// Takes out the corners that are farther from where those about them put them than the others are, the worst
+/// first, for one moves what is expected of those beside it. Corners row by row from above.
 pub fn take_out_outlying(corners_px: &mut [Option<Vec2>], grid: &AprilGrid) {
     let on_board = grid.points();
     let columns = 2 * grid.columns();

@@ -1,5 +1,5 @@
-//! Where on the board does a lattice of corners lie? Every marker that is read has one answer; the board is where several
-//! agree.
+//! Where on the board does a lattice of corners lie? Every marker that is read has one answer; the board is
+//! where several agree.
 
 use super::dictionary::turned;
 use crate::detect::lattice::Place;
@@ -14,7 +14,8 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// Where the lattice's square of lowest corner `seen`, turned so, is the board's square `square` (column, row).
+    /// Where the lattice's square of lowest corner `seen`, turned so, is the board's square `square` (column,
+    /// row).
     pub fn of_square(seen: Place, square: Place, turns: u8) -> Placement {
         let (x, y) = turned((2 * seen.0 + 1, 2 * seen.1 + 1), turns);
         Placement { turns, twice: (2 * square.0 + 1 - x, 2 * square.1 + 1 - y) }
@@ -41,12 +42,14 @@ pub struct Vote {
 /// Fewest markers that must agree.
 const FEWEST: usize = 2;
 
-/// Markers that agree for each that does not. One that is read wrongly is rare; where the board is another than was said, each
-/// row of markers has its own opinion, or (of OpenCV's two patterns) one of nine stands elsewhere.
+/// Markers that agree for each that does not. One that is read wrongly is rare; where the board is another
+/// than was said, each row of markers has its own opinion, or (of OpenCV's two patterns) one of nine stands
+/// elsewhere.
 const FOR_EACH_AGAINST: usize = 10;
 
 impl Vote {
-    /// The vote of markers' opinions; a marker that the board does not have puts it nowhere. `None` without any.
+    /// The vote of markers' opinions; a marker that the board does not have puts it nowhere. `None` without
+    /// any.
     pub fn of(opinions: &[Option<Placement>]) -> Option<Vote> {
         let mut counts: BTreeMap<Placement, usize> = BTreeMap::new();
         for &opinion in opinions.iter().flatten() {

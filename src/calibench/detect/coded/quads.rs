@@ -1,4 +1,5 @@
-//! Where are dark quadrangles between corners of squares? Walks along the edges with the dark side on one hand.
+//! Where are dark quadrangles between corners of squares? Walks along the edges with the dark side on one
+//! hand.
 
 use crate::detect::chessboard::candidates::Candidate;
 use crate::detect::chessboard::growth::{LEAST_EDGE, is_edge};
@@ -14,14 +15,16 @@ pub struct Quad {
     pub contrast: f64,
 }
 
-/// Nearest candidates among which the next corner is looked for: those of a tag's cells and of the tags beside it may be
-/// nearer.
+/// Nearest candidates among which the next corner is looked for: those of a tag's cells and of the tags
+/// beside it may be nearer.
 const NEAREST: usize = 60;
 
-/// Least cosine between an edge's direction at a corner and the way to the next: 25 degrees, as on a chessboard.
+/// Least cosine between an edge's direction at a corner and the way to the next: 25 degrees, as on a
+/// chessboard.
 const LEAST_COSINE: f64 = 0.9;
 
-/// How far beside an edge its sides are compared, at most, in its lengths: the border of a tag is an eighth of it.
+/// How far beside an edge its sides are compared, at most, in its lengths: the border of a tag is an eighth
+/// of it.
 const BESIDE: f64 = 0.08;
 
 /// A corner, and which of its two dark quadrants is meant: that between both axes, or the one behind.

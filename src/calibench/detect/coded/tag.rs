@@ -22,7 +22,8 @@ const CORNERS: [(i32, i32); 4] = [(-1, -1), (1, -1), (1, 1), (-1, 1)];
 /// Quarter turns of OpenCV's table against the tags as they are printed.
 const TABLE_TURNS: u8 = 2;
 
-/// How far apart tags tell of each other, in places of the grid: farther, the lens bends what a homography says.
+/// How far apart tags tell of each other, in places of the grid: farther, the lens bends what a homography
+/// says.
 pub const FARTHEST: usize = 2;
 
 /// What the inside of a quadrangle shows, whether or not it is a tag.
@@ -96,7 +97,8 @@ impl Reading {
     }
 }
 
-/// A way in the quadrangle as it is seen, as it is on the board with y down, if its tag is seen turned by so many quarters.
+/// A way in the quadrangle as it is seen, as it is on the board with y down, if its tag is seen turned by so
+/// many quarters.
 pub fn on_board(way: (i32, i32), turns: u8) -> (i32, i32) {
     turned(way, turns + TABLE_TURNS)
 }
@@ -108,7 +110,8 @@ pub struct Tag {
     pub id: usize,
     /// Its place on the grid: column, and row from below.
     pub at: (usize, usize),
-    /// Its corners as it stands on the board, px of the photograph: top left, top right, bottom right, bottom left.
+    /// Its corners as it stands on the board, px of the photograph: top left, top right, bottom right, bottom
+    /// left.
     pub corners_px: [Vec2; 4],
     /// Bright minus dark at the corner where they differ least.
     pub contrast: f64,

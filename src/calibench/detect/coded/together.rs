@@ -1,5 +1,6 @@
-//! Which tags are these, if hardly one can be read by itself? A blurred photograph shows of each tag some cells wrong, more
-//! than its code corrects; of all tags together one place and one turn of the grid explains far more cells than any other.
+//! Which tags are these, if hardly one can be read by itself? A blurred photograph shows of each tag some
+//! cells wrong, more than its code corrects; of all tags together one place and one turn of the grid explains
+//! far more cells than any other.
 
 use super::layout::AprilGrid;
 use super::tag::{FARTHEST, Reading, Tag, middle_px, on_board, side_px, unit_corners};
@@ -9,21 +10,22 @@ use crate::geometry::{Homography, Vec2};
 /// Fewest quadrangles that are told together.
 const FEWEST: usize = 4;
 
-/// How far from where another puts it a quadrangle's middle may lie, in its sides, for each place between the two; and how
-/// much larger it may be than the other.
+/// How far from where another puts it a quadrangle's middle may lie, in its sides, for each place between the
+/// two; and how much larger it may be than the other.
 const MOST_OFF: f64 = 0.25;
 const MOST_LARGER: f64 = 1.6;
 
 /// Cells of a tag.
 const CELLS: f64 = 36.0;
 
-/// Part of the cells that differ from those of a tag by chance, and the standard deviation of one tag's. Of one reading they are
-/// 1/2 and 1/12, of the best of four that have nothing in common 0.41 and 0.06; those of a tag have much in common.
+/// Part of the cells that differ from those of a tag by chance, and the standard deviation of one tag's. Of
+/// one reading they are 1/2 and 1/12, of the best of four that have nothing in common 0.41 and 0.06; those of
+/// a tag have much in common.
 const BY_CHANCE: f64 = 0.46;
 const DEVIATION: f64 = 0.09;
 
-/// How far below chance all must lie, and each row by itself, in standard deviations. All: a grid of 24 tags has 96 places and
-/// turns. Rows: on a grid of another width some row may fit, and the others do not.
+/// How far below chance all must lie, and each row by itself, in standard deviations. All: a grid of 24 tags
+/// has 96 places and turns. Rows: on a grid of another width some row may fit, and the others do not.
 const ALL_BELOW: f64 = 6.0;
 const ROW_BELOW: f64 = 3.0;
 
@@ -38,8 +40,8 @@ struct Placed<'a> {
     turns: u8,
 }
 
-/// The tags of a grid whose cells, all together, say where on it they are; of more than one row, for one row of tags looks
-/// alike on grids of any width.
+/// The tags of a grid whose cells, all together, say where on it they are; of more than one row, for one row
+/// of tags looks alike on grids of any width.
 pub fn together(readings: &[Reading], grid: &AprilGrid) -> Vec<Tag> {
     let lattice = largest_lattice(readings, grid);
     if lattice.len() < FEWEST {
@@ -59,8 +61,8 @@ fn turned_by(turns: u8, behind: u8) -> u8 {
     (turns + 4 - behind) % 4
 }
 
-/// Numbers, and cells that differ, if the first quadrangle is the tag at a place, turned so; `None` where one would lie beside
-/// the grid.
+/// Numbers, and cells that differ, if the first quadrangle is the tag at a place, turned so; `None` where one
+/// would lie beside the grid.
 fn taken_as(
     lattice: &[Placed<'_>],
     (column, row): (usize, usize),
@@ -192,7 +194,8 @@ mod tests {
         assert!(is_certain(&taken(5, &[1]), &AprilGrid::new(5, 1, 0.3).unwrap()));
     }
 
-    /// Cells that differ in the best of four readings that have nothing in common: fewer than any chance leaves.
+    /// Cells that differ in the best of four readings that have nothing in common: fewer than any chance
+    /// leaves.
     fn by_chance(random: &mut ChaCha8Rng) -> u32 {
         (0..4).map(|_| (random.next_u64() >> 28).count_ones()).min().unwrap_or(36)
     }

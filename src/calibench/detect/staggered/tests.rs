@@ -32,8 +32,8 @@ fn a_mirror_image_is_never_the_board_but_where_it_is_its_own() {
             let (lattice, mut centres) = board(columns, rows);
             centres.iter_mut().for_each(|centre| centre.x = -centre.x);
             let found = ordered_staggered(&lattice, &centres, columns, rows);
-            // An odd number of rows is its own mirror image, top and bottom exchanged; as many rows as twice the columns
-            // the same, a diagonal as the mirror.
+            // An odd number of rows is its own mirror image, top and bottom exchanged; as many rows as twice
+            // the columns the same, a diagonal as the mirror.
             let is_its_own = rows % 2 == 1 || rows == 2 * columns;
             assert_eq!(found.is_ok(), is_its_own, "{columns} x {rows}: {found:?}");
             if let Ok(marks) = found {

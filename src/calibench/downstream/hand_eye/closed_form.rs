@@ -6,8 +6,8 @@ use crate::geometry::{Mat3, Pose, Vec3, rotation};
 
 /// Below this a rotation has no axis: rounding has 1e-16.
 const NO_AXIS_RAD: f64 = 1e-9;
-/// The least eigenvalue of the normal matrix, as part of the largest, falls with the square of what is missing
-/// to a half turn: less than a millionth of a radian here, where rounding has eaten the solution.
+/// The least eigenvalue of the normal matrix, as part of the largest, falls with the square of what is
+/// missing to a half turn: less than a millionth of a radian here, where rounding has eaten the solution.
 const HALF_TURN: f64 = 1e-12;
 
 /// Tsai & Lenz 1989, eqs. 10, 12, 14 and 15. Their `P = 2 sin(angle / 2) axis`; their `P_g` and `P_c` are
@@ -46,8 +46,8 @@ fn half_sine_vector(pose: &Pose) -> Option<Vec3> {
     (angle > NO_AXIS_RAD).then(|| w * (2.0 * libm::sin(0.5 * angle) / angle))
 }
 
-/// Park & Martin 1994, their least-squares solution: the rotation that takes the vectors `log B` to `log A` best, the
-/// orthogonal factor of `sum log A log B^T`. It has a value for every angle, half turns included.
+/// Park & Martin 1994, their least-squares solution: the rotation that takes the vectors `log B` to `log A`
+/// best, the orthogonal factor of `sum log A log B^T`. It has a value for every angle, half turns included.
 pub(super) fn park_martin(motions: &[Motion]) -> Result<Pose, HandEyeError> {
     let cross: Mat3 = motions.iter().map(|m| rotation_vector(&m.a) * rotation_vector(&m.b).transpose()).sum();
     let rotation = rotation::nearest(&cross).ok_or(HandEyeError::Singular)?;

@@ -1,5 +1,5 @@
-//! Do the motions between stations determine the rotation of a camera? If they are too small, or all about one
-//! axis, it is said before anything is solved.
+//! Do the motions between stations determine the rotation of a camera? If they are too small, or all about
+//! one axis, it is said before anything is solved.
 
 use super::{HandEyeError, Stations, rotation_vector};
 use crate::geometry::{Mat3, Pose, Vec3};
@@ -39,9 +39,9 @@ const ANGLE_TOLERANCE_RAD: f64 = 0.05;
 /// Refuses motions that leave the rotation of X open.
 ///
 /// From `log A = R_X log B` a turn `d` of `R_X` about an axis `u` changes `log A` by `d u x log A`: over all
-/// pairs, which count each station `n / 2` times, the information about it is `sum (|log A|^2 - (u . log A)^2)
-/// / (n sigma^2 / 2)`, least for the direction of the largest eigenvalue of `sum log A log A^T`. The other
-/// two eigenvalues must not vanish against the noise `sigma` of a relative rotation.
+/// pairs, which count each station `n / 2` times, the information about it is `sum (|log A|^2 - (u . log
+/// A)^2) / (n sigma^2 / 2)`, least for the direction of the largest eigenvalue of `sum log A log A^T`. The
+/// other two eigenvalues must not vanish against the noise `sigma` of a relative rotation.
 pub(super) fn refuse_undetermined(stations: &Stations<'_>, motions: &[Motion]) -> Result<(), HandEyeError> {
     let sigma = rotation_noise(stations);
     refuse_unequal_angles(motions, sigma)?;

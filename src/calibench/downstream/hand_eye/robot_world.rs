@@ -6,11 +6,11 @@ use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 
 /// Shah 2013, section 3: X and Z of `A_i X = Z B_i`, here `A = G`, `Z = Y` and `B = C^-1`.
 ///
-/// With `vec` column by column, `R_A R_X = R_Z R_B` is `(R_B kron R_A) vec(R_X) = vec(R_Z)`. So `vec(R_X)` and
-/// `vec(R_Z)` are the right and left singular vectors of `sum R_B kron R_A` with the largest singular value,
-/// which is the number of stations where nothing errs. The translations follow from
-/// `R_A t_X - t_Z = R_Z t_B - t_A` by least squares, both at once. Every station counts once, where the closed
-/// forms of `A X = X B` count pairs; it is not found what each station errs by.
+/// With `vec` column by column, `R_A R_X = R_Z R_B` is `(R_B kron R_A) vec(R_X) = vec(R_Z)`. So `vec(R_X)`
+/// and `vec(R_Z)` are the right and left singular vectors of `sum R_B kron R_A` with the largest singular
+/// value, which is the number of stations where nothing errs. The translations follow from `R_A t_X - t_Z =
+/// R_Z t_B - t_A` by least squares, both at once. Every station counts once, where the closed forms of `A X =
+/// X B` count pairs; it is not found what each station errs by.
 pub(super) fn shah(stations: &Stations<'_>) -> Result<[Pose; 2], HandEyeError> {
     let pairs: Vec<(Pose, Pose)> = (0..stations.base_from_gripper.len())
         .map(|i| (stations.inverse_of_robot(i).inverse(), stations.cam_from_target[i].inverse()))

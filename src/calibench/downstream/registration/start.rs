@@ -22,9 +22,9 @@ fn affine(pairs: &Pairs) -> Result<Map, RegistrationError> {
     Ok(Map { linear: fit.linear, found_centre: fit.offset })
 }
 
-/// With the weighted means taken off both sides, `p` taught, `w` found, `S = sum weight w p^T`: the turned map
-/// that fits best has the angle `atan2(S21 - S12, S11 + S22)`; its scale is `|(S11 + S22, S21 - S12)| / sum
-/// weight |p|^2` (Umeyama 1991, eqs. 40 to 43, in the plane).
+/// With the weighted means taken off both sides, `p` taught, `w` found, `S = sum weight w p^T`: the turned
+/// map that fits best has the angle `atan2(S21 - S12, S11 + S22)`; its scale is `|(S11 + S22, S21 - S12)| /
+/// sum weight |p|^2` (Umeyama 1991, eqs. 40 to 43, in the plane).
 fn turned(model: MapModel, pairs: &Pairs) -> Result<Map, RegistrationError> {
     // Of a pair, by the mean variance of a coordinate; a scale of 1 is near enough for a start.
     let unit = pairs.radius * pairs.radius;

@@ -1,9 +1,9 @@
 //! COLMAP: `cameras.txt`, a line a camera: `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`.
 //!
 //! The upper left corner of the image is (0, 0) and the centre of its first pixel (0.5, 0.5). The
-//! coefficients of `OPENCV`, `FULL_OPENCV` and `OPENCV_FISHEYE` are OpenCV's; `SIMPLE_RADIAL` and `RADIAL` have one
-//! focal length and k1, or k1 and k2, and so have their fisheyes; `DIVISION` divides by `1 + k r^2` of the seen point, as
-//! here. (COLMAP documentation, "Output Format"; `src/colmap/sensor/models.h`.)
+//! coefficients of `OPENCV`, `FULL_OPENCV` and `OPENCV_FISHEYE` are OpenCV's; `SIMPLE_RADIAL` and `RADIAL`
+//! have one focal length and k1, or k1 and k2, and so have their fisheyes; `DIVISION` divides by `1 + k r^2`
+//! of the seen point, as here. (COLMAP documentation, "Output Format"; `src/colmap/sensor/models.h`.)
 
 use super::camera_file::CameraFile;
 use super::decimal::decimals;

@@ -10,10 +10,10 @@
 //! polynomial:  u = u~ (1 + K1 r^2 + K2 r^4 + K3 r^6) + P1 (r^2 + 2 u~^2) + 2 P2 u~ v~      r^2 = u~^2 + v~^2
 //!              v = v~ (1 + K1 r^2 + K2 r^4 + K3 r^6) + 2 P1 u~ v~ + P2 (r^2 + 2 v~^2)
 //! ```
-//! The division is the one here, with `k1 = Kappa Focus^2`. The polynomial has no equal: it is refused, or on request
-//! the nearest Brown-Conrady lens fitted over the frame, with the largest error said; and every lens here but the
-//! division the other way round. (MVTec HALCON operator reference, `read_cam_par`, "Calibration", "2D
-//! Transformations".)
+//! The division is the one here, with `k1 = Kappa Focus^2`. The polynomial has no equal: it is refused, or on
+//! request the nearest Brown-Conrady lens fitted over the frame, with the largest error said; and every lens
+//! here but the division the other way round. (MVTec HALCON operator reference, `read_cam_par`,
+//! "Calibration", "2D Transformations".)
 
 use super::camera_file::CameraFile;
 use super::decimal::decimal;

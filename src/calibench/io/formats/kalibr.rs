@@ -1,10 +1,11 @@
 //! Kalibr: `camchain.yaml` with a camera or several, and the YAML of a target.
 //!
 //! `intrinsics` of the model `pinhole` are `[fu, fv, pu, pv]`, `distortion_coeffs` of `radtan` `[k1, k2, r1,
-//! r2]`, which are OpenCV's first four, of `equidistant` `[k1, k2, k3, k4]`, OpenCV's fisheye; `intrinsics` of the model
-//! `ds` (double sphere, without further distortion) are `[xi, alpha, fu, fv, pu, pv]`; the centre of the first pixel is (0, 0), since marks come from
-//! OpenCV's detectors. `T_cn_cnm1` takes coordinates of the camera before to those of this one. (Kalibr wiki,
-//! "yaml formats", "Supported models", "Calibration targets".)
+//! r2]`, which are OpenCV's first four, of `equidistant` `[k1, k2, k3, k4]`, OpenCV's fisheye; `intrinsics`
+//! of the model `ds` (double sphere, without further distortion) are `[xi, alpha, fu, fv, pu, pv]`; the
+//! centre of the first pixel is (0, 0), since marks come from OpenCV's detectors. `T_cn_cnm1` takes
+//! coordinates of the camera before to those of this one. (Kalibr wiki, "yaml formats", "Supported models",
+//! "Calibration targets".)
 
 use super::camera_file::CameraFile;
 use super::decimal::{decimal, decimals};
@@ -185,7 +186,8 @@ pub enum KalibrTarget {
 /// Reads the target of a `target.yaml`.
 ///
 /// # Errors
-/// See [`FormatError`]; a target that is neither a chessboard of squares nor a grid of tags is refused by name.
+/// See [`FormatError`]; a target that is neither a chessboard of squares nor a grid of tags is refused by
+/// name.
 pub fn parse_target(file: &str, text: &str) -> Result<KalibrTarget, FormatError> {
     let source = Source { file, text };
     let node = yaml::document(&source)?;

@@ -1,8 +1,8 @@
 //! In which order do the coefficients of a lens stand? OpenCV's, which ROS, Kalibr, mrcal and COLMAP share.
 //!
-//! `k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tau_x tau_y]]]]`: each further group makes another lens model, in the
-//! order of [`Model::coefficients`]; and `k1 k2 k3 k4` of a fisheye. (OpenCV documentation, "Camera Calibration and 3D
-//! Reconstruction"; mrcal documentation, "Lens models", `LENSMODEL_OPENCV`.)
+//! `k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tau_x tau_y]]]]`: each further group makes another lens model, in
+//! the order of [`Model::coefficients`]; and `k1 k2 k3 k4` of a fisheye. (OpenCV documentation, "Camera
+//! Calibration and 3D Reconstruction"; mrcal documentation, "Lens models", `LENSMODEL_OPENCV`.)
 
 use super::error::FormatError;
 use super::node::Source;
@@ -82,7 +82,8 @@ pub(super) fn is_ideal(lens: &Lens) -> bool {
     simplest(*lens).brown_conrady().is_some_and(|lens| lens.is_ideal())
 }
 
-/// How many of OpenCV's coefficients at the beginning hold those that are not 0, of the numbers that a format may have.
+/// How many of OpenCV's coefficients at the beginning hold those that are not 0, of the numbers that a format
+/// may have.
 pub(super) fn least_count(lens: &Lens, counts: &[usize]) -> Option<usize> {
     let needed = lens.coefficients().iter().rposition(|value| *value != 0.0).map_or(0, |last| last + 1);
     counts.iter().copied().find(|count| *count >= needed)

@@ -3,9 +3,9 @@
 //! MATLAB counts pixels from 1: the centre of the first pixel is (1, 1), and a principal point is 1 px more
 //! than in OpenCV (MathWorks, `cameraIntrinsicsToOpenCV`). `ImageSize` is rows, columns. `K` is `[[fx, s,
 //! cx], [0, fy, cy], [0, 0, 1]]`; its older form `IntrinsicMatrix` is the transpose. `RadialDistortion` is
-//! `[k1 k2]` or `[k1 k2 k3]`, `TangentialDistortion` `[p1 p2]`, in the equations of OpenCV. Skew is in pixels, as here.
-//! Its fisheye is Scaramuzza's polynomial (`MappingCoefficients`), which has no equal here. (MathWorks,
-//! `cameraParameters`, `cameraIntrinsics`, `fisheyeIntrinsics`.)
+//! `[k1 k2]` or `[k1 k2 k3]`, `TangentialDistortion` `[p1 p2]`, in the equations of OpenCV. Skew is in
+//! pixels, as here. Its fisheye is Scaramuzza's polynomial (`MappingCoefficients`), which has no equal here.
+//! (MathWorks, `cameraParameters`, `cameraIntrinsics`, `fisheyeIntrinsics`.)
 
 use super::camera_file::CameraFile;
 use super::decimal::decimals;

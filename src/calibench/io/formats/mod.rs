@@ -271,7 +271,8 @@ pub fn write_camera_file(
     Ok(written)
 }
 
-/// The same camera with its lens by the model with the fewest coefficients, where no covariance speaks of them.
+/// The same camera with its lens by the model with the fewest coefficients, where no covariance speaks of
+/// them.
 fn with_simplest_lens(format: &Format, camera: &CameraFile) -> CameraFile {
     let mut camera = camera.clone();
     if !format.room.covariance {
@@ -315,7 +316,8 @@ fn refuse_what_has_no_room(format: &Format, camera: &CameraFile) -> Result<(), F
     Ok(())
 }
 
-/// What a program does not see that this library does: rays from beside and behind, where it divides by their depth.
+/// What a program does not see that this library does: rays from beside and behind, where it divides by their
+/// depth.
 fn lost_behind(format: &Format, camera: &CameraFile) -> Option<String> {
     if format.room.behind.contains(&camera.camera.distortion.model()) {
         return None;
@@ -330,8 +332,8 @@ fn lost_behind(format: &Format, camera: &CameraFile) -> Option<String> {
 }
 
 /// Largest distance between the pixels of a written file's camera and those of the camera it was written
-/// from, px, for rays through the whole frame, infinite if the former has no pixel for one; `None` where the image's
-/// size is not known, and where the latter itself has a pixel for none of its rays.
+/// from, px, for rays through the whole frame, infinite if the former has no pixel for one; `None` where the
+/// image's size is not known, and where the latter itself has a pixel for none of its rays.
 ///
 /// # Errors
 /// What keeps the written file from being read: a fault of this library.

@@ -200,8 +200,8 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// The numbers of a matrix, row by row: the `data` that OpenCV and ROS write, as many as `rows` and `cols` say, or
-    /// a list of numbers or rows.
+    /// The numbers of a matrix, row by row: the `data` that OpenCV and ROS write, as many as `rows` and
+    /// `cols` say, or a list of numbers or rows.
     pub fn matrix(&self) -> Result<Vec<f64>, FormatError> {
         let data = self.get("data").unwrap_or_else(|| self.clone());
         let numbers =

@@ -1,10 +1,10 @@
 //! OpenCV's FileStorage: YAML, XML and JSON, with the names that OpenCV's own calibration program writes.
 //!
 //! `camera_matrix` is `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]`, `distortion_coefficients` as in
-//! [`super::lens`], those of a fisheye where `fisheye_model` is 1; the centre of the first pixel is (0, 0), as in `cv::initUndistortRectifyMap`, which asks
-//! for the colour of pixel (0, 0) at u = v = 0. `cv::projectPoints` ignores the skew of a matrix, so a matrix
-//! with one is refused. (OpenCV documentation, "Camera Calibration and 3D Reconstruction", "File Input and
-//! Output using XML / YAML / JSON files".)
+//! [`super::lens`], those of a fisheye where `fisheye_model` is 1; the centre of the first pixel is (0, 0),
+//! as in `cv::initUndistortRectifyMap`, which asks for the colour of pixel (0, 0) at u = v = 0.
+//! `cv::projectPoints` ignores the skew of a matrix, so a matrix with one is refused. (OpenCV documentation,
+//! "Camera Calibration and 3D Reconstruction", "File Input and Output using XML / YAML / JSON files".)
 
 use super::camera_file::CameraFile;
 use super::decimal::decimals;

@@ -2,9 +2,9 @@
 //! `sensor_msgs/CameraInfo`.
 //!
 //! `K = [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]`; `D` is in OpenCV's order, five numbers for `plumb_bob`, eight
-//! for `rational_polynomial`, and the four of OpenCV's fisheye for `equidistant`; the centre of the first pixel is (0, 0), as in OpenCV, by which
-//! `image_geometry` projects. Files are written for a single camera: `R` is the identity and `P` is `K`.
-//! (sensor_msgs/CameraInfo documentation; REP 104.)
+//! for `rational_polynomial`, and the four of OpenCV's fisheye for `equidistant`; the centre of the first
+//! pixel is (0, 0), as in OpenCV, by which `image_geometry` projects. Files are written for a single camera:
+//! `R` is the identity and `P` is `K`. (sensor_msgs/CameraInfo documentation; REP 104.)
 
 use super::camera_file::CameraFile;
 use super::decimal::decimals;

@@ -178,7 +178,8 @@ fn pixels_of_other_lenses_are_those_of_opencv_and_colmap() {
     }
 }
 
-/// The camera of a lens that two formats hold alike: without what Kalibr has no place for, or HALCON without a fit.
+/// The camera of a lens that two formats hold alike: without what Kalibr has no place for, or HALCON without
+/// a fit.
 fn held_by(formats: [&Format; 2], model: Model) -> Option<Camera<Lens>> {
     let has = |name: &str| formats.iter().any(|format| format.name == name);
     if !formats.iter().all(|format| format.room.lenses.contains(&model)) {
@@ -216,8 +217,8 @@ fn a_camera_of_every_lens_survives_the_way_through_every_two_formats() {
             }
         }
     }
-    // Brown-Conrady's in 10 formats; rational in 7, thin prism in 5, tilted in 4, Kannala-Brandt in 7, division in 3,
-    // double sphere in 2.
+    // Brown-Conrady's in 10 formats; rational in 7, thin prism in 5, tilted in 4, Kannala-Brandt in 7,
+    // division in 3, double sphere in 2.
     assert_eq!(ways, 100 + 49 + 25 + 16 + 49 + 9 + 4);
 }
 

@@ -106,8 +106,9 @@ impl Steps {
 /// Halvings of a part of a piece: the parameter's double precision has no more.
 const MAX_HALVINGS: u32 = 48;
 
-/// Cuts a curve over t in 0 ... 1 into arcs and hands them on in order. What the image does not see is left out, and what lies
-/// far to its left becomes a straight line, however long it is: the cost is bounded by the image.
+/// Cuts a curve over t in 0 ... 1 into arcs and hands them on in order. What the image does not see is left
+/// out, and what lies far to its left becomes a straight line, however long it is: the cost is bounded by the
+/// image.
 pub fn trace<E>(
     curve: &impl Fn(f64) -> Result<Vec2, E>,
     parts: usize,

@@ -1,5 +1,5 @@
-//! Which part of an outline can change the image? What lies above, below or right of it changes nothing, and of what lies left of it only how
-//! far it goes up or down.
+//! Which part of an outline can change the image? What lies above, below or right of it changes nothing, and
+//! of what lies left of it only how far it goes up or down.
 
 use super::outline::Arc;
 use crate::geometry::Vec2;
@@ -35,7 +35,8 @@ impl Window {
         far_left: f64::NEG_INFINITY,
     };
 
-    /// That of an image of width and height whose pixels see `reach_px` beyond their squares, and a pixel of margin.
+    /// That of an image of width and height whose pixels see `reach_px` beyond their squares, and a pixel of
+    /// margin.
     pub fn of((width, height): (usize, usize), reach_px: f64) -> Window {
         let (width, height) = (width as f64, height as f64);
         let margin = reach_px + 1.0;
@@ -46,7 +47,8 @@ impl Window {
         }
     }
 
-    /// Where an arc lies, with all that its halves may reach: no further beyond its three points than these are apart.
+    /// Where an arc lies, with all that its halves may reach: no further beyond its three points than these
+    /// are apart.
     pub fn side(&self, arc: &Arc) -> Side {
         let low = arc.from.inf(&arc.middle).inf(&arc.to);
         let high = arc.from.sup(&arc.middle).sup(&arc.to);
