@@ -252,7 +252,7 @@ fn what_cannot_be_planned_is_wrong_usage_with_what_to_do() {
         (of(whole, &["fx", "--distance", "nan,10"]), "NEAR,FAR"),
         (of(whole, &["fx", "--most-tilt", "90"]), "less than 80"),
         (of(whole, &["fx", "--margin", "400"]), "no pose of"),
-        (of(whole, &["fx", "--mark-sd", "nan"]), "above 0"),
+        (of(whole, &["fx", "--mark-sd", "nan"]), "from 1e-9 to 1e9"),
         (vec!["next-pose", whole, "--want", "fx"], "--board"),
         (vec!["next-pose", whole, "--board", BOARD], "--want"),
         (vec!["next-pose", whole, "--board", "circles:1000x1000:1mm:0.5mm", "--want", "fx"], "marks"),

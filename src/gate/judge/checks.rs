@@ -69,8 +69,7 @@ properties! {
     RmseDefinition = "rmse-definition",
     /// The RMSE follows its distribution.
     Rmse = "rmse",
-    /// A stated covariance is symmetric, positive definite, and of the names and standard deviations beside
-    /// it.
+    /// A stated covariance is symmetric, positive definite, and of the names and deviations beside it.
     CovarianceForm = "covariance-form",
     /// The stated covariance is the true one.
     Covariance = "covariance",
