@@ -2,8 +2,8 @@
 //!
 //! 1. Levels: a plane is fitted to the ground around the disc and one to the inside, so that smooth shading
 //!    cancels; the pixels near the edge become coverage `c = (ground - level) / (ground - inside)`. Where the
-//! ring around the disc is not all    ground, because the sheet ends there, the disc is fitted to the part of
-//! its edge that is clear ([`super::beside`]).
+//!    ring around the disc is not all ground, because the sheet ends there, the disc is fitted to the part of
+//!    its edge that is clear ([`super::beside`]).
 //! 2. Moments of the coverage give the ellipse and a grey-weighted centroid. Pixels clear of the edge count
 //!    as 1 or 0, so only the noise of a narrow ring enters.
 //! 3. One Gauss-Newton step on the centre against the model `c = S(d)`, `d` the distance to the ellipse. It
