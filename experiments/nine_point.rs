@@ -15,9 +15,11 @@
 
 use calibench::detect::{GridError, circle_grid, sparse_dots};
 use calibench::geometry::{Affine, Mat3, Vec2};
-use calibench::io::image::parse_image;
+use calibench::io::image::{ImageError, parse_image};
 use calibench::io::input::{MOST_IMAGE_BYTES, read_regular};
+use calibench::io::memory::DEFAULT_MEMORY;
 use calibench::io::overlay::Overlay;
+use calibench::io::parse_extent;
 use calibench::planar::{PlaneCalibration, PlaneModel, calibrate_plane};
 use calibench::raster::Raster;
 use calibench::synth::render::nine_dot_stand_in;

@@ -190,6 +190,8 @@ fn a_photograph_that_needs_more_memory_than_there_is_is_refused_before_it_is_dec
     let need = ["large.pgm: needs some 3144388608 bytes of memory", "limit is 2147483648", "--memory"];
     refused(&folder, &["calibrate", "--board", "dots:3x3:1", "large.pgm"], &need);
     refused(&folder, &["ninepoint", "large.pgm"], &need);
+    let run = ["run", "nine-point", "--image", "large.pgm", "--out", "o"];
+    refused(&folder, &run, &["large.pgm: needs some 3144388608 bytes of memory", "fewer pixels"]);
     let more = ["large.pgm: needs some 7848388608 bytes of memory", "--memory"];
     refused(&folder, &["undistort", "--camera", "camera.json", "--out", "o", "large.pgm"], &more);
     // With the memory it asks for, the file is found to be cut off.
@@ -287,6 +289,22 @@ fn marks_outside_of_the_image_are_refused_and_swapped_sides_are_named() {
     assert_eq!(limited(&folder, &with("640x480")).status.code(), Some(0));
     refused(&folder, &with("480x640"), &["outside", "640x480", "swapped"]);
     refused(&folder, &with("10x10"), &["lie outside of the image of 10 x 10 px"]);
+    // So do the other verbs that are told a size.
+    let solid = corner_file().replace("X,Y,u,v", "X,Y,Z,u,v");
+    let solid: Vec<String> = solid
+        .lines()
+        .enumerate()
+        .map(|(i, line)| {
+            let mut fields: Vec<&str> = line.split(',').collect();
+            if i > 0 {
+                fields.insert(4, "0");
+            }
+            fields.join(",")
+        })
+        .collect();
+    fs::write(folder.join("z.csv"), solid.join("\n") + "\n").expect("written");
+    refused(&folder, &["tsai", "z.csv", "--image-size", "480x640"], &["outside", "640x480", "swapped"]);
+    refused(&folder, &["noise", "c.csv", "--image-size", "480x640"], &["outside", "640x480", "swapped"]);
     refused(&folder, &with("18446744073709551615x18446744073709551615"), &["1048576"]);
     refused(&folder, &with("36893488147419103232x480"), &["expected WIDTHxHEIGHT"]);
 }

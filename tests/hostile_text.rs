@@ -177,3 +177,36 @@ fn parts_whose_checkpoint_counts_wrongly_make_no_whole() {
     }
     assert!(!folder.join("whole/trials.csv").exists());
 }
+
+/// Counts that no file of TOML can keep, and texts that no figure can.
+#[test]
+fn a_study_with_numbers_or_texts_that_cannot_be_kept_is_refused() {
+    let folder = folder("unkept");
+    let spec = crate::hostile::fixed_poses();
+    for (from, to, words) in [
+        ("image = [640, 480]", "image = [9223372036854775808, 480]", "beyond 9223372036854775807"),
+        ("image = [640, 480]", "image = [18446744073709551615, 480]", "beyond 9223372036854775807"),
+        ("question = \"", "question = \"a\\u001B[31m", "holds a control character"),
+    ] {
+        let changed = spec.replace(from, to);
+        assert_ne!(changed, spec, "{from}");
+        fs::write(folder.join("s.toml"), changed).expect("written");
+        refused(&folder, &["study", "run", "s.toml", "--out", "r"], &[words]);
+    }
+}
+
+/// Hours of a slow solver are not lost for a name that was wrong.
+#[test]
+fn answers_are_kept_where_the_report_cannot_be_written() {
+    let folder = folder("kept-answers");
+    fs::write(folder.join("file"), "no folder").expect("written");
+    let gate = ["gate", "--samples", "1", "--record", "g", "--json", "file/report.json"];
+    assert_eq!(limited(&folder, &gate).status.code(), Some(3));
+    assert!(folder.join("g/answers.jsonl").is_file());
+    let judged = limited(&folder, &["gate", "--judge", "g"]);
+    assert_eq!(judged.status.code(), Some(0), "{}", text(&judged.stdout));
+    // Nor is a report asked for where there is none.
+    refused(&folder, &["gate", "--planted", "list", "--json", "r.json"], &["there is no report to write"]);
+    refused(&folder, &["gate", "--power", "p", "--json", "r.json"], &["cannot be used with"]);
+    refused(&folder, &["gate", "--least-digits", "3"], &["--certified"]);
+}

@@ -543,7 +543,7 @@ fn a_read_only_disk_ends_with_three_and_changes_nothing() {
     fs::remove_dir_all(folder).expect("removed");
 }
 
-/// Times that each verb is killed: 225 in all.
+/// Times that each verb is killed.
 const KILLS: usize = 25;
 
 #[test]

@@ -27,7 +27,14 @@ impl Shown {
         let bytes = read_regular(path, MOST_IMAGE_BYTES)
             .map_err(|error| ExperimentError::Input(error.to_string()))?;
         let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        let image = parse_image(&bytes, &name).map_err(|error| ExperimentError::Input(error.to_string()))?;
+        let wrong = |error: ImageError| ExperimentError::Input(error.to_string());
+        let needed = parse_extent(&bytes, &name).map_err(wrong)?.memory_to_detect();
+        if needed > DEFAULT_MEMORY {
+            return Err(ExperimentError::Input(format!(
+                "{name}: needs some {needed} bytes of memory, and the limit is {DEFAULT_MEMORY}: give an image with fewer pixels"
+            )));
+        }
+        let image = parse_image(&bytes, &name).map_err(wrong)?;
         record.input(name, &bytes);
         Ok(Shown { image: image.to_f32(), centres_true: None })
     }

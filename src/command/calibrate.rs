@@ -23,6 +23,7 @@ use std::path::{Path, PathBuf};
 mod advice;
 mod before_after;
 mod camera;
+pub(crate) use camera::refuse_views_outside;
 mod contradictions;
 mod finished;
 mod gallery;

@@ -104,7 +104,7 @@ pub(super) struct Arguments {
     planted: Option<String>,
     /// Measures the gate itself: every planted fault, false alarms over 200 clean seeds, how often textbook
     /// least squares is misled; writes three tables to a folder
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["solver", "judge", "export", "record", "planted"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["solver", "judge", "export", "record", "planted", "json", "junit", "html"])]
     power: Option<PathBuf>,
     /// Prints the tables in a folder written by --power as Markdown
     #[arg(long, value_name = "DIR", exclusive = true)]
@@ -141,8 +141,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "NAME", requires = "certified")]
     problem: Option<String>,
     /// Digits that every certified problem must reach
-    #[arg(long, value_name = "N", requires = "certified", default_value_t = 0.0)]
-    least_digits: f64,
+    #[arg(long, value_name = "N", requires = "certified")]
+    least_digits: Option<f64>,
     /// Counts the digits of this library's solver and of the programs in adapters/, and writes the table as
     /// CSV
     #[arg(long, value_name = "FILE", requires = "certified", conflicts_with = "solver")]
@@ -242,13 +242,16 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
     }
     // Told before anything else is done, whether a program is asked or not.
     program::process("", arguments.timeout, arguments.jobs).map_err(usage)?;
-    if !arguments.least_digits.is_finite() {
+    if arguments.least_digits.is_some_and(|digits| !digits.is_finite()) {
         return Err(usage("--least-digits must be a number"));
     }
     if arguments.median_time.is_some_and(|s| !(s > 0.0 && s.is_finite())) {
         return Err(usage("--median-time must be a positive number of seconds"));
     }
     if arguments.planted.as_deref() == Some("list") {
+        if arguments.json.is_some() || arguments.junit.is_some() || arguments.html.is_some() {
+            return Err(usage("--planted list judges nothing, so that there is no report to write"));
+        }
         planted().iter().for_each(|fault| print(&format!("{:<26} {}\n", fault.id, fault.about)));
         return Ok(Exit::Held);
     }
@@ -295,8 +298,10 @@ fn dispatch(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
         let plan = plan_of(arguments, samples, || solver.models())?;
         files::export(&plan, folder).map_err(of_files)?;
         let recorder = Recorder::new(solver.as_ref());
-        let exit = judge(arguments, &plan, &recorder, build)?;
+        let report = asked(arguments, &plan, &recorder, build)?;
+        // Before the report: where that cannot be written the answers are kept.
         files::file_answers(&plan, folder, &recorder).map_err(of_files)?;
+        let exit = told(arguments, &report)?;
         // The report is the one object on standard output.
         if arguments.format == Format::Text {
             print(&format!("{} problems and answers written to {}\n", plan.cases.len(), folder.shown()));
@@ -424,7 +429,11 @@ fn asked(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build)
 type Output<'a> = (&'a Option<PathBuf>, fn(&Report) -> String);
 
 fn judge(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build) -> Result<Exit, Stop> {
-    let report = asked(arguments, plan, solver, build)?;
+    told(arguments, &asked(arguments, plan, solver, build)?)
+}
+
+/// Tells what a report says, in all forms that are asked for.
+fn told(arguments: &Arguments, report: &Report) -> Result<Exit, Stop> {
     let outputs: [Output<'_>; 3] = [
         (&arguments.json, Report::to_json),
         (&arguments.junit, Report::to_junit),
@@ -432,7 +441,7 @@ fn judge(arguments: &Arguments, plan: &Plan, solver: &dyn Solver, build: &Build)
     ];
     for (path, text) in outputs {
         if let Some(path) = path {
-            write_atomically(path, text(&report).as_bytes()).map_err(incomplete)?;
+            write_atomically(path, text(report).as_bytes()).map_err(incomplete)?;
         }
     }
     match arguments.format {

@@ -1,12 +1,13 @@
 //! `calibench noise PHOTOS...|CSV`: how much do the marks of a still board scatter from frame to frame, and
 //! was it still?
 
-use super::calibrate::{Format, Views, parse_size, views_of};
+use super::calibrate::{Format, Views, parse_size, refuse_views_outside, views_of};
 use super::diff::parse_rate;
 use super::report::table;
 use super::said::{Said, number_that, say, written_by};
 use super::{Exit, warn};
 use crate::board::board_or_file;
+use calibench::board::View;
 use calibench::evaluate::Interval;
 use calibench::io::memory::{DEFAULT_MEMORY, parse_bytes};
 use calibench::io::significant;
@@ -81,6 +82,8 @@ struct Found {
 
 fn found(arguments: &Arguments) -> Result<Found, String> {
     let views = views_of(&arguments.files, arguments.board.as_ref(), arguments.image_size, arguments.memory)?;
+    let pixels = views.views.iter().map(View::pixels);
+    refuse_views_outside(&views.source, arguments.image_size, views.names.iter().zip(pixels))?;
     let mean = views.light.iter().sum::<f64>() / views.light.len() as f64;
     let light = (mean > 0.0).then(|| views.light.iter().map(|level| level / mean).collect::<Vec<f64>>());
     let noise = extraction_noise(&views.views, light.as_deref(), arguments.rate)

@@ -1,7 +1,7 @@
 //! `calibench tsai CORNERS.csv`: a camera from one view of a tilted plane or of a target in three dimensions,
 //! by Tsai's two stages, and refined from there.
 
-use super::calibrate::{Format, parse_size, unended};
+use super::calibrate::{Format, parse_size, refuse_views_outside, unended};
 use super::report::table;
 use super::said::{Said, number_that, ratio, say, written_by};
 use super::{Exit, warn};
@@ -120,6 +120,8 @@ fn found(arguments: &Arguments) -> Result<Found, String> {
     unended(&source, &bytes).iter().for_each(|said| warn(&format!("warning: {said}")));
     let SpatialFile { view_names, views } =
         parse_spatial(&source, &bytes).map_err(|error| error.to_string())?;
+    let pixels = views.iter().map(SpatialView::pixels);
+    refuse_views_outside(&source, arguments.image_size, view_names.iter().zip(pixels))?;
     let mut found = Found { source, views: Vec::new(), refused: Vec::new(), joint: None };
     for (name, view) in view_names.iter().zip(&views) {
         match two_stage(view, &arguments.assumed()) {

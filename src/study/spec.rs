@@ -258,6 +258,10 @@ impl Spec {
         if self.name.is_empty() || !self.name.bytes().all(plain) {
             return Err(SpecError::Name(self.name.clone()));
         }
+        let tree = serde_json::to_value(self).expect("a spec holds nothing that JSON cannot");
+        if let Some(text) = with_control_character(&tree) {
+            return Err(SpecError::ControlCharacter(calibench::io::shown(&text).to_string()));
+        }
         let trials = &self.trials;
         check("trials.per_cell", trials.per_cell as f64, "2 or more", trials.per_cell >= 2)?;
         check("trials.batch", trials.batch as f64, "1 or more", trials.batch >= 1)?;
@@ -277,6 +281,20 @@ impl Spec {
             )?;
         }
         Ok(())
+    }
+}
+
+/// A text of a tree with a character that neither XML nor a terminal takes for text.
+fn with_control_character(tree: &serde_json::Value) -> Option<String> {
+    let is_refused = |c: char| c.is_control() && !matches!(c, '\n' | '\r' | '\t');
+    match tree {
+        serde_json::Value::String(text) => text.contains(is_refused).then(|| text.clone()),
+        serde_json::Value::Array(list) => list.iter().find_map(with_control_character),
+        serde_json::Value::Object(fields) => {
+            let key = fields.keys().find(|key| key.contains(is_refused)).cloned();
+            key.or_else(|| fields.values().find_map(with_control_character))
+        }
+        _ => None,
     }
 }
 

@@ -29,6 +29,12 @@ pub enum SpecError {
         /// Its domain.
         need: &'static str,
     },
+    /// A count with which nothing is done, nor kept.
+    #[error("a whole number of the scene or the estimator is beyond {max}, the largest of TOML", max = i64::MAX)]
+    NumberTooLarge,
+    /// A text that would stand in tables, figures and pages.
+    #[error("the text {0} holds a control character: take it out")]
+    ControlCharacter(String),
     /// A study that would not end, or not fit into memory.
     #[error("the study needs {needed} {what}, and the limit is {limit}: {advice}")]
     TooMuch {

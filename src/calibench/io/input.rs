@@ -84,8 +84,17 @@ impl From<InputError> for io::Error {
 /// # Errors
 /// [`InputError::NotReplaceable`].
 pub fn replaceable(path: &Path) -> Result<(), InputError> {
-    let kind = std::fs::metadata(path).ok().as_ref().and_then(other_than_a_file);
+    let there = || std::fs::metadata(path).ok().as_ref().and_then(other_than_a_file);
+    let kind = if is_of_the_system(path) { Some("a name of the system") } else { there() };
     kind.map_or(Ok(()), |kind| Err(InputError::NotReplaceable { path: path.shown(), kind }))
+}
+
+/// Whether a name stands where the system has devices and processes: /dev/stdout may lead to a regular file, and is no
+/// place for another. /dev/shm is a disk in memory.
+fn is_of_the_system(path: &Path) -> bool {
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let is_below = |folder: &str| absolute.starts_with(folder);
+    cfg!(unix) && (is_below("/proc") || is_below("/dev") && !is_below("/dev/shm"))
 }
 
 fn regular(path: &Path, seen: &Metadata) -> Result<(), InputError> {
@@ -239,5 +248,18 @@ mod tests {
         assert!(open_without_waiting(&pipe).is_ok(), "opened without another end");
         std::fs::remove_file(&pipe).unwrap();
         assert!(refused.starts_with("x: a file that has to be waited for, not a regular file"), "{refused}");
+    }
+
+    /// Asked of names alone: whoever may do everything would lose the system's name to a file.
+    #[test]
+    #[cfg(unix)]
+    fn no_name_of_the_system_is_a_place_for_a_file() {
+        for name in ["/dev/stdout", "/dev/null", "/proc/self/fd/1", "/dev/new"] {
+            let refused = replaceable(Path::new(name)).unwrap_err().to_string();
+            assert!(refused.ends_with("where a file is to be written: name another place"), "{refused}");
+        }
+        for name in ["/dev/shm/new", "/device/new", "new"] {
+            assert!(replaceable(Path::new(name)).is_ok(), "{name}");
+        }
     }
 }

@@ -49,7 +49,7 @@ pub use digits::significant;
 pub use doubts::doubts;
 pub use ends::{PixelEnds, parse_pixel_ends, read_pixel_ends};
 #[cfg(feature = "photo")]
-pub use extent::{Extent, image_extent};
+pub use extent::{Extent, image_extent, parse_extent};
 pub use hash::sha256_hex;
 #[cfg(feature = "photo")]
 pub use image::{Grey, ImageError, read_image, write_png, write_png_16};

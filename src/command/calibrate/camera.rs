@@ -95,11 +95,20 @@ pub(super) fn refuse_marks_outside(
     ))
 }
 
+/// The same of the marks of views with their names.
+pub(crate) fn refuse_views_outside<'a>(
+    source: &str,
+    image_size: Option<(usize, usize)>,
+    views: impl Iterator<Item = (&'a String, &'a [Vec2])>,
+) -> Result<(), String> {
+    let marks = views.flat_map(|(name, pixels)| pixels.iter().map(move |pixel| (name.as_str(), *pixel)));
+    refuse_marks_outside(source, image_size, &marks.collect::<Vec<_>>())
+}
+
 impl Observed {
     fn refuse_marks_outside(&self) -> Result<(), String> {
-        let views = self.views.iter().zip(&self.names);
-        let marks = views.flat_map(|(v, n)| v.pixels().iter().map(move |p| (n.as_str(), *p)));
-        refuse_marks_outside(&self.source, self.image_size, &marks.collect::<Vec<_>>())
+        let views = self.names.iter().zip(self.views.iter().map(View::pixels));
+        refuse_views_outside(&self.source, self.image_size, views)
     }
 }
 

@@ -60,7 +60,7 @@ fn verdict(arguments: &Arguments, table: &DigitsTable, measured: &[Measured]) ->
         return Ok(Exit::Deviates);
     }
     let is_short = |found: &Measured| match found {
-        Ok(digits) => digits.least() < arguments.least_digits,
+        Ok(digits) => digits.least() < arguments.least_digits.unwrap_or(0.0),
         Err(why) => !matches!(why, NoDigits::UnknownModel(_)),
     };
     let failed: Vec<String> = table
@@ -73,7 +73,7 @@ fn verdict(arguments: &Arguments, table: &DigitsTable, measured: &[Measured]) ->
     if failed.is_empty() {
         return Ok(Exit::Held);
     }
-    let wanted = match arguments.least_digits {
+    let wanted = match arguments.least_digits.unwrap_or(0.0) {
         digits if digits > 0.0 => format!("not answered, or fewer than {digits} digits"),
         _ => "not answered".to_string(),
     };
