@@ -89,8 +89,8 @@ pub fn replaceable(path: &Path) -> Result<(), InputError> {
     kind.map_or(Ok(()), |kind| Err(InputError::NotReplaceable { path: path.shown(), kind }))
 }
 
-/// Whether a name stands where the system has devices and processes: /dev/stdout may lead to a regular file, and is no
-/// place for another. /dev/shm is a disk in memory.
+/// Whether a name stands where the system has devices and processes: /dev/stdout may lead to a regular file,
+/// and is no place for another. /dev/shm is a disk in memory.
 fn is_of_the_system(path: &Path) -> bool {
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let is_below = |folder: &str| absolute.starts_with(folder);
