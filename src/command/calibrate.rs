@@ -23,7 +23,6 @@ use std::path::{Path, PathBuf};
 mod advice;
 mod before_after;
 mod camera;
-pub(crate) use camera::refuse_views_outside;
 mod contradictions;
 mod finished;
 mod gallery;
@@ -42,6 +41,8 @@ mod poses;
 mod scatter;
 mod view_names;
 mod worst;
+
+pub(crate) use camera::refuse_views_outside;
 
 pub(super) use plane::plane_text;
 pub(super) use plane_page::PlaneReport;

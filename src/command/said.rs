@@ -3,6 +3,7 @@
 
 use super::calibrate::Format;
 use super::{Exit, print, warn};
+use calibench::io::corners::WEIGHTS;
 use calibench::io::write_atomically;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -83,7 +84,7 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
 
 /// The standard deviation of a pixel coordinate, as a table may have it.
 pub(super) fn noise_px(text: &str) -> Result<f64, String> {
-    number_that(text, |x| (1e-9..=1e9).contains(&x), "a number of pixels from 1e-9 to 1e9")
+    number_that(text, |x| WEIGHTS.contains(&x), "a number of pixels from 1e-9 to 1e9")
 }
 
 /// fy over fx of a sensor: pixels are a hundred times as wide as high at the most, or as high as wide.

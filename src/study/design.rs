@@ -28,6 +28,7 @@ pub(super) fn designs(spec: &Spec, text: &str) -> Result<Vec<(Vec<usize>, Design
     refuse_set_twice(&spec.factor)?;
     limits::check_trials(spec.factor.iter().map(|f| f.count()), spec.trials.per_cell, spec.trials.batch)?;
     let base = Design { scene: spec.scene.clone(), estimator: spec.estimator.clone() };
+    // All else that a design holds came from TOML, whose reader takes larger numbers than its writer.
     let mut base = Table::try_from(&base).map_err(|_| SpecError::NumberTooLarge)?;
     if let Some(estimator) = base.get_mut("estimator").and_then(Value::as_table_mut)
         && !spec.estimator.is_free_named

@@ -1,7 +1,7 @@
 //! How is a file replaced so that nobody ever sees half of it? Written beside its place, then renamed.
 
 use super::files::{Disk, Files};
-use super::input::open_without_waiting;
+use super::input::{irreplaceable, open_without_waiting};
 use super::kept::refuse_kept;
 use super::shown::ShownPath;
 use std::ffi::{OsStr, OsString};
@@ -134,17 +134,13 @@ impl Drop for Beside<'_> {
     }
 }
 
-/// A device, a pipe or a folder would be gone for good if a file took its place; a link to a file is
-/// replaced, and its target left alone.
+/// A link to a file is replaced, and its target left alone.
 fn refuse_what_is_no_file(path: &Path) -> io::Result<()> {
-    match fs::metadata(path) {
-        Ok(there) if !there.is_file() => Err(io::Error::new(
-            io::ErrorKind::InvalidInput,
-            "a device, pipe or folder is there, and no file: name another",
-        )),
-        // Nothing is there, or a link that leads nowhere.
-        _ => Ok(()),
-    }
+    let refused = |kind| {
+        let what = format!("{kind} is there, and no file: name another");
+        Err(io::Error::new(io::ErrorKind::InvalidInput, what))
+    };
+    irreplaceable(path).map_or(Ok(()), refused)
 }
 
 /// The error with the file that could not be written.
@@ -270,7 +266,10 @@ mod tests {
         fs::create_dir_all(folder.join("folder")).unwrap();
         let refused = write_atomically(&folder.join("folder"), b"new").unwrap_err();
         assert!(refused.to_string().contains("no file: name another"), "{refused}");
-        assert!(write_atomically(Path::new("/dev/null"), b"new").is_err());
+        for name in ["/dev/null", "/dev/stdout", "/dev/calibench-new"] {
+            let refused = write_atomically(Path::new(name), b"new").unwrap_err();
+            assert!(refused.to_string().contains("a name of the system is there"), "{refused}");
+        }
         fs::write(folder.join("target"), b"old").unwrap();
         std::os::unix::fs::symlink("target", folder.join("link")).unwrap();
         write_atomically(&folder.join("link"), b"new").unwrap();

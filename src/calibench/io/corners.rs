@@ -83,7 +83,7 @@ pub fn parse_corners(file: &str, mut input: impl Read) -> Result<CornerFile, Tab
 
 /// Weights, and standard deviations in px, with which marks are weighed against each other: their squares are
 /// summed.
-const WEIGHTS: RangeInclusive<f64> = 1e-9..=1e9;
+pub const WEIGHTS: RangeInclusive<f64> = 1e-9..=1e9;
 
 fn weighted(file: &str, bytes: &[u8]) -> Result<CornerFile, TableError> {
     let rows = with_column(file, bytes, Column::length("weight"))?;

@@ -84,9 +84,17 @@ impl From<InputError> for io::Error {
 /// # Errors
 /// [`InputError::NotReplaceable`].
 pub fn replaceable(path: &Path) -> Result<(), InputError> {
-    let there = || std::fs::metadata(path).ok().as_ref().and_then(other_than_a_file);
-    let kind = if is_of_the_system(path) { Some("a name of the system") } else { there() };
-    kind.map_or(Ok(()), |kind| Err(InputError::NotReplaceable { path: path.shown(), kind }))
+    let refused = |kind| Err(InputError::NotReplaceable { path: path.shown(), kind });
+    irreplaceable(path).map_or(Ok(()), refused)
+}
+
+/// What is there, where no file may take its place: it would be gone for good. Where nothing is, or a link that
+/// leads nowhere, one may.
+pub(super) fn irreplaceable(path: &Path) -> Option<&'static str> {
+    if is_of_the_system(path) {
+        return Some("a name of the system");
+    }
+    std::fs::metadata(path).ok().as_ref().and_then(other_than_a_file)
 }
 
 /// Whether a name stands where the system has devices and processes: /dev/stdout may lead to a regular file,

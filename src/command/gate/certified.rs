@@ -59,8 +59,9 @@ fn verdict(arguments: &Arguments, table: &DigitsTable, measured: &[Measured]) ->
         warn("nothing was asked: the solver knows none of these lens models");
         return Ok(Exit::Deviates);
     }
+    let least_digits = arguments.least_digits.unwrap_or(0.0);
     let is_short = |found: &Measured| match found {
-        Ok(digits) => digits.least() < arguments.least_digits.unwrap_or(0.0),
+        Ok(digits) => digits.least() < least_digits,
         Err(why) => !matches!(why, NoDigits::UnknownModel(_)),
     };
     let failed: Vec<String> = table
@@ -73,7 +74,7 @@ fn verdict(arguments: &Arguments, table: &DigitsTable, measured: &[Measured]) ->
     if failed.is_empty() {
         return Ok(Exit::Held);
     }
-    let wanted = match arguments.least_digits.unwrap_or(0.0) {
+    let wanted = match least_digits {
         digits if digits > 0.0 => format!("not answered, or fewer than {digits} digits"),
         _ => "not answered".to_string(),
     };
