@@ -88,8 +88,8 @@ pub fn replaceable(path: &Path) -> Result<(), InputError> {
     irreplaceable(path).map_or(Ok(()), refused)
 }
 
-/// What is there, where no file may take its place: it would be gone for good. Where nothing is, or a link that
-/// leads nowhere, one may.
+/// What is there, where no file may take its place: it would be gone for good. Where nothing is, or a link
+/// that leads nowhere, one may.
 pub(super) fn irreplaceable(path: &Path) -> Option<&'static str> {
     if is_of_the_system(path) {
         return Some("a name of the system");
