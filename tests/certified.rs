@@ -71,7 +71,7 @@ fn every_problem_is_well_formed() {
         let count = problems.iter().filter(|p| p.reference.level == level).count();
         assert!(count >= 5, "{count} problems of level {}", level.name());
     }
-    for ReferenceProblem { problem, reference } in &problems {
+    for ReferenceProblem { problem, reference, .. } in &problems {
         let (id, certified) = (&problem.id, &reference.certified);
         assert!(folder().join(format!("{id}.json")).is_file(), "{id} stands in the file of its name");
         let free: BTreeSet<&String> = problem.free.iter().collect();

@@ -84,18 +84,16 @@ pub fn with_tangential(view: &View, start: SinglePlane) -> Result<SinglePlane, E
 
 fn result(frames: &Frames, at: &Vector, start: SinglePlane, iterations: usize) -> SinglePlane {
     let focal_px = frames.focal_px;
-    let residuals_px: Vec<Vec2> =
-        frames.pairs().map(|(p, seen)| (lens(at).distort(&ideal(at, &p)) - seen) * focal_px).collect();
-    SinglePlane {
-        ideal_from_target: Homography(frames.to_pixels(&homography(at))),
-        distortion: lens(at),
-        rms_px: rms(&residuals_px),
-        degrees_of_freedom: 2 * residuals_px.len() - PARAMETERS,
-        residuals_px,
-        spread: None,
-        iterations: start.iterations + iterations,
-        ..start
-    }
+    let residual = |(p, seen)| (lens(at).distort(&ideal(at, &p)) - seen) * focal_px;
+    let mut found = start;
+    found.ideal_from_target = Homography(frames.to_pixels(&homography(at)));
+    found.distortion = lens(at);
+    found.residuals_px = frames.pairs().map(residual).collect();
+    found.rms_px = rms(&found.residuals_px);
+    found.degrees_of_freedom = 2 * found.residuals_px.len() - PARAMETERS;
+    found.spread = None;
+    found.iterations += iterations;
+    found
 }
 
 fn ideal(at: &Vector, point: &Vec3) -> Vec2 {

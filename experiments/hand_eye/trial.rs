@@ -138,11 +138,7 @@ fn solve(
     covariance: &Covariance,
 ) -> Result<HandEye, HandEyeError> {
     let n = robot.len();
-    let covariance = Covariance {
-        poses: covariance.poses[..n].to_vec(),
-        cross: covariance.cross[..n].to_vec(),
-        ..covariance.clone()
-    };
+    let covariance = covariance.of_views(0..n);
     hand_eye(&Stations {
         set_up: case.set_up,
         base_from_gripper: robot,

@@ -38,10 +38,6 @@ pub use nalgebra;
 #[cfg(feature = "serde")]
 mod as_data;
 pub mod board;
-// `powi(2)` in `intervals.rs` is `x * x` in whatever order, and a closure in `any_lens/judge.rs` is a
-// question of style. Both are to be written otherwise with the next change of the solver, after which the
-// committed measurements, which are stamped with its lines, are made again.
-#[allow(clippy::disallowed_methods, clippy::unnecessary_lazy_evaluations)]
 pub mod calibrate;
 pub mod camera;
 pub mod detect;

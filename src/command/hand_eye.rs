@@ -141,12 +141,7 @@ fn shared(robot: &RobotFile, known: &KnownCalibration) -> (Vec<Station>, Covaria
         .enumerate()
         .filter_map(|(in_robot, view)| Some(Station { in_robot, in_result: *place.get(view)? }));
     let stations: Vec<Station> = both.collect();
-    let all = &known.covariance;
-    let covariance = Covariance {
-        poses: stations.iter().map(|s| all.poses[s.in_result]).collect(),
-        cross: stations.iter().map(|s| all.cross[s.in_result].clone()).collect(),
-        ..all.clone()
-    };
+    let covariance = known.covariance.of_views(stations.iter().map(|s| s.in_result));
     (stations, covariance)
 }
 

@@ -188,7 +188,7 @@ pub fn main_for(experiment: &Experiment, build: &Build) -> ExitCode {
 fn end_well_on_interrupt() {
     let handler = || {
         warn("interrupted: what was finished and written is kept, the rest is missing");
-        calibench_gate::program::end_all();
+        calibench_gate::program::end_for_good();
         std::process::exit(Exit::Incomplete as i32);
     };
     // A handler that was set before stays in charge.

@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 
 /// An answer that keeps the protocol.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Estimate {
     /// Estimated and held parameters.
     pub camera: Camera<Lens>,
@@ -48,6 +49,7 @@ pub enum Outcome {
 
 /// How the protocol was broken.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Breakage {
     /// No answer in time; the process was ended and started again.
     #[error("no answer within {seconds} s")]

@@ -21,6 +21,7 @@ use toml::Spanned;
 
 /// A failure that is known.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Allowance {
     /// What may fail.
     pub property: Property,
@@ -37,6 +38,7 @@ pub struct Allowance {
 
 /// What became of an allowance.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Allowed {
     /// The allowance as stated.
     #[serde(flatten)]
@@ -51,6 +53,7 @@ pub struct Allowed {
 
 /// A file of allowances that says nothing, or nothing that can be meant.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum AllowError {
     /// It cannot be read.
     #[error(transparent)]

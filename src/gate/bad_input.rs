@@ -8,6 +8,7 @@ use calibench::synth::{Scene, SceneError, Stream, StreamKey, Truth};
 
 /// What is wrong with the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Fault {
     /// They are well formed and cannot determine the parameters.
     Degenerate,
@@ -17,6 +18,7 @@ pub enum Fault {
 
 /// A problem that should be refused or flagged.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct BadCase {
     /// Name.
     pub id: &'static str,

@@ -39,7 +39,7 @@ pub fn bound(
         blocks.iter().map(|view| view.of_pose + view.follows.transpose() * &intrinsics * &view.follows);
     let cross = blocks.iter().map(|view| -(&intrinsics * &view.follows));
     let (poses, cross) = (poses.collect(), cross.collect());
-    Some(Covariance { free, fy_per_fx: None, intrinsics, poses, cross }.scaled(sigma_px * sigma_px))
+    Some(Covariance::untied(free, intrinsics, poses, cross).scaled(sigma_px * sigma_px))
 }
 
 /// What a view says for unit noise.

@@ -9,6 +9,7 @@ const ROUNDED: f64 = 1e-3;
 
 /// Why a matrix is no covariance of the parameters it names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CovarianceFault {
     /// Entries differ from their mirror images.
     #[error("not symmetric")]

@@ -45,6 +45,7 @@ const MOST_BYTES: u64 = 1 << 32;
 
 /// Why a folder cannot be written or judged.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FilesError {
     /// It cannot be written.
     #[error(transparent)]

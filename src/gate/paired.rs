@@ -20,6 +20,7 @@ const RELEVANT: f64 = 1e-3;
 
 /// One scenario, compared.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Comparison {
     /// Scenario.
     pub scenario: &'static str,
@@ -48,6 +49,7 @@ pub struct Comparison {
 
 /// The comparison of two runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Paired {
     /// The new solver.
     pub solver: String,

@@ -12,6 +12,7 @@ use calibench::synth::{SceneError, Stream, StreamKey, fnv1a};
 
 /// What a problem is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Purpose {
     /// Noise-free data.
     Exact,
@@ -27,6 +28,7 @@ pub enum Purpose {
 
 /// One problem of the plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Case {
     /// Index of the scenario; unused by bad input.
     pub scenario: usize,
@@ -38,6 +40,7 @@ pub struct Case {
 
 /// Everything that is asked in a run.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Plan {
     /// The scenes.
     pub scenarios: Vec<Scenario>,
@@ -82,6 +85,7 @@ impl Asked {
 
 /// A plan that cannot be made.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PlanError {
     /// A scenario.
     #[error(transparent)]

@@ -8,7 +8,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -28,7 +28,18 @@ const LINES_AHEAD: usize = 16;
 
 /// Programs that run, by process group, each with its mark: to be ended when the gate is interrupted, since a
 /// group of its own hears no Ctrl-C.
-static RUNNING: Mutex<BTreeMap<u32, String>> = Mutex::new(BTreeMap::new());
+static RUNNING: Mutex<Running> = Mutex::new(Running { programs: BTreeMap::new(), is_over: false });
+
+struct Running {
+    /// Marks by process number.
+    programs: BTreeMap<u32, String>,
+    /// Whether no more is started.
+    is_over: bool,
+}
+
+fn running() -> MutexGuard<'static, Running> {
+    RUNNING.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// Makes this process the parent of whatever a program leaves behind, so that [`end_all`] finds it. Only for
 /// a process that starts no other programs: they would be ended too.
@@ -39,9 +50,15 @@ pub fn adopt_orphans() {
 /// Ends every program that any gate of this process started, with what they started, and whatever else runs
 /// below this process.
 pub fn end_all() {
-    let running = std::mem::take(&mut *RUNNING.lock().unwrap_or_else(PoisonError::into_inner));
-    running.iter().for_each(|(group, mark)| descendants::end(*group, mark));
+    let programs = std::mem::take(&mut running().programs);
+    programs.iter().for_each(|(group, mark)| descendants::end(*group, mark));
     descendants::end_below();
+}
+
+/// The same for a process that is about to end itself: a program that broke off is not started anew meanwhile.
+pub fn end_for_good() {
+    running().is_over = true;
+    end_all();
 }
 
 /// What ends a program from another thread than the one that talks with it.
@@ -54,8 +71,8 @@ pub(super) struct Ending {
 impl Ending {
     /// Ends the program with what it started, if it still runs: its number may be another's by now.
     pub fn end(&self) {
-        let running = RUNNING.lock().unwrap_or_else(PoisonError::into_inner).get(&self.group).cloned();
-        if running.as_ref() == Some(&self.mark) {
+        let mark = running().programs.get(&self.group).cloned();
+        if mark.as_ref() == Some(&self.mark) {
             descendants::end(self.group, &self.mark);
         }
     }
@@ -64,7 +81,7 @@ impl Ending {
 /// Whether a process was started here: who started it waits for it.
 #[cfg(target_os = "linux")]
 pub(super) fn is_waited_for(id: u32) -> bool {
-    RUNNING.lock().unwrap_or_else(PoisonError::into_inner).contains_key(&id)
+    running().programs.contains_key(&id)
 }
 
 /// What a program wrote.
@@ -84,6 +101,7 @@ impl Heard {
 
 /// Why a program is not heard.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Silence {
     /// No line before the deadline.
     #[error("no line in time")]
@@ -103,6 +121,7 @@ pub enum Silence {
 
 /// How a program ended when its input had ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct ProgramEnd {
     /// Whether it ended by itself, within five seconds; else it was ended.
     pub by_itself: bool,
@@ -172,9 +191,12 @@ impl PipedProgram {
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut starter, 0);
         // Known before anybody looks for children that nobody waits for.
-        let mut running = RUNNING.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut running = running();
+        if running.is_over {
+            return Err(std::io::Error::other("programs are being ended, and none is started any more"));
+        }
         let mut child = starter.spawn()?;
-        running.insert(child.id(), mark.clone());
+        running.programs.insert(child.id(), mark.clone());
         drop(running);
         let no_pipe = || std::io::Error::other("the program has no pipes");
         let stdin = child.stdin.take().ok_or_else(no_pipe)?;
@@ -274,7 +296,7 @@ impl Drop for PipedProgram {
         // As there: it fails only where the program has ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
-        RUNNING.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
+        running().programs.remove(&id);
     }
 }
 

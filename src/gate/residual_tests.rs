@@ -133,6 +133,7 @@ fn of_richer_lens(problem: &Problem, fit: &LensCalibration) -> f64 {
 
 /// A scene that breaks an assumption, and in how many draws its residuals show it.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Shown {
     /// The scene.
     pub scenario: Scenario,

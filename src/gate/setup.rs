@@ -11,6 +11,7 @@ use calibench::synth::{Scene, SceneError, Stream, Truth};
 
 /// Truth, exact pixels and bound of a sample.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Setup {
     /// Camera, poses and the whole board, with exact pixels.
     pub scene: Scene<Lens>,
@@ -23,6 +24,7 @@ pub struct Setup {
 
 /// A setup that cannot be.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SetupError {
     /// It cannot be photographed.
     #[error(transparent)]

@@ -85,6 +85,7 @@ pub trait Solver: Sync {
 
 /// What was given to a question, and the time it took.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Given {
     /// The answer as it came.
     pub answer: Result<Answer, Breakage>,

@@ -17,6 +17,7 @@ use std::borrow::Cow;
 
 /// What can be asked of a solver on a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Demand {
     /// The linearised theory holds: every statistical property is judged.
     Law,
@@ -29,6 +30,7 @@ pub enum Demand {
 
 /// From which poses are the samples of a scene taken?
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Poses {
     /// From the same.
     Fixed,
@@ -38,6 +40,7 @@ pub enum Poses {
 
 /// A scene with its noise and the parameters to estimate.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Scenario {
     /// Name, the first part of the ids of its problems.
     pub id: &'static str,
@@ -74,6 +77,7 @@ pub struct Scenario {
 
 /// A scene of the suite that cannot be built: a mistake in the suite.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SuiteError {
     /// The scene cannot be photographed, or determines nothing.
     #[error("{id}: {cause}")]

@@ -39,6 +39,7 @@ impl Solver for Textbook {
 
 /// A doubtful scene, and of how many draws textbook least squares is confidently wrong.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Misled {
     /// The scene.
     pub scenario: Scenario,

@@ -16,6 +16,7 @@ use nalgebra::{DMatrix, DVector, Matrix6};
 
 /// What became of a case.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Seen {
     /// An estimate, measured.
     Estimate(Box<Trial>),
@@ -34,6 +35,7 @@ pub enum Seen {
 
 /// An estimate against the truth.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Trial {
     /// The camera as answered.
     pub camera: Camera<Lens>,
@@ -82,6 +84,7 @@ pub struct Trial {
 
 /// A reported pose covariance against the bound, both marginal.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct PoseSpread {
     /// Variances of rotation about x, y, z and translation along them, over the bound's.
     pub over_bound: Vec<f64>,

@@ -6,6 +6,7 @@ use calibench::camera::{BrownConrady, Camera, Lens, Model, Parameter};
 
 /// A change of a problem that leaves the camera the same, but for a known change of its parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Variant {
     /// The views in another order.
     ViewOrder,

@@ -9,6 +9,7 @@ use calibench::synth::{Scene, Stream};
 
 /// Something that the model leaves out.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Violation {
     /// Noise that neighbouring marks share: its correlation from one mark of the grid to the next, along rows
     /// and columns. Its standard deviation stays.

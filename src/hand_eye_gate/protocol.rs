@@ -99,13 +99,12 @@ impl Problem {
             set_up: self.set_up.into(),
             base_from_gripper: &poses(&self.base_from_gripper),
             cam_from_target: &poses(&self.cam_from_target),
-            covariance: &Covariance {
-                free: FreeParameters::of(&[]),
-                fy_per_fx: None,
-                intrinsics: DMatrix::zeros(0, 0),
-                poses: self.cam_covariances.iter().map(covariance).collect(),
+            covariance: &Covariance::untied(
+                FreeParameters::of(&[]),
+                DMatrix::zeros(0, 0),
+                self.cam_covariances.iter().map(covariance).collect(),
                 cross,
-            },
+            ),
             robot: Repeatability { position: self.robot.position, rotation_rad: self.robot.rotation_rad },
         })
     }

@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, Matrix2, MatrixXx6, SMatrix};
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(into = "data::Rows", try_from = "data::Rows"))]
+#[non_exhaustive]
 pub struct Covariance {
     /// Which parameters the rows of `intrinsics` are, in order.
     pub free: FreeParameters,
@@ -27,6 +28,31 @@ pub struct Covariance {
 }
 
 impl Covariance {
+    /// Of parameters of which none is tied: `intrinsics` n x n for the n parameters of `free`, and 6 x 6 and
+    /// n x 6 a view.
+    pub fn untied(
+        free: FreeParameters,
+        intrinsics: DMatrix<f64>,
+        poses: Vec<SMatrix<f64, 6, 6>>,
+        cross: Vec<MatrixXx6<f64>>,
+    ) -> Covariance {
+        Covariance { free, fy_per_fx: None, intrinsics, poses, cross }
+    }
+
+    /// The part of some views, by their numbers here, in their order.
+    ///
+    /// # Panics
+    /// Where there is no such view.
+    pub fn of_views(&self, views: impl Iterator<Item = usize> + Clone) -> Covariance {
+        Covariance {
+            free: self.free,
+            fy_per_fx: self.fy_per_fx,
+            intrinsics: self.intrinsics.clone(),
+            poses: views.clone().map(|view| self.poses[view]).collect(),
+            cross: views.map(|view| self.cross[view].clone()).collect(),
+        }
+    }
+
     /// The covariance for noise of variance `factor` times that of this one.
     pub fn scaled(mut self, factor: f64) -> Covariance {
         self.intrinsics *= factor;

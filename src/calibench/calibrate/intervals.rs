@@ -227,7 +227,8 @@ impl<'a, P: Profiled<W>, const W: usize> Profile<'a, P, W> {
     /// other follows.
     fn refitted(&self, problem: &P, parameter: Parameter, offset: f64) -> Minimum<P::State, W> {
         let following = descend(problem, self.moved(parameter, offset));
-        let most = FAR_OFF * (offset / self.deviation(parameter)).powi(2) * self.noise.rise;
+        let deviations = offset / self.deviation(parameter);
+        let most = FAR_OFF * deviations * deviations * self.noise.rise;
         if following.system.cost - self.minimum.system.cost <= most {
             return following;
         }

@@ -318,7 +318,7 @@ impl fmt::Display for Warning {
             Warning::Ambiguous { parameter, value, other, excess } => write!(
                 f,
                 "another camera explains the data nearly as well: {parameter} = {other:.6} instead of {value:.6} costs {:.1} variances \
-                 {}; the standard deviations speak of one of the two only. Take more views, with tilts about different axes",
+                 {}; standard deviations and intervals speak of one of the two only. Take more views, with tilts about different axes",
                 excess.abs(),
                 if *excess < 0.0 { "less" } else { "more" }
             ),

@@ -101,6 +101,7 @@ pub struct SinglePlaneSpread {
 
 /// A lens, and how it saw one plane.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct SinglePlane {
     /// Ideal pixel of a target point.
     pub ideal_from_target: Homography,

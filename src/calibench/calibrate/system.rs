@@ -207,7 +207,7 @@ impl<const W: usize> Reduction<W> {
         let blocks: Vec<(PoseBlock, MatrixXx6<f64>)> =
             chunks::map(&self.eliminated, |_, factors| factors.covariance(&padded, n));
         let (poses, cross) = blocks.into_iter().unzip();
-        Some(Covariance { free: self.free, fy_per_fx: None, intrinsics, poses, cross })
+        Some(Covariance::untied(self.free, intrinsics, poses, cross))
     }
 }
 

@@ -154,6 +154,7 @@ pub enum HandEyeError {
 /// A hand-eye calibration.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct HandEye {
     /// `X`: gripper_from_cam, or base_from_cam for a fixed camera.
     pub x: Pose,

@@ -160,6 +160,7 @@ pub enum RegistrationError {
 /// The map from taught to found marks.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct Registration {
     /// The family that was fitted.
     pub model: MapModel,

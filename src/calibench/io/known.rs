@@ -17,6 +17,7 @@ use std::path::Path;
 
 /// A calibrated camera as its file tells of it.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct KnownCalibration {
     /// The camera, with a lens of any model.
     pub camera: Camera<Lens>,

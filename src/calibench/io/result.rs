@@ -243,6 +243,7 @@ impl ModelFields {
 
 /// The whole of a calibration.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct CalibrationFields {
     /// The program that wrote it.
     pub written_by: String,

@@ -30,6 +30,7 @@ impl PlaneModel {
 
 /// A calibrated plane.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct PlaneCalibration {
     /// The family that was fitted.
     pub model: PlaneModel,

@@ -44,7 +44,7 @@ pub(super) fn measure(
     drop(progress);
     let commit = build.commit.as_ref().map_or("unknown".to_string(), ToString::to_string);
     let command =
-        format!("calibench gate --power DIR --samples {samples} --seed {}; commit {commit}", sizes.seed);
+        format!("calibench gate power DIR --samples {samples} --seed {}; commit {commit}", sizes.seed);
     let head = Fingerprint::of_gate_power().head(&command);
     for (name, text) in measured.to_csv(&head) {
         write_atomically(&folder.join(name), text.as_bytes()).map_err(incomplete)?;

@@ -188,7 +188,7 @@ fn interruption() -> Arc<Interruption> {
     let seen = stop.clone();
     let installed = ctrlc::set_handler(move || {
         if seen.swap(true, Ordering::Relaxed) {
-            calibench_gate::program::end_all();
+            calibench_gate::program::end_for_good();
             std::process::exit(Exit::Incomplete as i32);
         }
         warn("finishing the batch; once more stops at once");

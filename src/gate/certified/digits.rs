@@ -18,6 +18,7 @@ pub fn log_relative_error(x: f64, certified: f64) -> f64 {
 
 /// The digits that an estimate shares with the certified values.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Digits {
     /// Of every free parameter, in order.
     pub parameters: Vec<(Parameter, f64)>,
@@ -66,6 +67,7 @@ impl Digits {
 
 /// Why a problem has no digits.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum NoDigits {
     /// The solver says which lens models it knows, and this is none of them: it was not asked.
     #[error("unsupported: it does not know the lens model {0}")]

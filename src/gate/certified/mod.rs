@@ -23,6 +23,7 @@ use std::path::{Path, PathBuf};
 /// How hard a problem is, as NIST's StRD divides its regression problems.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Level {
     /// Every calibrator should solve it.
     Lower,
@@ -48,6 +49,7 @@ impl Level {
 
 /// A problem of `reference/`.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct ReferenceProblem {
     /// As it is put to a solver.
     pub problem: Problem,
@@ -57,6 +59,7 @@ pub struct ReferenceProblem {
 
 /// What a file of `reference/` says besides the problem.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
+#[non_exhaustive]
 pub struct Reference {
     /// Version of the data in which the file came; it stays as it is in all that follow.
     pub version: u32,
@@ -74,6 +77,7 @@ pub struct Reference {
 
 /// A start for programs that want one.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
+#[non_exhaustive]
 pub struct Start {
     /// Of the free parameters.
     pub parameters: BTreeMap<String, f64>,
@@ -83,6 +87,7 @@ pub struct Start {
 
 /// A pose: `X_camera = exp([w]x) X_target + t`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
+#[non_exhaustive]
 pub struct StartPose {
     /// w, rad.
     pub rotation_vector: [f64; 3],
@@ -92,6 +97,7 @@ pub struct StartPose {
 
 /// The certified results, as the doubles nearest to the twenty digits of the file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
+#[non_exhaustive]
 pub struct Certified {
     /// Version of the certificate.
     pub version: u32,
@@ -113,6 +119,7 @@ pub struct Certified {
 
 /// Why the reference problems cannot be read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReferenceError {
     /// A file.
     #[error("cannot read {path}: {cause}", path = path.display())]

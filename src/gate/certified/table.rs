@@ -31,6 +31,7 @@ pub struct Row {
 
 /// A table that cannot be read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum TableError {
     /// It is no CSV.
     #[error(transparent)]
@@ -49,6 +50,7 @@ pub enum TableError {
 
 /// Rows of several solvers.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct DigitsTable {
     /// Solver by solver, problem by problem.
     pub rows: Vec<Row>,

@@ -34,6 +34,7 @@ type How = fn(&Problem, &dyn Fn() -> u64) -> Answer;
 
 /// A fault.
 #[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
 pub struct Planted {
     /// Name.
     pub id: &'static str,

@@ -29,6 +29,7 @@ const LEVEL: f64 = 0.95;
 
 /// What a solver says of a scene whose world is not the model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Admission {
     /// The scene.
     pub scenario: &'static str,
@@ -46,6 +47,7 @@ pub struct Admission {
 
 /// By how much a standard deviation is too small.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct TooSmall {
     /// Of which parameter.
     pub parameter: &'static str,

@@ -14,6 +14,7 @@ use std::path::Path;
 
 /// A planted fault.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct FaultRow {
     /// Name.
     pub fault: String,
@@ -33,6 +34,7 @@ pub struct FaultRow {
 
 /// False alarms at a stated rate.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct AlarmRow {
     /// Chance, as stated, that a correct solver fails a run.
     pub stated_rate: f64,
@@ -56,6 +58,7 @@ impl AlarmRow {
 
 /// A doubtful scene and textbook least squares.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct MisledRow {
     /// The scene.
     pub scenario: String,
@@ -69,6 +72,7 @@ pub struct MisledRow {
 
 /// Everything measured.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Measured {
     /// Every planted fault.
     pub faults: Vec<FaultRow>,
@@ -99,6 +103,7 @@ pub struct Sizes {
 
 /// Tables that cannot be read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MeasuredError {
     /// A file that cannot be read.
     #[error(transparent)]

@@ -15,6 +15,7 @@ use rayon::prelude::*;
 
 /// What became of a fault.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Catch {
     /// Samples a scenario after which a check failed; `None` if none did.
     pub samples: Option<usize>,
@@ -119,6 +120,7 @@ fn first_failing(
 
 /// How the correct solver fares over many seeds.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Alarms {
     /// Seeds tried.
     pub seeds: usize,

@@ -17,6 +17,7 @@ use serde::Serialize;
 
 /// The outcome of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Report {
     /// Name or command of the solver.
     pub solver: String,
@@ -63,6 +64,7 @@ pub struct Report {
 
 /// A scenario or a bad problem in words.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct Described {
     /// Its name in checks.
     pub name: &'static str,

@@ -196,7 +196,8 @@ impl Profiled<WIDTH> for Problem<'_> {
     fn beyond(state: &State) -> Option<(Parameter, f64)> {
         let limits = |(parameter, value): (Parameter, f64)| {
             let (low, high) = parameter.defined_range();
-            (!parameter.is_defined_at(value)).then(|| (parameter, if value < low { low } else { high }))
+            let limit = if value < low { low } else { high };
+            (!parameter.is_defined_at(value)).then_some((parameter, limit))
         };
         state.camera.values().find_map(limits)
     }

@@ -2,8 +2,9 @@
 //!
 //! A minimum that the search met is another camera where it lies so many standard deviations away that it
 //! cannot be the same one. Where the cost is no parabola deviations may be absurdly wide, and there the
-//! profile tells: with the focal length held on the way from one camera to the other the cost rises so far
-//! that an interval of two standard deviations ends before (Bates & Watts 1988, section 6.1).
+//! profile tells: with one parameter held on the way from one camera to the other the cost rises so far that
+//! an interval of two standard deviations ends before (Bates & Watts 1988, section 6.1). The focal length is
+//! asked first; its profile may run into the other's valley, and that of another parameter then does not.
 
 use super::super::intervals::{Profile, Skewed};
 use super::super::minimise::Minimum;
@@ -50,10 +51,9 @@ pub(super) fn of(
         let mut parameter =
             apart.filter(|(_, deviations)| *deviations > SAME).map(|(parameter, _)| parameter);
         if parameter.is_none() && !reached.iter().any(|known| is_one_camera(known, camera)) {
-            let ends =
-                profile.as_ref().is_some_and(|profile| ends_before(profile, problem, &best.camera, camera));
-            parameter = ends.then_some(Parameter::Fx);
-            reached.extend((!ends).then_some(*camera));
+            parameter =
+                profile.as_ref().and_then(|profile| ends_before(profile, problem, &best.camera, camera));
+            reached.extend(parameter.is_none().then_some(*camera));
         }
         let excess = best.excess(other, noise.rise);
         named.extend(parameter.map(|p| (Rival { parameter: p, value: value(camera, p), excess }, *camera)));
@@ -62,16 +62,16 @@ pub(super) fn of(
     named.into_iter().map(|(rival, _)| rival).take(MOST_NAMED).collect()
 }
 
-/// Whether the interval of the focal length ends before another camera's.
+/// The first parameter whose interval ends before another camera's value.
 fn ends_before(
     profile: &Profile<'_, Problem<'_>, WIDTH>,
     problem: &Problem<'_>,
     best: &Camera<Lens>,
     other: &Camera<Lens>,
-) -> bool {
-    problem.free.contains(Parameter::Fx)
-        && differ(best.fx, other.fx)
-        && !profile.reaches(Parameter::Fx, other.fx - best.fx, INTERVAL)
+) -> Option<Parameter> {
+    let offset = |parameter| value(other, parameter) - value(best, parameter);
+    let ends = |&parameter: &Parameter| !profile.reaches(parameter, offset(parameter), INTERVAL);
+    if is_one_camera(best, other) { None } else { problem.free.iter().find(ends) }
 }
 
 fn value(camera: &Camera<Lens>, parameter: Parameter) -> f64 {
