@@ -20,8 +20,7 @@ pub const MOST_WARM_UP_S: f64 = 600.0;
 pub struct Greeting {
     /// Version of the protocol that it speaks: 2.
     pub protocol: u32,
-    /// Names of the lens models it knows, `brown-conrady` among them; names that the gate does not know are
-    /// no fault.
+    /// Names of the lens models it knows, `brown-conrady` among them; unknown names are no fault.
     #[serde(default = "only_brown_conrady")]
     pub models: Vec<String>,
     /// Time in addition to the limit that its first answer may take, s; at most 600 are granted.
