@@ -66,7 +66,7 @@ peers *ARGUMENTS:
 
 # Digits of the certified problems that this library, OpenCV, SciPy and the minimal solver reach, for adapters/DIGITS.md and the book
 digits:
-    cargo run --release --locked -- gate --certified --digits reference/digits.csv --timeout 600
+    cargo run --release --locked -- gate certified --digits reference/digits.csv --timeout 600
 
 # The certified problems: sums, observations, two of them certified anew, and steps from the values of all
 certified *PROBLEMS:

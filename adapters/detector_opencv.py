@@ -1,7 +1,7 @@
-"""OpenCV's finders behind `calibench gate --detector`.
+"""OpenCV's finders behind `calibench gate detector`.
 
     pip install opencv-python-headless
-    calibench gate --detector --solver "python3 adapters/detector_opencv.py classic"
+    calibench gate detector --solver "python3 adapters/detector_opencv.py classic"
 
 `classic`: findChessboardCorners with cornerSubPix (window 5, as in OpenCV's tutorial), findCirclesGrid, CharucoDetector, and ArucoDetector
 with cornerSubPix for grids of AprilTags. `sb`: findChessboardCornersSB; the others as before.

@@ -1,7 +1,7 @@
-"""KinHEC's reference solvers behind `calibench gate --hand-eye`.
+"""KinHEC's reference solvers behind `calibench gate hand-eye`.
 
     pip install kinhec
-    calibench gate --hand-eye --solver "python3 adapters/hand_eye_kinhec_solver.py park_martin"
+    calibench gate hand-eye --solver "python3 adapters/hand_eye_kinhec_solver.py park_martin"
 
 KinHEC (MIT licence) has closed forms of A X = X B, which take the motions between all pairs of stations here, of A X = Y B, and a
 refinement of each, `refine` and `refine_world`, begun at park_martin and shah. It states no covariance.

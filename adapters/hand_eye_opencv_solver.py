@@ -1,7 +1,7 @@
-"""OpenCV's hand-eye methods behind `calibench gate --hand-eye`.
+"""OpenCV's hand-eye methods behind `calibench gate hand-eye`.
 
     pip install "opencv-python-headless<5"
-    calibench gate --hand-eye --solver "python3 adapters/hand_eye_opencv_solver.py park"
+    calibench gate hand-eye --solver "python3 adapters/hand_eye_opencv_solver.py park"
 
 Methods of calibrateHandEye: tsai, park, horaud, andreff, daniilidis; of calibrateRobotWorldHandEye: shah, li. For a fixed camera the
 robot's poses are inverted, as OpenCV's documentation says. Nothing is checked here that OpenCV does not check itself; where it fails it logs

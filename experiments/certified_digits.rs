@@ -7,7 +7,7 @@
 //! asked as it is.
 //!
 //! What it cannot show: whether the least-squares solution is near the truth; `four-pose` and the gate ask
-//! that. The other programs are not run here: `calibench gate --certified --digits reference/digits.csv`
+//! that. The other programs are not run here: `calibench gate certified --digits reference/digits.csv`
 //! measured them, and what it wrote is read.
 
 use calibench_gate::certified::{Digits, DigitsTable, Level, Measured, ReferenceProblem, measure, read_with};

@@ -6,7 +6,7 @@
 //!
 //! What it cannot show: faults of a kind that nobody thought of. The subtle faults need thousands of samples
 //! a scenario, and false alarms hundreds of runs: they are measured by
-//! `calibench gate --power golden/gate-power --size thorough`, and what that wrote is read here. It is
+//! `calibench gate power golden/gate-power --size thorough`, and what that wrote is read here. It is
 //! refused as stale when a line of the gate or of the solver has changed since.
 
 use calibench_gate::faults::{Class, Planted, planted};
@@ -40,7 +40,7 @@ const FALSE_ALARM_RATE: f64 = 1e-4;
 const STATED_RATES: usize = 4;
 
 /// The command of the thorough measurement.
-const COMMAND: &str = "calibench gate --power golden/gate-power --size thorough";
+const COMMAND: &str = "calibench gate power golden/gate-power --size thorough";
 
 /// What the thorough measurement wrote.
 const FAULTS: &str = include_str!("../golden/gate-power/faults.csv");

@@ -285,7 +285,7 @@ fn the_committed_table_has_our_digits_and_its_page_shows_it() {
     assert_eq!(
         shown,
         Some(table.to_markdown().as_str()),
-        "put there what `calibench gate --digits-table` prints"
+        "put there what `calibench gate digits-table` prints"
     );
 }
 
@@ -301,24 +301,24 @@ fn gate(arguments: &[&str]) -> (Option<i32>, String) {
 
 #[test]
 fn the_command_counts_digits_and_says_who_refused() {
-    let (code, text) = gate(&["--certified", "--problem", "nine-points", "--least-digits", "11"]);
+    let (code, text) = gate(&["certified", "--problem", "nine-points", "--least-digits", "11"]);
     assert_eq!(code, Some(0), "{text}");
     assert!(text.contains("nine-points") && text.contains("higher"), "{text}");
     let refuses = r#"while read -r line; do id=${line#*'"id":"'}; echo "{\"id\":\"${id%%'"'*}\",\"status\":\"refused\",\"message\":\"too few\"}"; done"#;
-    let (code, text) = gate(&["--certified", "--problem", "nine-points", "--solver", refuses]);
+    let (code, text) = gate(&["certified", "--problem", "nine-points", "--solver", refuses]);
     assert_eq!(code, Some(1), "{text}");
     assert!(text.contains("refused: too few"), "{text}");
     // A program that does not say that it knows a lens model is not asked; of what it knows nothing is left
     // here.
-    let (code, text) = gate(&["--certified", "--problem", "rational", "--solver", refuses]);
+    let (code, text) = gate(&["certified", "--problem", "rational", "--solver", refuses]);
     assert_eq!(code, Some(1), "{text}");
     assert!(text.contains("unsupported: it does not know the lens model rational"), "{text}");
     assert!(text.contains("nothing was asked"), "{text}");
     // This library's own solver, as it is: there is no polishing.
-    let (code, text) = gate(&["--certified", "--problem", "fisheye", "--least-digits", "6"]);
+    let (code, text) = gate(&["certified", "--problem", "fisheye", "--least-digits", "6"]);
     assert_eq!(code, Some(0), "{text}");
     assert!(!text.contains("polished") && text.contains("k4"), "{text}");
-    let (code, text) = gate(&["--certified", "--problem", "no-such-problem"]);
+    let (code, text) = gate(&["certified", "--problem", "no-such-problem"]);
     assert_eq!(code, Some(2), "{text}");
     assert!(text.contains("there are: "), "{text}");
 }

@@ -125,7 +125,7 @@ fn output_that_could_not_be_written_ends_with_three_and_a_sentence() {
     let verbs: [&[&str]; 6] = [
         &["list"],
         &["--help"],
-        &["gate", "--planted", "list"],
+        &["gate", "faults"],
         &["gate", "--samples", "1"],
         &["study", "plan", study, "--want", "fx=5", "--confirm", "10"],
         &["study", "measure", study, "--trials", "10"],

@@ -66,7 +66,7 @@ fn files_keep_the_lens_models_that_were_asked() {
     let path = dir.display().to_string();
     let written = gate(&["--samples", "1", "--models", "division,kannala-brandt", "--record", &path]);
     assert_eq!(written.status.code(), Some(0), "{}", String::from_utf8_lossy(&written.stderr));
-    let judged = gate(&["--judge", &path]);
+    let judged = gate(&["judge", &path]);
     assert_eq!(judged.status.code(), Some(0), "{}", String::from_utf8_lossy(&judged.stderr));
     assert!(String::from_utf8_lossy(&judged.stdout).contains("lens models: division, kannala-brandt\n"));
     let problems = std::fs::read_to_string(dir.join("problems.jsonl")).expect("problems");
@@ -100,7 +100,7 @@ fn answers_from_files_get_the_verdict_of_the_same_answers_from_a_pipe() {
     assert_eq!(gate(&["--samples", "2", "--record", &place]).status.code(), Some(0));
     let problems = std::fs::read_to_string(out.join("problems.jsonl")).expect("written");
     assert!(!problems.contains("truth"), "truth stands apart");
-    let judged = gate(&["--judge", &place]);
+    let judged = gate(&["judge", &place]);
     assert_eq!(judged.status.code(), Some(0), "{}", String::from_utf8_lossy(&judged.stdout));
     // The same solver against its own record: not a bit differs.
     let same = gate(&["--against", &place]);
@@ -120,7 +120,7 @@ fn answers_from_files_get_the_verdict_of_the_same_answers_from_a_pipe() {
         })
         .collect();
     std::fs::write(&path, spoilt).expect("written");
-    let judged = gate(&["--judge", &place]);
+    let judged = gate(&["judge", &place]);
     assert_eq!(judged.status.code(), Some(1));
     let text = String::from_utf8_lossy(&judged.stderr).into_owned();
     assert!(
@@ -131,7 +131,7 @@ fn answers_from_files_get_the_verdict_of_the_same_answers_from_a_pipe() {
     assert!(text.contains("answers.jsonl, line 9: no problem here is called another-"), "{text}");
     assert!(!text.contains('\u{1b}'), "{text:?}");
     std::fs::remove_file(path).expect("removed");
-    assert_eq!(gate(&["--judge", &place]).status.code(), Some(2));
+    assert_eq!(gate(&["judge", &place]).status.code(), Some(2));
 }
 
 /// A scene without estimates has no check of its bias or its poses: the checks of the other run must not be
@@ -170,7 +170,7 @@ fn verdicts_are_compared_scene_by_scene_where_one_run_has_fewer_checks() {
         })
         .collect();
     std::fs::write(&path, without).expect("written");
-    let output = gate(&["--judge", &place(&off), "--against", &place(&silent)]);
+    let output = gate(&["judge", &place(&off), "--against", &place(&silent)]);
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert_eq!(output.status.code(), Some(1), "{text}");
     let verdicts: Vec<&str> = text.lines().filter(|line| line.contains(" -> ")).collect();
@@ -206,7 +206,7 @@ fn two_files_of_answers_are_compared_as_the_solvers_behind_them_are() {
     record(&after, &["--planted", "biased-fx"]);
     record(&other, &["--seed", "2"]);
     let compare = |new: &str, reference: &str| {
-        let output = gate(&["--judge", new, "--against", reference]);
+        let output = gate(&["judge", new, "--against", reference]);
         let text = [output.stdout, output.stderr].map(|o| String::from_utf8_lossy(&o).into_owned()).concat();
         (output.status.code(), text)
     };
@@ -245,7 +245,7 @@ fn two_files_of_answers_are_compared_as_the_solvers_behind_them_are() {
     let (code, text) = compare(&before, "no-such-folder");
     assert!(code == Some(2) && text.contains("neither there as a folder nor as a program"), "{text}");
     // Where nothing took the time, nothing is said of it.
-    let judged = gate(&["--judge", &before, "--median-time", "600"]);
+    let judged = gate(&["judge", &before, "--median-time", "600"]);
     let text = String::from_utf8_lossy(&judged.stdout).into_owned();
     assert!(
         text.lines().any(|l| l.starts_with("time ") && l.contains("not known of answers in files")),
@@ -261,8 +261,8 @@ fn wrong_usage_ends_with_two() {
         &["--planted", "no-such-fault"],
         &["--timeout", "-1", "--solver", "true"],
         &["--median-time", "0"],
-        &["--power-table", "/no/such/folder"],
-        &["--judge", "/no/such/folder"],
+        &["power-table", "/no/such/folder"],
+        &["judge", "/no/such/folder"],
     ] {
         assert_eq!(gate(arguments).status.code(), Some(2), "{arguments:?}");
     }
@@ -315,7 +315,7 @@ fn the_page_of_planted_faults_quotes_the_committed_table() {
     assert_eq!(
         quoted.expect("the two marks").0,
         measured.to_markdown(),
-        "put there what `calibench gate --power-table golden/gate-power` prints"
+        "put there what `calibench gate power-table golden/gate-power` prints"
     );
 }
 

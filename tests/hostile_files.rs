@@ -152,12 +152,12 @@ fn a_pipe_in_the_place_of_a_table_or_of_a_record_blocks_nobody() {
     for name in ["faults.csv", "golden/line-bending.snap", "reference/SHA256SUMS"] {
         pipe(name);
     }
-    refused(&folder, &["gate", "--power-table", "."], &["faults.csv", "not a regular file"]);
-    refused(&folder, &["gate", "--digits-table", "faults.csv"], &["faults.csv", "not a regular file"]);
+    refused(&folder, &["gate", "power-table", "."], &["faults.csv", "not a regular file"]);
+    refused(&folder, &["gate", "digits-table", "faults.csv"], &["faults.csv", "not a regular file"]);
     refused(&folder, &["run", "nine-point", "--image", "faults.csv"], &["faults.csv", "not a regular file"]);
     // A source tree whose files are pipes: there is no snapshot, and there are no certified problems.
     fs::write(folder.join("golden/published.toml"), "").expect("written");
-    refused(&folder, &["gate", "--certified"], &["SHA256SUMS", "not a regular file"]);
+    refused(&folder, &["gate", "certified"], &["SHA256SUMS", "not a regular file"]);
     let checked = within(PATIENCE_FOR_WORK, &folder, &["check", "line-bending"]);
     assert!(checked.status.code().is_some_and(|code| code > 0), "{}", text(&checked.stdout));
 }
@@ -349,7 +349,7 @@ fn no_report_replaces_the_answers_that_it_is_of() {
         [("--json", "answers.jsonl"), ("--json", "manifest.json"), ("--html", "problems.jsonl")]
     {
         let before = fs::read(folder.join("rec").join(file)).expect("it is there");
-        let output = limited(&folder, &["gate", "--judge", "rec", option, &format!("rec/{file}")]);
+        let output = limited(&folder, &["gate", "judge", "rec", option, &format!("rec/{file}")]);
         let said = text(&output.stderr);
         assert!(output.status.code() == Some(3) && said.contains("given to read"), "{file}: {said}");
         assert!(fs::read(folder.join("rec").join(file)).expect("it is there") == before, "{file}");
@@ -366,7 +366,7 @@ fn by_shell(folder: &Path, line: &str) -> Output {
 #[test]
 fn a_standard_output_that_was_closed_before_the_start_ends_with_three_and_a_sentence() {
     let folder = folder("closed-output");
-    for arguments in ["list", "--help", "study --help", "gate --planted list"] {
+    for arguments in ["list", "--help", "study --help", "gate faults"] {
         let output = by_shell(&folder, &format!("exec \"$0\" {arguments} >&-"));
         let said = text(&output.stderr);
         assert_eq!(output.status.code(), Some(3), "{arguments}: {said}");
@@ -374,7 +374,7 @@ fn a_standard_output_that_was_closed_before_the_start_ends_with_three_and_a_sent
     }
     // Nothing was to be printed, or nobody wants to read it.
     for line in [
-        "exec \"$0\" gate --schema out >&-",
+        "exec \"$0\" gate schema out >&-",
         "exec \"$0\" list > /dev/null",
         "exec \"$0\" list <&- > /dev/null 2>&-",
     ] {
@@ -444,8 +444,8 @@ fn a_line_break_in_a_name_begins_no_line_of_a_message() {
         &["study", "resume", name],
         &["study", "merge", name, "--out", "w"],
         &["explain", name],
-        &["gate", "--judge", name],
-        &["gate", "--power-table", name],
+        &["gate", "judge", name],
+        &["gate", "power-table", name],
         &["run", "nine-point", "--image", name],
     ] {
         let output = within(PATIENCE, &folder, arguments);

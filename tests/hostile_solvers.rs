@@ -89,16 +89,17 @@ fn a_recorded_run_is_judged_like_any_other_and_keeps_answers_that_failed() {
     // This solver answers one problem and ends: the rest is broken.
     let solver = "read line; echo 'no answer'; exit 1";
     let gate = |rest: &[&str]| {
-        let arguments = [&["gate", "--samples", "2", "--timeout", "5"][..], rest].concat();
+        let arguments = [&["gate"][..], rest].concat();
         Command::new(CALIBENCH).args(arguments).current_dir(&folder).output().expect("the program starts")
     };
-    let recorded = gate(&["--solver", solver, "--record", "r", "--json", "recorded.json"]);
+    let asked = ["--samples", "2", "--timeout", "5", "--solver", solver];
+    let recorded = gate(&[&asked[..], &["--record", "r", "--json", "recorded.json"]].concat());
     assert_eq!(recorded.status.code(), Some(1), "{}", text(&recorded.stderr));
     assert!(text(&recorded.stdout).contains("NOT TRUSTED"), "{}", text(&recorded.stdout));
     let lines =
         |name: &str| fs::read_to_string(folder.join("r").join(name)).expect("written").lines().count();
     assert_eq!(lines("answers.jsonl"), lines("problems.jsonl"), "every problem has a line");
-    let again = gate(&["--judge", "r", "--json", "judged.json"]);
+    let again = gate(&["judge", "r", "--json", "judged.json"]);
     assert_eq!(again.status.code(), Some(1), "{}", text(&again.stderr));
     let verdicts = |name: &str| -> Vec<serde_json::Value> {
         let report = fs::read_to_string(folder.join(name)).expect("written");
@@ -107,8 +108,8 @@ fn a_recorded_run_is_judged_like_any_other_and_keeps_answers_that_failed() {
         checks.map(|c| serde_json::json!([c["property"], c["scenario"], c["verdict"]])).collect()
     };
     assert_eq!(verdicts("recorded.json"), verdicts("judged.json"));
-    for verb in ["--record", "--export"] {
-        refused(&folder, &["gate", "--samples", "1", verb, "r"], &["r holds answers already"]);
+    for written in [["gate", "--record", "r", "--samples", "1"], ["gate", "export", "r", "--samples", "1"]] {
+        refused(&folder, &written, &["r holds answers already"]);
     }
 }
 
@@ -116,14 +117,19 @@ fn a_recorded_run_is_judged_like_any_other_and_keeps_answers_that_failed() {
 fn options_of_the_gate_that_would_be_ignored_are_refused() {
     let folder = folder("ignored-options");
     for arguments in [
-        &["gate", "--certified", "--json", "report.json"][..],
-        &["gate", "--certified", "--samples", "3"],
+        &["gate", "certified", "--json", "report.json"][..],
+        &["gate", "certified", "--samples", "3"],
         &["gate", "--samples", "2", "--size", "thorough"],
+        &["gate", "--against", "builtin", "--junit", "report.xml"],
+        &["gate", "--against", "builtin", "--html", "report.html"],
+        &["gate", "judge", "r", "--scene", "four-pose"],
+        &["gate", "hand-eye", "--accept", "unbiased"],
+        &["gate", "detector", "--jobs", "2"],
         &["gate", "--timeout", "nan"],
         &["gate", "--jobs", "0"],
-        &["gate", "--certified", "--least-digits", "nan"],
-        &["gate", "--schema", "a", "--export", "b"],
-        &["gate", "--export", "b", "--json", "report.json"],
+        &["gate", "certified", "--least-digits", "nan"],
+        &["gate", "--samples", "1", "export", "b"],
+        &["gate", "export", "b", "--json", "report.json"],
     ] {
         refused(&folder, arguments, &[]);
     }

@@ -149,7 +149,7 @@ fn a_byte_order_mark_belongs_to_no_text() {
     let answers = folder.join("g/answers.jsonl");
     let given = fs::read_to_string(&answers).expect("recorded");
     fs::write(&answers, format!("\u{feff}{given}")).expect("written");
-    let judged = limited(&folder, &["gate", "--judge", "g"]);
+    let judged = limited(&folder, &["gate", "judge", "g"]);
     assert_eq!(judged.status.code(), Some(0), "{}", text(&judged.stdout));
 }
 
@@ -203,10 +203,9 @@ fn answers_are_kept_where_the_report_cannot_be_written() {
     let gate = ["gate", "--samples", "1", "--record", "g", "--json", "file/report.json"];
     assert_eq!(limited(&folder, &gate).status.code(), Some(3));
     assert!(folder.join("g/answers.jsonl").is_file());
-    let judged = limited(&folder, &["gate", "--judge", "g"]);
+    let judged = limited(&folder, &["gate", "judge", "g"]);
     assert_eq!(judged.status.code(), Some(0), "{}", text(&judged.stdout));
     // Nor is a report asked for where there is none.
-    refused(&folder, &["gate", "--planted", "list", "--json", "r.json"], &["there is no report to write"]);
-    refused(&folder, &["gate", "--power", "p", "--json", "r.json"], &["cannot be used with"]);
-    refused(&folder, &["gate", "--least-digits", "3"], &["--certified"]);
+    refused(&folder, &["gate", "faults", "--json", "r.json"], &["unexpected argument '--json'"]);
+    refused(&folder, &["gate", "power", "p", "--json", "r.json"], &["unexpected argument '--json'"]);
 }

@@ -155,7 +155,7 @@ fn what_people_read_programs_read_too() {
     assert!(said(&explained[0]["band"]).contains(':'));
     let looks = as_json(&["doctor"]);
     assert!(looks.as_array().expect("a list").iter().any(|look| look["what"] == "program"));
-    let gate = as_json(&["gate", "--hand-eye", "--samples", "32"]);
+    let gate = as_json(&["gate", "hand-eye", "--samples", "32"]);
     assert_eq!(gate["trusted"], true);
     let claims = as_json(&["claims", "line-bending"]);
     assert_eq!(said(&claims[0]["command"]), "calibench run line-bending");

@@ -35,7 +35,8 @@ fn help_of(verb: &str) -> String {
     String::from_utf8_lossy(&run.stdout).into_owned()
 }
 
-/// Verbs without verbs of their own, such as `study run`.
+/// Verbs that do something: those without verbs of their own, such as `study run`, and `gate`, which may stand
+/// alone.
 fn leaves() -> Vec<String> {
     let below = |verb: String| -> Vec<String> {
         let help = help_of(&verb);
@@ -43,7 +44,8 @@ fn leaves() -> Vec<String> {
         let indented = |line: &&str| line.starts_with("  ") && !line.starts_with("   ");
         let names = listed.lines().take_while(|line| !line.is_empty()).filter(indented);
         let names = names.filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help");
-        names.map(|name| format!("{verb} {name}")).collect()
+        let alone = help.contains(&format!("\n       calibench {verb} <COMMAND>")).then(|| verb.clone());
+        alone.into_iter().chain(names.map(|name| format!("{verb} {name}"))).collect()
     };
     verbs().into_iter().flat_map(below).collect()
 }
@@ -146,6 +148,13 @@ fn folder() -> PathBuf {
     ] {
         fs::write(folder.join(name), text).expect("written");
     }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    fs::create_dir_all(folder.join("gate-power")).expect("a folder is made");
+    for table in ["faults.csv", "false-alarms.csv", "textbook.csv"] {
+        let measured = Path::new("gate-power").join(table);
+        fs::copy(root.join("golden").join(&measured), folder.join(measured)).expect("copied");
+    }
+    fs::copy(root.join("reference/digits.csv"), folder.join("digits.csv")).expect("copied");
     folder
 }
 
@@ -174,8 +183,9 @@ fn every_verb_has_examples_and_they_run() {
     assert!(leaves.len() > 25, "{leaves:?}");
     for verb in &leaves {
         for line in examples(verb) {
-            // The book is built by a test of `tests/command.rs`: it takes the runs of all experiments.
-            if line.contains("python3") && !has_numpy() || verb == "book" {
+            // The book is built by a test of `tests/command.rs`: it takes the runs of all experiments. The
+            // gate's power is a measurement of a quarter of an hour.
+            if line.contains("python3") && !has_numpy() || ["book", "gate power"].contains(&verb.as_str()) {
                 continue;
             }
             let place = if ["bless", "new experiment"].contains(&verb.as_str()) { &tree } else { &folder };

@@ -122,7 +122,7 @@ const VERBS: [Verb; 23] = [
         ],
     },
     Verb { name: "manual", arguments: &["manual", "--out", "out"] },
-    Verb { name: "schema", arguments: &["gate", "--schema", "out"] },
+    Verb { name: "schema", arguments: &["gate", "schema", "out"] },
     Verb { name: "run", arguments: &["run", "line-bending"] },
     Verb { name: "bless", arguments: &["bless", "line-bending"] },
     Verb { name: "claims", arguments: &["claims", "line-bending", "--out", "out/claims.md"] },

@@ -5,9 +5,9 @@ function my_name(problems, answers)
 %
 % MATLAB, where this was not tried yet, cannot be asked at a pipe. It answers all problems at once:
 %
-%     calibench gate --export asked
+%     calibench gate export asked
 %     matlab -batch "my_name('asked/problems.jsonl', 'asked/answers.jsonl')"
-%     calibench gate --judge asked
+%     calibench gate judge asked
 %
 % It reads problems, a JSON object a line, and writes answers, a JSON object a line. These two functions, `answer` and the JSON at
 % the end can stay; put your own calibrator in the place of `solve`. What it does now: homographies, a focal length from them, and

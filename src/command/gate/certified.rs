@@ -1,7 +1,9 @@
-//! `calibench gate --certified`: the digits that a solver shares with the certified values of `reference/`.
+//! `calibench gate certified`: the digits that a solver shares with the certified values of `reference/`.
 
+use super::super::said::number_that;
 use super::super::{Exit, print, warn};
-use super::{Arguments, Stop, incomplete, process, usage};
+use super::options::Copies;
+use super::{Stop, incomplete, usage};
 use calibench::io::ShownPath;
 use calibench::io::input::MOST_SPEC_BYTES;
 use calibench::io::{read_regular_text, write_atomically};
@@ -12,7 +14,7 @@ use calibench_gate::solver::Polished;
 use calibench_gate::{Builtin, Solver};
 use calibench_harness::Build;
 use calibench_harness::project::Project;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Programs of the table besides this library's two, by the names that the table has. Where there are
 /// several, each is asked the problems of lens models that those before it do not know.
@@ -22,14 +24,53 @@ const PEERS: [(&str, &[&str]); 3] = [
     ("minimal solver", &["python3 adapters/minimal_solver.py"]),
 ];
 
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    /// Program whose digits are counted [default: this library's solver, polished to the last digits]
+    #[arg(long, value_name = "COMMAND")]
+    solver: Option<String>,
+    #[command(flatten)]
+    copies: Copies,
+    /// The only certified problem to put
+    #[arg(long, value_name = "NAME")]
+    problem: Option<String>,
+    /// Digits that every certified problem must reach
+    #[arg(long, value_name = "N", value_parser = digits)]
+    least_digits: Option<f64>,
+    /// Counts the digits of this library's solver and of the programs in adapters/, and writes the table as
+    /// CSV
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["solver", "problem", "least_digits"])]
+    digits: Option<PathBuf>,
+}
+
+#[derive(Debug, clap::Args)]
+pub(super) struct TableArguments {
+    /// Table that `calibench gate certified --digits` wrote
+    #[arg(value_name = "FILE")]
+    table: PathBuf,
+}
+
+fn digits(text: &str) -> Result<f64, String> {
+    number_that(text, |_| true, "a number of digits")
+}
+
+/// Counts the digits of one solver, or of all for the table.
+pub(super) fn run(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
+    arguments.copies.check()?;
+    match &arguments.digits {
+        Some(path) => write_table(arguments, path, build),
+        None => count(arguments),
+    }
+}
+
 /// Prints the digits of one solver. Without a program that is this library's: polished, and as it is with the
 /// lens models that cannot be polished.
-pub(super) fn run(arguments: &Arguments) -> Result<Exit, Stop> {
+fn count(arguments: &Arguments) -> Result<Exit, Stop> {
     let problems = chosen(arguments)?;
     let mut table = DigitsTable::default();
     let measured = match &arguments.solver {
         Some(command) => {
-            let solver = process(arguments, command)?;
+            let solver = arguments.copies.process(command)?;
             let measured = measure(&problems, solver.as_ref());
             table.add(&solver.name(), &problems, &measured);
             measured
@@ -83,7 +124,7 @@ fn verdict(arguments: &Arguments, table: &DigitsTable, measured: &[Measured]) ->
 }
 
 /// Writes the digits of this library's solver, polished and as it is, and of the adapters' programs.
-pub(super) fn write_table(arguments: &Arguments, path: &Path, build: &Build) -> Result<Exit, Stop> {
+fn write_table(arguments: &Arguments, path: &Path, build: &Build) -> Result<Exit, Stop> {
     let project = Project::find().map_err(usage)?;
     std::env::set_current_dir(project.root()).map_err(incomplete)?;
     let problems = chosen(arguments)?;
@@ -91,8 +132,10 @@ pub(super) fn write_table(arguments: &Arguments, path: &Path, build: &Build) -> 
     table.add("calibench, polished", &problems, &measure(&problems, &Polished));
     table.add("calibench", &problems, &measure(&problems, &Builtin));
     for (name, commands) in PEERS {
-        let programs =
-            commands.iter().map(|command| process(arguments, command)).collect::<Result<Vec<_>, _>>()?;
+        let programs = commands
+            .iter()
+            .map(|command| arguments.copies.process(command))
+            .collect::<Result<Vec<_>, _>>()?;
         let programs: Vec<&dyn Solver> = programs.iter().map(AsRef::as_ref).collect();
         let measured = measure_in_turn(&problems, &programs);
         if measured.iter().all(Result::is_err) {
@@ -105,15 +148,17 @@ pub(super) fn write_table(arguments: &Arguments, path: &Path, build: &Build) -> 
         table.add(name, &problems, &measured);
     }
     let commit = build.commit.as_ref().map_or("unknown".to_string(), ToString::to_string);
-    let provenance =
-        format!("calibench gate --certified --digits FILE --timeout {}; commit {commit}", arguments.timeout);
+    let provenance = format!(
+        "calibench gate certified --digits FILE --timeout {}; commit {commit}",
+        arguments.copies.timeout
+    );
     write_atomically(path, table.to_csv(&provenance).as_bytes()).map_err(incomplete)?;
     print(&table.to_markdown());
     Ok(Exit::Held)
 }
 
 /// Prints a table that was written before.
-pub(super) fn print_table(path: &Path) -> Result<Exit, Stop> {
+pub(super) fn print_table(TableArguments { table: path }: &TableArguments) -> Result<Exit, Stop> {
     let text = read_regular_text(path, MOST_SPEC_BYTES).map_err(usage)?;
     let table = DigitsTable::of_csv(&text)
         .map_err(|e| usage(format!("{} is no table of digits: {e}", path.shown())))?;

@@ -1,7 +1,9 @@
 //! `calibench gate --against`: two solvers on the same problems, asked now or judged by the answers they gave
 //! before.
 
-use super::{Arguments, Stop, incomplete, plan_of, process, recorded, terms, usage};
+use super::options::{Copies, Judgement, Problems};
+use super::verdict::recorded;
+use super::{Stop, incomplete, usage};
 use crate::{Exit, print};
 use calibench::camera::Model;
 use calibench::io::{ShownPath, write_atomically};
@@ -19,7 +21,7 @@ fn refuse_what_is_not_there(reference: &str) -> Result<(), Stop> {
     let path = Path::new(reference);
     if path.is_dir() {
         return Err(usage(format!(
-            "{} holds no manifest.json: a reference is a folder that `calibench gate --record` wrote, a program, or builtin",
+            "{} holds no manifest.json: a reference is a folder that `calibench gate --record DIR` wrote, a program, or builtin",
             path.shown()
         )));
     }
@@ -35,7 +37,7 @@ fn refuse_what_is_not_there(reference: &str) -> Result<(), Stop> {
     let there = path.exists() || (is_bare && on_path());
     if is_a_name && !there {
         return Err(usage(format!(
-            "{} is neither there as a folder nor as a program: a reference is a folder that `calibench gate --record` wrote, a \
+            "{} is neither there as a folder nor as a program: a reference is a folder that `calibench gate --record DIR` wrote, a \
              program, or builtin",
             path.shown()
         )));
@@ -43,54 +45,87 @@ fn refuse_what_is_not_there(reference: &str) -> Result<(), Stop> {
     Ok(())
 }
 
-/// Compares a solver that is asked now.
-pub(super) fn run(
-    arguments: &Arguments,
-    solver: &dyn Solver,
-    reference: &str,
-    samples: usize,
-) -> Result<Exit, Stop> {
-    let (plan, other): (Plan, Box<dyn Solver>) = match reference {
-        "builtin" => (plan_of(arguments, samples, || solver.models())?, Box::new(Builtin)),
-        folder if holds_a_run(folder) => {
-            let (plan, answers) = recorded(Path::new(folder))?;
-            (plan, Box::new(answers))
-        }
-        command => {
-            refuse_what_is_not_there(command)?;
-            let other = process(arguments, command)?;
-            let both = || solver.models().into_iter().filter(|m| other.models().contains(m)).collect();
-            (plan_of(arguments, samples, both)?, other)
-        }
-    };
-    compared(arguments, &plan, solver, other.as_ref())
+/// With what is compared, and where the report goes.
+pub(super) struct Comparison<'a> {
+    pub copies: &'a Copies,
+    pub judgement: &'a Judgement,
+    pub json: Option<&'a Path>,
 }
 
-/// Compares the answers in a folder, whose problems the reference is asked if it has not answered them
-/// before.
-pub(super) fn of_answers(arguments: &Arguments, folder: &Path, reference: &str) -> Result<Exit, Stop> {
-    let (plan, answers) = recorded(folder)?;
-    let (plan, other): (Plan, Box<dyn Solver>) = match reference {
-        "builtin" => (plan, Box::new(Builtin)),
-        before if holds_a_run(before) => {
-            let before = Path::new(before);
-            let (theirs, answers) = recorded(before)?;
-            (common((folder, &plan), (before, &theirs))?, Box::new(answers))
+impl Comparison<'_> {
+    /// Compares a solver that is asked now.
+    pub fn with_solver(
+        &self,
+        problems: &Problems,
+        solver: &dyn Solver,
+        reference: &str,
+    ) -> Result<Exit, Stop> {
+        let (plan, other): (Plan, Box<dyn Solver>) = match reference {
+            "builtin" => (problems.plan(|| solver.models())?, Box::new(Builtin)),
+            folder if holds_a_run(folder) => {
+                let (plan, answers) = recorded(Path::new(folder))?;
+                (plan, Box::new(answers))
+            }
+            command => {
+                refuse_what_is_not_there(command)?;
+                let other = self.copies.process(command)?;
+                let both = || solver.models().into_iter().filter(|m| other.models().contains(m)).collect();
+                (problems.plan(both)?, other)
+            }
+        };
+        self.compared(&plan, solver, other.as_ref())
+    }
+
+    /// Compares the answers in a folder, whose problems the reference is asked if it has not answered them
+    /// before.
+    pub fn of_answers(&self, folder: &Path, reference: &str) -> Result<Exit, Stop> {
+        let (plan, answers) = recorded(folder)?;
+        let (plan, other): (Plan, Box<dyn Solver>) = match reference {
+            "builtin" => (plan, Box::new(Builtin)),
+            before if holds_a_run(before) => {
+                let before = Path::new(before);
+                let (theirs, answers) = recorded(before)?;
+                (common((folder, &plan), (before, &theirs))?, Box::new(answers))
+            }
+            command => {
+                refuse_what_is_not_there(command)?;
+                let other = self.copies.process(command)?;
+                let known = other.models();
+                let plan = of_models(&plan, &known)?.ok_or_else(|| {
+                    usage(format!(
+                        "{command} knows none of the lens models whose problems {} answers",
+                        folder.shown()
+                    ))
+                })?;
+                (plan, other)
+            }
+        };
+        self.compared(&plan, &answers, other.as_ref())
+    }
+
+    fn compared(&self, plan: &Plan, solver: &dyn Solver, other: &dyn Solver) -> Result<Exit, Stop> {
+        let terms = self.judgement.terms()?;
+        let ask = |solver: &dyn Solver| {
+            let progress = ProgressDisplay::stderr().start("gate", plan.cases.len());
+            let seen = calibench_gate::run(plan, solver, &|done| progress.advance(done));
+            let report = Report::new(plan, "", &seen, &terms, 0.0);
+            (seen, report.checks)
+        };
+        let (old, old_checks) = ask(other);
+        let (new, new_checks) = ask(solver);
+        let paired: Paired = paired::compare(
+            plan,
+            (&solver.name(), &new, &new_checks),
+            (&other.name(), &old, &old_checks),
+            terms.false_alarm_rate,
+        );
+        if let Some(path) = self.json {
+            let text = format!("{:#}\n", serde_json::to_value(&paired).unwrap_or_default());
+            write_atomically(path, text.as_bytes()).map_err(incomplete)?;
         }
-        command => {
-            refuse_what_is_not_there(command)?;
-            let other = process(arguments, command)?;
-            let known = other.models();
-            let plan = of_models(&plan, &known)?.ok_or_else(|| {
-                usage(format!(
-                    "{command} knows none of the lens models whose problems {} answers",
-                    folder.shown()
-                ))
-            })?;
-            (plan, other)
-        }
-    };
-    compared(arguments, &plan, &answers, other.as_ref())
+        print(&paired.to_text());
+        Ok(if paired.held() { Exit::Held } else { Exit::Deviates })
+    }
 }
 
 fn holds_a_run(reference: &str) -> bool {
@@ -131,33 +166,4 @@ fn in_words(plan: &Plan) -> String {
         scenes => scenes.join(", "),
     };
     format!("seed {}, {} samples of {scenes} with {}", plan.seed, plan.samples, models.join(", "))
-}
-
-fn compared(
-    arguments: &Arguments,
-    plan: &Plan,
-    solver: &dyn Solver,
-    other: &dyn Solver,
-) -> Result<Exit, Stop> {
-    let terms = terms(arguments)?;
-    let ask = |solver: &dyn Solver| {
-        let progress = ProgressDisplay::stderr().start("gate", plan.cases.len());
-        let seen = calibench_gate::run(plan, solver, &|done| progress.advance(done));
-        let report = Report::new(plan, "", &seen, &terms, 0.0);
-        (seen, report.checks)
-    };
-    let (old, old_checks) = ask(other);
-    let (new, new_checks) = ask(solver);
-    let paired: Paired = paired::compare(
-        plan,
-        (&solver.name(), &new, &new_checks),
-        (&other.name(), &old, &old_checks),
-        arguments.false_alarms,
-    );
-    if let Some(path) = &arguments.json {
-        let text = format!("{:#}\n", serde_json::to_value(&paired).unwrap_or_default());
-        write_atomically(path, text.as_bytes()).map_err(incomplete)?;
-    }
-    print(&paired.to_text());
-    Ok(if paired.held() { Exit::Held } else { Exit::Deviates })
 }

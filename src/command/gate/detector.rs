@@ -1,35 +1,50 @@
-//! `calibench gate --detector`: is a detector of calibration boards to be trusted?
+//! `calibench gate detector`: is a detector of calibration boards to be trusted?
 
 use super::super::Exit;
 use super::super::program::timeout;
-use super::{Arguments, Size, Stop, incomplete, tell, usage};
+use super::options::{Amount, FalseAlarms, Told};
+use super::{Stop, incomplete, usage};
 use calibench_detector_gate::protocol::Kind;
 use calibench_detector_gate::{Builtin, Detector, MOST_PHOTOS, Program, QUICK, THOROUGH, run as judge};
 
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    /// Program to judge, by photographs of known truth (see adapters/DETECTOR-PROTOCOL.md) [default: this
+    /// library's detector]
+    #[arg(long, value_name = "COMMAND")]
+    solver: Option<String>,
+    /// Seconds that the program may take for a photograph
+    #[arg(long, value_name = "SECONDS", default_value_t = 20.0)]
+    timeout: f64,
+    /// Kinds of boards that the detector is asked for: chessboard, circles, asymmetric, hexagonal, charuco,
+    /// aprilgrid [default: all]
+    #[arg(long, value_name = "KINDS", value_delimiter = ',', value_parser = kind)]
+    boards: Vec<Kind>,
+    #[command(flatten)]
+    amount: Amount,
+    #[command(flatten)]
+    false_alarms: FalseAlarms,
+    #[command(flatten)]
+    told: Told,
+}
+
 /// Judges one detector; without a program that is this library's.
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Stop> {
-    let photos = arguments.samples.unwrap_or(match arguments.size {
-        Size::Quick => QUICK,
-        Size::Thorough => THOROUGH,
-    });
-    if photos > MOST_PHOTOS {
-        return Err(usage(format!("{photos} photographs a scene, and the limit is {MOST_PHOTOS}")));
-    }
+    arguments.told.check()?;
+    let photos = arguments.amount.samples([QUICK, THOROUGH], MOST_PHOTOS)?;
+    let timeout = timeout(arguments.timeout).map_err(usage)?;
     let mut detector: Box<dyn Detector> = match &arguments.solver {
-        Some(command) => {
-            let timeout = timeout(arguments.timeout).map_err(usage)?;
-            Box::new(Program::new(command, timeout).map_err(incomplete)?)
-        }
+        Some(command) => Box::new(Program::new(command, timeout).map_err(incomplete)?),
         None => Box::new(Builtin),
     };
     let kinds = if arguments.boards.is_empty() { &Kind::ALL[..] } else { &arguments.boards };
-    let report = judge(detector.as_mut(), kinds, arguments.seed, photos, arguments.false_alarms)
-        .map_err(incomplete)?;
-    tell(arguments, &report.to_json(), &report.to_text(), report.trusted)
+    let (seed, false_alarms) = (arguments.amount.seed, arguments.false_alarms.rate);
+    let report = judge(detector.as_mut(), kinds, seed, photos, false_alarms).map_err(incomplete)?;
+    arguments.told.tell(&report.to_json(), &report.to_text(), report.trusted)
 }
 
 /// A kind of board by its name.
-pub(super) fn kind(text: &str) -> Result<Kind, String> {
+fn kind(text: &str) -> Result<Kind, String> {
     let names = || Kind::ALL.map(Kind::name).join(", ");
     Kind::ALL.into_iter().find(|kind| kind.name() == text).ok_or_else(|| format!("expected {}", names()))
 }

@@ -1,13 +1,15 @@
-//! `calibench gate --hand-eye`: is a solver to be trusted that finds where a camera sits on a robot?
+//! `calibench gate hand-eye`: is a solver to be trusted that finds where a camera sits on a robot?
 
 use super::super::program::timeout;
 use super::super::{Exit, print, warn};
-use super::{Arguments, Size, Stop, incomplete, tell, terms, usage};
+use super::options::{Amount, FalseAlarms, Told};
+use super::{Stop, incomplete, usage};
 use calibench::io::write_atomically;
-use calibench_gate::THOROUGH;
+use calibench_gate::{THOROUGH, Terms};
 use calibench_hand_eye_gate::{Builtin, MOST_SAMPLES, Program, QUICK, Report, Solver, run as judge};
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Methods of the table besides this library's, with their programs. KinHEC's two refinements take so long
 /// that they are judged by themselves.
@@ -28,28 +30,52 @@ const METHODS: [(&str, &str); 14] = [
     ("KinHEC, Li", "python3 adapters/hand_eye_kinhec_solver.py li_kronecker"),
 ];
 
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    /// Program to judge, which finds where a camera sits on a robot (see adapters/HAND-EYE-PROTOCOL.md)
+    /// [default: this library's solver]
+    #[arg(long, value_name = "COMMAND")]
+    solver: Option<String>,
+    /// Seconds that the program may take for a problem
+    #[arg(long, value_name = "SECONDS", default_value_t = 20.0)]
+    timeout: f64,
+    #[command(flatten)]
+    amount: Amount,
+    #[command(flatten)]
+    false_alarms: FalseAlarms,
+    #[command(flatten)]
+    told: Told,
+    /// Judges this library and the hand-eye methods of the programs in adapters/, and writes the table as
+    /// Markdown
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["solver", "json", "format"])]
+    methods: Option<PathBuf>,
+}
+
+impl Arguments {
+    fn timeout(&self) -> Result<Duration, Stop> {
+        timeout(self.timeout).map_err(usage)
+    }
+}
+
 /// Judges one solver; without a program that is this library's.
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Stop> {
+    arguments.told.check()?;
+    let timeout = arguments.timeout()?;
     if let Some(path) = &arguments.methods {
         return write_table(arguments, path);
     }
     let mut solver: Box<dyn Solver> = match &arguments.solver {
-        Some(command) => Box::new(Program::new(command, timeout(arguments.timeout).map_err(usage)?)),
+        Some(command) => Box::new(Program::new(command, timeout)),
         None => Box::new(Builtin),
     };
     let report = judged(arguments, solver.as_mut())?;
-    tell(arguments, &report.to_json(), &report.to_text(), report.trusted)
+    arguments.told.tell(&report.to_json(), &report.to_text(), report.trusted)
 }
 
 fn judged(arguments: &Arguments, solver: &mut dyn Solver) -> Result<Report, Stop> {
-    let samples = arguments.samples.unwrap_or(match arguments.size {
-        Size::Quick => QUICK,
-        Size::Thorough => THOROUGH,
-    });
-    if samples > MOST_SAMPLES {
-        return Err(usage(format!("{samples} samples a scene, and the limit is {MOST_SAMPLES}")));
-    }
-    Ok(judge(solver, arguments.seed, samples, &terms(arguments)?))
+    let samples = arguments.amount.samples([QUICK, THOROUGH], MOST_SAMPLES)?;
+    let terms = Terms { false_alarm_rate: arguments.false_alarms.rate, ..Terms::default() };
+    Ok(judge(solver, arguments.amount.seed, samples, &terms))
 }
 
 /// What stands above the table.
@@ -67,8 +93,7 @@ fn write_table(arguments: &Arguments, path: &Path) -> Result<Exit, Stop> {
     let ours = judged(arguments, &mut Builtin)?;
     let mut text = format!("{TABLE_HEAD}\n{}\n{}\n", ours.head(), ours.to_row("calibench"));
     for (name, command) in METHODS {
-        let report =
-            judged(arguments, &mut Program::new(command, timeout(arguments.timeout).map_err(usage)?))?;
+        let report = judged(arguments, &mut Program::new(command, arguments.timeout()?))?;
         if report.scenes.iter().all(|scene| scene.over_bound.is_none()) {
             return Err(incomplete(format!(
                 "{name} answered nothing: adapters/requirements-hand-eye.txt names what it needs"
@@ -80,7 +105,7 @@ fn write_table(arguments: &Arguments, path: &Path) -> Result<Exit, Stop> {
     }
     let _ = writeln!(
         text,
-        "\nWritten by `calibench gate --hand-eye --methods FILE` with {} samples a scene, seed {}. A dash: nothing was answered.",
+        "\nWritten by `calibench gate hand-eye --methods FILE` with {} samples a scene, seed {}. A dash: nothing was answered.",
         ours.samples, ours.seed
     );
     write_atomically(path, text.as_bytes()).map_err(incomplete)?;
