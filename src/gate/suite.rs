@@ -106,7 +106,7 @@ const DRAWN: [f64; 6] = [0.2, 0.2, 0.2, 6.0, 6.0, 10.0];
 /// noise, so at a tenth of ordinary corner noise it is a tenth as large against the standard deviation: too
 /// small to be seen.
 pub const LAW_SIGMA_PX: f64 = 0.01;
-/// Ordinary corner noise, the chapter's.
+/// Ordinary corner noise, the example's.
 pub const ORDINARY_SIGMA_PX: f64 = 0.1;
 /// Shortest and longest displacement of an outlier, px.
 pub const OUTLIER_PX: (f64, f64) = (5.0, 20.0);
@@ -127,7 +127,7 @@ struct Draft {
     free: FreeParameters,
 }
 
-/// The chapter's four poses, as a draft gives them.
+/// The example's four poses, as a draft gives them.
 fn four(distance: f64) -> Vec<[f64; 6]> {
     [[0.0, 0.0, 0.0], [20.0, 0.0, 0.0], [0.0, -20.0, 0.0], [-15.0, 15.0, 10.0]]
         .map(|[x, y, z]| [x, y, z, 0.0, 0.0, distance])
@@ -150,7 +150,7 @@ fn ring(count: usize, tilt: f64, aside: f64, distance: f64) -> Vec<[f64; 6]> {
         .collect()
 }
 
-fn chapter_draft(id: &'static str, about: &'static str) -> Draft {
+fn example_draft(id: &'static str, about: &'static str) -> Draft {
     Draft {
         id,
         about,
@@ -167,58 +167,58 @@ fn lawful() -> Vec<Draft> {
     let base = Truth::example_camera();
     let lens = |k1, k2, p1, p2| BrownConrady { k1, k2, p1, p2, k3: 0.0 };
     vec![
-        chapter_draft("four-pose", "the chapter's camera and four poses"),
+        example_draft("four-pose", "the example's camera and four poses"),
         Draft {
             poses: ring(20, 25.0, 15.0, 138.0),
             board: (5, 4, 20.0),
-            ..chapter_draft("many-views", "twenty views")
+            ..example_draft("many-views", "twenty views")
         },
         Draft {
             poses: ring(6, 30.0, 0.0, 300.0),
             free: FreeParameters::of(&[Fx, Fy, Cx, Cy, K1]),
-            ..chapter_draft("weak-coverage", "points in the middle of the image only")
+            ..example_draft("weak-coverage", "points in the middle of the image only")
         },
         Draft {
             camera: base.with_distortion(lens(-0.32, 0.12, 0.0, 0.0)).into(),
             poses: ring(6, 25.0, 12.0, 122.0),
-            ..chapter_draft("strong-distortion", "a wide lens, points out to the image corners")
+            ..example_draft("strong-distortion", "a wide lens, points out to the image corners")
         },
         Draft {
             camera: base.with_distortion(lens(-0.18, 0.05, 0.002, -0.003)).into(),
             free: FreeParameters::STANDARD.with(Parameter::P1).with(Parameter::P2),
             poses: ring(6, 25.0, 12.0, 128.0),
-            ..chapter_draft("tangential", "decentred lens, p1 and p2 free")
+            ..example_draft("tangential", "decentred lens, p1 and p2 free")
         },
-        Draft { camera: Camera { fy: 450.0, ..base }.into(), ..chapter_draft("non-square", "pixels 4 : 3") },
+        Draft { camera: Camera { fy: 450.0, ..base }.into(), ..example_draft("non-square", "pixels 4 : 3") },
         Draft {
             camera: Camera { cx: 410.0, cy: 170.0, ..base }.into(),
-            ..chapter_draft("off-centre", "principal point 114 px from the image centre")
+            ..example_draft("off-centre", "principal point 114 px from the image centre")
         },
         Draft {
             board: (4, 3, 25.0),
             poses: ring(5, 25.0, 8.0, 130.0),
-            ..chapter_draft("few-points", "twelve points a view")
+            ..example_draft("few-points", "twelve points a view")
         },
         Draft {
             camera: Camera::pinhole(3800.0, 3800.0, 2060.0, 1490.0)
                 .with_distortion(BrownConrady::radial(-0.18, 0.05))
                 .into(),
             image_size: (4096, 3000),
-            ..chapter_draft("large-image", "12 megapixels")
+            ..example_draft("large-image", "12 megapixels")
         },
         Draft {
             board: (7, 5, 4.0),
             poses: ring(10, 30.0, 35.0, 120.0),
-            ..chapter_draft("small-target", "a small target moved about the image")
+            ..example_draft("small-target", "a small target moved about the image")
         },
         Draft {
             board: (9, 7, 0.01),
             poses: four(0.12),
-            ..chapter_draft("metres", "the chapter's scene in metres")
+            ..example_draft("metres", "the example's scene in metres")
         },
         Draft {
             free: FreeParameters::of(&[Fx, Fy, K1]),
-            ..chapter_draft("held", "principal point and k2 held at known values")
+            ..example_draft("held", "principal point and k2 held at known values")
         },
         Draft {
             camera: Camera {
@@ -228,7 +228,7 @@ fn lawful() -> Vec<Draft> {
             .into(),
             free: FreeParameters::STANDARD.with(Parameter::Skew).with(Parameter::K3),
             poses: ring(8, 30.0, 12.0, 126.0),
-            ..chapter_draft("skew-and-k3", "skewed axes and a third radial coefficient, both free")
+            ..example_draft("skew-and-k3", "skewed axes and a third radial coefficient, both free")
         },
         Draft {
             poses: ring(8, 52.0, 8.0, 150.0)
@@ -236,12 +236,12 @@ fn lawful() -> Vec<Draft> {
                 .enumerate()
                 .map(|(i, [x, y, _, across, down, distance])| [x, y, 45.0 * i as f64, across, down, distance])
                 .collect(),
-            ..chapter_draft("steep", "targets tilted by 52 degrees and rolled all the way round")
+            ..example_draft("steep", "targets tilted by 52 degrees and rolled all the way round")
         },
         Draft {
             camera: base.with_distortion(lens(0.12, 0.04, 0.0, 0.0)).into(),
             poses: ring(6, 25.0, 10.0, 136.0),
-            ..chapter_draft("pincushion", "magnification that grows towards the corners")
+            ..example_draft("pincushion", "magnification that grows towards the corners")
         },
         Draft {
             camera: Camera::pinhole(5000.0, 5000.0, 654.0, 470.0)
@@ -250,17 +250,17 @@ fn lawful() -> Vec<Draft> {
             image_size: (1280, 960),
             poses: ring(12, 45.0, 8.0, 700.0),
             free: FreeParameters::of(&[Fx, Fy, Cx, Cy, K1]),
-            ..chapter_draft("telephoto", "a focal length of four image widths")
+            ..example_draft("telephoto", "a focal length of four image widths")
         },
         Draft {
             poses: vec![[25.0, 12.0, 0.0, 3.0, 0.0, 115.0], [-18.0, 24.0, 8.0, 0.0, -3.0, 120.0]],
-            ..chapter_draft("two-views", "as few views as determine the camera")
+            ..example_draft("two-views", "as few views as determine the camera")
         },
-        Draft { board: (28, 20, 3.0), ..chapter_draft("many-marks", "560 points a view") },
+        Draft { board: (28, 20, 3.0), ..example_draft("many-marks", "560 points a view") },
         Draft {
             board: (5, 4, 20.0),
             poses: ring(32, 30.0, 14.0, 140.0),
-            ..chapter_draft("thirty-two-views", "more views than most programs are tried on")
+            ..example_draft("thirty-two-views", "more views than most programs are tried on")
         },
     ]
 }
@@ -278,7 +278,7 @@ pub fn suite() -> Result<Vec<Scenario>, SuiteError> {
         .map(|draft| Ok(Scenario { most: OTHER_LENSES, ..build(draft, LAW_SIGMA_PX)? }));
     // Second-order bias grows with the square of the noise. 500 samples would show one of 0.02 standard
     // deviations as 0.02 sqrt(500) = 0.45 standard errors, a tenth of what is called a deviation.
-    let ordinary = chapter_draft("ordinary-noise", "the chapter's scene with its noise of 0.1 px");
+    let ordinary = example_draft("ordinary-noise", "the example's scene with its noise of 0.1 px");
     scenarios.push(Scenario { most: 500, ..build(ordinary, ORDINARY_SIGMA_PX)? });
     let near = Draft {
         poses: vec![
@@ -287,7 +287,7 @@ pub fn suite() -> Result<Vec<Scenario>, SuiteError> {
             [0.0, -1.5, 0.0, 0.0, 0.0, 115.0],
             [-1.0, 1.0, 10.0, 0.0, 0.0, 120.0],
         ],
-        ..chapter_draft("near-degenerate", "four views within two degrees of parallel")
+        ..example_draft("near-degenerate", "four views within two degrees of parallel")
     };
     scenarios.push(Scenario {
         demand: Demand::Honesty,
@@ -295,7 +295,7 @@ pub fn suite() -> Result<Vec<Scenario>, SuiteError> {
         most: 200,
         ..build(near, ORDINARY_SIGMA_PX)?
     });
-    let wrong = chapter_draft("outliers", "two points in a hundred displaced by 5 to 20 px");
+    let wrong = example_draft("outliers", "two points in a hundred displaced by 5 to 20 px");
     scenarios.push(Scenario {
         demand: Demand::Honesty,
         outliers: 0.02,

@@ -2,7 +2,7 @@
 //!
 //! Where the data would not tell all coefficients of a model apart, some are held at the truth.
 
-use super::{Draft, chapter_draft, ring};
+use super::{Draft, example_draft, ring};
 use calibench::camera::{Camera, FreeParameters, Lens, Model, Parameter};
 
 /// k1, k2, p1, p2, k3, k4, k5, k6: a lens of some 110 degrees whose denominator is no part of its numerator.
@@ -70,7 +70,7 @@ fn draft(id: &'static str, about: &'static str, focal: f64, model: Model, coeffi
     Draft {
         camera: Camera::with_lens(focal, 1.002 * focal, 326.0, 243.0, lens),
         free: model.standard_free(),
-        ..chapter_draft(id, about)
+        ..example_draft(id, about)
     }
 }
 

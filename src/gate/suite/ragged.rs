@@ -1,6 +1,6 @@
 //! In which scenes does every view see another part of the board, or every sample other poses?
 
-use super::{Draft, LAW_SIGMA_PX, Poses, Scenario, SuiteError, chapter_draft, ring, scenario, truth_of};
+use super::{Draft, LAW_SIGMA_PX, Poses, Scenario, SuiteError, example_draft, ring, scenario, truth_of};
 use crate::setup::Setup;
 use calibench::geometry::Vec2;
 use calibench::synth::{Stream, StreamKey};
@@ -15,7 +15,7 @@ fn over_the_edge() -> Result<Scenario, SuiteError> {
     let draft = Draft {
         board: (13, 11, 10.0),
         poses: ring(8, 25.0, 40.0, 112.0),
-        ..chapter_draft(
+        ..example_draft(
             "over-the-edge",
             "a board that reaches over the edge of every image, another part each time",
         )
@@ -29,7 +29,7 @@ fn over_the_edge() -> Result<Scenario, SuiteError> {
 fn marks_missing() -> Result<Scenario, SuiteError> {
     let draft = Draft {
         poses: ring(6, 25.0, 10.0, 134.0),
-        ..chapter_draft(
+        ..example_draft(
             "marks-missing",
             "marks that are not found, from a tenth in the first view to six in the last",
         )
@@ -52,7 +52,7 @@ fn ragged(draft: Draft, sees: impl FnMut(usize, usize, &Vec2) -> bool) -> Result
 fn poses_anew() -> Result<Scenario, SuiteError> {
     let draft = Draft {
         poses: ring(6, 22.0, 6.0, 142.0),
-        ..chapter_draft("poses-anew", "six views whose poses are drawn anew for every sample")
+        ..example_draft("poses-anew", "six views whose poses are drawn anew for every sample")
     };
     let setup =
         Setup::whole(truth_of(&draft)?, draft.free, LAW_SIGMA_PX).map_err(SuiteError::of(draft.id))?;

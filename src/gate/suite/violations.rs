@@ -1,14 +1,14 @@
 //! In which scenes is the world not the model? Noise that is not independent or not equal, boards that are
 //! not what they are said to be, lenses that the model cannot be.
 
-use super::{Draft, chapter_draft, ring};
+use super::{Draft, example_draft, ring};
 use crate::violation::Violation;
 use calibench::camera::{BrownConrady, Camera, Lens, Model};
 use calibench::synth::Truth;
 
 /// Each with what is left out, and with the share of samples whose residuals show it.
 pub(super) fn drafts() -> Vec<(Draft, Violation, f64)> {
-    let eight = |id, about| Draft { poses: ring(8, 25.0, 12.0, 128.0), ..chapter_draft(id, about) };
+    let eight = |id, about| Draft { poses: ring(8, 25.0, 12.0, 128.0), ..example_draft(id, about) };
     let base = Truth::example_camera();
     let decentred = BrownConrady { p1: 0.0006, p2: -0.0009, ..base.distortion };
     let equidistant = Lens::new(Model::KannalaBrandt, &[0.0; 4]).expect("four coefficients");
@@ -30,7 +30,7 @@ pub(super) fn drafts() -> Vec<(Draft, Violation, f64)> {
         (
             Draft {
                 poses: six_and_two(),
-                ..chapter_draft(
+                ..example_draft(
                     "noise-of-tilted-views",
                     "four times the noise in the two views that are tilted most",
                 )
@@ -67,7 +67,7 @@ pub(super) fn drafts() -> Vec<(Draft, Violation, f64)> {
             Draft {
                 camera: wide.into(),
                 poses: ring(8, 25.0, 12.0, 80.0),
-                ..chapter_draft("lens-of-another-kind", "an equidistant fisheye, fitted with k1 and k2")
+                ..example_draft("lens-of-another-kind", "an equidistant fisheye, fitted with k1 and k2")
             },
             Violation::OtherLens(Camera::with_lens(wide.fx, wide.fy, wide.cx, wide.cy, equidistant)),
             1.0,
