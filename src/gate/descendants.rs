@@ -6,8 +6,10 @@
 //! becomes the parent of orphans (`PR_SET_CHILD_SUBREAPER`), so that at its end even those that cleared their
 //! environment are found below it.
 //!
-//! Limits: other systems end the process group only; and where the gate itself is killed, a program that does
-//! not end when its standard input does goes on.
+//! On Windows a program is put into a job object, whose processes end with it, the gate's own end included;
+//! what it starts in the moment before is not among them. Limits of the others: systems other than Linux end
+//! the process group only; and where the gate itself is killed, a program that does not end when its standard
+//! input does goes on.
 
 /// The name of the mark. Its value is of one program and one start.
 pub(super) const MARK: &str = "CALIBENCH_GATE_SOLVER";
@@ -67,12 +69,50 @@ fn end_group(id: u32) {
     let _ = killpg(nix::unistd::Pid::from_raw(group), Signal::SIGKILL);
 }
 
-#[cfg(not(unix))]
+#[cfg(windows)]
+use windows::end_job as end_group;
+
+#[cfg(not(any(unix, windows)))]
 fn end_group(_: u32) {}
+
+/// Sees to it that what a program starts can be ended with it, right after it was started.
+pub(super) fn follow(child: &std::process::Child) {
+    #[cfg(windows)]
+    windows::put_into_job(child);
+    #[cfg(not(windows))]
+    let _ = child;
+}
+
+#[cfg(windows)]
+mod windows {
+    use std::collections::BTreeMap;
+    use std::os::windows::io::AsRawHandle;
+    use std::process::Child;
+    use std::sync::{Mutex, PoisonError};
+    use win32job::{ExtendedLimitInfo, Job};
+
+    /// Jobs of the programs that run, by process number.
+    static JOBS: Mutex<BTreeMap<u32, Job>> = Mutex::new(BTreeMap::new());
+
+    pub fn put_into_job(child: &Child) {
+        let mut limits = ExtendedLimitInfo::new();
+        limits.limit_kill_on_job_close();
+        let job = Job::create_with_limit_info(&limits).ok();
+        let assigned = job.filter(|job| job.assign_process(child.as_raw_handle() as isize).is_ok());
+        // Where the system refuses, the program itself is ended and not what it started.
+        let mut jobs = JOBS.lock().unwrap_or_else(PoisonError::into_inner);
+        jobs.extend(assigned.map(|job| (child.id(), job)));
+    }
+
+    /// Ends the processes of a program's job: they end when its last handle is closed.
+    pub fn end_job(id: u32) {
+        drop(JOBS.lock().unwrap_or_else(PoisonError::into_inner).remove(&id));
+    }
+}
 
 #[cfg(target_os = "linux")]
 mod linux {
-    use super::super::program::is_waited_for;
+    use super::super::running::is_waited_for;
     use super::{ADOPTS, MARK, PATIENCE, QUIET_LOOKS};
     use nix::sys::signal::{Signal, kill, killpg};
     use nix::sys::wait::{WaitPidFlag, waitpid};

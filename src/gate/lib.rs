@@ -34,6 +34,7 @@ pub mod recorder;
 pub mod report;
 pub mod residual_tests;
 pub mod run;
+mod running;
 pub mod setup;
 pub mod solver;
 pub mod suite;

@@ -59,6 +59,8 @@ pub struct Paired {
     pub false_alarm_rate: f64,
     /// Number of tests that share it.
     pub tests: usize,
+    /// Samples that were asked and have an estimate.
+    pub samples: usize,
     /// Scenario by scenario.
     pub comparisons: Vec<Comparison>,
     /// Problems of any kind, not the samples only, to which one said something else than the other: another
@@ -89,12 +91,16 @@ pub fn compare(
         })
         .collect();
     let parameters: usize = plan.scenarios.iter().map(|s| s.free.len()).sum();
+    // Of poor or contaminated data both may refuse each.
+    let has_estimate = |scenario: usize| plan.scenarios[scenario].demand != Demand::Honesty;
+    let samples = plan.cases.iter().filter(|c| c.purpose == Purpose::Sample && has_estimate(c.scenario));
     let both = new.iter().zip(old).filter_map(|(n, o)| Some((n.as_ref()?, o.as_ref()?)));
     Paired {
         solver: solver.to_string(),
         reference: reference.to_string(),
         false_alarm_rate,
         tests: 4 * parameters,
+        samples: samples.count(),
         comparisons,
         differing: both.filter(|(n, o)| !says_the_same(n, o)).count(),
         verdicts: verdicts(new_checks, old_checks),
@@ -280,9 +286,16 @@ impl Paired {
         moved(&c.shift, is_relevant) || moved(&c.spread, is_other) || moved(&c.stated, is_other) || c.lost > 0
     }
 
-    /// Whether nothing that matters changed: what is no longer stated counts as changed.
+    /// Whether there was something to compare: of samples that were asked both must have estimated one.
+    pub fn is_compared(&self) -> bool {
+        self.samples == 0 || self.comparisons.iter().any(|c| c.pairs > 0)
+    }
+
+    /// Whether two solvers were compared and nothing that matters changed: what is no longer stated counts as
+    /// changed.
     pub fn held(&self) -> bool {
-        !self.comparisons.iter().any(|c| self.moved(c))
+        self.is_compared()
+            && !self.comparisons.iter().any(|c| self.moved(c))
             && !self.verdicts.iter().any(|(_, _, old, new)| worse(*old, *new))
     }
 
@@ -337,6 +350,7 @@ impl Paired {
             ));
         }
         let conclusion = match (self.held(), self.differing) {
+            _ if !self.is_compared() => "NOT COMPARED: of no problem are there two estimates".to_string(),
             (true, 0) => "SAME: not a bit differs".to_string(),
             (true, n) => format!("SAME LAW: {n} answers differ, in nothing that matters"),
             (false, n) => format!("CHANGED: {n} answers differ"),

@@ -2,13 +2,13 @@
 
 use super::descendants;
 use super::quoted::quoted;
+use super::running;
 use serde::Serialize;
-use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -26,21 +26,6 @@ const STDERR_TAIL: usize = 400;
 /// pipe.
 const LINES_AHEAD: usize = 16;
 
-/// Programs that run, by process group, each with its mark: to be ended when the gate is interrupted, since a
-/// group of its own hears no Ctrl-C.
-static RUNNING: Mutex<Running> = Mutex::new(Running { programs: BTreeMap::new(), is_over: false });
-
-struct Running {
-    /// Marks by process number.
-    programs: BTreeMap<u32, String>,
-    /// Whether no more is started.
-    is_over: bool,
-}
-
-fn running() -> MutexGuard<'static, Running> {
-    RUNNING.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 /// Makes this process the parent of whatever a program leaves behind, so that [`end_all`] finds it. Only for
 /// a process that starts no other programs: they would be ended too.
 pub fn adopt_orphans() {
@@ -50,14 +35,13 @@ pub fn adopt_orphans() {
 /// Ends every program that any gate of this process started, with what they started, and whatever else runs
 /// below this process.
 pub fn end_all() {
-    let programs = std::mem::take(&mut running().programs);
-    programs.iter().for_each(|(group, mark)| descendants::end(*group, mark));
+    running::take().iter().for_each(|(group, mark)| descendants::end(*group, mark));
     descendants::end_below();
 }
 
 /// The same for a process that is about to end itself: a program that broke off is not started anew meanwhile.
 pub fn end_for_good() {
-    running().is_over = true;
+    running::start_no_more();
     end_all();
 }
 
@@ -71,17 +55,10 @@ pub(super) struct Ending {
 impl Ending {
     /// Ends the program with what it started, if it still runs: its number may be another's by now.
     pub fn end(&self) {
-        let mark = running().programs.get(&self.group).cloned();
-        if mark.as_ref() == Some(&self.mark) {
+        if running::is_running(self.group, &self.mark) {
             descendants::end(self.group, &self.mark);
         }
     }
-}
-
-/// Whether a process was started here: who started it waits for it.
-#[cfg(target_os = "linux")]
-pub(super) fn is_waited_for(id: u32) -> bool {
-    running().programs.contains_key(&id)
 }
 
 /// What a program wrote.
@@ -190,14 +167,7 @@ impl PipedProgram {
         // A group of its own: what the shell starts can be ended together with it.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut starter, 0);
-        // Known before anybody looks for children that nobody waits for.
-        let mut running = running();
-        if running.is_over {
-            return Err(std::io::Error::other("programs are being ended, and none is started any more"));
-        }
-        let mut child = starter.spawn()?;
-        running.programs.insert(child.id(), mark.clone());
-        drop(running);
+        let mut child = running::start(&mut starter, &mark)?;
         let no_pipe = || std::io::Error::other("the program has no pipes");
         let stdin = child.stdin.take().ok_or_else(no_pipe)?;
         let stdout = child.stdout.take().ok_or_else(no_pipe)?;
@@ -296,7 +266,7 @@ impl Drop for PipedProgram {
         // As there: it fails only where the program has ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
-        running().programs.remove(&id);
+        running::let_go(id);
     }
 }
 

@@ -1,0 +1,61 @@
+//! Which programs run? Those that any gate of this process started, by process number, each with its mark: to
+//! be ended when the gate is interrupted, since a group of its own hears no Ctrl-C.
+
+use super::descendants;
+use std::collections::BTreeMap;
+use std::process::{Child, Command};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+static RUNNING: Mutex<Running> = Mutex::new(Running { programs: BTreeMap::new(), is_over: false });
+
+struct Running {
+    /// Marks by process number.
+    programs: BTreeMap<u32, String>,
+    /// Whether no more is started.
+    is_over: bool,
+}
+
+fn running() -> MutexGuard<'static, Running> {
+    RUNNING.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Starts a program: it is known before anybody looks for children that nobody waits for.
+///
+/// # Errors
+/// It cannot be started, or no more is.
+pub(super) fn start(starter: &mut Command, mark: &str) -> std::io::Result<Child> {
+    let mut running = running();
+    if running.is_over {
+        return Err(std::io::Error::other("programs are being ended, and none is started any more"));
+    }
+    let child = starter.spawn()?;
+    descendants::follow(&child);
+    running.programs.insert(child.id(), mark.to_string());
+    Ok(child)
+}
+
+/// Whether a program runs: its number may be another's by now.
+pub(super) fn is_running(id: u32, mark: &str) -> bool {
+    running().programs.get(&id).is_some_and(|known| known == mark)
+}
+
+/// Whether a process was started here: who started it waits for it.
+#[cfg(target_os = "linux")]
+pub(super) fn is_waited_for(id: u32) -> bool {
+    running().programs.contains_key(&id)
+}
+
+/// Lets go of a program that has been waited for.
+pub(super) fn let_go(id: u32) {
+    running().programs.remove(&id);
+}
+
+/// Takes all programs that run, with their marks.
+pub(super) fn take() -> BTreeMap<u32, String> {
+    std::mem::take(&mut running().programs)
+}
+
+/// From now on none is started.
+pub(super) fn start_no_more() {
+    running().is_over = true;
+}
