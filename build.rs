@@ -1,6 +1,6 @@
 //! From which sources is this program built? Asked once, of git and Cargo.lock, while it is built: a program
 //! that is older than the sources beside it still names its own. What does the command carry with it? And are
-//! there data for the tests that need some?
+//! there data, programs and rights for the tests that need some?
 
 #[path = "src/calibench/io/data.rs"]
 mod data;
@@ -45,6 +45,7 @@ fn main() {
     // came along.
     let crates = if tree.is_some() { versions(&root.join("Cargo.lock")) } else { String::new() };
     look_for_data();
+    look_for_means();
     carry(&root);
     println!("cargo::rustc-env=CALIBENCH_COMMIT={commit}");
     println!("cargo::rustc-env=CALIBENCH_CHANGED={changed}");
@@ -112,6 +113,37 @@ fn look_for_data() {
     if data::data_folder() != Ok(None) {
         println!("cargo::rustc-cfg=calibench_data");
     }
+}
+
+/// Tests that need a program or a right of this machine are ignored, and counted so, where it is missing.
+/// What comes or goes later is seen when a source changes, or the path.
+fn look_for_means() {
+    println!("cargo::rerun-if-env-changed=PATH");
+    let runs = |command: &[&str]| {
+        let run = Command::new(command[0]).args(&command[1..]).output();
+        run.is_ok_and(|output| output.status.success())
+    };
+    let means = [
+        ("calibench_numpy", runs(&["python3", "-c", "import numpy"])),
+        ("calibench_octave", runs(&["octave-cli", "--version"])),
+        ("calibench_cc", runs(&["cc", "--version"])),
+        ("calibench_cxx", runs(&["c++", "--version"])),
+        ("calibench_mounts", may_mount()),
+    ];
+    for (name, is_there) in means {
+        println!("cargo::rustc-check-cfg=cfg({name})");
+        if is_there {
+            println!("cargo::rustc-cfg={name}");
+        }
+    }
+}
+
+/// Whether a process of this user may mount file systems on Linux (capabilities(7): CAP_SYS_ADMIN).
+fn may_mount() -> bool {
+    const SYS_ADMIN: u64 = 1 << 21;
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let effective = status.lines().find_map(|line| line.strip_prefix("CapEff:"));
+    effective.and_then(|set| u64::from_str_radix(set.trim(), 16).ok()).is_some_and(|set| set & SYS_ADMIN != 0)
 }
 
 /// A working tree of git whose top is the package.

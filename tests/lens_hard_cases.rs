@@ -346,10 +346,12 @@ fn other_double_spheres_are_within_the_interval_or_told_however_absurd_deviation
             panic!("set {sets}: {interval:?}")
         };
         let another_is_told = tells(&found, |w| matches!(w, Warning::Ambiguous { .. }));
-        let held = |fx: f64| calibrate_lens(&views, &settings.clone().hold(Parameter::Fx, fx)).ok();
+        let held = |parameter: Parameter, value: f64| {
+            calibrate_lens(&views, &settings.clone().hold(parameter, value)).ok()
+        };
         let is_possible = |fit: &LensCalibration| !tells(fit, |w| matches!(w, Warning::OutsideRange { .. }));
         for end in [low, high] {
-            let fit = held(end).unwrap();
+            let fit = held(Parameter::Fx, end).unwrap();
             // A quantile of Student's distribution with hundreds of degrees of freedom.
             let t = excess(&fit, &found).max(0.0).sqrt() / 1.964;
             assert!(
@@ -357,14 +359,22 @@ fn other_double_spheres_are_within_the_interval_or_told_however_absurd_deviation
                 "set {sets}: {interval:?}: {t}"
             );
         }
-        for step in 0..40 {
-            let fx = found.camera.fx * (0.4 + 0.045 * f64::from(step));
-            let explains = held(fx).is_some_and(|fit| is_possible(&fit) && excess(&fit, &found) < 3.5);
-            if explains && !(low..=high).contains(&fx) {
+        let focal_lengths =
+            (0..40).map(|step| (Parameter::Fx, found.camera.fx * (0.4 + 0.045 * f64::from(step))));
+        let alphas = (0..20).map(|step| (Parameter::Alpha, 0.05 + 0.045 * f64::from(step)));
+        let xis = (0..20).map(|step| (Parameter::Xi, -0.9 + 0.09 * f64::from(step)));
+        for (parameter, value) in focal_lengths.chain(alphas).chain(xis) {
+            let interval = found.intervals.iter().find(|interval| interval.parameter == parameter).unwrap();
+            let is_within =
+                interval.low.is_none_or(|low| low <= value) && interval.high.is_none_or(|high| value <= high);
+            let explains = || {
+                held(parameter, value).is_some_and(|fit| is_possible(&fit) && excess(&fit, &found) < 3.5)
+            };
+            if !is_within && explains() {
+                let warnings = &found.warnings;
                 assert!(
                     another_is_told,
-                    "set {sets}: {fx} explains the marks: {interval:?} {:?}",
-                    found.warnings
+                    "set {sets}: {parameter} {value} explains the marks: {interval:?} {warnings:?}"
                 );
                 others += 1;
             }

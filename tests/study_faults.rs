@@ -241,6 +241,7 @@ fn of_two_runs_at_once_in_one_folder_one_is_refused_and_the_other_is_whole() {
 
 #[cfg(target_os = "linux")]
 #[test]
+#[cfg_attr(not(calibench_mounts), ignore = "needs the right to mount a file system (Linux)")]
 fn a_disk_that_became_read_only_ends_with_three_and_the_run_goes_on_later() {
     let folder = scratch("read-only");
     let disk = folder.join("disk");
@@ -250,10 +251,7 @@ fn a_disk_that_became_read_only_ends_with_three_and_the_run_goes_on_later() {
         mount.args(["-t", "tmpfs", "-o", options, "calibench"]).arg(&disk);
         mount.output().is_ok_and(|output| output.status.success())
     };
-    if !mount("size=4m") {
-        eprintln!("skipped: this user may not mount a file system");
-        return;
-    }
+    assert!(mount("size=4m"));
     let engine = Engine::new(&spec(), Shard::WHOLE).unwrap();
     let manifest = Manifest::new(&engine.spec, Shard::WHOLE, &calibench_experiments::build());
     drop(Folder::create(&disk.join("run"), &spec(), &manifest).unwrap());
@@ -284,27 +282,24 @@ int clock_gettime(clockid_t clock, struct timespec *now) {
 }
 ";
 
-/// Makes the clock a library that takes the place of the system's; `false` where no C compiler is.
+/// Makes the clock a library that takes the place of the system's.
 #[cfg(target_os = "linux")]
-fn made_clock(library: &Path) -> bool {
+fn make_clock(library: &Path) {
     let mut compiler = Command::new("cc");
     compiler.args(["-x", "c", "-shared", "-fPIC", "-o"]).arg(library).arg("-").stdin(Stdio::piped());
-    let Ok(mut compiler) = compiler.spawn() else { return false };
+    let mut compiler = compiler.spawn().unwrap();
     compiler.stdin.take().unwrap().write_all(JUMPING_CLOCK.as_bytes()).unwrap();
     assert!(compiler.wait().unwrap().success());
-    true
 }
 
 #[cfg(target_os = "linux")]
 #[test]
+#[cfg_attr(not(calibench_cc), ignore = "needs a C compiler, cc")]
 fn a_clock_that_jumps_while_a_study_runs_stops_and_goes_on_changes_no_byte() {
     let folder = scratch("clock");
     fs::create_dir_all(&folder).unwrap();
     let library = folder.join("clock.so");
-    if !made_clock(&library) {
-        eprintln!("skipped: there is no C compiler");
-        return;
-    }
+    make_clock(&library);
     let long = crate::study::SPEC.replace(", redraw = true", "").replace("per_cell = 45", "per_cell = 2000");
     fs::write(folder.join("spec.toml"), long).unwrap();
     let whole = command(&["study", "run", "spec.toml", "--out", "whole"], &folder).output().unwrap();

@@ -35,8 +35,8 @@ fn help_of(verb: &str) -> String {
     String::from_utf8_lossy(&run.stdout).into_owned()
 }
 
-/// Verbs that do something: those without verbs of their own, such as `study run`, and `gate`, which may stand
-/// alone.
+/// Verbs that do something: those without verbs of their own, such as `study run`, and `gate`, which may
+/// stand alone.
 fn leaves() -> Vec<String> {
     let below = |verb: String| -> Vec<String> {
         let help = help_of(&verb);
@@ -86,9 +86,9 @@ fn still_frames(folder: &Path) -> String {
 }
 
 /// What the examples read.
-fn folder() -> PathBuf {
+fn folder(name: &str) -> PathBuf {
     // Outside of the source tree: verbs that look for one find the one that the test makes, or none.
-    let folder = std::env::temp_dir().join(format!("calibench-examples-{}", std::process::id()));
+    let folder = std::env::temp_dir().join(format!("calibench-examples-{name}-{}", std::process::id()));
     fs::create_dir_all(&folder).expect("a folder is made");
     let scene = Scene::example();
     let mut corners = "view,point,X,Y,u,v\n".to_string();
@@ -170,37 +170,42 @@ fn tree(folder: &Path) -> PathBuf {
     tree
 }
 
-fn has_numpy() -> bool {
-    let run = Command::new("python3").args(["-c", "import numpy"]).output();
-    run.is_ok_and(|output| output.status.success())
+/// Runs the examples of every verb that are `wanted`, in their order.
+fn run_examples(folder: &Path, wanted: impl Fn(&str) -> bool) {
+    let tree = tree(folder);
+    let leaves = leaves();
+    assert!(leaves.len() > 25, "{leaves:?}");
+    for verb in &leaves {
+        let place = if ["bless", "new experiment"].contains(&verb.as_str()) { &tree } else { folder };
+        for line in examples(verb).iter().filter(|line| wanted(line)) {
+            let run = calibench(place, &split(line)[1..]);
+            // A planted fault is found, which is what its example shows.
+            let expected = if line.contains("--planted") { 1 } else { 0 };
+            let said = String::from_utf8_lossy(&run.stderr);
+            let found = String::from_utf8_lossy(&run.stdout);
+            assert_eq!(run.status.code(), Some(expected), "{line}\n{found}{said}");
+        }
+    }
 }
 
 #[test]
 fn every_verb_has_examples_and_they_run() {
-    let folder = folder();
-    let tree = tree(&folder);
-    let leaves = leaves();
-    assert!(leaves.len() > 25, "{leaves:?}");
-    for verb in &leaves {
-        for line in examples(verb) {
-            // The book is built by a test of `tests/command.rs`: it takes the runs of all experiments. The
-            // gate's power is a measurement of a quarter of an hour.
-            if line.contains("python3") && !has_numpy() || ["book", "gate power"].contains(&verb.as_str()) {
-                continue;
-            }
-            let place = if ["bless", "new experiment"].contains(&verb.as_str()) { &tree } else { &folder };
-            let run = calibench(place, &split(&line)[1..]);
-            // A planted fault is found, which is what its example shows.
-            let expected = if line.contains("--planted") { 1 } else { 0 };
-            let said = String::from_utf8_lossy(&run.stderr);
-            assert_eq!(
-                run.status.code(),
-                Some(expected),
-                "{line}\n{}{said}",
-                String::from_utf8_lossy(&run.stdout)
-            );
-        }
-    }
+    let folder = folder("all");
+    // The book is built by a test of `tests/command.rs`: it takes the runs of all experiments. The gate's
+    // power is a measurement of a quarter of an hour.
+    let elsewhere = ["calibench book", "calibench gate power "];
+    run_examples(&folder, |line| {
+        !line.contains("python3") && !elsewhere.iter().any(|words| line.starts_with(words))
+    });
+    fs::remove_dir_all(folder).expect("removed");
+}
+
+#[test]
+#[cfg_attr(not(calibench_numpy), ignore = "needs python3 with NumPy")]
+fn examples_with_a_solver_in_python_run() {
+    let folder = folder("python");
+    let makes = ["calibench new adapter my-solver", "calibench new study my-study"];
+    run_examples(&folder, |line| line.contains("python3") || makes.contains(&line));
     fs::remove_dir_all(folder).expect("removed");
 }
 

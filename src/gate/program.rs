@@ -39,7 +39,8 @@ pub fn end_all() {
     descendants::end_below();
 }
 
-/// The same for a process that is about to end itself: a program that broke off is not started anew meanwhile.
+/// The same for a process that is about to end itself: a program that broke off is not started anew
+/// meanwhile.
 pub fn end_for_good() {
     running::start_no_more();
     end_all();

@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 enum Size {
     /// Every gross fault: of calibrations 128 samples a scene
     Quick,
-    /// Small ones too: of calibrations 8192 samples a scene, for a bias of a tenth of a standard deviation or a
-    /// variance 5 % too large
+    /// Small ones too: of calibrations 8192 samples a scene, for a bias of a tenth of a standard deviation or
+    /// a variance 5 % too large
     Thorough,
 }
 
@@ -53,8 +53,8 @@ impl Amount {
 pub(super) struct Problems {
     #[command(flatten)]
     amount: Amount,
-    /// Lens models whose scenes are asked, such as brown-conrady,rational [default: those that the solver says
-    /// it knows; brown-conrady of a program that says nothing, and in files]
+    /// Lens models whose scenes are asked, such as brown-conrady,rational [default: those that the solver
+    /// says it knows; brown-conrady of a program that says nothing, and in files]
     #[arg(long, value_name = "MODELS", value_delimiter = ',')]
     models: Vec<Model>,
     /// The only scene or bad input to ask, by its name in reports; may be repeated
