@@ -367,9 +367,8 @@ fn other_double_spheres_are_within_the_interval_or_told_however_absurd_deviation
             let interval = found.intervals.iter().find(|interval| interval.parameter == parameter).unwrap();
             let is_within =
                 interval.low.is_none_or(|low| low <= value) && interval.high.is_none_or(|high| value <= high);
-            let explains = || {
-                held(parameter, value).is_some_and(|fit| is_possible(&fit) && excess(&fit, &found) < 3.5)
-            };
+            let explains =
+                || held(parameter, value).is_some_and(|fit| is_possible(&fit) && excess(&fit, &found) < 3.5);
             if !is_within && explains() {
                 let warnings = &found.warnings;
                 assert!(
