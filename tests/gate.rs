@@ -254,6 +254,18 @@ fn two_files_of_answers_are_compared_as_the_solvers_behind_them_are() {
 }
 
 #[test]
+fn a_reference_that_estimates_nothing_is_compared_with_nothing() {
+    let asked = ["--samples", "2", "--scene", "four-pose", "--against"];
+    let compared = gate(&[&asked[..], &["exit 1"]].concat());
+    let text = String::from_utf8_lossy(&compared.stdout).into_owned();
+    assert_eq!(compared.status.code(), Some(1), "{text}");
+    assert!(text.contains("\nNOT COMPARED: of no problem are there two estimates"), "{text}");
+    // Of bad input nothing is estimated, and both refuse it.
+    let refused = gate(&["--samples", "2", "--scene", "no-views", "--against", "builtin"]);
+    assert_eq!(refused.status.code(), Some(0), "{}", String::from_utf8_lossy(&refused.stdout));
+}
+
+#[test]
 fn wrong_usage_ends_with_two() {
     for arguments in [
         &["--samples", "0"][..],

@@ -1,8 +1,8 @@
 //! `calibench gate --against`: two solvers on the same problems, asked now or judged by the answers they gave
 //! before.
 
-use super::options::{Copies, Judgement, Problems};
-use super::verdict::recorded;
+use super::options::{Copies, Judgement, Problems, Reports};
+use super::verdict::{keep_recorded, recorded};
 use super::{Stop, incomplete, usage};
 use crate::{Exit, print};
 use calibench::camera::Model;
@@ -45,22 +45,19 @@ fn refuse_what_is_not_there(reference: &str) -> Result<(), Stop> {
     Ok(())
 }
 
-/// With what is compared, and where the report goes.
-pub(super) struct Comparison<'a> {
+/// What is compared with, how, and where the report goes.
+pub(super) struct Against<'a> {
+    pub reference: &'a str,
     pub copies: &'a Copies,
     pub judgement: &'a Judgement,
-    pub json: Option<&'a Path>,
+    pub reports: &'a Reports,
 }
 
-impl Comparison<'_> {
+impl Against<'_> {
     /// Compares a solver that is asked now.
-    pub fn with_solver(
-        &self,
-        problems: &Problems,
-        solver: &dyn Solver,
-        reference: &str,
-    ) -> Result<Exit, Stop> {
-        let (plan, other): (Plan, Box<dyn Solver>) = match reference {
+    pub fn solver(&self, problems: &Problems, solver: &dyn Solver) -> Result<Exit, Stop> {
+        keep_recorded(Path::new(self.reference));
+        let (plan, other): (Plan, Box<dyn Solver>) = match self.reference {
             "builtin" => (problems.plan(|| solver.models())?, Box::new(Builtin)),
             folder if holds_a_run(folder) => {
                 let (plan, answers) = recorded(Path::new(folder))?;
@@ -78,9 +75,10 @@ impl Comparison<'_> {
 
     /// Compares the answers in a folder, whose problems the reference is asked if it has not answered them
     /// before.
-    pub fn of_answers(&self, folder: &Path, reference: &str) -> Result<Exit, Stop> {
+    pub fn answers(&self, folder: &Path) -> Result<Exit, Stop> {
+        keep_recorded(Path::new(self.reference));
         let (plan, answers) = recorded(folder)?;
-        let (plan, other): (Plan, Box<dyn Solver>) = match reference {
+        let (plan, other): (Plan, Box<dyn Solver>) = match self.reference {
             "builtin" => (plan, Box::new(Builtin)),
             before if holds_a_run(before) => {
                 let before = Path::new(before);
@@ -119,7 +117,7 @@ impl Comparison<'_> {
             (&other.name(), &old, &old_checks),
             terms.false_alarm_rate,
         );
-        if let Some(path) = self.json {
+        if let Some(path) = &self.reports.told.json {
             let text = format!("{:#}\n", serde_json::to_value(&paired).unwrap_or_default());
             write_atomically(path, text.as_bytes()).map_err(incomplete)?;
         }

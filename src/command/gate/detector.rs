@@ -1,9 +1,8 @@
 //! `calibench gate detector`: is a detector of calibration boards to be trusted?
 
 use super::super::Exit;
-use super::super::program::timeout;
-use super::options::{Amount, FalseAlarms, Told};
-use super::{Stop, incomplete, usage};
+use super::options::OwnKind;
+use super::{Stop, incomplete};
 use calibench_detector_gate::protocol::Kind;
 use calibench_detector_gate::{Builtin, Detector, MOST_PHOTOS, Program, QUICK, THOROUGH, run as judge};
 
@@ -13,34 +12,27 @@ pub(super) struct Arguments {
     /// library's detector]
     #[arg(long, value_name = "COMMAND")]
     solver: Option<String>,
-    /// Seconds that the program may take for a photograph
-    #[arg(long, value_name = "SECONDS", default_value_t = 20.0)]
-    timeout: f64,
     /// Kinds of boards that the detector is asked for: chessboard, circles, asymmetric, hexagonal, charuco,
     /// aprilgrid [default: all]
     #[arg(long, value_name = "KINDS", value_delimiter = ',', value_parser = kind)]
     boards: Vec<Kind>,
     #[command(flatten)]
-    amount: Amount,
-    #[command(flatten)]
-    false_alarms: FalseAlarms,
-    #[command(flatten)]
-    told: Told,
+    own: OwnKind,
 }
 
 /// Judges one detector; without a program that is this library's.
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Stop> {
-    arguments.told.check()?;
-    let photos = arguments.amount.samples([QUICK, THOROUGH], MOST_PHOTOS)?;
-    let timeout = timeout(arguments.timeout).map_err(usage)?;
+    let OwnKind { amount, false_alarms, told, .. } = &arguments.own;
+    let timeout = arguments.own.timeout()?;
+    let photos = amount.samples([QUICK, THOROUGH], MOST_PHOTOS)?;
     let mut detector: Box<dyn Detector> = match &arguments.solver {
         Some(command) => Box::new(Program::new(command, timeout).map_err(incomplete)?),
         None => Box::new(Builtin),
     };
     let kinds = if arguments.boards.is_empty() { &Kind::ALL[..] } else { &arguments.boards };
-    let (seed, false_alarms) = (arguments.amount.seed, arguments.false_alarms.rate);
-    let report = judge(detector.as_mut(), kinds, seed, photos, false_alarms).map_err(incomplete)?;
-    arguments.told.tell(&report.to_json(), &report.to_text(), report.trusted)
+    let report =
+        judge(detector.as_mut(), kinds, amount.seed, photos, false_alarms.rate).map_err(incomplete)?;
+    told.tell(&report.to_json(), &report.to_text(), report.trusted)
 }
 
 /// A kind of board by its name.

@@ -1,8 +1,7 @@
 //! `calibench gate hand-eye`: is a solver to be trusted that finds where a camera sits on a robot?
 
-use super::super::program::timeout;
 use super::super::{Exit, print, warn};
-use super::options::{Amount, FalseAlarms, Told};
+use super::options::OwnKind;
 use super::{Stop, incomplete, usage};
 use calibench::io::write_atomically;
 use calibench_gate::{THOROUGH, Terms};
@@ -36,46 +35,32 @@ pub(super) struct Arguments {
     /// [default: this library's solver]
     #[arg(long, value_name = "COMMAND")]
     solver: Option<String>,
-    /// Seconds that the program may take for a problem
-    #[arg(long, value_name = "SECONDS", default_value_t = 20.0)]
-    timeout: f64,
     #[command(flatten)]
-    amount: Amount,
-    #[command(flatten)]
-    false_alarms: FalseAlarms,
-    #[command(flatten)]
-    told: Told,
+    own: OwnKind,
     /// Judges this library and the hand-eye methods of the programs in adapters/, and writes the table as
     /// Markdown
     #[arg(long, value_name = "FILE", conflicts_with_all = ["solver", "json", "format"])]
     methods: Option<PathBuf>,
 }
 
-impl Arguments {
-    fn timeout(&self) -> Result<Duration, Stop> {
-        timeout(self.timeout).map_err(usage)
-    }
-}
-
 /// Judges one solver; without a program that is this library's.
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Stop> {
-    arguments.told.check()?;
-    let timeout = arguments.timeout()?;
+    let timeout = arguments.own.timeout()?;
     if let Some(path) = &arguments.methods {
-        return write_table(arguments, path);
+        return write_table(&arguments.own, path, timeout);
     }
     let mut solver: Box<dyn Solver> = match &arguments.solver {
         Some(command) => Box::new(Program::new(command, timeout)),
         None => Box::new(Builtin),
     };
-    let report = judged(arguments, solver.as_mut())?;
-    arguments.told.tell(&report.to_json(), &report.to_text(), report.trusted)
+    let report = judged(&arguments.own, solver.as_mut())?;
+    arguments.own.told.tell(&report.to_json(), &report.to_text(), report.trusted)
 }
 
-fn judged(arguments: &Arguments, solver: &mut dyn Solver) -> Result<Report, Stop> {
-    let samples = arguments.amount.samples([QUICK, THOROUGH], MOST_SAMPLES)?;
-    let terms = Terms { false_alarm_rate: arguments.false_alarms.rate, ..Terms::default() };
-    Ok(judge(solver, arguments.amount.seed, samples, &terms))
+fn judged(own: &OwnKind, solver: &mut dyn Solver) -> Result<Report, Stop> {
+    let samples = own.amount.samples([QUICK, THOROUGH], MOST_SAMPLES)?;
+    let terms = Terms { false_alarm_rate: own.false_alarms.rate, ..Terms::default() };
+    Ok(judge(solver, own.amount.seed, samples, &terms))
 }
 
 /// What stands above the table.
@@ -87,13 +72,13 @@ How large are the errors of X, in terms of the Cramer-Rao bound, and what does n
 ";
 
 /// Judges this library and the methods of the adapters, and writes the table.
-fn write_table(arguments: &Arguments, path: &Path) -> Result<Exit, Stop> {
+fn write_table(own: &OwnKind, path: &Path, timeout: Duration) -> Result<Exit, Stop> {
     let project = calibench_harness::project::Project::find().map_err(usage)?;
     std::env::set_current_dir(project.root()).map_err(incomplete)?;
-    let ours = judged(arguments, &mut Builtin)?;
+    let ours = judged(own, &mut Builtin)?;
     let mut text = format!("{TABLE_HEAD}\n{}\n{}\n", ours.head(), ours.to_row("calibench"));
     for (name, command) in METHODS {
-        let report = judged(arguments, &mut Program::new(command, arguments.timeout()?))?;
+        let report = judged(own, &mut Program::new(command, timeout))?;
         if report.scenes.iter().all(|scene| scene.over_bound.is_none()) {
             return Err(incomplete(format!(
                 "{name} answered nothing: adapters/requirements-hand-eye.txt names what it needs"

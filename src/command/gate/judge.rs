@@ -1,11 +1,12 @@
 //! `calibench gate judge`: the answers in a folder, judged or compared.
 
+use super::Stop;
+use super::compare::Against;
 use super::options::{Copies, Judgement, Reports};
 use super::verdict::{asked, keep_recorded, recorded, told};
-use super::{Stop, compare};
 use crate::Exit;
 use calibench_harness::Build;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
@@ -28,13 +29,9 @@ pub(super) fn run(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
     arguments.copies.check()?;
     keep_recorded(&arguments.folder);
     if let Some(reference) = &arguments.against {
-        keep_recorded(Path::new(reference));
-        let comparison = compare::Comparison {
-            copies: &arguments.copies,
-            judgement: &arguments.judgement,
-            json: arguments.reports.told.json.as_deref(),
-        };
-        return comparison.of_answers(&arguments.folder, reference);
+        let Arguments { copies, judgement, reports, .. } = arguments;
+        let against = Against { reference, copies, judgement, reports };
+        return against.answers(&arguments.folder);
     }
     let (plan, answers) = recorded(&arguments.folder)?;
     told(&arguments.reports, &asked(&arguments.judgement, &plan, &answers, build)?)

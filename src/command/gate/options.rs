@@ -8,6 +8,7 @@ use calibench::camera::Model;
 use calibench::io::{ShownPath, write_atomically};
 use calibench_gate::{Allowance, Asked, EXPECTED_FALSE_ALARMS, Plan, PlanError, Property, Solver, Terms};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// How many problems.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -173,7 +174,28 @@ fn property(name: &str) -> Result<Property, String> {
         .ok_or_else(|| format!("no property `{name}`; there are: {}", known()))
 }
 
-/// The report of a gate of its own kind.
+/// What a gate of its own kind, for what finds marks or mountings, is asked with.
+#[derive(Debug, clap::Args)]
+pub(super) struct OwnKind {
+    /// Seconds that the program may take for an answer
+    #[arg(long, value_name = "SECONDS", default_value_t = 20.0)]
+    timeout: f64,
+    #[command(flatten)]
+    pub amount: Amount,
+    #[command(flatten)]
+    pub false_alarms: FalseAlarms,
+    #[command(flatten)]
+    pub told: Told,
+}
+
+impl OwnKind {
+    /// How long a program may take, once what can never be told is refused.
+    pub fn timeout(&self) -> Result<Duration, Stop> {
+        self.told.check()?;
+        program::timeout(self.timeout).map_err(usage)
+    }
+}
+
 #[derive(Debug, clap::Args)]
 pub(super) struct Told {
     /// The verdict as text for people, or the report as JSON for programs
@@ -185,8 +207,8 @@ pub(super) struct Told {
 }
 
 impl Told {
-    /// Refuses names that are none of a file.
-    pub fn check(&self) -> Result<(), Stop> {
+    /// Refuses a name that is none of a file.
+    fn check(&self) -> Result<(), Stop> {
         self.json.as_deref().map_or(Ok(()), refuse_standard_output).map_err(usage)
     }
 
@@ -219,16 +241,18 @@ impl Reports {
     /// Refuses names that are none of a file, and two reports in one file, of which the last would be left.
     pub fn check(&self) -> Result<(), Stop> {
         let reports = [("--json", &self.told.json), ("--junit", &self.junit), ("--html", &self.html)];
-        let named: Vec<(&str, &Path)> =
-            reports.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?))).collect();
-        for (i, (option, path)) in named.iter().enumerate() {
+        let mut named: Vec<(&str, PathBuf)> = Vec::new();
+        for (option, path) in reports {
+            let Some(path) = path else { continue };
             refuse_standard_output(path).map_err(usage)?;
-            if let Some((other, _)) = named[..i].iter().find(|(_, other)| place_of(other) == place_of(path)) {
+            let place = place_of(path);
+            if let Some((other, _)) = named.iter().find(|(_, known)| *known == place) {
                 return Err(usage(format!(
                     "{other} and {option} name one file, {}: give each report a file of its own",
-                    place_of(path).shown()
+                    place.shown()
                 )));
             }
+            named.push((option, place));
         }
         Ok(())
     }

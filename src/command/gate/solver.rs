@@ -2,9 +2,10 @@
 
 use super::super::calibrate::Format;
 use super::super::{Exit, print};
+use super::compare::Against;
 use super::options::{Copies, Judgement, Problems, Reports};
-use super::verdict::{asked, keep_recorded, told};
-use super::{Stop, compare, of_files, usage};
+use super::verdict::{asked, told};
+use super::{Stop, of_files, usage};
 use calibench::io::ShownPath;
 use calibench_gate::faults::{Faulty, planted};
 use calibench_gate::{Builtin, Plan, Recorder, Report, Solver, files};
@@ -43,13 +44,9 @@ pub(super) fn run(arguments: &Arguments, build: &Build) -> Result<Exit, Stop> {
     arguments.copies.check()?;
     let solver = arguments.solver()?;
     if let Some(reference) = &arguments.against {
-        keep_recorded(Path::new(reference));
-        let comparison = compare::Comparison {
-            copies: &arguments.copies,
-            judgement: &arguments.judgement,
-            json: arguments.reports.told.json.as_deref(),
-        };
-        return comparison.with_solver(&arguments.problems, solver.as_ref(), reference);
+        let Arguments { copies, judgement, reports, .. } = arguments;
+        let against = Against { reference, copies, judgement, reports };
+        return against.solver(&arguments.problems, solver.as_ref());
     }
     let plan = arguments.problems.plan(|| solver.models())?;
     match &arguments.record {
