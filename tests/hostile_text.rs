@@ -95,6 +95,11 @@ fn options_say_what_they_expect_in_place_of_a_negative_number() {
         &["diff", "a.json", "b.json", "--at", "-5"],
         &["'--at <MM>': expected a distance in mm, above 0"],
     );
+    refused(
+        &folder,
+        &["next-pose", "a.json", "--want", "fx", "--distance", "-5,10"],
+        &["invalid value '-5,10'", "a number above 0"],
+    );
     let threads = ["study", "run", "s.toml", "--threads"];
     for no_number in ["-1", "1e3", "18446744073709551616"] {
         let words = format!("invalid value '{no_number}'");

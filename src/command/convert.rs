@@ -50,7 +50,7 @@ pub(super) struct Arguments {
     resize: Option<(usize, usize)>,
     /// Both coordinates of the centre of the first pixel in IN, such as 0 or 0.5 [default: what its format
     /// says]
-    #[arg(long, value_name = "PX", value_parser = parse_finite, allow_negative_numbers = true)]
+    #[arg(long, value_name = "PX", value_parser = parse_finite)]
     first_pixel: Option<f64>,
     /// Fits the nearest lens where there is no equal one (HALCON's polynomial), and says the largest error
     #[arg(long)]

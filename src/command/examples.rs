@@ -152,12 +152,15 @@ pub(super) fn command() -> Command {
     })
 }
 
-/// The command with options that take -5 for a number, so that whoever wants another says why, and not for an
-/// option that does not exist.
+/// The command with options that take -5 for a number, and -5,10 for two where they want several, so that
+/// whoever wants others says why, and not for an option that does not exist.
 fn taking_negative_numbers(command: Command) -> Command {
     let of_option = |arg: Arg| {
-        let takes_a_value = !arg.is_positional() && arg.get_action().takes_values();
-        if takes_a_value { arg.allow_negative_numbers(true) } else { arg }
+        if arg.is_positional() || !arg.get_action().takes_values() {
+            return arg;
+        }
+        let wants_several = arg.get_value_names().is_some_and(|names| names.iter().any(|n| n.contains(',')));
+        arg.allow_negative_numbers(true).allow_hyphen_values(wants_several)
     };
     command.mut_args(of_option).mut_subcommands(taking_negative_numbers)
 }

@@ -26,13 +26,13 @@ pub(super) struct Arguments {
     view: Option<String>,
     /// Pose of the plane before the camera in place of a view: rotation vector in rad and translation, as in
     /// result.json
-    #[arg(long, value_name = "RX,RY,RZ,X,Y,Z", value_parser = parse_pose, allow_hyphen_values = true)]
+    #[arg(long, value_name = "RX,RY,RZ,X,Y,Z", value_parser = parse_pose)]
     pose: Option<Numbers<6>>,
     /// Standard deviations of that pose, independent of the camera's errors [default: 0]
-    #[arg(long, value_name = "RX,RY,RZ,X,Y,Z", value_parser = parse_pose_sd, allow_hyphen_values = true, requires = "pose")]
+    #[arg(long, value_name = "RX,RY,RZ,X,Y,Z", value_parser = parse_pose_sd, requires = "pose")]
     pose_sd: Option<Numbers<6>>,
     /// Pixels at both ends of a length, such as 100.5,200,300,201.2; may be repeated
-    #[arg(long, value_name = "U1,V1,U2,V2", value_parser = parse_ends, allow_hyphen_values = true)]
+    #[arg(long, value_name = "U1,V1,U2,V2", value_parser = parse_ends)]
     pixels: Vec<Numbers<4>>,
     /// CSV of such pixels: length,u1,v1,u2,v2
     #[arg(long, value_name = "FILE")]
@@ -56,7 +56,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "K", value_parser = parse_deviation, requires = "expansion")]
     temperature_sd: Option<f64>,
     /// Expansion of the board, 1/K, such as 11.5e-6 for steel
-    #[arg(long, value_name = "PER_K", value_parser = parse_expansion, allow_hyphen_values = true, requires = "temperature_sd")]
+    #[arg(long, value_name = "PER_K", value_parser = parse_expansion, requires = "temperature_sd")]
     expansion: Option<f64>,
     /// Folder for lengths.json
     #[arg(long, value_name = "DIR")]

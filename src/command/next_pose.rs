@@ -34,7 +34,7 @@ pub(super) struct Arguments {
     want: Vec<Quantity>,
     /// For `length`: place of its middle in the camera's frame, in the board's unit; it lies along the
     /// image's rows
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_place, allow_hyphen_values = true, requires = "length")]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_place, requires = "length")]
     at: Option<Vec3>,
     /// For `length`: the length, in the board's unit
     #[arg(long, value_name = "LENGTH", value_parser = positive, requires = "at")]

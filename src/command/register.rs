@@ -26,7 +26,7 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, default_value_t = Model::Rigid)]
     model: Model,
     /// A taught point whose found position is wanted, such as 12.5,40; may be repeated
-    #[arg(long, value_name = "X,Y", value_parser = parse_point, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y", value_parser = parse_point)]
     at: Vec<Vec2>,
     /// Loss of a residual: squares, huber:D or cauchy:D, with D in standard deviations where the files give
     /// them, otherwise in their unit

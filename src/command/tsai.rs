@@ -28,7 +28,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "WxH", value_parser = parse_size, required_unless_present = "principal_point")]
     image_size: Option<(usize, usize)>,
     /// The principal point, px, where it is known better
-    #[arg(long, value_name = "U,V", value_parser = parse_point, allow_hyphen_values = true)]
+    #[arg(long, value_name = "U,V", value_parser = parse_point)]
     principal_point: Option<Vec2>,
     /// fy over fx, or free to estimate it from a target in three dimensions
     #[arg(long, value_name = "RATIO", value_parser = parse_aspect, default_value = "1")]

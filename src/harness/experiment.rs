@@ -1,7 +1,8 @@
 //! What is an experiment? A question, a default seed, and a function from a context to a record.
 
 use super::progress::{Progress, ProgressDisplay};
-use super::record::{Record, RecordError};
+use super::record::Record;
+use super::record_error::RecordError;
 use calibench::io::message;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};

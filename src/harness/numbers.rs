@@ -145,7 +145,7 @@ impl Numbers<'_> {
 mod tests {
     use super::*;
     use crate::published::PublishedError;
-    use crate::record::RecordError;
+    use crate::record_error::RecordError;
 
     #[test]
     fn unit_and_band_hold_until_others_are_said() {

@@ -1,6 +1,6 @@
 //! What are the data behind a figure? Columns with units, rows of numbers and words; written as CSV.
 
-use super::RecordError;
+use super::record_error::RecordError;
 
 /// A column: a name and a unit (empty for a pure number or a word).
 #[derive(Debug, Clone, PartialEq, Eq)]

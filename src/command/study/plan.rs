@@ -35,7 +35,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "QUANTITY=SD", value_parser = parse_goal, required = true)]
     want: Vec<Goal>,
     /// For `length`: place of its middle in the camera's frame, mm
-    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',')]
     at: Option<Vec<f64>>,
     /// For `length`: the length, mm
     #[arg(long, value_name = "MM", requires = "at")]
