@@ -1,9 +1,8 @@
 //! Where is the chapter contradicted? book/contradictions.toml, declared where the text says so and listed on
 //! one page.
 
-use super::appendix::section;
 use super::listed;
-use super::text::inline;
+use super::text::{inline, section};
 use serde::Deserialize;
 
 /// A statement of the chapter that does not hold as it stands.

@@ -1,8 +1,7 @@
 //! What became of every item of the chapter? book/items.toml, listed on one page with links to what shows it.
 
-use super::appendix::section;
 use super::listed;
-use super::text::inline;
+use super::text::{inline, section};
 use serde::Deserialize;
 use std::fmt::Write;
 

@@ -18,6 +18,9 @@ pub(super) struct Label {
     line: usize,
 }
 
+/// Links into the text, by what they show.
+pub(super) type Uses = BTreeMap<String, Vec<String>>;
+
 /// All names of the book.
 #[derive(Debug, Default)]
 pub(super) struct Labels {

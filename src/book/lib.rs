@@ -54,6 +54,7 @@ mod page;
 mod picture;
 mod prose;
 mod record_page;
+mod record_summary;
 mod references;
 mod render;
 mod resolve;

@@ -1,21 +1,16 @@
 //! What stands on the page of a record? Everything that an experiment found, what computed it, and where the
 //! text speaks of it.
 
-use super::appendix::{claims_table, verdict};
 use super::evidence::{ExperimentEvidence, RecordItem, RecordProvenance};
 use super::format::{self, significant};
 use super::golden_file::GoldenFile;
+use super::labels::Uses;
 use super::page::CompiledPage;
-use super::resolve::Uses;
+use super::record_summary::{claims_table, page_of, verdict};
 use super::sources::Sources;
 use super::text::{attribute, inline};
 use std::collections::BTreeMap;
 use std::fmt::Write;
-
-/// The page of an experiment's record, from the root of the book.
-pub(super) fn page_of(experiment: &str) -> String {
-    format!("record-{experiment}.md")
-}
 
 /// One page an experiment with a snapshot; its numbers, tables and record among the assets.
 pub(super) fn record_pages(

@@ -6,12 +6,12 @@ use super::csv_table::csv_table;
 use super::evidence::ExperimentEvidence;
 use super::finding::Finding;
 use super::golden_file::{GoldenFigure, GoldenFile, GoldenNumber};
-use super::labels::Labels;
+use super::labels::{Labels, Uses};
 use super::scan::{Kind, scan};
 use super::sources::{CONTRADICTIONS, ITEMS, REFERENCES, Sources};
 use super::text::{attribute, escape, inline, sentence};
 use super::{
-    appendix, contradictions, format, items, laboratory, layout, listing, picture, record_page, references,
+    appendix, contradictions, format, items, laboratory, layout, listing, picture, record_summary, references,
 };
 use calibench::io::hash::sha256_hex;
 use calibench_harness::published::Entry;
@@ -31,9 +31,6 @@ pub(super) struct Resolver<'a> {
     /// Where the text shows a number, `<experiment>.<number>`: links to its first place on each page.
     pub used: Uses,
 }
-
-/// Links into the text, by what they show.
-pub(super) type Uses = BTreeMap<String, Vec<String>>;
 
 type Resolved = Result<String, String>;
 
@@ -118,7 +115,7 @@ impl<'a> Resolver<'a> {
         let held = evidence.published(name).is_none_or(|p| p.book_held && p.ours_held);
         let class = if held { "num" } else { "num deviates" };
         let title = attribute(&provenance(experiment, evidence, golden, row, number));
-        let href = format!("{}#number-{name}", record_page::page_of(experiment));
+        let href = format!("{}#number-{name}", record_summary::page_of(experiment));
         let place = self.place_in_text(id);
         Ok(format!(r#"<a class="{class}"{place} href="{href}" title="{title}">{text}{unit}</a>"#))
     }
@@ -225,13 +222,13 @@ impl<'a> Resolver<'a> {
         let record = evidence.record.as_ref();
         let record = record
             .ok_or_else(|| format!("claims of `{experiment}`: run `calibench run {experiment}` first"))?;
-        Ok(appendix::claims_table(&record.claims, false))
+        Ok(record_summary::claims_table(&record.claims, false))
     }
 
     fn command(&self, experiment: &str) -> Resolved {
         let (evidence, golden) = self.golden(experiment)?;
-        let verdict = appendix::verdict(experiment, evidence, golden);
-        let href = record_page::page_of(experiment);
+        let verdict = record_summary::verdict(experiment, evidence, golden);
+        let href = record_summary::page_of(experiment);
         Ok(format!(
             "<div class=\"run\"><b>Reproduce it:</b> <code>calibench run {experiment}</code> (seed {}). {verdict} \
              <a href=\"{href}\">All it found</a>.</div>\n",
@@ -361,7 +358,7 @@ impl<'a> Resolver<'a> {
         if found.record.as_ref().is_some_and(|r| r.claims.iter().any(|c| c.id == claim && !c.held)) {
             return Err(format!("claim `{id}` fails"));
         }
-        let page = record_page::page_of(experiment);
+        let page = record_summary::page_of(experiment);
         Ok(format!("<a href=\"{page}#claim-{claim}\"><code>{}</code></a>", inline(id)))
     }
 

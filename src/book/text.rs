@@ -40,6 +40,12 @@ pub(super) fn sentence(caption: &str) -> String {
     first.to_uppercase().chain(caption.chars().skip(1)).collect()
 }
 
+/// A section with its sign; `case study` has no number.
+pub(super) fn section(name: &str) -> String {
+    let sign = if name.starts_with(|c: char| c.is_ascii_digit()) { "\u{a7}" } else { "" };
+    format!("{sign}{}", inline(name))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

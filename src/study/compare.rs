@@ -1,7 +1,7 @@
 //! Which of two runs is closer to the truth? Trials that met the same noise are compared one by one.
 
 use super::engine::Engine;
-use super::folder::FolderError;
+use super::folder_error::FolderError;
 use super::moments::Estimated;
 use super::quantity::Quantity;
 use super::reading::Reading;

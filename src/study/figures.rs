@@ -2,6 +2,7 @@
 //! failed.
 
 use super::engine::Engine;
+use super::grid::{Grid, wide};
 use super::moments::Estimated;
 use super::panels::{Panel, Shows};
 use super::quantity::Quantity;
@@ -13,9 +14,6 @@ use calibench_harness::{Dash, Figure, HeatMap, Look, Plot};
 const MOST_SERIES: usize = 6;
 /// Width of a page on a desktop, px: three panels of 400.
 const PAGE: f64 = 1200.0;
-/// Axes that span more than this are logarithmic.
-const WIDE: f64 = 4.0;
-
 /// All figures of a study.
 pub(super) fn draw(engine: &Engine, summary: &Summary) -> Vec<Figure> {
     let grid = Grid { engine, summary };
@@ -59,89 +57,7 @@ pub(super) fn panels(engine: &Engine, summary: &Summary) -> Vec<Alone> {
         .collect()
 }
 
-pub(super) struct Grid<'a> {
-    engine: &'a Engine,
-    summary: &'a Summary,
-}
-
-/// Cells that differ in the level of the x factor only, in its order.
-pub(super) struct Series {
-    pub label: String,
-    pub cells: Vec<usize>,
-}
-
 impl Grid<'_> {
-    /// The numeric factor with most levels.
-    fn x_factor(&self) -> Option<usize> {
-        let factors = &self.engine.spec.factor;
-        (0..factors.len())
-            .filter(|&f| factors[f].is_numeric())
-            .max_by_key(|&f| (factors[f].count(), usize::MAX - f))
-    }
-
-    fn series(&self, x: usize) -> Vec<Series> {
-        let mut found: Vec<Series> = Vec::new();
-        for cell in &self.engine.cells {
-            let rest = |separator: &str| {
-                let others =
-                    self.engine.spec.factor.iter().zip(&cell.labels).enumerate().filter(|(f, _)| *f != x);
-                others
-                    .map(|(_, (f, label))| format!("{} {label}", f.name))
-                    .collect::<Vec<_>>()
-                    .join(separator)
-            };
-            let label = rest(", ");
-            match found.iter_mut().find(|s| s.label == label) {
-                Some(series) => series.cells.push(cell.index),
-                None => found.push(Series { label, cells: vec![cell.index] }),
-            }
-        }
-        found
-    }
-
-    pub fn x_of(&self, x: usize, cell: usize) -> f64 {
-        self.engine.spec.factor[x].number(self.engine.cells[cell].levels[x]).unwrap_or(f64::NAN)
-    }
-
-    pub fn x_label(&self, x: usize) -> String {
-        let factor = &self.engine.spec.factor[x];
-        if factor.unit.is_empty() {
-            factor.name.clone()
-        } else {
-            format!("{} ({})", factor.name, factor.unit)
-        }
-    }
-
-    /// What is no error: RMSE, NEES, sizes of displacements.
-    fn others(&self) -> impl Iterator<Item = Quantity> {
-        self.engine.quantities.iter().copied().filter(|q| !q.is_error())
-    }
-
-    fn errors(&self) -> impl Iterator<Item = Quantity> {
-        self.engine.quantities.iter().copied().filter(|q| q.is_error())
-    }
-
-    pub fn statistic(&self, cell: usize, quantity: Quantity) -> Option<&Statistic> {
-        self.summary.cells[cell].of(quantity.name())
-    }
-
-    /// What the bars of a plot are.
-    fn bars(&self) -> String {
-        format!("Bars are {} % intervals.", libm::round(1e6 * self.engine.spec.confidence) / 1e4)
-    }
-
-    fn caption(&self, what: &str) -> String {
-        let spec = &self.engine.spec;
-        let trials: Vec<u64> = self.summary.cells.iter().map(|c| c.trials).collect();
-        let (least, most) =
-            (trials.iter().min().copied().unwrap_or(0), trials.iter().max().copied().unwrap_or(0));
-        let trials = if least == most { format!("{most}") } else { format!("{least} to {most}") };
-        format!(
-            "{what} {trials} trials a cell, seed {}. Statistics are of the trials that converged.",
-            spec.seed
-        )
-    }
-
     /// What is drawn of errors and of the others: where the noise varies, every number over what the bound
     /// expects, which is proportional to the noise and spans as many decades.
     fn shown(&self, x: usize) -> [Shows; 3] {
@@ -328,11 +244,6 @@ impl Grid<'_> {
         );
         Figure::panels("errors", &panels, panels.len().min(3), self.caption(&what))
     }
-}
-
-pub(super) fn wide(values: &[f64]) -> bool {
-    let (low, high) = values.iter().fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
-    low > 0.0 && high > WIDE * low
 }
 
 #[cfg(test)]

@@ -2,7 +2,8 @@
 //! their hashes, in words of our own and in those of others.
 
 use super::engine::Engine;
-use super::folder::{Folder, FolderError, INPUTS};
+use super::folder::{Folder, INPUTS};
+use super::folder_error::FolderError;
 use super::manifest::Manifest;
 use super::summary::{Summary, summarise};
 use super::{alone, described, figures, report};

@@ -2,7 +2,8 @@
 //! checkpoint.
 
 use super::engine::{Engine, Interruption, Outcome, Pace};
-use super::folder::{Folder, FolderError, Located};
+use super::folder::Folder;
+use super::folder_error::{FolderError, Located};
 use super::manifest::Manifest;
 use super::replay::{Lines, Replay, Source};
 use super::run_error::RunError;

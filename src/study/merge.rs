@@ -2,7 +2,8 @@
 //! them.
 
 use super::engine::Engine;
-use super::folder::{Folder, FolderError};
+use super::folder::Folder;
+use super::folder_error::FolderError;
 use super::manifest::{Difference, Manifest};
 use super::reading::Reading;
 use super::run_error::RunError;

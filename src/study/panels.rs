@@ -1,7 +1,7 @@
 //! What does one panel of a study's figures show? One quantity against the x factor: its spread, its bias, or
 //! its mean, beside what theory expects.
 
-use super::figures::{Grid, Series, wide};
+use super::grid::{Grid, Series, wide};
 use super::moments::Estimated;
 use super::quantity::Quantity;
 use super::summary::Statistic;

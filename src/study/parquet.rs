@@ -6,7 +6,7 @@
 
 use super::described;
 use super::engine::Engine;
-use super::folder::{FolderError, Located};
+use super::folder_error::{FolderError, Located};
 use super::manifest::Manifest;
 use super::replay::Source;
 use super::tables;

@@ -2,7 +2,7 @@
 //! and what helps.
 
 use super::engine::Engine;
-use super::folder::FolderError;
+use super::folder_error::FolderError;
 use super::manifest::Manifest;
 use super::replay::Source;
 use super::trial_file::NoParquet;

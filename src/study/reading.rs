@@ -1,7 +1,8 @@
 //! What did a run do, batch by batch? Its trials beside the engine that knows their order.
 
 use super::engine::Engine;
-use super::folder::{Folder, FolderError};
+use super::folder::Folder;
+use super::folder_error::FolderError;
 use super::replay::Replay;
 use super::run_error::RunError;
 use super::trial::Trial;

@@ -2,7 +2,7 @@
 //! either kind of file.
 
 use super::engine::Engine;
-use super::folder::{FolderError, Located};
+use super::folder_error::{FolderError, Located};
 use super::tables;
 use super::trial::Trial;
 use std::fs::File;

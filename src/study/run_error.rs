@@ -1,6 +1,6 @@
 //! Why can a run not go on?
 
-use super::folder::FolderError;
+use super::folder_error::FolderError;
 use super::spec_error::SpecError;
 
 /// A run that cannot go on.

@@ -1,7 +1,8 @@
 //! How do trials that are all done already come into a folder? All of them or none, with the files that vouch
 //! for them.
 
-use super::folder::{Folder, FolderError, INPUTS};
+use super::folder::{Folder, INPUTS};
+use super::folder_error::FolderError;
 use super::log::Checkpoint;
 use super::manifest::Manifest;
 use calibench::io::atomic::Beside;
