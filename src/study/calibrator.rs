@@ -1,9 +1,8 @@
 //! Who calibrates in a trial? This library's solver, or whoever takes views and gives a camera.
 
 use super::cells::Cell;
-use super::trial::CONVERGED;
 use calibench::board::View;
-use calibench::calibrate::{CalibrationError, LensCalibration, calibrate, calibrate_lens};
+use calibench::calibrate::{CalibrationError, LensCalibration, Termination, calibrate, calibrate_lens};
 use calibench::camera::{Camera, Lens};
 use calibench::geometry::Pose;
 use nalgebra::{DMatrix, DVector};
@@ -49,7 +48,7 @@ impl From<LensCalibration> for Estimate {
         let ending = calibration.termination;
         Estimate {
             // Where the world is not the model, as with gross errors, a minimum is a minimum.
-            outcome: if ending.is_minimum() { CONVERGED } else { ending.name() }.to_string(),
+            outcome: if ending.is_minimum() { Termination::Converged } else { ending }.name().to_string(),
             camera: calibration.camera,
             cam_from_target: Some(calibration.cam_from_target),
             rmse_px: Some(calibration.rmse_px),

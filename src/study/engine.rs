@@ -4,6 +4,7 @@
 use super::accumulate::Tally;
 use super::calibrator::Calibrator;
 use super::cells::Cell;
+use super::frame;
 use super::inputs::Inputs;
 use super::quantity::Quantity;
 use super::shard::Shard;
@@ -279,6 +280,15 @@ impl Engine {
             report(&Pace { trials: self.trials() - before, before, expected, worst: self.worst() });
         }
         Ok(Outcome::Complete)
+    }
+
+    /// The first cell whose camera does not show the whole frame over which displacements are measured, and
+    /// the share that it shows.
+    pub fn frame_in_part(&self) -> Option<(&Cell, f64)> {
+        let measured = self.cells.iter().filter(|cell| cell.measures_frame);
+        measured
+            .into_iter()
+            .find_map(|cell| Some((cell, frame::shown(&cell.camera, cell.design.scene.image)?)))
     }
 }
 

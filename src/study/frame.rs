@@ -11,9 +11,7 @@ use calibench::planning::{Estimated, frame_form};
 use calibench::validate::frame_difference;
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use super::cells::Cell;
-use super::engine::Engine;
-use super::prediction::Expected;
+use super::expected::Expected;
 
 /// One number of the displacement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,19 +64,10 @@ impl Displacement {
 }
 
 /// The share of the frame's nodes that a camera shows; `None` where it shows them all.
-fn shown(camera: &Camera<Lens>, size: (usize, usize)) -> Option<f64> {
+pub(super) fn shown(camera: &Camera<Lens>, size: (usize, usize)) -> Option<f64> {
     let nodes = frame_nodes(size).0;
     let seen = nodes.iter().filter(|node| camera.ray(node).is_ok()).count();
     (seen < nodes.len()).then(|| seen as f64 / nodes.len() as f64)
-}
-
-impl Engine {
-    /// The first cell whose camera does not show the whole frame over which displacements are measured, and
-    /// the share that it shows.
-    pub fn frame_in_part(&self) -> Option<(&Cell, f64)> {
-        let measured = self.cells.iter().filter(|cell| cell.measures_frame);
-        measured.into_iter().find_map(|cell| Some((cell, shown(&cell.camera, cell.design.scene.image)?)))
-    }
 }
 
 /// Where the estimate shows the rays of the true camera's nodes.

@@ -19,6 +19,7 @@ mod design;
 mod engine;
 #[cfg(test)]
 mod example;
+mod expected;
 mod factor;
 mod figures;
 mod fingerprint;
@@ -71,6 +72,7 @@ pub use cells::Cell;
 pub use engine::{
     Engine, Interruption, Outcome, Pace, Worst, in_memory, in_memory_by, in_memory_seeing, in_memory_until,
 };
+pub use expected::Expected;
 pub use fingerprint::Fingerprint;
 pub use finish::{finish, single_panels};
 pub use folder::Folder;
@@ -82,7 +84,7 @@ pub use manifest::{Difference, Manifest};
 pub use merge::{MergeError, merge, merge_on};
 pub use moments::{Estimated, Moments};
 pub use poses::{Poses, PosesError};
-pub use prediction::{Expected, Prediction};
+pub use prediction::Prediction;
 pub use quantity::Quantity;
 pub use run_error::RunError;
 pub use shard::{Shard, ShardError};

@@ -1,6 +1,7 @@
 //! What does theory expect of a cell before anything is drawn? The Cramer-Rao bound and the distributions
 //! that follow from it.
 
+use super::expected::Expected;
 use super::frame;
 use super::quantity::Quantity;
 use super::spec::Length;
@@ -9,16 +10,6 @@ use calibench::camera::{Camera, FreeParameters, Lens, Model};
 use calibench::evaluate::{RmseDistribution, cramer_rao};
 use calibench::geometry::Vec2;
 use calibench::synth::Truth;
-
-/// Mean and standard deviation that theory expects, to first order in the noise and for Gaussian noise
-/// without gross errors.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Expected {
-    /// Mean; 0 for an error.
-    pub mean: f64,
-    /// Standard deviation; the Cramer-Rao bound for an error.
-    pub sd: f64,
-}
 
 /// The predictions of a cell, one a quantity; `None` where theory says nothing.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,8 +2,8 @@
 
 use super::accumulate::Tally;
 use super::engine::Engine;
+use super::expected::Expected;
 use super::moments::Estimated;
-use super::prediction::Expected;
 use super::quantity::Quantity;
 use super::sketch::Sketch;
 use calibench::evaluate::Interval;
