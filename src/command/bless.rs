@@ -1,7 +1,7 @@
 //! `calibench bless ID`: the present result becomes the golden snapshot. Claims are not touched: one that
 //! fails stays failed.
 
-use super::calibrate::Format;
+use super::format::Format;
 use super::said::written_by;
 use super::{Exit, find, print, warn};
 use calibench::io::write_atomically;

@@ -9,7 +9,7 @@ mod svg;
 
 pub(super) use named::board_or_file;
 
-use super::calibrate::Format;
+use super::format::Format;
 use super::said::say_written;
 use super::{Exit, warn};
 use calibench::io::input::MOST_SPEC_BYTES;

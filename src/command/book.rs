@@ -1,6 +1,6 @@
 //! `calibench book`: the book alone, from the last run; what the last run lacks is run.
 
-use super::calibrate::Format;
+use super::format::Format;
 use super::said::{print_as, written_by};
 use super::terminal::warn_lines;
 use super::{Exit, warn};

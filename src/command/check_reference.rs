@@ -1,7 +1,7 @@
 //! `calibench check-reference HISTORY.csv`: is a station still as it was? One reference of known size,
 //! measured again and again.
 
-use super::calibrate::Format;
+use super::format::Format;
 use super::said::{MOST, number_that, positive, written_by};
 use super::{Exit, print, warn};
 use calibench::downstream::control::{Ewma, Rule, Shewhart};

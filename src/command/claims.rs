@@ -2,7 +2,7 @@
 //! process of its own, so that time and memory are its own: what those ask who look at the artefacts of a
 //! paper.
 
-use super::calibrate::Format;
+use super::format::Format;
 use super::{Exit, find, print, warn};
 use calibench::io::write_atomically;
 use calibench_harness::{Build, Experiment, ProgressDisplay};

@@ -1,7 +1,9 @@
 //! `calibench convert IN OUT`: a camera, corners or a board from the file of one program to that of another.
 
-use super::calibrate::{Format as Shown, parse_size, unended};
+use super::calibrate::parse_size;
+use super::format::Format as Shown;
 use super::said::{refuse_standard_output, written_by};
+use super::source::unended;
 use super::{Exit, print, warn};
 use calibench::io::ShownPath;
 use calibench::io::formats::{

@@ -1,6 +1,7 @@
 //! `calibench diff A B`: how two cameras differ over the frame, and whether both may be one.
 
-use super::calibrate::{Format as Shown, parse_size, round_down};
+use super::calibrate::{parse_size, round_down};
+use super::format::Format as Shown;
 use super::said::written_by;
 use super::{Exit, print, warn};
 use calibench::camera::Model;

@@ -1,7 +1,7 @@
 //! `calibench doctor`: is this program what one thinks it is? Its build, what it can do here, and whether it
 //! belongs to the golden values beside it.
 
-use super::calibrate::Format;
+use super::format::Format;
 use super::report::table;
 use super::{Exit, print};
 use calibench::io::data::data_folder;

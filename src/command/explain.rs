@@ -4,17 +4,19 @@
 
 mod chapter;
 mod entry;
+mod known;
 mod names;
 mod pages;
 mod words;
 
-use super::calibrate::Format;
+use super::format::Format;
 use super::terminal::warn_lines;
 use super::{Exit, print};
 use calibench_book::{Evidence, Sources};
+use calibench_harness::Experiment;
 use calibench_harness::project::Project;
-use calibench_harness::{Context, Experiment, Record, golden};
 use clap::Args;
+use known::{Known, record_of};
 use names::{Meant, Names};
 use words::Answer;
 
@@ -26,23 +28,6 @@ pub(super) struct Arguments {
     /// Text for people or JSON for programs
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
-}
-
-/// What an explanation draws on.
-struct Known<'a> {
-    project: Project,
-    experiments: &'a [Experiment],
-    sources: Sources,
-}
-
-impl Known<'_> {
-    /// The value of a number that golden/ locks.
-    fn locked_value(&self, experiment: &str, own: &str) -> Option<f64> {
-        let snapshot = self.project.snapshot_text(experiment)?;
-        let line = format!("number | {own} | ");
-        let value = golden::contents(&snapshot).lines().find_map(|text| text.strip_prefix(&line))?;
-        value.split(" | ").next()?.parse().ok()
-    }
 }
 
 pub(super) fn run(experiments: &[Experiment], arguments: &Arguments) -> Exit {
@@ -78,10 +63,4 @@ fn explained(experiments: &[Experiment], name: &str) -> Result<Answer, (Exit, St
         }
         None => Err((Exit::Usage, names.not_found(name))),
     }
-}
-
-/// The record of the locked run.
-fn record_of(experiment: &Experiment) -> Result<Record, (Exit, String)> {
-    let record = experiment.execute(&Context::of(experiment));
-    record.map_err(|error| (Exit::of_failure(&error), format!("{}: {error}", experiment.id)))
 }

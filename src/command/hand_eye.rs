@@ -2,7 +2,7 @@
 //! uncertainty.
 
 use super::Exit;
-use super::calibrate::Format;
+use super::format::Format;
 use super::report::table;
 use super::said::{Said, positive, say, written_by};
 use calibench::calibrate::Covariance;

@@ -1,6 +1,6 @@
 //! `calibench list`: which experiments are there, and what do they ask?
 
-use super::calibrate::Format;
+use super::format::Format;
 use super::{Exit, print};
 use calibench_harness::Experiment;
 use serde_json::{Value, json};

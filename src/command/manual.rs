@@ -1,6 +1,6 @@
 //! `calibench manual --out DIR`: a page of the manual for the command and for every verb.
 
-use super::calibrate::Format;
+use super::format::Format;
 use super::said::say_written;
 use super::{Exit, warn};
 use calibench::io::write_together;

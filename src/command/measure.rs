@@ -1,7 +1,7 @@
 //! `calibench measure RESULT.json`: lengths on a plane, each with its uncertainty split by cause.
 
 use super::Exit;
-use super::calibrate::Format;
+use super::format::Format;
 use super::report::table;
 use super::said::{MOST, Said, number_that, positive, say, written_by};
 use calibench::camera::Camera;

@@ -2,7 +2,7 @@
 
 mod experiment;
 
-use super::calibrate::Format;
+use super::format::Format;
 use super::said::say_written;
 use super::{Exit, warn};
 use calibench::io::{ShownPath, write_together};

@@ -3,7 +3,8 @@
 
 mod words;
 
-use super::calibrate::{Format, parse_size};
+use super::calibrate::parse_size;
+use super::format::Format;
 use super::said::{Said, noise_px, number_that, positive, say};
 use super::{Exit, warn};
 use crate::board::board_or_file;

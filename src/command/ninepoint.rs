@@ -1,7 +1,9 @@
 //! `calibench ninepoint IMAGE`: the dots of a photograph, and the map from its pixels to the unit grid.
 
-use super::calibrate::{Format, Mode, PlaneReport, last_part, plane_text};
+use super::calibrate::{Mode, PlaneReport, plane_text};
+use super::format::Format;
 use super::said::written_by;
+use super::source::last_part;
 use super::{Exit, print, warn};
 use calibench::board::Board;
 use calibench::detect::{DotGrid, sparse_dots_of};

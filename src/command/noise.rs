@@ -1,8 +1,9 @@
 //! `calibench noise PHOTOS...|CSV`: how much do the marks of a still board scatter from frame to frame, and
 //! was it still?
 
-use super::calibrate::{Format, Views, parse_size, refuse_views_outside, views_of};
+use super::calibrate::{Views, parse_size, refuse_views_outside, views_of};
 use super::diff::parse_rate;
+use super::format::Format;
 use super::report::table;
 use super::said::{Said, number_that, say, written_by};
 use super::{Exit, warn};

@@ -2,7 +2,7 @@
 //! known.
 
 use super::Exit;
-use super::calibrate::Format;
+use super::format::Format;
 use super::report::table;
 use super::said::{MOST, Said, say, written_by};
 use calibench::calibrate::Loss;

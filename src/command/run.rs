@@ -1,7 +1,7 @@
 //! `calibench run ID`, and the own binary of every experiment: one run, its files, its verdict.
 
-use super::calibrate::Format;
 use super::check::verdict_json;
+use super::format::Format;
 use super::report::{details, summary};
 use super::terminal::{self, warn_lines};
 use super::{Exit, find, print, warn};

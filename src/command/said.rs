@@ -1,7 +1,7 @@
 //! What a verb found or wrote, as text and as JSON: printed in one form, written in the other. And how
 //! numbers of options are read.
 
-use super::calibrate::Format;
+use super::format::Format;
 use super::{Exit, print, warn};
 use calibench::io::corners::WEIGHTS;
 use calibench::io::write_atomically;

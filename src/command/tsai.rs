@@ -1,9 +1,11 @@
 //! `calibench tsai CORNERS.csv`: a camera from one view of a tilted plane or of a target in three dimensions,
 //! by Tsai's two stages, and refined from there.
 
-use super::calibrate::{Format, parse_size, refuse_views_outside, unended};
+use super::calibrate::{parse_size, refuse_views_outside};
+use super::format::Format;
 use super::report::table;
 use super::said::{Said, number_that, ratio, say, written_by};
+use super::source::unended;
 use super::{Exit, warn};
 use calibench::board::{View, ViewError};
 use calibench::calibrate::{Settings, calibrate};

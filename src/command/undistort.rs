@@ -1,6 +1,6 @@
 //! `calibench undistort --camera RESULT.json PHOTOS...`: what an ideal lens would have shown.
 
-use super::calibrate::Format;
+use super::format::Format;
 use super::said::{say_written, written_by};
 use super::{Exit, print, warn};
 use calibench::camera::{Camera, Lens};

@@ -1,8 +1,9 @@
 //! `calibench validate RESULT.json PHOTOS|CSV`: does a calibration hold on views that it has not seen, do its
 //! own views predict each other, and do repeated calibrations agree?
 
-use super::calibrate::{Format, Views, parse_size, views_of};
+use super::calibrate::{Views, parse_size, views_of};
 use super::diff::{NOT_DECIDED, doubts_of, parse_rate};
+use super::format::Format;
 use super::report::table;
 use super::said::{Said, say, written_by};
 use super::{Exit, warn};

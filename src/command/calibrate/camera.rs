@@ -1,16 +1,19 @@
 //! A camera from views, wherever they come from: the fit, how it is printed, and the files it leaves.
 
+use super::super::format::Format;
+use super::super::report::table;
+use super::super::{Exit, print, warn};
 use super::before_after::BeforeAfter;
+use super::failure::Failure;
 use super::finished::{Finished, parameter_rows, summary, warnings, weakest};
 use super::models::{self, Comparison};
+use super::observed::Observed;
 use super::optics::Optics;
+use super::options::{Arguments, ModelChoice};
 use super::scatter::Residuals;
 use super::view_names::ViewNames;
-use super::{
-    Arguments, Exit, Failure, Format, ModelChoice, advice, maps, page, plots, poses, print, scatter, table,
-    warn,
-};
-use calibench::board::{Board, View};
+use super::{advice, maps, page, plots, poses, scatter};
+use calibench::board::View;
 use calibench::calibrate::{Loss, ProfileInterval};
 use calibench::detect::Orientation;
 use calibench::geometry::Vec2;
@@ -23,41 +26,6 @@ use calibench_harness::Figure;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-
-/// Views and where they come from.
-#[derive(Debug, Default)]
-pub(super) struct Observed {
-    /// What errors call the input.
-    pub(super) source: String,
-    /// What the page calls it.
-    pub(super) title: String,
-    /// Unit of lengths on the board.
-    pub(super) unit: String,
-    /// Names of all that was given, the views and what was left out.
-    pub(super) given: Vec<String>,
-    /// The photographs, if those were given.
-    pub(super) photos: Vec<PathBuf>,
-    /// One name a view.
-    pub(super) names: Vec<String>,
-    /// The place of each view in what was given.
-    pub(super) places: Vec<usize>,
-    pub(super) views: Vec<View>,
-    pub(super) image_size: Option<(usize, usize)>,
-    /// How far photographs tell which mark is the board's first.
-    pub(super) orientation: Option<Orientation>,
-    /// Mean level of each photograph over the board.
-    pub(super) light: Vec<f64>,
-    /// The board whose discs' bias is to be corrected.
-    pub(super) discs: Option<Board>,
-    /// Input that gave no view.
-    pub(super) left_out: Vec<LeftOut>,
-    /// Its places in what was given.
-    pub(super) left_out_places: Vec<usize>,
-    /// Pictures by their photographs' places: paths relative to the output folder.
-    pub(super) overlays: BTreeMap<usize, String>,
-    /// What a reader must know about the input.
-    pub(super) notes: Vec<String>,
-}
 
 /// A mark may lie this part of the image's longer side beyond the centres of the outermost pixels, one pixel
 /// at least: its border is half a pixel away, files that count pixels from 1 add half a pixel, and what noise

@@ -1,7 +1,7 @@
 //! Do the options say one thing? What they say twice, or say to a kind of input that has no use for it, is
 //! refused and not decided.
 
-use super::{Arguments, ModelChoice};
+use super::options::{Arguments, ModelChoice};
 use calibench::camera::Parameter;
 
 /// What a file or the files hold.

@@ -2,7 +2,7 @@
 //! plots.
 
 use super::html::{self, escaped, heading, note, number, paragraph, table};
-use super::measured::{CORRECTION_COLUMNS, Report, correction_rows, summary};
+use super::measured_report::{CORRECTION_COLUMNS, Report, correction_rows, summary};
 use super::page::{optics, parameters};
 use super::scatter::{self, Residuals};
 use super::{maps, plots};

@@ -1,8 +1,8 @@
 //! Which lens model is to be taken, and which freedom explains what a fit leaves over?
 
-use super::Failure;
-use super::camera::Observed;
-use super::table;
+use super::super::report::table;
+use super::failure::Failure;
+use super::observed::Observed;
 use calibench::calibrate::{
     Board, Candidate, Compared, Freedom, LensCalibration, Loss, Settings, Warning, calibrate_lens,
     compare_models, explaining_freedoms,

@@ -1,8 +1,11 @@
 //! Photographs of a board: each is read, its marks found and drawn in; one that fails is named and the rest
 //! goes on.
 
-use super::camera::{self, Observed};
-use super::{Arguments, Exit, Failure, warn};
+use super::super::{Exit, warn};
+use super::camera;
+use super::failure::Failure;
+use super::observed::Observed;
+use super::options::Arguments;
 use calibench::board::{View, ViewError};
 use calibench::detect::SeenBoard;
 use calibench::geometry::Vec2;

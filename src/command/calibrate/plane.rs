@@ -1,7 +1,12 @@
 //! A map of a plane from a file of point pairs.
 
+use super::super::format::Format;
+use super::super::report::table;
+use super::super::source::last_part;
+use super::super::{Exit, print};
+use super::failure::Failure;
+use super::options::{Arguments, Mode};
 use super::plane_page::PlaneReport;
-use super::{Arguments, Exit, Failure, Format, Mode, last_part, print, table};
 use calibench::geometry::Vec2;
 use calibench::io::{PointPairs, parse_point_pairs, significant, write_together};
 use calibench::planar::{PlaneCalibration, calibrate_plane};

@@ -1,8 +1,8 @@
 //! What is said of a whole experiment, of a section of the chapter, and of a statement that does not hold?
 
+use super::known::{Known, record_of};
 use super::names::{Names, sections_of};
 use super::words::Answer;
-use super::{Known, record_of};
 use crate::Exit;
 use calibench::io::significant;
 use calibench_book::Contradiction;

@@ -1,7 +1,7 @@
 //! One thing of a record: what it is, how it is computed, what stands behind it, what the chapter prints,
 //! where it is shown.
 
-use super::Known;
+use super::known::Known;
 use super::pages::pages;
 use super::words::Answer;
 use calibench::io::significant;

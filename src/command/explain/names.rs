@@ -1,6 +1,6 @@
 //! What names are there, and which one is meant?
 
-use super::Known;
+use super::known::Known;
 use calibench::io::shown::on_one_line;
 use calibench_harness::{Experiment, golden};
 use std::collections::BTreeSet;

@@ -1,6 +1,6 @@
 //! Options that several ways of judging share, a group each.
 
-use super::super::calibrate::Format;
+use super::super::format::Format;
 use super::super::said::{refuse_standard_output, whole};
 use super::super::{Exit, print, program};
 use super::{Stop, incomplete, usage};

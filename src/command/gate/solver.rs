@@ -1,6 +1,6 @@
 //! `calibench gate` without a verb after it: asks a solver, and judges or compares what it answers.
 
-use super::super::calibrate::Format;
+use super::super::format::Format;
 use super::super::{Exit, print};
 use super::compare::Against;
 use super::options::{Copies, Judgement, Problems, Reports};

@@ -1,6 +1,6 @@
 //! A solver's report, taken and told: of one that is asked now, or of answers in a folder.
 
-use super::super::calibrate::Format;
+use super::super::format::Format;
 use super::super::terminal::warn_lines;
 use super::super::{Exit, print, warn};
 use super::options::{Judgement, Reports};

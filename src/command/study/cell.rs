@@ -2,7 +2,7 @@
 
 use super::{Failure, complete};
 use crate::Exit;
-use crate::calibrate::Format;
+use crate::format::Format;
 use crate::said::{print_as, written_by};
 use calibench::io::ShownPath;
 use calibench_study::{MARKS, POSES};

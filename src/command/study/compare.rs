@@ -4,7 +4,7 @@
 use super::Failure;
 use super::finished::estimated_json;
 use crate::Exit;
-use crate::calibrate::Format;
+use crate::format::Format;
 use crate::said::print_as;
 use calibench::io::significant;
 use calibench_study::compare::{CompareError, Comparison, Verdict, compare, compare_levels};

@@ -2,7 +2,7 @@
 //! everything stands in the report and the tables.
 
 use super::Failure;
-use crate::calibrate::Format;
+use crate::format::Format;
 use crate::said::{print_as, written_by};
 use calibench::io::{ShownPath, significant};
 use calibench_harness::stopwatch::rate;

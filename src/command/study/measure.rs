@@ -1,7 +1,7 @@
 //! `calibench study measure`: how fast are trials, and how much memory do they take?
 
 use super::{Failure, read_study};
-use crate::calibrate::Format;
+use crate::format::Format;
 use crate::said::written_by;
 use crate::{Exit, print};
 use calibench::io::ShownPath;

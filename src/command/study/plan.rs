@@ -3,7 +3,7 @@
 
 use super::finished::estimated_json;
 use super::{Failure, read_study};
-use crate::calibrate::Format;
+use crate::format::Format;
 use crate::said::{print_as, written_by};
 use crate::{Exit, print, warn};
 use calibench::io::ShownPath;

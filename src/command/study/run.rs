@@ -3,7 +3,7 @@
 use super::finished::{Finished, Ran};
 use super::solver::ProgramArguments;
 use super::{Failure, read_study};
-use crate::calibrate::Format;
+use crate::format::Format;
 use crate::{Exit, warn};
 use calibench::io::{ShownPath, keep_files, significant};
 use calibench_harness::project::Project;
