@@ -134,8 +134,8 @@ fn claim_current(record: &mut Record, measured: &[Measured], context: &Context) 
     record
         .claim_that(
             "scenes-are-current",
-            "every committed scene was judged by the present solver, drawn and referred by the present \
-             code",
+            "every committed scene was drawn and judged by the present code, or by code of which the \
+             present has made an eighth again, bit for bit",
         )
         .every(
             "cases",

@@ -11,7 +11,7 @@
 //!
 //! The run judges the first scenes of every model; all of them take minutes, stand in golden/lens-minimum/,
 //! and are read here. They are refused as stale when a line of the solver, of the scenes or of the reference
-//! has changed.
+//! has changed, unless the changed code has made an eighth of them again, bit for bit.
 
 use crate::global_minimum::{ENDINGS, judged::Class, more_than};
 use calibench::camera::Model;
@@ -103,7 +103,7 @@ fn claim_current(record: &mut Record, measured: &[Measured]) {
     record
         .claim_that(
             "scenes-are-current",
-            "every committed scene was judged by the present solver, drawn and referred by the present code",
+            "every committed scene was drawn and judged by the present code, or by code of which the present has made an eighth again, bit for bit",
         )
         .every("tables", measured.iter().map(case))
         .because("SHA-256 of the code lines of solver, scenes and reference, and the versions of the numeric crates");

@@ -27,6 +27,10 @@ struct Arguments {
     /// Draws other scenes
     #[arg(long, default_value_t = SEED)]
     seed: u64,
+    /// Makes every eighth row again instead, and notes in the tables that they are the same if they are: for a
+    /// change of the code that should move nothing
+    #[arg(long, conflicts_with = "seed")]
+    confirm: bool,
 }
 
 /// The command.
@@ -41,24 +45,43 @@ fn run(arguments: &Arguments) -> Result<(), String> {
         let names: Vec<&str> = FAMILIES.iter().map(Family::name).collect();
         return Err(format!("no scenes of that model; there are: {}", names.join(", ")));
     }
-    families.into_iter().try_for_each(|family| write(family, arguments.seed, &arguments.out))
+    families.into_iter().try_for_each(|family| match arguments.confirm {
+        true => confirm(family, &arguments.out),
+        false => write(family, arguments.seed, &arguments.out),
+    })
+}
+
+fn table_of(family: &Family, folder: &Path) -> PathBuf {
+    folder.join(format!("{}.csv", family.name()))
+}
+
+fn confirm(family: &'static Family, folder: &Path) -> Result<(), String> {
+    let present = Fingerprint::of_lens_minimum();
+    let every = (0..SCENES).skip(present.pick(campaign::EVERY)).step_by(campaign::EVERY);
+    let again: Vec<String> = lines(family, SEED, every.collect())?.iter().map(Line::text).collect();
+    campaign::confirm(&table_of(family, folder), &present, &again)
 }
 
 fn write(family: &'static Family, seed: u64, folder: &Path) -> Result<(), String> {
-    let path = folder.join(format!("{}.csv", family.name()));
+    let path = table_of(family, folder);
     let head = Fingerprint::of_lens_minimum().head(&format!("{COMMAND}; seed {seed}"));
     campaign::write_unless_current(&path, &head, || measured(family, seed))
 }
 
-#[allow(clippy::print_stdout, reason = "the command's answer")]
-fn measured(family: &'static Family, seed: u64) -> Result<String, String> {
-    let progress = ProgressDisplay::stderr().start(family.name(), SCENES as usize);
+/// Draws and judges some scenes.
+fn lines(family: &'static Family, seed: u64, scenes: Vec<u64>) -> Result<Vec<Line>, String> {
+    let progress = ProgressDisplay::stderr().start(family.name(), scenes.len());
     let line = |index: u64| {
         let line = judged(family, seed, index);
         progress.step();
         line.ok_or_else(|| format!("{}: no scene {index} can be drawn", family.name()))
     };
-    let lines: Vec<Line> = (0..SCENES).into_par_iter().map(line).collect::<Result<_, _>>()?;
+    scenes.into_par_iter().map(line).collect()
+}
+
+#[allow(clippy::print_stdout, reason = "the command's answer")]
+fn measured(family: &'static Family, seed: u64) -> Result<String, String> {
+    let lines = lines(family, seed, (0..SCENES).collect())?;
     let of = |class: Class| format!("{class} {}", lines.iter().filter(|line| line.class == class).count());
     println!("{}: {}", family.name(), Class::ALL.map(of).join(", "));
     Ok(campaign::table(HEADER, lines.iter().map(Line::text)))

@@ -1,6 +1,6 @@
 //! The whole measurement: all trials of a truth, or of every truth, and what is committed of them.
 
-use super::layout::LAYOUTS;
+use super::layout::{LAYOUTS, Layout};
 use super::row::{HEADER, Row};
 use super::trial::Photographs;
 use super::truths::{TRUTHS, Truth};
@@ -26,6 +26,10 @@ struct Arguments {
     /// Writes there instead
     #[arg(long, default_value = FOLDER)]
     out: PathBuf,
+    /// Makes every eighth trial again instead, and notes in the tables that its rows are the same if they are:
+    /// for a change of the code that should move nothing
+    #[arg(long)]
+    confirm: bool,
 }
 
 /// The command.
@@ -40,24 +44,40 @@ fn run(arguments: &Arguments) -> Result<(), String> {
         let names: Vec<&str> = TRUTHS.iter().map(|truth| truth.name).collect();
         return Err(format!("no truth of that name; there are: {}", names.join(", ")));
     }
-    truths.into_iter().try_for_each(|truth| write(truth, &arguments.out))
+    truths.into_iter().try_for_each(|truth| match arguments.confirm {
+        true => confirm(truth, &arguments.out),
+        false => write(truth, &arguments.out),
+    })
+}
+
+fn table_of(truth: &Truth, folder: &Path) -> PathBuf {
+    folder.join(format!("{}.csv", truth.name))
+}
+
+fn confirm(truth: &Truth, folder: &Path) -> Result<(), String> {
+    let present = Fingerprint::of_model_choice();
+    let every = jobs(truth).into_iter().skip(present.pick(campaign::EVERY)).step_by(campaign::EVERY);
+    let again: Vec<String> = measured(truth, every.collect())?.iter().map(Row::text).collect();
+    campaign::confirm(&table_of(truth, folder), &present, &again)
 }
 
 fn write(truth: &Truth, folder: &Path) -> Result<(), String> {
-    let path = folder.join(format!("{}.csv", truth.name));
+    let path = table_of(truth, folder);
     let head = Fingerprint::of_model_choice().head(&format!("{COMMAND}; seed {SEED}"));
-    let table = || Ok(campaign::table(HEADER, measured(truth)?.iter().map(Row::text)));
+    let table = || Ok(campaign::table(HEADER, measured(truth, jobs(truth))?.iter().map(Row::text)));
     campaign::write_unless_current(&path, &head, table)
 }
 
-/// All trials of a truth, the longest first so that no processor is left with one of them at the end; rows in
-/// order.
-fn measured(truth: &Truth) -> Result<Vec<Row>, String> {
-    let jobs =
-        LAYOUTS.iter().rev().flat_map(|layout| (0..layout.trials(truth)).map(move |trial| (*layout, trial)));
-    let jobs: Vec<_> = jobs.collect();
+/// All trials of a truth, the longest first so that no processor is left with one of them at the end.
+fn jobs(truth: &Truth) -> Vec<(Layout, u64)> {
+    let of = |layout: &'static Layout| (0..layout.trials(truth)).map(move |trial| (*layout, trial));
+    LAYOUTS.iter().rev().flat_map(of).collect()
+}
+
+/// Some trials of a truth; rows in order.
+fn measured(truth: &Truth, jobs: Vec<(Layout, u64)>) -> Result<Vec<Row>, String> {
     let progress = ProgressDisplay::stderr().start(truth.name, jobs.len());
-    let trial = |&(layout, trial): &(super::layout::Layout, u64)| {
+    let trial = |&(layout, trial): &(Layout, u64)| {
         let photographs = Photographs::new(truth, layout, SEED, trial);
         let rows = photographs.map(|photographs| photographs.rows());
         progress.step();

@@ -1,6 +1,7 @@
 //! Were committed measurements made by the code that runs now? A measurement that takes minutes is not
 //! repeated by every check: it carries the fingerprint of the code it depends on, and is stale as soon as a
-//! line of that code changes.
+//! line of that code changes, unless the changed code has made a part of its rows again, bit for bit, and the
+//! table says so.
 
 pub mod code;
 
@@ -77,15 +78,39 @@ impl Fingerprint {
         format!("# {command}; fingerprint {}", self.0.as_deref().unwrap_or("unknown"))
     }
 
-    /// A case for a claim: whether `table`, committed as `name`, was written with this fingerprint, and what
-    /// to do if not.
+    /// The first line of a table of which this code has made `again` of `all` rows again, bit for bit: the
+    /// line it had, with that in place of what it said of earlier code that did so.
+    pub fn head_again(&self, head: &str, again: usize, all: usize) -> String {
+        let before = head
+            .split_once(CONFIRMED)
+            .map_or(head, |(before, _)| before.rsplit_once("; ").map_or(before, |(before, _counts)| before));
+        let present = self.0.as_deref().unwrap_or("unknown");
+        format!("{before}; {again} of {all}{CONFIRMED}{present}")
+    }
+
+    /// A number below `count` that another code has another of.
+    pub fn pick(&self, count: usize) -> usize {
+        let digits = self.0.as_deref().and_then(|digits| usize::from_str_radix(&digits[..8], 16).ok());
+        digits.unwrap_or(0) % count
+    }
+
+    /// A case for a claim: whether `table`, committed as `name`, was written with this fingerprint or
+    /// confirmed with it, and what to do if not.
     pub fn case(&self, name: &str, table: &str, command: &str) -> (String, bool) {
-        let written = written(table).unwrap_or("none");
+        let written = confirmed(table).or_else(|| written(table)).unwrap_or("none");
         let Some(present) = &self.0 else { return (format!("{name}: {written}"), true) };
         let what =
             format!("{name} is stale: it has fingerprint {written}, the code {present}; run `{command}`");
         (what, written == present)
     }
+}
+
+/// What a first line says between the count of the rows that later code made again and its fingerprint.
+const CONFIRMED: &str = " rows made again, the same, with fingerprint ";
+
+/// The fingerprint of the code that has confirmed a table.
+fn confirmed(table: &str) -> Option<&str> {
+    Some(table.lines().next()?.split_once(CONFIRMED)?.1)
 }
 
 /// The fingerprint in the first line of a table.
@@ -106,6 +131,20 @@ mod tests {
         let (what, held) = after.case("t.csv", &table, "calibench x");
         assert!(!held && what.contains("run `calibench x`"), "{what}");
         assert!(!before.case("t.csv", "a,b\n1,2\n", "calibench x").1);
+    }
+
+    #[test]
+    fn code_that_made_rows_again_vouches_for_a_table_until_it_changes_too() {
+        let [first, second, third] = ["a\n", "b\n", "c\n"].map(Fingerprint::of);
+        let head = first.head("calibench x");
+        let again = second.head_again(&head, 2, 16);
+        assert!(again.starts_with(&format!("{head}; 2 of 16 rows made again, the same, with")), "{again}");
+        assert_eq!(written(&again), written(&head));
+        let held = |code: &Fingerprint, head: &str| code.case("t.csv", &format!("{head}\na\n1\n"), "x").1;
+        assert_eq!([&first, &second, &third].map(|code| held(code, &again)), [false, true, false]);
+        let later = third.head_again(&again, 3, 16);
+        assert_eq!(later, third.head_again(&head, 3, 16));
+        assert_eq!([&second, &third].map(|code| held(code, &later)), [false, true]);
     }
 
     #[test]
