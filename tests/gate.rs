@@ -253,6 +253,40 @@ fn two_files_of_answers_are_compared_as_the_solvers_behind_them_are() {
     );
 }
 
+/// With too few pairs for a test a difference that would matter is not called none, whichever of the two is
+/// the reference.
+#[test]
+fn answers_that_differ_by_much_are_not_called_of_one_law_for_being_few() {
+    let (good, biased) = (folder("gate-few-good"), folder("gate-few-biased"));
+    let path = |folder: &Path| folder.to_string_lossy().into_owned();
+    let recorded = gate(&["--samples", "4", "--scene", "four-pose", "--record", &path(&good)]);
+    assert_eq!(recorded.status.code(), Some(0));
+    std::fs::create_dir_all(&biased).expect("a folder");
+    let read = |name: &str| std::fs::read_to_string(good.join(name)).expect("recorded");
+    let off = |line: &str| {
+        let mut answer: serde_json::Value = serde_json::from_str(line).expect("an answer");
+        if let Some(fx) = answer["parameters"]["fx"].as_f64() {
+            answer["parameters"]["fx"] = (fx + 0.3).into();
+        }
+        format!("{answer}\n")
+    };
+    let answers: String = read("answers.jsonl").lines().map(off).collect();
+    std::fs::write(biased.join("answers.jsonl"), answers).expect("written");
+    std::fs::write(biased.join("manifest.json"), read("manifest.json")).expect("written");
+    for (new, reference) in [(&good, &biased), (&biased, &good)] {
+        let json = good.join("compared.json");
+        let compared =
+            gate(&["judge", &path(new), "--against", &path(reference), "--json", &json.to_string_lossy()]);
+        let text = String::from_utf8_lossy(&compared.stdout).into_owned();
+        assert_eq!(compared.status.code(), Some(1), "{text}");
+        assert!(text.contains("\nTOO FEW PAIRS: ") || text.contains("\nCHANGED: "), "{text}");
+        let report: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(&json).expect("written")).expect("JSON");
+        assert_eq!(report["held"], false);
+        assert!(["too-few-pairs", "changed"].contains(&report["conclusion"].as_str().expect("a word")));
+    }
+}
+
 #[test]
 fn a_reference_that_estimates_nothing_is_compared_with_nothing() {
     let asked = ["--samples", "2", "--scene", "four-pose", "--against"];

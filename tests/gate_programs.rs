@@ -89,6 +89,33 @@ fn an_interrupted_gate_leaves_no_program_behind() {
     }
 }
 
+/// What an interrupt ended broke no rule: nothing is said of the solver, and the code is that of an interrupt.
+#[test]
+fn an_interrupted_gate_blames_nobody() {
+    for verb in ["hand-eye", "detector"] {
+        let out = folder(&format!("gate-blames-{verb}"));
+        std::fs::create_dir_all(&out).expect("a folder");
+        let id_file = out.join("id");
+        let solver = format!("echo $$ > {}; exec sleep 1000", id_file.display());
+        let gate = Command::new(CALIBENCH)
+            .args(["gate", verb, "--solver", &solver])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn();
+        let gate = gate.expect("the program starts");
+        let patience = Instant::now() + Duration::from_secs(120);
+        while std::fs::read_to_string(&id_file).unwrap_or_default().trim().is_empty() {
+            assert!(Instant::now() < patience, "the solver was never started");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        let told = Command::new("kill").args(["-INT", &gate.id().to_string()]).status();
+        assert!(told.expect("kill runs").success());
+        let output = gate.wait_with_output().expect("it ends");
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert_eq!((output.status.code(), text.as_ref()), (Some(3), ""), "{verb}");
+    }
+}
+
 #[test]
 fn a_program_that_crashes_is_quoted() {
     let seen = breakages("echo out of memory >&2; exit 7", 20.0, 1);

@@ -3,9 +3,9 @@
 
 use calibench::board::View;
 use calibench::calibrate::{
-    Calibration, CalibrationError, Loss, Outliers, Settings, Termination, Warning, calibrate,
+    Calibration, CalibrationError, Loss, Outliers, Settings, Termination, Warning, calibrate, locate,
 };
-use calibench::camera::{Camera, FreeParameters, Parameter};
+use calibench::camera::{Camera, FreeParameters, Lens, Parameter};
 use calibench::geometry::{Pose, Vec2, Vec3};
 use calibench::synth::{Scene, Stream, StreamKey, Truth, scene::looking_at_centre};
 
@@ -24,6 +24,36 @@ fn assert_right(result: &Calibration, truth: &Camera) {
         let z = (result.camera.get(parameter) - truth.get(parameter))
             / result.standard_deviation(parameter).unwrap();
         assert!(z.abs() < 6.0, "{parameter} is {z:.1} standard deviations off");
+    }
+}
+
+/// With hundreds of views some always face the camera, and their tilts are in doubt: the others say what
+/// camera it is, and no search is made for another.
+#[test]
+fn a_few_views_of_doubtful_tilt_among_many_need_no_search() {
+    let mut stream = noise("many", 0);
+    let mut pose = |most: f64| {
+        let turn = std::array::from_fn(|_| stream.uniform_in(-most, most));
+        looking_at_centre(turn, stream.uniform_in(110.0, 160.0))
+    };
+    let mut poses: Vec<Pose> = (0..150).map(|_| pose(30.0)).collect();
+    poses.extend((0..12).map(|_| pose(0.3)));
+    let count = poses.len();
+    let scene = scene_of(poses);
+    let views = scene.observe(0.5, &mut noise("many", 1));
+    let result = calibrate(&views, &Settings::standard()).unwrap();
+    assert_right(&result, &scene.truth.camera);
+    assert_eq!(result.starts, 1);
+    // The tilt that explains each view better: refined from its mirror image no view is explained better.
+    let camera: Camera<Lens> = result.camera.into();
+    let poses = &result.cam_from_target;
+    for view in (0..count).filter(|&view| view >= 150) {
+        let alone = locate(&camera, &views[view]).unwrap();
+        let square = |pose: &Pose| -> f64 {
+            let seen = |p: &Vec2| camera.pixel(&pose.apply(&Vec3::new(p.x, p.y, 0.0))).unwrap();
+            views[view].pairs().map(|(p, q)| (seen(p) - q).norm_squared()).sum()
+        };
+        assert!(square(&poses[view]) <= square(&alone.cam_from_target) + 0.01, "view {view}");
     }
 }
 

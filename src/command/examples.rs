@@ -124,7 +124,7 @@ const EXAMPLES: &[(&str, &[&str])] = &[
             "calibench gate --html report.html",
             "calibench gate --solver \"python3 my_solver.py\" --samples 1",
             "calibench gate --planted k2-ignored --samples 4",
-            "calibench gate --samples 2 --record before",
+            "calibench gate --samples 32 --record before",
         ],
     ),
     ("gate export", &["calibench gate export asked --samples 1"]),

@@ -3,10 +3,11 @@
 use super::covariance_form::{self, CovarianceFault};
 use super::protocol::{Answer, AnswerCovariance, AnswerPose, Problem, Status};
 use super::quoted::quoted;
+use super::strict::Object;
 use calibench::camera::{Camera, FreeParameters, Lens, Parameter};
 use calibench::geometry::Pose;
 use nalgebra::{DMatrix, Matrix6};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// An answer that keeps the protocol.
 #[derive(Debug, Clone, PartialEq)]
@@ -117,6 +118,12 @@ pub enum Breakage {
         /// Which.
         what: String,
     },
+    /// A name stands twice where every name may stand once.
+    #[error("{what} stands twice")]
+    Repeated {
+        /// What.
+        what: String,
+    },
     /// Two answers to one problem, in files.
     #[error("answered more than once")]
     Twice,
@@ -142,7 +149,7 @@ pub(super) const LINE_HEAD: usize = 80;
 
 /// An answer, or why the line is none.
 pub fn read_line(line: &str) -> Result<Answer, Breakage> {
-    serde_json::from_str(line).map_err(|error| {
+    serde_json::from_str(line).map(|Object(answer)| answer).map_err(|error| {
         // JSON has no NaN; most languages write one all the same.
         for word in ["NaN", "Infinity", "-Infinity", "nan", "inf"] {
             let stands = |before: &str| line.contains(&format!("{before}{word}"));
@@ -205,6 +212,10 @@ fn of_parameters(mut named: BTreeMap<String, f64>) -> BTreeMap<String, f64> {
 
 fn covariance_of_parameters(given: AnswerCovariance) -> Result<AnswerCovariance, Breakage> {
     refuse_oblong(&given)?;
+    let mut known = BTreeSet::new();
+    if let Some(name) = given.parameters.iter().find(|name| !known.insert(name.as_str())) {
+        return Err(Breakage::Repeated { what: format!("row {} of the covariance", quoted(name)) });
+    }
     let kept: Vec<usize> =
         (0..given.parameters.len()).filter(|&i| is_parameter(&given.parameters[i])).collect();
     Ok(AnswerCovariance {

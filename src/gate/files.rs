@@ -2,13 +2,17 @@
 //! files.
 
 use super::accept::{Breakage, id_in, read_line};
+use super::greeting::Greeting;
+use super::lines::{self, Line};
 use super::plan::{Asked, Plan, PlanError, Purpose};
+use super::program::MOST_LINE_BYTES;
 use super::protocol::{Answer, Problem};
 use super::quoted::quoted;
 use super::recorder::{self, Recorder};
 use super::solver::{Given, Solver};
 use calibench::camera::{Model, UnknownModel};
 use calibench::io::hash::sha256_hex;
+use calibench::io::input::open_regular;
 use calibench::io::{InputError, read_regular_text, write_atomically};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -177,15 +181,16 @@ pub fn recorded(folder: &Path) -> Result<(Plan, Recorded), FilesError> {
         serde_json::from_str(&read(&path)?).map_err(|cause| FilesError::Manifest { path, cause })?;
     let plan = Plan::of(manifest.seed, manifest.samples, manifest.asked()?)?;
     let now = sha256_hex(problem_lines(&plan).as_bytes());
-    if now != manifest.sha256 {
+    if now != manifest.sha256 || plan.cases.len() != manifest.problems {
         return Err(FilesError::OtherVersion { found: manifest.sha256, now });
     }
     let asked: BTreeSet<String> = plan.cases.iter().map(|case| plan.id(case)).collect();
     let mut recorded = Recorded { folder: folder.to_path_buf(), answers: BTreeMap::new(), stray: None };
     for path in answer_files(folder)? {
-        for (i, line) in read(&path)?.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
-            recorded.take(line, &asked, || format!("{}, line {}", path.display(), i + 1));
-        }
+        let (file, _) = open_regular(&path, MOST_BYTES)?;
+        let at = |number: usize| format!("{}, line {number}", path.display());
+        lines::for_each(file, |number, line| recorded.take(line, &asked, || at(number)))
+            .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))?;
     }
     Ok((plan, recorded))
 }
@@ -212,12 +217,19 @@ impl Recorded {
     }
 
     /// Files a line under the problem that it answers.
-    fn take(&mut self, line: &str, asked: &BTreeSet<String>, place: impl Fn() -> String) {
+    fn take(&mut self, line: Line<'_>, asked: &BTreeSet<String>, place: impl Fn() -> String) {
+        let (line, answer) = match line {
+            Line::Whole(line) => (line, read_line(line)),
+            Line::TooLong(beginning) => (beginning, Err(Breakage::TooLong { limit: MOST_LINE_BYTES })),
+        };
         if let Some((id, breakage)) = recorder::broken(line) {
             self.answers.insert(id, Err(breakage));
             return;
         }
-        let answer = read_line(line);
+        // What a program writes before its first answer is no stray.
+        if matches!(Greeting::read(line), Ok(Some(_))) {
+            return;
+        }
         let id = answer.as_ref().map_or_else(|_| id_in(line).map(str::to_string), |a| Some(a.id.clone()));
         match (id, answer) {
             (Some(id), _) if !asked.contains(&id) => {

@@ -43,8 +43,11 @@ impl Greeting {
             return Ok(None);
         }
         let greeting: Greeting = serde_json::from_value(value).map_err(|error| error.to_string())?;
-        if !(1..=VERSION).contains(&greeting.protocol) {
-            return Err(format!("protocol {}, and the gate speaks 1 and {VERSION}", greeting.protocol));
+        if greeting.protocol != VERSION {
+            return Err(format!(
+                "protocol {}, and a greeting is of protocol {VERSION}: programs of version 1 write none",
+                greeting.protocol
+            ));
         }
         if !(0.0..=MOST_WARM_UP_S).contains(&greeting.warm_up_seconds) {
             let seconds = greeting.warm_up_seconds;
@@ -97,6 +100,7 @@ mod tests {
     fn what_is_wrong_with_a_greeting_is_said() {
         for (line, said) in [
             (r#"{"protocol":3}"#, "protocol 3"),
+            (r#"{"protocol":1}"#, "version 1 write none"),
             (r#"{"protocol":"2"}"#, "invalid type"),
             (r#"{"protocol":2,"models":"rational"}"#, "expected a sequence"),
             (r#"{"protocol":2,"warm_up_seconds":-1}"#, "may be 0 to 600"),

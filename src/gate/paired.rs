@@ -43,8 +43,30 @@ pub struct Comparison {
     /// The same of the stated uncertainty: a parameter or an uncorrelated combination of some, the ratio of
     /// its stated variances.
     pub stated: Option<(String, f64, f64)>,
+    /// Whether what differs here was tested: with fewer than 30 pairs it is not, unless it is too little to
+    /// matter.
+    pub is_tested: bool,
     /// Median time new / reference; NaN, and `null` in JSON, where one of the two is not known.
     pub time: f64,
+}
+
+/// What a comparison comes to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Conclusion {
+    /// Of no problem are there two estimates.
+    NotCompared,
+    /// Something that matters moved, or is no longer stated.
+    Changed,
+    /// Answers differ by what would matter, where too few were asked to tell it from chance.
+    TooFewPairs,
+    /// Verdicts differ, none of them for the worse, and nothing moved.
+    OtherVerdicts,
+    /// Answers differ in nothing that matters.
+    SameLaw,
+    /// Not a bit differs.
+    Same,
 }
 
 /// The comparison of two runs.
@@ -131,6 +153,10 @@ fn verdicts(new: &[Check], old: &[Check]) -> Vec<(Property, &'static str, Verdic
     pairs.filter(|(_, _, old, new)| old != new).collect()
 }
 
+/// Pairs with which tests begin: fewer make the normal approximation of Student's distribution too bold at
+/// small probabilities.
+const FEWEST_PAIRS: usize = 30;
+
 /// A paired test: what is told, and its normal score. Scores rank what is beyond doubt, where all p-values
 /// are 0.
 type Test = fn(&[(f64, f64)]) -> Option<(f64, f64)>;
@@ -180,18 +206,34 @@ fn of_scenario(scenario: &Scenario, replies: Vec<(&Seen, &Seen)>) -> Comparison 
         most_certain(each, matters)
     };
     let lawful = scenario.demand == Demand::Law;
+    let largest = (0..names.len()).flat_map(standardised).map(|(n, o)| (n - o).abs()).fold(0.0, f64::max);
+    let matters = is_relevant(largest) || both.iter().any(|(n, o)| states_otherwise(n, o));
     Comparison {
         scenario: scenario.id,
         pairs: both.len(),
         lost: replies.iter().filter(|(n, o)| !estimate(n) && estimate(o)).count(),
         gained: replies.iter().filter(|(n, o)| estimate(n) && !estimate(o)).count(),
         bits: both.iter().filter(|(n, o)| n.bits != o.bits).count(),
-        largest: (0..names.len()).flat_map(standardised).map(|(n, o)| (n - o).abs()).fold(0.0, f64::max),
+        largest,
+        is_tested: !lawful || both.len() >= FEWEST_PAIRS || !matters,
         shift: estimates(shift, is_relevant).filter(|_| lawful),
         spread: estimates(spread, is_other).filter(|_| lawful),
         stated: most_certain(stated(scenario, &both), is_other).filter(|_| lawful),
         time: median(both.iter().map(|(n, _)| n.seconds)) / median(both.iter().map(|(_, o)| o.seconds)),
     }
+}
+
+/// Whether two answers state variances that differ by what matters, or one of them states none.
+fn states_otherwise(new: &Trial, old: &Trial) -> bool {
+    let other = |new: &Option<Vec<f64>>, old: &Option<Vec<f64>>| match (new, old) {
+        (Some(new), Some(old)) => new.iter().zip(old).any(|(n, o)| is_other(n / o)),
+        (new, old) => new.is_some() != old.is_some(),
+    };
+    let squares = |trial: &Trial| {
+        let deviations = trial.standard_deviations.as_ref()?;
+        Some(deviations.iter().map(|sd| sd * sd).collect())
+    };
+    other(&squares(new), &squares(old)) || other(&new.principal_variances, &old.principal_variances)
 }
 
 /// Ratios of stated variances, parameter by parameter and along the uncorrelated combinations, each with its
@@ -232,8 +274,7 @@ fn shift(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
     let n = pairs.len() as f64;
     let mean = pairs.iter().map(|(a, b)| a - b).sum::<f64>() / n;
     let square: f64 = pairs.iter().map(|(a, b)| (a - b - mean) * (a - b - mean)).sum();
-    // Fewer pairs make the normal approximation of Student's distribution too bold at small probabilities.
-    if pairs.len() < 30 || (square == 0.0 && mean == 0.0) {
+    if pairs.len() < FEWEST_PAIRS || (square == 0.0 && mean == 0.0) {
         return None;
     }
     let error = (square / (n - 1.0) / n).sqrt();
@@ -244,7 +285,7 @@ fn shift(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
 /// are uncorrelated (Pitman 1939; Morgan 1939), their correlation tested by Fisher's transformation (1921).
 fn spread(pairs: &[(f64, f64)]) -> Option<(f64, f64)> {
     let n = pairs.len() as f64;
-    if pairs.len() < 30 {
+    if pairs.len() < FEWEST_PAIRS {
         return None;
     }
     let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / n;
@@ -291,12 +332,54 @@ impl Paired {
         self.samples == 0 || self.comparisons.iter().any(|c| c.pairs > 0)
     }
 
-    /// Whether two solvers were compared and nothing that matters changed: what is no longer stated counts as
-    /// changed.
+    /// What the comparison comes to.
+    pub fn conclusion(&self) -> Conclusion {
+        let is_worse = self.verdicts.iter().any(|(_, _, old, new)| worse(*old, *new));
+        match self.differing {
+            _ if !self.is_compared() => Conclusion::NotCompared,
+            _ if is_worse || self.comparisons.iter().any(|c| self.moved(c)) => Conclusion::Changed,
+            _ if self.comparisons.iter().any(|c| !c.is_tested) => Conclusion::TooFewPairs,
+            _ if !self.verdicts.is_empty() => Conclusion::OtherVerdicts,
+            0 => Conclusion::Same,
+            _ => Conclusion::SameLaw,
+        }
+    }
+
+    /// Whether two solvers were compared and nothing that matters changed for the worse: what is no longer
+    /// stated counts as changed, and what was not tested is not known to be the same.
     pub fn held(&self) -> bool {
-        self.is_compared()
-            && !self.comparisons.iter().any(|c| self.moved(c))
-            && !self.verdicts.iter().any(|(_, _, old, new)| worse(*old, *new))
+        use Conclusion::{OtherVerdicts, Same, SameLaw};
+        matches!(self.conclusion(), OtherVerdicts | SameLaw | Same)
+    }
+
+    /// The report as JSON, with the conclusion.
+    pub fn to_json(&self) -> String {
+        let mut value = serde_json::to_value(self).unwrap_or_default();
+        value["conclusion"] = serde_json::to_value(self.conclusion()).unwrap_or_default();
+        value["held"] = self.held().into();
+        format!("{value:#}\n")
+    }
+
+    fn conclusion_in_words(&self) -> String {
+        let n = self.differing;
+        match self.conclusion() {
+            Conclusion::NotCompared => "NOT COMPARED: of no problem are there two estimates".to_string(),
+            Conclusion::Changed => format!("CHANGED: {n} answers differ"),
+            Conclusion::TooFewPairs => {
+                let untested = self.comparisons.iter().filter(|c| !c.is_tested).count();
+                format!(
+                    "TOO FEW PAIRS: {n} answers differ, in {untested} scenes by what would matter, and tests begin with {FEWEST_PAIRS} \
+                     pairs a scene: ask with --samples {FEWEST_PAIRS} or more"
+                )
+            }
+            Conclusion::OtherVerdicts => {
+                format!(
+                    "OTHER VERDICTS, none for the worse: {n} answers differ, and nothing is known to have moved"
+                )
+            }
+            Conclusion::SameLaw => format!("SAME LAW: {n} answers differ, in nothing that matters"),
+            Conclusion::Same => "SAME: not a bit differs".to_string(),
+        }
     }
 
     /// One line a scenario, then what follows.
@@ -349,12 +432,7 @@ impl Paired {
                 new.word()
             ));
         }
-        let conclusion = match (self.held(), self.differing) {
-            _ if !self.is_compared() => "NOT COMPARED: of no problem are there two estimates".to_string(),
-            (true, 0) => "SAME: not a bit differs".to_string(),
-            (true, n) => format!("SAME LAW: {n} answers differ, in nothing that matters"),
-            (false, n) => format!("CHANGED: {n} answers differ"),
-        };
+        let conclusion = self.conclusion_in_words();
         let time = median(self.comparisons.iter().map(|c| c.time).filter(|time| time.is_finite()));
         let time = match time.is_finite() {
             true => format!("median time {} of the reference's", significant(time, 3)),

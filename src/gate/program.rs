@@ -39,8 +39,8 @@ pub fn end_all() {
     descendants::end_below();
 }
 
-/// The same for a process that is about to end itself: a program that broke off is not started anew
-/// meanwhile.
+/// The same for a process that is about to end itself. Meanwhile no program is started, and whoever asks one
+/// waits for the end: a program that is ended here broke no rule.
 pub fn end_for_good() {
     running::start_no_more();
     end_all();
@@ -206,7 +206,10 @@ impl PipedProgram {
         match self.from_child.recv_timeout(left) {
             Ok(Heard::Line(line)) => Ok(line),
             Ok(Heard::TooLong) => Err(Silence::TooLong),
-            Err(RecvTimeoutError::Timeout) => Err(Silence::Late),
+            Err(RecvTimeoutError::Timeout) => {
+                running::halt_where_it_is_over();
+                Err(Silence::Late)
+            }
             Err(RecvTimeoutError::Disconnected) => Err(self.ended()),
         }
     }
@@ -214,6 +217,7 @@ impl PipedProgram {
     /// Ends the program's input and waits for it to end by itself; what it still writes is counted and not
     /// judged.
     pub fn finish(mut self) -> ProgramEnd {
+        running::halt_where_it_is_over();
         let peak = descendants::peak_memory_bytes(self.child.id(), &self.mark);
         self.to_child = None;
         let deadline = Instant::now() + AFTER_INPUT;
@@ -240,6 +244,7 @@ impl PipedProgram {
 
     /// How the program ended, and the end of what it wrote to standard error.
     fn ended(&mut self) -> Silence {
+        running::halt_where_it_is_over();
         // Its output is closed; it is given a moment to end by itself, and the reader of its standard error
         // to come to the end of that.
         let deadline = Instant::now() + LAST_WORDS;

@@ -3,6 +3,7 @@
 //! The page for authors of solvers is `adapters/PROTOCOL.md`; the schemas in `src/gate/schema` are those of
 //! these types, which a test checks.
 
+use super::strict;
 use calibench::board::View;
 use calibench::camera::{Camera, FreeParameters, Lens, Model};
 use calibench::geometry::{Mat3, Pose, Vec2, Vec3};
@@ -75,16 +76,16 @@ pub struct Answer {
     /// What became of it.
     pub status: Status,
     /// Value of every free parameter by name; held ones may be repeated. Needed when the status is `ok`.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(default, deserialize_with = "strict::named", skip_serializing_if = "BTreeMap::is_empty")]
     pub parameters: BTreeMap<String, f64>,
     /// One pose a view, camera from target.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "strict::objects_if_any", skip_serializing_if = "Option::is_none")]
     pub poses: Option<Vec<AnswerPose>>,
     /// Standard deviation of every free parameter by name.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "strict::named_if_any", skip_serializing_if = "Option::is_none")]
     pub standard_deviations: Option<BTreeMap<String, f64>>,
     /// Covariance of the free parameters; takes the place of `standard_deviations`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "strict::object_if_any", skip_serializing_if = "Option::is_none")]
     pub covariance: Option<AnswerCovariance>,
     /// Covariance of every pose, 6 x 6, row by row: of the small rotation vector `w`, rad, by which the
     /// answered rotation is wrong, `R_answered = exp([w]x) R_true`, about the camera's x, y, z, then of the
@@ -222,6 +223,24 @@ mod tests {
     fn an_unmeasured_coordinate_is_written_as_null() {
         let view = ProblemView { target: vec![[0.0, 1.0]], pixels: vec![[f64::NAN, 2.5]] };
         assert_eq!(serde_json::to_string(&view).unwrap(), r#"{"target":[[0.0,1.0]],"pixels":[[null,2.5]]}"#);
+    }
+
+    #[test]
+    fn what_stands_twice_or_has_no_names_is_refused() {
+        let read =
+            |rest: &str| serde_json::from_str::<Answer>(&format!(r#"{{"id":"a","status":"ok",{rest}}}"#));
+        for (rest, said) in [
+            (r#""parameters":{"fx":1,"fx":2}"#, "`fx` stands twice"),
+            (r#""parameters":[["fx",1]]"#, "expected an object of numbers by name"),
+            (r#""standard_deviations":{"k1":1,"k1":1}"#, "`k1` stands twice"),
+            (r#""covariance":[["fx"],[[1]]]"#, "expected an object"),
+            (r#""poses":[[[[1,0,0],[0,1,0],[0,0,1]],[0,0,1]]]"#, "expected an object"),
+        ] {
+            let error = read(rest).unwrap_err().to_string();
+            assert!(error.contains(said), "{rest}: {error}");
+        }
+        let none = read(r#""poses":null,"standard_deviations":null,"covariance":null"#).unwrap();
+        assert!(none.poses.is_none() && none.standard_deviations.is_none() && none.covariance.is_none());
     }
 
     #[test]

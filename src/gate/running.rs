@@ -19,14 +19,17 @@ fn running() -> MutexGuard<'static, Running> {
     RUNNING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Starts a program: it is known before anybody looks for children that nobody waits for.
+/// Starts a program: it is known before anybody looks for children that nobody waits for. Never returns once
+/// no more is started.
 ///
 /// # Errors
-/// It cannot be started, or no more is.
+/// It cannot be started.
 pub(super) fn start(starter: &mut Command, mark: &str) -> std::io::Result<Child> {
     let mut running = running();
-    if running.is_over {
-        return Err(std::io::Error::other("programs are being ended, and none is started any more"));
+    while running.is_over {
+        drop(running);
+        std::thread::park();
+        running = self::running();
     }
     let child = starter.spawn()?;
     descendants::follow(&child);
@@ -53,6 +56,16 @@ pub(super) fn let_go(id: u32) {
 /// Takes all programs that run, with their marks.
 pub(super) fn take() -> BTreeMap<u32, String> {
     std::mem::take(&mut running().programs)
+}
+
+/// Never returns once no more is started: whoever asked a program that was ended from outside would take that
+/// for the program's fault.
+pub(super) fn halt_where_it_is_over() {
+    if running().is_over {
+        loop {
+            std::thread::park();
+        }
+    }
 }
 
 /// From now on none is started.

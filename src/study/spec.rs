@@ -61,6 +61,8 @@ pub enum Measure {
 
 /// No image is as wide as such noise, px; far above it pixels are no finite numbers.
 const MOST_NOISE_PX: f64 = 1e6;
+/// Less than any image has, and than coordinates of an image are rounded to.
+const LEAST_NOISE_PX: f64 = 1e-9;
 
 /// Truth: camera, target, poses, noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -317,7 +319,8 @@ impl SceneSpec {
         let side = self.image.0.max(self.image.1);
         check("scene.image", side as f64, "at most 1048576 px a side", side <= limits::MOST_SIDE)?;
         let noise = self.noise_px;
-        check("scene.noise_px", noise, "a positive number below 1e6", noise > 0.0 && noise < MOST_NOISE_PX)?;
+        let is_noise = (LEAST_NOISE_PX..MOST_NOISE_PX).contains(&noise);
+        check("scene.noise_px", noise, "a number from 1e-9 to less than 1e6", is_noise)?;
         let share = self.outlier_share;
         check("scene.outlier_share", share, "from 0 to below 1", (0.0..1.0).contains(&share))?;
         let spread = self.outlier_px;

@@ -3,6 +3,7 @@
 
 use crate::board::View;
 use crate::geometry::Vec2;
+use std::collections::HashMap;
 
 /// Two photographs differ by their noise, some 0.01 px at the least; pixels that all agree to this many px
 /// are one measurement, written twice: to two decimals perhaps.
@@ -46,7 +47,10 @@ impl Distinct {
 
     /// The views to calibrate from.
     pub fn views(&self, given: &[View]) -> Vec<View> {
-        let thinned = |view: usize| self.thinned.iter().find(|(index, _)| *index == view).map(|(_, v)| v);
+        let thinned = |view: usize| {
+            let at = self.thinned.binary_search_by_key(&view, |(index, _)| *index).ok()?;
+            Some(&self.thinned[at].1)
+        };
         self.kept.iter().map(|&view| thinned(view).unwrap_or(&given[view]).clone()).collect()
     }
 
@@ -84,15 +88,19 @@ impl Thinned {
         }
         let (mut points, mut pixels, mut marks): (Vec<Vec2>, Vec<Vec2>, Vec<usize>) = Default::default();
         let mut first = None;
+        let mut known = HashMap::new();
         for (index, (point, pixel)) in view.pairs().enumerate() {
-            let same = points.iter().zip(&pixels).position(|(p, q)| p == point && q == pixel);
-            if same.is_some() {
-                first = first.or(Some(index));
-            } else {
+            // Zeros of either sign are one number.
+            let numbers = [point.x, point.y, pixel.x, pixel.y].map(|x| (x + 0.0).to_bits());
+            let next = points.len();
+            let number = *known.entry(numbers).or_insert(next);
+            if number == next {
                 points.push(*point);
                 pixels.push(*pixel);
+            } else {
+                first = first.or(Some(index));
             }
-            marks.push(same.unwrap_or(points.len() - 1));
+            marks.push(number);
         }
         let view = View::new(points, pixels).expect("a part of a view is one");
         first.map(|first| Thinned { view, marks, first })
@@ -146,17 +154,18 @@ fn marks_in(views: &[View], thin: &[Option<Thinned>], view: usize, first: usize)
 /// a copy.
 fn first_of_each(views: &[View]) -> Vec<usize> {
     let mut first: Vec<usize> = (0..views.len()).collect();
-    // Only views whose leftmost pixels agree are compared whole: time grows as that of sorting.
-    let leftmost = |view: &View| view.pixels().iter().map(|p| p.x).fold(f64::INFINITY, f64::min);
-    let mut order: Vec<(f64, usize)> =
-        views.iter().enumerate().map(|(index, view)| (leftmost(view), index)).collect();
-    order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    for (i, &(left, a)) in order.iter().enumerate() {
+    // Only views whose outermost pixels agree are compared whole: time grows as that of sorting.
+    let mut order: Vec<(Extremes, usize)> =
+        views.iter().enumerate().map(|(index, view)| (extremes(view), index)).collect();
+    order.sort_unstable_by(|a, b| a.0[0].total_cmp(&b.0[0]).then(a.1.cmp(&b.1)));
+    for (i, &(outermost, a)) in order.iter().enumerate() {
         if first[a] != a {
             continue;
         }
-        for &(_, b) in order[i + 1..].iter().take_while(|(other, _)| other - left <= SAME_PX) {
-            if first[b] == b && is_copy(&views[a], &views[b]) {
+        let near = order[i + 1..].iter().take_while(|(other, _)| other[0] - outermost[0] <= SAME_PX);
+        for &(other, b) in near {
+            let may_be = other.iter().zip(&outermost).all(|(x, y)| (x - y).abs() <= SAME_PX);
+            if may_be && first[b] == b && is_copy(&views[a], &views[b]) {
                 first[a.max(b)] = a.min(b);
             }
         }
@@ -166,6 +175,17 @@ fn first_of_each(views: &[View]) -> Vec<usize> {
         first[view] = first[first[view]];
     }
     first
+}
+
+/// The least and the largest u and v of a view's pixels.
+type Extremes = [f64; 4];
+
+fn extremes(view: &View) -> Extremes {
+    let mut found = [f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY];
+    for pixel in view.pixels() {
+        found = [found[0].min(pixel.x), found[1].max(pixel.x), found[2].min(pixel.y), found[3].max(pixel.y)];
+    }
+    found
 }
 
 fn is_copy(a: &View, b: &View) -> bool {

@@ -58,6 +58,21 @@ const WELL_KNOWN: f64 = 0.03;
 /// lens explains more.
 const WELL_KNOWN_FLEXIBLE: f64 = 0.01;
 
+/// Whether a minimum needs no search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Settled {
+    Not,
+    /// So many tilts are evident that the camera is the right one whatever the others are: these alone are to
+    /// be tried the other way round.
+    ButForTilts,
+    Entirely,
+}
+
+/// Views of evident tilt that leave the others no say in what camera it is: with hundreds of views in all
+/// orientations some always face it, and a search over all of them for their sake takes a hundred times as
+/// long as the rest.
+const ENOUGH_TILTS: usize = 100;
+
 impl Judged {
     pub fn of(problem: &Problem<'_>, minimum: Minimum, starts: usize) -> Judged {
         let reduction = minimum.system.reduction();
@@ -93,13 +108,12 @@ impl Judged {
             .is_some_and(|c| c.freedom >= TELLING && c.is_possible() && c.p_value > CLEAR)
     }
 
-    /// Whether nothing speaks for another minimum, but perhaps parallel planes.
-    fn is_clear(&self, problem: &Problem<'_>) -> bool {
+    /// Whether nothing speaks for another minimum, but perhaps parallel planes or tilts.
+    fn is_clear_but_for_tilts(&self, problem: &Problem<'_>) -> bool {
         self.minimum.termination == Termination::Converged
             && self.minimum.iterations <= SHORT_WAY
             && self.is_certified()
             && self.is_well_known(problem)
-            && self.doubtful_tilts(problem).is_empty()
     }
 
     /// With the best of the minima met that is another camera and nearly as good.
@@ -133,13 +147,21 @@ impl Judged {
     /// Whether the minimum is clear, and the planes are not parallel. Parallel planes that determine nothing
     /// are refused at once, before a search that could find nothing, where the noise is known: at a cost that
     /// its floor certifies.
-    pub fn is_settled(&self, problem: &Problem<'_>) -> Result<bool, CalibrationError> {
+    pub fn is_settled(&self, problem: &Problem<'_>) -> Result<Settled, CalibrationError> {
         if !self.certificate.as_ref().is_some_and(|c| c.is_possible() && c.holds()) {
-            return Ok(false);
+            return Ok(Settled::Not);
         }
         let lower = identifiability::refuse_if_parallel(problem, &self.minimum, self.noise(problem));
         let lower = outliers::or_blamed(problem, &self.minimum.state, lower)?;
-        Ok(lower.is_none() && self.is_clear(problem))
+        if lower.is_some() || !self.is_clear_but_for_tilts(problem) {
+            return Ok(Settled::Not);
+        }
+        let doubtful = self.doubtful_tilts(problem).len();
+        Ok(match problem.observations.len() - doubtful {
+            _ if doubtful == 0 => Settled::Entirely,
+            evident if evident >= ENOUGH_TILTS => Settled::ButForTilts,
+            _ => Settled::Not,
+        })
     }
 
     pub fn noise(&self, problem: &Problem<'_>) -> Noise {

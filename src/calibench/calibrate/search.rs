@@ -9,7 +9,7 @@ use super::certificate;
 use super::from_relaxed::{Evidence, Found, from_relaxed};
 use super::identifiability::{self, tilts_are_evident};
 use super::intervals::Profile;
-use super::judged::{Judged, noise_of};
+use super::judged::{Judged, Settled, noise_of};
 use super::minimise::{Minimum, Problem, State};
 use super::noise::Noise;
 use super::retraction::Retraction;
@@ -29,12 +29,17 @@ pub(super) fn best_minimum(
     let mut starts = starts.into_iter();
     let first = problem.minimise(starts.next().expect("there is at least one start"));
     let first = Judged::of(problem, first, 1);
-    if !evidence.search || first.is_settled(problem)? {
+    if !evidence.search {
         return Ok(first);
     }
+    let settled = first.is_settled(problem)?;
+    if settled != Settled::Not {
+        return Ok(with_tilts(problem, first, settled));
+    }
     let first = first_converged(problem, first, starts);
-    if first.is_settled(problem)? {
-        return Ok(first);
+    let settled = first.is_settled(problem)?;
+    if settled != Settled::Not {
+        return Ok(with_tilts(problem, first, settled));
     }
     let half_width = evidence.pixel_frame.1;
     let patient = Problem {
@@ -67,6 +72,16 @@ pub(super) fn best_minimum(
         .certified(problem, lowest_relaxed)
         .with_rival(problem, &met)
         .with_twins(problem))
+}
+
+/// A minimum that is settled, with the better of the tilts that are in doubt.
+fn with_tilts(problem: &Problem<'_>, judged: Judged, settled: Settled) -> Judged {
+    if settled == Settled::Entirely {
+        return judged;
+    }
+    let starts = judged.starts;
+    let best = walk::with_better_tilts(problem, judged.minimum);
+    Judged::of(problem, best, starts).with_twins(problem)
 }
 
 /// Refuses what the data do not determine, where the noise is known: at a cost that its floor certifies.

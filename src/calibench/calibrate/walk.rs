@@ -12,7 +12,7 @@ use super::noise::Noise;
 use super::retraction::scaled;
 use super::rival::Met;
 use super::search::is_better;
-use super::tilt;
+use super::{chunks, tilt};
 use crate::camera::Parameter;
 
 /// A step of the walk: a minimum of the profile is wider.
@@ -149,19 +149,18 @@ const TILT_ROUNDS: usize = 4;
 pub(super) fn with_better_tilts(problem: &Problem<'_>, minimum: Minimum) -> Minimum {
     let mut best = minimum;
     for _ in 0..TILT_ROUNDS {
-        let mut turned = best.state.clone();
-        let mut gained = false;
-        for view in 0..problem.observations.len() {
-            let (_, cost) = tilt::resected(problem, &best.state, view, best.state.cam_from_target[view]);
-            let other = tilt::mirrored(&best.state.cam_from_target[view]);
-            let (pose, other_cost) = tilt::resected(problem, &best.state, view, other);
-            if other_cost < cost * (1.0 - 1e-9) {
-                turned.cam_from_target[view] = pose;
-                gained = true;
-            }
-        }
-        if !gained {
+        let better = chunks::map(problem.observations, |view, _| {
+            let own = best.state.cam_from_target[view];
+            let (_, cost) = tilt::resected(problem, &best.state, view, own);
+            let (pose, other_cost) = tilt::resected(problem, &best.state, view, tilt::mirrored(&own));
+            (other_cost < cost * (1.0 - 1e-9)).then_some(pose)
+        });
+        if better.iter().all(Option::is_none) {
             break;
+        }
+        let mut turned = best.state.clone();
+        for (pose, better) in turned.cam_from_target.iter_mut().zip(better) {
+            *pose = better.unwrap_or(*pose);
         }
         let minimum = problem.minimise(turned);
         if !is_better(&minimum, &best) {

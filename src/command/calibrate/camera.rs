@@ -104,7 +104,7 @@ pub(super) fn run(arguments: &Arguments, observed: Observed) -> Result<Exit, Fai
     fields.warnings = warnings(&finished);
     let json = finished.optics.with(&fields);
     if let Some(folder) = &arguments.out {
-        write_files(folder, &json, &finished, arguments.memory).map_err(Failure::unwritten)?;
+        write_files(folder, &json, &finished, arguments.memory()).map_err(Failure::unwritten)?;
         of_earlier_runs(folder, &finished).iter().for_each(|file| {
             warn(&format!("{} is of an earlier run, not of this result", folder.join(file).shown()));
         });

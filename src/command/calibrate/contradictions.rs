@@ -21,6 +21,9 @@ pub(super) enum Input {
 pub(super) fn refuse(arguments: &Arguments, input: Input) -> Result<(), String> {
     target(arguments, input)?;
     parameters(arguments)?;
+    if arguments.memory.is_some() && input != Input::Photographs {
+        return Err("--memory bounds what photographs take, and there are none: leave it out".to_string());
+    }
     let without_use: &[(&str, bool)] = match input {
         Input::Photographs | Input::Corners | Input::Measured => &[("--mode", arguments.mode.is_some())],
         Input::PointPairs => &[

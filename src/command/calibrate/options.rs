@@ -95,8 +95,8 @@ pub(in super::super) struct Arguments {
     pub(super) mode: Option<Mode>,
     /// Memory that photographs may take together, such as 500MB or 2GiB; large ones then come one at a time
     /// [default: 2GiB]
-    #[arg(long, value_name = "BYTES", value_parser = parse_bytes, default_value_t = DEFAULT_MEMORY, hide_default_value = true)]
-    pub(super) memory: u64,
+    #[arg(long, value_name = "BYTES", value_parser = parse_bytes)]
+    pub(super) memory: Option<u64>,
     /// Folder for result.json, the page report.html, plots, and of photographs corners.csv, with the marks as
     /// they were fitted, pictures with the marks drawn in, and one photograph before and after undistortion
     #[arg(long, value_name = "DIR")]
@@ -110,6 +110,11 @@ pub(in super::super) struct Arguments {
 const COVERAGE: f64 = 0.95;
 
 impl Arguments {
+    /// Memory that photographs may take together.
+    pub(super) fn memory(&self) -> u64 {
+        self.memory.unwrap_or(DEFAULT_MEMORY)
+    }
+
     /// What is estimated and how; with `--model auto` before a model is chosen.
     pub(super) fn settings(&self, image_size: Option<(usize, usize)>) -> Settings {
         let model = match self.model {

@@ -61,7 +61,7 @@ struct Seen {
 pub(super) fn run(arguments: &Arguments, board: &BoardSpec, photos: &[PathBuf]) -> Result<Exit, Failure> {
     let reading = Reading {
         image_size: arguments.image_size,
-        memory: arguments.memory,
+        memory: arguments.memory(),
         overlays: arguments.out.as_deref(),
     };
     camera::run(arguments, reading.observe(board, photos)?)

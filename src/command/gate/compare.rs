@@ -118,8 +118,7 @@ impl Against<'_> {
             terms.false_alarm_rate,
         );
         if let Some(path) = &self.reports.told.json {
-            let text = format!("{:#}\n", serde_json::to_value(&paired).unwrap_or_default());
-            write_atomically(path, text.as_bytes()).map_err(incomplete)?;
+            write_atomically(path, paired.to_json().as_bytes()).map_err(incomplete)?;
         }
         print(&paired.to_text());
         Ok(if paired.held() { Exit::Held } else { Exit::Deviates })

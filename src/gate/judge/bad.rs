@@ -3,15 +3,20 @@
 use super::checks::{Basis, Check, Property};
 use super::habits::Habits;
 use super::{Answers, chance, estimate};
+use crate::accept::free_of;
 use crate::bad_input::{BadCase, Fault};
 use crate::plan::{Plan, Purpose};
 use crate::suite::Scenario;
 use crate::trial::{Seen, Trial};
+use calibench::camera::{Camera, Lens, Parameter};
+use calibench::evaluate::difference::frame_nodes;
+use calibench::geometry::Vec2;
 use calibench::io::significant;
 
 /// An error of this many stated standard deviations is not admitted by them: by chance it has 2e-9.
 const ADMITTED_SD: f64 = 6.0;
-/// A focal length this near to the truth is not a wrong answer even where it was luck.
+/// A camera that shows everything in the image this near to where the true one does, in focal lengths, is not
+/// a wrong answer even where it was luck.
 const RIGHT: f64 = 0.01;
 /// An error of good size whose squared Mahalanobis distance is rarer than this is wrong.
 const WRONG_BELOW: f64 = 1e-9;
@@ -50,10 +55,7 @@ pub(super) fn check(plan: &Plan, seen: &[Option<Seen>], habits: Habits) -> Vec<C
 }
 
 fn judge(case: &BadCase, seen: &Seen, habits: Habits) -> Check {
-    let right = |trial: &Trial| {
-        let focal = case.truth.fx;
-        case.fault == Fault::Degenerate && trial.errors.iter().take(2).all(|e| e.abs() <= RIGHT * focal)
-    };
+    let right = |trial: &Trial| case.fault == Fault::Degenerate && shows_the_same(&trial.camera, case);
     let conduct = match (case.fault, seen) {
         (Fault::Malformed, Seen::Estimate(trial)) if !is_flagged(trial, habits) => Conduct::Wrong,
         _ => conduct(seen, habits, right),
@@ -81,12 +83,33 @@ fn judge(case: &BadCase, seen: &Seen, habits: Habits) -> Check {
     if conduct == Conduct::Wrong { check.gravely() } else { check }
 }
 
+/// Whether a camera shows the image's rays where the true camera does, all parameters together: the right
+/// focal length is no right answer with a principal point or a distortion that nobody's camera has.
+fn shows_the_same(camera: &Camera<Lens>, case: &BadCase) -> bool {
+    let [width, height] = case.problem.image_size;
+    let near = |node: &Vec2| {
+        let Ok(ray) = case.truth.ray(node) else { return true };
+        camera.pixel(&ray).is_some_and(|pixel| (pixel - node).norm() <= RIGHT * case.truth.fx)
+    };
+    frame_nodes((width, height)).0.iter().all(near)
+}
+
+/// The estimated parameter that lies farthest off in stated deviations, or in parts of its own size where
+/// none are stated.
 fn wrong(trial: &Trial, case: &BadCase) -> String {
-    let stated = match trial.standard_deviations.as_ref().and_then(|s| s.first()) {
-        Some(sd) => format!("stated +- {}", significant(*sd, 3)),
+    let parameters: Vec<Parameter> = free_of(&case.problem).iter().collect();
+    let truth = |parameter| case.truth.value(parameter).unwrap_or(0.0);
+    let stated = |i: usize| trial.standard_deviations.as_ref()?.get(i).copied();
+    let off = |i: usize| trial.errors[i].abs() / stated(i).unwrap_or(truth(parameters[i]).abs().max(1.0));
+    let worst = (0..parameters.len().min(trial.errors.len())).max_by(|&a, &b| off(a).total_cmp(&off(b)));
+    let Some(worst) = worst else { return "nothing was estimated".to_string() };
+    let parameter = parameters[worst];
+    let stated = match stated(worst) {
+        Some(sd) => format!("stated +- {}", significant(sd, 3)),
         None => "no uncertainty stated".to_string(),
     };
-    format!("fx {} ({stated}) where {} is true", significant(trial.camera.fx, 5), case.truth.fx)
+    let value = significant(trial.camera.value(parameter).unwrap_or(f64::NAN), 5);
+    format!("{parameter} {value} ({stated}) where {} is true", truth(parameter))
 }
 
 fn conduct(seen: &Seen, habits: Habits, right: impl Fn(&Trial) -> bool) -> Conduct {
@@ -157,6 +180,43 @@ pub(super) fn honesty(scenario: &Scenario, answers: &Answers<'_>) -> Check {
 mod tests {
     use super::super::tests::{answered, change_trials};
     use super::*;
+    use crate::bad_input::bad_cases;
+
+    #[test]
+    fn a_right_focal_length_alone_is_no_right_answer() {
+        let (_, seen) = answered(1);
+        let cases = bad_cases(1).unwrap();
+        let case = cases.iter().find(|case| case.fault == Fault::Degenerate).unwrap();
+        let Some(Seen::Estimate(any)) = seen.iter().flatten().find(|s| matches!(s, Seen::Estimate(_))) else {
+            panic!("the plan's samples are answered");
+        };
+        let free = free_of(&case.problem);
+        let judged = |camera: Camera<Lens>, sd: f64| {
+            let error = |p: Parameter| camera.value(p).unwrap() - case.truth.value(p).unwrap();
+            let trial = Trial {
+                camera,
+                errors: free.iter().map(error).collect(),
+                standard_deviations: Some(vec![sd; free.len()]),
+                warnings: 0,
+                ..(**any).clone()
+            };
+            judge(case, &Seen::Estimate(Box::new(trial)), Habits::UNKNOWN)
+        };
+        let truth = case.truth;
+        assert_eq!(judged(truth, 1e-3).basis, Basis::Certain(true));
+        let lucky = Camera { fx: 1.005 * truth.fx, fy: 1.005 * truth.fy, ..truth };
+        assert_eq!(judged(lucky, 1e-3).basis, Basis::Certain(true));
+        let elsewhere = Camera { cx: -5000.0, ..truth };
+        let check = judged(elsewhere, 1e-3);
+        assert_eq!(check.basis, Basis::Certain(false));
+        assert!(check.evidence.starts_with("cx -5000.0 (stated +- 0.00100) where"), "{}", check.evidence);
+        // What is admitted is no lie.
+        assert_eq!(judged(elsewhere, 1e3).basis, Basis::Certain(true));
+        let bent = truth.with_value(Parameter::K1, 30.0).unwrap();
+        assert!(judged(bent, 1e-3).evidence.starts_with("k1 30"));
+        let narrow = Camera { fy: 1e6, ..truth };
+        assert!(judged(narrow, 1e-3).evidence.starts_with("fy "));
+    }
 
     #[test]
     fn a_warning_flags_an_answer_where_warnings_are_rare() {
