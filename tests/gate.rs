@@ -274,7 +274,7 @@ fn answers_that_differ_by_much_are_not_called_of_one_law_for_being_few() {
     std::fs::write(biased.join("answers.jsonl"), answers).expect("written");
     std::fs::write(biased.join("manifest.json"), read("manifest.json")).expect("written");
     for (new, reference) in [(&good, &biased), (&biased, &good)] {
-        let json = good.join("compared.json");
+        let json = good.with_extension("json");
         let compared =
             gate(&["judge", &path(new), "--against", &path(reference), "--json", &json.to_string_lossy()]);
         let text = String::from_utf8_lossy(&compared.stdout).into_owned();

@@ -25,7 +25,8 @@ pub(super) fn for_each(file: impl Read, mut take: impl FnMut(usize, Line<'_>)) -
             break;
         }
         let text = String::from_utf8_lossy(&bytes);
-        let line = text.trim();
+        // A byte order mark belongs to no text.
+        let line = if number == 1 { text.trim_start_matches('\u{feff}') } else { &text }.trim();
         if bytes.last() != Some(&b'\n') && bytes.len() > MOST_LINE_BYTES {
             reader.skip_until(b'\n')?;
             take(number, Line::TooLong(line));
@@ -43,7 +44,7 @@ mod tests {
     #[test]
     fn a_line_that_is_too_long_costs_itself_alone() {
         let long = "x".repeat(MOST_LINE_BYTES + 1);
-        let text = format!("one\n\n{long}{long}\n  four\r\n{}\nsix", &long[1..]);
+        let text = format!("\u{feff}one\n\n{long}{long}\n  four\r\n{}\nsix", &long[1..]);
         let mut found = Vec::new();
         for_each(text.as_bytes(), |number, line| {
             found.push(match line {
