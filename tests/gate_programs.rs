@@ -89,7 +89,8 @@ fn an_interrupted_gate_leaves_no_program_behind() {
     }
 }
 
-/// What an interrupt ended broke no rule: nothing is said of the solver, and the code is that of an interrupt.
+/// What an interrupt ended broke no rule: nothing is said of the solver, and the code is that of an
+/// interrupt.
 #[test]
 fn an_interrupted_gate_blames_nobody() {
     for verb in ["hand-eye", "detector"] {

@@ -27,8 +27,8 @@ struct Arguments {
     /// Draws other scenes
     #[arg(long, default_value_t = SEED)]
     seed: u64,
-    /// Makes every eighth row again instead, and notes in the tables that they are the same if they are: for a
-    /// change of the code that should move nothing
+    /// Makes every eighth row again instead, and notes in the tables that they are the same if they are: for
+    /// a change of the code that should move nothing
     #[arg(long, conflicts_with = "seed")]
     confirm: bool,
 }
@@ -64,8 +64,8 @@ fn confirm(family: &'static Family, folder: &Path) -> Result<(), String> {
 
 fn write(family: &'static Family, seed: u64, folder: &Path) -> Result<(), String> {
     let path = table_of(family, folder);
-    let head = Fingerprint::of_lens_minimum().head(&format!("{COMMAND}; seed {seed}"));
-    campaign::write_unless_current(&path, &head, || measured(family, seed))
+    let (present, command) = (Fingerprint::of_lens_minimum(), format!("{COMMAND}; seed {seed}"));
+    campaign::write_unless_current(&path, &present, &command, || measured(family, seed))
 }
 
 /// Draws and judges some scenes.

@@ -26,8 +26,8 @@ struct Arguments {
     /// Writes there instead
     #[arg(long, default_value = FOLDER)]
     out: PathBuf,
-    /// Makes every eighth trial again instead, and notes in the tables that its rows are the same if they are:
-    /// for a change of the code that should move nothing
+    /// Makes every eighth trial again instead, and notes in the tables that its rows are the same if they
+    /// are: for a change of the code that should move nothing
     #[arg(long)]
     confirm: bool,
 }
@@ -63,9 +63,9 @@ fn confirm(truth: &Truth, folder: &Path) -> Result<(), String> {
 
 fn write(truth: &Truth, folder: &Path) -> Result<(), String> {
     let path = table_of(truth, folder);
-    let head = Fingerprint::of_model_choice().head(&format!("{COMMAND}; seed {SEED}"));
+    let (present, command) = (Fingerprint::of_model_choice(), format!("{COMMAND}; seed {SEED}"));
     let table = || Ok(campaign::table(HEADER, measured(truth, jobs(truth))?.iter().map(Row::text)));
-    campaign::write_unless_current(&path, &head, table)
+    campaign::write_unless_current(&path, &present, &command, table)
 }
 
 /// All trials of a truth, the longest first so that no processor is left with one of them at the end.

@@ -25,13 +25,13 @@ pub(super) struct Arguments {
     /// History of the checks: when,value, the newest last; begin a new one after a calibration
     history: PathBuf,
     /// Size of the reference
-    #[arg(long, value_name = "VALUE", value_parser = parse_finite)]
+    #[arg(long, value_name = "VALUE", value_parser = parse_finite, allow_hyphen_values = true)]
     reference: f64,
     /// Standard deviation of one check while nothing drifts
     #[arg(long, value_name = "SD", value_parser = positive)]
     sd: f64,
     /// A new check, which is added to the history first
-    #[arg(long, value_name = "VALUE", value_parser = parse_finite)]
+    #[arg(long, value_name = "VALUE", value_parser = parse_finite, allow_hyphen_values = true)]
     add: Option<f64>,
     /// When it was made, in any words [default: its number]
     #[arg(long, value_name = "TEXT", requires = "add", value_parser = parse_when)]

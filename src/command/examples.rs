@@ -160,7 +160,8 @@ fn taking_negative_numbers(command: Command) -> Command {
             return arg;
         }
         let wants_several = arg.get_value_names().is_some_and(|names| names.iter().any(|n| n.contains(',')));
-        arg.allow_negative_numbers(true).allow_hyphen_values(wants_several)
+        let arg = arg.allow_negative_numbers(true);
+        if wants_several { arg.allow_hyphen_values(true) } else { arg }
     };
     command.mut_args(of_option).mut_subcommands(taking_negative_numbers)
 }

@@ -56,7 +56,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "K", value_parser = parse_deviation, requires = "expansion")]
     temperature_sd: Option<f64>,
     /// Expansion of the board, 1/K, such as 11.5e-6 for steel
-    #[arg(long, value_name = "PER_K", value_parser = parse_expansion, requires = "temperature_sd")]
+    #[arg(long, value_name = "PER_K", value_parser = parse_expansion, allow_hyphen_values = true, requires = "temperature_sd")]
     expansion: Option<f64>,
     /// Folder for lengths.json
     #[arg(long, value_name = "DIR")]

@@ -1,5 +1,5 @@
-//! How is JSON read that a program wrote? An object by its names, each of them once: a list in its place, or a
-//! name that stands twice, is somebody's mistake, and no reader may choose what was meant.
+//! How is JSON read that a program wrote? An object by its names, each of them once: a list in its place, or
+//! a name that stands twice, is somebody's mistake, and no reader may choose what was meant.
 
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error, MapAccess, Visitor};

@@ -43,21 +43,22 @@ pub fn write(out: Option<&Path>, folder: &str, name: &str, text: &str) -> Result
     write_atomically(&path, text.as_bytes()).map_err(|error| error.to_string())
 }
 
-/// Writes `head` and what `measured` gives below it, unless the table begins with `head` already: then the
-/// present code wrote it.
+/// Writes what `measured` gives below a head that names `command` and the present code, unless the present
+/// code wrote or confirmed the table already.
 ///
 /// # Errors
 /// What could not be measured or written, in words.
 pub fn write_unless_current(
     path: &Path,
-    head: &str,
+    present: &Fingerprint,
+    command: &str,
     measured: impl FnOnce() -> Result<String, String>,
 ) -> Result<(), String> {
     let before = read_regular_text(path, MOST_TABLE_BYTES).unwrap_or_default();
-    if before.lines().next() == Some(head) {
+    if present.vouches_for(&before, command) {
         return Ok(());
     }
-    let text = format!("{head}\n{}", measured()?);
+    let text = format!("{}\n{}", present.head(command), measured()?);
     write_atomically(path, text.as_bytes()).map_err(|error| error.to_string())
 }
 

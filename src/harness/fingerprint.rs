@@ -88,6 +88,12 @@ impl Fingerprint {
         format!("{before}; {again} of {all}{CONFIRMED}{present}")
     }
 
+    /// Whether the table that `command` writes was written with this fingerprint or confirmed with it.
+    pub fn vouches_for(&self, table: &str, command: &str) -> bool {
+        let is_of_it = table.starts_with(&format!("# {command}; fingerprint "));
+        is_of_it && self.0.as_deref().is_some_and(|present| vouching(table) == Some(present))
+    }
+
     /// A number below `count` that another code has another of.
     pub fn pick(&self, count: usize) -> usize {
         let digits = self.0.as_deref().and_then(|digits| usize::from_str_radix(&digits[..8], 16).ok());
@@ -97,7 +103,7 @@ impl Fingerprint {
     /// A case for a claim: whether `table`, committed as `name`, was written with this fingerprint or
     /// confirmed with it, and what to do if not.
     pub fn case(&self, name: &str, table: &str, command: &str) -> (String, bool) {
-        let written = confirmed(table).or_else(|| written(table)).unwrap_or("none");
+        let written = vouching(table).unwrap_or("none");
         let Some(present) = &self.0 else { return (format!("{name}: {written}"), true) };
         let what =
             format!("{name} is stale: it has fingerprint {written}, the code {present}; run `{command}`");
@@ -111,6 +117,11 @@ const CONFIRMED: &str = " rows made again, the same, with fingerprint ";
 /// The fingerprint of the code that has confirmed a table.
 fn confirmed(table: &str) -> Option<&str> {
     Some(table.lines().next()?.split_once(CONFIRMED)?.1)
+}
+
+/// The fingerprint of the last code that wrote or confirmed a table.
+fn vouching(table: &str) -> Option<&str> {
+    confirmed(table).or_else(|| written(table))
 }
 
 /// The fingerprint in the first line of a table.
@@ -142,6 +153,8 @@ mod tests {
         assert_eq!(written(&again), written(&head));
         let held = |code: &Fingerprint, head: &str| code.case("t.csv", &format!("{head}\na\n1\n"), "x").1;
         assert_eq!([&first, &second, &third].map(|code| held(code, &again)), [false, true, false]);
+        assert_eq!([&first, &second].map(|code| code.vouches_for(&again, "calibench x")), [false, true]);
+        assert!(first.vouches_for(&head, "calibench x") && !first.vouches_for(&head, "calibench y"));
         let later = third.head_again(&again, 3, 16);
         assert_eq!(later, third.head_again(&head, 3, 16));
         assert_eq!([&second, &third].map(|code| held(code, &later)), [false, true]);

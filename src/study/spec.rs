@@ -320,7 +320,7 @@ impl SceneSpec {
         check("scene.image", side as f64, "at most 1048576 px a side", side <= limits::MOST_SIDE)?;
         let noise = self.noise_px;
         let is_noise = (LEAST_NOISE_PX..MOST_NOISE_PX).contains(&noise);
-        check("scene.noise_px", noise, "a number from 1e-9 to less than 1e6", is_noise)?;
+        check("scene.noise_px", noise, "a number from 1e-9 to below 1e6", is_noise)?;
         let share = self.outlier_share;
         check("scene.outlier_share", share, "from 0 to below 1", (0.0..1.0).contains(&share))?;
         let spread = self.outlier_px;
