@@ -86,6 +86,37 @@ fn a_double_sphere_is_found_behind_pixels_far_from_square() {
     }
 }
 
+/// Two views aside of an axis that meets the image near its corner: a lens about the middle of the image
+/// ends in another minimum, or in none.
+#[test]
+fn a_fisheye_whose_axis_is_far_from_the_middle_of_the_image_is_found() {
+    for (f, [cx, cy], aside, spread) in [
+        (500.0, [150.0, 120.0], 0.5, 0.5),
+        (600.0, [74.0, 100.0], 0.9, 0.3),
+        (600.0, [74.0, 100.0], 0.9, 0.5),
+    ] {
+        let truth = Camera { cx, cy, ..camera(Model::KannalaBrandt, f, f, &[-0.02, 0.004, -0.001, 0.0002]) };
+        let mut poses = lens_views::poses(2, 80.0, [spread, spread]);
+        poses.iter_mut().for_each(|pose| pose.translation += 80.0 * aside * Vec3::new(1.0, 1.0, 0.0));
+        let is_inside =
+            |pixel: &Vec2| (0.0..SIZE.0 as f64).contains(&pixel.x) && (0.0..SIZE.1 as f64).contains(&pixel.y);
+        let inside = |view: usize| {
+            let on_board = |p: &Vec2| poses[view].apply(&Vec3::new(p.x, p.y, 0.0));
+            board().into_iter().filter(|p| truth.pixel(&on_board(p)).is_some_and(|q| is_inside(&q))).collect()
+        };
+        let views = seen(&truth, &poses, inside, 0.0);
+        let found = calibrate_lens(&views, &settings(Model::KannalaBrandt)).unwrap();
+        let freedom = found.degrees_of_freedom as f64;
+        // Five deviations of a variance of so many degrees of freedom.
+        let square = (found.sigma_px / 0.1) * (found.sigma_px / 0.1);
+        assert!(
+            (square - 1.0).abs() < 5.0 * (2.0 / freedom).sqrt(),
+            "{cx} {spread}: {square} {:?}",
+            found.camera
+        );
+    }
+}
+
 /// Five marks a view may lead a pinhole's first minimum astray, and with it all that starts there.
 #[test]
 fn a_fisheye_behind_tall_pixels_is_found_from_five_marks_a_view() {

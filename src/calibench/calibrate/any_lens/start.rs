@@ -10,6 +10,8 @@ use super::super::Settings;
 use super::super::chunks;
 use super::super::estimate::state_alone;
 use super::super::minimise::descend;
+use super::super::normal::Observations;
+use super::super::radial_centre::radial_centre;
 use super::super::target_frame::TargetFrames;
 use super::super::tie::tied;
 use super::super::tilt::mirrored;
@@ -116,14 +118,42 @@ fn pinhole(views: &[View], settings: &Settings) -> Option<(State, bool)> {
 /// is tied, otherwise with square ones, and where they come out far from it once fy is free, with pixels of
 /// any shape besides. Few marks lead these astray where square ones are right.
 pub(super) fn by_rays(problem: &Problem<'_>, settings: &Settings) -> Vec<State> {
+    about(problem, settings, middle(problem.views, settings))
+}
+
+/// The same about the pixel about which the marks say that the lens distorts: where the axis meets the image
+/// far from its middle, a lens about the middle leads to a wrong camera. None where the principal point is
+/// held or the marks do not say.
+pub(super) fn by_rays_off_centre(problem: &Problem<'_>, settings: &Settings) -> Vec<State> {
+    let is_free = [Parameter::Cx, Parameter::Cy].into_iter().all(|p| problem.free.contains(p));
+    match told_centre(problem.views).filter(|_| is_free) {
+        Some(centre) => about(problem, settings, centre),
+        None => Vec::new(),
+    }
+}
+
+/// The pixel about which the lens distorts, from the marks alone; `None` where they do not say.
+fn told_centre(views: &[Marks]) -> Option<Vec2> {
+    let (low, high) = extent(views);
+    let pixel_frame = (0.5 * (low + high), 0.5 * (high - low).max());
+    let pairs = |marks: &Marks| {
+        let pairs: Vec<_> = marks.list.iter().map(|mark| (mark.point, mark.pixel)).collect();
+        Observations::new(pairs.into_iter())
+    };
+    let observations: Vec<Observations> = views.iter().map(pairs).collect();
+    radial_centre(&observations, pixel_frame)
+}
+
+/// Starts with the axis at a pixel.
+fn about(problem: &Problem<'_>, settings: &Settings, centre: Vec2) -> Vec<State> {
     let rough = Problem { priors: &[], bend: None, relative_gain: ROUGH_GAIN, ..*problem };
     let shaped = |fy_per_fx| Problem { fy_per_fx, ..rough };
-    let square = polynomial(&shaped(problem.fy_per_fx.or(Some(1.0))), settings);
+    let square = polynomial(&shaped(problem.fy_per_fx.or(Some(1.0))), centre);
     let is_known = problem.fy_per_fx.is_some() || !problem.free.contains(Parameter::Fy);
     let any = match &square {
         _ if is_known => None,
         Some(state) if is_nearly_square(&shaped(None), state) => None,
-        _ => polynomial(&shaped(None), settings),
+        _ => polynomial(&shaped(None), centre),
     };
     [square, any].into_iter().flatten().flat_map(|state| with_model(problem, &state, settings)).collect()
 }
@@ -138,9 +168,10 @@ fn is_nearly_square(fisheye: &Problem<'_>, state: &State) -> bool {
     (camera.fy / camera.fx - 1.0).abs() <= NEARLY_SQUARE
 }
 
-/// The best state with an angle polynomial of two terms.
-fn polynomial(fisheye: &Problem<'_>, settings: &Settings) -> Option<State> {
-    let (centre, reach) = frame(fisheye.views, settings);
+/// The best state with an angle polynomial of two terms that leaves from an axis at `centre`.
+fn polynomial(fisheye: &Problem<'_>, centre: Vec2) -> Option<State> {
+    let distances = pixels(fisheye.views).map(|p| (p - centre).norm());
+    let reach = distances.fold(1.0, f64::max);
     let chosen: Vec<Marks> =
         chosen_views(fisheye.views).into_iter().map(|view| fisheye.views[view].clone()).collect();
     let few = Problem { views: &chosen, ..*fisheye };
@@ -186,11 +217,9 @@ fn polynomial(fisheye: &Problem<'_>, settings: &Settings) -> Option<State> {
     Some(descend(&whole, state).state)
 }
 
-/// Where the axis may meet the image, and the distance of the farthest pixel from there.
-fn frame(views: &[Marks], settings: &Settings) -> (Vec2, f64) {
-    let pixels = || views.iter().flat_map(|view| &view.list).map(|mark| mark.pixel);
-    let outside = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
-    let (low, high) = pixels().fold(outside, |(low, high), p| (low.inf(&p), high.sup(&p)));
+/// Where the axis may meet the image: where it is held, or else in the middle.
+fn middle(views: &[Marks], settings: &Settings) -> Vec2 {
+    let (low, high) = extent(views);
     let middle = match settings.image_size {
         Some((width, height)) => Vec2::new(0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0)),
         None => 0.5 * (low + high),
@@ -199,8 +228,17 @@ fn frame(views: &[Marks], settings: &Settings) -> (Vec2, f64) {
         Ok(Some(value)) => value,
         _ => otherwise,
     };
-    let centre = Vec2::new(held(Parameter::Cx, middle.x), held(Parameter::Cy, middle.y));
-    (centre, pixels().map(|p| (p - centre).norm()).fold(1.0, f64::max))
+    Vec2::new(held(Parameter::Cx, middle.x), held(Parameter::Cy, middle.y))
+}
+
+fn pixels(views: &[Marks]) -> impl Iterator<Item = Vec2> {
+    views.iter().flat_map(|view| &view.list).map(|mark| mark.pixel)
+}
+
+/// The least and the greatest coordinates of the pixels.
+fn extent(views: &[Marks]) -> (Vec2, Vec2) {
+    let outside = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
+    pixels(views).fold(outside, |(low, high), p| (low.inf(&p), high.sup(&p)))
 }
 
 /// Views evenly taken from all, with enough marks.

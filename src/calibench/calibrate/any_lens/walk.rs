@@ -17,7 +17,8 @@ pub(super) struct Walked {
 
 /// Refines the starts: those that the pinhole's solver gives, and, unless one of them converges to residuals
 /// that look like noise and either the pinhole or this minimum is certified, those that an angle polynomial
-/// gives. The pinhole's certificate counts for its own lens, and where that does not hold it may be one of a
+/// gives; where none of all these looks like noise, those of one about the centre that the marks tell. The
+/// pinhole's certificate counts for its own lens, and where that does not hold it may be one of a
 /// wrong camera.
 ///
 /// # Errors
@@ -36,6 +37,9 @@ pub(super) fn walk(
         |m: &Minimum<State, WIDTH>| is_right(m) && (is_certified || certificate::holds(problem, m));
     if !minima.iter().any(is_settled) {
         minima.extend(refined(problem, start::by_rays(problem, settings)));
+        if !minima.iter().any(is_right) {
+            minima.extend(refined(problem, start::by_rays_off_centre(problem, settings)));
+        }
     }
     let mut spheres = Vec::new();
     if let Some(first) = best_of(problem, &minima) {
