@@ -27,7 +27,8 @@ use crate::camera::{FreeParameters, Model, Parameter};
 pub struct Candidate {
     /// The model.
     pub model: Model,
-    /// Its coefficients that are free; the others are 0.
+    /// Its coefficients that are free; the others are 0, or held as the settings say. Of fx, fy, cx, cy and skew those that are free besides
+    /// what the settings say.
     pub coefficients: FreeParameters,
     /// The board.
     pub board: Board,
@@ -46,14 +47,20 @@ impl Candidate {
         brown.into_iter().chain(others).map(flat).collect()
     }
 
-    /// The settings with this model: what they say of fx, fy, cx, cy and skew stays.
+    /// The settings with this model: what they say of fx, fy, cx, cy and skew stays, but for those that are
+    /// free here.
     pub fn settings(&self, settings: &Settings) -> Settings {
         let mut own = settings.clone().with_model(self.model).with_board(self.board);
         for parameter in Parameter::OF_ALL_MODELS.into_iter().filter(|p| !Parameter::LINEAR.contains(p)) {
-            let role = if self.coefficients.contains(parameter) { Role::Free } else { Role::Default };
+            let role = match (self.coefficients.contains(parameter), settings.role(parameter)) {
+                (true, known @ Role::Known { .. }) => known,
+                (true, _) => Role::Free,
+                (false, held @ Role::Held(_)) if self.model == settings.model() => held,
+                (false, _) => Role::Default,
+            };
             own = own.with_role(parameter, role);
         }
-        own
+        Parameter::LINEAR.into_iter().filter(|&p| self.coefficients.contains(p)).fold(own, Settings::estimate)
     }
 }
 
@@ -203,9 +210,9 @@ fn hold_out(views: &[View], settings: &Settings, counted: &Counted) -> Option<Ve
             let (out, kept): (Vec<_>, Vec<_>) =
                 views.iter().enumerate().partition(|(view, _)| view % folds == fold);
             let kept: Vec<View> = kept.into_iter().map(|(_, view)| view.clone()).collect();
-            let camera = calibrate_lens(&kept, settings).ok()?.camera;
+            let fit = calibrate_lens(&kept, settings).ok()?;
             let of_view = |(place, view): (usize, &View)| {
-                let residuals = located(&camera, view, settings.loss)?.residuals;
+                let residuals = located(&fit.camera, fit.board.as_ref(), view, settings.loss)?.residuals;
                 let (square, marks) = counted.in_view(place, view, &residuals);
                 Some((square, (2.0 * marks as f64 - 6.0).max(0.0)))
             };
@@ -236,6 +243,15 @@ const WORTH: f64 = 0.05;
 /// A criterion of Schwarz's that falls by so much is very strong evidence (Kass & Raftery 1995).
 const STRONG_EVIDENCE: f64 = 10.0;
 
+/// What of fx, fy, cx, cy and skew is held or tied: the focal lengths, the principal point and skew each by
+/// itself.
+fn held_basics(settings: &Settings) -> Vec<&'static [Parameter]> {
+    const BASICS: [&[Parameter]; 4] =
+        [&[Parameter::Fx], &[Parameter::Fy], &[Parameter::Cx, Parameter::Cy], &[Parameter::Skew]];
+    let free = settings.free();
+    BASICS.into_iter().filter(|list| list.iter().any(|&p| !free.contains(p))).collect()
+}
+
 /// Where residuals of neighbouring marks agree: which one freedom more, of the lens or of the board, lowers
 /// the RMSE of `fit` by a twentieth or more, the best first; where none does, those for which the criterion
 /// of Schwarz is very strong evidence.
@@ -245,11 +261,17 @@ pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibr
     let is_coefficient = |p: &Parameter| !Parameter::LINEAR.contains(p);
     let own = fit.free.iter().filter(is_coefficient).fold(FreeParameters::NONE, FreeParameters::with);
     let with = |more: &[Parameter]| more.iter().fold(own, |set, &p| set.with(p));
-    let richer = [with(&[K3]), with(&[P1, P2]), with(&[K1, K2, K3, P1, P2])];
-    let of_brown = richer.into_iter().filter(|_| model == Model::BrownConrady).map(|set| (model, set));
+    let basics = held_basics(settings);
+    let richer = [with(&[K3]), with(&[P1, P2]), with(&[K1, K2, K3, P1, P2])]
+        .into_iter()
+        .filter(|_| model == Model::BrownConrady)
+        .chain(basics.into_iter().map(with))
+        .map(|set| (model, set));
     let others = [
         (Model::Rational, Model::Rational.coefficients()),
         (Model::KannalaBrandt, Model::KannalaBrandt.coefficients()),
+        (Model::DoubleSphere, Model::DoubleSphere.coefficients()),
+        (Model::Division, Model::Division.coefficients()),
         (Model::ThinPrism, &[K1, K2, K3, P1, P2, S1, S2, S3, S4]),
         (Model::Tilted, &[K1, K2, K3, P1, P2, TauX, TauY]),
     ]
@@ -262,7 +284,7 @@ pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibr
         Board::Bowed { .. } => vec![Board::Bent { standard_deviation }],
         Board::Bent { .. } => Vec::new(),
     };
-    let candidates = of_brown
+    let candidates = richer
         .chain(others)
         .map(|(model, coefficients)| Candidate { model, coefficients, board: settings.board })
         .filter(|candidate| candidate.coefficients != own)

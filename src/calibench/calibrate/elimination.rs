@@ -50,6 +50,26 @@ impl<const W: usize> Reduced<W> {
         DMatrix::from_fn(n, n, |i, j| self.rows[i.min(j)][i.max(j)])
     }
 
+    /// That of some of the unknowns, in the order of `rows`, the others held.
+    pub fn part(&self, rows: &[usize]) -> Reduced<W> {
+        let mut part = Reduced { rows: [[0.0; W]; W], right: [0.0; W] };
+        for (i, &row) in rows.iter().enumerate() {
+            for (j, &column) in rows.iter().enumerate().skip(i) {
+                part.rows[i][j] = self.rows[row.min(column)][row.max(column)];
+            }
+            part.right[i] = self.right[row];
+        }
+        part
+    }
+
+    /// What the cost falls by, to second order, at the minimum over some of the unknowns, `right^T S^-1
+    /// right`; `None` if it is not determined.
+    pub fn gain(&self, rows: &[usize]) -> Option<f64> {
+        let part = self.part(rows);
+        let step = part.solve(rows.len())?;
+        Some((0..rows.len()).map(|i| -step[i] * part.right[i]).sum())
+    }
+
     /// `-S^-1 right`, 0 beyond `n`; `None` if `S` is not positive definite.
     pub fn solve(&self, n: usize) -> Option<SVector<f64, W>> {
         let mut lower = [[0.0; W]; W];

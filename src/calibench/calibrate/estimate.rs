@@ -5,7 +5,6 @@ use super::conditioning::Conditioning;
 use super::from_relaxed::Evidence;
 use super::intervals::Profile;
 use super::judged::Judged;
-use super::left_out::{self, LeftOut};
 use super::minimise::{Problem, State, rounding_cost};
 use super::noise::Noise;
 use super::normal::Observations;
@@ -53,35 +52,20 @@ const START_GAIN: f64 = 1e-3;
 /// # Ok::<(), CalibrationError>(())
 /// ```
 pub fn calibrate(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
-    copies::without(views, |views| calibrate_different(views, settings, &[]))
+    copies::without(views, |views| calibrate_different(views, settings))
 }
 
-/// [`calibrate`], and whether the marks ask for coefficients that are left out, which takes half as long
-/// again.
-pub(super) fn calibrate_asking(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
-    let undecided = left_out::undecided(settings);
-    copies::without(views, |views| calibrate_different(views, settings, &undecided))
-}
-
-fn calibrate_different(
-    views: &[View],
-    settings: &Settings,
-    undecided: &[LeftOut],
-) -> Result<Calibration, CalibrationError> {
+fn calibrate_different(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
     check_counts(views, settings)?;
-    let (calibration, noise) = chunks::in_pool(views.len(), || estimate(views, settings, undecided))?;
+    let (calibration, noise) = chunks::in_pool(views.len(), || estimate(views, settings))?;
     Ok(if settings.polish { polish::polish(views, settings.loss, noise, calibration) } else { calibration })
 }
 
 /// The calibration, and the noise that weighed the priors.
-fn estimate(
-    views: &[View],
-    settings: &Settings,
-    undecided: &[LeftOut],
-) -> Result<(Calibration, Noise), CalibrationError> {
+fn estimate(views: &[View], settings: &Settings) -> Result<(Calibration, Noise), CalibrationError> {
     searched(views, settings, |judged, problem, frames| {
         let noise = problem.priors.noise;
-        Ok((report(judged, problem, frames, settings, undecided)?, noise))
+        Ok((report(judged, problem, frames, settings)?, noise))
     })
 }
 
@@ -217,7 +201,6 @@ fn report(
     problem: &Problem<'_>,
     frames: &TargetFrames,
     settings: &Settings,
-    undecided: &[LeftOut],
 ) -> Result<Calibration, CalibrationError> {
     let observations = problem.observations;
     let Judged { minimum, reduction, certificate, starts, skewed, rival, twins } = judged;
@@ -229,8 +212,7 @@ fn report(
     let freedom = fit.freedom(system, settled);
     let degrees_of_freedom = whole((2 * points) as f64 + settled - system.unknowns() as f64);
     outliers::refuse_narrow_loss(problem.loss, &fit.residuals)?;
-    let left_out = left_out::asked_for(problem, &minimum, undecided, fit.square / freedom, freedom);
-    let of_residuals = warnings_of_residuals(problem, &minimum.state, &fit, freedom).chain(left_out);
+    let of_residuals = warnings_of_residuals(problem, &minimum.state, &fit, freedom);
     let noise =
         if problem.priors.list.is_empty() { fit.noise(problem.loss, freedom) } else { problem.priors.noise };
     let Fit { residuals, square, largest_radius, .. } = fit;

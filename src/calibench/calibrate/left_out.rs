@@ -1,79 +1,160 @@
-//! Do coefficients that are left out matter? Rao's score test (1948): what the cost would fall by if they
-//! were free, to second order at the minimum without them, with no further fit.
+//! Which freedoms that nobody decided on do the marks ask for? Groups of parameters and the board's shape, by
+//! what the cost would fall by with them; with any lens.
 //!
-//! With the normal equations `H` and the gradient `g` of a problem in which `k` coefficients more are free,
-//! at the minimum with these at 0, the cost falls by `g^T H^-1 g`. If they are 0 in truth, that over `k`
-//! variances of a coordinate follows Fisher's F of `k` and the residuals' degrees of freedom.
+//! Rao's score test (1948) needs no further fit: with the normal equations `H` and the gradient `g` of a
+//! problem in which `k` numbers more are free, at the minimum without them, the cost falls by `g^T H^-1 g`,
+//! to second order. If they are 0 in truth, that over `k` variances of a coordinate follows Fisher's F of `k`
+//! and the residuals' degrees of freedom. One shortcoming of a model looks like many: of what is asked for,
+//! the least likely is named first, and the others only for what they explain beside it.
 
+use super::any_lens::Falls;
 use super::chance::fisher_tail;
-use super::minimise::{Minimum, Problem};
-use super::system::{Step, System};
-use super::{Loss, Role, Settings, Warning};
-use crate::camera::Parameter;
+use super::{Board, LensCalibration, Loss, Role, Settings, Warning};
+use crate::board::View;
+use crate::camera::{FreeParameters, Parameter};
 
-/// Coefficients that come together.
-pub(super) type LeftOut = &'static [Parameter];
+/// Numbers that come together.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Group {
+    /// What most lenses have, or the standard choice leaves out.
+    Parameters(&'static [Parameter]),
+    /// Two bows and a twist.
+    Shape,
+}
 
-/// What are looked for, each by itself: what most lenses have and the standard choice leaves out.
-const ASKED: [LeftOut; 2] = [&[Parameter::P1, Parameter::P2], &[Parameter::K3]];
-/// A set whose lens has none of them is told that it has with this probability, for each.
+impl Group {
+    fn len(self) -> usize {
+        match self {
+            Group::Parameters(list) => list.len(),
+            Group::Shape => DEFORMATIONS,
+        }
+    }
+}
+
+/// Of a board that is not flat.
+pub(super) const DEFORMATIONS: usize = 3;
+
+/// Parameters that are looked for, each group by itself.
+const ASKED: [&[Parameter]; 4] =
+    [&[Parameter::P1, Parameter::P2], &[Parameter::K3], &[Parameter::Cx, Parameter::Cy], &[Parameter::Skew]];
+/// A set that needs none of them is told that it does with this probability, for each.
 const CHANCE: f64 = 1e-5;
 
-/// The coefficients that nobody has decided on.
-pub(super) fn undecided(settings: &Settings) -> Vec<LeftOut> {
-    let is_left_out = |list: &LeftOut| list.iter().all(|&p| settings.role(p) == Role::Default);
-    ASKED.into_iter().filter(is_left_out).collect()
+/// What nobody has decided on.
+fn undecided(settings: &Settings) -> Vec<Group> {
+    let model = settings.model();
+    let is_left_out = |list: &&[Parameter]| {
+        list.iter().all(|&p| settings.role(p) == Role::Default && model.parameters().any(|own| own == p))
+    };
+    let parameters = ASKED.into_iter().filter(is_left_out).map(Group::Parameters);
+    parameters.chain((settings.board == Board::Flat).then_some(Group::Shape)).collect()
 }
 
-/// Those of `undecided` that the marks ask for; `variance` is that of a coordinate, with so many degrees of
-/// freedom.
-pub(super) fn asked_for(
-    problem: &Problem<'_>,
-    minimum: &Minimum,
-    undecided: &[LeftOut],
-    variance: f64,
-    freedom: f64,
-) -> Vec<Warning> {
-    if problem.loss != Loss::Squares
-        || minimum.system.cost <= problem.rounding_cost
-        || !minimum.termination.is_minimum()
-    {
+/// A warning for each group that the marks of a calibration ask for.
+pub(super) fn asked_for(views: &[View], settings: &Settings, found: &LensCalibration) -> Vec<Warning> {
+    if settings.loss != Loss::Squares || !found.termination.is_minimum() {
         return Vec::new();
     }
-    let asked = |parameters: &LeftOut| {
-        let k = parameters.len();
-        let fall = fall(problem, minimum, parameters)? / variance;
-        let below = (freedom as usize).checked_sub(k).filter(|&below| below > 0)?;
-        let probability = fisher_tail(fall / k as f64, k, below);
-        let parameters = parameters.to_vec();
-        (probability < CHANCE).then_some(Warning::LeftOut { parameters, fall, probability })
-    };
-    undecided.iter().filter_map(asked).collect()
+    let undecided = undecided(settings);
+    let parameters = undecided.iter().fold(FreeParameters::NONE, |all, group| match group {
+        Group::Parameters(list) => list.iter().fold(all, |all, &p| all.with(p)),
+        Group::Shape => all,
+    });
+    let with_shape = undecided.contains(&Group::Shape);
+    let variance = found.sigma_px * found.sigma_px;
+    match Falls::of(views, settings, found, parameters, with_shape) {
+        Some(falls) => named(&falls, undecided, variance, found.degrees_of_freedom),
+        None => Vec::new(),
+    }
 }
 
-/// What the cost would fall by with these coefficients free.
-fn fall(problem: &Problem<'_>, minimum: &Minimum, parameters: &[Parameter]) -> Option<f64> {
-    let free = parameters.iter().fold(problem.free, |free, &parameter| free.with(parameter));
-    let wider = Problem { free, ..*problem };
-    let mut system = System::new(free, problem.observations.len());
-    wider.linearise_into(&minimum.state, &mut system);
-    let mut step = Step::default();
-    system.solve_into(0.0, &mut step)?;
-    Some(step.predicted_gain).filter(|gain| gain.is_finite())
+/// A group with what the cost would fall by for it, in variances, and how likely chance makes so much.
+#[derive(Clone, Copy)]
+struct Told {
+    group: Group,
+    fall: f64,
+    probability: f64,
+}
+
+fn named(falls: &Falls, mut undecided: Vec<Group>, variance: f64, freedom: usize) -> Vec<Warning> {
+    let (mut with, mut before) = (Chosen::default(), 0.0);
+    let mut told = Vec::new();
+    loop {
+        let asked = |&group: &Group| {
+            let fall = (with.and(group).fall(falls)? - before) / variance;
+            let below = freedom.checked_sub(group.len()).filter(|&below| below > 0)?;
+            let probability = fisher_tail(fall / group.len() as f64, group.len(), below);
+            (probability < CHANCE).then_some(Told { group, fall, probability })
+        };
+        let less_likely = |a: &Told, b: &Told| {
+            let each = |told: &Told| told.fall / told.group.len() as f64;
+            a.probability.total_cmp(&b.probability).then(each(b).total_cmp(&each(a)))
+        };
+        let Some(next) = undecided.iter().filter_map(asked).min_by(less_likely) else { break };
+        (with, before) = (with.and(next.group), before + next.fall * variance);
+        undecided.retain(|group| *group != next.group);
+        told.push(next);
+    }
+    told.into_iter().map(|told| warning(told, with.shape(falls))).collect()
+}
+
+/// Groups that are taken to be free.
+#[derive(Debug, Clone, Copy)]
+struct Chosen {
+    parameters: FreeParameters,
+    with_shape: bool,
+}
+
+impl Default for Chosen {
+    fn default() -> Chosen {
+        Chosen { parameters: FreeParameters::NONE, with_shape: false }
+    }
+}
+
+impl Chosen {
+    fn and(self, group: Group) -> Chosen {
+        match group {
+            Group::Parameters(list) => {
+                let parameters = list.iter().fold(self.parameters, |all, &p| all.with(p));
+                Chosen { parameters, ..self }
+            }
+            Group::Shape => Chosen { with_shape: true, ..self },
+        }
+    }
+
+    fn fall(self, falls: &Falls) -> Option<f64> {
+        falls.fall(self.parameters, self.with_shape)
+    }
+
+    /// The shape that the board would have.
+    fn shape(self, falls: &Falls) -> [f64; DEFORMATIONS] {
+        falls.shape(self.parameters).unwrap_or_default()
+    }
+}
+
+fn warning(Told { group, fall, probability }: Told, [bow_x, bow_y, twist]: [f64; DEFORMATIONS]) -> Warning {
+    match group {
+        Group::Parameters(list) => Warning::LeftOut { parameters: list.to_vec(), fall, probability },
+        Group::Shape => Warning::NotFlat { bow_x, bow_y, twist, fall, probability },
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::Model;
 
     #[test]
     fn what_is_decided_on_is_not_asked() {
-        use Parameter::{K3, P1, P2};
+        use Parameter::{K3, P1, P2, Skew};
+        let [tangential, radial, _, skew] = ASKED.map(Group::Parameters);
         let standard = Settings::standard();
-        let (tangential, radial): (LeftOut, LeftOut) = (&[P1, P2], &[K3]);
-        assert_eq!(undecided(&standard), [tangential, radial]);
-        assert_eq!(undecided(&standard.clone().hold(K3, 0.0)), [tangential]);
-        assert_eq!(undecided(&standard.clone().estimate(P2)), [radial]);
-        assert!(undecided(&standard.estimate(P1).estimate(K3)).is_empty());
+        assert_eq!(undecided(&standard), [tangential, radial, skew, Group::Shape]);
+        assert_eq!(undecided(&standard.clone().hold(K3, 0.0)), [tangential, skew, Group::Shape]);
+        assert_eq!(undecided(&standard.clone().estimate(P2).estimate(Skew)), [radial, Group::Shape]);
+        let bowed = Board::Bowed { standard_deviation: f64::INFINITY };
+        assert!(undecided(&standard.with_board(bowed).estimate(P1).estimate(K3).hold(Skew, 0.0)).is_empty());
+        // A lens is asked for nothing that it does not have.
+        assert_eq!(undecided(&Settings::of_model(Model::KannalaBrandt)), [skew, Group::Shape]);
     }
 }

@@ -1,8 +1,7 @@
 //! Which of the two estimators calibrates? That of [`super::calibrate`] knows one lens, and much about it;
 //! that of [`super::any_lens`] knows all.
 
-use super::estimate::calibrate_asking;
-use super::{Board, Calibration, CalibrationError, Settings, any_lens, copies};
+use super::{Board, Calibration, CalibrationError, Settings, any_lens, calibrate, copies, left_out};
 use crate::board::View;
 use crate::camera::{Camera, Lens, Model};
 
@@ -54,11 +53,13 @@ impl LensCalibration {
 /// The cost is `sum w^2 |r|^2` under the loss, with the priors' share; see [`Prior`](super::Prior). The
 /// covariance is that of [`calibrate`](super::calibrate), the noise that of a coordinate of weight 1. A
 /// camera with Brown-Conrady's lens, marks of weight 1 and a flat board is handed to
-/// [`calibrate`](super::calibrate), with all that it checks, and asked whether its marks ask for p1 and p2,
-/// or k3, where nobody has decided on them ([`Warning::LeftOut`](super::Warning::LeftOut)). For all else the
-/// best of a few starts is refined, by the rays of a fisheye and by a pinhole, and the profiles of the
+/// [`calibrate`](super::calibrate), with all that it checks. For all else the best of a few starts is refined, by the rays of a fisheye and by a pinhole, and the profiles of the
 /// parameters are walked where the cost is no parabola; nothing certifies that minimum. Views given twice
 /// count once, but where marks have weights.
+///
+/// With any lens the marks are asked by score tests whether they need what nobody has decided on: p1 and p2,
+/// k3, the principal point, skew ([`Warning::LeftOut`](super::Warning::LeftOut)), a board that is not flat
+/// ([`Warning::NotFlat`](super::Warning::NotFlat)).
 ///
 /// # Errors
 /// As [`calibrate`](super::calibrate); a parameter that the model does not have; a model that cannot see
@@ -85,13 +86,22 @@ impl LensCalibration {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn calibrate_lens(views: &[View], settings: &Settings) -> Result<LensCalibration, CalibrationError> {
-    let is_plain = views.iter().all(|view| view.weights().is_none()) && settings.board == Board::Flat;
-    if settings.model() == Model::BrownConrady && is_plain {
-        return calibrate_asking(views, settings).map(LensCalibration::from);
-    }
     // A mark that was given twice with weights may be meant so.
     if views.iter().any(|view| view.weights().is_some()) {
-        return any_lens::calibrate(views, settings);
+        return asked(views, settings);
     }
-    copies::without(views, |views| any_lens::calibrate(views, settings))
+    copies::without(views, |views| asked(views, settings))
+}
+
+/// The calibration of views without copies, with what the marks ask for besides.
+fn asked(views: &[View], settings: &Settings) -> Result<LensCalibration, CalibrationError> {
+    let is_plain = views.iter().all(|view| view.weights().is_none()) && settings.board == Board::Flat;
+    let mut found = if settings.model() == Model::BrownConrady && is_plain {
+        LensCalibration::from(calibrate(views, settings)?)
+    } else {
+        any_lens::calibrate(views, settings)?
+    };
+    let asked_for = left_out::asked_for(views, settings, &found);
+    found.warnings.extend(asked_for);
+    Ok(found)
 }

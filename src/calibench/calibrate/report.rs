@@ -151,13 +151,27 @@ pub enum Warning {
         /// Correlation coefficient of a mark's residual with the next one's.
         correlation: f64,
     },
-    /// Coefficients that are held at 0 because nobody asked for them, and that the marks ask for.
+    /// Parameters that are held at their default because nobody asked for them, and that the marks ask for.
     LeftOut {
         /// Which.
         parameters: Vec<Parameter>,
         /// By how many variances the cost would fall with them.
         fall: f64,
-        /// How likely chance makes so much for a lens without them.
+        /// How likely chance makes so much for a camera without them.
+        probability: f64,
+    },
+    /// The board is taken to be flat, and the marks ask for one that is not: two bows and a twist as in
+    /// [`super::BoardShape`], in the target's unit, to first order.
+    NotFlat {
+        /// Height of the middle over the edges in x.
+        bow_x: f64,
+        /// The same in y.
+        bow_y: f64,
+        /// Height of the corners where `x y = 1`.
+        twist: f64,
+        /// By how many variances the cost would fall with them.
+        fall: f64,
+        /// How likely chance makes so much for a flat board.
         probability: f64,
     },
     /// Two parameters cannot be told apart well: an error of one is made up by the other.
@@ -237,6 +251,11 @@ pub(super) const UNCERTAIN_FOCAL: f64 = 0.05;
 /// A number with two significant digits at the least, as a user may type it.
 pub(super) fn digits(number: f64) -> String {
     if number >= 0.1 { format!("{number:.2}") } else { format!("{number:.1e}") }
+}
+
+/// The same of a number of either sign, which is told.
+fn signed(number: f64) -> String {
+    format!("{}{}", if number < 0.0 { '-' } else { '+' }, digits(number.abs()))
 }
 
 /// How far a true interval reaches, over the linear one.
@@ -337,13 +356,24 @@ impl fmt::Display for Warning {
             Warning::LeftOut { parameters, fall, probability } => {
                 let names: Vec<&str> = parameters.iter().map(|parameter| parameter.name()).collect();
                 let them = if names.len() == 1 { "it" } else { "them" };
+                let is_centre = parameters.contains(&Parameter::Cx);
+                let held = if is_centre { "held in the middle of the image" } else { "held at 0" };
                 write!(
                     f,
-                    "the marks ask for {}, held at 0: the cost would fall by {fall:.0} variances, by chance \
+                    "the marks ask for {}, {held}: the cost would fall by {fall:.0} variances, by chance \
                      with probability {probability:.1e}; estimate {them} too, as the other parameters make up for {them}",
                     names.join(" and ")
                 )
             }
+            Warning::NotFlat { bow_x, bow_y, twist, fall, probability } => write!(
+                f,
+                "the marks ask for a board that is not flat: with its middle {} higher than its edges in x and {} in y, and corners twisted by {} \
+                 (in its unit, to first order), the cost would fall by {fall:.0} variances, by chance with probability {probability:.1e}; estimate \
+                 its shape too, as the camera makes up for it",
+                signed(*bow_x),
+                signed(*bow_y),
+                signed(*twist)
+            ),
             Warning::Correlated { a, b, correlation } => write!(
                 f,
                 "{a} and {b} are correlated {correlation:+.4}: the data hardly tell them apart; cover the image corners, or \

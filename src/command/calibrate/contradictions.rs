@@ -111,11 +111,6 @@ fn parameters(arguments: &Arguments) -> Result<(), String> {
                 "--model auto chooses what is estimated of a lens, and {p} is told already: leave it out"
             ));
         }
-        if arguments.bow.is_some() {
-            return Err(
-                "--model auto compares lenses before a flat board: leave --board-shape out".to_string()
-            );
-        }
     }
     let in_both = |list: &[Parameter]| fixed.iter().copied().find(|p| list.contains(p));
     // The parameters that are free by default give way to --fix; those that were named do not.

@@ -7,7 +7,7 @@ use calibench::calibrate::{
     Board, Candidate, Compared, Freedom, LensCalibration, Loss, Settings, Warning, calibrate_lens,
     compare_models, explaining_freedoms,
 };
-use calibench::camera::Model;
+use calibench::camera::{Model, Parameter};
 use calibench::io::result::ModelFields;
 use calibench::io::{message, significant};
 use calibench::photos::Fit;
@@ -19,9 +19,10 @@ pub(super) struct Comparison {
     refused: Vec<String>,
 }
 
-/// Compares the usual models, and gives the settings the chosen one.
+/// Compares the usual models before the board that is asked for, and gives the settings the chosen one.
 pub(super) fn compare(observed: &Observed, settings: &mut Settings) -> Result<Comparison, Failure> {
-    let (compared, refused) = compare_models(&observed.views, settings, &Candidate::usual());
+    let candidates = usual(settings);
+    let (compared, refused) = compare_models(&observed.views, settings, &candidates);
     let Some(chosen) = compared.first() else {
         let reason = refused.first().map(|(_, error)| message(error)).unwrap_or_default();
         return Err(Failure::from(format!("{}: no lens model can be calibrated: {reason}", observed.source)));
@@ -29,6 +30,10 @@ pub(super) fn compare(observed: &Observed, settings: &mut Settings) -> Result<Co
     *settings = chosen.candidate.settings(settings);
     let refused = refused.iter().map(|(c, error)| format!("{}: {}", name(c), message(error))).collect();
     Ok(Comparison { compared, refused })
+}
+
+fn usual(settings: &Settings) -> Vec<Candidate> {
+    Candidate::usual().into_iter().map(|usual| Candidate { board: settings.board, ..usual }).collect()
 }
 
 fn name(candidate: &Candidate) -> String {
@@ -123,7 +128,7 @@ fn better_model(fit: &Fit, settings: &Settings) -> Option<String> {
         return None;
     }
     let own = criterion(&fit.calibration);
-    let fitted = Candidate::usual().into_iter().filter_map(|candidate| {
+    let fitted = usual(settings).into_iter().filter_map(|candidate| {
         let other = calibrate_lens(&fit.views, &candidate.settings(settings)).ok()?;
         let gain = own - criterion(&other);
         (gain > STRONG && other.rmse_px < fit.calibration.rmse_px).then_some((gain, candidate, other))
@@ -159,7 +164,9 @@ fn in_words(freedom: &Freedom, settings: &Settings) -> String {
             _ => "a bowed board (--board-shape bow:free)".to_string(),
         }
     } else if candidate.model == settings.model() {
-        format!("coefficients {} free (--free)", candidate.coefficients)
+        let is_new = |p: &Parameter| !settings.free().contains(*p);
+        let names: Vec<&str> = candidate.coefficients.iter().filter(is_new).map(Parameter::name).collect();
+        format!("{} estimated too (--free)", names.join(" and "))
     } else {
         format!("a {} lens (--model {})", candidate.model, candidate.model)
     };

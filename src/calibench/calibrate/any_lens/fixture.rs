@@ -31,6 +31,11 @@ pub(super) const WIDE_NOISE_PX: f64 = 0.003;
 /// Twenty views from near by, marks up to 60 degrees from the axis: the certificate of a pinhole with k1 and
 /// k2 fails.
 pub(super) fn wide_views() -> Vec<View> {
+    wide_views_of_a_bowed_board(0.0)
+}
+
+/// The same of a board whose middle lies higher than its edges in x, by this part of the target's unit.
+pub(super) fn wide_views_of_a_bowed_board(bow: f64) -> Vec<View> {
     let lens = Lens::new(Model::KannalaBrandt, &[0.02, -0.01, 0.004, -0.0015]).unwrap();
     let pose = |k: i32| Pose {
         rotation: rotation::from_xyz_rad(
@@ -44,11 +49,18 @@ pub(super) fn wide_views() -> Vec<View> {
         &Camera::with_lens(230.0, 230.0, 326.0, 243.0, lens),
         &(0..20).map(pose).collect::<Vec<_>>(),
         WIDE_NOISE_PX,
+        bow,
     )
 }
 
+/// Five views without noise.
+pub(super) fn exact_views() -> Vec<View> {
+    let (camera, poses) = truth();
+    seen(&camera, &poses, 0.0, 0.0)
+}
+
 /// What the camera sees of five rows of seven marks.
-fn seen(camera: &Camera<Lens>, poses: &[Pose], noise_px: f64) -> Vec<View> {
+fn seen(camera: &Camera<Lens>, poses: &[Pose], noise_px: f64, bow: f64) -> Vec<View> {
     let points: Vec<Vec2> =
         (0..35).map(|i| Vec2::new(f64::from(i % 7) - 3.0, f64::from(i / 7) - 2.0) * 12.0).collect();
     // Deviations that have nothing in common: the phases are those of a chirp.
@@ -59,7 +71,8 @@ fn seen(camera: &Camera<Lens>, poses: &[Pose], noise_px: f64) -> Vec<View> {
     };
     let mut seen = |pose: &Pose| {
         let mut pixel = |p: &Vec2| {
-            let pixel = camera.pixel(&pose.apply(&Vec3::new(p.x, p.y, 0.0))).unwrap();
+            let height = bow * (1.0 - (p.x / 36.0) * (p.x / 36.0));
+            let pixel = camera.pixel(&pose.apply(&Vec3::new(p.x, p.y, height))).unwrap();
             pixel + Vec2::new(noise(), noise())
         };
         View::new(points.clone(), points.iter().map(&mut pixel).collect()).unwrap()
@@ -93,7 +106,7 @@ pub(super) fn at_minimum<T>(
     then: impl Fn(&Problem<'_>, &Minimum<State, WIDTH>) -> T,
 ) -> T {
     let (camera, poses) = truth();
-    let views = seen(&camera, &poses, 0.1);
+    let views = seen(&camera, &poses, 0.1, 0.0);
     let frames = TargetFrames::of(&views);
     let listed = marks::of_views(&views, &frames, &shape::region(&views));
     let problem = problem(&listed, free);

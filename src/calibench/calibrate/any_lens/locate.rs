@@ -6,7 +6,7 @@ use super::super::target_frame::TargetFrames;
 use super::super::{Loss, Settings};
 use super::marks::Marks;
 use super::problem::{Problem, State, rounding_cost};
-use super::{shape, start};
+use super::{BoardShape, shape, start};
 use crate::board::View;
 use crate::camera::{Camera, FreeParameters, Lens};
 use crate::geometry::{Pose, Vec2};
@@ -36,17 +36,23 @@ pub struct Located {
 /// assert!((found.cam_from_target.translation - truth.translation).norm() < 1e-6);
 /// ```
 pub fn locate(camera: &Camera<Lens>, view: &View) -> Option<Located> {
-    located(camera, view, Loss::Squares)
+    located(camera, None, view, Loss::Squares)
 }
 
-/// The same with the pose of least loss.
-pub(in super::super) fn located(camera: &Camera<Lens>, view: &View, loss: Loss) -> Option<Located> {
+/// The same of a board of any shape, with the pose of least loss.
+pub(in super::super) fn located(
+    camera: &Camera<Lens>,
+    board: Option<&BoardShape>,
+    view: &View,
+    loss: Loss,
+) -> Option<Located> {
     if view.len() < FEWEST_MARKS {
         return None;
     }
     let views = std::slice::from_ref(view);
     let frames = TargetFrames::of(views);
-    let marks = [Marks::of(view, frames.at(0), &shape::region(views))];
+    let region = board.map_or_else(|| shape::region(views), |board| board.region);
+    let marks = [Marks::of(view, frames.at(0), &region)];
     let problem = Problem {
         views: &marks,
         free: FreeParameters::NONE,
@@ -61,7 +67,8 @@ pub(in super::super) fn located(camera: &Camera<Lens>, view: &View, loss: Loss) 
         rounding_cost: rounding_cost(&marks),
         is_certifiable: false,
     };
-    let state = start::with_poses(&marks, *camera)?;
+    let shape = board.map_or([0.0; 3], |board| [board.bow_x, board.bow_y, board.twist]);
+    let state = State { shape, ..start::with_poses(&marks, *camera)? };
     let state = start::with_better_tilts(&problem, descend(&problem, state).state);
     residuals(&marks[0], &state).map(|(residuals, square)| Located {
         cam_from_target: frames.at(0).cam_from_target(&state.cam_from_target[0]),

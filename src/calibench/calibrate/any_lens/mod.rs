@@ -11,6 +11,7 @@ mod certificate;
 mod counterpart;
 mod curvature;
 mod estimate;
+mod falls;
 #[cfg(test)]
 mod fixture;
 mod focal;
@@ -31,6 +32,7 @@ mod start;
 mod walk;
 
 pub(super) use estimate::{calibrate, spans_a_plane};
+pub(super) use falls::Falls;
 pub use information::lens_information;
 pub(super) use locate::located;
 pub use locate::{Located, locate};
