@@ -3,7 +3,7 @@
 
 use calibench::board::View;
 use calibench::calibrate::{
-    Board, CalibrationError, Candidate, LensCalibration, Outliers, Settings, Warning, calibrate_lens,
+    Board, CalibrationError, Candidate, LensCalibration, Outliers, Role, Settings, Warning, calibrate_lens,
     compare_models, explaining_freedoms,
 };
 use calibench::camera::{Camera, Lens, Model, Parameter};
@@ -182,6 +182,91 @@ fn a_twisted_board_is_one_of_the_explanations() {
     assert!(bent.rmse_px < 0.16 && flat.rmse_px > 2.0 * bent.rmse_px, "{} {}", flat.rmse_px, bent.rmse_px);
     // Two bows do not make a twist.
     assert!(found.iter().all(|f| !matches!(f.candidate.board, Board::Bowed { .. })), "{found:?}");
+}
+
+/// A bow that moves the camera and leaves residuals of neighbours that hardly agree.
+#[test]
+fn a_board_that_is_bowed_a_little_is_told_with_every_lens() {
+    let lens = [
+        (Model::BrownConrady, 800.0, vec![-0.2, 0.05, 0.0, 0.0, 0.0], 150.0),
+        (Model::KannalaBrandt, 420.0, vec![-0.02, 0.004, -0.001, 0.0002], 60.0),
+        (Model::Rational, 800.0, vec![0.1, 0.01, 0.0, 0.0, 0.0, 0.3, 0.02, 0.0], 150.0),
+        (Model::Division, 420.0, vec![-0.2], 60.0),
+        (Model::DoubleSphere, 330.0, vec![-0.3, 0.6], 60.0),
+    ];
+    for (model, f, coefficients, distance) in lens {
+        let truth = camera(model, f, f, &coefficients);
+        for twist in [0.0, 0.12] {
+            let views = seen(&truth, &poses(12, distance), |_| board(), twist);
+            let found = calibrate_lens(&views, &settings(model)).unwrap();
+            let told = found.warnings.iter().find_map(|w| match w {
+                Warning::NotFlat { bow_x, bow_y, twist, .. } => Some([*bow_x, *bow_y, *twist]),
+                _ => None,
+            });
+            assert_eq!(told.is_some(), twist > 0.0, "{model}: {:?}", found.warnings);
+            if let Some([bow_x, bow_y, told]) = told {
+                // To first order, and 0.1 px of noise.
+                assert!((told / twist - 1.0).abs() < 0.3, "{model}: {told}");
+                assert!(bow_x.abs() < 0.3 * twist && bow_y.abs() < 0.3 * twist, "{model}: {bow_x} {bow_y}");
+            }
+            // One shortcoming is told once.
+            assert!(
+                !found.warnings.iter().any(|w| matches!(w, Warning::LeftOut { .. })),
+                "{:?}",
+                found.warnings
+            );
+        }
+        // Nor is it asked where its shape is estimated.
+        let views = seen(&truth, &poses(12, distance), |_| board(), 0.12);
+        let bent = settings(model).with_board(Board::Bent { standard_deviation: f64::INFINITY });
+        let found = calibrate_lens(&views, &bent).unwrap();
+        assert!(!found.warnings.iter().any(|w| matches!(w, Warning::NotFlat { .. })), "{:?}", found.warnings);
+    }
+}
+
+/// Pixels that are not square, an axis that is not in the middle, a skew: what is held of them may be what
+/// residuals are left by.
+#[test]
+fn what_is_held_of_the_basic_parameters_is_told_and_is_one_of_the_explanations() {
+    use Parameter::{Cx, Cy, Fy, Skew};
+    let square = fisheye();
+    let skewed = Camera { skew: 2.0, ..square };
+    let held = settings(Model::KannalaBrandt);
+    let centred = [Cx, Cy].into_iter().fold(held.clone(), |own, p| own.with_role(p, Role::Default));
+    for (truth, settings, missing, is_told) in [
+        (square, held.clone().tie_focal_lengths(1.0), vec![Fy], false),
+        (square, centred, vec![Cx, Cy], true),
+        (skewed, held, vec![Skew], true),
+    ] {
+        let views = seen(&truth, &poses(12, 60.0), |_| board(), 0.0);
+        let found = calibrate_lens(&views, &settings).unwrap();
+        let asks = |w: &Warning| matches!(w, Warning::LeftOut { parameters, .. } if *parameters == missing);
+        assert_eq!(found.warnings.iter().any(asks), is_told, "{missing:?}: {:?}", found.warnings);
+        let explained = explaining_freedoms(&views, &settings, &found);
+        let best = explained.first().expect("something explains it");
+        assert!(
+            missing.iter().all(|&p| best.candidate.coefficients.contains(p)),
+            "{missing:?}: {explained:?}"
+        );
+        assert!((best.rmse_px / 0.1 / 2.0_f64.sqrt() - 1.0).abs() < 0.05, "{missing:?}: {}", best.rmse_px);
+    }
+}
+
+#[test]
+fn models_are_compared_before_a_board_that_is_bent() {
+    let views = seen(&fisheye(), &poses(12, 60.0), |_| board(), 1.0);
+    let board = Board::Bent { standard_deviation: f64::INFINITY };
+    let candidates: Vec<Candidate> = Candidate::usual()
+        .into_iter()
+        .filter(|c| [Model::KannalaBrandt, Model::Division].contains(&c.model))
+        .flat_map(|usual| [usual, Candidate { board, ..usual }])
+        .collect();
+    let (compared, _) = compare_models(&views, &Settings::standard().with_image_size(SIZE), &candidates);
+    let best = &compared[0];
+    assert_eq!((best.candidate.model, best.candidate.board), (Model::KannalaBrandt, board));
+    // Views that were left out are predicted before the board that is bent.
+    let hold_out_px = best.hold_out_px.unwrap();
+    assert!((hold_out_px / 0.1 - 1.0).abs() < 0.2, "{hold_out_px}");
 }
 
 /// Views that face the camera leave the focal length to the distance, with any lens.
