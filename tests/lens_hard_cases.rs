@@ -216,8 +216,11 @@ fn a_board_that_is_bowed_a_little_is_told_with_every_lens() {
                 found.warnings
             );
         }
-        // Nor is it asked where its shape is estimated.
+        // Two bows make no twist, and nothing is asked where the whole shape is estimated.
         let views = seen(&truth, &poses(12, distance), |_| board(), 0.12);
+        let bowed = settings(model).with_board(Board::Bowed { standard_deviation: f64::INFINITY });
+        let found = calibrate_lens(&views, &bowed).unwrap();
+        assert!(found.warnings.iter().any(|w| matches!(w, Warning::NotFlat { .. })), "{:?}", found.warnings);
         let bent = settings(model).with_board(Board::Bent { standard_deviation: f64::INFINITY });
         let found = calibrate_lens(&views, &bent).unwrap();
         assert!(!found.warnings.iter().any(|w| matches!(w, Warning::NotFlat { .. })), "{:?}", found.warnings);
@@ -236,6 +239,7 @@ fn what_is_held_of_the_basic_parameters_is_told_and_is_one_of_the_explanations()
     for (truth, settings, missing, is_told) in [
         (square, held.clone().tie_focal_lengths(1.0), vec![Fy], false),
         (square, centred, vec![Cx, Cy], true),
+        (square, held.clone().hold(Cx, 640.0).hold(Cy, 480.0), vec![Cx, Cy], true),
         (skewed, held, vec![Skew], true),
     ] {
         let views = seen(&truth, &poses(12, 60.0), |_| board(), 0.0);

@@ -279,16 +279,20 @@ pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibr
     .filter(|(other, _)| *other != model)
     .map(|(other, coefficients)| (other, FreeParameters::of(coefficients)));
     let standard_deviation = f64::INFINITY;
-    let boards = match settings.board {
-        Board::Flat => vec![Board::Bowed { standard_deviation }, Board::Bent { standard_deviation }],
-        Board::Bowed { .. } => vec![Board::Bent { standard_deviation }],
-        Board::Bent { .. } => Vec::new(),
+    let boards = [Board::Bowed { standard_deviation }, Board::Bent { standard_deviation }];
+    let is_richer = |board: &Board| match (settings.board, board) {
+        (Board::Bent { .. }, Board::Bowed { .. }) => false,
+        (own, board) => own != *board,
     };
     let candidates = richer
         .chain(others)
         .map(|(model, coefficients)| Candidate { model, coefficients, board: settings.board })
         .filter(|candidate| candidate.coefficients != own)
-        .chain(boards.into_iter().map(|board| Candidate { model, coefficients: own, board }));
+        .chain(boards.into_iter().filter(is_richer).map(|board| Candidate {
+            model,
+            coefficients: own,
+            board,
+        }));
     let fitted: Vec<(Candidate, LensCalibration)> = candidates
         .filter_map(|candidate| Some((candidate, calibrate_lens(views, &candidate.settings(settings)).ok()?)))
         .filter(|(_, calibration)| calibration.termination.is_minimum())

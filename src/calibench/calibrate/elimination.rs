@@ -21,6 +21,10 @@ pub(super) struct Reduced<const W: usize = N> {
     right: [f64; W],
 }
 
+/// Combinations that are known worse than each unknown alone by more than this part of its square count as
+/// held: rounding may have left nothing of them.
+const HARDLY: f64 = 1e-10;
+
 impl<const W: usize> Reduced<W> {
     /// The intrinsics' own part.
     pub fn of(intrinsics: &Intrinsics<W>, gradient: &SVector<f64, W>, damping: f64) -> Reduced<W> {
@@ -50,13 +54,14 @@ impl<const W: usize> Reduced<W> {
         DMatrix::from_fn(n, n, |i, j| self.rows[i.min(j)][i.max(j)])
     }
 
-    /// That of some of the unknowns, in the order of `rows`, the others held.
+    /// That of some of the unknowns, in the order of `rows`, the others held, damped by [`HARDLY`].
     pub fn part(&self, rows: &[usize]) -> Reduced<W> {
         let mut part = Reduced { rows: [[0.0; W]; W], right: [0.0; W] };
         for (i, &row) in rows.iter().enumerate() {
             for (j, &column) in rows.iter().enumerate().skip(i) {
                 part.rows[i][j] = self.rows[row.min(column)][row.max(column)];
             }
+            part.rows[i][i] *= 1.0 + HARDLY;
             part.right[i] = self.right[row];
         }
         part

@@ -9,7 +9,7 @@
 
 use super::any_lens::Falls;
 use super::chance::fisher_tail;
-use super::{Board, LensCalibration, Loss, Role, Settings, Warning};
+use super::{LensCalibration, Loss, Role, Settings, Warning};
 use crate::board::View;
 use crate::camera::{FreeParameters, Parameter};
 
@@ -18,15 +18,18 @@ use crate::camera::{FreeParameters, Parameter};
 enum Group {
     /// What most lenses have, or the standard choice leaves out.
     Parameters(&'static [Parameter]),
-    /// Two bows and a twist.
-    Shape,
+    /// So many of two bows and a twist.
+    Shape {
+        /// The others are estimated already.
+        more: usize,
+    },
 }
 
 impl Group {
     fn len(self) -> usize {
         match self {
             Group::Parameters(list) => list.len(),
-            Group::Shape => DEFORMATIONS,
+            Group::Shape { more } => more,
         }
     }
 }
@@ -40,14 +43,18 @@ const ASKED: [&[Parameter]; 4] =
 /// A set that needs none of them is told that it does with this probability, for each.
 const CHANCE: f64 = 1e-5;
 
-/// What nobody has decided on.
+/// What nobody has decided on. What is held of the basic parameters counts as well: a coefficient that nobody
+/// asked for would make up for a wrong value.
 fn undecided(settings: &Settings) -> Vec<Group> {
     let model = settings.model();
-    let is_left_out = |list: &&[Parameter]| {
-        list.iter().all(|&p| settings.role(p) == Role::Default && model.parameters().any(|own| own == p))
+    let is_left_out = |&p: &Parameter| match settings.role(p) {
+        Role::Default => model.parameters().any(|own| own == p),
+        Role::Held(_) => Parameter::LINEAR.contains(&p),
+        _ => false,
     };
-    let parameters = ASKED.into_iter().filter(is_left_out).map(Group::Parameters);
-    parameters.chain((settings.board == Board::Flat).then_some(Group::Shape)).collect()
+    let parameters = ASKED.into_iter().filter(|list| list.iter().all(is_left_out)).map(Group::Parameters);
+    let more = DEFORMATIONS - settings.board.bend().map_or(0, |bend| bend.deformations);
+    parameters.chain((more > 0).then_some(Group::Shape { more })).collect()
 }
 
 /// A warning for each group that the marks of a calibration ask for.
@@ -58,9 +65,9 @@ pub(super) fn asked_for(views: &[View], settings: &Settings, found: &LensCalibra
     let undecided = undecided(settings);
     let parameters = undecided.iter().fold(FreeParameters::NONE, |all, group| match group {
         Group::Parameters(list) => list.iter().fold(all, |all, &p| all.with(p)),
-        Group::Shape => all,
+        Group::Shape { .. } => all,
     });
-    let with_shape = undecided.contains(&Group::Shape);
+    let with_shape = undecided.iter().any(|group| matches!(group, Group::Shape { .. }));
     let variance = found.sigma_px * found.sigma_px;
     match Falls::of(views, settings, found, parameters, with_shape) {
         Some(falls) => named(&falls, undecided, variance, found.degrees_of_freedom),
@@ -118,7 +125,7 @@ impl Chosen {
                 let parameters = list.iter().fold(self.parameters, |all, &p| all.with(p));
                 Chosen { parameters, ..self }
             }
-            Group::Shape => Chosen { with_shape: true, ..self },
+            Group::Shape { .. } => Chosen { with_shape: true, ..self },
         }
     }
 
@@ -135,26 +142,34 @@ impl Chosen {
 fn warning(Told { group, fall, probability }: Told, [bow_x, bow_y, twist]: [f64; DEFORMATIONS]) -> Warning {
     match group {
         Group::Parameters(list) => Warning::LeftOut { parameters: list.to_vec(), fall, probability },
-        Group::Shape => Warning::NotFlat { bow_x, bow_y, twist, fall, probability },
+        Group::Shape { .. } => Warning::NotFlat { bow_x, bow_y, twist, fall, probability },
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::Board;
     use super::*;
     use crate::camera::Model;
 
     #[test]
     fn what_is_decided_on_is_not_asked() {
-        use Parameter::{K3, P1, P2, Skew};
-        let [tangential, radial, _, skew] = ASKED.map(Group::Parameters);
+        use Parameter::{Cx, Cy, K3, P1, P2, Skew};
+        let [tangential, radial, centre, skew] = ASKED.map(Group::Parameters);
+        let shape = Group::Shape { more: 3 };
         let standard = Settings::standard();
-        assert_eq!(undecided(&standard), [tangential, radial, skew, Group::Shape]);
-        assert_eq!(undecided(&standard.clone().hold(K3, 0.0)), [tangential, skew, Group::Shape]);
-        assert_eq!(undecided(&standard.clone().estimate(P2).estimate(Skew)), [radial, Group::Shape]);
-        let bowed = Board::Bowed { standard_deviation: f64::INFINITY };
-        assert!(undecided(&standard.with_board(bowed).estimate(P1).estimate(K3).hold(Skew, 0.0)).is_empty());
+        assert_eq!(undecided(&standard), [tangential, radial, skew, shape]);
+        assert_eq!(undecided(&standard.clone().hold(K3, 0.0)), [tangential, skew, shape]);
+        assert_eq!(undecided(&standard.clone().estimate(P2).estimate(Skew)), [radial, shape]);
+        let standard_deviation = f64::INFINITY;
+        let decided = standard.clone().estimate(P1).estimate(K3).estimate(Skew);
+        let bowed = decided.clone().with_board(Board::Bowed { standard_deviation });
+        assert_eq!(undecided(&bowed), [Group::Shape { more: 1 }]);
+        assert!(undecided(&decided.with_board(Board::Bent { standard_deviation })).is_empty());
         // A lens is asked for nothing that it does not have.
-        assert_eq!(undecided(&Settings::of_model(Model::KannalaBrandt)), [skew, Group::Shape]);
+        assert_eq!(undecided(&Settings::of_model(Model::KannalaBrandt)), [skew, shape]);
+        // What a wrong value of the principal point does is not to be put down to p1 and p2.
+        let off = standard.hold(Cx, 320.0).hold(Cy, 240.0);
+        assert_eq!(undecided(&off), [tangential, radial, centre, skew, shape]);
     }
 }

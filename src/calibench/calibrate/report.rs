@@ -151,7 +151,8 @@ pub enum Warning {
         /// Correlation coefficient of a mark's residual with the next one's.
         correlation: f64,
     },
-    /// Parameters that are held at their default because nobody asked for them, and that the marks ask for.
+    /// Parameters that are held because nobody asked for them, or of the principal point and skew that are
+    /// held at all, and that the marks ask for.
     LeftOut {
         /// Which.
         parameters: Vec<Parameter>,
@@ -160,8 +161,8 @@ pub enum Warning {
         /// How likely chance makes so much for a camera without them.
         probability: f64,
     },
-    /// The board is taken to be flat, and the marks ask for one that is not: two bows and a twist as in
-    /// [`super::BoardShape`], in the target's unit, to first order.
+    /// The board is taken to be flat, or to have no twist, and the marks ask for one that is bent: two bows and
+    /// a twist as in [`super::BoardShape`], in the target's unit, to first order.
     NotFlat {
         /// Height of the middle over the edges in x.
         bow_x: f64,
@@ -356,8 +357,7 @@ impl fmt::Display for Warning {
             Warning::LeftOut { parameters, fall, probability } => {
                 let names: Vec<&str> = parameters.iter().map(|parameter| parameter.name()).collect();
                 let them = if names.len() == 1 { "it" } else { "them" };
-                let is_centre = parameters.contains(&Parameter::Cx);
-                let held = if is_centre { "held in the middle of the image" } else { "held at 0" };
+                let held = if names.len() == 1 { "which is held" } else { "which are held" };
                 write!(
                     f,
                     "the marks ask for {}, {held}: the cost would fall by {fall:.0} variances, by chance \
@@ -367,7 +367,7 @@ impl fmt::Display for Warning {
             }
             Warning::NotFlat { bow_x, bow_y, twist, fall, probability } => write!(
                 f,
-                "the marks ask for a board that is not flat: with its middle {} higher than its edges in x and {} in y, and corners twisted by {} \
+                "the marks ask for a board that is bent, or bent otherwise: with its middle {} higher than its edges in x and {} in y, and corners twisted by {} \
                  (in its unit, to first order), the cost would fall by {fall:.0} variances, by chance with probability {probability:.1e}; estimate \
                  its shape too, as the camera makes up for it",
                 signed(*bow_x),

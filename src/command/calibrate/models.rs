@@ -163,16 +163,29 @@ fn in_words(freedom: &Freedom, settings: &Settings) -> String {
             Board::Bent { .. } => "a bowed and twisted board (--board-shape bent:free)".to_string(),
             _ => "a bowed board (--board-shape bow:free)".to_string(),
         }
-    } else if candidate.model == settings.model() {
-        let is_new = |p: &Parameter| !settings.free().contains(*p);
-        let names: Vec<&str> = candidate.coefficients.iter().filter(is_new).map(Parameter::name).collect();
-        format!("{} estimated too (--free)", names.join(" and "))
     } else {
-        format!("a {} lens (--model {})", candidate.model, candidate.model)
+        changed_camera(candidate, settings)
     };
     format!(
         "{what} lowers the RMSE from {} to {} px and leaves neighbours a correlation of {correlation:+.2}",
         significant(*rmse_without_px, 3),
         significant(*rmse_px, 3),
     )
+}
+
+/// Another lens, or more of this one, with the options that ask for it.
+fn changed_camera(candidate: &Candidate, settings: &Settings) -> String {
+    let (before, after) = (settings.free(), candidate.settings(settings));
+    let unties =
+        if settings.fy_per_fx().is_some() && after.fy_per_fx().is_none() { ", no --tie" } else { "" };
+    let list = format!("--free {}{unties}", after.free());
+    if candidate.model == settings.model() {
+        let is_new = |p: &Parameter| !before.contains(*p);
+        let names: Vec<&str> = candidate.coefficients.iter().filter(is_new).map(Parameter::name).collect();
+        return format!("{} estimated too ({list})", names.join(" and "));
+    }
+    let model = candidate.model;
+    let is_standard = before == settings.model().standard_free() && after.free() == model.standard_free();
+    let list = if is_standard { String::new() } else { format!(" {list}") };
+    format!("a {model} lens (--model {model}{list})")
 }

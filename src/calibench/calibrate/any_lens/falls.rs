@@ -24,6 +24,7 @@ pub(in super::super) struct Falls {
     /// The parameters and the deformations that the minimum has.
     own: FreeParameters,
     own_deformations: usize,
+    own_shape: [f64; 3],
     /// What its own freedoms would still lower the cost by.
     left: f64,
 }
@@ -51,7 +52,10 @@ impl Falls {
             fy_per_fx: settings.tie().ok()?,
             priors: &found.priors,
             noise: Noise::of_squares(found.sigma_px * found.sigma_px),
-            bend: settings.board.bend().or((deformations > 0).then_some(nothing_known)),
+            bend: match settings.board.bend() {
+                Some(bend) => Some(Bend { deformations, ..bend }),
+                None => (deformations > 0).then_some(nothing_known),
+            },
             loss: settings.loss,
             max_iterations: settings.max_iterations,
             relative_gain: RELATIVE_GAIN,
@@ -69,7 +73,8 @@ impl Falls {
         }
         let reduced = system.eliminate(0.0, &mut Vec::new())?;
         let own = found.free;
-        let mut falls = Falls { reduced, all, deformations, own, own_deformations, left: 0.0 };
+        let mut falls =
+            Falls { reduced, all, deformations, own, own_deformations, own_shape: shape, left: 0.0 };
         falls.left = falls.fall(FreeParameters::NONE, false)?;
         Some(falls)
     }
@@ -81,13 +86,13 @@ impl Falls {
         Some(gain - self.left).filter(|fall| fall.is_finite())
     }
 
-    /// Two bows and a twist, in the target's unit, with which the cost would fall most, with these parameters
+    /// Two bows and a twist, in the target's unit, with which the cost would be least, with these parameters
     /// more.
     pub fn shape(&self, more: FreeParameters) -> Option<[f64; DEFORMATIONS]> {
         let rows = self.rows(more, true);
         let step: SVector<f64, WIDTH> = self.reduced.part(&rows).solve(rows.len())?;
         let first = rows.len().checked_sub(DEFORMATIONS)?;
-        Some(std::array::from_fn(|k| step[first + k]))
+        Some(std::array::from_fn(|k| self.own_shape[k] + step[first + k]))
     }
 
     /// The rows of the minimum's own unknowns and of these.
