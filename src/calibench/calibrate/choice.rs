@@ -27,8 +27,8 @@ use crate::camera::{FreeParameters, Model, Parameter};
 pub struct Candidate {
     /// The model.
     pub model: Model,
-    /// Its coefficients that are free; the others are 0, or held as the settings say. Of fx, fy, cx, cy and skew those that are free besides
-    /// what the settings say.
+    /// Its coefficients that are free; the others are 0, or held as the settings say. Of fx, fy, cx, cy and
+    /// skew those that are free besides what the settings say.
     pub coefficients: FreeParameters,
     /// The board.
     pub board: Board,

@@ -161,8 +161,8 @@ pub enum Warning {
         /// How likely chance makes so much for a camera without them.
         probability: f64,
     },
-    /// The board is taken to be flat, or to have no twist, and the marks ask for one that is bent: two bows and
-    /// a twist as in [`super::BoardShape`], in the target's unit, to first order.
+    /// The board is taken to be flat, or to have no twist, and the marks ask for one that is bent: two bows
+    /// and a twist as in [`super::BoardShape`], in the target's unit, to first order.
     NotFlat {
         /// Height of the middle over the edges in x.
         bow_x: f64,
