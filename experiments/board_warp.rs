@@ -7,8 +7,7 @@
 //! Expected: taken for flat, the camera is biased in proportion to the bow, by standard deviations long
 //! before the RMSE looks wrong, and the stated covariance is a lie. Residuals that agree with their
 //! neighbours' tell of it where the RMSE does not, and a score test, which asks the marks for that very bow,
-//! sooner. With the bows estimated bias and lie are gone, at the
-//! price of a little spread.
+//! sooner. With the bows estimated bias and lie are gone, at the price of a little spread.
 //!
 //! A board that bends otherwise is calibrated with its marks measured in space besides.
 //!

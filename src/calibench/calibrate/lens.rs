@@ -53,9 +53,10 @@ impl LensCalibration {
 /// The cost is `sum w^2 |r|^2` under the loss, with the priors' share; see [`Prior`](super::Prior). The
 /// covariance is that of [`calibrate`](super::calibrate), the noise that of a coordinate of weight 1. A
 /// camera with Brown-Conrady's lens, marks of weight 1 and a flat board is handed to
-/// [`calibrate`](super::calibrate), with all that it checks. For all else the best of a few starts is refined, by the rays of a fisheye and by a pinhole, and the profiles of the
-/// parameters are walked where the cost is no parabola; nothing certifies that minimum. Views given twice
-/// count once, but where marks have weights.
+/// [`calibrate`](super::calibrate), with all that it checks. For all else the best of a few starts is
+/// refined, by the rays of a fisheye and by a pinhole, and the profiles of the parameters are walked where
+/// the cost is no parabola; nothing certifies that minimum. Views given twice count once, but where marks
+/// have weights.
 ///
 /// With any lens the marks are asked by score tests whether they need what nobody has decided on: p1 and p2,
 /// k3, the principal point, skew ([`Warning::LeftOut`](super::Warning::LeftOut)), a board that is not flat

@@ -18,8 +18,8 @@ pub(super) struct Walked {
 /// Refines the starts: those that the pinhole's solver gives, and, unless one of them converges to residuals
 /// that look like noise and either the pinhole or this minimum is certified, those that an angle polynomial
 /// gives; where none of all these looks like noise, those of one about the centre that the marks tell. The
-/// pinhole's certificate counts for its own lens, and where that does not hold it may be one of a
-/// wrong camera.
+/// pinhole's certificate counts for its own lens, and where that does not hold it may be one of a wrong
+/// camera.
 ///
 /// # Errors
 /// No lens of the model sees every mark.
