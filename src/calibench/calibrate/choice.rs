@@ -60,7 +60,9 @@ impl Candidate {
             };
             own = own.with_role(parameter, role);
         }
-        Parameter::LINEAR.into_iter().filter(|&p| self.coefficients.contains(p)).fold(own, Settings::estimate)
+        // What is known of one of them beforehand stays known.
+        let is_new = |p: &Parameter| self.coefficients.contains(*p) && !settings.free().contains(*p);
+        Parameter::LINEAR.into_iter().filter(is_new).fold(own, Settings::estimate)
     }
 }
 
@@ -253,8 +255,9 @@ fn held_basics(settings: &Settings) -> Vec<&'static [Parameter]> {
 }
 
 /// Where residuals of neighbouring marks agree: which one freedom more, of the lens or of the board, lowers
-/// the RMSE of `fit` by a twentieth or more, the best first; where none does, those for which the criterion
-/// of Schwarz is very strong evidence.
+/// the RMSE of `fit` by a twentieth or more; where none does, those for which the criterion of Schwarz is
+/// very strong evidence. The first has the strongest: a dozen coefficients come behind the two that do as
+/// well.
 pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibration) -> Vec<Freedom> {
     use Parameter::{K1, K2, K3, P1, P2, S1, S2, S3, S4, TauX, TauY};
     let model = settings.model();
@@ -312,6 +315,7 @@ pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibr
     let is_much = |freedom: &Freedom| freedom.rmse_px < (1.0 - WORTH) * rmse_without_px;
     let one_is_much = tried.iter().any(|(_, freedom)| is_much(freedom));
     tried.retain(|(gain, freedom)| if one_is_much { is_much(freedom) } else { *gain > STRONG_EVIDENCE });
+    tried.sort_by(|(a, _), (b, _)| b.total_cmp(a));
     let mut found: Vec<Freedom> = tried.into_iter().map(|(_, freedom)| freedom).collect();
     // A twist besides two bows explains something only where bows alone do not explain it.
     let is_bowed = |f: &&Freedom| matches!(f.candidate.board, Board::Bowed { .. });
@@ -320,7 +324,6 @@ pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibr
         matches!(f.candidate.board, Board::Bent { .. }) && f.rmse_px >= (1.0 - WORTH) * bowed_px
     };
     found.retain(|freedom| !is_idle(freedom));
-    found.sort_by(|a, b| a.rmse_px.total_cmp(&b.rmse_px));
     found
 }
 
@@ -339,6 +342,21 @@ mod tests {
         // Where no part of the views can be left out the criterion is alone.
         assert_eq!(chosen(&[(-350.0, none), (-349.0, none)]), Some(0));
         assert_eq!(chosen(&[(-350.0, none), (-349.0, 0.2)]), Some(1));
+    }
+
+    #[test]
+    fn what_is_held_or_known_stays_so_while_others_are_freed() {
+        use Parameter::{Cx, Cy, K1, K2};
+        let known = Role::Known { mean: 320.0, standard_deviation: 1.0 };
+        let settings = Settings::standard().with_role(Cx, known).hold(Cy, 240.0).hold(K2, 0.05);
+        let coefficients = FreeParameters::of(&[K1, Cx, Cy]);
+        let candidate = Candidate { model: Model::BrownConrady, coefficients, board: Board::Flat };
+        let own = candidate.settings(&settings);
+        let roles = [Cx, Cy, K1, K2].map(|p| own.role(p));
+        assert_eq!(roles, [known, Role::Free, Role::Free, Role::Held(0.05)]);
+        // Another lens has its own coefficients.
+        let other = Candidate { model: Model::Rational, ..candidate };
+        assert_eq!(other.settings(&settings).role(K2), Role::Default);
     }
 
     #[test]

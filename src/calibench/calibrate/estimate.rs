@@ -52,10 +52,14 @@ const START_GAIN: f64 = 1e-3;
 /// # Ok::<(), CalibrationError>(())
 /// ```
 pub fn calibrate(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
-    copies::without(views, |views| calibrate_different(views, settings))
+    copies::without(views, |views| calibrate_distinct(views, settings))
 }
 
-fn calibrate_different(views: &[View], settings: &Settings) -> Result<Calibration, CalibrationError> {
+/// [`calibrate`] of views of which none is a copy.
+pub(super) fn calibrate_distinct(
+    views: &[View],
+    settings: &Settings,
+) -> Result<Calibration, CalibrationError> {
     check_counts(views, settings)?;
     let (calibration, noise) = chunks::in_pool(views.len(), || estimate(views, settings))?;
     Ok(if settings.polish { polish::polish(views, settings.loss, noise, calibration) } else { calibration })

@@ -7,11 +7,11 @@
 //! and the residuals' degrees of freedom. One shortcoming of a model looks like many: of what is asked for,
 //! the least likely is named first, and the others only for what they explain beside it.
 
-use super::any_lens::Falls;
+use super::any_lens::{Falls, Freedoms};
 use super::chance::fisher_tail;
 use super::{LensCalibration, Loss, Role, Settings, Warning};
 use crate::board::View;
-use crate::camera::{FreeParameters, Parameter};
+use crate::camera::Parameter;
 
 /// Numbers that come together.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,6 +30,17 @@ impl Group {
         match self {
             Group::Parameters(list) => list.len(),
             Group::Shape { more } => more,
+        }
+    }
+
+    /// Other freedoms and this one.
+    fn besides(self, others: Freedoms) -> Freedoms {
+        match self {
+            Group::Parameters(list) => {
+                let parameters = list.iter().fold(others.parameters, |all, &p| all.with(p));
+                Freedoms { parameters, ..others }
+            }
+            Group::Shape { .. } => Freedoms { shape: true, ..others },
         }
     }
 }
@@ -63,13 +74,9 @@ pub(super) fn asked_for(views: &[View], settings: &Settings, found: &LensCalibra
         return Vec::new();
     }
     let undecided = undecided(settings);
-    let parameters = undecided.iter().fold(FreeParameters::NONE, |all, group| match group {
-        Group::Parameters(list) => list.iter().fold(all, |all, &p| all.with(p)),
-        Group::Shape { .. } => all,
-    });
-    let with_shape = undecided.iter().any(|group| matches!(group, Group::Shape { .. }));
+    let all = undecided.iter().fold(Freedoms::NONE, |all, group| group.besides(all));
     let variance = found.sigma_px * found.sigma_px;
-    match Falls::of(views, settings, found, parameters, with_shape) {
+    match Falls::of(views, settings, found, all) {
         Some(falls) => named(&falls, undecided, variance, found.degrees_of_freedom),
         None => Vec::new(),
     }
@@ -84,11 +91,11 @@ struct Told {
 }
 
 fn named(falls: &Falls, mut undecided: Vec<Group>, variance: f64, freedom: usize) -> Vec<Warning> {
-    let (mut with, mut before) = (Chosen::default(), 0.0);
+    let (mut with, mut before) = (Freedoms::NONE, 0.0);
     let mut told = Vec::new();
     loop {
         let asked = |&group: &Group| {
-            let fall = (with.and(group).fall(falls)? - before) / variance;
+            let fall = (falls.fall(group.besides(with))? - before) / variance;
             let below = freedom.checked_sub(group.len()).filter(|&below| below > 0)?;
             let probability = fisher_tail(fall / group.len() as f64, group.len(), below);
             (probability < CHANCE).then_some(Told { group, fall, probability })
@@ -98,45 +105,12 @@ fn named(falls: &Falls, mut undecided: Vec<Group>, variance: f64, freedom: usize
             a.probability.total_cmp(&b.probability).then(each(b).total_cmp(&each(a)))
         };
         let Some(next) = undecided.iter().filter_map(asked).min_by(less_likely) else { break };
-        (with, before) = (with.and(next.group), before + next.fall * variance);
+        (with, before) = (next.group.besides(with), before + next.fall * variance);
         undecided.retain(|group| *group != next.group);
         told.push(next);
     }
-    told.into_iter().map(|told| warning(told, with.shape(falls))).collect()
-}
-
-/// Groups that are taken to be free.
-#[derive(Debug, Clone, Copy)]
-struct Chosen {
-    parameters: FreeParameters,
-    with_shape: bool,
-}
-
-impl Default for Chosen {
-    fn default() -> Chosen {
-        Chosen { parameters: FreeParameters::NONE, with_shape: false }
-    }
-}
-
-impl Chosen {
-    fn and(self, group: Group) -> Chosen {
-        match group {
-            Group::Parameters(list) => {
-                let parameters = list.iter().fold(self.parameters, |all, &p| all.with(p));
-                Chosen { parameters, ..self }
-            }
-            Group::Shape { .. } => Chosen { with_shape: true, ..self },
-        }
-    }
-
-    fn fall(self, falls: &Falls) -> Option<f64> {
-        falls.fall(self.parameters, self.with_shape)
-    }
-
-    /// The shape that the board would have.
-    fn shape(self, falls: &Falls) -> [f64; DEFORMATIONS] {
-        falls.shape(self.parameters).unwrap_or_default()
-    }
+    let shape = falls.shape(with.parameters).unwrap_or_default();
+    told.into_iter().map(|told| warning(told, shape)).collect()
 }
 
 fn warning(Told { group, fall, probability }: Told, [bow_x, bow_y, twist]: [f64; DEFORMATIONS]) -> Warning {

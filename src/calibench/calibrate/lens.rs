@@ -1,7 +1,8 @@
 //! Which of the two estimators calibrates? That of [`super::calibrate`] knows one lens, and much about it;
 //! that of [`super::any_lens`] knows all.
 
-use super::{Board, Calibration, CalibrationError, Settings, any_lens, calibrate, copies, left_out};
+use super::estimate::calibrate_distinct;
+use super::{Board, Calibration, CalibrationError, Settings, any_lens, copies, left_out};
 use crate::board::View;
 use crate::camera::{Camera, Lens, Model};
 
@@ -98,7 +99,7 @@ pub fn calibrate_lens(views: &[View], settings: &Settings) -> Result<LensCalibra
 fn asked(views: &[View], settings: &Settings) -> Result<LensCalibration, CalibrationError> {
     let is_plain = views.iter().all(|view| view.weights().is_none()) && settings.board == Board::Flat;
     let mut found = if settings.model() == Model::BrownConrady && is_plain {
-        LensCalibration::from(calibrate(views, settings)?)
+        LensCalibration::from(calibrate_distinct(views, settings)?)
     } else {
         any_lens::calibrate(views, settings)?
     };

@@ -77,7 +77,7 @@ fn target(arguments: &Arguments, input: Input) -> Result<(), String> {
             "standard input cannot be both files: give one of them by its name"
         }
         _ if arguments.model == Some(ModelChoice::Auto) => {
-            "--model auto compares lenses before a flat board: with --target name one"
+            "--model auto takes marks of a board, flat or bent: with --target name a lens"
         }
         _ if arguments.bow.is_some() => {
             "--board-shape estimates how a flat board is bent, and --target says where its marks are: leave one of them out"

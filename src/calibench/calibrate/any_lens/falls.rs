@@ -9,10 +9,22 @@ use super::super::settings::Bend;
 use super::super::target_frame::TargetFrames;
 use super::super::{LensCalibration, Settings};
 use super::problem::{Problem, State, rounding_cost};
-use super::{WIDTH, certificate, marks, shape};
+use super::{BoardShape, WIDTH, certificate, marks, shape};
 use crate::board::View;
 use crate::camera::{FreeParameters, Parameter};
 use nalgebra::SVector;
+
+/// What may be free besides: parameters, and the board's two bows and twist.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct Freedoms {
+    pub parameters: FreeParameters,
+    pub shape: bool,
+}
+
+impl Freedoms {
+    /// Nothing besides.
+    pub const NONE: Freedoms = Freedoms { parameters: FreeParameters::NONE, shape: false };
+}
 
 /// Normal equations of the shared unknowns at a minimum, the poses eliminated, with freedoms that it does not
 /// have.
@@ -30,20 +42,13 @@ pub(in super::super) struct Falls {
 }
 
 impl Falls {
-    /// With `more` parameters, and the board's shape `with_shape`; `None` where the marks fit up to rounding,
-    /// or leave a pose open.
-    pub fn of(
-        views: &[View],
-        settings: &Settings,
-        found: &LensCalibration,
-        more: FreeParameters,
-        with_shape: bool,
-    ) -> Option<Falls> {
+    /// With `more` freedoms; `None` where the marks fit up to rounding, or leave a pose open.
+    pub fn of(views: &[View], settings: &Settings, found: &LensCalibration, more: Freedoms) -> Option<Falls> {
         let frames = TargetFrames::of(views);
         let marks = marks::of_views(views, &frames, &shape::region(views));
         let own_deformations = found.board.as_ref().and(settings.board.bend()).map_or(0, |b| b.deformations);
-        let deformations = if with_shape { DEFORMATIONS } else { own_deformations };
-        let all = more.iter().fold(found.free, FreeParameters::with);
+        let deformations = if more.shape { DEFORMATIONS } else { own_deformations };
+        let all = more.parameters.iter().fold(found.free, FreeParameters::with);
         let nothing_known = Bend { deformations, standard_deviation: f64::INFINITY };
         let problem = Problem {
             views: &marks,
@@ -64,7 +69,7 @@ impl Falls {
         };
         let poses = found.cam_from_target.iter().enumerate();
         let cam_from_target = poses.map(|(view, pose)| frames.at(view).of_pose(pose)).collect();
-        let shape = found.board.as_ref().map_or([0.0; 3], |board| [board.bow_x, board.bow_y, board.twist]);
+        let shape = found.board.as_ref().map_or([0.0; 3], BoardShape::deformations);
         let state = State { camera: found.camera, cam_from_target, shape };
         let mut system = problem.system();
         problem.linearise_into(&state, &mut system);
@@ -75,31 +80,30 @@ impl Falls {
         let own = found.free;
         let mut falls =
             Falls { reduced, all, deformations, own, own_deformations, own_shape: shape, left: 0.0 };
-        falls.left = falls.fall(FreeParameters::NONE, false)?;
+        falls.left = falls.fall(Freedoms::NONE)?;
         Some(falls)
     }
 
-    /// What the cost would fall by with these parameters more, and with the board's shape; `None` where the
-    /// marks do not determine them.
-    pub fn fall(&self, more: FreeParameters, with_shape: bool) -> Option<f64> {
-        let gain = self.reduced.gain(&self.rows(more, with_shape))?;
+    /// What the cost would fall by with some of the freedoms; `None` where the marks do not determine them.
+    pub fn fall(&self, more: Freedoms) -> Option<f64> {
+        let gain = self.reduced.gain(&self.rows(more))?;
         Some(gain - self.left).filter(|fall| fall.is_finite())
     }
 
     /// Two bows and a twist, in the target's unit, with which the cost would be least, with these parameters
     /// more.
-    pub fn shape(&self, more: FreeParameters) -> Option<[f64; DEFORMATIONS]> {
-        let rows = self.rows(more, true);
+    pub fn shape(&self, parameters: FreeParameters) -> Option<[f64; DEFORMATIONS]> {
+        let rows = self.rows(Freedoms { parameters, shape: true });
         let step: SVector<f64, WIDTH> = self.reduced.part(&rows).solve(rows.len())?;
         let first = rows.len().checked_sub(DEFORMATIONS)?;
         Some(std::array::from_fn(|k| self.own_shape[k] + step[first + k]))
     }
 
     /// The rows of the minimum's own unknowns and of these.
-    fn rows(&self, more: FreeParameters, with_shape: bool) -> Vec<usize> {
-        let is_taken = |p: &Parameter| self.own.contains(*p) || more.contains(*p);
+    fn rows(&self, more: Freedoms) -> Vec<usize> {
+        let is_taken = |p: &Parameter| self.own.contains(*p) || more.parameters.contains(*p);
         let parameters = self.all.iter().filter(is_taken).filter_map(|p| self.all.position(p));
-        let deformations = if with_shape { self.deformations } else { self.own_deformations };
+        let deformations = if more.shape { self.deformations } else { self.own_deformations };
         parameters.chain((0..deformations).map(|k| self.all.len() + k)).collect()
     }
 }
@@ -118,26 +122,27 @@ mod tests {
         let found = calibrate_lens(&views, &held).unwrap();
         let square = |found: &LensCalibration| found.rmse_px * found.rmse_px * found.points() as f64;
         let k4 = FreeParameters::of(&[Parameter::K4]);
-        let falls = Falls::of(&views, &held, &found, k4, true).unwrap();
+        let both = Freedoms { parameters: k4, shape: true };
+        let falls = Falls::of(&views, &held, &found, both).unwrap();
         let bent = Board::Bent { standard_deviation: f64::INFINITY };
         let free = held.clone().estimate(Parameter::K4);
-        for (more, with_shape, settings) in [
-            (k4, false, free.clone()),
-            (FreeParameters::NONE, true, held.clone().with_board(bent)),
-            (k4, true, free.with_board(bent)),
+        for (more, settings) in [
+            (Freedoms { shape: false, ..both }, free.clone()),
+            (Freedoms { shape: true, ..Freedoms::NONE }, held.clone().with_board(bent)),
+            (both, free.with_board(bent)),
         ] {
             let refitted = calibrate_lens(&views, &settings).unwrap();
-            let (fall, said) = (square(&found) - square(&refitted), falls.fall(more, with_shape).unwrap());
+            let (fall, said) = (square(&found) - square(&refitted), falls.fall(more).unwrap());
             assert!((said / fall - 1.0).abs() < 0.01, "{said} {fall}");
             if let Some(board) = refitted.board {
-                let told = falls.shape(more).unwrap();
+                let told = falls.shape(more.parameters).unwrap();
                 for (told, found) in told.into_iter().zip([board.bow_x, board.bow_y, board.twist]) {
                     assert!((told - found).abs() < 1e-4, "{told} {found}");
                 }
             }
         }
         // A minimum has nothing left to gain.
-        assert!(falls.fall(FreeParameters::NONE, false).unwrap().abs() < 1e-9 * square(&found));
+        assert!(falls.fall(Freedoms::NONE).unwrap().abs() < 1e-9 * square(&found));
     }
 
     #[test]
@@ -145,6 +150,7 @@ mod tests {
         let views = fixture::exact_views();
         let settings = Settings::of_model(Model::KannalaBrandt);
         let found = calibrate_lens(&views, &settings).unwrap();
-        assert!(Falls::of(&views, &settings, &found, FreeParameters::NONE, true).is_none());
+        let shape = Freedoms { shape: true, ..Freedoms::NONE };
+        assert!(Falls::of(&views, &settings, &found, shape).is_none());
     }
 }

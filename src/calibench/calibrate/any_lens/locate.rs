@@ -67,7 +67,7 @@ pub(in super::super) fn located(
         rounding_cost: rounding_cost(&marks),
         is_certifiable: false,
     };
-    let shape = board.map_or([0.0; 3], |board| [board.bow_x, board.bow_y, board.twist]);
+    let shape = board.map_or([0.0; 3], BoardShape::deformations);
     let state = State { shape, ..start::with_poses(&marks, *camera)? };
     let state = start::with_better_tilts(&problem, descend(&problem, state).state);
     residuals(&marks[0], &state).map(|(residuals, square)| Located {

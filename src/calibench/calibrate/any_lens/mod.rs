@@ -32,7 +32,7 @@ mod start;
 mod walk;
 
 pub(super) use estimate::{calibrate, spans_a_plane};
-pub(super) use falls::Falls;
+pub(super) use falls::{Falls, Freedoms};
 pub use information::lens_information;
 pub(super) use locate::located;
 pub use locate::{Located, locate};

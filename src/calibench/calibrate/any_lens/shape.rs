@@ -27,6 +27,11 @@ impl BoardShape {
         let [a, b, c] = basis(&self.region, mark);
         self.bow_x * a + self.bow_y * b + self.twist * c
     }
+
+    /// The three deformations, in the order of [`basis`].
+    pub(super) fn deformations(&self) -> [f64; 3] {
+        [self.bow_x, self.bow_y, self.twist]
+    }
 }
 
 /// The box around the marks of all views.
