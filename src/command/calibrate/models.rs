@@ -182,7 +182,7 @@ fn changed_camera(candidate: &Candidate, settings: &Settings) -> String {
     if candidate.model == settings.model() {
         let is_new = |p: &Parameter| !before.contains(*p);
         let names: Vec<&str> = candidate.coefficients.iter().filter(is_new).map(Parameter::name).collect();
-        return format!("{} estimated too ({list})", names.join(" and "));
+        return format!("{} estimated too ({list})", names.join(", "));
     }
     let model = candidate.model;
     let is_standard = before == settings.model().standard_free() && after.free() == model.standard_free();
