@@ -10,6 +10,8 @@ coefficients and a point `(X, Y, Z)` and returns None where it has no image, or
 `certify.py` compares all derivatives with differences in 60 digits before it certifies anything.
 """
 
+import math
+
 # Coefficients by model, in the order in which the functions take them.
 COEFFICIENTS = {
     "brown-conrady": "k1 k2 p1 p2 k3".split(),
@@ -19,7 +21,11 @@ COEFFICIENTS = {
     "kannala-brandt": "k1 k2 k3 k4".split(),
     "division": ["k1"],
     "double-sphere": ["xi", "alpha"],
+    "halcon-polynomial": "k1 k2 p1 p2 k3".split(),
 }
+
+# Of a lens that must be solved: paces per unit of the radius, so many at first, the shortest, and the most steps of Newton's method.
+PACES, MOST_PACES, LEAST_PACE, NEWTON_STEPS = 4, 64, 1e-4, 30
 
 
 # --- lenses before which a point must lie: functions of (x, y) = (X / Z, Y / Z) -------------------------------------------------------
@@ -143,6 +149,93 @@ def applied(m, v):
     return [row[0] * v[0] + row[1] * v[1] + row[2] * v[2] for row in m]
 
 
+def halcon_polynomial(ctx, coefficients, x, y):
+    """HALCON's polynomial (MVTec's operator reference, "Calibration"): the ideal point as a polynomial of the seen one, solved for that.
+
+    Newton's method, from a point in double precision on the branch that holds the axis. Where the seen point p belongs to the ideal one q,
+    q = F(p; c), it moves by F_p^-1 when q moves, and by -F_p^-1 F_c when a coefficient does.
+    """
+    start = followed([float(c) for c in coefficients], float(x), float(y))
+    if start is None:
+        return None
+    a, b = (ctx.mpf(c) for c in start)
+    # The error after a step is of the order of its square.
+    enough = ctx.sqrt(ctx.eps) / 1000
+    for _ in range(NEWTON_STEPS):
+        (p, q), across, _ = to_ideal(coefficients, a, b)
+        step = solved(across, x - p, y - q)
+        if step is None:
+            return None
+        a, b = a + step[0], b + step[1]
+        if abs(step[0]) + abs(step[1]) <= enough * (1 + abs(a) + abs(b)):
+            break
+    else:
+        return None
+    _, across, by_lens = to_ideal(coefficients, a, b)
+    one, zero = ctx.mpf(1), ctx.mpf(0)
+    columns = [solved(across, one, zero), solved(across, zero, one)]
+    if None in columns:
+        return None
+    return (a, b), tuple(zip(*columns)), [solved(across, -f, -g) for f, g in by_lens]
+
+
+def to_ideal(coefficients, a, b):
+    """The ideal point of a seen one, its derivatives by that and by k1 k2 p1 p2 k3: Brown's lens with p1 and p2 changed over."""
+    k1, k2, p1, p2, k3 = coefficients
+    s = a * a + b * b
+    g, slope = 1 + s * (k1 + s * (k2 + s * k3)), k1 + s * (2 * k2 + s * 3 * k3)
+    image, across, (by_second, by_first) = with_tangential(a, b, s, g, slope, p2, p1)
+    return image, across, [(a * s, b * s), (a * s * s, b * s * s), by_first, by_second, (a * s * s * s, b * s * s * s)]
+
+
+def solved(across, p, q):
+    """across^-1 (p, q), or None where the symmetric matrix is not positive definite: the axis's branch has ended."""
+    (a, b), (_, d) = across
+    determinant = a * d - b * b
+    if not (a > 0 and determinant > 0):
+        return None
+    return (d * p - b * q) / determinant, (a * q - b * p) / determinant
+
+
+def followed(coefficients, x, y):
+    """The seen point of an ideal one, to about double precision: followed out from the axis as the ideal one moves along its ray.
+
+    None where the branch ends on the way, which is where no pace is short enough any more.
+    """
+    seen, done, pace = (0.0, 0.0), 0.0, 1 / (1 + int(min(MOST_PACES, PACES * math.hypot(x, y))))
+    while done < 1:
+        part = min(done + pace, 1.0)
+        moved = paced(coefficients, seen, part * x, part * y)
+        if moved is not None:
+            seen, done = moved, part
+        elif pace > LEAST_PACE:
+            pace /= 2
+        else:
+            return None
+    return seen
+
+
+def paced(coefficients, seen, x, y):
+    """The seen point of (x, y) from that of a neighbour by steps of Newton's method, or None where they might have left the branch.
+
+    They have not where they shrink at once, and where the matrix stays positive definite on the way and its determinant about what it was:
+    a step over a fold, to where another branch begins, starts from a determinant near 0.
+    """
+    (a, b), sizes, determinants = seen, [], []
+    for _ in range(4):
+        (p, q), across, _ = to_ideal(coefficients, a, b)
+        step = solved(across, x - p, y - q)
+        if step is None:
+            return None
+        determinants.append(across[0][0] * across[1][1] - across[0][1] ** 2)
+        sizes.append(math.hypot(*step))
+        a, b = a + step[0], b + step[1]
+    shrinks = all(after < before_it / 4 or after < 1e-12 for before_it, after in zip(sizes, sizes[1:]))
+    alike = max(determinants) < 2 * min(determinants)
+    halfway = to_ideal(coefficients, (a + seen[0]) / 2, (b + seen[1]) / 2)[1]
+    return (a, b) if shrinks and alike and solved(halfway, 0.0, 0.0) else None
+
+
 def before(bend):
     """A model of rays from a model of (X / Z, Y / Z): points must lie before the camera."""
 
@@ -251,4 +344,5 @@ MODELS = {
     "kannala-brandt": kannala_brandt,
     "division": division,
     "double-sphere": double_sphere,
+    "halcon-polynomial": before(halcon_polynomial),
 }

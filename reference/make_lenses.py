@@ -14,6 +14,7 @@ COEFFICIENTS = {
     "kannala-brandt": ["k1", "k2", "k3", "k4"],
     "division": ["k1"],
     "double-sphere": ["xi", "alpha"],
+    "halcon-polynomial": ["k1", "k2", "p1", "p2", "k3"],
 }
 # Their far start has an equidistant fisheye's focal length and poses.
 FISHEYES = ("kannala-brandt", "double-sphere")
@@ -31,6 +32,8 @@ def image(camera, point):
     if point[2] <= 0:
         return None
     x, y = point[0] / point[2], point[1] / point[2]
+    if model == "halcon-polynomial":
+        return halcon_polynomial(camera, x, y)
     s = x * x + y * y
     g = 1 + camera["k1"] * s + camera["k2"] * s**2 + camera["k3"] * s**3
     if model != "brown-conrady":
@@ -90,3 +93,65 @@ def double_sphere(camera, x, y, z):
     w = camera["xi"] * d1 + z
     below = camera["alpha"] * math.sqrt(x * x + y * y + w * w) + (1 - camera["alpha"]) * w
     return (x / below, y / below) if below > 0 else None
+
+
+def halcon_polynomial(camera, x, y):
+    """The seen point whose ideal one is (x, y), on the branch that holds the axis: without p1 and p2 by bisection along the radius, and
+    from there by Newton's method in the plane, whose steps are halved until they come nearer and stay on the branch.
+    """
+    k1, k2, p1, p2, k3 = (camera[name] for name in COEFFICIENTS["halcon-polynomial"])
+
+    def ideal(u, v):
+        s = u * u + v * v
+        radial = 1 + k1 * s + k2 * s**2 + k3 * s**3
+        return u * radial + p1 * (s + 2 * u * u) + 2 * p2 * u * v, v * radial + 2 * p1 * u * v + p2 * (s + 2 * v * v)
+
+    def slopes(u, v):
+        """d x / d u, d x / d v = d y / d u, and d y / d v: the matrix is symmetric."""
+        s = u * u + v * v
+        radial, more = 1 + k1 * s + k2 * s**2 + k3 * s**3, 2 * k1 + 4 * k2 * s + 6 * k3 * s**2
+        return (
+            radial + more * u * u + 6 * p1 * u + 2 * p2 * v,
+            more * u * v + 2 * p1 * v + 2 * p2 * u,
+            radial + more * v * v + 2 * p1 * u + 6 * p2 * v,
+        )
+
+    def on_branch(u, v):
+        """Is the matrix positive definite here? It is on the axis, and ceases to be where the image folds."""
+        a, b, d = slopes(u, v)
+        return a > 0 and a * d > b * b
+
+    def distance(u, v):
+        p, q = ideal(u, v)
+        return math.hypot(p - x, q - y)
+
+    t = math.hypot(x, y)
+    if t == 0:
+        return 0.0, 0.0
+    # Outwards as far as the radius needs, or to its fold.
+    radius = lambda r: r * (1 + k1 * r**2 + k2 * r**4 + k3 * r**6)
+    low, pace = 0.0, min(t, 1.0) / 32
+    while radius(low) < radius(low + pace) < t:
+        low += pace
+    high = low + pace
+    if radius(high) >= t:
+        for _ in range(60):
+            middle = (low + high) / 2
+            low, high = (middle, high) if radius(middle) < t else (low, middle)
+    u, v = x / t * low, y / t * low
+    # p1 and p2 move the fold a little: back from it.
+    while not on_branch(u, v):
+        u, v = 0.98 * u, 0.98 * v
+    for _ in range(50):
+        p, q = ideal(u, v)
+        a, b, d = slopes(u, v)
+        determinant = a * d - b * b
+        du, dv = (d * (x - p) - b * (y - q)) / determinant, (a * (y - q) - b * (x - p)) / determinant
+        part = 1.0
+        while part > 1e-3 and not (on_branch(u + part * du, v + part * dv) and distance(u + part * du, v + part * dv) < distance(u, v)):
+            part /= 2
+        if part <= 1e-3:
+            break
+        u, v = u + part * du, v + part * dv
+    from_the_axis = all(on_branch(u * i / 64, v * i / 64) for i in range(65))
+    return (u, v) if from_the_axis and distance(u, v) < 1e-12 * (1 + t) else None
