@@ -466,6 +466,20 @@ def double_sphere_two_minima(normal):
         (26, 275, 60, (24, 15, -10)), (40, 20, 60, (-12, 10, 70)), (40, 160, 58, (12, -14, 35))])
 
 
+# --- problems of version 3: a lens that is solved for the seen point -------------------------------------------------------------
+
+
+INVERSE = camera(418.0, 420.0, 326.0, 243.0, model="halcon-polynomial", k1=0.25, k2=0.04, p1=0.0006, p2=-0.0009, k3=-0.01)
+
+
+@problem("higher", 1501, "HALCON's polynomial, from the seen point to the ideal one: five coefficients, marks up to 48 degrees from the axis",
+         image=(640, 480), noise=0.05, free=LINEAR + COEFFICIENTS["halcon-polynomial"], truth=INVERSE, version=3)
+def halcon_polynomial(normal):
+    return aimed(grid(9, 7, 10.0), [
+        (2, 0, 68, (25, 8, 3)), (4, 80, 72, (-28, 10, -6)), (6, 175, 76, (6, 30, 12)), (5, 260, 82, (9, -27, 170)),
+        (28, 31, 128, (-12, -16, 8)), (26, 148, 132, (15, -18, -8)), (29, 217, 132, (-14, 15, 8)), (24, 328, 124, (20, 14, -8))])
+
+
 # --- start values -----------------------------------------------------------------------------------------------------------
 
 
