@@ -2,7 +2,8 @@
 
 OpenCV's projectPoints (5, 8, 12 and 14 coefficients) and fisheye.projectPoints; the double sphere and the division
 model written out from their papers (Usenko et al. 2018, equations 40 to 43; Fitzgibbon 2001, equation 1, solved for
-the distorted point by bisection).
+the distorted point by bisection). HALCON's polynomial takes the seen point to the ideal one, as OpenCV's five
+coefficients take the ideal one to the seen one but for the order of p1 and p2: OpenCV's undistortPoints solves it.
 """
 
 import cv2
@@ -22,6 +23,7 @@ LENSES = {
     "kannala-brandt": [-0.021, 0.0043, -0.0011, 2.3e-4],
     "division": [-0.27],
     "double-sphere": [-0.2, 0.6],
+    "halcon-polynomial": [0.25, 0.04, 6e-4, -9e-4, -0.01],
 }
 
 
@@ -47,6 +49,14 @@ def double_sphere(point, xi, alpha):
     return x / below, y / below
 
 
+def halcon_polynomial(point, k1, k2, p1, p2, k3):
+    ideal = np.array([point[0] / point[2], point[1] / point[2]]).reshape(1, 1, 2)
+    changed_over = np.array([k1, k2, p2, p1, k3])
+    # Each round more than halves the error of these coefficients over this frame: 200 leave rounding alone.
+    rounds = (cv2.TERM_CRITERIA_COUNT, 200, 0.0)
+    return cv2.undistortPoints(ideal, np.eye(3), changed_over, criteria=rounds).ravel()
+
+
 def pixel(model, coefficients, point):
     p = np.array(point, dtype=np.float64).reshape(1, 1, 3)
     zero = np.zeros(3)
@@ -56,6 +66,8 @@ def pixel(model, coefficients, point):
         x, y = division(point, coefficients[0])
     elif model == "double-sphere":
         x, y = double_sphere(point, *coefficients)
+    elif model == "halcon-polynomial":
+        x, y = halcon_polynomial(point, *coefficients)
     else:
         return cv2.projectPoints(p, zero, zero, K, np.array(coefficients))[0].ravel()
     return K[0, 0] * x + K[0, 2], K[1, 1] * y + K[1, 2]
