@@ -32,7 +32,9 @@ def solve(problem):
     )
 
 
-MODELS = ["brown-conrady", "rational", "thin-prism", "tilted", "kannala-brandt", "division", "double-sphere"]
+MODELS = [
+    "brown-conrady", "rational", "thin-prism", "tilted", "kannala-brandt", "division", "double-sphere", "halcon-polynomial"
+]
 
 
 def main():
