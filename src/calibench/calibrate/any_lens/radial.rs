@@ -91,6 +91,10 @@ fn equation(model: Model, &[angle, radius]: &[f64; 2]) -> (Vec<(Parameter, f64)>
             (vec![(K1, t), (K2, t * t), (K3, t * t * t), (K4, t * t * t * t)], radius / angle - 1.0)
         }
         Model::Division => (vec![(K1, radius * radius)], g - 1.0),
+        Model::HalconPolynomial => {
+            let t = radius * radius;
+            (vec![(K1, t), (K2, t * t), (K3, t * t * t)], r / radius - 1.0)
+        }
         _ => {
             let above = [(K1, s), (K2, s * s), (K3, s * s * s)];
             let below = [(K4, -g * s), (K5, -g * s * s), (K6, -g * s * s * s)];

@@ -13,8 +13,10 @@
 mod brown_conrady;
 mod division;
 mod double_sphere;
+mod halcon_polynomial;
 mod kannala_brandt;
 mod model;
+mod models;
 mod pinhole;
 mod rational;
 mod roots;
@@ -23,8 +25,9 @@ mod tests;
 mod thin_prism;
 mod tilted;
 
-pub use model::{Lens, Model, UnknownModel, WrongCoefficients};
+pub use model::{Lens, WrongCoefficients};
 pub(crate) use model::{LensVisitor, visit};
+pub use models::{Model, UnknownModel};
 
 use super::{Parameter, UndistortError};
 pub(crate) use crate::geometry::lanes::Real;

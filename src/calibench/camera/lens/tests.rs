@@ -73,6 +73,8 @@ fn coefficients(model: Model, random: &[f64; 14]) -> Vec<f64> {
         .map(|(parameter, x)| {
             use Parameter::*;
             match parameter {
+                // A barrel, as most lenses are.
+                K1 if model == Model::HalconPolynomial => 0.1 + 0.1 * x,
                 K1 => -0.1 + 0.1 * x,
                 K2 | K3 | K4 => 0.02 * x,
                 K5 | K6 => 0.01 * x,
@@ -203,12 +205,18 @@ proptest! {
             let lens = Lens::new(model, &strong).unwrap();
             let limit = lens.monotone_angle();
             let radius = |angle: f64| lens.project(&Vec3::new(libm::sin(angle), 0.0, libm::cos(angle))).map(|p| p.x);
-            let mut last = 0.0;
+            let (mut last, mut missed) = (0.0, 0);
             for k in 1..2000 {
-                let now = radius(limit * 0.9999 * f64::from(k) / 2000.0).unwrap();
+                let Some(now) = radius(limit * 0.9999 * f64::from(k) / 2000.0) else {
+                    missed += 1;
+                    continue;
+                };
                 prop_assert!(now > last, "{model} {strong:?} {k}");
                 last = now;
             }
+            // A polynomial that is solved for the seen point may end short where it hardly grows.
+            let may_miss = if model == Model::HalconPolynomial { 400 } else { 0 };
+            prop_assert!(missed <= may_miss, "{model} {strong:?}: {missed}");
             let (rim, beyond) = (radius(limit * 0.99999), radius(limit * 1.001));
             let ends = limit * 1.001 >= if model.sees_behind() { std::f64::consts::PI } else { 1.57 };
             let folds = match (rim, beyond) {
@@ -228,6 +236,7 @@ fn outside_the_domain_there_is_no_ray() {
         Lens::new(Model::KannalaBrandt, &[-0.1, 0.0, 0.0, 0.0]),
         Lens::new(Model::Division, &[1.0]),
         Lens::new(Model::DoubleSphere, &[0.2, 0.7]),
+        Lens::new(Model::HalconPolynomial, &[-0.3, 0.0, 0.0, 0.0, 0.0]),
     ];
     for lens in folding.map(Result::unwrap) {
         let refused = lens.ray(&Vec2::new(3.0, 2.0));
