@@ -32,7 +32,7 @@ use judged::{DETERMINED, HEADER, Line};
 pub const EXPERIMENT: Experiment = Experiment {
     id: "lens-minimum",
     title: "The right minimum with every lens model",
-    question: "Random scenes of six lens models: fields of 30 to 200 degrees, 640 to 4000 px wide, pixels up to twice as high as wide, 3 x 4 to \
+    question: "Random scenes of seven lens models: fields of 30 to 200 degrees, 640 to 4000 px wide, pixels up to twice as high as wide, 3 x 4 to \
                9 x 12 marks of which a part is seen, 4 to 20 views, tilts of up to 15 to 60 degrees, noise of 0.01 to 1 px. How often does \
                the solver accept a minimum of higher cost than the one next to the truth, not converge, or refuse? Expected: never where \
                the marks determine the camera.",
@@ -56,6 +56,7 @@ const COMMITTED: [&str; FAMILIES.len()] = [
     include_str!("../golden/lens-minimum/kannala-brandt.csv"),
     include_str!("../golden/lens-minimum/division.csv"),
     include_str!("../golden/lens-minimum/double-sphere.csv"),
+    include_str!("../golden/lens-minimum/halcon-polynomial.csv"),
 ];
 
 /// A model with what was committed of it.

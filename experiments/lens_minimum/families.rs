@@ -22,7 +22,7 @@ pub struct Family {
 pub const SCENES: u64 = 2000;
 
 /// All families.
-pub const FAMILIES: [Family; 6] = [
+pub const FAMILIES: [Family; 7] = [
     Family {
         model: Model::Rational,
         about: "k1 to k6, p1, p2: numerator and denominator half cancel, as in what cameras' makers state",
@@ -88,6 +88,19 @@ pub const FAMILIES: [Family; 6] = [
         about: "xi and alpha, fields of 60 to 200 degrees",
         half_field_deg: (30.0, 100.0),
         coefficients: &[(Xi, -0.3, 0.3), (Alpha, 0.45, 0.7)],
+        held: &[],
+    },
+    Family {
+        model: Model::HalconPolynomial,
+        about: "k1 to k3, p1, p2, fields of 30 to 120 degrees",
+        half_field_deg: (15.0, 60.0),
+        coefficients: &[
+            (K1, -0.1, 0.4),
+            (K2, -0.05, 0.1),
+            (P1, -0.001, 0.001),
+            (P2, -0.001, 0.001),
+            (K3, -0.02, 0.03),
+        ],
         held: &[],
     },
 ];

@@ -9,6 +9,8 @@ use calibench::camera::{Camera, FreeParameters, Lens, Model, Parameter};
 const RATIONAL: [f64; 8] = [0.2, 0.3, 0.0006, -0.0009, 0.02, 0.5, 0.4, 0.1];
 /// A polynomial of the same kind whose denominator is 1 and held.
 const POLYNOMIAL: [f64; 8] = [-0.2, 0.05, 0.0006, -0.0009, -0.004, 0.0, 0.0, 0.0];
+/// k1, k2, p1, p2, k3 of HALCON's polynomial: a barrel.
+const HALCON_POLYNOMIAL: [f64; 5] = [0.2, 0.03, 0.0006, -0.0009, 0.004];
 /// s1, s2, s3, s4.
 const PRISMS: [f64; 4] = [0.001, -0.0004, -0.0012, 0.0003];
 /// tau_x, tau_y, rad.
@@ -61,6 +63,16 @@ pub(super) fn drafts() -> Vec<Draft> {
         Draft {
             poses: ring(8, 35.0, 20.0, 45.0),
             ..draft("double-sphere", "a fisheye of two spheres", 150.0, Model::DoubleSphere, &[-0.2, 0.55])
+        },
+        Draft {
+            poses: ring(8, 30.0, 12.0, 95.0),
+            ..draft(
+                "halcon-polynomial",
+                "a lens by HALCON's polynomial",
+                450.0,
+                Model::HalconPolynomial,
+                &HALCON_POLYNOMIAL,
+            )
         },
     ]
 }
