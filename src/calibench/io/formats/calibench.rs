@@ -36,7 +36,7 @@ pub(super) const FORMAT: Format = Format {
     looks_like: |text| {
         text.trim_start().starts_with('{') && text.contains("\"camera\"") && text.contains("\"fx\"")
     },
-    read: |source, _| read(source),
+    read,
     write: |camera, _| Ok(write(camera)),
 };
 

@@ -28,7 +28,7 @@ pub(super) const FORMAT: Format = Format {
         size: Size::Needed,
     },
     looks_like,
-    read: |source, _| read(source),
+    read,
     write: |camera, _| Ok(write(camera)),
 };
 

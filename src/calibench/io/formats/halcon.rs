@@ -10,10 +10,11 @@
 //! polynomial:  u = u~ (1 + K1 r^2 + K2 r^4 + K3 r^6) + P1 (r^2 + 2 u~^2) + 2 P2 u~ v~      r^2 = u~^2 + v~^2
 //!              v = v~ (1 + K1 r^2 + K2 r^4 + K3 r^6) + 2 P1 u~ v~ + P2 (r^2 + 2 v~^2)
 //! ```
-//! The division is the one here, with `k1 = Kappa Focus^2`. The polynomial has no equal: it is refused, or on
-//! request the nearest Brown-Conrady lens fitted over the frame, with the largest error said; and every lens
-//! here but the division the other way round. (MVTec HALCON operator reference, `read_cam_par`,
-//! "Calibration", "2D Transformations".)
+//! Both are lenses here, which have the focal length for their unit: `division` with `k1 = Kappa Focus^2`,
+//! and `halcon-polynomial` with `k1 = K1 Focus^2`, `k2 = K2 Focus^4`, `k3 = K3 Focus^6`, `p1 = P1 Focus`, `p2
+//! = P2 Focus`. Any other lens is refused, or on request the nearest polynomial fitted over the frame, with
+//! the largest error said. (MVTec HALCON operator reference, `read_cam_par`, "Calibration", "2D
+//! Transformations".)
 
 use super::camera_file::CameraFile;
 use super::decimal::decimal;
@@ -30,7 +31,7 @@ pub(super) const FORMAT: Format = Format {
     first_pixel: 0.0,
     coefficients: "Kappa, or K1 K2 K3 P1 P2, of its own lenses",
     room: Room {
-        // All but the division with --fit, which the writer asks for.
+        // All but its own two with --fit, which the writer asks for.
         lenses: &Model::ALL,
         behind: &[],
         skew: false,
@@ -44,13 +45,7 @@ pub(super) const FORMAT: Format = Format {
     write,
 };
 
-const FIT: &str = "its polynomial takes what is seen to what is ideal, the other way round than here; --fit finds the nearest lens and says its largest error, and HALCON's division is division here";
-
-/// HALCON's polynomial `K1 K2 K3 P1 P2`: the ideal point of a seen one, m.
-fn ideal_from_seen([k1, k2, k3, p1, p2]: [f64; 5], seen: &Vec2) -> Vec2 {
-    // Its P1 stands where p2 does here, and the other way round.
-    BrownConrady { k1, k2, p1: p2, p2: p1, k3 }.distort(seen)
-}
+const FIT: &str = "its lenses are division and halcon-polynomial here; --fit finds the nearest polynomial and says its largest error";
 
 /// The parameters of a file: name, place of the value, value.
 struct Entries<'a> {
@@ -110,7 +105,7 @@ const OTHER_KINDS: [(&str, &str); 5] = [
     ("Vz", "a line scan camera"),
 ];
 
-fn read(source: &Source, wishes: &Wishes) -> Result<Vec<Found>, FormatError> {
+fn read(source: &Source) -> Result<Vec<Found>, FormatError> {
     let entries = Entries::of(source)?;
     let other = OTHER_KINDS.iter().find(|(name, _)| entries.get(name).is_some());
     if let Some((_, kind)) = other {
@@ -127,59 +122,25 @@ fn read(source: &Source, wishes: &Wishes) -> Result<Vec<Found>, FormatError> {
     let (sx, sy) = (entries.number("Sx")?, entries.number("Sy")?);
     let linear = [focus / sx, focus / sy, entries.number("Cx")?, entries.number("Cy")?];
     let size = (entries.side("ImageWidth")?, entries.side("ImageHeight")?);
-    let mut notes = vec![format!("a pixel measures {sx} x {sy} m, which is not kept")];
-    let lens = match polynomial_of(&entries)? {
-        None => lens::simplest(lens::division(entries.number("Kappa")? * focus * focus)),
-        Some([0.0, 0.0, 0.0, 0.0, 0.0]) => lens::ideal(),
-        Some(_) if !wishes.fit => return Err(source.lens(POLYNOMIAL, FIT)),
-        Some(coefficients) => {
-            let seen = |pixel: &Vec2| Vec2::new((pixel.x - linear[2]) * sx, (pixel.y - linear[3]) * sy);
-            let (lens, error_px) = nearest(coefficients, focus, seen, linear, size)
-                .ok_or_else(|| source.lens(POLYNOMIAL, "no lens here comes near it over the frame"))?;
-            notes.push(format!(
-                "{POLYNOMIAL} is fitted over the frame: the largest error is {error_px:.2e} px"
-            ));
-            lens
-        }
+    let notes = vec![format!("a pixel measures {sx} x {sy} m, which is not kept")];
+    let lens = match polynomial(&entries, focus)? {
+        None => lens::division(entries.number("Kappa")? * focus * focus),
+        Some(polynomial) => polynomial,
     };
-    let camera = lens::camera(linear, lens);
+    let camera = lens::camera(linear, lens::simplest(lens));
     Ok(vec![CameraFile { image_size: Some(size), notes, ..CameraFile::of(camera) }.into()])
 }
 
-const POLYNOMIAL: &str = "HALCON's polynomial lens";
-
-/// The Brown-Conrady lens nearest to a polynomial over the frame, and its largest error, px.
-fn nearest(
-    coefficients: [f64; 5],
-    focus: f64,
-    seen: impl Fn(&Vec2) -> Vec2,
-    linear: [f64; 4],
-    size: (usize, usize),
-) -> Option<(Lens, f64)> {
-    // Seen and ideal points over the frame, in units of the focal length.
-    let pixels: Vec<Vec2> = fitted::frame(size).collect();
-    let rays: Vec<Vec2> =
-        pixels.iter().map(|pixel| ideal_from_seen(coefficients, &seen(pixel)) / focus).collect();
-    let pairs: Vec<(Vec2, Vec2)> =
-        rays.iter().zip(&pixels).map(|(ray, pixel)| (*ray, seen(pixel) / focus)).collect();
-    let lens = fitted::polynomial(&pairs)?.into();
-    let error = fitted::largest_error_px(
-        &lens::camera(linear, lens),
-        &rays.into_iter().zip(pixels).collect::<Vec<_>>(),
-    );
-    error.is_finite().then_some((lens, error))
-}
-
 /// The polynomial of a file, if it has one.
-fn polynomial_of(entries: &Entries) -> Result<Option<[f64; 5]>, FormatError> {
+fn polynomial(entries: &Entries, focus: f64) -> Result<Option<Lens>, FormatError> {
     if entries.get("Poly1").is_none() {
         return Ok(None);
     }
-    let mut coefficients = [0.0; 5];
-    for (coefficient, name) in coefficients.iter_mut().zip(["Poly1", "Poly2", "Poly3", "Poly4", "Poly5"]) {
-        *coefficient = entries.number(name)?;
-    }
-    Ok(Some(coefficients))
+    let f2 = focus * focus;
+    let scaled = |name: &str, by: f64| entries.number(name).map(|value| value * by);
+    let (k1, k2, k3) = (scaled("Poly1", f2)?, scaled("Poly2", f2 * f2)?, scaled("Poly3", f2 * f2 * f2)?);
+    let (p1, p2) = (scaled("Poly4", focus)?, scaled("Poly5", focus)?);
+    Ok(Some(lens::halcon_polynomial([k1, k2, p1, p2, k3])))
 }
 
 fn write(file: &CameraFile, wishes: &Wishes) -> Result<Written, FormatError> {
@@ -195,16 +156,21 @@ fn write(file: &CameraFile, wishes: &Wishes) -> Result<Written, FormatError> {
     let lens = if let Some(k1) = division(&camera.distortion) {
         vec![("Kappa", "kappa", k1 / f2, "Radial distortion coefficient [1/(meter*meter)]")]
     } else {
-        let (coefficients, error) = inverse_polynomial(camera, (width, height), wishes)?;
-        converted.push(format!("the lens is fitted over the frame: the largest error is {error:.2e} px"));
-        let metres = [f2, f2 * f2, f2 * f2 * f2, focus, focus];
-        let c = |i: usize| coefficients[i] / metres[i];
+        let [k1, k2, p1, p2, k3] = match halcon_polynomial(&camera.distortion) {
+            Some(coefficients) => coefficients,
+            None => {
+                let (coefficients, error) = nearest(camera, (width, height), wishes)?;
+                converted
+                    .push(format!("the lens is fitted over the frame: the largest error is {error:.2e} px"));
+                coefficients
+            }
+        };
         vec![
-            ("Poly1", "poly1", c(0), "Radial distortion coefficient K1 [1/m^2]"),
-            ("Poly2", "poly2", c(1), "Radial distortion coefficient K2 [1/m^4]"),
-            ("Poly3", "poly3", c(2), "Radial distortion coefficient K3 [1/m^6]"),
-            ("Poly4", "poly4", c(3), "Decentering distortion coefficient P1 [1/m]"),
-            ("Poly5", "poly5", c(4), "Decentering distortion coefficient P2 [1/m]"),
+            ("Poly1", "poly1", k1 / f2, "Radial distortion coefficient K1 [1/m^2]"),
+            ("Poly2", "poly2", k2 / (f2 * f2), "Radial distortion coefficient K2 [1/m^4]"),
+            ("Poly3", "poly3", k3 / (f2 * f2 * f2), "Radial distortion coefficient K3 [1/m^6]"),
+            ("Poly4", "poly4", p1 / focus, "Decentering distortion coefficient P1 [1/m]"),
+            ("Poly5", "poly5", p2 / focus, "Decentering distortion coefficient P2 [1/m]"),
         ]
     };
     let mut text = "# INTERNAL CAMERA PARAMETERS\n\nParGroup: Camera: Parameter;\n    \"Internal camera parameters\";\n\n".to_string();
@@ -232,11 +198,16 @@ fn division(lens: &Lens) -> Option<f64> {
     }
 }
 
+/// k1, k2, p1, p2, k3 of a polynomial of its own.
+fn halcon_polynomial(lens: &Lens) -> Option<[f64; 5]> {
+    (lens.model() == Model::HalconPolynomial).then(|| lens.coefficients().try_into().ok()).flatten()
+}
+
 /// Why a fit is none.
 const FAR: &str = "no lens there comes near it over the frame";
 
-/// K1, K2, K3, P1, P2 in units of the focal length, and the largest error, px.
-fn inverse_polynomial(
+/// k1, k2, p1, p2, k3 of its polynomial that is nearest to a lens over the frame, and the largest error, px.
+fn nearest(
     camera: &Camera<Lens>,
     size: (usize, usize),
     wishes: &Wishes,
@@ -266,5 +237,6 @@ fn inverse_polynomial(
     if !error_px.is_finite() {
         return refuse(FAR.into());
     }
-    Ok(([k1, k2, k3, p2, p1], error_px))
+    // Its p1 stands where p2 does in Brown and Conrady's polynomial, and the other way round.
+    Ok(([k1, k2, p2, p1, k3], error_px))
 }

@@ -32,7 +32,7 @@ pub(super) const FORMAT: Format = Format {
         size: Size::Needed,
     },
     looks_like: |text| ["camera_model:", "intrinsics:", "resolution:"].iter().all(|key| text.contains(key)),
-    read: |source, _| read(source),
+    read,
     write: |camera, _| write(camera),
 };
 

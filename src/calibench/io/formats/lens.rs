@@ -45,11 +45,11 @@ pub(super) fn least_of(coefficients: &[f64]) -> Lens {
 }
 
 /// The same lens by the model with the fewest coefficients: those that are 0 at the end of OpenCV's order say
-/// nothing, and a division by 1 is no distortion.
+/// nothing, and a division by 1 and a polynomial that is 1 are no distortion.
 pub(super) fn simplest(lens: Lens) -> Lens {
     match lens.model() {
         model if OPENCV.contains(&model) => least_of(lens.coefficients()),
-        Model::Division if lens.coefficients() == [0.0] => Lens::ideal(Model::BrownConrady),
+        Model::Division | Model::HalconPolynomial if lens.coefficients().iter().all(|c| *c == 0.0) => ideal(),
         _ => lens,
     }
 }
@@ -65,6 +65,12 @@ pub(super) fn fisheye(coefficients: &[f64]) -> Option<Lens> {
 pub(super) fn division(k1: f64) -> Lens {
     // One coefficient is what the model has; an ideal lens would be a fault that the tests see.
     Lens::new(Model::Division, &[k1]).unwrap_or(Lens::ideal(Model::Division))
+}
+
+/// The lens of HALCON's polynomial: k1, k2, p1, p2, k3.
+pub(super) fn halcon_polynomial(coefficients: [f64; 5]) -> Lens {
+    // As many as the model has, like the division's.
+    Lens::new(Model::HalconPolynomial, &coefficients).unwrap_or(Lens::ideal(Model::HalconPolynomial))
 }
 
 /// A camera without skew.
@@ -121,6 +127,9 @@ mod tests {
         assert_eq!(simplest(tilted), ideal());
         assert_eq!(simplest(division(0.0)), ideal());
         assert_eq!(simplest(division(0.1)).model(), Model::Division);
+        assert_eq!(simplest(halcon_polynomial([0.0; 5])), ideal());
+        let tangential = halcon_polynomial([0.0, 0.0, 0.0, 1e-3, 0.0]);
+        assert_eq!(simplest(tangential), tangential);
         assert!(is_ideal(&tilted) && !is_ideal(&Lens::ideal(Model::KannalaBrandt)));
     }
 }

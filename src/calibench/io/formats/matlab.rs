@@ -34,7 +34,7 @@ pub(super) const FORMAT: Format = Format {
         let of_a_lens = ["\"RadialDistortion\"", "\"MappingCoefficients\""];
         text.trim_start().starts_with('{') && of_a_lens.iter().any(|key| text.contains(key))
     },
-    read: |source, _| read(source),
+    read,
     write: |camera, _| Ok(write(camera)),
 };
 

@@ -76,7 +76,7 @@ pub struct Format {
     pub coefficients: &'static str,
     room: Room,
     looks_like: fn(&str) -> bool,
-    read: fn(&Source, &Wishes) -> Result<Vec<Found>, FormatError>,
+    read: fn(&Source) -> Result<Vec<Found>, FormatError>,
     write: fn(&CameraFile, &Wishes) -> Result<Written, FormatError>,
 }
 
@@ -96,7 +96,7 @@ impl From<CameraFile> for Found {
 /// What the user wants where the files leave a choice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wishes {
-    /// Fits the nearest lens where a lens has no equal in the other format.
+    /// Fits the nearest lens where a lens has no equal in the format that is written.
     pub fit: bool,
     /// Height of a pixel, m: HALCON states focal lengths in metres.
     pub pixel_height_m: f64,
@@ -219,7 +219,7 @@ pub fn read_camera_file(
     wishes: &Wishes,
 ) -> Result<CameraFile, FormatError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let cameras = (format.read)(&Source { file, text }, wishes)?;
+    let cameras = (format.read)(&Source { file, text })?;
     let first_pixel = wishes.first_pixel.unwrap_or(format.first_pixel);
     let read = chosen(file, cameras, camera)?.with_origin_moved(-first_pixel);
     match implausible(&read.camera) {
@@ -342,8 +342,7 @@ pub fn read_back_px(
     written: &Written,
     camera: &CameraFile,
 ) -> Result<Option<f64>, FormatError> {
-    let wishes = Wishes { fit: true, ..Wishes::default() };
-    let back = read_camera_file(format, "what was written", &written.text, None, &wishes)?;
+    let back = read_camera_file(format, "what was written", &written.text, None, &Wishes::default())?;
     let Some(size) = camera.image_size else { return Ok(None) };
     let rays = fitted::frame(size).filter_map(|pixel| camera.camera.ray(&pixel).ok());
     let apart = rays.filter_map(|ray| {

@@ -29,7 +29,7 @@ pub(super) const FORMAT: Format = Format {
         size: Size::Needed,
     },
     looks_like: |text| ["'lensmodel'", "\"lensmodel\"", "'lens_model'"].iter().any(|key| text.contains(key)),
-    read: |source, _| read(source),
+    read,
     write: |camera, _| Ok(write(camera)),
 };
 

@@ -31,7 +31,7 @@ pub(super) const YAML: Format = Format {
     coefficients: lens::IN_OPENCVS_ORDER,
     room: ROOM,
     looks_like: |text| is_yaml(text) && NAMES_OF_K.iter().any(|name| text.contains(name)),
-    read: |source, _| read(source, &yaml::document(source)?),
+    read: |source| read(source, &yaml::document(source)?),
     write: |camera, _| Ok(write_yaml(camera).into()),
 };
 
@@ -43,7 +43,7 @@ pub(super) const XML: Format = Format {
     coefficients: lens::IN_OPENCVS_ORDER,
     room: ROOM,
     looks_like: |text| text.contains("<opencv_storage>"),
-    read: |source, _| read(source, &xml::document(source)?),
+    read: |source| read(source, &xml::document(source)?),
     write: |camera, _| Ok(write_xml(camera).into()),
 };
 
@@ -56,7 +56,7 @@ pub(super) const JSON: Format = Format {
     coefficients: lens::IN_OPENCVS_ORDER,
     room: ROOM,
     looks_like: |text| text.trim_start().starts_with('{') && text.contains("\"opencv-matrix\""),
-    read: |source, _| read(source, &flow::json(source)?),
+    read: |source| read(source, &flow::json(source)?),
     write: |camera, _| Ok(write_json(camera).into()),
 };
 

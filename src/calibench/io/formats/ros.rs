@@ -36,7 +36,7 @@ pub(super) const FORMAT: Format = Format {
         has("distortion_model:") && (has("camera_matrix:") || message)
             || has("camera_matrix:") && has("projection_matrix:")
     },
-    read: |source, _| read(source),
+    read,
     write: |camera, _| Ok(write(camera)),
 };
 
