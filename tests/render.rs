@@ -92,7 +92,7 @@ fn squares_cover_what_supersampling_finds() {
 fn every_lens_shows_what_its_rays_meet() {
     let board = Board::chessboard(9, 7, 10.0).unwrap();
     let pose = looking_at_centre([-25.0, 30.0, 10.0], 150.0);
-    let coefficients: [(Model, &[f64]); 6] = [
+    let coefficients: [(Model, &[f64]); 7] = [
         (Model::Rational, &[-0.2, 0.05, 0.001, -0.001, 0.01, 0.02, 0.01, 0.003]),
         (
             Model::ThinPrism,
@@ -105,6 +105,7 @@ fn every_lens_shows_what_its_rays_meet() {
         (Model::KannalaBrandt, &[-0.03, 0.004, 0.001, -0.0005]),
         (Model::Division, &[-0.2]),
         (Model::DoubleSphere, &[-0.1, 0.55]),
+        (Model::HalconPolynomial, &[0.2, 0.03, 0.001, -0.001, 0.01]),
     ];
     for (model, coefficients) in coefficients {
         let lens = Lens::new(model, coefficients).unwrap();

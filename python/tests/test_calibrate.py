@@ -109,6 +109,7 @@ FREE = {
     "kannala-brandt": ["fx", "fy", "cx", "cy", "k1", "k2"],
     "division": None,
     "double-sphere": "fx,fy,cx,cy,alpha",
+    "halcon-polynomial": "fx,fy,cx,cy,k1,k2",
 }
 
 

@@ -15,6 +15,7 @@ COEFFICIENTS = {
     "kannala-brandt": {"k1": -0.02, "k2": 0.003},
     "division": {"k1": -0.1},
     "double-sphere": {"xi": 0.1, "alpha": 0.55},
+    "halcon-polynomial": {"k1": 0.2, "k2": 0.03, "p1": 1e-3, "p2": -2e-3, "k3": 0.01},
 }
 
 
@@ -101,6 +102,7 @@ FISHEYES = {
     "kannala-brandt": {"k1": -0.05},
     "division": {"k1": -0.1},
     "double-sphere": {"xi": -0.2, "alpha": 0.6},
+    "halcon-polynomial": {"k1": -0.2},
 }
 
 

@@ -16,7 +16,7 @@ def test_every_problem_of_the_source_tree_is_there() -> None:
     assert {problem.name for problem in PROBLEMS} == {path.stem for path in REFERENCE.glob("*.json")}
     levels = [problem.level for problem in PROBLEMS]
     assert len(BROWN) == 22 and {problem.model for problem in OTHERS} == {
-        "rational", "thin-prism", "tilted", "kannala-brandt", "division", "double-sphere"
+        "rational", "thin-prism", "tilted", "kannala-brandt", "division", "double-sphere", "halcon-polynomial"
     }
     assert levels == sorted(levels, key=["lower", "average", "higher"].index) and set(levels) == {"lower", "average", "higher"}
 

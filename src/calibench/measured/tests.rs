@@ -133,6 +133,7 @@ fn exact_data_give_the_camera_back() {
     let models = [
         (Model::Division, vec![-0.2]),
         (Model::DoubleSphere, vec![-0.2, 0.6]),
+        (Model::HalconPolynomial, vec![0.2, 0.03, 0.001, -0.001, 0.01]),
         (Model::Rational, vec![0.3, -0.05, 0.0005, -0.0004, 0.0, 0.5, 0.0, 0.0]),
     ];
     let of_model = |(model, coefficients): (Model, Vec<f64>)| {
