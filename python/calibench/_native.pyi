@@ -26,7 +26,7 @@ from .records import (
 )
 
 _Floats = NDArray[np.float64]
-_Model = Literal["brown-conrady", "rational", "thin-prism", "tilted", "kannala-brandt", "division", "double-sphere"]
+_Model = Literal["brown-conrady", "rational", "thin-prism", "tilted", "kannala-brandt", "division", "double-sphere", "halcon-polynomial"]
 _Outside = Literal["raise", "nan"]
 _Path = str | PathLike[str]
 _PerView = ArrayLike | Sequence[ArrayLike]
@@ -312,7 +312,6 @@ def read_camera(
     *,
     format: str | None = None,
     camera: str | None = None,
-    fit: bool = False,
     pixel_height_m: float | None = None,
     first_pixel: float | None = None,
 ) -> CameraFile: ...

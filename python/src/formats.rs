@@ -39,20 +39,18 @@ fn wishes(fit: bool, pixel_height_m: Option<f64>, first_pixel: Option<f64>) -> W
 /// Args:
 ///     format: one of `format_names`; by the file's contents and ending if not given.
 ///     camera: name of the camera in a file of several.
-///     fit: fits the nearest lens where a lens has no equal.
 ///     pixel_height_m: height of a pixel, m, for HALCON.
 ///     first_pixel: both coordinates of the first pixel's centre in the file, where its program did not keep to the format's.
 ///
 /// Raises:
 ///     FormatError: with file, line and column.
 #[pyfunction]
-#[pyo3(signature = (path, *, format = None, camera = None, fit = false, pixel_height_m = None, first_pixel = None))]
+#[pyo3(signature = (path, *, format = None, camera = None, pixel_height_m = None, first_pixel = None))]
 pub(crate) fn read_camera<'py>(
     py: Python<'py>,
     path: PathBuf,
     format: Option<&str>,
     camera: Option<&str>,
-    fit: bool,
     pixel_height_m: Option<f64>,
     first_pixel: Option<f64>,
 ) -> PyResult<Bound<'py, PyAny>> {
@@ -60,7 +58,7 @@ pub(crate) fn read_camera<'py>(
     let file = path.display().to_string();
     let text = read_regular_text(&path, MOST_BYTES).map_err(|e| refused(e.into()))?;
     let format = format.map_or_else(|| detect(&file, &text).map_err(refused), named)?;
-    let wishes = wishes(fit, pixel_height_m, first_pixel);
+    let wishes = wishes(false, pixel_height_m, first_pixel);
     let read = read_camera_file(format, &file, &text, camera, &wishes).map_err(refused)?;
     camera_file(py, format.name, &read)
 }

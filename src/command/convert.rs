@@ -54,7 +54,7 @@ pub(super) struct Arguments {
     /// says]
     #[arg(long, value_name = "PX", value_parser = parse_finite)]
     first_pixel: Option<f64>,
-    /// Fits the nearest lens where there is no equal one (HALCON's polynomial), and says the largest error
+    /// Fits the nearest lens where OUT has no equal one (HALCON's polynomial), and says the largest error
     #[arg(long)]
     fit: bool,
     /// Height of a pixel in micrometres, for HALCON, which states focal lengths in metres
@@ -117,8 +117,6 @@ struct Converted {
     converted: Vec<String>,
     lost: Vec<String>,
     read_back_px: Option<f64>,
-    /// Whether a lens may have been fitted, to be written and then to be read.
-    may_be_fitted: bool,
 }
 
 impl Converted {
@@ -135,9 +133,8 @@ impl Converted {
         } else if let Some(px) = self.read_back_px {
             let _ = writeln!(
                 text,
-                "read back by this program: over the whole frame pixels differ by {} px at most{}",
-                significant(px, 2),
-                if self.may_be_fitted { ", errors of a fit on the way back included" } else { "" }
+                "read back by this program: over the whole frame pixels differ by {} px at most",
+                significant(px, 2)
             );
         }
         text
@@ -232,16 +229,7 @@ fn camera(arguments: &Arguments, name: &str, text: &str, to: &Path) -> Result<Co
     }
     converted.extend(written.converted);
     let (from, to) = (from.name.to_string(), to.name.to_string());
-    Ok(Converted {
-        text: written.text,
-        from,
-        to,
-        noted,
-        converted,
-        lost: written.lost,
-        read_back_px,
-        may_be_fitted: arguments.fit,
-    })
+    Ok(Converted { text: written.text, from, to, noted, converted, lost: written.lost, read_back_px })
 }
 
 /// The camera with the size that the user states, and scaled as the user asks.
