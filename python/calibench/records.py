@@ -298,7 +298,8 @@ class CertifiedProblem:
     """What is particular to it."""
     image_size: tuple[int, int]
     model: str
-    """The lens model: ``brown-conrady``, ``rational``, ``thin-prism``, ``tilted``, ``kannala-brandt``, ``division`` or ``double-sphere``."""
+    """The lens model: ``brown-conrady``, ``rational``, ``thin-prism``, ``tilted``, ``kannala-brandt``, ``division``, ``double-sphere`` or
+    ``halcon-polynomial``."""
     points: tuple[Array, ...]
     """One array (N, 2) a view, on the target."""
     pixels: tuple[Array, ...]

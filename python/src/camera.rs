@@ -29,7 +29,8 @@ const MANY: usize = 100_000;
 ///     fx, fy: focal lengths, px.
 ///     cx, cy: principal point, px.
 ///     model: ``brown-conrady`` (k1 k2 p1 p2 k3), ``rational`` (and k4 k5 k6), ``thin-prism`` (and s1 s2 s3 s4), ``tilted`` (and tau_x tau_y,
-///         rad), ``kannala-brandt`` (k1 k2 k3 k4), ``division`` (k1), ``double-sphere`` (xi alpha).
+///         rad), ``kannala-brandt`` (k1 k2 k3 k4), ``division`` (k1), ``double-sphere`` (xi alpha),
+///         ``halcon-polynomial`` (k1 k2 p1 p2 k3, from the seen point to the ideal one).
 ///     values: ``skew`` (px) and the coefficients of the model by name.
 ///
 /// Raises:

@@ -47,9 +47,10 @@ pub(in super::super) struct Arguments {
     /// a column sigma_px at its word) [default: estimated from the residuals]
     #[arg(long, value_name = "PX", value_parser = said::noise_px)]
     pub(super) sigma: Option<f64>,
-    /// Lens model: brown-conrady, rational, thin-prism, tilted, kannala-brandt, division or double-sphere;
-    /// auto compares eight (tilted and thin-prism are not among them) by Schwarz's criterion, and by how they
-    /// predict views that were left out where it is undecided [default: brown-conrady]
+    /// Lens model: brown-conrady, rational, thin-prism, tilted, kannala-brandt, division, double-sphere or
+    /// halcon-polynomial; auto compares eight (tilted, thin-prism and halcon-polynomial are not among them)
+    /// by Schwarz's criterion, and by how they predict views that were left out where it is undecided
+    /// [default: brown-conrady]
     #[arg(long, value_name = "MODEL")]
     pub(super) model: Option<ModelChoice>,
     /// Estimates how the board is bent, each number known beforehand to be 0 with a standard deviation in the
