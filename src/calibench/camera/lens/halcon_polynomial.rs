@@ -214,11 +214,11 @@ mod tests {
 
     /// What the polynomial gives of a seen point, one term after another.
     fn by_the_book([k1, k2, p1, p2, k3]: [f64; 5], x: f64, y: f64) -> [f64; 2] {
-        let r = libm::hypot(x, y);
-        let radial = 1.0 + k1 * r.powi(2) + k2 * r.powi(4) + k3 * r.powi(6);
+        let s = x * x + y * y;
+        let radial = 1.0 + k1 * s + k2 * s * s + k3 * s * s * s;
         [
-            x * radial + p1 * (r.powi(2) + 2.0 * x.powi(2)) + 2.0 * p2 * x * y,
-            y * radial + 2.0 * p1 * x * y + p2 * (r.powi(2) + 2.0 * y.powi(2)),
+            x * radial + p1 * (s + 2.0 * x * x) + 2.0 * p2 * x * y,
+            y * radial + 2.0 * p1 * x * y + p2 * (s + 2.0 * y * y),
         ]
     }
 
@@ -248,7 +248,7 @@ mod tests {
         let pincushion = [-0.3, 0.0, 0.0, 0.0, 0.0];
         let at = |x: f64| HalconPolynomial::project(&pincushion, [x, 0.0, 1.0]);
         assert!(at(0.70).inside > 0.0);
-        assert!((HalconPolynomial::monotone_angle(&pincushion) - 0.703_f64.atan()).abs() < 1e-3);
+        assert!((HalconPolynomial::monotone_angle(&pincushion) - libm::atan(0.703)).abs() < 1e-3);
         for x in [0.71, 1.0, 30.0] {
             assert!(at(x).inside.is_nan() || at(x).inside <= 0.0, "{x}");
         }
