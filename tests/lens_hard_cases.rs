@@ -193,6 +193,7 @@ fn a_board_that_is_bowed_a_little_is_told_with_every_lens() {
         (Model::Rational, 800.0, vec![0.1, 0.01, 0.0, 0.0, 0.0, 0.3, 0.02, 0.0], 150.0),
         (Model::Division, 420.0, vec![-0.2], 60.0),
         (Model::DoubleSphere, 330.0, vec![-0.3, 0.6], 60.0),
+        (Model::HalconPolynomial, 800.0, vec![0.2, 0.03, 0.0, 0.0, 0.0], 150.0),
     ];
     for (model, f, coefficients, distance) in lens {
         let truth = camera(model, f, f, &coefficients);
