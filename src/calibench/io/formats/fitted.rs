@@ -43,6 +43,26 @@ pub(super) fn polynomial(pairs: &[(Vec2, Vec2)]) -> Option<BrownConrady> {
     [lens.k1, lens.k2, lens.p1, lens.p2, lens.k3].iter().all(|c| c.is_finite()).then_some(lens)
 }
 
+/// The Brown-Conrady lens nearest to that of a camera over a frame, and its largest error, px; `None` where
+/// none comes near it or the camera does not reach the whole frame.
+pub(super) fn nearest_brown_conrady(
+    camera: &Camera<Lens>,
+    size: (usize, usize),
+) -> Option<(BrownConrady, f64)> {
+    let pixels: Vec<Vec2> = frame(size).collect();
+    let ideal = |pixel: &Vec2| camera.ray(pixel).ok().filter(|ray| ray.z > 0.0).map(|ray| ray.xy() / ray.z);
+    let rays: Vec<Vec2> = pixels.iter().map(ideal).collect::<Option<_>>()?;
+    let seen = |pixel: &Vec2| {
+        let y = (pixel.y - camera.cy) / camera.fy;
+        Vec2::new((pixel.x - camera.cx - camera.skew * y) / camera.fx, y)
+    };
+    let pairs: Vec<(Vec2, Vec2)> = rays.iter().zip(&pixels).map(|(ray, pixel)| (*ray, seen(pixel))).collect();
+    let lens = polynomial(&pairs)?;
+    let fitted = Camera { distortion: lens.into(), ..*camera };
+    let error_px = largest_error_px(&fitted, &rays.into_iter().zip(pixels).collect::<Vec<_>>());
+    error_px.is_finite().then_some((lens, error_px))
+}
+
 /// What k1, k2, p1, p2, k3 of one each move a point by: the columns.
 fn terms(p: &Vec2) -> SMatrix<f64, 2, 5> {
     let (x, y, s) = (p.x, p.y, p.norm_squared());

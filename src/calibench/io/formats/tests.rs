@@ -333,6 +333,40 @@ fn a_lens_that_halcon_has_not_is_fitted_with_the_error_that_is_said() {
 }
 
 #[test]
+fn halcons_polynomial_is_fitted_for_other_programs_if_asked_for() {
+    let camera = whole(with_lens(Model::HalconPolynomial));
+    let (plain, fit) = (Wishes::default(), Wishes { fit: true, ..Wishes::default() });
+    for format in FORMATS.iter().filter(|format| !format.room.lenses.contains(&Model::HalconPolynomial)) {
+        let refused = write_camera_file(format, &camera, &plain).unwrap_err().to_string();
+        assert!(refused.contains("--fit"), "{}: {refused}", format.name);
+        let written = match write_camera_file(format, &camera, &fit) {
+            // The nearest lens has a k3.
+            Err(error) => {
+                assert!(
+                    format.name == "kalibr" && error.to_string().contains("k3"),
+                    "{}: {error}",
+                    format.name
+                );
+                continue;
+            }
+            Ok(written) => written,
+        };
+        let said = written.converted.iter().find_map(|line| line.split_once("the largest error is "));
+        let said: f64 = said.expect("it is said").1.trim_end_matches(" px").parse().unwrap();
+        let apart = read_back_px(format, &written, &camera).unwrap().unwrap();
+        assert!(
+            0.01 < said && said < 1.0 && (apart / said - 1.0).abs() < 0.01,
+            "{}: {said} {apart}",
+            format.name
+        );
+        // What the format holds already is not fitted.
+        let plain_lens = whole(CAMERA);
+        let exact = write_camera_file(format, &plain_lens, &fit).unwrap();
+        assert!(read_back_px(format, &exact, &plain_lens).unwrap().unwrap() < 1e-6, "{}", format.name);
+    }
+}
+
+#[test]
 fn halcons_polynomial_without_a_coefficient_is_an_ideal_lens() {
     let (file, text) = sample!("halcon-polynomial.dat");
     let is_coefficient = |line: &str| line.starts_with("Poly");
