@@ -36,7 +36,7 @@ pub fn problems(count: usize) -> Vec<Problem> {
 #[test]
 fn the_correct_solver_is_trusted_with_every_lens() {
     let plan = Plan::of(1, 2, Asked::of(&Builtin.models()[1..])).expect("a plan");
-    assert_eq!(plan.scenarios.len(), 7);
+    assert_eq!(plan.scenarios.len(), 8);
     let report = Report::new(&plan, "", &run(&plan, &Builtin, &|_| ()), &Terms::default(), 0.0);
     assert!(report.held(), "{}{}", report.to_text(200), report.details());
 }

@@ -136,7 +136,7 @@ fn what_contradicts_a_target_is_refused() {
     };
     for (more, words) in [
         (vec!["--board", "circles:9x7:10mm:3mm"], "--board and --out DIR first"),
-        (vec!["--model", "auto"], "--model auto compares"),
+        (vec!["--model", "auto"], "with --target name a lens"),
         (vec!["--board-shape", "bow:0.1"], "--board-shape estimates"),
         (vec!["--loss", "huber:0.5"], "--loss resists strays"),
         (vec!["--intervals", "profile"], "--intervals is not known"),

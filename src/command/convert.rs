@@ -54,8 +54,8 @@ pub(super) struct Arguments {
     /// says]
     #[arg(long, value_name = "PX", value_parser = parse_finite)]
     first_pixel: Option<f64>,
-    /// Fits the nearest lens where OUT has no equal one (from or to HALCON's polynomial), and says the largest
-    /// error
+    /// Fits the nearest lens where OUT has no equal one (from or to HALCON's polynomial), and says the
+    /// largest error
     #[arg(long)]
     fit: bool,
     /// Height of a pixel in micrometres, for HALCON, which states focal lengths in metres

@@ -16,8 +16,8 @@ pub fn lines(source: &str) -> String {
 }
 
 /// The code lines of these files of `root`, and of every `.rs` file but `tests.rs` in these folders and
-/// below, in the order of their paths, each file under its path; but for the files `without` and what lies in such
-/// folders.
+/// below, in the order of their paths, each file under its path; but for the files `without` and what lies
+/// in such folders.
 ///
 /// # Errors
 /// A folder or file that cannot be read.

@@ -9,10 +9,11 @@
 //! ```
 //! so that the inverse is the simple direction, `k1 > 0` is a barrel, and p1 and p2 stand the other way round
 //! than in [`super::brown_conrady`]. HALCON measures the seen point in metres on the sensor, here it is in
-//! units of the focal length `f`: `K1 = k1 / f^2`, `K2 = k2 / f^4`, `K3 = k3 / f^6`, `P1 = p1 / f`, `P2 = p2 /
-//! f`. (MVTec HALCON operator reference, `calibrate_cameras`, `area_scan_polynomial`.)
+//! units of the focal length `f`: `K1 = k1 / f^2`, `K2 = k2 / f^4`, `K3 = k3 / f^6`, `P1 = p1 / f` and
+//! `P2 = p2 / f`. (MVTec HALCON operator reference, `calibrate_cameras`, `area_scan_polynomial`.)
 //!
-//! The image of a point is the solution on the piece that holds the axis: up to where the radius stops to grow.
+//! The image of a point is the solution on the piece that holds the axis: up to where the radius stops to
+//! grow.
 
 use super::pinhole::{self, Bent};
 use super::roots::smallest_positive_root;
@@ -22,10 +23,12 @@ use crate::geometry::{Vec2, Vec3};
 
 pub(super) struct HalconPolynomial;
 
-/// Steps along the radius. Ten miss 1 to 35 of a million points of lenses drawn at random up to 89.9 degrees
-/// from the axis, all of them far out or next to where the radius hardly grows; such a point counts as unseen.
+/// Steps along the radius. Ten miss 1 to 121 of a million points of lenses drawn at random up to 89.9 degrees
+/// from the axis, far out or next to where the radius hardly grows; such a point counts as unseen.
 const RADIAL_STEPS: usize = 10;
 /// Steps in the plane from there: what p1 and p2 move is small, and each step squares what is left of it.
+/// Three miss 2 of ten thousand points that they move by a two-hundredth of the distance from the axis, and
+/// most of those that they move by a tenth.
 const PLANE_STEPS: usize = 3;
 /// A solution leaves rounding: less than this squared, for an ideal point of length 1.
 const SOLVED: f64 = 1e-24;
