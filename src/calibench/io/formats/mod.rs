@@ -284,8 +284,8 @@ fn with_simplest_lens(format: &Format, camera: &CameraFile) -> CameraFile {
 }
 
 /// With a wish for it, the same camera with the Brown-Conrady lens nearest over the frame in place of
-/// HALCON's polynomial where the format does not hold that, and the largest error in words. What was estimated
-/// is not kept then: it is another lens.
+/// HALCON's polynomial where the format does not hold that, and the largest error in words. What was
+/// estimated is not kept then: it is another lens.
 fn with_nearest_lens(format: &Format, camera: CameraFile, wishes: &Wishes) -> (CameraFile, Option<String>) {
     let CameraFile { camera: of, image_size, .. } = &camera;
     let holds = |model| format.room.lenses.contains(&model);
