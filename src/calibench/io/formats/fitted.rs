@@ -43,24 +43,45 @@ pub(super) fn polynomial(pairs: &[(Vec2, Vec2)]) -> Option<BrownConrady> {
     [lens.k1, lens.k2, lens.p1, lens.p2, lens.k3].iter().all(|c| c.is_finite()).then_some(lens)
 }
 
-/// The Brown-Conrady lens nearest to that of a camera over a frame, and its largest error, px; `None` where
-/// none comes near it or the camera does not reach the whole frame.
+/// Why a fit is none.
+pub(super) const FAR: &str = "no lens there comes near it over the frame";
+
+/// What a camera sees over a frame: the seen point of each pixel, on the plane of the linear parameters, and
+/// the ideal one.
+///
+/// # Errors
+/// In words, where it sees no ideal point at some pixel.
+pub(super) fn seen_and_ideal(
+    camera: &Camera<Lens>,
+    size: (usize, usize),
+) -> Result<Vec<(Vec2, Vec2)>, String> {
+    let pair = |pixel: Vec2| match camera.ray(&pixel) {
+        Ok(ray) if ray.z > 0.0 => {
+            let y = (pixel.y - camera.cy) / camera.fy;
+            let x = (pixel.x - camera.cx - camera.skew * y) / camera.fx;
+            Ok((Vec2::new(x, y), ray.xy() / ray.z))
+        }
+        Ok(_) => Err("it sees beyond 90 degrees, where its lens has no image".to_string()),
+        Err(error) => Err(format!("it does not reach the whole frame: {error}")),
+    };
+    frame(size).map(pair).collect()
+}
+
+/// The camera with the Brown-Conrady lens nearest to its own over a frame, and the largest error, px.
+///
+/// # Errors
+/// Why there is none, in words.
 pub(super) fn nearest_brown_conrady(
     camera: &Camera<Lens>,
     size: (usize, usize),
-) -> Option<(BrownConrady, f64)> {
-    let pixels: Vec<Vec2> = frame(size).collect();
-    let ideal = |pixel: &Vec2| camera.ray(pixel).ok().filter(|ray| ray.z > 0.0).map(|ray| ray.xy() / ray.z);
-    let rays: Vec<Vec2> = pixels.iter().map(ideal).collect::<Option<_>>()?;
-    let seen = |pixel: &Vec2| {
-        let y = (pixel.y - camera.cy) / camera.fy;
-        Vec2::new((pixel.x - camera.cx - camera.skew * y) / camera.fx, y)
-    };
-    let pairs: Vec<(Vec2, Vec2)> = rays.iter().zip(&pixels).map(|(ray, pixel)| (*ray, seen(pixel))).collect();
-    let lens = polynomial(&pairs)?;
+) -> Result<(Camera<Lens>, f64), String> {
+    let pairs: Vec<(Vec2, Vec2)> =
+        seen_and_ideal(camera, size)?.into_iter().map(|(seen, ideal)| (ideal, seen)).collect();
+    let lens = polynomial(&pairs).ok_or(FAR)?;
     let fitted = Camera { distortion: lens.into(), ..*camera };
-    let error_px = largest_error_px(&fitted, &rays.into_iter().zip(pixels).collect::<Vec<_>>());
-    error_px.is_finite().then_some((lens, error_px))
+    let rays: Vec<(Vec2, Vec2)> = pairs.iter().map(|(ideal, _)| *ideal).zip(frame(size)).collect();
+    let error_px = largest_error_px(&fitted, &rays);
+    if error_px.is_finite() { Ok((fitted, error_px)) } else { Err(FAR.into()) }
 }
 
 /// What k1, k2, p1, p2, k3 of one each move a point by: the columns.

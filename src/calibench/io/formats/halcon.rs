@@ -203,9 +203,6 @@ fn halcon_polynomial(lens: &Lens) -> Option<[f64; 5]> {
     (lens.model() == Model::HalconPolynomial).then(|| lens.coefficients().try_into().ok()).flatten()
 }
 
-/// Why a fit is none.
-const FAR: &str = "no lens there comes near it over the frame";
-
 /// k1, k2, p1, p2, k3 of its polynomial that is nearest to a lens over the frame, and the largest error, px.
 fn nearest(
     camera: &Camera<Lens>,
@@ -218,24 +215,19 @@ fn nearest(
     if !wishes.fit {
         return refuse(FIT.into());
     }
-    let seen = |pixel: &Vec2| Vec2::new((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy);
-    let mut pairs = Vec::new();
-    for pixel in fitted::frame(size) {
-        match camera.ray(&pixel) {
-            Ok(ray) if ray.z > 0.0 => pairs.push((seen(&pixel), ray.xy() / ray.z)),
-            Ok(_) => return refuse("it sees beyond 90 degrees, where its lens has no image".into()),
-            Err(error) => return refuse(format!("it does not reach the whole frame: {error}")),
-        }
-    }
+    let pairs = match fitted::seen_and_ideal(camera, size) {
+        Ok(pairs) => pairs,
+        Err(reason) => return refuse(reason),
+    };
     let Some(fit) = fitted::polynomial(&pairs) else {
-        return refuse(FAR.into());
+        return refuse(fitted::FAR.into());
     };
     let by_halcon: Vec<(Vec2, Vec2)> =
-        fitted::frame(size).map(|pixel| (fit.distort(&seen(&pixel)), pixel)).collect();
+        pairs.iter().map(|(seen, _)| fit.distort(seen)).zip(fitted::frame(size)).collect();
     let BrownConrady { k1, k2, p1, p2, k3 } = fit;
     let error_px = fitted::largest_error_px(camera, &by_halcon);
     if !error_px.is_finite() {
-        return refuse(FAR.into());
+        return refuse(fitted::FAR.into());
     }
     // Its p1 stands where p2 does in Brown and Conrady's polynomial, and the other way round.
     Ok(([k1, k2, p2, p1, k3], error_px))

@@ -33,7 +33,7 @@ pub use kalibr::{AprilTarget, ChessTarget, KalibrTarget, parse_target, target_te
 pub use vnl::{VnlBoard, corner_text, looks_like_vnl, parse_vnl, vnl_text};
 
 use super::plausible::implausible;
-use crate::camera::{Camera, Model, Parameter};
+use crate::camera::{Model, Parameter};
 use crate::geometry::Vec3;
 use node::Source;
 
@@ -257,7 +257,7 @@ pub fn write_camera_file(
     wishes: &Wishes,
 ) -> Result<Written, FormatError> {
     let camera = with_simplest_lens(format, camera);
-    let (camera, fitted) = &with_nearest_lens(format, camera, wishes);
+    let (camera, fitted) = &with_nearest_lens(format, camera, wishes)?;
     refuse_what_has_no_room(format, camera)?;
     let mut written = (format.write)(&camera.clone().with_origin_moved(format.first_pixel), wishes)?;
     written.converted.extend(fitted.clone());
@@ -286,19 +286,35 @@ fn with_simplest_lens(format: &Format, camera: &CameraFile) -> CameraFile {
 /// With a wish for it, the same camera with the Brown-Conrady lens nearest over the frame in place of
 /// HALCON's polynomial where the format does not hold that, and the largest error in words. What was
 /// estimated is not kept then: it is another lens.
-fn with_nearest_lens(format: &Format, camera: CameraFile, wishes: &Wishes) -> (CameraFile, Option<String>) {
-    let CameraFile { camera: of, image_size, .. } = &camera;
-    let holds = |model| format.room.lenses.contains(&model);
-    let asked = wishes.fit
-        && of.distortion.model() == Model::HalconPolynomial
-        && !holds(Model::HalconPolynomial)
-        && holds(Model::BrownConrady);
-    let nearest = image_size.filter(|_| asked).and_then(|size| fitted::nearest_brown_conrady(of, size));
-    let Some((lens, error_px)) = nearest else { return (camera, None) };
+///
+/// # Errors
+/// A lens that none comes near to, and a frame of no known size.
+fn with_nearest_lens(
+    format: &Format,
+    camera: CameraFile,
+    wishes: &Wishes,
+) -> Result<(CameraFile, Option<String>), FormatError> {
+    if !wishes.fit || !can_be_fitted(format, camera.camera.distortion.model()) {
+        return Ok((camera, None));
+    }
+    let nearest = match camera.image_size {
+        Some(size) => fitted::nearest_brown_conrady(&camera.camera, size),
+        None => Err("give --image-size WxH: it is fitted over the frame".into()),
+    };
+    let (fitted, error_px) = nearest.map_err(|help| FormatError::CannotHold {
+        format: format.of,
+        what: "this lens exactly".into(),
+        help,
+    })?;
     let said =
         format!("HALCON's polynomial lens is fitted over the frame: the largest error is {error_px:.2e} px");
-    let fitted = Camera { distortion: lens.into(), ..*of };
-    (CameraFile { camera: fitted, estimated: None, ..camera }, Some(said))
+    Ok((CameraFile { camera: fitted, estimated: None, ..camera }, Some(said)))
+}
+
+/// Whether the nearest lens of another model is looked for on request.
+fn can_be_fitted(format: &Format, model: Model) -> bool {
+    let holds = |model| format.room.lenses.contains(&model);
+    model == Model::HalconPolynomial && !holds(model) && holds(Model::BrownConrady)
 }
 
 fn refuse_what_has_no_room(format: &Format, camera: &CameraFile) -> Result<(), FormatError> {
@@ -324,8 +340,7 @@ fn refuse_what_has_no_room(format: &Format, camera: &CameraFile) -> Result<(), F
     }
     if !room.lenses.contains(&lens) {
         let held: Vec<&str> = room.lenses.iter().map(|model| model.name()).collect();
-        let fits = lens == Model::HalconPolynomial && room.lenses.contains(&Model::BrownConrady);
-        let how = if fits { "--fit finds the nearest lens, or " } else { "" };
+        let how = if can_be_fitted(format, lens) { "--fit finds the nearest lens, or " } else { "" };
         let help = format!("{how}calibrate again with another --model; it holds {}", held.join(", "));
         return refuse(&format!("a {lens} lens"), &help);
     }

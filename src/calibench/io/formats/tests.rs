@@ -359,6 +359,10 @@ fn halcons_polynomial_is_fitted_for_other_programs_if_asked_for() {
             "{}: {said} {apart}",
             format.name
         );
+        // Asked for and not possible, the reason is told.
+        let unsized_camera = CameraFile { image_size: None, ..camera.clone() };
+        let refused = write_camera_file(format, &unsized_camera, &fit).unwrap_err().to_string();
+        assert!(refused.contains("--image-size"), "{}: {refused}", format.name);
         // What the format holds already is not fitted.
         let plain_lens = whole(CAMERA);
         let exact = write_camera_file(format, &plain_lens, &fit).unwrap();
