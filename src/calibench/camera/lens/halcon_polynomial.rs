@@ -246,6 +246,30 @@ mod tests {
     }
 
     #[test]
+    fn a_decentring_by_a_fiftieth_of_the_distance_is_solved_for_in_nearly_all_places() {
+        // The part of a thousand lenses and places of which the image is found, p1 and p2 moving it by `shift`
+        // of its distance from the axis.
+        let found = |shift: f64| {
+            let place = |i: usize| {
+                // Numbers between 0 and 1 that fill the square evenly.
+                let [radius, k1, turn] =
+                    [0.754_877, 0.569_840, 0.618_034].map(|step| (step * i as f64).fract());
+                let (radius, k1) = (0.1 + 0.9 * radius, -0.1 + 0.4 * k1);
+                let (p1, p2) =
+                    (shift / radius * libm::cos(7.0 * turn), shift / radius * libm::sin(7.0 * turn));
+                let lens = [k1, 0.0, p1, p2, 0.0];
+                let seen = [radius * libm::cos(0.1 * i as f64), radius * libm::sin(0.1 * i as f64)];
+                let ideal = by_the_book(lens, seen[0], seen[1]);
+                let p = HalconPolynomial::project(&lens, [ideal[0], ideal[1], 1.0]);
+                p.inside > 0.0 && libm::hypot(p.at[0] - seen[0], p.at[1] - seen[1]) < 1e-11
+            };
+            (0..1000).filter(|&i| place(i)).count()
+        };
+        assert_eq!(found(0.002), 1000);
+        assert!(found(0.02) >= 980, "{}", found(0.02));
+    }
+
+    #[test]
     fn beyond_the_fold_nothing_is_seen() {
         // x = x_d - 0.3 x_d^3 grows up to x_d = 1.054, x = 0.703.
         let pincushion = [-0.3, 0.0, 0.0, 0.0, 0.0];

@@ -284,8 +284,7 @@ fn with_simplest_lens(format: &Format, camera: &CameraFile) -> CameraFile {
 }
 
 /// With a wish for it, the same camera with the Brown-Conrady lens nearest over the frame in place of
-/// HALCON's polynomial where the format does not hold that, and the largest error in words. What was
-/// estimated is not kept then: it is another lens.
+/// HALCON's polynomial where the format does not hold that, and the largest error in words.
 ///
 /// # Errors
 /// A lens that none comes near to, and a frame of no known size.
@@ -308,13 +307,15 @@ fn with_nearest_lens(
     })?;
     let said =
         format!("HALCON's polynomial lens is fitted over the frame: the largest error is {error_px:.2e} px");
-    Ok((CameraFile { camera: fitted, estimated: None, ..camera }, Some(said)))
+    Ok((CameraFile { camera: fitted, ..camera }, Some(said)))
 }
 
-/// Whether the nearest lens of another model is looked for on request.
+/// Whether the nearest lens of another model is looked for on request. Not where a covariance is kept: it is
+/// of other coefficients.
 fn can_be_fitted(format: &Format, model: Model) -> bool {
-    let holds = |model| format.room.lenses.contains(&model);
-    model == Model::HalconPolynomial && !holds(model) && holds(Model::BrownConrady)
+    let Room { lenses, covariance, .. } = format.room;
+    let holds = |model| lenses.contains(&model);
+    model == Model::HalconPolynomial && !holds(model) && holds(Model::BrownConrady) && !covariance
 }
 
 fn refuse_what_has_no_room(format: &Format, camera: &CameraFile) -> Result<(), FormatError> {
