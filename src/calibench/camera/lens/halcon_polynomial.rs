@@ -247,8 +247,8 @@ mod tests {
 
     #[test]
     fn a_decentring_by_a_fiftieth_of_the_distance_is_solved_for_in_nearly_all_places() {
-        // Of a thousand lenses and places those of which the image is found, p1 and p2 moving it by `shift` of
-        // its distance from the axis.
+        // How many images are found of a thousand lenses and places that p1 and p2 move by `shift` of the
+        // distance from the axis.
         let found = |shift: f64| {
             let place = |i: usize| {
                 // Numbers between 0 and 1 that fill the square evenly.
