@@ -3,8 +3,8 @@
 
 use calibench::board::View;
 use calibench::calibrate::{
-    Board, CalibrationError, Candidate, LensCalibration, Settings, Warning, calibrate, calibrate_lens,
-    compare_models,
+    Board, CalibrationError, Candidate, Deformation, LensCalibration, Settings, Warning, calibrate,
+    calibrate_lens, compare_models,
 };
 use calibench::camera::{BrownConrady, Camera, Lens, Model, Parameter};
 use calibench::geometry::{Pose, Vec2, Vec3};
@@ -208,9 +208,22 @@ fn a_bowed_board_is_found_with_its_size() {
     }
     let middle = Vec2::new(40.0, 30.0);
     assert!((shape.height(&middle) - 0.3).abs() < 0.1);
-    // A prior that says flat keeps it flat.
-    let tight = settings(&truth).with_board(Board::Bent { standard_deviation: 1e-4 });
-    assert!(calibrate_lens(&views, &tight).unwrap().board.unwrap().bow_x.abs() < 1e-2);
+    // A prior that says flat keeps it flat, and is told to be wrong; one that allows for it is not.
+    let known = |standard_deviation| {
+        calibrate_lens(&views, &settings(&truth).with_board(Board::Bent { standard_deviation })).unwrap()
+    };
+    let contradicted = |found: &LensCalibration| {
+        found.warnings.iter().find_map(|w| match *w {
+            Warning::BoardContradicted { deformation, deviations, .. } => Some((deformation, deviations)),
+            _ => None,
+        })
+    };
+    let tight = known(1e-4);
+    assert!(tight.board.unwrap().bow_x.abs() < 1e-2);
+    let told = contradicted(&tight);
+    assert!(matches!(told, Some((Deformation::BowX, deviations)) if deviations > 100.0), "{told:?}");
+    assert_eq!(contradicted(&known(0.5)), None);
+    assert_eq!(contradicted(&bent), None);
 }
 
 #[test]

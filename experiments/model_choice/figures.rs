@@ -157,7 +157,7 @@ pub fn cost(trials: &[Trial<'_>]) -> Figure {
         });
     let of_auto = marks().map(|marks| median_ratio(trials, marks, Criterion::Auto));
     let caption = format!(
-        "Difference from the truth over the frame of what a criterion takes, over that of the trial's best candidate, of all nine truths: median, \
+        "Difference from the truth over the frame of what a criterion takes, over that of the trial's best candidate, of all ten truths: median, \
          and share of trials in which it is over {FAR} times as large, with intervals of 95 %; noise 0.1 px, seed {SEED}. What shows \
          less than the frame in most trials has no median. Notice that knowing \
          the true model brings {:.2} with {} marks, where auto brings {:.2}: the best candidate of a trial is known afterwards only.",

@@ -21,7 +21,7 @@ pub struct Truth {
 }
 
 /// All truths.
-pub const TRUTHS: [Truth; 9] = [
+pub const TRUTHS: [Truth; 10] = [
     Truth {
         name: "two-radial",
         about: "Brown-Conrady with k1 and k2 alone",
@@ -107,6 +107,16 @@ pub const TRUTHS: [Truth; 9] = [
         coefficients: &[-0.18, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.004, -0.002, -0.003, 0.001],
         is_slow: false,
     },
+    // A barrel like the second lens, as HALCON would describe it.
+    Truth {
+        name: "halcon-polynomial",
+        about: "HALCON's polynomial with k1, k2, p1 and p2: no candidate has it",
+        size: (1280, 960),
+        linear: [1000.0, 1002.0, 645.0, 474.0],
+        model: Model::HalconPolynomial,
+        coefficients: &[0.2, 0.03, 8e-4, -6e-4, 0.0],
+        is_slow: false,
+    },
 ];
 
 /// Names of [`Candidate::usual`], in its order.
@@ -167,10 +177,11 @@ mod tests {
             Some("division"),
             None,
             None,
+            None,
         ];
         assert_eq!(right, expected);
         let contain = |truth: &Truth| all.iter().filter(|c| truth.is_within(c)).count();
-        assert_eq!(TRUTHS.each_ref().map(contain), [5, 3, 3, 1, 1, 1, 1, 0, 0]);
+        assert_eq!(TRUTHS.each_ref().map(contain), [5, 3, 3, 1, 1, 1, 1, 0, 0, 0]);
     }
 
     #[test]

@@ -55,7 +55,7 @@ mod unknown;
 mod walk;
 mod warnings;
 
-pub use any_lens::{BoardShape, Located, lens_information, locate};
+pub use any_lens::{BoardShape, Deformation, Located, lens_information, locate};
 pub use certificate::Certificate;
 pub use choice::{Candidate, Compared, Freedom, compare_models, explaining_freedoms};
 pub use closed_form::{ClosedFormError, closed_form, pose_from_homography};
@@ -70,6 +70,7 @@ pub use loss::Loss;
 pub use normal::information;
 pub use outliers::Outliers;
 pub use prior::Prior;
+pub(crate) use prior::contradiction;
 pub use report::{Calibration, Warning};
 pub use settings::{Board, Role, Settings};
 pub use system::System;

@@ -28,6 +28,21 @@ use super::system::System;
 use super::{CalibrationError, relaxed};
 use crate::camera::{Camera, Parameter};
 
+/// A normal number exceeds this in size with a probability of one in a million.
+const CONTRADICTED: f64 = 4.89;
+/// Where the pixels make an estimate better than its prior by less than this part, they say nothing of it.
+const TOLD_BY_PIXELS: f64 = 1e-6;
+
+/// By how many standard deviations an estimate that lies `away` from a prior's mean contradicts it; `None`
+/// where it does not. Before the photographs the estimate is spread about the mean with the variance that
+/// they take away from it: `prior_sd^2 - posterior_sd^2`.
+pub(crate) fn contradiction(away: f64, prior_sd: f64, posterior_sd: f64) -> Option<f64> {
+    let share = posterior_sd / prior_sd;
+    let taken = 1.0 - share * share;
+    let deviations = away.abs() / (prior_sd * taken.max(0.0).sqrt());
+    (taken > TOLD_BY_PIXELS && deviations > CONTRADICTED).then_some(deviations)
+}
+
 /// A parameter that is estimated, and known beforehand: `mean +- standard_deviation`, normally distributed.
 ///
 /// With the noise `sigma` of a pixel coordinate it counts as a residual of `sigma (p - mean) /

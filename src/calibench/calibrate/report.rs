@@ -1,7 +1,8 @@
 //! What does a calibration say? The estimate, how sure it is, how it fits, and what to be careful about.
 
 use super::{
-    BoardShape, Certificate, Conditioning, Covariance, Outliers, Prior, ProfileInterval, Termination,
+    BoardShape, Certificate, Conditioning, Covariance, Deformation, Outliers, Prior, ProfileInterval,
+    Termination,
 };
 use crate::camera::{BrownConrady, Camera, FreeParameters, Parameter};
 use crate::geometry::{Pose, Vec2};
@@ -235,6 +236,18 @@ pub enum Warning {
         /// By how many standard deviations of their difference they disagree.
         deviations: f64,
     },
+    /// The marks and what was known of the board's shape beforehand do not go together: one of the two is
+    /// wrong.
+    BoardContradicted {
+        /// Of which deformation, the one that contradicts most.
+        deformation: Deformation,
+        /// The standard deviation known beforehand, about 0, in the target's unit.
+        standard_deviation: f64,
+        /// The estimate, between the two.
+        estimate: f64,
+        /// By how many standard deviations of their difference they disagree.
+        deviations: f64,
+    },
     /// No residual degrees of freedom: the fit is exact whatever the noise, and no standard deviation can be
     /// told.
     NoDegreesOfFreedom,
@@ -412,6 +425,12 @@ impl fmt::Display for Warning {
                 f,
                 "the marks contradict what is known of {parameter} beforehand, {mean} +- {standard_deviation}: with both it is {estimate:.6}, and \
                  they disagree by {deviations:.1} standard deviations; one of the two is wrong"
+            ),
+            Warning::BoardContradicted { deformation, standard_deviation, estimate, deviations } => write!(
+                f,
+                "the marks contradict what is known of the board's shape beforehand, {deformation} 0 +- {standard_deviation}: with both it is {}, and \
+                 they disagree by {deviations:.1} standard deviations; one of the two is wrong, and the camera makes up for it",
+                signed(*estimate)
             ),
             Warning::NoDegreesOfFreedom => f.write_str(
                 "as many unknowns as measurements: the fit is exact and says nothing about its accuracy",

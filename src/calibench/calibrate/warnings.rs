@@ -3,11 +3,13 @@
 use super::intervals::Skewed;
 use super::intervals::student_quantile;
 use super::judged::Twin;
+use super::prior::contradiction;
 use super::report::{STRONG_CORRELATION, UNCERTAIN_FOCAL};
 use super::rival::Rival;
+use super::settings::Bend;
 use super::{
-    Calibration, Certificate, Covariance, LensCalibration, Prior, Termination, Unknown, Warning,
-    WeakComponent,
+    BoardShape, Calibration, Certificate, Covariance, Deformation, LensCalibration, Prior, Termination,
+    Unknown, Warning, WeakComponent,
 };
 use crate::camera::{Camera, FreeParameters, Lens, Model, Parameter};
 use crate::geometry::Pose;
@@ -43,13 +45,14 @@ pub(super) fn of(
     warnings
 }
 
-/// The warnings of a calibration with a lens of any model: `neighbours` is what residuals have in common.
+/// The warnings of a calibration with a lens of any model: `bend` is what was known of the board's shape.
 pub(super) fn of_lens(
     calibration: &LensCalibration,
     largest_angle: f64,
     of_residuals: Vec<Warning>,
     skewed: &[Skewed],
     rivals: &[Rival],
+    bend: Option<Bend>,
 ) -> Vec<Warning> {
     let mut warnings = Vec::new();
     if calibration.termination != Termination::Converged {
@@ -60,6 +63,8 @@ pub(super) fn of_lens(
     warnings.extend(few_degrees_of_freedom(calibration.degrees_of_freedom));
     let value = |parameter| calibration.camera.value(parameter).unwrap_or(0.0);
     warnings.extend(calibration.priors.iter().filter_map(|prior| contradicted(calibration, prior, value)));
+    let known_board = calibration.board.as_ref().zip(bend);
+    warnings.extend(known_board.and_then(|(board, bend)| board_contradicted(board, bend.standard_deviation)));
     warnings.extend(from_behind(&calibration.cam_from_target));
     let model = calibration.camera.distortion.model();
     let pairs = correlated(&calibration.covariance, calibration.free);
@@ -142,30 +147,30 @@ fn focal_length_uncertain<L>(
     })
 }
 
-/// A normal number exceeds this in size with a probability of one in a million.
-const CONTRADICTED: f64 = 4.89;
-/// Where the pixels make an estimate better than its prior by less than this part, they say nothing of it.
-const TOLD_BY_PIXELS: f64 = 1e-6;
-
-/// Before the photographs the estimate is spread about the prior's mean with the variance that they take away
-/// from it.
 fn contradicted<L>(
     calibration: &Calibration<L>,
     prior: &Prior,
     value: impl Fn(Parameter) -> f64,
 ) -> Option<Warning> {
     let Prior { parameter, mean, standard_deviation } = *prior;
-    let share = calibration.covariance.standard_deviation(parameter)? / standard_deviation;
-    let taken = 1.0 - share * share;
+    let posterior = calibration.covariance.standard_deviation(parameter)?;
     let estimate = value(parameter);
-    let deviations = (estimate - mean).abs() / (standard_deviation * taken.sqrt());
-    (taken > TOLD_BY_PIXELS && deviations > CONTRADICTED).then_some(Warning::Contradicted {
-        parameter,
-        mean,
-        standard_deviation,
-        estimate,
-        deviations,
-    })
+    let deviations = contradiction(estimate - mean, standard_deviation, posterior)?;
+    Some(Warning::Contradicted { parameter, mean, standard_deviation, estimate, deviations })
+}
+
+/// The deformation of a board that contradicts most what is known of all of them beforehand: 0 +-
+/// `standard_deviation`.
+fn board_contradicted(board: &BoardShape, standard_deviation: f64) -> Option<Warning> {
+    let deformations = board.deformations().into_iter().zip(board.standard_deviations).zip(Deformation::ALL);
+    let contradicted = |((estimate, posterior), deformation)| {
+        let deviations = contradiction(estimate, standard_deviation, posterior)?;
+        Some((
+            deviations,
+            Warning::BoardContradicted { deformation, standard_deviation, estimate, deviations },
+        ))
+    };
+    deformations.filter_map(contradicted).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, warning)| warning)
 }
 
 /// Coverage of the interval that few degrees of freedom widen.

@@ -2,17 +2,13 @@
 //! calibration that apply to it, under the same conditions; those of the marks stand in the result itself.
 
 use super::MeasuredView;
-use crate::calibrate::{LensCalibration, Outliers, Prior, Termination, Warning};
+use crate::calibrate::{LensCalibration, Outliers, Prior, Termination, Warning, contradiction};
 use crate::camera::Parameter;
 
 /// Beyond this two parameters share 96 % of their variance.
 const STRONG_CORRELATION: f64 = 0.98;
 /// A focal length known worse than this part of itself.
 const UNCERTAIN_FOCAL: f64 = 0.05;
-/// A normal number exceeds this in size with a probability of one in a million.
-const CONTRADICTED: f64 = 4.89;
-/// Where the pixels make an estimate better than its prior by less than this part, they say nothing of it.
-const TOLD_BY_PIXELS: f64 = 1e-6;
 /// A correct set of marks has a stray with this probability: `exp(-13)`, as in every calibration.
 const LOG_STRAY: f64 = 13.0;
 
@@ -69,17 +65,10 @@ fn outliers(calibration: &LensCalibration, views: &[MeasuredView], variance: f64
 
 fn contradicted(calibration: &LensCalibration, prior: &Prior) -> Option<Warning> {
     let Prior { parameter, mean, standard_deviation } = *prior;
-    let share = calibration.standard_deviation(parameter)? / standard_deviation;
-    let taken = 1.0 - share * share;
+    let posterior = calibration.standard_deviation(parameter)?;
     let estimate = calibration.camera.value(parameter)?;
-    let deviations = (estimate - mean).abs() / (standard_deviation * taken.max(0.0).sqrt());
-    (taken > TOLD_BY_PIXELS && deviations > CONTRADICTED).then_some(Warning::Contradicted {
-        parameter,
-        mean,
-        standard_deviation,
-        estimate,
-        deviations,
-    })
+    let deviations = contradiction(estimate - mean, standard_deviation, posterior)?;
+    Some(Warning::Contradicted { parameter, mean, standard_deviation, estimate, deviations })
 }
 
 fn correlated(calibration: &LensCalibration) -> Vec<Warning> {

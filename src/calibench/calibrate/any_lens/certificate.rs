@@ -44,7 +44,7 @@ const UNTOLD: f64 = 1e-9;
 /// of 2000 double spheres, where 3 ended lower. So these models, prisms and tilted sensors among them, start
 /// as if there were no certificate, to the same bits. Brown-Conrady's lens has a certificate of its own.
 pub(super) fn counts_for(model: Model) -> bool {
-    matches!(model, Model::KannalaBrandt | Model::Division)
+    matches!(model, Model::KannalaBrandt | Model::Division | Model::HalconPolynomial)
 }
 
 /// Whether a minimum of least squares without priors explains the marks as well as free homographies would,

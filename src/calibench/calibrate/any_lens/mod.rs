@@ -36,7 +36,7 @@ pub(super) use falls::{Falls, Freedoms};
 pub use information::lens_information;
 pub(super) use locate::located;
 pub use locate::{Located, locate};
-pub use shape::BoardShape;
+pub use shape::{BoardShape, Deformation};
 
 /// Room for the free parameters of any lens, the board's shape and the gradient, in whole lanes.
 const WIDTH: usize = 24;

@@ -185,7 +185,8 @@ pub(super) fn report(
         residuals: residuals.plain,
     };
     let largest_angle = largest_angle(problem, state);
-    calibration.warnings = warnings::of_lens(&calibration, largest_angle, of_residuals, &skewed, &rivals);
+    calibration.warnings =
+        warnings::of_lens(&calibration, largest_angle, of_residuals, &skewed, &rivals, problem.bend);
     Ok(calibration)
 }
 

@@ -21,6 +21,34 @@ pub struct BoardShape {
     pub region: [Vec2; 2],
 }
 
+/// One of the numbers of a [`BoardShape`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Deformation {
+    /// `bow_x`.
+    BowX,
+    /// `bow_y`.
+    BowY,
+    /// `twist`.
+    Twist,
+}
+
+impl Deformation {
+    /// All, in the order of a board's numbers.
+    pub(in super::super) const ALL: [Deformation; 3] =
+        [Deformation::BowX, Deformation::BowY, Deformation::Twist];
+}
+
+impl std::fmt::Display for Deformation {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Deformation::BowX => "bow along x",
+            Deformation::BowY => "bow along y",
+            Deformation::Twist => "twist",
+        })
+    }
+}
+
 impl BoardShape {
     /// The height of a mark over the board's plane, in the target's unit.
     pub fn height(&self, mark: &Vec2) -> f64 {
@@ -29,7 +57,7 @@ impl BoardShape {
     }
 
     /// The three deformations, in the order of [`basis`].
-    pub(super) fn deformations(&self) -> [f64; 3] {
+    pub(in super::super) fn deformations(&self) -> [f64; 3] {
         [self.bow_x, self.bow_y, self.twist]
     }
 }

@@ -37,7 +37,10 @@ pub(super) fn walk(
         |m: &Minimum<State, WIDTH>| is_right(m) && (is_certified || certificate::holds(problem, m));
     if !minima.iter().any(is_settled) {
         minima.extend(refined(problem, start::by_rays(problem, settings)));
-        if !minima.iter().any(is_right) {
+        let is_enough = |m: &Minimum<State, WIDTH>| {
+            if problem.is_certifiable { is_settled(m) } else { is_right(m) }
+        };
+        if !minima.iter().any(is_enough) {
             minima.extend(refined(problem, start::by_rays_off_centre(problem, settings)));
         }
     }

@@ -27,9 +27,9 @@ pub(super) struct HalconPolynomial;
 /// from the axis, far out or next to where the radius hardly grows; such a point counts as unseen.
 const RADIAL_STEPS: usize = 10;
 /// Steps in the plane from there: what p1 and p2 move is small, and each step squares what is left of it.
-/// Three miss 2 of ten thousand points that they move by a two-hundredth of the distance from the axis, and
-/// most of those that they move by a tenth.
-const PLANE_STEPS: usize = 3;
+/// Six miss none of 300 000 points that they move by a fiftieth of the distance from the axis, and 9 of ten
+/// thousand that they move by a tenth; more steps find hardly one of these.
+const PLANE_STEPS: usize = 6;
 /// A solution leaves rounding: less than this squared, for an ideal point of length 1.
 const SOLVED: f64 = 1e-24;
 /// Added where a root of 0 would be taken: no digit of any other feels it.
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn a_decentring_by_a_fiftieth_of_the_distance_is_solved_for_in_nearly_all_places() {
+    fn a_decentring_by_a_tenth_of_the_distance_is_solved_for_in_nearly_all_places() {
         // How many images are found of a thousand lenses and places that p1 and p2 move by `shift` of the
         // distance from the axis.
         let found = |shift: f64| {
@@ -265,8 +265,8 @@ mod tests {
             };
             (0..1000).filter(|&i| place(i)).count()
         };
-        assert_eq!(found(0.002), 1000);
-        assert!(found(0.02) >= 980, "{}", found(0.02));
+        assert_eq!(found(0.02), 1000);
+        assert!(found(0.1) >= 995, "{}", found(0.1));
     }
 
     #[test]
