@@ -284,6 +284,9 @@ impl Work<'_> {
         let (width, height) = size;
         let mask = map.mask();
         let empty = mask.samples().iter().filter(|&&has_data| !has_data).count();
+        if let Some(told) = nearly_empty(empty, size, self.arguments.projection) {
+            warn(&format!("{}: {told}", self.arguments.camera.shown()));
+        }
         let camera = match output {
             Some(camera) => serde_json::json!(LensFields(camera)),
             None => {
@@ -310,6 +313,26 @@ impl Work<'_> {
     }
 }
 
+/// An output of which less than this part has data is told.
+const FEW_WITH_DATA: f64 = 0.25;
+
+/// What to say of an output that shows little.
+fn nearly_empty(empty: usize, (width, height): Size, projection: To) -> Option<String> {
+    let shown = 1.0 - empty as f64 / (width * height) as f64;
+    let advice = match projection {
+        To::Pinhole => {
+            "the camera folds there, or sees so far to the side that --projection equidistant shows more"
+        }
+        To::Equidistant | To::Equirectangular => "the camera folds beyond it, or sees no more",
+    };
+    (shown < FEW_WITH_DATA).then(|| {
+        format!(
+            "only {:.1} % of the {width} x {height} output shows the photograph, the rest has no data: {advice}",
+            100.0 * shown
+        )
+    })
+}
+
 /// Every channel corrected. Pixels without data get the level `border` in colours and `clear` in alpha, the
 /// second or fourth channel.
 fn all<T: Interpolated>(
@@ -330,6 +353,13 @@ mod tests {
     #[test]
     fn the_output_has_the_photographs_name_as_png() {
         assert_eq!(output_path(Path::new("o"), Path::new("a/b.c.jpg")), Path::new("o/b.c.png"));
+    }
+
+    #[test]
+    fn an_output_that_shows_little_is_told() {
+        let told = nearly_empty(990, (50, 20), To::Pinhole).unwrap();
+        assert!(told.starts_with("only 1.0 % of the 50 x 20 output"), "{told}");
+        assert_eq!(nearly_empty(700, (50, 20), To::Pinhole), None);
     }
 
     #[test]

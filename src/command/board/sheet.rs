@@ -40,6 +40,10 @@ pub(super) enum SheetError {
     #[error("the discs have no diameter, so they cannot be drawn: add it, as in circles:9x7:10mm:3mm")]
     NoDiameter,
     #[error(
+        "its marks would be {size:.2e} mm wide, and no printer draws less than {LEAST_MARK} mm: is the unit right?"
+    )]
+    TooSmall { size: f64 },
+    #[error(
         "the board is {width:.0} x {height:.0} mm and {paper} has room for {room_width:.0} x {room_height:.0} mm beside the rulers: \
          {advice}"
     )]
@@ -56,6 +60,9 @@ const STRIP_LEFT: f64 = 11.0;
 const QUIET: f64 = 3.0;
 /// Shortest ruler: read to half a millimetre, 30 mm tell the scale to 2 %, and less is of no use.
 const SHORTEST_RULER: f64 = 30.0;
+
+/// The least width of a mark, mm: a dot of a printer with 600 dots an inch is 0.042 mm wide.
+const LEAST_MARK: f64 = 0.05;
 
 /// Helvetica's letters are about half as wide as high on average.
 const LETTER_WIDTH: f64 = 0.52;
@@ -94,7 +101,12 @@ impl Sheet {
         let size = Vec2::new(lying.width_mm, lying.height_mm);
         let middle =
             Vec2::new(0.5 * (EDGE + STRIP_LEFT + size.x - EDGE), 0.5 * (EDGE + size.y - STRIP_BELOW - EDGE));
-        let mut sheet = Sheet { size, ink: marks(board, unit, middle), rulers: [0.0; 2] };
+        let ink = marks(board, unit, middle);
+        let least = ink.iter().map(width).fold(f64::INFINITY, f64::min);
+        if least < LEAST_MARK {
+            return Err(SheetError::TooSmall { size: least });
+        }
+        let mut sheet = Sheet { size, ink, rulers: [0.0; 2] };
         sheet.rulers = [sheet.lower_ruler(), sheet.left_ruler()];
         let words = format!(
             "{board}. Drawn at 100 %: the rulers are {} and {} mm long. Print without scaling, measure both, and write it into board.toml.",
@@ -209,6 +221,18 @@ fn marks(board: &BoardSpec, unit: f64, middle: Vec2) -> Vec<Ink> {
                 .map(|square| Ink::Rectangle { corner: place(square), size: Vec2::new(side, side) })
                 .collect()
         }
+    }
+}
+
+/// The width of a mark; of cells that of the narrowest one.
+fn width(ink: &Ink) -> f64 {
+    match ink {
+        Ink::Disc { diameter, .. } => *diameter,
+        Ink::Rectangle { size, .. } => size.min(),
+        Ink::Cells(cells) => {
+            cells.iter().map(|[first, last]| (last - first).min()).fold(f64::INFINITY, f64::min)
+        }
+        Ink::Words { .. } => f64::INFINITY,
     }
 }
 
@@ -336,6 +360,9 @@ mod tests {
         assert_eq!(sheet("circles:9x7:10mm", "A4"), Err(SheetError::NoDiameter));
         let large = sheet("chess:9x6:30mm", "A4").unwrap_err();
         assert!(large.to_string().contains("take A3"), "{large}");
+        assert!(matches!(sheet("chess:9x6:0.02mm", "A4"), Err(SheetError::TooSmall { size: 0.02 })));
+        assert!(matches!(sheet("dots:9x6:1mm:1e-320mm", "A4"), Err(SheetError::TooSmall { .. })));
+        assert!(sheet("chess:9x6:0.1mm", "A4").is_ok());
         assert!(sheet("chess:9x6:3m", "A0").unwrap_err().to_string().contains("less of a spacing"));
     }
 
