@@ -27,8 +27,8 @@ pub(super) struct HalconPolynomial;
 /// from the axis, far out or next to where the radius hardly grows; such a point counts as unseen.
 const RADIAL_STEPS: usize = 10;
 /// Steps in the plane from there: what p1 and p2 move is small, and each step squares what is left of it.
-/// Six miss none of 300 000 points that they move by a fiftieth of the distance from the axis, and 9 of ten
-/// thousand that they move by a tenth; more steps find hardly one of these.
+/// Six miss none of the points of the test below that they move by a fiftieth of the distance from the axis,
+/// and few that they move by a tenth; eight find hardly one of these.
 const PLANE_STEPS: usize = 6;
 /// A solution leaves rounding: less than this squared, for an ideal point of length 1.
 const SOLVED: f64 = 1e-24;
