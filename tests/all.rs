@@ -33,6 +33,7 @@ mod golden;
 mod hard_sets;
 mod hostile;
 mod hostile_files;
+mod hostile_silent;
 mod hostile_solvers;
 mod hostile_text;
 mod json_forms;

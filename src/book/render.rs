@@ -4,8 +4,8 @@
 use super::compile::Compiled;
 use super::page::CompiledPage;
 use super::{html, laboratory, layout, search};
+use calibench::io::lock::{lock, lock_of};
 use calibench_harness::project::Project;
-use std::fs::{File, OpenOptions};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
@@ -35,7 +35,7 @@ pub fn index_of(folder: &Path) -> PathBuf {
 /// A file cannot be read or written.
 pub fn build(project: &Project, compiled: &Compiled, folder: &Path) -> Result<(), BookError> {
     let failed = |cause| BookError { path: folder.to_path_buf(), cause };
-    let _lock = lock(&beside(folder, "lock")).map_err(failed)?;
+    let _lock = lock(&lock_of(folder)).map_err(failed)?;
     let (new, old) = (beside(folder, "new"), beside(folder, "old"));
     // What a build that was killed has left: half of a new book, or the old one beside its place.
     if old.exists() && !folder.exists() {
@@ -58,14 +58,6 @@ pub fn build(project: &Project, compiled: &Compiled, folder: &Path) -> Result<()
 fn beside(folder: &Path, role: &str) -> PathBuf {
     let name = folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     folder.with_file_name(format!(".{name}.{role}"))
-}
-
-/// A file that one process at a time holds; the system lets go of it however the process ends.
-fn lock(path: &Path) -> io::Result<File> {
-    path.parent().map_or(Ok(()), fs::create_dir_all)?;
-    let file = OpenOptions::new().create(true).append(true).open(path)?;
-    file.lock()?;
-    Ok(file)
 }
 
 /// Removes a folder that may not be there.

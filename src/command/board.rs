@@ -11,6 +11,7 @@ pub(super) use named::board_or_file;
 
 use super::format::Format;
 use super::said::say_written;
+use super::shell_word::shell_word;
 use super::{Exit, warn};
 use calibench::io::input::MOST_SPEC_BYTES;
 use calibench::io::{ShownPath, read_regular_text, write_together};
@@ -104,14 +105,8 @@ fn told(board: &BoardSpec, paper: &Paper, written: &[String]) -> String {
         "\nnext:\n  1. print it without scaling (\"actual size\", 100 %), and glue it to something flat\n  2. measure both rulers, and write \
          their lengths into {file}\n  3. take 10 to 20 photographs without zoom or autofocus: the board tilted by 20 to 45 degrees, each \
          time another way, in all parts of the frame\n  4. calibench calibrate --board {} --out result PHOTOS...\n",
-        as_a_word(file)
+        shell_word(file)
     )
-}
-
-/// A path as a shell takes it for one word.
-fn as_a_word(path: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "._-/+:".contains(c);
-    if path.chars().all(is_plain) { path.to_string() } else { format!("'{}'", path.replace('\'', r"'\''")) }
 }
 
 /// A board that may grow by less fills its page.

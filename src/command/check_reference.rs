@@ -6,6 +6,7 @@ use super::said::{MOST, number_that, positive, written_by};
 use super::{Exit, print, warn};
 use calibench::downstream::control::{Ewma, Rule, Shewhart};
 use calibench::io::input::{MOST_TABLE_BYTES, read_regular};
+use calibench::io::lock::{lock, lock_of};
 use calibench::io::{
     Check, ShownPath, keep_files, parse_checks, significant, write_atomically, write_together,
 };
@@ -73,7 +74,18 @@ fn parse_when(text: &str) -> Result<String, String> {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Exit {
-    let text = match history(arguments) {
+    // A link leads to where the history is, which is added to.
+    let history = arguments.history.canonicalize().unwrap_or_else(|_| arguments.history.clone());
+    // Two that add at once would each read it without the other's check.
+    let alone = arguments.add.map(|_| lock(&lock_of(&history))).transpose();
+    let _alone = match alone {
+        Ok(alone) => alone,
+        Err(error) => {
+            warn(&format!("{}: {error}", lock_of(&history).shown()));
+            return Exit::Incomplete;
+        }
+    };
+    let text = match with_new_check(arguments) {
         Ok(text) => text,
         Err(message) => {
             warn(&message);
@@ -97,7 +109,7 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
     }
     let judged = Judged::of(arguments, checks);
     let json = format!("{:#}\n", judged.json(arguments));
-    if let Err(error) = write_files(arguments, &text, &json, &judged) {
+    if let Err(error) = write_files(arguments, (&history, &text), &json, &judged) {
         warn(&error.to_string());
         return Exit::Incomplete;
     }
@@ -115,7 +127,7 @@ const MOST_CHECKS: usize = 100_000;
 const HEADER: &str = "when,value";
 
 /// The history's text, with the new check.
-fn history(arguments: &Arguments) -> Result<String, String> {
+fn with_new_check(arguments: &Arguments) -> Result<String, String> {
     let path = &arguments.history;
     let mut text = if arguments.add.is_some() && !path.exists() {
         format!("{HEADER}\n")
@@ -142,11 +154,16 @@ fn history(arguments: &Arguments) -> Result<String, String> {
 }
 
 /// The history is written first: a check that was made must not be lost.
-fn write_files(arguments: &Arguments, history: &str, json: &str, judged: &Judged) -> std::io::Result<()> {
+fn write_files(
+    arguments: &Arguments,
+    (history, text): (&Path, &str),
+    json: &str,
+    judged: &Judged,
+) -> std::io::Result<()> {
     if arguments.add.is_some() {
-        write_atomically(&arguments.history, history.as_bytes())?;
+        write_atomically(history, text.as_bytes())?;
     }
-    keep_files([arguments.history.as_path()]);
+    keep_files([arguments.history.as_path(), history]);
     let Some(folder) = &arguments.out else { return Ok(()) };
     let trend = judged.trend(arguments);
     let trend = (folder.join(trend.file_name()), trend.bytes);

@@ -281,7 +281,13 @@ fn board_of(arguments: &Arguments) -> Result<VnlBoard, String> {
 fn corners_to_vnl(arguments: &Arguments, name: &str, bytes: &[u8]) -> Result<Converted, String> {
     let corners = parse_corners(name, bytes).map_err(said)?;
     let text = formats::vnl_text(&corners, &board_of(arguments)?).map_err(said)?;
-    let lost = vec!["the board: corners.vnl has no place for it".to_string()];
+    let mut lost = vec!["the board: corners.vnl has no place for it".to_string()];
+    if corners.views.iter().any(|view| view.weights().is_some()) {
+        lost.push(
+            "how well each mark was seen (weight or sigma_px): every corner is written with level 0"
+                .to_string(),
+        );
+    }
     Ok(Converted { text, from: "corners".into(), to: "vnl".into(), lost, ..Converted::default() })
 }
 

@@ -32,6 +32,7 @@ mod report;
 mod reproduce;
 mod run;
 mod said;
+mod shell_word;
 mod source;
 mod startup;
 mod study;

@@ -1,10 +1,10 @@
 //! `calibench register TAUGHT.csv FOUND.csv`: where a part has moved to, and how well any point of it is
 //! known.
 
-use super::Exit;
 use super::format::Format;
 use super::report::table;
 use super::said::{MOST, Said, say, written_by};
+use super::{Exit, warn};
 use calibench::calibrate::Loss;
 use calibench::downstream::{MapModel, Mark, Registration, coverage_factor, register};
 use calibench::geometry::Vec2;
@@ -82,6 +82,9 @@ fn parse_loss(text: &str) -> Result<Loss, String> {
 
 pub(super) fn run(arguments: &Arguments) -> Exit {
     let registered = registered(arguments);
+    if let Some(doubt) = registered.as_ref().ok().and_then(Registered::doubt) {
+        warn(&doubt);
+    }
     let said = registered.map(|map| Said { text: map.text(arguments), json: map.json(arguments) });
     say(said, arguments.out.as_deref(), "registration.json", arguments.format)
 }
@@ -141,7 +144,21 @@ struct Position {
     known: Option<([f64; 2], f64)>,
 }
 
+/// A deviation of the angle, degrees, from which positions beside the marks say nothing.
+const UNTOLD_DEG: f64 = 5.0;
+
 impl Registered {
+    /// What is to be said where the marks do not tell the angle.
+    fn doubt(&self) -> Option<String> {
+        let deviation = self.map.angle_deviation_rad()?.to_degrees();
+        (deviation > UNTOLD_DEG).then(|| {
+            format!(
+                "warning: the marks do not tell the angle (standard deviation {} degrees): have both files the same unit, and is each name the same mark in both?",
+                significant(deviation, 2)
+            )
+        })
+    }
+
     fn positions(&self, arguments: &Arguments) -> Vec<Position> {
         let centre = self.map.taught_centre;
         let position = |taught: &Vec2| Position {

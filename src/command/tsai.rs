@@ -139,9 +139,9 @@ fn found(arguments: &Arguments) -> Result<Found, String> {
     let Some(first) = found.views.first() else {
         let reasons = found.refused.iter().map(|(name, reason)| format!("view {name}: {reason}"));
         return Err(format!(
-            "{}: no view gives a camera\n{}",
+            "{}: no view gives a camera: {}",
             found.source,
-            reasons.collect::<Vec<_>>().join("\n")
+            reasons.collect::<Vec<_>>().join("; ")
         ));
     };
     found.joint = joint(arguments, &view_names, &views, &first.tsai);

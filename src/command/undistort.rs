@@ -116,6 +116,10 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
             exit = exit.max(failed);
         }
     }
+    // What is finished stands.
+    if exit == Exit::Usage && !work.written.is_empty() {
+        exit = Exit::Incomplete;
+    }
     // People saw each as it was finished.
     say_written(&work.written, arguments.format, String::new);
     exit
@@ -173,6 +177,20 @@ fn output_path(folder: &Path, photo: &Path) -> PathBuf {
     folder.join(name)
 }
 
+/// Floating-point levels are written with 16 bits, black 0 to white 1: what lies elsewhere would be lost.
+fn refuse_other_levels(photo: &Path, image: &Channels) -> Result<(), String> {
+    let Channels::F32(channels) = image else { return Ok(()) };
+    let levels = || channels.iter().flat_map(|channel| channel.samples());
+    match levels().filter(|level| !(0.0..=1.0).contains(*level)).count() {
+        0 => Ok(()),
+        beyond => Err(format!(
+            "{}: {beyond} of {} floating-point levels are not from 0 (black) to 1 (white), between which they are written with 16 bits: scale them first",
+            photo.shown(),
+            levels().count()
+        )),
+    }
+}
+
 type Size = (usize, usize);
 
 struct Work<'a> {
@@ -199,6 +217,7 @@ impl Work<'_> {
         let memory = Memory::new(self.arguments.memory);
         let _taken = memory.take(photo, extent.memory_to_correct()).map_err(|e| wrong(e.to_string()))?;
         let image = read_channels(photo).map_err(|error| wrong(error.to_string()))?;
+        refuse_other_levels(photo, &image).map_err(wrong)?;
         let arguments = self.arguments;
         let map = self.map_of(image.size())?;
         let output = output_path(&arguments.out, photo);

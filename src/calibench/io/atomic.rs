@@ -79,6 +79,11 @@ impl<'a> Beside<'a> {
     pub fn begin(files: &'a dyn Files, path: &Path) -> io::Result<Beside<'a>> {
         let folder = folder_of(path);
         refuse_what_is_no_file(path).and_then(|()| refuse_kept(path)).map_err(with_path(path))?;
+        if folder.is_file() {
+            let message =
+                format!("cannot write {}: {} is a file, name a folder", path.shown(), folder.shown());
+            return Err(io::Error::new(io::ErrorKind::NotADirectory, message));
+        }
         files.make_folder(folder).map_err(with_path(path))?;
         // What cannot be removed is in nobody's way.
         let _ = remove_leftovers_of(files, folder, path.file_name());

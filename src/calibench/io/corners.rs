@@ -1,7 +1,7 @@
 //! What was seen where? Corner files: `view,point,X,Y,u,v`, one line an observed point, and if it is known
 //! how well each was seen, `weight` or `sigma_px`.
 
-use super::table::{Column, Row, TableError, columns, open, read_table};
+use super::table::{Column, Row, TableError, columns, open, read_table, refuse_long_lines, refuse_misspelt};
 use crate::board::{View, ViewError};
 use crate::geometry::Vec2;
 use std::collections::BTreeMap;
@@ -63,10 +63,12 @@ pub fn read_corners(path: &Path) -> Result<CornerFile, TableError> {
 /// # Ok::<(), calibench::io::TableError>(())
 /// ```
 pub fn parse_corners(file: &str, mut input: impl Read) -> Result<CornerFile, TableError> {
-    let unreadable = |message: String| TableError::Unreadable { file: file.into(), line: 0, message };
+    let unreadable = |message: String| TableError::Unreadable { file: file.into(), line: 1, message };
     let mut bytes = Vec::new();
     input.read_to_end(&mut bytes).map_err(|e| unreadable(e.to_string()))?;
+    refuse_long_lines(file, &bytes)?;
     let header = columns(&bytes);
+    refuse_misspelt(file, &header, &["view", "point", "X", "Y", "u", "v", "weight", "sigma_px"])?;
     let has = |name: &str| header.iter().any(|column| column == name);
     match (has("weight"), has("sigma_px")) {
         (true, true) => {

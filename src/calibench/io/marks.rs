@@ -1,7 +1,7 @@
 //! Where are the marks of a part? Mark files: `point,X,Y`, and if known their standard deviations, `sd` for
 //! both coordinates or `sd_X,sd_Y`.
 
-use super::table::{Column, Row, TableError, columns, open, read_table};
+use super::table::{Column, Row, TableError, columns, open, read_table, refuse_misspelt};
 use crate::downstream::Mark;
 use crate::geometry::Vec2;
 use std::collections::BTreeMap;
@@ -39,7 +39,12 @@ pub fn read_marks(path: &Path) -> Result<MarkFile, TableError> {
 /// ```
 pub fn parse_marks(file: &str, bytes: &[u8]) -> Result<MarkFile, TableError> {
     let named = columns(bytes);
+    refuse_misspelt(file, &named, &["point", "X", "Y", "sd", "sd_X", "sd_Y"])?;
     let has = |name: &str| named.iter().any(|column| column == name);
+    if has("sd") && (has("sd_X") || has("sd_Y")) {
+        let message = "columns 'sd' and 'sd_X' or 'sd_Y' say the same twice: keep one or two of them".into();
+        return Err(TableError::Unreadable { file: file.into(), line: 1, message });
+    }
     let rows: Vec<(u64, String, Mark)> = if has("sd_X") || has("sd_Y") {
         let rows = read_table(file, bytes, ["point"], ["X", "Y", "sd_X", "sd_Y"].map(Column::length))?;
         rows.into_iter().map(|row| marked(row, |n: &[f64; 4]| Vec2::new(n[2], n[3]))).collect()

@@ -3,7 +3,7 @@
 //! with the marks in it.
 
 use super::result::CalibrationFields;
-use super::table::{Column, Row, TableError, columns, read_table};
+use super::table::{Column, Row, TableError, columns, read_table, refuse_misspelt};
 use crate::board::ViewError;
 use crate::geometry::{Vec2, Vec3};
 use crate::measured::{
@@ -58,6 +58,7 @@ const PLACE: [Column; 3] = [Column::length("X"), Column::length("Y"), Column::le
 /// ```
 pub fn parse_target(file: &str, bytes: &[u8]) -> Result<MeasuredTarget, TargetFileError> {
     let header = columns(bytes);
+    refuse_misspelt(file, &header, &["point", "X", "Y", "Z", "sd", "sdX", "sdY", "sdZ"])?;
     let has = |name: &str| header.iter().any(|column| column == name);
     let wrong = |what| Err(TargetFileError::Deviations { file: file.into(), what });
     let of_axes = ["sdX", "sdY", "sdZ"].iter().filter(|name| has(name)).count();
@@ -142,12 +143,13 @@ pub struct SeenFile {
 /// ```
 pub fn parse_seen(file: &str, bytes: &[u8]) -> Result<SeenFile, TableError> {
     let header = columns(bytes);
+    refuse_misspelt(file, &header, &["view", "point", "X", "Y", "Z", "u", "v", "weight", "sigma_px"])?;
     let has = |name: &str| header.iter().any(|column| column == name);
     let (u, v) = (Column::pixels("u"), Column::pixels("v"));
     let (view_names, views) = match (has("weight"), has("sigma_px")) {
         (true, true) => {
             let message = "columns 'weight' and 'sigma_px' say the same twice: keep one of them".to_string();
-            return Err(TableError::Unreadable { file: file.into(), line: 0, message });
+            return Err(TableError::Unreadable { file: file.into(), line: 1, message });
         }
         (true, false) => seen(file, bytes, [u, v, Column::length("weight")], |[.., weight]| weight)?,
         (false, true) => seen(file, bytes, [u, v, Column::pixels("sigma_px")], |[.., sigma]| 1.0 / sigma)?,

@@ -21,6 +21,7 @@ pub mod input;
 mod jpeg;
 mod kept;
 pub mod known;
+pub mod lock;
 mod loss;
 pub mod marks;
 pub mod measured;

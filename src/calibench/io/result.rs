@@ -10,6 +10,7 @@ use crate::calibrate::{
 };
 use crate::camera::{Camera, Lens, Model, Parameter};
 use crate::geometry::{Vec2, rotation};
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -394,6 +395,35 @@ struct CameraOnly {
     image_size: ImageSize,
     #[serde(default)]
     termination: Option<String>,
+    /// What was estimated, of a result: the camera must have it.
+    #[serde(default)]
+    free: Vec<String>,
+    // What would be part of the camera, were it in `camera`: left beside it, another camera would be read.
+    model: Option<IgnoredAny>,
+    distortion: Option<IgnoredAny>,
+    distortion_model: Option<IgnoredAny>,
+    distortion_coefficients: Option<IgnoredAny>,
+    dist_coeffs: Option<IgnoredAny>,
+}
+
+impl CameraOnly {
+    /// What stands beside the camera and belongs into it.
+    fn beside(&self) -> Option<&'static str> {
+        let named = [
+            ("model", &self.model),
+            ("distortion", &self.distortion),
+            ("distortion_model", &self.distortion_model),
+            ("distortion_coefficients", &self.distortion_coefficients),
+            ("dist_coeffs", &self.dist_coeffs),
+        ];
+        named.into_iter().find(|(_, value)| value.is_some()).map(|(name, _)| name)
+    }
+}
+
+/// The names of a camera's numbers.
+#[derive(Debug, Deserialize)]
+struct NamesOnly {
+    camera: BTreeMap<String, IgnoredAny>,
 }
 
 /// Why a result cannot be used.
@@ -492,6 +522,7 @@ pub fn read_lens_camera(path: &Path) -> Result<(Camera<Lens>, ImageSize), Result
 pub fn parse_lens_camera(file: &str, text: &str) -> Result<(Camera<Lens>, ImageSize), ResultError> {
     let fields: CameraOnly =
         serde_json::from_str(text).map_err(|cause| ResultError::Format { file: file.into(), cause })?;
+    refuse_parts(file, &fields, text)?;
     let LensFields(camera) = fields.camera;
     refuse_unfinished(file, fields.termination)?;
     if let Some(reason) = implausible(&camera) {
@@ -502,6 +533,26 @@ pub fn parse_lens_camera(file: &str, text: &str) -> Result<(Camera<Lens>, ImageS
             Err(ResultError::NoImage { file: file.into(), width, height })
         }
         size => Ok((camera, size)),
+    }
+}
+
+/// Refuses a file of which a part of the camera would not be read, or was lost.
+fn refuse_parts(file: &str, fields: &CameraOnly, text: &str) -> Result<(), ResultError> {
+    let no_camera = |reason| Err(ResultError::NoCamera { file: file.into(), reason });
+    if let Some(name) = fields.beside() {
+        let places = "`camera` has `model` and each coefficient by its name, such as \"k1\": -0.2";
+        return no_camera(format!("{name} stands beside `camera`, where it is not read: {places}"));
+    }
+    if fields.free.is_empty() {
+        return Ok(());
+    }
+    let NamesOnly { camera } =
+        serde_json::from_str(text).map_err(|cause| ResultError::Format { file: file.into(), cause })?;
+    match fields.free.iter().find(|name| !camera.contains_key(*name)) {
+        Some(lost) => no_camera(format!(
+            "{lost} was estimated (`free`), and `camera` has none: it is not the file that was written"
+        )),
+        None => Ok(()),
     }
 }
 
@@ -573,6 +624,12 @@ mod tests {
         assert!(refused(&format!("{kannala_brandt}, \"fx\": 2"), "").contains("fx is given twice"));
         assert!(refused(r#", "k4": 0.1"#, "").contains("the brown-conrady model has no k4"));
         assert!(refused(r#", "focus": 0.1"#, "").contains("focus"));
+        for beside in ["model", "distortion", "dist_coeffs"] {
+            let error = refused("", &format!(", \"{beside}\": [0.1]"));
+            assert!(error.contains(&format!("{beside} stands beside `camera`")), "{error}");
+        }
+        let error = refused("", ", \"free\": [\"fx\", \"k1\"]");
+        assert!(error.contains("k1 was estimated"), "{error}");
         for size in ["[0, 480]", "[640, 0]", "[640, 10000000000]"] {
             let error = refused("", &format!(", \"image_size\": {size}"));
             assert!(error.contains("each side must have 1 to"), "{error}");

@@ -372,7 +372,7 @@ fn is_quote_open(row: &[u8]) -> bool {
 }
 
 /// What is no table is told before fields are made of it, which take several times its length.
-fn refuse_long_lines(file: &str, bytes: &[u8]) -> Result<(), TableError> {
+pub(super) fn refuse_long_lines(file: &str, bytes: &[u8]) -> Result<(), TableError> {
     let is_end = |byte: &u8| matches!(byte, b'\n' | b'\r');
     let mut start = 0;
     for part in bytes.split(is_end) {
@@ -493,6 +493,46 @@ pub fn unended_line(bytes: &[u8]) -> Option<u64> {
     (!ended).then(|| 1 + bytes.iter().filter(|byte| **byte == b'\n').count() as u64)
 }
 
+/// Refuses a header with a column that is not read and looks like one that would be: left unread, it would
+/// change the result without a word. `read` are all that the table may have.
+pub(super) fn refuse_misspelt(file: &str, header: &[String], read: &[&str]) -> Result<(), TableError> {
+    let unread = header.iter().filter(|column| !read.contains(&column.as_str()));
+    let mut meant = unread.flat_map(|column| read.iter().map(move |name| (column, name)));
+    match meant.find(|(column, name)| is_nearly(column, name)) {
+        Some((column, name)) => Err(TableError::Unreadable {
+            file: file.into(),
+            line: 1,
+            message: format!("no column '{column}' is read, and it looks like '{name}': rename or remove it"),
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Whether a name has the letters of another, in any case and order, with one more at the most; a letter
+/// less where there are many.
+fn is_nearly(name: &str, other: &str) -> bool {
+    let letters = |text: &str| {
+        let mut letters: Vec<char> =
+            text.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
+        letters.sort_unstable();
+        letters
+    };
+    let (name, other) = (letters(name), letters(other));
+    // Of two sorted lists, whether the longer is the shorter and one more.
+    let one_more = |longer: &[char], shorter: &[char]| {
+        longer.len() == shorter.len() + 1 && {
+            let same = longer.iter().zip(shorter).take_while(|(a, b)| a == b).count();
+            longer[same + 1..] == shorter[same..]
+        }
+    };
+    name == other
+        || (other.len() > 1 && one_more(&name, &other))
+        || (other.len() >= MANY_LETTERS && one_more(&other, &name))
+}
+
+/// Letters of a name of which one may be missing.
+const MANY_LETTERS: usize = 5;
+
 /// The names of the columns; none where the first line cannot be read, of which the reader of the table says
 /// why.
 pub fn columns(bytes: &[u8]) -> Vec<String> {
@@ -500,4 +540,38 @@ pub fn columns(bytes: &[u8]) -> Vec<String> {
     let bytes = &bytes[..bytes.len().min(MOST_LINE_BYTES)];
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(bytes);
     reader.headers().map(|header| header.iter().map(String::from).collect()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_column_that_looks_like_one_that_is_read_is_refused() {
+        let read = ["view", "point", "u", "v", "weight", "sigma_px"];
+        let refused = |column: &str| refuse_misspelt("c.csv", &["view".into(), column.into()], &read);
+        for (column, meant) in [
+            ("wieght", "weight"),
+            ("Weight", "weight"),
+            ("weights", "weight"),
+            ("wight", "weight"),
+            ("sigmapx", "sigma_px"),
+            ("View", "view"),
+        ] {
+            let message = refused(column).unwrap_err().to_string();
+            let expected = format!(
+                "c.csv:1: no column '{column}' is read, and it looks like '{meant}': rename or remove it"
+            );
+            assert_eq!(message, expected);
+        }
+        for column in ["weight", "height", "id", "file", "x", "t", "uv", "U_mm"] {
+            assert_eq!(refused(column), Ok(()), "{column}");
+        }
+        assert!(
+            is_nearly("sdd", "sd")
+                && is_nearly("sD", "sd")
+                && !is_nearly("id", "sd")
+                && !is_nearly("s", "sd")
+        );
+    }
 }

@@ -1,6 +1,7 @@
 //! `calibench study commands`: one line a shard, for whatever runs lines.
 
 use super::{Failure, read_study};
+use crate::shell_word::shell_word;
 use crate::{Exit, print};
 use calibench::io::ShownPath;
 use calibench_study::{Engine, Shard};
@@ -30,37 +31,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Failure> {
     let (text, inputs) = read_study(&arguments.spec)?;
     Engine::with_inputs(&text, &inputs, Shard { index: 0, count })
         .map_err(|e| Failure::usage(format!("{}: {e}", arguments.spec.shown())))?;
-    let part = |index: u64| quoted(&arguments.out.join(format!("part-{index}-of-{count}")));
+    let part = |index: u64| word(&arguments.out.join(format!("part-{index}-of-{count}")));
     if arguments.merge {
         let parts: Vec<String> = (0..count).map(part).collect();
-        let whole = quoted(&arguments.out.join("whole"));
+        let whole = word(&arguments.out.join("whole"));
         print(&format!("calibench study merge {} --out {whole}\n", parts.join(" ")));
         return Ok(Exit::Held);
     }
-    let spec = quoted(&arguments.spec);
+    let spec = word(&arguments.spec);
     for index in 0..count {
         print(&format!("calibench study run {spec} --shard {index}/{count} --out {}\n", part(index)));
     }
     Ok(Exit::Held)
 }
 
-/// A path as one word of a shell.
-fn quoted(path: &Path) -> String {
-    let text = path.to_string_lossy();
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./,:@%+=".contains(c);
-    match !text.is_empty() && text.chars().all(is_plain) {
-        true => text.into_owned(),
-        false => format!("'{}'", text.replace('\'', "'\\''")),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_path_is_one_word_of_a_shell() {
-        assert_eq!(quoted(Path::new("out/a-1.toml")), "out/a-1.toml");
-        assert_eq!(quoted(Path::new("my study's.toml")), r"'my study'\''s.toml'");
-    }
+fn word(path: &Path) -> String {
+    shell_word(&path.to_string_lossy())
 }

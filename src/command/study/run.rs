@@ -4,6 +4,7 @@ use super::finished::{Finished, Ran};
 use super::solver::ProgramArguments;
 use super::{Failure, read_study};
 use crate::format::Format;
+use crate::shell_word::shell_word;
 use crate::{Exit, warn};
 use calibench::io::{ShownPath, keep_files, significant};
 use calibench_harness::project::Project;
@@ -66,6 +67,7 @@ pub(crate) struct MergeArguments {
 }
 
 pub(super) fn run(arguments: &Arguments, build: &Build) -> Result<Exit, Failure> {
+    let stop = interruption();
     arguments.trials.check().map_err(FolderError::from)?;
     let (text, inputs) = read_study(&arguments.spec)?;
     let engine = Engine::with_inputs(&text, &inputs, arguments.shard)
@@ -78,7 +80,7 @@ pub(super) fn run(arguments: &Arguments, build: &Build) -> Result<Exit, Failure>
     let engine = arguments.program.applied(engine)?;
     keep_inputs(&inputs.places(&arguments.spec), &out)?;
     let folder = Folder::create(&out, &text, &manifest)?;
-    drive(&folder, engine, arguments.format)
+    drive(&folder, engine, &stop, arguments.format)
 }
 
 /// Refuses a folder for the results in which something lies that the study reads: a result might have its
@@ -102,6 +104,7 @@ fn keep_inputs(inputs: &[PathBuf], out: &Path) -> Result<(), Failure> {
 }
 
 pub(super) fn resume(arguments: &ResumeArguments, build: &Build) -> Result<Exit, Failure> {
+    let stop = interruption();
     let folder = Folder::open(&arguments.run)?;
     folder.manifest()?.trials.check().map_err(FolderError::from)?;
     let shard = folder.shard()?;
@@ -109,7 +112,7 @@ pub(super) fn resume(arguments: &ResumeArguments, build: &Build) -> Result<Exit,
     // A command in a folder may be a stranger's: it is compared with the user's, and never run by itself.
     let manifest = Manifest::new(&engine.spec, shard, build).with_solver(arguments.program.solver.clone());
     folder.check(&manifest)?;
-    drive(&folder, arguments.program.applied(engine)?, arguments.format)
+    drive(&folder, arguments.program.applied(engine)?, &stop, arguments.format)
 }
 
 pub(super) fn merge_parts(arguments: &MergeArguments, build: &Build) -> Result<Exit, Failure> {
@@ -181,29 +184,46 @@ fn default_folder(engine: &Engine) -> PathBuf {
     out.join("studies").join(format!("{}{part}", engine.spec.name))
 }
 
-/// Set by Ctrl-C and by a request to terminate; a second one ends the process at once, which loses a batch
-/// and no more.
-fn interruption() -> Arc<Interruption> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let seen = stop.clone();
+/// Ctrl-C, or a request to terminate.
+#[derive(Default)]
+struct Interrupted {
+    /// Set by the first: the batch is the last.
+    stop: Interruption,
+    /// Whether trials are being made; before that there is no batch to finish.
+    makes_trials: AtomicBool,
+}
+
+/// Asks for a run to be ended well: by the first interruption after a batch, and at once by a second one, which
+/// loses a batch and no more, or before the trials, as while a solver starts.
+fn interruption() -> Arc<Interrupted> {
+    let interrupted = Arc::new(Interrupted::default());
+    let seen = interrupted.clone();
     let installed = ctrlc::set_handler(move || {
-        if seen.swap(true, Ordering::Relaxed) {
-            calibench_gate::program::end_for_good();
-            std::process::exit(Exit::Incomplete as i32);
+        if !seen.makes_trials.load(Ordering::Relaxed) {
+            warn("interrupted before the first batch");
+        } else if !seen.stop.swap(true, Ordering::Relaxed) {
+            warn("finishing the batch; once more stops at once");
+            return;
         }
-        warn("finishing the batch; once more stops at once");
+        calibench_gate::program::end_for_good();
+        std::process::exit(Exit::Incomplete as i32);
     });
     if let Err(error) = installed {
         warn(&format!("Ctrl-C will lose the present batch: {error}"));
     }
-    stop
+    interrupted
 }
 
-fn drive(folder: &Folder, mut engine: Engine, format: Format) -> Result<Exit, Failure> {
-    let stop = interruption();
+fn drive(
+    folder: &Folder,
+    mut engine: Engine,
+    interrupted: &Interrupted,
+    format: Format,
+) -> Result<Exit, Failure> {
+    interrupted.makes_trials.store(true, Ordering::Relaxed);
     let progress = ProgressDisplay::stderr().start(&engine.spec.name, engine.most_trials() as usize);
     let (watch, mut shown) = (Stopwatch::start(), None);
-    let outcome = folder.run(&mut engine, &stop, |pace| {
+    let outcome = folder.run(&mut engine, &interrupted.stop, |pace| {
         if shown.is_none() {
             progress.already(pace.before as usize);
         }
@@ -215,11 +235,11 @@ fn drive(folder: &Folder, mut engine: Engine, format: Format) -> Result<Exit, Fa
     drop(progress);
     let took = watch.elapsed();
     if outcome == Outcome::Interrupted {
-        let path = folder.path().shown();
         let again = if engine.is_calibrated_here() { "" } else { " --solver 'THE SAME COMMAND'" };
         warn(&format!(
-            "interrupted after {} trials; continue with: calibench study resume {path}{again}",
-            engine.trials()
+            "interrupted after {} trials; continue with: calibench study resume {}{again}",
+            engine.trials(),
+            shell_word(&folder.path().to_string_lossy())
         ));
         return Ok(Exit::Incomplete);
     }
