@@ -1,4 +1,5 @@
 //! What would change a result without a word, were it not read, read in part or lost? It is refused or told.
+#![cfg(target_os = "linux")]
 
 use crate::hostile::{CALIBENCH, corner_file, limited, refused};
 use crate::program::{folder, text};
