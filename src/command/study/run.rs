@@ -193,8 +193,8 @@ struct Interrupted {
     makes_trials: AtomicBool,
 }
 
-/// Asks for a run to be ended well: by the first interruption after a batch, and at once by a second one, which
-/// loses a batch and no more, or before the trials, as while a solver starts.
+/// Asks for a run to be ended well: by the first interruption after a batch, and at once by a second one,
+/// which loses a batch and no more, or before the trials, as while a solver starts.
 fn interruption() -> Arc<Interrupted> {
     let interrupted = Arc::new(Interrupted::default());
     let seen = interrupted.clone();
