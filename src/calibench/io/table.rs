@@ -565,7 +565,7 @@ mod tests {
             assert_eq!(message, expected);
         }
         for column in ["weight", "height", "id", "file", "x", "t", "uv", "U_mm"] {
-            assert_eq!(refused(column), Ok(()), "{column}");
+            assert!(refused(column).is_ok(), "{column}");
         }
         assert!(
             is_nearly("sdd", "sd")
