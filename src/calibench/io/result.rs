@@ -548,7 +548,10 @@ fn refuse_parts(file: &str, fields: &CameraOnly, text: &str) -> Result<(), Resul
     }
     let NamesOnly { camera } =
         serde_json::from_str(text).map_err(|cause| ResultError::Format { file: file.into(), cause })?;
-    match fields.free.iter().find(|name| !camera.contains_key(*name)) {
+    // Names that the model does not have are told where the covariance is read.
+    let is_of_model = |name: &str| name.parse().is_ok_and(|p: Parameter| fields.camera.0.value(p).is_some());
+    let is_lost = |name: &&String| is_of_model(name) && !camera.contains_key(*name);
+    match fields.free.iter().find(is_lost) {
         Some(lost) => no_camera(format!(
             "{lost} was estimated (`free`), and `camera` has none: it is not the file that was written"
         )),
