@@ -11,7 +11,7 @@ use calibench::io::formats::{
 };
 use calibench::io::image::parse_image;
 use calibench::io::measured::parse_target as parse_measured_target;
-use calibench::io::result::{parse_camera, parse_lens_camera};
+use calibench::io::result_camera::{parse_camera, parse_lens_camera};
 use calibench::io::robot::parse_robot;
 use calibench::io::scene_tables::{parse_target_marks, parse_target_poses};
 use calibench::io::{

@@ -113,13 +113,10 @@ fn checks_that_are_added_at_once_are_all_kept_and_a_link_is_followed() {
     }
     let kept = fs::read_to_string(folder.join("h.csv")).expect("a history");
     assert_eq!(kept.lines().count(), 9, "{kept}");
-    #[cfg(unix)]
-    {
-        std::os::unix::fs::symlink("h.csv", folder.join("link.csv")).expect("a link");
-        assert_eq!(add("link.csv", 8).wait().expect("it ends").code(), Some(0));
-        assert!(folder.join("link.csv").is_symlink());
-        assert_eq!(fs::read_to_string(folder.join("h.csv")).expect("a history").lines().count(), 10);
-    }
+    std::os::unix::fs::symlink("h.csv", folder.join("link.csv")).expect("a link");
+    assert_eq!(add("link.csv", 8).wait().expect("it ends").code(), Some(0));
+    assert!(folder.join("link.csv").is_symlink());
+    assert_eq!(fs::read_to_string(folder.join("h.csv")).expect("a history").lines().count(), 10);
 }
 
 /// A PGM of one grey.
@@ -139,6 +136,23 @@ fn photographs_that_are_not_corrected_beside_others_make_the_work_incomplete() {
         limited(&folder, &arguments).status.code()
     };
     assert_eq!((ends(&["b.pgm"]), ends(&["a.pgm", "b.pgm"]), ends(&["a.pgm"])), (Some(2), Some(3), Some(0)));
+}
+
+#[test]
+fn levels_beyond_white_and_none_are_refused() {
+    let folder = folder("levels");
+    fs::write(folder.join("camera.json"), r#"{"camera": {"fx": 20, "fy": 20, "cx": 8, "cy": 6}}"#)
+        .expect("written");
+    let undistort = ["undistort", "--camera", "camera.json", "--out", "o", "f.tif"];
+    for (level, is_refused) in [(0.5, false), (1.0, false), (255.0, true), (-0.1, true), (f32::NAN, true)] {
+        let grey = image::ImageBuffer::from_pixel(16, 12, image::Rgb([level; 3]));
+        image::DynamicImage::ImageRgb32F(grey).save(folder.join("f.tif")).expect("written");
+        if is_refused {
+            refused(&folder, &undistort, &["576 of 576 floating-point levels", "scale them first"]);
+        } else {
+            assert_eq!(limited(&folder, &undistort).status.code(), Some(0), "{level}");
+        }
+    }
 }
 
 #[test]

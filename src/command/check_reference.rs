@@ -76,8 +76,9 @@ fn parse_when(text: &str) -> Result<String, String> {
 pub(super) fn run(arguments: &Arguments) -> Exit {
     // A link leads to where the history is, which is added to.
     let history = arguments.history.canonicalize().unwrap_or_else(|_| arguments.history.clone());
-    // Two that add at once would each read it without the other's check.
-    let alone = arguments.add.map(|_| lock(&lock_of(&history))).transpose();
+    // Two that add at once would each read it without the other's check. What is no file is refused below.
+    let adds = arguments.add.is_some() && (history.is_file() || !history.exists());
+    let alone = adds.then(|| lock(&lock_of(&history))).transpose();
     let _alone = match alone {
         Ok(alone) => alone,
         Err(error) => {

@@ -49,7 +49,7 @@ pub fn read_corners(path: &Path) -> Result<CornerFile, TableError> {
 /// its coordinates: 1 over the weight ([`View::with_weights`]).
 ///
 /// # Errors
-/// See [`TableError`]; both columns at once.
+/// See [`TableError`]; both columns at once; a column that is not read and looks like one that is.
 ///
 /// ```
 /// use calibench::io::parse_corners;

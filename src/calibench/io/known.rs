@@ -3,7 +3,7 @@
 
 use super::doubts::doubts;
 use super::input::{InputError, MOST_SIDE_PX, MOST_TABLE_BYTES, read_regular_text};
-use super::result::{ResultError, parse_lens_camera};
+use super::result_camera::{ResultError, parse_lens_camera};
 use super::shown::{ShownPath, on_one_line};
 use crate::calibrate::Covariance;
 use crate::camera::{Camera, FreeParameters, Lens, Model, Parameter, UnknownParameter};

@@ -43,7 +43,8 @@ pub enum TargetFileError {
 const PLACE: [Column; 3] = [Column::length("X"), Column::length("Y"), Column::length("Z")];
 
 /// Reads a target file with the columns `point,X,Y,Z`, and `sd` for the standard deviation of every
-/// coordinate or `sdX`, `sdY`, `sdZ` for each; without them marks are exact. Further columns are ignored;
+/// coordinate or `sdX`, `sdY`, `sdZ` for each; without them marks are exact. Further columns are ignored,
+/// unless they look like one of these;
 /// `file` names the source in errors.
 ///
 /// # Errors

@@ -254,7 +254,8 @@ pub(super) struct Row<const NAMES: usize, const NUMBERS: usize> {
     pub numbers: [f64; NUMBERS],
 }
 
-/// Reads the named columns, in whatever order they stand; further columns are ignored. A byte order mark,
+/// Reads the named columns, in whatever order they stand; further columns are ignored, but for those that a
+/// reader has refused ([`refuse_misspelt`]). A byte order mark,
 /// line ends of either kind, blank lines and blanks around fields are harmless.
 pub(super) fn read_table<const NAMES: usize, const NUMBERS: usize>(
     file: &str,

@@ -17,9 +17,9 @@ pub(super) struct Walked {
 
 /// Refines the starts: those that the pinhole's solver gives, and, unless one of them converges to residuals
 /// that look like noise and either the pinhole or this minimum is certified, those that an angle polynomial
-/// gives; where none of all these looks like noise, those of one about the centre that the marks tell. The
-/// pinhole's certificate counts for its own lens, and where that does not hold it may be one of a wrong
-/// camera.
+/// gives; where none of all these looks like noise, or none is certified of a model that can be, those of one
+/// about the centre that the marks tell: few marks look like noise at a wrong minimum too. The pinhole's
+/// certificate counts for its own lens, and where that does not hold it may be one of a wrong camera.
 ///
 /// # Errors
 /// No lens of the model sees every mark.

@@ -5,7 +5,8 @@
 
 use super::super::doubts::doubts;
 use super::super::known::is_possible;
-use super::super::result::{LensFields, parse_lens_camera};
+use super::super::result::LensFields;
+use super::super::result_camera::parse_lens_camera;
 use super::camera_file::{CameraFile, Estimated};
 use super::error::FormatError;
 use super::node::Source;

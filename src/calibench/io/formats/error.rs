@@ -1,7 +1,7 @@
 //! Why is a file of another program not read, or not written?
 
 use super::super::input::InputError;
-use super::super::result::ResultError;
+use super::super::result_camera::ResultError;
 use super::super::table::TableError;
 use crate::camera::Model;
 
