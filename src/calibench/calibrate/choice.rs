@@ -81,8 +81,9 @@ pub struct Compared {
     pub hold_out_px: Option<f64>,
     /// Squared error of each fold, for the comparison of two candidates.
     folds: Vec<f64>,
-    /// Whether a coefficient lies where the model is not defined.
-    is_outside: bool,
+    /// Whether it is behind all that are not: a coefficient lies where the model is not defined, or there are as
+    /// many unknowns as measurements, so that it fits whatever was measured.
+    is_behind: bool,
     /// Correlation of a mark's residual with the next one's: 0 for noise.
     pub correlation: f64,
 }
@@ -111,7 +112,7 @@ const NO_EVIDENCE: f64 = 2.0;
 /// Fits every candidate. The first of the result is the choice: of those whose criterion of Schwarz lies
 /// within 2 of the least, the one that best predicts views that were left out (in five parts of the views in
 /// turn). The others follow by their criterion; behind them those whose coefficients lie where their model is
-/// not defined. Candidates that the views do not determine come with their reason. Views whose marks do not
+/// not defined, or that have as many unknowns as there are measurements. Candidates that the views do not determine come with their reason. Views whose marks do not
 /// span a plane tell nothing and take no part, as long as half of the views do.
 ///
 /// ```
@@ -144,10 +145,9 @@ pub fn compare_models(
     let counted = Counted::of(views, fitted.iter().map(|(_, fit)| fit), settings.loss);
     let judge = |(candidate, fit)| judged(views, settings, &counted, candidate, fit);
     let mut compared: Vec<Compared> = fitted.into_iter().map(judge).collect();
-    // A camera that the model does not have comes behind all that have one.
-    compared.sort_by(|a, b| (a.is_outside.cmp(&b.is_outside)).then(a.bic.total_cmp(&b.bic)));
-    let worst = compared.first().is_some_and(|first| first.is_outside);
-    let eligible = compared.iter().take_while(|c| c.is_outside == worst);
+    compared.sort_by(|a, b| (a.is_behind.cmp(&b.is_behind)).then(a.bic.total_cmp(&b.bic)));
+    let worst = compared.first().is_some_and(|first| first.is_behind);
+    let eligible = compared.iter().take_while(|c| c.is_behind == worst);
     let measures: Vec<(f64, f64)> = eligible.map(|c| (c.bic, c.predicted())).collect();
     if let Some(place) = chosen(&measures) {
         compared[..=place].rotate_right(1);
@@ -187,7 +187,7 @@ fn judged(
         bic: criterion(counted.in_fit(views, &calibration), unknowns(&calibration)),
         hold_out_px: folds.as_deref().map(error),
         folds: folds.unwrap_or_default().into_iter().map(|(square, _)| square).collect(),
-        is_outside: Warning::is_outside_range(&calibration.camera),
+        is_behind: Warning::is_outside_range(&calibration.camera) || calibration.degrees_of_freedom == 0,
         correlation: neighbours(&weighted_residuals(views, &calibration), settings.loss).correlation,
         calibration,
     }
@@ -298,7 +298,7 @@ pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibr
         }));
     let fitted: Vec<(Candidate, LensCalibration)> = candidates
         .filter_map(|candidate| Some((candidate, calibrate_lens(views, &candidate.settings(settings)).ok()?)))
-        .filter(|(_, calibration)| calibration.termination.is_minimum())
+        .filter(|(_, fit)| fit.termination.is_minimum() && fit.degrees_of_freedom > 0)
         .collect();
     let fits = fitted.iter().map(|(_, calibration)| calibration);
     let counted = Counted::of(views, fits.chain([fit]), settings.loss);

@@ -18,6 +18,9 @@ use crate::camera::Parameter;
 enum Group {
     /// What most lenses have, or the standard choice leaves out.
     Parameters(&'static [Parameter]),
+    /// One that is held at a value which is not 0: that the marks contradict it is told as of one that is known
+    /// beforehand.
+    Value(Parameter),
     /// So many of two bows and a twist.
     Shape {
         /// The others are estimated already.
@@ -29,6 +32,7 @@ impl Group {
     fn len(self) -> usize {
         match self {
             Group::Parameters(list) => list.len(),
+            Group::Value(_) => 1,
             Group::Shape { more } => more,
         }
     }
@@ -40,6 +44,7 @@ impl Group {
                 let parameters = list.iter().fold(others.parameters, |all, &p| all.with(p));
                 Freedoms { parameters, ..others }
             }
+            Group::Value(parameter) => Freedoms { parameters: others.parameters.with(parameter), ..others },
             Group::Shape { .. } => Freedoms { shape: true, ..others },
         }
     }
@@ -54,8 +59,8 @@ const ASKED: [&[Parameter]; 4] =
 /// A set that needs none of them is told that it does with this probability, for each.
 const CHANCE: f64 = 1e-5;
 
-/// What nobody has decided on. What is held of the basic parameters counts as well: a coefficient that nobody
-/// asked for would make up for a wrong value.
+/// What nobody has decided on, and the values that are held. Without these a coefficient that nobody asked for
+/// would make up for a wrong one.
 fn undecided(settings: &Settings) -> Vec<Group> {
     let model = settings.model();
     let is_left_out = |&p: &Parameter| match settings.role(p) {
@@ -63,7 +68,11 @@ fn undecided(settings: &Settings) -> Vec<Group> {
         Role::Held(_) => Parameter::LINEAR.contains(&p),
         _ => false,
     };
-    let parameters = ASKED.into_iter().filter(|list| list.iter().all(is_left_out)).map(Group::Parameters);
+    let asked: Vec<&[Parameter]> = ASKED.into_iter().filter(|list| list.iter().all(is_left_out)).collect();
+    let is_value = |p: &Parameter| matches!(settings.role(*p), Role::Held(value) if value != 0.0);
+    let is_alone = |p: &Parameter| !asked.iter().any(|list| list.contains(p));
+    let values: Vec<Parameter> = model.parameters().filter(is_value).filter(is_alone).collect();
+    let parameters = asked.into_iter().map(Group::Parameters).chain(values.into_iter().map(Group::Value));
     let more = DEFORMATIONS - settings.board.bend().map_or(0, |bend| bend.deformations);
     parameters.chain((more > 0).then_some(Group::Shape { more })).collect()
 }
@@ -116,6 +125,7 @@ fn named(falls: &Falls, mut undecided: Vec<Group>, variance: f64, freedom: usize
 fn warning(Told { group, fall, probability }: Told, [bow_x, bow_y, twist]: [f64; DEFORMATIONS]) -> Warning {
     match group {
         Group::Parameters(list) => Warning::LeftOut { parameters: list.to_vec(), fall, probability },
+        Group::Value(parameter) => Warning::LeftOut { parameters: vec![parameter], fall, probability },
         Group::Shape { .. } => Warning::NotFlat { bow_x, bow_y, twist, fall, probability },
     }
 }
@@ -140,6 +150,10 @@ mod tests {
         let bowed = decided.clone().with_board(Board::Bowed { standard_deviation });
         assert_eq!(undecided(&bowed), [Group::Shape { more: 1 }]);
         assert!(undecided(&decided.with_board(Board::Bent { standard_deviation })).is_empty());
+        // A value that is held is one that somebody believes in.
+        let k2 = standard.clone().hold(Parameter::K2, 0.07).hold(Parameter::Fx, 600.0);
+        let [fx, k2_alone] = [Parameter::Fx, Parameter::K2].map(Group::Value);
+        assert_eq!(undecided(&k2), [tangential, radial, skew, fx, k2_alone, shape]);
         // A lens is asked for nothing that it does not have.
         assert_eq!(undecided(&Settings::of_model(Model::KannalaBrandt)), [skew, shape]);
         // What a wrong value of the principal point does is not to be put down to p1 and p2.
