@@ -3,7 +3,7 @@
 
 use calibench::board::View;
 use calibench::calibrate::{
-    Calibration, CalibrationError, Loss, Settings, Termination, Unknown, Warning, calibrate,
+    Calibration, CalibrationError, Loss, Settings, Termination, Unknown, Warning, calibrate, calibrate_lens,
 };
 use calibench::camera::{Camera, FreeParameters, Parameter};
 use calibench::evaluate::errors_of;
@@ -407,5 +407,27 @@ fn certificates_miss_as_often_as_they_say_under_ties_and_priors() {
         let (missed, trials) = (missed.count() as f64, TRIALS as f64);
         let z = (missed - RATE * trials) / (RATE * (1.0 - RATE) * trials).sqrt();
         assert!(z.abs() < FAR, "{known:?}, tied {tie}: {missed} of {trials}");
+    }
+}
+
+/// A value that is held is asked as one that is known: the marks contradict it, or they do not.
+#[test]
+fn a_held_value_that_the_marks_contradict_is_told() {
+    let views = Scene::example().observe(0.1, &mut noise("held", 0));
+    let truth = Truth::example().camera;
+    let alone = calibrate(&views, &Settings::standard()).unwrap();
+    for parameter in [Parameter::Fx, Parameter::Cx, Parameter::K1, Parameter::K2] {
+        let sd = alone.standard_deviation(parameter).unwrap();
+        let told = |value: f64| {
+            let settings = Settings::standard().hold(parameter, value);
+            let found = calibrate_lens(&views, &settings).unwrap();
+            found
+                .warnings
+                .iter()
+                .any(|w| matches!(w, Warning::LeftOut { parameters, .. } if parameters.contains(&parameter)))
+        };
+        let value = truth.get(parameter);
+        assert!(!told(value), "{parameter}");
+        assert!(told(value + 12.0 * sd), "{parameter}");
     }
 }

@@ -15,8 +15,9 @@
 //! of them a rich model is known poorly. So the criterion decides, and predictions only where it says
 //! nothing.
 
-use super::any_lens::{located, spans_a_plane};
+use super::any_lens::located;
 use super::counted::{Counted, weighted_residuals};
+use super::domain::spans_a_plane;
 use super::structure::neighbours;
 use super::{Board, CalibrationError, LensCalibration, Role, Settings, Warning, calibrate_lens};
 use crate::board::View;

@@ -1,7 +1,9 @@
 //! Which settings can no camera meet? Told before any mark is looked at, and alike by every estimator.
 
 use super::{CalibrationError, Loss, Prior, Role, Settings};
+use crate::board::View;
 use crate::camera::Parameter;
+use crate::geometry::{Homography, HomographyError};
 
 /// Scales of a robust loss, px: with any other their squares are lost in rounding.
 const SCALES_PX: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
@@ -68,6 +70,13 @@ fn check_parameters(settings: &Settings) -> Result<(), CalibrationError> {
         return Err(CalibrationError::NotOfModel { parameter, model });
     }
     model.parameters().try_for_each(|parameter| settings.held(parameter).map(drop))
+}
+
+/// Whether a view tells its pose. Marks on a line do not, and with but one beside the line they tell it as
+/// badly: such a view is refused. The homography of the marks to themselves says it of
+/// the board's side; of pixels it is no question beyond a pinhole.
+pub(super) fn spans_a_plane(view: &View) -> Result<(), HomographyError> {
+    Homography::fit(view.points(), view.points()).map(drop)
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use super::certificate::Certificate;
 use super::conditioning::Conditioning;
+use super::domain::spans_a_plane;
 use super::from_relaxed::Evidence;
 use super::intervals::Profile;
 use super::judged::Judged;
@@ -61,8 +62,19 @@ pub(super) fn calibrate_distinct(
     settings: &Settings,
 ) -> Result<Calibration, CalibrationError> {
     check_counts(views, settings)?;
-    let (calibration, noise) = chunks::in_pool(views.len(), || estimate(views, settings))?;
+    let found = chunks::in_pool(views.len(), || estimate(views, settings));
+    let (calibration, noise) = found.map_err(|refusal| of_a_view(views, refusal))?;
     Ok(if settings.polish { polish::polish(views, settings.loss, noise, calibration) } else { calibration })
+}
+
+/// A refusal for want of information, or that of a view whose marks do not span a plane: such a view hides
+/// what the others tell, and its homography may pass, since distortion bends the image of a line.
+fn of_a_view(views: &[View], refusal: CalibrationError) -> CalibrationError {
+    if !matches!(refusal, CalibrationError::NotIdentifiable { .. }) {
+        return refusal;
+    }
+    let flat = views.iter().enumerate().find_map(|(view, marks)| Some((view, spans_a_plane(marks).err()?)));
+    flat.map_or(refusal, |(view, source)| CalibrationError::View { view, source })
 }
 
 /// The calibration, and the noise that weighed the priors.
@@ -366,5 +378,19 @@ mod tests {
         let refused = CalibrationError::TooFewPoints { coordinates: 16, unknowns: 18 };
         assert_eq!(check_counts(&some(4), &Settings::standard()), Err(refused));
         assert_eq!(check_counts(&some(5), &Settings::standard()), Ok(()));
+    }
+
+    #[test]
+    fn a_refusal_is_that_of_the_view_whose_marks_lie_on_a_line_but_for_one() {
+        let mut views = four_views(0.1);
+        let of = |view: &View| {
+            let (points, pixels) =
+                [0, 1, 2, 3, 4, 62].map(|i| (view.points()[i], view.pixels()[i])).into_iter().unzip();
+            View::new(points, pixels).unwrap()
+        };
+        views[2] = of(&views[2]);
+        let singular = identifiability::singular();
+        assert_eq!(of_a_view(&views[..2], singular.clone()), singular);
+        assert!(matches!(of_a_view(&views, singular), CalibrationError::View { view: 2, .. }));
     }
 }

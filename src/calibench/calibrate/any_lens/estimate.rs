@@ -10,7 +10,6 @@ use super::problem::{Problem, State, rounding_cost};
 use super::{WIDTH, certificate, judge, marks, report, shape, start, walk};
 use crate::board::View;
 use crate::camera::{FreeParameters, Parameter};
-use crate::geometry::{Homography, HomographyError};
 
 /// Where nothing else tells the noise of a coordinate, priors are first weighed with this one, px.
 const USUAL_PX: f64 = 0.1;
@@ -67,15 +66,8 @@ fn check(views: &[View], settings: &Settings) -> Result<(), CalibrationError> {
         return Err(CalibrationError::TooFewPoints { coordinates, unknowns });
     }
     views.iter().enumerate().try_for_each(|(view, marks)| {
-        spans_a_plane(marks).map_err(|source| CalibrationError::View { view, source })
+        domain::spans_a_plane(marks).map_err(|source| CalibrationError::View { view, source })
     })
-}
-
-/// Whether a view tells its pose. Marks on a line do not, and with but one beside the line they tell it as
-/// badly: such a view is refused, as [`calibrate`] does. The homography of the marks to themselves says it of
-/// the board's side; of pixels it is no question beyond a pinhole.
-pub(in super::super) fn spans_a_plane(view: &View) -> Result<(), HomographyError> {
-    Homography::fit(view.points(), view.points()).map(drop)
 }
 
 fn estimate(views: &[View], settings: &Settings) -> Result<LensCalibration, CalibrationError> {

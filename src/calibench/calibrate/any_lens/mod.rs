@@ -31,7 +31,7 @@ mod shape;
 mod start;
 mod walk;
 
-pub(super) use estimate::{calibrate, spans_a_plane};
+pub(super) use estimate::calibrate;
 pub(super) use falls::{Falls, Freedoms};
 pub use information::lens_information;
 pub(super) use locate::located;
