@@ -410,7 +410,8 @@ fn certificates_miss_as_often_as_they_say_under_ties_and_priors() {
     }
 }
 
-/// A value that is held is asked as one that is known: the marks contradict it, or they do not.
+/// A value that is held is asked as one that is known: the marks contradict it, or they do not. So is one
+/// that is known too well for the marks to move it.
 #[test]
 fn a_held_value_that_the_marks_contradict_is_told() {
     let views = Scene::example().observe(0.1, &mut noise("held", 0));
@@ -418,16 +419,27 @@ fn a_held_value_that_the_marks_contradict_is_told() {
     let alone = calibrate(&views, &Settings::standard()).unwrap();
     for parameter in [Parameter::Fx, Parameter::Cx, Parameter::K1, Parameter::K2] {
         let sd = alone.standard_deviation(parameter).unwrap();
-        let told = |value: f64| {
-            let settings = Settings::standard().hold(parameter, value);
-            let found = calibrate_lens(&views, &settings).unwrap();
-            found
-                .warnings
-                .iter()
-                .any(|w| matches!(w, Warning::LeftOut { parameters, .. } if parameters.contains(&parameter)))
+        let told = |settings: Settings| {
+            let is_told = |warning: &Warning| match warning {
+                Warning::LeftOut { parameters, .. } => parameters.contains(&parameter),
+                Warning::Contradicted { parameter: contradicted, .. } => *contradicted == parameter,
+                _ => false,
+            };
+            calibrate_lens(&views, &settings).unwrap().warnings.iter().filter(|w| is_told(w)).count()
         };
         let value = truth.get(parameter);
-        assert!(!told(value), "{parameter}");
-        assert!(told(value + 12.0 * sd), "{parameter}");
+        for (value, times) in [(value, 0), (value + 12.0 * sd, 1)] {
+            let held = told(Settings::standard().hold(parameter, value));
+            assert_eq!(held, times, "{parameter}");
+            for share in [1.0, 1e-2, 0.9e-3, 1e-5, 1e-8] {
+                let known = told(Settings::standard().with_prior(parameter, value, share * sd));
+                assert_eq!(known, times, "{parameter} {share}");
+            }
+        }
     }
+    // A coefficient that is known to be 0.
+    let zero = Settings::standard().with_prior(Parameter::K1, 0.0, 1e-9);
+    let warnings = calibrate_lens(&views, &zero).unwrap().warnings;
+    let of_k1 = |w: &Warning| matches!(w, Warning::LeftOut { parameters, .. } if parameters == &[Parameter::K1]);
+    assert!(warnings.iter().any(of_k1));
 }

@@ -9,7 +9,8 @@
 
 use super::any_lens::{Falls, Freedoms};
 use super::chance::fisher_tail;
-use super::{LensCalibration, Loss, Role, Settings, Warning};
+use super::prior::is_held;
+use super::{Board, LensCalibration, Loss, Prior, Role, Settings, Warning};
 use crate::board::View;
 use crate::camera::Parameter;
 
@@ -18,8 +19,8 @@ use crate::camera::Parameter;
 enum Group {
     /// What most lenses have, or the standard choice leaves out.
     Parameters(&'static [Parameter]),
-    /// One that is held at a value which is not 0: that the marks contradict it is told as of one that is known
-    /// beforehand.
+    /// One that is held at a value which is not 0, or known too well for the marks to have a say: that they
+    /// contradict it is told as of one that is known beforehand.
     Value(Parameter),
     /// So many of two bows and a twist.
     Shape {
@@ -82,6 +83,41 @@ pub(super) fn asked_for(views: &[View], settings: &Settings, found: &LensCalibra
     if settings.loss != Loss::Squares || !found.termination.is_minimum() {
         return Vec::new();
     }
+    match held_by_priors(settings, found) {
+        Some((settings, found)) => asked_of_held(views, &settings, &found),
+        None => asked_of_held(views, settings, found),
+    }
+}
+
+/// The same where what is known so well that the marks have no say is held; `None` where nothing is. A prior
+/// of this kind can be contradicted no other way: by how far the estimate lies from it is lost in rounding.
+fn held_by_priors(settings: &Settings, found: &LensCalibration) -> Option<(Settings, LensCalibration)> {
+    let is_tight = |prior: &&Prior| {
+        let posterior = found.covariance.standard_deviation(prior.parameter);
+        posterior.is_some_and(|posterior| is_held(prior.standard_deviation, posterior))
+    };
+    let tight: Vec<Prior> = found.priors.iter().filter(is_tight).copied().collect();
+    let is_flat = settings.board.bend().zip(found.board.as_ref()).is_some_and(|(bend, shape)| {
+        let mut known = shape.standard_deviations.iter().take(bend.deformations);
+        known.all(|&posterior| is_held(bend.standard_deviation, posterior))
+    });
+    if tight.is_empty() && !is_flat {
+        return None;
+    }
+    let (mut settings, mut found) = (settings.clone(), found.clone());
+    if is_flat {
+        settings = settings.with_board(Board::Flat);
+    }
+    for Prior { parameter, .. } in tight {
+        // Where it is, which is hardly ever 0: a value that is known to be 0 is asked too.
+        settings = settings.hold(parameter, found.camera.value(parameter)?);
+        found.free = found.free.without(parameter);
+        found.priors.retain(|prior| prior.parameter != parameter);
+    }
+    Some((settings, found))
+}
+
+fn asked_of_held(views: &[View], settings: &Settings, found: &LensCalibration) -> Vec<Warning> {
     let undecided = undecided(settings);
     let all = undecided.iter().fold(Freedoms::NONE, |all, group| group.besides(all));
     let variance = found.sigma_px * found.sigma_px;
@@ -132,7 +168,6 @@ fn warning(Told { group, fall, probability }: Told, [bow_x, bow_y, twist]: [f64;
 
 #[cfg(test)]
 mod tests {
-    use super::super::Board;
     use super::*;
     use crate::camera::Model;
 

@@ -37,10 +37,19 @@ const TOLD_BY_PIXELS: f64 = 1e-6;
 /// where it does not. Before the photographs the estimate is spread about the mean with the variance that
 /// they take away from it: `prior_sd^2 - posterior_sd^2`.
 pub(crate) fn contradiction(away: f64, prior_sd: f64, posterior_sd: f64) -> Option<f64> {
+    let deviations = away.abs() / (prior_sd * taken(prior_sd, posterior_sd).max(0.0).sqrt());
+    (!is_held(prior_sd, posterior_sd) && deviations > CONTRADICTED).then_some(deviations)
+}
+
+/// Whether what is known of a parameter beforehand leaves the pixels no say: it is as good as held.
+pub(super) fn is_held(prior_sd: f64, posterior_sd: f64) -> bool {
+    taken(prior_sd, posterior_sd) <= TOLD_BY_PIXELS
+}
+
+/// The part of a prior's variance that the pixels take away.
+fn taken(prior_sd: f64, posterior_sd: f64) -> f64 {
     let share = posterior_sd / prior_sd;
-    let taken = 1.0 - share * share;
-    let deviations = away.abs() / (prior_sd * taken.max(0.0).sqrt());
-    (taken > TOLD_BY_PIXELS && deviations > CONTRADICTED).then_some(deviations)
+    1.0 - share * share
 }
 
 /// A parameter that is estimated, and known beforehand: `mean +- standard_deviation`, normally distributed.
