@@ -60,7 +60,8 @@ impl LensCalibration {
 /// have weights.
 ///
 /// With any lens the marks are asked by score tests whether they need what nobody has decided on: p1 and p2,
-/// k3, the principal point, skew ([`Warning::LeftOut`](super::Warning::LeftOut)), a board that is not flat
+/// k3, the principal point, skew, and what is held at another value than 0
+/// ([`Warning::LeftOut`](super::Warning::LeftOut)), a board that is not flat
 /// ([`Warning::NotFlat`](super::Warning::NotFlat)).
 ///
 /// # Errors

@@ -152,8 +152,9 @@ pub enum Warning {
         /// Correlation coefficient of a mark's residual with the next one's.
         correlation: f64,
     },
-    /// Parameters that are held because nobody asked for them, or of the principal point and skew that are
-    /// held at all, and that the marks ask for.
+    /// Parameters that are held because nobody asked for them, at a value other than 0, or of the principal
+    /// point and skew at all, and that the marks ask for; one that is known too well for the marks to move it
+    /// counts as held.
     LeftOut {
         /// Which.
         parameters: Vec<Parameter>,
