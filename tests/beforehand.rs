@@ -440,6 +440,7 @@ fn a_held_value_that_the_marks_contradict_is_told() {
     // A coefficient that is known to be 0.
     let zero = Settings::standard().with_prior(Parameter::K1, 0.0, 1e-9);
     let warnings = calibrate_lens(&views, &zero).unwrap().warnings;
-    let of_k1 = |w: &Warning| matches!(w, Warning::LeftOut { parameters, .. } if parameters == &[Parameter::K1]);
+    let of_k1 =
+        |w: &Warning| matches!(w, Warning::LeftOut { parameters, .. } if parameters == &[Parameter::K1]);
     assert!(warnings.iter().any(of_k1));
 }

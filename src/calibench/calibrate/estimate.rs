@@ -383,12 +383,9 @@ mod tests {
     #[test]
     fn a_refusal_is_that_of_the_view_whose_marks_lie_on_a_line_but_for_one() {
         let mut views = four_views(0.1);
-        let of = |view: &View| {
-            let (points, pixels) =
-                [0, 1, 2, 3, 4, 62].map(|i| (view.points()[i], view.pixels()[i])).into_iter().unzip();
-            View::new(points, pixels).unwrap()
-        };
-        views[2] = of(&views[2]);
+        let few = [0, 1, 2, 3, 4, 62].map(|i| (views[2].points()[i], views[2].pixels()[i]));
+        let (points, pixels) = few.into_iter().unzip();
+        views[2] = View::new(points, pixels).unwrap();
         let singular = identifiability::singular();
         assert_eq!(of_a_view(&views[..2], singular.clone()), singular);
         assert!(matches!(of_a_view(&views, singular), CalibrationError::View { view: 2, .. }));

@@ -7,7 +7,7 @@ use super::problem::{Problem, State};
 use super::report::{MeasuredCalibration, report};
 use super::resection::{IN_PLANE, IN_SPACE};
 use super::shape::{FLAT, NEARLY_FLAT, Shape};
-use super::{MeasuredError, MeasuredTarget, MeasuredView, plane, rivals, space};
+use super::{MeasuredError, MeasuredTarget, MeasuredView, linearity, plane, rivals, space};
 use crate::calibrate::{Board, CalibrationError, Loss, Prior, Settings, Termination, Warning, domain};
 use crate::camera::Parameter;
 
@@ -95,13 +95,14 @@ pub fn calibrate_measured(
         moves_poses: true,
         max_iterations: settings.max_iterations,
     };
-    let (starts, shape_of_cost) = starts(&problem, settings)?;
+    let (starts, ambiguous) = starts(&problem, settings)?;
     let (minima, starts) = space::minima(&problem, starts);
     let (problem, minimum, others) = best(problem, noise, minima)?;
+    let (problem, minimum, not_linear) = linearity::checked(problem, noise, minimum)?;
     let least = minimum.equations.cost;
     let mut found = report(&problem, minimum, starts, target, noise, views)?;
     let rival = rivals::rival(&problem, &found.calibration, least, &others);
-    found.calibration.warnings.extend(shape_of_cost.into_iter().chain(rival));
+    found.calibration.warnings.extend(not_linear.into_iter().chain(ambiguous).chain(rival));
     Ok(found)
 }
 
@@ -145,7 +146,7 @@ fn check_settings(settings: &Settings, noise: Noise) -> Result<(), MeasuredError
         (
             settings.profile_coverage.is_some(),
             "the profile of the cost",
-            "state intervals by the standard deviations",
+            "state intervals by the standard deviations: where they mislead the result says so",
         ),
         (settings.start.is_some(), "a start for the intrinsics", "leave it out"),
         (
@@ -201,7 +202,7 @@ fn check_counts(data: &Data, settings: &Settings) -> Result<(), MeasuredError> {
     Ok(())
 }
 
-/// Starts by how the marks lie, and what a plane's says of the cost around it.
+/// Starts by how the marks lie, and other cameras that explain a plane's as well.
 fn starts(problem: &Problem<'_>, settings: &Settings) -> Result<(Vec<State>, Vec<Warning>), MeasuredError> {
     let shape = Shape::of(&problem.data.positions);
     if plane::is_flat(problem.data, &shape) {

@@ -24,9 +24,9 @@
 //! of the measurements, which stays as stated (Foerstner 1979). Whether what is stated can be believed is
 //! tested: see [`SumTest`].
 //!
-//! The cost is not walked along its profiles, as `calibrate_lens` does where it is no parabola: of a double
-//! sphere seen over a narrow angle, whose parameters hang together, standard deviations may mislead, and
-//! nothing says so.
+//! Where the cost is no parabola and standard deviations mislead, as of a double sphere seen over a narrow
+//! angle, whose parameters hang together, [`crate::calibrate::Warning::NotLinear`] says so, as after
+//! [`crate::calibrate::calibrate_lens`].
 //!
 //! The folder lies outside of `calibrate`, whose solver knows planes and up to three numbers of a board's
 //! shape, and builds on it: a target near a plane starts from [`crate::calibrate::calibrate_lens`].
@@ -38,6 +38,7 @@ mod error;
 mod estimate;
 mod identifiability;
 mod lens;
+mod linearity;
 mod noise;
 mod plane;
 mod problem;

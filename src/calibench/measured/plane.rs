@@ -7,8 +7,8 @@ use crate::board::View;
 use crate::calibrate::{CalibrationError, Settings, Warning, calibrate_lens};
 use crate::geometry::{Vec2, Vec3};
 
-/// The camera and the poses that [`calibrate_lens`] finds for the marks as a flat board, and its warnings
-/// where the cost is no parabola: they are the data's, whatever a few hundredths of a millimetre do.
+/// The camera and the poses that [`calibrate_lens`] finds for the marks as a flat board, and its warnings of
+/// other cameras: they are the data's, whatever a few hundredths of a millimetre do.
 ///
 /// # Errors
 /// What it refuses: planes that face the camera, too few views.
@@ -37,8 +37,8 @@ pub(super) fn start(
         cam_from_target: poses.collect(),
         offsets: vec![0.0; data.unknown_deviations.len()],
     };
-    let is_of_shape = |w: &Warning| matches!(w, Warning::NotLinear { .. } | Warning::Ambiguous { .. });
-    Ok((state, found.warnings.into_iter().filter(is_of_shape).collect()))
+    let is_ambiguous = |w: &Warning| matches!(w, Warning::Ambiguous { .. });
+    Ok((state, found.warnings.into_iter().filter(is_ambiguous).collect()))
 }
 
 /// Marks are a plane's if they are as flat as one, or as flat as they are known to be.

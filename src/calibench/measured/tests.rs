@@ -11,21 +11,21 @@ use crate::distribution::ChiSquare;
 use crate::geometry::{Pose, Vec2, Vec3, rotation};
 use crate::synth::{Stream, StreamKey};
 
-const SIGMA_PX: f64 = 0.1;
+pub(super) const SIGMA_PX: f64 = 0.1;
 
 /// What is photographed: a camera, places of marks, poses.
-struct Scene {
-    camera: Camera<Lens>,
-    marks: Vec<Vec3>,
-    cam_from_target: Vec<Pose>,
+pub(super) struct Scene {
+    pub camera: Camera<Lens>,
+    pub marks: Vec<Vec3>,
+    pub cam_from_target: Vec<Pose>,
 }
 
-fn stream(scenario: &'static str, trial: u64) -> Stream {
+pub(super) fn stream(scenario: &'static str, trial: u64) -> Stream {
     Stream::open(StreamKey { seed: 5, scenario, trial, purpose: "measured" })
 }
 
 /// Poses about a target of some 60 mm, turned about axes that follow the golden angle.
-fn poses(count: usize, distance: f64) -> Vec<Pose> {
+pub(super) fn poses(count: usize, distance: f64) -> Vec<Pose> {
     let pose = |k: usize| {
         let (sin, cos) = libm::sincos(2.399_963_229_728_653 * k as f64);
         let turn = Vec3::new(0.5 * cos, 0.5 * sin, 0.2 * sin);
@@ -61,7 +61,7 @@ fn fisheye() -> Camera<Lens> {
 }
 
 impl Scene {
-    fn cube() -> Scene {
+    pub fn cube() -> Scene {
         Scene { camera: brown_conrady(), marks: cube(), cam_from_target: poses(6, 220.0) }
     }
 
@@ -98,12 +98,12 @@ impl Scene {
         self.cam_from_target.iter().enumerate().map(view).collect()
     }
 
-    fn settings(&self) -> Settings {
+    pub fn settings(&self) -> Settings {
         Settings::of_model(self.camera.distortion.model())
     }
 
     /// One set of measurements and photographs.
-    fn drawn(&self, sd: f64, stream: &mut Stream) -> (MeasuredTarget, Vec<MeasuredView>) {
+    pub fn drawn(&self, sd: f64, stream: &mut Stream) -> (MeasuredTarget, Vec<MeasuredView>) {
         let target = self.target(sd, || stream.normal());
         let views = self.views(|| SIGMA_PX * stream.normal());
         (target, views)
