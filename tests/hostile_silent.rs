@@ -167,3 +167,33 @@ fn an_output_of_undistort_that_shows_little_is_told() {
         assert_eq!(said.contains("output shows the photograph"), is_told, "{k1}: {said}");
     }
 }
+
+#[test]
+fn a_photograph_that_is_to_be_turned_or_one_of_several_in_its_file_is_told() {
+    let folder = folder("turned");
+    let camera = r#"{"camera": {"fx": 20, "fy": 20, "cx": 8, "cy": 6}}"#;
+    fs::write(folder.join("camera.json"), camera).expect("written");
+    let grey = image::ImageBuffer::from_pixel(16, 12, image::Luma([90_u8]));
+    for name in ["plain.jpg", "plain.tif"] {
+        grey.save(folder.join(name)).expect("written");
+    }
+    let told = |name: &str, bytes: &[u8]| {
+        fs::write(folder.join(name), bytes).expect("written");
+        let output = limited(&folder, &["undistort", "--camera", "camera.json", "--out", "o", name]);
+        assert_eq!(output.status.code(), Some(0), "{name}");
+        text(&output.stderr).lines().filter(|line| line.contains(name)).map(String::from).collect::<Vec<_>>()
+    };
+    let jpeg = fs::read(folder.join("plain.jpg")).expect("read");
+    assert_eq!(told("a.jpg", &jpeg), Vec::<String>::new());
+    // Exif data with an orientation of 6: to be turned by a quarter.
+    let exif = b"\xff\xe1\0\x22Exif\0\0II\x2a\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0";
+    let turned = told("b.jpg", &[&jpeg[..2], exif, &jpeg[2..]].concat());
+    assert!(turned.len() == 1 && turned[0].contains("asks to be shown turned or mirrored"), "{turned:?}");
+    let mut tiff = fs::read(folder.join("plain.tif")).expect("read");
+    assert_eq!(told("a.tif", &tiff), Vec::<String>::new());
+    let directory = u32::from_le_bytes(tiff[4..8].try_into().expect("four bytes")) as usize;
+    let entries = usize::from(u16::from_le_bytes([tiff[directory], tiff[directory + 1]]));
+    tiff[directory + 2 + 12 * entries] = 8;
+    let several = told("b.tif", &tiff);
+    assert!(several.len() == 1 && several[0].contains("holds more than one image"), "{several:?}");
+}

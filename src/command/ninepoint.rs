@@ -58,9 +58,13 @@ pub(super) fn run(arguments: &Arguments) -> Exit {
 fn ninepoint(arguments: &Arguments) -> Result<Exit, String> {
     // The limits of a board, before any work.
     Board::chessboard(arguments.columns, arguments.rows, 1.0).map_err(|error| error.to_string())?;
-    let needed = image_extent(&arguments.image).map_err(|error| error.to_string())?.memory_to_detect();
+    let extent = image_extent(&arguments.image).map_err(|error| error.to_string())?;
     let memory = Memory::new(arguments.memory);
-    let _taken = memory.take(&arguments.image, needed).map_err(|error| error.to_string())?;
+    let _taken =
+        memory.take(&arguments.image, extent.memory_to_detect()).map_err(|error| error.to_string())?;
+    if let Some(what) = extent.left_out() {
+        warn(&format!("{} {what}", arguments.image.shown()));
+    }
     let image = read_image(&arguments.image).map_err(|error| error.to_string())?;
     let at_file = |error: &dyn std::fmt::Display| format!("{}: {error}", arguments.image.shown());
     let grid = ordered_discs(&image, |discs| sparse_dots_of(discs, arguments.columns, arguments.rows))

@@ -1,12 +1,20 @@
 //! How large is a photograph, and what memory will it take? Known from the beginning of its file, before it
 //! is decoded.
 
-use super::image::{ImageError, MOST_NOTES_BYTES, broken, decoder, opened, refuse_size, scanned_jpeg};
+use super::image::{
+    ImageError, MOST_NOTES_BYTES, broken, decoder, opened, refuse_size, scanned_jpeg, unread,
+};
 use super::jpeg::Jpeg;
 use super::shown::ShownPath;
+use super::tiff;
 use image::ImageDecoder;
+use image::metadata::Orientation;
 use std::io::{Cursor, Seek};
 use std::path::Path;
+
+const TURNED: &str = "asks to be shown turned or mirrored (Exif): it is read as it is stored, and so are its pixel coordinates";
+const MORE: &str = "holds more than one image: the first is read";
+const TURNED_AND_MORE: &str = "asks to be shown turned or mirrored (Exif) and holds more than one image: the first is read, as it is stored";
 
 /// The size of an image, known before it is decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,26 +28,58 @@ pub struct Extent {
     /// Bytes that are held beside the samples while it is decoded: a JPEG's file, here and in its decoder, or
     /// what the decoder of another format may hold of colour profiles, texts and rows.
     pub held_bytes: u64,
+    /// Whether the file asks for the image to be turned or mirrored where it is shown (Exif's orientation).
+    /// It is read as it is stored.
+    pub is_turned: bool,
+    /// Whether a TIFF holds more images than the first, which is the one that is read.
+    pub has_more: bool,
 }
 
 impl Extent {
-    fn of(decoder: &dyn ImageDecoder) -> Extent {
+    fn of(decoder: &mut dyn ImageDecoder, has_more: bool) -> Extent {
         let (width, height) = decoder.dimensions();
-        let (size, pixels) = ((width as usize, height as usize), u64::from(width) * u64::from(height));
-        Extent { size, pixels, bytes: decoder.total_bytes(), held_bytes: MOST_NOTES_BYTES }
+        // What cannot be read of it is no reason to refuse the image.
+        let is_turned = decoder.orientation().is_ok_and(is_turned);
+        Extent {
+            size: (width as usize, height as usize),
+            pixels: u64::from(width) * u64::from(height),
+            bytes: decoder.total_bytes(),
+            held_bytes: MOST_NOTES_BYTES,
+            is_turned,
+            has_more,
+        }
     }
 
     /// That of the first photograph that a source holds.
     fn read(mut source: impl std::io::BufRead + Seek, name: &str) -> Result<Extent, ImageError> {
-        let Some(Jpeg { length, frame }) = scanned_jpeg(&mut source, name)? else {
-            return Ok(Extent::of(&*decoder(source, name)?));
+        let Some(Jpeg { length, frame, orientation }) = scanned_jpeg(&mut source, name)? else {
+            let has_more = tiff::has_more(&mut source).map_err(|cause| unread(cause, name))?;
+            source.rewind().map_err(|cause| unread(cause, name))?;
+            return Ok(Extent::of(&mut *decoder(source, name)?, has_more));
         };
         let frame = frame.ok_or_else(|| broken("the JPEG has no frame".into(), name))?;
         let (width, height) = frame.size();
         refuse_size(width as u32, height as u32, name)?;
         let pixels = width as u64 * height as u64;
         let bytes = pixels.saturating_mul(u64::from(frame.components));
-        Ok(Extent { size: (width, height), pixels, bytes, held_bytes: length.saturating_mul(2) })
+        Ok(Extent {
+            size: (width, height),
+            pixels,
+            bytes,
+            held_bytes: length.saturating_mul(2),
+            is_turned: is_turned(orientation),
+            has_more: false,
+        })
+    }
+
+    /// What of the file is left out where it is read, in words; `None` where that is nothing.
+    pub fn left_out(&self) -> Option<&'static str> {
+        match (self.is_turned, self.has_more) {
+            (false, false) => None,
+            (true, false) => Some(TURNED),
+            (false, true) => Some(MORE),
+            (true, true) => Some(TURNED_AND_MORE),
+        }
     }
 
     /// Memory that reading the photograph as grey, finding its marks and drawing them in takes at most: the
@@ -74,4 +114,8 @@ pub fn image_extent(path: &Path) -> Result<Extent, ImageError> {
 /// See [`ImageError`].
 pub fn parse_extent(bytes: &[u8], name: &str) -> Result<Extent, ImageError> {
     Extent::read(Cursor::new(bytes), name)
+}
+
+fn is_turned(orientation: Orientation) -> bool {
+    orientation != Orientation::NoTransforms
 }

@@ -5,6 +5,7 @@
 //! data follow, in which a byte `FF` is always followed by `00` or the number of a restart. It ends with `FF
 //! D9` (ITU-T T.81, 1992, annex B).
 
+use image::metadata::Orientation;
 use std::io::{BufRead, Result};
 
 /// What the segments of a JPEG say.
@@ -15,6 +16,8 @@ pub(super) struct Jpeg {
     pub length: u64,
     /// The header of the first frame.
     pub frame: Option<Frame>,
+    /// How the image is to be turned to be shown.
+    pub orientation: Orientation,
 }
 
 /// The header of a frame.
@@ -29,30 +32,39 @@ pub(super) struct Frame {
 /// Reads the segments up to the end; `None` where the file ends before.
 pub(super) fn scanned(source: &mut impl BufRead) -> Result<Option<Jpeg>> {
     let mut bytes = Bytes { source, at: 0 };
-    let mut frame = None;
+    let (mut frame, mut orientation) = (None, None);
     bytes.skip(2)?;
     let mut marker = bytes.marker()?;
     loop {
         let kind = match marker {
             Marker::Missing => return Ok(None),
-            Marker::Kind(0xd9) => return Ok(Some(Jpeg { length: bytes.at, frame })),
+            Marker::Kind(0xd9) => break,
             Marker::Kind(kind) => kind,
-            Marker::None => break,
+            Marker::None => {
+                bytes.skip(u64::MAX)?;
+                break;
+            }
         };
         if !matches!(kind, 0x01 | 0xd0..=0xd8) {
             let Some(length) = bytes.next_u16()? else { return Ok(None) };
             // It counts itself.
-            let Some(length) = length.checked_sub(2) else { break };
+            let Some(length) = length.checked_sub(2) else {
+                bytes.skip(u64::MAX)?;
+                break;
+            };
             let end = bytes.at + u64::from(length);
             if is_frame(kind) && length >= 6 {
                 frame = frame.or(bytes.frame()?);
+            }
+            if kind == 0xe1 && orientation.is_none() {
+                orientation = Orientation::from_exif_chunk(&bytes.exif(length)?);
             }
             bytes.skip(end - bytes.at)?;
         }
         marker = if kind == 0xda { bytes.marker_after_scan()? } else { bytes.marker()? };
     }
-    bytes.skip(u64::MAX)?;
-    Ok(Some(Jpeg { length: bytes.at, frame }))
+    let orientation = orientation.unwrap_or(Orientation::NoTransforms);
+    Ok(Some(Jpeg { length: bytes.at, frame, orientation }))
 }
 
 /// What stands where a segment should begin.
@@ -115,6 +127,15 @@ impl<R: BufRead> Bytes<'_, R> {
         Ok(size.map(|((height, width), components)| Frame { width, height, components }))
     }
 
+    /// The Exif data of a segment of this length behind its own; nothing where it is of another kind.
+    fn exif(&mut self, length: u16) -> Result<Vec<u8>> {
+        let mut data = Vec::with_capacity(usize::from(length));
+        for _ in 0..length {
+            data.extend(self.next()?);
+        }
+        Ok(data.strip_prefix(b"Exif\0\0").map_or(Vec::new(), <[u8]>::to_vec))
+    }
+
     fn marker(&mut self) -> Result<Marker> {
         match self.next()? {
             None => Ok(Marker::Missing),
@@ -166,6 +187,7 @@ impl<R: BufRead> Bytes<'_, R> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use Orientation::NoTransforms;
     use std::io::BufReader;
 
     /// A frame of 2 x 3 px of one component, a header of four bytes, a scan with data in which `FF` occurs,
@@ -185,7 +207,8 @@ mod tests {
 
     #[test]
     fn only_a_whole_file_has_an_end_whatever_follows_it() {
-        let jpeg = Jpeg { length: 33, frame: Some(Frame { width: 2, height: 3, components: 1 }) };
+        let frame = Some(Frame { width: 2, height: 3, components: 1 });
+        let jpeg = Jpeg { length: 33, frame, orientation: NoTransforms };
         assert_eq!(read(&WHOLE), Some(jpeg));
         assert_eq!(read(&[&WHOLE[..], &[0xff, 0xda, 0, 9]].concat()), Some(jpeg));
         for length in 2..WHOLE.len() {
@@ -197,6 +220,26 @@ mod tests {
     fn of_bytes_that_are_no_segment_the_whole_file_is_the_length() {
         let other = [&WHOLE[..16], &[7; 100]].concat();
         assert_eq!(read(&other).unwrap().length, 116);
-        assert_eq!(read(&[0xff, 0xd8, 0xff, 0xe0, 0, 1, 5]).unwrap(), Jpeg { length: 7, frame: None });
+        let none = Jpeg { length: 7, frame: None, orientation: NoTransforms };
+        assert_eq!(read(&[0xff, 0xd8, 0xff, 0xe0, 0, 1, 5]).unwrap(), none);
+    }
+
+    #[test]
+    fn the_first_exif_data_say_how_the_image_is_to_be_turned() {
+        // A TIFF directory of one entry: orientation, a short.
+        let segment = |orientation: u8, name: &[u8; 6]| {
+            let entry = [0x12, 1, 3, 0, 1, 0, 0, 0, orientation, 0, 0, 0];
+            let data = [&name[..], b"II\x2a\0\x08\0\0\0\x01\0", &entry, &[0; 4]].concat();
+            [&[0xff, 0xe1, 0, data.len() as u8 + 2][..], &data].concat()
+        };
+        let with = |segments: &[Vec<u8>]| [&WHOLE[..2], &segments.concat(), &WHOLE[2..]].concat();
+        let turned = |segments: &[Vec<u8>]| read(&with(segments)).unwrap().orientation;
+        let exif = |orientation| segment(orientation, b"Exif\0\0");
+        assert_eq!(turned(&[exif(6)]), Orientation::Rotate90);
+        assert_eq!(turned(&[segment(3, b"http:/"), exif(8), exif(6)]), Orientation::Rotate270);
+        assert_eq!(turned(&[exif(1)]), NoTransforms);
+        assert_eq!(turned(&[exif(77)]), NoTransforms);
+        assert_eq!(turned(&[]), NoTransforms);
+        assert_eq!(read(&with(&[exif(6)])).unwrap().length, 33 + exif(6).len() as u64);
     }
 }

@@ -40,6 +40,7 @@ pub mod scene_tables;
 pub mod shown;
 pub mod spatial;
 pub mod table;
+mod tiff;
 
 pub use atomic::{write_atomically, write_together};
 #[cfg(feature = "photo")]

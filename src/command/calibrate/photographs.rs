@@ -56,6 +56,8 @@ struct Seen {
     light: f64,
     /// The overlay's path in the output folder, or why it could not be written.
     overlay: Option<Result<String, String>>,
+    /// What of its file is not read.
+    not_read: Option<&'static str>,
 }
 
 pub(super) fn run(arguments: &Arguments, board: &BoardSpec, photos: &[PathBuf]) -> Result<Exit, Failure> {
@@ -87,11 +89,14 @@ impl Reading<'_> {
     ) -> Result<Observed, Failure> {
         let memory = Memory::new(self.memory);
         let seen = each(photos, |index, path| {
-            let needed = image_extent(path)?.memory_to_detect();
-            let _taken = memory.take(path, needed).map_err(ImageError::Input)?;
-            see(path, index, board, self.overlays)
+            let extent = image_extent(path)?;
+            let _taken = memory.take(path, extent.memory_to_detect()).map_err(ImageError::Input)?;
+            let seen = see(path, index, board, self.overlays)?;
+            Ok(Seen { not_read: extent.left_out(), ..seen })
         });
-        let observed = observed(self.image_size, board, photos, seen)?;
+        let notes = not_read(photos, &seen);
+        let mut observed = observed(self.image_size, board, photos, seen)?;
+        observed.notes.extend(notes);
         for LeftOut { name, reason } in &observed.left_out {
             warn(&format!("left out: {name}: {reason}"));
         }
@@ -134,7 +139,22 @@ fn see(path: &Path, index: usize, board: &BoardSpec, out: Option<&Path>) -> Resu
         written.map(|()| name).map_err(|error| error.to_string())
     });
     let light = marks.as_ref().map_or(0.0, |marks| light(&photo, marks));
-    Ok(Seen { size: photo.size(), marks, light, overlay })
+    Ok(Seen { size: photo.size(), marks, light, overlay, not_read: None })
+}
+
+/// What of the files is not read: a sentence for each such thing, which names the first photograph.
+fn not_read(photos: &[PathBuf], seen: &[Result<Seen, ImageError>]) -> Vec<String> {
+    let mut by_what: BTreeMap<&str, Vec<&PathBuf>> = BTreeMap::new();
+    for (path, seen) in photos.iter().zip(seen.iter()) {
+        if let Some(what) = seen.as_ref().ok().and_then(|seen| seen.not_read) {
+            by_what.entry(what).or_default().push(path);
+        }
+    }
+    let sentence = |(what, paths): (&str, Vec<&PathBuf>)| match paths[..] {
+        [path] => format!("{} {what}", path.shown()),
+        _ => format!("{} photographs, {} the first of them: each {what}", paths.len(), paths[0].shown()),
+    };
+    by_what.into_iter().map(sentence).collect()
 }
 
 /// Mean level of the upright rectangle that holds all marks.
