@@ -82,8 +82,8 @@ pub struct Compared {
     pub hold_out_px: Option<f64>,
     /// Squared error of each fold, for the comparison of two candidates.
     folds: Vec<f64>,
-    /// Whether it is behind all that are not: a coefficient lies where the model is not defined, or there are as
-    /// many unknowns as measurements, so that it fits whatever was measured.
+    /// Whether it is behind all that are not: a coefficient lies where the model is not defined, or there are
+    /// as many unknowns as measurements, so that it fits whatever was measured.
     is_behind: bool,
     /// Correlation of a mark's residual with the next one's: 0 for noise.
     pub correlation: f64,
@@ -113,8 +113,9 @@ const NO_EVIDENCE: f64 = 2.0;
 /// Fits every candidate. The first of the result is the choice: of those whose criterion of Schwarz lies
 /// within 2 of the least, the one that best predicts views that were left out (in five parts of the views in
 /// turn). The others follow by their criterion; behind them those whose coefficients lie where their model is
-/// not defined, or that have as many unknowns as there are measurements. Candidates that the views do not determine come with their reason. Views whose marks do not
-/// span a plane tell nothing and take no part, as long as half of the views do.
+/// not defined, or that have as many unknowns as there are measurements. Candidates that the views do not
+/// determine come with their reason. Views whose marks do not span a plane tell nothing and take no part, as
+/// long as half of the views do.
 ///
 /// ```
 /// use calibench::calibrate::{Candidate, Settings, compare_models};

@@ -100,9 +100,10 @@ pub(super) fn refuse_if_open(
         let rise = (other.equations.cost - minimum.equations.cost) / problem.variance;
         if rise < FOCAL_RISE {
             let why = format!(
-                "fx {:.5} fits as {:.5} does: the cost rises by {rise:.1} variances only, and {FOCAL_RISE:.0} are needed to rule chance out",
+                "fx {:.5} fits as {:.5} does: the cost rises by {:.1} variances only, and {FOCAL_RISE:.0} are needed to rule chance out",
                 factor * camera.fx,
-                camera.fx
+                camera.fx,
+                rise.max(0.0)
             );
             return Err(not_identifiable(vec![Unknown::FocalLength, Unknown::Distance], why));
         }

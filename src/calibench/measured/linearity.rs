@@ -2,8 +2,8 @@
 //! ends elsewhere.
 //!
 //! The profile of the cost holds one parameter two standard deviations away and refits the rest: linear
-//! theory has it rise by `2^2` variances, and where it rises by `tau^2` the half-width of the interval is `2 /
-//! tau` times as large (Bates & Watts 1988, section 6.1; [`crate::calibrate`] asks the same).
+//! theory has it rise by `2^2` variances, and where it rises by `tau^2` the half-width of the interval is `2
+//! / tau` times as large (Bates & Watts 1988, section 6.1; [`crate::calibrate`] asks the same).
 
 use super::descent::{Minimum, descend};
 use super::equations::{Inverse, Reduced, Step};
@@ -208,7 +208,8 @@ mod tests {
 
     #[test]
     fn ratios_are_those_of_calibrations_with_the_parameter_held_and_marks_that_move() {
-        // From afar the distance is told by little, and the focal length with it: its inverse is known evenly.
+        // From afar the distance is told by little, and the focal length with it: its inverse is known
+        // evenly.
         let camera = Camera::pinhole(40_000.0, 40_100.0, 320.0, 240.0).into();
         let scene = Scene { camera, cam_from_target: poses(6, 15_000.0), ..Scene::cube() };
         let settings =

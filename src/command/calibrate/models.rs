@@ -109,7 +109,10 @@ pub(super) fn freedoms(fit: &Fit, settings: &Settings) -> Vec<String> {
              themselves{narrow}"
         )];
     }
-    found.iter().map(|freedom| in_words(freedom, settings)).collect()
+    // A held coefficient that a richer lens of the same model has is tried as both.
+    let mut told: Vec<String> = found.iter().map(|freedom| in_words(freedom, settings)).collect();
+    told.dedup();
+    told
 }
 
 /// With fewer marks a view than this, poses take up what residuals of neighbours would share.
@@ -131,7 +134,9 @@ fn better_model(fit: &Fit, settings: &Settings) -> Option<String> {
     let fitted = usual(settings).into_iter().filter_map(|candidate| {
         let other = calibrate_lens(&fit.views, &candidate.settings(settings)).ok()?;
         let gain = own - criterion(&other);
-        (gain > STRONG && other.rmse_px < fit.calibration.rmse_px).then_some((gain, candidate, other))
+        // As many unknowns as measurements explain whatever was measured.
+        let is_better = other.degrees_of_freedom > 0 && other.rmse_px < fit.calibration.rmse_px;
+        (gain > STRONG && is_better).then_some((gain, candidate, other))
     });
     let (gain, candidate, other) = fitted.max_by(|(a, ..), (b, ..)| a.total_cmp(b))?;
     let coefficients: Vec<&str> = candidate.coefficients.iter().map(|parameter| parameter.name()).collect();
