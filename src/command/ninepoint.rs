@@ -62,7 +62,7 @@ fn ninepoint(arguments: &Arguments) -> Result<Exit, String> {
     let memory = Memory::new(arguments.memory);
     let _taken =
         memory.take(&arguments.image, extent.memory_to_detect()).map_err(|error| error.to_string())?;
-    if let Some(what) = extent.left_out() {
+    for what in extent.left_out() {
         warn(&format!("{} {what}", arguments.image.shown()));
     }
     let image = read_image(&arguments.image).map_err(|error| error.to_string())?;

@@ -219,7 +219,7 @@ impl Work<'_> {
         let _taken = memory.take(photo, extent.memory_to_correct()).map_err(|e| wrong(e.to_string()))?;
         let image = read_channels(photo).map_err(|error| wrong(error.to_string()))?;
         refuse_other_levels(photo, &image).map_err(wrong)?;
-        if let Some(what) = extent.left_out() {
+        for what in extent.left_out() {
             warn(&format!("{} {what}", photo.shown()));
         }
         let arguments = self.arguments;

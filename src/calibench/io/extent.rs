@@ -14,7 +14,6 @@ use std::path::Path;
 
 const TURNED: &str = "asks to be shown turned or mirrored (Exif): it is read as it is stored, and so are its pixel coordinates";
 const MORE: &str = "holds more than one image: the first is read";
-const TURNED_AND_MORE: &str = "asks to be shown turned or mirrored (Exif) and holds more than one image: the first is read, as it is stored";
 
 /// The size of an image, known before it is decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,14 +71,10 @@ impl Extent {
         })
     }
 
-    /// What of the file is left out where it is read, in words; `None` where that is nothing.
-    pub fn left_out(&self) -> Option<&'static str> {
-        match (self.is_turned, self.has_more) {
-            (false, false) => None,
-            (true, false) => Some(TURNED),
-            (false, true) => Some(MORE),
-            (true, true) => Some(TURNED_AND_MORE),
-        }
+    /// What of the file is left out where it is read, in words.
+    pub fn left_out(&self) -> impl Iterator<Item = &'static str> {
+        let told = [(self.is_turned, TURNED), (self.has_more, MORE)];
+        told.into_iter().filter_map(|(is_left_out, what)| is_left_out.then_some(what))
     }
 
     /// Memory that reading the photograph as grey, finding its marks and drawing them in takes at most: the

@@ -32,39 +32,33 @@ pub(super) struct Frame {
 /// Reads the segments up to the end; `None` where the file ends before.
 pub(super) fn scanned(source: &mut impl BufRead) -> Result<Option<Jpeg>> {
     let mut bytes = Bytes { source, at: 0 };
-    let (mut frame, mut orientation) = (None, None);
+    let mut jpeg = Jpeg { length: 0, frame: None, orientation: Orientation::NoTransforms };
     bytes.skip(2)?;
     let mut marker = bytes.marker()?;
     loop {
         let kind = match marker {
             Marker::Missing => return Ok(None),
-            Marker::Kind(0xd9) => break,
+            Marker::Kind(0xd9) => return Ok(Some(Jpeg { length: bytes.at, ..jpeg })),
             Marker::Kind(kind) => kind,
-            Marker::None => {
-                bytes.skip(u64::MAX)?;
-                break;
-            }
+            Marker::None => break,
         };
         if !matches!(kind, 0x01 | 0xd0..=0xd8) {
             let Some(length) = bytes.next_u16()? else { return Ok(None) };
             // It counts itself.
-            let Some(length) = length.checked_sub(2) else {
-                bytes.skip(u64::MAX)?;
-                break;
-            };
+            let Some(length) = length.checked_sub(2) else { break };
             let end = bytes.at + u64::from(length);
             if is_frame(kind) && length >= 6 {
-                frame = frame.or(bytes.frame()?);
+                jpeg.frame = jpeg.frame.or(bytes.frame()?);
             }
-            if kind == 0xe1 && orientation.is_none() {
-                orientation = Orientation::from_exif_chunk(&bytes.exif(length)?);
+            if kind == 0xe1 && jpeg.orientation == Orientation::NoTransforms {
+                jpeg.orientation = bytes.orientation(length)?;
             }
             bytes.skip(end - bytes.at)?;
         }
         marker = if kind == 0xda { bytes.marker_after_scan()? } else { bytes.marker()? };
     }
-    let orientation = orientation.unwrap_or(Orientation::NoTransforms);
-    Ok(Some(Jpeg { length: bytes.at, frame, orientation }))
+    bytes.skip(u64::MAX)?;
+    Ok(Some(Jpeg { length: bytes.at, ..jpeg }))
 }
 
 /// What stands where a segment should begin.
@@ -127,13 +121,14 @@ impl<R: BufRead> Bytes<'_, R> {
         Ok(size.map(|((height, width), components)| Frame { width, height, components }))
     }
 
-    /// The Exif data of a segment of this length behind its own; nothing where it is of another kind.
-    fn exif(&mut self, length: u16) -> Result<Vec<u8>> {
+    /// What a segment with so many bytes behind its length asks for, if it is one of Exif data.
+    fn orientation(&mut self, length: u16) -> Result<Orientation> {
         let mut data = Vec::with_capacity(usize::from(length));
         for _ in 0..length {
             data.extend(self.next()?);
         }
-        Ok(data.strip_prefix(b"Exif\0\0").map_or(Vec::new(), <[u8]>::to_vec))
+        let exif = data.strip_prefix(b"Exif\0\0");
+        Ok(exif.and_then(Orientation::from_exif_chunk).unwrap_or(Orientation::NoTransforms))
     }
 
     fn marker(&mut self) -> Result<Marker> {

@@ -23,7 +23,8 @@ const LOWER: f64 = 1e-3;
 /// Better minima that profiles may meet on their way before the search is left as it is.
 const BETTER_BY_PROFILE: usize = 5;
 
-/// A minimum around which no profile meets a lower cost, and the parameters whose deviations mislead.
+/// A minimum around which no profile meets a lower cost, and the parameters whose deviations mislead: among
+/// them, where a search from such a cost ends no lower, those whose profile does not rise.
 ///
 /// # Errors
 /// As [`settled`].
@@ -33,10 +34,10 @@ pub(super) fn checked<'a>(
     mut minimum: Minimum,
 ) -> Result<(Problem<'a>, Minimum, Vec<Warning>), MeasuredError> {
     for _ in 0..BETTER_BY_PROFILE {
-        let lower = match Profile::of(&problem, &minimum).map(|profile| profile.misleading()) {
-            None => return Ok((problem, minimum, Vec::new())),
-            Some(Ok(warnings)) => return Ok((problem, minimum, warnings)),
-            Some(Err(lower)) => lower,
+        let Some(profile) = Profile::of(&problem, &minimum) else { break };
+        let lower = match profile.misleading(Err) {
+            Ok(warnings) => return Ok((problem, minimum, warnings)),
+            Err(lower) => lower,
         };
         let (next_problem, next) = settled(problem, noise, *lower)?;
         if next.equations.cost.is_nan() || next.equations.cost >= minimum.equations.cost {
@@ -45,7 +46,8 @@ pub(super) fn checked<'a>(
         let iterations = minimum.iterations + next.iterations;
         (problem, minimum) = (next_problem, Minimum { iterations, ..next });
     }
-    Ok((problem, minimum, Vec::new()))
+    let open = Profile::of(&problem, &minimum).and_then(|profile| profile.misleading(|_| Ok(0.0)).ok());
+    Ok((problem, minimum, open.unwrap_or_default()))
 }
 
 /// The profile around a minimum.
@@ -68,8 +70,12 @@ impl<'a, 'b> Profile<'a, 'b> {
         Some(Profile { problem, minimum, reduced, inverse })
     }
 
-    /// The parameters whose deviations mislead, or a state of lower cost if one is met.
-    fn misleading(&self) -> Result<Vec<Warning>, Box<State>> {
+    /// The parameters whose deviations mislead; `at_lower` says what `tau` is where a state of lower cost is
+    /// met, or ends the search with it.
+    fn misleading(
+        &self,
+        at_lower: impl Fn(Box<State>) -> Result<f64, Box<State>>,
+    ) -> Result<Vec<Warning>, Box<State>> {
         let mut found = Vec::new();
         if self.rises_straight() {
             return Ok(found);
@@ -77,7 +83,7 @@ impl<'a, 'b> Profile<'a, 'b> {
         for (row, parameter) in self.problem.free.iter().enumerate() {
             let mut ratios = [1.0; 2];
             for (ratio, side) in ratios.iter_mut().zip([-CHECKED_AT, CHECKED_AT]) {
-                *ratio = CHECKED_AT / self.tau(row, parameter, side)?;
+                *ratio = CHECKED_AT / self.tau(row, parameter, side).or_else(&at_lower)?;
             }
             // A ratio that is no number counts as far off.
             if !ratios.iter().all(|r| (r - 1.0).abs() <= TOLERATED) {
@@ -102,7 +108,8 @@ impl<'a, 'b> Profile<'a, 'b> {
         })
     }
 
-    /// `sqrt(rise)` in variances with a parameter held so many deviations away; infinite where no camera is.
+    /// `sqrt(rise)` in variances with a parameter held so many deviations away; infinite where no camera is,
+    /// and a state of lower cost if one is met.
     fn tau(&self, row: usize, parameter: Parameter, deviations: f64) -> Result<f64, Box<State>> {
         let holding = self.holding(parameter);
         // Marks follow nearly to first order: the large equations that have their positions come last.

@@ -57,7 +57,7 @@ struct Seen {
     /// The overlay's path in the output folder, or why it could not be written.
     overlay: Option<Result<String, String>>,
     /// What of its file is not read.
-    not_read: Option<&'static str>,
+    not_read: Vec<&'static str>,
 }
 
 pub(super) fn run(arguments: &Arguments, board: &BoardSpec, photos: &[PathBuf]) -> Result<Exit, Failure> {
@@ -92,7 +92,7 @@ impl Reading<'_> {
             let extent = image_extent(path)?;
             let _taken = memory.take(path, extent.memory_to_detect()).map_err(ImageError::Input)?;
             let seen = see(path, index, board, self.overlays)?;
-            Ok(Seen { not_read: extent.left_out(), ..seen })
+            Ok(Seen { not_read: extent.left_out().collect(), ..seen })
         });
         let notes = not_read(photos, &seen);
         let mut observed = observed(self.image_size, board, photos, seen)?;
@@ -139,14 +139,14 @@ fn see(path: &Path, index: usize, board: &BoardSpec, out: Option<&Path>) -> Resu
         written.map(|()| name).map_err(|error| error.to_string())
     });
     let light = marks.as_ref().map_or(0.0, |marks| light(&photo, marks));
-    Ok(Seen { size: photo.size(), marks, light, overlay, not_read: None })
+    Ok(Seen { size: photo.size(), marks, light, overlay, not_read: Vec::new() })
 }
 
 /// What of the files is not read: a sentence for each such thing, which names the first photograph.
 fn not_read(photos: &[PathBuf], seen: &[Result<Seen, ImageError>]) -> Vec<String> {
     let mut by_what: BTreeMap<&str, Vec<&PathBuf>> = BTreeMap::new();
     for (path, seen) in photos.iter().zip(seen.iter()) {
-        if let Some(what) = seen.as_ref().ok().and_then(|seen| seen.not_read) {
+        for what in seen.iter().flat_map(|seen| &seen.not_read) {
             by_what.entry(what).or_default().push(path);
         }
     }
