@@ -1,4 +1,5 @@
-//! Which settings can no camera meet? Told before any mark is looked at, and alike by every estimator.
+//! Which settings can no camera meet, and which views tell no pose? Told before any camera is looked for, and
+//! alike by every estimator.
 
 use super::{CalibrationError, Loss, Prior, Role, Settings};
 use crate::board::View;
@@ -73,8 +74,8 @@ fn check_parameters(settings: &Settings) -> Result<(), CalibrationError> {
 }
 
 /// Whether a view tells its pose. Marks on a line do not, and with but one beside the line they tell it as
-/// badly: such a view is refused. The homography of the marks to themselves says it of
-/// the board's side; of pixels it is no question beyond a pinhole.
+/// badly: such a view is refused. The homography of the marks to themselves says it of the board's side; of
+/// pixels it is no question beyond a pinhole.
 pub(super) fn spans_a_plane(view: &View) -> Result<(), HomographyError> {
     Homography::fit(view.points(), view.points()).map(drop)
 }
