@@ -437,6 +437,20 @@ fn a_held_value_that_the_marks_contradict_is_told() {
             }
         }
     }
+    // Both focal lengths wrong by one factor, which distances make up for.
+    for (factor, is_told) in [(1.0, false), (1.02, true)] {
+        let [fx, fy] = [truth.fx, truth.fy].map(|length| factor * length);
+        let held = Settings::standard().hold(Parameter::Fx, fx).hold(Parameter::Fy, fy);
+        let known =
+            Settings::standard().with_prior(Parameter::Fx, fx, 1e-7).with_prior(Parameter::Fy, fy, 1e-7);
+        for settings in [held, known] {
+            let both = [Parameter::Fx, Parameter::Fy];
+            let warnings = calibrate_lens(&views, &settings).unwrap().warnings;
+            let of_both =
+                |w: &Warning| matches!(w, Warning::LeftOut { parameters, .. } if *parameters == both);
+            assert_eq!(warnings.iter().any(of_both), is_told, "{factor} {warnings:?}");
+        }
+    }
     // A coefficient that is known to be 0.
     let zero = Settings::standard().with_prior(Parameter::K1, 0.0, 1e-9);
     let warnings = calibrate_lens(&views, &zero).unwrap().warnings;

@@ -7,21 +7,42 @@
 //! and the residuals' degrees of freedom. One shortcoming of a model looks like many: of what is asked for,
 //! the least likely is named first, and the others only for what they explain beside it.
 
-use super::any_lens::{Falls, Freedoms};
+use super::any_lens::Falls;
 use super::chance::fisher_tail;
 use super::prior::is_held;
 use super::{Board, LensCalibration, Loss, Prior, Role, Settings, Warning};
 use crate::board::View;
-use crate::camera::Parameter;
+use crate::camera::{FreeParameters, Parameter};
+
+/// What may be free besides: parameters, and the board's two bows and twist.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Freedoms {
+    pub parameters: FreeParameters,
+    pub shape: bool,
+}
+
+impl Freedoms {
+    /// Nothing besides.
+    pub const NONE: Freedoms = Freedoms { parameters: FreeParameters::NONE, shape: false };
+}
+
+/// What the cost of a minimum would fall by with more freedoms.
+pub(crate) trait CostFalls {
+    /// With some of them; `None` where the marks do not determine them.
+    fn fall(&self, more: Freedoms) -> Option<f64>;
+
+    /// Two bows and a twist with which it would be least, with these parameters more; `None` of marks that
+    /// are not a board's.
+    fn shape(&self, parameters: FreeParameters) -> Option<[f64; DEFORMATIONS]>;
+}
 
 /// Numbers that come together.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Group {
-    /// What most lenses have, or the standard choice leaves out.
-    Parameters(&'static [Parameter]),
-    /// One that is held at a value which is not 0, or known too well for the marks to have a say: that they
-    /// contradict it is told as of one that is known beforehand.
-    Value(Parameter),
+    /// What most lenses have, or the standard choice leaves out; or what is held at values that are not 0, or
+    /// known too well for the marks to have a say: that they contradict it is told as of one that is known
+    /// beforehand.
+    Parameters(FreeParameters),
     /// So many of two bows and a twist.
     Shape {
         /// The others are estimated already.
@@ -30,10 +51,24 @@ enum Group {
 }
 
 impl Group {
+    fn of(parameters: &[Parameter]) -> Group {
+        Group::Parameters(FreeParameters::of(parameters))
+    }
+
+    /// What of it others do not have; `None` where that is nothing.
+    fn beyond(self, others: Freedoms) -> Option<Group> {
+        match self {
+            Group::Parameters(all) => {
+                let new = others.parameters.iter().fold(all, FreeParameters::without);
+                (!new.is_empty()).then_some(Group::Parameters(new))
+            }
+            Group::Shape { .. } => Some(self),
+        }
+    }
+
     fn len(self) -> usize {
         match self {
-            Group::Parameters(list) => list.len(),
-            Group::Value(_) => 1,
+            Group::Parameters(set) => set.len(),
             Group::Shape { more } => more,
         }
     }
@@ -41,18 +76,16 @@ impl Group {
     /// Other freedoms and this one.
     fn besides(self, others: Freedoms) -> Freedoms {
         match self {
-            Group::Parameters(list) => {
-                let parameters = list.iter().fold(others.parameters, |all, &p| all.with(p));
-                Freedoms { parameters, ..others }
+            Group::Parameters(set) => {
+                Freedoms { parameters: set.iter().fold(others.parameters, FreeParameters::with), ..others }
             }
-            Group::Value(parameter) => Freedoms { parameters: others.parameters.with(parameter), ..others },
             Group::Shape { .. } => Freedoms { shape: true, ..others },
         }
     }
 }
 
 /// Of a board that is not flat.
-pub(super) const DEFORMATIONS: usize = 3;
+pub(crate) const DEFORMATIONS: usize = 3;
 
 /// Parameters that are looked for, each group by itself.
 const ASKED: [&[Parameter]; 4] =
@@ -73,19 +106,45 @@ fn undecided(settings: &Settings) -> Vec<Group> {
     let is_value = |p: &Parameter| matches!(settings.role(*p), Role::Held(value) if value != 0.0);
     let is_alone = |p: &Parameter| !asked.iter().any(|list| list.contains(p));
     let values: Vec<Parameter> = model.parameters().filter(is_value).filter(is_alone).collect();
-    let parameters = asked.into_iter().map(Group::Parameters).chain(values.into_iter().map(Group::Value));
     let more = DEFORMATIONS - settings.board.bend().map_or(0, |bend| bend.deformations);
-    parameters.chain((more > 0).then_some(Group::Shape { more })).collect()
+    let shape = (more > 0).then_some(Group::Shape { more });
+    asked.into_iter().map(Group::of).chain(of_values(&values)).chain(shape).collect()
+}
+
+/// Values that are held: each, both focal lengths, which distances make up for where they are wrong by one
+/// factor, and all together.
+fn of_values(values: &[Parameter]) -> Vec<Group> {
+    let mut groups: Vec<Group> = values.iter().map(|&value| Group::of(&[value])).collect();
+    let focal = [Parameter::Fx, Parameter::Fy];
+    let together = [&focal[..], values].map(Group::of);
+    let is_held = [focal.iter().all(|p| values.contains(p)), values.len() > 1];
+    for (group, is_held) in together.into_iter().zip(is_held) {
+        if is_held && !groups.contains(&group) {
+            groups.push(group);
+        }
+    }
+    groups
 }
 
 /// A warning for each group that the marks of a calibration ask for.
 pub(super) fn asked_for(views: &[View], settings: &Settings, found: &LensCalibration) -> Vec<Warning> {
+    asked(settings, found, true, |settings, found, more| Falls::of(views, settings, found, more))
+}
+
+/// The same of any marks, a board's or others: `falls` gives what the cost of a result would fall by, with
+/// what is as good as held no longer among its free parameters and priors.
+pub(crate) fn asked<F: CostFalls>(
+    settings: &Settings,
+    found: &LensCalibration,
+    are_of_board: bool,
+    falls: impl FnOnce(&Settings, &LensCalibration, Freedoms) -> Option<F>,
+) -> Vec<Warning> {
     if settings.loss != Loss::Squares || !found.termination.is_minimum() {
         return Vec::new();
     }
     match held_by_priors(settings, found) {
-        Some((settings, found)) => asked_of_held(views, &settings, &found),
-        None => asked_of_held(views, settings, found),
+        Some((settings, found)) => asked_of_held(&settings, &found, are_of_board, falls),
+        None => asked_of_held(settings, found, are_of_board, falls),
     }
 }
 
@@ -117,11 +176,17 @@ fn held_by_priors(settings: &Settings, found: &LensCalibration) -> Option<(Setti
     Some((settings, found))
 }
 
-fn asked_of_held(views: &[View], settings: &Settings, found: &LensCalibration) -> Vec<Warning> {
-    let undecided = undecided(settings);
+fn asked_of_held<F: CostFalls>(
+    settings: &Settings,
+    found: &LensCalibration,
+    are_of_board: bool,
+    falls: impl FnOnce(&Settings, &LensCalibration, Freedoms) -> Option<F>,
+) -> Vec<Warning> {
+    let mut undecided = undecided(settings);
+    undecided.retain(|group| are_of_board || !matches!(group, Group::Shape { .. }));
     let all = undecided.iter().fold(Freedoms::NONE, |all, group| group.besides(all));
     let variance = found.sigma_px * found.sigma_px;
-    match Falls::of(views, settings, found, all) {
+    match falls(settings, found, all) {
         Some(falls) => named(&falls, undecided, variance, found.degrees_of_freedom),
         None => Vec::new(),
     }
@@ -135,11 +200,12 @@ struct Told {
     probability: f64,
 }
 
-fn named(falls: &Falls, mut undecided: Vec<Group>, variance: f64, freedom: usize) -> Vec<Warning> {
+fn named(falls: &impl CostFalls, mut undecided: Vec<Group>, variance: f64, freedom: usize) -> Vec<Warning> {
     let (mut with, mut before) = (Freedoms::NONE, 0.0);
     let mut told = Vec::new();
     loop {
-        let asked = |&group: &Group| {
+        let asked = |group: &Group| {
+            let group = group.beyond(with)?;
             let fall = (falls.fall(group.besides(with))? - before) / variance;
             let below = freedom.checked_sub(group.len()).filter(|&below| below > 0)?;
             let probability = fisher_tail(fall / group.len() as f64, group.len(), below);
@@ -151,7 +217,7 @@ fn named(falls: &Falls, mut undecided: Vec<Group>, variance: f64, freedom: usize
         };
         let Some(next) = undecided.iter().filter_map(asked).min_by(less_likely) else { break };
         (with, before) = (next.group.besides(with), before + next.fall * variance);
-        undecided.retain(|group| *group != next.group);
+        undecided.retain(|group| group.beyond(with).is_some() && *group != next.group);
         told.push(next);
     }
     let shape = falls.shape(with.parameters).unwrap_or_default();
@@ -160,8 +226,7 @@ fn named(falls: &Falls, mut undecided: Vec<Group>, variance: f64, freedom: usize
 
 fn warning(Told { group, fall, probability }: Told, [bow_x, bow_y, twist]: [f64; DEFORMATIONS]) -> Warning {
     match group {
-        Group::Parameters(list) => Warning::LeftOut { parameters: list.to_vec(), fall, probability },
-        Group::Value(parameter) => Warning::LeftOut { parameters: vec![parameter], fall, probability },
+        Group::Parameters(set) => Warning::LeftOut { parameters: set.iter().collect(), fall, probability },
         Group::Shape { .. } => Warning::NotFlat { bow_x, bow_y, twist, fall, probability },
     }
 }
@@ -174,7 +239,7 @@ mod tests {
     #[test]
     fn what_is_decided_on_is_not_asked() {
         use Parameter::{Cx, Cy, K3, P1, P2, Skew};
-        let [tangential, radial, centre, skew] = ASKED.map(Group::Parameters);
+        let [tangential, radial, centre, skew] = ASKED.map(Group::of);
         let shape = Group::Shape { more: 3 };
         let standard = Settings::standard();
         assert_eq!(undecided(&standard), [tangential, radial, skew, shape]);
@@ -186,9 +251,14 @@ mod tests {
         assert_eq!(undecided(&bowed), [Group::Shape { more: 1 }]);
         assert!(undecided(&decided.with_board(Board::Bent { standard_deviation })).is_empty());
         // A value that is held is one that somebody believes in.
-        let k2 = standard.clone().hold(Parameter::K2, 0.07).hold(Parameter::Fx, 600.0);
-        let [fx, k2_alone] = [Parameter::Fx, Parameter::K2].map(Group::Value);
-        assert_eq!(undecided(&k2), [tangential, radial, skew, fx, k2_alone, shape]);
+        let k2 = standard.clone().hold(Parameter::K2, 0.07);
+        let [fx, fy, k2_alone] = [Parameter::Fx, Parameter::Fy, Parameter::K2].map(|p| Group::of(&[p]));
+        assert_eq!(undecided(&k2), [tangential, radial, skew, k2_alone, shape]);
+        // Distances make up for focal lengths that are both wrong.
+        let focal = k2.hold(Parameter::Fx, 600.0).hold(Parameter::Fy, 600.0);
+        let both = Group::of(&[Parameter::Fx, Parameter::Fy]);
+        let all = Group::of(&[Parameter::Fx, Parameter::Fy, Parameter::K2]);
+        assert_eq!(undecided(&focal), [tangential, radial, skew, fx, fy, k2_alone, both, all, shape]);
         // A lens is asked for nothing that it does not have.
         assert_eq!(undecided(&Settings::of_model(Model::KannalaBrandt)), [skew, shape]);
         // What a wrong value of the principal point does is not to be put down to p1 and p2.

@@ -65,6 +65,7 @@ pub use error::CalibrationError;
 pub use estimate::calibrate;
 pub use in_words::in_words;
 pub use intervals::ProfileInterval;
+pub(crate) use left_out::{CostFalls, DEFORMATIONS, Freedoms, asked};
 pub use lens::{LensCalibration, calibrate_lens};
 pub use loss::Loss;
 pub use normal::information;

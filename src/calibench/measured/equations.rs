@@ -114,6 +114,22 @@ impl Equations {
         Some(Reduced { matrix, gradient, factors })
     }
 
+    /// Matrix and gradient of the first shared unknowns without the others and the poses; `None` where those
+    /// are undetermined.
+    pub fn of_first(&self, count: usize) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let Reduced { matrix, gradient, .. } = self.reduced(0.0)?;
+        let others = matrix.nrows() - count;
+        let (own, of_own) = (matrix.view((0, 0), (count, count)).into_owned(), gradient.rows(0, count));
+        if others == 0 {
+            return Some((own, of_own.into_owned()));
+        }
+        let factor = matrix.view((count, count), (others, others)).into_owned().cholesky()?;
+        let coupling = matrix.view((0, count), (count, others));
+        let follow = factor.solve(&coupling.transpose());
+        let of_others = gradient.rows(count, others);
+        Some((own - coupling * &follow, of_own - follow.transpose() * of_others))
+    }
+
     /// The step of `H + damping diag(H)`; `None` where that is not positive definite.
     pub fn solve(&self, damping: f64) -> Option<Step> {
         let reduced = self.reduced(damping)?;

@@ -7,8 +7,8 @@ use super::problem::{Problem, State};
 use super::report::{MeasuredCalibration, report};
 use super::resection::{IN_PLANE, IN_SPACE};
 use super::shape::{FLAT, NEARLY_FLAT, Shape};
-use super::{MeasuredError, MeasuredTarget, MeasuredView, linearity, plane, rivals, space};
-use crate::calibrate::{Board, CalibrationError, Loss, Prior, Settings, Termination, Warning, domain};
+use super::{MeasuredError, MeasuredTarget, MeasuredView, left_out, linearity, plane, rivals, space};
+use crate::calibrate::{Board, CalibrationError, Loss, Prior, Settings, Termination, Warning, asked, domain};
 use crate::camera::Parameter;
 
 /// Most marks with a standard deviation that may be seen: 1500 coordinates, equations of 18 MB, a
@@ -99,10 +99,13 @@ pub fn calibrate_measured(
     let (minima, starts) = space::minima(&problem, starts);
     let (problem, minimum, others) = best(problem, noise, minima)?;
     let (problem, minimum, not_linear) = linearity::checked(problem, noise, minimum)?;
-    let least = minimum.equations.cost;
-    let mut found = report(&problem, minimum, starts, target, noise, views)?;
-    let rival = rivals::rival(&problem, &found.calibration, least, &others);
-    found.calibration.warnings.extend(not_linear.into_iter().chain(ambiguous).chain(rival));
+    let mut found = report(&problem, &minimum, starts, target, noise, views)?;
+    let rival = rivals::rival(&problem, &found.calibration, minimum.equations.cost, &others);
+    let left_out = asked(settings, &found.calibration, false, |_, found, more| {
+        left_out::Falls::of(&problem, &minimum, found, more)
+    });
+    let of_cost = not_linear.into_iter().chain(ambiguous).chain(rival);
+    found.calibration.warnings.extend(of_cost.chain(left_out));
     Ok(found)
 }
 

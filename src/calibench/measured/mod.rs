@@ -37,6 +37,7 @@ mod equations;
 mod error;
 mod estimate;
 mod identifiability;
+mod left_out;
 mod lens;
 mod linearity;
 mod noise;

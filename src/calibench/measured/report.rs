@@ -136,7 +136,7 @@ const TOLD: f64 = 1e-6;
 /// The result at a minimum.
 pub(super) fn report(
     problem: &Problem<'_>,
-    minimum: Minimum,
+    minimum: &Minimum,
     starts: usize,
     target: &MeasuredTarget,
     noise: Noise,
@@ -149,7 +149,7 @@ pub(super) fn report(
         why: "the normal equations are singular".into(),
     };
     let inverse = minimum.equations.inverse().ok_or_else(singular)?;
-    let left = Left::of(problem, &minimum, &inverse).ok_or(MeasuredError::NoStart)?;
+    let left = Left::of(problem, minimum, &inverse).ok_or(MeasuredError::NoStart)?;
     // Under priors the noise is settled to a part of 1e-6; without, the residuals tell it now.
     let variance = match noise {
         Noise::Known { .. } => problem.variance,
@@ -159,12 +159,12 @@ pub(super) fn report(
             return Err(MeasuredError::NoFreedom { coordinates, freedom: left.moments.sum });
         }
     };
-    let covariance = covariance(problem, &minimum, &inverse, variance);
+    let covariance = covariance(problem, minimum, &inverse, variance);
     let fx = minimum.state.camera.fx;
     let relative = covariance.standard_deviation(Parameter::Fx).map_or(0.0, |sd| sd / fx);
-    identifiability::refuse_if_open(problem, &minimum, relative)?;
-    let marks = marks(problem, &minimum, &inverse, target);
-    let credibility = credibility(problem, &minimum, &inverse);
+    identifiability::refuse_if_open(problem, minimum, relative)?;
+    let marks = marks(problem, minimum, &inverse, target);
+    let credibility = credibility(problem, minimum, &inverse);
     let noise_test = match noise {
         Noise::Known { .. } => SumTest::of(left.square / variance, left.moments),
         Noise::Estimated => None,

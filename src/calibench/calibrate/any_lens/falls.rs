@@ -2,7 +2,7 @@
 //! once, and the sums of squares that any of them would take away.
 
 use super::super::elimination::Reduced;
-use super::super::left_out::DEFORMATIONS;
+use super::super::left_out::{CostFalls, DEFORMATIONS, Freedoms};
 use super::super::minimise::{Descent, RELATIVE_GAIN};
 use super::super::noise::Noise;
 use super::super::settings::Bend;
@@ -13,18 +13,6 @@ use super::{BoardShape, WIDTH, certificate, marks, shape};
 use crate::board::View;
 use crate::camera::{FreeParameters, Parameter};
 use nalgebra::SVector;
-
-/// What may be free besides: parameters, and the board's two bows and twist.
-#[derive(Debug, Clone, Copy)]
-pub(in super::super) struct Freedoms {
-    pub parameters: FreeParameters,
-    pub shape: bool,
-}
-
-impl Freedoms {
-    /// Nothing besides.
-    pub const NONE: Freedoms = Freedoms { parameters: FreeParameters::NONE, shape: false };
-}
 
 /// Normal equations of the shared unknowns at a minimum, the poses eliminated, with freedoms that it does not
 /// have.
@@ -84,27 +72,26 @@ impl Falls {
         Some(falls)
     }
 
-    /// What the cost would fall by with some of the freedoms; `None` where the marks do not determine them.
-    pub fn fall(&self, more: Freedoms) -> Option<f64> {
-        let gain = self.reduced.gain(&self.rows(more))?;
-        Some(gain - self.left).filter(|fall| fall.is_finite())
-    }
-
-    /// Two bows and a twist, in the target's unit, with which the cost would be least, with these parameters
-    /// more.
-    pub fn shape(&self, parameters: FreeParameters) -> Option<[f64; DEFORMATIONS]> {
-        let rows = self.rows(Freedoms { parameters, shape: true });
-        let step: SVector<f64, WIDTH> = self.reduced.part(&rows).solve(rows.len())?;
-        let first = rows.len().checked_sub(DEFORMATIONS)?;
-        Some(std::array::from_fn(|k| self.own_shape[k] + step[first + k]))
-    }
-
     /// The rows of the minimum's own unknowns and of these.
     fn rows(&self, more: Freedoms) -> Vec<usize> {
         let is_taken = |p: &Parameter| self.own.contains(*p) || more.parameters.contains(*p);
         let parameters = self.all.iter().filter(is_taken).filter_map(|p| self.all.position(p));
         let deformations = if more.shape { self.deformations } else { self.own_deformations };
         parameters.chain((0..deformations).map(|k| self.all.len() + k)).collect()
+    }
+}
+
+impl CostFalls for Falls {
+    fn fall(&self, more: Freedoms) -> Option<f64> {
+        let gain = self.reduced.gain(&self.rows(more))?;
+        Some(gain - self.left).filter(|fall| fall.is_finite())
+    }
+
+    fn shape(&self, parameters: FreeParameters) -> Option<[f64; DEFORMATIONS]> {
+        let rows = self.rows(Freedoms { parameters, shape: true });
+        let step: SVector<f64, WIDTH> = self.reduced.part(&rows).solve(rows.len())?;
+        let first = rows.len().checked_sub(DEFORMATIONS)?;
+        Some(std::array::from_fn(|k| self.own_shape[k] + step[first + k]))
     }
 }
 

@@ -32,7 +32,7 @@ mod start;
 mod walk;
 
 pub(super) use estimate::calibrate;
-pub(super) use falls::{Falls, Freedoms};
+pub(super) use falls::Falls;
 pub use information::lens_information;
 pub(super) use locate::located;
 pub use locate::{Located, locate};
