@@ -298,7 +298,15 @@ pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibr
             coefficients: own,
             board,
         }));
-    let fitted: Vec<(Candidate, LensCalibration)> = candidates
+    // A coefficient that is held, and that richer sets have, makes some of these the same.
+    let distinct = candidates.fold(Vec::new(), |mut distinct: Vec<Candidate>, candidate| {
+        if !distinct.contains(&candidate) {
+            distinct.push(candidate);
+        }
+        distinct
+    });
+    let fitted: Vec<(Candidate, LensCalibration)> = distinct
+        .into_iter()
         .filter_map(|candidate| Some((candidate, calibrate_lens(views, &candidate.settings(settings)).ok()?)))
         .filter(|(_, fit)| fit.termination.is_minimum() && fit.degrees_of_freedom > 0)
         .collect();

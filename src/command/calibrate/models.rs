@@ -109,10 +109,7 @@ pub(super) fn freedoms(fit: &Fit, settings: &Settings) -> Vec<String> {
              themselves{narrow}"
         )];
     }
-    // A held coefficient that a richer lens of the same model has is tried as both.
-    let mut told: Vec<String> = found.iter().map(|freedom| in_words(freedom, settings)).collect();
-    told.dedup();
-    told
+    found.iter().map(|freedom| in_words(freedom, settings)).collect()
 }
 
 /// With fewer marks a view than this, poses take up what residuals of neighbours would share.
