@@ -76,6 +76,7 @@ pub use report::{Calibration, Warning};
 pub use settings::{Board, Role, Settings};
 pub use system::System;
 pub use termination::Termination;
+pub(crate) use tilt::mirrored;
 pub use unknown::Unknown;
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use crate::geometry::{Mat3, Pose, Vec3};
 /// The pose whose plane is mirrored about the line of sight to the target's origin: `R' = Q^T D Q R D` with
 /// `D = diag(1, 1, -1)` and `Q` the rotation that takes the line of sight to the optical axis. Its image
 /// agrees to first order in size over distance.
-pub(super) fn mirrored(pose: &Pose) -> Pose {
+pub(crate) fn mirrored(pose: &Pose) -> Pose {
     let sight = pose.translation.normalize();
     let about = to_axis(&sight);
     let flip = Mat3::from_diagonal(&Vec3::new(1.0, 1.0, -1.0));

@@ -52,6 +52,7 @@ mod target;
 #[cfg(test)]
 mod tests;
 mod tests_of_sums;
+mod tilts;
 mod view;
 mod warnings;
 

@@ -36,18 +36,16 @@ fn pose(data: &Data, view: usize, camera: &Camera<Lens>) -> Option<Pose> {
     let flat = (shape.thickness() < NEARLY_FLAT).then(|| in_plane(data, view, camera)).flatten();
     let is_spatial = shape.thickness() > SPATIAL && data.views[view].len() >= IN_SPACE;
     let spatial = is_spatial.then(|| in_space(data, view, camera)).flatten();
-    let alone = data.with_views(&[view]);
-    let refined = |pose: Pose| {
-        let state = State {
-            camera: *camera,
-            cam_from_target: vec![pose],
-            offsets: vec![0.0; data.unknown_deviations.len()],
-        };
-        let found = descend(&poses_alone(&alone), state)?;
-        Some((found.equations.cost, found.state.cam_from_target[0]))
-    };
-    let candidates = [flat, spatial].into_iter().flatten().filter_map(refined);
-    candidates.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, pose)| pose)
+    let start = [flat, spatial].into_iter().flatten().filter_map(|pose| refined(data, view, camera, pose));
+    start.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, pose)| pose)
+}
+
+/// The pose of one view refined alone, the camera and the marks held, and its cost.
+pub(super) fn refined(data: &Data, view: usize, camera: &Camera<Lens>, pose: Pose) -> Option<(f64, Pose)> {
+    let offsets = vec![0.0; data.unknown_deviations.len()];
+    let state = State { camera: *camera, cam_from_target: vec![pose], offsets };
+    let found = descend(&poses_alone(&data.with_views(&[view])), state)?;
+    Some((found.equations.cost, found.state.cam_from_target[0]))
 }
 
 /// The problem in which nothing but poses is unknown.

@@ -12,6 +12,7 @@ use super::descent::{Minimum, descend};
 use super::lens::{is_seen, with_model, with_values};
 use super::problem::{Problem, State};
 use super::resection::with_poses;
+use super::tilts::with_better_tilts;
 use crate::calibrate::{Settings, Termination};
 use crate::camera::{Camera, FreeParameters, Lens, Model, Parameter};
 use crate::geometry::Vec2;
@@ -141,7 +142,8 @@ fn by_tsai(problem: &Problem<'_>, centre: Vec2, settings: &Settings) -> Vec<Stat
 /// many starts there were.
 pub(super) fn minima(problem: &Problem<'_>, starts: Vec<State>) -> (Vec<Minimum>, usize) {
     let exact = Problem { moves_marks: false, ..*problem };
-    let mut all: Vec<Minimum> = starts.into_iter().filter_map(|state| descend(&exact, state)).collect();
+    let search = |state| Some(with_better_tilts(&exact, descend(&exact, state)?));
+    let mut all: Vec<Minimum> = starts.into_iter().filter_map(search).collect();
     let count = all.len();
     all.sort_by(|a, b| a.equations.cost.total_cmp(&b.equations.cost));
     let mut kept: Vec<Minimum> = Vec::new();
