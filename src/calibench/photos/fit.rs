@@ -112,6 +112,7 @@ impl Fitter<'_> {
     pub fn fit(&self, views: &[View]) -> Result<Fit, CalibrationError> {
         let mut kept: Vec<usize> = (0..views.len()).collect();
         let mut rejected: Vec<Rejected> = Vec::new();
+        let mut on_a_line = None;
         loop {
             let chosen: Vec<View> = kept.iter().map(|&view| views[view].clone()).collect();
             let half_stay = 2 * (kept.len() - 1) >= views.len();
@@ -123,8 +124,11 @@ impl Fitter<'_> {
                 },
                 // Marks on a line say next to nothing, whatever the fit.
                 Err(CalibrationError::View { view, source }) if half_stay => {
-                    rejected.push(Rejected { view: kept.remove(view), reason: source.to_string() });
+                    rejected.push(Rejected { view: kept[view], reason: source.to_string() });
+                    on_a_line.get_or_insert(CalibrationError::View { view: kept.remove(view), source });
                 }
+                // Of a view that was given, "too few" says nothing.
+                Err(error @ CalibrationError::TooFewViews { .. }) => return Err(on_a_line.unwrap_or(error)),
                 Err(CalibrationError::View { view, source }) => {
                     return Err(CalibrationError::View { view: kept[view], source });
                 }
@@ -348,6 +352,18 @@ mod tests {
         let exact = &Scene::example().exact()[2];
         let left = known.pixels().iter().zip(&exact.pixels()[5..]).map(|(a, b)| (a - b).norm());
         assert!(left.fold(0.0, f64::max) < SETTLED_PX);
+    }
+
+    #[test]
+    fn where_too_few_views_stay_the_one_that_tells_nothing_is_named() {
+        let mut views = Scene::example().exact();
+        views.truncate(2);
+        let line = |list: &[Vec2]| list[..9].to_vec();
+        views[1] = View::new(line(views[1].points()), line(views[1].pixels())).unwrap();
+        let settings = Settings::standard();
+        let fitter = Fitter { settings: &settings, discs: None, reject_factor: None };
+        let refused = fitter.fit(&views).unwrap_err();
+        assert!(matches!(refused, CalibrationError::View { view: 1, .. }), "{refused}");
     }
 
     #[test]

@@ -268,8 +268,9 @@ fn text(finished: &Finished) -> String {
     if let Some(weakest) = weakest(calibration) {
         let _ = writeln!(text, "weakest direction: {weakest}");
     }
+    let view = if finished.names.are_numbers() { "view " } else { "" };
     for LeftOut { name, reason } in &finished.left_out {
-        let _ = writeln!(text, "left out: {name}: {reason}");
+        let _ = writeln!(text, "left out: {view}{name}: {reason}");
     }
     for warning in warnings(finished) {
         let _ = writeln!(text, "warning: {warning}");
