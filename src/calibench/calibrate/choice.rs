@@ -16,6 +16,7 @@
 //! nothing.
 
 use super::any_lens::located;
+use super::chance::fisher_tail;
 use super::counted::{Counted, weighted_residuals};
 use super::domain::spans_a_plane;
 use super::structure::neighbours;
@@ -82,9 +83,11 @@ pub struct Compared {
     pub hold_out_px: Option<f64>,
     /// Squared error of each fold, for the comparison of two candidates.
     folds: Vec<f64>,
-    /// Whether it is behind all that are not: a coefficient lies where the model is not defined, or there are
-    /// as many unknowns as measurements, so that it fits whatever was measured.
-    is_behind: bool,
+    /// Sum of the squares of what counts of the residuals, px^2.
+    square: f64,
+    /// Whether it comes behind all of which this is false: a coefficient lies where the model is not defined,
+    /// or there are as many unknowns as measurements, so that it fits whatever was measured.
+    pub is_behind: bool,
     /// Correlation of a mark's residual with the next one's: 0 for noise.
     pub correlation: f64,
 }
@@ -95,6 +98,18 @@ impl Compared {
     pub fn wins_against(&self, other: &Compared) -> (usize, usize) {
         let better = self.folds.iter().zip(&other.folds).filter(|(own, others)| own < others).count();
         (better, self.folds.len().min(other.folds.len()))
+    }
+
+    /// How likely would the sum of squares be so much below that of `other`, which has more degrees of
+    /// freedom, if `other` were right and this model held it? The tail of Fisher's F, of what the unknowns
+    /// more take away over what is left; `None` where this model has not more unknowns, or no degree of
+    /// freedom.
+    pub fn chance_against(&self, other: &Compared) -> Option<f64> {
+        let own = self.calibration.degrees_of_freedom;
+        let more = other.calibration.degrees_of_freedom.checked_sub(own).filter(|&more| more > 0)?;
+        let each = |square: f64, freedom: usize| square / freedom as f64;
+        (own > 0)
+            .then(|| fisher_tail(each(other.square - self.square, more) / each(self.square, own), more, own))
     }
 
     /// The error on views that were left out; infinite where there is none.
@@ -184,11 +199,13 @@ fn judged(
             folds.iter().fold((0.0, 0.0), |(s, f), (square, freedom)| (s + square, f + freedom));
         (square / freedom).sqrt()
     };
+    let of_fit = counted.in_fit(views, &calibration);
     Compared {
         candidate,
-        bic: criterion(counted.in_fit(views, &calibration), unknowns(&calibration)),
+        bic: criterion(of_fit, unknowns(&calibration)),
         hold_out_px: folds.as_deref().map(error),
         folds: folds.unwrap_or_default().into_iter().map(|(square, _)| square).collect(),
+        square: of_fit.0,
         is_behind: Warning::is_outside_range(&calibration.camera) || calibration.degrees_of_freedom == 0,
         correlation: neighbours(&weighted_residuals(views, &calibration), settings.loss).correlation,
         calibration,

@@ -160,7 +160,8 @@ pub enum CalibrationError {
     /// Gross errors that hide what the other marks could tell.
     #[error(
         "{} mark(s) lie too far off to be noise, the worst (view {}, point {}) by {:.2} px where half of all stay below {:.2} px, and with \
-         them nothing is determined: correct or remove them, or use a robust loss (huber:{})",
+         them nothing is determined: correct or remove them, or use a robust loss (huber:{}); where nothing is wrong with them, the lens model, \
+         the board or a value that is held or known beforehand is",
         .0.marks, .0.view, .0.point, .0.residual_px, .0.median_px, super::report::digits(2.0 * .0.median_px)
     )]
     Outliers(Outliers),

@@ -64,8 +64,8 @@ fn all_skewed(skewed: &[(Parameter, [Option<f64>; 2])]) -> String {
     let far = |ratio: f64| reach(Some(ratio).filter(|ratio| ratio.is_finite()));
     let reach = if least == most { far(most) } else { format!("{} to {}", far(least), far(most)) };
     format!(
-        "the standard deviations of {} mislead: intervals of two of them truly reach {reach}; state intervals by the profile of the cost, \
-         or free fewer coefficients",
+        "the standard deviations of {} mislead: intervals of two of them truly reach {reach}; state intervals by the profile of the cost where they \
+         can be had, or free fewer coefficients",
         names.join(", ")
     )
 }

@@ -359,7 +359,7 @@ impl fmt::Display for Warning {
             Warning::NotLinear { parameter, below, above } => write!(
                 f,
                 "the standard deviation of {parameter} misleads: an interval of two of them truly reaches {} below and {} above; state \
-                 intervals by the profile of the cost",
+                 that one, or one by the profile of the cost",
                 reach(*below),
                 reach(*above)
             ),
@@ -371,10 +371,10 @@ impl fmt::Display for Warning {
             Warning::LeftOut { parameters, fall, probability } => {
                 let names: Vec<&str> = parameters.iter().map(|parameter| parameter.name()).collect();
                 let them = if names.len() == 1 { "it" } else { "them" };
-                let held = if names.len() == 1 { "which is held" } else { "which are held" };
+                let held = if names.len() == 1 { "it is held" } else { "they are held" };
                 write!(
                     f,
-                    "the marks ask for {}, {held}: the cost would fall by {fall:.0} variances, by chance \
+                    "the marks ask for {}, but {held}, or known beforehand too well to move: the cost would fall by {fall:.0} variances, by chance \
                      with probability {probability:.1e}; estimate {them} too, as the other parameters make up for {them}",
                     names.join(" and ")
                 )

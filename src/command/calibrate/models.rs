@@ -76,6 +76,13 @@ impl Comparison {
         let Some(next) = self.compared.get(1) else {
             return format!("chosen: {}, the only one that the views determine", name(&chosen.candidate));
         };
+        if next.is_behind && !chosen.is_behind {
+            return format!(
+                "chosen: {}; of the others each has as many unknowns as there are measurements, or coefficients where its model is not \
+                 defined",
+                name(&chosen.candidate)
+            );
+        }
         let predicts = match chosen.wins_against(next) {
             (_, 0) => "no part of the views can be left out".to_string(),
             (wins, folds) => format!(
@@ -84,13 +91,34 @@ impl Comparison {
             ),
         };
         format!(
-            "chosen: {}; {predicts}, and its BIC is {} by {:.1}",
+            "chosen: {}; {predicts}, and its BIC is {} by {:.1}{}",
             name(&chosen.candidate),
             if chosen.bic < next.bic { "lower" } else { "higher" },
             (chosen.bic - next.bic).abs(),
+            self.doubt(chosen),
         )
     }
+
+    /// That a lens with fewer unknowns may be right: the one for which chance makes the fall of the squares
+    /// likeliest. The criterion takes the noise for well known, which few degrees of freedom do not tell.
+    fn doubt(&self, chosen: &Compared) -> String {
+        let likely =
+            |other| Some((chosen.chance_against(other)?, other)).filter(|(chance, _)| *chance > DOUBTFUL);
+        let likeliest = self.compared.iter().filter_map(likely).max_by(|(a, _), (b, _)| a.total_cmp(b));
+        likeliest.map_or_else(String::new, |(chance, other)| {
+            format!(
+                "; but with {} degree(s) of freedom, chance makes a fit as much better than that of {} with probability {} where the \
+                 latter is right",
+                chosen.calibration.degrees_of_freedom,
+                name(&other.candidate),
+                significant(chance, 2)
+            )
+        })
+    }
 }
+
+/// A choice that chance makes with more than this probability is in doubt.
+const DOUBTFUL: f64 = 0.01;
 
 /// Where residuals of neighbours agree: what would explain them.
 pub(super) fn freedoms(fit: &Fit, settings: &Settings) -> Vec<String> {
