@@ -51,6 +51,22 @@ pub fn refused(folder: &Path, arguments: &[&str], words: &[&str]) {
 }
 
 #[test]
+fn a_program_that_is_not_there_is_refused_before_it_is_asked() {
+    let folder = folder("no-program");
+    for gate in [&["gate"][..], &["gate", "certified"], &["gate", "detector"], &["gate", "hand-eye"]] {
+        for name in ["/nonexistent", "no-such-program", "./none.py"] {
+            refused(&folder, &[gate, &["--solver", name]].concat(), &[name, "no such program"]);
+        }
+    }
+    std::fs::write(folder.join("plan.toml"), crate::study::SPEC).unwrap();
+    refused(
+        &folder,
+        &["study", "run", "plan.toml", "--solver", "/nonexistent", "--out", "run"],
+        &["no such program"],
+    );
+}
+
+#[test]
 fn sizes_beyond_their_limits_are_refused_at_once_with_what_they_would_need() {
     let folder = folder("sizes");
     let change = |name: &str, from: &str, to: &str| {

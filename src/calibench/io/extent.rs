@@ -6,7 +6,7 @@ use super::image::{
 };
 use super::jpeg::Jpeg;
 use super::shown::ShownPath;
-use super::tiff;
+use super::{png, tiff};
 use image::ImageDecoder;
 use image::metadata::Orientation;
 use std::io::{Cursor, Seek};
@@ -30,7 +30,7 @@ pub struct Extent {
     /// Whether the file asks for the image to be turned or mirrored where it is shown (Exif's orientation).
     /// It is read as it is stored.
     pub is_turned: bool,
-    /// Whether a TIFF holds more images than the first, which is the one that is read.
+    /// Whether a TIFF or an animated PNG holds more images than the first, which is the one that is read.
     pub has_more: bool,
 }
 
@@ -52,7 +52,8 @@ impl Extent {
     /// That of the first photograph that a source holds.
     fn read(mut source: impl std::io::BufRead + Seek, name: &str) -> Result<Extent, ImageError> {
         let Some(Jpeg { length, frame, orientation }) = scanned_jpeg(&mut source, name)? else {
-            let has_more = tiff::has_more(&mut source).map_err(|cause| unread(cause, name))?;
+            let more = tiff::has_more(&mut source).and_then(|more| Ok(more || png::has_more(&mut source)?));
+            let has_more = more.map_err(|cause| unread(cause, name))?;
             source.rewind().map_err(|cause| unread(cause, name))?;
             return Ok(Extent::of(&mut *decoder(source, name)?, has_more));
         };

@@ -2,6 +2,8 @@
 
 pub mod atomic;
 #[cfg(feature = "photo")]
+mod bytes;
+#[cfg(feature = "photo")]
 pub mod channels;
 pub mod checks;
 pub mod corners;
@@ -32,6 +34,8 @@ pub mod misplaced;
 pub mod overlay;
 pub mod pairs;
 mod plausible;
+#[cfg(feature = "photo")]
+mod png;
 pub mod provenance;
 pub mod result;
 pub mod result_camera;
@@ -40,6 +44,7 @@ pub mod scene_tables;
 pub mod shown;
 pub mod spatial;
 pub mod table;
+#[cfg(feature = "photo")]
 mod tiff;
 
 pub use atomic::{write_atomically, write_together};

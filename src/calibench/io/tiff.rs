@@ -5,6 +5,7 @@
 //! entries, two bytes, twelve bytes for each, and the place of the next directory, 0 behind the last (TIFF
 //! 6.0, 1992, section 2). With 43 these are eight, eight, twenty and eight bytes (BigTIFF).
 
+use super::bytes::bytes;
 use std::io::{Read, Result, Seek, SeekFrom};
 
 /// Whether a second directory follows; not so of what is no TIFF, or was cut off.
@@ -57,13 +58,6 @@ impl Header {
         let of = if self.is_little_endian { u16::from_le_bytes } else { u16::from_be_bytes };
         Ok(bytes(source)?.map(of).map(u64::from))
     }
-}
-
-/// So many bytes; `None` where there are fewer.
-fn bytes<const N: usize>(source: &mut impl Read) -> Result<Option<[u8; N]>> {
-    let mut read = Vec::with_capacity(N);
-    source.take(N as u64).read_to_end(&mut read)?;
-    Ok(read.try_into().ok())
 }
 
 #[cfg(test)]

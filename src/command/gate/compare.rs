@@ -4,16 +4,13 @@
 use super::options::{Copies, Judgement, Problems, Reports};
 use super::verdict::{keep_recorded, recorded};
 use super::{Stop, incomplete, usage};
-use crate::{Exit, print};
+use crate::{Exit, print, program};
 use calibench::camera::Model;
 use calibench::io::{ShownPath, write_atomically};
 use calibench_gate::paired::{self, Paired};
 use calibench_gate::{Asked, Builtin, Plan, Report, Solver};
 use calibench_harness::ProgressDisplay;
 use std::path::Path;
-
-/// Characters of which the names of folders and programs are made; a command of the shell has others.
-const OF_NAMES: &str = "-_.+/";
 
 /// Refuses a folder that holds no recorded run, and a name of which there is neither a folder nor a program:
 /// as a command it would only say that it is not found.
@@ -25,17 +22,7 @@ fn refuse_what_is_not_there(reference: &str) -> Result<(), Stop> {
             path.shown()
         )));
     }
-    let is_a_name = reference.chars().all(|c| c.is_alphanumeric() || OF_NAMES.contains(c));
-    let by_the_shell = |folder: &Path| folder.join(reference).is_file();
-    // Windows completes names.
-    let on_path = || {
-        cfg!(windows)
-            || std::env::var_os("PATH")
-                .is_some_and(|all| std::env::split_paths(&all).any(|f| by_the_shell(&f)))
-    };
-    let is_bare = path.components().count() == 1;
-    let there = path.exists() || (is_bare && on_path());
-    if is_a_name && !there {
+    if program::is_missing(reference) {
         return Err(usage(format!(
             "{} is neither there as a folder nor as a program: a reference is a folder that `calibench gate --record DIR` wrote, a \
              program, or builtin",

@@ -23,7 +23,7 @@ pub(super) struct Arguments {
 /// Judges one detector; without a program that is this library's.
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Stop> {
     let OwnKind { amount, false_alarms, told, .. } = &arguments.own;
-    let timeout = arguments.own.timeout()?;
+    let timeout = arguments.own.timeout(arguments.solver.as_deref())?;
     let photos = amount.samples([QUICK, THOROUGH], MOST_PHOTOS)?;
     let mut detector: Box<dyn Detector> = match &arguments.solver {
         Some(command) => Box::new(Program::new(command, timeout).map_err(incomplete)?),

@@ -45,7 +45,7 @@ pub(super) struct Arguments {
 
 /// Judges one solver; without a program that is this library's.
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Stop> {
-    let timeout = arguments.own.timeout()?;
+    let timeout = arguments.own.timeout(arguments.solver.as_deref())?;
     if let Some(path) = &arguments.methods {
         return write_table(&arguments.own, path, timeout);
     }

@@ -119,7 +119,7 @@ pub(super) struct Copies {
 impl Copies {
     /// Refuses numbers that no program can be asked with, whether one is asked or not.
     pub fn check(&self) -> Result<(), Stop> {
-        program::process("", self.timeout, self.jobs).map(drop).map_err(usage)
+        program::limits(self.timeout, self.jobs).map(drop).map_err(usage)
     }
 
     pub fn process(&self, command: &str) -> Result<Box<dyn Solver>, Stop> {
@@ -189,9 +189,10 @@ pub(super) struct OwnKind {
 }
 
 impl OwnKind {
-    /// How long a program may take, once what can never be told is refused.
-    pub fn timeout(&self) -> Result<Duration, Stop> {
+    /// How long a program may take, once what can never be told or asked is refused.
+    pub fn timeout(&self, command: Option<&str>) -> Result<Duration, Stop> {
         self.told.check()?;
+        command.map_or(Ok(()), program::refuse_missing).map_err(usage)?;
         program::timeout(self.timeout).map_err(usage)
     }
 }
