@@ -67,6 +67,15 @@ fn a_program_that_is_not_there_is_refused_before_it_is_asked() {
 }
 
 #[test]
+fn json_that_is_no_camera_is_refused_in_words_of_cameras() {
+    let folder = folder("no-camera");
+    for text in ["[]", "3", "\"camera\"", "null"] {
+        std::fs::write(folder.join("camera.json"), text).unwrap();
+        refused(&folder, &["diff", "camera.json", "camera.json"], &["an object with `camera`"]);
+    }
+}
+
+#[test]
 fn sizes_beyond_their_limits_are_refused_at_once_with_what_they_would_need() {
     let folder = folder("sizes");
     let change = |name: &str, from: &str, to: &str| {

@@ -163,6 +163,7 @@ pub enum KnownError {
 
 /// Fields of a camera's result that matter here; a number that is `null` is not known.
 #[derive(Deserialize)]
+#[serde(expecting = "a camera's result, an object with `camera` and `views`")]
 struct CameraFields {
     #[serde(default)]
     free: Vec<String>,
@@ -187,6 +188,7 @@ struct CameraFields {
 }
 
 #[derive(Deserialize)]
+#[serde(expecting = "a view, an object with `name` and its pose")]
 struct ViewFields {
     name: String,
     rotation_vector_rad: [f64; 3],
@@ -199,12 +201,14 @@ struct ViewFields {
 
 /// Fields of a plane's result.
 #[derive(Deserialize)]
+#[serde(expecting = "a plane's result, an object with `points`")]
 struct PlaneFields {
     mode: String,
     points: Vec<PlanePoint>,
 }
 
 #[derive(Deserialize)]
+#[serde(expecting = "a point of a plane, an object")]
 struct PlanePoint {
     pixel: [f64; 2],
     world: [f64; 2],
@@ -212,6 +216,7 @@ struct PlanePoint {
 
 /// What tells one result from the other.
 #[derive(Deserialize)]
+#[serde(expecting = "a result of calibench, an object")]
 struct Kind {
     #[serde(default)]
     camera: Option<IgnoredAny>,

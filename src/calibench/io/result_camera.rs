@@ -14,6 +14,7 @@ use std::path::Path;
 
 /// What another command needs of a result; further fields are ignored.
 #[derive(Debug, Deserialize)]
+#[serde(expecting = "an object with `camera`")]
 struct CameraOnly {
     camera: LensFields,
     #[serde(default)]
@@ -47,6 +48,7 @@ impl CameraOnly {
 
 /// The names of a camera's numbers.
 #[derive(Debug, Deserialize)]
+#[serde(expecting = "an object with `camera`")]
 struct NamesOnly {
     camera: BTreeMap<String, IgnoredAny>,
 }
