@@ -451,6 +451,24 @@ fn a_held_value_that_the_marks_contradict_is_told() {
             assert_eq!(warnings.iter().any(of_both), is_told, "{factor} {warnings:?}");
         }
     }
+    // A length that is held and that the other is tied to, and a tie that does not hold.
+    let ratio = truth.fy / truth.fx;
+    for (factor, told) in [(1.0, None), (1.02, Some(Parameter::Fx))] {
+        let held = Settings::standard().hold(Parameter::Fx, factor * truth.fx).tie_focal_lengths(ratio);
+        let warnings = calibrate_lens(&views, &held).unwrap().warnings;
+        let first = warnings.iter().find_map(|w| match w {
+            Warning::LeftOut { parameters, .. } => parameters.first().copied(),
+            _ => None,
+        });
+        assert_eq!(first, told, "{warnings:?}");
+    }
+    for (factor, is_told) in [(1.0, false), (1.02, true)] {
+        let tied = Settings::standard().tie_focal_lengths(factor * ratio);
+        let warnings = calibrate_lens(&views, &tied).unwrap().warnings;
+        let of_fy =
+            |w: &Warning| matches!(w, Warning::LeftOut { parameters, .. } if parameters == &[Parameter::Fy]);
+        assert_eq!(warnings.iter().any(of_fy), is_told, "{factor} {warnings:?}");
+    }
     // A coefficient that is known to be 0.
     let zero = Settings::standard().with_prior(Parameter::K1, 0.0, 1e-9);
     let warnings = calibrate_lens(&views, &zero).unwrap().warnings;

@@ -4,10 +4,13 @@
 use super::{CalibrationError, Loss, Prior, Role, Settings};
 use crate::board::View;
 use crate::camera::Parameter;
-use crate::geometry::{Homography, HomographyError};
+use crate::geometry::{Homography, HomographyError, Vec3};
 
 /// Scales of a robust loss, px: with any other their squares are lost in rounding.
 const SCALES_PX: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
+
+/// The square of a smaller standard deviation has no inverse.
+const LEAST_DEVIATION: f64 = 1e-100;
 
 impl Loss {
     /// Whether a robust loss has a scale from 1e-9 to 1e9 px.
@@ -23,7 +26,7 @@ impl Prior {
     /// Whether a camera may have the value, and the standard deviation says something of it.
     fn is_possible(&self) -> bool {
         let sd = self.standard_deviation;
-        self.parameter.is_defined_at(self.mean) && sd > 0.0 && sd.is_finite()
+        self.parameter.is_defined_at(self.mean) && sd >= LEAST_DEVIATION && sd.is_finite()
     }
 }
 
@@ -80,10 +83,69 @@ pub(super) fn spans_a_plane(view: &View) -> Result<(), HomographyError> {
     Homography::fit(view.points(), view.points()).map(drop)
 }
 
+/// The same, as fast where nothing is wrong with it.
+pub(super) fn refuse_line(view: usize, marks: &View) -> Result<(), CalibrationError> {
+    let points = marks.points();
+    if is_line_but_for_one(points.len(), 0.0, |i| Vec3::new(points[i].x, points[i].y, 0.0)) {
+        return spans_a_plane(marks).map_err(|source| CalibrationError::View { view, source });
+    }
+    Ok(())
+}
+
+/// Whether so many points, one of them `at(i)`, lie on a line but for one at most: farther from it than by
+/// rounding, and by `thickness` of their distance from a point on it. A look at the first three and at two
+/// beside their lines says so of most.
+pub(crate) fn is_line_but_for_one(count: usize, thickness: f64, at: impl Fn(usize) -> Vec3) -> bool {
+    let sine = thickness.max(ROUNDED);
+    // Of three points two are on the line, if there is one.
+    [(0, 1), (0, 2), (1, 2)].into_iter().any(|(a, b)| {
+        let (from, along) = (at(a), at(b) - at(a));
+        let is_beside = |&i: &usize| {
+            let to = at(i) - from;
+            along.cross(&to).norm_squared() > sine * sine * along.norm_squared() * to.norm_squared()
+        };
+        along.norm_squared() > 0.0 && (0..count).filter(is_beside).take(2).count() < 2
+    })
+}
+
+/// A sine that rounding makes of points on a line, and more.
+const ROUNDED: f64 = 1e-9;
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::camera::{Camera, Model};
+    use crate::geometry::Vec2;
+
+    #[test]
+    fn a_line_but_for_one_is_told_wherever_the_one_stands() {
+        let is_line = |points: &[Vec3]| is_line_but_for_one(points.len(), 0.0, |i| points[i]);
+        let on_line = |i: usize| Vec3::new(1.0, -2.0, 0.3) * i as f64 + Vec3::new(7.0, 0.0, 100.0);
+        let line: Vec<Vec3> = (0..6).map(on_line).collect();
+        assert!(is_line(&line));
+        for place in 0..6 {
+            let mut points = line.clone();
+            points[place] += Vec3::new(3.0, 1.0, 0.0);
+            assert!(is_line(&points), "{place}");
+            points[(place + 1) % 6] -= Vec3::new(5.0, 0.1, 1.0);
+            assert!(!is_line(&points), "{place}");
+        }
+        // As flat as it is allowed to be.
+        let mut bent = line;
+        bent[3].x += 1e-4;
+        bent[4].y += 1e-4;
+        assert!(!is_line(&bent) && is_line_but_for_one(6, 1e-3, |i| bent[i]));
+    }
+
+    #[test]
+    fn a_view_is_refused_where_its_homography_to_itself_is() {
+        let grid = |i: usize| Vec2::new((i % 3) as f64, (i / 3) as f64);
+        for chosen in [&[0, 1, 2, 5][..], &[0, 3, 6, 7], &[0, 1, 2, 3, 4], &[0, 4, 8, 2], &[0, 1, 3, 4]] {
+            let points: Vec<Vec2> = chosen.iter().map(|&i| grid(i)).collect();
+            let view = View::new(points.clone(), points).unwrap();
+            assert_eq!(refuse_line(0, &view).is_err(), spans_a_plane(&view).is_err(), "{chosen:?}");
+        }
+    }
 
     #[track_caller]
     fn is_refused(settings: Settings, is_meant: fn(&CalibrationError) -> bool) {

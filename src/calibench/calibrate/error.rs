@@ -108,7 +108,7 @@ pub enum CalibrationError {
     },
     /// A prior that no camera has, or that says nothing.
     #[error(
-        "{parameter} = {mean} +- {standard_deviation} is no prior: a standard deviation is positive, and {}", parameter.range_in_words()
+        "{parameter} = {mean} +- {standard_deviation:?} is no prior: a standard deviation is positive (1e-100 or more), and {}", parameter.range_in_words()
     )]
     BadPrior {
         /// Which.

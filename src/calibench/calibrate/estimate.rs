@@ -2,7 +2,6 @@
 
 use super::certificate::Certificate;
 use super::conditioning::Conditioning;
-use super::domain::spans_a_plane;
 use super::from_relaxed::Evidence;
 use super::intervals::Profile;
 use super::judged::Judged;
@@ -63,18 +62,8 @@ pub(super) fn calibrate_distinct(
 ) -> Result<Calibration, CalibrationError> {
     check_counts(views, settings)?;
     let found = chunks::in_pool(views.len(), || estimate(views, settings));
-    let (calibration, noise) = found.map_err(|refusal| of_a_view(views, refusal))?;
+    let (calibration, noise) = found?;
     Ok(if settings.polish { polish::polish(views, settings.loss, noise, calibration) } else { calibration })
-}
-
-/// A refusal for want of information, or that of a view whose marks do not span a plane: such a view hides
-/// what the others tell, and its homography may pass, since distortion bends the image of a line.
-fn of_a_view(views: &[View], refusal: CalibrationError) -> CalibrationError {
-    if !matches!(refusal, CalibrationError::NotIdentifiable { .. }) {
-        return refusal;
-    }
-    let flat = views.iter().enumerate().find_map(|(view, marks)| Some((view, spans_a_plane(marks).err()?)));
-    flat.map_or(refusal, |(view, source)| CalibrationError::View { view, source })
 }
 
 /// The calibration, and the noise that weighed the priors.
@@ -153,7 +142,9 @@ fn check_counts(views: &[View], settings: &Settings) -> Result<(), CalibrationEr
     if coordinates < unknowns {
         return Err(CalibrationError::TooFewPoints { coordinates, unknowns });
     }
-    Ok(())
+    // The homography of such a view may pass, since distortion bends the image of a line, and would certify
+    // whatever it says.
+    views.iter().enumerate().try_for_each(|(view, marks)| domain::refuse_line(view, marks))
 }
 
 /// What [`super::calibrate_lens`] is for.
@@ -381,13 +372,12 @@ mod tests {
     }
 
     #[test]
-    fn a_refusal_is_that_of_the_view_whose_marks_lie_on_a_line_but_for_one() {
+    fn a_view_whose_marks_lie_on_a_line_but_for_one_is_refused() {
         let mut views = four_views(0.1);
         let few = [0, 1, 2, 3, 4, 62].map(|i| (views[2].points()[i], views[2].pixels()[i]));
         let (points, pixels) = few.into_iter().unzip();
         views[2] = View::new(points, pixels).unwrap();
-        let singular = identifiability::singular();
-        assert_eq!(of_a_view(&views[..2], singular.clone()), singular);
-        assert!(matches!(of_a_view(&views, singular), CalibrationError::View { view: 2, .. }));
+        let refused = calibrate(&views, &Settings::standard());
+        assert!(matches!(refused, Err(CalibrationError::View { view: 2, .. })), "{refused:?}");
     }
 }

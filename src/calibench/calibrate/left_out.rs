@@ -93,7 +93,7 @@ const ASKED: [&[Parameter]; 4] =
 /// A set that needs none of them is told that it does with this probability, for each.
 const CHANCE: f64 = 1e-5;
 
-/// What nobody has decided on, and the values that are held. Without these a coefficient that nobody asked
+/// What nobody has decided on, and the values that are held or tied. Without these a coefficient that nobody asked
 /// for would make up for a wrong one.
 fn undecided(settings: &Settings) -> Vec<Group> {
     let model = settings.model();
@@ -103,7 +103,9 @@ fn undecided(settings: &Settings) -> Vec<Group> {
         _ => false,
     };
     let asked: Vec<&[Parameter]> = ASKED.into_iter().filter(|list| list.iter().all(is_left_out)).collect();
-    let is_value = |p: &Parameter| matches!(settings.role(*p), Role::Held(value) if value != 0.0);
+    let is_tied = |p: &Parameter| *p == Parameter::Fy && settings.fy_per_fx().is_some();
+    let is_value =
+        |p: &Parameter| is_tied(p) || matches!(settings.role(*p), Role::Held(value) if value != 0.0);
     let is_alone = |p: &Parameter| !asked.iter().any(|list| list.contains(p));
     let values: Vec<Parameter> = model.parameters().filter(is_value).filter(is_alone).collect();
     let more = DEFORMATIONS - settings.board.bend().map_or(0, |bend| bend.deformations);
@@ -259,6 +261,8 @@ mod tests {
         let both = Group::of(&[Parameter::Fx, Parameter::Fy]);
         let all = Group::of(&[Parameter::Fx, Parameter::Fy, Parameter::K2]);
         assert_eq!(undecided(&focal), [tangential, radial, skew, fx, fy, k2_alone, both, all, shape]);
+        let tied = standard.clone().hold(Parameter::Fx, 600.0).tie_focal_lengths(1.0);
+        assert_eq!(undecided(&tied), [tangential, radial, skew, fx, fy, both, shape]);
         // A lens is asked for nothing that it does not have.
         assert_eq!(undecided(&Settings::of_model(Model::KannalaBrandt)), [skew, shape]);
         // What a wrong value of the principal point does is not to be put down to p1 and p2.

@@ -371,10 +371,10 @@ impl fmt::Display for Warning {
             Warning::LeftOut { parameters, fall, probability } => {
                 let names: Vec<&str> = parameters.iter().map(|parameter| parameter.name()).collect();
                 let them = if names.len() == 1 { "it" } else { "them" };
-                let held = if names.len() == 1 { "it is held" } else { "they are held" };
+                let held = if names.len() == 1 { "it is held or tied" } else { "they are held or tied" };
                 write!(
                     f,
-                    "the marks ask for {}, but {held}, or known beforehand too well to move: the cost would fall by {fall:.0} variances, by chance \
+                    "the marks ask for {}, but {held}, or known too well to move: the cost would fall by {fall:.0} variances, by chance \
                      with probability {probability:.1e}; estimate {them} too, as the other parameters make up for {them}",
                     names.join(" and ")
                 )

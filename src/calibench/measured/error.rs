@@ -64,7 +64,7 @@ pub enum MeasuredError {
     },
     /// Marks that tell no pose.
     #[error(
-        "the marks of view {view} lie on one line, or at one place: its pose has no unique answer; leave it out"
+        "the marks of view {view} lie on one line, all or all but one, or at one place: its pose has no unique answer; leave it out"
     )]
     OnALine {
         /// The view.

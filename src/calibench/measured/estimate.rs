@@ -101,8 +101,8 @@ pub fn calibrate_measured(
     let (problem, minimum, not_linear) = linearity::checked(problem, noise, minimum)?;
     let mut found = report(&problem, &minimum, starts, target, noise, views)?;
     let rival = rivals::rival(&problem, &found.calibration, minimum.equations.cost, &others);
-    let left_out = asked(settings, &found.calibration, false, |_, found, more| {
-        left_out::Falls::of(&problem, &minimum, found, more)
+    let left_out = asked(settings, &found.calibration, false, |settings, found, more| {
+        left_out::Falls::of(&problem, &minimum, settings, found, more)
     });
     let of_cost = not_linear.into_iter().chain(ambiguous).chain(rival);
     found.calibration.warnings.extend(of_cost.chain(left_out));
@@ -180,7 +180,8 @@ fn check_views(data: &Data) -> Result<(), MeasuredError> {
             return Err(MeasuredError::TooFewMarks { view, need: IN_PLANE, got });
         }
         let shape = data.shape(view);
-        if shape.is_line() {
+        let position = |i: usize| data.positions[list[i].mark];
+        if shape.is_line() || domain::is_line_but_for_one(got, FLAT, position) {
             return Err(MeasuredError::OnALine { view });
         }
         if got < IN_SPACE && shape.thickness() > NEARLY_FLAT {

@@ -3,7 +3,7 @@
 
 use super::descent::Minimum;
 use super::problem::Problem;
-use crate::calibrate::{CostFalls, DEFORMATIONS, Freedoms, LensCalibration};
+use crate::calibrate::{CostFalls, DEFORMATIONS, Freedoms, LensCalibration, Settings};
 use crate::camera::FreeParameters;
 use nalgebra::{DMatrix, DVector};
 
@@ -24,6 +24,7 @@ impl Falls {
     pub fn of(
         problem: &Problem<'_>,
         minimum: &Minimum,
+        settings: &Settings,
         found: &LensCalibration,
         more: Freedoms,
     ) -> Option<Falls> {
@@ -31,7 +32,8 @@ impl Falls {
             return None;
         }
         let all = more.parameters.iter().fold(found.free, FreeParameters::with);
-        let with_all = Problem { free: all, priors: &found.priors, ..*problem };
+        let with_all =
+            Problem { free: all, fy_per_fx: settings.fy_per_fx(), priors: &found.priors, ..*problem };
         let (matrix, gradient) = with_all.equations(&minimum.state)?.of_first(all.len())?;
         let mut falls = Falls { matrix, gradient, all, own: found.free, left: 0.0 };
         falls.left = falls.fall(Freedoms::NONE)?;
@@ -104,6 +106,11 @@ mod tests {
                 (none.clone(), vec![vec![Fx, Fy]]),
                 "{sd}"
             );
+            // One of them, which the other is tied to.
+            let ratio = value(Fy) / value(Fx);
+            let tied = |factor: f64| scene.settings().hold(Fx, factor * value(Fx)).tie_focal_lengths(ratio);
+            let wrong = told(tied(1.0 + far(Fx) / value(Fx)));
+            assert!(told(tied(1.0)) == none && wrong.first().is_some_and(|p| p[0] == Fx), "{sd} {wrong:?}");
         }
     }
 

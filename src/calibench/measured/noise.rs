@@ -72,11 +72,12 @@ impl Known {
             .map(|(row, _, sd)| (row, problem.variance / (sd * sd)))
             .collect();
         let q = &inverse.shared;
-        let trace = rows.iter().map(|&(i, weight)| q[(i, i)] * weight).sum();
+        // A measurement settles one number at most, whatever the inverse of singular equations says.
+        let trace: f64 = rows.iter().map(|&(i, weight)| (q[(i, i)] * weight).min(1.0)).sum();
         let row = |&(i, a): &(usize, f64)| -> f64 {
             rows.iter().map(|&(j, b)| q[(i, j)] * q[(i, j)] * a * b).sum()
         };
-        Known { trace, trace_of_square: rows.iter().map(row).sum() }
+        Known { trace, trace_of_square: rows.iter().map(row).sum::<f64>().min(trace) }
     }
 }
 

@@ -42,7 +42,8 @@ impl Falls {
             views: &marks,
             free: all,
             held: FreeParameters::NONE,
-            fy_per_fx: settings.tie().ok()?,
+            // Also where both are held: they move together if at all.
+            fy_per_fx: settings.fy_per_fx(),
             priors: &found.priors,
             noise: Noise::of_squares(found.sigma_px * found.sigma_px),
             bend: match settings.board.bend() {
