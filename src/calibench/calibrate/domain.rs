@@ -98,14 +98,17 @@ pub(super) fn refuse_line(view: usize, marks: &View) -> Result<(), CalibrationEr
 pub(crate) fn is_line_but_for_one(count: usize, thickness: f64, at: impl Fn(usize) -> Vec3) -> bool {
     let sine = thickness.max(ROUNDED);
     // Of three points two are on the line, if there is one.
-    [(0, 1), (0, 2), (1, 2)].into_iter().any(|(a, b)| {
-        let (from, along) = (at(a), at(b) - at(a));
-        let is_beside = |&i: &usize| {
-            let to = at(i) - from;
-            along.cross(&to).norm_squared() > sine * sine * along.norm_squared() * to.norm_squared()
-        };
-        along.norm_squared() > 0.0 && (0..count).filter(is_beside).take(2).count() < 2
-    })
+    let through_two = || {
+        [(0, 1), (0, 2), (1, 2)].into_iter().any(|(a, b)| {
+            let (from, along) = (at(a), at(b) - at(a));
+            let is_beside = |&i: &usize| {
+                let to = at(i) - from;
+                along.cross(&to).norm_squared() > sine * sine * along.norm_squared() * to.norm_squared()
+            };
+            along.norm_squared() > 0.0 && (0..count).filter(is_beside).take(2).count() < 2
+        })
+    };
+    count < 3 || through_two()
 }
 
 /// A sine that rounding makes of points on a line, and more.
@@ -122,7 +125,7 @@ mod tests {
         let is_line = |points: &[Vec3]| is_line_but_for_one(points.len(), 0.0, |i| points[i]);
         let on_line = |i: usize| Vec3::new(1.0, -2.0, 0.3) * i as f64 + Vec3::new(7.0, 0.0, 100.0);
         let line: Vec<Vec3> = (0..6).map(on_line).collect();
-        assert!(is_line(&line));
+        assert!(is_line(&line) && (0..3).all(|count| is_line(&line[..count])));
         for place in 0..6 {
             let mut points = line.clone();
             points[place] += Vec3::new(3.0, 1.0, 0.0);

@@ -93,8 +93,8 @@ const ASKED: [&[Parameter]; 4] =
 /// A set that needs none of them is told that it does with this probability, for each.
 const CHANCE: f64 = 1e-5;
 
-/// What nobody has decided on, and the values that are held or tied. Without these a coefficient that nobody asked
-/// for would make up for a wrong one.
+/// What nobody has decided on, and the values that are held or tied. Without these a coefficient that nobody
+/// asked for would make up for a wrong one.
 fn undecided(settings: &Settings) -> Vec<Group> {
     let model = settings.model();
     let is_left_out = |&p: &Parameter| match settings.role(p) {
