@@ -237,16 +237,16 @@ fn what_is_held_of_the_basic_parameters_is_told_and_is_one_of_the_explanations()
     let skewed = Camera { skew: 2.0, ..square };
     let held = settings(Model::KannalaBrandt);
     let centred = [Cx, Cy].into_iter().fold(held.clone(), |own, p| own.with_role(p, Role::Default));
-    for (truth, settings, missing, is_told) in [
-        (square, held.clone().tie_focal_lengths(1.0), vec![Fy], false),
-        (square, centred, vec![Cx, Cy], true),
-        (square, held.clone().hold(Cx, 640.0).hold(Cy, 480.0), vec![Cx, Cy], true),
-        (skewed, held, vec![Skew], true),
+    for (truth, settings, missing) in [
+        (square, held.clone().tie_focal_lengths(1.0), vec![Fy]),
+        (square, centred, vec![Cx, Cy]),
+        (square, held.clone().hold(Cx, 640.0).hold(Cy, 480.0), vec![Cx, Cy]),
+        (skewed, held, vec![Skew]),
     ] {
         let views = seen(&truth, &poses(12, 60.0), |_| board(), 0.0);
         let found = calibrate_lens(&views, &settings).unwrap();
         let asks = |w: &Warning| matches!(w, Warning::LeftOut { parameters, .. } if *parameters == missing);
-        assert_eq!(found.warnings.iter().any(asks), is_told, "{missing:?}: {:?}", found.warnings);
+        assert!(found.warnings.iter().any(asks), "{missing:?}: {:?}", found.warnings);
         let explained = explaining_freedoms(&views, &settings, &found);
         let best = explained.first().expect("something explains it");
         assert!(
