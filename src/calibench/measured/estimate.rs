@@ -2,6 +2,7 @@
 
 use super::data::Data;
 use super::descent::{Minimum, descend};
+use super::focal::with_better_focal;
 use super::noise::settled;
 use super::problem::{Problem, State};
 use super::report::{MeasuredCalibration, report};
@@ -98,6 +99,7 @@ pub fn calibrate_measured(
     let (starts, ambiguous) = starts(&problem, settings)?;
     let (minima, starts) = space::minima(&problem, starts);
     let (problem, minimum, others) = best(problem, noise, minima)?;
+    let (problem, minimum) = with_better_focal(problem, noise, minimum)?;
     let (problem, minimum, not_linear) = linearity::checked(problem, noise, minimum)?;
     let mut found = report(&problem, &minimum, starts, target, noise, views)?;
     let rival = rivals::rival(&problem, &found.calibration, minimum.equations.cost, &others);

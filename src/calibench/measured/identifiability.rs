@@ -3,8 +3,9 @@
 
 use super::MeasuredError;
 use super::data::Data;
-use super::descent::{Minimum, descend};
+use super::descent::Minimum;
 use super::equations::Equations;
+use super::focal::{DOUBTFUL, OTHER_FOCAL, at_focal};
 use super::problem::{Problem, State};
 use crate::calibrate::{CalibrationError, Conditioning, Unknown, WeakComponent};
 use crate::camera::{FreeParameters, Parameter};
@@ -12,11 +13,8 @@ use nalgebra::{DMatrix, DVector};
 
 /// Members of the weakest combination below this share of the largest one are not worth a name.
 const NAMED_SHARE: f64 = 0.2;
-/// Where a focal length is known worse than this part of itself, it is asked whether it is known at all.
-const DOUBTFUL: f64 = 0.03;
-/// Focal lengths so many times as long and as short must cost this many variances more, three standard
-/// deviations: as [`crate::calibrate::calibrate`] asks.
-const OTHER_FOCAL: f64 = 3.0;
+/// Focal lengths far off must cost this many variances more, three standard deviations: as
+/// [`crate::calibrate::calibrate`] asks.
 const FOCAL_RISE: f64 = 9.0;
 
 /// How well the data separate the camera's parameters.
@@ -85,24 +83,15 @@ pub(super) fn refuse_if_open(
     if !problem.free.contains(Parameter::Fx) || relative.is_nan() || relative < DOUBTFUL {
         return Ok(());
     }
-    let camera = &minimum.state.camera;
-    // A double sphere makes up for its focal length with xi, at the same picture: that is no other distance.
-    let rest = Problem {
-        free: problem.free.without(Parameter::Fx).without(Parameter::Fy).without(Parameter::Xi),
-        fy_per_fx: None,
-        ..*problem
-    };
+    let fx = minimum.state.camera.fx;
     for factor in [OTHER_FOCAL, 1.0 / OTHER_FOCAL] {
-        let mut state = minimum.state.clone();
-        (state.camera.fx, state.camera.fy) = (factor * camera.fx, factor * camera.fy);
-        state.cam_from_target.iter_mut().for_each(|pose| pose.translation.z *= factor);
-        let Some(other) = descend(&rest, state) else { continue };
+        let Some(other) = at_focal(problem, minimum, factor) else { continue };
         let rise = (other.equations.cost - minimum.equations.cost) / problem.variance;
         if rise < FOCAL_RISE {
             let why = format!(
                 "fx {:.5} fits as {:.5} does: the cost rises by {:.1} variances only, and {FOCAL_RISE:.0} are needed to rule chance out",
-                factor * camera.fx,
-                camera.fx,
+                factor * fx,
+                fx,
                 rise.max(0.0)
             );
             return Err(not_identifiable(vec![Unknown::FocalLength, Unknown::Distance], why));

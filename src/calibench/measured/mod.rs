@@ -36,6 +36,7 @@ mod descent;
 mod equations;
 mod error;
 mod estimate;
+mod focal;
 mod identifiability;
 mod left_out;
 mod lens;
