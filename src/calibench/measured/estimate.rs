@@ -1,15 +1,13 @@
 //! From measured marks and their pixels to a camera: the steps in order.
 
 use super::data::Data;
-use super::descent::{Minimum, descend};
-use super::focal::with_better_focal;
-use super::noise::settled;
 use super::problem::{Problem, State};
 use super::report::{MeasuredCalibration, report};
 use super::resection::{IN_PLANE, IN_SPACE};
+use super::search::Found;
 use super::shape::{FLAT, NEARLY_FLAT, Shape};
-use super::{MeasuredError, MeasuredTarget, MeasuredView, left_out, linearity, plane, rivals, space};
-use crate::calibrate::{Board, CalibrationError, Loss, Prior, Settings, Termination, Warning, asked, domain};
+use super::{MeasuredError, MeasuredTarget, MeasuredView, left_out, linearity, plane, rivals, search, space};
+use crate::calibrate::{Board, CalibrationError, Loss, Prior, Settings, Warning, asked, domain};
 use crate::camera::Parameter;
 
 /// Most marks with a standard deviation that may be seen: 1500 coordinates, equations of 18 MB, a
@@ -98,9 +96,8 @@ pub fn calibrate_measured(
     };
     let (starts, ambiguous) = starts(&problem, settings)?;
     let (minima, starts) = space::minima(&problem, starts);
-    let (problem, minimum, others) = best(problem, noise, minima)?;
-    let (problem, minimum) = with_better_focal(problem, noise, minimum)?;
-    let (problem, minimum, not_linear) = linearity::checked(problem, noise, minimum)?;
+    let Found { problem, best, others } = search::best(problem, noise, minima)?;
+    let (problem, minimum, not_linear) = linearity::checked(problem, noise, best)?;
     let mut found = report(&problem, &minimum, starts, target, noise, views)?;
     let rival = rivals::rival(&problem, &found.calibration, minimum.equations.cost, &others);
     let left_out = asked(settings, &found.calibration, false, |settings, found, more| {
@@ -109,30 +106,6 @@ pub fn calibrate_measured(
     let of_cost = not_linear.into_iter().chain(ambiguous).chain(rival);
     found.calibration.warnings.extend(of_cost.chain(left_out));
     Ok(found)
-}
-
-/// The best of several minima with the marks' positions estimated too, and the others.
-fn best<'a>(
-    problem: Problem<'a>,
-    noise: Noise,
-    minima: Vec<Minimum>,
-) -> Result<(Problem<'a>, Minimum, Vec<State>), MeasuredError> {
-    let mut minima = minima.into_iter();
-    let first = minima.next().ok_or(MeasuredError::NoStart)?;
-    let (mut problem, mut best) = settled(problem, noise, first.state)?;
-    best.iterations += first.iterations;
-    let mut others = Vec::new();
-    for next in minima {
-        // Costs are compared at one noise.
-        let Some(next) = descend(&problem, next.state) else { continue };
-        if space::is_better(&next, &best) {
-            others.push(best.state);
-            (problem, best) = settled(problem, noise, next.state)?;
-        } else if next.termination == Termination::Converged {
-            others.push(next.state);
-        }
-    }
-    Ok((problem, best, others))
 }
 
 /// What only other estimators know is refused, as are values that no camera has.

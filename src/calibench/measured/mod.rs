@@ -47,6 +47,7 @@ mod problem;
 mod report;
 mod resection;
 mod rivals;
+mod search;
 mod shape;
 mod space;
 mod target;

@@ -13,7 +13,7 @@ use super::lens::{is_seen, with_model, with_values};
 use super::problem::{Problem, State};
 use super::resection::with_poses;
 use super::tilts::with_better_tilts;
-use crate::calibrate::{Settings, Termination};
+use crate::calibrate::Settings;
 use crate::camera::{Camera, FreeParameters, Lens, Model, Parameter};
 use crate::geometry::Vec2;
 use crate::tsai::{Assumed, SpatialView, two_stage};
@@ -164,18 +164,3 @@ const SAME: f64 = 1e-4;
 fn is_same(a: &Camera<Lens>, b: &Camera<Lens>) -> bool {
     a.values().zip(b.values()).all(|((_, a), (_, b))| (a - b).abs() <= SAME * a.abs().max(1.0))
 }
-
-/// Less cost, and where only one of two searches ended in a minimum, so much less that it is not a valley
-/// without end.
-pub(super) fn is_better(next: &Minimum, best: &Minimum) -> bool {
-    let ends = |m: &Minimum| m.termination == Termination::Converged;
-    let (a, b) = (next.equations.cost, best.equations.cost);
-    match (ends(next), ends(best)) {
-        (true, false) => a < b * (1.0 + MARGIN),
-        (false, true) => a * (1.0 + MARGIN) < b,
-        _ => a < b,
-    }
-}
-
-/// A part of the cost that a handful of a thousand residuals may make.
-const MARGIN: f64 = 1e-2;

@@ -60,10 +60,9 @@ mod tests {
     use super::super::data::Data;
     use super::super::problem::State;
     use super::super::tests::{SIGMA_PX, Scene, poses, stream};
-    use super::super::{MeasuredMark, MeasuredTarget, MeasuredView, SeenMark};
     use super::*;
     use crate::camera::{Camera, Model};
-    use crate::geometry::{Vec2, Vec3};
+    use crate::geometry::Vec3;
 
     /// Twenty-four marks within 3 mm of a plane of 225 x 135 mm, photographed from 2.5 m; the last view shows
     /// four of them.
@@ -74,19 +73,8 @@ mod tests {
         };
         let camera = Camera::pinhole(6000.0, 6010.0, 322.0, 241.0).into();
         let scene = Scene { camera, marks: (0..24).map(mark).collect(), cam_from_target: poses(5, 2500.0) };
-        let exact = |(i, p): (usize, &Vec3)| MeasuredMark::new(i.to_string(), *p, 0.0);
-        let target = MeasuredTarget::new(scene.marks.iter().enumerate().map(exact).collect()).unwrap();
-        let mut stream = stream("tilts", 0);
-        let mut view = |(number, pose): (usize, &Pose)| {
-            let is_seen = |i: &usize| number < 4 || [0, 5, 18, 23].contains(i);
-            let seen = (0..24).filter(is_seen).map(|i| {
-                let noise = Vec2::new(stream.normal(), stream.normal());
-                let pixel = scene.camera.pixel(&pose.apply(&scene.marks[i])).unwrap();
-                SeenMark::new(i.to_string(), pixel + SIGMA_PX * noise)
-            });
-            MeasuredView::new(seen.collect()).unwrap()
-        };
-        let views: Vec<MeasuredView> = scene.cam_from_target.iter().enumerate().map(&mut view).collect();
+        let is_seen = |view: usize, mark: usize| view < 4 || [0, 5, 18, 23].contains(&mark);
+        let (target, views) = scene.drawn_where(is_seen, 0.0, &mut stream("tilts", 0));
         let data = Data::of(&target, &views).unwrap();
         (scene, data)
     }

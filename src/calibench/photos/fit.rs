@@ -124,8 +124,9 @@ impl Fitter<'_> {
                 },
                 // Marks on a line say next to nothing, whatever the fit.
                 Err(CalibrationError::View { view, source }) if half_stay => {
-                    rejected.push(Rejected { view: kept[view], reason: source.to_string() });
-                    on_a_line.get_or_insert(CalibrationError::View { view: kept.remove(view), source });
+                    let view = kept.remove(view);
+                    rejected.push(Rejected { view, reason: source.to_string() });
+                    on_a_line = on_a_line.or(Some(CalibrationError::View { view, source }));
                 }
                 // Of a view that was given, "too few" says nothing.
                 Err(error @ CalibrationError::TooFewViews { .. }) => return Err(on_a_line.unwrap_or(error)),

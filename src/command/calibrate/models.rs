@@ -104,7 +104,8 @@ impl Comparison {
     fn doubt(&self, chosen: &Compared) -> String {
         let likely =
             |other| Some((chosen.chance_against(other)?, other)).filter(|(chance, _)| *chance > DOUBTFUL);
-        let likeliest = self.compared.iter().filter_map(likely).max_by(|(a, _), (b, _)| a.total_cmp(b));
+        let others = self.compared.iter().filter(|other| !other.is_behind);
+        let likeliest = others.filter_map(likely).max_by(|(a, _), (b, _)| a.total_cmp(b));
         likeliest.map_or_else(String::new, |(chance, other)| {
             format!(
                 "; but with {} degree(s) of freedom, chance makes a fit as much better than that of {} with probability {} where the \
