@@ -194,6 +194,9 @@ fn a_photograph_that_is_to_be_turned_or_one_of_several_in_its_file_is_told() {
     let directory = u32::from_le_bytes(tiff[4..8].try_into().expect("four bytes")) as usize;
     let entries = usize::from(u16::from_le_bytes([tiff[directory], tiff[directory + 1]]));
     tiff[directory + 2 + 12 * entries] = 8;
-    let several = told("b.tif", &tiff);
-    assert!(several.len() == 1 && several[0].contains("holds more than one image"), "{several:?}");
+    let pgm = [b"P5 16 12 255\n".as_slice(), &[90; 16 * 12]].concat();
+    assert_eq!(told("a.pgm", &pgm), Vec::<String>::new());
+    for several in [told("b.tif", &tiff), told("b.pgm", &pgm.repeat(2))] {
+        assert!(several.len() == 1 && several[0].contains("holds more than one image"), "{several:?}");
+    }
 }

@@ -5,7 +5,7 @@ use super::source::{last_part, unended};
 use super::{Exit, warn};
 use calibench::board::View;
 use calibench::io::ShownPath;
-use calibench::io::input::{MOST_TABLE_BYTES, read_named};
+use calibench::io::read_named_table;
 use calibench::io::table::columns;
 use calibench::io::{misplaced_marks, parse_corners};
 use calibench::photos::BoardSpec;
@@ -70,7 +70,7 @@ fn from_table(arguments: &Arguments, file: &Path) -> Result<Exit, Failure> {
         contradictions::refuse(arguments, Input::Measured)?;
         return measured::run(arguments, file, target);
     }
-    let bytes = read_named(file, MOST_TABLE_BYTES).map_err(|error| error.to_string())?;
+    let bytes = read_named_table(file).map_err(|error| error.to_string())?;
     let name = if file.as_os_str() == "-" { "standard input".into() } else { file.shown() };
     let columns = columns(&bytes);
     let has = |names: &[&str]| names.iter().all(|name| columns.iter().any(|column| column == name));
@@ -133,7 +133,7 @@ pub(super) fn views_of(
             files.len()
         ));
     };
-    let bytes = read_named(file, MOST_TABLE_BYTES).map_err(|error| error.to_string())?;
+    let bytes = read_named_table(file).map_err(|error| error.to_string())?;
     let source = file.shown();
     unended(&source, &bytes).iter().for_each(|said| warn(&format!("warning: {said}")));
     let corners = parse_corners(&source, bytes.as_slice()).map_err(|error| error.to_string())?;

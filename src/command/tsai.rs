@@ -11,7 +11,7 @@ use calibench::board::{View, ViewError};
 use calibench::calibrate::{Settings, calibrate};
 use calibench::camera::{FreeParameters, Parameter};
 use calibench::geometry::{Vec2, rotation};
-use calibench::io::input::{MOST_TABLE_BYTES, read_named};
+use calibench::io::read_named_table;
 use calibench::io::{
     CalibrationFields, ShownPath, SpatialFile, message, parse_spatial, significant, write_together,
 };
@@ -117,7 +117,7 @@ struct OfView {
 }
 
 fn found(arguments: &Arguments) -> Result<Found, String> {
-    let bytes = read_named(&arguments.corners, MOST_TABLE_BYTES).map_err(|error| error.to_string())?;
+    let bytes = read_named_table(&arguments.corners).map_err(|error| error.to_string())?;
     let source = arguments.corners.shown();
     unended(&source, &bytes).iter().for_each(|said| warn(&format!("warning: {said}")));
     let SpatialFile { view_names, views } =

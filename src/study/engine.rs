@@ -38,7 +38,7 @@ pub struct Engine {
     place: usize,
 }
 
-/// How far a run is, told after each batch.
+/// How far a run is, told after each batch and within long ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pace {
     /// Trials done since the run began or was resumed.
@@ -77,6 +77,8 @@ pub type Interruption = AtomicBool;
 
 /// Trials that somebody else's solver is given at once: what they have seen is held in memory.
 const ASKED_AT_ONCE: u64 = 64;
+/// Trials that a thread makes until it is told how far they are.
+const MADE_AT_ONCE: u64 = 16;
 
 /// The stop rule needs this many batches.
 const LEAST_BATCHES: u64 = 2;
@@ -160,20 +162,30 @@ impl Engine {
         first..first.saturating_add(size).min(self.spec.trials.per_cell)
     }
 
-    /// Runs the batch that comes next, in parallel; the trials are in order.
-    fn run(&self, (cell, batch): (usize, u64)) -> Vec<Trial> {
+    /// Runs the batch that comes next, in parallel; the trials are in order. Tells how many are done before
+    /// all are.
+    fn run(&self, (cell, batch): (usize, u64), mut report: impl FnMut(u64)) -> Vec<Trial> {
         let cell = &self.cells[cell];
-        let trials = self.trials_of(batch);
-        let Some(calibrator) = &self.calibrator else {
-            return trials.into_par_iter().map(|trial| run_trial(cell, &self.quantities, trial)).collect();
+        let range = self.trials_of(batch);
+        let size = match self.calibrator {
+            Some(_) => ASKED_AT_ONCE,
+            None => MADE_AT_ONCE * rayon::current_num_threads() as u64,
         };
-        let chunks = trials.clone().step_by(ASKED_AT_ONCE as usize);
-        chunks
-            .flat_map(|first| {
-                let chunk = first..trials.end.min(first + ASKED_AT_ONCE);
-                run_trials_of(calibrator.as_ref(), cell, &self.quantities, chunk)
-            })
-            .collect()
+        let mut trials = Vec::with_capacity((range.end - range.start) as usize);
+        for first in range.clone().step_by(size as usize) {
+            if first > range.start {
+                report(first - range.start);
+            }
+            let chunk = first..range.end.min(first + size);
+            match &self.calibrator {
+                Some(solver) => {
+                    trials.extend(run_trials_of(solver.as_ref(), cell, &self.quantities, chunk));
+                }
+                None => trials
+                    .par_extend(chunk.into_par_iter().map(|trial| run_trial(cell, &self.quantities, trial))),
+            }
+        }
+        trials
     }
 
     /// Takes in the trials of the batch that comes next.
@@ -269,15 +281,22 @@ impl Engine {
         mut report: impl FnMut(&Pace),
     ) -> Result<Outcome, E> {
         let before = self.trials();
+        let pace = |engine: &Engine| Pace {
+            trials: engine.trials() - before,
+            before,
+            expected: engine.expected_trials(),
+            worst: engine.worst(),
+        };
+        let mut last = pace(self);
         while let Some(unit) = self.next() {
             if stop.load(Ordering::Relaxed) {
                 return Ok(Outcome::Interrupted);
             }
-            let trials = self.run(unit);
+            let trials = self.run(unit, |done| report(&Pace { trials: last.trials + done, ..last.clone() }));
             keep(&trials)?;
             self.absorb(unit, &trials);
-            let expected = self.expected_trials();
-            report(&Pace { trials: self.trials() - before, before, expected, worst: self.worst() });
+            last = pace(self);
+            report(&last);
         }
         Ok(Outcome::Complete)
     }

@@ -1,7 +1,8 @@
 //! What was seen where? Corner files: `view,point,X,Y,u,v`, one line an observed point, and if it is known
 //! how well each was seen, `weight` or `sigma_px`.
 
-use super::table::{Column, Row, TableError, columns, open, read_table, refuse_long_lines, refuse_misspelt};
+use super::lines::{open, read_lines};
+use super::table::{Column, Row, TableError, columns, read_table, refuse_misspelt};
 use crate::board::{View, ViewError};
 use crate::geometry::Vec2;
 use std::collections::BTreeMap;
@@ -62,11 +63,9 @@ pub fn read_corners(path: &Path) -> Result<CornerFile, TableError> {
 /// assert!(broken.to_string().starts_with("corners.csv:3: column 'u'"));
 /// # Ok::<(), calibench::io::TableError>(())
 /// ```
-pub fn parse_corners(file: &str, mut input: impl Read) -> Result<CornerFile, TableError> {
+pub fn parse_corners(file: &str, input: impl Read) -> Result<CornerFile, TableError> {
     let unreadable = |message: String| TableError::Unreadable { file: file.into(), line: 1, message };
-    let mut bytes = Vec::new();
-    input.read_to_end(&mut bytes).map_err(|e| unreadable(e.to_string()))?;
-    refuse_long_lines(file, &bytes)?;
+    let bytes = read_lines(file, input)?;
     let header = columns(&bytes);
     refuse_misspelt(file, &header, &["view", "point", "X", "Y", "u", "v", "weight", "sigma_px"])?;
     let has = |name: &str| header.iter().any(|column| column == name);

@@ -1,6 +1,7 @@
 //! Which lengths are to be measured? Pairs of pixels: `length,u1,v1,u2,v2`, one line a length.
 
-use super::table::{Column, Row, TableError, open, read_table};
+use super::lines::open;
+use super::table::{Column, Row, TableError, read_table};
 use crate::geometry::Vec2;
 use std::path::Path;
 

@@ -6,7 +6,7 @@ use super::image::{
 };
 use super::jpeg::Jpeg;
 use super::shown::ShownPath;
-use super::{png, tiff};
+use super::{png, pnm, tiff};
 use image::ImageDecoder;
 use image::metadata::Orientation;
 use std::io::{Cursor, Seek};
@@ -30,7 +30,8 @@ pub struct Extent {
     /// Whether the file asks for the image to be turned or mirrored where it is shown (Exif's orientation).
     /// It is read as it is stored.
     pub is_turned: bool,
-    /// Whether a TIFF or an animated PNG holds more images than the first, which is the one that is read.
+    /// Whether a TIFF, an animated PNG, a PGM or PPM holds more images than the first, which is the one that is
+    /// read.
     pub has_more: bool,
 }
 
@@ -52,8 +53,7 @@ impl Extent {
     /// That of the first photograph that a source holds.
     fn read(mut source: impl std::io::BufRead + Seek, name: &str) -> Result<Extent, ImageError> {
         let Some(Jpeg { length, frame, orientation }) = scanned_jpeg(&mut source, name)? else {
-            let more = tiff::has_more(&mut source).and_then(|more| Ok(more || png::has_more(&mut source)?));
-            let has_more = more.map_err(|cause| unread(cause, name))?;
+            let has_more = holds_more(&mut source).map_err(|cause| unread(cause, name))?;
             source.rewind().map_err(|cause| unread(cause, name))?;
             return Ok(Extent::of(&mut *decoder(source, name)?, has_more));
         };
@@ -110,6 +110,11 @@ pub fn image_extent(path: &Path) -> Result<Extent, ImageError> {
 /// See [`ImageError`].
 pub fn parse_extent(bytes: &[u8], name: &str) -> Result<Extent, ImageError> {
     Extent::read(Cursor::new(bytes), name)
+}
+
+/// Whether a file that is no JPEG holds more images than its first.
+fn holds_more(source: &mut (impl std::io::Read + Seek)) -> std::io::Result<bool> {
+    Ok(tiff::has_more(source)? || png::has_more(source)? || pnm::has_more(source)?)
 }
 
 fn is_turned(orientation: Orientation) -> bool {

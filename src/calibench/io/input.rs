@@ -146,7 +146,7 @@ pub fn open_without_waiting(path: &Path) -> io::Result<File> {
 }
 
 /// What the system said of a file, where it would have to be waited for in words of ours.
-fn unopened(path: String, cause: io::Error) -> InputError {
+pub(super) fn unopened(path: String, cause: io::Error) -> InputError {
     match cause.kind() {
         io::ErrorKind::WouldBlock => {
             InputError::NotRegular { path, kind: "a file that has to be waited for", hint: "" }
@@ -185,20 +185,21 @@ pub fn read_regular_text(path: &Path, most: u64) -> Result<String, InputError> {
     })
 }
 
-/// All bytes of a file that the user named, where `-` is standard input.
+/// A file that the user named, where `-` is standard input, and what it is called.
 ///
 /// # Errors
 /// See [`InputError`].
-pub fn read_named(path: &Path, most: u64) -> Result<Vec<u8>, InputError> {
+pub(super) fn open_named(path: &Path, most: u64) -> Result<(String, Box<dyn Read>), InputError> {
     if path.as_os_str() == "-" {
-        return read_at_most(io::stdin().lock(), "standard input", 0, most);
+        return Ok(("standard input".to_string(), Box::new(io::stdin().lock())));
     }
-    read_regular(path, most).map_err(|error| match error {
+    let opened = open_regular(path, most).map_err(|error| match error {
         InputError::NotRegular { path, kind, .. } => {
             InputError::NotRegular { path, kind, hint: ", or send it to standard input and name it -" }
         }
         error => error,
-    })
+    });
+    opened.map(|(file, _)| (path.shown(), Box::new(file) as Box<dyn Read>))
 }
 
 fn read_at_most(input: impl Read, name: &str, expected: usize, most: u64) -> Result<Vec<u8>, InputError> {

@@ -1,7 +1,8 @@
 //! Where are the marks of a part? Mark files: `point,X,Y`, and if known their standard deviations, `sd` for
 //! both coordinates or `sd_X,sd_Y`.
 
-use super::table::{Column, Row, TableError, columns, open, read_table, refuse_misspelt};
+use super::lines::open;
+use super::table::{Column, Row, TableError, columns, read_table, refuse_misspelt};
 use crate::downstream::Mark;
 use crate::geometry::Vec2;
 use std::collections::BTreeMap;

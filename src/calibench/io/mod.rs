@@ -23,6 +23,7 @@ pub mod input;
 mod jpeg;
 mod kept;
 pub mod known;
+mod lines;
 pub mod lock;
 mod loss;
 pub mod marks;
@@ -36,6 +37,8 @@ pub mod pairs;
 mod plausible;
 #[cfg(feature = "photo")]
 mod png;
+#[cfg(feature = "photo")]
+mod pnm;
 pub mod provenance;
 pub mod result;
 pub mod result_camera;
@@ -64,6 +67,7 @@ pub use image::{Grey, ImageError, read_image, write_png, write_png_16};
 pub use input::{InputError, MOST_SIDE_PX, read_regular, read_regular_text};
 pub use kept::{is_kept, keep_files};
 pub use known::{Known, KnownCalibration, KnownError, parse_known, read_known};
+pub use lines::read_named_table;
 pub use loss::{loss_from_text, loss_to_text};
 pub use marks::{MarkFile, parse_marks, read_marks};
 pub use measured::{MeasuredFields, SeenFile, TargetFileError, parse_seen, parse_target, refusal_by_names};

@@ -1,6 +1,7 @@
 //! Which pixel shows which world point? Point-pair files: `point,px,py,X,Y`, one line a pair.
 
-use super::table::{Column, Row, TableError, open, read_table};
+use super::lines::open;
+use super::table::{Column, Row, TableError, read_table};
 use crate::geometry::Vec2;
 use std::collections::BTreeMap;
 use std::io::Read;

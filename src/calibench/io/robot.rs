@@ -1,7 +1,8 @@
 //! Where was the robot? Pose files: `view,x,y,z` and the rotation as `rx,ry,rz` (rotation vector, rad),
 //! `qw,qx,qy,qz` (quaternion) or `roll,pitch,yaw` (degrees, `Rz(yaw) Ry(pitch) Rx(roll)`), one line a view.
 
-use super::table::{Column, Row, TableError, columns, open, read_table};
+use super::lines::open;
+use super::table::{Column, Row, TableError, columns, read_table};
 use crate::geometry::{Mat3, Pose, Vec3, rotation};
 use std::collections::BTreeMap;
 use std::path::Path;

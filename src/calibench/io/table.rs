@@ -1,7 +1,8 @@
 //! What stands in a table of numbers? CSV with named columns; every complaint carries file, line and column.
 
-use super::input::{InputError, MOST_SIDE_PX, MOST_TABLE_BYTES, byte_order_mark_len, read_regular};
-use super::shown::{ShownPath, excerpt, on_one_line};
+use super::input::{InputError, MOST_SIDE_PX, byte_order_mark_len};
+use super::lines::read_lines;
+use super::shown::{excerpt, on_one_line};
 use crate::board::ViewError;
 use std::cell::Cell;
 use std::io::{self, Read};
@@ -242,7 +243,7 @@ impl Column {
 pub const MOST_ROWS: usize = 10_000_000;
 
 /// Bytes of a line: some fifty thousand numbers of twenty digits.
-const MOST_LINE_BYTES: usize = 1 << 20;
+pub(super) const MOST_LINE_BYTES: usize = 1 << 20;
 
 /// Bytes of a name: as long as a path may be.
 const MOST_NAME_BYTES: usize = 4096;
@@ -322,19 +323,13 @@ pub(super) fn read_table<const NAMES: usize, const NUMBERS: usize>(
 const OF_UTF_16: [&[u8]; 2] = [b"\xff\xfe", b"\xfe\xff"];
 
 /// The whole input, without a byte order mark.
-fn read_all(file: &str, mut input: impl Read) -> Result<Vec<u8>, TableError> {
-    let mut bytes = Vec::new();
-    input.read_to_end(&mut bytes).map_err(|e| TableError::Unreadable {
-        file: file.into(),
-        line: 0,
-        message: e.to_string(),
-    })?;
+fn read_all(file: &str, input: impl Read) -> Result<Vec<u8>, TableError> {
+    let mut bytes = read_lines(file, input)?;
     bytes.drain(..byte_order_mark_len(&bytes));
     if OF_UTF_16.iter().any(|mark| bytes.starts_with(mark)) {
         let message = "the text is UTF-16: save it as UTF-8".to_string();
         return Err(TableError::Unreadable { file: file.into(), line: 1, message });
     }
-    refuse_long_lines(file, &bytes)?;
     Ok(bytes)
 }
 
@@ -370,20 +365,6 @@ fn is_quote_open(row: &[u8]) -> bool {
         }
     }
     is_open
-}
-
-/// What is no table is told before fields are made of it, which take several times its length.
-pub(super) fn refuse_long_lines(file: &str, bytes: &[u8]) -> Result<(), TableError> {
-    let is_end = |byte: &u8| matches!(byte, b'\n' | b'\r');
-    let mut start = 0;
-    for part in bytes.split(is_end) {
-        if part.len() > MOST_LINE_BYTES {
-            let line = 1 + bytes[..start].iter().filter(|byte| **byte == b'\n').count() as u64;
-            return Err(TableError::LongLine { file: file.into(), line, most: MOST_LINE_BYTES });
-        }
-        start += part.len() + 1;
-    }
-    Ok(())
 }
 
 /// Counts lines up to a record's first byte. The csv reader's own count stops before the blank lines, and
@@ -473,11 +454,6 @@ fn unreadable(file: &str, line: u64, error: &csv::Error) -> TableError {
         _ => error.to_string(),
     };
     TableError::Unreadable { file, line, message }
-}
-
-/// Name and bytes of a file for one of the readers.
-pub(super) fn open(path: &std::path::Path) -> Result<(String, Vec<u8>), TableError> {
-    Ok((path.shown(), read_regular(path, MOST_TABLE_BYTES)?))
 }
 
 /// The number of the last line, if it has no end. Many programs write files so; a file that was cut off

@@ -10,7 +10,7 @@ use super::measured_report::{Report, text};
 use super::optics::Optics;
 use super::options::Arguments;
 use calibench::geometry::{Vec2, Vec3};
-use calibench::io::input::{MOST_TABLE_BYTES, read_named};
+use calibench::io::read_named_table;
 use calibench::io::{
     MeasuredFields, SeenFile, ShownPath, parse_seen, parse_target, refusal_by_names, write_together,
 };
@@ -53,7 +53,7 @@ pub(super) fn run(arguments: &Arguments, corners: &Path, target: &Path) -> Resul
 }
 
 fn read(file: &Path) -> Result<(String, Vec<u8>), String> {
-    let bytes = read_named(file, MOST_TABLE_BYTES).map_err(|error| error.to_string())?;
+    let bytes = read_named_table(file).map_err(|error| error.to_string())?;
     let name = if file.as_os_str() == "-" { "standard input".into() } else { file.shown() };
     Ok((name, bytes))
 }
