@@ -30,8 +30,7 @@ pub struct Extent {
     /// Whether the file asks for the image to be turned or mirrored where it is shown (Exif's orientation).
     /// It is read as it is stored.
     pub is_turned: bool,
-    /// Whether a TIFF, an animated PNG, a PGM or PPM holds more images than the first, which is the one that is
-    /// read.
+    /// Whether a TIFF, an animated PNG, a PGM or PPM holds more images than the first, which is read.
     pub has_more: bool,
 }
 
