@@ -411,7 +411,7 @@ mod tests {
         assert_eq!(engine.worst(), None);
         let take = |engine: &mut Engine| {
             let unit = engine.next().unwrap();
-            let trials = engine.run(unit);
+            let trials = engine.run(unit, |_| {});
             engine.absorb(unit, &trials);
         };
         take(&mut engine);
@@ -424,6 +424,25 @@ mod tests {
         let widths = [0, 1].map(|cell| engine.relative_half_width(cell, "fx").unwrap());
         let least = if widths[0] > widths[1] { "noise = 0.1" } else { "noise = 0.3" };
         assert_eq!(engine.worst().unwrap().cell, least);
+    }
+
+    #[test]
+    fn a_long_batch_tells_how_far_it_is_and_has_the_trials_of_one_thread() {
+        let text = STUDY.replace("per_cell = 3\nbatch = 2", "per_cell = 80\nbatch = 40");
+        let run = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let (mut trials, mut told) = (Vec::new(), Vec::new());
+            let spec = Spec::parse(&text).unwrap();
+            let see = |trial: &Trial| trials.push(trial.clone());
+            pool.install(|| in_memory_seeing(spec, &text, see, |pace| told.push(pace.trials)).unwrap());
+            (trials, told)
+        };
+        let (alone, told) = run(1);
+        // Two batches of each of two cells.
+        assert_eq!(told, [16, 32, 40, 56, 72, 80, 96, 112, 120, 136, 152, 160]);
+        let (together, told) = run(2);
+        assert_eq!(told, [32, 40, 72, 80, 112, 120, 152, 160]);
+        assert!(alone == together);
     }
 
     #[test]
