@@ -87,7 +87,6 @@ mod tests {
             let off = (found.calibration.camera.fx - scene.camera.fx) / sd;
             // Of 57 degrees of freedom the noise is known to 9 %.
             let noise = found.calibration.sigma_px / SIGMA_PX;
-            println!("{trial}: {off} standard deviations, {noise} times the noise");
             assert!(off.abs() < 4.0 && (noise - 1.0).abs() < 0.3, "{trial}: {off} {noise}");
         }
     }

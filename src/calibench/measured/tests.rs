@@ -126,7 +126,7 @@ impl Scene {
 
 /// Views that do not show one mark in six.
 fn five_in_six(view: usize, mark: usize) -> bool {
-    (view + mark) % 6 != 0
+    !(view + mark).is_multiple_of(6)
 }
 
 fn errors(found: &MeasuredCalibration, truth: &Camera<Lens>) -> Vec<f64> {
