@@ -6,6 +6,7 @@ use super::growth::axes_at;
 use crate::detect::lattice::{Lattice, Place};
 use crate::detect::rectangle::Rectangle;
 use crate::geometry::{Homography, Vec2};
+use std::collections::BTreeMap;
 
 /// What a lattice holds of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,19 +26,15 @@ pub enum Found {
 
 /// Looks for a board of `columns x rows` in a lattice.
 pub fn find(lattice: &Lattice, columns: usize, rows: usize) -> Found {
-    let full: Vec<Rectangle> = lattice
+    let mut full = lattice
         .keys()
         .flat_map(|&low| {
             [(columns, rows), (rows, columns)].map(|(width, height)| Rectangle { low, width, height })
         })
-        .filter(|rectangle| rectangle.is_full(lattice))
-        .collect();
-    let mut boards = full.iter().filter(|rectangle| !rectangle.goes_on(lattice));
+        .filter(|rectangle| rectangle.is_full(lattice));
     // Of a square board both ways round are one.
-    let only = boards.next().filter(|first| boards.all(|other| other == *first));
-    if let Some(&board) = only
-        && full.iter().all(|other| *other == board)
-    {
+    let only = full.next().filter(|first| full.all(|other| other == *first));
+    if let Some(board) = only.filter(|only| !only.goes_on(lattice)) {
         return Found::Board(board);
     }
     match largest(lattice) {
@@ -48,23 +45,33 @@ pub fn find(lattice: &Lattice, columns: usize, rows: usize) -> Found {
     }
 }
 
-/// The full rectangle with the most places, at least 3 x 3.
+/// The full rectangle with the most places, at least 3 x 3; of equal ones the first, and the lower.
 fn largest(lattice: &Lattice) -> Option<Rectangle> {
-    let mut best: Option<Rectangle> = None;
-    for &low in lattice.keys() {
-        let (mut widest, mut height) = (i32::MAX, 0);
-        while widest > 0 {
-            let is_full = |i: &i32| lattice.contains_key(&(low.0 + i, low.1 + height));
-            widest = (0..widest).take_while(is_full).count() as i32;
-            height += 1;
-            let seen = Rectangle { low, width: widest as usize, height: height as usize };
-            let area = |r: &Rectangle| r.width * r.height;
-            if seen.width.min(seen.height) >= 3 && best.as_ref().is_none_or(|b| area(&seen) > area(b)) {
-                best = Some(seen);
+    let runs = runs(lattice);
+    let (mut best, mut most) = (None, 0);
+    for (&low, &(mut width, below)) in &runs {
+        for height in 1..=below {
+            width = width.min(runs[&(low.0, low.1 + height as i32 - 1)].0);
+            if width * below <= most {
+                break;
+            }
+            if width.min(height) >= 3 && width * height > most {
+                (best, most) = (Some(Rectangle { low, width, height }), width * height);
             }
         }
     }
     best
+}
+
+/// How many places follow each other from every place on, itself among them: along i, and along j.
+fn runs(lattice: &Lattice) -> BTreeMap<Place, (usize, usize)> {
+    let mut runs = BTreeMap::<Place, (usize, usize)>::new();
+    for &(i, j) in lattice.keys().rev() {
+        let along_i = runs.get(&(i + 1, j)).map_or(0, |next| next.0);
+        let along_j = runs.get(&(i, j + 1)).map_or(0, |next| next.1);
+        runs.insert((i, j), (along_i + 1, along_j + 1));
+    }
+    runs
 }
 
 /// A rectangle's marks in the board's order.
@@ -179,6 +186,30 @@ mod tests {
         assert_eq!(find(&lattice(10, 7), 9, 6), Found::Other { columns: 10, rows: 7 });
         assert_eq!(find(&lattice(9, 6), 10, 7), Found::Other { columns: 9, rows: 6 });
         assert_eq!(find(&lattice(9, 7), 9, 6), Found::Other { columns: 9, rows: 7 });
+    }
+
+    /// The definition, place by place: what [`largest`] finds faster.
+    fn largest_by_trying_all(lattice: &Lattice) -> Option<Rectangle> {
+        let sizes = |low| (3..=12).flat_map(move |height| (3..=12).map(move |width| (low, width, height)));
+        let all = lattice.keys().flat_map(|&low| sizes(low));
+        all.map(|(low, width, height)| Rectangle { low, width, height })
+            .filter(|rectangle| rectangle.is_full(lattice))
+            .reduce(
+                |best, next| if next.width * next.height > best.width * best.height { next } else { best },
+            )
+    }
+
+    #[test]
+    fn the_largest_rectangle_among_holes_is_that_of_the_definition() {
+        let mut state = 7_u32;
+        for holes in (0..24).cycle().take(240) {
+            let mut part = lattice(12, 9);
+            for _ in 0..holes {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                part.remove(&((state >> 8) as i32 % 12, (state >> 20) as i32 % 9));
+            }
+            assert_eq!(largest(&part), largest_by_trying_all(&part), "{part:?}");
+        }
     }
 
     #[test]
