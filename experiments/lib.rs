@@ -70,6 +70,19 @@ pub const EXPERIMENTS: &[Experiment] = &[
     lens_minimum::EXPERIMENT,
 ];
 
+/// Those that compute for more than some seconds: `cargo test` leaves them to `calibench run` and `calibench check`.
+pub const HEAVY: &[&str] = &[
+    k2_observability::EXPERIMENT.id,
+    focal_depth::EXPERIMENT.id,
+    one_view::EXPERIMENT.id,
+    board_warp::EXPERIMENT.id,
+    model_choice::EXPERIMENT.id,
+    hand_eye::EXPERIMENT.id,
+    gate_power::EXPERIMENT.id,
+    detector_gate::EXPERIMENT.id,
+    global_minimum::EXPERIMENT.id,
+];
+
 /// What this program was built from, as `build.rs` found it.
 pub fn build() -> Build {
     Build::read(env!("CALIBENCH_COMMIT"), env!("CALIBENCH_CHANGED"), env!("CALIBENCH_CRATES"))
