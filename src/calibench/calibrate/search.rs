@@ -168,3 +168,37 @@ pub(super) fn is_better(new: &Minimum, old: &Minimum) -> bool {
     }
     converged(new) && !converged(old) && new.system.cost <= old.system.cost * (1.0 + EQUAL)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::system::System;
+    use crate::camera::{Camera, FreeParameters};
+
+    #[test]
+    fn a_minimum_is_better_by_more_than_rounding_or_as_good_and_converged() {
+        let at = |cost: f64, converged: bool| {
+            let mut system = System::new(FreeParameters::NONE, 0);
+            system.cost = cost;
+            let camera = Camera::pinhole(600.0, 600.0, 320.0, 240.0);
+            let termination = if converged { Termination::Converged } else { Termination::Stalled };
+            Minimum {
+                state: State { camera, cam_from_target: Vec::new() },
+                system,
+                termination,
+                iterations: 1,
+            }
+        };
+        for (new, old, is) in [
+            (at(7.0 - 1e-7, false), at(7.0, true), true),
+            (at(7.0 - 1e-9, true), at(7.0, true), false),
+            (at(7.0, true), at(7.0, true), false),
+            (at(7.0, false), at(7.0, false), false),
+            (at(7.0, true), at(7.0, false), true),
+            (at(7.0 + 1e-9, true), at(7.0, false), true),
+            (at(7.0 + 1e-7, true), at(7.0, false), false),
+        ] {
+            assert_eq!(is_better(&new, &old), is, "{} {}", new.system.cost, old.system.cost);
+        }
+    }
+}
