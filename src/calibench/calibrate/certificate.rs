@@ -403,15 +403,15 @@ mod tests {
         // Half of the marks lie half of delta off, half twice.
         let pair = |i: u32| {
             let point = Vec2::new(f64::from(i % 4), f64::from(i / 4)) * 10.0;
-            let off = if i % 2 == 0 { 0.5 } else { 2.0 };
+            let off = if i.is_multiple_of(2) { 0.5 } else { 2.0 };
             (point, camera.project(&Vec3::new(point.x, point.y, 100.0)).unwrap() + Vec2::new(off, 0.0))
         };
         let observations = [Observations::new((0..8).map(pair))];
         let state = State { camera, cam_from_target: vec![pose] };
         let Chance { share, stretch } =
             Chance::of(&problem(&observations, Loss::Huber { delta_px: 1.0 }), &state);
-        // Weights 1 and 1/2, mean slopes of the influence 1 and 1/4; it squares to 1/4 and 1, and half the marks
-        // cost 1/4, half 4 - 1.
+        // Weights 1 and 1/2, mean slopes of the influence 1 and 1/4; it squares to 1/4 and 1, and half the
+        // marks cost 1/4, half 4 - 1.
         let (weight, slope, square, cost) = (0.75, 0.625, 0.625, 1.625);
         assert!((stretch - weight / slope).abs() < 1e-12, "{stretch}");
         assert!((share - square / slope / cost).abs() < 1e-12, "{share}");

@@ -478,8 +478,8 @@ mod tests {
         assert!(doubtful_slopes(&problem(&observations), &state, 1.0).is_empty());
     }
 
-    /// What is said of three views that face the camera, with noise of 0.1 px, where fx is free and fy follows:
-    /// with what is known of fx beforehand, and a cost as if the minimum had so much more.
+    /// What is said of three views that face the camera, with noise of 0.1 px, where fx is free and fy
+    /// follows: with what is known of fx beforehand, and a cost as if the minimum had so much more.
     fn facing(prior_sd: Option<f64>, more_cost: f64) -> Result<Option<State>, CalibrationError> {
         let camera = Camera::pinhole(600.0, 600.0, 320.0, 240.0);
         let pose = |(roll, z): (f64, f64)| Pose {
@@ -525,7 +525,8 @@ mod tests {
     fn views_that_face_the_camera_within_noise_determine_no_focal_length() {
         let Err(CalibrationError::NotIdentifiable { inseparable, why }) = facing(None, 0.0) else { panic!() };
         assert_eq!(inseparable, [Unknown::FocalLength, Unknown::Distance]);
-        // Four degrees of freedom a view: 12, which exceed x with probability exp(-x / 2) sum_(k < 6) (x / 2)^k / k!.
+        // Four degrees of freedom a view: 12, which exceed x with probability exp(-x / 2) sum_(k < 6) (x /
+        // 2)^k / k!.
         let tail = |x: f64| {
             let terms = (1..6).scan(1.0, |term, k| {
                 *term *= 0.5 * x / f64::from(k);

@@ -119,8 +119,8 @@ mod tests {
         let open = Warning::NotLinear { parameter: K4, below: Some(0.8), above: None };
         let lines = in_words(&[&three[..], &[open]].concat());
         assert_eq!(lines.len(), 1);
-        let start = "the standard deviations of k1, k2, k3, k4 mislead: intervals of two of them truly reach 0.50 times \
-                     as far to without end;";
+        let start = "the standard deviations of k1, k2, k3, k4 mislead: intervals of two of them truly reach 0.50 \
+                     times as far to without end;";
         assert!(lines[0].starts_with(start), "{}", lines[0]);
     }
 }

@@ -285,8 +285,8 @@ mod tests {
         }
     }
 
-    /// Parameters, fall and probability of what is told of p1 with p2 and of k3, by what the cost falls by with
-    /// the first, the second and both.
+    /// Parameters, fall and probability of what is told of p1 with p2 and of k3, by what the cost falls by
+    /// with the first, the second and both.
     fn told(falls: [f64; 3], variance: f64, freedom: usize) -> Vec<(Vec<Parameter>, f64, f64)> {
         let [tangential, radial, ..] = ASKED;
         let sets = [tangential.to_vec(), radial.to_vec(), [tangential, radial].concat()];
@@ -306,7 +306,8 @@ mod tests {
         let found = told([50.0, 30.0, 70.0], 0.5, 200);
         let [(first, a, probability), (second, b, _)] = &found[..] else { panic!("{found:?}") };
         assert_eq!((&first[..], *a, &second[..], *b), (&[P1, P2][..], 100.0, &[K3][..], 40.0));
-        // Of two and d degrees of freedom F is exceeded with probability (1 + 2 F / d)^(-d / 2): F = 50, d = 198.
+        // Of two and d degrees of freedom F is exceeded with probability (1 + 2 F / d)^(-d / 2): F = 50, d =
+        // 198.
         let expected = libm::pow(1.0 + 100.0 / 198.0, -99.0);
         assert!((probability / expected - 1.0).abs() < 1e-6, "{probability}");
         // What is explained already is not told.

@@ -286,7 +286,8 @@ mod tests {
         assert_eq!(predicted_rms_px(0.1, 5, 10).0, 0.0);
     }
 
-    /// A lens about (326, 243), and what it sees of a tilted board: marks, ideal pixels and pixels with noise.
+    /// A lens about (326, 243), and what it sees of a tilted board: marks, ideal pixels and pixels with
+    /// noise.
     fn seen(k1: f64, noise_px: f64) -> (Camera, View, Vec<Vec2>) {
         let ideal = Camera::pinhole(600.0, 600.0, 326.0, 243.0);
         let camera = ideal.with_distortion(BrownConrady::radial(k1, -0.25 * k1));
