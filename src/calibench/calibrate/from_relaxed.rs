@@ -270,6 +270,8 @@ fn state_of(relaxed: &Relaxed, held: &Held, hypothesis: &Hypothesis) -> State {
 mod tests {
     use super::*;
     use crate::calibrate::Settings;
+    use crate::calibrate::Termination;
+    use crate::calibrate::system::System;
     use crate::geometry::{Pose, Vec3, rotation};
 
     #[test]
@@ -324,5 +326,18 @@ mod tests {
             [260.0, 320.0, 380.0].into_iter().flat_map(around).all(|centre| list.contains(&centre)),
             "{list:?}"
         );
+    }
+
+    #[test]
+    fn a_cost_three_times_that_of_the_relaxed_model_is_far_above_it() {
+        let is_far = |cost: f64| {
+            let mut system = System::new(FreeParameters::NONE, 0);
+            system.cost = cost;
+            let camera = Camera::pinhole(600.0, 600.0, 320.0, 240.0);
+            let state = State { camera, cam_from_target: Vec::new() };
+            let best = Minimum { state, system, termination: Termination::Converged, iterations: 1 };
+            Found { best, starts: 1, met: Vec::new(), lowest_relaxed: 2.0 }.is_far_above_floor()
+        };
+        assert!(is_far(6.1) && !is_far(5.9));
     }
 }

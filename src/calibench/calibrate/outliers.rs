@@ -178,9 +178,9 @@ mod tests {
 
     #[test]
     fn what_noise_hardly_exceeds_grows_with_what_a_fit_follows() {
-        // One of 100 exceeds 2 (ln 100 + 13) variances with probability exp(-13), half of all 2 ln 2 of them. Of
-        // 200 coordinates 150 are degrees of freedom.
-        let expected = (100f64.ln() + 13.0) / 2f64.ln() * (200.0 / 150.0) * (200.0 / 150.0);
+        // One of 100 exceeds 2 (ln 100 + 13) variances with probability exp(-13), half of all 2 ln 2 of them.
+        // Of 200 coordinates 150 are degrees of freedom.
+        let expected = (libm::log(100.0) + 13.0) / libm::log(2.0) * (200.0 / 150.0) * (200.0 / 150.0);
         let largest = largest_of_noise(100, 50).unwrap();
         assert!((largest / expected - 1.0).abs() < 1e-12, "{largest}");
         assert_eq!((largest_of_noise(100, 101), largest_of_noise(100, 201)), (None, None));
@@ -224,19 +224,19 @@ mod tests {
                 rotation: rotation::from_xyz_rad(x, y, z),
                 translation: Vec3::new(0.0, 0.0, 120.0),
             });
-        let seen = |pose: &Pose, columns: u32, off: f64| {
+        let seen = |pose: &Pose, marks: u32, off: f64| {
             let pair = |i: u32| {
-                let point = Vec2::new(f64::from(i % columns) - 1.0, f64::from(i / columns) - 0.5) * 20.0;
+                let point = Vec2::new(f64::from(i % 4) - 1.5, f64::from(i / 4) - 1.0) * 15.0;
                 let noise = 0.1 * Vec2::new(libm::sin(7.0 * f64::from(i)), libm::cos(5.0 * f64::from(i)));
                 let off = if i == 4 { Vec2::new(off, 0.0) } else { Vec2::zeros() };
                 (point, camera.project(&pose.apply(&Vec3::new(point.x, point.y, 0.0))).unwrap() + noise + off)
             };
-            Observations::new((0..2 * columns).map(pair).collect::<Vec<_>>().into_iter())
+            Observations::new((0..marks).map(pair).collect::<Vec<_>>().into_iter())
         };
-        // Six and twelve marks in each of four views: 18 and 66 degrees of freedom of 24 and 48 marks.
-        let found = [3, 6].map(|columns| {
+        // Seven and twelve marks in each of four views: 26 and 66 degrees of freedom of 28 and 48 marks.
+        let found = [7, 12].map(|marks| {
             let views = [0.0, 0.0, 30.0, 0.0].into_iter().zip(&poses);
-            let observations: Vec<Observations> = views.map(|(off, pose)| seen(pose, columns, off)).collect();
+            let observations: Vec<Observations> = views.map(|(off, pose)| seen(pose, marks, off)).collect();
             let problem = Problem {
                 free: FreeParameters::STANDARD,
                 fy_per_fx: None,
