@@ -41,3 +41,26 @@ impl<const W: usize> ViewBlock<W> {
         self.gradient = keep * self.gradient;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Vector3, Vector6};
+
+    #[test]
+    fn a_plane_whose_tilt_is_held_turns_about_its_normal_only() {
+        let root = PoseBlock::from_fn(|i, j| libm::sin((7 * i + 3 * j) as f64) + 2.0 * f64::from(i == j));
+        let mut block: ViewBlock = ViewBlock::zero();
+        block.pose = root * root.transpose();
+        block.gradient = Vector6::new(1.0, -2.0, 3.0, -4.0, 5.0, -6.0);
+        let (free, normal) = (block.clone(), Vector3::new(2.0, -1.0, 2.0) / 3.0);
+        block.hold_tilt(&normal);
+        let step = block.pose.lu().solve(&block.gradient).unwrap();
+        let turn: Vector3<f64> = step.fixed_rows::<3>(0).into();
+        assert!(turn.cross(&normal).norm() < 1e-12 * step.norm());
+        // What may still move does so by the equations as they were.
+        let allowed = Vector6::new(0.5 * normal.x, 0.5 * normal.y, 0.5 * normal.z, 0.3, -0.2, 0.7);
+        let cost = |block: &ViewBlock| allowed.dot(&(block.pose * allowed)) + block.gradient.dot(&allowed);
+        assert!((cost(&block) - cost(&free)).abs() < 1e-12 * cost(&free).abs());
+    }
+}

@@ -313,8 +313,14 @@ fn quadratic_form(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibrate::Termination;
+    use crate::calibrate::from_relaxed::beside;
+    use crate::calibrate::normal::Observations;
+    use crate::calibrate::retraction::Retraction;
     use crate::calibrate::tests::four_views;
     use crate::calibrate::{Settings, calibrate};
+    use crate::camera::{Camera, FreeParameters};
+    use crate::geometry::{Mat3, Pose, Vec2, Vec3};
 
     #[test]
     fn the_floor_is_what_pixels_reach_whatever_is_known_beforehand() {
@@ -349,5 +355,86 @@ mod tests {
         right[..3].copy_from_slice(&[6.0, 3.0, 2.0]);
         scale[..3].copy_from_slice(&[4.0, 1.0, 4.0]);
         assert_eq!(quadratic_form(&mut matrix, &mut right, &scale, 3), (10.0, 1));
+    }
+
+    fn problem(observations: &[Observations], loss: Loss) -> Problem<'_> {
+        Problem {
+            free: FreeParameters::STANDARD,
+            fy_per_fx: None,
+            priors: Priors::NONE,
+            observations,
+            loss,
+            max_iterations: 100,
+            hold_tilt: false,
+            retraction: Retraction::Straight,
+            focal_limits: (0.0, f64::INFINITY),
+            rounding_cost: 0.0,
+        }
+    }
+
+    #[test]
+    fn the_probability_of_an_excess_is_the_tail_of_fishers_distribution() {
+        // Of 2 and d degrees of freedom F is exceeded with probability (1 + 2 F / d)^(-d / 2). A floor of 10
+        // px^2 on 10 degrees of freedom is a variance of 1 px^2, an excess of 6 then F = 3.
+        let own = Certificate::of(16.0, 10.0, 8, [2, 10], 1.0);
+        assert!((own.p_value / libm::pow(1.6, -5.0) - 1.0).abs() < 1e-9, "{own:?}");
+        assert_eq!((own.excess, own.rmse_px), (6.0, 2f64.sqrt()));
+        assert!((own.floor(8) / 10.0 - 1.0).abs() < 1e-15);
+        // Where one deviation costs half of the mean the same excess is twice as many variances.
+        assert_eq!(Certificate::of(16.0, 10.0, 8, [2, 10], 0.5).excess, 12.0);
+    }
+
+    #[test]
+    fn without_degrees_of_freedom_nothing_is_certified_and_nothing_held_against_a_minimum() {
+        for (freedoms, is_possible) in [([0, 5], false), ([5, 0], false), ([5, 5], true)] {
+            let own = Certificate::of(20.0, 1.0, 10, freedoms, 1.0);
+            assert_eq!(own.is_possible(), is_possible);
+            assert_eq!(own.p_value == 1.0, !is_possible, "{own:?}");
+        }
+        // Neither cost nor floor: no number is no excess.
+        let exact = Certificate::of(0.0, 0.0, 10, [5, 5], 1.0);
+        assert_eq!((exact.p_value, exact.excess), (1.0, 0.0));
+    }
+
+    #[test]
+    fn what_chance_costs_under_hubers_loss_is_that_of_its_influence() {
+        let camera = Camera::pinhole(600.0, 600.0, 320.0, 240.0);
+        let pose = Pose { rotation: Mat3::identity(), translation: Vec3::new(0.0, 0.0, 100.0) };
+        // Half of the marks lie half of delta off, half twice.
+        let pair = |i: u32| {
+            let point = Vec2::new(f64::from(i % 4), f64::from(i / 4)) * 10.0;
+            let off = if i.is_multiple_of(2) { 0.5 } else { 2.0 };
+            (point, camera.project(&Vec3::new(point.x, point.y, 100.0)).unwrap() + Vec2::new(off, 0.0))
+        };
+        let observations = [Observations::new((0..8).map(pair))];
+        let state = State { camera, cam_from_target: vec![pose] };
+        let Chance { share, stretch } =
+            Chance::of(&problem(&observations, Loss::Huber { delta_px: 1.0 }), &state);
+        // Weights 1 and 1/2, mean slopes of the influence 1 and 1/4; it squares to 1/4 and 1, and half the
+        // marks cost 1/4, half 4 - 1.
+        let (weight, slope, square, cost) = (0.75, 0.625, 0.625, 1.625);
+        assert!((stretch - weight / slope).abs() < 1e-12, "{stretch}");
+        assert!((share - square / slope / cost).abs() < 1e-12, "{share}");
+    }
+
+    #[test]
+    fn the_floor_by_the_score_is_the_minimum_of_the_relaxed_model() {
+        let views = four_views(0.1);
+        let found = calibrate(&views, &Settings::standard().without_search()).unwrap();
+        let observations: Vec<Observations> = views
+            .iter()
+            .map(|view| Observations::new(view.points().iter().copied().zip(view.pixels().iter().copied())))
+            .collect();
+        let problem = problem(&observations, Loss::Squares);
+        let minimum =
+            problem.minimise(State { camera: found.camera, cam_from_target: found.cam_from_target });
+        assert_eq!(minimum.termination, Termination::Converged);
+        let cost = minimum.system.cost;
+        let certificate = certify(&problem, &minimum.state, &minimum.system.reduction().unwrap(), cost);
+        let floor = beside(&problem, &minimum).unwrap().cost;
+        // The excess is that of seven degrees of freedom, some 0.07 px^2; the score has it to second order.
+        let excess = cost - floor;
+        assert!((0.01..0.3).contains(&excess), "{excess}");
+        assert!((certificate.floor(252) - floor).abs() < 0.02 * excess, "{} {floor}", certificate.floor(252));
     }
 }

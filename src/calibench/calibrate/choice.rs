@@ -358,6 +358,7 @@ pub fn explaining_freedoms(views: &[View], settings: &Settings, fit: &LensCalibr
 mod tests {
     use super::*;
     use crate::calibrate::tests::four_views;
+    use crate::geometry::Vec2;
 
     #[test]
     fn the_criterion_decides_and_predictions_where_it_says_nothing() {
@@ -393,5 +394,101 @@ mod tests {
         // Of 480 degrees of freedom the noise is known to 3 %; the camera of three views adds a little.
         let hold_out_px = compared[0].hold_out_px.unwrap();
         assert!((0.09..0.12).contains(&hold_out_px), "{hold_out_px}");
+    }
+
+    /// A candidate with so many degrees of freedom, sum of squares, and errors of folds.
+    fn compared(freedom: usize, square: f64, folds: &[f64]) -> Compared {
+        let candidate = Candidate::usual()[0];
+        let mut calibration =
+            calibrate_lens(&four_views(0.1), &candidate.settings(&Settings::standard())).unwrap();
+        calibration.degrees_of_freedom = freedom;
+        Compared {
+            candidate,
+            calibration,
+            bic: 0.0,
+            hold_out_px: None,
+            folds: folds.to_vec(),
+            square,
+            is_behind: false,
+            correlation: 0.0,
+        }
+    }
+
+    #[test]
+    fn chance_takes_so_much_away_with_the_tail_of_fishers_distribution() {
+        // Of 2 and d degrees of freedom F is exceeded with probability (1 + 2 F / d)^(-d / 2), which is the
+        // ratio of the squares to the power of d / 2.
+        let (rich, plain) = (compared(100, 1.0, &[]), compared(102, 1.2, &[]));
+        let chance = rich.chance_against(&plain).unwrap();
+        assert!((chance / libm::pow(1.2, -50.0) - 1.0).abs() < 1e-6, "{chance}");
+        assert_eq!((plain.chance_against(&rich), plain.chance_against(&plain)), (None, None));
+        assert_eq!(compared(0, 1.0, &[]).chance_against(&plain), None);
+    }
+
+    #[test]
+    fn a_fold_is_won_by_the_smaller_error() {
+        let (a, b) = (compared(9, 1.0, &[1.0, 2.0, 3.0, 4.0]), compared(9, 1.0, &[1.0, 3.0, 4.0]));
+        assert_eq!((a.wins_against(&b), b.wins_against(&a)), ((2, 3), (0, 3)));
+        // Nothing is predicted where nothing could be left out.
+        assert_eq!(a.predicted(), f64::INFINITY);
+        assert_eq!(Compared { hold_out_px: Some(0.2), ..a }.predicted(), 0.2);
+    }
+
+    #[test]
+    fn the_criterion_is_schwarzs() {
+        // Twenty coordinates of mean square e^2: 20 ln e^2 + 3 ln 20.
+        let own = criterion((20.0 * libm::exp(2.0), 10), 3.0);
+        assert!((own - (40.0 + 3.0 * libm::log(20.0))).abs() < 1e-12, "{own}");
+        assert_eq!(unknowns(&compared(474, 1.0, &[]).calibration), 30.0);
+    }
+
+    #[test]
+    fn views_that_span_no_plane_take_no_part_where_half_of_all_do() {
+        let plane = four_views(0.1)[0].clone();
+        let row = View::new(plane.points()[..9].to_vec(), plane.pixels()[..9].to_vec()).unwrap();
+        let of = |planes: usize, rows: usize| {
+            telling(&[vec![plane.clone(); planes], vec![row.clone(); rows]].concat()).len()
+        };
+        assert_eq!((of(2, 2), of(3, 1), of(1, 2), of(2, 3)), (2, 3, 3, 5));
+    }
+
+    #[test]
+    fn a_view_left_out_has_its_coordinates_but_for_those_of_its_pose() {
+        let views = four_views(0.1);
+        let settings = Settings::standard();
+        let fit = calibrate_lens(&views, &settings).unwrap();
+        let counted = Counted::of(&views, [&fit].into_iter(), settings.loss);
+        let folds = hold_out(&views, &settings, &counted).unwrap();
+        assert_eq!(folds.iter().map(|(_, freedom)| *freedom).collect::<Vec<_>>(), [120.0; 4]);
+    }
+
+    #[test]
+    fn a_fit_with_degrees_of_freedom_and_coefficients_in_range_comes_before_those_without() {
+        let (compared, _) = compare_models(&four_views(0.1), &Settings::standard(), &Candidate::usual()[..2]);
+        assert!(compared.iter().all(|c| !c.is_behind));
+    }
+
+    #[test]
+    fn a_lens_that_is_not_centred_asks_for_tangential_terms() {
+        use Parameter::{K1, K2, P1, P2};
+        // A shift by the tangential terms of p1 = 0.01 about (326, 243), to first order.
+        let tangential = |view: &View| {
+            let shifted = |pixel: &Vec2| {
+                let at = (pixel - Vec2::new(326.0, 243.0)) / 600.0;
+                let shift = 0.01 * Vec2::new(2.0 * at.x * at.y, at.norm_squared() + 2.0 * at.y * at.y);
+                pixel + 600.0 * shift
+            };
+            View::new(view.points().to_vec(), view.pixels().iter().map(shifted).collect()).unwrap()
+        };
+        let views: Vec<View> = four_views(0.02).iter().map(tangential).collect();
+        let settings = Settings::standard().hold(Parameter::P1, 0.0).hold(Parameter::P2, 0.0);
+        let fit = calibrate_lens(&views, &settings).unwrap();
+        let found = explaining_freedoms(&views, &settings, &fit);
+        let crooked = FreeParameters::of(&[K1, K2, P1, P2]);
+        let own = found.iter().find(|freedom| freedom.candidate.coefficients == crooked).unwrap();
+        assert!(own.rmse_px < 0.032 && own.rmse_without_px > 0.05, "{own:?}");
+        // Richer models that have these terms do as well; what explains nothing is not named.
+        assert!(found.iter().any(|freedom| freedom.candidate.model == Model::ThinPrism));
+        assert!(found.iter().all(|freedom| freedom.rmse_px < 0.95 * freedom.rmse_without_px), "{found:?}");
     }
 }

@@ -124,4 +124,19 @@ mod tests {
             assert!((difference - j.column(i)).norm() < 1e-8, "{i}");
         }
     }
+
+    #[test]
+    fn a_pose_is_refined_to_the_one_of_the_homography() {
+        let camera = Camera { skew: 0.1, ..Camera::pinhole(1.3, 1.2, 0.2, -0.1) };
+        let pose =
+            Pose { rotation: rotation::from_xyz_rad(0.3, -0.4, 0.2), translation: Vec3::new(0.3, -0.2, 4.0) };
+        let h = predicted(&camera.k(), &pose);
+        let start = pose.perturbed(&Vector6::new(0.02, -0.01, 0.03, 0.05, -0.04, 0.1));
+        let (found, cost) = refined(&camera, start, &h, &EntriesBlock::identity());
+        assert!(cost < 1e-12, "{cost}");
+        assert!(
+            (found.rotation - pose.rotation).norm() < 1e-5
+                && (found.translation - pose.translation).norm() < 1e-4
+        );
+    }
 }

@@ -170,3 +170,81 @@ fn pose_response<const W: usize>(
     // root.
     squares.map(|s| (s / total).sqrt())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::information;
+    use crate::camera::{BrownConrady, Camera, FreeParameters, Parameter};
+    use crate::geometry::{Pose, Vec2, Vec3, rotation};
+
+    /// Normal equations of three views, six parameters free.
+    fn system() -> System {
+        let camera =
+            Camera::pinhole(600.0, 590.0, 320.0, 240.0).with_distortion(BrownConrady::radial(-0.2, 0.1));
+        let points: Vec<Vec2> =
+            (0..35).map(|i| Vec2::new(f64::from(i % 7) - 3.0, f64::from(i / 7) - 2.0) * 12.0).collect();
+        let poses = [[0.3, 0.0, 0.1], [0.0, -0.3, 0.0], [-0.2, 0.25, 0.4]].map(|[x, y, z]| Pose {
+            rotation: rotation::from_xyz_rad(x, y, z),
+            translation: Vec3::new(2.0, -3.0, 120.0),
+        });
+        information(&camera, FreeParameters::STANDARD, &poses, &points).unwrap()
+    }
+
+    #[test]
+    fn poses_follow_the_intrinsics_as_a_dense_solver_says() {
+        let system = system();
+        let step = SVector::from_fn(|i, _| [1.0, -2.0, 3.0, 0.5, 0.01, -0.02].get(i).copied().unwrap_or(0.0));
+        let found = pose_response(&system, &system.reduction().unwrap().eliminated, &step);
+        let mut squares = [0.0; 4];
+        for view in &system.views {
+            let moved = view.pose.lu().solve(&(view.coupling.transpose() * step)).unwrap();
+            // In units of what each number of a pose alone is known to.
+            let part = |i: usize| moved[i] * moved[i] * view.pose[(i, i)];
+            let parts = [part(0) + part(1), part(2), part(3) + part(4), part(5)];
+            squares.iter_mut().zip(parts).for_each(|(square, part)| *square += part);
+        }
+        // The mean over three views, each with a third of the intrinsics' information.
+        for (own, square) in found.into_iter().zip(squares) {
+            let expected = (square / 3.0 / 3.0).sqrt();
+            assert!((own / expected - 1.0).abs() < 1e-9, "{own} {expected}");
+        }
+    }
+
+    #[test]
+    fn members_below_a_fifth_of_the_strongest_are_not_named() {
+        let mut system = system();
+        // Poses that do not follow.
+        system.views.iter_mut().for_each(|view| view.coupling.fill(0.0));
+        let eliminated = system.reduction().unwrap().eliminated;
+        let direction = DVector::from_row_slice(&[0.8, 0.15, -0.17, 0.5, 0.0, 0.0]);
+        let members = named(&system, &eliminated, &direction, &system.scale());
+        let names: Vec<Unknown> = members.iter().map(|member| member.unknown).collect();
+        assert_eq!(names, [Parameter::Fx, Parameter::Cy, Parameter::Cx].map(Unknown::Intrinsic));
+    }
+
+    #[test]
+    fn a_root_of_the_information_has_the_same_spectrum() {
+        let system = system();
+        let (mut reduction, scale) = (system.reduction().unwrap(), system.scale());
+        let sorted = |reduction: &Reduction| {
+            let mut values: Vec<f64> =
+                Spectrum::of(reduction, &scale).unwrap().values.iter().copied().collect();
+            values.sort_unstable_by(f64::total_cmp);
+            values
+        };
+        let of_square = sorted(&reduction);
+        reduction.root = Some(reduction.schur.clone().cholesky().unwrap().l().transpose());
+        for (own, expected) in sorted(&reduction).iter().zip(&of_square) {
+            assert!((own - expected).abs() < 1e-12 + 1e-6 * expected, "{own} {expected}");
+        }
+    }
+
+    #[test]
+    fn information_that_is_no_number_has_no_spectrum() {
+        let system = system();
+        let (mut reduction, scale) = (system.reduction().unwrap(), system.scale());
+        reduction.schur[(1, 2)] = f64::NAN;
+        assert!(Spectrum::of(&reduction, &scale).is_none());
+    }
+}

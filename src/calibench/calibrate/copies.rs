@@ -58,3 +58,24 @@ fn with_copies<L>(mut calibration: Calibration<L>, distinct: &Distinct) -> Calib
     }
     calibration
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::tests::four_views;
+    use crate::calibrate::{Settings, calibrate};
+
+    #[test]
+    fn copies_are_counted_in_what_is_told() {
+        let views = four_views(0.1);
+        let copied =
+            |order: &[usize]| -> Vec<View> { order.iter().map(|&view| views[view].clone()).collect() };
+        let found = calibrate(&copied(&[0, 1, 2, 3, 1, 0, 1]), &Settings::standard()).unwrap();
+        assert!(found.warnings.contains(&Warning::Duplicates { view: 4, copy_of: 1, copies: 3 }));
+        assert_eq!(found.residuals[6], found.residuals[1]);
+        // Three copies of one view are one.
+        let refused = calibrate(&copied(&[1, 1, 1]), &Settings::standard());
+        let expected = CalibrationError::TooFewViews { need: 2, got: 1, linear: 4, copies: 2 };
+        assert_eq!(refused.map(|found| found.camera), Err(expected));
+    }
+}

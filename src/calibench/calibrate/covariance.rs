@@ -186,3 +186,46 @@ mod data {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of fx and k1, with deviations 2 and 3 and a correlation of -1/2.
+    fn two(fy_per_fx: Option<f64>) -> Covariance {
+        let free = FreeParameters::of(&[Parameter::Fx, Parameter::K1]);
+        let matrix = DMatrix::from_row_slice(2, 2, &[4.0, -3.0, -3.0, 9.0]);
+        Covariance { fy_per_fx, ..Covariance::untied(free, matrix, Vec::new(), Vec::new()) }
+    }
+
+    #[test]
+    fn a_correlation_is_over_both_deviations_and_1_with_what_is_tied() {
+        use Parameter::{Fx, Fy, K1};
+        assert_eq!((two(None).correlation(Fx, K1), two(None).correlation(Fx, Fy)), (Some(-0.5), None));
+        let tied = two(Some(0.75));
+        assert_eq!((tied.correlation(Fx, Fy), tied.correlation(K1, Fy)), (Some(1.0), Some(-0.5)));
+    }
+
+    #[test]
+    fn the_largest_spread_is_that_of_the_worst_direction() {
+        let slopes = [
+            (Parameter::Fx, Vec2::new(0.5, 0.1)),
+            (Parameter::Fy, Vec2::new(-0.3, 0.8)),
+            (Parameter::K1, Vec2::new(0.2, 0.4)),
+        ];
+        for fy_per_fx in [None, Some(0.75)] {
+            let covariance = two(fy_per_fx);
+            let fx = slopes[0].1 + fy_per_fx.unwrap_or(0.0) * slopes[1].1;
+            // The variance along (cos a, sin a).
+            let along = |i: u32| {
+                let angle = 1e-4 * f64::from(i);
+                let direction = Vec2::new(libm::cos(angle), libm::sin(angle));
+                let (a, b) = (direction.dot(&fx), direction.dot(&slopes[2].1));
+                4.0 * a * a - 6.0 * a * b + 9.0 * b * b
+            };
+            let worst = (0..31416).map(along).fold(0.0, f64::max).sqrt();
+            let found = covariance.largest_spread(&slopes);
+            assert!((found / worst - 1.0).abs() < 1e-8, "{found} {worst}");
+        }
+    }
+}

@@ -264,4 +264,39 @@ mod tests {
         assert_eq!(distinct.spread(1, &found), [0, 1, 2, 2, 3, 4, 0, 5]);
         assert_eq!(distinct.given_mark(1, 3), (1, 4));
     }
+
+    /// The same, its pixels moved by 100 px.
+    fn moved(view: &View) -> View {
+        View::new(view.points().to_vec(), view.pixels().iter().map(|p| p + Vec2::repeat(100.0)).collect())
+            .unwrap()
+    }
+
+    #[test]
+    fn copies_are_found_wherever_in_the_image() {
+        let views = [moved(&view(1.0)), moved(&view(0.0)), moved(&view(1.0))];
+        assert_eq!(first_of_each(&views), [0, 1, 0]);
+    }
+
+    #[test]
+    fn coordinates_of_a_target_are_the_same_to_a_part_of_its_size() {
+        let of = |off: f64| {
+            let mut points: Vec<Vec2> = view(0.0).points().iter().map(|p| 500.0 * p).collect();
+            points[2].x += off;
+            View::new(points, view(0.0).pixels().to_vec()).unwrap()
+        };
+        // Of 1000 mm a part in 1e9 is 1e-6 mm.
+        for (off, is_same) in [(9e-7, true), (1.1e-6, false)] {
+            assert_eq!(is_copy(&of(0.0), &of(off)), is_same, "{off}");
+        }
+    }
+
+    #[test]
+    fn pixels_that_differ_by_rounding_do_not_order_the_marks() {
+        let (own, order) = (view(0.0), [3, 1, 5, 0, 2, 4]);
+        let other = reordered(&own, &order, 0.0);
+        // Up in one row of the target and down in the other: marks of a column change places by their pixels.
+        let rounded = |(point, pixel): (&Vec2, &Vec2)| pixel + Vec2::new(2e-3 - 4e-3 * point.y, 0.0);
+        let pixels = other.pairs().map(rounded).collect();
+        assert!(is_copy(&own, &View::new(other.points().to_vec(), pixels).unwrap()));
+    }
 }

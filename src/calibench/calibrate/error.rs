@@ -192,3 +192,13 @@ pub enum CalibrationError {
         source: ClosedFormError,
     },
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_coefficients_of_a_model_are_listed_in_its_order() {
+        assert_eq!(coefficients(Model::KannalaBrandt), "k1 k2 k3 k4");
+    }
+}

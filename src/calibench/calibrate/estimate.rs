@@ -354,6 +354,8 @@ impl Fit {
 mod tests {
     use super::*;
     use crate::calibrate::tests::four_views;
+    use crate::camera::{Camera, FreeParameters};
+    use crate::geometry::{Mat3, Pose, Vec3};
 
     #[test]
     fn every_view_has_six_unknowns_that_its_marks_must_pay_for() {
@@ -379,5 +381,88 @@ mod tests {
         views[2] = View::new(points, pixels).unwrap();
         let refused = calibrate(&views, &Settings::standard());
         assert!(matches!(refused, Err(CalibrationError::View { view: 2, .. })), "{refused:?}");
+    }
+
+    #[test]
+    fn the_frame_of_the_pixels_is_the_box_around_all_of_them() {
+        let corners = |low: f64, high: f64| {
+            let pairs = [(low, 50.0), (high, 150.0)].map(|(u, v)| (Vec2::zeros(), Vec2::new(u, v)));
+            Observations::new(pairs.into_iter())
+        };
+        let (centre, half_width) = pixel_frame(&[corners(100.0, 120.0), corners(110.0, 300.0)]);
+        assert_eq!((centre, half_width), (Vec2::new(200.0, 100.0), 100.0));
+    }
+
+    #[test]
+    fn what_is_known_beforehand_needs_no_view() {
+        let views = &four_views(0.1)[1..2];
+        let need = |settings: &Settings| match check_counts(views, settings) {
+            Err(CalibrationError::TooFewViews { need, got: 1, linear, .. }) => Some((need, linear)),
+            _ => None,
+        };
+        // A view has two equations for the linear parameters.
+        let standard = Settings::standard();
+        assert_eq!(need(&standard), Some((2, 4)));
+        let one = standard.with_prior(Parameter::Cx, 326.0, 1.0);
+        assert_eq!(need(&one), Some((2, 3)));
+        assert_eq!(check_counts(views, &one.with_prior(Parameter::Cy, 243.0, 1.0)), Ok(()));
+    }
+
+    #[test]
+    fn a_fit_has_the_tails_and_degrees_of_freedom_of_its_residuals() {
+        let camera = Camera::pinhole(600.0, 600.0, 320.0, 240.0);
+        let pose = Pose { rotation: Mat3::identity(), translation: Vec3::new(0.0, 0.0, 100.0) };
+        // Squared residuals of 1, 1, 1 and 9.
+        let pair = |i: u32| {
+            let point = Vec2::new(f64::from(i % 2), f64::from(i / 2)) * 10.0;
+            let off = if i == 3 { 3.0 } else { 1.0 };
+            (point, camera.project(&Vec3::new(point.x, point.y, 100.0)).unwrap() + Vec2::new(0.0, off))
+        };
+        let fit =
+            Fit::of(&State { camera, cam_from_target: vec![pose] }, &[Observations::new((0..4).map(pair))]);
+        assert!((fit.tails() - 4.0 * 84.0 / 144.0).abs() < 1e-9, "{}", fit.tails());
+        // Eight coordinates and half of an unknown known from elsewhere, less two parameters.
+        let system = System::new(FreeParameters::of(&[Parameter::Fx, Parameter::Fy]), 0);
+        assert_eq!(fit.freedom(&system, 0.5), 6.5);
+    }
+
+    #[test]
+    fn the_correlation_that_is_told_is_that_of_neighbours_residuals() {
+        // A wave that no lens of two coefficients follows.
+        let waved = |view: &View| {
+            let wave = |pixel: &Vec2| pixel + Vec2::new(0.2 * libm::sin(pixel.y / 25.0), 0.0);
+            View::new(view.points().to_vec(), view.pixels().iter().map(wave).collect()).unwrap()
+        };
+        let views: Vec<View> = four_views(0.02).iter().map(waved).collect();
+        let found = calibrate(&views, &Settings::standard()).unwrap();
+        let of = |warning: &Warning| match warning {
+            Warning::Structured { correlation } => Some(*correlation),
+            _ => None,
+        };
+        let told = found.warnings.iter().find_map(of).unwrap();
+        // The mean product of a mark's residual with the next one's, 62 in each view, over the mean square.
+        let products =
+            found.residuals.iter().flat_map(|view| view.windows(2).map(|pair| pair[0].dot(&pair[1])));
+        let squares = found.residuals.iter().flatten().map(Vec2::norm_squared);
+        let expected = (products.sum::<f64>() / 248.0) / (squares.sum::<f64>() / 252.0);
+        assert!((told - expected).abs() < 1e-12, "{told} {expected}");
+    }
+
+    #[test]
+    fn a_mark_nine_deviations_off_is_an_outlier_by_the_noise_of_a_coordinate() {
+        // Sixteen views: four times four with other noise.
+        let mut views: Vec<View> = [0.1, 0.101, 0.102, 0.103].into_iter().flat_map(four_views).collect();
+        let mut pixels = views[6].pixels().to_vec();
+        pixels[17].x += 0.92;
+        views[6] = View::new(views[6].points().to_vec(), pixels).unwrap();
+        let found = calibrate(&views, &Settings::standard()).unwrap();
+        // So few do not make the tails heavy: four times the square of the mean square.
+        let squares = || found.residuals.iter().flatten().map(Vec2::norm_squared);
+        let (mean, fourth) =
+            (squares().sum::<f64>() / 1008.0, squares().map(|s| s * s).sum::<f64>() / 1008.0);
+        assert!(fourth < 3.8 * mean * mean, "{}", fourth / (mean * mean));
+        let is_it =
+            |w: &Warning| matches!(w, Warning::Outliers(o) if (o.marks, o.view, o.point) == (1, 6, 17));
+        assert!(found.warnings.iter().any(is_it), "{:?}", found.warnings);
     }
 }

@@ -265,3 +265,79 @@ fn state_of(relaxed: &Relaxed, held: &Held, hypothesis: &Hypothesis) -> State {
         cam_from_target: hypothesis.poses.clone(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::Settings;
+    use crate::calibrate::Termination;
+    use crate::calibrate::system::System;
+    use crate::geometry::{Pose, Vec3, rotation};
+
+    #[test]
+    fn the_camera_of_a_hypothesis_makes_the_relaxed_models_picture() {
+        use Parameter::{K3, P1, P2, Skew};
+        let settings = [K3, P1, P2, Skew].into_iter().fold(Settings::standard(), Settings::estimate);
+        let held = Held::of(&settings, Vec2::zeros()).unwrap();
+        let plain = Camera::pinhole(600.0, 580.0, 326.0, 243.0);
+        let bent = Camera::from_parameters([600.0, 580.0, 326.0, 243.0, 1.5, -0.2, 0.05, 1e-3, -2e-3, 0.01]);
+        // Without distortion the centre may move, and the shape of the cells change.
+        for (lens, camera) in
+            [(bent, Camera::pinhole(1.7, 1.7, 0.0, 0.0)), (plain, Camera::pinhole(1.7, 1.5, 0.1, -0.05))]
+        {
+            let pose = Pose {
+                rotation: rotation::from_xyz_rad(0.3, -0.4, 0.2),
+                translation: Vec3::new(5.0, -7.0, 150.0),
+            };
+            let relaxed = Relaxed { lens, homographies: Vec::new(), information: Vec::new(), cost: 0.0 };
+            let state = state_of(&relaxed, &held, &Hypothesis { camera, poses: vec![pose], cost: 0.0 });
+            for (x, y) in [(-40.0, -30.0), (13.0, 25.0), (35.0, 0.0)] {
+                let point = pose.apply(&Vec3::new(x, y, 0.0));
+                // The homography is that of a pinhole in units of the gauge; the lens comes behind it.
+                let expected = lens.project(&(camera.k() * point)).unwrap();
+                let own =
+                    state.camera.project(&state.cam_from_target[0].apply(&Vec3::new(x, y, 0.0))).unwrap();
+                assert!((own - expected).norm() < 1e-10, "{own} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_minima_of_a_scan_come_lowest_first() {
+        let hypothesis =
+            |cost: f64| Hypothesis { camera: Camera::pinhole(1.0, 1.0, 0.0, 0.0), poses: Vec::new(), cost };
+        let costs = |scan: &[f64]| -> Vec<f64> {
+            let scan = scan.iter().map(|&cost| (cost < 100.0).then(|| hypothesis(cost))).collect();
+            lowest(scan).into_iter().map(|hypothesis| hypothesis.cost).collect()
+        };
+        // 100 stands for no hypothesis.
+        assert_eq!(costs(&[5.0, 3.0, 4.0, 100.0, 2.0, 6.0, 1.0, 7.0, 0.5]), [0.5, 1.0, 2.0]);
+        assert_eq!(costs(&[3.0, 4.0, 5.0]), [3.0]);
+        // Equals are one.
+        assert_eq!(costs(&[5.0, 2.0, 2.0, 6.0]), [2.0]);
+    }
+
+    #[test]
+    fn centres_are_tried_in_the_middle_and_around_it() {
+        let list: Vec<Vec2> = spread_over((Vec2::new(320.0, 240.0), 100.0)).collect();
+        let around = |x: f64| [180.0, 240.0, 300.0].map(|y| Vec2::new(x, y));
+        assert_eq!(list.len(), 9);
+        assert!(
+            [260.0, 320.0, 380.0].into_iter().flat_map(around).all(|centre| list.contains(&centre)),
+            "{list:?}"
+        );
+    }
+
+    #[test]
+    fn a_cost_three_times_that_of_the_relaxed_model_is_far_above_it() {
+        let is_far = |cost: f64| {
+            let mut system = System::new(FreeParameters::NONE, 0);
+            system.cost = cost;
+            let camera = Camera::pinhole(600.0, 600.0, 320.0, 240.0);
+            let state = State { camera, cam_from_target: Vec::new() };
+            let best = Minimum { state, system, termination: Termination::Converged, iterations: 1 };
+            Found { best, starts: 1, met: Vec::new(), lowest_relaxed: 2.0 }.is_far_above_floor()
+        };
+        assert!(is_far(6.1) && !is_far(5.9));
+    }
+}

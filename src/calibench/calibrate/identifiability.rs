@@ -324,9 +324,26 @@ fn turned_to(state: &State, slope: Vec2) -> State {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibrate::Prior;
     use crate::calibrate::retraction::Retraction;
+    use crate::calibrate::tilt::angle_between;
     use crate::calibrate::{Loss, Termination};
     use crate::camera::Camera;
+
+    fn problem(observations: &[Observations]) -> Problem<'_> {
+        Problem {
+            free: FreeParameters::STANDARD,
+            fy_per_fx: None,
+            priors: Priors::NONE,
+            observations,
+            loss: Loss::Squares,
+            max_iterations: 1,
+            hold_tilt: false,
+            retraction: Retraction::Straight,
+            focal_limits: (0.0, f64::INFINITY),
+            rounding_cost: 0.0,
+        }
+    }
 
     /// What is said of a parameter that was moved far away at the cost of so many variances.
     fn verdict(parameter: Parameter, value: f64, variances: f64) -> Result<(), CalibrationError> {
@@ -339,19 +356,7 @@ mod tests {
         };
         let far = Far { parameter, minimum: at(camera.with(parameter, value), variances) };
         let walked = Walked { best: at(camera, 0.0), starts: 1, far: vec![far], met: Vec::new() };
-        let problem = Problem {
-            free: FreeParameters::STANDARD,
-            fy_per_fx: None,
-            priors: Priors::NONE,
-            observations: &[],
-            loss: Loss::Squares,
-            max_iterations: 1,
-            hold_tilt: false,
-            retraction: Retraction::Straight,
-            focal_limits: (0.0, f64::INFINITY),
-            rounding_cost: 0.0,
-        };
-        refuse_if_flat(&problem, &walked, Noise::of_squares(noise_px * noise_px))
+        refuse_if_flat(&problem(&[]), &walked, Noise::of_squares(noise_px * noise_px))
     }
 
     #[test]
@@ -366,5 +371,189 @@ mod tests {
         }
         // Where the walk came back to the minimum it says nothing.
         assert_eq!(verdict(Parameter::Fx, 600.01, 0.0), Ok(()));
+    }
+
+    #[test]
+    fn data_that_determine_nothing_pass_once_in_a_million() {
+        // With two degrees of freedom chi-squared exceeds x with probability exp(-x / 2).
+        let exceeded = libm::exp(-0.5 * largest_chance_chi_squared(2));
+        assert!((exceeded / 1e-6 - 1.0).abs() < 1e-4, "{exceeded}");
+    }
+
+    #[test]
+    fn equations_that_say_nothing_are_refused_unless_nothing_is_free() {
+        assert!(refuse_singular_minimum(FreeParameters::STANDARD, None).is_err());
+        assert_eq!(refuse_singular_minimum(FreeParameters::NONE, None), Ok(()));
+    }
+
+    #[test]
+    fn what_moved_along_by_more_than_a_tenth_is_named() {
+        use Unknown::{Distance, FocalLength, LateralPosition, PrincipalPoint, Tilt};
+        // Mean focal length 500 px; two views, the second from twice as far.
+        let state = |focal: f64, cx: f64, x: f64, away: f64, tilt: f64| {
+            let pose = |side: f64, z: f64| Pose {
+                rotation: rotation::from_xyz_rad(side * tilt, 0.0, 0.4),
+                translation: Vec3::new(x, 3.0, z * away),
+            };
+            let camera = Camera::pinhole(600.0 * focal, 400.0 * focal, cx, 240.0);
+            State { camera, cam_from_target: vec![pose(1.0, 100.0), pose(-1.0, 200.0)] }
+        };
+        let near = state(1.0, 320.0, 5.0, 1.0, 0.3);
+        let first = Unknown::Intrinsic(Parameter::Skew);
+        for (far, along) in [
+            (state(1.0, 320.0, 5.0, 1.0, 0.3), None),
+            (state(1.08, 320.0, 5.0, 1.0, 0.3), None),
+            (state(1.15, 320.0, 5.0, 1.0, 0.3), Some(FocalLength)),
+            (state(1.0, 350.0, 5.0, 1.0, 0.3), None),
+            (state(1.0, 380.0, 5.0, 1.0, 0.3), Some(PrincipalPoint)),
+            // A shift of d mm is d / 100 and d / 200 of the distance: d / 126 in the root mean square.
+            (state(1.0, 320.0, 15.0, 1.0, 0.3), None),
+            (state(1.0, 320.0, 19.0, 1.0, 0.3), Some(LateralPosition)),
+            (state(1.0, 320.0, 5.0, 1.06, 0.3), None),
+            (state(1.0, 320.0, 5.0, 1.2, 0.3), Some(Distance)),
+            (state(1.0, 320.0, 5.0, 1.0, 0.38), None),
+            (state(1.0, 320.0, 5.0, 1.0, 0.42), Some(Tilt)),
+        ] {
+            let expected: Vec<Unknown> = std::iter::once(first).chain(along).collect();
+            assert_eq!(moved(&near, &far, Parameter::Skew), expected);
+        }
+    }
+
+    #[test]
+    fn the_shortest_turn_gives_a_plane_the_slope_that_is_wanted() {
+        let slope = Vec2::new(0.3, -0.2);
+        // The second is seen from behind.
+        for [x, y, z] in [[0.3, -0.2, 0.5], [3.0, 0.3, 1.0]] {
+            let pose =
+                Pose { rotation: rotation::from_xyz_rad(x, y, z), translation: Vec3::new(1.0, 2.0, 100.0) };
+            let camera = Camera::pinhole(600.0, 600.0, 320.0, 240.0);
+            let turned = turned_to(&State { camera, cam_from_target: vec![pose] }, slope).cam_from_target[0];
+            let normal = turned.rotation.column(2);
+            assert!((normal.xy() / normal.z - slope).norm() < 1e-14);
+            let turn = rotation::log(&(turned.rotation * pose.rotation.transpose())).norm();
+            assert!((turn - angle_between(&pose, &turned)).abs() < 1e-14, "{turn}");
+            assert!(turn < std::f64::consts::FRAC_PI_2 && turned.translation == pose.translation);
+        }
+    }
+
+    /// A plane of this slope in y, about the optical axis.
+    fn sloping(slope: f64) -> Pose {
+        Pose {
+            rotation: rotation::from_xyz_rad(-libm::atan(slope), 0.0, 0.0),
+            translation: Vec3::new(0.0, 0.0, 100.0),
+        }
+    }
+
+    #[test]
+    fn planes_are_parallel_by_accident_where_no_edge_is_shifted_by_fifty_deviations() {
+        // Corners of a box of half-width 100 px.
+        let corners = [(-100.0, -100.0), (100.0, -100.0), (-100.0, 100.0), (100.0, 100.0)];
+        let corners = corners.map(|(x, y)| (Vec2::new(x, y), Vec2::new(320.0 + x, 240.0 + y)));
+        let observations = vec![Observations::new(corners.into_iter()); 2];
+        // A slope g shifts the edge by g 100^2 / f = 25 g px for the mean f of 400 px.
+        let camera = Camera::pinhole(500.0, 300.0, 320.0, 240.0);
+        let common = |slopes: [f64; 2], noise_px: f64| -> Vec<Vec2> {
+            let state = State { camera, cam_from_target: slopes.map(sloping).to_vec() };
+            let list = doubtful_slopes(&problem(&observations), &state, noise_px);
+            list.into_iter().map(|(common, _)| common).collect()
+        };
+        let is = |found: Vec<Vec2>, expected: &[f64]| {
+            let agree = |(f, e): (&Vec2, &f64)| (f - Vec2::new(0.0, *e)).norm() < 1e-14;
+            found.len() == expected.len() && found.iter().zip(expected).all(agree)
+        };
+        // 2.5 px either way are more than 50 * 0.048 px and less than 50 * 0.052.
+        assert!(common([0.1, -0.1], 0.048).is_empty());
+        assert!(is(common([0.1, -0.1], 0.052), &[0.0, 0.0]));
+        // Against their mean slope 1.25 px each, against none 2.5 and 5.
+        assert!(is(common([0.1, 0.2], 0.052), &[0.15]));
+        // The same of slopes in x.
+        let aside = Pose { rotation: rotation::from_xyz_rad(0.0, libm::atan(0.8), 0.0), ..sloping(0.0) };
+        let state = State { camera, cam_from_target: vec![aside; 2] };
+        let found = doubtful_slopes(&problem(&observations), &state, 0.1);
+        assert!(found.len() == 1 && (found[0].0 - Vec2::new(0.8, 0.0)).norm() < 1e-14, "{found:?}");
+        // No plane that is seen edge-on is parallel to another by accident.
+        let edge_on =
+            Pose { rotation: rotation::from_xyz_rad(std::f64::consts::FRAC_PI_2, 0.0, 0.0), ..sloping(0.0) };
+        let state = State { camera, cam_from_target: vec![sloping(0.0), edge_on] };
+        assert!(doubtful_slopes(&problem(&observations), &state, 1.0).is_empty());
+    }
+
+    /// What is said of three views that face the camera, with noise of 0.1 px, where fx is free and fy
+    /// follows: with what is known of fx beforehand, and a cost as if the minimum had so much more.
+    fn facing(prior_sd: Option<f64>, more_cost: f64) -> Result<Option<State>, CalibrationError> {
+        let camera = Camera::pinhole(600.0, 600.0, 320.0, 240.0);
+        let pose = |(roll, z): (f64, f64)| Pose {
+            rotation: rotation::from_xyz_rad(0.0, 0.0, roll),
+            translation: Vec3::new(2.0, -3.0, z),
+        };
+        let poses = [(0.0, 120.0), (0.3, 130.0), (-0.2, 140.0)].map(pose);
+        let mut count = 0.0;
+        let mut noise = || {
+            count += 1.0;
+            0.1 * std::f64::consts::SQRT_2 * libm::sin(0.7 * count * count)
+        };
+        let mut seen = |pose: &Pose| {
+            let mut pair = |i: u32| {
+                let point = Vec2::new(f64::from(i % 9) - 4.0, f64::from(i / 9) - 3.0) * 10.0;
+                let pixel = camera.project(&pose.apply(&Vec3::new(point.x, point.y, 0.0))).unwrap();
+                (point, pixel + Vec2::new(noise(), noise()))
+            };
+            let pairs: Vec<(Vec2, Vec2)> = (0..63).map(&mut pair).collect();
+            Observations::new(pairs.into_iter())
+        };
+        let observations: Vec<Observations> = poses.iter().map(&mut seen).collect();
+        let noise = Noise::of_squares(0.01);
+        let known = prior_sd.map(|standard_deviation| Prior {
+            parameter: Parameter::Fx,
+            mean: 600.0,
+            standard_deviation,
+        });
+        let list: Vec<Prior> = known.into_iter().collect();
+        let problem = Problem {
+            free: FreeParameters::of(&[Parameter::Fx]),
+            fy_per_fx: Some(1.0),
+            priors: Priors { list: &list, noise },
+            max_iterations: 100,
+            ..problem(&observations)
+        };
+        let mut minimum = problem.minimise(State { camera, cam_from_target: poses.to_vec() });
+        minimum.system.cost += more_cost;
+        refuse_if_parallel(&problem, &minimum, noise)
+    }
+
+    #[test]
+    fn views_that_face_the_camera_within_noise_determine_no_focal_length() {
+        let Err(CalibrationError::NotIdentifiable { inseparable, why }) = facing(None, 0.0) else { panic!() };
+        assert_eq!(inseparable, [Unknown::FocalLength, Unknown::Distance]);
+        // Four degrees of freedom a view: 12, which exceed x with probability exp(-x / 2) sum_(k < 6) (x /
+        // 2)^k / k!.
+        let tail = |x: f64| {
+            let terms = (1..6).scan(1.0, |term, k| {
+                *term *= 0.5 * x / f64::from(k);
+                Some(*term)
+            });
+            libm::exp(-0.5 * x) * (1.0 + terms.sum::<f64>())
+        };
+        let bound = (0..1000).map(|i| 0.1 * f64::from(i)).find(|&x| tail(x) < 1e-6).unwrap();
+        let end = format!("up to {bound:.0} could be chance on 12 degrees of freedom)");
+        assert!(
+            why.starts_with("the target is parallel to the image plane in every view") && why.ends_with(&end),
+            "{why}"
+        );
+    }
+
+    #[test]
+    fn a_prior_on_the_focal_length_must_be_narrow_where_no_tilt_tells_it() {
+        let Err(CalibrationError::NotIdentifiable { why, .. }) = facing(Some(1e4), 0.0) else { panic!() };
+        assert!(why.ends_with("state it more narrowly"), "{why}");
+        for sd in [0.05, 1.0] {
+            assert!(matches!(facing(Some(sd), 0.0), Ok(None)), "{sd}");
+        }
+    }
+
+    #[test]
+    fn a_lower_cost_with_parallel_planes_is_no_reason_to_refuse() {
+        // A minimum a hundred variances higher than it could be is none.
+        assert!(matches!(facing(None, 1.0), Ok(Some(_))));
     }
 }

@@ -89,3 +89,38 @@ fn all_correlated(pairs: &[(Parameter, Parameter, f64)]) -> String {
         names.join(", ")
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Parameter::{K1, K2, K3, K4, K5};
+
+    fn pair(a: Parameter, b: Parameter, correlation: f64) -> Warning {
+        Warning::Correlated { a, b, correlation }
+    }
+
+    #[test]
+    fn more_than_three_pairs_are_told_in_one_line_with_the_strongest() {
+        let three = [pair(K1, K2, 0.99), pair(K1, K4, -0.995), pair(K2, K5, 0.985)];
+        assert_eq!(in_words(&three), three.clone().map(|warning| warning.to_string()));
+        let lines = in_words(&[&three[..], &[Warning::NotCertified, pair(K3, K5, 0.99)]].concat());
+        assert_eq!((lines.len(), &lines[1]), (2, &Warning::NotCertified.to_string()));
+        let start =
+            "4 pairs of parameters are correlated by up to 0.9950 (k1 and k4), of k1, k2, k4, k5, k3: ";
+        assert!(lines[0].starts_with(start), "{}", lines[0]);
+    }
+
+    #[test]
+    fn more_than_three_deviations_that_mislead_are_told_in_one_line_with_their_range() {
+        let skewed =
+            |parameter, below| Warning::NotLinear { parameter, below: Some(below), above: Some(0.9) };
+        let three = [skewed(K1, 0.8), skewed(K2, 0.5), skewed(K3, 0.7)];
+        assert_eq!(in_words(&three), three.clone().map(|warning| warning.to_string()));
+        let open = Warning::NotLinear { parameter: K4, below: Some(0.8), above: None };
+        let lines = in_words(&[&three[..], &[open]].concat());
+        assert_eq!(lines.len(), 1);
+        let start = "the standard deviations of k1, k2, k3, k4 mislead: intervals of two of them truly reach 0.50 \
+                     times as far to without end;";
+        assert!(lines[0].starts_with(start), "{}", lines[0]);
+    }
+}

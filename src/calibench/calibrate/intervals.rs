@@ -296,7 +296,9 @@ pub(super) fn student_quantile(coverage: f64, degrees_of_freedom: usize) -> f64 
 
 #[cfg(test)]
 mod tests {
-    use super::student_quantile;
+    use super::*;
+    use crate::calibrate::Termination;
+    use crate::calibrate::system::{Step, System};
     use crate::calibrate::tests::four_views;
     use crate::calibrate::{Settings, calibrate};
 
@@ -327,5 +329,126 @@ mod tests {
                 assert!((end - expected).abs() < 0.1 * half, "{interval:?}");
             }
         }
+    }
+
+    /// A cost of one number.
+    struct Curve {
+        free: FreeParameters,
+        cost: fn(f64) -> f64,
+    }
+
+    impl Descent<N> for Curve {
+        type State = f64;
+
+        fn system(&self) -> System {
+            System::new(self.free, 0)
+        }
+
+        fn linearise_into(&self, at: &f64, system: &mut System) {
+            system.cost = (self.cost)(*at);
+        }
+
+        fn step(&self, from: &f64, step: &Step, to: &mut f64) {
+            *to = from + step.intrinsics[0];
+        }
+
+        fn max_iterations(&self) -> usize {
+            10
+        }
+
+        fn rounding_cost(&self) -> f64 {
+            0.0
+        }
+    }
+
+    impl Profiled<N> for Curve {
+        fn free(&self) -> FreeParameters {
+            self.free
+        }
+
+        fn holding(&self, parameter: Parameter) -> Self {
+            Curve { free: self.free.without(parameter), ..*self }
+        }
+
+        fn value(state: &f64, _: Parameter) -> f64 {
+            *state
+        }
+
+        fn with_value(&self, _: f64, _: Parameter, value: f64) -> f64 {
+            value
+        }
+
+        fn beyond(_: &f64) -> Option<(Parameter, f64)> {
+            None
+        }
+    }
+
+    /// What `then` makes of the profile of a cost about 0, with this standard deviation and unit noise.
+    fn profile_of<T>(
+        cost: fn(f64) -> f64,
+        deviation: f64,
+        then: impl FnOnce(&Profile<'_, Curve, N>) -> T,
+    ) -> T {
+        let problem = Curve { free: FreeParameters::of(&[Parameter::Fx]), cost };
+        let mut system = problem.system();
+        system.cost = cost(0.0);
+        system.intrinsics[(0, 0)] = 1.0 / (deviation * deviation);
+        let reduction = system.reduction().unwrap();
+        let minimum = Minimum { state: 0.0, system, termination: Termination::Converged, iterations: 1 };
+        then(&Profile::new(&problem, &minimum, &reduction, Noise::of_squares(1.0)).unwrap())
+    }
+
+    /// Half the width of an interval of 95 % with many degrees of freedom.
+    const T: f64 = 1.959964;
+
+    fn ends(cost: fn(f64) -> f64, deviation: f64) -> [Option<f64>; 2] {
+        profile_of(cost, deviation, |profile| {
+            let interval = profile.intervals(0.95, 10_000_000)[0];
+            [interval.low, interval.high]
+        })
+    }
+
+    #[test]
+    fn the_ends_of_a_skewed_profile_are_where_it_has_risen_by_the_quantile() {
+        // tau is |x| + x^2 below and 3 (1 - exp(-x / 3)) above.
+        let [low, high] = ends(
+            |x| {
+                let tau = if x < 0.0 { x * x - x } else { 3.0 * (1.0 - libm::exp(-x / 3.0)) };
+                5.0 + tau * tau
+            },
+            1.0,
+        );
+        let expected = [0.5 - (0.25 + T).sqrt(), -3.0 * libm::log(1.0 - T / 3.0)];
+        for (end, expected) in [low, high].into_iter().zip(expected) {
+            assert!((end.unwrap() - expected).abs() < 1e-3, "{end:?} {expected}");
+        }
+    }
+
+    #[test]
+    fn an_interval_has_no_end_where_the_cost_never_rises_enough() {
+        // tau rises to 1.5.
+        let [low, high] = ends(
+            |x| {
+                let tau = if x < 0.0 { x } else { 1.5 * (1.0 - libm::exp(-x)) };
+                5.0 + tau * tau
+            },
+            1.0,
+        );
+        assert!((low.unwrap() + T).abs() < 1e-3 && high.is_none(), "{low:?} {high:?}");
+    }
+
+    #[test]
+    fn an_interval_ends_where_the_cost_leaps() {
+        let [low, high] = ends(|x| if x < 12_345.0 { 5.0 + 1e-8 * x * x } else { 1e6 }, 1e4);
+        assert!((high.unwrap() / 12_345.0 - 1.0).abs() < 1e-5, "{high:?}");
+        assert!((low.unwrap() / (-1e4 * T) - 1.0).abs() < 1e-3, "{low:?}");
+    }
+
+    #[test]
+    fn a_lower_cost_on_the_profile_is_a_better_minimum() {
+        let lower = profile_of(|x| if x < -1.0 { 4.0 } else { 5.0 + x * x }, 1.0, |profile| profile.skewed());
+        assert_eq!(lower, Err(Box::new(-2.0)));
+        let parabola = profile_of(|x| 5.0 + x * x, 1.0, |profile| profile.skewed());
+        assert_eq!(parabola, Ok(Vec::new()));
     }
 }

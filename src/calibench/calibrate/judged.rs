@@ -241,3 +241,200 @@ pub(super) fn noise_of(problem: &Problem<'_>, minimum: &Minimum) -> Noise {
     }
     Fit::of(&minimum.state, problem.observations).noise(problem.loss, freedom as f64)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::normal::Observations;
+    use crate::calibrate::prior::Priors;
+    use crate::calibrate::retraction::Retraction;
+    use crate::camera::BrownConrady;
+    use crate::geometry::{Pose, Vec2, Vec3, rotation};
+
+    const TURNS: [[f64; 3]; 4] = [[0.0; 3], [0.35, 0.0, 0.0], [0.0, -0.35, 0.0], [-0.26, 0.26, 0.17]];
+
+    fn barrel() -> BrownConrady {
+        BrownConrady::radial(-0.18, 0.05)
+    }
+
+    /// What `then` makes of the minimum with these parameters free, of views of 9 x 7 marks so turned: 252
+    /// marks of [`TURNS`], with noise of 0.1 px.
+    fn at_minimum<T>(
+        turns: &[[f64; 3]],
+        lens: BrownConrady,
+        (free, fy_per_fx): (FreeParameters, Option<f64>),
+        then: impl FnOnce(&Problem<'_>, Judged) -> T,
+    ) -> T {
+        let camera = Camera::pinhole(600.0, 600.0, 320.0, 240.0).with_distortion(lens);
+        let mut count = 0.0;
+        let mut noise = || {
+            count += 1.0;
+            0.1 * std::f64::consts::SQRT_2 * libm::sin(0.7 * count * count)
+        };
+        let pose = |(view, [x, y, z]): (usize, &[f64; 3])| Pose {
+            rotation: rotation::from_xyz_rad(*x, *y, *z),
+            translation: Vec3::new(2.0, -3.0, 120.0 + 10.0 * view as f64),
+        };
+        let cam_from_target: Vec<Pose> = turns.iter().enumerate().map(pose).collect();
+        let mut seen = |pose: &Pose| {
+            let mut pair = |i: u32| {
+                let point = Vec2::new(f64::from(i % 9) - 4.0, f64::from(i / 9) - 3.0) * 10.0;
+                let pixel = camera.project(&pose.apply(&Vec3::new(point.x, point.y, 0.0))).unwrap();
+                (point, pixel + Vec2::new(noise(), noise()))
+            };
+            Observations::new((0..63).map(&mut pair).collect::<Vec<_>>().into_iter())
+        };
+        let observations: Vec<Observations> = cam_from_target.iter().map(&mut seen).collect();
+        let problem = Problem { fy_per_fx, ..problem(&observations, free) };
+        let minimum = problem.minimise(State { camera, cam_from_target });
+        then(&problem, Judged::of(&problem, minimum, 1))
+    }
+
+    fn problem(observations: &[Observations], free: FreeParameters) -> Problem<'_> {
+        Problem {
+            free,
+            fy_per_fx: None,
+            priors: Priors::NONE,
+            observations,
+            loss: Loss::Squares,
+            max_iterations: 100,
+            hold_tilt: false,
+            retraction: Retraction::Straight,
+            focal_limits: (0.0, f64::INFINITY),
+            rounding_cost: 0.0,
+        }
+    }
+
+    #[test]
+    fn the_minimum_of_good_views_needs_no_search() {
+        at_minimum(&TURNS, barrel(), (FreeParameters::STANDARD, None), |problem, judged| {
+            assert!(judged.is_certified() && judged.is_well_known(problem));
+            assert!(judged.doubtful_tilts(problem).is_empty());
+            assert_eq!(judged.is_settled(problem), Ok(Settled::Entirely));
+        });
+    }
+
+    #[test]
+    fn a_minimum_is_clear_by_a_certificate_that_tells_enough_only() {
+        at_minimum(&TURNS, barrel(), (FreeParameters::STANDARD, None), |problem, mut judged| {
+            let own = judged.certificate.unwrap();
+            let is_not_possible = Certificate { floor_freedom: 0, p_value: 1.0, ..own };
+            for certificate in [
+                None,
+                Some(Certificate { freedom: 3, ..own }),
+                Some(Certificate { p_value: 1e-5, ..own }),
+                Some(is_not_possible),
+            ] {
+                judged.certificate = certificate;
+                assert!(!judged.is_certified() && !judged.is_clear_but_for_tilts(problem), "{certificate:?}");
+            }
+            judged.certificate = Some(own);
+            assert!(judged.is_clear_but_for_tilts(problem));
+            judged.minimum.iterations = SHORT_WAY + 1;
+            assert!(!judged.is_clear_but_for_tilts(problem));
+        });
+    }
+
+    #[test]
+    fn a_focal_length_or_principal_point_is_well_known_to_three_hundredths_of_the_focal_length() {
+        use Parameter::{Cx, Cy, Fx, Fy, P1};
+        for (parameter, lens, limit) in
+            [(Fx, None, 0.03), (Fy, None, 0.03), (Cx, None, 0.03), (Cy, None, 0.03), (Fx, Some(P1), 0.01)]
+        {
+            let free = lens.iter().fold(FreeParameters::of(&[parameter]), |free, &p| free.with(p));
+            at_minimum(&TURNS, barrel(), (free, None), |problem, mut judged| {
+                let unit = judged.reduction.as_ref().unwrap().intrinsics_covariance().unwrap();
+                let freedom = (504 - free.len() - 24) as f64;
+                for (relative, is_known) in [(0.98 * limit, true), (1.02 * limit, false)] {
+                    // A cost of so much noise that the deviation is this part of 600 px.
+                    let variance = (relative * 600.0) * (relative * 600.0) / unit[(0, 0)];
+                    judged.minimum.system.cost = variance * freedom;
+                    assert_eq!(judged.is_well_known(problem), is_known, "{parameter} {relative}");
+                }
+            });
+        }
+    }
+
+    #[test]
+    fn parallel_planes_are_refused_at_a_certified_cost_only() {
+        let facing = [[0.0; 3], [0.0, 0.0, 0.3], [0.0, 0.0, -0.2]];
+        // A distortion that is known would tell the focal length.
+        let lens = BrownConrady::radial(0.0, 0.0);
+        let fx = FreeParameters::of(&[Parameter::Fx]);
+        at_minimum(&facing, lens, (fx, Some(1.0)), |problem, mut judged| {
+            let refused = judged.is_settled(problem);
+            assert!(matches!(refused, Err(CalibrationError::NotIdentifiable { .. })), "{refused:?}");
+            judged.certificate = judged.certificate.map(|own| Certificate { p_value: 0.0, ..own });
+            assert_eq!(judged.is_settled(problem), Ok(Settled::Not));
+        });
+    }
+
+    #[test]
+    fn noise_is_the_cost_of_a_degree_of_freedom() {
+        at_minimum(&TURNS, barrel(), (FreeParameters::STANDARD, None), |problem, mut judged| {
+            // 504 coordinates, 6 parameters and 24 numbers of poses.
+            judged.minimum.system.cost = 4.74;
+            assert!((judged.noise(problem).variance - 0.01).abs() < 1e-15);
+        });
+    }
+
+    #[test]
+    fn a_rival_lies_many_deviations_of_the_noise_away() {
+        at_minimum(&TURNS, barrel(), (FreeParameters::STANDARD, None), |problem, mut judged| {
+            let variance = judged.noise(problem).variance;
+            let unit = judged.reduction.as_ref().unwrap().intrinsics_covariance().unwrap();
+            let own = Met::of(&judged.minimum);
+            for (deviations, is_rival) in [(5.0, false), (7.0, true)] {
+                let fx = own.camera.fx + deviations * (unit[(0, 0)] * variance).sqrt();
+                let other = Met { camera: Camera { fx, ..own.camera }, cost: own.cost + variance, ..own };
+                judged = judged.with_rival(problem, &[other]);
+                assert_eq!(judged.rival.is_some(), is_rival, "{deviations}");
+            }
+            let rival = judged.rival.unwrap();
+            assert!(rival.parameter == Parameter::Fx && (rival.excess - 1.0).abs() < 1e-9, "{rival:?}");
+        });
+    }
+
+    #[test]
+    fn a_twin_is_told_with_what_its_cost_is_higher_by() {
+        // A small target far away, without noise.
+        let camera = Camera::pinhole(3000.0, 3000.0, 320.0, 240.0);
+        let pose = |tilt: f64| Pose {
+            rotation: rotation::from_xyz_rad(tilt, 0.0, 0.0),
+            translation: Vec3::new(0.0, 0.0, 3000.0),
+        };
+        let pair = |i: u32| {
+            let point = Vec2::new(f64::from(i % 9) - 4.0, f64::from(i / 9) - 4.0) * 7.5;
+            (point, camera.project(&pose(0.5).apply(&Vec3::new(point.x, point.y, 0.0))).unwrap())
+        };
+        let observations = [Observations::new((0..81).map(pair))];
+        let problem = problem(&observations, FreeParameters::NONE);
+        let [own, other] =
+            [0.5, -0.5].map(|tilt| problem.minimise(State { camera, cam_from_target: vec![pose(tilt)] }));
+        let higher = other.system.cost - own.system.cost;
+        let mut judged = Judged::of(&problem, own, 1);
+        // Of 162 coordinates six belong to the pose; noise of 0.4 px on the others.
+        judged.minimum.system.cost = 0.16 * 156.0;
+        let judged = judged.with_twins(&problem);
+        let [twin] = &judged.twins[..] else { panic!("{:?}", judged.twins) };
+        assert!(twin.view == 0 && (twin.degrees - 57.3).abs() < 1.0, "{twin:?}");
+        assert!(higher > 0.5 && (twin.excess - higher / 0.16).abs() < 1e-6, "{twin:?} {higher}");
+    }
+
+    #[test]
+    fn a_principal_point_trades_off_with_tangential_terms_where_they_are_correlated() {
+        use Parameter::{Cx, Cy, P1, P2};
+        let free = FreeParameters::of(&[Cx, Cy, P1, P2]);
+        // Deviations of 2, 2, 3 and 3.
+        let with = |row: usize, column: usize, covariance: f64| {
+            let mut matrix =
+                DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&[4.0, 4.0, 9.0, 9.0]));
+            (matrix[(row, column)], matrix[(column, row)]) = (covariance, covariance);
+            trades_off(free, &matrix)
+        };
+        assert!(with(0, 2, 5.94) && with(1, 3, -5.94));
+        assert!(!with(0, 2, 5.82) && !with(1, 3, -5.82));
+        // Of one with the other it is no trade.
+        assert!(!with(0, 1, 3.99));
+    }
+}

@@ -236,6 +236,8 @@ fn warning(Told { group, fall, probability }: Told, [bow_x, bow_y, twist]: [f64;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibrate::calibrate_lens;
+    use crate::calibrate::tests::four_views;
     use crate::camera::Model;
 
     #[test]
@@ -268,5 +270,63 @@ mod tests {
         // What a wrong value of the principal point does is not to be put down to p1 and p2.
         let off = standard.hold(Cx, 320.0).hold(Cy, 240.0);
         assert_eq!(undecided(&off), [tangential, radial, centre, skew, shape]);
+    }
+
+    /// What the cost falls by for each set of parameters.
+    struct Table(Vec<(FreeParameters, f64)>);
+
+    impl CostFalls for Table {
+        fn fall(&self, more: Freedoms) -> Option<f64> {
+            self.0.iter().find(|(parameters, _)| *parameters == more.parameters).map(|(_, fall)| *fall)
+        }
+
+        fn shape(&self, _: FreeParameters) -> Option<[f64; DEFORMATIONS]> {
+            None
+        }
+    }
+
+    /// Parameters, fall and probability of what is told of p1 with p2 and of k3, by what the cost falls by
+    /// with the first, the second and both.
+    fn told(falls: [f64; 3], variance: f64, freedom: usize) -> Vec<(Vec<Parameter>, f64, f64)> {
+        let [tangential, radial, ..] = ASKED;
+        let sets = [tangential.to_vec(), radial.to_vec(), [tangential, radial].concat()];
+        let table = Table(sets.iter().map(|set| FreeParameters::of(set)).zip(falls).collect());
+        let warnings = named(&table, vec![Group::of(tangential), Group::of(radial)], variance, freedom);
+        let told = warnings.into_iter().map(|warning| match warning {
+            Warning::LeftOut { parameters, fall, probability } => (parameters, fall, probability),
+            other => panic!("{other}"),
+        });
+        told.collect()
+    }
+
+    #[test]
+    fn the_second_is_told_with_what_it_explains_beside_the_first() {
+        use Parameter::{K3, P1, P2};
+        // Variances of 0.5 px^2: alone 100 and 60 of them, together 140.
+        let found = told([50.0, 30.0, 70.0], 0.5, 200);
+        let [(first, a, probability), (second, b, _)] = &found[..] else { panic!("{found:?}") };
+        assert_eq!((&first[..], *a, &second[..], *b), (&[P1, P2][..], 100.0, &[K3][..], 40.0));
+        // Of two and d degrees of freedom F is exceeded with probability (1 + 2 F / d)^(-d / 2): F = 50, d =
+        // 198.
+        let expected = libm::pow(1.0 + 100.0 / 198.0, -99.0);
+        assert!((probability / expected - 1.0).abs() < 1e-6, "{probability}");
+        // What is explained already is not told.
+        assert_eq!(told([50.0, 30.0, 51.0], 0.5, 200).len(), 1);
+    }
+
+    #[test]
+    fn where_no_chance_is_left_the_first_is_what_explains_most_with_each_parameter() {
+        let found = told([1e6, 8e5, 2e6], 1.0, 1000);
+        assert_eq!((found[0].2, found[1].2), (0.0, 0.0));
+        assert_eq!(found[0].0, [Parameter::K3]);
+    }
+
+    #[test]
+    fn a_wrong_value_that_is_held_is_told() {
+        let settings = Settings::standard().hold(Parameter::K1, -0.15);
+        let views = four_views(0.1);
+        let found = calibrate_lens(&views, &settings).unwrap();
+        let is_k1 = |w: &Warning| matches!(w, Warning::LeftOut { parameters, .. } if parameters[..] == [Parameter::K1]);
+        assert!(asked_for(&views, &settings, &found).iter().any(is_k1));
     }
 }

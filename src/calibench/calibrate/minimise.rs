@@ -281,3 +281,46 @@ pub(super) fn descend<D: Descent<W>, const W: usize>(problem: &D, start: D::Stat
     };
     Minimum { state, system, termination, iterations }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Mat3, Vec2, Vec3};
+
+    fn one_mark() -> Observations {
+        Observations::new([(Vec2::new(10.0, 0.0), Vec2::new(300.0, 400.0))].into_iter())
+    }
+
+    #[test]
+    fn a_cost_is_rounding_below_eight_roundings_of_each_coordinate() {
+        // 8 * 2^-52 of 300 px and of 400 px.
+        let expected = (8.0 * f64::EPSILON * 500.0) * (8.0 * f64::EPSILON * 500.0);
+        assert!((rounding_cost(&[one_mark()]) / expected - 1.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_camera_with_a_negative_focal_length_is_none() {
+        let observations = [one_mark()];
+        let problem = Problem {
+            free: FreeParameters::STANDARD,
+            fy_per_fx: None,
+            priors: Priors::NONE,
+            observations: &observations,
+            loss: Loss::Squares,
+            max_iterations: 1,
+            hold_tilt: false,
+            retraction: Retraction::Straight,
+            focal_limits: (0.0, f64::INFINITY),
+            rounding_cost: 0.0,
+        };
+        let pose = Pose { rotation: Mat3::identity(), translation: Vec3::new(0.0, 0.0, 100.0) };
+        for (fx, fy, is_camera) in
+            [(600.0, 600.0, true), (-600.0, 600.0, false), (600.0, -600.0, false), (f64::NAN, 600.0, false)]
+        {
+            let state = State { camera: Camera::pinhole(fx, fy, 320.0, 240.0), cam_from_target: vec![pose] };
+            let mut system = System::new(problem.free, 1);
+            problem.linearise_into(&state, &mut system);
+            assert_eq!(system.cost.is_finite(), is_camera, "{fx} {fy}");
+        }
+    }
+}

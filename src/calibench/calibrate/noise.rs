@@ -192,4 +192,10 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_deviation_is_the_root_of_the_variance() {
+        let noise = Noise { coordinate: 0.04, variance: 0.09, rise: 0.25 };
+        assert!((noise.px() - 0.2).abs() < 1e-15 && (noise.scale() - 0.3).abs() < 1e-15);
+    }
 }

@@ -157,6 +157,11 @@ pub(super) fn median(residuals: &[Vec<Vec2>]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibrate::normal::Observations;
+    use crate::calibrate::prior::Priors;
+    use crate::calibrate::retraction::Retraction;
+    use crate::camera::{Camera, FreeParameters};
+    use crate::geometry::{Pose, Vec3, rotation};
 
     #[test]
     fn many_outliers_show_in_the_tails_where_none_of_them_stands_out() {
@@ -169,5 +174,85 @@ mod tests {
         assert_eq!((found.marks, found.share, found.view, found.point), (10, 0.1, 1, 43));
         assert!((found.residual_px - 1.093).abs() < 1e-12);
         assert!((found.median_px - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_noise_hardly_exceeds_grows_with_what_a_fit_follows() {
+        // One of 100 exceeds 2 (ln 100 + 13) variances with probability exp(-13), half of all 2 ln 2 of them.
+        // Of 200 coordinates 150 are degrees of freedom.
+        let expected = (libm::log(100.0) + 13.0) / libm::log(2.0) * (200.0 / 150.0) * (200.0 / 150.0);
+        let largest = largest_of_noise(100, 50).unwrap();
+        assert!((largest / expected - 1.0).abs() < 1e-12, "{largest}");
+        assert_eq!((largest_of_noise(100, 101), largest_of_noise(100, 201)), (None, None));
+    }
+
+    #[test]
+    fn half_of_the_marks_stay_below_the_median() {
+        let residuals = [5.0, 1.0, 3.0, 2.0, 4.0].map(|x| Vec2::new(0.0, x)).to_vec();
+        assert_eq!(median(&[residuals]), 9.0);
+    }
+
+    #[test]
+    fn a_loss_narrower_than_the_noise_is_refused() {
+        let residuals = [vec![Vec2::new(0.6, 0.8); 5]];
+        for (delta_px, is_refused) in [(0.29, true), (0.31, false)] {
+            let refused = refuse_narrow_loss(Loss::Huber { delta_px }, &residuals);
+            assert_eq!(refused.is_err(), is_refused);
+        }
+        for (scale_px, is_refused) in [(0.49, true), (0.51, false)] {
+            let refused = refuse_narrow_loss(Loss::Cauchy { scale_px }, &residuals);
+            assert_eq!(refused.is_err(), is_refused);
+        }
+    }
+
+    #[test]
+    fn outliers_are_the_same_in_any_unit() {
+        let of = |unit: f64| {
+            let residual = |i: usize| Vec2::new(if i % 10 == 3 { 12.0 } else { 1.0 } * unit, 0.0);
+            let residuals = vec![(0..100).map(residual).collect::<Vec<_>>()];
+            // So large a variance that none of them stands out.
+            of_residuals(&residuals, 20, 100.0 * unit * unit, |_| residuals.clone()).map(|found| found.marks)
+        };
+        assert_eq!([1e-3, 1.0, 1e3].map(of), [Some(10); 3]);
+    }
+
+    #[test]
+    fn a_fit_that_follows_half_of_its_marks_names_no_outlier() {
+        let camera = Camera::pinhole(600.0, 600.0, 320.0, 240.0);
+        let poses =
+            [[0.4, 0.0, 0.0], [0.0, -0.4, 0.2], [-0.3, 0.3, 1.0], [0.3, 0.3, 2.0]].map(|[x, y, z]| Pose {
+                rotation: rotation::from_xyz_rad(x, y, z),
+                translation: Vec3::new(0.0, 0.0, 120.0),
+            });
+        let seen = |pose: &Pose, marks: u32, off: f64| {
+            let pair = |i: u32| {
+                let point = Vec2::new(f64::from(i % 4) - 1.5, f64::from(i / 4) - 1.0) * 15.0;
+                let noise = 0.1 * Vec2::new(libm::sin(7.0 * f64::from(i)), libm::cos(5.0 * f64::from(i)));
+                let off = if i == 4 { Vec2::new(off, 0.0) } else { Vec2::zeros() };
+                (point, camera.project(&pose.apply(&Vec3::new(point.x, point.y, 0.0))).unwrap() + noise + off)
+            };
+            Observations::new((0..marks).map(pair).collect::<Vec<_>>().into_iter())
+        };
+        // Seven and twelve marks in each of four views: 26 and 66 degrees of freedom of 28 and 48 marks.
+        let found = [7, 12].map(|marks| {
+            let views = [0.0, 0.0, 30.0, 0.0].into_iter().zip(&poses);
+            let observations: Vec<Observations> = views.map(|(off, pose)| seen(pose, marks, off)).collect();
+            let problem = Problem {
+                free: FreeParameters::STANDARD,
+                fy_per_fx: None,
+                priors: Priors::NONE,
+                observations: &observations,
+                loss: Loss::Squares,
+                max_iterations: 100,
+                hold_tilt: false,
+                retraction: Retraction::Straight,
+                focal_limits: (0.0, f64::INFINITY),
+                rounding_cost: 0.0,
+            };
+            let state = State { camera, cam_from_target: poses.to_vec() };
+            let fit = Fit::of(&state, &observations);
+            outliers(&problem, &state, &fit, 0.01).map(|found| (found.view, found.point))
+        });
+        assert_eq!(found, [None, Some((2, 4))]);
     }
 }

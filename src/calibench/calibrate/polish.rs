@@ -406,6 +406,8 @@ fn inverse_of_lower(lower: &Square, n: usize) -> Square {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibrate::tests::four_views;
+    use crate::calibrate::{Settings, calibrate};
     use crate::geometry::{Vec3, rotation};
     use nalgebra::Vector6;
 
@@ -422,5 +424,31 @@ mod tests {
         let (own, expected) = (numbers.to_pose(), pose.perturbed(&Vector6::from(step)));
         assert!((own.rotation - expected.rotation).norm() < 1e-15);
         assert!((own.translation - expected.translation).norm() < 1e-13);
+    }
+
+    #[test]
+    fn the_polished_minimum_is_the_same_with_more_digits() {
+        let (views, standard) = (four_views(0.1), Settings::standard());
+        for settings in [
+            standard.clone(),
+            standard.clone().tie_focal_lengths(1.01),
+            standard.clone().with_prior(Parameter::K1, -0.17, 0.002),
+            standard.with_loss(Loss::Huber { delta_px: 0.2 }),
+        ] {
+            let [plain, polished] =
+                [settings.clone(), settings.polished()].map(|settings| calibrate(&views, &settings).unwrap());
+            assert!(!polished.warnings.contains(&Warning::NotPolished));
+            assert_ne!(polished.camera, plain.camera);
+            for parameter in plain.free.iter() {
+                let sd = plain.standard_deviation(parameter).unwrap();
+                let moved = polished.camera.get(parameter) - plain.camera.get(parameter);
+                assert!(moved.abs() < 1e-4 * sd, "{parameter} {moved} {sd}");
+                let ratio = polished.standard_deviation(parameter).unwrap() / sd;
+                assert!((ratio - 1.0).abs() < 1e-5, "{parameter} {ratio}");
+            }
+            for (own, expected) in [(polished.sigma_px, plain.sigma_px), (polished.rmse_px, plain.rmse_px)] {
+                assert!((own / expected - 1.0).abs() < 1e-9, "{own} {expected}");
+            }
+        }
     }
 }

@@ -378,6 +378,8 @@ impl State {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibrate::prior::Priors;
+    use crate::calibrate::retraction::Retraction;
     use crate::camera::BrownConrady;
 
     const FREE: [Parameter; 6] =
@@ -463,5 +465,34 @@ mod tests {
         let with = |tilt: f64| Entries::from_column_slice(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, tilt, tilt]);
         assert_eq!(in_front(with(-0.4), &pairs), with(-0.4));
         assert_eq!(in_front(with(-0.6), &pairs), with(0.0));
+    }
+
+    #[test]
+    fn the_relaxed_model_has_the_parameters_that_homographies_do_not_take_up() {
+        use Parameter::{Cx, Cy, Fy, K1, K2, K3};
+        let sought = |free: FreeParameters, fy_per_fx: Option<f64>, held: &[Parameter]| {
+            let problem = Problem {
+                free,
+                fy_per_fx,
+                priors: Priors::NONE,
+                observations: &[],
+                loss: Loss::Squares,
+                max_iterations: 1,
+                hold_tilt: false,
+                retraction: Retraction::Straight,
+                focal_limits: (0.0, f64::INFINITY),
+                rounding_cost: 0.0,
+            };
+            parameters(&problem, |p| held.contains(&p))
+        };
+        let (standard, of) = (FreeParameters::STANDARD, FreeParameters::of);
+        assert_eq!(sought(standard, None, &[]), of(&[Fy, Cx, Cy, K1, K2]));
+        // The shape of the cells is known.
+        assert_eq!(sought(standard, Some(1.0), &[]), of(&[Cx, Cy, K1, K2]));
+        // A coefficient that is held belongs to a focal length.
+        assert_eq!(sought(standard, None, &[K3]), of(&[Fy, Cx, Cy, K1, K2, K3]));
+        assert_eq!(sought(of(&[Cx, Cy, K1]), None, &[K3]), of(&[Cx, Cy, K1]));
+        // Without distortion homographies take up all.
+        assert_eq!(sought(of(&[Parameter::Fx, Fy, Cx, Cy]), None, &[]), FreeParameters::NONE);
     }
 }

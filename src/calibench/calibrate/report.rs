@@ -484,8 +484,10 @@ fn rms<'a>(residuals: impl ExactSizeIterator<Item = &'a Vec2>) -> f64 {
 
 #[cfg(all(test, feature = "serde", feature = "io"))]
 mod tests {
+    use super::signed;
     use crate::board::View;
     use crate::calibrate::{Calibration, CalibrationError, Conditioning, Loss, Settings, Warning, calibrate};
+    use crate::calibrate::{Certificate, Termination};
     use crate::camera::{BrownConrady, Camera, Parameter};
     use crate::geometry::{Pose, Vec2, Vec3, rotation};
     use serde::{Serialize, de::DeserializeOwned};
@@ -556,5 +558,67 @@ mod tests {
         let text = r#"{"free": "fx,fy", "intrinsics": [[1.0]], "poses": [], "cross": []}"#;
         let error = serde_json::from_str::<crate::calibrate::Covariance>(text).unwrap_err();
         assert!(error.to_string().contains("other sizes"), "{error}");
+    }
+
+    #[test]
+    fn serde_refuses_a_covariance_whose_rows_are_not_of_one_length() {
+        let text = r#"{"free": "fx,fy", "intrinsics": [[1.0, 0.0], [0.0]], "poses": [], "cross": []}"#;
+        assert!(serde_json::from_str::<crate::calibrate::Covariance>(text).is_err());
+    }
+
+    /// A calibration of three views.
+    fn calibration() -> Calibration {
+        let views = views(&[[0.3, 0.0, 0.1], [0.0, -0.3, 0.0], [-0.2, 0.25, 0.4]]);
+        calibrate(&views, &Settings::standard().hold(Parameter::K2, 0.1)).unwrap()
+    }
+
+    #[test]
+    fn the_rmse_of_a_view_is_that_of_its_own_points() {
+        let mut found = calibration();
+        found.residuals = vec![vec![Vec2::new(1.0, 1.0)], vec![Vec2::new(3.0, 4.0), Vec2::new(-5.0, 0.0)]];
+        assert_eq!((found.view_rmse_px(1), found.view_rmse_px(2)), (Some(5.0), None));
+    }
+
+    #[test]
+    fn a_minimum_a_quarter_above_its_floor_is_not_to_be_used() {
+        let mut found = calibration();
+        let certificate = found.certificate.unwrap();
+        for (rmse_px, p_value, termination, is_usable) in [
+            (0.125, 0.0, Termination::AboveFloor, false),
+            (0.115, 0.0, Termination::AboveFloor, true),
+            // By chance, as of few marks.
+            (0.125, 0.1, Termination::Converged, true),
+            (0.1, 0.5, Termination::IterationLimit, false),
+        ] {
+            found.certificate = Some(Certificate { rmse_px, floor_rmse_px: 0.095, p_value, ..certificate });
+            found.termination = termination;
+            assert_eq!(found.is_usable(), is_usable, "{rmse_px} {p_value}");
+        }
+    }
+
+    #[test]
+    fn a_number_of_either_sign_is_told_with_it() {
+        assert_eq!([-0.25, 0.25, 0.0031, -0.0031].map(signed), ["-0.25", "+0.25", "+3.1e-3", "-3.1e-3"]);
+    }
+
+    #[test]
+    fn advice_depends_on_how_far_above_its_floor_a_minimum_lies() {
+        let told = |rmse_px: f64| {
+            Warning::AboveFloor { rmse_px, floor_rmse_px: 0.1, p_value: 1e-9, starts: 7 }.to_string()
+        };
+        assert!(
+            told(0.126).contains("do not use the result") && !told(0.124).contains("do not use the result")
+        );
+    }
+
+    #[test]
+    fn one_parameter_left_out_is_told_of_in_the_singular() {
+        let told = |parameters: Vec<Parameter>| {
+            Warning::LeftOut { parameters, fall: 100.0, probability: 1e-9 }.to_string()
+        };
+        assert!(told(vec![Parameter::K3]).contains("ask for k3, but it is held or tied"));
+        assert!(
+            told(vec![Parameter::P1, Parameter::P2]).contains("ask for p1 and p2, but they are held or tied")
+        );
     }
 }

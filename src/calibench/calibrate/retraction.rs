@@ -225,4 +225,39 @@ mod tests {
         let ratio = apart(0.05) / apart(0.005);
         assert!((80.0..125.0).contains(&ratio), "{ratio}");
     }
+
+    #[test]
+    fn steps_of_both_ways_agree_to_first_order_whichever_focal_length_is_free() {
+        use Parameter::{Cx, Fx, Fy, K1, P1};
+        let distortion = BrownConrady { k1: -0.2, k2: 0.1, p1: 1e-3, p2: -2e-3, k3: 0.03 };
+        let camera = Camera::pinhole(600.0, 610.0, 320.0, 240.0).with_distortion(distortion);
+        let pose = Pose {
+            rotation: rotation::from_xyz_rad(0.3, -0.4, 0.2),
+            translation: Vec3::new(3.0, -2.0, 12.0),
+        };
+        let state = State { camera, cam_from_target: vec![pose] };
+        let turn = SVector::<f64, 6>::from([0.2, -0.1, 0.3, 0.5, 0.4, 2.0]);
+        for list in
+            [vec![(Fx, 30.0), (Fy, 20.0), (Cx, 5.0), (P1, 1e-3)], vec![(Fy, 20.0), (Cx, 5.0), (K1, 0.1)]]
+        {
+            let free = list.iter().fold(FreeParameters::NONE, |free, (p, _)| free.with(*p));
+            let apart = |h: f64| {
+                let intrinsics = SVector::from_fn(|i, _| list.get(i).map_or(0.0, |(_, unit)| h * unit));
+                let step = Step::along(intrinsics, vec![h * turn]);
+                let [a, b] = [Retraction::Straight, Retraction::Curved].map(|way| {
+                    let mut to = state.clone();
+                    way.apply(&state, free, None, &step, &mut to);
+                    to
+                });
+                let cameras =
+                    |&(p, unit): &(Parameter, f64)| ((a.camera.get(p) - b.camera.get(p)) / unit).abs();
+                let (p, q) = (a.cam_from_target[0], b.cam_from_target[0]);
+                list.iter().map(cameras).sum::<f64>()
+                    + (p.rotation - q.rotation).norm()
+                    + (p.translation - q.translation).norm()
+            };
+            let ratio = apart(1e-2) / apart(1e-3);
+            assert!((80.0..125.0).contains(&ratio), "{ratio}");
+        }
+    }
 }

@@ -89,3 +89,32 @@ impl Rival {
         self.excess.total_cmp(&other.excess)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_best_of_what_is_far_in_deviations_and_near_in_cost_is_the_rival() {
+        let free = FreeParameters::of(&[Parameter::Fx, Parameter::K1]);
+        // Deviations of 2 px and 0.01; a deviation costs 0.5 px^2.
+        let covariance = DMatrix::from_row_slice(2, 2, &[4.0, 0.0, 0.0, 1e-4]);
+        let met = |fx: f64, k1: f64, excess: f64, converged: bool| {
+            let camera =
+                Camera::pinhole(fx, 600.0, 320.0, 240.0).with_distortion(BrownConrady::radial(k1, 0.0));
+            Met { camera, cost: 7.0 + 0.5 * excess, converged }
+        };
+        let others = [
+            met(613.0, -0.2, 10.0, true),
+            met(600.0, -0.13, 5.0, true),
+            met(611.0, -0.2, 1.0, true),
+            met(700.0, -0.2, 17.0, true),
+            met(700.0, -0.2, 0.5, false),
+        ];
+        let value = |camera: &Camera, parameter| camera.get(parameter);
+        let best = met(600.0, -0.2, 0.0, true);
+        let rival = |others: &[Met]| best.rival(others, free, &covariance, 0.5, value);
+        assert_eq!(rival(&others), Some(Rival { parameter: Parameter::K1, value: -0.13, excess: 5.0 }));
+        assert_eq!(rival(&others[2..]), None);
+    }
+}

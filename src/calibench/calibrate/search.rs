@@ -168,3 +168,96 @@ pub(super) fn is_better(new: &Minimum, old: &Minimum) -> bool {
     }
     converged(new) && !converged(old) && new.system.cost <= old.system.cost * (1.0 + EQUAL)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::Loss;
+    use crate::calibrate::normal::Observations;
+    use crate::calibrate::prior::Priors;
+    use crate::calibrate::system::System;
+    use crate::calibrate::walk::Far;
+    use crate::camera::Parameter;
+    use crate::camera::{Camera, FreeParameters};
+    use crate::geometry::{Pose, Vec2, Vec3, rotation};
+
+    #[test]
+    fn a_minimum_is_better_by_more_than_rounding_or_as_good_and_converged() {
+        let at = |cost: f64, converged: bool| {
+            let mut system = System::new(FreeParameters::NONE, 0);
+            system.cost = cost;
+            let camera = Camera::pinhole(600.0, 600.0, 320.0, 240.0);
+            let termination = if converged { Termination::Converged } else { Termination::Stalled };
+            Minimum {
+                state: State { camera, cam_from_target: Vec::new() },
+                system,
+                termination,
+                iterations: 1,
+            }
+        };
+        for (new, old, is) in [
+            (at(7.0 - 1e-7, false), at(7.0, true), true),
+            (at(7.0 - 1e-9, true), at(7.0, true), false),
+            (at(7.0, true), at(7.0, true), false),
+            (at(7.0, false), at(7.0, false), false),
+            (at(7.0, true), at(7.0, false), true),
+            (at(7.0 + 1e-9, true), at(7.0, false), true),
+            (at(7.0 + 1e-7, true), at(7.0, false), false),
+        ] {
+            assert_eq!(is_better(&new, &old), is, "{} {}", new.system.cost, old.system.cost);
+        }
+    }
+
+    #[test]
+    fn what_the_data_leave_open_is_refused_at_a_certified_cost_only() {
+        let camera = Camera::pinhole(600.0, 600.0, 320.0, 240.0);
+        let poses = [[0.35, 0.0, 0.0], [0.0, -0.35, 0.3], [-0.26, 0.26, -0.2]].map(|[x, y, z]| Pose {
+            rotation: rotation::from_xyz_rad(x, y, z),
+            translation: Vec3::new(2.0, -3.0, 120.0),
+        });
+        // One view stretched as no pose can, and as any homography can.
+        for (stretch, is_refused) in [(1.0, true), (1.05, false)] {
+            let mut count = 0.0;
+            let mut noise = || {
+                count += 1.0;
+                0.1 * std::f64::consts::SQRT_2 * libm::sin(0.7 * count * count)
+            };
+            let mut seen = |(view, pose): (usize, &Pose)| {
+                let mut pair = |i: u32| {
+                    let point = Vec2::new(f64::from(i % 9) - 4.0, f64::from(i / 9) - 3.0) * 10.0;
+                    let mut pixel = camera.project(&pose.apply(&Vec3::new(point.x, point.y, 0.0))).unwrap();
+                    pixel.y = if view == 1 { stretch * pixel.y } else { pixel.y };
+                    (point, pixel + Vec2::new(noise(), noise()))
+                };
+                Observations::new((0..63).map(&mut pair).collect::<Vec<_>>().into_iter())
+            };
+            let observations: Vec<Observations> = poses.iter().enumerate().map(&mut seen).collect();
+            let problem = Problem {
+                free: FreeParameters::of(&[Parameter::Fx]),
+                fy_per_fx: Some(1.0),
+                priors: Priors::NONE,
+                observations: &observations,
+                loss: Loss::Squares,
+                max_iterations: 100,
+                hold_tilt: false,
+                retraction: Retraction::Straight,
+                focal_limits: (0.0, f64::INFINITY),
+                rounding_cost: 0.0,
+            };
+            let best = problem.minimise(State { camera, cam_from_target: poses.to_vec() });
+            // As if a focal length three times as long cost no more.
+            let mut minimum = best.clone();
+            minimum.state.camera.fx *= 3.0;
+            let far = vec![Far { parameter: Parameter::Fx, minimum }];
+            let noise = noise_of(&problem, &best);
+            let walked = Walked { best, starts: 1, far, met: Vec::new() };
+            let outcome = refuse_undetermined(&problem, &walked, noise);
+            assert_eq!(
+                matches!(outcome, Err(CalibrationError::NotIdentifiable { .. })),
+                is_refused,
+                "{stretch}"
+            );
+            assert_eq!(matches!(outcome, Ok(None)), !is_refused, "{stretch}");
+        }
+    }
+}

@@ -276,6 +276,7 @@ fn lens_camera(focal_px: f64, centre: &Vec2, distortion: BrownConrady) -> Camera
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::{Pose, Vec3, rotation};
 
     #[test]
     fn the_expected_rms_is_that_of_the_degrees_of_freedom() {
@@ -283,5 +284,115 @@ mod tests {
         let (rms_px, sd_px) = predicted_rms_px(0.1, 50, 10);
         assert!((rms_px - 0.134_164_078_649_987_4).abs() < 1e-15 && (sd_px - 0.01).abs() < 1e-15);
         assert_eq!(predicted_rms_px(0.1, 5, 10).0, 0.0);
+    }
+
+    /// A lens about (326, 243), and what it sees of a tilted board: marks, ideal pixels and pixels with
+    /// noise.
+    fn seen(k1: f64, noise_px: f64) -> (Camera, View, Vec<Vec2>) {
+        let ideal = Camera::pinhole(600.0, 600.0, 326.0, 243.0);
+        let camera = ideal.with_distortion(BrownConrady::radial(k1, -0.25 * k1));
+        let pose = Pose {
+            rotation: rotation::from_xyz_rad(0.35, -0.2, 0.1),
+            translation: Vec3::new(3.0, -2.0, 120.0),
+        };
+        let points: Vec<Vec2> =
+            (0..63).map(|i| Vec2::new(f64::from(i % 9) - 3.0, f64::from(i / 9) - 2.0) * 10.0).collect();
+        let image = |camera: &Camera| -> Vec<Vec2> {
+            points.iter().map(|p| camera.project(&pose.apply(&Vec3::new(p.x, p.y, 0.0))).unwrap()).collect()
+        };
+        let noise = |k: f64| noise_px * std::f64::consts::SQRT_2 * libm::sin(0.7 * k * k);
+        let observed = image(&camera).into_iter().enumerate().map(|(i, pixel)| {
+            let k = 2.0 * i as f64;
+            pixel + Vec2::new(noise(k + 1.0), noise(k + 2.0))
+        });
+        let view = View::new(points.clone(), observed.collect()).unwrap();
+        (camera, view, image(&ideal))
+    }
+
+    fn options(off: Vec2, centre_free: bool) -> SinglePlaneOptions {
+        SinglePlaneOptions { focal_px: 600.0, centre_px: Vec2::new(326.0, 243.0) + off, centre_free }
+    }
+
+    #[test]
+    fn exact_pixels_tell_the_lens_its_centre_and_the_plane() {
+        let (camera, view, ideal) = seen(-0.18, 0.0);
+        for (off, centre_free) in [(Vec2::zeros(), false), (Vec2::new(9.0, -7.0), true)] {
+            let found = calibrate_single_plane(&view, &options(off, centre_free)).unwrap();
+            assert!((found.centre_px - Vec2::new(326.0, 243.0)).norm() < 1e-6);
+            assert!((found.distortion.k1 - camera.distortion.k1).abs() < 1e-8);
+            assert!((found.distortion.k2 - camera.distortion.k2).abs() < 1e-7);
+            for ((point, pixel), ideal) in view.pairs().zip(&ideal) {
+                assert!((found.ideal_from_target.apply(point).unwrap() - ideal).norm() < 1e-6);
+                assert!((found.correct_pixel(pixel).unwrap() - ideal).norm() < 1e-6);
+                assert!((found.target_from_pixel(pixel).unwrap().unwrap() - point).norm() < 1e-6);
+            }
+        }
+    }
+
+    /// What the lens with this homography and these coefficients shows of a point.
+    fn predicted(h: &Mat3, k: Vec2, point: &Vec2) -> Vec2 {
+        let ideal = Homography(*h).apply(point).unwrap();
+        lens_camera(600.0, &Vec2::new(326.0, 243.0), BrownConrady::radial(k.x, k.y))
+            .project(&Vec3::new((ideal.x - 326.0) / 600.0, (ideal.y - 243.0) / 600.0, 1.0))
+            .unwrap()
+    }
+
+    #[test]
+    fn residuals_and_deviations_are_those_of_least_squares_in_pixels() {
+        let (_, view, _) = seen(-0.18, 0.1);
+        let found = calibrate_single_plane(&view, &options(Vec2::zeros(), false)).unwrap();
+        let (h, k) = (found.ideal_from_target.0, Vec2::new(found.distortion.k1, found.distortion.k2));
+        let mut square = 0.0;
+        for ((point, pixel), residual) in view.pairs().zip(&found.residuals_px) {
+            assert!((predicted(&h, k, point) - pixel - residual).norm() < 1e-9);
+            square += residual.norm_squared();
+        }
+        // 126 coordinates; eight entries of a homography and two coefficients.
+        let spread = found.spread.unwrap();
+        assert_eq!(found.degrees_of_freedom, 116);
+        assert!((found.rms_px / (square / 63.0).sqrt() - 1.0).abs() < 1e-12);
+        assert!((spread.sigma_px / (square / 116.0).sqrt() - 1.0).abs() < 1e-12);
+        // The covariance of k1 and k2 by central differences: any eight numbers of the homography do.
+        let moved = |column: usize, part: f64| {
+            let (mut h, mut k) = (h, k);
+            match column {
+                8 | 9 => k[column - 8] += part,
+                _ => h[(column / 3, column % 3)] *= 1.0 + part,
+            }
+            view.points().iter().map(|point| predicted(&h, k, point)).collect::<Vec<_>>()
+        };
+        let columns: Vec<(Vec<Vec2>, Vec<Vec2>)> =
+            (0..10).map(|j| (moved(j, 1e-6), moved(j, -1e-6))).collect();
+        let jacobian = DMatrix::from_fn(126, 10, |i, j| {
+            (columns[j].0[i / 2][i % 2] - columns[j].1[i / 2][i % 2]) / 2e-6
+        });
+        let covariance = (jacobian.transpose() * &jacobian).try_inverse().unwrap() * (square / 116.0);
+        for (i, j) in [(0, 0), (0, 1), (1, 1)] {
+            let ratio = spread.lens[(i, j)] / covariance[(8 + i, 8 + j)];
+            assert!((ratio - 1.0).abs() < 1e-3, "{i} {j}: {ratio}");
+        }
+        assert_eq!(spread.lens[(2, 2)], 0.0);
+    }
+
+    #[test]
+    fn a_centre_is_looked_for_where_distortion_is_seen() {
+        for (k1, is_seen) in [(0.0, false), (-0.18, true)] {
+            let (_, view, _) = seen(k1, 0.1);
+            let held = calibrate_single_plane(&view, &options(Vec2::zeros(), false)).unwrap();
+            let covariance = held.spread.unwrap().lens.fixed_view::<2, 2>(0, 0).into_owned();
+            let k = Vec2::new(held.distortion.k1, held.distortion.k2);
+            let expected = k.dot(&(covariance.try_inverse().unwrap() * k));
+            assert_eq!(expected > SEEN_DISTORTION, is_seen, "{expected}");
+            match calibrate_single_plane(&view, &options(Vec2::zeros(), true)) {
+                Ok(found) => assert!(is_seen && (found.centre_px - Vec2::new(326.0, 243.0)).norm() < 20.0),
+                Err(SinglePlaneError::CentreNotIdentifiable { chi_square, .. }) => {
+                    assert!(
+                        !is_seen && (chi_square / expected - 1.0).abs() < 1e-6,
+                        "{chi_square} {expected}"
+                    );
+                }
+                Err(other) => panic!("{other}"),
+            }
+        }
     }
 }

@@ -192,4 +192,48 @@ mod tests {
             assert!((found - 600.0).abs() < 1e-8, "{found}");
         }
     }
+
+    #[test]
+    fn a_camera_is_plausible_within_what_optics_make() {
+        for (fx, fy, cx, is) in [
+            (600.0, 600.0, 320.0, true),
+            // A tenth of the half-width of 300 px, and two hundred times it.
+            (29.0, 35.0, 320.0, false),
+            (35.0, 29.0, 320.0, false),
+            (31.0, 31.0, 320.0, true),
+            (59_000.0, 59_000.0, 320.0, true),
+            (61_000.0, 59_000.0, 320.0, false),
+            // Cells five times as high as wide, or as wide as high.
+            (600.0, 121.0, 320.0, true),
+            (600.0, 119.0, 320.0, false),
+            (119.0, 600.0, 320.0, false),
+            // Five half-widths aside.
+            (600.0, 600.0, 320.0 + 1490.0, true),
+            (600.0, 600.0, 320.0 + 1510.0, false),
+        ] {
+            let frame = (Vec2::new(320.0, 240.0), 300.0);
+            assert_eq!(is_plausible(&Camera::pinhole(fx, fy, cx, 240.0), frame), is, "{fx} {fy} {cx}");
+        }
+    }
+
+    #[test]
+    fn the_centre_is_what_is_known_of_it_or_the_middle_of_the_image() {
+        let pixels = Vec2::new(300.0, 200.0);
+        let centre = |settings: &Settings| Held::of(settings, pixels).unwrap().centre;
+        let standard = Settings::standard();
+        assert_eq!(centre(&standard), pixels);
+        // Pixel centres are whole numbers: the middle of 640 lies between 319 and 320.
+        let sized = standard.with_image_size((640, 480));
+        assert_eq!(centre(&sized), Vec2::new(319.5, 239.5));
+        assert_eq!(centre(&sized.clone().with_prior(Parameter::Cy, 250.0, 1.0)), Vec2::new(319.5, 250.0));
+        assert_eq!(centre(&sized.hold(Parameter::Cx, 330.0)), Vec2::new(330.0, 239.5));
+    }
+
+    #[test]
+    fn a_focal_length_known_to_a_tenth_is_a_start() {
+        for (sd, expected) in [(59.0, Some(600.0)), (61.0, None)] {
+            let settings = Settings::standard().with_prior(Parameter::Fx, 600.0, sd);
+            assert_eq!(Held::of(&settings, Vec2::zeros()).unwrap().focal_known, expected);
+        }
+    }
 }

@@ -82,4 +82,10 @@ mod tests {
         let square = view(&[(1.0, 0.0), (0.0, 1.0)]);
         assert_eq!(neighbours(&[square.clone(), view(&[(0.0, 1.0), (1.0, 0.0)])]).correlation, 0.0);
     }
+
+    #[test]
+    fn neighbours_may_agree_beyond_three_deviations() {
+        let may_agree = |z: f64| Neighbours { correlation: 0.1, z }.may_agree();
+        assert!(may_agree(3.1) && !may_agree(2.9) && !may_agree(-3.1));
+    }
 }

@@ -315,4 +315,26 @@ mod tests {
         assert!((&stacked - &expected).norm() <= 1e-8 * expected.norm());
         assert!((step.predicted_gain + gradient.dot(&expected)).abs() <= 1e-8 * step.predicted_gain);
     }
+
+    #[test]
+    fn a_step_is_bent_by_half_of_an_acceleration_that_is_short_in_the_systems_metric() {
+        let system = system();
+        let pose = |k: f64| SVector::from_fn(|i, _| k * (i as f64 - 2.2));
+        let own =
+            Step::along(SVector::from_fn(|i, _| 0.1 * (i as f64 + 1.0)), [1.0, -2.0, 3.0].map(pose).to_vec());
+        let mut step = own.clone();
+        assert!(!step.bend(&own.times(-0.76), &system));
+        assert_eq!((step.intrinsics, &step.poses), (own.intrinsics, &own.poses));
+        assert!(step.bend(&own.times(-0.74), &system));
+        assert!((step.intrinsics - 0.63 * own.intrinsics).norm() < 1e-12);
+        assert!(step.poses.iter().zip(&own.poses).all(|(bent, own)| (bent - 0.63 * own).norm() < 1e-12));
+    }
+
+    #[test]
+    fn the_inverse_of_a_square_is_that_of_the_whole_matrix() {
+        let root = DMatrix::from_row_slice(3, 3, &[2.0, -1.0, 0.5, 0.0, 3.0, 0.7, 0.0, 0.0, 0.4]);
+        let expected = (root.transpose() * &root).try_inverse().unwrap();
+        let own = inverse_of_square(&root).unwrap();
+        assert!((&own - &expected).norm() < 1e-12 * expected.norm(), "{own} {expected}");
+    }
 }

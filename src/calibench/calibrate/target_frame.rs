@@ -194,4 +194,19 @@ mod tests {
         );
         assert!(matches!(TargetFrames::of(&[nothing()]), TargetFrames::Own(_)));
     }
+
+    #[test]
+    fn a_pose_in_the_frame_shows_the_same_points_and_leads_back() {
+        let frame = TargetFrame { centre: Vec2::new(50.0, -30.0), scale: 4.0 };
+        let pose = Pose {
+            rotation: rotation::from_xyz_rad(0.3, -0.4, 0.2),
+            translation: Vec3::new(5.0, -7.0, 150.0),
+        };
+        let own = frame.of_pose(&pose);
+        let point = Vec2::new(61.0, -12.0);
+        let in_frame = frame.of_point(&point);
+        let seen = 4.0 * own.apply(&Vec3::new(in_frame.x, in_frame.y, 0.0));
+        assert!((seen - pose.apply(&Vec3::new(point.x, point.y, 0.0))).norm() < 1e-12);
+        assert!((frame.cam_from_target(&own).translation - pose.translation).norm() < 1e-12);
+    }
 }

@@ -22,3 +22,16 @@ pub(super) fn met_halfway(camera: Camera, fy_per_fx: Option<f64>) -> Camera {
         None => camera,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn focal_lengths_that_meet_halfway_move_by_the_same_factor() {
+        // 600 and 300 px to a ratio of 3/4: fx by sqrt(2/3), fy by its inverse.
+        let camera = met_halfway(Camera::pinhole(600.0, 300.0, 320.0, 240.0), Some(0.75));
+        let factor = (2.0f64 / 3.0).sqrt();
+        assert!((camera.fx - 600.0 * factor).abs() < 1e-12 && (camera.fy - 300.0 / factor).abs() < 1e-12);
+    }
+}

@@ -84,6 +84,7 @@ pub(super) fn resected(problem: &Problem<'_>, state: &State, view: usize, start:
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Vec2;
     use crate::geometry::rotation;
 
     #[test]
@@ -117,5 +118,23 @@ mod tests {
         for turn in [0.0, 0.3, 2.0, 3.1] {
             assert!((angle_between(&pose(0.1, 0.7), &pose(0.1 + turn, -1.2)) - turn).abs() < 1e-14);
         }
+    }
+
+    #[test]
+    fn a_tilt_is_doubtful_where_it_shows_and_perspective_hardly_tells_its_sign() {
+        // 100 marks over a square of half-width 50 px, seen with 1000 px and noise of 0.1 px.
+        let pair = |i: u32| (Vec2::zeros(), Vec2::new(f64::from(i % 10), f64::from(i / 10)) * (100.0 / 9.0));
+        let observations = Observations::new((0..100).map(pair));
+        let is_doubtful = |tilt: f64| {
+            let pose = Pose {
+                rotation: rotation::from_xyz_rad(tilt, 0.0, 0.2),
+                translation: Vec3::new(0.0, 0.0, 500.0),
+            };
+            is_doubtful(&pose, &observations, 1000.0, 0.1)
+        };
+        // Shorter by 50 (1 - cos) px: 0.17 * 100 * (500 (1 - cos))^2 is 4 at cos = 0.99903, a tilt of 0.0441.
+        assert!(!is_doubtful(0.042) && is_doubtful(0.046));
+        // Perspective of 2 tan * 50^2 / 1000 px: 0.16 * 100 * (50 tan)^2 is 400 at tan = 0.1.
+        assert!(is_doubtful(libm::atan(0.098)) && !is_doubtful(libm::atan(0.102)));
     }
 }

@@ -99,3 +99,23 @@ pub(super) fn advice(unknowns: &[Unknown]) -> &'static str {
         "Tilt the target by 20 degrees or more, about different axes, in some views, or give one of them a value to be held at"
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn advice_is_of_the_lens_where_its_coefficients_take_part() {
+        let k1 = Unknown::Intrinsic(Parameter::K1);
+        let (model, tilt) = ("lens model with fewer coefficients", "Tilt the target");
+        for (unknowns, of_model, of_tilt) in [
+            (vec![k1, Unknown::TangentialDistortion], true, false),
+            (vec![k1, Unknown::FocalLength], true, true),
+            (vec![Unknown::Camera, Unknown::Poses], true, true),
+            (vec![Unknown::FocalLength, Unknown::Distance], false, true),
+        ] {
+            let told = advice(&unknowns);
+            assert_eq!((told.contains(model), told.contains(tilt)), (of_model, of_tilt), "{told}");
+        }
+    }
+}

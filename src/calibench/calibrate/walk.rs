@@ -170,3 +170,45 @@ pub(super) fn with_better_tilts(problem: &Problem<'_>, minimum: Minimum) -> Mini
     }
     best
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::Loss;
+    use crate::calibrate::minimise::State;
+    use crate::calibrate::normal::Observations;
+    use crate::calibrate::prior::Priors;
+    use crate::calibrate::retraction::Retraction;
+    use crate::camera::{Camera, FreeParameters};
+    use crate::geometry::{Mat3, Pose, Vec2, Vec3};
+
+    #[test]
+    fn a_principal_point_that_a_facing_target_does_not_tell_may_lie_far_away_on_either_side() {
+        let camera = Camera::pinhole(600.0, 600.0, 320.0, 240.0);
+        let pose = Pose { rotation: Mat3::identity(), translation: Vec3::new(0.0, 0.0, 100.0) };
+        let pair = |i: u32| {
+            let point = Vec2::new(f64::from(i % 9) - 4.0, f64::from(i / 9) - 3.0) * 5.0;
+            (point, camera.project(&Vec3::new(point.x, point.y, 100.0)).unwrap())
+        };
+        let observations = [Observations::new((0..63).map(pair))];
+        let problem = Problem {
+            free: FreeParameters::of(&[Parameter::Cx]),
+            fy_per_fx: None,
+            priors: Priors::NONE,
+            observations: &observations,
+            loss: Loss::Squares,
+            max_iterations: 100,
+            hold_tilt: false,
+            retraction: Retraction::Straight,
+            focal_limits: (0.0, f64::INFINITY),
+            rounding_cost: 0.0,
+        };
+        let held = Problem { free: FreeParameters::NONE, ..problem };
+        let best = held.minimise(State { camera, cam_from_target: vec![pose] });
+        let mut walked = Walked { best, starts: 0, far: Vec::new(), met: Vec::new() };
+        step_aside(&problem, Parameter::Cx, 1.0, &mut walked);
+        let far: Vec<f64> = walked.far.iter().map(|far| far.minimum.state.camera.cx).collect();
+        // Half of the focal length.
+        assert_eq!((walked.starts, far), (2, vec![620.0, 20.0]));
+    }
+}

@@ -269,8 +269,12 @@ fn folding(camera: &Camera, largest_observed: f64) -> Option<Warning> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibrate::calibrate_lens;
     use crate::calibrate::tests::four_views;
     use crate::calibrate::{Settings, calibrate};
+    use crate::camera::BrownConrady;
+    use crate::geometry::{Mat3, Vec3};
+    use nalgebra::DMatrix;
 
     #[test]
     fn a_prior_is_contradicted_by_its_distance_over_the_deviation_of_both() {
@@ -291,5 +295,85 @@ mod tests {
         let deviations = told(6.0).unwrap();
         assert!((deviations - 6.0).abs() < 0.1, "{deviations}");
         assert_eq!(told(-4.0), None);
+    }
+
+    #[test]
+    fn the_fewer_views_from_one_side_are_those_from_behind() {
+        let seen = |sides: &[f64]| {
+            let pose = |side: &f64| Pose {
+                rotation: Mat3::from_diagonal(&Vec3::new(1.0, *side, *side)),
+                translation: Vec3::new(0.0, 0.0, 100.0),
+            };
+            from_behind(&sides.iter().map(pose).collect::<Vec<_>>())
+        };
+        let found = Some(Warning::FromBehind { view: 1, views: 2 });
+        assert_eq!(seen(&[1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0]), found);
+        assert_eq!(seen(&[-1.0, 1.0, -1.0, -1.0, 1.0, -1.0, -1.0]), found);
+        assert_eq!((seen(&[1.0; 3]), seen(&[-1.0; 3])), (None, None));
+    }
+
+    #[test]
+    fn pairs_that_share_their_variance_are_told_but_for_the_focal_lengths() {
+        use Parameter::{Cx, Fx, Fy, K1};
+        let free = FreeParameters::of(&[Fx, Fy, Cx, K1]);
+        // Deviations of 2, 2, 3 and 5.
+        let rows =
+            [[4.0, 3.98, 0.0, 9.7], [3.98, 4.0, 0.0, 9.7], [0.0, 0.0, 9.0, -14.85], [9.7, 9.7, -14.85, 25.0]];
+        let matrix = DMatrix::from_fn(4, 4, |i, j| rows[i][j]);
+        let found = correlated(&Covariance::untied(free, matrix, Vec::new(), Vec::new()), free);
+        assert_eq!(found, [Warning::Correlated { a: Cx, b: K1, correlation: -0.99 }]);
+    }
+
+    #[test]
+    fn radial_coefficients_of_other_lenses_make_up_for_each_other_in_every_calibration() {
+        use Parameter::{Alpha, Cx, Fx, Fy, K1, K2, K4, P1, Xi};
+        for (a, b, is) in [
+            (K1, K2, true),
+            (K2, K4, true),
+            (Xi, Alpha, true),
+            (Fx, Xi, true),
+            (Fy, Alpha, true),
+            (Fx, K1, false),
+            (Cx, P1, false),
+            (K1, P1, false),
+        ] {
+            assert_eq!(is_by_construction(&Warning::Correlated { a, b, correlation: 0.99 }), is, "{a} {b}");
+        }
+        assert!(!is_by_construction(&Warning::NotCertified));
+    }
+
+    #[test]
+    fn a_lens_that_folds_within_a_fifth_of_what_was_seen_is_told() {
+        // r - 0.3 r^3 turns at r = 1 / sqrt(0.9) = 1.0541: 1.2 times 0.8784.
+        let camera =
+            Camera::pinhole(600.0, 600.0, 320.0, 240.0).with_distortion(BrownConrady::radial(-0.3, 0.0));
+        assert_eq!(folding(&camera, 0.875), None);
+        let Some(Warning::FoldsInsideImage { monotone_radius, largest_observed }) = folding(&camera, 0.882)
+        else {
+            panic!();
+        };
+        assert!((monotone_radius - 1.0 / 0.9f64.sqrt()).abs() < 1e-9 && largest_observed == 0.882);
+    }
+
+    #[test]
+    fn a_focal_length_known_better_than_its_deviation_says_is_not_called_uncertain() {
+        let mut found = calibrate_lens(&four_views(0.1), &Settings::standard()).unwrap();
+        // Deviations of more than a twentieth.
+        let sd = found.standard_deviation(Parameter::Fx).unwrap();
+        found.covariance = found.covariance.scaled((60.0 / sd) * (60.0 / sd));
+        let uncertain = |skewed: &[Skewed]| -> Vec<Parameter> {
+            let warnings = of_lens(&found, 0.5, Vec::new(), skewed, &[], None);
+            let of = |warning: &Warning| match warning {
+                Warning::FocalLengthUncertain { parameter, .. } => Some(*parameter),
+                _ => None,
+            };
+            warnings.iter().filter_map(of).collect()
+        };
+        let skewed = |parameter: Parameter, below: f64| Skewed { parameter, ratios: [below, 0.1] };
+        assert_eq!(uncertain(&[]), [Parameter::Fx, Parameter::Fy]);
+        assert_eq!(uncertain(&[skewed(Parameter::Fx, 0.4)]), [Parameter::Fy]);
+        // Better on one side only, or another parameter.
+        assert_eq!(uncertain(&[skewed(Parameter::Fx, 0.6)]), [Parameter::Fx, Parameter::Fy]);
+        assert_eq!(uncertain(&[skewed(Parameter::Cx, 0.1)]), [Parameter::Fx, Parameter::Fy]);
     }
 }

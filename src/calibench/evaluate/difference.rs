@@ -246,4 +246,15 @@ mod tests {
         let nowhere = TakenOut::RotationAndTranslation { distance: 0.0 };
         assert_eq!(frame_difference(&camera, &longer, SIZE, nowhere), Err(DifferenceError::Distance(0.0)));
     }
+
+    #[test]
+    fn nodes_are_the_middles_of_equal_cells() {
+        // Cells of one pixel: the pixels' centres themselves.
+        let (nodes, columns) = frame_nodes((30, 20));
+        assert_eq!((nodes.len(), columns), (600, 30));
+        let centre = |i: usize| Vec2::new((i % 30) as f64, (i / 30) as f64);
+        assert!(nodes.iter().enumerate().all(|(i, node)| (node - centre(i)).norm() < 1e-12));
+        // Of four pixels each: between the second and the third.
+        assert_eq!(frame_nodes((120, 80)).0[31], Vec2::new(5.5, 5.5));
+    }
 }

@@ -248,4 +248,17 @@ mod tests {
         assert!(matches!(error, PlaneError::Projective(_)), "{error}");
         assert!(calibrate_plane(PlaneModel::Affine, &image, &points).is_ok());
     }
+
+    #[test]
+    fn a_plane_seen_upside_down_is_mirrored() {
+        let pixels: Vec<Vec2> =
+            (0..9).map(|i| Vec2::new(f64::from(i % 3), f64::from(i / 3)) * 100.0).collect();
+        for (sign, handedness) in [(1.0, Handedness::Proper), (-1.0, Handedness::Mirrored)] {
+            let world: Vec<Vec2> = pixels.iter().map(|p| 0.1 * Vec2::new(p.x, sign * p.y)).collect();
+            for model in [PlaneModel::Similarity, PlaneModel::Affine, PlaneModel::Projective] {
+                let plane = calibrate_plane(model, &pixels, &world).unwrap();
+                assert_eq!(plane.handedness, handedness, "{model:?}");
+            }
+        }
+    }
 }

@@ -136,4 +136,21 @@ mod tests {
         assert!((image.xy() / image.z - world).norm() < 1e-13);
         assert_eq!(map.matrix()[(2, 2)], 1.0);
     }
+
+    #[test]
+    fn the_derivatives_by_the_entries_agree_with_central_differences() {
+        let (map, p, h) = (sample(), Vec2::new(170.0, -90.0), 1e-6);
+        let analytic = map.entry_jacobian(&p).unwrap();
+        for entry in 0..8 {
+            let offset = |step: f64| {
+                let mut local = map.local;
+                local[(entry / 3, entry % 3)] += step;
+                PlaneMap { local, ..map }.offset_from_pixel(&p).unwrap()
+            };
+            // The lower entries are multiplied by pixels: a smaller step.
+            let h = if entry < 6 { h } else { 1e-2 * h };
+            let difference = (offset(h) - offset(-h)) / (2.0 * h);
+            assert!((analytic.column(entry) - difference).norm() < 1e-5 * difference.norm(), "{entry}");
+        }
+    }
 }

@@ -186,6 +186,8 @@ fn left(
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::minimise::descend;
+    use super::super::super::settings::Bend;
     use super::super::fixture::{FREE, at_minimum};
     use super::*;
     use crate::camera::FreeParameters;
@@ -230,6 +232,88 @@ mod tests {
             assert!((score / promised - 1.0).abs() < 1e-2, "{score} {promised}");
             // Four degrees of freedom at the least, ten at the most, each worth 0.01 px^2.
             assert!((0.005..0.4).contains(&score), "{score}");
+        });
+    }
+
+    #[test]
+    fn the_columns_of_the_strains_agree_with_central_differences() {
+        at_minimum(FreeParameters::of(&FREE), 1.0, |problem, minimum| {
+            let state = &minimum.state;
+            let columns = problem.columns(state);
+            for (view, marks) in problem.views.iter().enumerate() {
+                let rows = kernel::rows_of_view(&problem.view(state, &columns, view)).unwrap();
+                let found = strains(&rows, marks, &state.cam_from_target[view]);
+                for (i, mark) in marks.list.iter().enumerate() {
+                    let h = 1e-6;
+                    // Longer in X and shorter in Y, and the right angle bent.
+                    let [x, y] = [mark.point.x, mark.point.y];
+                    for (column, by) in found.iter().zip([[x, -y], [y, x]]) {
+                        let pixel = |step: f64| {
+                            let mut moved = *mark;
+                            (moved.point.x, moved.point.y) = (x + step * by[0], y + step * by[1]);
+                            state.pixel(view, &moved).unwrap()
+                        };
+                        let expected = (pixel(h) - pixel(-h)) / (2.0 * h);
+                        let own = [column[row_of_u(i)], column[row_of_u(i) + LANES]];
+                        assert!(
+                            (own[0] - expected.x).abs() + (own[1] - expected.y).abs() < 1e-5,
+                            "{own:?} {expected}"
+                        );
+                    }
+                }
+            }
+        });
+    }
+
+    #[test]
+    fn a_minimum_is_certified_as_long_as_chance_explains_its_excess() {
+        let held = FreeParameters::of(&FREE).without(Parameter::Fx).without(Parameter::Fy);
+        let cost =
+            |factor: f64, free: FreeParameters| at_minimum(free, factor, |_, minimum| minimum.system.cost);
+        // The least of all, up to the excess of a few degrees of freedom.
+        let least = cost(1.0, FreeParameters::of(&FREE));
+        let mut seen = [0; 2];
+        for k in 0..40 {
+            let factor = 1.0 + 2.5e-4 * f64::from(k);
+            let excess = (cost(factor, held) - least) / 0.01;
+            // With eight degrees of freedom chi-squared is 43 with a probability of one in a million.
+            if !(30.0..65.0).contains(&excess) && excess < 95.0 {
+                assert_eq!(at_minimum(held, factor, holds), excess < 30.0, "{factor}: {excess}");
+                seen[usize::from(excess < 30.0)] += 1;
+            }
+        }
+        assert!(seen[0] > 0 && seen[1] > 0, "{seen:?}");
+    }
+
+    #[test]
+    fn a_board_that_is_not_flat_is_not_certified() {
+        at_minimum(FreeParameters::of(&FREE), 1.0, |problem, minimum| {
+            let bend = Some(Bend { deformations: 2, standard_deviation: f64::INFINITY });
+            assert!(!holds(&Problem { bend, ..*problem }, minimum));
+        });
+    }
+
+    #[test]
+    fn a_focal_length_is_well_known_to_a_hundredth_of_itself() {
+        at_minimum(FreeParameters::of(&FREE), 1.0, |problem, minimum| {
+            let reduction = minimum.system.reduction().unwrap();
+            let unit = reduction.intrinsics_covariance().unwrap()[(0, 0)];
+            for (relative, is_known) in [(0.0098, true), (0.0102, false)] {
+                let deviation = relative * minimum.state.camera.fx;
+                let variance = deviation * deviation / unit;
+                assert_eq!(is_well_known(problem, &minimum.state, &reduction, variance), is_known);
+            }
+        });
+    }
+
+    #[test]
+    fn few_views_certify_nothing() {
+        at_minimum(FreeParameters::of(&FREE), 1.0, |problem, minimum| {
+            // Six strains, of which four parameters may take up as many.
+            let three = Problem { views: &problem.views[..3], ..*problem };
+            let mut state = minimum.state.clone();
+            state.cam_from_target.truncate(3);
+            assert!(!holds(&three, &descend(&three, state)));
         });
     }
 }

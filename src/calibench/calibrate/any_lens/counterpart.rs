@@ -77,9 +77,14 @@ fn same_picture(camera: &Camera<Lens>) -> Option<Camera<Lens>> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{fixture, marks, shape};
     use super::*;
+    use crate::board::View;
+    use crate::calibrate::target_frame::TargetFrames;
+    use crate::camera::FreeParameters;
     use crate::camera::Model;
     use crate::geometry::Vec3;
+    use crate::geometry::{Pose, Vec2, rotation};
 
     #[test]
     fn both_cameras_make_the_same_picture() {
@@ -103,5 +108,53 @@ mod tests {
         assert!(same_picture(&camera(300.0, 0.0, 0.6)).is_none());
         assert!(same_picture(&camera(300.0, -0.2, 0.0)).is_none());
         assert!(same_picture(&camera(300.0, -0.2, 0.5)).is_none());
+    }
+
+    #[test]
+    fn the_second_camera_costs_what_the_first_does_at_a_coefficient_of_none() {
+        use Parameter::{Alpha, Cx, Cy, Fx, Fy, Xi};
+        let lens = Lens::ideal(Model::DoubleSphere).with(Xi, 0.4).unwrap();
+        let camera = Camera::with_lens(230.0, 230.0, 326.0, 243.0, lens.with(Alpha, 0.0).unwrap());
+        let pose = |k: i32| Pose {
+            rotation: rotation::from_xyz_rad(
+                0.7 * libm::sin(f64::from(2 * k)),
+                0.7 * libm::cos(f64::from(3 * k)),
+                0.8 * f64::from(k),
+            ),
+            translation: Vec3::new(6.0 * (f64::from(k % 3) - 1.0), 6.0 * (f64::from(k % 4) - 1.5), 38.0),
+        };
+        let points: Vec<Vec2> =
+            (0..35).map(|i| Vec2::new(f64::from(i % 7) - 3.0, f64::from(i / 7) - 2.0) * 12.0).collect();
+        let mut count = 0.0;
+        let mut noise = || {
+            count += 1.0;
+            0.1 * std::f64::consts::SQRT_2 * libm::sin(0.7 * count * count)
+        };
+        let mut seen = |pose: &Pose| {
+            let mut pixel = |p: &Vec2| {
+                camera.pixel(&pose.apply(&Vec3::new(p.x, p.y, 0.0))).unwrap() + Vec2::new(noise(), noise())
+            };
+            View::new(points.clone(), points.iter().map(&mut pixel).collect()).unwrap()
+        };
+        let poses: Vec<Pose> = (0..10).map(pose).collect();
+        let views: Vec<View> = poses.iter().map(&mut seen).collect();
+        let frames = TargetFrames::of(&views);
+        let listed = marks::of_views(&views, &frames, &shape::region(&views));
+        let problem = fixture::problem(&listed, FreeParameters::of(&[Fx, Fy, Cx, Cy, Xi, Alpha]));
+        let poses = poses.iter().enumerate();
+        let cam_from_target = poses.map(|(view, pose)| frames.at(view).of_pose(pose)).collect();
+        let minimum = descend(&problem, State { camera, cam_from_target, shape: [0.0; 3] });
+        let unit = minimum.system.reduction().unwrap().intrinsics_covariance().unwrap();
+        let noise = Noise::of_squares(0.01);
+        let (rival, second) = counterpart(&problem, &minimum, &unit, noise).unwrap();
+        // Of the same picture with f / (1 + xi), as alpha is 0.
+        assert!(
+            (second.fx / (230.0 / 1.4) - 1.0).abs() < 0.05 && second.value(Xi) == Some(0.0),
+            "{second:?}"
+        );
+        let held = problem.holding(Alpha);
+        let there = descend(&held, held.with_value(minimum.state.clone(), Alpha, 0.0));
+        let expected = (there.system.cost - minimum.system.cost) / 0.01;
+        assert!((rival.excess - expected).abs() < 1e-6 && rival.value == second.fx, "{rival:?} {expected}");
     }
 }

@@ -162,3 +162,34 @@ fn sharpen(problem: &Problem<'_>, minimum: &mut Minimum<State, WIDTH>) {
         minimum.system.clone_from(&system);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture;
+    use super::*;
+    use crate::camera::Model;
+
+    #[test]
+    fn every_view_and_parameter_must_be_paid_for() {
+        let settings = Settings::of_model(Model::KannalaBrandt);
+        let few = |views: usize, marks: usize| -> Vec<View> {
+            let corners = [0, 6, 28, 34, 17];
+            let of = |view: &View| {
+                let (points, pixels) =
+                    corners.into_iter().take(marks).map(|i| (view.points()[i], view.pixels()[i])).unzip();
+                View::new(points, pixels).unwrap()
+            };
+            fixture::exact_views()[..views].iter().map(of).collect()
+        };
+        // Of eight parameters four are linear; a view has two equations for them.
+        let one = CalibrationError::TooFewViews { need: 2, got: 1, linear: 4, copies: 0 };
+        assert_eq!(check(&few(1, 5), &settings), Err(one));
+        let known = settings.clone().with_prior(Parameter::Cx, 320.0, 1.0);
+        let three = CalibrationError::TooFewViews { need: 2, got: 1, linear: 3, copies: 0 };
+        assert_eq!(check(&few(1, 5), &known), Err(three));
+        // Eight parameters and twice six numbers of a pose.
+        let points = CalibrationError::TooFewPoints { coordinates: 16, unknowns: 20 };
+        assert_eq!(check(&few(2, 4), &settings), Err(points));
+        assert_eq!(check(&few(2, 5), &settings), Ok(()));
+    }
+}

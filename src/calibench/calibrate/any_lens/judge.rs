@@ -202,3 +202,58 @@ impl Profiled<WIDTH> for Problem<'_> {
         state.camera.values().find_map(limits)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture::{FREE, at_minimum};
+    use super::*;
+    use crate::camera::{Camera, Model};
+
+    #[test]
+    fn the_cost_of_good_views_is_a_parabola_by_the_noise_that_is_right() {
+        at_minimum(FreeParameters::of(&FREE), 1.0, |problem, minimum| {
+            let reduction = reduction_of(problem, minimum).unwrap();
+            let noise = Noise::of_squares(0.01);
+            assert!(is_parabola(problem, minimum, &reduction, noise));
+            // A deviation that costs four times as much as it should is no parabola's.
+            let wrong = Noise { rise: 0.04, ..noise };
+            assert!(!is_parabola(problem, minimum, &reduction, wrong));
+            // Rounding has any shape.
+            let exact = Problem { rounding_cost: 2.0 * minimum.system.cost, ..*problem };
+            assert!(is_parabola(&exact, minimum, &reduction, wrong));
+        });
+    }
+
+    #[test]
+    fn a_start_that_leads_to_a_lower_cost_is_taken() {
+        at_minimum(FreeParameters::of(&FREE), 1.0, |problem, minimum| {
+            let mut worse = minimum.clone();
+            (worse.system.cost, worse.iterations) = (2.0 * minimum.system.cost, 7);
+            worse.state.camera.fx *= 1.1;
+            let mut met = Vec::new();
+            assert!(take_better(problem, &mut worse, minimum.state.clone(), &mut met));
+            assert!((worse.system.cost / minimum.system.cost - 1.0).abs() < 1e-9 && worse.iterations >= 7);
+            assert!((worse.state.camera.fx / minimum.state.camera.fx - 1.0).abs() < 1e-6);
+            // From there it is none any more; both are noted.
+            assert!(!take_better(problem, &mut worse, minimum.state.clone(), &mut met));
+            assert_eq!(met.len(), 2);
+        });
+    }
+
+    #[test]
+    fn a_coefficient_beyond_its_range_is_told_with_the_limit_that_it_passed() {
+        let beyond = |xi: f64, alpha: f64| {
+            let lens = Lens::ideal(Model::DoubleSphere);
+            let camera = Camera::with_lens(300.0, 300.0, 320.0, 240.0, lens)
+                .with_value(Parameter::Xi, xi)
+                .and_then(|camera| camera.with_value(Parameter::Alpha, alpha))
+                .unwrap();
+            let state = State { camera, cam_from_target: Vec::new(), shape: [0.0; 3] };
+            <Problem<'_> as Profiled<WIDTH>>::beyond(&state)
+        };
+        assert_eq!(beyond(0.2, 0.3), None);
+        assert_eq!(beyond(0.2, -0.1), Some((Parameter::Alpha, 0.0)));
+        assert_eq!(beyond(0.2, 1.1), Some((Parameter::Alpha, 1.0)));
+        assert_eq!(beyond(-1.2, 0.3), Some((Parameter::Xi, -1.0)));
+    }
+}

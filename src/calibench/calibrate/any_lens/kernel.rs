@@ -585,4 +585,30 @@ mod tests {
             }
         });
     }
+
+    #[test]
+    fn the_rows_of_coefficients_agree_with_central_differences_where_axes_are_slanted() {
+        at_minimum(FreeParameters::of(&FREE), 1.0, |problem, minimum| {
+            let mut state = minimum.state.clone();
+            state.camera.skew = 30.0;
+            let columns = problem.columns(&state);
+            let rows = rows_of_view(&problem.view(&state, &columns, 1)).unwrap();
+            for (i, mark) in problem.views[1].list.iter().enumerate() {
+                for (k, parameter) in [(4, Parameter::K1), (5, Parameter::K2)] {
+                    let pixel = |step: f64| {
+                        let value = state.camera.value(parameter).unwrap() + step;
+                        let camera = state.camera.with_value(parameter, value).unwrap();
+                        State { camera, ..state.clone() }.pixel(1, mark).unwrap()
+                    };
+                    let expected = (pixel(1e-5) - pixel(-1e-5)) / 2e-5;
+                    let row = 2 * LANES * (i / LANES) + i % LANES;
+                    let own = [rows[(row, 6 + k)], rows[(row + LANES, 6 + k)]];
+                    assert!(
+                        (own[0] - expected.x).abs() + (own[1] - expected.y).abs() < 1e-6,
+                        "{own:?} {expected}"
+                    );
+                }
+            }
+        });
+    }
 }

@@ -264,6 +264,7 @@ impl Descent<WIDTH> for Problem<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::minimise::descend;
     use super::super::fixture::{FREE, at_minimum};
     use super::*;
     use crate::camera::Parameter;
@@ -298,6 +299,37 @@ mod tests {
             let of_marks = Problem { priors: &[], bend: None, ..problem }.cost(&state);
             assert!((system.cost / (of_marks + known_cost) - 1.0).abs() < 1e-14);
             assert_eq!(problem.cost(&state), system.cost);
+        });
+    }
+
+    #[test]
+    fn a_camera_with_a_negative_focal_length_is_none() {
+        at_minimum(FreeParameters::of(&FREE), 1.0, |problem, minimum| {
+            for (x, y) in [(-1.0, 1.0), (1.0, -1.0)] {
+                let mut state = minimum.state.clone();
+                (state.camera.fx, state.camera.fy) = (x * state.camera.fx, y * state.camera.fy);
+                let mut system = problem.system();
+                problem.linearise_into(&state, &mut system);
+                assert_eq!((problem.cost(&state), system.cost), (f64::INFINITY, f64::INFINITY));
+            }
+        });
+    }
+
+    #[test]
+    fn what_is_known_beforehand_settles_its_part_of_an_unknown() {
+        at_minimum(FreeParameters::of(&FREE), 1.0, |nothing_known, minimum| {
+            assert_eq!(nothing_known.settled(&minimum.system), 0.0);
+            let unit = minimum.system.reduction().unwrap().intrinsics_covariance().unwrap();
+            let (row, cx) = (2, minimum.state.camera.cx);
+            let pixels = 0.01 * unit[(row, row)];
+            // A prior as wide as what the pixels say settles half, one half as wide four fifths.
+            for (part, settled) in [(1.0, 0.5), (0.25, 0.8)] {
+                let prior =
+                    Prior { parameter: Parameter::Cx, mean: cx, standard_deviation: (part * pixels).sqrt() };
+                let problem = Problem { priors: &[prior], noise: Noise::of_squares(0.01), ..*nothing_known };
+                let own = problem.settled(&descend(&problem, minimum.state.clone()).system);
+                assert!((own - settled).abs() < 1e-6, "{own}");
+            }
         });
     }
 }

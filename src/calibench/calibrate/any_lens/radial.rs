@@ -209,4 +209,44 @@ mod tests {
         assert_eq!((lens.get(Xi), factor), (Some(0.23), 1.23));
         assert!((lens.get(Alpha).unwrap() - 0.6).abs() < 0.04, "{lens:?}");
     }
+
+    #[test]
+    fn the_equation_of_a_model_holds_of_its_lenses() {
+        use Parameter::{K1, K2, K3, K4, K5, K6};
+        for (model, coefficients) in [
+            (Model::KannalaBrandt, vec![(K1, 0.02), (K2, -0.01), (K3, 0.004), (K4, -0.0015)]),
+            (Model::Division, vec![(K1, -0.2)]),
+            (Model::HalconPolynomial, vec![(K1, 0.2), (K2, 0.05), (K3, 0.01)]),
+            (Model::Rational, vec![(K1, 0.3), (K2, 0.2), (K3, 0.1), (K4, 0.4), (K5, 0.25), (K6, 0.05)]),
+        ] {
+            let lens = coefficients
+                .iter()
+                .fold(Lens::ideal(model), |lens, &(p, value)| lens.with(p, value).unwrap());
+            for sample in radii(&lens, 1.0) {
+                let (factors, right) = equation(model, &sample);
+                let left: f64 = factors.iter().map(|(p, factor)| factor * lens.get(*p).unwrap()).sum();
+                assert!(
+                    (left - right).abs() < 1e-9 * (1.0 + right.abs()),
+                    "{model:?} {sample:?}: {left} {right}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn other_spheres_make_nearly_the_same_picture_with_another_focal_length() {
+        use Parameter::{Alpha, Xi};
+        let own = Lens::new(Model::DoubleSphere, &[0.2, 0.55]).unwrap();
+        let own_radii = radii(&own, 1.0);
+        let others = other_spheres(own, FreeParameters::of(&[Xi, Alpha]), &own_radii);
+        assert!(others.len() >= 2, "{others:?}");
+        for (other, factor) in others {
+            assert!((other.get(Xi).unwrap() - 0.2).abs() > 0.05);
+            for ([_, here], [_, there]) in own_radii.iter().zip(radii(&other, 1.0)) {
+                assert!((factor * there / here - 1.0).abs() < 0.05, "{other:?} {factor}: {there} {here}");
+            }
+        }
+        // Where xi is held there are none.
+        assert!(other_spheres(own, FreeParameters::of(&[Alpha]), &own_radii).is_empty());
+    }
 }

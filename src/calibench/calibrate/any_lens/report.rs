@@ -194,6 +194,9 @@ pub(super) fn report(
 mod tests {
     use super::super::super::{Board, Settings, Warning};
     use super::super::{estimate, fixture};
+    use super::*;
+    use crate::board::View;
+    use crate::camera::FreeParameters;
     use crate::camera::{Model, Parameter};
 
     #[test]
@@ -232,5 +235,62 @@ mod tests {
                 assert!(number.abs() <= 5.0 * sd, "{k}: {number} {sd}");
             }
         }
+    }
+
+    #[test]
+    fn the_largest_angle_is_that_of_the_outermost_mark() {
+        fixture::at_minimum(FreeParameters::of(&fixture::FREE), 1.0, |problem, minimum| {
+            let mut largest: f64 = 0.0;
+            for (marks, pose) in problem.views.iter().zip(&minimum.state.cam_from_target) {
+                for mark in &marks.list {
+                    let at = pose.rotation.columns(0, 2) * mark.point + pose.translation;
+                    largest = largest.max(libm::acos(at.z / at.norm()));
+                }
+            }
+            let own = largest_angle(problem, &minimum.state);
+            assert!((own - largest).abs() < 1e-12, "{own} {largest}");
+        });
+    }
+
+    #[test]
+    fn what_is_known_from_elsewhere_costs_no_degree_of_freedom() {
+        fixture::at_minimum(FreeParameters::of(&fixture::FREE), 1.0, |problem, minimum| {
+            // Five views of 35 marks; six parameters and five poses.
+            let residuals = Residuals::of(problem, &minimum.state);
+            assert_eq!(residuals.freedom(minimum, 1.5), 350.0 + 1.5 - 36.0);
+        });
+    }
+
+    #[test]
+    fn the_correlation_that_is_told_is_that_of_neighbours_residuals() {
+        let views = fixture::wide_views_of_a_bowed_board(0.05);
+        let found = estimate::calibrate(&views, &Settings::of_model(Model::KannalaBrandt)).unwrap();
+        let of = |warning: &Warning| match warning {
+            Warning::Structured { correlation } => Some(*correlation),
+            _ => None,
+        };
+        let told = found.warnings.iter().find_map(of).unwrap();
+        // The mean product of a mark's residual with the next one's, 34 in each view, over the mean square.
+        let products =
+            found.residuals.iter().flat_map(|view| view.windows(2).map(|pair| pair[0].dot(&pair[1])));
+        let squares = found.residuals.iter().flatten().map(Vec2::norm_squared);
+        let expected = (products.sum::<f64>() / 680.0) / (squares.sum::<f64>() / 700.0);
+        assert!((told - expected).abs() < 1e-12, "{told} {expected}");
+    }
+
+    #[test]
+    fn a_mark_ten_deviations_off_is_an_outlier_by_the_noise_of_a_coordinate() {
+        let mut views = fixture::wide_views();
+        let mut pixels = views[3].pixels().to_vec();
+        pixels[17].x -= 10.3 * fixture::WIDE_NOISE_PX;
+        views[3] = View::new(views[3].points().to_vec(), pixels).unwrap();
+        let found = estimate::calibrate(&views, &Settings::of_model(Model::KannalaBrandt)).unwrap();
+        // So few do not make the tails heavy: four times the square of the mean square.
+        let squares = || found.residuals.iter().flatten().map(Vec2::norm_squared);
+        let (mean, fourth) = (squares().sum::<f64>() / 700.0, squares().map(|s| s * s).sum::<f64>() / 700.0);
+        assert!(fourth < 3.8 * mean * mean, "{}", fourth / (mean * mean));
+        let is_it =
+            |w: &Warning| matches!(w, Warning::Outliers(o) if (o.marks, o.view, o.point) == (1, 3, 17));
+        assert!(found.warnings.iter().any(is_it), "{:?}", found.warnings);
     }
 }

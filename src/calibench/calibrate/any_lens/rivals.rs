@@ -87,3 +87,63 @@ fn is_one_camera(a: &Camera<Lens>, b: &Camera<Lens>) -> bool {
 fn differ(a: f64, b: f64) -> bool {
     (a - b).abs() > ONE_CAMERA * a.abs().max(b.abs())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture::{FREE, at_minimum};
+    use super::*;
+    use crate::camera::{FreeParameters, Model};
+
+    fn camera(fx: f64, fy: f64) -> Camera<Lens> {
+        Camera::with_lens(fx, fy, 320.0, 240.0, Lens::ideal(Model::KannalaBrandt))
+    }
+
+    #[test]
+    fn cameras_are_one_whose_focal_lengths_both_agree_to_a_fiftieth() {
+        for (fx, fy, is_one) in [
+            (600.0, 600.0, true),
+            (611.0, 590.0, true),
+            (613.0, 600.0, false),
+            (600.0, 587.0, false),
+            (613.0, 613.0, false),
+        ] {
+            assert_eq!(is_one_camera(&camera(600.0, 600.0), &camera(fx, fy)), is_one, "{fx} {fy}");
+        }
+    }
+
+    #[test]
+    fn a_rival_is_a_minimum_that_is_another_camera_and_nearly_as_good() {
+        at_minimum(FreeParameters::of(&FREE), 1.0, |problem, minimum| {
+            let noise = Noise::of_squares(0.01);
+            let own = walk::met(minimum);
+            let met = |factor: f64, excess: f64, converged: bool| {
+                let camera = Camera { fx: factor * own.camera.fx, fy: factor * own.camera.fy, ..own.camera };
+                Met { camera, cost: own.cost + 0.01 * excess, converged }
+            };
+            let others = [met(1.1, 5.0, true), met(1.2, 1.0, false), met(1.3, 17.0, true), own];
+            let rivals = of(problem, minimum, &minimum.system.reduction().unwrap(), noise, &others, &[]);
+            let [rival] = &rivals[..] else { panic!("{rivals:?}") };
+            assert!((rival.excess - 5.0).abs() < 1e-9, "{rival:?}");
+            assert_eq!(Some(rival.value), others[0].camera.value(rival.parameter));
+        });
+    }
+
+    #[test]
+    fn the_parameter_is_named_whose_interval_ends_before_a_camera_far_away() {
+        use Parameter::{Cx, Cy, K1, K2};
+        at_minimum(FreeParameters::of(&[Cx, Cy, K1, K2]), 1.0, |problem, minimum| {
+            let reduction = minimum.system.reduction().unwrap();
+            let profile = Profile::new(problem, minimum, &reduction, Noise::of_squares(0.01)).unwrap();
+            let own = &minimum.state.camera;
+            let sd = |row: usize| 0.1 * reduction.intrinsics_covariance().unwrap()[(row, row)].sqrt();
+            let moved = |deviations: [f64; 2]| {
+                let camera = Camera { fx: 1.05 * own.fx, cx: own.cx + deviations[0] * sd(0), ..*own };
+                camera.with_value(K2, value(own, K2) + deviations[1] * sd(3)).unwrap()
+            };
+            let named = |other: &Camera<Lens>| ends_before(&profile, problem, own, other);
+            assert_eq!(named(&moved([0.0, 10.0])), Some(K2));
+            assert_eq!(named(&moved([10.0, 10.0])), Some(Cx));
+            assert_eq!((named(&moved([1.0, 0.0])), named(own)), (None, None));
+        });
+    }
+}

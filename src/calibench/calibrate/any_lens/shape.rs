@@ -77,3 +77,26 @@ pub(super) fn basis([low, high]: &[Vec2; 2], mark: &Vec2) -> [f64; 3] {
     let (x, y) = (across(low.x, high.x, mark.x), across(low.y, high.y, mark.y));
     [1.0 - x * x, 1.0 - y * y, x * y]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_board_is_as_high_as_its_bows_and_twist_make_it() {
+        let region = [Vec2::new(-10.0, -5.0), Vec2::new(30.0, 15.0)];
+        let board = BoardShape { bow_x: 0.3, bow_y: -0.2, twist: 0.7, standard_deviations: [0.0; 3], region };
+        // In the middle, at corners, and half-way to an edge.
+        for (x, y, height) in [
+            (10.0, 5.0, 0.3 - 0.2),
+            (30.0, 15.0, 0.7),
+            (-10.0, 15.0, -0.7),
+            (20.0, 5.0, 0.75 * 0.3 - 0.2),
+            (10.0, 0.0, 0.3 - 0.75 * 0.2),
+        ] {
+            let own = board.height(&Vec2::new(x, y));
+            assert!((own - height).abs() < 1e-15, "{x} {y}: {own}");
+        }
+        assert_eq!(Deformation::ALL.map(|d| d.to_string()), ["bow along x", "bow along y", "twist"]);
+    }
+}

@@ -198,4 +198,22 @@ mod tests {
         assert_eq!(found.starts, 1);
         assert!((found.sigma_px / fixture::WIDE_NOISE_PX - 1.0).abs() < 0.2, "{}", found.sigma_px);
     }
+
+    #[test]
+    fn a_fault_of_a_minimum_is_as_dear_as_a_rival() {
+        let free = FreeParameters::of(&fixture::FREE);
+        fixture::at_minimum(free, 1.0, |problem, minimum| {
+            assert_eq!(dearness(minimum, 0.01), minimum.system.cost);
+            let mut unended = minimum.clone();
+            unended.termination = Termination::IterationLimit;
+            // 16 variances of 0.01 px^2.
+            assert!((dearness(&unended, 0.01) - minimum.system.cost - 0.16).abs() < 1e-12);
+            assert!(is_better(problem, minimum, &unended) && !is_better(problem, &unended, minimum));
+            // A minimum far lower is better all the same.
+            let mut dear = minimum.clone();
+            dear.system.cost *= 1.5;
+            assert!(is_better(problem, &unended, &dear) && !is_better(problem, &dear, &unended));
+            assert!(!is_better(problem, minimum, minimum));
+        });
+    }
 }

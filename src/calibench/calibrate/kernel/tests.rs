@@ -207,3 +207,20 @@ fn strains_are_those_of_the_definition_for_every_model_and_loss() {
         }
     }
 }
+
+#[test]
+fn residuals_are_those_of_the_readable_projection() {
+    let (camera, blocks) = (full_camera(), pairs(&full_camera(), 63));
+    let found = view_residuals(&camera, &pose(), &blocks).residuals;
+    for ((point, pixel), own) in blocks.iter().zip(found) {
+        let expected = camera.project(&pose().apply(&Vec3::new(point.x, point.y, 0.0))).unwrap() - pixel;
+        assert!((own - expected).norm() < 1e-11, "{own} {expected}");
+    }
+}
+
+#[test]
+fn a_camera_is_radial_where_all_other_terms_are_held_at_none() {
+    let free = FreeParameters::STANDARD;
+    assert!(is_radial(&radial_camera(), free) && !is_radial(&full_camera(), free));
+    assert!(!is_radial(&radial_camera(), free.with(Parameter::P1)));
+}
