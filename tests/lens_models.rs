@@ -1,11 +1,11 @@
 //! Lens models against other programs, and as the command's user meets them.
 
 use crate::program::{calibench as run, folder, text};
-use calibench::camera::{Camera, Lens, Model};
+use calibench::camera::{BrownConrady, Camera, Lens, Model};
 use calibench::geometry::{Pose, Vec2, Vec3, rotation};
 use calibench::io::read_lens_camera;
 use calibench::raster::Raster;
-use calibench::synth::{Stream, StreamKey};
+use calibench::synth::{Stream, StreamKey, Truth};
 use serde_json::Value;
 use std::fmt::Write;
 use std::fs;
@@ -70,6 +70,37 @@ fn fisheye_corners(column: Option<(&str, &dyn Fn(usize) -> f64)>) -> (Camera<Len
         }
     }
     (camera, file)
+}
+
+/// Little distortion, which a double sphere and Brown-Conrady's lens show alike.
+#[test]
+fn lenses_that_the_criterion_does_not_tell_from_the_chosen_one_are_named() {
+    let folder = folder("alike");
+    let camera = Truth::example_camera().with_distortion(BrownConrady::radial(-0.02, 0.0));
+    let mut stream = Stream::open(StreamKey { seed: 3, scenario: "alike", trial: 0, purpose: "noise" });
+    let mut file = String::from("view,point,X,Y,u,v\n");
+    for (view, pose) in Truth::example_poses().iter().enumerate() {
+        for (i, point) in Truth::example_board().points().iter().enumerate() {
+            let pixel = camera.project(&pose.apply(&Vec3::new(point.x, point.y, 0.0))).unwrap();
+            let [du, dv] = [stream.normal(), stream.normal()].map(|n| 0.1 * n);
+            writeln!(file, "{view},{i},{},{},{},{}", point.x, point.y, pixel.x + du, pixel.y + dv).unwrap();
+        }
+    }
+    fs::write(folder.join("corners.csv"), file).unwrap();
+    let of = |format: &str| {
+        let arguments =
+            ["calibrate", "corners.csv", "--image-size", "640x480", "--model", "auto", "--format"];
+        text(&run(&folder, &[&arguments[..], &[format]].concat()).stdout)
+    };
+    let said: Value = serde_json::from_str(&of("json")).unwrap();
+    let models = said["models"].as_array().unwrap();
+    let bic = |model: &Value| model["bic"].as_f64().unwrap();
+    let alike = models[1..].iter().filter(|model| (bic(model) - bic(&models[0])).abs() < 2.0).count();
+    let text = of("text");
+    let verdict = text.lines().find(|line| line.starts_with("chosen: ")).unwrap();
+    let (_, named) = verdict.split_once("a difference of BIC below 2 is no evidence: ").expect(verdict);
+    assert!(alike > 0 && named.ends_with(" may be right as well"), "{verdict}");
+    assert_eq!(named.matches(" or ").count() + 1, alike, "{verdict}");
 }
 
 #[test]

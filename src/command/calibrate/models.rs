@@ -99,14 +99,15 @@ impl Comparison {
         )
     }
 
-    /// That a lens with fewer unknowns may be right: the one for which chance makes the fall of the squares
-    /// likeliest. The criterion takes the noise for well known, which few degrees of freedom do not tell.
+    /// That another lens may be right. One with fewer unknowns: the one for which chance makes the fall of
+    /// the squares likeliest, since the criterion takes the noise for well known, which few degrees of freedom
+    /// do not tell. And those that the criterion does not tell from the chosen one.
     fn doubt(&self, chosen: &Compared) -> String {
+        let others = || self.compared[1..].iter().filter(|other| !other.is_behind);
         let likely =
             |other| Some((chosen.chance_against(other)?, other)).filter(|(chance, _)| *chance > DOUBTFUL);
-        let others = self.compared.iter().filter(|other| !other.is_behind);
-        let likeliest = others.filter_map(likely).max_by(|(a, _), (b, _)| a.total_cmp(b));
-        likeliest.map_or_else(String::new, |(chance, other)| {
+        let likeliest = others().filter_map(likely).max_by(|(a, _), (b, _)| a.total_cmp(b));
+        let simpler = likeliest.map_or_else(String::new, |(chance, other)| {
             format!(
                 "; but with {} degree(s) of freedom, chance makes a fit as much better than that of {} with probability {} where the \
                  latter is right",
@@ -114,10 +115,21 @@ impl Comparison {
                 name(&other.candidate),
                 significant(chance, 2)
             )
-        })
+        });
+        let is_alike = |other: &&Compared| (chosen.bic - other.bic).abs() < NO_EVIDENCE;
+        let alike: Vec<String> = others().filter(is_alike).map(|other| name(&other.candidate)).collect();
+        if alike.is_empty() {
+            return simpler;
+        }
+        format!(
+            "{simpler}; a difference of BIC below {NO_EVIDENCE} is no evidence: {} may be right as well",
+            alike.join(" or ")
+        )
     }
 }
 
+/// A difference of the criterion that is not worth more than a bare mention (Kass & Raftery 1995).
+const NO_EVIDENCE: f64 = 2.0;
 /// A choice that chance makes with more than this probability is in doubt.
 const DOUBTFUL: f64 = 0.01;
 
