@@ -70,7 +70,8 @@ pub const EXPERIMENTS: &[Experiment] = &[
     lens_minimum::EXPERIMENT,
 ];
 
-/// Those that compute for more than some seconds: `cargo test` leaves them to `calibench run` and `calibench check`.
+/// Those that compute for more than some seconds: `cargo test` leaves them to `calibench run` and
+/// `calibench check`.
 pub const HEAVY: &[&str] = &[
     k2_observability::EXPERIMENT.id,
     focal_depth::EXPERIMENT.id,

@@ -100,7 +100,7 @@ impl Comparison {
     }
 
     /// That another lens may be right. One with fewer unknowns: the one for which chance makes the fall of
-    /// the squares likeliest, since the criterion takes the noise for well known, which few degrees of freedom
+    /// the squares likeliest, as the criterion takes the noise for well known, which few degrees of freedom
     /// do not tell. And those that the criterion does not tell from the chosen one.
     fn doubt(&self, chosen: &Compared) -> String {
         let others = || self.compared[1..].iter().filter(|other| !other.is_behind);
