@@ -103,4 +103,18 @@ mod tests {
         assert!(tally.sketches.iter().all(|sketch| sketch.total() == 2));
         assert_eq!(tally.joint.count(), 2);
     }
+
+    #[test]
+    fn a_sketch_counts_values_by_their_distance_from_what_is_expected() {
+        let mut engine = Engine::new(STUDY, Shard::WHOLE).unwrap();
+        let tally = &mut engine.tallies[0];
+        // The RMSE is expected at a tenth of a pixel, the NEES at six or so, errors at zero.
+        assert!(tally.origins[0] > 0.1 && tally.origins[1] > 1.0);
+        let values = tally.origins.iter().map(|origin| Some(origin + 0.25)).collect();
+        tally.add(&Trial { cell: 0, trial: 0, outcome: "converged".into(), iterations: 1, values });
+        for sketch in &tally.sketches {
+            let found = sketch.of_rank(1).unwrap();
+            assert!((found - 0.25).abs() <= 0.25 * 0.005_001, "{found}");
+        }
+    }
 }

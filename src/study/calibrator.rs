@@ -81,3 +81,43 @@ fn reason(error: &CalibrationError) -> &'static str {
         _ => "refused",
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stating(covariance: Option<DMatrix<f64>>) -> Estimate {
+        Estimate {
+            camera: Camera::pinhole(600.0, 600.0, 320.0, 240.0).into(),
+            cam_from_target: None,
+            rmse_px: None,
+            covariance,
+            outcome: "converged".into(),
+            iterations: 0,
+        }
+    }
+
+    #[test]
+    fn an_error_is_measured_by_the_inverse_of_the_stated_covariance() {
+        // The inverse is [[2, -1], [-1, 2]] / 3.
+        let stated = stating(Some(DMatrix::from_row_slice(2, 2, &[2.0, 1.0, 1.0, 2.0])));
+        let square = |error: &[f64]| stated.normalised_error_squared(error);
+        assert!((square(&[1.0, 1.0]).unwrap() - 2.0 / 3.0).abs() < 1e-14);
+        assert!((square(&[1.0, -1.0]).unwrap() - 2.0).abs() < 1e-14);
+        assert_eq!(square(&[1.0]), None, "a covariance of other parameters");
+        assert_eq!(stating(None).normalised_error_squared(&[1.0]), None);
+    }
+
+    #[test]
+    fn a_refusal_is_counted_under_the_name_of_its_reason() {
+        let few = CalibrationError::TooFewViews { need: 3, got: 1, linear: 5, copies: 0 };
+        assert_eq!(reason(&few), "too-few-views");
+        assert_eq!(
+            reason(&CalibrationError::TooFewPoints { coordinates: 8, unknowns: 12 }),
+            "too-few-points"
+        );
+        assert_eq!(reason(&CalibrationError::BadLoss), "loss");
+        let parameter = calibench::camera::Parameter::Cx;
+        assert_eq!(reason(&CalibrationError::HeldWithoutValue { parameter }), "held-value");
+    }
+}

@@ -256,4 +256,43 @@ mod tests {
         };
         assert_eq!(refused.to_string(), expected.to_string());
     }
+
+    #[test]
+    fn a_cell_tells_what_is_seen_and_what_is_estimated() {
+        let text = STUDY.replace("[trials]", "[estimator]\nfree = [\"fx\", \"cy\"]\n\n[trials]");
+        let cells = Spec::parse(&text).unwrap().cells(&text).unwrap();
+        assert_eq!([cells[0].noise_px(), cells[1].noise_px()], [0.1, 0.3]);
+        assert_eq!((cells[0].size(), cells[0].image_size()), ((3, 9), (640, 480)));
+        let free: Vec<&str> = cells[0].free().iter().map(|parameter| parameter.name()).collect();
+        assert_eq!(free, ["fx", "cy"]);
+        assert!(cells[0].minimises_squares() && cells[0].knows_its_lens() && cells[0].bound().is_some());
+    }
+
+    #[test]
+    fn of_another_lens_than_the_cameras_nothing_is_expected() {
+        let text = STUDY.replace("[trials]", "[estimator]\nmodel = \"kannala-brandt\"\n\n[trials]");
+        let cells = Spec::parse(&text).unwrap().cells(&text).unwrap();
+        assert!(!cells[0].knows_its_lens() && cells[0].bound().is_none());
+        assert!(cells[0].prediction.0.iter().all(Option::is_none));
+        let text =
+            STUDY.replace("[trials]", "[estimator]\nloss = { kind = \"huber\", delta_px = 0.2 }\n\n[trials]");
+        let cells = Spec::parse(&text).unwrap().cells(&text).unwrap();
+        assert!(!cells[0].minimises_squares() && cells[0].knows_its_lens());
+    }
+
+    #[test]
+    fn the_expected_rmse_is_that_of_the_degrees_of_freedom() {
+        let text = STUDY.replace(
+            "[trials]",
+            "[estimator]\nfree = [\"fx\", \"fy\", \"cx\", \"cy\", \"k1\", \"k2\"]\n\n[trials]",
+        );
+        let spec = Spec::parse(&text).unwrap();
+        let cells = spec.cells(&text).unwrap();
+        // 27 points, 54 coordinates less 6 + 18 unknowns: N rmse^2 / sigma^2 is chi-squared on 30, the mean
+        // of its root sqrt(2) gamma(15.5) / gamma(15) = 5.431780, its variance 30 less the square of that.
+        let found = cells[0].predicted(&spec.quantities(&cells), "rmse").unwrap();
+        let mean = 0.1 / 27.0f64.sqrt() * 5.431_780_054_2;
+        assert!((found.mean - mean).abs() < 1e-9, "{found:?}");
+        assert!((found.sd - (0.01 * 30.0 / 27.0 - mean * mean).sqrt()).abs() < 1e-7, "{found:?}");
+    }
 }

@@ -326,4 +326,76 @@ mod tests {
         assert_eq!(one(&[(1.5, 1.0), (2.4, 2.0)]), Verdict::SecondBetter);
         assert_eq!(one(&[(1.0, 2.0), (2.0, 1.0)]), Verdict::NotTold);
     }
+
+    /// A complete run of this study in a folder of its own.
+    fn ran(name: &str, text: &str) -> PathBuf {
+        let at = std::env::temp_dir().join(format!("calibench-compare-{}-{name}", std::process::id()));
+        let spec = crate::Spec::parse(text).unwrap();
+        let manifest = crate::Manifest::new(&spec, crate::Shard::WHOLE, &calibench_harness::Build::default());
+        let folder = crate::Folder::create(&at, text, &manifest).unwrap();
+        let mut engine = folder.engine(crate::Shard::WHOLE).unwrap();
+        folder.run(&mut engine, &Default::default(), |_| ()).unwrap();
+        crate::finish(&folder, &engine).unwrap();
+        at
+    }
+
+    #[test]
+    fn levels_are_compared_with_the_first_at_the_same_levels_of_the_other_factors() {
+        let other = "\n[[factor]]\nname = \"distance\"\nset = [\"scene.poses.distance_mm\"]\nlevels = [150.0, 160.0]\n";
+        let text =
+            crate::example::STUDY.replace("per_cell = 3\nbatch = 2", "per_cell = 6\nbatch = 4") + other;
+        let at = ran("levels", &text);
+        let found = compare_levels(&at, "noise").unwrap();
+        std::fs::remove_dir_all(&at).unwrap();
+        let engine = Engine::new(&text, crate::Shard::WHOLE).unwrap();
+        let fx = engine.quantities.iter().position(|q| q.name() == "fx").unwrap();
+        // Cells 0 and 1 have the first level of the noise, and the two distances.
+        for (first, second) in [(0, 2), (1, 3)] {
+            let square = |cell: usize| -> f64 {
+                let of_trial = |trial| crate::run_trial(&engine.cells[cell], &engine.quantities, trial);
+                (0..6).map(|trial| of_trial(trial).values[fx].unwrap()).map(|x| x * x).sum()
+            };
+            let is_it = |e: &&Effect| e.cell == engine.cells[second].name && e.quantity.name() == "fx";
+            let effect = found.effects.iter().find(is_it).unwrap();
+            assert_eq!(effect.pairs, 6);
+            assert!((effect.ratio.value / (square(second) / square(first)).sqrt() - 1.0).abs() < 1e-12);
+            assert!((effect.rms[0] / (square(first) / 6.0).sqrt() - 1.0).abs() < 1e-12);
+        }
+        assert!(found.effects.iter().all(|e| e.cell.starts_with("noise = 0.3")));
+    }
+
+    #[test]
+    fn trials_that_converge_in_one_run_only_are_counted_and_not_compared() {
+        let trial = |outcome: &str, x: f64| Trial {
+            cell: 0,
+            trial: 0,
+            outcome: outcome.into(),
+            iterations: 1,
+            values: vec![Some(x)],
+        };
+        let (mut sums, mut only) = ([Pairs::default()], (0, 0));
+        for (a, b) in [
+            ("converged", "stalled"),
+            ("converged", "stalled"),
+            ("stalled", "converged"),
+            ("converged", "converged"),
+            ("stalled", "stalled"),
+        ] {
+            add(&trial(a, 2.0), &trial(b, 3.0), &[(Quantity::Depth, 0, 0)], &mut sums, &mut only);
+        }
+        assert_eq!((only, sums[0].count, sums[0].a, sums[0].b), ((2, 1), 1, 4.0, 9.0));
+    }
+
+    #[test]
+    fn three_pairs_tell_no_ratio_and_four_do() {
+        let of = |count: usize| {
+            let mut pairs = Pairs::default();
+            (0..count).for_each(|i| pairs.add(1.0 + i as f64, 2.0));
+            pairs.ratio(0.05)
+        };
+        assert!(of(3).is_none() && of(4).is_some());
+        let mut exact = Pairs::default();
+        (0..4).for_each(|_| exact.add(0.0, 1.0));
+        assert_eq!(exact.ratio(0.05), None, "nothing is so many times zero");
+    }
 }

@@ -97,3 +97,52 @@ fn digits(mut index: usize, counts: &[usize]) -> Vec<usize> {
     }
     digits
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::example::STUDY;
+
+    #[test]
+    fn in_mixed_radix_the_last_digit_varies_fastest() {
+        let mut index = 0;
+        for a in 0..2 {
+            for b in 0..3 {
+                for c in 0..4 {
+                    assert_eq!(digits(index, &[2, 3, 4]), [a, b, c], "{index}");
+                    index += 1;
+                }
+            }
+        }
+        assert_eq!(digits(0, &[]), [0; 0]);
+    }
+
+    #[test]
+    fn the_cells_of_a_grid_are_all_combinations_of_levels() {
+        let text = STUDY.to_string()
+            + "\n[[factor]]\nname = \"views\"\nset = [\"scene.poses.views\"]\nlevels = [3, 4, 5]\n";
+        let found: Vec<(f64, usize)> = designs(&Spec::parse(&text).unwrap(), &text)
+            .unwrap()
+            .iter()
+            .map(|(_, design)| (design.scene.noise_px, design.scene.poses.views()))
+            .collect();
+        assert_eq!(found, [(0.1, 3), (0.1, 4), (0.1, 5), (0.3, 3), (0.3, 4), (0.3, 5)]);
+    }
+
+    #[test]
+    fn a_field_is_set_by_one_factor_alone() {
+        let refused = |first: &str, second: &str, levels: &str| {
+            let text = STUDY.replace("set = [\"scene.noise_px\"]", &format!("set = [\"{first}\"]"))
+                + &format!("\n[[factor]]\nname = \"other\"\nset = [\"{second}\"]\nlevels = {levels}\n");
+            let found = designs(&Spec::parse(&text).unwrap(), &text);
+            matches!(found, Err(SpecError::SetTwice { .. }))
+        };
+        let noise = "[0.2, 0.4]";
+        assert!(refused("scene.noise_px", "scene.noise_px", noise));
+        assert!(!refused("scene.noise_px", "scene.outlier_share", noise));
+        // A table takes its fields along, and a longer name is no field of a shorter one.
+        let target = "[{ columns = 3, rows = 3, spacing_mm = 10.0 }]";
+        assert!(refused("scene.target.spacing_mm", "scene.target", target));
+        assert!(!refused("scene.outlier_px", "scene.outlier", noise));
+    }
+}

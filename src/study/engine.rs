@@ -475,4 +475,98 @@ mod tests {
         assert!((2.0 * width * sd.value - (sd.high - sd.low)).abs() < 1e-12 && width > 0.1, "{width}");
         assert_eq!(engine.relative_half_width(0, "cx"), None);
     }
+
+    /// The study with a wanted precision, and some values of fx in each cell.
+    fn precise(per_cell: u64, batch: u64, shard: Shard, values: [&[f64]; 2]) -> Engine {
+        let trials = format!("per_cell = {per_cell}\nbatch = {batch}\n");
+        let wanted = "precision = { quantity = \"fx\", relative_half_width = 0.05 }";
+        let text = STUDY.replace("per_cell = 3\nbatch = 2", &(trials + wanted));
+        let mut engine = Engine::new(&text, shard).unwrap();
+        let at = engine.quantities.iter().position(|q| q.name() == "fx").unwrap();
+        for (tally, values) in engine.tallies.iter_mut().zip(values) {
+            tally.trials = values.len() as u64;
+            values.iter().for_each(|x| tally.moments[at].add(*x));
+        }
+        engine
+    }
+
+    #[test]
+    fn as_many_more_trials_are_expected_as_narrow_the_interval_to_what_is_wanted() {
+        assert_eq!(precise(1000, 10, Shard::WHOLE, [&[], &[]]).expected_trials(), 2000);
+        // Of ten times +-1 the interval's half-width is 0.1018 of the standard deviation: 20 (0.1018 /
+        // 0.05)^2 = 82.9 trials, nine batches of ten.
+        let signs: Vec<f64> = (0..20).map(|i| [1.0, -1.0][i % 2]).collect();
+        assert_eq!(precise(1000, 10, Shard::WHOLE, [&signs, &[]]).expected_trials(), 1090);
+        assert_eq!(precise(60, 10, Shard::WHOLE, [&signs, &signs]).expected_trials(), 120);
+        // A cell that has ended takes none beyond its own.
+        let mut engine = precise(1000, 10, Shard::WHOLE, [&signs, &signs]);
+        engine.finished[0] = true;
+        assert_eq!(engine.expected_trials(), 110);
+        let part = |index| precise(1000, 10, Shard { index, count: 2 }, [&signs, &[]]).expected_trials();
+        assert_eq!((part(0), part(1)), (90, 1000));
+    }
+
+    #[test]
+    fn a_cell_is_imprecise_where_a_precision_is_wanted_and_not_reached() {
+        let signs: Vec<f64> = (0..20).map(|i| [1.0, -1.0][i % 2]).collect();
+        let names = |shard| -> Vec<String> {
+            let engine = precise(1000, 10, shard, [&[2.0; 20], &signs]);
+            engine.imprecise().iter().map(|cell| cell.name.clone()).collect()
+        };
+        assert_eq!(names(Shard::WHOLE), ["noise = 0.3"]);
+        assert_eq!(names(Shard { index: 0, count: 2 }), [""; 0]);
+        assert_eq!(names(Shard { index: 1, count: 2 }), ["noise = 0.3"]);
+        assert!(Engine::new(STUDY, Shard::WHOLE).unwrap().imprecise().is_empty());
+    }
+
+    #[test]
+    fn a_part_of_a_study_with_a_precision_holds_whole_cells_until_they_end() {
+        let units = |shard, ended: Option<usize>| {
+            let mut engine = precise(5, 2, shard, [&[], &[]]);
+            let mut units = Vec::new();
+            while let Some(unit) = engine.next() {
+                units.push(unit);
+                engine.absorb(unit, &[]);
+                if let (Some(cell), 1) = (ended, unit.1) {
+                    engine.finished[cell] = true;
+                }
+            }
+            units
+        };
+        assert_eq!(units(Shard::WHOLE, None), [(0, 0), (1, 0), (0, 1), (1, 1), (0, 2), (1, 2)]);
+        assert_eq!(units(Shard::WHOLE, Some(0)), [(0, 0), (1, 0), (0, 1), (1, 1), (1, 2)]);
+        assert_eq!(units(Shard { index: 1, count: 2 }, None), [(1, 0), (1, 1), (1, 2)]);
+        let most = |index, count| precise(5, 2, Shard { index, count }, [&[], &[]]).most_trials();
+        assert_eq!([most(0, 1), most(0, 2), most(1, 2), most(2, 3)], [10, 5, 5, 0]);
+    }
+
+    #[test]
+    fn a_cell_ends_after_two_batches_at_least_and_only_if_it_is_precise() {
+        let signs: Vec<f64> = (0..20).map(|i| [1.0, -1.0][i % 2]).collect();
+        let mut engine = precise(1000, 10, Shard::WHOLE, [&[2.0; 20], &signs]);
+        for (unit, ended) in [((0, 0), false), ((1, 0), false), ((0, 1), true), ((1, 1), false)] {
+            engine.absorb(unit, &[]);
+            assert_eq!(engine.finished[unit.0], ended, "{unit:?}");
+        }
+        assert_eq!(engine.batches, 4);
+    }
+
+    #[test]
+    fn a_cell_that_has_ended_is_never_the_worst() {
+        let signs: Vec<f64> = (0..20).map(|i| [1.0, -1.0][i % 2]).collect();
+        let mut engine = precise(1000, 10, Shard::WHOLE, [&[2.0; 20], &signs]);
+        assert_eq!(engine.worst().unwrap().cell, "noise = 0.3");
+        engine.finished[1] = true;
+        assert_eq!(engine.worst().unwrap().cell, "noise = 0.1");
+    }
+
+    #[test]
+    fn the_last_batch_has_the_trials_that_are_left() {
+        let text = STUDY.replace("per_cell = 3\nbatch = 2", "per_cell = 7\nbatch = 3");
+        let engine = Engine::new(&text, Shard::WHOLE).unwrap();
+        assert_eq!([0, 1, 2].map(|batch| engine.trials_of(batch)), [0..3, 3..6, 6..7]);
+        let of = |unit| engine.run(unit, |_| {}).iter().map(|t| (t.cell, t.trial)).collect::<Vec<_>>();
+        assert_eq!(of((1, 1)), [(1, 3), (1, 4), (1, 5)]);
+        assert_eq!(of((0, 2)), [(0, 6)]);
+    }
 }

@@ -134,3 +134,56 @@ fn put(tree: &mut Table, path: &str, value: &Value) -> Result<(), String> {
     table.insert(field.to_string(), value.clone());
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn factor(set: &str, levels: &str) -> Factor {
+        toml::from_str(&format!("name = \"f\"\nset = {set}\nlevels = {levels}\n")).unwrap()
+    }
+
+    #[test]
+    fn a_level_is_a_number_where_it_is_written_as_one() {
+        let numbers = factor("[\"scene.noise_px\"]", "[4, 0.5]");
+        assert_eq!((numbers.number(0), numbers.number(1)), (Some(4.0), Some(0.5)));
+        assert!(numbers.is_numeric());
+        let mixed = factor("[\"estimator.model\"]", "[2, \"pinhole\"]");
+        assert_eq!((mixed.number(0), mixed.number(1)), (Some(2.0), None));
+        assert!(!mixed.is_numeric());
+        assert_eq!((mixed.label(0), mixed.label(1)), ("2".to_string(), "pinhole".to_string()));
+    }
+
+    #[test]
+    fn a_level_of_two_fields_has_two_values() {
+        let apply = |levels: &str| {
+            let both = factor("[\"scene.a\", \"scene.b\"]", levels);
+            let mut tree: Table = toml::from_str("[scene]\na = 0\nb = 0").unwrap();
+            both.apply(&mut tree, 0, "").map(|()| (tree["scene"]["a"].clone(), tree["scene"]["b"].clone()))
+        };
+        assert_eq!(apply("[[1, 2]]").unwrap(), (Value::Integer(1), Value::Integer(2)));
+        for wrong in ["[[1]]", "[[1, 2, 3]]", "[1]"] {
+            let refused = apply(wrong).unwrap_err().to_string();
+            assert!(refused.contains("must be a list of 2 values"), "{wrong}: {refused}");
+        }
+    }
+
+    #[test]
+    fn labels_are_as_many_as_levels_and_each_is_called_once() {
+        let with = |levels: &str, labels: &str| {
+            let text = format!("name = \"f\"\nset = [\"scene.a\"]\nlevels = {levels}\nlabels = {labels}\n");
+            toml::from_str::<Factor>(&text).unwrap().check("").map_err(|refused| refused.to_string())
+        };
+        assert_eq!(with("[1, 2]", "[]"), Ok(()));
+        assert_eq!(with("[1, 1]", "[\"a\", \"b\"]"), Ok(()));
+        for (levels, labels, told) in [
+            ("[1, 2]", "[\"a\"]", "1 labels for 2 levels"),
+            ("[1, 2]", "[\"a\", \"a\"]", "level a is named twice"),
+            ("[1, 1]", "[]", "level 1 is named twice"),
+            ("[]", "[]", "at least one level"),
+        ] {
+            let refused = with(levels, labels).unwrap_err();
+            assert!(refused.contains(told), "{levels} {labels}: {refused}");
+        }
+    }
+}

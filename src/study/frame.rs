@@ -186,4 +186,19 @@ mod tests {
         assert!((rms - 3.0).abs() < 1e-9 && (max - 3.0).abs() < 1e-9, "{found:?}");
         assert!(turned < 0.6 && turned > 0.05 && largest > turned && largest < 3.0, "{found:?}");
     }
+
+    #[test]
+    fn the_root_mean_square_and_the_largest_are_of_all_nodes() {
+        // A focal length 1 % longer moves a pixel by a hundredth of its distance from the principal point.
+        let truth: Camera<Lens> = Camera::pinhole(600.0, 600.0, 319.5, 239.5).into();
+        let longer = Camera { fx: 606.0, fy: 606.0, ..truth };
+        let found = Displacement::of(&truth, &longer, (640, 480));
+        let centre = Vec2::new(319.5, 239.5);
+        let sizes: Vec<f64> =
+            frame_nodes((640, 480)).0.iter().map(|node| 0.01 * (node - centre).norm()).collect();
+        let rms = (sizes.iter().map(|size| size * size).sum::<f64>() / sizes.len() as f64).sqrt();
+        let most = sizes.iter().copied().fold(0.0, f64::max);
+        assert!((found.value(FrameQuantity::Rms).unwrap() - rms).abs() < 1e-9, "{found:?}");
+        assert!((found.value(FrameQuantity::Max).unwrap() - most).abs() < 1e-9, "{found:?}");
+    }
 }

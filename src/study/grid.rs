@@ -98,3 +98,50 @@ pub(super) fn wide(values: &[f64]) -> bool {
     let (low, high) = values.iter().fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
     low > 0.0 && high > WIDE * low
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::example::STUDY;
+    use crate::{Shard, summarise};
+
+    #[test]
+    fn an_axis_is_logarithmic_where_positive_values_span_more_than_four_times_the_least() {
+        assert!(wide(&[4.1, 1.0]) && wide(&[0.01, 0.02, 1.0]));
+        for narrow in [&[1.0, 4.0][..], &[0.0, 5.0], &[-1.0, 5.0], &[3.0], &[]] {
+            assert!(!wide(narrow), "{narrow:?}");
+        }
+    }
+
+    #[test]
+    fn figures_have_the_numeric_factor_of_most_levels_along_x_and_a_series_for_the_others() {
+        let text = STUDY.to_string()
+            + "\n[[factor]]\nname = \"views\"\nset = [\"scene.poses.views\"]\nlevels = [3, 4, 5]\n"
+            + "\n[[factor]]\nname = \"tilt\"\nset = [\"scene.poses.tilt_deg\"]\nlevels = [25.0, 30.0, 35.0]\n";
+        let engine = Engine::new(&text, Shard::WHOLE).unwrap();
+        let summary = summarise(&engine);
+        let grid = Grid { engine: &engine, summary: &summary };
+        assert_eq!(grid.x_factor(), Some(1), "the first of those with three");
+        let series: Vec<(String, Vec<usize>)> =
+            grid.series(1).into_iter().map(|series| (series.label, series.cells)).collect();
+        // Cells count tilts fastest, then views, then noise.
+        let expected = [("noise 0.1, tilt 25.0", [0, 3, 6]), ("noise 0.1, tilt 30.0", [1, 4, 7])];
+        for ((label, cells), (name, indices)) in series.iter().zip(expected) {
+            assert_eq!((label.as_str(), &cells[..]), (name, &indices[..]));
+        }
+        assert_eq!(series.len(), 6);
+        assert_eq!([0, 3, 6].map(|cell| grid.x_of(1, cell)), [3.0, 4.0, 5.0]);
+    }
+
+    #[test]
+    fn every_quantity_is_an_error_or_none() {
+        let engine = Engine::new(STUDY, Shard::WHOLE).unwrap();
+        let summary = summarise(&engine);
+        let grid = Grid { engine: &engine, summary: &summary };
+        let others: Vec<&str> = grid.others().map(Quantity::name).collect();
+        let errors: Vec<&str> = grid.errors().map(Quantity::name).collect();
+        assert_eq!(others, ["rmse", "nees"]);
+        assert_eq!(errors, ["fx", "fy", "cx", "cy", "k1", "k2", "depth"]);
+        assert_eq!(grid.bars(), "Bars are 95 % intervals.");
+    }
+}

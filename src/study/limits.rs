@@ -55,3 +55,39 @@ impl Points {
 fn refuse_above(needed: u128, limit: u64, what: &'static str, advice: &'static str) -> Result<(), SpecError> {
     if needed <= u128::from(limit) { Ok(()) } else { Err(SpecError::TooMuch { needed, limit, what, advice }) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn needed(result: Result<(), SpecError>) -> Option<u128> {
+        match result {
+            Ok(()) => None,
+            Err(SpecError::TooMuch { needed, .. }) => Some(needed),
+            Err(other) => panic!("{other}"),
+        }
+    }
+
+    #[test]
+    fn a_study_has_ten_thousand_cells_a_million_of_a_batch_and_a_quadrillion_trials_and_no_more() {
+        let of =
+            |levels: &[usize], per_cell, batch| needed(check_trials(levels.iter().copied(), per_cell, batch));
+        assert_eq!(of(&[100, 100], 100_000_000_000, 1), None);
+        assert_eq!(of(&[100, 101], 2, 1), Some(10_100));
+        assert_eq!(of(&[100, 100], 100_000_000_001, 1), Some(1_000_000_000_010_000));
+        assert_eq!(of(&[2], 2_000_000, 1_000_000), None);
+        assert_eq!(of(&[2], 2_000_000, 1_000_001), Some(1_000_001));
+        // A batch is no larger than its cell.
+        assert_eq!(of(&[], 1_000_000, u64::MAX), None);
+    }
+
+    #[test]
+    fn points_are_counted_a_trial_and_over_all_cells_with_their_draws() {
+        assert_eq!(needed(Points::default().add(1000, 1000, 1)), None);
+        assert_eq!(needed(Points::default().add(1000, 1001, 1)), Some(1_001_000));
+        let mut points = Points::default();
+        // Fifty cells of 10 000 points drawn two hundred times are a hundred million.
+        assert!((0..50).all(|_| points.add(100, 100, 200).is_ok()));
+        assert_eq!(needed(points.add(1, 1, 1)), Some(100_000_001));
+    }
+}

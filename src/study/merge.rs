@@ -235,4 +235,31 @@ mod tests {
         assert_eq!(merged([&parts[0], &parts[2]], "unlike"), (None, None));
         std::fs::remove_dir_all(at).unwrap();
     }
+
+    #[test]
+    fn parts_that_do_not_make_a_whole_are_told_one_by_one() {
+        let at = std::env::temp_dir().join(format!("calibench-parts-{}", std::process::id()));
+        let part = |name: &str, index: u64, count: u64| {
+            let shard = Shard { index, count };
+            let manifest = Manifest::new(&Spec::parse(STUDY).unwrap(), shard, &Build::default());
+            let folder = Folder::create(&at.join(name), STUDY, &manifest).unwrap();
+            Part { folder, manifest, shard }
+        };
+        let told = |parts: &[Part], count| match check(parts, count) {
+            Ok(()) => ("none".to_string(), "none".to_string()),
+            Err(MergeError::Parts { missing, surplus, .. }) => (missing, surplus),
+            Err(other) => panic!("{other}"),
+        };
+        let expected = |missing: &str, surplus: &str| (missing.to_string(), surplus.to_string());
+        let mut parts = vec![part("a", 0, 2), part("b", 1, 2)];
+        assert_eq!(told(&parts, 2), expected("none", "none"));
+        assert_eq!(told(&parts[1..], 2), expected("0/2", "none"));
+        parts.push(part("c", 1, 2));
+        assert_eq!(told(&parts, 2), expected("none", "1/2"));
+        parts.push(part("d", 1, 3));
+        assert_eq!(told(&parts, 2), expected("none", "1/2, 1/3"));
+        assert_eq!(told(&parts[3..], 3), expected("0/3, 2/3", "none"));
+        drop(parts);
+        std::fs::remove_dir_all(at).unwrap();
+    }
 }

@@ -276,4 +276,44 @@ mod tests {
         moments.add(0.7);
         assert!(moments.sd_interval(0.05).is_some() && moments.sd_interval(1e-6).is_none());
     }
+
+    #[test]
+    fn moments_of_values_that_lean_to_one_side_are_those_of_the_definition() {
+        // About their mean of 4: -3, -2, -1 and 6.
+        let moments = of([1.0, 2.0, 3.0, 10.0]);
+        assert!((moments.central(2) - 12.5).abs() < 1e-13);
+        assert!((moments.central(3) - 45.0).abs() < 1e-12);
+        assert!((moments.central(4) - 348.5).abs() < 1e-11);
+        // 1 + 4 + 9 + 100 and 1 + 16 + 81 + 10 000, over four.
+        let (square, fourth) = moments.about_zero();
+        assert!((square - 28.5).abs() < 1e-13 && (fourth - 2524.5).abs() < 1e-10, "{square} {fourth}");
+    }
+
+    #[test]
+    fn intervals_of_a_spread_are_bonetts_with_the_kurtosis_of_the_values() {
+        let near = |found: Option<Estimated>, [value, low, high]: [f64; 3]| {
+            let found = found.unwrap();
+            let part = |x: f64, y: f64| (x / y - 1.0).abs() < 1e-9;
+            assert!(
+                part(found.value, value) && part(found.low, low) && part(found.high, high),
+                "{found:?} for {value} {low} {high}"
+            );
+        };
+        // Four ones and a six: kurtosis 52 / 4^2 = 3.25 about the mean, 260 / 8^2 = 4.0625 about zero. With z
+        // = 1.959964, c = 5 / (5 - z) and r^2 = (kurtosis - 2 / 5) / 4 or (kurtosis - 3 / 5) / 4 the ends are
+        // value sqrt(c) exp(-+ z c r / 2).
+        let moments = of([1.0, 1.0, 1.0, 1.0, 6.0]);
+        near(moments.sd_interval(0.05), [2.236_067_977_5, 0.735_645_466_993, 11.178_736_433_65]);
+        near(moments.rms_interval(0.05), [2.828_427_124_746, 0.809_700_437_449_9, 16.250_131_833_989]);
+        // Ten times +-1: both kurtoses are 1.
+        let signs = of((0..20).map(|i| [1.0, -1.0][i % 2]));
+        near(signs.sd_interval(0.05), [1.025_978_352_085, 0.980_867_595_256_6, 1.189_757_916_088_6]);
+        near(signs.rms_interval(0.05), [1.0, 0.973_117_778_142_2, 1.139_271_382_856_9]);
+    }
+
+    #[test]
+    fn an_interval_is_scaled_with_its_value() {
+        let scaled = Estimated { value: 3.0, low: 2.0, high: 5.0 }.scaled(0.5);
+        assert_eq!(scaled, Estimated { value: 1.5, low: 1.0, high: 2.5 });
+    }
 }

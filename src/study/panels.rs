@@ -130,3 +130,35 @@ impl Grid<'_> {
         (!all_y.is_empty()).then_some(Panel { name, plot })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Expected;
+
+    #[test]
+    fn a_panel_shows_its_statistic_in_units_of_what_is_expected() {
+        let estimated = |value: f64| Estimated { value, low: value - 1.0, high: value + 1.0 };
+        let statistic = Statistic {
+            quantity: Quantity::Depth,
+            count: 9,
+            mean: Some(estimated(3.0)),
+            sd: Some(estimated(5.0)),
+            rms: None,
+            quantiles: Vec::new(),
+            predicted: Some(Expected { mean: 4.0, sd: 2.0 }),
+            ratio: Some(estimated(2.5)),
+            ratio_jointly: None,
+        };
+        let values = |shows: Shows| (shows.measured(&statistic).unwrap(), shows.expected(&statistic));
+        assert_eq!(values(Shows::Spread), (estimated(5.0), Some(2.0)));
+        assert_eq!(values(Shows::Mean), (estimated(3.0), Some(4.0)));
+        assert_eq!(values(Shows::SpreadOverBound), (estimated(2.5), None));
+        // A mean of 2 to 4, over a bound of 2 and over a mean of 4.
+        let over = |low, value, high| (Estimated { value, low, high }, None);
+        assert_eq!(values(Shows::Bias), over(1.0, 1.5, 2.0));
+        assert_eq!(values(Shows::MeanOverExpected), over(0.5, 0.75, 1.0));
+        let unknown = Statistic { predicted: None, ..statistic };
+        assert_eq!((Shows::Bias.measured(&unknown), Shows::Mean.expected(&unknown)), (None, None));
+    }
+}

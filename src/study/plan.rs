@@ -469,4 +469,81 @@ mod tests {
         assert_eq!(finding(1.0, 0.06, 1.0).deciding_trials, None, "nothing decides between equals");
         assert_eq!(finding(0.5, 0.06, 1.0).deciding_trials, None, "it is decided");
     }
+
+    #[test]
+    fn halving_finds_the_fewest_views_that_suffice() {
+        for enough in 4..=20 {
+            // Below four views there is no camera.
+            let at = |views: usize| Ok((views >= 4).then(|| vec![1.0 / views as f64]));
+            let is_good = |sds: &[f64]| sds[0] <= 1.0 / enough as f64;
+            let found = fewest((0, 20, vec![0.05]), at, is_good).unwrap();
+            assert_eq!(found, (enough, vec![1.0 / enough as f64]));
+        }
+    }
+
+    #[test]
+    fn the_views_found_are_the_first_whose_bound_meets_the_wish() {
+        let spec = Spec::parse(crate::example::STUDY).unwrap();
+        let wide = Search { tilts_deg: vec![30.0], coverages: vec![0.0], most_views: 12, distance_mm: 150.0 };
+        let goal = |sd: f64| [Goal { quantity: "fx".into(), sd }];
+        let sd = |views: usize| {
+            predicted(&with_poses(&spec, views, 30.0, 0.0, 150.0), &goal(1.0)).unwrap().map(|sds| sds[0])
+        };
+        let wanted = sd(7).unwrap();
+        let found = search(&spec, &goal(wanted), &wide).unwrap();
+        assert_eq!(found[0].enough, Some((7, vec![wanted])));
+        assert_eq!(found[0].best, Ok(Some(vec![sd(12).unwrap()])));
+        let found = search(&spec, &goal(0.99 * sd(12).unwrap()), &wide).unwrap();
+        assert_eq!(found[0].enough, None);
+        // Where the board fits nowhere there is no plan; where it fits somewhere there is one.
+        let near = Search { distance_mm: 20.0, ..wide.clone() };
+        assert!(matches!(search(&spec, &goal(1.0), &near), Err(PlanError::Nowhere(_))));
+        let beside = Search { tilts_deg: vec![5.0, 30.0], distance_mm: 26.5, ..wide };
+        let found = search(&spec, &goal(1.0), &beside).unwrap();
+        assert!(found[0].best.is_ok() && found[1].best.is_err(), "{found:?}");
+    }
+
+    #[test]
+    fn a_wish_is_a_positive_number_and_stands_once() {
+        let goal = |quantity: &str, sd: f64| Goal { quantity: quantity.into(), sd };
+        for sd in [0.0, -1.0, f64::INFINITY, f64::NAN] {
+            assert!(matches!(check(&[goal("fx", sd)]), Err(PlanError::Wanted(_))), "{sd}");
+        }
+        assert_eq!(check(&[goal("fx", 1.0), goal("fx", 2.0)]), Err(PlanError::Twice("fx".into())));
+        assert_eq!(check(&[goal("fx", 1.0), goal("fy", 1.0)]), Ok(()));
+        assert_eq!(check(&[]), Err(PlanError::Nothing));
+    }
+
+    #[test]
+    fn as_many_trials_decide_an_attempt_as_its_slowest_goal_needs() {
+        let [sooner, later, never, done] =
+            [(1.0, 1.03), (1.0, 0.98), (1.0, 1.0), (0.5, 1.0)].map(|(x, wanted)| finding(x, 0.06, wanted));
+        let most = later.deciding_trials;
+        assert!(most > sooner.deciding_trials);
+        assert_eq!(attempt(vec![sooner.clone(), later.clone(), done]).deciding_trials(), most);
+        assert_eq!(attempt(vec![sooner, never, later]).deciding_trials(), None);
+    }
+
+    #[test]
+    fn predictions_are_taken_by_as_much_as_the_trials_exceeded_them_at_most() {
+        // The trials exceed the bound by 6 % at most.
+        let tried = attempt(vec![finding(1.0, 0.06, 2.12)]);
+        assert!(tried.expects(&[1.99]) && !tried.expects(&[2.01]));
+        let exact = attempt(vec![finding(1.0, 0.0, 2.0)]);
+        assert!(exact.expects(&[2.0]), "at the wish it is met");
+    }
+
+    #[test]
+    fn too_few_trials_that_converge_ask_for_twice_the_views_and_no_more_than_the_most() {
+        let spec = Spec::parse(crate::example::STUDY).unwrap();
+        let to = |most_views| Search {
+            tilts_deg: vec![30.0],
+            coverages: vec![0.5],
+            most_views,
+            distance_mm: 150.0,
+        };
+        let design = Design { tilt_deg: 30.0, coverage: 0.5, enough: None, best: Ok(None) };
+        let next = |most| next_views(&spec, &[], (&attempt(vec![]), &design), &to(most)).unwrap();
+        assert_eq!([next(20), next(8), next(6), next(5)], [Some(10), Some(8), Some(6), None]);
+    }
 }

@@ -412,4 +412,122 @@ mod tests {
             assert!(!at(u, v), "({u}, {v})");
         }
     }
+
+    /// Angles in four quarters of the circle, of which each has a quarter: five standard deviations of the
+    /// binomial.
+    fn go_all_round(angles: &[f64]) {
+        let expected = angles.len() as f64 / 4.0;
+        for quarter in 0..4 {
+            let low = f64::from(quarter) * TAU / 4.0;
+            let held = |angle: &&f64| (low..low + TAU / 4.0).contains(&angle.rem_euclid(TAU));
+            let count = angles.iter().filter(held).count() as f64;
+            assert!((count - expected).abs() < 5.0 * (0.75 * expected).sqrt(), "{quarter}: {count}");
+        }
+    }
+
+    #[test]
+    fn random_poses_tilt_and_shift_in_every_direction_alike_and_roll_both_ways() {
+        let random = RandomPoses {
+            views: 1600,
+            tilt_deg: 20.0,
+            tilt_min_deg: 10.0,
+            roll_deg: 0.0,
+            coverage: 0.5,
+            distance_mm: 200.0,
+            distance_spread: 0.0,
+            redraw: false,
+        };
+        let poses = generate(&Poses::Random(random)).unwrap();
+        // The normal leans at a right angle to the axis of the tilt.
+        go_all_round(
+            &poses
+                .iter()
+                .map(|pose| libm::atan2(pose.rotation[(0, 2)], -pose.rotation[(1, 2)]))
+                .collect::<Vec<_>>(),
+        );
+        go_all_round(
+            &poses.iter().map(|pose| libm::atan2(pose.translation.y, pose.translation.x)).collect::<Vec<_>>(),
+        );
+        let rolled = RandomPoses {
+            tilt_deg: 0.0,
+            tilt_min_deg: 0.0,
+            roll_deg: 40.0,
+            coverage: 0.0,
+            views: 400,
+            ..random
+        };
+        let angle = |pose: &Pose| libm::atan2(pose.rotation[(1, 0)], pose.rotation[(0, 0)]).to_degrees();
+        let rolls: Vec<f64> = generate(&Poses::Random(rolled)).unwrap().iter().map(angle).collect();
+        // None of 400 uniform numbers in the outer tenths: by chance once in 10^18.
+        let (least, most) = rolls.iter().fold((0.0f64, 0.0f64), |(l, m), r| (l.min(*r), m.max(*r)));
+        assert!((-40.0..-32.0).contains(&least) && (32.0..40.0).contains(&most), "{least} {most}");
+    }
+
+    #[test]
+    fn views_of_a_series_tilt_and_shift_by_their_own_steps_around_the_circle() {
+        // Golden and silver steps: (3 - sqrt(5)) / 2 and sqrt(2) - 1 of a turn.
+        let (golden, silver) = (TAU * (3.0 - 5.0f64.sqrt()) / 2.0, TAU * (2.0f64.sqrt() - 1.0));
+        let apart = |angle: f64, expected: f64| {
+            let turned = (angle - expected).rem_euclid(TAU);
+            turned.min(TAU - turned)
+        };
+        for (k, pose) in generate(&series(6, 25.0, 0.8)).unwrap().iter().enumerate() {
+            let tilt = libm::atan2(pose.rotation[(0, 2)], -pose.rotation[(1, 2)]);
+            let shift = libm::atan2(pose.translation.y, pose.translation.x);
+            assert!(apart(tilt, golden * k as f64) < 1e-12, "{k}: {tilt}");
+            assert!(apart(shift, silver * k as f64) < 1e-12, "{k}: {shift}");
+        }
+    }
+
+    #[test]
+    fn a_shift_by_its_whole_share_touches_the_border_of_the_image() {
+        let points = Truth::example_board().points();
+        let camera = Truth::example_camera().into();
+        let sight = Sight { camera: &camera, image: Truth::EXAMPLE_IMAGE, points: &points };
+        for direction in [0.0, 0.7, 2.0, 4.0] {
+            let at = |share: f64| sight.shifted(Mat3::identity(), 160.0, direction, share);
+            let way = |pose: Pose| pose.translation.xy();
+            assert!(sight.holds(&at(1.0)) && way(at(1.0)).norm() > 10.0);
+            let beyond =
+                Pose { translation: at(1.0).translation + (way(at(1.0)) * 1e-5).push(0.0), ..at(1.0) };
+            assert!(!sight.holds(&beyond), "{direction}");
+            assert!((way(at(0.3)) - way(at(1.0)) * 0.3).norm() < 1e-9 && way(at(0.0)).norm() == 0.0);
+        }
+    }
+
+    #[test]
+    fn what_no_poses_can_have_is_refused_by_its_field() {
+        let random = RandomPoses {
+            views: 3,
+            tilt_deg: 30.0,
+            tilt_min_deg: 0.0,
+            roll_deg: 0.0,
+            coverage: 0.0,
+            distance_mm: 200.0,
+            distance_spread: 0.0,
+            redraw: false,
+        };
+        assert!(generate(&Poses::Random(random)).is_ok());
+        for (field, wrong) in [
+            ("views", RandomPoses { views: 0, ..random }),
+            ("tilt_deg", RandomPoses { tilt_deg: 90.0, ..random }),
+            ("tilt_min_deg", RandomPoses { tilt_min_deg: 31.0, ..random }),
+            ("roll_deg", RandomPoses { roll_deg: f64::INFINITY, ..random }),
+            ("coverage", RandomPoses { coverage: 1.5, ..random }),
+            ("distance_mm", RandomPoses { distance_mm: 0.0, ..random }),
+            ("distance_mm", RandomPoses { distance_mm: f64::INFINITY, ..random }),
+            ("distance_spread", RandomPoses { distance_spread: 1.0, ..random }),
+        ] {
+            let refused = generate(&Poses::Random(wrong)).unwrap_err();
+            assert!(matches!(&refused, PosesError::Value { field: own, .. } if *own == field), "{refused}");
+        }
+    }
+
+    #[test]
+    fn a_pose_of_a_list_stands_where_it_is_said_to_stand() {
+        let spec = PoseSpec { rotation_deg: [0.0, 0.0, 90.0], translation_mm: [3.0, -4.0, 160.0] };
+        let pose = generate(&Poses::List { poses: vec![spec] }).unwrap()[0];
+        // A quarter turn about Z takes X to Y.
+        assert!((pose.apply(&Vec3::new(10.0, 0.0, 0.0)) - Vec3::new(3.0, 6.0, 160.0)).norm() < 1e-12);
+    }
 }

@@ -110,4 +110,15 @@ mod tests {
         b.merge(&a);
         assert_eq!(b, whole);
     }
+
+    #[test]
+    fn a_value_of_the_least_size_is_told_and_what_is_smaller_is_zero() {
+        let only = |x: f64| {
+            let mut sketch = Sketch::default();
+            sketch.add(x);
+            sketch.of_rank(1).unwrap()
+        };
+        assert!((only(1e-12) / 1e-12 - 1.0).abs() < 0.0051 && (only(-1e-12) / -1e-12 - 1.0).abs() < 0.0051);
+        assert_eq!((only(0.99e-12), only(0.0)), (0.0, 0.0));
+    }
 }

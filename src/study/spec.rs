@@ -450,4 +450,69 @@ mod tests {
         );
         assert!(spec.scene.read(&Inputs::default()).is_err());
     }
+
+    #[test]
+    fn a_scene_that_no_study_can_have_is_refused_by_its_field() {
+        let check = |old: &str, new: &str| {
+            let text = STUDY.replace(old, new);
+            assert_ne!(text, STUDY, "{old}");
+            Spec::parse(&text).unwrap().scene.check()
+        };
+        let noise = "noise_px = 0.1";
+        for (old, new, field) in [
+            ("fx = 600.0", "fx = 0.0", "scene.camera.fx"),
+            ("fy = 600.0", "fy = -600.0", "scene.camera.fy"),
+            ("cx = 320.0", "cx = nan", "scene.camera"),
+            ("[640, 480]", "[640, 1048577]", "scene.image"),
+            (noise, "noise_px = 0.0", "scene.noise_px"),
+            (noise, "noise_px = 1e6", "scene.noise_px"),
+            (noise, "noise_px = 0.1\noutlier_share = 1.0", "scene.outlier_share"),
+            (noise, "noise_px = 0.1\noutlier_px = 0.0", "scene.outlier_px"),
+            (noise, "noise_px = 0.1\noutlier_px = inf", "scene.outlier_px"),
+            (noise, "noise_px = 0.1\nnoise_correlation = 1.0", "scene.noise_correlation"),
+            (noise, "noise_px = 0.1\nbow_mm = inf", "scene.bow_mm"),
+        ] {
+            let refused = check(old, new).unwrap_err();
+            assert!(matches!(&refused, SpecError::Value { field: own, .. } if *own == field), "{refused}");
+        }
+        assert_eq!(check("[640, 480]", "[640, 1048576]").map_err(|e| e.to_string()), Ok(()));
+    }
+
+    #[test]
+    fn a_length_is_positive_and_lies_in_front_of_the_camera() {
+        let good = Length { centre_mm: [0.0, 0.0, 100.0], length_mm: 10.0, direction_deg: 30.0 };
+        let field = |length: Length| match length.check() {
+            Ok(()) => "none",
+            Err(SpecError::Value { field, .. }) => field,
+            Err(other) => panic!("{other}"),
+        };
+        assert_eq!(field(good), "none");
+        for length_mm in [0.0, -1.0, f64::INFINITY] {
+            assert_eq!(field(Length { length_mm, ..good }), "scene.length.length_mm");
+        }
+        for centre_mm in [[0.0, 0.0, 0.0], [0.0, 0.0, f64::INFINITY], [f64::NAN, 0.0, 100.0]] {
+            assert_eq!(field(Length { centre_mm, ..good }), "scene.length.centre_mm");
+        }
+        assert_eq!(field(Length { direction_deg: f64::NAN, ..good }), "scene.length.direction_deg");
+    }
+
+    #[test]
+    fn a_gross_error_is_up_to_ten_pixels_large_unless_it_is_said_how_large() {
+        assert_eq!(Spec::parse(STUDY).unwrap().scene.outlier_px, 10.0);
+    }
+
+    #[test]
+    fn what_is_free_and_held_has_to_be_of_the_model() {
+        let check = |estimator: &str| {
+            let text = STUDY.replace("[trials]", &format!("[estimator]\n{estimator}\n\n[trials]"));
+            Spec::parse(&text).unwrap().estimator.check()
+        };
+        assert!(check("free = [\"fx\", \"k1\"]\nhold = { k2 = 0.1 }").is_ok());
+        let kannala = "model = \"kannala-brandt\"\nfree = [\"fx\"]\nhold = { p1 = 0.1 }";
+        assert!(matches!(check(kannala), Err(SpecError::NotOfModel { .. })));
+        for delta in ["0.0", "-1.0"] {
+            let refused = check(&format!("loss = {{ kind = \"huber\", delta_px = {delta} }}"));
+            assert!(matches!(refused, Err(SpecError::Value { field: "estimator.loss.delta_px", .. })));
+        }
+    }
 }

@@ -155,3 +155,30 @@ pub(super) fn place(text: &str, byte: usize) -> (usize, usize) {
     let column = before[start..].iter().filter(|&&b| b & 0xc0 != 0x80).count() + 1;
     (line, column)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_and_columns_are_counted_from_one_and_columns_in_characters() {
+        let text = "ab\nc\u{e9}\u{4e2d}d\n";
+        let at = |what: &str| place(text, text.find(what).unwrap());
+        assert_eq!((at("a"), at("b"), at("c")), ((1, 1), (1, 2), (2, 1)));
+        // Two bytes and three bytes are a character each.
+        assert_eq!((at("\u{4e2d}"), at("d")), ((2, 3), (2, 4)));
+        assert_eq!(place(text, 1000), (3, 1));
+    }
+
+    #[test]
+    fn what_a_field_takes_is_told_in_words() {
+        assert_eq!(
+            in_words("invalid type: string, expected u64"),
+            "invalid type: string, expected a whole number from 0"
+        );
+        assert_eq!(
+            in_words("floating point `1.5`, expected usize"),
+            "number `1.5`, expected a whole number from 0"
+        );
+    }
+}

@@ -337,4 +337,20 @@ mod tests {
         let share = found[0].2;
         assert!((share.low - 0.300_642).abs() < 1e-6 && (share.high - 0.954_413).abs() < 1e-6, "{share:?}");
     }
+
+    #[test]
+    fn three_trials_tell_no_correlation_and_four_do() {
+        let engine = Engine::new(STUDY, Shard::WHOLE).unwrap();
+        let told = |count: usize| {
+            let mut tally = engine.tallies[0].clone();
+            for i in 0..count {
+                let values = (0..engine.quantities.len()).map(|q| Some(libm::sin((i * q) as f64 + 1.0)));
+                let values = values.collect();
+                tally.add(&Trial { cell: 0, trial: 0, outcome: "converged".into(), iterations: 1, values });
+            }
+            correlations(&engine.quantities, &tally, 0.05).len()
+        };
+        // Seven errors have 21 pairs.
+        assert_eq!([0, 1, 3, 4, 5].map(told), [0, 0, 0, 21, 21]);
+    }
 }

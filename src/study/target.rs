@@ -136,3 +136,34 @@ impl TargetSpec {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(rows: &str) -> Result<TargetSpec, SpecError> {
+        let text = serde_json::json!({ "marks.csv": format!("X,Y\n{rows}") }).to_string();
+        let file = TargetSpec::File { file: "marks.csv".into(), cell: None, marks: Vec::new() };
+        file.read(&Inputs::parse(&text).unwrap())
+    }
+
+    #[test]
+    fn a_target_of_a_file_has_four_marks_that_do_not_lie_on_a_line() {
+        assert_eq!(read("0,0\n9,0\n0,9\n9,9\n").unwrap().count(), 4);
+        for (rows, told) in [
+            ("0,0\n9,0\n0,9\n", "3 marks: a target needs 4 at least"),
+            ("0,0\n9,0\n", "2 marks"),
+            ("0,0\n1,1\n2,2\n3,3\n", "lie on a line"),
+        ] {
+            let refused = read(rows).unwrap_err().to_string();
+            assert!(refused.contains(told), "{refused}");
+        }
+    }
+
+    #[test]
+    fn a_grid_has_columns_times_rows_marks_and_a_file_no_columns() {
+        let grid = TargetSpec::Grid { columns: 5, rows: 4, spacing_mm: 2.0 };
+        assert_eq!((grid.count(), grid.columns(), grid.points().unwrap().len()), (20, Some(5), 20));
+        assert_eq!(read("0,0\n9,0\n0,9\n9,9\n").unwrap().columns(), None);
+    }
+}

@@ -196,3 +196,84 @@ fn is_the_same_thing(parameter: Parameter, models: [Model; 2]) -> bool {
         _ => false,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::example::STUDY;
+    use crate::{Engine, Shard};
+    use calibench::synth::StreamKey;
+
+    /// A solver that answers with the true camera, but for a focal length three pixels too long and poses two
+    /// millimetres too far; it refuses the second problem and forgets the last.
+    #[derive(Debug)]
+    struct Longer;
+
+    impl Calibrator for Longer {
+        fn calibrate(&self, cell: &Cell, seen: &[Vec<View>]) -> Vec<Result<Estimate, String>> {
+            let mut poses = cell.poses().unwrap().to_vec();
+            poses.iter_mut().for_each(|pose| pose.translation.z += 2.0);
+            let answer = |i: usize| match i {
+                1 => Err("refused-loss".to_string()),
+                _ => Ok(Estimate {
+                    camera: cell.camera.with_value(Parameter::Fx, cell.camera.fx + 3.0).unwrap(),
+                    cam_from_target: Some(poses.clone()),
+                    rmse_px: Some(0.25),
+                    covariance: Some(nalgebra::DMatrix::identity(6, 6) * 4.0),
+                    outcome: "converged".into(),
+                    iterations: 7,
+                }),
+            };
+            (0..seen.len() - 1).map(answer).collect()
+        }
+    }
+
+    #[test]
+    fn an_error_is_the_estimate_less_the_truth() {
+        let engine = Engine::new(STUDY, Shard::WHOLE).unwrap();
+        let trials = run_trials_of(&Longer, &engine.cells[0], &engine.quantities, 4..8);
+        let of = |trial: &Trial, name: &str| {
+            let at = engine.quantities.iter().position(|q| q.name() == name).unwrap();
+            trial.values[at]
+        };
+        for i in [0, 2] {
+            let value = |name: &str| of(&trials[i], name).unwrap();
+            assert_eq!(["fx", "fy", "cx", "k1"].map(value), [3.0, 0.0, 0.0, 0.0]);
+            // 3^2 / 4 of the stated variance.
+            assert!((value("nees") - 2.25).abs() < 1e-12 && (value("depth") - 2.0).abs() < 1e-12);
+            assert_eq!((value("rmse"), trials[i].trial, trials[i].iterations), (0.25, 4 + i as u64, 7));
+        }
+        assert_eq!([1, 3].map(|i: usize| trials[i].outcome.as_str()), ["refused-loss", "broken"]);
+        assert!([1, 3].iter().all(|&i: &usize| of(&trials[i], "fx").is_none() && !trials[i].converged()));
+    }
+
+    #[test]
+    fn gross_errors_fill_their_square_and_are_as_many_as_their_share() {
+        let key = StreamKey { seed: 1, scenario: "spoil", trial: 0, purpose: "outliers" };
+        let clean = View::new(vec![Vec2::zeros(); 2000], vec![Vec2::new(100.0, 50.0); 2000]).unwrap();
+        let jumps = |share: f64| -> Vec<Vec2> {
+            let spoilt = spoil(&clean, share, 8.0, &mut Stream::open(key));
+            spoilt.pixels().iter().map(|pixel| pixel - Vec2::new(100.0, 50.0)).collect()
+        };
+        let all = jumps(1.0);
+        for axis in 0..2 {
+            let along: Vec<f64> = all.iter().map(|jump| jump[axis]).collect();
+            // Of 2000 uniform numbers one lies in each outer tenth, but for once in 10^90.
+            let (least, most) = along.iter().fold((0.0f64, 0.0f64), |(l, m), x| (l.min(*x), m.max(*x)));
+            assert!((-8.0..-6.4).contains(&least) && (6.4..8.0).contains(&most), "{least} {most}");
+        }
+        let moved = |share: f64| jumps(share).iter().filter(|jump| jump.norm() > 0.0).count();
+        assert_eq!(moved(0.0), 0);
+        // Five standard deviations of 18.3.
+        assert!((moved(0.2) as f64 - 400.0).abs() < 90.0, "{}", moved(0.2));
+    }
+
+    #[test]
+    fn only_what_every_model_means_alike_is_compared_between_models() {
+        use Model::{BrownConrady, DoubleSphere, KannalaBrandt};
+        let fisheye = [BrownConrady, KannalaBrandt];
+        let spheres = [DoubleSphere, KannalaBrandt];
+        assert!(is_the_same_thing(Parameter::Cx, spheres) && is_the_same_thing(Parameter::Fx, fisheye));
+        assert!(!is_the_same_thing(Parameter::Fx, spheres) && !is_the_same_thing(Parameter::K1, fisheye));
+    }
+}
