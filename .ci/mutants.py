@@ -23,7 +23,7 @@ import tomllib
 import tree_sitter
 import tree_sitter_rust
 
-FEATURES = {"calibench": ["--features", "io,serde"]}
+FEATURES = {"calibench": ["--features", "io,serde"], "calibench-study": ["--features", "parquet"]}
 ROOT = {"calibench": "src/calibench", "calibench-gate": "src/gate", "calibench-study": "src/study"}
 # A test that runs so many times longer than without a change, and this many seconds, hangs.
 SLOWER, PATIENCE = 10, 20
@@ -188,10 +188,15 @@ def near(source, line):
     return {change["id"] for change in arms or function or source.changes}
 
 
+def checked(build):
+    command = ["cargo", "check", "--profile", "test", "--message-format=json", *build]
+    return subprocess.run(command, capture_output=True, text=True)
+
+
 def take_out_what_does_not_compile(sources, build):
     """Lines are those of the unchanged file: no change adds one."""
     while True:
-        ran = subprocess.run(["cargo", "check", "--profile", "test", "--message-format=json", *build], capture_output=True, text=True)
+        ran = checked(build)
         if ran.returncode == 0:
             return
         wrong = set()
@@ -267,6 +272,9 @@ class Tests:
 def main():
     package, nth, folders = sys.argv[1], int(sys.argv[2]), [folder.rstrip("/") for folder in sys.argv[3:]]
     build = ["--package", package, "--lib", *FEATURES.get(package, [])]
+    # What does not compile without a change would be taken for a fault of the changes.
+    if checked(build).returncode:
+        sys.exit(f"{package} does not compile as it is")
     by_file = collections.defaultdict(list)
     for change in listed(folders, nth):
         by_file[change["file"]].append(change)
@@ -278,6 +286,8 @@ def main():
         lib.write("\n#[doc(hidden)]\npub mod mutant;\n")
     for source in sources.values():
         source.write()
+    placed = sum(len(source.changes) for source in sources.values())
+    print(f"{placed} of {sum(counted.values())} changes have a place; a field that is left out of a struct has none", flush=True)
     take_out_what_does_not_compile(sources, build)
     tests = Tests(package, build)
     changes = [change for source in sources.values() for change in source.changes]
