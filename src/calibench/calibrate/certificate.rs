@@ -316,8 +316,7 @@ mod tests {
     use crate::calibrate::Termination;
     use crate::calibrate::from_relaxed::beside;
     use crate::calibrate::normal::Observations;
-    use crate::calibrate::retraction::Retraction;
-    use crate::calibrate::tests::four_views;
+    use crate::calibrate::tests::{four_views, plain_problem};
     use crate::calibrate::{Settings, calibrate};
     use crate::camera::{Camera, FreeParameters};
     use crate::geometry::{Mat3, Pose, Vec2, Vec3};
@@ -358,18 +357,7 @@ mod tests {
     }
 
     fn problem(observations: &[Observations], loss: Loss) -> Problem<'_> {
-        Problem {
-            free: FreeParameters::STANDARD,
-            fy_per_fx: None,
-            priors: Priors::NONE,
-            observations,
-            loss,
-            max_iterations: 100,
-            hold_tilt: false,
-            retraction: Retraction::Straight,
-            focal_limits: (0.0, f64::INFINITY),
-            rounding_cost: 0.0,
-        }
+        Problem { loss, ..plain_problem(observations, FreeParameters::STANDARD) }
     }
 
     #[test]

@@ -246,8 +246,7 @@ pub(super) fn noise_of(problem: &Problem<'_>, minimum: &Minimum) -> Noise {
 mod tests {
     use super::*;
     use crate::calibrate::normal::Observations;
-    use crate::calibrate::prior::Priors;
-    use crate::calibrate::retraction::Retraction;
+    use crate::calibrate::tests::plain_problem;
     use crate::camera::BrownConrady;
     use crate::geometry::{Pose, Vec2, Vec3, rotation};
 
@@ -291,18 +290,7 @@ mod tests {
     }
 
     fn problem(observations: &[Observations], free: FreeParameters) -> Problem<'_> {
-        Problem {
-            free,
-            fy_per_fx: None,
-            priors: Priors::NONE,
-            observations,
-            loss: Loss::Squares,
-            max_iterations: 100,
-            hold_tilt: false,
-            retraction: Retraction::Straight,
-            focal_limits: (0.0, f64::INFINITY),
-            rounding_cost: 0.0,
-        }
+        plain_problem(observations, free)
     }
 
     #[test]

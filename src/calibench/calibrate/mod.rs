@@ -83,9 +83,30 @@ pub use unknown::Unknown;
 mod tests {
     //! Views for the unit tests of this folder, which does not know the scenes that `synth` draws.
 
+    use super::Loss;
+    use super::minimise::Problem;
+    use super::normal::Observations;
+    use super::prior::Priors;
+    use super::retraction::Retraction;
     use crate::board::View;
-    use crate::camera::{BrownConrady, Camera};
+    use crate::camera::{BrownConrady, Camera, FreeParameters};
     use crate::geometry::{Pose, Vec2, Vec3, rotation};
+
+    /// Least squares of these parameters, nothing known beforehand and nothing held.
+    pub(super) fn plain_problem(observations: &[Observations], free: FreeParameters) -> Problem<'_> {
+        Problem {
+            free,
+            fy_per_fx: None,
+            priors: Priors::NONE,
+            observations,
+            loss: Loss::Squares,
+            max_iterations: 100,
+            hold_tilt: false,
+            retraction: Retraction::Straight,
+            focal_limits: (0.0, f64::INFINITY),
+            rounding_cost: 0.0,
+        }
+    }
 
     /// Four views of 9 x 7 marks, 10 mm apart, from 120 mm, with deviations of standard deviation `noise_px`
     /// that have nothing in common: the phases are those of a chirp.

@@ -158,8 +158,7 @@ pub(super) fn median(residuals: &[Vec<Vec2>]) -> f64 {
 mod tests {
     use super::*;
     use crate::calibrate::normal::Observations;
-    use crate::calibrate::prior::Priors;
-    use crate::calibrate::retraction::Retraction;
+    use crate::calibrate::tests::plain_problem;
     use crate::camera::{Camera, FreeParameters};
     use crate::geometry::{Pose, Vec3, rotation};
 
@@ -237,18 +236,7 @@ mod tests {
         let found = [7, 12].map(|marks| {
             let views = [0.0, 0.0, 30.0, 0.0].into_iter().zip(&poses);
             let observations: Vec<Observations> = views.map(|(off, pose)| seen(pose, marks, off)).collect();
-            let problem = Problem {
-                free: FreeParameters::STANDARD,
-                fy_per_fx: None,
-                priors: Priors::NONE,
-                observations: &observations,
-                loss: Loss::Squares,
-                max_iterations: 100,
-                hold_tilt: false,
-                retraction: Retraction::Straight,
-                focal_limits: (0.0, f64::INFINITY),
-                rounding_cost: 0.0,
-            };
+            let problem = plain_problem(&observations, FreeParameters::STANDARD);
             let state = State { camera, cam_from_target: poses.to_vec() };
             let fit = Fit::of(&state, &observations);
             outliers(&problem, &state, &fit, 0.01).map(|found| (found.view, found.point))

@@ -172,10 +172,9 @@ pub(super) fn is_better(new: &Minimum, old: &Minimum) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibrate::Loss;
     use crate::calibrate::normal::Observations;
-    use crate::calibrate::prior::Priors;
     use crate::calibrate::system::System;
+    use crate::calibrate::tests::plain_problem;
     use crate::calibrate::walk::Far;
     use crate::camera::Parameter;
     use crate::camera::{Camera, FreeParameters};
@@ -233,16 +232,8 @@ mod tests {
             };
             let observations: Vec<Observations> = poses.iter().enumerate().map(&mut seen).collect();
             let problem = Problem {
-                free: FreeParameters::of(&[Parameter::Fx]),
                 fy_per_fx: Some(1.0),
-                priors: Priors::NONE,
-                observations: &observations,
-                loss: Loss::Squares,
-                max_iterations: 100,
-                hold_tilt: false,
-                retraction: Retraction::Straight,
-                focal_limits: (0.0, f64::INFINITY),
-                rounding_cost: 0.0,
+                ..plain_problem(&observations, FreeParameters::of(&[Parameter::Fx]))
             };
             let best = problem.minimise(State { camera, cam_from_target: poses.to_vec() });
             // As if a focal length three times as long cost no more.

@@ -174,11 +174,9 @@ pub(super) fn with_better_tilts(problem: &Problem<'_>, minimum: Minimum) -> Mini
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibrate::Loss;
     use crate::calibrate::minimise::State;
     use crate::calibrate::normal::Observations;
-    use crate::calibrate::prior::Priors;
-    use crate::calibrate::retraction::Retraction;
+    use crate::calibrate::tests::plain_problem;
     use crate::camera::{Camera, FreeParameters};
     use crate::geometry::{Mat3, Pose, Vec2, Vec3};
 
@@ -191,18 +189,7 @@ mod tests {
             (point, camera.project(&Vec3::new(point.x, point.y, 100.0)).unwrap())
         };
         let observations = [Observations::new((0..63).map(pair))];
-        let problem = Problem {
-            free: FreeParameters::of(&[Parameter::Cx]),
-            fy_per_fx: None,
-            priors: Priors::NONE,
-            observations: &observations,
-            loss: Loss::Squares,
-            max_iterations: 100,
-            hold_tilt: false,
-            retraction: Retraction::Straight,
-            focal_limits: (0.0, f64::INFINITY),
-            rounding_cost: 0.0,
-        };
+        let problem = plain_problem(&observations, FreeParameters::of(&[Parameter::Cx]));
         let held = Problem { free: FreeParameters::NONE, ..problem };
         let best = held.minimise(State { camera, cam_from_target: vec![pose] });
         let mut walked = Walked { best, starts: 0, far: Vec::new(), met: Vec::new() };
