@@ -136,6 +136,9 @@ class ComparedModel:
     """Schwarz's criterion: the least is best, 10 more is very strong evidence against (Kass & Raftery 1995)."""
     correlation: float
     """Of a mark's residual with the next one's: 0 for noise."""
+    is_behind: bool
+    """Whether it comes behind the others whatever its criterion: a coefficient lies where the model is not defined, or there are as many
+    unknowns as measurements."""
     calibration: Calibration
     """The fit to all views."""
 

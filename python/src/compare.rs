@@ -44,6 +44,7 @@ pub(crate) fn compare_models<'py>(
         fields.set_item("hold_out_px", compared.hold_out_px)?;
         fields.set_item("bic", compared.bic)?;
         fields.set_item("correlation", compared.correlation)?;
+        fields.set_item("is_behind", compared.is_behind)?;
         fields.set_item("calibration", Calibration::of(compared.calibration, image_size, loss))?;
         record(py, "ComparedModel", &fields)
     };

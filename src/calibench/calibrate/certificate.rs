@@ -316,7 +316,7 @@ mod tests {
     use crate::calibrate::Termination;
     use crate::calibrate::from_relaxed::beside;
     use crate::calibrate::normal::Observations;
-    use crate::calibrate::tests::{four_views, plain_problem};
+    use crate::calibrate::tests::{four_views, observations, plain_problem};
     use crate::calibrate::{Settings, calibrate};
     use crate::camera::{Camera, FreeParameters};
     use crate::geometry::{Mat3, Pose, Vec2, Vec3};
@@ -409,10 +409,7 @@ mod tests {
     fn the_floor_by_the_score_is_the_minimum_of_the_relaxed_model() {
         let views = four_views(0.1);
         let found = calibrate(&views, &Settings::standard().without_search()).unwrap();
-        let observations: Vec<Observations> = views
-            .iter()
-            .map(|view| Observations::new(view.points().iter().copied().zip(view.pixels().iter().copied())))
-            .collect();
+        let observations = observations(&views);
         let problem = problem(&observations, Loss::Squares);
         let minimum =
             problem.minimise(State { camera: found.camera, cam_from_target: found.cam_from_target });

@@ -463,7 +463,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fit_with_degrees_of_freedom_and_coefficients_in_range_comes_before_those_without() {
+    fn a_fit_with_degrees_of_freedom_and_coefficients_in_range_is_not_behind() {
         let (compared, _) = compare_models(&four_views(0.1), &Settings::standard(), &Candidate::usual()[..2]);
         assert!(compared.iter().all(|c| !c.is_behind));
     }

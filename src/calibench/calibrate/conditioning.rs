@@ -174,26 +174,12 @@ fn pose_response<const W: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibrate::information;
-    use crate::camera::{BrownConrady, Camera, FreeParameters, Parameter};
-    use crate::geometry::{Pose, Vec2, Vec3, rotation};
-
-    /// Normal equations of three views, six parameters free.
-    fn system() -> System {
-        let camera =
-            Camera::pinhole(600.0, 590.0, 320.0, 240.0).with_distortion(BrownConrady::radial(-0.2, 0.1));
-        let points: Vec<Vec2> =
-            (0..35).map(|i| Vec2::new(f64::from(i % 7) - 3.0, f64::from(i / 7) - 2.0) * 12.0).collect();
-        let poses = [[0.3, 0.0, 0.1], [0.0, -0.3, 0.0], [-0.2, 0.25, 0.4]].map(|[x, y, z]| Pose {
-            rotation: rotation::from_xyz_rad(x, y, z),
-            translation: Vec3::new(2.0, -3.0, 120.0),
-        });
-        information(&camera, FreeParameters::STANDARD, &poses, &points).unwrap()
-    }
+    use crate::calibrate::tests::equations;
+    use crate::camera::Parameter;
 
     #[test]
     fn poses_follow_the_intrinsics_as_a_dense_solver_says() {
-        let system = system();
+        let system = equations();
         let step = SVector::from_fn(|i, _| [1.0, -2.0, 3.0, 0.5, 0.01, -0.02].get(i).copied().unwrap_or(0.0));
         let found = pose_response(&system, &system.reduction().unwrap().eliminated, &step);
         let mut squares = [0.0; 4];
@@ -213,7 +199,7 @@ mod tests {
 
     #[test]
     fn members_below_a_fifth_of_the_strongest_are_not_named() {
-        let mut system = system();
+        let mut system = equations();
         // Poses that do not follow.
         system.views.iter_mut().for_each(|view| view.coupling.fill(0.0));
         let eliminated = system.reduction().unwrap().eliminated;
@@ -225,7 +211,7 @@ mod tests {
 
     #[test]
     fn a_root_of_the_information_has_the_same_spectrum() {
-        let system = system();
+        let system = equations();
         let (mut reduction, scale) = (system.reduction().unwrap(), system.scale());
         let sorted = |reduction: &Reduction| {
             let mut values: Vec<f64> =
@@ -242,7 +228,7 @@ mod tests {
 
     #[test]
     fn information_that_is_no_number_has_no_spectrum() {
-        let system = system();
+        let system = equations();
         let (mut reduction, scale) = (system.reduction().unwrap(), system.scale());
         reduction.schur[(1, 2)] = f64::NAN;
         assert!(Spectrum::of(&reduction, &scale).is_none());

@@ -353,7 +353,7 @@ impl Fit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibrate::tests::four_views;
+    use crate::calibrate::tests::{correlations, four_views};
     use crate::camera::{Camera, FreeParameters};
     use crate::geometry::{Mat3, Pose, Vec3};
 
@@ -435,16 +435,7 @@ mod tests {
         };
         let views: Vec<View> = four_views(0.02).iter().map(waved).collect();
         let found = calibrate(&views, &Settings::standard()).unwrap();
-        let of = |warning: &Warning| match warning {
-            Warning::Structured { correlation } => Some(*correlation),
-            _ => None,
-        };
-        let told = found.warnings.iter().find_map(of).unwrap();
-        // The mean product of a mark's residual with the next one's, 62 in each view, over the mean square.
-        let products =
-            found.residuals.iter().flat_map(|view| view.windows(2).map(|pair| pair[0].dot(&pair[1])));
-        let squares = found.residuals.iter().flatten().map(Vec2::norm_squared);
-        let expected = (products.sum::<f64>() / 248.0) / (squares.sum::<f64>() / 252.0);
+        let (told, expected) = correlations(&found);
         assert!((told - expected).abs() < 1e-12, "{told} {expected}");
     }
 

@@ -325,25 +325,10 @@ fn turned_to(state: &State, slope: Vec2) -> State {
 mod tests {
     use super::*;
     use crate::calibrate::Prior;
-    use crate::calibrate::retraction::Retraction;
+    use crate::calibrate::Termination;
+    use crate::calibrate::tests::{observations, plain_problem, seen};
     use crate::calibrate::tilt::angle_between;
-    use crate::calibrate::{Loss, Termination};
     use crate::camera::Camera;
-
-    fn problem(observations: &[Observations]) -> Problem<'_> {
-        Problem {
-            free: FreeParameters::STANDARD,
-            fy_per_fx: None,
-            priors: Priors::NONE,
-            observations,
-            loss: Loss::Squares,
-            max_iterations: 1,
-            hold_tilt: false,
-            retraction: Retraction::Straight,
-            focal_limits: (0.0, f64::INFINITY),
-            rounding_cost: 0.0,
-        }
-    }
 
     /// What is said of a parameter that was moved far away at the cost of so many variances.
     fn verdict(parameter: Parameter, value: f64, variances: f64) -> Result<(), CalibrationError> {
@@ -356,7 +341,11 @@ mod tests {
         };
         let far = Far { parameter, minimum: at(camera.with(parameter, value), variances) };
         let walked = Walked { best: at(camera, 0.0), starts: 1, far: vec![far], met: Vec::new() };
-        refuse_if_flat(&problem(&[]), &walked, Noise::of_squares(noise_px * noise_px))
+        refuse_if_flat(
+            &plain_problem(&[], FreeParameters::STANDARD),
+            &walked,
+            Noise::of_squares(noise_px * noise_px),
+        )
     }
 
     #[test]
@@ -454,7 +443,8 @@ mod tests {
         let camera = Camera::pinhole(500.0, 300.0, 320.0, 240.0);
         let common = |slopes: [f64; 2], noise_px: f64| -> Vec<Vec2> {
             let state = State { camera, cam_from_target: slopes.map(sloping).to_vec() };
-            let list = doubtful_slopes(&problem(&observations), &state, noise_px);
+            let list =
+                doubtful_slopes(&plain_problem(&observations, FreeParameters::STANDARD), &state, noise_px);
             list.into_iter().map(|(common, _)| common).collect()
         };
         let is = |found: Vec<Vec2>, expected: &[f64]| {
@@ -469,13 +459,15 @@ mod tests {
         // The same of slopes in x.
         let aside = Pose { rotation: rotation::from_xyz_rad(0.0, libm::atan(0.8), 0.0), ..sloping(0.0) };
         let state = State { camera, cam_from_target: vec![aside; 2] };
-        let found = doubtful_slopes(&problem(&observations), &state, 0.1);
+        let found = doubtful_slopes(&plain_problem(&observations, FreeParameters::STANDARD), &state, 0.1);
         assert!(found.len() == 1 && (found[0].0 - Vec2::new(0.8, 0.0)).norm() < 1e-14, "{found:?}");
         // No plane that is seen edge-on is parallel to another by accident.
         let edge_on =
             Pose { rotation: rotation::from_xyz_rad(std::f64::consts::FRAC_PI_2, 0.0, 0.0), ..sloping(0.0) };
         let state = State { camera, cam_from_target: vec![sloping(0.0), edge_on] };
-        assert!(doubtful_slopes(&problem(&observations), &state, 1.0).is_empty());
+        assert!(
+            doubtful_slopes(&plain_problem(&observations, FreeParameters::STANDARD), &state, 1.0).is_empty()
+        );
     }
 
     /// What is said of three views that face the camera, with noise of 0.1 px, where fx is free and fy
@@ -487,21 +479,7 @@ mod tests {
             translation: Vec3::new(2.0, -3.0, z),
         };
         let poses = [(0.0, 120.0), (0.3, 130.0), (-0.2, 140.0)].map(pose);
-        let mut count = 0.0;
-        let mut noise = || {
-            count += 1.0;
-            0.1 * std::f64::consts::SQRT_2 * libm::sin(0.7 * count * count)
-        };
-        let mut seen = |pose: &Pose| {
-            let mut pair = |i: u32| {
-                let point = Vec2::new(f64::from(i % 9) - 4.0, f64::from(i / 9) - 3.0) * 10.0;
-                let pixel = camera.project(&pose.apply(&Vec3::new(point.x, point.y, 0.0))).unwrap();
-                (point, pixel + Vec2::new(noise(), noise()))
-            };
-            let pairs: Vec<(Vec2, Vec2)> = (0..63).map(&mut pair).collect();
-            Observations::new(pairs.into_iter())
-        };
-        let observations: Vec<Observations> = poses.iter().map(&mut seen).collect();
+        let observations = observations(&seen(&camera, &poses, 0.1));
         let noise = Noise::of_squares(0.01);
         let known = prior_sd.map(|standard_deviation| Prior {
             parameter: Parameter::Fx,
@@ -510,11 +488,9 @@ mod tests {
         });
         let list: Vec<Prior> = known.into_iter().collect();
         let problem = Problem {
-            free: FreeParameters::of(&[Parameter::Fx]),
             fy_per_fx: Some(1.0),
             priors: Priors { list: &list, noise },
-            max_iterations: 100,
-            ..problem(&observations)
+            ..plain_problem(&observations, FreeParameters::of(&[Parameter::Fx]))
         };
         let mut minimum = problem.minimise(State { camera, cam_from_target: poses.to_vec() });
         minimum.system.cost += more_cost;

@@ -246,11 +246,9 @@ pub(super) fn noise_of(problem: &Problem<'_>, minimum: &Minimum) -> Noise {
 mod tests {
     use super::*;
     use crate::calibrate::normal::Observations;
-    use crate::calibrate::tests::plain_problem;
+    use crate::calibrate::tests::{TURNS, observations, plain_problem, seen};
     use crate::camera::BrownConrady;
     use crate::geometry::{Pose, Vec2, Vec3, rotation};
-
-    const TURNS: [[f64; 3]; 4] = [[0.0; 3], [0.35, 0.0, 0.0], [0.0, -0.35, 0.0], [-0.26, 0.26, 0.17]];
 
     fn barrel() -> BrownConrady {
         BrownConrady::radial(-0.18, 0.05)
@@ -265,32 +263,15 @@ mod tests {
         then: impl FnOnce(&Problem<'_>, Judged) -> T,
     ) -> T {
         let camera = Camera::pinhole(600.0, 600.0, 320.0, 240.0).with_distortion(lens);
-        let mut count = 0.0;
-        let mut noise = || {
-            count += 1.0;
-            0.1 * std::f64::consts::SQRT_2 * libm::sin(0.7 * count * count)
-        };
         let pose = |(view, [x, y, z]): (usize, &[f64; 3])| Pose {
             rotation: rotation::from_xyz_rad(*x, *y, *z),
             translation: Vec3::new(2.0, -3.0, 120.0 + 10.0 * view as f64),
         };
         let cam_from_target: Vec<Pose> = turns.iter().enumerate().map(pose).collect();
-        let mut seen = |pose: &Pose| {
-            let mut pair = |i: u32| {
-                let point = Vec2::new(f64::from(i % 9) - 4.0, f64::from(i / 9) - 3.0) * 10.0;
-                let pixel = camera.project(&pose.apply(&Vec3::new(point.x, point.y, 0.0))).unwrap();
-                (point, pixel + Vec2::new(noise(), noise()))
-            };
-            Observations::new((0..63).map(&mut pair).collect::<Vec<_>>().into_iter())
-        };
-        let observations: Vec<Observations> = cam_from_target.iter().map(&mut seen).collect();
-        let problem = Problem { fy_per_fx, ..problem(&observations, free) };
+        let observations = observations(&seen(&camera, &cam_from_target, 0.1));
+        let problem = Problem { fy_per_fx, ..plain_problem(&observations, free) };
         let minimum = problem.minimise(State { camera, cam_from_target });
         then(&problem, Judged::of(&problem, minimum, 1))
-    }
-
-    fn problem(observations: &[Observations], free: FreeParameters) -> Problem<'_> {
-        plain_problem(observations, free)
     }
 
     #[test]
@@ -396,7 +377,7 @@ mod tests {
             (point, camera.project(&pose(0.5).apply(&Vec3::new(point.x, point.y, 0.0))).unwrap())
         };
         let observations = [Observations::new((0..81).map(pair))];
-        let problem = problem(&observations, FreeParameters::NONE);
+        let problem = plain_problem(&observations, FreeParameters::NONE);
         let [own, other] =
             [0.5, -0.5].map(|tilt| problem.minimise(State { camera, cam_from_target: vec![pose(tilt)] }));
         let higher = other.system.cost - own.system.cost;

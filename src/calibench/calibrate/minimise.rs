@@ -285,6 +285,7 @@ pub(super) fn descend<D: Descent<W>, const W: usize>(problem: &D, start: D::Stat
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibrate::tests::plain_problem;
     use crate::geometry::{Mat3, Vec2, Vec3};
 
     fn one_mark() -> Observations {
@@ -301,18 +302,7 @@ mod tests {
     #[test]
     fn a_camera_with_a_negative_focal_length_is_none() {
         let observations = [one_mark()];
-        let problem = Problem {
-            free: FreeParameters::STANDARD,
-            fy_per_fx: None,
-            priors: Priors::NONE,
-            observations: &observations,
-            loss: Loss::Squares,
-            max_iterations: 1,
-            hold_tilt: false,
-            retraction: Retraction::Straight,
-            focal_limits: (0.0, f64::INFINITY),
-            rounding_cost: 0.0,
-        };
+        let problem = plain_problem(&observations, FreeParameters::STANDARD);
         let pose = Pose { rotation: Mat3::identity(), translation: Vec3::new(0.0, 0.0, 100.0) };
         for (fx, fy, is_camera) in
             [(600.0, 600.0, true), (-600.0, 600.0, false), (600.0, -600.0, false), (f64::NAN, 600.0, false)]

@@ -83,11 +83,12 @@ pub use unknown::Unknown;
 mod tests {
     //! Views for the unit tests of this folder, which does not know the scenes that `synth` draws.
 
-    use super::Loss;
     use super::minimise::Problem;
     use super::normal::Observations;
     use super::prior::Priors;
     use super::retraction::Retraction;
+    use super::system::System;
+    use super::{Calibration, Loss, Warning, information};
     use crate::board::View;
     use crate::camera::{BrownConrady, Camera, FreeParameters};
     use crate::geometry::{Pose, Vec2, Vec3, rotation};
@@ -108,11 +109,24 @@ mod tests {
         }
     }
 
-    /// Four views of 9 x 7 marks, 10 mm apart, from 120 mm, with deviations of standard deviation `noise_px`
-    /// that have nothing in common: the phases are those of a chirp.
+    /// Four views from 120 mm, with deviations of standard deviation `noise_px`.
     pub(super) fn four_views(noise_px: f64) -> Vec<View> {
         let camera =
             Camera::pinhole(600.0, 600.0, 326.0, 243.0).with_distortion(BrownConrady::radial(-0.18, 0.05));
+        let pose = |[x, y, z]: [f64; 3]| Pose {
+            rotation: rotation::from_xyz_rad(x, y, z),
+            translation: Vec3::new(0.0, 0.0, 120.0),
+        };
+        seen(&camera, &TURNS.map(pose), noise_px)
+    }
+
+    /// Turns of four views that tell a camera.
+    pub(super) const TURNS: [[f64; 3]; 4] =
+        [[0.0, 0.0, 0.0], [0.35, 0.0, 0.0], [0.0, -0.35, 0.0], [-0.26, 0.26, 0.17]];
+
+    /// Views of 9 x 7 marks, 10 mm apart, with deviations that have nothing in common: the phases are those
+    /// of a chirp.
+    pub(super) fn seen(camera: &Camera, poses: &[Pose], noise_px: f64) -> Vec<View> {
         let points: Vec<Vec2> =
             (0..63).map(|i| Vec2::new(f64::from(i % 9) - 4.0, f64::from(i / 9) - 3.0) * 10.0).collect();
         let mut count = 0.0;
@@ -120,14 +134,45 @@ mod tests {
             count += 1.0;
             noise_px * std::f64::consts::SQRT_2 * libm::sin(0.7 * count * count)
         };
-        let mut seen = |[x, y, z]: [f64; 3]| {
-            let rotation = rotation::from_xyz_rad(x, y, z);
-            let pose = Pose { rotation, translation: Vec3::new(0.0, 0.0, 120.0) };
+        let mut of = |pose: &Pose| {
             let mut pixel = |p: &Vec2| {
                 camera.project(&pose.apply(&Vec3::new(p.x, p.y, 0.0))).unwrap() + Vec2::new(noise(), noise())
             };
             View::new(points.clone(), points.iter().map(&mut pixel).collect()).unwrap()
         };
-        [[0.0, 0.0, 0.0], [0.35, 0.0, 0.0], [0.0, -0.35, 0.0], [-0.26, 0.26, 0.17]].map(&mut seen).to_vec()
+        poses.iter().map(&mut of).collect()
+    }
+
+    /// The marks of these views, as the solver has them.
+    pub(super) fn observations(views: &[View]) -> Vec<Observations> {
+        views.iter().map(|view| Observations::new(view.pairs().map(|(p, q)| (*p, *q)))).collect()
+    }
+
+    /// Normal equations of three views, six parameters free.
+    pub(super) fn equations() -> System {
+        let camera =
+            Camera::pinhole(600.0, 590.0, 320.0, 240.0).with_distortion(BrownConrady::radial(-0.2, 0.1));
+        let points: Vec<Vec2> =
+            (0..35).map(|i| Vec2::new(f64::from(i % 7) - 3.0, f64::from(i / 7) - 2.0) * 12.0).collect();
+        let poses = [[0.3, 0.0, 0.1], [0.0, -0.3, 0.0], [-0.2, 0.25, 0.4]].map(|[x, y, z]| Pose {
+            rotation: rotation::from_xyz_rad(x, y, z),
+            translation: Vec3::new(2.0, -3.0, 120.0),
+        });
+        information(&camera, FreeParameters::STANDARD, &poses, &points).unwrap()
+    }
+
+    /// The correlation that a calibration tells of, and that of its residuals by the definition: the mean
+    /// product of a mark's residual with the next one's of its view, over the mean square.
+    pub(super) fn correlations<L>(found: &Calibration<L>) -> (f64, f64) {
+        let of = |warning: &Warning| match warning {
+            Warning::Structured { correlation } => Some(*correlation),
+            _ => None,
+        };
+        let told = found.warnings.iter().find_map(of).unwrap();
+        let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
+        let products =
+            found.residuals.iter().flat_map(|view| view.windows(2).map(|pair| pair[0].dot(&pair[1])));
+        let squares = found.residuals.iter().flatten().map(Vec2::norm_squared);
+        (told, mean(products.collect()) / mean(squares.collect()))
     }
 }

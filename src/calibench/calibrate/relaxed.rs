@@ -378,8 +378,7 @@ impl State {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibrate::prior::Priors;
-    use crate::calibrate::retraction::Retraction;
+    use crate::calibrate::tests::plain_problem;
     use crate::camera::BrownConrady;
 
     const FREE: [Parameter; 6] =
@@ -471,18 +470,7 @@ mod tests {
     fn the_relaxed_model_has_the_parameters_that_homographies_do_not_take_up() {
         use Parameter::{Cx, Cy, Fy, K1, K2, K3};
         let sought = |free: FreeParameters, fy_per_fx: Option<f64>, held: &[Parameter]| {
-            let problem = Problem {
-                free,
-                fy_per_fx,
-                priors: Priors::NONE,
-                observations: &[],
-                loss: Loss::Squares,
-                max_iterations: 1,
-                hold_tilt: false,
-                retraction: Retraction::Straight,
-                focal_limits: (0.0, f64::INFINITY),
-                rounding_cost: 0.0,
-            };
+            let problem = Problem { fy_per_fx, ..plain_problem(&[], free) };
             parameters(&problem, |p| held.contains(&p))
         };
         let (standard, of) = (FreeParameters::STANDARD, FreeParameters::of);

@@ -172,12 +172,11 @@ pub(super) fn is_better(new: &Minimum, old: &Minimum) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibrate::normal::Observations;
+    use crate::board::View;
     use crate::calibrate::system::System;
-    use crate::calibrate::tests::plain_problem;
+    use crate::calibrate::tests::{observations, plain_problem, seen};
     use crate::calibrate::walk::Far;
-    use crate::camera::Parameter;
-    use crate::camera::{Camera, FreeParameters};
+    use crate::camera::{Camera, FreeParameters, Parameter};
     use crate::geometry::{Pose, Vec2, Vec3, rotation};
 
     #[test]
@@ -216,21 +215,10 @@ mod tests {
         });
         // One view stretched as no pose can, and as any homography can.
         for (stretch, is_refused) in [(1.0, true), (1.05, false)] {
-            let mut count = 0.0;
-            let mut noise = || {
-                count += 1.0;
-                0.1 * std::f64::consts::SQRT_2 * libm::sin(0.7 * count * count)
-            };
-            let mut seen = |(view, pose): (usize, &Pose)| {
-                let mut pair = |i: u32| {
-                    let point = Vec2::new(f64::from(i % 9) - 4.0, f64::from(i / 9) - 3.0) * 10.0;
-                    let mut pixel = camera.project(&pose.apply(&Vec3::new(point.x, point.y, 0.0))).unwrap();
-                    pixel.y = if view == 1 { stretch * pixel.y } else { pixel.y };
-                    (point, pixel + Vec2::new(noise(), noise()))
-                };
-                Observations::new((0..63).map(&mut pair).collect::<Vec<_>>().into_iter())
-            };
-            let observations: Vec<Observations> = poses.iter().enumerate().map(&mut seen).collect();
+            let mut views = seen(&camera, &poses, 0.1);
+            let pixels = views[1].pixels().iter().map(|q| Vec2::new(q.x, stretch * q.y)).collect();
+            views[1] = View::new(views[1].points().to_vec(), pixels).unwrap();
+            let observations = observations(&views);
             let problem = Problem {
                 fy_per_fx: Some(1.0),
                 ..plain_problem(&observations, FreeParameters::of(&[Parameter::Fx]))

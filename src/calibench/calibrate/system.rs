@@ -223,22 +223,8 @@ fn inverse_of_square(root: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibrate::information;
-    use crate::camera::{BrownConrady, Camera};
-    use crate::geometry::{Pose, Vec2, Vec3, rotation};
+    use crate::calibrate::tests::equations;
     use nalgebra::DVector;
-
-    fn system() -> System {
-        let camera =
-            Camera::pinhole(600.0, 590.0, 320.0, 240.0).with_distortion(BrownConrady::radial(-0.2, 0.1));
-        let points: Vec<Vec2> =
-            (0..35).map(|i| Vec2::new(f64::from(i % 7) - 3.0, f64::from(i / 7) - 2.0) * 12.0).collect();
-        let poses = [[0.3, 0.0, 0.1], [0.0, -0.3, 0.0], [-0.2, 0.25, 0.4]].map(|[x, y, z]| Pose {
-            rotation: rotation::from_xyz_rad(x, y, z),
-            translation: Vec3::new(2.0, -3.0, 120.0),
-        });
-        information(&camera, FreeParameters::STANDARD, &poses, &points).unwrap()
-    }
 
     /// The same matrix written out in full.
     fn dense(system: &System) -> DMatrix<f64> {
@@ -264,7 +250,7 @@ mod tests {
 
     #[test]
     fn elimination_gives_the_inverse_of_the_full_matrix() {
-        let system = system();
+        let system = equations();
         let inverse = dense(&system).try_inverse().unwrap();
         let covariance = system.covariance().unwrap();
         let n = system.free.len();
@@ -293,7 +279,7 @@ mod tests {
 
     #[test]
     fn the_step_solves_the_full_equations() {
-        let mut system = system();
+        let mut system = equations();
         for (i, g) in system.gradient.iter_mut().take(6).enumerate() {
             *g = 1.0 + i as f64;
         }
@@ -318,7 +304,7 @@ mod tests {
 
     #[test]
     fn a_step_is_bent_by_half_of_an_acceleration_that_is_short_in_the_systems_metric() {
-        let system = system();
+        let system = equations();
         let pose = |k: f64| SVector::from_fn(|i, _| k * (i as f64 - 2.2));
         let own =
             Step::along(SVector::from_fn(|i, _| 0.1 * (i as f64 + 1.0)), [1.0, -2.0, 3.0].map(pose).to_vec());

@@ -221,6 +221,9 @@ pub struct ModelFields {
     pub bic: f64,
     /// Correlation of a mark's residual with the next one's.
     pub correlation: f64,
+    /// Whether it comes behind the others whatever its criterion: a coefficient lies where the model is not
+    /// defined, or there are as many unknowns as measurements.
+    pub is_behind: bool,
 }
 
 impl ModelFields {
@@ -233,6 +236,7 @@ impl ModelFields {
             hold_out_px: compared.hold_out_px,
             bic: compared.bic,
             correlation: compared.correlation,
+            is_behind: compared.is_behind,
         }
     }
 }

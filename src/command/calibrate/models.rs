@@ -59,7 +59,7 @@ impl Comparison {
         let least = self.compared.iter().map(|c| c.bic).fold(f64::INFINITY, f64::min);
         for compared in &self.compared {
             rows.add_row([
-                name(&compared.candidate),
+                format!("{}{}", name(&compared.candidate), if compared.is_behind { ", behind" } else { "" }),
                 significant(compared.calibration.rmse_px, 4),
                 compared.hold_out_px.map_or("none".to_string(), |px| significant(px, 4)),
                 format!("{:.1}", compared.bic - least),
@@ -68,7 +68,8 @@ impl Comparison {
         }
         let refused: String =
             self.refused.iter().map(|reason| format!("not determined: {reason}\n")).collect();
-        format!("{}\n\n{refused}{}\n\n", rows.trim_fmt(), self.verdict())
+        let behind = if self.compared.iter().any(|compared| compared.is_behind) { BEHIND } else { "" };
+        format!("{}\n\n{behind}{refused}{}\n\n", rows.trim_fmt(), self.verdict())
     }
 
     fn verdict(&self) -> String {
@@ -128,6 +129,8 @@ impl Comparison {
     }
 }
 
+/// What the table means by it.
+const BEHIND: &str = "behind: a coefficient lies where the model is not defined, or there are as many unknowns as measurements\n";
 /// A difference of the criterion that is not worth more than a bare mention (Kass & Raftery 1995).
 const NO_EVIDENCE: f64 = 2.0;
 /// A choice that chance makes with more than this probability is in doubt.

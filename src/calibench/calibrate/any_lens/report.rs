@@ -196,6 +196,7 @@ mod tests {
     use super::super::{estimate, fixture};
     use super::*;
     use crate::board::View;
+    use crate::calibrate::tests::correlations;
     use crate::camera::FreeParameters;
     use crate::camera::{Model, Parameter};
 
@@ -265,16 +266,7 @@ mod tests {
     fn the_correlation_that_is_told_is_that_of_neighbours_residuals() {
         let views = fixture::wide_views_of_a_bowed_board(0.05);
         let found = estimate::calibrate(&views, &Settings::of_model(Model::KannalaBrandt)).unwrap();
-        let of = |warning: &Warning| match warning {
-            Warning::Structured { correlation } => Some(*correlation),
-            _ => None,
-        };
-        let told = found.warnings.iter().find_map(of).unwrap();
-        // The mean product of a mark's residual with the next one's, 34 in each view, over the mean square.
-        let products =
-            found.residuals.iter().flat_map(|view| view.windows(2).map(|pair| pair[0].dot(&pair[1])));
-        let squares = found.residuals.iter().flatten().map(Vec2::norm_squared);
-        let expected = (products.sum::<f64>() / 680.0) / (squares.sum::<f64>() / 700.0);
+        let (told, expected) = correlations(&found);
         assert!((told - expected).abs() < 1e-12, "{told} {expected}");
     }
 
