@@ -500,4 +500,153 @@ mod tests {
         assert!(shift(&all[..30]).is_some() && spread(&all[..30]).is_some());
         assert!(shift(&all[..29]).is_none() && spread(&all[..29]).is_none());
     }
+
+    #[test]
+    fn a_mean_difference_is_scored_by_its_standard_error() {
+        // Differences 3 and -1 in turn: mean 1, sum of squares about it 160, variance 160 / 39.
+        let pairs: Vec<(f64, f64)> =
+            (0..40).map(|i| (f64::from(i) + [3.0, -1.0][i as usize % 2], f64::from(i))).collect();
+        let (mean, z) = shift(&pairs).unwrap();
+        assert!((mean - 1.0).abs() < 1e-12 && (z - 39.0f64.sqrt() / 2.0).abs() < 1e-12, "{mean} {z}");
+        assert!((two_sided(1.959_964) - 0.05).abs() < 1e-7 && two_sided(0.0) == 1.0);
+    }
+
+    #[test]
+    fn a_ratio_of_variances_is_scored_by_the_correlation_of_sum_and_difference() {
+        // About their means of 5 and -3: +-2 and +-1, three times of one sign for once of the other. In eight
+        // of them aa = 32, bb = 8, ab = 8: the correlation is 24 / sqrt(56 * 24), of 40 pairs.
+        let signs = [(2.0, 1.0), (2.0, 1.0), (2.0, 1.0), (2.0, -1.0)];
+        let both = signs.into_iter().flat_map(|(x, y)| [(5.0 + x, -3.0 + y), (5.0 - x, -3.0 - y)]);
+        let (ratio, z) = spread(&both.collect::<Vec<_>>().repeat(5)).unwrap();
+        let expected = libm::atanh(24.0 / 1344.0f64.sqrt()) * 37.0f64.sqrt();
+        assert!((ratio - 4.0).abs() < 1e-12 && (z - expected).abs() < 1e-9, "{ratio} {z} {expected}");
+    }
+
+    fn unmoved() -> Comparison {
+        Comparison {
+            scenario: "s",
+            pairs: 40,
+            lost: 0,
+            gained: 0,
+            bits: 5,
+            largest: 0.0,
+            shift: None,
+            spread: None,
+            stated: None,
+            is_tested: true,
+            time: 1.0,
+        }
+    }
+
+    /// Ten tests at a rate of 0.001: each at 0.0001.
+    fn compared(comparison: Comparison) -> Paired {
+        Paired {
+            solver: "new".into(),
+            reference: "old".into(),
+            false_alarm_rate: 1e-3,
+            tests: 10,
+            samples: 40,
+            comparisons: vec![comparison],
+            differing: 5,
+            verdicts: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn what_is_relevant_and_certain_has_moved_whichever_test_shows_it() {
+        let test = |value: f64, p: f64| Some(("fx".to_string(), value, p));
+        let conclusion = |comparison: Comparison| compared(comparison).conclusion();
+        let (certain, doubtful) = (0.9e-4, 1.1e-4);
+        assert_eq!(conclusion(Comparison { shift: test(-0.002, certain), ..unmoved() }), Conclusion::Changed);
+        assert_eq!(conclusion(Comparison { spread: test(1.002, certain), ..unmoved() }), Conclusion::Changed);
+        assert_eq!(conclusion(Comparison { stated: test(0.998, certain), ..unmoved() }), Conclusion::Changed);
+        assert_eq!(conclusion(Comparison { lost: 1, ..unmoved() }), Conclusion::Changed);
+        for nothing in [
+            Comparison { shift: test(0.002, doubtful), ..unmoved() },
+            Comparison { shift: test(0.0009, 0.0), ..unmoved() },
+            Comparison { spread: test(1.0009, 0.0), ..unmoved() },
+            Comparison { stated: test(1.002, doubtful), ..unmoved() },
+            Comparison { gained: 1, ..unmoved() },
+            unmoved(),
+        ] {
+            assert_eq!(conclusion(nothing.clone()), Conclusion::SameLaw, "{nothing:?}");
+        }
+    }
+
+    #[test]
+    fn a_comparison_holds_where_nothing_is_worse_and_all_that_differs_was_tested() {
+        let verdicts =
+            |old, new| Paired { verdicts: vec![(Property::Bias, "s", old, new)], ..compared(unmoved()) };
+        use Verdict::{Accepted, Failed, Grave, Held, NotJudged};
+        for (old, new, conclusion) in [
+            (Held, Failed, Conclusion::Changed),
+            (Failed, Grave, Conclusion::Changed),
+            (Held, NotJudged, Conclusion::Changed),
+            (NotJudged, Failed, Conclusion::Changed),
+            (NotJudged, Accepted, Conclusion::OtherVerdicts),
+            (NotJudged, Held, Conclusion::OtherVerdicts),
+            (Grave, Failed, Conclusion::OtherVerdicts),
+            (Failed, Held, Conclusion::OtherVerdicts),
+        ] {
+            let found = verdicts(old, new);
+            assert_eq!(found.conclusion(), conclusion, "{old:?} {new:?}");
+            assert_eq!(found.held(), conclusion == Conclusion::OtherVerdicts);
+        }
+        let untested = compared(Comparison { is_tested: false, ..unmoved() });
+        assert!(untested.conclusion() == Conclusion::TooFewPairs && !untested.held());
+        let same = Paired { differing: 0, ..compared(unmoved()) };
+        assert!(same.conclusion() == Conclusion::Same && same.held());
+        let none = compared(Comparison { pairs: 0, ..unmoved() });
+        assert!(none.conclusion() == Conclusion::NotCompared && !none.held());
+        let unasked = Paired { samples: 0, ..none };
+        assert!(unasked.is_compared() && unasked.conclusion() == Conclusion::SameLaw);
+    }
+
+    #[test]
+    fn answers_are_compared_problem_by_problem() {
+        let asked = crate::plan::Asked { scenes: vec!["four-pose".into()], ..Default::default() };
+        let plan = Plan::of(1, 3, asked).unwrap();
+        let old = crate::run(&plan, &crate::Builtin, &|_| ());
+        let mut new = old.clone();
+        let samples: Vec<usize> =
+            (0..new.len()).filter(|&i| plan.cases[i].purpose == Purpose::Sample).collect();
+        let scene = |new: &[Option<Seen>], old: &[Option<Seen>]| {
+            let mut found = compare(&plan, ("new", new, &[]), ("old", old, &[]), 1e-3);
+            (found.differing, found.comparisons.remove(0))
+        };
+        let (differing, same) = scene(&new, &old);
+        assert_eq!((differing, same.pairs, same.bits, same.largest, same.is_tested), (0, 3, 0, 0.0, true));
+        new[samples[0]] = Some(Seen::Refused { reason: "no".into(), seconds: 0.0 });
+        let Some(Seen::Estimate(trial)) = &mut new[samples[1]] else { panic!("it is answered") };
+        trial.standardised[2] -= 0.25;
+        trial.bits ^= 1;
+        let (differing, found) = scene(&new, &old);
+        assert_eq!((differing, found.pairs, found.bits, found.lost, found.gained), (2, 2, 1, 1, 0));
+        assert!((found.largest - 0.25).abs() < 1e-12 && !found.is_tested && found.shift.is_none());
+        let (_, turned) = scene(&old, &new);
+        assert_eq!((turned.lost, turned.gained), (0, 1));
+    }
+
+    #[test]
+    fn stated_variances_differ_where_a_ratio_matters_or_one_side_states_none() {
+        let asked = crate::plan::Asked { scenes: vec!["four-pose".into()], ..Default::default() };
+        let plan = Plan::of(1, 1, asked).unwrap();
+        let seen = crate::run(&plan, &crate::Builtin, &|_| ());
+        let first = seen.iter().flatten().find_map(|seen| match seen {
+            Seen::Estimate(trial) => Some((**trial).clone()),
+            _ => None,
+        });
+        let stating = |sd: Option<f64>, principal: Option<f64>| Trial {
+            standard_deviations: sd.map(|sd| vec![0.5, sd]),
+            principal_variances: principal.map(|variance| vec![variance]),
+            ..first.clone().unwrap()
+        };
+        let otherwise = |new: &Trial| states_otherwise(new, &stating(Some(2.0), Some(1.0)));
+        assert!(!otherwise(&stating(Some(2.0), Some(1.0))));
+        // A variance is the square: 0.04 % of the deviation are 0.08 %, 0.06 % are 0.12 %.
+        assert!(!otherwise(&stating(Some(2.0 * 1.0004), Some(1.0))));
+        assert!(otherwise(&stating(Some(2.0 * 1.0006), Some(1.0))));
+        assert!(otherwise(&stating(Some(2.0), Some(0.99))));
+        assert!(otherwise(&stating(None, Some(1.0))) && otherwise(&stating(Some(2.0), None)));
+    }
 }

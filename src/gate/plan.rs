@@ -316,4 +316,15 @@ mod tests {
         assert!((98..225).contains(&far.len()), "{}", far.len());
         assert!(far.iter().all(|px| (4.4..20.6).contains(px)) && near.iter().all(|px| *px < 0.6));
     }
+
+    #[test]
+    fn a_scene_that_there_is_not_is_refused_and_so_are_too_many_samples() {
+        let asked = Asked { scenes: vec!["four-pose".into(), "five-pose".into()], ..Asked::default() };
+        let refused = Plan::of(1, 1, asked).map(|plan| plan.cases.len());
+        assert!(matches!(&refused, Err(PlanError::UnknownScene { scene, .. }) if scene == "five-pose"));
+        let only =
+            |samples| Plan::of(1, samples, Asked { scenes: vec!["four-pose".into()], ..Asked::default() });
+        assert!(matches!(only(MOST_SAMPLES + 1), Err(PlanError::TooManySamples { .. })));
+        assert!(only(MOST_SAMPLES).is_ok());
+    }
 }

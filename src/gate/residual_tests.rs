@@ -191,4 +191,91 @@ mod tests {
             assert_eq!(seen.count, 0, "{}", seen.scenario.id);
         }
     }
+
+    fn views(of: &[&[[f64; 2]]]) -> Vec<Vec<Vec2>> {
+        of.iter().map(|view| view.iter().map(|&[u, v]| Vec2::new(u, v)).collect()).collect()
+    }
+
+    fn near(found: f64, expected: f64) {
+        assert!((found - expected).abs() < 1e-6, "{found} for {expected}");
+    }
+
+    #[test]
+    fn neighbours_along_rows_are_tested_by_their_normal_score() {
+        // Six marks of mean square 1/2 per coordinate; products 2 and 0 of four pairs: a score of 2 / (0.5
+        // sqrt(8)) = sqrt(2), above which lies erfc(1) / 2.
+        let alike = [[1.0, 0.0], [1.0, 0.0], [1.0, 0.0]];
+        let turned = [[0.0, 1.0], [0.0, 1.0], [0.0, -1.0]];
+        near(along_rows(&views(&[&alike, &turned])), 0.078_649_603_5);
+    }
+
+    #[test]
+    fn the_two_axes_are_tested_by_the_ratio_of_their_squares() {
+        // Of F with two and two degrees of freedom 1 / (1 + x) lies above x: twice that of x = 3.
+        let wide = [[1.0, 1.0], [2.0f64.sqrt(), 0.0]];
+        near(of_axes(&views(&[&wide])), 0.5);
+        near(of_axes(&views(&[&wide.map(|[u, v]| [v, u])])), 0.5);
+    }
+
+    #[test]
+    fn a_view_is_tested_against_the_others() {
+        // Of F with two and d degrees of freedom (1 + 2 x / d)^(-d / 2) lies above x. The first view has 4 /
+        // 2 against 2 / 4: one in nine, and it is the worst of three.
+        near(of_views(&views(&[&[[2.0, 0.0]], &[[1.0, 0.0]], &[[0.0, 1.0]]])), 1.0 / 3.0);
+    }
+
+    #[test]
+    fn a_mark_is_tested_by_its_mean_over_the_views() {
+        // Means of 2 and 0: between 2 * 4 = 8, within 2 + 2 = 4; of F with 4 and 4 degrees of freedom (1 + 3
+        // x) / (1 + x)^3 lies above x.
+        let marks = [&[[3.0, 0.0], [0.0, 1.0]][..], &[[1.0, 0.0], [0.0, -1.0]][..]];
+        near(of_marks(&views(&marks)), 7.0 / 27.0);
+        // Between 8, within 2, each on 2; and 1 / (1 + x) above x.
+        near(of_marks(&views(&[&[[3.0, 0.0]], &[[1.0, 0.0]]])), 0.2);
+        // Three views: between 3 * 4 = 12 on 2, within 2 on 4: (1 + x / 2)^-2 above x.
+        near(of_marks(&views(&[&[[3.0, 0.0]], &[[1.0, 0.0]], &[[2.0, 0.0]]])), 1.0 / 49.0);
+    }
+
+    #[test]
+    fn marks_of_one_view_or_of_ragged_views_tell_nothing() {
+        assert_eq!(of_marks(&views(&[&[[3.0, 0.0], [1.0, 1.0]]])), 1.0);
+        assert_eq!(of_marks(&views(&[&[[3.0, 0.0], [1.0, 1.0]], &[[1.0, 0.0]]])), 1.0);
+    }
+
+    #[test]
+    fn a_richer_lens_is_tested_by_what_its_coefficients_take_from_the_residuals() {
+        use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+        let plan = Plan::new(1, 1).unwrap();
+        let problem = plan.problem(&Case { scenario: 0, purpose: Purpose::Sample, trial: 0 });
+        let mut richer = problem.clone();
+        for name in ["p1", "p2", "k3"] {
+            richer.held.remove(name).unwrap();
+            richer.free.push(name.into());
+        }
+        let [few, many] = [&problem, &richer].map(|problem| {
+            let fit = solve(problem, Settings::without_search).unwrap();
+            residuals(problem, &fit).unwrap().iter().flatten().map(Vec2::norm_squared).sum::<f64>()
+        });
+        // Four views of 63 marks: 504 coordinates less 9 and 24 unknowns.
+        let ratio = (few - many) / 3.0 / (many / 471.0);
+        let fit = solve(&problem, Settings::without_search).unwrap();
+        near(of_richer_lens(&problem, &fit), FisherSnedecor::new(3.0, 471.0).unwrap().sf(ratio));
+    }
+
+    #[test]
+    fn a_share_agrees_within_five_deviations_of_the_difference_and_one_draw() {
+        let scenario = crate::suite::suite().unwrap().remove(0);
+        let shown = |share: f64, count: usize| Shown {
+            scenario: Scenario { seen_in_residuals: share, ..scenario.clone() },
+            draws: 2000,
+            count,
+        };
+        // 5 sqrt(0.25 * 2 / 2000) = 0.07906 and 0.0005: 159.1 of 2000. 5 sqrt(0.09 * 2 / 2000) is 0.04743.
+        for (share, count) in [(0.5, 1159), (0.5, 841), (0.1, 295), (0.1, 105)] {
+            assert!(shown(share, count).agrees(), "{share} {count}");
+        }
+        for (share, count) in [(0.5, 1160), (0.5, 840), (0.1, 296), (0.1, 104)] {
+            assert!(!shown(share, count).agrees(), "{share} {count}");
+        }
+    }
 }

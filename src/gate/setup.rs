@@ -111,3 +111,31 @@ impl Setup {
         self.exact().iter().flat_map(|view| view.pixels().iter().map(beyond)).fold(0.0, f64::max)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn how_far_pixels_lie_outside_is_told_by_the_farthest() {
+        let setup = crate::suite::suite().unwrap().remove(0).setup;
+        assert_eq!(setup.outside_image_px(), 0.0);
+        let pixels: Vec<Vec2> = setup.exact().iter().flat_map(|view| view.pixels().to_vec()).collect();
+        let most = |axis: usize| pixels.iter().map(|pixel| pixel[axis]).fold(0.0, f64::max);
+        // The image ends half a pixel beyond its last pixel's centre.
+        for (size, expected) in
+            [((300, 480), most(0) - 299.5), ((640, 300), most(1) - 299.5), ((640, 481), 0.0)]
+        {
+            let mut cut = setup.clone();
+            cut.scene.truth.image_size = size;
+            assert!((cut.outside_image_px() - expected).abs() < 1e-9, "{size:?}");
+        }
+    }
+
+    #[test]
+    fn degrees_of_freedom_are_coordinates_less_unknowns() {
+        let setup = crate::suite::suite().unwrap().remove(0).setup;
+        // Four views of 63 marks, six parameters and six numbers a pose.
+        assert_eq!((setup.observations(), setup.degrees_of_freedom()), (252, 504 - 6 - 24));
+    }
+}

@@ -90,4 +90,17 @@ mod tests {
             assert!(seen.agrees(), "{}: {} of {}", seen.scenario.id, seen.count, seen.draws);
         }
     }
+
+    #[test]
+    fn a_rate_agrees_within_five_deviations_of_the_difference_of_two_counts() {
+        let scenario = crate::suite::suite().unwrap().remove(0);
+        let seen = |count: usize| Misled {
+            scenario: Scenario { textbook_misled: 0.01, ..scenario.clone() },
+            draws: DRAWS,
+            count,
+        };
+        // 5 sqrt(0.0099 * 2 / 100 000) of 100 000 draws are 222.5.
+        assert!(seen(1222).agrees() && seen(778).agrees());
+        assert!(!seen(1223).agrees() && !seen(777).agrees());
+    }
 }

@@ -309,4 +309,75 @@ mod tests {
         let worse = camera.with_value(Parameter::Fx, camera.fx + 1.0).unwrap();
         assert!(refitted_square(&worse, &problem).unwrap() > 1.01 * best);
     }
+
+    #[test]
+    fn an_answer_is_measured_by_its_errors_in_the_units_of_the_bound() {
+        let plan = Plan::new(1, 1).unwrap();
+        let case = Case { scenario: 0, purpose: Purpose::Sample, trial: 0 };
+        let problem = plan.problem(&case);
+        let Outcome::Estimate(mut estimate) =
+            super::super::accept::accept(&problem, Builtin.ask(&problem).unwrap())
+        else {
+            panic!("no estimate");
+        };
+        let setup = plan.scenarios[0].setup_of(1, 0);
+        let (truth, bound) = (&setup.scene.truth, &setup.bound);
+        estimate.covariance = Some(bound.intrinsics.clone() * 4.0);
+        estimate.standard_deviations =
+            Some(bound.intrinsics.diagonal().map(|v| 3.0 * v.sqrt()).iter().copied().collect());
+        estimate.pose_covariances = Some(bound.poses.iter().map(|pose| pose * 2.5).collect());
+        let trial = measure(&plan, &case, &problem, &estimate, 0.0);
+        let free: Vec<Parameter> = plan.scenarios[0].free.iter().collect();
+        for (i, &p) in free.iter().enumerate() {
+            let error = estimate.camera.value(p).unwrap() - truth.camera.value(p).unwrap();
+            assert_eq!(trial.errors[i], error);
+            let sd = bound.intrinsics[(i, i)].sqrt();
+            assert!((trial.standardised[i] / (error / sd) - 1.0).abs() < 1e-12);
+        }
+        let near =
+            |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-6, "{found} {expected}");
+        let e = DVector::from_column_slice(&trial.errors);
+        let nees = e.dot(&(bound.intrinsics.clone().try_inverse().unwrap() * &e));
+        near(trial.nees, nees);
+        near(trial.own_nees.unwrap(), nees / 4.0);
+        assert_eq!(trial.whitened.len(), 6);
+        trial.deviations_over_bound.unwrap().iter().for_each(|ratio| near(*ratio, 3.0));
+        let along = trial.principal_variances.unwrap();
+        assert_eq!(along.len(), 6);
+        along.iter().for_each(|ratio| near(*ratio, 4.0));
+        let spread = trial.pose_spread.unwrap();
+        spread.over_bound.iter().chain(&spread.principal).for_each(|ratio| near(*ratio, 2.5));
+        near(spread.own_nees.unwrap(), trial.pose_nees.as_ref().unwrap()[0] / 2.5);
+        assert!(trial.pose_nees.unwrap().iter().all(|nees| (0.1..40.0).contains(nees)));
+    }
+
+    #[test]
+    fn a_pose_is_as_far_off_as_its_covariance_says_and_infinitely_where_it_is_no_rotation() {
+        let at =
+            |x: f64| Pose { rotation: nalgebra::Matrix3::identity(), translation: Vec3::new(x, 0.0, 100.0) };
+        let variances = nalgebra::Vector6::new(1.0, 1.0, 1.0, 4.0, 9.0, 16.0);
+        let covariance = Matrix6::from_diagonal(&variances);
+        assert!((pose_distance(&at(0.0), &at(3.0), &covariance) - 9.0 / 4.0).abs() < 1e-12);
+        let spoilt = |entry: f64| {
+            let mut pose = at(0.0);
+            pose.rotation[(2, 2)] = entry;
+            pose_distance(&at(0.0), &pose, &covariance)
+        };
+        assert_eq!((spoilt(-1.0), spoilt(1.001)), (f64::INFINITY, f64::INFINITY));
+        assert!(spoilt(1.0 + 1e-7).is_finite());
+        assert_eq!(pose_distance(&at(0.0), &at(1.0), &Matrix6::zeros()), f64::INFINITY);
+    }
+
+    #[test]
+    fn residuals_are_summed_over_both_coordinates_of_every_mark() {
+        let camera: Camera<Lens> = Camera::pinhole(100.0, 100.0, 50.0, 40.0).into();
+        let pose = Pose { rotation: nalgebra::Matrix3::identity(), translation: Vec3::new(0.0, 0.0, 10.0) };
+        let plan = Plan::new(1, 1).unwrap();
+        let mut problem = plan.problem(&Case { scenario: 0, purpose: Purpose::Sample, trial: 0 });
+        problem.views.truncate(1);
+        // Seen at (50, 40) and (60, 60).
+        problem.views[0].target = vec![[0.0, 0.0], [1.0, 2.0]];
+        problem.views[0].pixels = vec![[51.0, 42.0], [63.0, 56.0]];
+        assert!((square(&camera, &[pose], &problem) - (1.0 + 4.0 + 9.0 + 16.0)).abs() < 1e-9);
+    }
 }

@@ -173,4 +173,61 @@ mod tests {
         }
         assert!((with_axes_swapped(&swapped).skew - camera.skew).abs() < 1e-10);
     }
+
+    fn held_in_the_middle() -> Problem {
+        Problem {
+            id: "a".into(),
+            image_size: [640, 480],
+            model: "brown-conrady".into(),
+            views: vec![crate::protocol::ProblemView {
+                target: vec![[1.0, 2.0]],
+                pixels: vec![[100.0, 50.0]],
+            }],
+            free: vec!["fx".into(), "p1".into()],
+            held: [("cx".to_string(), 320.0), ("k1".to_string(), 0.5)].into(),
+        }
+    }
+
+    #[test]
+    fn an_image_cut_out_of_a_larger_one_has_its_margin_on_every_side() {
+        let larger = Variant::ImageShift.apply(&held_in_the_middle(), "b".into());
+        assert_eq!(larger.image_size, [640 + 2 * 37, 480 + 2 * 21]);
+        assert_eq!((larger.views[0].pixels[0], larger.views[0].target[0]), ([137.0, 71.0], [1.0, 2.0]));
+        assert_eq!((larger.held["cx"], larger.held["k1"]), (357.0, 0.5));
+        let camera: Camera<Lens> = Camera::pinhole(600.0, 590.0, 357.0, 261.0).into();
+        let undone = Variant::ImageShift.undo(&camera);
+        assert_eq!((undone.cx, undone.cy, undone.fx, undone.fy), (320.0, 240.0, 600.0, 590.0));
+    }
+
+    #[test]
+    fn exchanged_axes_exchange_what_belongs_to_them_and_nothing_else() {
+        let swapped = Variant::SwappedAxes.apply(&held_in_the_middle(), "b".into());
+        assert_eq!(swapped.image_size, [480, 640]);
+        assert_eq!((swapped.views[0].pixels[0], swapped.views[0].target[0]), ([50.0, 100.0], [2.0, 1.0]));
+        assert_eq!(swapped.free, ["fy", "p2"]);
+        assert_eq!((swapped.held["cy"], swapped.held["k1"]), (320.0, 0.5));
+        let lens = Lens::new(Model::KannalaBrandt, &[0.1, 0.2, 0.3, 0.4]).unwrap();
+        let camera = Camera::with_lens(600.0, 590.0, 320.0, 240.0, lens);
+        let other = Variant::SwappedAxes.undo(&camera);
+        assert_eq!((other.fx, other.fy, other.cx, other.cy), (590.0, 600.0, 240.0, 320.0));
+        assert_eq!(other.distortion, lens);
+    }
+
+    #[test]
+    fn only_a_tilted_sensor_has_no_known_camera_behind_exchanged_axes() {
+        for variant in Variant::ALL {
+            for model in Model::ALL {
+                let unknown = variant == Variant::SwappedAxes && model == Model::Tilted;
+                assert_eq!(variant.is_known_of(model), !unknown, "{variant:?} {model:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_target_in_inches_is_smaller_by_their_millimetres() {
+        let inches = Variant::TargetUnits.apply(&held_in_the_middle(), "b".into());
+        let [x, y] = inches.views[0].target[0];
+        assert!((x * 25.4 - 1.0).abs() < 1e-15 && (y * 25.4 - 2.0).abs() < 1e-15);
+        assert_eq!(inches.views[0].pixels[0], [100.0, 50.0]);
+    }
 }

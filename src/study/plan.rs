@@ -546,4 +546,25 @@ mod tests {
         let next = |most| next_views(&spec, &[], (&attempt(vec![]), &design), &to(most)).unwrap();
         assert_eq!([next(20), next(8), next(6), next(5)], [Some(10), Some(8), Some(6), None]);
     }
+
+    #[test]
+    fn fewest_views_rank_first_and_among_equals_the_smaller_part_of_the_wish() {
+        let goals = [("fx", 2.0), ("k1", 0.1)].map(|(q, sd)| Goal { quantity: q.into(), sd });
+        let design = |coverage: f64, enough: Option<(usize, Vec<f64>)>| Design {
+            tilt_deg: 30.0,
+            coverage,
+            enough,
+            best: Ok(None),
+        };
+        // Parts of the wishes: 0.5 and 0.9, 0.8 and 0.1, nothing, 0.95 and 0.95.
+        let designs = [
+            design(0.1, Some((6, vec![1.0, 0.09]))),
+            design(0.2, Some((6, vec![1.6, 0.01]))),
+            design(0.3, None),
+            design(0.4, Some((5, vec![1.9, 0.095]))),
+        ];
+        let order: Vec<(usize, f64)> =
+            ranked(&designs, &goals).into_iter().map(|(views, design)| (views, design.coverage)).collect();
+        assert_eq!(order, [(5, 0.4), (6, 0.2), (6, 0.1)]);
+    }
 }

@@ -339,6 +339,35 @@ mod tests {
     }
 
     #[test]
+    fn what_the_trials_of_a_study_say_is_what_their_values_say() {
+        let text = STUDY.replace("per_cell = 3\nbatch = 2", "per_cell = 30\nbatch = 30");
+        let text = text.replace("views = 3", "views = 8");
+        let spec = crate::Spec::parse(&text).unwrap();
+        let mut seen = Vec::new();
+        let engine = crate::in_memory_seeing(spec, &text, |trial| seen.push(trial.clone()), |_| {}).unwrap();
+        let at = engine.quantities.iter().position(|q| q.name() == "fx").unwrap();
+        let values: Vec<f64> = seen.iter().filter(|t| t.cell == 1).map(|t| t.values[at].unwrap()).collect();
+        let mean = values.iter().sum::<f64>() / 30.0;
+        let sd = (values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / 29.0).sqrt();
+        let summary = summarise(&engine);
+        let fx = summary.cells[1].of("fx").unwrap();
+        let (found, ratio, jointly) = (fx.sd.unwrap(), fx.ratio.unwrap(), fx.ratio_jointly.unwrap());
+        assert!((found.value / sd - 1.0).abs() < 1e-12 && fx.count == 30);
+        // Student's 97.5 % point with 29 degrees of freedom.
+        let mean_told = fx.mean.unwrap();
+        let half = 2.045_230 * sd / 30.0f64.sqrt();
+        assert!((mean_told.value - mean).abs() < 1e-12 * sd);
+        assert!((0.5 * (mean_told.high - mean_told.low) / half - 1.0).abs() < 1e-6, "{mean_told:?}");
+        let bound = fx.predicted.unwrap().sd;
+        assert!((ratio.value * bound / sd - 1.0).abs() < 1e-12 && ratio.low < jointly.low);
+        assert!((ratio.high * bound / found.high - 1.0).abs() < 1e-12 && ratio.high < jointly.high);
+        assert_eq!((jointly.value, summary.confidence), (ratio.value, 0.95));
+        let converged = summary.cells[1].converged().unwrap();
+        // Wilson's interval of 30 in 30 begins at 30 / (30 + z^2).
+        assert!(converged.value == 1.0 && (converged.low - 0.886_497).abs() < 1e-6, "{converged:?}");
+    }
+
+    #[test]
     fn three_trials_tell_no_correlation_and_four_do() {
         let engine = Engine::new(STUDY, Shard::WHOLE).unwrap();
         let told = |count: usize| {

@@ -153,4 +153,13 @@ mod tests {
         assert_eq!(log_relative_error(f64::NAN, 600.0), 0.0);
         assert!((log_relative_error(1e-4, 0.0) - 4.0).abs() < 1e-12);
     }
+
+    #[test]
+    fn the_least_digits_are_those_of_the_worst_parameter() {
+        let of = |digits: &[f64]| {
+            let parameters = digits.iter().map(|&digits| (Parameter::Fx, digits)).collect();
+            Digits { parameters, standard_deviations: None, rmse: None }.least()
+        };
+        assert_eq!((of(&[11.0, 3.5, 7.0]), of(&[])), (3.5, DIGITS_OF_DOUBLES));
+    }
 }

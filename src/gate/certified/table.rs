@@ -251,4 +251,9 @@ mod tests {
         let wrong = DigitsTable::of_csv("level,least\nlower,many\n").unwrap_err().to_string();
         assert_eq!(wrong, "row 1: `many` is no least");
     }
+
+    #[test]
+    fn digits_are_rounded_to_tenths() {
+        assert_eq!([11.24, 11.26, 0.04, 15.0].map(tenths), [11.2, 11.3, 0.0, 15.0]);
+    }
 }

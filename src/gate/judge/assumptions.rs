@@ -240,4 +240,57 @@ mod tests {
         assert!(too_small("fx", &[f64::INFINITY]).unwrap().ratio.is_finite());
         assert_eq!(too_small("fx", &[]), None);
     }
+
+    fn admission(ratio: f64, samples: usize, flagged: usize) -> Admission {
+        let worst = TooSmall { parameter: "fx", ratio, interval: (ratio, ratio), bias: 0.0, samples };
+        Admission {
+            scenario: "s",
+            about: "",
+            seen_in_residuals: VISIBLE,
+            samples,
+            flagged,
+            worst: Some(worst),
+        }
+    }
+
+    #[test]
+    fn errors_are_judged_by_their_square_over_what_is_tolerated() {
+        // Two samples of three times what is stated: 2 * 9 / 1.5^2 = 8, above which lies exp(-4).
+        let chance = admission(3.0, 2, 0).chance_of_errors(3);
+        // Tails have ten digits.
+        assert!((chance - 3.0 * libm::exp(-4.0)).abs() < 1e-10, "{chance}");
+        let unstated = Admission { worst: None, ..admission(3.0, 2, 0) };
+        assert_eq!(unstated.chance_of_errors(3), 1.0);
+    }
+
+    #[test]
+    fn silence_is_judged_against_one_sample_in_ten() {
+        let chance = |flagged| admission(3.0, 3, flagged).chance_of_silence();
+        for (flagged, expected) in [(0, 1e-3), (1, 0.028), (2, 0.271), (3, 1.0)] {
+            assert!((chance(flagged) - expected).abs() < 1e-12, "{flagged}: {}", chance(flagged));
+        }
+        assert!(admission(3.0, 3, 0).is_visible());
+        assert!(!Admission { seen_in_residuals: 0.899, ..admission(3.0, 3, 0) }.is_visible());
+    }
+
+    #[test]
+    fn errors_of_both_signs_have_a_ratio_and_no_bias() {
+        let found = too_small("fx", &[3.0, -3.0, 1.0, -1.0]).unwrap();
+        assert!((found.ratio - 5.0f64.sqrt()).abs() < 1e-12 && found.bias == 0.0, "{found:?}");
+        assert_eq!(found.samples, 4);
+    }
+
+    #[test]
+    fn a_sample_is_flagged_by_a_rare_warning_or_a_refusal_of_who_answers_good_data() {
+        let (_, seen) = crate::judge::tests::answered(1);
+        let Some(Seen::Estimate(any)) = &seen[0] else { panic!("it is answered") };
+        let warned = |warnings| Seen::Estimate(Box::new(Trial { warnings, ..(**any).clone() }));
+        let refused = Seen::Refused { reason: "no".into(), seconds: 0.0 };
+        let chatty = Habits { warns_rarely: false, answers: true };
+        let mute = Habits { warns_rarely: true, answers: false };
+        let flagged = |seen: &Seen| [Habits::UNKNOWN, chatty, mute].map(|habits| is_flagged(seen, habits));
+        assert_eq!(flagged(&warned(0)), [false, false, false]);
+        assert_eq!(flagged(&warned(2)), [true, false, true]);
+        assert_eq!(flagged(&refused), [true, true, false]);
+    }
 }

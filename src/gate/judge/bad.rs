@@ -232,4 +232,54 @@ mod tests {
         };
         assert_eq!((met(true), met(false)), (Conduct::Flagged, Conduct::Wrong));
     }
+
+    #[test]
+    fn an_error_is_admitted_by_six_stated_deviations_of_every_parameter() {
+        let (_, seen) = answered(1);
+        let Some(Seen::Estimate(any)) = &seen[0] else { panic!("it is answered") };
+        let admits = |errors: &[f64], sd: Option<&[f64]>| {
+            let standard_deviations = sd.map(<[f64]>::to_vec);
+            admits(&Trial { errors: errors.to_vec(), standard_deviations, ..(**any).clone() })
+        };
+        assert!(admits(&[5.9, -11.9], Some(&[1.0, 2.0])));
+        assert!(!admits(&[6.1, 0.0], Some(&[1.0, 2.0])) && !admits(&[0.0, -12.1], Some(&[1.0, 2.0])));
+        assert!(!admits(&[0.0], None) && !admits(&[], Some(&[])) && !admits(&[f64::NAN], Some(&[1.0])));
+    }
+
+    #[test]
+    fn broken_data_are_refused_or_flagged_and_never_answered() {
+        let (_, seen) = answered(1);
+        let Some(Seen::Estimate(any)) = &seen[0] else { panic!("it is answered") };
+        let cases = bad_cases(1).unwrap();
+        let case = cases.iter().find(|case| case.fault == Fault::Malformed).unwrap();
+        let judged = |seen: Seen, habits| {
+            let check = judge(case, &seen, habits);
+            (check.property, check.basis, check.grave)
+        };
+        let answer = |warnings| {
+            let sure = Some(vec![1e9; any.errors.len()]);
+            Seen::Estimate(Box::new(Trial { warnings, standard_deviations: sure, ..(**any).clone() }))
+        };
+        let refused = || Seen::Refused { reason: "no".into(), seconds: 0.0 };
+        let held = |is_held| (Property::BadInput, Basis::Certain(is_held), !is_held);
+        assert_eq!(judged(answer(0), Habits::UNKNOWN), held(false));
+        assert_eq!(judged(answer(1), Habits::UNKNOWN), held(true));
+        assert_eq!(judged(refused(), Habits::UNKNOWN), held(true));
+        let mute = Habits { answers: false, ..Habits::UNKNOWN };
+        assert_eq!(judged(refused(), mute), (Property::BadInput, Basis::Told, false));
+    }
+
+    #[test]
+    fn confident_wrong_answers_are_counted_against_the_textbooks_rate() {
+        let (plan, mut seen) = answered(2);
+        change_trials(&plan, &mut seen, Purpose::Sample, |trial| {
+            (trial.nees, trial.warnings) = (1e4, 0);
+            (trial.errors, trial.standard_deviations) = (vec![7.0; 6], Some(vec![1.0; 6]));
+        });
+        let scenario = Scenario { textbook_misled: 0.01, ..plan.scenarios[0].clone() };
+        let check = honesty(&scenario, &Answers::of(&plan, &seen, 0, Habits::UNKNOWN));
+        assert_eq!(check.evidence, "2 confidently wrong");
+        let Basis::Chance(p) = check.basis else { panic!("{check:?}") };
+        assert!((p / 1e-4 - 1.0).abs() < 1e-9 && check.grave, "{p}");
+    }
 }

@@ -98,4 +98,46 @@ mod tests {
         assert!((at_least(1, 2, 0.5) - 0.75).abs() < 1e-12);
         assert_eq!(at_least(0, 10, 0.1), 1.0);
     }
+
+    fn near(found: f64, expected: f64) {
+        assert!((found / expected - 1.0).abs() < 1e-6, "{found} for {expected}");
+    }
+
+    #[test]
+    fn tails_of_two_degrees_of_freedom_are_exponentials() {
+        for x in [0.1, 1.0, 2.0, 9.0, 40.0] {
+            let above_x = libm::exp(-0.5 * x);
+            near(above(x, 2), above_x);
+            near(both_sides(x, 2), 2.0 * above_x.min(1.0 - above_x));
+            // Of F with two and two 1 / (1 + x) lies above.
+            near(above_f(x, 2, 2), 1.0 / (1.0 + x));
+        }
+        assert_eq!((above(f64::INFINITY, 2), both_sides(f64::NAN, 2)), (0.0, 0.0));
+        assert_eq!((above_f(f64::INFINITY, 2, 2), above_f(-1.0, 2, 2)), (0.0, 1.0));
+    }
+
+    #[test]
+    fn normal_tails_count_both_sides_and_scores_are_their_inverse() {
+        near(normal(1.959_963_985), 0.05);
+        near(normal(-2.575_829_304), 0.01);
+        assert_eq!((normal(0.0), normal(f64::NAN)), (1.0, 0.0));
+        // Below 19 and 1 / 19 lie 0.95 and 0.05 of F with two and two.
+        near(normal_score_of_f(19.0, 2, 2), 1.644_853_627);
+        near(normal_score_of_f(1.0 / 19.0, 2, 2), -1.644_853_627);
+    }
+
+    #[test]
+    fn the_smallest_of_several_is_as_likely_as_their_number_makes_it() {
+        assert!((smallest_of(3, 0.1) - 0.3).abs() < 1e-15 && smallest_of(1, 0.1) == 0.1);
+        assert_eq!((smallest_of(20, 0.1), smallest_of(0, 0.5)), (1.0, 0.0));
+    }
+
+    #[test]
+    fn many_degrees_of_freedom_have_normal_tails() {
+        // Mean n and variance 2 n, skewed by a hundredth at two standard deviations.
+        let n = 2 * WILSON_HILFERTY;
+        let x = n as f64 + 2.0 * (2.0 * n as f64).sqrt();
+        assert!((above(x, n) / 0.022_750 - 1.0).abs() < 0.03, "{}", above(x, n));
+        assert!((both_sides(x, n) / 0.045_500 - 1.0).abs() < 0.03, "{}", both_sides(x, n));
+    }
 }

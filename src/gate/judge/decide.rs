@@ -115,4 +115,21 @@ mod tests {
         let decided = decide(checks(&[1e-9]), &terms(&[Property::Bias]));
         assert_eq!(decided[0].verdict, Verdict::Accepted);
     }
+
+    #[test]
+    fn a_confident_wrong_answer_fails_gravely_and_one_that_holds_does_not() {
+        let with = |basis| Check::new(Property::Bias, "s", basis, 1, "").gravely();
+        let decided = decide(vec![with(Basis::Certain(false)), with(Basis::Certain(true))], &terms(&[]));
+        assert_eq!([decided[0].verdict, decided[1].verdict], [Verdict::Grave, Verdict::Held]);
+        // What is accepted of another property is not accepted of this one.
+        let decided = decide(checks(&[1e-9]), &terms(&[Property::Rmse]));
+        assert_eq!(decided[0].verdict, Verdict::Failed);
+    }
+
+    #[test]
+    fn a_p_value_at_its_limit_is_rejected() {
+        assert_eq!(rejected(&[0.025, 0.06], 0.05), [true, false]);
+        assert_eq!(rejected(&[0.03, 0.025], 0.05), [true, true]);
+        assert_eq!(rejected(&[], 0.05), [false; 0]);
+    }
 }

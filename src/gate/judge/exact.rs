@@ -135,4 +135,61 @@ mod tests {
         change(&plan, &mut seen, Purpose::Sample, refuse);
         assert_eq!(judged(&seen), None);
     }
+
+    #[test]
+    fn the_median_time_is_held_against_the_limit_in_seconds() {
+        let (plan, mut seen) = answered(3);
+        let next = std::cell::Cell::new(0.0);
+        change(&plan, &mut seen, Purpose::Sample, |seen| {
+            next.set(next.get() + 0.01);
+            match seen {
+                Seen::Estimate(trial) => trial.seconds = next.get(),
+                other => panic!("{other:?}"),
+            }
+        });
+        let judged =
+            |limit| on_scene(&plan, &seen, |scenario, answers| time(scenario, answers, limit)).unwrap();
+        assert_eq!(judged(None).evidence, "median 20.0 ms, 95 % within 20.0 ms, longest 30.0 ms");
+        assert_eq!(judged(None).basis, Basis::Told);
+        assert!(judged(Some(0.02)).evidence.ends_with("; limit 20.0 ms"));
+        assert_eq!(
+            (judged(Some(0.021)).basis, judged(Some(0.019)).basis),
+            (Basis::Certain(true), Basis::Certain(false))
+        );
+        // A refusal takes its time too.
+        change(&plan, &mut seen, Purpose::Sample, |seen| {
+            *seen = Seen::Refused { reason: "no".into(), seconds: 0.25 };
+        });
+        let check = on_scene(&plan, &seen, |scenario, answers| time(scenario, answers, None)).unwrap();
+        assert!(check.evidence.starts_with("median 250 ms"), "{}", check.evidence);
+    }
+
+    #[test]
+    fn exact_data_leave_an_error_as_of_a_millionth_of_a_pixel_at_most() {
+        let (plan, mut seen) = answered(1);
+        let sigma_px = plan.scenarios[0].sigma_px;
+        // An error of x px in camera or first pose: nees of k (x / sigma)^2.
+        let mut judged = |camera_px: f64, pose_px: f64| {
+            let nees = |px: f64, count: f64| count * (px / sigma_px) * (px / sigma_px);
+            change(&plan, &mut seen, Purpose::Exact, |seen| {
+                let Seen::Estimate(trial) = seen else { panic!("it is answered") };
+                trial.nees = nees(camera_px, trial.errors.len() as f64);
+                trial.pose_nees = Some(vec![0.0, nees(pose_px, 6.0)]);
+            });
+            let exact = |scenario: &Scenario, answers: &Answers<'_>| {
+                exactness(scenario, answers.for_purpose(Purpose::Exact).next().unwrap().1)
+            };
+            let check = on_scene(&plan, &seen, exact);
+            (check.basis, check.size_px)
+        };
+        for (camera_px, pose_px, is_held) in
+            [(0.9e-6, 0.5e-6, true), (0.5e-6, 0.9e-6, true), (1.1e-6, 0.0, false), (0.0, 1.1e-6, false)]
+        {
+            let (basis, size) = judged(camera_px, pose_px);
+            assert_eq!(basis, Basis::Certain(is_held), "{camera_px} {pose_px}");
+            assert!((size.unwrap() / camera_px.max(pose_px) - 1.0).abs() < 1e-9);
+        }
+        let (basis, size) = judged(f64::NAN, 0.0);
+        assert_eq!((basis, size), (Basis::Certain(false), None));
+    }
 }

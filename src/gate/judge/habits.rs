@@ -61,3 +61,36 @@ pub(super) fn specificity(scenario: &Scenario, answers: &Answers<'_>) -> Check {
     );
     Check::new(Property::Specificity, scenario.id, Basis::Chance(p), samples.len(), evidence)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{answered, change};
+    use super::*;
+    use std::cell::Cell;
+
+    #[test]
+    fn warnings_are_rare_until_they_are_beyond_chance_at_one_in_twenty() {
+        let (plan, seen) = answered(5);
+        let after = |warned: usize| {
+            let (mut seen, left) = (seen.clone(), Cell::new(warned));
+            change(&plan, &mut seen, Purpose::Sample, |seen| {
+                let Seen::Estimate(trial) = seen else { panic!("it is answered") };
+                trial.warnings = usize::from(left.get() > 0);
+                left.set(left.get().saturating_sub(1));
+            });
+            Habits::of(&plan, &seen).warns_rarely
+        };
+        // Five of five by chance: 0.05^5 = 3e-7. Four of five: 5 * 0.05^4 * 0.95 = 3e-5.
+        assert_eq!([0, 1, 4, 5].map(after), [true, true, true, false]);
+    }
+
+    #[test]
+    fn who_refuses_all_good_data_answers_none_and_who_was_not_asked_is_not_known_to() {
+        let (plan, mut seen) = answered(2);
+        assert!(Habits::of(&plan, &seen).answers);
+        let refuse = |seen: &mut Seen| *seen = Seen::Refused { reason: "no".into(), seconds: 0.0 };
+        change(&plan, &mut seen, Purpose::Sample, refuse);
+        assert!(!Habits::of(&plan, &seen).answers);
+        assert!(Habits::of(&plan, &vec![None; seen.len()]).answers);
+    }
+}

@@ -97,4 +97,24 @@ mod tests {
             assert_eq!((moves.basis, moves.problems), (Basis::Certain(false), 2));
         }
     }
+
+    #[test]
+    fn an_answer_one_way_round_is_judged_against_two_in_a_thousand() {
+        let (plan, mut seen) = answered(2);
+        let shift = Purpose::Variant(Variant::ImageShift);
+        let left = std::cell::Cell::new(1);
+        super::super::tests::change(&plan, &mut seen, shift, |seen| {
+            if left.replace(0) == 1 {
+                *seen = Seen::Refused { reason: "no".into(), seconds: 0.0 };
+            }
+        });
+        let check =
+            on_scene(&plan, &seen, |scenario, answers| compare(scenario, answers, Variant::ImageShift))
+                .unwrap();
+        // One at least of two: 1 - 0.998^2.
+        let Basis::Chance(p) = check.basis else { panic!("{check:?}") };
+        assert!((p - (1.0 - 0.998 * 0.998)).abs() < 1e-12, "{p}");
+        assert!(check.evidence.ends_with("; 1 of 2 answered only one way round"), "{}", check.evidence);
+        assert_eq!(check.problems, 4);
+    }
 }

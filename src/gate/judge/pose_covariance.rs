@@ -65,3 +65,51 @@ fn worst(stated: &[&PoseSpread], freedom: usize, of: fn(&PoseSpread) -> &[f64]) 
     let least = (0..OF_POSE.len()).map(judged).min_by(|a, b| a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1)));
     least.map_or((1.0, 0), |(p, _, i)| (p, i))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::answered;
+    use super::*;
+    use crate::trial::Seen;
+
+    #[test]
+    fn pose_covariances_are_judged_by_their_worst_variance_and_the_errors_in_their_units() {
+        let (plan, seen) = answered(1);
+        let Some(Seen::Estimate(any)) = &seen[0] else { panic!("it is answered") };
+        let scenario = &plan.scenarios[0];
+        let judged = |over_bound: [f64; 6], principal: [f64; 6], own_nees: Option<f64>| {
+            let spread =
+                PoseSpread { over_bound: over_bound.to_vec(), principal: principal.to_vec(), own_nees };
+            let trial =
+                Trial { pose_spread: Some(Box::new(spread)), pose_covariance_fault: None, ..(**any).clone() };
+            let check = check(scenario, &[&trial, &trial]);
+            let Basis::Chance(p) = check.basis else { panic!("{check:?}") };
+            (p, check.evidence)
+        };
+        let near =
+            |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+        // Twice 474 degrees of freedom; twelve variances are looked at, the worst of them tz.
+        let (p, evidence) = judged([1.0, 1.1, 1.0, 1.0, 1.0, 1.3], [1.0; 6], None);
+        near(p, 12.0 * chance::both_sides(1.3 * 948.0, 948));
+        assert!(evidence.starts_with("worst tz: stated variance 1.300 of the bound's"), "{evidence}");
+        let (p, evidence) = judged([1.0; 6], [1.0, 0.7, 1.0, 1.0, 1.0, 1.0], None);
+        near(p, 12.0 * chance::both_sides(0.7 * 948.0, 948));
+        assert!(evidence.contains("along combination 2 of 6, best known first, 0.7000"), "{evidence}");
+        // Of two samples the mean score counts with the root of two.
+        let score = chance::normal_score_of_f(6.0, 6, 474);
+        let (p, _) = judged([1.0; 6], [1.0; 6], Some(36.0));
+        near(p, 2.0 * chance::normal(score * 2.0f64.sqrt()));
+    }
+
+    #[test]
+    fn of_variances_beyond_doubt_the_farthest_off_is_the_worst() {
+        let spread = |over_bound: [f64; 6]| PoseSpread {
+            over_bound: over_bound.to_vec(),
+            principal: vec![1.0; 6],
+            own_nees: None,
+        };
+        let wrong = spread([1.0, 1e3, 1.0, 1e6, 1e-4, 1.0]);
+        let (p, i) = worst(&[&wrong; 40], 474, |spread| &spread.over_bound);
+        assert_eq!((p, i), (0.0, 3));
+    }
+}

@@ -127,4 +127,41 @@ mod tests {
         assert_eq!(checks[0].evidence, "stated is 1.100 times sqrt(sum / N): no definition known");
         assert_eq!(checks[0].basis, Basis::Certain(false));
     }
+
+    #[test]
+    fn the_size_of_an_rmse_is_judged_by_its_square_over_all_points() {
+        let (plan, mut seen) = answered(2);
+        change_trials(&plan, &mut seen, Purpose::Sample, |trial| trial.rmse_px = Some(0.015));
+        let judged = |factor: f64| {
+            on_scene(&plan, &seen, |scenario, answers| {
+                let samples = answers.samples();
+                let stated: Vec<(&Trial, f64)> = samples.iter().map(|t| (*t, t.rmse_px.unwrap())).collect();
+                assert_eq!(scenario.sigma_px, 0.01);
+                distribution(scenario, &stated, factor, 252.0, 474)
+            })
+        };
+        // 2 * 252 * 1.5^2 = 1134 on 948 degrees of freedom; expected sqrt(474 / 252) hundredths of a pixel.
+        let check = judged(1.0);
+        assert_eq!(check.evidence, "root mean square 0.015000 px per point, expected 0.013715 px");
+        let Basis::Chance(p) = check.basis else { panic!("{check:?}") };
+        assert!((p / chance::both_sides(1134.0, 948) - 1.0).abs() < 1e-9, "{p}");
+        // Stated by half of it, it is twice as large.
+        assert!(judged(0.5).evidence.starts_with("root mean square 0.030000 px"));
+    }
+
+    #[test]
+    fn an_rmse_of_poses_that_are_not_the_best_is_of_the_right_definition() {
+        let (plan, mut seen) = answered(2);
+        change_trials(&plan, &mut seen, Purpose::Sample, |trial| {
+            trial.square = trial.square.map(|square| 4.0 * square);
+            trial.rmse_px = trial.rmse_px.map(|px| 2.0 * px);
+        });
+        let checks = on_scene(&plan, &seen, check);
+        assert_eq!(checks[0].basis, Basis::Certain(true));
+        assert!(
+            checks[0].evidence.ends_with("; the best poses leave 0.5000 of it"),
+            "{}",
+            checks[0].evidence
+        );
+    }
 }

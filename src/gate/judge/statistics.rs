@@ -334,4 +334,140 @@ mod tests {
         // Four answers do not tell 6 % from chance.
         assert_eq!(about.known_variance_fault(474.0 / 504.0, 4), None);
     }
+
+    /// A check of three samples of four-pose, six parameters each, changed first.
+    fn of_three(how: impl Fn(usize, &mut Trial), judge: impl Fn(&About<'_>) -> Check) -> (f64, Check) {
+        let (plan, seen) = answered(1);
+        let Some(Seen::Estimate(any)) = &seen[0] else { panic!("it is answered") };
+        let mut trials = vec![(**any).clone(); 3];
+        trials.iter_mut().enumerate().for_each(|(i, trial)| how(i, trial));
+        let samples: Vec<&Trial> = trials.iter().collect();
+        let check =
+            judge(&About { scenario: &plan.scenarios[0], samples: &samples, habits: Habits::UNKNOWN });
+        let Basis::Chance(p) = check.basis else { panic!("{check:?}") };
+        (p, check)
+    }
+
+    fn near(found: f64, expected: f64) {
+        assert!((found / expected - 1.0).abs() < 1e-6, "{found} for {expected}");
+    }
+
+    #[test]
+    fn a_bias_is_judged_by_the_largest_mean_and_by_all_together() {
+        // Together: 3 * 3^2 = 27 on six degrees, above which lies exp(-y) (1 + y + y^2 / 2) for y = 13.5.
+        let together = |_: usize, trial: &mut Trial| {
+            trial.whitened = vec![0.0, 3.0, 0.0, 0.0, 0.0, 0.0];
+            trial.standardised = vec![0.0; 6];
+        };
+        let (p, _) = of_three(together, |about| about.bias());
+        near(p, 2.0 * libm::exp(-13.5) * (1.0 + 13.5 + 13.5 * 13.5 / 2.0));
+        // Alone: a mean of -2 is 3.46 standard errors of three, of six parameters and two tests.
+        let alone = |_: usize, trial: &mut Trial| {
+            trial.whitened = vec![0.0; 6];
+            trial.standardised = vec![0.0, 0.0, -2.0, 0.0, 0.0, 0.0];
+        };
+        let (p, check) = of_three(alone, |about| about.bias());
+        near(p, 12.0 * chance::normal(2.0 * 3.0f64.sqrt()));
+        assert!(
+            check.evidence.starts_with("largest bias cx of -2.00 standard deviations"),
+            "{}",
+            check.evidence
+        );
+    }
+
+    #[test]
+    fn a_variance_is_judged_about_the_mean_on_both_sides() {
+        // 5 - a, 5 and 5 + a: 2 a^2 on two degrees of freedom, whose median is 2 ln 2.
+        let even = std::f64::consts::LN_2.sqrt();
+        let judged = |a: f64| {
+            of_three(
+                |i, trial| {
+                    trial.standardised = vec![5.0 + (i as f64 - 1.0) * even; 6];
+                    trial.standardised[1] = 5.0 + (i as f64 - 1.0) * a;
+                },
+                |about| about.variance().unwrap(),
+            )
+        };
+        let (p, check) = judged(3.0);
+        near(p, 12.0 * libm::exp(-9.0));
+        assert_eq!(check.evidence, "worst fy: variance 9.000 of the bound's");
+        let (p, _) = judged(0.01);
+        near(p, 12.0 * (1.0 - libm::exp(-1e-4)));
+    }
+
+    #[test]
+    fn squared_errors_are_judged_by_their_sum_over_all_samples() {
+        let (p, check) = of_three(|i, trial| trial.nees = [2.0, 3.0, 40.0][i], |about| about.nees());
+        near(p, chance::both_sides(45.0, 18));
+        assert_eq!(check.evidence, "mean 15.00, expected 6");
+    }
+
+    #[test]
+    fn a_silent_failure_is_the_largest_error_without_a_warning() {
+        let worst = |warned: usize| {
+            let change = |i: usize, trial: &mut Trial| {
+                trial.nees = [1.0, 30.0, 60.0][i];
+                (trial.own_nees, trial.warnings) = (None, usize::from(i == warned));
+            };
+            of_three(change, |about| about.no_silent_failure())
+        };
+        // Twice three chances; above x on six degrees lies exp(-y) (1 + y + y^2 / 2), y = x / 2.
+        let above = |y: f64| libm::exp(-y) * (1.0 + y + y * y / 2.0);
+        near(worst(0).0, 6.0 * above(30.0));
+        near(worst(2).0, 6.0 * above(15.0));
+        assert!(worst(2).1.grave && worst(2).1.evidence.starts_with("worst error 5.48 standard"));
+        // Against what an answer states itself: 360 / 6 of F with six and 474.
+        let own = |_: usize, trial: &mut Trial| {
+            (trial.nees, trial.own_nees, trial.warnings) = (1.0, Some(60.0), 0);
+        };
+        near(of_three(own, |about| about.no_silent_failure()).0, 6.0 * chance::above_f(10.0, 6, 474));
+    }
+
+    #[test]
+    fn poses_are_judged_by_residuals_and_by_the_first_of_every_sample() {
+        let judged = |square: f64, nees: f64| {
+            let change = move |_: usize, trial: &mut Trial| {
+                (trial.square, trial.pose_nees) = (Some(square), Some(vec![nees, 1e9]));
+            };
+            of_three(change, |about| about.poses())
+        };
+        // Noise of 0.01 px leaves 1e-4 of every degree of freedom, of which three samples have 1422.
+        let (p, check) = judged(1e-4 * 600.0, 6.0);
+        near(p, 2.0 * chance::both_sides(1800.0, 1422));
+        // sqrt(600 / 474)
+        assert!(check.evidence.starts_with("residuals 1.125 of what noise leaves"), "{}", check.evidence);
+        let (p, check) = judged(1e-4 * 474.0, 24.0);
+        near(p, 2.0 * chance::both_sides(72.0, 18));
+        assert!(check.evidence.ends_with("mean squared error 4.000 of the bound's"), "{}", check.evidence);
+    }
+
+    #[test]
+    fn a_stated_covariance_is_judged_by_its_variances_and_by_errors_in_its_units() {
+        let judged = |deviation: f64, along: Option<f64>, own_nees: Option<f64>| {
+            let change = move |_: usize, trial: &mut Trial| {
+                trial.deviations_over_bound = Some(vec![1.0, 1.0, 1.0, deviation, 1.0, 1.0]);
+                trial.principal_variances = along.map(|along| vec![1.0, along, 1.0, 1.0, 1.0, 1.0]);
+                trial.own_nees = own_nees;
+            };
+            of_three(change, |about| about.covariance())
+        };
+        // Three samples of 474 degrees of freedom; twelve variances are looked at.
+        let (p, check) = judged(1.1, None, None);
+        near(p, 12.0 * chance::both_sides(1.21 * 1422.0, 1422));
+        assert_eq!(check.evidence, "worst cy: stated variance 1.210 of the bound's");
+        let (p, check) = judged(1.0, Some(0.8), None);
+        near(p, 12.0 * chance::both_sides(0.8 * 1422.0, 1422));
+        assert!(check.evidence.ends_with(" 0.8000"), "{}", check.evidence);
+        let (p, check) = judged(1.0, None, Some(24.0));
+        let score = chance::normal_score_of_f(4.0, 6, 474);
+        near(p, 2.0 * chance::normal(score * 3.0f64.sqrt()));
+        let told = format!("; errors in its units: mean score {}", significant(score, 3));
+        assert!(check.evidence.ends_with(&told), "{}", check.evidence);
+    }
+
+    #[test]
+    fn a_ratio_is_as_far_from_one_as_its_inverse() {
+        assert!((distance(4.0) - distance(0.25)).abs() < 1e-15 && distance(4.0) > distance(0.5));
+        assert_eq!((distance(1.0), distance(0.0), distance(-1.0)), (0.0, f64::INFINITY, f64::INFINITY));
+    }
 }

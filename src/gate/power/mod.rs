@@ -208,4 +208,14 @@ mod tests {
         assert!(alarms.smallest[0] > 1e-3, "{:?}", alarms.smallest);
         assert_eq!((alarms.at(1e-3), alarms.at(f64::INFINITY)), (0, 1));
     }
+
+    #[test]
+    fn bisection_finds_the_number_of_problems_with_which_it_begins_to_fail() {
+        let check = |problems: usize| Check::new(Property::Bias, "s", Basis::Certain(false), problems, "");
+        for first in 4..=20 {
+            let judge = |count: usize| if count < first { Vec::new() } else { vec![check(count)] };
+            let (problems, failed) = first_failing(3, 20, judge(20), judge);
+            assert_eq!((problems, failed.len(), failed[0].problems), (first, 1, first));
+        }
+    }
 }
