@@ -367,18 +367,22 @@ mod tests {
     #[test]
     fn a_run_is_compared_with_another_and_not_with_itself() {
         let text = crate::example::STUDY.replace("per_cell = 3\nbatch = 2", "per_cell = 6\nbatch = 4");
-        let text = text.replace("views = 3", "views = 8").replace("[0.1, 0.3]", "[0.05, 0.1]");
-        let louder = text.replace("[0.05, 0.1]", "[0.05, 0.2]");
+        let text = text.replace("views = 3", "views = 8").replace("[0.1, 0.3]", "[0.001, 0.002]");
+        let louder = text.replace("[0.001, 0.002]", "[0.001, 0.004]");
         let (first, second) = (ran("first", &text), ran("second", &louder));
         let found = compare(&first, &second).unwrap();
         let itself = compare(&first, &first);
         [first, second].iter().for_each(|at| std::fs::remove_dir_all(at).unwrap());
         assert!(matches!(itself, Err(CompareError::Same(_))));
         let of = |cell: &str| found.effects.iter().filter(|e| e.cell == cell).collect::<Vec<_>>();
-        let (same, other) = (of("noise = 0.05"), of("noise = 0.1 | noise = 0.2"));
+        let (same, other) = (of("noise = 0.001"), of("noise = 0.002 | noise = 0.004"));
         assert!(same.len() == other.len() && same.len() + other.len() == found.effects.len());
         assert!(same.iter().all(|e| e.verdict == Verdict::Alike && e.ratio.value == 1.0 && e.pairs == 6));
-        assert!(other.iter().all(|e| e.verdict == Verdict::FirstBetter && e.ratio.value > 1.5));
+        for effect in other {
+            // Of so little noise errors are a linear function.
+            assert!((effect.ratio.value / 2.0 - 1.0).abs() < 0.05, "{effect:?}");
+            assert_eq!(effect.verdict, Verdict::FirstBetter, "{effect:?}");
+        }
     }
 
     #[test]

@@ -359,12 +359,14 @@ mod tests {
         assert!((mean_told.value - mean).abs() < 1e-12 * sd);
         assert!((0.5 * (mean_told.high - mean_told.low) / half - 1.0).abs() < 1e-6, "{mean_told:?}");
         let bound = fx.predicted.unwrap().sd;
-        assert!((ratio.value * bound / sd - 1.0).abs() < 1e-12 && ratio.low < jointly.low);
-        assert!((ratio.high * bound / found.high - 1.0).abs() < 1e-12 && ratio.high < jointly.high);
+        assert!((ratio.value * bound / sd - 1.0).abs() < 1e-12, "{ratio:?} {bound} {sd}");
+        assert!(jointly.low < ratio.low, "{ratio:?} {jointly:?}");
+        assert!((ratio.high * bound / found.high - 1.0).abs() < 1e-12, "{ratio:?} {found:?}");
+        assert!(ratio.high < jointly.high, "{ratio:?} {jointly:?}");
         assert_eq!((jointly.value, summary.confidence), (ratio.value, 0.95));
         let converged = summary.cells[1].converged().unwrap();
         // Wilson's interval of 30 in 30 begins at 30 / (30 + z^2).
-        assert!(converged.value == 1.0 && (converged.low - 0.886_497).abs() < 1e-6, "{converged:?}");
+        assert!(converged.value == 1.0 && (converged.low - 0.886_487).abs() < 1e-6, "{converged:?}");
     }
 
     #[test]
