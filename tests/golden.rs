@@ -62,7 +62,7 @@ fn refuse_deviations(records: &[Record]) {
 }
 
 #[test]
-#[ignore = "runs the heavy experiments unoptimised: `cargo test --test all -- --ignored heavy`, as .ci/run does"]
+#[ignore = "runs the heavy experiments unoptimised: `cargo test --test all -- --ignored heavy`, as `.ci/run all` does"]
 fn heavy_experiments_hold_too() {
     let records = records(true);
     assert_eq!(records.len(), HEAVY.len());
@@ -84,7 +84,7 @@ fn every_published_value_that_can_be_judged_is_reconciled_exactly_once() {
 }
 
 #[test]
-#[ignore = "runs every experiment once more: `cargo test --test all -- --ignored another_seed`, as .ci/run does"]
+#[ignore = "runs every experiment once more: `cargo test --test all -- --ignored another_seed`, as `.ci/run all` does"]
 fn claims_and_published_values_hold_for_another_seed_too() {
     for experiment in EXPERIMENTS {
         let context = Context::of(experiment).with_seed(experiment.seed + 1);

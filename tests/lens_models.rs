@@ -116,10 +116,26 @@ fn lenses_that_the_criterion_does_not_tell_from_the_chosen_one_are_named() {
             // The table says why another one is not named.
             let is_behind = models.iter().any(|model| model["is_behind"] == true);
             assert_eq!(told.contains("behind: a coefficient"), is_behind, "{told}");
+            let is_unpredicted = models.iter().any(|model| model["hold_out_px"].is_null());
+            assert_eq!(told.contains("none: without a part"), is_unpredicted, "{told}");
             (named, behind) = (named + names.len(), behind + near.len() - alike.len());
         }
     }
     assert!(named > 0 && behind > 0, "{named} {behind}");
+}
+
+#[test]
+fn that_views_left_out_cannot_be_predicted_is_told() {
+    let folder = folder("unpredicted");
+    // Of two views none can be left out.
+    let all = corners_through(-0.3, 0.1, 0.05);
+    let two: Vec<&str> = all.lines().take_while(|line| !line.starts_with("2,")).collect();
+    fs::write(folder.join("corners.csv"), two.join("\n")).unwrap();
+    let arguments = ["calibrate", "corners.csv", "--image-size", "640x480", "--model", "auto"];
+    let told = text(&run(&folder, &arguments).stdout);
+    assert!(told.contains("none: without a part of the views the lens is not determined"), "{told}");
+    let verdict = told.lines().find(|line| line.starts_with("chosen: ")).unwrap();
+    assert!(verdict.contains("predicts views that were left out is not known"), "{verdict}");
 }
 
 #[test]

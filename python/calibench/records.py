@@ -131,7 +131,8 @@ class ComparedModel:
     coefficients: str
     """Those that were estimated, separated by commas."""
     hold_out_px: float | None
-    """Error of a coordinate on views that were left out, px; ``None`` where too few are left to calibrate from."""
+    """Error of a coordinate on views that were left out, px; ``None`` where the lens cannot be
+    calibrated without a part of the views, or does not reach a mark of that part."""
     bic: float
     """Schwarz's criterion: the least is best, 10 more is very strong evidence against (Kass & Raftery 1995)."""
     correlation: float

@@ -78,8 +78,8 @@ pub struct Compared {
     pub calibration: LensCalibration,
     /// Schwarz's criterion: the least is best, 10 more is very strong evidence against (Kass & Raftery 1995).
     pub bic: f64,
-    /// Error of a coordinate on views that were left out, px; `None` where too few views are left to
-    /// calibrate from.
+    /// Error of a coordinate on views that were left out, px; `None` where the lens cannot be calibrated
+    /// without a part of the views, or does not reach a mark of that part.
     pub hold_out_px: Option<f64>,
     /// Squared error of each fold, for the comparison of two candidates.
     folds: Vec<f64>,

@@ -215,7 +215,8 @@ pub struct ModelFields {
     pub coefficients: String,
     /// RMSE of the fit, px.
     pub rmse_px: f64,
-    /// Error of a coordinate on views that were left out, px.
+    /// Error of a coordinate on views that were left out, px; none where the lens cannot be calibrated
+    /// without a part of the views, or does not reach a mark of that part.
     pub hold_out_px: Option<f64>,
     /// Schwarz's criterion.
     pub bic: f64,

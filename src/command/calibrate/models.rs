@@ -69,7 +69,9 @@ impl Comparison {
         let refused: String =
             self.refused.iter().map(|reason| format!("not determined: {reason}\n")).collect();
         let behind = if self.compared.iter().any(|compared| compared.is_behind) { BEHIND } else { "" };
-        format!("{}\n\n{behind}{refused}{}\n\n", rows.trim_fmt(), self.verdict())
+        let none =
+            if self.compared.iter().any(|compared| compared.hold_out_px.is_none()) { NONE } else { "" };
+        format!("{}\n\n{none}{behind}{refused}{}\n\n", rows.trim_fmt(), self.verdict())
     }
 
     fn verdict(&self) -> String {
@@ -84,8 +86,15 @@ impl Comparison {
                 name(&chosen.candidate)
             );
         }
+        let unpredicted: Vec<String> = [chosen, next]
+            .into_iter()
+            .filter(|compared| compared.hold_out_px.is_none())
+            .map(|compared| name(&compared.candidate))
+            .collect();
         let predicts = match chosen.wins_against(next) {
-            (_, 0) => "no part of the views can be left out".to_string(),
+            _ if !unpredicted.is_empty() => {
+                format!("how {} predicts views that were left out is not known", unpredicted.join(" or "))
+            }
             (wins, folds) => format!(
                 "it predicts views that were left out better than {} in {wins} of {folds} parts of the views",
                 name(&next.candidate)
@@ -129,7 +138,8 @@ impl Comparison {
     }
 }
 
-/// What the table means by it.
+/// What the table means by these words.
+const NONE: &str = "none: without a part of the views the lens is not determined, or does not reach a mark that was left out\n";
 const BEHIND: &str = "behind: a coefficient lies where the model is not defined, or there are as many unknowns as measurements\n";
 /// A difference of the criterion that is not worth more than a bare mention (Kass & Raftery 1995).
 const NO_EVIDENCE: f64 = 2.0;
