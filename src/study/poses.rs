@@ -127,7 +127,7 @@ pub enum PosesError {
         marks: usize,
     },
     /// A number outside its domain.
-    #[error("{field} is {value}: it must be {need}", value = calibench::io::exact(*value))]
+    #[error("{field} is {value}: it must be {need}")]
     Value {
         /// Name of the field.
         field: &'static str,
