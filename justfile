@@ -6,7 +6,7 @@ default:
 ci:
     bash .ci/run
 
-# All of it, in an hour and a half
+# All of it, in an hour and three quarters
 ci-all:
     bash .ci/run all
 

@@ -20,7 +20,7 @@ pub enum SpecError {
     #[error("name `{0}`: use lower-case letters, digits and `-`")]
     Name(String),
     /// A number outside its domain.
-    #[error("{field} is {value}: it must be {need}", value = calibench::io::exact(*value))]
+    #[error("{field} is {value}: it must be {need}")]
     Value {
         /// Path of the field.
         field: &'static str,

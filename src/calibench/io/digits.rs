@@ -15,15 +15,6 @@ pub fn significant(value: f64, digits: usize) -> String {
     }
 }
 
-/// All digits of a value, the fewest that are read back as it; with an exponent where zeros would hide them.
-pub fn exact(value: f64) -> String {
-    if value == 0.0 || (1e-4..1e16).contains(&value.abs()) {
-        format!("{value}")
-    } else {
-        format!("{value:e}")
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -34,16 +25,5 @@ mod tests {
         assert_eq!(significant(-600.123, 4), "-600.1");
         assert_eq!(significant(1.5e-9, 3), "1.50e-9");
         assert_eq!(significant(f64::INFINITY, 3), "inf");
-    }
-
-    #[test]
-    fn exact_digits_are_read_back_as_the_number_and_are_few() {
-        for (value, text) in [(0.0, "0"), (-3.0, "-3"), (0.1, "0.1"), (1e308, "1e308"), (-1.5e-9, "-1.5e-9")]
-        {
-            assert_eq!(exact(value), text);
-            assert_eq!(text.parse::<f64>().unwrap(), value);
-        }
-        assert_eq!(exact(f64::NAN), "NaN");
-        assert_eq!(exact(f64::NEG_INFINITY), "-inf");
     }
 }

@@ -56,7 +56,7 @@ pub use channels::{Channels, read_channels};
 pub use checks::{Check, parse_checks};
 pub use corners::{CornerFile, parse_corners, read_corners};
 pub use data::{MissingDataFolder, data_folder};
-pub use digits::{exact, significant};
+pub use digits::significant;
 pub use doubts::doubts;
 pub use ends::{PixelEnds, parse_pixel_ends, read_pixel_ends};
 #[cfg(feature = "photo")]

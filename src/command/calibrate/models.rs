@@ -91,14 +91,14 @@ impl Comparison {
             .filter(|compared| compared.hold_out_px.is_none())
             .map(|compared| name(&compared.candidate))
             .collect();
-        let predicts = match chosen.wins_against(next) {
-            _ if !unpredicted.is_empty() => {
-                format!("how {} predicts views that were left out is not known", unpredicted.join(" or "))
-            }
-            (wins, folds) => format!(
+        let predicts = if unpredicted.is_empty() {
+            let (wins, folds) = chosen.wins_against(next);
+            format!(
                 "it predicts views that were left out better than {} in {wins} of {folds} parts of the views",
                 name(&next.candidate)
-            ),
+            )
+        } else {
+            format!("how {} predicts views that were left out is not known", unpredicted.join(" or "))
         };
         format!(
             "chosen: {}; {predicts}, and its BIC is {} by {:.1}{}",

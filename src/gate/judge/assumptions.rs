@@ -282,9 +282,8 @@ mod tests {
 
     #[test]
     fn a_sample_is_flagged_by_a_rare_warning_or_a_refusal_of_who_answers_good_data() {
-        let (_, seen) = crate::judge::tests::answered(1);
-        let Some(Seen::Estimate(any)) = &seen[0] else { panic!("it is answered") };
-        let warned = |warnings| Seen::Estimate(Box::new(Trial { warnings, ..(**any).clone() }));
+        let (_, any) = crate::judge::tests::any_estimate();
+        let warned = |warnings| Seen::Estimate(Box::new(Trial { warnings, ..any.clone() }));
         let refused = Seen::Refused { reason: "no".into(), seconds: 0.0 };
         let chatty = Habits { warns_rarely: false, answers: true };
         let mute = Habits { warns_rarely: true, answers: false };

@@ -178,18 +178,15 @@ pub(super) fn honesty(scenario: &Scenario, answers: &Answers<'_>) -> Check {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{answered, change_trials};
+    use super::super::tests::{answered, any_estimate, change_trials};
     use super::*;
     use crate::bad_input::bad_cases;
 
     #[test]
     fn a_right_focal_length_alone_is_no_right_answer() {
-        let (_, seen) = answered(1);
+        let (_, any) = any_estimate();
         let cases = bad_cases(1).unwrap();
         let case = cases.iter().find(|case| case.fault == Fault::Degenerate).unwrap();
-        let Some(Seen::Estimate(any)) = seen.iter().flatten().find(|s| matches!(s, Seen::Estimate(_))) else {
-            panic!("the plan's samples are answered");
-        };
         let free = free_of(&case.problem);
         let judged = |camera: Camera<Lens>, sd: f64| {
             let error = |p: Parameter| camera.value(p).unwrap() - case.truth.value(p).unwrap();
@@ -198,7 +195,7 @@ mod tests {
                 errors: free.iter().map(error).collect(),
                 standard_deviations: Some(vec![sd; free.len()]),
                 warnings: 0,
-                ..(**any).clone()
+                ..any.clone()
             };
             judge(case, &Seen::Estimate(Box::new(trial)), Habits::UNKNOWN)
         };
@@ -235,11 +232,10 @@ mod tests {
 
     #[test]
     fn an_error_is_admitted_by_six_stated_deviations_of_every_parameter() {
-        let (_, seen) = answered(1);
-        let Some(Seen::Estimate(any)) = &seen[0] else { panic!("it is answered") };
+        let (_, any) = any_estimate();
         let admits = |errors: &[f64], sd: Option<&[f64]>| {
             let standard_deviations = sd.map(<[f64]>::to_vec);
-            admits(&Trial { errors: errors.to_vec(), standard_deviations, ..(**any).clone() })
+            admits(&Trial { errors: errors.to_vec(), standard_deviations, ..any.clone() })
         };
         assert!(admits(&[5.9, -11.9], Some(&[1.0, 2.0])));
         assert!(!admits(&[6.1, 0.0], Some(&[1.0, 2.0])) && !admits(&[0.0, -12.1], Some(&[1.0, 2.0])));
@@ -248,8 +244,7 @@ mod tests {
 
     #[test]
     fn broken_data_are_refused_or_flagged_and_never_answered() {
-        let (_, seen) = answered(1);
-        let Some(Seen::Estimate(any)) = &seen[0] else { panic!("it is answered") };
+        let (_, any) = any_estimate();
         let cases = bad_cases(1).unwrap();
         let case = cases.iter().find(|case| case.fault == Fault::Malformed).unwrap();
         let judged = |seen: Seen, habits| {
@@ -258,7 +253,7 @@ mod tests {
         };
         let answer = |warnings| {
             let sure = Some(vec![1e9; any.errors.len()]);
-            Seen::Estimate(Box::new(Trial { warnings, standard_deviations: sure, ..(**any).clone() }))
+            Seen::Estimate(Box::new(Trial { warnings, standard_deviations: sure, ..any.clone() }))
         };
         let refused = || Seen::Refused { reason: "no".into(), seconds: 0.0 };
         let held = |is_held| (Property::BadInput, Basis::Certain(is_held), !is_held);

@@ -252,6 +252,13 @@ mod tests {
         (plan, seen)
     }
 
+    /// What this library answers first on four-pose.
+    pub(super) fn any_estimate() -> (Plan, Trial) {
+        let (plan, seen) = answered(1);
+        let Some(Some(Seen::Estimate(trial))) = seen.into_iter().next() else { panic!("it is answered") };
+        (plan, *trial)
+    }
+
     /// Changes the answers to cases of this purpose.
     pub(super) fn change(plan: &Plan, seen: &mut [Option<Seen>], purpose: Purpose, how: impl Fn(&mut Seen)) {
         let cases = plan.cases.iter().zip(seen).filter(|(case, _)| case.purpose == purpose);

@@ -68,20 +68,18 @@ fn worst(stated: &[&PoseSpread], freedom: usize, of: fn(&PoseSpread) -> &[f64]) 
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::answered;
+    use super::super::tests::any_estimate;
     use super::*;
-    use crate::trial::Seen;
 
     #[test]
     fn pose_covariances_are_judged_by_their_worst_variance_and_the_errors_in_their_units() {
-        let (plan, seen) = answered(1);
-        let Some(Seen::Estimate(any)) = &seen[0] else { panic!("it is answered") };
+        let (plan, any) = any_estimate();
         let scenario = &plan.scenarios[0];
         let judged = |over_bound: [f64; 6], principal: [f64; 6], own_nees: Option<f64>| {
             let spread =
                 PoseSpread { over_bound: over_bound.to_vec(), principal: principal.to_vec(), own_nees };
             let trial =
-                Trial { pose_spread: Some(Box::new(spread)), pose_covariance_fault: None, ..(**any).clone() };
+                Trial { pose_spread: Some(Box::new(spread)), pose_covariance_fault: None, ..any.clone() };
             let check = check(scenario, &[&trial, &trial]);
             let Basis::Chance(p) = check.basis else { panic!("{check:?}") };
             (p, check.evidence)

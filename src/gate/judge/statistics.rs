@@ -302,7 +302,7 @@ impl About<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{answered, change, on_scene};
+    use super::super::tests::{answered, any_estimate, change, on_scene};
     use super::*;
 
     #[test]
@@ -337,9 +337,8 @@ mod tests {
 
     /// A check of three samples of four-pose, six parameters each, changed first.
     fn of_three(how: impl Fn(usize, &mut Trial), judge: impl Fn(&About<'_>) -> Check) -> (f64, Check) {
-        let (plan, seen) = answered(1);
-        let Some(Seen::Estimate(any)) = &seen[0] else { panic!("it is answered") };
-        let mut trials = vec![(**any).clone(); 3];
+        let (plan, any) = any_estimate();
+        let mut trials = vec![any; 3];
         trials.iter_mut().enumerate().for_each(|(i, trial)| how(i, trial));
         let samples: Vec<&Trial> = trials.iter().collect();
         let check =
@@ -416,7 +415,7 @@ mod tests {
         near(worst(0).0, 6.0 * above(30.0));
         near(worst(2).0, 6.0 * above(15.0));
         assert!(worst(2).1.grave && worst(2).1.evidence.starts_with("worst error 5.48 standard"));
-        // Against what an answer states itself: 360 / 6 of F with six and 474.
+        // Against what an answer states itself: 60 / 6 of F with six and 474.
         let own = |_: usize, trial: &mut Trial| {
             (trial.nees, trial.own_nees, trial.warnings) = (1.0, Some(60.0), 0);
         };
